@@ -1,0 +1,2 @@
+//! The `gaurast` command.
+fn main() {}
