@@ -60,11 +60,11 @@ impl SimdLevel {
             Self::Best => Some(best),
             Self::Baseline => Some(Level::baseline()),
             #[cfg(target_arch = "x86_64")]
-            Self::Sse4_2 => best.as_sse4_2().map(Level::from),
+            Self::Sse4_2 => best.as_sse4_2().map(Level::Sse4_2),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => best.as_avx2().map(Level::from),
+            Self::Avx2 => best.as_avx2().map(Level::Avx2),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => best.as_avx512().map(Level::from),
+            Self::Avx512 => best.as_avx512().map(Level::Avx512),
             #[cfg(not(target_arch = "x86_64"))]
             _ => None,
         }
