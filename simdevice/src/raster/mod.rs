@@ -1,1 +1,3 @@
 //! The tile engine.
+
+pub mod gaussian;
