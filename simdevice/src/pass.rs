@@ -33,9 +33,7 @@ impl PassDraw {
     /// Bytes of host memory that it holds while it waits.
     fn memory_bytes(&self) -> u64 {
         match self {
-            Self::Clear(clear) => {
-                (size_of_val(&*clear.clears) + size_of_val(&*clear.rects)) as u64
-            }
+            Self::Clear(clear) => (size_of_val(&*clear.clears) + size_of_val(&*clear.rects)) as u64,
             Self::Gaussians(draw) => draw.memory_bytes(),
             Self::Triangles(draw) => match *draw {},
         }
@@ -349,15 +347,8 @@ impl Frame<'_> {
     }
 
     /// Renders what a Gaussian draw covers of one tile, and blends it into the first colour attachment.
-    fn gaussians(
-        &self,
-        worker: &mut Worker,
-        draw: &GaussianDraw,
-        blender: &Blender,
-        tile: &Tile,
-    ) {
-        let (Some(Some(target)), Some(plane)) =
-            (self.pass.color.first(), worker.color.first_mut())
+    fn gaussians(&self, worker: &mut Worker, draw: &GaussianDraw, blender: &Blender, tile: &Tile) {
+        let (Some(Some(target)), Some(plane)) = (self.pass.color.first(), worker.color.first_mut())
         else {
             return;
         };

@@ -33,7 +33,13 @@ pub enum AttachmentError {
     /// More than one sample per texel.
     #[error("attachments of {0} samples cannot be rendered to")]
     Samples(u32),
+    /// Wider or higher than [`MAX_FRAMEBUFFER_SIZE`].
+    #[error("an attachment of {0}x{1} pixels is too large")]
+    Extent(u32, u32),
 }
+
+/// The greatest width and height of an attachment in pixels.
+pub const MAX_FRAMEBUFFER_SIZE: u32 = 1 << 16;
 
 /// One aspect of an attachment: where its texels are, and what a tile begins with.
 #[derive(Clone, Debug)]
@@ -89,6 +95,10 @@ impl Target {
         };
         if layout.format.texel_size() != format.texel_size() {
             return Err(AttachmentError::Format(view.format));
+        }
+        let [width, height, _] = layout.extent;
+        if width.max(height) > MAX_FRAMEBUFFER_SIZE {
+            return Err(AttachmentError::Extent(width, height));
         }
         Ok(Self {
             image: image.clone(),
@@ -368,13 +378,23 @@ mod tests {
         let rects: Vec<_> = tiles
             .iter()
             .map(|tile| {
-                let Rect { x, y, width, height } = tile.pixels;
+                let Rect {
+                    x,
+                    y,
+                    width,
+                    height,
+                } = tile.pixels;
                 (tile.index, x, y, width, height)
             })
             .collect();
         assert_eq!(
             rects,
-            [(0, 3, 0, 13, 16), (1, 16, 0, 4, 16), (2, 3, 16, 13, 1), (3, 16, 16, 4, 1)]
+            [
+                (0, 3, 0, 13, 16),
+                (1, 16, 0, 4, 16),
+                (2, 3, 16, 13, 1),
+                (3, 16, 16, 4, 1)
+            ]
         );
         assert_eq!(tiles[3].rows(AREA_20X17).collect::<Vec<_>>(), [(0, 0..4)]);
         assert_eq!(Tile::of_macro_tile(32, [1, 0], AREA_20X17).count(), 0);
@@ -392,15 +412,28 @@ mod tests {
             if tile.index == 1 {
                 let texels = plane.touch(&target, 0, &tile);
                 assert_eq!(texels[0], [7.0 / 255.0; 4]);
-                fill_rect(texels, &tile, Rect { x: 17, y: 1, width: 1, height: 1 }, [1.0; 4]);
+                fill_rect(
+                    texels,
+                    &tile,
+                    Rect {
+                        x: 17,
+                        y: 1,
+                        width: 1,
+                        height: 1,
+                    },
+                    [1.0; 4],
+                );
             }
             plane.finish(&target, 0, &tile, true);
         }
-        let mut bytes = vec![0; memory.len() as usize];
+        let mut bytes = vec![0u8; memory.len() as usize];
         memory.read(0, &mut bytes).unwrap();
         let changed: Vec<_> = (0..bytes.len()).filter(|&at| bytes[at] != 7).collect();
         let pitch = 128;
-        assert_eq!(changed, (0..4).map(|at| pitch + 17 * 4 + at).collect::<Vec<_>>());
+        assert_eq!(
+            changed,
+            (0..4).map(|at| pitch + 17 * 4 + at).collect::<Vec<_>>()
+        );
     }
 
     #[test]
@@ -410,7 +443,12 @@ mod tests {
         depth.clear = Some(Format::X8D24UnormPack32.encode([0.75, 0.0, 0.0, 0.0]));
         let mut stencil = Target::new(&view, Aspect::Stencil, 1, StoreOp::Store).unwrap();
         stencil.clear = Some([3; MAX_TEXEL_SIZE]);
-        let area = Rect { x: 0, y: 0, width: 16, height: 16 };
+        let area = Rect {
+            x: 0,
+            y: 0,
+            width: 16,
+            height: 16,
+        };
         let [tile] = Tile::of_macro_tile(16, [0, 0], area).collect::<Vec<_>>()[..] else {
             panic!("one tile");
         };
@@ -430,11 +468,26 @@ mod tests {
     fn what_cannot_be_rendered_to_is_refused() {
         let color = view(Format::R8Unorm, [4, 4, 1], ImageKind::D2);
         let new = |view: &ImageView, aspect| Target::new(view, aspect, 1, StoreOp::Store).err();
-        assert_eq!(new(&color, Aspect::Depth), Some(AttachmentError::Format(Format::R8Unorm)));
-        let wider = ImageView { format: Format::R32Sfloat, ..color.clone() };
-        assert_eq!(new(&wider, Aspect::Color), Some(AttachmentError::Format(Format::R32Sfloat)));
-        let missing = ImageView { base_layer: u32::MAX, ..color };
-        assert!(matches!(new(&missing, Aspect::Color), Some(AttachmentError::Subresource { .. })));
+        assert_eq!(
+            new(&color, Aspect::Depth),
+            Some(AttachmentError::Format(Format::R8Unorm))
+        );
+        let wider = ImageView {
+            format: Format::R32Sfloat,
+            ..color.clone()
+        };
+        assert_eq!(
+            new(&wider, Aspect::Color),
+            Some(AttachmentError::Format(Format::R32Sfloat))
+        );
+        let missing = ImageView {
+            base_layer: u32::MAX,
+            ..color
+        };
+        assert!(matches!(
+            new(&missing, Aspect::Color),
+            Some(AttachmentError::Subresource { .. })
+        ));
         let solid = view(Format::R8Unorm, [4, 4, 3], ImageKind::D3);
         let target = Target::new(&solid, Aspect::Color, 9, StoreOp::Store).unwrap();
         assert_eq!(target.layer_count(), 3, "slices are layers");
