@@ -1,1 +1,4 @@
-//! See the package description.
+//! What the project's tests share: the reference renderer, image comparison, test data.
+
+pub mod oracle;
+pub mod scenes;
