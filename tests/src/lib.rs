@@ -1,4 +1,7 @@
-//! What the project's tests share: the reference renderer, image comparison, test data.
+//! What the project's tests share: the reference renderer, generated scenes, image comparison and
+//! the place of test data.
 
+pub mod compare;
+pub mod data;
 pub mod oracle;
 pub mod scenes;
