@@ -1,5 +1,6 @@
 //! The oracle against values worked out by hand.
 
+mod binary32;
 mod bounded;
 mod meaning;
 mod skips;
