@@ -2,6 +2,7 @@
 //! the place of test data.
 
 pub mod compare;
+pub mod convert;
 pub mod data;
 pub mod oracle;
 pub mod scenes;
