@@ -1,4 +1,4 @@
-//! Vertex fetch for Gaussians: attribute streams to structure-of-arrays binary32.
+//! Vertex fetch for Gaussians: attribute streams to structures of arrays. Values are binary32, held as binary64.
 
 use crate::format::Format;
 use crate::packet::{AttributeStream, GaussianAppend, IndexStream};
@@ -104,7 +104,7 @@ fn layout(format: Format) -> (usize, bool) {
             | Format::R32G32B32Sfloat
             | Format::R32G32B32A32Sfloat
     );
-    (format.texel_size() as usize, floats)
+    (format.texel_size(), floats)
 }
 
 /// Reads attribute elements; holds the scratch that this needs.
@@ -119,7 +119,7 @@ impl Fetcher {
         &mut self,
         stream: &AttributeStream,
         batch: &Batch,
-        mut out: [&mut [f32; BATCH]; COMPONENTS],
+        mut out: [&mut [f64; BATCH]; COMPONENTS],
     ) {
         let (size, floats) = layout(stream.format);
         let step = self.read_bytes(stream, batch, size);
@@ -127,7 +127,7 @@ impl Fetcher {
         if floats && size >= 4 * COMPONENTS {
             for (lane, bytes) in elements {
                 for (component, out) in out.iter_mut().enumerate() {
-                    out[lane] = float_at(bytes, component);
+                    out[lane] = float_at(bytes, component).into();
                 }
             }
             return;
@@ -135,7 +135,7 @@ impl Fetcher {
         for (lane, bytes) in elements {
             let value = stream.format.decode(&bytes[..size]);
             for (component, out) in out.iter_mut().enumerate() {
-                out[lane] = value[component];
+                out[lane] = value[component].into();
             }
         }
     }
@@ -175,8 +175,11 @@ fn float_at(bytes: &[u8], component: usize) -> f32 {
     f32::from_le_bytes([word[0], word[1], word[2], word[3]])
 }
 
-/// The coefficients of all degrees up to 4, three components each.
+/// The coefficients of all degrees up to 4.
 pub(super) const MAX_COEFFICIENTS: usize = 25;
+
+/// Three components of each, and what makes it whole vectors.
+pub(super) const COEFFICIENT_FLOATS: usize = 80;
 
 /// Reads the spherical harmonics of single lanes.
 pub(super) struct CoefficientReader<'a> {
@@ -205,7 +208,7 @@ impl<'a> CoefficientReader<'a> {
     }
 
     /// Reads the coefficients of `lane`: red, green, blue of each in turn.
-    pub(super) fn read(&self, batch: &Batch, lane: usize, out: &mut [f32; 3 * MAX_COEFFICIENTS]) {
+    pub(super) fn read(&self, batch: &Batch, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
         let at = |stream: &AttributeStream| {
             batch
                 .element(stream, lane)

@@ -6,6 +6,7 @@
 
 mod fetch;
 pub(crate) mod footprint;
+mod lanes;
 pub(crate) mod project;
 mod sort;
 pub mod spherical_harmonics;
@@ -26,6 +27,9 @@ use std::time::Instant;
 
 /// The most batches of a set: a survivor is named by its batch and its place there, in 32 bits.
 const MAX_BATCHES: u64 = (1 << 32) / BATCH as u64;
+
+/// Batches that a worker takes at a time, so that its scratch is made rarely.
+const BATCHES_PER_TASK: usize = 16;
 
 /// A set of Gaussians that are sorted and drawn together.
 #[derive(Debug)]
@@ -157,7 +161,8 @@ impl GaussianSet {
             Visible::from(self.bounds),
         );
         let level = device.level();
-        let one = |scratch: &mut Box<Scratch>, number: u64| {
+        let one = |scratch: &mut Scratch, number: usize| {
+            let number = number as u64;
             let which = starts.partition_point(|&start| start <= number) - 1;
             let append = &self.appends[which];
             let within = number - starts[which];
@@ -167,12 +172,13 @@ impl GaussianSet {
             let instance = append.first_instance.saturating_add(instance);
             let batch = Batch::new(append, instance, start, len);
             let mut out = Projected::default();
-            dispatch!(level, _simd => projection.run(&append.attributes, &batch, scratch, &mut out));
+            dispatch!(level, simd => projection.run(simd, &append.attributes, &batch, scratch, &mut out));
             out
         };
         Ok(device.install(|| {
-            (0..batches)
+            (0..batches as usize)
                 .into_par_iter()
+                .with_min_len(BATCHES_PER_TASK)
                 .map_init(Scratch::new, one)
                 .collect()
         }))

@@ -1,16 +1,18 @@
 //! Projection: 3D Gaussians to the nine numbers that the rasterizer takes.
 //!
 //! Everything from the camera-space mean to the conic is computed in binary64 and rounded once at the end: in
-//! binary32 the determinant of a needle and the depth of neighbours are wrong in the fourth digit. The loops
-//! are straight lines over lanes, compiled once per SIMD level; what is culled leaves before the covariance is
-//! computed, and spherical harmonics are read only for what reaches a tile.
+//! binary32 the determinant of a needle and the depth of neighbours are wrong in the fourth digit. What is
+//! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
+//! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
-use super::fetch::{BATCH, Batch, CoefficientReader, Fetcher, MAX_COEFFICIENTS};
+use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader, Fetcher};
 use super::footprint::{Ellipse, Span, Visible};
+use super::lanes::{Bits, log2};
 use super::sort::ordered_bits;
 use super::spherical_harmonics;
 use crate::counters::{Counter, Counters};
 use crate::packet::{Camera, GaussianAttributes, GaussianState, Viewport};
+use fearless_simd::{Simd, prelude::*};
 
 /// A projected Gaussian: what the tile engine needs of it, in one cache line.
 ///
@@ -46,18 +48,6 @@ pub(crate) struct Projected {
     pub counters: Counters,
 }
 
-/// Why a Gaussian is skipped, as lanes hold it; `KEPT` for those that are not.
-const KEPT: u32 = 0;
-const REASONS: [Counter; 7] = [
-    Counter::SkippedNonFinite,
-    Counter::SkippedZeroRotation,
-    Counter::SkippedNegativeScale,
-    Counter::SkippedFaint,
-    Counter::SkippedNear,
-    Counter::SkippedFar,
-    Counter::SkippedOffScreen,
-];
-
 /// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
 /// underflows binary32.
 const LEAST_LOG2_ALPHA: f64 = -150.0;
@@ -80,59 +70,141 @@ pub(crate) struct Projection {
     far: f32,
     low_pass: f64,
     compensated: bool,
-    alpha_floor: f32,
+    alpha_floor: f64,
     log2_floor: f64,
     sh_degree: u32,
     visible: Visible,
 }
 
-/// A lane's worth of every attribute and of what becomes of it.
+/// A number for each Gaussian of a batch.
+type Lanes = [f64; BATCH];
+
+/// What a batch's Gaussians are, and what becomes of them. Structures of arrays.
 pub(crate) struct Scratch {
     fetcher: Fetcher,
-    position: [[f32; BATCH]; 3],
-    scale: [[f32; BATCH]; 3],
-    rotation: [[f32; BATCH]; 4],
-    opacity: [f32; BATCH],
-    offset: [[f64; BATCH]; 3],
-    camera: [[f64; BATCH]; 3],
-    reason: [u32; BATCH],
-    /// The lanes that were kept.
-    lanes: [usize; BATCH],
-    mean: [[f64; BATCH]; 2],
-    covariance: [[f64; BATCH]; 3],
-    determinant: [f64; BATCH],
-    log2_opacity: [f64; BATCH],
+    attributes: Box<Attributes>,
+    /// The mean from the eye, in world axes.
+    offset: Box<[Lanes; 3]>,
+    /// The mean from the eye, in camera axes.
+    camera: Box<[Lanes; 3]>,
+    /// The lanes that were kept; what follows is dense in their order.
+    lanes: Vec<usize>,
+    dense: Box<Attributes>,
+    dense_camera: Box<[Lanes; 3]>,
+    dense_offset: Box<[Lanes; 3]>,
+    flat: Box<Flat>,
 }
 
-impl Scratch {
-    /// Scratch for one worker.
-    pub(crate) fn new() -> Box<Self> {
-        Box::new(Self {
-            fetcher: Fetcher::default(),
+struct Attributes {
+    position: [Lanes; 3],
+    scale: [Lanes; 3],
+    rotation: [Lanes; 4],
+    opacity: Lanes,
+}
+
+/// Gaussians on the screen.
+struct Flat {
+    mean: [Lanes; 2],
+    determinant: Lanes,
+    log2_opacity: Lanes,
+    /// See [`Splat::factor`].
+    factor: [Lanes; 3],
+    /// See [`Ellipse`].
+    half: [Lanes; 2],
+    slope: Lanes,
+    narrowing: Lanes,
+    peak: Lanes,
+    /// The unit vector from the eye, in world axes.
+    direction: [Lanes; 3],
+}
+
+impl Default for Attributes {
+    fn default() -> Self {
+        Self {
             position: [[0.0; BATCH]; 3],
             scale: [[0.0; BATCH]; 3],
             rotation: [[0.0; BATCH]; 4],
             opacity: [0.0; BATCH],
-            offset: [[0.0; BATCH]; 3],
-            camera: [[0.0; BATCH]; 3],
-            reason: [0; BATCH],
-            lanes: [0; BATCH],
+        }
+    }
+}
+
+impl Default for Flat {
+    fn default() -> Self {
+        Self {
             mean: [[0.0; BATCH]; 2],
-            covariance: [[0.0; BATCH]; 3],
             determinant: [0.0; BATCH],
             log2_opacity: [0.0; BATCH],
-        })
+            factor: [[0.0; BATCH]; 3],
+            half: [[0.0; BATCH]; 2],
+            slope: [0.0; BATCH],
+            narrowing: [0.0; BATCH],
+            peak: [0.0; BATCH],
+            direction: [[0.0; BATCH]; 3],
+        }
+    }
+}
+
+impl Scratch {
+    /// Scratch for one worker.
+    pub(crate) fn new() -> Self {
+        Self {
+            fetcher: Fetcher::default(),
+            attributes: Box::default(),
+            offset: Box::new([[0.0; BATCH]; 3]),
+            camera: Box::new([[0.0; BATCH]; 3]),
+            lanes: Vec::with_capacity(BATCH),
+            dense: Box::default(),
+            dense_camera: Box::new([[0.0; BATCH]; 3]),
+            dense_offset: Box::new([[0.0; BATCH]; 3]),
+            flat: Box::default(),
+        }
     }
 
     fn fetch(&mut self, attributes: &GaussianAttributes, batch: &Batch) {
-        let [x, y, z] = &mut self.position;
-        self.fetcher.read(&attributes.position, batch, [x, y, z]);
-        let [x, y, z] = &mut self.scale;
-        self.fetcher.read(&attributes.scale, batch, [x, y, z]);
-        let [w, x, y, z] = &mut self.rotation;
-        self.fetcher.read(&attributes.rotation, batch, [w, x, y, z]);
+        let to = &mut *self.attributes;
         self.fetcher
-            .read(&attributes.opacity, batch, [&mut self.opacity]);
+            .read(&attributes.position, batch, to.position.each_mut());
+        self.fetcher
+            .read(&attributes.scale, batch, to.scale.each_mut());
+        self.fetcher
+            .read(&attributes.rotation, batch, to.rotation.each_mut());
+        self.fetcher
+            .read(&attributes.opacity, batch, [&mut to.opacity]);
+    }
+
+    /// Packs the kept lanes densely.
+    #[inline(always)]
+    fn gather(&mut self, kept: &Bits) {
+        self.lanes.clear();
+        kept.for_each(|lane| self.lanes.push(lane));
+        let pack = |from: &Lanes, to: &mut Lanes| {
+            for (to, &lane) in to.iter_mut().zip(&self.lanes) {
+                *to = from[lane % BATCH];
+            }
+        };
+        let (from, to) = (&*self.attributes, &mut *self.dense);
+        for (from, to) in from.scale.iter().zip(&mut to.scale) {
+            pack(from, to);
+        }
+        for (from, to) in from.rotation.iter().zip(&mut to.rotation) {
+            pack(from, to);
+        }
+        pack(&from.opacity, &mut to.opacity);
+        for (from, to) in self.camera.iter().zip(&mut *self.dense_camera) {
+            pack(from, to);
+        }
+        for (from, to) in self.offset.iter().zip(&mut *self.dense_offset) {
+            pack(from, to);
+        }
+    }
+}
+
+impl Projected {
+    fn reserve(&mut self, count: usize) {
+        self.splats.reserve_exact(count);
+        self.keys.reserve_exact(count);
+        self.spans.reserve(2 * count);
     }
 }
 
@@ -163,7 +235,7 @@ impl Projection {
             far: camera.far_plane,
             low_pass: f64::from(state.low_pass_variance),
             compensated: state.opacity_compensated,
-            alpha_floor: state.alpha_floor,
+            alpha_floor: state.alpha_floor.into(),
             log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
             sh_degree: state.sh_degree,
             visible,
@@ -172,237 +244,306 @@ impl Projection {
 
     /// Projects a batch.
     #[inline(always)]
-    pub(crate) fn run(
+    pub(super) fn run<S: Simd>(
         &self,
+        simd: S,
         attributes: &GaussianAttributes,
         batch: &Batch,
         scratch: &mut Scratch,
         out: &mut Projected,
     ) {
         scratch.fetch(attributes, batch);
-        self.cull(batch.len, scratch);
         out.counters.add(Counter::GaussiansRead, batch.len as u64);
-        let mut kept = 0;
-        for lane in 0..batch.len {
-            scratch.lanes[kept] = lane;
-            kept += usize::from(scratch.reason[lane] == KEPT);
-        }
-        if kept < batch.len {
-            for reason in &scratch.reason[..batch.len] {
-                if *reason != KEPT {
-                    out.counters.add(REASONS[*reason as usize - 1], 1);
-                }
-            }
-        }
-        self.flatten(kept, scratch);
-        self.emit(kept, attributes, batch, scratch, out);
+        let kept = self.cull(simd, batch.len, scratch, &mut out.counters);
+        scratch.gather(&kept);
+        self.flatten(simd, scratch);
+        self.emit(simd, attributes, batch, scratch, out);
     }
 
-    /// Finds the camera-space mean of each lane and the first reason to skip it, if there is one.
+    /// Finds the camera-space mean of each lane, and counts the first reason to skip it, if there is one.
+    /// Returns which lanes have none.
     #[inline(always)]
-    fn cull(&self, len: usize, scratch: &mut Scratch) {
-        let Scratch {
+    fn cull<S: Simd>(
+        &self,
+        simd: S,
+        len: usize,
+        scratch: &mut Scratch,
+        counters: &mut Counters,
+    ) -> Bits {
+        let number = |value: f64| S::f64s::splat(simd, value);
+        let load =
+            |lanes: &Lanes, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+        let Attributes {
             position,
             scale,
             rotation,
             opacity,
-            offset,
-            camera,
-            reason,
-            ..
-        } = scratch;
-        let len = len.min(BATCH);
-        let r = &self.rotation;
-        for lane in 0..len {
-            let p = [0, 1, 2].map(|axis| f64::from(position[axis][lane]) - self.eye[axis]);
-            for axis in 0..3 {
-                offset[axis][lane] = p[axis];
-                let row = &r[3 * axis..3 * axis + 3];
-                camera[axis][lane] = row[0] * p[0] + row[1] * p[1] + row[2] * p[2];
+        } = &*scratch.attributes;
+        let zero = number(0.0);
+        let largest_opacity = opacity[..len].iter().fold(1.0f64, |a, &b| a.max(b));
+        // A hundredth more than the ellipse needs, so that rounding loses nothing.
+        let extent = number(2.02 * LN_2 * (largest_opacity.log2() - self.log2_floor));
+        let low_pass = number(self.low_pass);
+        let r = self.rotation;
+        let [
+            mut finite,
+            mut rotated,
+            mut positive,
+            mut bright,
+            mut inside,
+        ] = [Bits::default(); 5];
+        for at in (0..len).step_by(S::f64s::LEN) {
+            let [px, py, pz] = [0, 1, 2].map(
+                #[inline(always)]
+                |axis| load(&position[axis], at),
+            );
+            let [sx, sy, sz] = [
+                load(&scale[0], at),
+                load(&scale[1], at),
+                load(&scale[2], at),
+            ];
+            let [qw, qx] = [load(&rotation[0], at), load(&rotation[1], at)];
+            let [qy, qz] = [load(&rotation[2], at), load(&rotation[3], at)];
+            let o = load(opacity, at);
+            // Multiplied by zero, what is not finite becomes NaN, and stays it.
+            let nothing = (px + py + pz) * zero
+                + (sx * zero + sy * zero + sz * zero)
+                + (qw * zero + qx * zero + qy * zero + qz * zero)
+                + o * zero;
+            finite.set(at, nothing.simd_eq(zero));
+            rotated.set(
+                at,
+                (qw.abs() + qx.abs() + qy.abs() + qz.abs()).simd_gt(zero),
+            );
+            positive.set(at, sx.min(sy).min(sz).simd_ge(zero));
+            bright.set(at, o.simd_ge(self.alpha_floor));
+
+            let d = [px - self.eye[0], py - self.eye[1], pz - self.eye[2]];
+            for (lanes, d) in scratch.offset.iter_mut().zip(d) {
+                d.store_slice(&mut lanes[at..at + S::f64s::LEN]);
             }
+            let [dx, dy, dz] = d;
+            let tx = dx * r[0] + dy * r[1] + dz * r[2];
+            let ty = dx * r[3] + dy * r[4] + dz * r[5];
+            let tz = dx * r[6] + dy * r[7] + dz * r[8];
+            for (lanes, t) in scratch.camera.iter_mut().zip([tx, ty, tz]) {
+                t.store_slice(&mut lanes[at..at + S::f64s::LEN]);
+            }
+
+            // The projection of a sphere about the Gaussian bounds that of the Gaussian. Comparisons are such
+            // that NaN counts as inside.
+            let largest = sx.max(sy).max(sz);
+            let mut outside = S::mask64s::splat(simd, false);
+            for (axis, t) in [tx, ty].into_iter().enumerate() {
+                let slope = t / tz;
+                let clamped = slope.max(self.slope_min[axis]).min(self.slope_max[axis]);
+                let kx = number(r[3 * axis]) - clamped * r[6];
+                let ky = number(r[3 * axis + 1]) - clamped * r[7];
+                let kz = number(r[3 * axis + 2]) - clamped * r[8];
+                let scale = largest * self.focal[axis] / tz;
+                let variance = scale * scale * (kx * kx + ky * ky + kz * kz) + low_pass;
+                let reach = (extent * variance).sqrt();
+                let center = slope * self.focal[axis] + self.center[axis];
+                let [first, end] = self.visible_range(axis);
+                outside = outside | (center + reach).simd_lt(first) | (center - reach).simd_gt(end);
+            }
+            inside.set(at, !outside);
         }
-        let greatest = opacity[..len].iter().fold(1.0f32, |a, &b| a.max(b));
-        let extent = 2.0 * LN_2 * (f64::from(greatest).log2() - self.log2_floor) * 1.01;
-        let [a0, a1] = [0, 1].map(|axis| [0, 1, 2].map(|k| r[3 * axis + k]));
-        let a2 = [r[6], r[7], r[8]];
-        let left = self.visible.left as f64 - 1.0;
-        let right = self.visible.right as f64 + 1.0;
-        let top = self.visible.top as f64 - 1.0;
-        let bottom = self.visible.bottom as f64 + 1.0;
-        for lane in 0..len {
-            let s = [0, 1, 2].map(|axis| scale[axis][lane]);
-            let q = [0, 1, 2, 3].map(|part| rotation[part][lane]);
-            let p = [0, 1, 2].map(|axis| position[axis][lane]);
-            let o = opacity[lane];
-            // Multiplied by zero, what is not finite becomes NaN.
-            let zero = p[0] * 0.0
-                + p[1] * 0.0
-                + p[2] * 0.0
-                + s[0] * 0.0
-                + s[1] * 0.0
-                + s[2] * 0.0
-                + q[0] * 0.0
-                + q[1] * 0.0
-                + q[2] * 0.0
-                + q[3] * 0.0
-                + o * 0.0;
-            let z = camera[2][lane];
-            let slope = [camera[0][lane] / z, camera[1][lane] / z];
-            let clamped = [0, 1].map(|axis| {
-                slope[axis]
-                    .max(self.slope_min[axis])
-                    .min(self.slope_max[axis])
-            });
-            // The projection of the sphere about the Gaussian bounds that of the Gaussian.
-            let largest = f64::from(s[0].max(s[1]).max(s[2]));
-            let reach = |axis: usize, row: &[f64; 3]| {
-                let scale = largest * self.focal[axis] / z;
-                let k = [0, 1, 2].map(|k| row[k] - clamped[axis] * a2[k]);
-                let norm2 = k[0] * k[0] + k[1] * k[1] + k[2] * k[2];
-                (extent * (scale * scale * norm2 + self.low_pass)).sqrt()
-            };
-            let reach = [reach(0, &a0), reach(1, &a1)];
-            let x = self.focal[0] * slope[0] + self.center[0];
-            let y = self.focal[1] * slope[1] + self.center[1];
-            let outside = (x + reach[0] < left)
-                | (x - reach[0] > right)
-                | (y + reach[1] < top)
-                | (y - reach[1] > bottom);
+        let [mut beyond_near, mut before_far] = [Bits::default(); 2];
+        for (lane, &z) in scratch.camera[2][..len].iter().enumerate() {
             let z = z as f32;
-            let mut why = if outside { 7 } else { KEPT };
-            why = if z < self.far { why } else { 6 };
-            why = if self.near < z { why } else { 5 };
-            why = if o < self.alpha_floor { 4 } else { why };
-            why = if (s[0] < 0.0) | (s[1] < 0.0) | (s[2] < 0.0) {
-                3
-            } else {
-                why
-            };
-            why = if (q[0] == 0.0) & (q[1] == 0.0) & (q[2] == 0.0) & (q[3] == 0.0) {
-                2
-            } else {
-                why
-            };
-            reason[lane] = if zero == 0.0 { why } else { 1 };
+            beyond_near.set_one(lane, self.near < z);
+            before_far.set_one(lane, z < self.far);
         }
+        let mut kept = Bits::first(len);
+        for (passed, counter) in [
+            (finite, Counter::SkippedNonFinite),
+            (rotated, Counter::SkippedZeroRotation),
+            (positive, Counter::SkippedNegativeScale),
+            (bright, Counter::SkippedFaint),
+            (beyond_near, Counter::SkippedNear),
+            (before_far, Counter::SkippedFar),
+            (inside, Counter::SkippedOffScreen),
+        ] {
+            counters.add(counter, kept.without(&passed).count());
+            kept = kept.and(&passed);
+        }
+        kept
     }
 
-    /// Computes mean, covariance and opacity on the screen of the kept lanes, densely.
+    /// Bounds of the visible pixels' centres along an axis, with a pixel to spare.
+    fn visible_range(&self, axis: usize) -> [f64; 2] {
+        let Visible {
+            left,
+            top,
+            right,
+            bottom,
+        } = self.visible;
+        let [first, end] = [[left, right], [top, bottom]][axis];
+        [first as f64 - 1.0, end as f64 + 1.0]
+    }
+
+    /// Computes mean, covariance and opacity on the screen of the kept Gaussians.
     #[inline(always)]
-    fn flatten(&self, kept: usize, scratch: &mut Scratch) {
-        let Scratch {
+    fn flatten<S: Simd>(&self, simd: S, scratch: &mut Scratch) {
+        let number = |value: f64| S::f64s::splat(simd, value);
+        let load =
+            |lanes: &Lanes, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+        let Attributes {
             scale,
             rotation,
             opacity,
-            camera,
-            lanes,
-            mean,
-            covariance,
-            determinant,
-            log2_opacity,
             ..
-        } = scratch;
-        let r = &self.rotation;
-        for (at, &lane) in lanes[..kept.min(BATCH)].iter().enumerate() {
-            let lane = lane % BATCH;
-            let z = camera[2][lane];
-            let slope = [camera[0][lane] / z, camera[1][lane] / z];
-            mean[0][at] = self.focal[0] * slope[0] + self.center[0];
-            mean[1][at] = self.focal[1] * slope[1] + self.center[1];
-            let q = normalized([0, 1, 2, 3].map(|part| f64::from(rotation[part][lane])));
-            let columns = rotation_columns(q);
-            let m = [0, 1].map(|axis| {
-                let clamped = slope[axis]
-                    .max(self.slope_min[axis])
-                    .min(self.slope_max[axis]);
-                let scale_to_screen = self.focal[axis] / z;
-                let row =
-                    [0, 1, 2].map(|k| scale_to_screen * (r[3 * axis + k] - clamped * r[6 + k]));
-                [0, 1, 2].map(|k| f64::from(scale[k][lane]) * dot(row, columns[k]))
-            });
-            let cross = [
-                m[0][1] * m[1][2] - m[0][2] * m[1][1],
-                m[0][2] * m[1][0] - m[0][0] * m[1][2],
-                m[0][0] * m[1][1] - m[0][1] * m[1][0],
-            ];
-            let area2 = dot(cross, cross);
-            let (a, b, c) = (dot(m[0], m[0]), dot(m[0], m[1]), dot(m[1], m[1]));
-            let low_pass = self.low_pass;
-            let det = area2 + low_pass * (a + c) + low_pass * low_pass;
-            covariance[0][at] = a + low_pass;
-            covariance[1][at] = b;
-            covariance[2][at] = c + low_pass;
-            determinant[at] = det;
-            let o = f64::from(opacity[lane]);
-            let o = if self.compensated {
-                o * (area2 / det).sqrt()
-            } else {
-                o
+        } = &*scratch.dense;
+        let flat = &mut *scratch.flat;
+        let r = self.rotation;
+        let (one, two, low_pass) = (number(1.0), number(2.0), number(self.low_pass));
+        for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
+            let store = |value: S::f64s, lanes: &mut Lanes| {
+                value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
             };
-            log2_opacity[at] = log2(o);
+            let [w, x] = [load(&rotation[0], at), load(&rotation[1], at)];
+            let [y, z] = [load(&rotation[2], at), load(&rotation[3], at)];
+            // Divided by the largest component first, a quaternion of any size can be squared.
+            let largest = w.abs().max(x.abs()).max(y.abs().max(z.abs()));
+            let [w, x, y, z] = [w / largest, x / largest, y / largest, z / largest];
+            let norm = (w * w + x * x + y * y + z * z).sqrt();
+            let [w, x, y, z] = [w / norm, x / norm, y / norm, z / norm];
+            let columns = [
+                [
+                    one - two * (y * y + z * z),
+                    two * (x * y + w * z),
+                    two * (x * z - w * y),
+                ],
+                [
+                    two * (x * y - w * z),
+                    one - two * (x * x + z * z),
+                    two * (y * z + w * x),
+                ],
+                [
+                    two * (x * z + w * y),
+                    two * (y * z - w * x),
+                    one - two * (x * x + y * y),
+                ],
+            ];
+            let scale = [
+                load(&scale[0], at),
+                load(&scale[1], at),
+                load(&scale[2], at),
+            ];
+            let depth = load(&scratch.dense_camera[2], at);
+            let mut m = [[one; 3]; 2];
+            for axis in 0..2 {
+                let slope = load(&scratch.dense_camera[axis], at) / depth;
+                let focal = number(self.focal[axis]);
+                store(slope * focal + self.center[axis], &mut flat.mean[axis]);
+                let clamped = slope.max(self.slope_min[axis]).min(self.slope_max[axis]);
+                let to_screen = focal / depth;
+                let kx = to_screen * (number(r[3 * axis]) - clamped * r[6]);
+                let ky = to_screen * (number(r[3 * axis + 1]) - clamped * r[7]);
+                let kz = to_screen * (number(r[3 * axis + 2]) - clamped * r[8]);
+                for part in 0..3 {
+                    let [cx, cy, cz] = columns[part];
+                    m[axis][part] = scale[part] * (kx * cx + ky * cy + kz * cz);
+                }
+            }
+            let [[ax, ay, az], [bx, by, bz]] = m;
+            let [cx, cy, cz] = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
+            let area2 = cx * cx + cy * cy + cz * cz;
+            let xx = ax * ax + ay * ay + az * az;
+            let yy = bx * bx + by * by + bz * bz;
+            let determinant = area2 + low_pass * (xx + yy) + low_pass * low_pass;
+            store(determinant, &mut flat.determinant);
+            let mut o = load(opacity, at);
+            if self.compensated {
+                o = o * (area2 / determinant).sqrt();
+            }
+            let log2_opacity = log2(simd, o);
+            store(log2_opacity, &mut flat.log2_opacity);
+
+            let (a, b, c) = (xx + low_pass, ax * bx + ay * by + az * bz, yy + low_pass);
+            // alpha = opacity exp(-q / 2) = 2^(log2 opacity - q / (2 ln 2)), and
+            // q = d.x^2 / a + (a / det) (d.y - (b / a) d.x)^2.
+            let unit = (0.5 / LN_2).sqrt();
+            let vertical = (a / determinant).sqrt() * unit;
+            store(number(unit) / a.sqrt(), &mut flat.factor[0]);
+            store(-(b / a) * vertical, &mut flat.factor[1]);
+            store(vertical, &mut flat.factor[2]);
+            // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
+            // pixel that it would accept. What cannot reach the floor even so has a negative extent.
+            let room = log2_opacity - self.log2_floor;
+            let extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+            let half_x = (a * extent).sqrt();
+            store(half_x, &mut flat.half[0]);
+            store((c * extent).sqrt(), &mut flat.half[1]);
+            store(b / c, &mut flat.slope);
+            store(determinant / (c * c), &mut flat.narrowing);
+            store(b * half_x / a, &mut flat.peak);
+
+            let d = &scratch.dense_offset;
+            let [dx, dy, dz] = [load(&d[0], at), load(&d[1], at), load(&d[2], at)];
+            let largest = dx.abs().max(dy.abs()).max(dz.abs());
+            let [dx, dy, dz] = [dx / largest, dy / largest, dz / largest];
+            let norm = (dx * dx + dy * dy + dz * dz).sqrt();
+            for (lanes, d) in flat.direction.iter_mut().zip([dx, dy, dz]) {
+                store(d / norm, lanes);
+            }
         }
     }
 
-    /// Finds the tiles and the colour of the kept lanes and appends what reaches a tile to `out`.
+    /// Finds the tiles and the colour of the kept Gaussians and appends what reaches a tile to `out`.
     #[inline(always)]
-    fn emit(
+    fn emit<S: Simd>(
         &self,
-        kept: usize,
+        simd: S,
         attributes: &GaussianAttributes,
         batch: &Batch,
         scratch: &Scratch,
         out: &mut Projected,
     ) {
         let reader = CoefficientReader::new(&attributes.spherical_harmonics);
-        let mut coefficients = [0.0; 3 * MAX_COEFFICIENTS];
-        for at in 0..kept {
-            let determinant = scratch.determinant[at];
+        let mut coefficients = [0.0; COEFFICIENT_FLOATS];
+        let flat = &*scratch.flat;
+        out.reserve(scratch.lanes.len());
+        for (at, &lane) in scratch.lanes.iter().enumerate() {
+            let at = at % BATCH;
+            let determinant = flat.determinant[at];
             if !(determinant > 0.0 && determinant.is_finite()) {
                 out.counters.add(Counter::SkippedDegenerate, 1);
                 continue;
             }
-            let log2_opacity = scratch.log2_opacity[at];
-            let [a, b, c] = [0, 1, 2].map(|part| scratch.covariance[part][at]);
-            let mean = [scratch.mean[0][at], scratch.mean[1][at]];
-            // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
-            // pixel that it would accept.
-            let room = log2_opacity - self.log2_floor;
-            let extent = 2.0 * LN_2 * (room + 1e-3 + 1e-5 * room.abs());
             let first_span = out.spans.len();
-            if extent > 0.0 {
-                let ellipse = Ellipse {
-                    mean,
-                    a,
-                    b,
-                    c,
-                    determinant,
-                    extent,
-                };
+            let ellipse = Ellipse {
+                mean: [flat.mean[0][at], flat.mean[1][at]],
+                half: [flat.half[0][at], flat.half[1][at]],
+                slope: flat.slope[at],
+                narrowing: flat.narrowing[at],
+                peak: flat.peak[at],
+            };
+            // The square root of a negative extent is not a number.
+            if ellipse.half[1] >= 0.0 {
                 ellipse.append_spans(&self.visible, &mut out.spans);
             }
             if out.spans.len() == first_span {
                 out.counters.add(Counter::SkippedOffScreen, 1);
                 continue;
             }
-            let lane = scratch.lanes[at];
             reader.read(batch, lane, &mut coefficients);
-            let direction = direction([0, 1, 2].map(|axis| scratch.offset[axis][lane]));
-            let Some(color) = spherical_harmonics::color(self.sh_degree, direction, &coefficients)
+            let d = &flat.direction;
+            let direction = [d[0][at] as f32, d[1][at] as f32, d[2][at] as f32];
+            let degree = self.sh_degree;
+            let Some(color) = spherical_harmonics::color(simd, degree, direction, &coefficients)
             else {
                 out.spans.truncate(first_span);
                 out.counters.add(Counter::SkippedNonFinite, 1);
                 continue;
             };
-            // alpha = opacity exp(-q / 2) = 2^(log2 opacity - q / (2 ln 2)), and q = d.x^2 / a +
-            // (a / det) (d.y - (b / a) d.x)^2.
-            let unit = (0.5 / LN_2).sqrt();
-            let vertical = unit * (a / determinant).sqrt();
-            let factor = [unit / a.sqrt(), -(b / a) * vertical, vertical];
-            out.keys.push(ordered_bits(scratch.camera[2][lane] as f32));
+            out.keys
+                .push(ordered_bits(scratch.camera[2][lane % BATCH] as f32));
             out.splats.push(Splat {
-                mean,
-                factor,
-                log2_opacity: log2_opacity as f32,
+                mean: ellipse.mean,
+                factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
+                log2_opacity: flat.log2_opacity[at] as f32,
                 color,
                 first_span: first_span as u32,
                 span_count: (out.spans.len() - first_span) as u32,
@@ -410,112 +551,5 @@ impl Projection {
         }
         out.counters
             .add(Counter::GaussiansDrawn, out.splats.len() as u64);
-    }
-}
-
-#[inline(always)]
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// The unit quaternion of one that is not zero, whatever its size.
-#[inline(always)]
-fn normalized(q: [f64; 4]) -> [f64; 4] {
-    let largest = q[0].abs().max(q[1].abs()).max(q[2].abs()).max(q[3].abs());
-    let q = q.map(|part| part / largest);
-    let norm = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
-    q.map(|part| part / norm)
-}
-
-/// The columns of the rotation matrix of a unit quaternion w, x, y, z.
-#[inline(always)]
-fn rotation_columns([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
-    [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y + w * z),
-            2.0 * (x * z - w * y),
-        ],
-        [
-            2.0 * (x * y - w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z + w * x),
-        ],
-        [
-            2.0 * (x * z + w * y),
-            2.0 * (y * z - w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
-    ]
-}
-
-/// The unit vector along `d` in binary32; zero where `d` is.
-#[inline(always)]
-fn direction(d: [f64; 3]) -> [f32; 3] {
-    let largest = d[0].abs().max(d[1].abs()).max(d[2].abs());
-    if largest == 0.0 {
-        return [0.0; 3];
-    }
-    let d = d.map(|part| part / largest);
-    let norm = dot(d, d).sqrt();
-    d.map(|part| (part / norm) as f32)
-}
-
-/// Base-2 logarithm of a number that is zero (negative infinity) or a binary32 number or above 1e-300, to
-/// 1e-13; a series without branches, so that it is computed in lanes.
-#[inline(always)]
-fn log2(x: f64) -> f64 {
-    // Mantissa in [sqrt(1/2), sqrt(2)): subtracting the bits of sqrt(1/2) makes the exponent field tell.
-    const SQRT_HALF_BITS: u64 = 0x3fe6_a09e_667f_3bcd;
-    let exponent = (x.to_bits().wrapping_sub(SQRT_HALF_BITS) as i64) >> 52;
-    let mantissa = f64::from_bits(x.to_bits().wrapping_sub((exponent << 52) as u64));
-    let s = (mantissa - 1.0) / (mantissa + 1.0);
-    let s2 = s * s;
-    // 2 atanh(s) = 2 (s + s^3 / 3 + ...), |s| < 0.1716: the first term left out is below 1e-14.
-    let series = 1.0
-        + s2 * (1.0 / 3.0
-            + s2 * (1.0 / 5.0
-                + s2 * (1.0 / 7.0
-                    + s2 * (1.0 / 9.0
-                        + s2 * (1.0 / 11.0
-                            + s2 * (1.0 / 13.0 + s2 * (1.0 / 15.0 + s2 * (1.0 / 17.0))))))));
-    let value = exponent as f64 + 2.0 / LN_2 * s * series;
-    if x > 0.0 { value } else { f64::NEG_INFINITY }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn log2_is_exact_enough() {
-        let mut x = 1e-45f64;
-        while x < 4e38 {
-            let error = (log2(x) - x.log2()).abs();
-            assert!(error <= 1e-13 * x.log2().abs().max(1.0), "{x}: {error}");
-            x *= 1.000_37;
-        }
-        assert_eq!(log2(0.0), f64::NEG_INFINITY);
-        assert_eq!(log2(1.0), 0.0);
-    }
-
-    #[test]
-    fn quaternions_of_any_size_rotate_alike() {
-        let unit = rotation_columns(normalized([0.5, -0.5, 0.5, 0.5]));
-        for size in [1e-30, 1e-20, 3.0, 1e20, 1e30] {
-            let columns = rotation_columns(normalized([size, -size, size, size]));
-            for (a, b) in unit.iter().flatten().zip(columns.iter().flatten()) {
-                assert!((a - b).abs() < 1e-15);
-            }
-        }
-    }
-
-    #[test]
-    fn a_direction_is_a_unit_vector_at_any_distance() {
-        for size in [1e-30, 1.0, 1e200] {
-            let [x, y, z] = direction([3.0 * size, 0.0, -4.0 * size]);
-            assert_eq!([x, y, z], [0.6, 0.0, -0.8]);
-        }
-        assert_eq!(direction([0.0; 3]), [0.0; 3]);
     }
 }

@@ -1,6 +1,7 @@
 //! Spherical harmonics: the view-dependent colour of a Gaussian, with the signs and order of 3DGS.
 
-use super::fetch::MAX_COEFFICIENTS;
+use super::fetch::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
+use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
 
 const C0: f32 = 0.282_094_79;
 const C1: f32 = 0.488_602_51;
@@ -58,36 +59,53 @@ fn basis(degree: u32, [x, y, z]: [f32; 3]) -> [f32; MAX_COEFFICIENTS] {
 
 /// The colour `max(0, 0.5 + SH)` in the unit direction from the eye; `None` if a coefficient is not finite.
 ///
-/// `coefficients` holds red, green and blue of each coefficient in turn.
+/// `coefficients` holds red, green and blue of each coefficient in turn; what follows them is not used.
 #[inline(always)]
-pub(super) fn color(
+pub(super) fn color<S: Simd>(
+    simd: S,
     degree: u32,
     direction: [f32; 3],
-    coefficients: &[f32; 3 * MAX_COEFFICIENTS],
+    coefficients: &[f32; COEFFICIENT_FLOATS],
 ) -> Option<[f32; 3]> {
     let count = coefficient_count(degree).min(MAX_COEFFICIENTS);
     let basis = basis(degree, direction);
-    // Small terms first: the constant term and the 0.5 are the largest, so they lose least when added last.
-    // The fourth lane tells whether all coefficients are finite: it stays zero exactly then.
-    let mut sum = [0.0f32; 4];
-    for k in (0..count).rev() {
-        for (channel, sum) in sum.iter_mut().take(3).enumerate() {
-            *sum += basis[k] * coefficients[3 * k + channel];
-        }
+    // A vector holds a coefficient's three components and the next one's first, which is not used. Two sums
+    // halve the wait for one another; the largest terms, the constant one and 0.5, are added last.
+    let load = |k: usize| f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
+    let mut sums = [f32x4::splat(simd, 0.0); 2];
+    for k in (1..count).rev() {
+        sums[k % 2] = load(k).mul_add(f32x4::splat(simd, basis[k]), sums[k % 2]);
     }
-    let finite = coefficients[..3 * count]
-        .iter()
-        .fold(0.0f32, |sum, c| sum + c * 0.0)
-        == 0.0;
-    finite.then(|| [0, 1, 2].map(|channel| (0.5 + sum[channel]).max(0.0)))
+    let sum = load(0).mul_add(f32x4::splat(simd, basis[0]), sums[0] + sums[1]) + 0.5;
+    // Multiplied by zero, what is not finite becomes NaN.
+    let nothing = coefficients[..3 * count]
+        .chunks(16)
+        .map(|part| match f32x16_of(simd, part) {
+            Some(part) => (part * 0.0).reduce_sum(),
+            None => part.iter().map(|c| c * 0.0).sum(),
+        })
+        .fold(0.0f32, |sum, part| sum + part);
+    (nothing == 0.0).then(|| [sum[0].max(0.0), sum[1].max(0.0), sum[2].max(0.0)])
+}
+
+/// A vector of a whole part.
+#[inline(always)]
+fn f32x16_of<S: Simd>(simd: S, part: &[f32]) -> Option<f32x16<S>> {
+    (part.len() == 16).then(|| f32x16::from_slice(simd, part))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn coefficients(values: &[(usize, [f32; 3])]) -> [f32; 3 * MAX_COEFFICIENTS] {
-        let mut out = [0.0; 3 * MAX_COEFFICIENTS];
+    use fearless_simd::{Level, dispatch};
+
+    fn color(degree: u32, direction: [f32; 3], sh: &[f32; COEFFICIENT_FLOATS]) -> Option<[f32; 3]> {
+        dispatch!(Level::new(), simd => super::color(simd, degree, direction, sh))
+    }
+
+    fn coefficients(values: &[(usize, [f32; 3])]) -> [f32; COEFFICIENT_FLOATS] {
+        let mut out = [0.0; COEFFICIENT_FLOATS];
         for &(k, rgb) in values {
             out[3 * k..3 * k + 3].copy_from_slice(&rgb);
         }
