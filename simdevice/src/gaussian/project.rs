@@ -29,10 +29,6 @@ pub(crate) struct Splat {
     pub log2_opacity: f32,
     /// Red, green, blue.
     pub color: [f32; 3],
-    /// Where its spans begin in its batch.
-    pub first_span: u32,
-    /// How many spans it has.
-    pub span_count: u32,
 }
 
 /// What came of a batch.
@@ -42,8 +38,10 @@ pub(crate) struct Projected {
     pub splats: Vec<Splat>,
     /// The depth key of each.
     pub keys: Vec<u32>,
-    /// The tiles of each.
+    /// The tiles of all of them, one after the other.
     pub spans: Vec<Span>,
+    /// Where the tiles of each end in `spans`.
+    pub span_ends: Vec<u32>,
     /// What was skipped and why.
     pub counters: Counters,
 }
@@ -201,9 +199,19 @@ impl Scratch {
 }
 
 impl Projected {
+    /// The tiles of a splat of the batch.
+    #[inline(always)]
+    pub(crate) fn spans_of(&self, place: usize) -> &[Span] {
+        let start = place
+            .checked_sub(1)
+            .map_or(0, |before| self.span_ends[before]);
+        &self.spans[start as usize..self.span_ends[place] as usize]
+    }
+
     fn reserve(&mut self, count: usize) {
         self.splats.reserve_exact(count);
         self.keys.reserve_exact(count);
+        self.span_ends.reserve_exact(count);
         self.spans.reserve(2 * count);
     }
 }
@@ -545,9 +553,8 @@ impl Projection {
                 factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
                 log2_opacity: flat.log2_opacity[at] as f32,
                 color,
-                first_span: first_span as u32,
-                span_count: (out.spans.len() - first_span) as u32,
             });
+            out.span_ends.push(out.spans.len() as u32);
         }
         out.counters
             .add(Counter::GaussiansDrawn, out.splats.len() as u64);

@@ -72,11 +72,15 @@ pub(super) fn color<S: Simd>(
     // A vector holds a coefficient's three components and the next one's first, which is not used. Two sums
     // halve the wait for one another; the largest terms, the constant one and 0.5, are added last.
     let load = |k: usize| f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
-    let mut sums = [f32x4::splat(simd, 0.0); 2];
-    for k in (1..count).rev() {
-        sums[k % 2] = load(k).mul_add(f32x4::splat(simd, basis[k]), sums[k % 2]);
+    let term = |k: usize, sum| load(k).mul_add(f32x4::splat(simd, basis[k]), sum);
+    let (mut even, mut odd) = (f32x4::splat(simd, 0.0), f32x4::splat(simd, 0.0));
+    for k in (2..count).step_by(2) {
+        even = term(k, even);
     }
-    let sum = load(0).mul_add(f32x4::splat(simd, basis[0]), sums[0] + sums[1]) + 0.5;
+    for k in (1..count).step_by(2) {
+        odd = term(k, odd);
+    }
+    let sum = term(0, even + odd) + 0.5;
     // Multiplied by zero, what is not finite becomes NaN.
     let nothing = coefficients[..3 * count]
         .chunks(16)

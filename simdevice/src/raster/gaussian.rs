@@ -12,7 +12,7 @@
 
 use crate::counters::{Counter, Counters};
 use crate::gaussian::project::Splat;
-use crate::gaussian::{GaussianDraw, TILE_SIZE};
+use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::packet::{GaussianState, Rect};
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 
@@ -163,7 +163,7 @@ impl GaussianTile {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        splats: &[Splat],
+        splats: &[Vec<Splat>],
         list: &[u32],
         corner: [u32; 2],
         thresholds: Thresholds,
@@ -175,7 +175,8 @@ impl GaussianTile {
                 break;
             }
             for (record, &primitive) in self.chunk.iter_mut().zip(chunk) {
-                *record = Record::new(&splats[primitive as usize], corner, thresholds.log2_floor);
+                let (batch, place) = locate(primitive);
+                *record = Record::new(&splats[batch][place], corner, thresholds.log2_floor);
             }
             let items = find_items(simd, &self.chunk[..chunk.len()], open, &mut self.items);
             work.pairs += chunk.len() as u64;
@@ -279,14 +280,16 @@ impl Record {
         let [left, top] = corner.map(f64::from);
         let at = [splat.mean[0] - left, splat.mean[1] - top];
         // The index of the pixel that the mean lies in, or of the nearest one of this tile.
-        let anchor = at.map(|at| at.floor().max(0.0).min(TILE as f64 - 1.0));
+        // Truncation is the floor of what is not negative, and what is becomes zero.
+        let nearest = |at: f64| f64::from(at.clamp(0.0, TILE as f64 - 1.0) as i32);
+        let anchor = [nearest(at[0]), nearest(at[1])];
         let d = [anchor[0] + 0.5 - at[0], anchor[1] + 0.5 - at[1]];
         let [a, b, c] = splat.factor;
         let room = splat.log2_opacity - log2_floor;
         Self {
-            anchor: anchor.map(|at| at as f32),
+            anchor: [anchor[0] as f32, anchor[1] as f32],
             at_anchor: [(a * d[0]) as f32, (b * d[0] + c * d[1]) as f32],
-            factor: splat.factor.map(|part| part as f32),
+            factor: [a as f32, b as f32, c as f32],
             log2_opacity: splat.log2_opacity,
             color: splat.color,
             room: room + 1e-3 + 1e-5 * room.abs(),
