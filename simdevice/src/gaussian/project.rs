@@ -7,7 +7,7 @@
 
 use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader, Fetcher};
 use super::footprint::{Ellipse, Span, Visible};
-use super::lanes::{Bits, log2};
+use super::lanes::{Bits, Lanes, NO_LANES, log2};
 use super::sort::ordered_bits;
 use super::spherical_harmonics;
 use crate::counters::{Counter, Counters};
@@ -74,9 +74,6 @@ pub(crate) struct Projection {
     visible: Visible,
 }
 
-/// A number for each Gaussian of a batch.
-type Lanes = [f64; BATCH];
-
 /// What a batch's Gaussians are, and what becomes of them. Structures of arrays.
 pub(crate) struct Scratch {
     fetcher: Fetcher,
@@ -119,10 +116,10 @@ struct Flat {
 impl Default for Attributes {
     fn default() -> Self {
         Self {
-            position: [[0.0; BATCH]; 3],
-            scale: [[0.0; BATCH]; 3],
-            rotation: [[0.0; BATCH]; 4],
-            opacity: [0.0; BATCH],
+            position: [NO_LANES; 3],
+            scale: [NO_LANES; 3],
+            rotation: [NO_LANES; 4],
+            opacity: NO_LANES,
         }
     }
 }
@@ -130,15 +127,15 @@ impl Default for Attributes {
 impl Default for Flat {
     fn default() -> Self {
         Self {
-            mean: [[0.0; BATCH]; 2],
-            determinant: [0.0; BATCH],
-            log2_opacity: [0.0; BATCH],
-            factor: [[0.0; BATCH]; 3],
-            half: [[0.0; BATCH]; 2],
-            slope: [0.0; BATCH],
-            narrowing: [0.0; BATCH],
-            peak: [0.0; BATCH],
-            direction: [[0.0; BATCH]; 3],
+            mean: [NO_LANES; 2],
+            determinant: NO_LANES,
+            log2_opacity: NO_LANES,
+            factor: [NO_LANES; 3],
+            half: [NO_LANES; 2],
+            slope: NO_LANES,
+            narrowing: NO_LANES,
+            peak: NO_LANES,
+            direction: [NO_LANES; 3],
         }
     }
 }
@@ -149,12 +146,12 @@ impl Scratch {
         Self {
             fetcher: Fetcher::default(),
             attributes: Box::default(),
-            offset: Box::new([[0.0; BATCH]; 3]),
-            camera: Box::new([[0.0; BATCH]; 3]),
+            offset: Box::new([NO_LANES; 3]),
+            camera: Box::new([NO_LANES; 3]),
             lanes: Vec::with_capacity(BATCH),
             dense: Box::default(),
-            dense_camera: Box::new([[0.0; BATCH]; 3]),
-            dense_offset: Box::new([[0.0; BATCH]; 3]),
+            dense_camera: Box::new([NO_LANES; 3]),
+            dense_offset: Box::new([NO_LANES; 3]),
             flat: Box::default(),
         }
     }
@@ -464,7 +461,7 @@ impl Projection {
             store(determinant, &mut flat.determinant);
             let mut o = load(opacity, at);
             if self.compensated {
-                o = o * (area2 / determinant).sqrt();
+                o *= (area2 / determinant).sqrt();
             }
             let log2_opacity = log2(simd, o);
             store(log2_opacity, &mut flat.log2_opacity);

@@ -347,7 +347,7 @@ fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let p = p.mul_add(f, constant(0.009_671_513));
     let p = p.mul_add(f, constant(0.055_507_336));
     let p = p.mul_add(f, constant(0.240_222_42));
-    let p = p.mul_add(f, constant(0.693_147));
+    let p = p.mul_add(f, constant(0.693_147_1));
     let p = p.mul_add(f, constant(1.0));
     let exponent = shifted.to_bits() << 23;
     f32x16::from_bits(p.to_bits() + exponent)
