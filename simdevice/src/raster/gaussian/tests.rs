@@ -159,10 +159,7 @@ fn naive_pixel(
         let x = x.clamp(-126.0, 1.0);
         let n = (x + 12_582_912.0) - 12_582_912.0;
         let f = x - n;
-        let coefficients = [0.009_671_513, 0.055_507_336, 0.240_222_42, 0.693_147, 1.0];
-        let p = coefficients
-            .iter()
-            .fold(0.001_326_472_7, |p, &c| mul_add(p, f, c));
+        let p = POWER_OF_TWO.iter().fold(0.0, |p, &c| mul_add(p, f, c));
         f32::from_bits(p.to_bits().wrapping_add_signed((n as i32) << 23))
     };
     let state = &draw.state;
