@@ -184,7 +184,9 @@ mod tests {
     use crate::object::debug_messenger::DebugMessenger;
 
     fn messenger() -> Arc<DebugMessenger> {
-        Arc::new(DebugMessenger::new(&vk::DebugUtilsMessengerCreateInfoEXT::default()))
+        Arc::new(DebugMessenger::new(
+            &vk::DebugUtilsMessengerCreateInfoEXT::default(),
+        ))
     }
 
     fn is_invalid<T>(result: Result<T, Error>) -> bool {
@@ -221,9 +223,13 @@ mod tests {
         // SAFETY: the handle is live, though its type is another; null and odd addresses aren't followed.
         unsafe {
             assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(raw))));
-            assert!(is_invalid(destroy(<vk::Device as vk::Handle>::from_raw(raw))));
+            assert!(is_invalid(destroy(<vk::Device as vk::Handle>::from_raw(
+                raw
+            ))));
             assert!(is_invalid(get(vk::Device::null())));
-            assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(raw + 1))));
+            assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(
+                raw + 1
+            ))));
             assert!(is_invalid(get_all(&[vk::Device::null()])));
             assert!(get_optional(vk::Device::null()).unwrap().is_none());
             assert!(destroy(vk::Device::null()).unwrap().is_none());

@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn structures_are_found_by_their_type() {
-        let mut unknown = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+        let mut unknown = vk::PhysicalDeviceDriverProperties::default();
         let mut wanted = vk::PhysicalDeviceMaintenance3Properties::default();
         let mut chain = vk::PhysicalDeviceProperties2::default()
             .push_next(&mut wanted)
@@ -77,7 +77,8 @@ mod tests {
         // SAFETY: ash built the chain of live structures.
         unsafe {
             for_each_output(chain.p_next, |mut structure| {
-                if let Some(out) = structure.cast::<vk::PhysicalDeviceMaintenance3Properties<'_>>() {
+                if let Some(out) = structure.cast::<vk::PhysicalDeviceMaintenance3Properties<'_>>()
+                {
                     out.max_per_set_descriptors = 7;
                 }
             });

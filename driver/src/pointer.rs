@@ -194,21 +194,21 @@ mod tests {
     #[test]
     fn enumeration_counts_then_fills_and_says_when_it_is_incomplete() {
         let values = [1u8, 2, 3];
-        let enumerate = |count: &mut u32, out: *mut u8| {
+        let fill = |count: &mut u32, out: *mut u8| {
             // SAFETY: `out` is null or has room for `*count` values.
-            unsafe { super::enumerate(count, out, &values) }.unwrap()
+            unsafe { enumerate(count, out, &values) }.unwrap()
         };
         let mut count = 0;
-        assert_eq!(enumerate(&mut count, ptr::null_mut()), vk::Result::SUCCESS);
+        assert_eq!(fill(&mut count, ptr::null_mut()), vk::Result::SUCCESS);
         assert_eq!(count, 3);
 
         let mut out = [0; 4];
         count = 2;
-        assert_eq!(enumerate(&mut count, out.as_mut_ptr()), vk::Result::INCOMPLETE);
+        assert_eq!(fill(&mut count, out.as_mut_ptr()), vk::Result::INCOMPLETE);
         assert_eq!((count, out), (2, [1, 2, 0, 0]));
 
         count = 4;
-        assert_eq!(enumerate(&mut count, out.as_mut_ptr()), vk::Result::SUCCESS);
+        assert_eq!(fill(&mut count, out.as_mut_ptr()), vk::Result::SUCCESS);
         assert_eq!((count, out), (3, [1, 2, 3, 0]));
     }
 

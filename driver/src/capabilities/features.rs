@@ -388,7 +388,9 @@ mod tests {
         names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(0));
         names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(2));
         names.extend(all_true::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(1));
-        names.extend(all_true::<PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(2));
+        names.extend(all_true::<
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+        >(2));
         let names: HashSet<_> = names.into_iter().collect();
         assert_eq!(names, SUPPORTED.iter().copied().collect());
     }
@@ -396,7 +398,10 @@ mod tests {
     #[test]
     fn missing_features_are_listed_truly() {
         for feature in REQUIRED_BUT_MISSING {
-            assert!(!is_supported(feature), "{feature} works now; take it off the list");
+            assert!(
+                !is_supported(feature),
+                "{feature} works now; take it off the list"
+            );
         }
     }
 
@@ -408,7 +413,9 @@ mod tests {
         };
         let mut works = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
         let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(true);
-        let info = vk::DeviceCreateInfo::default().enabled_features(&core).push_next(&mut works);
+        let info = vk::DeviceCreateInfo::default()
+            .enabled_features(&core)
+            .push_next(&mut works);
         let enabled = requested(&info).unwrap();
         assert!(enabled.has("dynamic_rendering") && enabled.has("robust_buffer_access"));
         assert!(!enabled.has("synchronization2"));

@@ -73,7 +73,7 @@ impl Device {
             queues: OnceLock::new(),
         });
         let start = |_| {
-            let processor = CommandProcessor {};
+            let processor = CommandProcessor::new(Arc::clone(&device.simulated));
             Queue::start(Arc::downgrade(&device), Arc::clone(&device.loss), processor)
         };
         let queues: Vec<_> = (0..queue_count).map(start).collect::<Result<_, _>>()?;

@@ -144,7 +144,12 @@ mod tests {
 
     fn queue() -> Arc<Queue> {
         let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
-        Queue::start(Weak::new(), Arc::default(), processor(simulated)).unwrap()
+        Queue::start(
+            Weak::new(),
+            Arc::default(),
+            CommandProcessor::new(Arc::new(simulated)),
+        )
+        .unwrap()
     }
 
     #[test]
@@ -153,10 +158,15 @@ mod tests {
         let (sent, received) = channel();
         for index in 0..10 {
             let sent = sent.clone();
-            queue.submit(Box::new(move |_| sent.send(index).unwrap())).unwrap();
+            queue
+                .submit(Box::new(move |_| sent.send(index).unwrap()))
+                .unwrap();
         }
         queue.wait_idle().unwrap();
-        assert_eq!(received.try_iter().collect::<Vec<_>>(), (0..10).collect::<Vec<_>>());
+        assert_eq!(
+            received.try_iter().collect::<Vec<_>>(),
+            (0..10).collect::<Vec<_>>()
+        );
         queue.stop();
         queue.stop();
         assert!(queue.submit(Box::new(|_| ())).is_err());
