@@ -1,0 +1,8 @@
+//! Command buffers' contents: what recording leaves, and how a queue turns it into packets.
+//!
+//! [`record`] is plain data. [`replay`] walks it through one exhaustive match, with the bound [`state`] that
+//! draws need, and hands packets to the device's command processor.
+
+pub mod record;
+pub mod replay;
+pub mod state;
