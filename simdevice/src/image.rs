@@ -147,6 +147,17 @@ impl ImageDesc {
 }
 
 impl SubresourceLayout {
+    /// The layout of one sample, which is that of an image of one sample.
+    pub fn sample(&self, sample: u32) -> Self {
+        Self {
+            offset: self
+                .offset
+                .saturating_add(self.sample_pitch.saturating_mul(sample.into())),
+            size: self.sample_pitch,
+            ..*self
+        }
+    }
+
     /// The offset from the image's beginning of texel (x, y, z), and how many bytes of its row begin there; `None`
     /// outside the subresource.
     fn texel(&self, [x, y, z]: [u32; 3]) -> Option<(u64, u64)> {
@@ -155,11 +166,14 @@ impl SubresourceLayout {
             return None;
         }
         let texel_size = self.format.texel_size() as u64;
-        let offset = self.offset
-            + u64::from(z) * self.depth_pitch
+        // What lies inside the subresource was computed without overflow when it was laid out.
+        let inside = u64::from(z) * self.depth_pitch
             + u64::from(y) * self.row_pitch
             + u64::from(x) * texel_size;
-        Some((offset, u64::from(width - x) * texel_size))
+        Some((
+            self.offset.checked_add(inside)?,
+            u64::from(width - x) * texel_size,
+        ))
     }
 }
 
