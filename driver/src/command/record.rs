@@ -1,7 +1,6 @@
 //! What a command buffer holds. Everything that the application passed by pointer has been copied, and every
 //! object that a command names is held by [`Arc`].
 
-use crate::object::buffer::Buffer;
 use crate::object::event::Event;
 use crate::object::pipeline::GraphicsPipeline;
 use crate::object::query_pool::QueryPool;
@@ -11,7 +10,7 @@ use std::sync::Arc;
 
 /// A recorded command.
 #[derive(Clone, Debug)]
-pub enum Command {
+pub(crate) enum Command {
     /// A command whose meaning depends on no bound state, already lowered: copies, clears, barriers, the
     /// beginning and end of passes, queries.
     Packet(Packet),
@@ -60,65 +59,63 @@ pub enum Command {
 
 /// A vertex buffer binding.
 #[derive(Clone, Debug)]
-pub struct VertexBuffer {
+pub(crate) struct VertexBuffer {
     /// The bytes that vertices are read from.
-    pub range: BufferRange,
+    pub(crate) range: BufferRange,
     /// The stride, where `vkCmdBindVertexBuffers2` gave one.
-    pub stride: Option<u32>,
+    pub(crate) stride: Option<u32>,
 }
 
 /// An index buffer binding.
 #[derive(Clone, Debug)]
-pub struct IndexBuffer {
+pub(crate) struct IndexBuffer {
     /// The bytes that indices are read from.
-    pub range: BufferRange,
+    pub(crate) range: BufferRange,
     /// Bytes per index: 2 or 4 (1 with 8-bit indices).
-    pub index_size: u32,
+    pub(crate) index_size: u32,
 }
 
 /// A draw's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Draw {
+pub(crate) struct Draw {
     /// The value added to each index, or `None` for a draw without an index buffer.
-    pub vertex_offset: Option<i32>,
+    pub(crate) vertex_offset: Option<i32>,
     /// The first vertex or index.
-    pub first: u32,
+    pub(crate) first: u32,
     /// How many vertices or indices.
-    pub count: u32,
+    pub(crate) count: u32,
     /// The first instance.
-    pub first_instance: u32,
+    pub(crate) first_instance: u32,
     /// How many instances.
-    pub instance_count: u32,
+    pub(crate) instance_count: u32,
 }
 
 /// Draws whose numbers lie in a buffer.
 #[derive(Clone, Debug)]
-pub struct DrawIndirect {
+pub(crate) struct DrawIndirect {
     /// The bytes from the first draw's numbers to the end of the buffer.
-    pub parameters: BufferRange,
+    pub(crate) parameters: BufferRange,
     /// How many draws.
-    pub draw_count: u32,
+    pub(crate) draw_count: u32,
     /// Bytes from one draw's numbers to the next.
-    pub stride: u32,
+    pub(crate) stride: u32,
     /// Whether they are those of indexed draws.
-    pub indexed: bool,
+    pub(crate) indexed: bool,
 }
 
 /// A copy of query results to a buffer.
 #[derive(Clone, Debug)]
-pub struct CopyQueryResults {
+pub(crate) struct CopyQueryResults {
     /// The pool.
-    pub pool: Arc<QueryPool>,
+    pub(crate) pool: Arc<QueryPool>,
     /// The first query.
-    pub first: u32,
+    pub(crate) first: u32,
     /// How many queries.
-    pub count: u32,
-    /// The buffer; kept so that it outlives the copy.
-    pub target: Arc<Buffer>,
-    /// The first byte written.
-    pub offset: u64,
+    pub(crate) count: u32,
+    /// The bytes from the first one written to the end of the buffer.
+    pub(crate) target: BufferRange,
     /// Bytes from one query's results to the next.
-    pub stride: u64,
+    pub(crate) stride: u64,
     /// What is written for each query, and whether the copy waits for it.
-    pub flags: ash::vk::QueryResultFlags,
+    pub(crate) flags: ash::vk::QueryResultFlags,
 }

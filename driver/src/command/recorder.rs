@@ -196,6 +196,19 @@ impl Recorder {
         Ok((Arc::clone(commands), Pending::new(&self.pending)))
     }
 
+    /// What was recorded, for a primary command buffer to execute.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if it is not executable.
+    pub(crate) fn contents(&self) -> Result<Arc<[Command]>, Error> {
+        self.finished.clone().ok_or_else(|| {
+            Error::usage(
+                "VUID-vkCmdExecuteCommands-pCommandBuffers-00089",
+                format!("a secondary command buffer is {:?}, not executable", self.status),
+            )
+        })
+    }
+
     /// Appends a command.
     pub(crate) fn push(&mut self, command: Command) {
         self.commands.push(command);

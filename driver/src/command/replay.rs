@@ -9,7 +9,7 @@ use simdevice::Packet;
 use simdevice::packet::BufferRange;
 
 /// What a replay needs of the queue that it runs on.
-pub trait Executor {
+pub(crate) trait Executor {
     /// Executes a packet; everything before it has been executed.
     ///
     /// # Errors
@@ -35,13 +35,13 @@ pub trait Executor {
 /// The device cannot go on.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("the device is lost: {0}")]
-pub struct Lost(pub String);
+pub(crate) struct Lost(pub String);
 
 /// Replays a command buffer.
 ///
 /// # Errors
 /// [`Lost`] if the device is lost while it executes; what follows in the command buffer is then not executed.
-pub fn replay(commands: &[Command], executor: &mut dyn Executor) -> Result<(), Lost> {
+pub(crate) fn replay(commands: &[Command], executor: &mut dyn Executor) -> Result<(), Lost> {
     let mut state = State::default();
     for command in commands {
         step(command, &mut state, executor)?;

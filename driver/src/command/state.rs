@@ -7,46 +7,46 @@ use std::sync::Arc;
 
 /// Bound state. All of it is undefined when a command buffer begins; here "undefined" is `None`.
 #[derive(Clone, Debug, Default)]
-pub struct State {
+pub(crate) struct State {
     /// The graphics pipeline.
-    pub pipeline: Option<Arc<GraphicsPipeline>>,
+    pub(crate) pipeline: Option<Arc<GraphicsPipeline>>,
     /// The vertex buffers by binding.
-    pub vertex_buffers: Vec<Option<VertexBuffer>>,
+    pub(crate) vertex_buffers: Vec<Option<VertexBuffer>>,
     /// The index buffer.
-    pub index_buffer: Option<IndexBuffer>,
+    pub(crate) index_buffer: Option<IndexBuffer>,
     /// Dynamic viewports.
-    pub viewports: Vec<Option<Viewport>>,
+    pub(crate) viewports: Vec<Option<Viewport>>,
     /// Dynamic scissors.
-    pub scissors: Vec<Option<Rect>>,
+    pub(crate) scissors: Vec<Option<Rect>>,
     /// Dynamic blend constants.
-    pub blend_constants: Option<[f32; 4]>,
+    pub(crate) blend_constants: Option<[f32; 4]>,
     /// The camera of Gaussian draws; kept when another pipeline is bound.
-    pub camera: Option<Camera>,
+    pub(crate) camera: Option<Camera>,
 }
 
 impl State {
     /// The viewport in effect: the pipeline's, or the dynamic one.
-    pub fn viewport(&self, pipeline: &GraphicsPipeline) -> Option<Viewport> {
+    pub(crate) fn viewport(&self, pipeline: &GraphicsPipeline) -> Option<Viewport> {
         pipeline
             .viewport
             .or_else(|| self.viewports.first().copied().flatten())
     }
 
     /// The scissor in effect: the pipeline's, or the dynamic one.
-    pub fn scissor(&self, pipeline: &GraphicsPipeline) -> Option<Rect> {
+    pub(crate) fn scissor(&self, pipeline: &GraphicsPipeline) -> Option<Rect> {
         pipeline
             .scissor
             .or_else(|| self.scissors.first().copied().flatten())
     }
 
     /// The vertex buffer bound at `binding`.
-    pub fn vertex_buffer(&self, binding: u32) -> Option<&VertexBuffer> {
+    pub(crate) fn vertex_buffer(&self, binding: u32) -> Option<&VertexBuffer> {
         self.vertex_buffers.get(binding as usize)?.as_ref()
     }
 }
 
 /// Replaces the elements of `slots` from `first` on by `values`, growing it as needed.
-pub fn bind<T: Clone>(slots: &mut Vec<Option<T>>, first: u32, values: &[T]) {
+pub(crate) fn bind<T: Clone>(slots: &mut Vec<Option<T>>, first: u32, values: &[T]) {
     let first = first as usize;
     let end = first + values.len();
     if slots.len() < end {

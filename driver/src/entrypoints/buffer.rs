@@ -1,6 +1,6 @@
 //! Buffers.
 
-use crate::capabilities::memory::ALL_TYPES;
+use crate::capabilities::memory::ALL_TYPE_BITS;
 use crate::error::Error;
 use crate::object::buffer::Buffer;
 use crate::{handle, pnext, pointer};
@@ -31,7 +31,7 @@ crate::entry_points! {
         buffer: vk::Buffer,
         memory_requirements: *mut vk::MemoryRequirements,
     ) {
-        let requirements = handle::get(buffer)?.requirements(ALL_TYPES);
+        let requirements = handle::get(buffer)?.requirements(ALL_TYPE_BITS);
         pointer::output(memory_requirements, requirements)
     }
 
@@ -41,7 +41,7 @@ crate::entry_points! {
         memory_requirements: *mut vk::MemoryRequirements2<'_>,
     ) {
         let buffer = handle::get(pointer::input(info)?.buffer)?;
-        fill_requirements(memory_requirements, buffer.requirements(ALL_TYPES))
+        fill_requirements(memory_requirements, buffer.requirements(ALL_TYPE_BITS))
     }
 
     fn get_device_buffer_memory_requirements(
@@ -51,7 +51,7 @@ crate::entry_points! {
     ) {
         let create_info = pointer::input(pointer::input(info)?.p_create_info)?;
         let buffer = new_buffer(create_info)?;
-        fill_requirements(memory_requirements, buffer.requirements(ALL_TYPES))
+        fill_requirements(memory_requirements, buffer.requirements(ALL_TYPE_BITS))
     }
 }
 

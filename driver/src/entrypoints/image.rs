@@ -2,7 +2,7 @@
 
 use super::buffer::fill_requirements;
 use crate::capabilities::formats;
-use crate::capabilities::memory::ALL_TYPES;
+use crate::capabilities::memory::ALL_TYPE_BITS;
 use crate::error::Error;
 use crate::lower::transfer;
 use crate::object::image::{Image, ImageView};
@@ -35,7 +35,7 @@ crate::entry_points! {
         image: vk::Image,
         memory_requirements: *mut vk::MemoryRequirements,
     ) {
-        let requirements = handle::get(image)?.requirements(ALL_TYPES);
+        let requirements = handle::get(image)?.requirements(ALL_TYPE_BITS);
         pointer::output(memory_requirements, requirements)
     }
 
@@ -45,7 +45,7 @@ crate::entry_points! {
         memory_requirements: *mut vk::MemoryRequirements2<'_>,
     ) {
         let image = handle::get(pointer::input(info)?.image)?;
-        fill_requirements(memory_requirements, image.requirements(ALL_TYPES))
+        fill_requirements(memory_requirements, image.requirements(ALL_TYPE_BITS))
     }
 
     fn get_device_image_memory_requirements(
@@ -55,7 +55,7 @@ crate::entry_points! {
     ) {
         let create_info = pointer::input(pointer::input(info)?.p_create_info)?;
         let image = new_image(create_info)?;
-        fill_requirements(memory_requirements, image.requirements(ALL_TYPES))
+        fill_requirements(memory_requirements, image.requirements(ALL_TYPE_BITS))
     }
 
     /// No image is sparse.

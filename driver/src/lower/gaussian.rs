@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// Why a draw draws nothing: state that it needs is undefined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Undrawn {
+pub(crate) enum Undrawn {
     /// No pipeline.
     #[error("no graphics pipeline is bound")]
     Pipeline,
@@ -40,7 +40,7 @@ pub enum Undrawn {
 ///
 /// # Errors
 /// [`Undrawn`] where bound state that the draw needs is missing.
-pub fn draw(
+pub(crate) fn draw(
     state: &State,
     pipeline: &GraphicsPipeline,
     gaussian: &GaussianPipeline,

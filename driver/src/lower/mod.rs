@@ -1,5 +1,6 @@
 //! Lowers Vulkan's state to the device's packets.
 
-pub mod gaussian;
-pub mod rendering;
-pub mod transfer;
+pub(crate) mod camera;
+pub(crate) mod gaussian;
+pub(crate) mod rendering;
+pub(crate) mod transfer;

@@ -16,6 +16,8 @@ pub(crate) struct Buffer {
     memory: OnceLock<(Arc<Allocation>, u64)>,
 }
 
+crate::objects! { vk::Buffer => Buffer; }
+
 impl Buffer {
     /// A buffer of `size` bytes, not yet bound to memory.
     pub(crate) fn new(size: u64) -> Self {

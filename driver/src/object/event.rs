@@ -6,14 +6,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// An event.
 #[derive(Debug)]
-pub struct Event {
+pub(crate) struct Event {
     signals: Arc<Signals>,
     value: AtomicBool,
 }
 
+crate::objects! { ash::vk::Event => Event; }
+
 impl Event {
     /// An event that is not set.
-    pub fn new(signals: Arc<Signals>) -> Self {
+    pub(crate) fn new(signals: Arc<Signals>) -> Self {
         Self {
             signals,
             value: AtomicBool::new(false),
@@ -21,12 +23,12 @@ impl Event {
     }
 
     /// Whether it is set.
-    pub fn is_set(&self) -> bool {
+    pub(crate) fn is_set(&self) -> bool {
         self.value.load(Ordering::Acquire)
     }
 
     /// Sets or resets it.
-    pub fn set(&self, value: bool) {
+    pub(crate) fn set(&self, value: bool) {
         self.signals
             .change(|| self.value.store(value, Ordering::Release));
     }

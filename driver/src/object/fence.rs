@@ -6,14 +6,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A fence.
 #[derive(Debug)]
-pub struct Fence {
+pub(crate) struct Fence {
     signals: Arc<Signals>,
     signaled: AtomicBool,
 }
 
+crate::objects! { ash::vk::Fence => Fence; }
+
 impl Fence {
     /// A fence, signaled or not.
-    pub fn new(signals: Arc<Signals>, signaled: bool) -> Self {
+    pub(crate) fn new(signals: Arc<Signals>, signaled: bool) -> Self {
         Self {
             signals,
             signaled: AtomicBool::new(signaled),
@@ -21,18 +23,18 @@ impl Fence {
     }
 
     /// Whether it is signaled.
-    pub fn is_signaled(&self) -> bool {
+    pub(crate) fn is_signaled(&self) -> bool {
         self.signaled.load(Ordering::Acquire)
     }
 
     /// Signals it.
-    pub fn signal(&self) {
+    pub(crate) fn signal(&self) {
         self.signals
             .change(|| self.signaled.store(true, Ordering::Release));
     }
 
     /// Makes it unsignaled.
-    pub fn reset(&self) {
+    pub(crate) fn reset(&self) {
         self.signaled.store(false, Ordering::Release);
     }
 }

@@ -4,8 +4,7 @@ use super::buffer;
 use crate::error::Error;
 use ash::vk;
 use simdevice::Allocation;
-use simdevice::image::{self, ImageDesc, SubresourceLayout};
-use simdevice::packet::Aspect;
+use simdevice::image::{self, ImageDesc};
 use std::sync::{Arc, OnceLock};
 
 /// An image.
@@ -15,6 +14,11 @@ pub(crate) struct Image {
     pub(crate) desc: ImageDesc,
     size: u64,
     bound: OnceLock<Arc<image::Image>>,
+}
+
+crate::objects! {
+    vk::Image => Image;
+    vk::ImageView => ImageView;
 }
 
 impl Image {
@@ -79,15 +83,6 @@ impl Image {
         })
     }
 
-    /// Where a subresource lies.
-    pub(crate) fn subresource_layout(
-        &self,
-        aspect: Aspect,
-        level: u32,
-        layer: u32,
-    ) -> Option<SubresourceLayout> {
-        self.desc.subresource(aspect, level, layer)
-    }
 }
 
 /// An image view.

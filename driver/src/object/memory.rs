@@ -48,6 +48,8 @@ pub(crate) struct Memory {
     mapped: AtomicBool,
 }
 
+crate::objects! { ash::vk::DeviceMemory => Memory; }
+
 impl Memory {
     /// Allocates `size` zeroed bytes of `heap`.
     ///

@@ -45,6 +45,11 @@ impl Subpass {
     }
 }
 
+crate::objects! {
+    vk::RenderPass => RenderPass;
+    vk::Framebuffer => Framebuffer;
+}
+
 impl RenderPass {
     /// A render pass.
     ///

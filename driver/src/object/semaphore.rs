@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// A semaphore.
 #[derive(Debug)]
-pub struct Semaphore {
+pub(crate) struct Semaphore {
     signals: Arc<Signals>,
     payload: Payload,
 }
@@ -17,9 +17,11 @@ enum Payload {
     Timeline(AtomicU64),
 }
 
+crate::objects! { ash::vk::Semaphore => Semaphore; }
+
 impl Semaphore {
     /// An unsignaled binary semaphore.
-    pub fn new_binary(signals: Arc<Signals>) -> Self {
+    pub(crate) fn new_binary(signals: Arc<Signals>) -> Self {
         Self {
             signals,
             payload: Payload::Binary(AtomicBool::new(false)),
@@ -27,7 +29,7 @@ impl Semaphore {
     }
 
     /// A timeline semaphore with that value.
-    pub fn new_timeline(signals: Arc<Signals>, value: u64) -> Self {
+    pub(crate) fn new_timeline(signals: Arc<Signals>, value: u64) -> Self {
         Self {
             signals,
             payload: Payload::Timeline(AtomicU64::new(value)),
@@ -35,7 +37,7 @@ impl Semaphore {
     }
 
     /// A timeline semaphore's value; `None` for a binary one.
-    pub fn value(&self) -> Option<u64> {
+    pub(crate) fn value(&self) -> Option<u64> {
         match &self.payload {
             Payload::Binary(_) => None,
             Payload::Timeline(value) => Some(value.load(Ordering::Acquire)),
@@ -43,7 +45,7 @@ impl Semaphore {
     }
 
     /// Signals it; a timeline semaphore gets `value`.
-    pub fn signal(&self, value: u64) {
+    pub(crate) fn signal(&self, value: u64) {
         self.signals.change(|| match &self.payload {
             Payload::Binary(signaled) => signaled.store(true, Ordering::Release),
             // A smaller value is the application's error; a timeline never runs backwards.
@@ -54,7 +56,7 @@ impl Semaphore {
     }
 
     /// Whether a wait for `value` (which a binary semaphore ignores) is over.
-    pub fn is_reached(&self, value: u64) -> bool {
+    pub(crate) fn is_reached(&self, value: u64) -> bool {
         match &self.payload {
             Payload::Binary(signaled) => signaled.load(Ordering::Acquire),
             Payload::Timeline(current) => current.load(Ordering::Acquire) >= value,
@@ -62,7 +64,7 @@ impl Semaphore {
     }
 
     /// Ends a queue's wait: a binary semaphore becomes unsignaled.
-    pub fn consume(&self) {
+    pub(crate) fn consume(&self) {
         if let Payload::Binary(signaled) = &self.payload {
             signaled.store(false, Ordering::Release);
         }

@@ -1,6 +1,7 @@
 //! What hosts and queue threads wait for: fences, semaphores and events of a device share one lock and one
 //! condition, so that waiting for any of several is simple and losing the device wakes everybody.
 
+use crate::error::Error;
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -8,7 +9,7 @@ use std::time::{Duration, Instant};
 ///
 /// Values live in atomics of the objects; they change only inside [`Signals::change`].
 #[derive(Debug, Default)]
-pub struct Signals {
+pub(crate) struct Signals {
     gate: Mutex<()>,
     changed: Condvar,
     lost: OnceLock<String>,
@@ -16,7 +17,7 @@ pub struct Signals {
 
 /// How a wait ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Waited {
+pub(crate) enum Waited {
     /// What was waited for is there.
     Ready,
     /// The time is over.
@@ -32,7 +33,7 @@ impl Signals {
     }
 
     /// Changes values that others may wait for, and wakes them.
-    pub fn change<R>(&self, change: impl FnOnce() -> R) -> R {
+    pub(crate) fn change<R>(&self, change: impl FnOnce() -> R) -> R {
         let guard = self.lock();
         let result = change();
         drop(guard);
@@ -40,27 +41,33 @@ impl Signals {
         result
     }
 
-    /// Marks the device as lost and wakes every waiter. Only the first reason is kept.
-    pub fn lose(&self, reason: String) {
+    /// Marks the device as lost and wakes every waiter. The first reason stays: others follow from it.
+    pub(crate) fn lose(&self, reason: &str) {
+        log::error!("the device is lost: {reason}");
         self.change(|| {
-            // A second reason is a consequence of the first.
-            let _ = self.lost.set(reason);
+            self.lost.get_or_init(|| reason.to_owned());
         });
     }
 
-    /// Why the device was lost, if it was.
-    pub fn lost(&self) -> Option<&str> {
-        self.lost.get().map(String::as_str)
+    /// Fails if the device is lost. Commands that may return `VK_ERROR_DEVICE_LOST` ask first.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`].
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        match self.lost.get() {
+            None => Ok(()),
+            Some(reason) => Err(Error::DeviceLost(reason.clone())),
+        }
     }
 
     /// Waits until `ready`, at most until `deadline` (forever without one).
-    pub fn wait(&self, deadline: Option<Instant>, ready: impl Fn() -> bool) -> Waited {
+    pub(crate) fn wait(&self, deadline: Option<Instant>, ready: impl Fn() -> bool) -> Waited {
         let mut guard = self.lock();
         loop {
             if ready() {
                 return Waited::Ready;
             }
-            if self.lost().is_some() {
+            if self.lost.get().is_some() {
                 return Waited::Lost;
             }
             guard = match deadline {
@@ -84,7 +91,7 @@ impl Signals {
 }
 
 /// The moment `nanoseconds` from now, or `None` where that is beyond what the clock can tell: forever.
-pub fn deadline(nanoseconds: u64) -> Option<Instant> {
+pub(crate) fn deadline(nanoseconds: u64) -> Option<Instant> {
     Instant::now().checked_add(Duration::from_nanos(nanoseconds))
 }
 
@@ -115,9 +122,9 @@ mod tests {
             let signals = signals.clone();
             move || signals.wait(None, || false)
         });
-        signals.lose("a test".into());
+        signals.lose("a test");
         assert_eq!(waiter.join().unwrap(), Waited::Lost);
         assert_eq!(signals.wait(None, || true), Waited::Ready);
-        assert_eq!(signals.lost(), Some("a test"));
+        assert!(signals.check().unwrap_err().to_string().contains("a test"));
     }
 }

@@ -13,13 +13,16 @@ use ash::vk;
 use simdevice::{CommandProcessor, Packet};
 use std::sync::Arc;
 
+/// What a command buffer held when it was submitted.
+pub(crate) type Commands = (Arc<[Command]>, Pending);
+
 /// A batch: semaphores to wait for, command buffers, semaphores to signal; each semaphore with a timeline's value.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {
     /// What is waited for first.
     pub(crate) waits: Vec<(Arc<Semaphore>, u64)>,
     /// What is executed.
-    pub(crate) commands: Vec<(Arc<[Command]>, Pending)>,
+    pub(crate) commands: Vec<Commands>,
     /// What is signaled last.
     pub(crate) signals: Vec<(Arc<Semaphore>, u64)>,
 }

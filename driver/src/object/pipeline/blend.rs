@@ -8,7 +8,7 @@ use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
 ///
 /// # Errors
 /// An [`Error`] for factors and operations that Vulkan does not have, or that take a second source.
-pub fn blend_state(state: &vk::PipelineColorBlendAttachmentState) -> Result<BlendState, Error> {
+pub(crate) fn blend_state(state: &vk::PipelineColorBlendAttachmentState) -> Result<BlendState, Error> {
     let equations = if state.blend_enable == vk::FALSE {
         None
     } else {

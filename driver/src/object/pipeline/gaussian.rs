@@ -1,7 +1,8 @@
 //! Pipelines of the Gaussian list topology.
 
 use super::vertex_input::attribute;
-use super::{GaussianFeatures, GaussianPipeline, GraphicsPipelineInfo, blend};
+use super::{GaussianPipeline, GraphicsPipelineInfo, blend};
+use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
 use ash::vk;
 use gaurast::vk::{
@@ -14,7 +15,7 @@ use simdevice::packet::{BlendState, GaussianOrder, GaussianState};
 use std::sync::Arc;
 
 /// The greatest degree of spherical harmonics that a pipeline may ask for.
-pub const MAX_SPHERICAL_HARMONICS_DEGREE: u32 = 3;
+pub(crate) const MAX_SPHERICAL_HARMONICS_DEGREE: u32 = 3;
 
 const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
 
@@ -22,11 +23,11 @@ impl GaussianPipeline {
     /// Validates and converts the Gaussian part of a pipeline.
     pub(super) fn new(
         info: &GraphicsPipelineInfo,
-        features: &GaussianFeatures,
+        features: &EnabledFeatures,
     ) -> Result<Self, Error> {
         require(
             "gaussianPrimitiveTopology",
-            features.gaussian_primitive_topology,
+            features.has("gaussian_primitive_topology"),
         )?;
         let Some(gaussian) = &info.gaussian else {
             return Err(Error::usage(
@@ -74,12 +75,12 @@ impl GaussianPipeline {
 fn state(
     info: &GraphicsPipelineInfo,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &GaussianFeatures,
+    features: &EnabledFeatures,
 ) -> Result<GaussianState, Error> {
     let opacity_compensated = match gaussian.antialiasing {
         GaussianAntialiasingGAURAST::DILATE => false,
         GaussianAntialiasingGAURAST::OPACITY_COMPENSATED => {
-            require("opacityCompensation", features.opacity_compensation)?;
+            require("opacityCompensation", features.has("opacity_compensation"))?;
             true
         }
         other => return Err(unknown("antialiasing", &other)),
@@ -287,6 +288,16 @@ fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
             "rasterizerDiscardEnable with Gaussians".into(),
         ));
     }
+    if info.alpha_to {
+        return Err(Error::FeatureNotPresent(
+            "alphaToCoverageEnable or alphaToOneEnable with Gaussians".into(),
+        ));
+    }
+    if let Some(state) = info.dynamic.iter().find(|state| !may_be_dynamic(**state)) {
+        return Err(Error::FeatureNotPresent(format!(
+            "the dynamic state {state:?} with Gaussians"
+        )));
+    }
     if info.logic_op {
         return Err(Error::FeatureNotPresent(
             "logicOpEnable (feature logicOp)".into(),
@@ -301,8 +312,35 @@ fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
     Ok(())
 }
 
-fn require(feature: &str, enabled: vk::Bool32) -> Result<(), Error> {
-    if enabled != vk::FALSE {
+/// Whether a Gaussian pipeline takes the state from the command buffer, or has no use for it.
+fn may_be_dynamic(state: vk::DynamicState) -> bool {
+    use vk::DynamicState as S;
+    matches!(
+        state,
+        S::VIEWPORT
+            | S::SCISSOR
+            | S::VIEWPORT_WITH_COUNT
+            | S::SCISSOR_WITH_COUNT
+            | S::BLEND_CONSTANTS
+            | S::VERTEX_INPUT_BINDING_STRIDE
+            | S::LINE_WIDTH
+            | S::DEPTH_BIAS
+            | S::DEPTH_BIAS_ENABLE
+            | S::DEPTH_BOUNDS
+            | S::DEPTH_WRITE_ENABLE
+            | S::DEPTH_COMPARE_OP
+            | S::STENCIL_COMPARE_MASK
+            | S::STENCIL_WRITE_MASK
+            | S::STENCIL_REFERENCE
+            | S::STENCIL_OP
+            | S::CULL_MODE
+            | S::FRONT_FACE
+            | S::PRIMITIVE_TOPOLOGY
+    )
+}
+
+fn require(feature: &str, enabled: bool) -> Result<(), Error> {
+    if enabled {
         return Ok(());
     }
     Err(Error::FeatureNotPresent(format!(

@@ -8,105 +8,106 @@ mod gaussian;
 mod tests;
 mod vertex_input;
 
+use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
 use crate::lower::rendering;
 use ash::vk;
 use gaurast::vk::{
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::packet::{GaussianState, Rect, Viewport};
 use std::sync::Arc;
-pub use vertex_input::AttributeSource;
+pub(crate) use vertex_input::AttributeSource;
 
 /// A graphics pipeline.
 #[derive(Debug)]
-pub struct GraphicsPipeline {
+pub(crate) struct GraphicsPipeline {
     /// What it draws.
-    pub primitive: Primitive,
+    pub(crate) primitive: Primitive,
     /// The viewport, unless it is dynamic.
-    pub viewport: Option<Viewport>,
+    pub(crate) viewport: Option<Viewport>,
     /// The scissor, unless it is dynamic.
-    pub scissor: Option<Rect>,
+    pub(crate) scissor: Option<Rect>,
     /// Whether the blend constants are dynamic.
-    pub dynamic_blend_constants: bool,
+    pub(crate) dynamic_blend_constants: bool,
     /// Whether vertex strides come from `vkCmdBindVertexBuffers2`.
-    pub dynamic_stride: bool,
+    pub(crate) dynamic_stride: bool,
 }
 
 /// What a pipeline draws. Triangles need shader cores, so there is one kind so far.
 #[derive(Debug)]
-pub enum Primitive {
+pub(crate) enum Primitive {
     /// Gaussians with fixed-function projection.
     Gaussian(Box<GaussianPipeline>),
 }
 
 /// The Gaussian part of a pipeline.
 #[derive(Debug)]
-pub struct GaussianPipeline {
+pub(crate) struct GaussianPipeline {
     /// What the device needs to know.
-    pub state: Arc<GaussianState>,
+    pub(crate) state: Arc<GaussianState>,
     /// Where means are read from.
-    pub position: AttributeSource,
+    pub(crate) position: AttributeSource,
     /// Where standard deviations are read from.
-    pub scale: AttributeSource,
+    pub(crate) scale: AttributeSource,
     /// Where quaternions are read from.
-    pub rotation: AttributeSource,
+    pub(crate) rotation: AttributeSource,
     /// Where opacities are read from.
-    pub opacity: AttributeSource,
+    pub(crate) opacity: AttributeSource,
     /// Where the spherical harmonics' coefficients are read from.
-    pub spherical_harmonics: Vec<AttributeSource>,
+    pub(crate) spherical_harmonics: Vec<AttributeSource>,
 }
 
 /// A `VkGraphicsPipelineCreateInfo` with its pointers followed. State that the application may leave out is
 /// empty, `None` or the default.
 #[derive(Debug, Default)]
-pub struct GraphicsPipelineInfo<'a> {
+pub(crate) struct GraphicsPipelineInfo<'a> {
     /// The shader stages.
-    pub stages: &'a [vk::PipelineShaderStageCreateInfo<'a>],
+    pub(crate) stages: &'a [vk::PipelineShaderStageCreateInfo<'a>],
     /// Vertex bindings.
-    pub bindings: &'a [vk::VertexInputBindingDescription],
+    pub(crate) bindings: &'a [vk::VertexInputBindingDescription],
     /// Vertex attributes.
-    pub attributes: &'a [vk::VertexInputAttributeDescription],
+    pub(crate) attributes: &'a [vk::VertexInputAttributeDescription],
     /// The topology.
-    pub topology: vk::PrimitiveTopology,
+    pub(crate) topology: vk::PrimitiveTopology,
     /// Whether an index restarts the primitive.
-    pub primitive_restart: bool,
+    pub(crate) primitive_restart: bool,
     /// How many viewports; one each is given unless they are dynamic.
-    pub viewport_count: u32,
+    pub(crate) viewport_count: u32,
     /// Viewports, unless dynamic.
-    pub viewports: &'a [vk::Viewport],
+    pub(crate) viewports: &'a [vk::Viewport],
     /// Scissors, unless dynamic.
-    pub scissors: &'a [vk::Rect2D],
+    pub(crate) scissors: &'a [vk::Rect2D],
     /// Rasterization state.
-    pub rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
+    pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
     /// Samples per pixel.
-    pub samples: vk::SampleCountFlags,
+    pub(crate) samples: vk::SampleCountFlags,
     /// Depth and stencil state.
-    pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'a>,
+    pub(crate) depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'a>,
     /// Whether the logic operation is enabled.
-    pub logic_op: bool,
+    pub(crate) logic_op: bool,
     /// Blend state by colour attachment.
-    pub blend: &'a [vk::PipelineColorBlendAttachmentState],
+    pub(crate) blend: &'a [vk::PipelineColorBlendAttachmentState],
     /// Blend constants.
-    pub blend_constants: [f32; 4],
+    pub(crate) blend_constants: [f32; 4],
     /// What is dynamic.
-    pub dynamic: &'a [vk::DynamicState],
+    pub(crate) dynamic: &'a [vk::DynamicState],
     /// The colour formats of the subpass; undefined where the attachment is unused.
-    pub color_formats: Vec<vk::Format>,
+    pub(crate) color_formats: Vec<vk::Format>,
+    /// Whether alpha makes coverage, or becomes one.
+    pub(crate) alpha_to: bool,
     /// The extension's structure.
-    pub gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
+    pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
 }
 
-/// The extension's features, as enabled on the device.
-pub type GaussianFeatures = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'static>;
+crate::objects! { vk::Pipeline => GraphicsPipeline; }
 
 impl GraphicsPipeline {
     /// Creates a pipeline.
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
-    pub fn new(info: &GraphicsPipelineInfo, features: &GaussianFeatures) -> Result<Self, Error> {
+    pub(crate) fn new(info: &GraphicsPipelineInfo, features: &EnabledFeatures) -> Result<Self, Error> {
         let is_dynamic = |state| info.dynamic.contains(&state);
         let primitive = match info.topology {
             PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST => {
@@ -123,13 +124,15 @@ impl GraphicsPipeline {
             primitive,
             viewport: fixed(
                 "viewport",
-                is_dynamic(vk::DynamicState::VIEWPORT),
+                is_dynamic(vk::DynamicState::VIEWPORT)
+                    || is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
                 info.viewports,
             )?
             .map(viewport),
             scissor: fixed(
                 "scissor",
-                is_dynamic(vk::DynamicState::SCISSOR),
+                is_dynamic(vk::DynamicState::SCISSOR)
+                    || is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
                 info.scissors,
             )?
             .map(rendering::rect),
@@ -151,8 +154,21 @@ fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, 
     }
 }
 
+/// A pipeline's layout. No pipeline reads descriptors or push constants yet, so there is nothing to keep.
+#[derive(Debug)]
+pub(crate) struct PipelineLayout;
+
+/// A pipeline cache. Pipelines are cheap to make, so it stays empty.
+#[derive(Debug)]
+pub(crate) struct PipelineCache;
+
+crate::objects! {
+    vk::PipelineLayout => PipelineLayout;
+    vk::PipelineCache => PipelineCache;
+}
+
 /// A viewport for the device.
-pub fn viewport(viewport: vk::Viewport) -> Viewport {
+pub(crate) fn viewport(viewport: vk::Viewport) -> Viewport {
     Viewport {
         x: viewport.x,
         y: viewport.y,

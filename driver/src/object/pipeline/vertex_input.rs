@@ -8,24 +8,24 @@ use simdevice::Format;
 
 /// Where a pipeline reads an attribute from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AttributeSource {
+pub(crate) struct AttributeSource {
     /// The vertex buffer binding.
-    pub binding: u32,
+    pub(crate) binding: u32,
     /// Bytes from one vertex to the next.
-    pub stride: u32,
+    pub(crate) stride: u32,
     /// Bytes from the vertex's start to the attribute.
-    pub offset: u32,
+    pub(crate) offset: u32,
     /// How it is stored.
-    pub format: Format,
+    pub(crate) format: Format,
     /// `Some(1)` if it advances by instance, `None` if by vertex.
-    pub instance_divisor: Option<u32>,
+    pub(crate) instance_divisor: Option<u32>,
 }
 
 /// Finds the attribute at `location`, which the extension calls `name` and needs `components` of.
 ///
 /// # Errors
 /// An [`Error`] if the location, its binding or its format won't do.
-pub fn attribute(
+pub(crate) fn attribute(
     info: &GraphicsPipelineInfo,
     name: &str,
     location: u32,
