@@ -57,6 +57,18 @@ commands! {
         PFN_vkDestroyInstance = instance::destroy_instance;
         PFN_vkEnumeratePhysicalDevices = instance::enumerate_physical_devices;
     }
+    PhysicalDevice, Core(API_VERSION_1_0) => {
+        PFN_vkGetPhysicalDeviceFeatures = physical_device::get_physical_device_features;
+        PFN_vkGetPhysicalDeviceFormatProperties = physical_device::get_physical_device_format_properties;
+        PFN_vkGetPhysicalDeviceImageFormatProperties = physical_device::get_physical_device_image_format_properties;
+        PFN_vkGetPhysicalDeviceProperties = physical_device::get_physical_device_properties;
+        PFN_vkGetPhysicalDeviceQueueFamilyProperties = physical_device::get_physical_device_queue_family_properties;
+        PFN_vkGetPhysicalDeviceMemoryProperties = physical_device::get_physical_device_memory_properties;
+        PFN_vkCreateDevice = device::create_device;
+        PFN_vkEnumerateDeviceExtensionProperties = physical_device::enumerate_device_extension_properties;
+        PFN_vkEnumerateDeviceLayerProperties = physical_device::enumerate_device_layer_properties;
+        PFN_vkGetPhysicalDeviceSparseImageFormatProperties = physical_device::get_physical_device_sparse_image_format_properties;
+    }
     Device, Core(API_VERSION_1_0) => {
         PFN_vkGetDeviceProcAddr = device::get_device_proc_addr;
         PFN_vkDestroyDevice = device::destroy_device;
@@ -186,6 +198,18 @@ commands! {
     Instance, Core(API_VERSION_1_1) => {
         PFN_vkEnumeratePhysicalDeviceGroups = instance::enumerate_physical_device_groups;
     }
+    PhysicalDevice, Core(API_VERSION_1_1) => {
+        PFN_vkGetPhysicalDeviceFeatures2 = physical_device::get_physical_device_features2;
+        PFN_vkGetPhysicalDeviceProperties2 = physical_device::get_physical_device_properties2;
+        PFN_vkGetPhysicalDeviceFormatProperties2 = physical_device::get_physical_device_format_properties2;
+        PFN_vkGetPhysicalDeviceImageFormatProperties2 = physical_device::get_physical_device_image_format_properties2;
+        PFN_vkGetPhysicalDeviceQueueFamilyProperties2 = physical_device::get_physical_device_queue_family_properties2;
+        PFN_vkGetPhysicalDeviceMemoryProperties2 = physical_device::get_physical_device_memory_properties2;
+        PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 = physical_device::get_physical_device_sparse_image_format_properties2;
+        PFN_vkGetPhysicalDeviceExternalBufferProperties = physical_device::get_physical_device_external_buffer_properties;
+        PFN_vkGetPhysicalDeviceExternalFenceProperties = physical_device::get_physical_device_external_fence_properties;
+        PFN_vkGetPhysicalDeviceExternalSemaphoreProperties = physical_device::get_physical_device_external_semaphore_properties;
+    }
     Device, Core(API_VERSION_1_1) => {
         PFN_vkBindBufferMemory2 = memory::bind_buffer_memory2;
         PFN_vkBindImageMemory2 = memory::bind_image_memory2;
@@ -218,6 +242,9 @@ commands! {
         PFN_vkGetBufferDeviceAddress = unsupported::get_buffer_device_address;
         PFN_vkGetBufferOpaqueCaptureAddress = unsupported::get_buffer_opaque_capture_address;
         PFN_vkGetDeviceMemoryOpaqueCaptureAddress = unsupported::get_device_memory_opaque_capture_address;
+    }
+    PhysicalDevice, Core(API_VERSION_1_3) => {
+        PFN_vkGetPhysicalDeviceToolProperties = physical_device::get_physical_device_tool_properties;
     }
     Device, Core(API_VERSION_1_3) => {
         PFN_vkCreatePrivateDataSlot = unsupported::create_private_data_slot;
@@ -274,6 +301,20 @@ commands! {
         PFN_vkCmdInsertDebugUtilsLabelEXT = debug_utils::cmd_insert_debug_utils_label_ext;
     }
 
+    PhysicalDevice, InstanceExtension(GET_PHYSICAL_DEVICE_PROPERTIES2) => {
+        PFN_vkGetPhysicalDeviceFeatures2 as "vkGetPhysicalDeviceFeatures2KHR" = physical_device::get_physical_device_features2;
+        PFN_vkGetPhysicalDeviceProperties2 as "vkGetPhysicalDeviceProperties2KHR" = physical_device::get_physical_device_properties2;
+        PFN_vkGetPhysicalDeviceFormatProperties2 as "vkGetPhysicalDeviceFormatProperties2KHR" = physical_device::get_physical_device_format_properties2;
+        PFN_vkGetPhysicalDeviceImageFormatProperties2 as "vkGetPhysicalDeviceImageFormatProperties2KHR" = physical_device::get_physical_device_image_format_properties2;
+        PFN_vkGetPhysicalDeviceQueueFamilyProperties2 as "vkGetPhysicalDeviceQueueFamilyProperties2KHR" = physical_device::get_physical_device_queue_family_properties2;
+        PFN_vkGetPhysicalDeviceMemoryProperties2 as "vkGetPhysicalDeviceMemoryProperties2KHR" = physical_device::get_physical_device_memory_properties2;
+        PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 as "vkGetPhysicalDeviceSparseImageFormatProperties2KHR" = physical_device::get_physical_device_sparse_image_format_properties2;
+    }
+
+    PhysicalDevice, DeviceExtension(PERFORMANCE_QUERY) => {
+        PFN_vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR = physical_device::enumerate_physical_device_queue_family_performance_query_counters_khr;
+        PFN_vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR = physical_device::get_physical_device_queue_family_performance_query_passes_khr;
+    }
     Device, DeviceExtension(PERFORMANCE_QUERY) => {
         PFN_vkAcquireProfilingLockKHR = device::acquire_profiling_lock_khr;
         PFN_vkReleaseProfilingLockKHR = device::release_profiling_lock_khr;
