@@ -327,10 +327,10 @@ mod tests {
         let fragments = [None, Some([0.001, 0.0, 0.0, 0.001]), None];
         over.blend_row(&mut row, fragments.into_iter());
         assert_eq!(row, [background; 3], "less than half a code");
-        let fragments = [Some([0.5; 4]), None, None];
+        let fragments = [Some([0.25; 4]), None, None];
         over.blend_row(&mut row, fragments.into_iter());
-        // 128 = round(127.5 + 0.5 x 10) to even is 132.5 -> 132.
-        assert_eq!(Format::R8G8B8A8Unorm.encode(row[0])[..4], [132, 138, 142, 255]);
+        // In codes: 63.75 + 0.75 d = 71.25, 78.75, 86.25, 255.
+        assert_eq!(Format::R8G8B8A8Unorm.encode(row[0])[..4], [71, 79, 86, 255]);
         assert_eq!(row[1..], [background; 2]);
     }
 }
