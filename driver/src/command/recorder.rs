@@ -28,7 +28,6 @@ pub(crate) struct Usage {
 }
 
 /// The pass that is being recorded.
-#[derive(Debug)]
 enum Pass {
     /// A render pass, at one of its subpasses.
     RenderPass {
@@ -43,7 +42,6 @@ enum Pass {
 }
 
 /// What a command buffer records into.
-#[derive(Debug)]
 pub(crate) struct Recorder {
     status: Status,
     usage: Usage,
@@ -204,7 +202,10 @@ impl Recorder {
         self.finished.clone().ok_or_else(|| {
             Error::usage(
                 "VUID-vkCmdExecuteCommands-pCommandBuffers-00089",
-                format!("a secondary command buffer is {:?}, not executable", self.status),
+                format!(
+                    "a secondary command buffer is {:?}, not executable",
+                    self.status
+                ),
             )
         })
     }

@@ -14,7 +14,7 @@ pub(crate) trait Executor {
     ///
     /// # Errors
     /// [`Lost`] if the device cannot go on.
-    fn execute(&mut self, packet: Packet) -> Result<(), Lost>;
+    fn execute(&mut self, packet: &Packet) -> Result<(), Lost>;
 
     /// Waits until `event` is set.
     ///
@@ -51,7 +51,7 @@ pub(crate) fn replay(commands: &[Command], executor: &mut dyn Executor) -> Resul
 
 fn step(command: &Command, state: &mut State, executor: &mut dyn Executor) -> Result<(), Lost> {
     match command {
-        Command::Packet(packet) => executor.execute(packet.clone())?,
+        Command::Packet(packet) => executor.execute(packet)?,
         Command::BindPipeline(pipeline) => state.pipeline = Some(pipeline.clone()),
         Command::BindVertexBuffers { first, buffers } => {
             bind(&mut state.vertex_buffers, *first, buffers);
@@ -71,7 +71,7 @@ fn step(command: &Command, state: &mut State, executor: &mut dyn Executor) -> Re
         }
         Command::CopyQueryResults(copy) => {
             for packet in executor.query_results(copy)? {
-                executor.execute(packet)?;
+                executor.execute(&packet)?;
             }
         }
         Command::Execute(secondaries) => {
@@ -97,7 +97,7 @@ fn draw(state: &State, numbers: &Draw, executor: &mut dyn Executor) -> Result<()
     };
     match packets {
         Ok(packets) => packets
-            .into_iter()
+            .iter()
             .try_for_each(|packet| executor.execute(packet)),
         Err(reason) => {
             executor.report(&format!("a draw draws nothing: {reason}"));

@@ -81,7 +81,7 @@ unsafe fn new_buffer(info: &vk::BufferCreateInfo<'_>) -> Result<Buffer, Error> {
             "the size of a buffer is 0",
         ));
     }
-    Buffer::new(info.size)
+    Ok(Buffer::new(info.size))
 }
 
 /// Writes requirements and, where asked for, that no dedicated allocation is wanted.

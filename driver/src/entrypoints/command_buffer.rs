@@ -137,8 +137,7 @@ unsafe fn inherited_formats(
                     )
                 })?
         } else {
-            let rendering =
-                pnext::find::<vk::CommandBufferInheritanceRenderingInfo>(info.p_next);
+            let rendering = pnext::find::<vk::CommandBufferInheritanceRenderingInfo>(info.p_next);
             match rendering {
                 None => Vec::new(),
                 Some(rendering) => pointer::slice(

@@ -180,8 +180,8 @@ unsafe fn new_image(info: &vk::ImageCreateInfo<'_>) -> Result<Image, Error> {
             ));
         }
     };
-    let format = formats::device_format(info.format)
-        .ok_or_else(|| unsupported_format(info.format))?;
+    let format =
+        formats::device_format(info.format).ok_or_else(|| unsupported_format(info.format))?;
     let extent = info.extent;
     Image::new(ImageDesc {
         kind,

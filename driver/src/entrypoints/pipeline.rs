@@ -173,7 +173,8 @@ unsafe fn gather<'a>(
     // SAFETY: the caller's promise.
     unsafe {
         gathered.stages = pointer::slice(info.p_stages, info.stage_count)?;
-        gathered.gaussian = pnext::find::<PipelineGaussianStateCreateInfoGAURAST>(info.p_next).copied();
+        gathered.gaussian =
+            pnext::find::<PipelineGaussianStateCreateInfoGAURAST>(info.p_next).copied();
         gathered.color_formats = color_formats(info)?;
         if let Some(state) = pointer::optional(info.p_vertex_input_state) {
             gathered.bindings = pointer::slice(

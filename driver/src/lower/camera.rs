@@ -101,7 +101,10 @@ mod tests {
         let lowered = camera(&good()).unwrap();
         assert_eq!(lowered.focal_length, [500.0, 510.0]);
         assert_eq!(lowered.principal_point, [320.0, 240.0]);
-        assert_eq!((lowered.near_plane, lowered.far_plane), (0.2, f32::INFINITY));
+        assert_eq!(
+            (lowered.near_plane, lowered.far_plane),
+            (0.2, f32::INFINITY)
+        );
     }
 
     #[test]

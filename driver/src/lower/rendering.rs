@@ -80,7 +80,7 @@ fn store(op: vk::AttachmentStoreOp) -> Result<StoreOp, Error> {
 }
 
 /// A render pass that has begun, with what it renders to.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct BegunPass {
     /// The render pass.
     pub(crate) render_pass: Arc<RenderPass>,
@@ -180,7 +180,7 @@ impl AttachmentDescription {
 }
 
 /// An attachment of dynamic rendering.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct DynamicAttachment {
     /// What is rendered to.
     pub(crate) view: Arc<ImageView>,
@@ -193,7 +193,7 @@ pub(crate) struct DynamicAttachment {
 }
 
 /// Dynamic rendering.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub(crate) struct DynamicRendering {
     /// Whether it suspends or resumes.
     pub(crate) flags: vk::RenderingFlags,
@@ -235,7 +235,9 @@ impl DynamicRendering {
             load: if self.flags.contains(vk::RenderingFlags::RESUMING) {
                 LoadOp::Load
             } else {
-                load(attachment.load, || clear_value(format, attachment.clear_value))?
+                load(attachment.load, || {
+                    clear_value(format, attachment.clear_value)
+                })?
             },
             store: if self.flags.contains(vk::RenderingFlags::SUSPENDING) {
                 StoreOp::Store

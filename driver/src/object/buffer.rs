@@ -37,7 +37,12 @@ impl Buffer {
     /// # Errors
     /// [`Error::Usage`] if it is bound already or does not fit.
     pub(crate) fn bind(&self, memory: Arc<Allocation>, offset: u64) -> Result<(), Error> {
-        fits("VUID-vkBindBufferMemory-size-01037", &memory, offset, self.size)?;
+        fits(
+            "VUID-vkBindBufferMemory-size-01037",
+            &memory,
+            offset,
+            self.size,
+        )?;
         self.memory.set((memory, offset)).map_err(|_| {
             Error::usage(
                 "VUID-vkBindBufferMemory-buffer-07459",

@@ -55,8 +55,12 @@ impl Device {
             queues: OnceLock::new(),
         });
         let start = |_| {
-            let processor = CommandProcessor {};
-            Queue::start(Arc::downgrade(&device), Arc::clone(&device.signals), processor)
+            let processor = CommandProcessor::new(Arc::clone(&device.simulated));
+            Queue::start(
+                Arc::downgrade(&device),
+                Arc::clone(&device.signals),
+                processor,
+            )
         };
         let queues: Vec<_> = (0..queue_count).map(start).collect::<Result<_, _>>()?;
         device

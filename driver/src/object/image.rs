@@ -82,7 +82,6 @@ impl Image {
             )
         })
     }
-
 }
 
 /// An image view.

@@ -90,7 +90,7 @@ impl QueueExecutor<'_> {
 }
 
 impl Executor for QueueExecutor<'_> {
-    fn execute(&mut self, packet: Packet) -> Result<(), Lost> {
+    fn execute(&mut self, packet: &Packet) -> Result<(), Lost> {
         self.processor
             .execute(packet)
             .map_err(|error| Lost(error.to_string()))

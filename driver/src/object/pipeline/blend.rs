@@ -8,7 +8,9 @@ use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
 ///
 /// # Errors
 /// An [`Error`] for factors and operations that Vulkan does not have, or that take a second source.
-pub(crate) fn blend_state(state: &vk::PipelineColorBlendAttachmentState) -> Result<BlendState, Error> {
+pub(crate) fn blend_state(
+    state: &vk::PipelineColorBlendAttachmentState,
+) -> Result<BlendState, Error> {
     let equations = if state.blend_enable == vk::FALSE {
         None
     } else {
@@ -82,7 +84,9 @@ fn operation(op: vk::BlendOp) -> Result<BlendOp, Error> {
         vk::BlendOp::MIN => BlendOp::Min,
         vk::BlendOp::MAX => BlendOp::Max,
         other => {
-            return Err(Error::FeatureNotPresent(format!("blend operation {other:?}")));
+            return Err(Error::FeatureNotPresent(format!(
+                "blend operation {other:?}"
+            )));
         }
     })
 }

@@ -212,7 +212,11 @@ macro_rules! named {
     ($name:literal) => {
         (
             $name,
-            concat!("VUID-VkPipelineGaussianStateCreateInfoGAURAST-", $name, "-value"),
+            concat!(
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-",
+                $name,
+                "-value"
+            ),
         )
     };
 }

@@ -107,7 +107,10 @@ impl GraphicsPipeline {
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
-    pub(crate) fn new(info: &GraphicsPipelineInfo, features: &EnabledFeatures) -> Result<Self, Error> {
+    pub(crate) fn new(
+        info: &GraphicsPipelineInfo,
+        features: &EnabledFeatures,
+    ) -> Result<Self, Error> {
         let is_dynamic = |state| info.dynamic.contains(&state);
         let primitive = match info.topology {
             PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST => {

@@ -50,7 +50,10 @@ pub(crate) fn attribute(
             attribute.binding
         ));
     };
-    let Some(format) = formats::vertex_format(attribute.format) else {
+    let features = formats::properties(attribute.format).buffer_features;
+    let format = formats::device_format(attribute.format)
+        .filter(|_| features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
+    let Some(format) = format else {
         return refuse(format!(
             "whose format {:?} this device does not read as a vertex attribute",
             attribute.format
