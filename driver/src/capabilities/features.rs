@@ -12,6 +12,14 @@ const SUPPORTED: &[&str] = &[
     // Core 1.0.
     "full_draw_index_uint32",
     "robust_buffer_access",
+    "independent_blend",
+    "multi_draw_indirect",
+    "draw_indirect_first_instance",
+    // Core 1.2.
+    "host_query_reset",
+    "imageless_framebuffer",
+    "separate_depth_stencil_layouts",
+    "timeline_semaphore",
     // Core 1.3.
     "dynamic_rendering",
     "synchronization2",
