@@ -177,3 +177,63 @@ pub(crate) unsafe fn destroy<H: Handle>(handle: H) -> Result<Option<Arc<H::Objec
 pub fn live_handles() -> usize {
     LIVE.load(Ordering::Relaxed)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object::debug_messenger::DebugMessenger;
+
+    fn messenger() -> Arc<DebugMessenger> {
+        Arc::new(DebugMessenger::new(
+            &vk::DebugUtilsMessengerCreateInfoEXT::default(),
+        ))
+    }
+
+    fn is_invalid<T>(result: Result<T, Error>) -> bool {
+        matches!(result, Err(Error::InvalidHandle { .. }))
+    }
+
+    #[test]
+    fn a_dispatchable_handle_begins_with_the_loaders_word() {
+        let instance = create(Instance::new(0, &[]).unwrap());
+        let pointer = vk::Handle::as_raw(instance) as usize as *const usize;
+        // SAFETY: the handle is live and points at a `Slot`, whose first word this is.
+        assert_eq!(unsafe { pointer.read() }, 0x01CD_C0DE);
+        // SAFETY: the handle is live and not used again.
+        assert!(unsafe { destroy(instance) }.unwrap().is_some());
+    }
+
+    #[test]
+    fn a_handle_owns_its_object_until_it_is_destroyed() {
+        let object = messenger();
+        let handle = create(Arc::clone(&object));
+        // SAFETY: the handle is live.
+        let found = unsafe { get(handle) }.unwrap();
+        assert!(Arc::ptr_eq(found, &object));
+        assert_eq!(Arc::strong_count(&object), 2);
+        // SAFETY: the handle is live and not used again.
+        drop(unsafe { destroy(handle) }.unwrap());
+        assert_eq!(Arc::strong_count(&object), 1);
+    }
+
+    #[test]
+    fn wrong_handles_are_refused() {
+        let handle = create(messenger());
+        let raw = vk::Handle::as_raw(handle);
+        // SAFETY: the handle is live, though its type is another; null and odd addresses aren't followed.
+        unsafe {
+            assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(raw))));
+            assert!(is_invalid(destroy(<vk::Device as vk::Handle>::from_raw(
+                raw
+            ))));
+            assert!(is_invalid(get(vk::Device::null())));
+            assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(
+                raw + 1
+            ))));
+            assert!(is_invalid(get_all(&[vk::Device::null()])));
+            assert!(get_optional(vk::Device::null()).unwrap().is_none());
+            assert!(destroy(vk::Device::null()).unwrap().is_none());
+            assert!(destroy(handle).unwrap().is_some());
+        }
+    }
+}
