@@ -238,6 +238,12 @@ crate::entry_points! {
         command_buffer_count: u32,
         command_buffers: *const vk::CommandBuffer,
     ) {
+        if handle::get(command_buffer)?.is_secondary() {
+            return Err(Error::usage(
+                "VUID-vkCmdExecuteCommands-bufferlevel",
+                "a secondary command buffer executes others",
+            ));
+        }
         record(command_buffer, |recorder| {
             let secondaries = pointer::slice(command_buffers, command_buffer_count)?;
             let mut contents = Vec::with_capacity(secondaries.len());

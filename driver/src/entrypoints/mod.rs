@@ -18,6 +18,7 @@ pub(crate) mod command;
 pub(crate) mod command_buffer;
 pub(crate) mod debug_utils;
 pub(crate) mod device;
+pub(crate) mod dynamic_state;
 pub(crate) mod image;
 pub(crate) mod instance;
 pub(crate) mod memory;

@@ -81,19 +81,12 @@ unsupported! {
     fn allocate_descriptor_sets(device: vk::Device, allocate_info: *const vk::DescriptorSetAllocateInfo<'_>, descriptor_sets: *mut vk::DescriptorSet) -> vk::Result;
     fn free_descriptor_sets(device: vk::Device, descriptor_pool: vk::DescriptorPool, descriptor_set_count: u32, descriptor_sets: *const vk::DescriptorSet) -> vk::Result;
     fn update_descriptor_sets(device: vk::Device, descriptor_write_count: u32, descriptor_writes: *const vk::WriteDescriptorSet<'_>, descriptor_copy_count: u32, descriptor_copies: *const vk::CopyDescriptorSet<'_>);
-    fn cmd_set_line_width(command_buffer: vk::CommandBuffer, line_width: f32);
-    fn cmd_set_depth_bias(command_buffer: vk::CommandBuffer, depth_bias_constant_factor: f32, depth_bias_clamp: f32, depth_bias_slope_factor: f32);
-    fn cmd_set_depth_bounds(command_buffer: vk::CommandBuffer, min_depth_bounds: f32, max_depth_bounds: f32);
-    fn cmd_set_stencil_compare_mask(command_buffer: vk::CommandBuffer, face_mask: vk::StencilFaceFlags, compare_mask: u32);
-    fn cmd_set_stencil_write_mask(command_buffer: vk::CommandBuffer, face_mask: vk::StencilFaceFlags, write_mask: u32);
-    fn cmd_set_stencil_reference(command_buffer: vk::CommandBuffer, face_mask: vk::StencilFaceFlags, reference: u32);
     fn cmd_bind_descriptor_sets(command_buffer: vk::CommandBuffer, pipeline_bind_point: vk::PipelineBindPoint, layout: vk::PipelineLayout, first_set: u32, descriptor_set_count: u32, descriptor_sets: *const vk::DescriptorSet, dynamic_offset_count: u32, dynamic_offsets: *const u32);
     fn cmd_dispatch(command_buffer: vk::CommandBuffer, group_count_x: u32, group_count_y: u32, group_count_z: u32);
     fn cmd_dispatch_indirect(command_buffer: vk::CommandBuffer, buffer: vk::Buffer, offset: vk::DeviceSize);
     fn cmd_blit_image(command_buffer: vk::CommandBuffer, src_image: vk::Image, src_image_layout: vk::ImageLayout, dst_image: vk::Image, dst_image_layout: vk::ImageLayout, region_count: u32, regions: *const vk::ImageBlit, filter: vk::Filter);
     fn cmd_resolve_image(command_buffer: vk::CommandBuffer, src_image: vk::Image, src_image_layout: vk::ImageLayout, dst_image: vk::Image, dst_image_layout: vk::ImageLayout, region_count: u32, regions: *const vk::ImageResolve);
     fn cmd_push_constants(command_buffer: vk::CommandBuffer, layout: vk::PipelineLayout, stage_flags: vk::ShaderStageFlags, offset: u32, size: u32, values: *const c_void);
-    fn cmd_set_device_mask(command_buffer: vk::CommandBuffer, device_mask: u32);
     fn cmd_dispatch_base(command_buffer: vk::CommandBuffer, base_group_x: u32, base_group_y: u32, base_group_z: u32, group_count_x: u32, group_count_y: u32, group_count_z: u32);
     fn create_sampler_ycbcr_conversion(device: vk::Device, create_info: *const vk::SamplerYcbcrConversionCreateInfo<'_>, allocator: *const vk::AllocationCallbacks<'_>, ycbcr_conversion: *mut vk::SamplerYcbcrConversion) -> vk::Result;
     fn destroy_sampler_ycbcr_conversion(device: vk::Device, ycbcr_conversion: vk::SamplerYcbcrConversion, allocator: *const vk::AllocationCallbacks<'_>);
@@ -108,16 +101,4 @@ unsupported! {
     fn get_device_memory_opaque_capture_address(device: vk::Device, info: *const vk::DeviceMemoryOpaqueCaptureAddressInfo<'_>) -> u64;
     fn cmd_blit_image2(command_buffer: vk::CommandBuffer, blit_image_info: *const vk::BlitImageInfo2<'_>);
     fn cmd_resolve_image2(command_buffer: vk::CommandBuffer, resolve_image_info: *const vk::ResolveImageInfo2<'_>);
-    fn cmd_set_cull_mode(command_buffer: vk::CommandBuffer, cull_mode: vk::CullModeFlags);
-    fn cmd_set_front_face(command_buffer: vk::CommandBuffer, front_face: vk::FrontFace);
-    fn cmd_set_primitive_topology(command_buffer: vk::CommandBuffer, primitive_topology: vk::PrimitiveTopology);
-    fn cmd_set_depth_test_enable(command_buffer: vk::CommandBuffer, depth_test_enable: vk::Bool32);
-    fn cmd_set_depth_write_enable(command_buffer: vk::CommandBuffer, depth_write_enable: vk::Bool32);
-    fn cmd_set_depth_compare_op(command_buffer: vk::CommandBuffer, depth_compare_op: vk::CompareOp);
-    fn cmd_set_depth_bounds_test_enable(command_buffer: vk::CommandBuffer, depth_bounds_test_enable: vk::Bool32);
-    fn cmd_set_stencil_test_enable(command_buffer: vk::CommandBuffer, stencil_test_enable: vk::Bool32);
-    fn cmd_set_stencil_op(command_buffer: vk::CommandBuffer, face_mask: vk::StencilFaceFlags, fail_op: vk::StencilOp, pass_op: vk::StencilOp, depth_fail_op: vk::StencilOp, compare_op: vk::CompareOp);
-    fn cmd_set_rasterizer_discard_enable(command_buffer: vk::CommandBuffer, rasterizer_discard_enable: vk::Bool32);
-    fn cmd_set_depth_bias_enable(command_buffer: vk::CommandBuffer, depth_bias_enable: vk::Bool32);
-    fn cmd_set_primitive_restart_enable(command_buffer: vk::CommandBuffer, primitive_restart_enable: vk::Bool32);
 }

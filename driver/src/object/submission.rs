@@ -48,8 +48,15 @@ impl Submission {
             instance: &self.instance,
         };
         for batch in self.batches {
-            if let Err(Lost(reason)) = execute_batch(batch, &mut executor) {
-                self.signals.lose(&reason);
+            if let Err(lost) = execute_batch(batch, &mut executor) {
+                let Lost(reason) = &lost;
+                self.signals.lose(reason);
+                self.instance.report(
+                    vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                    vk::DebugUtilsMessageTypeFlagsEXT::GENERAL,
+                    "GAURAST-device-lost",
+                    &lost.to_string(),
+                );
                 return;
             }
         }
