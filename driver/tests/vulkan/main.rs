@@ -1,0 +1,7 @@
+//! The driver as an application sees it: `ash` over the embedded door.
+//!
+//! `unsafe` here has one reason throughout: these are Vulkan calls, and each test follows Vulkan's valid usage or
+//! breaks it in the one way that it is about, which the driver must survive.
+
+mod gaussian_draws;
+mod gpu;
