@@ -5,8 +5,10 @@
 //! +x right, +y **down**, +z forward. PLY, compressed PLY and `.splat` files are kept as they are;
 //! SPZ files, which are right-up-back, are turned half around x.
 
+mod benchmark;
 mod error;
 mod format;
+mod generate;
 
 mod ply;
 mod splat;
@@ -20,6 +22,7 @@ use bytemuck::{Pod, Zeroable};
 
 pub use error::{Place, Reason, SceneError};
 use format::Input;
+pub use generate::DEFAULT_COUNT;
 
 /// The value of the constant spherical harmonic, 1 / (2 sqrt(pi)).
 pub(crate) const SH_C0: f64 = 0.282_094_791_773_878_14;
