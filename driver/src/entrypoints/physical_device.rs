@@ -1,0 +1,1 @@
+//! Physical devices: what they can do.

@@ -1,0 +1,150 @@
+//! Logical devices.
+
+use crate::capabilities::features::EnabledFeatures;
+use crate::dispatch::Enabled;
+use crate::error::Error;
+use crate::handle;
+use crate::object::instance::Instance;
+use crate::object::queue::Queue;
+use ash::vk;
+use simdevice::CommandProcessor;
+use std::ffi::CStr;
+use std::sync::{Arc, OnceLock};
+
+/// Whether a device is lost, and why. Shared with its queues' threads.
+#[derive(Debug, Default)]
+pub(crate) struct Loss(OnceLock<String>);
+
+impl Loss {
+    /// Marks the device as lost; the first reason stays.
+    pub(crate) fn lose(&self, reason: &str) {
+        log::error!("the device is lost: {reason}");
+        self.0.get_or_init(|| reason.to_owned());
+    }
+
+    /// Fails if the device is lost.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`].
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        match self.0.get() {
+            None => Ok(()),
+            Some(reason) => Err(Error::DeviceLost(reason.clone())),
+        }
+    }
+}
+
+/// A logical device over a simulated device of its own.
+pub(crate) struct Device {
+    instance: Arc<Instance>,
+    extensions: Vec<&'static CStr>,
+    features: EnabledFeatures,
+    simulated: Arc<simdevice::Device>,
+    loss: Arc<Loss>,
+    queues: OnceLock<Vec<vk::Queue>>,
+}
+
+crate::objects! {
+    vk::Device => Device {
+        fn reporting_instance(&self) -> Option<Arc<Instance>> {
+            Some(Arc::clone(&self.instance))
+        }
+    };
+}
+
+impl Device {
+    /// Opens a device with `queue_count` queues.
+    ///
+    /// # Errors
+    /// [`Error::InitializationFailed`] if the host gives no thread for a queue.
+    pub(crate) fn new(
+        instance: Arc<Instance>,
+        extensions: Vec<&'static CStr>,
+        features: EnabledFeatures,
+        simulated: simdevice::Device,
+        queue_count: u32,
+    ) -> Result<Arc<Self>, Error> {
+        let device = Arc::new(Self {
+            instance,
+            extensions,
+            features,
+            simulated: Arc::new(simulated),
+            loss: Arc::default(),
+            queues: OnceLock::new(),
+        });
+        let start = |_| {
+            let processor = CommandProcessor {};
+            Queue::start(Arc::downgrade(&device), Arc::clone(&device.loss), processor)
+        };
+        let queues: Vec<_> = (0..queue_count).map(start).collect::<Result<_, _>>()?;
+        device
+            .queues
+            .get_or_init(|| queues.into_iter().map(handle::create).collect());
+        Ok(device)
+    }
+
+    /// The simulated device that executes its packets.
+    pub(crate) fn simulated(&self) -> &Arc<simdevice::Device> {
+        &self.simulated
+    }
+
+    /// The features that the application enabled.
+    pub(crate) fn features(&self) -> &EnabledFeatures {
+        &self.features
+    }
+
+    /// Whether the application enabled the extension.
+    pub(crate) fn has_extension(&self, name: &CStr) -> bool {
+        self.extensions.contains(&name)
+    }
+
+    /// Whether it is lost. Commands that may return `VK_ERROR_DEVICE_LOST` ask first.
+    pub(crate) fn loss(&self) -> &Arc<Loss> {
+        &self.loss
+    }
+
+    /// The handle of queue `index`.
+    pub(crate) fn queue(&self, index: u32) -> Option<vk::Queue> {
+        self.queues().get(index as usize).copied()
+    }
+
+    /// The handles of its queues.
+    pub(crate) fn queues(&self) -> &[vk::Queue] {
+        self.queues.get().map_or(&[], Vec::as_slice)
+    }
+
+    /// What gates commands that are looked up through this device.
+    pub(crate) fn enabled(&self) -> Enabled<'_> {
+        Enabled {
+            device_extensions: &self.extensions,
+            ..self.instance.enabled()
+        }
+    }
+
+    /// Executes what its queues were given and joins their threads.
+    pub(crate) fn stop(&self) {
+        for &queue in self.queues() {
+            // SAFETY: the handle was made with the device and lives as long.
+            match unsafe { handle::get(queue) } {
+                Ok(queue) => queue.stop(),
+                Err(error) => log::error!("a queue's handle was overwritten: {error}"),
+            }
+        }
+    }
+
+    /// Its instance.
+    pub(crate) fn instance(&self) -> &Arc<Instance> {
+        &self.instance
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        for &queue in self.queues() {
+            // SAFETY: the handle was made with the device, and the application may not use it once that is destroyed.
+            if let Err(error) = unsafe { handle::destroy(queue) } {
+                log::error!("a queue's handle was overwritten: {error}");
+            }
+        }
+    }
+}
