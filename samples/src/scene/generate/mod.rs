@@ -44,17 +44,18 @@ impl Scene {
 }
 
 impl Camera {
-    /// The view that [`Scene::generate`] is composed for.
+    /// The view that [`Scene::generate`] is composed for, unless with another vertical field of
+    /// view of `fov` degrees.
     ///
     /// # Errors
-    /// Never; the view is a camera at any size.
-    pub fn of_generated(size: [u32; 2]) -> Result<Self, CameraError> {
+    /// [`CameraError::FieldOfView`] unless `fov` is more than 0 and less than 180.
+    pub fn of_generated(fov: Option<f64>, size: [u32; 2]) -> Result<Self, CameraError> {
         let turn = |v: DVec3| brush::turn(v).to_array();
         Self::look_at(
             turn(DVec3::new(2.3, 1.55, 5.6)),
             turn(DVec3::new(0.0, 1.0, 0.0)),
             turn(DVec3::Y),
-            42.0,
+            fov.unwrap_or(42.0),
             size,
         )
     }
@@ -101,7 +102,7 @@ mod tests {
             assert!((0.0..=1.0).contains(&shape.opacity), "{shape:?}");
         }
         assert!(scene.sh().as_flattened().iter().all(|c| c.is_finite()));
-        let camera = Camera::of_generated([1280, 720]).expect("a camera");
+        let camera = Camera::of_generated(None, [1280, 720]).expect("a camera");
         let seen = scene.positions().iter().filter(|position| {
             camera
                 .project(position.map(f64::from))
