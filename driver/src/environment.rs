@@ -52,7 +52,6 @@ mod tests {
 
     #[test]
     fn values_are_understood_or_refused() {
-        let config = |simd, threads| super::config(simd, threads);
         assert_eq!(config(None, None).unwrap().threads, 0);
         let chosen = config(Some("sse2"), Some("3")).unwrap();
         assert_eq!((chosen.simd, chosen.threads), (SimdLevel::Baseline, 3));

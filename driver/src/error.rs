@@ -70,6 +70,14 @@ pub(crate) enum Error {
 }
 
 impl Error {
+    /// A rule that the application breaks.
+    pub(crate) fn usage(vuid: &'static str, message: impl Into<String>) -> Self {
+        Self::Usage {
+            vuid,
+            message: message.into(),
+        }
+    }
+
     /// What the application receives.
     pub(crate) fn result(&self) -> vk::Result {
         match self {

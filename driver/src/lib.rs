@@ -7,6 +7,7 @@
 //! pixel.
 
 mod capabilities;
+mod command;
 mod dispatch;
 mod embed;
 mod entrypoints;
@@ -14,6 +15,7 @@ mod environment;
 mod error;
 mod handle;
 mod icd;
+mod lower;
 mod object;
 mod pnext;
 mod pointer;

@@ -41,11 +41,6 @@ pub(crate) fn cast<'a, T: vk::TaggedStructure>(
 pub(crate) struct Output<'a>(&'a mut vk::BaseOutStructure<'a>);
 
 impl Output<'_> {
-    /// Its type.
-    pub(crate) fn structure_type(&self) -> vk::StructureType {
-        self.0.s_type
-    }
-
     /// The structure as a `T`, if its `sType` says that it is one.
     pub(crate) fn cast<T: vk::TaggedStructure>(&mut self) -> Option<&mut T> {
         (self.0.s_type == T::STRUCTURE_TYPE)

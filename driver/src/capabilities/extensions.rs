@@ -12,7 +12,7 @@ use std::ffi::CStr;
 use std::sync::LazyLock;
 
 /// The version of the instance and of its device.
-pub(crate) const API_VERSION: u32 = vk::API_VERSION_1_3;
+pub(crate) const API_VERSION: u32 = vk::HEADER_VERSION_COMPLETE;
 
 /// An extension's name and the version of its specification.
 pub(crate) type Extension = (&'static CStr, u32);

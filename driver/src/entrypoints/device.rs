@@ -2,6 +2,7 @@
 
 use crate::capabilities::extensions;
 use crate::capabilities::features::EnabledFeatures;
+use crate::capabilities::queues;
 use crate::dispatch;
 use crate::entry_points;
 use crate::environment;
@@ -12,22 +13,19 @@ use crate::pointer;
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
-/// The one queue family.
-pub(crate) const QUEUE_FAMILY: u32 = 0;
-
-/// How many queues the family has.
-pub(crate) const QUEUE_COUNT: u32 = 1;
-
 /// How many queues are asked for.
 unsafe fn queue_count(info: &vk::DeviceCreateInfo<'_>) -> Result<u32, Error> {
     // SAFETY: the caller promises a valid creation info.
     let families =
         unsafe { pointer::slice(info.p_queue_create_infos, info.queue_create_info_count)? };
     for family in families {
-        if family.queue_family_index != QUEUE_FAMILY || family.queue_count > QUEUE_COUNT {
+        if family.queue_family_index != queues::FAMILY || family.queue_count > queues::COUNT {
             return Err(Error::InitializationFailed(format!(
-                "{} queues of family {} were asked for; there is family {QUEUE_FAMILY} with {QUEUE_COUNT}",
-                family.queue_count, family.queue_family_index
+                "{} queues of family {} were asked for; there is family {} with {}",
+                family.queue_count,
+                family.queue_family_index,
+                queues::FAMILY,
+                queues::COUNT
             )));
         }
         if !family.flags.is_empty() {
@@ -85,7 +83,7 @@ entry_points! {
         index: u32,
         queue: *mut vk::Queue,
     ) {
-        let found = if family == QUEUE_FAMILY { handle::get(device)?.queue(index) } else { None };
+        let found = if family == queues::FAMILY { handle::get(device)?.queue(index) } else { None };
         pointer::output(queue, found.unwrap_or_default())
     }
 
@@ -96,7 +94,7 @@ entry_points! {
     ) {
         let device = handle::get(device)?;
         let info = pointer::input(info)?;
-        let matches = info.queue_family_index == QUEUE_FAMILY && info.flags.is_empty();
+        let matches = info.queue_family_index == queues::FAMILY && info.flags.is_empty();
         let found = if matches { device.queue(info.queue_index) } else { None };
         pointer::output(queue, found.unwrap_or_default())
     }

@@ -13,10 +13,22 @@
 //! - output handles of a command that fails are left as they were, except where Vulkan demands null;
 //! - allocation callbacks are accepted and ignored, as Vulkan allows.
 
+pub(crate) mod buffer;
+pub(crate) mod command;
+pub(crate) mod command_buffer;
 pub(crate) mod debug_utils;
 pub(crate) mod device;
+pub(crate) mod image;
 pub(crate) mod instance;
+pub(crate) mod memory;
 pub(crate) mod physical_device;
+pub(crate) mod pipeline;
+pub(crate) mod query;
+pub(crate) mod queue;
+pub(crate) mod render_pass;
+pub(crate) mod rendering;
+pub(crate) mod sync;
+pub(crate) mod transfer;
 pub(crate) mod unsupported;
 
 use crate::error::Error;

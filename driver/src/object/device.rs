@@ -1,38 +1,18 @@
 //! Logical devices.
 
 use crate::capabilities::features::EnabledFeatures;
+use crate::capabilities::memory;
 use crate::dispatch::Enabled;
 use crate::error::Error;
 use crate::handle;
 use crate::object::instance::Instance;
+use crate::object::memory::Heap;
 use crate::object::queue::Queue;
+use crate::object::signals::Signals;
 use ash::vk;
 use simdevice::CommandProcessor;
 use std::ffi::CStr;
 use std::sync::{Arc, OnceLock};
-
-/// Whether a device is lost, and why. Shared with its queues' threads.
-#[derive(Debug, Default)]
-pub(crate) struct Loss(OnceLock<String>);
-
-impl Loss {
-    /// Marks the device as lost; the first reason stays.
-    pub(crate) fn lose(&self, reason: &str) {
-        log::error!("the device is lost: {reason}");
-        self.0.get_or_init(|| reason.to_owned());
-    }
-
-    /// Fails if the device is lost.
-    ///
-    /// # Errors
-    /// [`Error::DeviceLost`].
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        match self.0.get() {
-            None => Ok(()),
-            Some(reason) => Err(Error::DeviceLost(reason.clone())),
-        }
-    }
-}
 
 /// A logical device over a simulated device of its own.
 pub(crate) struct Device {
@@ -40,7 +20,8 @@ pub(crate) struct Device {
     extensions: Vec<&'static CStr>,
     features: EnabledFeatures,
     simulated: Arc<simdevice::Device>,
-    loss: Arc<Loss>,
+    signals: Arc<Signals>,
+    heap: Arc<Heap>,
     queues: OnceLock<Vec<vk::Queue>>,
 }
 
@@ -69,12 +50,17 @@ impl Device {
             extensions,
             features,
             simulated: Arc::new(simulated),
-            loss: Arc::default(),
+            signals: Arc::default(),
+            heap: Arc::new(Heap::new(memory::heap_size())),
             queues: OnceLock::new(),
         });
         let start = |_| {
-            let processor = CommandProcessor {};
-            Queue::start(Arc::downgrade(&device), Arc::clone(&device.loss), processor)
+            let processor = CommandProcessor::new(Arc::clone(&device.simulated));
+            Queue::start(
+                Arc::downgrade(&device),
+                Arc::clone(&device.signals),
+                processor,
+            )
         };
         let queues: Vec<_> = (0..queue_count).map(start).collect::<Result<_, _>>()?;
         device
@@ -98,9 +84,16 @@ impl Device {
         self.extensions.contains(&name)
     }
 
-    /// Whether it is lost. Commands that may return `VK_ERROR_DEVICE_LOST` ask first.
-    pub(crate) fn loss(&self) -> &Arc<Loss> {
-        &self.loss
+    /// What is waited for on it, and whether it is lost.
+    pub(crate) fn signals(&self) -> &Arc<Signals> {
+        &self.signals
+    }
+
+    /// The heap of a memory type and whether the host may map memory of it; `None` if there is no such type.
+    pub(crate) fn memory_type(&self, index: u32) -> Option<(&Arc<Heap>, bool)> {
+        let properties = memory::type_properties(index)?;
+        let host_visible = properties.contains(vk::MemoryPropertyFlags::HOST_VISIBLE);
+        Some((&self.heap, host_visible))
     }
 
     /// The handle of queue `index`.

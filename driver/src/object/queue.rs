@@ -7,8 +7,9 @@
 use crate::entrypoints::panic_message;
 use crate::error::Error;
 
-use crate::object::device::{Device, Loss};
+use crate::object::device::Device;
 use crate::object::instance::Instance;
+use crate::object::signals::Signals;
 use ash::vk;
 use simdevice::CommandProcessor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -22,7 +23,7 @@ pub(crate) type Work = Box<dyn FnOnce(&mut CommandProcessor) + Send>;
 /// A queue of a device.
 pub(crate) struct Queue {
     device: Weak<Device>,
-    loss: Arc<Loss>,
+    signals: Arc<Signals>,
     /// Gone once the queue is stopped.
     worker: Mutex<Option<Worker>>,
 }
@@ -47,20 +48,20 @@ impl Queue {
     /// [`Error::InitializationFailed`] if the host gives no thread.
     pub(crate) fn start(
         device: Weak<Device>,
-        loss: Arc<Loss>,
+        signals: Arc<Signals>,
         processor: CommandProcessor,
     ) -> Result<Arc<Self>, Error> {
         let (work, receiver) = channel();
-        let thread_loss = Arc::clone(&loss);
+        let thread_signals = Arc::clone(&signals);
         let thread = std::thread::Builder::new()
             .name("gaurast-queue".to_owned())
-            .spawn(move || run(&receiver, processor, &thread_loss))
+            .spawn(move || run(&receiver, processor, &thread_signals))
             .map_err(|error| {
                 Error::InitializationFailed(format!("the queue's thread cannot start: {error}"))
             })?;
         Ok(Arc::new(Self {
             device,
-            loss,
+            signals,
             worker: Mutex::new(Some(Worker { work, thread })),
         }))
     }
@@ -80,7 +81,7 @@ impl Queue {
     /// # Errors
     /// [`Error::DeviceLost`]; the work is dropped.
     pub(crate) fn submit(&self, work: Work) -> Result<(), Error> {
-        self.loss.check()?;
+        self.signals.check()?;
         let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
         worker
             .as_ref()
@@ -100,7 +101,7 @@ impl Queue {
         }))?;
         // The sender is dropped unsent only if the queue gave the work up.
         let waited = wait.recv();
-        self.loss.check()?;
+        self.signals.check()?;
         waited.map_err(|_| Error::DeviceLost("its queue has stopped".to_owned()))
     }
 
@@ -122,17 +123,17 @@ impl Queue {
 }
 
 /// The queue's thread: runs work until the queue is stopped. After a panic it drops what comes instead of running it.
-fn run(work: &Receiver<Work>, mut processor: CommandProcessor, loss: &Loss) {
+fn run(work: &Receiver<Work>, mut processor: CommandProcessor, signals: &Signals) {
     while let Ok(work) = work.recv() {
         let executed = catch_unwind(AssertUnwindSafe(|| {
-            if loss.check().is_ok() {
+            if signals.check().is_ok() {
                 work(&mut processor);
             } else {
                 drop(work);
             }
         }));
         if let Err(panic) = executed {
-            loss.lose(panic_message(panic.as_ref()));
+            signals.lose(panic_message(panic.as_ref()));
         }
     }
 }
