@@ -11,8 +11,7 @@ use gaurast_samples::scene::Scene;
 /// The table: what the host knows, then everything that the device counted, in its groups.
 pub fn table(scene: &Scene, loading: Duration, frame: &Frame) -> Table {
     let mut table = Table::new();
-    table.load_preset(UTF8_FULL_CONDENSED);
-    table.set_header(["", "", ""]);
+    table.load_style(UTF8_FULL_CONDENSED);
     let mut row = {
         let mut last = String::new();
         let table = &mut table;
