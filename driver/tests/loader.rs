@@ -98,6 +98,21 @@ fn a_device_is_created_and_destroyed() {
     });
 }
 
+/// The library is unloaded with the last instance, when no thread may be left in it.
+#[test]
+fn the_library_is_loaded_and_unloaded_many_times() {
+    through_the_loader("the_library_is_loaded_and_unloaded_many_times", |entry| {
+        for _ in 0..20 {
+            let context = Context::new(entry.clone(), &[]);
+            let device = context
+                .device(&[], &mut vk::PhysicalDeviceFeatures2::default())
+                .unwrap();
+            // SAFETY: the device is live and not used again.
+            unsafe { device.destroy_device(None) };
+        }
+    });
+}
+
 /// Physical-device commands of extensions that the loader may not know reach the driver.
 #[test]
 fn counters_are_enumerated() {
