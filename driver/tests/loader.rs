@@ -4,7 +4,8 @@
 
 mod support;
 
-use ash::vk;
+use ash::vk::{self, TaggedStructure};
+use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 use std::ffi::CStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -37,6 +38,20 @@ fn manifest(directory: &Path) -> PathBuf {
     path
 }
 
+/// The extension's structures as the validation layer wants to be told of them: pairs of type and size.
+fn unregistered_structures() -> String {
+    use gaurast::vk::{
+        PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
+        PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties,
+    };
+    [
+        (Features::STRUCTURE_TYPE, size_of::<Features<'_>>()),
+        (Properties::STRUCTURE_TYPE, size_of::<Properties<'_>>()),
+    ]
+    .map(|(structure, size)| format!("{},{size}", structure.as_raw()))
+    .join(",")
+}
+
 /// Runs `inside` in a process of its own, where the loader finds this driver alone.
 fn through_the_loader(test: &str, inside: impl FnOnce(ash::Entry)) {
     // SAFETY: the loader is the system's own.
@@ -56,6 +71,7 @@ fn through_the_loader(test: &str, inside: impl FnOnce(ash::Entry)) {
         .env(INSIDE, "1")
         .env("VK_DRIVER_FILES", manifest(directory.path()))
         .env("VK_ICD_FILENAMES", manifest(directory.path()))
+        .env("VK_LAYER_CUSTOM_STYPE_LIST", unregistered_structures())
         .output()
         .expect("the test starts itself");
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
@@ -94,6 +110,21 @@ fn a_device_is_created_and_destroyed() {
         unsafe {
             assert_ne!(device.get_device_queue(0, 0), vk::Queue::null());
             device.destroy_device(None);
+        }
+    });
+}
+
+/// The library is unloaded with the last instance, when no thread may be left in it.
+#[test]
+fn the_library_is_loaded_and_unloaded_many_times() {
+    through_the_loader("the_library_is_loaded_and_unloaded_many_times", |entry| {
+        for _ in 0..20 {
+            let context = Context::new(entry.clone(), &[]);
+            let device = context
+                .device(&[], &mut vk::PhysicalDeviceFeatures2::default())
+                .unwrap();
+            // SAFETY: the device is live and not used again.
+            unsafe { device.destroy_device(None) };
         }
     });
 }
@@ -177,10 +208,16 @@ fn the_validation_layer_is_content() {
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default()
             .dynamic_rendering(true)
             .synchronization2(true);
-        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13);
-        let device = context
-            .device(&[ash::khr::performance_query::NAME], &mut features)
-            .unwrap();
+        let mut gaussian = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
+            .gaussian_primitive_topology(true);
+        let mut features = vk::PhysicalDeviceFeatures2::default()
+            .push_next(&mut vulkan13)
+            .push_next(&mut gaussian);
+        let extensions = [
+            ash::khr::performance_query::NAME,
+            gaurast::gaussian_primitive_topology::NAME,
+        ];
+        let device = context.device(&extensions, &mut features).unwrap();
         // SAFETY: the device is live, and destroyed last.
         unsafe {
             device.get_device_queue(0, 0);
