@@ -120,7 +120,7 @@ fn limits() -> vk::PhysicalDeviceLimits {
         sub_texel_precision_bits: 8,
         mipmap_precision_bits: 8,
         max_draw_indexed_index_value: u32::MAX,
-        max_draw_indirect_count: 1,
+        max_draw_indirect_count: u32::MAX,
         max_sampler_lod_bias: 2.0,
         max_sampler_anisotropy: 1.0,
         max_viewports: 1,
