@@ -20,6 +20,9 @@ const TAG_MAGIC: u64 = 0x4741_5553 << 32;
 /// The tag of a destroyed object, seen if its memory has not been reused.
 const DESTROYED: u64 = 0;
 
+/// How many handles were ever made.
+static MADE: AtomicU64 = AtomicU64::new(0);
+
 /// How many handles exist.
 static LIVE: AtomicUsize = AtomicUsize::new(0);
 
@@ -62,6 +65,8 @@ struct Slot<T> {
     /// The loader overwrites it with its dispatch table; the driver never reads it.
     loader_word: UnsafeCell<usize>,
     tag: AtomicU64,
+    /// Tells this handle from those that had its address before.
+    serial: u64,
     object: Arc<T>,
 }
 
@@ -82,6 +87,7 @@ pub(crate) fn create<T: Object>(object: Arc<T>) -> T::Handle {
     let slot = Box::new(Slot {
         loader_word: UnsafeCell::new(LOADER_MAGIC),
         tag: AtomicU64::new(tag::<T::Handle>()),
+        serial: MADE.fetch_add(1, Ordering::Relaxed),
         object,
     });
     vk::Handle::from_raw(Box::into_raw(slot) as u64)
@@ -173,6 +179,32 @@ pub(crate) unsafe fn destroy<H: Handle>(handle: H) -> Result<Option<Arc<H::Objec
     Ok(Some(slot.object))
 }
 
+/// A number that no other handle of this process has or had.
+///
+/// # Errors
+/// [`Error::InvalidHandle`] if the handle is null or not of `object_type`.
+///
+/// # Safety
+/// As [`get`], for a handle given as its type and bits.
+pub(crate) unsafe fn serial(object_type: vk::ObjectType, raw: u64) -> Result<u64, Error> {
+    let pointer = raw as usize as *const Slot<()>;
+    let invalid = Error::InvalidHandle {
+        expected: object_type,
+        raw,
+    };
+    if pointer.is_null() || !pointer.is_aligned() {
+        return Err(invalid);
+    }
+    // SAFETY: the caller promises a handle made by `create` for some object type; what precedes the object, which
+    // isn't touched, lies at the same offsets in every `Slot`.
+    let (tag, serial) = unsafe { ((*pointer).tag.load(Ordering::Relaxed), (*pointer).serial) };
+    if tag == TAG_MAGIC | u64::from(object_type.as_raw() as u32) {
+        Ok(serial)
+    } else {
+        Err(invalid)
+    }
+}
+
 /// How many Vulkan objects this process holds handles of, over all instances. Tests find leaks by it.
 pub fn live_handles() -> usize {
     LIVE.load(Ordering::Relaxed)
@@ -231,6 +263,9 @@ mod tests {
                 raw + 1
             ))));
             assert!(is_invalid(get_all(&[vk::Device::null()])));
+            assert!(is_invalid(serial(vk::ObjectType::DEVICE, raw)));
+            assert!(is_invalid(serial(vk::ObjectType::DEVICE, 0)));
+            assert!(serial(vk::ObjectType::DEBUG_UTILS_MESSENGER_EXT, raw).is_ok());
             assert!(get_optional(vk::Device::null()).unwrap().is_none());
             assert!(destroy(vk::Device::null()).unwrap().is_none());
             assert!(destroy(handle).unwrap().is_some());

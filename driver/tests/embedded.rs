@@ -291,3 +291,131 @@ fn counters_are_enumerated_with_their_descriptions() {
             .all(|c| c.storage == vk::PerformanceCounterStorageKHR::UINT64)
     );
 }
+
+/// A device with the features of Vulkan 1.2 and 1.3 that tests below use.
+fn device_with_core_features(context: &Context) -> ash::Device {
+    let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default()
+        .timeline_semaphore(true)
+        .host_query_reset(true);
+    let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default().private_data(true);
+    let mut features = vk::PhysicalDeviceFeatures2::default()
+        .push_next(&mut vulkan12)
+        .push_next(&mut vulkan13);
+    context.device(&[], &mut features).unwrap()
+}
+
+#[test]
+fn timelines_are_signalled_by_host_and_queue() {
+    let context = Context::embedded(&[]);
+    let device = device_with_core_features(&context);
+    let mut timeline = vk::SemaphoreTypeCreateInfo::default()
+        .semaphore_type(vk::SemaphoreType::TIMELINE)
+        .initial_value(3);
+    let info = vk::SemaphoreCreateInfo::default().push_next(&mut timeline);
+    // SAFETY: the device is live, and destroyed last; the semaphore is idle when it is destroyed.
+    unsafe {
+        let semaphore = device.create_semaphore(&info, None).unwrap();
+        assert_eq!(device.get_semaphore_counter_value(semaphore), Ok(3));
+        let semaphores = [semaphore];
+        let wait = |value, timeout| {
+            let values = [value];
+            let info = vk::SemaphoreWaitInfo::default()
+                .semaphores(&semaphores)
+                .values(&values);
+            device.wait_semaphores(&info, timeout)
+        };
+        assert_eq!(wait(3, 0), Ok(()));
+        assert_eq!(wait(4, 1000), Err(vk::Result::TIMEOUT));
+
+        // The queue waits for what the host signals afterwards.
+        let (wait_values, signal_values) = ([4], [7]);
+        let mut values = vk::TimelineSemaphoreSubmitInfo::default()
+            .wait_semaphore_values(&wait_values)
+            .signal_semaphore_values(&signal_values);
+        let submit = vk::SubmitInfo::default()
+            .wait_semaphores(&semaphores)
+            .wait_dst_stage_mask(&[vk::PipelineStageFlags::ALL_COMMANDS])
+            .signal_semaphores(&semaphores)
+            .push_next(&mut values);
+        let queue = device.get_device_queue(0, 0);
+        device
+            .queue_submit(queue, &[submit], vk::Fence::null())
+            .unwrap();
+        let signal = vk::SemaphoreSignalInfo::default()
+            .semaphore(semaphore)
+            .value(4);
+        device.signal_semaphore(&signal).unwrap();
+        assert_eq!(wait(7, u64::MAX), Ok(()));
+        device.queue_wait_idle(queue).unwrap();
+        device.destroy_semaphore(semaphore, None);
+        device.destroy_device(None);
+    }
+}
+
+#[test]
+fn private_data_is_kept_per_object_and_slot() {
+    let context = Context::embedded(&[]);
+    let device = device_with_core_features(&context);
+    let info = vk::PrivateDataSlotCreateInfo::default();
+    // SAFETY: the device is live, and destroyed last.
+    unsafe {
+        let slots = [(); 2].map(|()| device.create_private_data_slot(&info, None).unwrap());
+        let queue = device.get_device_queue(0, 0);
+        device.set_private_data(queue, slots[0], 5).unwrap();
+        device
+            .set_private_data(device.handle(), slots[0], 6)
+            .unwrap();
+        assert_eq!(device.get_private_data(queue, slots[0]), 5);
+        assert_eq!(device.get_private_data(device.handle(), slots[0]), 6);
+        assert_eq!(device.get_private_data(queue, slots[1]), 0);
+        for slot in slots {
+            device.destroy_private_data_slot(slot, None);
+        }
+        device.destroy_device(None);
+    }
+}
+
+/// What isn't there yet fails with a message; it neither aborts nor does something else.
+#[test]
+fn core_commands_that_do_not_work_yet_fail() {
+    let heard = Heard::default();
+    let context = Context::embedded(&[ash::ext::debug_utils::NAME]);
+    let debug = ash::ext::debug_utils::Instance::new(&context.entry, &context.instance);
+    let device = context.device(&[], &mut Default::default()).unwrap();
+    // SAFETY: everything is destroyed after its last use.
+    unsafe {
+        let messenger = debug
+            .create_debug_utils_messenger(&heard.messenger(), None)
+            .unwrap();
+        let error = device
+            .create_sampler(&vk::SamplerCreateInfo::default(), None)
+            .err();
+        assert_eq!(error, Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
+        let messages = heard.take();
+        assert_eq!(messages[0].0, "GAURAST-unsupported-command");
+        assert!(messages[0].1.contains("vkCreateSampler"), "{messages:?}");
+
+        let pool = device
+            .create_command_pool(&vk::CommandPoolCreateInfo::default(), None)
+            .unwrap();
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(pool)
+            .command_buffer_count(1);
+        let command_buffer = device.allocate_command_buffers(&info).unwrap()[0];
+        device
+            .begin_command_buffer(command_buffer, &vk::CommandBufferBeginInfo::default())
+            .unwrap();
+        device.cmd_dispatch(command_buffer, 1, 1, 1);
+        let error = device.end_command_buffer(command_buffer).err();
+        assert_eq!(error, Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
+        assert!(
+            heard
+                .take()
+                .iter()
+                .any(|(_, text)| text.contains("vkCmdDispatch"))
+        );
+        device.destroy_command_pool(pool, None);
+        debug.destroy_debug_utils_messenger(messenger, None);
+        device.destroy_device(None);
+    }
+}

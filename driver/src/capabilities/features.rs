@@ -2,32 +2,46 @@
 
 use crate::error::Error;
 use crate::pnext;
-use ash::vk;
+use ash::vk::{self, TaggedStructure};
+use gaurast::gaussian_primitive_topology;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
-use std::ffi::c_void;
+use std::ffi::{CStr, c_void};
 
 /// The features that work, by the names of their fields. A feature has one name in all structures that hold it, so
 /// this is the only place to state it.
 const SUPPORTED: &[&str] = &[
     // Core 1.0.
+    "draw_indirect_first_instance",
     "full_draw_index_uint32",
-    "robust_buffer_access",
     "independent_blend",
     "multi_draw_indirect",
-    "draw_indirect_first_instance",
-    // Core 1.2.
+    "robust_buffer_access",
+    // Core 1.2. Image layouts don't matter to the device, so that depth and stencil may differ in theirs.
     "host_query_reset",
     "imageless_framebuffer",
     "separate_depth_stencil_layouts",
     "timeline_semaphore",
     // Core 1.3.
     "dynamic_rendering",
+    "private_data",
     "synchronization2",
     // VK_KHR_performance_query.
     "performance_counter_query_pools",
     // VK_GAURAST_gaussian_primitive_topology.
     "gaussian_primitive_topology",
     "opacity_compensation",
+];
+
+/// The extensions whose features can't be enabled without them. (Features of core need none.)
+const EXTENSIONS: &[(vk::StructureType, &CStr)] = &[
+    (
+        vk::PhysicalDevicePerformanceQueryFeaturesKHR::STRUCTURE_TYPE,
+        ash::khr::performance_query::NAME,
+    ),
+    (
+        PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::STRUCTURE_TYPE,
+        gaussian_primitive_topology::NAME,
+    ),
 ];
 
 fn is_supported(feature: &str) -> bool {
@@ -39,14 +53,18 @@ fn is_supported(feature: &str) -> bool {
 pub(crate) struct EnabledFeatures(Vec<&'static str>);
 
 impl EnabledFeatures {
-    /// What `vkCreateDevice` was asked to enable.
+    /// What `vkCreateDevice` was asked to enable, together with `extensions`.
     ///
     /// # Errors
-    /// [`Error::FeatureNotPresent`] names the first feature that isn't supported.
+    /// [`Error::FeatureNotPresent`] names the first feature that isn't supported, [`Error::Usage`] one whose extension
+    /// isn't enabled.
     ///
     /// # Safety
     /// The creation info is valid.
-    pub(crate) unsafe fn requested(info: &vk::DeviceCreateInfo<'_>) -> Result<Self, Error> {
+    pub(crate) unsafe fn requested(
+        info: &vk::DeviceCreateInfo<'_>,
+        extensions: &[&CStr],
+    ) -> Result<Self, Error> {
         let mut enabled = Self::default();
         // SAFETY: the pointer is null or valid in a valid creation info.
         if let Some(features) = unsafe { info.p_enabled_features.as_ref() } {
@@ -57,6 +75,9 @@ impl EnabledFeatures {
             if let Some(features) = pnext::cast::<vk::PhysicalDeviceFeatures2<'_>>(structure) {
                 enabled.enable(features.features.requested())?;
             } else if let Some(requested) = requested_in(structure) {
+                if let Some(feature) = requested.first() {
+                    require_extension(structure.s_type, feature, extensions)?;
+                }
                 enabled.enable(requested)?;
             }
         }
@@ -74,6 +95,22 @@ impl EnabledFeatures {
     /// Whether the feature, named as ash names its field, was enabled.
     pub(crate) fn has(&self, feature: &str) -> bool {
         self.0.contains(&feature)
+    }
+}
+
+/// Refuses a feature of an extension that isn't enabled.
+fn require_extension(
+    structure: vk::StructureType,
+    feature: &str,
+    extensions: &[&CStr],
+) -> Result<(), Error> {
+    let needed = EXTENSIONS.iter().find(|(s_type, _)| *s_type == structure);
+    match needed {
+        Some((_, name)) if !extensions.contains(name) => Err(Error::usage(
+            "VUID-VkDeviceCreateInfo-pNext-extension",
+            format!("the feature {feature} needs {name:?}, which is not enabled"),
+        )),
+        _ => Ok(()),
     }
 }
 
@@ -359,15 +396,11 @@ mod tests {
         "buffer_device_address",
         "compute_full_subgroups",
         "descriptor_binding_inline_uniform_block_update_after_bind",
-        "host_query_reset",
-        "imageless_framebuffer",
         "inline_uniform_block",
         "maintenance4",
         "multiview",
         "pipeline_creation_cache_control",
-        "private_data",
         "robust_image_access",
-        "separate_depth_stencil_layouts",
         "shader_demote_to_helper_invocation",
         "shader_integer_dot_product",
         "shader_subgroup_extended_types",
@@ -375,7 +408,6 @@ mod tests {
         "shader_zero_initialize_workgroup_memory",
         "subgroup_broadcast_dynamic_id",
         "subgroup_size_control",
-        "timeline_semaphore",
         "uniform_buffer_standard_layout",
         "vulkan_memory_model",
         "vulkan_memory_model_device_scope",
@@ -391,10 +423,10 @@ mod tests {
 
     #[test]
     fn supported_features_are_those_of_the_structures() {
-        let mut names = all_true::<vk::PhysicalDeviceFeatures>(2);
+        let mut names = all_true::<vk::PhysicalDeviceFeatures>(5);
         names.extend(all_true::<vk::PhysicalDeviceVulkan11Features<'_>>(0));
-        names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(0));
-        names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(2));
+        names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(4));
+        names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(3));
         names.extend(all_true::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(1));
         names.extend(all_true::<
             PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
@@ -417,7 +449,7 @@ mod tests {
     fn requests_are_checked_wherever_they_stand() {
         let requested = |info: &vk::DeviceCreateInfo<'_>| {
             // SAFETY: ash built the creation info.
-            unsafe { EnabledFeatures::requested(info) }
+            unsafe { EnabledFeatures::requested(info, &[gaussian_primitive_topology::NAME]) }
         };
         let mut works = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
         let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(true);
@@ -451,5 +483,10 @@ mod tests {
             requested(&vk::DeviceCreateInfo::default().push_next(&mut missing)),
             "per_pixel_order",
         );
+
+        let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()
+            .performance_counter_query_pools(true);
+        let error = requested(&vk::DeviceCreateInfo::default().push_next(&mut other)).unwrap_err();
+        assert!(error.is_usage(), "{error}");
     }
 }

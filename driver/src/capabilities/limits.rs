@@ -182,6 +182,7 @@ fn vulkan12() -> vk::PhysicalDeviceVulkan12Properties<'static> {
         // No driver id is registered for this driver, and it claims no conformance.
         driver_id: vk::DriverId::from_raw(0),
         conformance_version: vk::ConformanceVersion::default(),
+        max_timeline_semaphore_value_difference: u64::MAX,
         framebuffer_integer_color_sample_counts: vk::SampleCountFlags::TYPE_1,
         ..Default::default()
     };

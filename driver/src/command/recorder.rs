@@ -419,8 +419,8 @@ mod tests {
         let mut recorder = Recorder::new();
         assert!(recorder.end().is_err(), "not recording");
         recorder.begin(Usage::default()).unwrap();
-        recorder.fail(Error::OutOfHostMemory("first".into()));
-        recorder.fail(Error::OutOfHostMemory("second".into()));
+        recorder.fail(Error::OutOfDeviceMemory("first".into()));
+        recorder.fail(Error::OutOfDeviceMemory("second".into()));
         let error = recorder.end().unwrap_err();
         assert!(error.to_string().contains("first"));
         assert!(recorder.submit().is_err(), "invalid");

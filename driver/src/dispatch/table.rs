@@ -247,10 +247,10 @@ commands! {
         PFN_vkGetPhysicalDeviceToolProperties = physical_device::get_physical_device_tool_properties;
     }
     Device, Core(API_VERSION_1_3) => {
-        PFN_vkCreatePrivateDataSlot = unsupported::create_private_data_slot;
-        PFN_vkDestroyPrivateDataSlot = unsupported::destroy_private_data_slot;
-        PFN_vkSetPrivateData = unsupported::set_private_data;
-        PFN_vkGetPrivateData = unsupported::get_private_data;
+        PFN_vkCreatePrivateDataSlot = private_data::create_private_data_slot;
+        PFN_vkDestroyPrivateDataSlot = private_data::destroy_private_data_slot;
+        PFN_vkSetPrivateData = private_data::set_private_data;
+        PFN_vkGetPrivateData = private_data::get_private_data;
         PFN_vkCmdSetEvent2 = command::cmd_set_event2;
         PFN_vkCmdResetEvent2 = command::cmd_reset_event2;
         PFN_vkCmdWaitEvents2 = command::cmd_wait_events2;

@@ -99,10 +99,6 @@ unsupported! {
     fn get_buffer_device_address(device: vk::Device, info: *const vk::BufferDeviceAddressInfo<'_>) -> vk::DeviceAddress;
     fn get_buffer_opaque_capture_address(device: vk::Device, info: *const vk::BufferDeviceAddressInfo<'_>) -> u64;
     fn get_device_memory_opaque_capture_address(device: vk::Device, info: *const vk::DeviceMemoryOpaqueCaptureAddressInfo<'_>) -> u64;
-    fn create_private_data_slot(device: vk::Device, create_info: *const vk::PrivateDataSlotCreateInfo<'_>, allocator: *const vk::AllocationCallbacks<'_>, private_data_slot: *mut vk::PrivateDataSlot) -> vk::Result;
-    fn destroy_private_data_slot(device: vk::Device, private_data_slot: vk::PrivateDataSlot, allocator: *const vk::AllocationCallbacks<'_>);
-    fn set_private_data(device: vk::Device, object_type: vk::ObjectType, object_handle: u64, private_data_slot: vk::PrivateDataSlot, data: u64) -> vk::Result;
-    fn get_private_data(device: vk::Device, object_type: vk::ObjectType, object_handle: u64, private_data_slot: vk::PrivateDataSlot, data: *mut u64);
     fn cmd_blit_image2(command_buffer: vk::CommandBuffer, blit_image_info: *const vk::BlitImageInfo2<'_>);
     fn cmd_resolve_image2(command_buffer: vk::CommandBuffer, resolve_image_info: *const vk::ResolveImageInfo2<'_>);
 }

@@ -23,6 +23,11 @@ impl Context {
             .enabled_extension_names(&names);
         // SAFETY: the creation info is valid.
         let instance = unsafe { entry.create_instance(&info, None) }.expect("an instance");
+        Self::of(entry, instance)
+    }
+
+    /// Finds the one physical device of an instance.
+    pub fn of(entry: ash::Entry, instance: ash::Instance) -> Self {
         // SAFETY: the instance is live.
         let physical_devices = unsafe { instance.enumerate_physical_devices() }.unwrap();
         let &[physical_device] = physical_devices.as_slice() else {
