@@ -59,7 +59,7 @@ mod tests {
     use crate::compare::Statistics;
     use crate::data::require_data;
     use crate::oracle::render_bounded;
-    use gaurast_samples::camera::Camera;
+    use gaurast_samples::camera::{Camera, DEFAULT_FOV};
 
     #[test]
     fn defaults_are_those_of_the_extension() {
@@ -89,7 +89,7 @@ mod tests {
             };
             let scene = Scene::load(&path).unwrap();
             let size = [192, 144];
-            let camera = Camera::framing(&scene, size).to_vulkan();
+            let camera = Camera::framing(&scene, DEFAULT_FOV, size).to_vulkan();
             let reference = render_bounded(
                 &SceneBuffers::from(&scene).as_oracle(),
                 &OracleCamera::new(&camera, size).unwrap(),
