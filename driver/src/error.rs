@@ -26,9 +26,6 @@ pub(crate) enum Error {
         /// Its Vulkan name.
         command: String,
     },
-    /// The host has no memory for it.
-    #[error("out of host memory: {0}")]
-    OutOfHostMemory(String),
     /// The device has no memory for it.
     #[error("out of device memory: {0}")]
     OutOfDeviceMemory(String),
@@ -53,9 +50,6 @@ pub(crate) enum Error {
     /// A format, or a use of it, that isn't supported.
     #[error("{0}")]
     FormatNotSupported(String),
-    /// A descriptor or command pool has no room.
-    #[error("out of pool memory: {0}")]
-    OutOfPoolMemory(String),
     /// The application breaks a rule of the extension or of Vulkan that the driver must check itself.
     #[error("{message} ({vuid})")]
     Usage {
@@ -87,7 +81,6 @@ impl Error {
             Self::Unsupported { .. } | Self::FeatureNotPresent(_) => {
                 vk::Result::ERROR_FEATURE_NOT_PRESENT
             }
-            Self::OutOfHostMemory(_) => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
             Self::OutOfDeviceMemory(_) => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
             Self::InitializationFailed(_) => vk::Result::ERROR_INITIALIZATION_FAILED,
             Self::DeviceLost(_) => vk::Result::ERROR_DEVICE_LOST,
@@ -95,7 +88,6 @@ impl Error {
             Self::LayerNotPresent(_) => vk::Result::ERROR_LAYER_NOT_PRESENT,
             Self::ExtensionNotPresent(_) => vk::Result::ERROR_EXTENSION_NOT_PRESENT,
             Self::FormatNotSupported(_) => vk::Result::ERROR_FORMAT_NOT_SUPPORTED,
-            Self::OutOfPoolMemory(_) => vk::Result::ERROR_OUT_OF_POOL_MEMORY,
             Self::Usage { .. } => vk::Result::ERROR_VALIDATION_FAILED_EXT,
         }
     }

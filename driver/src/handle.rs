@@ -20,6 +20,9 @@ const TAG_MAGIC: u64 = 0x4741_5553 << 32;
 /// The tag of a destroyed object, seen if its memory has not been reused.
 const DESTROYED: u64 = 0;
 
+/// How many handles were ever made.
+static MADE: AtomicU64 = AtomicU64::new(0);
+
 /// How many handles exist.
 static LIVE: AtomicUsize = AtomicUsize::new(0);
 
@@ -62,6 +65,8 @@ struct Slot<T> {
     /// The loader overwrites it with its dispatch table; the driver never reads it.
     loader_word: UnsafeCell<usize>,
     tag: AtomicU64,
+    /// Tells this handle from those that had its address before.
+    serial: u64,
     object: Arc<T>,
 }
 
@@ -82,6 +87,7 @@ pub(crate) fn create<T: Object>(object: Arc<T>) -> T::Handle {
     let slot = Box::new(Slot {
         loader_word: UnsafeCell::new(LOADER_MAGIC),
         tag: AtomicU64::new(tag::<T::Handle>()),
+        serial: MADE.fetch_add(1, Ordering::Relaxed),
         object,
     });
     vk::Handle::from_raw(Box::into_raw(slot) as u64)
@@ -173,7 +179,96 @@ pub(crate) unsafe fn destroy<H: Handle>(handle: H) -> Result<Option<Arc<H::Objec
     Ok(Some(slot.object))
 }
 
+/// A number that no other handle of this process has or had.
+///
+/// # Errors
+/// [`Error::InvalidHandle`] if the handle is null or not of `object_type`.
+///
+/// # Safety
+/// As [`get`], for a handle given as its type and bits.
+pub(crate) unsafe fn serial(object_type: vk::ObjectType, raw: u64) -> Result<u64, Error> {
+    let pointer = raw as usize as *const Slot<()>;
+    let invalid = Error::InvalidHandle {
+        expected: object_type,
+        raw,
+    };
+    if pointer.is_null() || !pointer.is_aligned() {
+        return Err(invalid);
+    }
+    // SAFETY: the caller promises a handle made by `create` for some object type; what precedes the object, which
+    // isn't touched, lies at the same offsets in every `Slot`.
+    let (tag, serial) = unsafe { ((*pointer).tag.load(Ordering::Relaxed), (*pointer).serial) };
+    if tag == TAG_MAGIC | u64::from(object_type.as_raw() as u32) {
+        Ok(serial)
+    } else {
+        Err(invalid)
+    }
+}
+
 /// How many Vulkan objects this process holds handles of, over all instances. Tests find leaks by it.
 pub fn live_handles() -> usize {
     LIVE.load(Ordering::Relaxed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object::debug_messenger::DebugMessenger;
+
+    fn messenger() -> Arc<DebugMessenger> {
+        Arc::new(DebugMessenger::new(
+            &vk::DebugUtilsMessengerCreateInfoEXT::default(),
+        ))
+    }
+
+    fn is_invalid<T>(result: Result<T, Error>) -> bool {
+        matches!(result, Err(Error::InvalidHandle { .. }))
+    }
+
+    #[test]
+    fn a_dispatchable_handle_begins_with_the_loaders_word() {
+        let instance = create(Instance::new(0, &[]).unwrap());
+        let pointer = vk::Handle::as_raw(instance) as usize as *const usize;
+        // SAFETY: the handle is live and points at a `Slot`, whose first word this is.
+        assert_eq!(unsafe { pointer.read() }, 0x01CD_C0DE);
+        // SAFETY: the handle is live and not used again.
+        assert!(unsafe { destroy(instance) }.unwrap().is_some());
+    }
+
+    #[test]
+    fn a_handle_owns_its_object_until_it_is_destroyed() {
+        let object = messenger();
+        let handle = create(Arc::clone(&object));
+        // SAFETY: the handle is live.
+        let found = unsafe { get(handle) }.unwrap();
+        assert!(Arc::ptr_eq(found, &object));
+        assert_eq!(Arc::strong_count(&object), 2);
+        // SAFETY: the handle is live and not used again.
+        drop(unsafe { destroy(handle) }.unwrap());
+        assert_eq!(Arc::strong_count(&object), 1);
+    }
+
+    #[test]
+    fn wrong_handles_are_refused() {
+        let handle = create(messenger());
+        let raw = vk::Handle::as_raw(handle);
+        // SAFETY: the handle is live, though its type is another; null and odd addresses aren't followed.
+        unsafe {
+            assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(raw))));
+            assert!(is_invalid(destroy(<vk::Device as vk::Handle>::from_raw(
+                raw
+            ))));
+            assert!(is_invalid(get(vk::Device::null())));
+            assert!(is_invalid(get(<vk::Device as vk::Handle>::from_raw(
+                raw + 1
+            ))));
+            assert!(is_invalid(get_all(&[vk::Device::null()])));
+            assert!(is_invalid(serial(vk::ObjectType::DEVICE, raw)));
+            assert!(is_invalid(serial(vk::ObjectType::DEVICE, 0)));
+            assert!(serial(vk::ObjectType::DEBUG_UTILS_MESSENGER_EXT, raw).is_ok());
+            assert!(get_optional(vk::Device::null()).unwrap().is_none());
+            assert!(destroy(vk::Device::null()).unwrap().is_none());
+            assert!(destroy(handle).unwrap().is_some());
+        }
+    }
 }

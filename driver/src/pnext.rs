@@ -62,3 +62,32 @@ pub(crate) unsafe fn for_each_output(first: *mut c_void, mut visit: impl FnMut(O
         visit(Output(structure));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn structures_are_found_by_their_type() {
+        let mut unknown = vk::PhysicalDeviceDriverProperties::default();
+        let mut wanted = vk::PhysicalDeviceMaintenance3Properties::default();
+        let mut chain = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut wanted)
+            .push_next(&mut unknown);
+        // SAFETY: ash built the chain of live structures.
+        unsafe {
+            for_each_output(chain.p_next, |mut structure| {
+                if let Some(out) = structure.cast::<vk::PhysicalDeviceMaintenance3Properties<'_>>()
+                {
+                    out.max_per_set_descriptors = 7;
+                }
+            });
+            let first = (&raw mut chain).cast_const().cast();
+            assert_eq!(iter(first).count(), 3);
+            let found = find::<vk::PhysicalDeviceMaintenance3Properties<'_>>(first).unwrap();
+            assert_eq!(found.max_per_set_descriptors, 7);
+            assert!(find::<vk::PhysicalDeviceIDProperties<'_>>(first).is_none());
+            assert_eq!(iter(std::ptr::null()).count(), 0);
+        }
+    }
+}

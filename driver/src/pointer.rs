@@ -185,3 +185,43 @@ unsafe fn enumerate_into<T>(
         vk::Result::SUCCESS
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::ptr;
+
+    #[test]
+    fn enumeration_counts_then_fills_and_says_when_it_is_incomplete() {
+        let values = [1u8, 2, 3];
+        let fill = |count: &mut u32, out: *mut u8| {
+            // SAFETY: `out` is null or has room for `*count` values.
+            unsafe { enumerate(count, out, &values) }.unwrap()
+        };
+        let mut count = 0;
+        assert_eq!(fill(&mut count, ptr::null_mut()), vk::Result::SUCCESS);
+        assert_eq!(count, 3);
+
+        let mut out = [0; 4];
+        count = 2;
+        assert_eq!(fill(&mut count, out.as_mut_ptr()), vk::Result::INCOMPLETE);
+        assert_eq!((count, out), (2, [1, 2, 0, 0]));
+
+        count = 4;
+        assert_eq!(fill(&mut count, out.as_mut_ptr()), vk::Result::SUCCESS);
+        assert_eq!((count, out), (3, [1, 2, 3, 0]));
+    }
+
+    #[test]
+    fn null_pointers_are_refused_where_vulkan_requires_others() {
+        // SAFETY: null pointers aren't followed.
+        unsafe {
+            assert!(input::<u32>(ptr::null()).is_err());
+            assert!(output(ptr::null_mut(), 1u32).is_err());
+            assert!(slice::<u32>(ptr::null(), 1).is_err());
+            assert!(slice::<u32>(ptr::null(), 0).unwrap().is_empty());
+            assert!(strings(ptr::null(), 0).unwrap().is_empty());
+            assert!(enumerate(ptr::null_mut(), ptr::null_mut::<u32>(), &[]).is_err());
+        }
+    }
+}

@@ -317,65 +317,80 @@ impl Format {
 
     /// Reads consecutive texels, as many as both slices have.
     pub fn decode_row(self, bytes: &[u8], out: &mut [[f32; 4]]) {
-        let texels = bytes.chunks_exact(self.texel_size()).zip(out);
         match self {
-            Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => texels.for_each(|(bytes, out)| {
-                *out = from_array(bytes).map(convert::from_unorm8);
+            Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => {
+                decode_each(bytes, out, |texel: [u8; 4]| texel.map(convert::from_unorm8));
+            }
+            Self::B8G8R8A8Unorm => decode_each(bytes, out, |[b, g, r, a]| {
+                [r, g, b, a].map(convert::from_unorm8)
             }),
-            Self::B8G8R8A8Unorm => texels.for_each(|(bytes, out)| {
-                let [b, g, r, a] = from_array(bytes).map(convert::from_unorm8);
-                *out = [r, g, b, a];
+            Self::R8G8B8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
+                decode_each(bytes, out, convert::from_srgb8);
+            }
+            Self::B8G8R8A8Srgb => {
+                decode_each(bytes, out, |[b, g, r, a]| convert::from_srgb8([r, g, b, a]));
+            }
+            Self::R16G16B16A16Sfloat => {
+                let (texels, _) = bytes.as_chunks::<8>();
+                convert::from_halves(texels.as_flattened(), out.as_flattened_mut());
+            }
+            Self::R32Sfloat => decode_each(bytes, out, |texel: [u8; 4]| {
+                [f32::from_le_bytes(texel), 0.0, 0.0, 1.0]
             }),
-            Self::R16G16B16A16Sfloat => texels.for_each(|(bytes, out)| {
-                *out = convert::from_half(from_array(bytes));
+            Self::R32G32Sfloat => decode_each(bytes, out, |texel: [u8; 8]| {
+                let [x, y] = bytemuck::cast(texel);
+                [x, y, 0.0, 1.0]
             }),
-            Self::R32Sfloat => texels.for_each(|(bytes, out)| {
-                let [x] = floats(bytes);
-                *out = [x, 0.0, 0.0, 1.0];
+            Self::R32G32B32Sfloat => decode_each(bytes, out, |texel: [u8; 12]| {
+                let [x, y, z] = bytemuck::cast(texel);
+                [x, y, z, 1.0]
             }),
-            Self::R32G32Sfloat => texels.for_each(|(bytes, out)| {
-                let [x, y] = floats(bytes);
-                *out = [x, y, 0.0, 1.0];
-            }),
-            Self::R32G32B32Sfloat => texels.for_each(|(bytes, out)| {
-                let [x, y, z] = floats(bytes);
-                *out = [x, y, z, 1.0];
-            }),
-            Self::R32G32B32A32Sfloat => texels.for_each(|(bytes, out)| *out = floats(bytes)),
-            Self::E5B9G9R9UfloatPack32 => texels.for_each(|(bytes, out)| {
-                *out = convert::from_shared_exponent(u32::from_le_bytes(from_array(bytes)));
+            Self::R32G32B32A32Sfloat => {
+                decode_each(bytes, out, bytemuck::cast::<[u8; 16], _>);
+            }
+            Self::E5B9G9R9UfloatPack32 => decode_each(bytes, out, |texel| {
+                convert::from_shared_exponent(u32::from_le_bytes(texel))
             }),
             _ => {
                 let (numeric, components) = (self.numeric(), self.components());
-                texels
-                    .for_each(|(bytes, out)| *out = decode_components(numeric, components, bytes));
+                for (texel, out) in bytes.chunks_exact(self.texel_size()).zip(out) {
+                    *out = decode_components(numeric, components, texel);
+                }
             }
         }
     }
 
     /// Writes consecutive texels, as many as both slices have room for.
     pub fn encode_row(self, texels: &[[f32; 4]], out: &mut [u8]) {
-        let texels = out.chunks_exact_mut(self.texel_size()).zip(texels);
         match self {
-            Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => texels.for_each(|(out, texel)| {
-                out.copy_from_slice(&texel.map(convert::to_unorm8));
+            Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => {
+                encode_each(texels, out, |texel| texel.map(convert::to_unorm8));
+            }
+            Self::B8G8R8A8Unorm => encode_each(texels, out, |[r, g, b, a]| {
+                [b, g, r, a].map(convert::to_unorm8)
             }),
-            Self::B8G8R8A8Unorm => texels.for_each(|(out, texel)| {
-                let [r, g, b, a] = texel.map(convert::to_unorm8);
-                out.copy_from_slice(&[b, g, r, a]);
+            Self::R8G8B8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
+                encode_each(texels, out, convert::to_srgb8);
+            }
+            Self::B8G8R8A8Srgb => encode_each(texels, out, |texel| {
+                let [r, g, b, a] = convert::to_srgb8(texel);
+                [b, g, r, a]
             }),
-            Self::R16G16B16A16Sfloat => texels.for_each(|(out, texel)| {
-                out.copy_from_slice(&convert::to_half(texel));
-            }),
-            Self::R32G32B32A32Sfloat => texels.for_each(|(out, texel)| {
-                out.copy_from_slice(bytemuck::bytes_of(texel));
-            }),
-            Self::E5B9G9R9UfloatPack32 => texels.for_each(|(out, texel)| {
-                out.copy_from_slice(&convert::to_shared_exponent(texel).to_le_bytes());
+            Self::R16G16B16A16Sfloat => {
+                let (out, _) = out.as_chunks_mut::<8>();
+                convert::to_halves(texels.as_flattened(), out.as_flattened_mut());
+            }
+            Self::R32G32B32A32Sfloat => {
+                encode_each(texels, out, bytemuck::cast::<_, [u8; 16]>);
+            }
+            Self::E5B9G9R9UfloatPack32 => encode_each(texels, out, |texel| {
+                convert::to_shared_exponent(&texel).to_le_bytes()
             }),
             _ => {
                 let (numeric, components) = (self.numeric(), self.components());
-                texels.for_each(|(out, texel)| encode_components(numeric, components, texel, out));
+                for (out, texel) in out.chunks_exact_mut(self.texel_size()).zip(texels) {
+                    encode_components(numeric, components, texel, out);
+                }
             }
         }
     }
@@ -388,6 +403,12 @@ impl Format {
                     *component = convert::quantize_unorm8(*component);
                 }
             }
+            Self::R8G8B8A8Srgb | Self::B8G8R8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
+                for texel in texels {
+                    *texel = convert::from_srgb8(convert::to_srgb8(*texel));
+                }
+            }
+            Self::R16G16B16A16Sfloat => convert::quantize_halves(texels.as_flattened_mut()),
             Self::R32G32B32A32Sfloat => {}
             _ => {
                 for texel in texels {
@@ -416,14 +437,28 @@ impl Format {
     }
 }
 
-/// The first `N` bytes of a texel that has them.
-fn from_array<const N: usize>(bytes: &[u8]) -> [u8; N] {
-    bytes.first_chunk().copied().unwrap_or([0; N])
+/// Decodes texels of `N` bytes.
+fn decode_each<const N: usize>(
+    bytes: &[u8],
+    out: &mut [[f32; 4]],
+    decode: impl Fn([u8; N]) -> [f32; 4],
+) {
+    let (texels, _) = bytes.as_chunks();
+    for (&texel, out) in texels.iter().zip(out) {
+        *out = decode(texel);
+    }
 }
 
-/// The first `N` floats of a texel that has them.
-fn floats<const N: usize>(bytes: &[u8]) -> [f32; N] {
-    std::array::from_fn(|index| f32::from_le_bytes(from_array(&bytes[4 * index..])))
+/// Encodes texels of `N` bytes.
+fn encode_each<const N: usize>(
+    texels: &[[f32; 4]],
+    out: &mut [u8],
+    encode: impl Fn([f32; 4]) -> [u8; N],
+) {
+    let (out, _) = out.as_chunks_mut();
+    for (&texel, out) in texels.iter().zip(out) {
+        *out = encode(texel);
+    }
 }
 
 fn decode_components(numeric: Numeric, components: &[Component], bytes: &[u8]) -> [f32; 4] {

@@ -8,8 +8,33 @@ use simdevice::device::FlushPolicy;
 use simdevice::packet::*;
 use simdevice::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::raster::blend::Blender;
-use simdevice::{Config, Format, ImageView, Packet};
+use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
 use std::sync::Arc;
+
+/// Replaces the destination.
+const REPLACE: BlendState = BlendState {
+    equations: None,
+    write_mask: 0xF,
+};
+
+/// A texel of an aspect of a layer.
+fn texel(view: &ImageView, aspect: Aspect, layer: u32, x: u32, y: u32) -> [f32; 4] {
+    let layout = view.image.subresource(aspect, 0, layer).unwrap();
+    let mut out = vec![0; layout.format.texel_size()];
+    view.image.read_row(&layout, [x, y, 0], &mut out).unwrap();
+    layout.format.decode(&out)
+}
+
+/// Executes `packets` as one pass on a device of its own.
+fn run(config: &Config, rendering: &Rendering, packets: &[Packet]) -> Counters {
+    let device = Arc::new(Device::new(config).unwrap());
+    let mut processor = CommandProcessor::new(device);
+    let begin = Packet::BeginRendering(Box::new(rendering.clone()));
+    for packet in [begin].iter().chain(packets).chain([&Packet::EndRendering]) {
+        processor.execute(packet).unwrap();
+    }
+    processor.counters().clone()
+}
 
 fn rect(x: i32, y: i32, width: u32, height: u32) -> Rect {
     Rect {

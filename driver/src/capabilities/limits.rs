@@ -120,7 +120,7 @@ fn limits() -> vk::PhysicalDeviceLimits {
         sub_texel_precision_bits: 8,
         mipmap_precision_bits: 8,
         max_draw_indexed_index_value: u32::MAX,
-        max_draw_indirect_count: 1,
+        max_draw_indirect_count: u32::MAX,
         max_sampler_lod_bias: 2.0,
         max_sampler_anisotropy: 1.0,
         max_viewports: 1,
@@ -182,6 +182,7 @@ fn vulkan12() -> vk::PhysicalDeviceVulkan12Properties<'static> {
         // No driver id is registered for this driver, and it claims no conformance.
         driver_id: vk::DriverId::from_raw(0),
         conformance_version: vk::ConformanceVersion::default(),
+        max_timeline_semaphore_value_difference: u64::MAX,
         framebuffer_integer_color_sample_counts: vk::SampleCountFlags::TYPE_1,
         ..Default::default()
     };

@@ -115,3 +115,6 @@ pub(crate) fn device_command(name: &CStr, enabled: &Enabled<'_>) -> vk::PFN_vkVo
         .filter(|command| command.scope == Scope::Device && command.gate.is_open(enabled))
         .map(|command| command.function)
 }
+
+#[cfg(test)]
+mod tests;

@@ -51,10 +51,12 @@ entry_points! {
         let physical_device = handle::get(physical_device)?;
         let info = pointer::input(info)?;
         let names = pointer::strings(info.pp_enabled_extension_names, info.enabled_extension_count)?;
+        let extensions = extensions::resolve(extensions::DEVICE, &names)?;
+        let features = EnabledFeatures::requested(info, &extensions)?;
         let created = Device::new(
             physical_device.require_instance()?,
-            extensions::resolve(extensions::DEVICE, &names)?,
-            EnabledFeatures::requested(info)?,
+            extensions,
+            features,
             environment::open_device()?,
             queue_count(info)?,
         )?;

@@ -1,7 +1,7 @@
 //! Images and their views.
 
 use super::buffer::fill_requirements;
-use crate::capabilities::formats;
+use crate::capabilities::formats::{self, ImageQuery};
 use crate::capabilities::memory::ALL_TYPE_BITS;
 use crate::error::Error;
 use crate::lower::transfer;
@@ -159,15 +159,30 @@ unsafe fn new_image(info: &vk::ImageCreateInfo<'_>) -> Result<Image, Error> {
     if external.is_some_and(|external| !external.handle_types.is_empty()) {
         return Err(Error::FeatureNotPresent("external memory".into()));
     }
-    let supported = vk::ImageCreateFlags::MUTABLE_FORMAT
-        | vk::ImageCreateFlags::EXTENDED_USAGE
-        | vk::ImageCreateFlags::CUBE_COMPATIBLE
-        | vk::ImageCreateFlags::ALIAS;
-    if !supported.contains(info.flags) {
-        return Err(Error::FeatureNotPresent(format!(
-            "an image with flags {:?}",
-            info.flags
-        )));
+    let supported = formats::image_properties(ImageQuery {
+        format: info.format,
+        ty: info.image_type,
+        tiling: info.tiling,
+        usage: info.usage,
+        flags: info.flags,
+    })?;
+    let (extent, max) = (info.extent, supported.max_extent);
+    if extent.width > max.width
+        || extent.height > max.height
+        || extent.depth > max.depth
+        || info.mip_levels > supported.max_mip_levels
+        || info.array_layers > supported.max_array_layers
+        || !supported.sample_counts.contains(info.samples)
+        || info.samples.is_empty()
+    {
+        return Err(Error::usage(
+            "VUID-VkImageCreateInfo-extent-02252",
+            format!(
+                "an image of {extent:?} with {} levels, {} layers and samples {:?} is beyond what its format \
+                 supports, {supported:?}",
+                info.mip_levels, info.array_layers, info.samples
+            ),
+        ));
     }
     let kind = match info.image_type {
         vk::ImageType::TYPE_1D => ImageKind::D1,
@@ -182,7 +197,6 @@ unsafe fn new_image(info: &vk::ImageCreateInfo<'_>) -> Result<Image, Error> {
     };
     let format =
         formats::device_format(info.format).ok_or_else(|| unsupported_format(info.format))?;
-    let extent = info.extent;
     Image::new(ImageDesc {
         kind,
         format,

@@ -110,11 +110,6 @@ impl CommandBuffer {
         self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Its device.
-    pub(crate) fn device(&self) -> &Arc<Device> {
-        &self.device
-    }
-
     /// Whether it is a secondary command buffer.
     pub(crate) fn is_secondary(&self) -> bool {
         self.level == vk::CommandBufferLevel::SECONDARY

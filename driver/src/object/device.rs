@@ -69,19 +69,9 @@ impl Device {
         Ok(device)
     }
 
-    /// The simulated device that executes its packets.
-    pub(crate) fn simulated(&self) -> &Arc<simdevice::Device> {
-        &self.simulated
-    }
-
     /// The features that the application enabled.
     pub(crate) fn features(&self) -> &EnabledFeatures {
         &self.features
-    }
-
-    /// Whether the application enabled the extension.
-    pub(crate) fn has_extension(&self, name: &CStr) -> bool {
-        self.extensions.contains(&name)
     }
 
     /// What is waited for on it, and whether it is lost.

@@ -89,8 +89,6 @@ impl Image {
 pub(crate) struct ImageView {
     /// The device's half.
     pub(crate) view: image::ImageView,
-    /// How its texels are read, by Vulkan's name.
-    pub(crate) format: vk::Format,
 }
 
 impl ImageView {
@@ -140,7 +138,6 @@ impl ImageView {
                 base_layer,
                 layer_count,
             },
-            format: view_format,
         })
     }
 }

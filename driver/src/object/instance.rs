@@ -47,11 +47,6 @@ impl Instance {
         }))
     }
 
-    /// The version that the application asked for, at most the driver's.
-    pub(crate) fn api_version(&self) -> u32 {
-        self.api_version
-    }
-
     /// Its one physical device.
     pub(crate) fn physical_device(&self) -> vk::PhysicalDevice {
         self.physical_device

@@ -11,6 +11,7 @@ pub(crate) mod instance;
 pub(crate) mod memory;
 pub(crate) mod physical_device;
 pub(crate) mod pipeline;
+pub(crate) mod private_data;
 pub(crate) mod query_pool;
 pub(crate) mod queue;
 pub(crate) mod render_pass;

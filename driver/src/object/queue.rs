@@ -137,3 +137,73 @@ fn run(work: &Receiver<Work>, mut processor: CommandProcessor, signals: &Signals
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    fn queue() -> Arc<Queue> {
+        let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
+        Queue::start(
+            Weak::new(),
+            Arc::default(),
+            CommandProcessor::new(Arc::new(simulated)),
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn work_is_done_in_order_before_the_queue_is_idle() {
+        let queue = queue();
+        let (sent, received) = channel();
+        for index in 0..10 {
+            let sent = sent.clone();
+            queue
+                .submit(Box::new(move |_| sent.send(index).unwrap()))
+                .unwrap();
+        }
+        queue.wait_idle().unwrap();
+        assert_eq!(
+            received.try_iter().collect::<Vec<_>>(),
+            (0..10).collect::<Vec<_>>()
+        );
+        queue.stop();
+        queue.stop();
+        assert!(queue.submit(Box::new(|_| ())).is_err());
+    }
+
+    #[test]
+    fn a_panic_loses_the_device_and_drops_what_waits() {
+        struct Dropped(Arc<AtomicUsize>);
+        impl Drop for Dropped {
+            fn drop(&mut self) {
+                self.0.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        let queue = queue();
+        let (go, wait) = channel::<()>();
+        let dropped = Arc::new(AtomicUsize::new(0));
+        queue
+            .submit(Box::new(move |_| {
+                let _ = wait.recv();
+                panic!("provoked");
+            }))
+            .unwrap();
+        let ran = Arc::new(AtomicUsize::new(0));
+        let (waiting, counted) = (Dropped(Arc::clone(&dropped)), Arc::clone(&ran));
+        queue
+            .submit(Box::new(move |_| {
+                let _waiting = waiting;
+                counted.fetch_add(1, Ordering::Relaxed);
+            }))
+            .unwrap();
+        go.send(()).unwrap();
+        let error = queue.wait_idle().unwrap_err();
+        assert_eq!(error.result(), vk::Result::ERROR_DEVICE_LOST);
+        assert!(error.to_string().contains("provoked"), "{error}");
+        queue.stop();
+        assert_eq!(dropped.load(Ordering::Relaxed), 1);
+        assert_eq!(ran.load(Ordering::Relaxed), 0);
+    }
+}

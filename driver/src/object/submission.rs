@@ -48,8 +48,15 @@ impl Submission {
             instance: &self.instance,
         };
         for batch in self.batches {
-            if let Err(Lost(reason)) = execute_batch(batch, &mut executor) {
-                self.signals.lose(&reason);
+            if let Err(lost) = execute_batch(batch, &mut executor) {
+                let Lost(reason) = &lost;
+                self.signals.lose(reason);
+                self.instance.report(
+                    vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                    vk::DebugUtilsMessageTypeFlagsEXT::GENERAL,
+                    "GAURAST-device-lost",
+                    &lost.to_string(),
+                );
                 return;
             }
         }
@@ -113,5 +120,110 @@ impl Executor for QueueExecutor<'_> {
             "GAURAST-draw-skipped",
             message,
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+    use crate::object::queue::Queue;
+    use simdevice::packet::BufferRange;
+    use simdevice::{Allocation, Device};
+    use std::sync::Weak;
+
+    struct Fixture {
+        signals: Arc<Signals>,
+        queue: Arc<Queue>,
+        instance: Arc<Instance>,
+    }
+
+    impl Fixture {
+        fn new() -> Self {
+            let simulated = Arc::new(Device::new(&simdevice::Config::default()).unwrap());
+            let signals = Arc::<Signals>::default();
+            let processor = CommandProcessor::new(simulated);
+            Self {
+                queue: Queue::start(Weak::new(), Arc::clone(&signals), processor).unwrap(),
+                instance: Instance::new(vk::API_VERSION_1_3, &[]).unwrap(),
+                signals,
+            }
+        }
+
+        /// Submits packets with a fence that a thread waits for, and says how that wait ended.
+        fn submit(&self, commands: Vec<Command>) -> Waited {
+            let fence = Arc::new(Fence::new(Arc::clone(&self.signals), false));
+            let waiter = std::thread::spawn({
+                let (signals, fence) = (Arc::clone(&self.signals), Arc::clone(&fence));
+                move || signals.wait(None, || fence.is_signaled())
+            });
+            let mut recorder = crate::command::recorder::Recorder::new();
+            recorder.begin(Default::default()).unwrap();
+            commands.into_iter().for_each(|c| recorder.push(c));
+            recorder.end().unwrap();
+            let submission = Submission {
+                batches: vec![Batch {
+                    commands: vec![recorder.submit().unwrap()],
+                    ..Batch::default()
+                }],
+                fence: Some(fence),
+                signals: Arc::clone(&self.signals),
+                instance: Arc::clone(&self.instance),
+            };
+            let submitted = self
+                .queue
+                .submit(Box::new(move |processor| submission.execute(processor)));
+            if let Err(error) = submitted {
+                assert!(matches!(error, Error::DeviceLost(_)));
+            }
+            waiter.join().unwrap()
+        }
+    }
+
+    fn fill(memory: &Arc<Allocation>) -> Command {
+        Command::Packet(Packet::FillBuffer {
+            target: BufferRange {
+                memory: Arc::clone(memory),
+                offset: 0,
+                size: 4,
+            },
+            word: 7,
+        })
+    }
+
+    fn word(memory: &Allocation) -> u32 {
+        let mut word = [0];
+        memory.read(0, &mut word).unwrap();
+        word[0]
+    }
+
+    #[test]
+    fn an_execution_error_loses_the_device_and_wakes_who_waits() {
+        let fixture = Fixture::new();
+        let memory = Allocation::new_zeroed(4).unwrap();
+        assert_eq!(fixture.submit(vec![fill(&memory)]), Waited::Ready);
+        assert_eq!(word(&memory), 7);
+        let outside_pass = Command::Packet(Packet::EndRendering);
+        let waited = fixture.submit(vec![outside_pass]);
+        assert_eq!(waited, Waited::Lost);
+        assert!(fixture.signals.check().is_err());
+        assert_eq!(fixture.submit(vec![fill(&memory)]), Waited::Lost);
+        assert!(fixture.queue.wait_idle().is_err());
+        fixture.queue.stop();
+    }
+
+    #[test]
+    fn a_panic_loses_the_device_and_wakes_who_waits() {
+        let fixture = Fixture::new();
+        let waiter = std::thread::spawn({
+            let signals = Arc::clone(&fixture.signals);
+            move || signals.wait(None, || false)
+        });
+        let panicking = Box::new(|_: &mut CommandProcessor| panic!("in a test"));
+        fixture.queue.submit(panicking).unwrap();
+        assert_eq!(waiter.join().unwrap(), Waited::Lost);
+        let error = fixture.signals.check().unwrap_err();
+        assert!(error.to_string().contains("in a test"));
+        fixture.queue.stop();
     }
 }

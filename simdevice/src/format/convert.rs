@@ -88,8 +88,9 @@ fn from_unorm(code: u32, bits: u32) -> f32 {
 
 fn to_unorm(value: f32, bits: u32) -> u32 {
     let max = f64::from(u32::MAX >> (32 - bits));
-    // The product of 24 and up to 24 bits is exact in binary64, so that only the rounding rounds.
-    round_ties_even(clamp_unorm(value) * max) as u32
+    // The product of 24 and up to 24 bits is exact in binary64, so that only the sum rounds: to nearest, ties to
+    // even, and to an integer, since 2^52 leaves no bits for a fraction. It stands in the low bits.
+    (clamp_unorm(value) * max + 4_503_599_627_370_496.0).to_bits() as u32
 }
 
 pub(super) fn from_unorm8(code: u8) -> f32 {
@@ -105,16 +106,51 @@ pub(super) fn quantize_unorm8(value: f32) -> f32 {
     round_ties_even(clamp_unorm(value) * 255.0) as f32 / 255.0
 }
 
-pub(super) fn from_half(bytes: [u8; 8]) -> [f32; 4] {
-    let mut out = [0.0; 4];
-    bytemuck::cast::<_, [f16; 4]>(bytes).convert_to_f32_slice(&mut out);
-    out
+/// R, G and B by the transfer function, A linear.
+pub(super) fn from_srgb8([r, g, b, a]: [u8; 4]) -> [f32; 4] {
+    let linear = &SRGB.linear;
+    let [r, g, b] = [r, g, b].map(|code| linear[usize::from(code)]);
+    [r, g, b, from_unorm8(a)]
 }
 
-pub(super) fn to_half(texel: &[f32; 4]) -> [u8; 8] {
-    let mut out = [f16::ZERO; 4];
-    out.convert_from_f32_slice(texel);
-    bytemuck::cast(out)
+/// The inverse of [`from_srgb8`].
+pub(super) fn to_srgb8([r, g, b, a]: [f32; 4]) -> [u8; 4] {
+    let table = &*SRGB;
+    let [r, g, b] = [r, g, b].map(|linear| table.encode(linear));
+    [r, g, b, to_unorm8(a)]
+}
+
+/// Components that are converted at once between binary16 and binary32.
+const HALVES: usize = 16;
+
+/// Reads consecutive little-endian binary16 numbers, as many as both slices have.
+pub(super) fn from_halves(bytes: &[u8], out: &mut [f32]) {
+    for (bytes, out) in bytes.chunks(2 * HALVES).zip(out.chunks_mut(HALVES)) {
+        let mut halves = [f16::ZERO; HALVES];
+        let count = out.len().min(bytes.len() / 2);
+        bytemuck::cast_slice_mut(&mut halves[..count]).copy_from_slice(&bytes[..2 * count]);
+        halves[..count].convert_to_f32_slice(&mut out[..count]);
+    }
+}
+
+/// Writes consecutive little-endian binary16 numbers, as many as both slices have room for.
+pub(super) fn to_halves(numbers: &[f32], out: &mut [u8]) {
+    for (numbers, out) in numbers.chunks(HALVES).zip(out.chunks_mut(2 * HALVES)) {
+        let mut halves = [f16::ZERO; HALVES];
+        let count = numbers.len().min(out.len() / 2);
+        halves[..count].convert_from_f32_slice(&numbers[..count]);
+        out[..2 * count].copy_from_slice(bytemuck::cast_slice(&halves[..count]));
+    }
+}
+
+/// Rounds numbers to binary16.
+pub(super) fn quantize_halves(numbers: &mut [f32]) {
+    for numbers in numbers.chunks_mut(HALVES) {
+        let mut halves = [f16::ZERO; HALVES];
+        let halves = &mut halves[..numbers.len()];
+        halves.convert_from_f32_slice(numbers);
+        halves.convert_to_f32_slice(numbers);
+    }
 }
 
 /// A float without a sign: 5 bits of exponent with bias 15, `mantissa` bits. Negative numbers become 0, finite

@@ -1,6 +1,11 @@
 use super::*;
 use crate::packet::Aspect;
 
+/// The first bytes of a texel.
+fn first<const N: usize>(texel: &[u8; MAX_TEXEL_SIZE]) -> [u8; N] {
+    *texel.first_chunk().unwrap()
+}
+
 /// Formats whose every texel is a texel of one component at a time, decoded and encoded alike.
 fn simple() -> impl Iterator<Item = Format> {
     Format::ALL.iter().copied().filter(|format| {
@@ -71,7 +76,7 @@ fn every_24_bit_depth_is_distinct() {
 #[test]
 fn packed_formats_have_their_components_in_place() {
     let texel = [1.0, 0.0, 0.0, 0.0];
-    let bits16 = |format: Format| u16::from_le_bytes(from_array(&format.encode(texel)));
+    let bits16 = |format: Format| u16::from_le_bytes(first(&format.encode(texel)));
     assert_eq!(bits16(Format::R5G6B5UnormPack16), 0xF800);
     assert_eq!(bits16(Format::B5G6R5UnormPack16), 0x001F);
     assert_eq!(bits16(Format::A1R5G5B5UnormPack16), 0x7C00);
@@ -79,7 +84,7 @@ fn packed_formats_have_their_components_in_place() {
     assert_eq!(bits16(Format::B5G5R5A1UnormPack16), 0x003E);
     assert_eq!(bits16(Format::R4G4B4A4UnormPack16), 0xF000);
     assert_eq!(bits16(Format::B4G4R4A4UnormPack16), 0x00F0);
-    let bits32 = |format: Format| u32::from_le_bytes(from_array(&format.encode(texel)));
+    let bits32 = |format: Format| u32::from_le_bytes(first(&format.encode(texel)));
     assert_eq!(bits32(Format::A2B10G10R10UnormPack32), 0x0000_03FF);
     assert_eq!(bits32(Format::A2R10G10B10UnormPack32), 0x3FF0_0000);
     assert_eq!(bits32(Format::R8G8B8A8Unorm), 0x0000_00FF);
@@ -120,6 +125,8 @@ fn fast_rows_agree_with_single_components() {
     for format in [
         Format::R8G8B8A8Unorm,
         Format::B8G8R8A8Unorm,
+        Format::R8G8B8A8Srgb,
+        Format::B8G8R8A8Srgb,
         Format::R16G16B16A16Sfloat,
         Format::R32G32B32A32Sfloat,
         Format::R32G32B32Sfloat,
@@ -215,7 +222,7 @@ fn scaled_and_signed_normalised_components() {
 #[test]
 fn unsigned_floats_round_to_nearest() {
     let encode = |x| {
-        u32::from_le_bytes(from_array(
+        u32::from_le_bytes(first(
             &Format::B10G11R11UfloatPack32.encode([x, 0.0, 0.0, 0.0]),
         ))
     };
@@ -290,4 +297,30 @@ fn clear_values_follow_the_format() {
 fn short_texels_are_padded_with_zeros() {
     assert_eq!(Format::R8G8B8A8Unorm.decode(&[255]), [1.0, 0.0, 0.0, 0.0]);
     assert_eq!(Format::R32Sfloat.decode(&[]), [0.0, 0.0, 0.0, 1.0]);
+}
+
+#[test]
+fn rows_stop_where_either_slice_does() {
+    for format in simple() {
+        let size = format.texel_size();
+        let bytes = vec![0x3C; 7 * size];
+        let mut out = [[9.0; 4]; 9];
+        format.decode_row(&bytes[..7 * size - 1], &mut out);
+        assert_eq!(out[6..], [[9.0; 4]; 3], "{format:?}");
+        let one = format.decode(&bytes);
+        assert_eq!(
+            out[..6]
+                .as_flattened()
+                .iter()
+                .map(|x| x.to_bits())
+                .collect::<Vec<_>>(),
+            one.map(f32::to_bits).repeat(6)
+        );
+        let mut back = vec![0xEE; 9 * size];
+        format.encode_row(&out[..6], &mut back);
+        let mut expected = format.encode(one)[..size].repeat(6);
+        expected.resize(9 * size, 0xEE);
+        assert_eq!(back, expected, "{format:?}");
+        format.encode_row(&out[..6], &mut back[..2 * size - 1]);
+    }
 }

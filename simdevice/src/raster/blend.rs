@@ -70,10 +70,9 @@ impl Blender {
             }
             Mode::General(color, alpha) => {
                 let (s, d) = (clamp(source, self.range), clamp(destination, self.range));
-                std::array::from_fn(|component| {
-                    let equation = if component == 3 { alpha } else { color };
-                    evaluate(equation, s, d, self.constants, component)
-                })
+                let [r, g, b, _] = evaluate(color, s, d, self.constants);
+                let [.., a] = evaluate(alpha, s, d, self.constants);
+                [r, g, b, a]
             }
         };
         std::array::from_fn(|component| {
@@ -113,55 +112,54 @@ fn clamp(color: [f32; 4], range: Option<(f32, f32)>) -> [f32; 4] {
     }
 }
 
-/// One component of the blend equation.
-fn evaluate(
-    equation: BlendEquation,
-    source: [f32; 4],
-    destination: [f32; 4],
-    constants: [f32; 4],
-    component: usize,
-) -> f32 {
-    let (s, d) = (source[component], destination[component]);
-    let term = |value: f32, by: BlendFactor| {
+/// The blend equation.
+fn evaluate(equation: BlendEquation, s: [f32; 4], d: [f32; 4], constants: [f32; 4]) -> [f32; 4] {
+    let term = |value: [f32; 4], by: BlendFactor| {
         // A factor of zero removes a term whatever its value, infinities and NaNs included.
-        match by {
-            BlendFactor::Zero => 0.0,
-            by => value * factor(by, source, destination, constants, component),
+        if by == BlendFactor::Zero {
+            return [0.0; 4];
         }
+        let factors = factors(by, s, d, constants);
+        std::array::from_fn::<f32, 4, _>(|component| value[component] * factors[component])
     };
-    match equation.op {
-        BlendOp::Add => term(s, equation.source) + term(d, equation.destination),
-        BlendOp::Subtract => term(s, equation.source) - term(d, equation.destination),
-        BlendOp::ReverseSubtract => term(d, equation.destination) - term(s, equation.source),
-        BlendOp::Min => s.min(d),
-        BlendOp::Max => s.max(d),
-    }
+    let (source, destination) = match equation.op {
+        BlendOp::Min | BlendOp::Max => (s, d),
+        _ => (term(s, equation.source), term(d, equation.destination)),
+    };
+    std::array::from_fn(|component| {
+        let (s, d) = (source[component], destination[component]);
+        match equation.op {
+            BlendOp::Add => s + d,
+            BlendOp::Subtract => s - d,
+            BlendOp::ReverseSubtract => d - s,
+            BlendOp::Min => s.min(d),
+            BlendOp::Max => s.max(d),
+        }
+    })
 }
 
-fn factor(
-    factor: BlendFactor,
-    source: [f32; 4],
-    destination: [f32; 4],
-    constants: [f32; 4],
-    component: usize,
-) -> f32 {
+/// The factor of each component.
+fn factors(factor: BlendFactor, s: [f32; 4], d: [f32; 4], constants: [f32; 4]) -> [f32; 4] {
+    let inverse = |of: [f32; 4]| of.map(|component| 1.0 - component);
     match factor {
-        BlendFactor::Zero => 0.0,
-        BlendFactor::One => 1.0,
-        BlendFactor::SrcColor => source[component],
-        BlendFactor::OneMinusSrcColor => 1.0 - source[component],
-        BlendFactor::DstColor => destination[component],
-        BlendFactor::OneMinusDstColor => 1.0 - destination[component],
-        BlendFactor::SrcAlpha => source[3],
-        BlendFactor::OneMinusSrcAlpha => 1.0 - source[3],
-        BlendFactor::DstAlpha => destination[3],
-        BlendFactor::OneMinusDstAlpha => 1.0 - destination[3],
-        BlendFactor::ConstantColor => constants[component],
-        BlendFactor::OneMinusConstantColor => 1.0 - constants[component],
-        BlendFactor::ConstantAlpha => constants[3],
-        BlendFactor::OneMinusConstantAlpha => 1.0 - constants[3],
-        BlendFactor::SrcAlphaSaturate if component == 3 => 1.0,
-        BlendFactor::SrcAlphaSaturate => source[3].min(1.0 - destination[3]),
+        BlendFactor::Zero => [0.0; 4],
+        BlendFactor::One => [1.0; 4],
+        BlendFactor::SrcColor => s,
+        BlendFactor::OneMinusSrcColor => inverse(s),
+        BlendFactor::DstColor => d,
+        BlendFactor::OneMinusDstColor => inverse(d),
+        BlendFactor::SrcAlpha => [s[3]; 4],
+        BlendFactor::OneMinusSrcAlpha => [1.0 - s[3]; 4],
+        BlendFactor::DstAlpha => [d[3]; 4],
+        BlendFactor::OneMinusDstAlpha => [1.0 - d[3]; 4],
+        BlendFactor::ConstantColor => constants,
+        BlendFactor::OneMinusConstantColor => inverse(constants),
+        BlendFactor::ConstantAlpha => [constants[3]; 4],
+        BlendFactor::OneMinusConstantAlpha => [1.0 - constants[3]; 4],
+        BlendFactor::SrcAlphaSaturate => {
+            let least = s[3].min(1.0 - d[3]);
+            [least, least, least, 1.0]
+        }
     }
 }
 

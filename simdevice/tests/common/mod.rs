@@ -2,10 +2,9 @@
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::counters::Counters;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::*;
-use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
+use simdevice::{Allocation, Config, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
 /// The framebuffer of every test: neither side is a multiple of a tile's.
@@ -30,12 +29,6 @@ const OVER_EQUATION: BlendEquation = BlendEquation {
     source: BlendFactor::One,
     destination: BlendFactor::OneMinusSrcAlpha,
     op: BlendOp::Add,
-};
-
-/// Replaces the destination.
-pub const REPLACE: BlendState = BlendState {
-    equations: None,
-    write_mask: 0xF,
 };
 
 /// An image of `layers` layers whose memory holds `byte` everywhere.
@@ -66,14 +59,6 @@ pub fn bytes(view: &ImageView) -> Vec<u8> {
     let mut out = vec![0u8; memory.len() as usize];
     memory.read(0, &mut out).unwrap();
     out
-}
-
-/// A texel of an aspect of layer 0.
-pub fn texel(view: &ImageView, aspect: Aspect, layer: u32, x: u32, y: u32) -> [f32; 4] {
-    let layout = view.image.subresource(aspect, 0, layer).unwrap();
-    let mut out = vec![0; layout.format.texel_size()];
-    view.image.read_row(&layout, [x, y, 0], &mut out).unwrap();
-    layout.format.decode(&out)
 }
 
 /// An attachment that is stored.
@@ -189,17 +174,6 @@ pub fn clear(clears: Vec<AttachmentClear>, rects: &[Rect]) -> Packet {
         clears,
         rects: rects.iter().map(|&rect| (rect, 0, 1)).collect(),
     })
-}
-
-/// Executes `packets` as one pass on a device of its own.
-pub fn run(config: &Config, rendering: &Rendering, packets: &[Packet]) -> Counters {
-    let device = Arc::new(Device::new(config).unwrap());
-    let mut processor = CommandProcessor::new(device);
-    let begin = Packet::BeginRendering(Box::new(rendering.clone()));
-    for packet in [begin].iter().chain(packets).chain([&Packet::EndRendering]) {
-        processor.execute(packet).unwrap();
-    }
-    processor.counters().clone()
 }
 
 /// One worker, otherwise the default.

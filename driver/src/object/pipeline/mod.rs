@@ -4,8 +4,6 @@
 
 mod blend;
 mod gaussian;
-#[cfg(test)]
-mod tests;
 mod vertex_input;
 
 use crate::capabilities::features::EnabledFeatures;
