@@ -80,7 +80,7 @@ impl<'a> Commands<'a> {
                 .width(target.extent.width as f32)
                 .height(target.extent.height as f32)
                 .max_depth(1.0);
-            device.cmd_set_viewport(self.raw, 0, &[viewport]);
+            self.viewport(viewport);
             self.scissor(whole);
             record();
             if pass.object.is_some() {
@@ -110,6 +110,16 @@ impl<'a> Commands<'a> {
         let (device, raw) = (self.context.device(), indices.raw());
         // SAFETY: see `contexts`.
         unsafe { device.cmd_bind_index_buffer(self.raw, raw, 0, vk::IndexType::UINT32) };
+    }
+
+    /// Sets the viewport.
+    pub fn viewport(&self, viewport: vk::Viewport) {
+        // SAFETY: see `contexts`.
+        unsafe {
+            self.context
+                .device()
+                .cmd_set_viewport(self.raw, 0, &[viewport])
+        };
     }
 
     /// Sets the scissor.
