@@ -49,6 +49,11 @@ impl Devices {
                     render_bounded(&scene.as_oracle(), &camera, &OracleState::from(&state));
                 let seconds = start.elapsed().as_secs_f64();
                 eprintln!("{name}, {}: oracle, {seconds:.1} s", view.name);
+                let covered = reference.nominal.iter().filter(|rgba| rgba[3] > 0.1);
+                assert!(
+                    covered.count() * 20 > reference.nominal.len(),
+                    "hardly anything"
+                );
                 reference
             })
             .collect();

@@ -46,7 +46,7 @@ impl<'a> Commands<'a> {
             Some(_) if pass.area.is_none() => vk::ImageLayout::UNDEFINED,
             _ => vk::ImageLayout::GENERAL,
         };
-        self.barrier(target, old_layout);
+        self.barrier(target, old_layout, vk::ImageLayout::GENERAL);
         let clear = vk::ClearValue {
             color: vk::ClearColorValue {
                 float32: pass.clear.unwrap_or_default(),
@@ -114,22 +114,16 @@ impl<'a> Commands<'a> {
 
     /// Sets the viewport.
     pub fn viewport(&self, viewport: vk::Viewport) {
+        let device = self.context.device();
         // SAFETY: see `contexts`.
-        unsafe {
-            self.context
-                .device()
-                .cmd_set_viewport(self.raw, 0, &[viewport])
-        };
+        unsafe { device.cmd_set_viewport(self.raw, 0, &[viewport]) };
     }
 
     /// Sets the scissor.
     pub fn scissor(&self, scissor: vk::Rect2D) {
+        let device = self.context.device();
         // SAFETY: see `contexts`.
-        unsafe {
-            self.context
-                .device()
-                .cmd_set_scissor(self.raw, 0, &[scissor])
-        };
+        unsafe { device.cmd_set_scissor(self.raw, 0, &[scissor]) };
     }
 
     /// `vkCmdDraw` with `[vertexCount, instanceCount, firstVertex, firstInstance]`.
@@ -155,7 +149,8 @@ impl<'a> Commands<'a> {
 
     /// Copies all texels of `target` to the beginning of `buffer`.
     pub(super) fn copy(&self, target: &Target, buffer: &Buffer) {
-        self.barrier(target, vk::ImageLayout::GENERAL);
+        let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+        self.barrier(target, vk::ImageLayout::GENERAL, source);
         let layers = vk::ImageSubresourceLayers::default()
             .aspect_mask(vk::ImageAspectFlags::COLOR)
             .layer_count(1);
@@ -168,13 +163,7 @@ impl<'a> Commands<'a> {
         let device = self.context.device();
         // SAFETY: see `contexts`.
         unsafe {
-            device.cmd_copy_image_to_buffer(
-                self.raw,
-                target.image,
-                vk::ImageLayout::GENERAL,
-                buffer.raw(),
-                &regions,
-            );
+            device.cmd_copy_image_to_buffer(self.raw, target.image, source, buffer.raw(), &regions);
             device.cmd_pipeline_barrier(
                 self.raw,
                 vk::PipelineStageFlags::TRANSFER,
@@ -185,16 +174,17 @@ impl<'a> Commands<'a> {
                 &[],
             );
         }
+        self.barrier(target, source, vk::ImageLayout::GENERAL);
     }
 
-    /// Whatever was done to `target` before happens before whatever follows.
-    fn barrier(&self, target: &Target, old_layout: vk::ImageLayout) {
+    /// Whatever was done to `target` before happens before whatever follows, in the layout `to`.
+    fn barrier(&self, target: &Target, from: vk::ImageLayout, to: vk::ImageLayout) {
         let access = vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE;
         let barriers = [vk::ImageMemoryBarrier::default()
             .src_access_mask(access)
             .dst_access_mask(access)
-            .old_layout(old_layout)
-            .new_layout(vk::ImageLayout::GENERAL)
+            .old_layout(from)
+            .new_layout(to)
             .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .image(target.image)

@@ -97,7 +97,7 @@ impl Drop for Buffer {
     }
 }
 
-/// A colour attachment in device memory, with its view.
+/// A colour attachment in device memory, with its view. Between passes its layout is general.
 pub struct Target {
     pub(super) image: vk::Image,
     pub(super) view: vk::ImageView,
