@@ -1,6 +1,6 @@
 //! The renderer's pictures against pictures that another renderer made.
 
-use gaurast_samples::camera::{Camera, DEFAULT_FOV};
+use gaurast_samples::camera::Camera;
 use gaurast_samples::output;
 use gaurast_samples::renderer::Renderer;
 use gaurast_samples::scene::Scene;
@@ -50,31 +50,4 @@ fn tiny_is_as_another_renderer_drew_it() {
 #[test]
 fn mid_is_as_another_renderer_drew_it() {
     assert_psnr("mid", [0.0, 10.0, -15.0], [640, 360], 40.0);
-}
-
-/// Scenes that are there in two formats, one of them with 8 bits a number or few more.
-#[test]
-fn spz_looks_like_the_ply_that_it_was_made_from() {
-    let mut renderer = with_settings(&Settings::default(), || {
-        Renderer::new(vulkan_gaurast::entry()).expect("a device")
-    });
-    let size = [640, 480];
-    for name in ["yashica-t4", "leica-sofort"] {
-        let paths =
-            ["ply", "spz"].map(|kind| require_data(&format!("splats/{name}-top8192.{kind}")));
-        let [Some(ply), Some(spz)] = paths else {
-            continue;
-        };
-        let [ply, spz] = [ply, spz].map(|path| Scene::load(&path).expect("a scene"));
-        let camera = Camera::framing(&ply, DEFAULT_FOV, size);
-        let [ply, spz] = [ply, spz].map(|scene| {
-            let uploaded = renderer.upload(&scene, None).expect("uploaded");
-            let frame = renderer.render(&uploaded, &camera).expect("a frame");
-            frame.picture.pixels
-        });
-        let statistics = Statistics::new(&spz, &ply, size[0]);
-        eprintln!("{name}: {statistics}");
-        assert!(statistics.psnr > 30.0, "{name}: {statistics}");
-        assert!(ply.iter().filter(|rgba| rgba[3] > 0.5).count() > ply.len() / 20);
-    }
 }
