@@ -49,10 +49,16 @@ impl Devices {
                     render_bounded(&scene.as_oracle(), &camera, &OracleState::from(&state));
                 let seconds = start.elapsed().as_secs_f64();
                 eprintln!("{name}, {}: oracle, {seconds:.1} s", view.name);
-                let covered = reference.nominal.iter().filter(|rgba| rgba[3] > 0.1);
+                let covered = reference
+                    .nominal
+                    .iter()
+                    .filter(|rgba| rgba[3] > 0.1)
+                    .count();
+                let least = reference.nominal.len() / 20;
+                let is_made_up = view.limits == Limits::ENVELOPE_ONLY;
                 assert!(
-                    covered.count() * 20 > reference.nominal.len(),
-                    "hardly anything"
+                    is_made_up || covered > least,
+                    "{name}: hardly anything is seen"
                 );
                 reference
             })
@@ -166,8 +172,9 @@ fn generated_scenes_keep_the_contract_in_every_state() {
 #[test]
 fn awkward_scenes_stay_within_the_envelope_in_every_state() {
     let devices = Devices::new();
-    for (seed, degree) in [(11, 0), (12, 3), (13, 1)] {
-        let scene = scenes::awkward(seed, 400, degree);
+    // Few at a time: a huge opaque one hides the others.
+    for seed in 100..120 {
+        let scene = scenes::awkward(seed, 10 + 2 * (seed - 100) as usize, (seed % 4) as u32);
         for (name, state) in states() {
             let name = format!("awkward {seed} {name}");
             devices.judge(
