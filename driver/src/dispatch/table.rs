@@ -120,7 +120,7 @@ commands! {
         PFN_vkGetPipelineCacheData = pipeline::get_pipeline_cache_data;
         PFN_vkMergePipelineCaches = pipeline::merge_pipeline_caches;
         PFN_vkCreateGraphicsPipelines = pipeline::create_graphics_pipelines;
-        PFN_vkCreateComputePipelines = unsupported::create_compute_pipelines;
+        PFN_vkCreateComputePipelines = pipeline::create_compute_pipelines;
         PFN_vkDestroyPipeline = pipeline::destroy_pipeline;
         PFN_vkCreatePipelineLayout = pipeline::create_pipeline_layout;
         PFN_vkDestroyPipelineLayout = pipeline::destroy_pipeline_layout;
@@ -229,8 +229,8 @@ commands! {
         PFN_vkGetDescriptorSetLayoutSupport = unsupported::get_descriptor_set_layout_support;
     }
     Device, Core(API_VERSION_1_2) => {
-        PFN_vkCmdDrawIndirectCount = unsupported::cmd_draw_indirect_count;
-        PFN_vkCmdDrawIndexedIndirectCount = unsupported::cmd_draw_indexed_indirect_count;
+        PFN_vkCmdDrawIndirectCount = command::cmd_draw_indirect_count;
+        PFN_vkCmdDrawIndexedIndirectCount = command::cmd_draw_indexed_indirect_count;
         PFN_vkCreateRenderPass2 = render_pass::create_render_pass2;
         PFN_vkCmdBeginRenderPass2 = rendering::cmd_begin_render_pass2;
         PFN_vkCmdNextSubpass2 = rendering::cmd_next_subpass2;

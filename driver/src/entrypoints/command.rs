@@ -201,7 +201,8 @@ crate::entry_points! {
         draw_count: u32,
         stride: u32,
     ) {
-        draw_indirect(command_buffer, buffer, offset, draw_count, stride, false)
+        let parameters = (buffer, offset);
+        draw_indirect(command_buffer, parameters, None, draw_count, stride, false)
     }
 
     fn cmd_draw_indexed_indirect(
@@ -211,7 +212,36 @@ crate::entry_points! {
         draw_count: u32,
         stride: u32,
     ) {
-        draw_indirect(command_buffer, buffer, offset, draw_count, stride, true)
+        let parameters = (buffer, offset);
+        draw_indirect(command_buffer, parameters, None, draw_count, stride, true)
+    }
+
+    fn cmd_draw_indirect_count(
+        command_buffer: vk::CommandBuffer,
+        buffer: vk::Buffer,
+        offset: vk::DeviceSize,
+        count_buffer: vk::Buffer,
+        count_buffer_offset: vk::DeviceSize,
+        max_draw_count: u32,
+        stride: u32,
+    ) {
+        let parameters = (buffer, offset);
+        let count = Some((count_buffer, count_buffer_offset));
+        draw_indirect(command_buffer, parameters, count, max_draw_count, stride, false)
+    }
+
+    fn cmd_draw_indexed_indirect_count(
+        command_buffer: vk::CommandBuffer,
+        buffer: vk::Buffer,
+        offset: vk::DeviceSize,
+        count_buffer: vk::Buffer,
+        count_buffer_offset: vk::DeviceSize,
+        max_draw_count: u32,
+        stride: u32,
+    ) {
+        let parameters = (buffer, offset);
+        let count = Some((count_buffer, count_buffer_offset));
+        draw_indirect(command_buffer, parameters, count, max_draw_count, stride, true)
     }
 
     fn cmd_execute_commands(
@@ -419,14 +449,17 @@ unsafe fn set_scissors(
     }
 }
 
+/// A buffer and an offset in it.
+type Place = (vk::Buffer, vk::DeviceSize);
+
 /// Records draws whose numbers lie in a buffer.
 ///
 /// # Safety
 /// The handles are live.
 unsafe fn draw_indirect(
     command_buffer: vk::CommandBuffer,
-    buffer: vk::Buffer,
-    offset: vk::DeviceSize,
+    (buffer, offset): Place,
+    count: Option<Place>,
     draw_count: u32,
     stride: u32,
     indexed: bool,
@@ -436,9 +469,14 @@ unsafe fn draw_indirect(
         record(command_buffer, |recorder| {
             recorder.require_pass()?;
             let parameters = handle::get(buffer)?.range(offset, None)?;
+            let count = match count {
+                Some((buffer, offset)) => Some(handle::get(buffer)?.range(offset, Some(4))?),
+                None => None,
+            };
             recorder.push(Command::DrawIndirect(DrawIndirect {
                 parameters,
                 draw_count,
+                count,
                 stride,
                 indexed,
             }));

@@ -41,6 +41,21 @@ crate::entry_points! {
         first_error.map_or(Ok(()), Err)
     }
 
+    /// Compute needs shader cores. The handles are null, as Vulkan has it for what was not created.
+    fn create_compute_pipelines(
+        _device: vk::Device,
+        _pipeline_cache: vk::PipelineCache,
+        create_info_count: u32,
+        _create_infos: *const vk::ComputePipelineCreateInfo<'_>,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+        pipelines: *mut vk::Pipeline,
+    ) -> vk::Result {
+        for index in 0..create_info_count as usize {
+            pointer::output(pipelines.add(index), vk::Pipeline::null())?;
+        }
+        Err::<(), _>(Error::FeatureNotPresent("a compute pipeline (it needs shader cores)".into()))
+    }
+
     fn destroy_pipeline(
         _device: vk::Device,
         pipeline: vk::Pipeline,
@@ -157,9 +172,33 @@ unsafe fn new_graphics_pipeline(
     info: &vk::GraphicsPipelineCreateInfo<'_>,
 ) -> Result<vk::Pipeline, Error> {
     // SAFETY: the caller's promise.
-    let gathered = unsafe { gather(info)? };
+    let gathered = unsafe {
+        withhold_feedback(info)?;
+        gather(info)?
+    };
     let pipeline = GraphicsPipeline::new(&gathered, device.features())?;
     Ok(handle::create(Arc::new(pipeline)))
+}
+
+/// Says of creation feedback that there is none: it takes no time that anybody would want to know.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn withhold_feedback(info: &vk::GraphicsPipelineCreateInfo<'_>) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let Some(feedback) = pnext::find::<vk::PipelineCreationFeedbackCreateInfo>(info.p_next)
+        else {
+            return Ok(());
+        };
+        let none = vk::PipelineCreationFeedback::default();
+        pointer::output(feedback.p_pipeline_creation_feedback, none)?;
+        for index in 0..feedback.pipeline_stage_creation_feedback_count as usize {
+            let place = feedback.p_pipeline_stage_creation_feedbacks.add(index);
+            pointer::output(place, none)?;
+        }
+        Ok(())
+    }
 }
 
 /// Follows a create info's pointers.

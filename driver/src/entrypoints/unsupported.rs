@@ -70,7 +70,6 @@ unsupported! {
     fn queue_bind_sparse(queue: vk::Queue, bind_info_count: u32, bind_info: *const vk::BindSparseInfo<'_>, fence: vk::Fence) -> vk::Result;
     fn create_buffer_view(device: vk::Device, create_info: *const vk::BufferViewCreateInfo<'_>, allocator: *const vk::AllocationCallbacks<'_>, view: *mut vk::BufferView) -> vk::Result;
     fn destroy_buffer_view(device: vk::Device, buffer_view: vk::BufferView, allocator: *const vk::AllocationCallbacks<'_>);
-    fn create_compute_pipelines(device: vk::Device, pipeline_cache: vk::PipelineCache, create_info_count: u32, create_infos: *const vk::ComputePipelineCreateInfo<'_>, allocator: *const vk::AllocationCallbacks<'_>, pipelines: *mut vk::Pipeline) -> vk::Result;
     fn create_sampler(device: vk::Device, create_info: *const vk::SamplerCreateInfo<'_>, allocator: *const vk::AllocationCallbacks<'_>, sampler: *mut vk::Sampler) -> vk::Result;
     fn destroy_sampler(device: vk::Device, sampler: vk::Sampler, allocator: *const vk::AllocationCallbacks<'_>);
     fn create_descriptor_set_layout(device: vk::Device, create_info: *const vk::DescriptorSetLayoutCreateInfo<'_>, allocator: *const vk::AllocationCallbacks<'_>, set_layout: *mut vk::DescriptorSetLayout) -> vk::Result;
@@ -94,8 +93,6 @@ unsupported! {
     fn destroy_descriptor_update_template(device: vk::Device, descriptor_update_template: vk::DescriptorUpdateTemplate, allocator: *const vk::AllocationCallbacks<'_>);
     fn update_descriptor_set_with_template(device: vk::Device, descriptor_set: vk::DescriptorSet, descriptor_update_template: vk::DescriptorUpdateTemplate, data: *const c_void);
     fn get_descriptor_set_layout_support(device: vk::Device, create_info: *const vk::DescriptorSetLayoutCreateInfo<'_>, support: *mut vk::DescriptorSetLayoutSupport<'_>);
-    fn cmd_draw_indirect_count(command_buffer: vk::CommandBuffer, buffer: vk::Buffer, offset: vk::DeviceSize, count_buffer: vk::Buffer, count_buffer_offset: vk::DeviceSize, max_draw_count: u32, stride: u32);
-    fn cmd_draw_indexed_indirect_count(command_buffer: vk::CommandBuffer, buffer: vk::Buffer, offset: vk::DeviceSize, count_buffer: vk::Buffer, count_buffer_offset: vk::DeviceSize, max_draw_count: u32, stride: u32);
     fn get_buffer_device_address(device: vk::Device, info: *const vk::BufferDeviceAddressInfo<'_>) -> vk::DeviceAddress;
     fn get_buffer_opaque_capture_address(device: vk::Device, info: *const vk::BufferDeviceAddressInfo<'_>) -> u64;
     fn get_device_memory_opaque_capture_address(device: vk::Device, info: *const vk::DeviceMemoryOpaqueCaptureAddressInfo<'_>) -> u64;
