@@ -1,4 +1,29 @@
-//! See the package description.
+//! The simulated GauRast device.
+//!
+//! A device executes [`Packet`]s: its [`CommandProcessor`] is the one place that tells a Gaussian draw from a
+//! triangle draw, a copy or a clear. It computes real pixels in [`devmem`] memory and knows nothing of Vulkan;
+//! the driver lowers Vulkan state to packets.
+//!
+//! Data flows one way: packets -> geometry and Gaussian preprocessing -> binning -> the tile engine -> memory.
+//! [`counters`] records the work that was done.
 #![forbid(unsafe_code)]
 
+pub mod command_processor;
+pub mod counters;
+pub mod device;
+pub mod format;
+pub mod gaussian;
+pub mod image;
 pub mod isa;
+pub mod packet;
+pub mod pass;
+pub mod query;
+pub mod raster;
+pub mod transfer;
+
+pub use command_processor::CommandProcessor;
+pub use device::{Config, Device};
+pub use devmem::Allocation;
+pub use format::Format;
+pub use image::{Image, ImageView};
+pub use packet::Packet;

@@ -1,1 +1,236 @@
-//! See the package description.
+//! Device memory.
+//!
+//! An [`Allocation`] is a page-aligned, zeroed range that the application may hold mapped while the device
+//! works on it, and on which shader invocations may legally race. Therefore no reference into it is ever
+//! formed: bulk access copies to and from the caller's scratch, shader access is a relaxed atomic of 8 to
+//! 64 bits, and every access is checked against the allocation's length.
+//!
+//! All of the simulated device's `unsafe` lives here.
+
+mod atomic;
+
+use bytemuck::{AnyBitPattern, NoUninit};
+use memmap2::{MmapOptions, MmapRaw};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The alignment of every allocation in bytes, and the granularity at which the host backs it with pages.
+pub const PAGE_SIZE: u64 = 4096;
+
+/// The host could not back an allocation.
+#[derive(Debug, thiserror::Error)]
+#[error("the host cannot back {size} bytes of device memory: {source}")]
+pub struct AllocationError {
+    /// The length asked for in bytes.
+    pub size: u64,
+    /// What the host said.
+    #[source]
+    pub source: std::io::Error,
+}
+
+/// An access reached past the end of an allocation; nothing was read or written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{size} bytes at offset {offset} lie outside an allocation of {len} bytes")]
+pub struct OutOfBounds {
+    /// The byte offset of the access.
+    pub offset: u64,
+    /// Its length in bytes.
+    pub size: u64,
+    /// The allocation's length in bytes.
+    pub len: u64,
+}
+
+/// A range of device memory.
+///
+/// Pages are backed when they are first touched, so that an allocation costs what is used of it.
+#[derive(Debug)]
+pub struct Allocation {
+    map: MmapRaw,
+    len: u64,
+    /// Bumped by every packet that writes; anything derived from the contents is keyed by it.
+    generation: AtomicU64,
+    host_visible: bool,
+}
+
+impl Allocation {
+    /// Allocates `len` bytes of zeroed memory that the host may map.
+    ///
+    /// # Errors
+    /// [`AllocationError`] if the host refuses, or if `len` is zero or does not fit the address space.
+    pub fn new_zeroed(len: u64) -> Result<Arc<Self>, AllocationError> {
+        Self::new(len, true)
+    }
+
+    /// Allocates `len` bytes of zeroed memory, mappable by the host only if `host_visible`.
+    ///
+    /// # Errors
+    /// As [`Allocation::new_zeroed`].
+    pub fn new(len: u64, host_visible: bool) -> Result<Arc<Self>, AllocationError> {
+        let refuse = |source| AllocationError { size: len, source };
+        let bytes = usize::try_from(len)
+            .ok()
+            .filter(|&bytes| bytes > 0 && bytes <= isize::MAX as usize)
+            .ok_or_else(|| refuse(std::io::ErrorKind::InvalidInput.into()))?;
+        let map = MmapOptions::new()
+            .len(bytes)
+            .no_reserve_swap()
+            .map_anon()
+            .map_err(refuse)?;
+        Ok(Arc::new(Self {
+            map: MmapRaw::from(map),
+            len,
+            generation: AtomicU64::new(0),
+            host_visible,
+        }))
+    }
+
+    /// The length in bytes.
+    #[allow(clippy::len_without_is_empty, reason = "an allocation is never empty")]
+    pub fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// Whether the host may map this memory, and so change it at any time without the device seeing it.
+    pub fn is_host_visible(&self) -> bool {
+        self.host_visible
+    }
+
+    /// Counts the device's writes to this allocation (see [`Allocation::bump_generation`]).
+    pub fn generation(&self) -> u64 {
+        self.generation.load(Ordering::Acquire)
+    }
+
+    /// Marks the contents as changed, so that what was derived from them is derived anew.
+    pub fn bump_generation(&self) {
+        self.generation.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// The address of byte 0, for the application that maps this memory; valid while the allocation lives.
+    pub fn host_pointer(&self) -> *mut u8 {
+        self.map.as_mut_ptr()
+    }
+
+    /// Copies `out.len()` elements from byte `offset` on.
+    ///
+    /// # Errors
+    /// [`OutOfBounds`], and `out` is untouched, if the range does not lie inside the allocation.
+    pub fn read<T: AnyBitPattern>(&self, offset: u64, out: &mut [T]) -> Result<(), OutOfBounds> {
+        let source = self.checked(offset, size_of_val(out))?;
+        // SAFETY: `checked` proved that the source range lies inside the mapping; `out` is a distinct,
+        // exclusive slice of the same number of bytes, any of which make valid `T`s. The copy is by bytes, so
+        // alignment does not matter. A host that writes concurrently breaks Vulkan's rules and gets
+        // unspecified values, for which every bit pattern of `T` is prepared.
+        unsafe {
+            std::ptr::copy_nonoverlapping(source, out.as_mut_ptr().cast::<u8>(), size_of_val(out));
+        }
+        Ok(())
+    }
+
+    /// Copies `data` to byte `offset` on.
+    ///
+    /// # Errors
+    /// [`OutOfBounds`], and nothing is written, if the range does not lie inside the allocation.
+    pub fn write<T: NoUninit>(&self, offset: u64, data: &[T]) -> Result<(), OutOfBounds> {
+        let target = self.checked(offset, size_of_val(data))?;
+        // SAFETY: `checked` proved that the target range lies inside the mapping, which no Rust reference
+        // covers; `data` is initialised (`NoUninit`) and does not overlap it, since safe code can hold no
+        // slice into the mapping.
+        unsafe {
+            std::ptr::copy_nonoverlapping(data.as_ptr().cast::<u8>(), target, size_of_val(data));
+        }
+        Ok(())
+    }
+
+    /// Copies `size` bytes from `source` at `source_offset` to `self` at `offset`; overlap is allowed.
+    ///
+    /// # Errors
+    /// [`OutOfBounds`], and nothing is written, if either range does not lie inside its allocation.
+    pub fn copy_from(
+        &self,
+        offset: u64,
+        source: &Self,
+        source_offset: u64,
+        size: u64,
+    ) -> Result<(), OutOfBounds> {
+        let bytes = usize::try_from(size).unwrap_or(usize::MAX);
+        let from = source.checked(source_offset, bytes)?;
+        let to = self.checked(offset, bytes)?;
+        // SAFETY: both ranges were proved to lie inside their mappings; `copy` allows them to overlap.
+        unsafe { std::ptr::copy(from, to, bytes) };
+        Ok(())
+    }
+
+    /// Sets `size` bytes from `offset` on to `value`.
+    ///
+    /// # Errors
+    /// [`OutOfBounds`], and nothing is written, if the range does not lie inside the allocation.
+    pub fn fill(&self, offset: u64, size: u64, value: u8) -> Result<(), OutOfBounds> {
+        let bytes = usize::try_from(size).unwrap_or(usize::MAX);
+        let target = self.checked(offset, bytes)?;
+        // SAFETY: the range was proved to lie inside the mapping, which no Rust reference covers.
+        unsafe { std::ptr::write_bytes(target, value, bytes) };
+        Ok(())
+    }
+
+    /// The address of byte `offset`, if `size` bytes from there on lie inside the allocation.
+    fn checked(&self, offset: u64, size: usize) -> Result<*mut u8, OutOfBounds> {
+        let out_of_bounds = OutOfBounds {
+            offset,
+            size: size as u64,
+            len: self.len,
+        };
+        let end = offset.checked_add(size as u64).ok_or(out_of_bounds)?;
+        if end > self.len {
+            return Err(out_of_bounds);
+        }
+        // `offset <= len <= isize::MAX`, so the conversion loses nothing and the sum stays in the mapping.
+        Ok(self.host_pointer().wrapping_add(offset as usize))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_starts_zeroed_and_keeps_what_is_written() {
+        let memory = Allocation::new_zeroed(10_000).unwrap();
+        let mut out = [1u32; 4];
+        memory.read(9_984, &mut out).unwrap();
+        assert_eq!(out, [0; 4]);
+        memory.write(3, &[0x0102_0304u32, 5]).unwrap();
+        let mut bytes = [0u8; 9];
+        memory.read(2, &mut bytes).unwrap();
+        assert_eq!(bytes, [0, 4, 3, 2, 1, 5, 0, 0, 0]);
+    }
+
+    #[test]
+    fn what_lies_outside_is_refused_whole() {
+        let memory = Allocation::new_zeroed(16).unwrap();
+        assert!(memory.write(8, &[1u64, 2]).is_err());
+        let mut all = [1u64; 2];
+        memory.read(0, &mut all).unwrap();
+        assert_eq!(all, [0; 2], "a refused write leaves nothing behind");
+        assert!(memory.read(u64::MAX, &mut all).is_err());
+        assert!(memory.fill(15, 2, 1).is_err());
+        assert!(memory.copy_from(0, &memory, 9, 8).is_err());
+        assert!(memory.read::<u8>(16, &mut []).is_ok());
+    }
+
+    #[test]
+    fn empty_and_impossible_allocations_are_errors() {
+        assert!(Allocation::new_zeroed(0).is_err());
+        assert!(Allocation::new_zeroed(u64::MAX).is_err());
+        assert!(Allocation::new_zeroed(1 << 62).is_err());
+    }
+
+    #[test]
+    fn overlapping_copies_move_bytes() {
+        let memory = Allocation::new_zeroed(16).unwrap();
+        memory.write(0, &[1u8, 2, 3, 4]).unwrap();
+        memory.copy_from(2, &memory, 0, 4).unwrap();
+        let mut out = [0u8; 6];
+        memory.read(0, &mut out).unwrap();
+        assert_eq!(out, [1, 2, 1, 2, 3, 4]);
+    }
+}

@@ -1,0 +1,548 @@
+//! Packets: what the driver asks of the device. Plain data; everything a packet needs it holds by [`Arc`].
+
+use crate::format::Format;
+use crate::image::{Image, ImageView};
+use crate::query::QueryPool;
+use devmem::Allocation;
+use std::sync::Arc;
+
+/// One command for the [`CommandProcessor`](crate::CommandProcessor).
+#[derive(Clone, Debug)]
+pub enum Packet {
+    /// Copies regions between two buffers.
+    CopyBuffer(CopyBuffer),
+    /// Copies regions of a buffer into an image.
+    CopyBufferToImage(CopyBufferImage),
+    /// Copies regions of an image into a buffer.
+    CopyImageToBuffer(CopyBufferImage),
+    /// Copies texels between images whose formats have equal texel sizes.
+    CopyImage(CopyImage),
+    /// Fills a buffer range with a repeated 32-bit word.
+    FillBuffer {
+        /// The range; offset and size are multiples of four.
+        target: BufferRange,
+        /// The word, in the host's byte order.
+        word: u32,
+    },
+    /// Writes bytes that travelled in the packet to a buffer range.
+    UpdateBuffer {
+        /// The range; as long as `data`.
+        target: BufferRange,
+        /// The bytes.
+        data: Arc<[u8]>,
+    },
+    /// Clears subresources of an image outside a render pass.
+    ClearImage(ClearImage),
+    /// Starts a render pass: attachments are loaded or cleared tile by tile when the pass is flushed.
+    BeginRendering(Box<Rendering>),
+    /// Clears rectangles of the current pass's attachments, in submission order with its draws.
+    ClearAttachments(ClearAttachments),
+    /// Starts a sorted set of Gaussians.
+    GaussianBegin(Box<GaussianBegin>),
+    /// Adds Gaussians to the set.
+    GaussianAppend(Box<GaussianAppend>),
+    /// Ends the set: it is sorted, binned and becomes one draw of the current pass.
+    GaussianResolve,
+    /// A triangle draw.
+    TriangleDraw(TriangleDraw),
+    /// Makes everything before visible to everything after; flushes a pass's bins if it is inside one.
+    Barrier,
+    /// Ends the render pass: its bins are rendered and its attachments stored.
+    EndRendering,
+    /// Starts query `index` of `pool`.
+    BeginQuery {
+        /// The pool.
+        pool: Arc<QueryPool>,
+        /// The query's index in it.
+        index: u32,
+    },
+    /// Ends query `index` of `pool` and makes its result available.
+    EndQuery {
+        /// The pool.
+        pool: Arc<QueryPool>,
+        /// The query's index in it.
+        index: u32,
+    },
+    /// Makes `count` queries from `first` on unavailable.
+    ResetQueries {
+        /// The pool.
+        pool: Arc<QueryPool>,
+        /// The first query.
+        first: u32,
+        /// How many.
+        count: u32,
+    },
+    /// Writes the host's monotonic time in nanoseconds once everything before has finished.
+    WriteTimestamp {
+        /// The pool.
+        pool: Arc<QueryPool>,
+        /// The query's index in it.
+        index: u32,
+    },
+}
+
+/// Bytes `offset..offset + size` of an allocation.
+#[derive(Clone, Debug)]
+pub struct BufferRange {
+    /// The memory.
+    pub memory: Arc<Allocation>,
+    /// The first byte.
+    pub offset: u64,
+    /// How many bytes.
+    pub size: u64,
+}
+
+/// A region of a buffer-to-buffer copy; offsets are relative to the packet's ranges.
+#[derive(Clone, Copy, Debug)]
+pub struct BufferCopyRegion {
+    /// The first byte in the source range.
+    pub source_offset: u64,
+    /// The first byte in the target range.
+    pub target_offset: u64,
+    /// How many bytes.
+    pub size: u64,
+}
+
+/// See [`Packet::CopyBuffer`].
+#[derive(Clone, Debug)]
+pub struct CopyBuffer {
+    /// Where bytes come from.
+    pub source: BufferRange,
+    /// Where they go.
+    pub target: BufferRange,
+    /// What is copied.
+    pub regions: Vec<BufferCopyRegion>,
+}
+
+/// Which half of a depth and stencil image is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Aspect {
+    /// Colour texels.
+    Color,
+    /// The depth component.
+    Depth,
+    /// The stencil component.
+    Stencil,
+}
+
+/// One mip level of a run of array layers, one aspect.
+#[derive(Clone, Copy, Debug)]
+pub struct SubresourceLayers {
+    /// The aspect.
+    pub aspect: Aspect,
+    /// The mip level.
+    pub mip_level: u32,
+    /// The first array layer.
+    pub base_layer: u32,
+    /// How many layers.
+    pub layer_count: u32,
+}
+
+/// A region of a copy between a buffer and an image.
+#[derive(Clone, Copy, Debug)]
+pub struct BufferImageRegion {
+    /// Byte offset in the buffer range.
+    pub buffer_offset: u64,
+    /// Texels from one row to the next in the buffer; 0 means tightly packed.
+    pub buffer_row_length: u32,
+    /// Rows from one slice or layer to the next in the buffer; 0 means tightly packed.
+    pub buffer_image_height: u32,
+    /// What part of the image.
+    pub subresource: SubresourceLayers,
+    /// The first texel: x, y, z.
+    pub image_offset: [i32; 3],
+    /// Texels in x, y and z.
+    pub image_extent: [u32; 3],
+}
+
+/// See [`Packet::CopyBufferToImage`] and [`Packet::CopyImageToBuffer`].
+#[derive(Clone, Debug)]
+pub struct CopyBufferImage {
+    /// The buffer side.
+    pub buffer: BufferRange,
+    /// The image side.
+    pub image: Arc<Image>,
+    /// What is copied.
+    pub regions: Vec<BufferImageRegion>,
+}
+
+/// A region of an image-to-image copy.
+#[derive(Clone, Copy, Debug)]
+pub struct ImageCopyRegion {
+    /// What part of the source.
+    pub source: SubresourceLayers,
+    /// The first texel there: x, y, z.
+    pub source_offset: [i32; 3],
+    /// What part of the target.
+    pub target: SubresourceLayers,
+    /// The first texel there: x, y, z.
+    pub target_offset: [i32; 3],
+    /// Texels in x, y and z.
+    pub extent: [u32; 3],
+}
+
+/// See [`Packet::CopyImage`].
+#[derive(Clone, Debug)]
+pub struct CopyImage {
+    /// Where texels come from.
+    pub source: Arc<Image>,
+    /// Where they go.
+    pub target: Arc<Image>,
+    /// What is copied.
+    pub regions: Vec<ImageCopyRegion>,
+}
+
+/// A clear value, as bits: how they are read depends on the format cleared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ClearValue {
+    /// For normalised and floating-point colour formats.
+    Float([f32; 4]),
+    /// For signed integer colour formats.
+    Int([i32; 4]),
+    /// For unsigned integer colour formats.
+    Uint([u32; 4]),
+    /// For depth and stencil formats.
+    DepthStencil {
+        /// Depth, 0 to 1.
+        depth: f32,
+        /// Stencil.
+        stencil: u32,
+    },
+}
+
+/// A range of an image's subresources, one aspect.
+#[derive(Clone, Copy, Debug)]
+pub struct SubresourceRange {
+    /// The aspect.
+    pub aspect: Aspect,
+    /// The first mip level.
+    pub base_mip_level: u32,
+    /// How many levels.
+    pub level_count: u32,
+    /// The first array layer.
+    pub base_layer: u32,
+    /// How many layers.
+    pub layer_count: u32,
+}
+
+/// See [`Packet::ClearImage`].
+#[derive(Clone, Debug)]
+pub struct ClearImage {
+    /// The image.
+    pub image: Arc<Image>,
+    /// The value.
+    pub value: ClearValue,
+    /// What is cleared.
+    pub ranges: Vec<SubresourceRange>,
+}
+
+/// A rectangle of framebuffer pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rect {
+    /// The left edge in pixels.
+    pub x: i32,
+    /// The top edge in pixels.
+    pub y: i32,
+    /// The width in pixels.
+    pub width: u32,
+    /// The height in pixels.
+    pub height: u32,
+}
+
+impl Rect {
+    /// The pixels that lie in both, as an empty rectangle where there are none.
+    pub fn intersect(self, other: Self) -> Self {
+        let right = |r: &Self| i64::from(r.x) + i64::from(r.width);
+        let bottom = |r: &Self| i64::from(r.y) + i64::from(r.height);
+        let (x, y) = (self.x.max(other.x), self.y.max(other.y));
+        let span = |end: i64, start: i32| (end - i64::from(start)).clamp(0, u32::MAX.into()) as u32;
+        Self {
+            x,
+            y,
+            width: span(right(&self).min(right(&other)), x),
+            height: span(bottom(&self).min(bottom(&other)), y),
+        }
+    }
+
+    /// Whether it holds no pixel.
+    pub fn is_empty(self) -> bool {
+        self.width == 0 || self.height == 0
+    }
+}
+
+/// What a pass does with an attachment's contents when it begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LoadOp {
+    /// Reads them.
+    Load,
+    /// Replaces them.
+    Clear(ClearValue),
+    /// Leaves them undefined (the device leaves what was there).
+    DontCare,
+}
+
+/// What a pass does with an attachment's contents when it ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StoreOp {
+    /// Writes them to memory.
+    Store,
+    /// Drops them (they may be written all the same).
+    DontCare,
+    /// The attachment was not written.
+    None,
+}
+
+/// An attachment of a pass.
+#[derive(Clone, Debug)]
+pub struct Attachment {
+    /// What is rendered to.
+    pub view: ImageView,
+    /// What happens at the beginning.
+    pub load: LoadOp,
+    /// What happens at the end.
+    pub store: StoreOp,
+}
+
+/// See [`Packet::BeginRendering`].
+#[derive(Clone, Debug)]
+pub struct Rendering {
+    /// The pixels that the pass may touch.
+    pub area: Rect,
+    /// How many layers of each attachment are rendered.
+    pub layer_count: u32,
+    /// Colour attachments by location; unused ones are `None`.
+    pub color: Vec<Option<Attachment>>,
+    /// The depth attachment.
+    pub depth: Option<Attachment>,
+    /// The stencil attachment.
+    pub stencil: Option<Attachment>,
+}
+
+/// See [`Packet::ClearAttachments`].
+#[derive(Clone, Debug)]
+pub struct ClearAttachments {
+    /// What is cleared to which value.
+    pub clears: Vec<AttachmentClear>,
+    /// Where, in framebuffer pixels and layers (first, count).
+    pub rects: Vec<(Rect, u32, u32)>,
+}
+
+/// One attachment's clear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AttachmentClear {
+    /// Colour attachment number `index`.
+    Color {
+        /// The attachment's index.
+        index: usize,
+        /// Its new value.
+        value: ClearValue,
+    },
+    /// The depth attachment.
+    Depth(f32),
+    /// The stencil attachment.
+    Stencil(u32),
+}
+
+/// The viewport transform, in framebuffer pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewport {
+    /// The left edge.
+    pub x: f32,
+    /// The top edge.
+    pub y: f32,
+    /// The width.
+    pub width: f32,
+    /// The height.
+    pub height: f32,
+    /// The depth that 0 maps to.
+    pub min_depth: f32,
+    /// The depth that 1 maps to.
+    pub max_depth: f32,
+}
+
+/// How a Gaussian draw's camera projects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CameraModel {
+    /// Perspective with a principal point anywhere.
+    Pinhole,
+}
+
+/// The camera of a Gaussian draw: +x right, +y down, +z forward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// How it projects.
+    pub model: CameraModel,
+    /// World to camera, row-major.
+    pub rotation: [f32; 9],
+    /// The eye in world units; double, so that scenes far from the origin lose nothing.
+    pub eye: [f64; 3],
+    /// Focal lengths in pixels.
+    pub focal_length: [f32; 2],
+    /// The principal point in pixels from the viewport's corner.
+    pub principal_point: [f32; 2],
+    /// Gaussians must lie beyond this depth, in world units; greater than 0.
+    pub near_plane: f32,
+    /// Gaussians must lie before this depth, in world units; may be infinite.
+    pub far_plane: f32,
+    /// Fragment depth is `c0 + c1 / t.z`.
+    pub depth_coefficients: [f32; 2],
+}
+
+/// What Gaussians are sorted by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum GaussianOrder {
+    /// The camera-space z of the centre.
+    ViewDepth,
+}
+
+/// The state of a Gaussian draw that its pipeline fixes. See the extension for each value's meaning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GaussianState {
+    /// The spherical harmonics degree drawn, 0 to 3.
+    pub sh_degree: u32,
+    /// What the Gaussians are sorted by.
+    pub order: GaussianOrder,
+    /// Whether opacity is scaled by the ratio of determinants, so that the low-pass filter conserves energy.
+    pub opacity_compensated: bool,
+    /// Added to both diagonal elements of the screen-space covariance, in px^2.
+    pub low_pass_variance: f32,
+    /// The least alpha that contributes.
+    pub alpha_floor: f32,
+    /// The greatest alpha.
+    pub alpha_ceiling: f32,
+    /// A pixel is finished before its transmittance would fall below this.
+    pub transmittance_floor: f32,
+    /// Blending and write masks, one per colour attachment.
+    pub blend: Vec<BlendState>,
+    /// The constants of the constant blend factors.
+    pub blend_constants: [f32; 4],
+}
+
+/// A factor of the blend equation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "the names are Vulkan's")]
+pub enum BlendFactor {
+    Zero,
+    One,
+    SrcColor,
+    OneMinusSrcColor,
+    DstColor,
+    OneMinusDstColor,
+    SrcAlpha,
+    OneMinusSrcAlpha,
+    DstAlpha,
+    OneMinusDstAlpha,
+    ConstantColor,
+    OneMinusConstantColor,
+    ConstantAlpha,
+    OneMinusConstantAlpha,
+    SrcAlphaSaturate,
+}
+
+/// The operation of the blend equation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "the names are Vulkan's")]
+pub enum BlendOp {
+    Add,
+    Subtract,
+    ReverseSubtract,
+    Min,
+    Max,
+}
+
+/// One half (colour or alpha) of the blend equation: `op(source * s, destination * d)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct BlendEquation {
+    /// The source's factor.
+    pub source: BlendFactor,
+    /// The destination's factor.
+    pub destination: BlendFactor,
+    /// The operation.
+    pub op: BlendOp,
+}
+
+/// The blending of one colour attachment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct BlendState {
+    /// The colour and alpha equations; `None` replaces the destination.
+    pub equations: Option<(BlendEquation, BlendEquation)>,
+    /// Bits 0 to 3 enable writes to R, G, B and A.
+    pub write_mask: u8,
+}
+
+/// See [`Packet::GaussianBegin`].
+#[derive(Clone, Debug)]
+pub struct GaussianBegin {
+    /// What the pipeline fixes.
+    pub state: Arc<GaussianState>,
+    /// The camera.
+    pub camera: Camera,
+    /// The viewport; its width and height are the W and H of the projection.
+    pub viewport: Viewport,
+    /// Pixels outside are not touched.
+    pub scissor: Rect,
+}
+
+/// Where one vertex attribute is read from. An element outside `buffer` reads as zero.
+#[derive(Clone, Debug)]
+pub struct AttributeStream {
+    /// The vertex buffer, from the bound offset on.
+    pub buffer: BufferRange,
+    /// Bytes from one vertex to the next.
+    pub stride: u32,
+    /// Bytes from the vertex's start to the attribute.
+    pub offset: u32,
+    /// How it is stored.
+    pub format: Format,
+    /// Read by instance (advancing every `divisor` instances; 0: never) instead of by vertex.
+    pub instance_divisor: Option<u32>,
+}
+
+/// The vertex attributes of fixed-function projection.
+#[derive(Clone, Debug)]
+pub struct GaussianAttributes {
+    /// The mean in world units: x, y, z.
+    pub position: AttributeStream,
+    /// Standard deviations in world units along the rotated axes: x, y, z.
+    pub scale: AttributeStream,
+    /// The quaternion w, x, y, z; it need not be normalised.
+    pub rotation: AttributeStream,
+    /// Opacity.
+    pub opacity: AttributeStream,
+    /// `(degree + 1)^2` spherical harmonics coefficients of red, green and blue.
+    pub spherical_harmonics: Vec<AttributeStream>,
+}
+
+/// An index buffer.
+#[derive(Clone, Debug)]
+pub struct IndexStream {
+    /// The indices, from the bound offset on.
+    pub buffer: BufferRange,
+    /// Bytes per index: 1, 2 or 4.
+    pub index_size: u32,
+    /// Added to every index.
+    pub vertex_offset: i32,
+}
+
+/// See [`Packet::GaussianAppend`].
+#[derive(Clone, Debug)]
+pub struct GaussianAppend {
+    /// Where the Gaussians are.
+    pub attributes: GaussianAttributes,
+    /// The index buffer that picks them; without one they are consecutive.
+    pub indices: Option<IndexStream>,
+    /// The first vertex, or the first index.
+    pub first: u32,
+    /// How many vertices or indices.
+    pub count: u32,
+    /// The first instance.
+    pub first_instance: u32,
+    /// How many instances.
+    pub instance_count: u32,
+}
+
+/// A triangle draw. There is none yet: it needs the shader cores, so the driver refuses its pipeline.
+///
+/// The command processor, the binner and the tile engine already have an arm for it.
+#[derive(Clone, Copy, Debug)]
+pub enum TriangleDraw {}
