@@ -48,15 +48,17 @@
 //!
 //! # Life of a program
 //!
-//! [`builder::Builder`] → [`ir::Program`] → [`validate::validate`] → [`optimize::optimize`] →
-//! [`exec::Executable`] (registers allocated, control flow flattened, lanes fixed) → [`exec::Machine::run`], once
-//! a batch.
+//! [`builder::Builder`] → [`ir::Program`], checked → [`exec::Executable`] (optimized, registers allocated, control flow
+//! flattened, lanes fixed) → [`exec::Machine::run`], once a batch.
 
 pub mod builder;
 mod display;
 mod escape;
+pub mod exec;
 pub mod ir;
 pub mod op;
+mod optimize;
 pub mod resources;
+mod uniformity;
 pub mod validate;
 mod visit;

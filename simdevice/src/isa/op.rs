@@ -215,6 +215,10 @@ operations! {
     FMul(w w) -> w, Float;
     /// `a * b + c`, fused where the host fuses.
     FFma(w w w) -> w, Float;
+    /// `a * b - c`, fused where the host fuses.
+    FMulSub(w w w) -> w, Float;
+    /// `c - a * b`, fused where the host fuses.
+    FNegMulAdd(w w w) -> w, Float;
     /// `a / b`.
     FDiv(w w) -> w, Special;
     /// Remainder with the sign of `a` (C's `fmod`).

@@ -1,6 +1,87 @@
 //! What a program reaches besides its registers: buffers, push constants, images, global memory.
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use super::ir::{AtomicOp, CHUNK_LANES, ImageShape};
+use crate::packet::BufferRange;
+
+/// What a program is bound to while it runs.
+#[derive(Clone, Copy)]
+pub struct Resources<'a> {
+    /// Buffers by bind point; None, or beyond the end, is a buffer of size zero. Offsets are multiples of 4.
+    pub buffers: &'a [Option<BufferRange>],
+    /// Push constants, as [`words`] makes them.
+    pub push_constants: &'a [AtomicU32],
+    /// Images and samplers.
+    pub images: &'a dyn ImageUnit,
+    /// Device addresses.
+    pub global: &'a dyn GlobalMemory,
+}
+
+impl Default for Resources<'_> {
+    fn default() -> Self {
+        Self {
+            buffers: &[],
+            push_constants: &[],
+            images: &NoImages,
+            global: &NoGlobalMemory,
+        }
+    }
+}
+
+/// Bytes as the words that [`Resources::push_constants`] holds; the last is filled up with zeros.
+pub fn words(bytes: &[u8]) -> Vec<AtomicU32> {
+    bytes
+        .chunks(4)
+        .map(|chunk| {
+            let mut word = [0; 4];
+            word[..chunk.len()].copy_from_slice(chunk);
+            AtomicU32::new(u32::from_le_bytes(word))
+        })
+        .collect()
+}
+
+/// Device addresses of 64 bits: virtual ranges that buffers occupy.
+pub trait GlobalMemory: Sync {
+    /// The buffer that an address lies in, and the address of the buffer's first byte. None if it lies in none.
+    fn find(&self, address: u64) -> Option<(&BufferRange, u64)>;
+}
+
+/// No buffer has an address.
+#[derive(Clone, Copy, Debug)]
+pub struct NoGlobalMemory;
+
+impl GlobalMemory for NoGlobalMemory {
+    fn find(&self, _address: u64) -> Option<(&BufferRange, u64)> {
+        None
+    }
+}
+
+/// The words of a buffer range and its size in bytes. A range that isn't within its memory, or not aligned to words, is
+/// empty.
+pub(super) fn range_words(range: &BufferRange) -> (&[AtomicU32], u32) {
+    let memory = range.memory.words();
+    let end = range
+        .offset
+        .checked_add(range.size)
+        .filter(|end| *end <= range.memory.len());
+    match end {
+        Some(end) if range.offset.is_multiple_of(4) => {
+            let last = (end.div_ceil(4) as usize).min(memory.len());
+            let words = memory
+                .get((range.offset / 4) as usize..last)
+                .unwrap_or_default();
+            (words, u32::try_from(range.size).unwrap_or(u32::MAX))
+        }
+        _ => (&[], 0),
+    }
+}
+
+/// A word, if the slice has it.
+#[inline(always)]
+pub(super) fn load_word(words: &[AtomicU32], index: usize) -> Option<u32> {
+    words.get(index).map(|word| word.load(Ordering::Relaxed))
+}
 
 /// One register for the 16 lanes of a chunk; floats as their bits.
 pub type Lanes = [u32; CHUNK_LANES];
@@ -95,4 +176,47 @@ pub trait ImageUnit: Sync {
 
     /// The level of detail of an implicit sample, clamped to what exists, and before clamping; floats.
     fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 2];
+}
+
+/// No image is bound.
+#[derive(Clone, Copy, Debug)]
+pub struct NoImages;
+
+impl ImageUnit for NoImages {
+    fn sample(&self, _image: u32, _sampler: u32, _request: &SampleRequest) -> [Lanes; 4] {
+        Default::default()
+    }
+
+    fn read(&self, _image: u32, _request: &TexelRequest) -> [Lanes; 4] {
+        Default::default()
+    }
+
+    fn write(&self, _image: u32, _request: &TexelRequest, _texel: &[Lanes; 4]) {}
+
+    fn atomic(
+        &self,
+        _image: u32,
+        _request: &TexelRequest,
+        _op: AtomicOp,
+        _value: &Lanes,
+        _comparator: &Lanes,
+    ) -> Lanes {
+        Lanes::default()
+    }
+
+    fn size(&self, _image: u32, _shape: ImageShape, _level: u32) -> [u32; 4] {
+        [0; 4]
+    }
+
+    fn levels(&self, _image: u32) -> u32 {
+        0
+    }
+
+    fn samples(&self, _image: u32) -> u32 {
+        0
+    }
+
+    fn lod(&self, _image: u32, _sampler: u32, _request: &SampleRequest) -> [Lanes; 2] {
+        Default::default()
+    }
 }
