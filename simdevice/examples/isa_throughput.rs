@@ -141,9 +141,15 @@ fn measure(program: &Program, level: SimdLevel, lanes: usize) -> Option<(f64, f6
 }
 
 fn main() {
+    // Only the lines that contain these words, if any are given.
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
     for (name, program) in [("arithmetic", arithmetic()), ("mandelbrot", mandelbrot())] {
         for (level_name, level) in SimdLevel::supported() {
             for lanes in [64, 256] {
+                let words = format!("{name} {level_name} {lanes}");
+                if !wanted.iter().all(|word| words.contains(word)) {
+                    continue;
+                }
                 if let Some((rate, instructions, occupancy)) = measure(&program, level, lanes) {
                     println!(
                         "{name:12} {level_name:8} {lanes:4} lanes: {:8.2} M lanes/s, {:6.2} G lane-instructions/s, occupancy {occupancy:.2}",

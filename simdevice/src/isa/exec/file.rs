@@ -247,6 +247,22 @@ pub fn from_mask<S: Simd>(mask: mask32x16<S>) -> u32x16<S> {
         .bitcast::<u32x16<S>>()
 }
 
+/// The chunk of an operand for one round: its own if it is `VARYING`, else the only one.
+#[inline(always)]
+fn operand<const VARYING: bool>(chunks: &[Cell<Chunk>], index: usize) -> &Cell<Chunk> {
+    if VARYING { &chunks[index] } else { &chunks[0] }
+}
+
+/// As many chunks as there are rounds, so that indices below that need no check.
+#[inline(always)]
+fn cut<const VARYING: bool>(chunks: &[Cell<Chunk>], rounds: usize) -> &[Cell<Chunk>] {
+    if VARYING {
+        &chunks[..rounds]
+    } else {
+        &chunks[..1]
+    }
+}
+
 /// Vector by vector, one operand.
 #[inline(always)]
 pub fn vector1<S: Simd>(
@@ -257,9 +273,13 @@ pub fn vector1<S: Simd>(
     f: impl Fn(u32x16<S>) -> u32x16<S>,
 ) {
     let (dst, a) = (file.narrow(dst), file.narrow(src[0]));
-    let step = usize::from(a.len() == dst.len());
-    for (index, dst) in dst.iter().enumerate() {
-        store(dst, f(load(simd, &a[index * step])));
+    if a.len() == dst.len() {
+        for (dst, a) in dst.iter().zip(a) {
+            store(dst, f(load(simd, a)));
+        }
+    } else {
+        let value = f(load(simd, &a[0]));
+        dst.iter().for_each(|dst| store(dst, value));
     }
 }
 
@@ -273,24 +293,29 @@ pub fn vector2<S: Simd>(
     f: impl Fn(u32x16<S>, u32x16<S>) -> u32x16<S>,
 ) {
     let (dst, a, b) = (file.narrow(dst), file.narrow(src[0]), file.narrow(src[1]));
-    if a.len() == dst.len() && b.len() == dst.len() {
-        for ((dst, a), b) in dst.iter().zip(a).zip(b) {
-            store(dst, f(load(simd, a), load(simd, b)));
+    match (a.len() == dst.len(), b.len() == dst.len()) {
+        (true, true) => rounds2::<S, true, true>(simd, dst, a, b, f),
+        (true, false) => rounds2::<S, true, false>(simd, dst, a, b, f),
+        (false, true) => rounds2::<S, false, true>(simd, dst, a, b, f),
+        (false, false) => {
+            let value = f(load(simd, &a[0]), load(simd, &b[0]));
+            dst.iter().for_each(|dst| store(dst, value));
         }
-    } else {
-        let (step_a, step_b) = (
-            usize::from(a.len() == dst.len()),
-            usize::from(b.len() == dst.len()),
-        );
-        for (index, dst) in dst.iter().enumerate() {
-            store(
-                dst,
-                f(
-                    load(simd, &a[index * step_a]),
-                    load(simd, &b[index * step_b]),
-                ),
-            );
-        }
+    }
+}
+
+#[inline(always)]
+fn rounds2<S: Simd, const A: bool, const B: bool>(
+    simd: S,
+    dst: &[Cell<Chunk>],
+    a: &[Cell<Chunk>],
+    b: &[Cell<Chunk>],
+    f: impl Fn(u32x16<S>, u32x16<S>) -> u32x16<S>,
+) {
+    let (a, b) = (cut::<A>(a, dst.len()), cut::<B>(b, dst.len()));
+    for (index, dst) in dst.iter().enumerate() {
+        let (a, b) = (operand::<A>(a, index), operand::<B>(b, index));
+        store(dst, f(load(simd, a), load(simd, b)));
     }
 }
 
@@ -303,13 +328,39 @@ pub fn vector3<S: Simd>(
     src: &[Slot; 4],
     f: impl Fn(u32x16<S>, u32x16<S>, u32x16<S>) -> u32x16<S>,
 ) {
-    let dst = file.narrow(dst);
-    let [a, b, c] = [src[0], src[1], src[2]].map(|slot| file.narrow(slot));
-    let [step_a, step_b, step_c] = [a, b, c].map(|chunks| usize::from(chunks.len() == dst.len()));
+    let (dst, a, b) = (file.narrow(dst), file.narrow(src[0]), file.narrow(src[1]));
+    let c = file.narrow(src[2]);
+    let n = dst.len();
+    match (a.len() == n, b.len() == n, c.len() == n) {
+        (true, true, true) => rounds3::<S, true, true, true>(simd, dst, a, b, c, f),
+        (false, true, true) => rounds3::<S, false, true, true>(simd, dst, a, b, c, f),
+        (true, false, true) => rounds3::<S, true, false, true>(simd, dst, a, b, c, f),
+        (true, true, false) => rounds3::<S, true, true, false>(simd, dst, a, b, c, f),
+        (true, false, false) => rounds3::<S, true, false, false>(simd, dst, a, b, c, f),
+        (false, true, false) => rounds3::<S, false, true, false>(simd, dst, a, b, c, f),
+        (false, false, true) => rounds3::<S, false, false, true>(simd, dst, a, b, c, f),
+        (false, false, false) => rounds3::<S, false, false, false>(simd, dst, a, b, c, f),
+    }
+}
+
+#[inline(always)]
+fn rounds3<S: Simd, const A: bool, const B: bool, const C: bool>(
+    simd: S,
+    dst: &[Cell<Chunk>],
+    a: &[Cell<Chunk>],
+    b: &[Cell<Chunk>],
+    c: &[Cell<Chunk>],
+    f: impl Fn(u32x16<S>, u32x16<S>, u32x16<S>) -> u32x16<S>,
+) {
+    let rounds = dst.len();
+    let (a, b, c) = (
+        cut::<A>(a, rounds),
+        cut::<B>(b, rounds),
+        cut::<C>(c, rounds),
+    );
     for (index, dst) in dst.iter().enumerate() {
-        let a = load(simd, &a[index * step_a]);
-        let b = load(simd, &b[index * step_b]);
-        let c = load(simd, &c[index * step_c]);
-        store(dst, f(a, b, c));
+        let (a, b) = (operand::<A>(a, index), operand::<B>(b, index));
+        let c = operand::<C>(c, index);
+        store(dst, f(load(simd, a), load(simd, b), load(simd, c)));
     }
 }
