@@ -307,7 +307,11 @@ impl Lowering<'_> {
             self.control(Step::Clear(continues));
         }
         // No statement may run without lanes: it would still set uniform registers.
-        let back = if continues.is_some() { at_continuing } else { end };
+        let back = if continues.is_some() {
+            at_continuing
+        } else {
+            end
+        };
         self.block(body, back);
         self.place(at_continuing);
         if let Some(mask) = continues {

@@ -259,7 +259,7 @@ pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
         Op::INeg => s(sa.wrapping_neg()),
         Op::SAbs => s(sa.wrapping_abs()),
         Op::SSign => s(sa.signum()),
-        Op::UDiv => u(if ub == 0 { u32::MAX } else { ua / ub }),
+        Op::UDiv => u(ua.checked_div(ub).unwrap_or(u32::MAX)),
         Op::URem => u(if ub == 0 { ua } else { ua % ub }),
         Op::SDiv => s(if sb == 0 { -1 } else { sa.wrapping_div(sb) }),
         Op::SRem => s(if sb == 0 { sa } else { sa.wrapping_rem(sb) }),
@@ -329,7 +329,7 @@ pub fn apply(op: Op, operands: &[u64], fused: bool) -> u64 {
         Op::FNe => bool_bits(fa != fb),
         Op::FLt => bool_bits(fa < fb),
         Op::FLe => bool_bits(fa <= fb),
-        Op::FLtGt => bool_bits(fa < fb || fa > fb),
+        Op::FLtGt => bool_bits(fa.partial_cmp(&fb).is_some_and(|order| order.is_ne())),
         Op::FIsNan => bool_bits(fa.is_nan()),
         Op::FIsInf => bool_bits(fa.is_infinite()),
         Op::FExp => wide(f64::exp),
@@ -424,7 +424,7 @@ fn apply64(op: Op, a: u64, b: u64, c: u64) -> u64 {
         Op::FNe64 => bool_bits(fa != fb),
         Op::FLt64 => bool_bits(fa < fb),
         Op::FLe64 => bool_bits(fa <= fb),
-        Op::FLtGt64 => bool_bits(fa < fb || fa > fb),
+        Op::FLtGt64 => bool_bits(fa.partial_cmp(&fb).is_some_and(|order| order.is_ne())),
         Op::FIsNan64 => bool_bits(fa.is_nan()),
         Op::FIsInf64 => bool_bits(fa.is_infinite()),
         Op::FLdexp64 => f(ldexp(fa, (b as u32).cast_signed())),
@@ -436,13 +436,7 @@ fn apply64(op: Op, a: u64, b: u64, c: u64) -> u64 {
         Op::INeg64 => a.wrapping_neg(),
         Op::SAbs64 => s(sa.wrapping_abs()),
         Op::SSign64 => s(sa.signum()),
-        Op::UDiv64 => {
-            if b == 0 {
-                u64::MAX
-            } else {
-                a / b
-            }
-        }
+        Op::UDiv64 => a.checked_div(b).unwrap_or(u64::MAX),
         Op::URem64 => {
             if b == 0 {
                 a
@@ -516,13 +510,9 @@ fn ldexp(mut a: f64, mut exponent: i32) -> f64 {
         a *= 2.0;
         exponent -= 1;
     }
-    while exponent < -1000 {
-        // Kept for the last factor, so that only one multiplication rounds.
-        if exponent >= -1021 {
-            break;
-        }
-        let rest = exponent + 1021;
-        return a * 2f64.powi(-1021) * 2f64.powi(rest);
+    if exponent < -1021 {
+        // Only the last multiplication may round.
+        return a * 2f64.powi(-1021) * 2f64.powi(exponent + 1021);
     }
     a * 2f64.powi(exponent)
 }

@@ -26,7 +26,7 @@ fn misuse_of_the_builder_is_an_error() {
         |b| {
             (0..100_000).for_each(|_| {
                 b.begin_scope();
-            })
+            });
         },
         |b| b.break_to(Label(7)),
     ];
