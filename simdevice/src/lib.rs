@@ -8,6 +8,7 @@
 //! [`counters`] records the work that was done.
 #![forbid(unsafe_code)]
 
+mod binning;
 pub mod command_processor;
 pub mod counters;
 pub mod device;
