@@ -17,7 +17,7 @@ const TOLERANCE: f64 = 1e-4;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// An input is infinite or not a number.
+    /// An input, or the camera that follows from it, is infinite or not a number.
     NotFinite,
     /// The view matrix or the pose is not a rotation (or reflection) with a translation: it scales,
     /// shears, projects or is singular.
@@ -51,20 +51,19 @@ impl fmt::Display for CameraError {
 impl core::error::Error for CameraError {}
 
 impl GaussianCameraGAURAST<'_> {
-    /// The camera of a view matrix that looks along -z with +y up (OpenGL's convention, `glam`'s
-    /// `look_at_rh`) and a projection matrix for it (`glam`'s `perspective_rh`,
-    /// `orthographic_rh`, ...).
+    /// The camera of a right-handed view matrix, which looks along -z with +y up (OpenGL's
+    /// convention), and a projection matrix for it, such as those of
+    /// `glam::camera::rh::proj::vulkan`.
     ///
     /// `view` is world to camera. `viewport` is the Vulkan viewport's width and height in pixels; a
     /// negative height turns the picture over, as in Vulkan. The projection may be off-centre, have
-    /// either sign of y (so a y-up matrix without a negative height gives an upside-down picture,
-    /// exactly as it does for triangles), reverse depth, or have an infinite far plane. Its depths 0
+    /// either sign of y (so one made for another API gives an upside-down picture, exactly as it
+    /// does for triangles), reverse depth, or have an infinite far plane. Its depths 0
     /// and 1 become the camera's near and far plane.
     ///
     /// # Errors
     ///
-    /// See [`CameraError`]; never [`InvalidDepthRange`](CameraError::InvalidDepthRange) for an
-    /// orthographic projection.
+    /// See [`CameraError`].
     pub fn from_view_projection(
         view: &[[f64; 4]; 4],
         projection: &[[f64; 4]; 4],
@@ -73,8 +72,9 @@ impl GaussianCameraGAURAST<'_> {
         from_matrices(view, projection, viewport, -1.0)
     }
 
-    /// The camera of a view matrix that looks along +z (the convention of OpenCV, COLMAP, and
-    /// `glam`'s `look_at_lh`) and a projection matrix for it (`glam`'s `perspective_lh`, ...).
+    /// The camera of a view matrix that looks along +z (the convention of OpenCV and COLMAP, with +y
+    /// down, and of left-handed engines, with +y up) and a projection matrix for it, such as those
+    /// of `glam::camera::lh::proj::vulkan`.
     ///
     /// Otherwise as [`from_view_projection`](Self::from_view_projection), with the same errors.
     pub fn from_forward_z_view_projection(
@@ -220,15 +220,32 @@ fn from_matrices(
     } else {
         GaussianCameraModelGAURAST::PINHOLE
     };
-    Ok(GaussianCameraGAURAST::default()
+    let camera = GaussianCameraGAURAST::default()
         .model(model)
         .rotation(flatten(&rotation))
         .eye(eye)
         .focal_length(signed_focal.map(|f| f.abs() as f32))
         .principal_point(principal.map(|c| c as f32))
-        .near_plane(near as f32)
-        .far_plane(far as f32)
-        .depth_coefficients(projection.depth_coefficients.map(|c| c as f32)))
+        .near_plane(near)
+        .far_plane(far)
+        .depth_coefficients(projection.depth_coefficients.map(|c| c as f32));
+    if fits_binary32(&camera) {
+        Ok(camera)
+    } else {
+        Err(CameraError::NotFinite)
+    }
+}
+
+/// Whether rounding to binary32 has left every number finite (the far plane need not be).
+fn fits_binary32(camera: &GaussianCameraGAURAST<'_>) -> bool {
+    let pairs = [
+        camera.focal_length,
+        camera.principal_point,
+        camera.depth_coefficients,
+    ];
+    pairs.as_flattened().iter().all(|x| x.is_finite())
+        && camera.near_plane.is_finite()
+        && camera.eye.iter().all(|x| x.is_finite())
 }
 
 /// The rows of a view matrix's rotation, and its eye.
@@ -318,7 +335,7 @@ fn decompose_projection(
 }
 
 /// The nearest and the farthest distance ahead whose depth lies in 0..1.
-fn depth_planes(projection: &Projection) -> Result<(f64, f64), CameraError> {
+fn depth_planes(projection: &Projection) -> Result<(f32, f32), CameraError> {
     let [c0, c1] = projection.depth_coefficients;
     let distance_at = |depth: f64| {
         if projection.orthographic {
@@ -333,8 +350,8 @@ fn depth_planes(projection: &Projection) -> Result<(f64, f64), CameraError> {
         }
     };
     let [a, b] = [distance_at(0.0), distance_at(1.0)];
-    let (near, far) = (a.min(b), a.max(b));
-    if near < far {
+    let (near, far) = (a.min(b) as f32, a.max(b) as f32);
+    if near < far && (projection.orthographic || near > 0.0) {
         Ok((near, far))
     } else {
         Err(CameraError::InvalidDepthRange)

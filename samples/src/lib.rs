@@ -3,4 +3,5 @@
 
 pub mod camera;
 pub mod output;
+pub mod renderer;
 pub mod scene;

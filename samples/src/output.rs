@@ -97,6 +97,35 @@ impl ImageFormat {
     }
 }
 
+/// Checks, before there is a picture, that one could be written to `path`: its format is known, and
+/// its folder is there.
+///
+/// # Errors
+/// [`OutputError::UnknownFormat`] or [`OutputError::Io`].
+pub fn check(path: &Path) -> Result<(), OutputError> {
+    ImageFormat::of(path)?;
+    let io = |source| OutputError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let is_folder = |path: &Path| path.metadata().map(|metadata| metadata.is_dir());
+    if !is_folder(folder(path)).map_err(io)? {
+        return Err(io(io::ErrorKind::NotADirectory.into()));
+    }
+    if is_folder(path).unwrap_or(false) {
+        return Err(io(io::ErrorKind::IsADirectory.into()));
+    }
+    Ok(())
+}
+
+/// The folder that the file `path` is in.
+fn folder(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    }
+}
+
 /// Writes `picture` to `path`, in the format of its extension, over `background` if there is one.
 /// The file appears whole or not at all.
 ///
@@ -112,16 +141,12 @@ pub fn write(
         source,
     };
     let format = ImageFormat::of(path)?;
-    let folder = match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
     let mut builder = tempfile::Builder::new();
     builder.prefix(".gaurast-");
     // Readable like any other new file; the crate's own default is for secrets.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(io)?;
+    let mut file = builder.tempfile_in(folder(path)).map_err(io)?;
     let mut writer = BufWriter::new(&mut file);
     encode(&mut writer, format, picture, background).map_err(|source| match source {
         image::ImageError::IoError(source) => io(source),
@@ -231,11 +256,14 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let unknown = write(&folder.path().join("a.jpg"), &picture(), None);
         assert!(matches!(unknown, Err(OutputError::UnknownFormat { .. })));
-        let missing = write(&folder.path().join("no/such/a.png"), &picture(), None);
+        let missing = folder.path().join("no/such/a.png");
+        assert!(matches!(check(&missing), Err(OutputError::Io { .. })));
+        let missing = write(&missing, &picture(), None);
         assert!(matches!(missing, Err(OutputError::Io { .. })));
         // The target is a folder: the rename fails after everything was written.
         let taken = folder.path().join("a.png");
         std::fs::create_dir(&taken).expect("a folder");
+        assert!(matches!(check(&taken), Err(OutputError::Io { .. })));
         assert!(write(&taken, &picture(), None).is_err());
         let left = std::fs::read_dir(folder.path()).expect("readable").count();
         assert_eq!(left, 1);

@@ -6,7 +6,7 @@
 
 use crate::gaussian::footprint::{Span, TILE_SIZE};
 use crate::gaussian::locate;
-use crate::gaussian::project::{Projected, Splat};
+use crate::gaussian::project::Projected;
 use crate::packet::Rect;
 use rayon::prelude::*;
 
@@ -35,19 +35,18 @@ pub(crate) struct TileLists {
 }
 
 impl TileLists {
-    /// Places the survivors named by `order` in lists; returns them in that order, and the lists.
+    /// Places the survivors named by `order`, in that order, in the lists of the tiles they reach.
     pub(crate) fn build(
         batches: &[Projected],
         order: &[(u32, u32)],
         bounds: Rect,
         threads: usize,
-    ) -> (Vec<Splat>, Self) {
+    ) -> Self {
         if bounds.is_empty() || order.is_empty() {
-            let empty = Self {
+            return Self {
                 first_row: 0,
                 rows: Vec::new(),
             };
-            return (Vec::new(), empty);
         }
         // Visible pixels have coordinates from zero on: the render area lies inside its attachments.
         let tile = |pixel: i64| (pixel.max(0) / i64::from(TILE_SIZE)) as u32;
@@ -56,24 +55,17 @@ impl TileLists {
         let columns = tile(i64::from(bounds.x) + i64::from(bounds.width) - 1) + 1;
         let row_count = (last_row - first_row + 1) as usize;
 
+        // Several runs for each worker, so that one that is late does not keep the others waiting.
         let run = order.len().div_ceil(4 * threads.max(1)).max(1024);
-        let mut splats = vec![Splat::default(); order.len()];
         let runs: Vec<Vec<Vec<RowEntry>>> = order
             .par_chunks(run)
-            .zip(splats.par_chunks_mut(run))
-            .enumerate()
-            .map(|(number, (names, splats))| {
-                let mut rows = vec![Vec::new(); row_count];
-                let primitives = (number * run) as u32..;
-                for ((&(_, name), splat), primitive) in names.iter().zip(splats).zip(primitives) {
-                    let (batch, place) = locate(name);
-                    let batch = &batches[batch];
-                    *splat = batch.splats[place];
-                    let spans = splat.first_span as usize..;
-                    for span in &batch.spans[spans][..splat.span_count as usize] {
-                        let &Span { row, first, end } = span;
-                        let row = u32::from(row) - first_row;
-                        rows[row as usize].push(RowEntry {
+            .map(|names| {
+                let mut rows = vec![Vec::with_capacity(2 * run / row_count); row_count];
+                for &(_, primitive) in names {
+                    let (batch, place) = locate(primitive);
+                    for &Span { row, first, end } in batches[batch].spans_of(place) {
+                        let row = (u32::from(row) - first_row) as usize;
+                        rows[row].push(RowEntry {
                             primitive,
                             first,
                             end,
@@ -87,7 +79,7 @@ impl TileLists {
             .into_par_iter()
             .map(|row| Row::place(columns, || runs.iter().flat_map(move |run| &run[row])))
             .collect();
-        (splats, Self { first_row, rows })
+        Self { first_row, rows }
     }
 
     /// The primitives of a tile.
@@ -159,29 +151,16 @@ impl Row {
 mod tests {
     use super::*;
 
-    fn batch(spans: &[&[(u16, u16, u16)]]) -> Projected {
-        let mut out = Projected::default();
-        for (number, tiles) in spans.iter().enumerate() {
-            out.splats.push(Splat {
-                mean: [number as f64, 0.0],
-                first_span: out.spans.len() as u32,
-                span_count: tiles.len() as u32,
-                ..Splat::default()
-            });
-            let tiles = tiles.iter();
-            out.spans
-                .extend(tiles.map(|&(row, first, end)| Span { row, first, end }));
-        }
-        out
-    }
-
     #[test]
     fn lists_keep_the_sorted_order() {
-        let batches = [batch(&[
-            &[(1, 0, 2)],
-            &[(1, 1, 2), (2, 0, 3)],
-            &[(1, 0, 1)],
-        ])];
+        let mut batch = Projected::default();
+        for tiles in [&[(1, 0, 2)][..], &[(1, 1, 2), (2, 0, 3)], &[(1, 0, 1)]] {
+            let tiles = tiles.iter();
+            batch
+                .spans
+                .extend(tiles.map(|&(row, first, end)| Span { row, first, end }));
+            batch.span_ends.push(batch.spans.len() as u32);
+        }
         let order = [(5, 2), (6, 0), (7, 1)];
         let bounds = Rect {
             x: 0,
@@ -189,13 +168,11 @@ mod tests {
             width: 40,
             height: 32,
         };
-        let (splats, lists) = TileLists::build(&batches, &order, bounds, 2);
-        let means: Vec<_> = splats.iter().map(|splat| splat.mean[0]).collect();
-        assert_eq!(means, [2.0, 0.0, 1.0]);
-        assert_eq!(lists.list(0, 1), [0, 1]);
-        assert_eq!(lists.list(1, 1), [1, 2]);
+        let lists = TileLists::build(&[batch], &order, bounds, 2);
+        assert_eq!(lists.list(0, 1), [2, 0]);
+        assert_eq!(lists.list(1, 1), [0, 1]);
         assert_eq!(lists.list(2, 1), []);
-        assert_eq!(lists.list(2, 2), [2]);
+        assert_eq!(lists.list(2, 2), [1]);
         assert_eq!(lists.list(0, 0), [], "outside the bounds there is nothing");
         assert_eq!(lists.list(9, 9), []);
         assert_eq!(lists.pairs(), 7);

@@ -1,6 +1,7 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::workers::Workers;
 use fearless_simd::Level;
 
 /// What can be chosen when a device is created.
@@ -117,7 +118,7 @@ pub enum DeviceError {
 /// A simulated device. Its threads are joined when it is dropped.
 #[derive(Debug)]
 pub struct Device {
-    pool: rayon::ThreadPool,
+    workers: Workers,
     level: Level,
     config: Config,
 }
@@ -137,12 +138,9 @@ impl Device {
         if !(TILE_SIZE..=MAX_MACRO_TILE_SIZE).contains(&size) || !size.is_multiple_of(TILE_SIZE) {
             return Err(DeviceError::MacroTileSize(size));
         }
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(config.threads)
-            .thread_name(|index| format!("gaurast-{index}"))
-            .build()?;
+        let workers = Workers::new(config.threads)?;
         Ok(Self {
-            pool,
+            workers,
             level,
             config: config.clone(),
         })
@@ -160,12 +158,17 @@ impl Device {
 
     /// How many workers it has.
     pub fn threads(&self) -> usize {
-        self.pool.current_num_threads()
+        self.workers
+            .pool()
+            .map_or(1, rayon::ThreadPool::current_num_threads)
     }
 
     /// Runs `work` on the device's workers.
     pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
-        self.pool.install(work)
+        match self.workers.pool() {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
     }
 }
 

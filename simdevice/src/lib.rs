@@ -21,6 +21,7 @@ pub mod pass;
 pub mod query;
 pub mod raster;
 pub mod transfer;
+mod workers;
 
 pub use command_processor::CommandProcessor;
 pub use device::{Config, Device};

@@ -18,7 +18,7 @@ pub enum SceneError {
         source: io::Error,
     },
     /// Neither the name nor the first bytes tell what the file is.
-    #[error("{}: this is not a scene file of a known kind ({})", path.display(), super::format::known())]
+    #[error("{}: this is not a scene file of a known kind ({})", path.display(), super::format::known_extensions())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -188,7 +188,7 @@ pub enum Reason {
 
 impl Reason {
     /// This reason, at `place`.
-    pub(crate) fn at(self, place: Place) -> Fault {
+    pub(super) fn at(self, place: Place) -> Fault {
         Fault {
             place,
             reason: self,
@@ -198,14 +198,14 @@ impl Reason {
 
 /// A [`SceneError`] before the file's name is known.
 #[derive(Debug)]
-pub struct Fault {
-    pub(crate) place: Place,
-    pub(crate) reason: Reason,
+pub(super) struct Fault {
+    pub(super) place: Place,
+    pub(super) reason: Reason,
 }
 
 impl Fault {
     /// This fault, of the file `path`.
-    pub(crate) fn of(self, path: &Path) -> SceneError {
+    pub(super) fn of(self, path: &Path) -> SceneError {
         let path = path.to_owned();
         match self.reason {
             Reason::NotReadYet(format) => SceneError::NotReadYet { path, format },

@@ -7,7 +7,7 @@ use super::error::{Fault, Place, Reason};
 use super::{Scene, ply, splat, spz};
 
 /// A format of scene files.
-pub trait Format: Sync {
+pub(super) trait Format: Sync {
     /// The name, as messages show it.
     fn name(&self) -> &'static str;
 
@@ -25,7 +25,7 @@ pub trait Format: Sync {
 }
 
 /// Every format that is known, in the order in which they are tried.
-pub static FORMATS: &[&dyn Format] = &[
+pub(super) static FORMATS: &[&dyn Format] = &[
     &ply::Ply,
     &splat::Splat,
     &spz::Spz,
@@ -90,8 +90,8 @@ pub(super) fn choose(path: &Path, start: &[u8]) -> Option<&'static dyn Format> {
     by_extension.or_else(by_magic).copied()
 }
 
-/// The extensions of all formats, for messages.
-pub(super) fn known() -> String {
+/// The extensions of all formats that are known, for messages.
+pub fn known_extensions() -> String {
     FORMATS
         .iter()
         .flat_map(|format| format.extensions())
@@ -101,7 +101,7 @@ pub(super) fn known() -> String {
 }
 
 /// What a [`Format`] reads from: bytes in order, how many there are, and how many have been read.
-pub struct Input<'a> {
+pub(super) struct Input<'a> {
     reader: &'a mut dyn BufRead,
     len: u64,
     position: u64,

@@ -5,21 +5,25 @@
 //! +x right, +y **down**, +z forward. PLY, compressed PLY and `.splat` files are kept as they are;
 //! SPZ files, which are right-up-back, are turned half around x.
 
+mod benchmark;
 mod error;
 mod format;
+mod generate;
 
 mod ply;
 mod splat;
 mod spz;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use bytemuck::{Pod, Zeroable};
 
 pub use error::{Place, Reason, SceneError};
 use format::Input;
+pub use format::known_extensions;
+pub use generate::DEFAULT_COUNT;
 
 /// The value of the constant spherical harmonic, 1 / (2 sqrt(pi)).
 pub(crate) const SH_C0: f64 = 0.282_094_791_773_878_14;
@@ -73,8 +77,20 @@ impl Scene {
     /// Reads the scene file at `path`.
     ///
     /// # Errors
-    /// If the file cannot be opened or read, is of no kind in [`FORMATS`], or is malformed.
+    /// If the file cannot be opened or read, is of no known kind, or is malformed.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
+        Self::load_through(path, |file, _| file)
+    }
+
+    /// As [`Scene::load`], reading through what `wrap` makes of the file and its size in bytes: a
+    /// reader that shows progress, say.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn load_through<R: Read>(
+        path: &Path,
+        wrap: impl FnOnce(File, u64) -> R,
+    ) -> Result<Self, SceneError> {
         let io = |source| SceneError::Io {
             path: path.to_owned(),
             source,
@@ -84,11 +100,9 @@ impl Scene {
         if metadata.is_dir() {
             return Err(io(std::io::ErrorKind::IsADirectory.into()));
         }
-        Self::read(
-            path,
-            &mut BufReader::with_capacity(1 << 20, file),
-            metadata.len(),
-        )
+        let len = metadata.len();
+        let mut reader = BufReader::with_capacity(1 << 20, wrap(file, len));
+        Self::read(path, &mut reader, len)
     }
 
     /// Reads a scene of `len` bytes from `reader`; `path` picks the format and names the file in

@@ -1,5 +1,6 @@
 //! Vertex fetch for Gaussians: attribute streams to structures of arrays. Values are binary32, held as binary64.
 
+use super::lanes::Lanes;
 use crate::format::Format;
 use crate::packet::{AttributeStream, GaussianAppend, IndexStream};
 
@@ -119,7 +120,7 @@ impl Fetcher {
         &mut self,
         stream: &AttributeStream,
         batch: &Batch,
-        mut out: [&mut [f64; BATCH]; COMPONENTS],
+        mut out: [&mut Lanes; COMPONENTS],
     ) {
         let (size, floats) = layout(stream.format);
         let step = self.read_bytes(stream, batch, size);

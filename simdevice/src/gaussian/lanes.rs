@@ -1,7 +1,16 @@
-//! Helpers for a batch's lanes: sets of lanes, and the logarithm.
+//! A batch's lanes: numbers, sets of lanes, and the logarithm.
 
 use super::fetch::BATCH;
 use fearless_simd::{Simd, prelude::*};
+
+/// A number for each Gaussian of a batch.
+///
+/// Some thirty of these are walked side by side: a cache line more than a power of two keeps them from
+/// competing for the same few sets of the first-level cache.
+pub(super) type Lanes = [f64; BATCH + 8];
+
+/// Lanes before anything is known of them.
+pub(super) const NO_LANES: Lanes = [0.0; BATCH + 8];
 
 const WORDS: usize = BATCH / 64;
 

@@ -56,7 +56,8 @@ pub struct GaussianDraw {
     pub state: Arc<GaussianState>,
     /// The pixels that it may touch.
     pub bounds: Rect,
-    pub(crate) splats: Vec<Splat>,
+    /// By batch; [`locate`] finds a primitive's.
+    pub(crate) splats: Vec<Vec<Splat>>,
     pub(crate) tiles: TileLists,
 }
 
@@ -115,7 +116,7 @@ impl GaussianSet {
         let projected = Instant::now();
         let order = sorted(&batches);
         let sorted = Instant::now();
-        let (splats, tiles) =
+        let tiles =
             device.install(|| TileLists::build(&batches, &order, self.bounds, device.threads()));
         counters.add(Counter::TilePairs, tiles.pairs());
         let nanoseconds = |from: Instant, to: Instant| (to - from).as_nanos() as u64;
@@ -125,7 +126,7 @@ impl GaussianSet {
         Ok(GaussianDraw {
             state: self.begin.state,
             bounds: self.bounds,
-            splats,
+            splats: batches.into_iter().map(|batch| batch.splats).collect(),
             tiles,
         })
     }
@@ -204,6 +205,7 @@ fn sorted(batches: &[Projected]) -> Vec<(u32, u32)> {
 }
 
 /// The batch of a survivor's name, and its place there.
+#[inline(always)]
 pub(crate) fn locate(name: u32) -> (usize, usize) {
     (name as usize / BATCH, name as usize % BATCH)
 }
@@ -211,7 +213,8 @@ pub(crate) fn locate(name: u32) -> (usize, usize) {
 impl GaussianDraw {
     /// Bytes of host memory that it holds while it waits to be rendered.
     pub fn memory_bytes(&self) -> u64 {
-        size_of_val(&*self.splats) as u64 + self.tiles.memory_bytes()
+        let splats = self.splats.iter().map(|batch| size_of_val(&**batch) as u64);
+        splats.sum::<u64>() + self.tiles.memory_bytes()
     }
 
     /// Whether it may touch a pixel of `rect`.

@@ -7,7 +7,7 @@
 
 use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader, Fetcher};
 use super::footprint::{Ellipse, Span, Visible};
-use super::lanes::{Bits, log2};
+use super::lanes::{Bits, Lanes, NO_LANES, log2};
 use super::sort::ordered_bits;
 use super::spherical_harmonics;
 use crate::counters::{Counter, Counters};
@@ -29,10 +29,6 @@ pub(crate) struct Splat {
     pub log2_opacity: f32,
     /// Red, green, blue.
     pub color: [f32; 3],
-    /// Where its spans begin in its batch.
-    pub first_span: u32,
-    /// How many spans it has.
-    pub span_count: u32,
 }
 
 /// What came of a batch.
@@ -42,8 +38,10 @@ pub(crate) struct Projected {
     pub splats: Vec<Splat>,
     /// The depth key of each.
     pub keys: Vec<u32>,
-    /// The tiles of each.
+    /// The tiles of all of them, one after the other.
     pub spans: Vec<Span>,
+    /// Where the tiles of each end in `spans`.
+    pub span_ends: Vec<u32>,
     /// What was skipped and why.
     pub counters: Counters,
 }
@@ -75,9 +73,6 @@ pub(crate) struct Projection {
     sh_degree: u32,
     visible: Visible,
 }
-
-/// A number for each Gaussian of a batch.
-type Lanes = [f64; BATCH];
 
 /// What a batch's Gaussians are, and what becomes of them. Structures of arrays.
 pub(crate) struct Scratch {
@@ -121,10 +116,10 @@ struct Flat {
 impl Default for Attributes {
     fn default() -> Self {
         Self {
-            position: [[0.0; BATCH]; 3],
-            scale: [[0.0; BATCH]; 3],
-            rotation: [[0.0; BATCH]; 4],
-            opacity: [0.0; BATCH],
+            position: [NO_LANES; 3],
+            scale: [NO_LANES; 3],
+            rotation: [NO_LANES; 4],
+            opacity: NO_LANES,
         }
     }
 }
@@ -132,15 +127,15 @@ impl Default for Attributes {
 impl Default for Flat {
     fn default() -> Self {
         Self {
-            mean: [[0.0; BATCH]; 2],
-            determinant: [0.0; BATCH],
-            log2_opacity: [0.0; BATCH],
-            factor: [[0.0; BATCH]; 3],
-            half: [[0.0; BATCH]; 2],
-            slope: [0.0; BATCH],
-            narrowing: [0.0; BATCH],
-            peak: [0.0; BATCH],
-            direction: [[0.0; BATCH]; 3],
+            mean: [NO_LANES; 2],
+            determinant: NO_LANES,
+            log2_opacity: NO_LANES,
+            factor: [NO_LANES; 3],
+            half: [NO_LANES; 2],
+            slope: NO_LANES,
+            narrowing: NO_LANES,
+            peak: NO_LANES,
+            direction: [NO_LANES; 3],
         }
     }
 }
@@ -151,12 +146,12 @@ impl Scratch {
         Self {
             fetcher: Fetcher::default(),
             attributes: Box::default(),
-            offset: Box::new([[0.0; BATCH]; 3]),
-            camera: Box::new([[0.0; BATCH]; 3]),
+            offset: Box::new([NO_LANES; 3]),
+            camera: Box::new([NO_LANES; 3]),
             lanes: Vec::with_capacity(BATCH),
             dense: Box::default(),
-            dense_camera: Box::new([[0.0; BATCH]; 3]),
-            dense_offset: Box::new([[0.0; BATCH]; 3]),
+            dense_camera: Box::new([NO_LANES; 3]),
+            dense_offset: Box::new([NO_LANES; 3]),
             flat: Box::default(),
         }
     }
@@ -201,9 +196,19 @@ impl Scratch {
 }
 
 impl Projected {
+    /// The tiles of a splat of the batch.
+    #[inline(always)]
+    pub(crate) fn spans_of(&self, place: usize) -> &[Span] {
+        let start = place
+            .checked_sub(1)
+            .map_or(0, |before| self.span_ends[before]);
+        &self.spans[start as usize..self.span_ends[place] as usize]
+    }
+
     fn reserve(&mut self, count: usize) {
         self.splats.reserve_exact(count);
         self.keys.reserve_exact(count);
+        self.span_ends.reserve_exact(count);
         self.spans.reserve(2 * count);
     }
 }
@@ -456,7 +461,7 @@ impl Projection {
             store(determinant, &mut flat.determinant);
             let mut o = load(opacity, at);
             if self.compensated {
-                o = o * (area2 / determinant).sqrt();
+                o *= (area2 / determinant).sqrt();
             }
             let log2_opacity = log2(simd, o);
             store(log2_opacity, &mut flat.log2_opacity);
@@ -545,9 +550,8 @@ impl Projection {
                 factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
                 log2_opacity: flat.log2_opacity[at] as f32,
                 color,
-                first_span: first_span as u32,
-                span_count: (out.spans.len() - first_span) as u32,
             });
+            out.span_ends.push(out.spans.len() as u32);
         }
         out.counters
             .add(Counter::GaussiansDrawn, out.splats.len() as u64);

@@ -72,11 +72,15 @@ pub(super) fn color<S: Simd>(
     // A vector holds a coefficient's three components and the next one's first, which is not used. Two sums
     // halve the wait for one another; the largest terms, the constant one and 0.5, are added last.
     let load = |k: usize| f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
-    let mut sums = [f32x4::splat(simd, 0.0); 2];
-    for k in (1..count).rev() {
-        sums[k % 2] = load(k).mul_add(f32x4::splat(simd, basis[k]), sums[k % 2]);
+    let term = |k: usize, sum| load(k).mul_add(f32x4::splat(simd, basis[k]), sum);
+    let (mut even, mut odd) = (f32x4::splat(simd, 0.0), f32x4::splat(simd, 0.0));
+    for k in (2..count).step_by(2) {
+        even = term(k, even);
     }
-    let sum = load(0).mul_add(f32x4::splat(simd, basis[0]), sums[0] + sums[1]) + 0.5;
+    for k in (1..count).step_by(2) {
+        odd = term(k, odd);
+    }
+    let sum = term(0, even + odd) + 0.5;
     // Multiplied by zero, what is not finite becomes NaN.
     let nothing = coefficients[..3 * count]
         .chunks(16)
@@ -144,13 +148,13 @@ mod tests {
     #[test]
     fn the_basis_is_orthonormal() {
         // A midpoint rule over the sphere is exact enough to tell any wrong constant or sign of a square.
-        let (rows, columns) = (200, 400);
+        let (rows, columns) = (200u32, 400u32);
         let mut products = vec![[0.0f64; 16]; 16];
         for row in 0..rows {
-            let z = -1.0 + (row as f64 + 0.5) * 2.0 / rows as f64;
+            let z = -1.0 + (f64::from(row) + 0.5) * 2.0 / f64::from(rows);
             let radius = (1.0 - z * z).sqrt();
             for column in 0..columns {
-                let angle = (column as f64 + 0.5) * std::f64::consts::TAU / columns as f64;
+                let angle = (f64::from(column) + 0.5) * std::f64::consts::TAU / f64::from(columns);
                 let direction = [radius * angle.cos(), radius * angle.sin(), z].map(|v| v as f32);
                 let b = basis(3, direction);
                 for i in 0..16 {
@@ -160,7 +164,7 @@ mod tests {
                 }
             }
         }
-        let area = 4.0 * std::f64::consts::PI / (rows * columns) as f64;
+        let area = 4.0 * std::f64::consts::PI / f64::from(rows * columns);
         for (i, row) in products.iter().enumerate() {
             for (j, product) in row.iter().enumerate() {
                 let expected = f64::from(u8::from(i == j));

@@ -12,7 +12,7 @@
 
 use crate::counters::{Counter, Counters};
 use crate::gaussian::project::Splat;
-use crate::gaussian::{GaussianDraw, TILE_SIZE};
+use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::packet::{GaussianState, Rect};
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 
@@ -163,7 +163,7 @@ impl GaussianTile {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        splats: &[Splat],
+        splats: &[Vec<Splat>],
         list: &[u32],
         corner: [u32; 2],
         thresholds: Thresholds,
@@ -175,7 +175,8 @@ impl GaussianTile {
                 break;
             }
             for (record, &primitive) in self.chunk.iter_mut().zip(chunk) {
-                *record = Record::new(&splats[primitive as usize], corner, thresholds.log2_floor);
+                let (batch, place) = locate(primitive);
+                *record = Record::new(&splats[batch][place], corner, thresholds.log2_floor);
             }
             let items = find_items(simd, &self.chunk[..chunk.len()], open, &mut self.items);
             work.pairs += chunk.len() as u64;
@@ -279,14 +280,16 @@ impl Record {
         let [left, top] = corner.map(f64::from);
         let at = [splat.mean[0] - left, splat.mean[1] - top];
         // The index of the pixel that the mean lies in, or of the nearest one of this tile.
-        let anchor = at.map(|at| at.floor().max(0.0).min(TILE as f64 - 1.0));
+        // Truncation is the floor of what is not negative, and what is becomes zero.
+        let nearest = |at: f64| f64::from(at.clamp(0.0, TILE as f64 - 1.0) as i32);
+        let anchor = [nearest(at[0]), nearest(at[1])];
         let d = [anchor[0] + 0.5 - at[0], anchor[1] + 0.5 - at[1]];
         let [a, b, c] = splat.factor;
         let room = splat.log2_opacity - log2_floor;
         Self {
-            anchor: anchor.map(|at| at as f32),
+            anchor: [anchor[0] as f32, anchor[1] as f32],
             at_anchor: [(a * d[0]) as f32, (b * d[0] + c * d[1]) as f32],
-            factor: splat.factor.map(|part| part as f32),
+            factor: [a as f32, b as f32, c as f32],
             log2_opacity: splat.log2_opacity,
             color: splat.color,
             room: room + 1e-3 + 1e-5 * room.abs(),
@@ -329,9 +332,28 @@ fn find_items<S: Simd>(simd: S, records: &[Record], open: u64, items: &mut [u32]
     count
 }
 
-/// 2 to the power of `x`, for `x` below 1; below -126 the result is 2^-126. Error: at most 1.6 ulp.
+/// A polynomial fitted to 2^f for f in [-1/2, 1/2], highest power first; relative error 9.2e-8.
+#[allow(
+    clippy::approx_constant,
+    reason = "the coefficients are fitted; one comes near ln 2"
+)]
+const POWER_OF_TWO: [f32; 6] = [
+    0.001_326_472_7,
+    0.009_671_513,
+    0.055_507_336,
+    0.240_222_42,
+    0.693_147,
+    1.0,
+];
+
+/// 2 to the power of `x`, for `x` below 1; below -126 the result is 2^-126. Error: at most 1.9 ulp with
+/// fused multiply-add, 2.1 ulp without (measured).
 ///
-/// `x = n + f` with `f` in [-1/2, 1/2]; a polynomial with p(0) = 1 fits 2^f to 9.2e-8 relative.
+/// `x = n + f` with `f` in [-1/2, 1/2], and 2^f is [`POWER_OF_TWO`].
+#[allow(
+    clippy::approx_constant,
+    reason = "the coefficients are fitted; one comes near ln 2"
+)]
 #[inline(always)]
 fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let constant = |value| f32x16::splat(simd, value);
@@ -340,12 +362,14 @@ fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let shifter = constant(12_582_912.0);
     let shifted = x + shifter;
     let f = x - (shifted - shifter);
-    let p = constant(0.001_326_472_7);
-    let p = p.mul_add(f, constant(0.009_671_513));
-    let p = p.mul_add(f, constant(0.055_507_336));
-    let p = p.mul_add(f, constant(0.240_222_42));
-    let p = p.mul_add(f, constant(0.693_147));
-    let p = p.mul_add(f, constant(1.0));
+    let [first, rest @ ..] = POWER_OF_TWO;
+    let mut p = constant(first);
+    for coefficient in rest {
+        p = p.mul_add(f, constant(coefficient));
+    }
     let exponent = shifted.to_bits() << 23;
     f32x16::from_bits(p.to_bits() + exponent)
 }
+
+#[cfg(test)]
+mod tests;
