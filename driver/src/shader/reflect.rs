@@ -1,0 +1,1 @@
+//! What a shader wants of the pipeline's layout.
