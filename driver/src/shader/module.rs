@@ -7,9 +7,13 @@
 //! - `OpSpecConstantOp` is decoded recursively, with each operand of the inner instruction once, so shuffles and
 //!   composite extractions of more than one index would be refused. These instructions are kept aside as words, and
 //!   rspirv sees an `OpUndef` with the same type and id in their place.
+//!
+//! Its loader also has no place for `OpExecutionModeId` and for extended instructions outside functions (debug
+//! information); [`Loader`] takes these out of its way.
 
 use std::collections::HashMap;
 
+use rspirv::binary::{Consumer, ParseAction, parse_words};
 use rspirv::dr::{self, Instruction, Operand};
 use rspirv::spirv::{self, BuiltIn, Decoration, Op};
 
@@ -71,9 +75,12 @@ impl Module {
     pub fn parse(words: &[u32]) -> Result<Self, Error> {
         let version = check_header(words)?;
         let (words, spec_ops) = set_spec_ops_aside(words)?;
-        let data = dr::load_words(&words).map_err(|state| Error::Binary {
+        let mut loader = Loader::default();
+        parse_words(&words, &mut loader).map_err(|state| Error::Binary {
             reason: state.to_string(),
         })?;
+        let mut data = loader.loader.module();
+        data.execution_modes.append(&mut loader.mode_ids);
         let mut module = Self {
             spec_ops,
             extended_sets: extended_sets(&data),
@@ -247,6 +254,42 @@ impl Module {
             }
         }
         applied
+    }
+}
+
+/// rspirv's loader, spared what it has no place for.
+#[derive(Default)]
+struct Loader {
+    loader: dr::Loader,
+    mode_ids: Vec<Instruction>,
+    in_function: bool,
+}
+
+impl Consumer for Loader {
+    fn initialize(&mut self) -> ParseAction {
+        self.loader.initialize()
+    }
+
+    fn finalize(&mut self) -> ParseAction {
+        self.loader.finalize()
+    }
+
+    fn consume_header(&mut self, header: dr::ModuleHeader) -> ParseAction {
+        self.loader.consume_header(header)
+    }
+
+    fn consume_instruction(&mut self, it: Instruction) -> ParseAction {
+        match it.class.opcode {
+            Op::ExecutionModeId => {
+                self.mode_ids.push(it);
+                return ParseAction::Continue;
+            }
+            Op::ExtInst if !self.in_function => return ParseAction::Continue,
+            Op::Function => self.in_function = true,
+            Op::FunctionEnd => self.in_function = false,
+            _ => {}
+        }
+        self.loader.consume_instruction(it)
     }
 }
 
