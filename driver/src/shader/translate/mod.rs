@@ -59,7 +59,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            subgroup_size: 16,
+            subgroup_size: 64,
             samples: 1,
             unsized_descriptors: 1,
         }
@@ -219,11 +219,9 @@ impl Translator<'_> {
 
     /// The type of an id.
     fn type_of(&self, id: u32) -> Outcome<u32> {
-        if let Some(constant) = self.globals.constants.get(&id) {
-            return Ok(constant.ty);
-        }
-        match self.types.get(&id) {
-            Some(ty) => Ok(*ty),
+        let constant = || self.globals.constants.get(&id).map(|constant| constant.ty);
+        match self.types.get(&id).copied().or_else(constant) {
+            Some(ty) => Ok(ty),
             None => malformed(format!("%{id} has no type here")),
         }
     }
