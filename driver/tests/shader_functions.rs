@@ -324,11 +324,11 @@ const INTEGERS: &[(&str, Exactly)] = &[
     ("usubBorrow", |x, y, _| x.wrapping_sub(y)),
     ("borrow", |x, y, _| u32::from(x < y)),
     ("umulExtended high", |x, y, _| {
-        (u64::from(x) * u64::from(y) >> 32) as u32
+        ((u64::from(x) * u64::from(y)) >> 32) as u32
     }),
     ("umulExtended low", |x, y, _| x.wrapping_mul(y)),
     ("imulExtended high", |x, y, _| {
-        (i64::from(s(x)) * i64::from(s(y)) >> 32) as u32
+        ((i64::from(s(x)) * i64::from(s(y))) >> 32) as u32
     }),
     ("udiv", |x, y, _| x / (y | 1)),
     ("umod", |x, y, _| x % (y | 1)),

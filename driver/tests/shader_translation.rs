@@ -62,3 +62,24 @@ fn kept_binaries_match_their_sources() {
         );
     }
 }
+
+/// Disassemblies that are kept, to be looked at when the translation changes.
+const KEPT: [&str; 3] = ["triangle.vert", "mandelbrot.comp", "matrix_product.comp"];
+
+#[test]
+fn disassemblies_are_as_kept() {
+    for name in KEPT {
+        let text = translated(name, &Specialization::default())
+            .program
+            .to_string();
+        let path = folder().join(format!("{name}.ir"));
+        if std::env::var_os("GAURAST_BLESS").is_some() {
+            std::fs::write(&path, &text).unwrap();
+        }
+        let kept = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(
+            text, kept,
+            "{name}: run with GAURAST_BLESS=1 to keep the new disassembly"
+        );
+    }
+}

@@ -13,6 +13,7 @@ mod analysis;
 mod arithmetic;
 mod atomic;
 mod built_in;
+mod cases;
 mod composite;
 mod control;
 mod convert;
@@ -348,10 +349,8 @@ impl Translator<'_> {
                 ];
             }
             ExecutionMode::EarlyFragmentTests => self.interface.early_fragment_tests = true,
-            ExecutionMode::DepthReplacing => {
-                if self.interface.depth == DepthMode::Fixed {
-                    self.interface.depth = DepthMode::Any;
-                }
+            ExecutionMode::DepthReplacing if self.interface.depth == DepthMode::Fixed => {
+                self.interface.depth = DepthMode::Any;
             }
             ExecutionMode::DepthGreater => self.interface.depth = DepthMode::Greater,
             ExecutionMode::DepthLess => self.interface.depth = DepthMode::Less,
