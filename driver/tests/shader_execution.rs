@@ -1,5 +1,6 @@
 //! Kept compute shaders run on the shader cores and give what the host computes.
 
+#[path = "common/mod.rs"]
 mod common;
 
 use common::{Dispatch, Random, buffer, contents, float_contents, floats, translated};

@@ -1,5 +1,6 @@
 //! Functions of GLSL.std.450 against f64 or exact models, within the precision that Vulkan asks for.
 
+#[path = "common/mod.rs"]
 mod common;
 
 use common::{Dispatch, OPTIONS, Random, buffer, contents, float_contents, translated, words_of};

@@ -46,19 +46,33 @@ fn kept_binaries_match_their_sources() {
     }
     let scratch = tempfile::tempdir().unwrap();
     for name in all_shaders() {
+        let source = name.strip_suffix(".opt").unwrap_or(&name);
         let binary = scratch.path().join("out.spv");
         let output = Command::new(compiler)
             .args(["-V", "--target-env", "vulkan1.3", "-o"])
             .arg(&binary)
-            .arg(folder().join(&name))
+            .arg(folder().join(source))
             .output()
             .unwrap();
-        assert!(output.status.success(), "{name} doesn't compile");
+        assert!(output.status.success(), "{source} doesn't compile");
+        if source != name {
+            let mut optimizer = Command::new("spirv-opt");
+            optimizer
+                .args(["-O", "--target-env=vulkan1.3"])
+                .arg(&binary);
+            match optimizer.arg("-o").arg(&binary).output() {
+                Ok(output) => assert!(output.status.success(), "{source} can't be optimized"),
+                Err(error) => {
+                    eprintln!("skipped {name}: spirv-opt can't be run: {error}");
+                    continue;
+                }
+            }
+        }
         let kept = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
         let fresh = std::fs::read(&binary).unwrap();
         assert!(
             comparable(&kept) == comparable(&fresh),
-            "{name}.spv isn't what {name} compiles to"
+            "{name}.spv isn't what {source} compiles to"
         );
     }
 }
