@@ -26,6 +26,18 @@ fn comparable(bytes: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// Whether spirv-opt is there, in the version that the kept binaries are of.
+fn spirv_opt_is_as_kept() -> bool {
+    let version = Command::new("spirv-opt").arg("--version").output();
+    let found = version.is_ok_and(|output| {
+        String::from_utf8_lossy(&output.stdout).contains("SPIRV-Tools v2023.1")
+    });
+    if !found {
+        eprintln!("skipped what spirv-opt makes: SPIRV-Tools v2023.1 isn't there");
+    }
+    found
+}
+
 #[test]
 fn kept_binaries_match_their_sources() {
     let compiler = "glslangValidator";
@@ -56,17 +68,15 @@ fn kept_binaries_match_their_sources() {
             .unwrap();
         assert!(output.status.success(), "{source} doesn't compile");
         if source != name {
+            if !spirv_opt_is_as_kept() {
+                continue;
+            }
             let mut optimizer = Command::new("spirv-opt");
             optimizer
                 .args(["-O", "--target-env=vulkan1.3"])
                 .arg(&binary);
-            match optimizer.arg("-o").arg(&binary).output() {
-                Ok(output) => assert!(output.status.success(), "{source} can't be optimized"),
-                Err(error) => {
-                    eprintln!("skipped {name}: spirv-opt can't be run: {error}");
-                    continue;
-                }
-            }
+            let output = optimizer.arg("-o").arg(&binary).output().unwrap();
+            assert!(output.status.success(), "{source} can't be optimized");
         }
         let kept = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
         let fresh = std::fs::read(&binary).unwrap();
