@@ -1,3 +1,25 @@
-//! See the package description.
+//! The GauRast driver: a software Vulkan driver that draws with a simulated device.
+//!
+//! There are two doors to it. [`entry`] gives an [`ash::Entry`] over the driver linked into this process; and the
+//! crate as a shared library is a driver for the Vulkan loader. Both lead to one table of commands.
+//!
+//! The driver keeps Vulkan's objects and lowers recorded commands to [`simdevice`] packets. It never computes a
+//! pixel.
 
+mod capabilities;
+mod command;
+mod dispatch;
+mod embed;
+mod entrypoints;
+mod environment;
+mod error;
+mod handle;
+mod icd;
+mod lower;
+mod object;
+mod pnext;
+mod pointer;
 pub mod shader;
+
+pub use embed::entry;
+pub use handle::live_handles;

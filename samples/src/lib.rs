@@ -1,1 +1,7 @@
-//! See the package description.
+//! What the `gaurast` command and the samples share: scenes, cameras, images, and a renderer that
+//! is an ordinary application of the Gaussian primitive topology.
+
+pub mod camera;
+pub mod output;
+pub mod renderer;
+pub mod scene;

@@ -1,5 +1,184 @@
-//! The command processor: the one match over [`Packet`](crate::Packet).
+//! The command processor: the one match over [`Packet`].
 
-/// Executes packets in order.
+use crate::counters::Counters;
+use crate::device::Device;
+use crate::gaussian::{GaussianSet, TooManyGaussians};
+use crate::packet::Packet;
+use crate::pass::{Pass, PassDraw};
+use crate::query::host_time;
+use crate::raster::tile::AttachmentError;
+use crate::transfer::{self, Direction};
+use std::sync::Arc;
+
+/// Why a packet could not be executed. The command processor stays usable: nothing of the packet was done, and a
+/// Gaussian set or a pass that it would have ended has ended.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ExecutionError {
+    /// The packet belongs in a render pass.
+    #[error("there is no render pass")]
+    OutsidePass,
+    /// The packet belongs outside of render passes.
+    #[error("a render pass has not ended")]
+    InsidePass,
+    /// The packet belongs between the beginning and the end of a sorted set of Gaussians.
+    #[error("no set of Gaussians was begun")]
+    NoGaussianSet,
+    /// The packet belongs outside of sorted sets of Gaussians.
+    #[error("a set of Gaussians was not resolved")]
+    GaussianSetOpen,
+    /// An attachment cannot be rendered to.
+    #[error(transparent)]
+    Attachment(#[from] AttachmentError),
+    /// A set is too large.
+    #[error(transparent)]
+    TooManyGaussians(#[from] TooManyGaussians),
+}
+
+/// Executes packets in order. Dropping it in the middle of a pass drops what was not flushed.
 #[derive(Debug)]
-pub struct CommandProcessor {}
+pub struct CommandProcessor {
+    device: Arc<Device>,
+    counters: Counters,
+    pass: Option<Pass>,
+    gaussians: Option<GaussianSet>,
+}
+
+impl CommandProcessor {
+    /// A command processor outside of any pass, with all counters at zero.
+    pub fn new(device: Arc<Device>) -> Self {
+        Self {
+            device,
+            counters: Counters::default(),
+            pass: None,
+            gaussians: None,
+        }
+    }
+
+    /// What it has counted so far.
+    pub fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// Whether a render pass has begun and not ended.
+    pub fn in_pass(&self) -> bool {
+        self.pass.is_some()
+    }
+
+    /// Forgets a render pass and a set of Gaussians that were begun and not ended; what was not flushed is lost.
+    pub fn reset(&mut self) {
+        self.pass = None;
+        self.gaussians = None;
+    }
+
+    /// Executes one packet.
+    ///
+    /// # Errors
+    /// [`ExecutionError`] if the packet does not fit what came before, or asks for too much.
+    pub fn execute(&mut self, packet: &Packet) -> Result<(), ExecutionError> {
+        match packet {
+            Packet::CopyBuffer(copy) => self.transfer(|| transfer::copy_buffer(copy)),
+            Packet::CopyBufferToImage(copy) => {
+                self.transfer(|| transfer::copy_buffer_image(copy, Direction::ToImage))
+            }
+            Packet::CopyImageToBuffer(copy) => {
+                self.transfer(|| transfer::copy_buffer_image(copy, Direction::ToBuffer))
+            }
+            Packet::CopyImage(copy) => self.transfer(|| transfer::copy_image(copy)),
+            Packet::FillBuffer { target, word } => {
+                self.transfer(|| transfer::fill_buffer(target, *word))
+            }
+            Packet::UpdateBuffer { target, data } => {
+                self.transfer(|| transfer::update_buffer(target, data))
+            }
+            Packet::ClearImage(clear) => self.transfer(|| transfer::clear_image(clear)),
+            Packet::BeginRendering(rendering) => {
+                if self.pass.is_some() {
+                    return Err(ExecutionError::InsidePass);
+                }
+                self.pass = Some(Pass::begin(rendering)?);
+                Ok(())
+            }
+            Packet::ClearAttachments(clear) => self.draw(PassDraw::Clear(clear.clone())),
+            Packet::GaussianBegin(begin) => {
+                let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
+                self.outside_gaussian_set()?;
+                self.gaussians = Some(GaussianSet::begin(begin, pass.area()));
+                Ok(())
+            }
+            Packet::GaussianAppend(append) => {
+                let set = self.gaussians.as_mut();
+                set.ok_or(ExecutionError::NoGaussianSet)?.append(append);
+                Ok(())
+            }
+            Packet::GaussianResolve => {
+                let set = self.gaussians.take().ok_or(ExecutionError::NoGaussianSet)?;
+                let draw = set.resolve(&self.device, &mut self.counters)?;
+                self.draw(PassDraw::Gaussians(draw))
+            }
+            Packet::TriangleDraw(draw) => match *draw {},
+            Packet::Barrier => {
+                self.flush();
+                Ok(())
+            }
+            Packet::EndRendering => {
+                let pass = self.pass.take().ok_or(ExecutionError::OutsidePass)?;
+                if self.gaussians.take().is_some() {
+                    return Err(ExecutionError::GaussianSetOpen);
+                }
+                pass.end(&self.device, &mut self.counters);
+                Ok(())
+            }
+            // What a query measures is what was done, not what waits.
+            Packet::BeginQuery { pool, index } => {
+                self.flush();
+                pool.begin(*index, &self.counters);
+                Ok(())
+            }
+            Packet::EndQuery { pool, index } => {
+                self.flush();
+                pool.end(*index, &self.counters);
+                Ok(())
+            }
+            Packet::ResetQueries { pool, first, count } => {
+                pool.reset(*first, *count);
+                Ok(())
+            }
+            Packet::WriteTimestamp { pool, index } => {
+                self.flush();
+                pool.write_timestamp(*index, host_time());
+                Ok(())
+            }
+        }
+    }
+
+    fn outside_gaussian_set(&self) -> Result<(), ExecutionError> {
+        match self.gaussians {
+            Some(_) => Err(ExecutionError::GaussianSetOpen),
+            None => Ok(()),
+        }
+    }
+
+    /// Does what belongs outside of render passes.
+    fn transfer(&self, work: impl FnOnce()) -> Result<(), ExecutionError> {
+        if self.pass.is_some() {
+            return Err(ExecutionError::InsidePass);
+        }
+        work();
+        Ok(())
+    }
+
+    /// Adds a draw to the pass.
+    fn draw(&mut self, draw: PassDraw) -> Result<(), ExecutionError> {
+        self.outside_gaussian_set()?;
+        let pass = self.pass.as_mut().ok_or(ExecutionError::OutsidePass)?;
+        pass.push(draw, &self.device, &mut self.counters);
+        Ok(())
+    }
+
+    /// Renders what waits in the pass, if there is one.
+    fn flush(&mut self) {
+        if let Some(pass) = &mut self.pass {
+            pass.flush(&self.device, &mut self.counters);
+        }
+    }
+}

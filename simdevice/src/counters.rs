@@ -65,10 +65,9 @@ counters! {
     TilePairsEvaluated: "raster", "tile pairs evaluated", Count, "Tile pairs that were fetched before their tile was saturated";
     BlockEvaluations: "raster", "block evaluations", Count, "Pairs of a 4x4 block and a Gaussian whose alpha was evaluated";
     PixelContributions: "raster", "pixel contributions", Count, "Pairs of a pixel and a Gaussian that contributed to it";
-    PreprocessTime: "time", "preprocess", Nanoseconds, "Reading, culling and projecting Gaussians";
+    PreprocessTime: "time", "preprocess", Nanoseconds, "Reading, culling, projecting and colouring Gaussians";
     SortTime: "time", "sort", Nanoseconds, "Sorting by depth";
     BinningTime: "time", "binning", Nanoseconds, "Finding the tiles of each Gaussian, and placing it in their lists";
-    ColorTime: "time", "spherical harmonics", Nanoseconds, "Evaluating the colour of what is drawn";
     RasterTime: "time", "raster", Nanoseconds, "Rendering tiles: load, evaluate, blend, store";
 }
 

@@ -1,5 +1,7 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
+use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::workers::Workers;
 use fearless_simd::Level;
 
 /// What can be chosen when a device is created.
@@ -9,6 +11,22 @@ pub struct Config {
     pub threads: usize,
     /// The SIMD level of every kernel.
     pub simd: SimdLevel,
+    /// The side of a macro-tile, the piece of a pass that one worker renders, in pixels: a multiple of 16 from 16
+    /// to 128. It never changes an image.
+    pub macro_tile_size: u32,
+    /// A pass is flushed early when its bins exceed this many bytes.
+    pub bin_budget_bytes: u64,
+    /// When a pass is flushed.
+    pub flush: FlushPolicy,
+}
+
+/// When a pass's bins are rendered. It never changes an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FlushPolicy {
+    /// When they exceed the budget, at a barrier and at the end of the pass.
+    WhenFull,
+    /// After every draw, too.
+    EveryDraw,
 }
 
 impl Default for Config {
@@ -16,6 +34,9 @@ impl Default for Config {
         Self {
             threads: 0,
             simd: SimdLevel::Best,
+            macro_tile_size: 64,
+            bin_budget_bytes: 256 << 20,
+            flush: FlushPolicy::WhenFull,
         }
     }
 }
@@ -86,6 +107,9 @@ pub enum DeviceError {
     /// The processor lacks the SIMD level asked for.
     #[error("this processor does not support the SIMD level {0:?}")]
     UnsupportedSimdLevel(SimdLevel),
+    /// A macro-tile of this side cannot be cut into tiles, or is too large.
+    #[error("a macro-tile's side must be a multiple of 16 from 16 to 128, not {0}")]
+    MacroTileSize(u32),
     /// The host gave no threads.
     #[error("the worker pool cannot be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -94,25 +118,37 @@ pub enum DeviceError {
 /// A simulated device. Its threads are joined when it is dropped.
 #[derive(Debug)]
 pub struct Device {
-    pool: rayon::ThreadPool,
+    workers: Workers,
     level: Level,
+    config: Config,
 }
 
 impl Device {
     /// Starts a device.
     ///
     /// # Errors
-    /// [`DeviceError`] if the processor lacks the level or the host refuses threads.
+    /// [`DeviceError`] if the processor lacks the level, the macro-tile's size is impossible or the host refuses
+    /// threads.
     pub fn new(config: &Config) -> Result<Self, DeviceError> {
         let level = config
             .simd
             .resolve()
             .ok_or(DeviceError::UnsupportedSimdLevel(config.simd))?;
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(config.threads)
-            .thread_name(|index| format!("gaurast-{index}"))
-            .build()?;
-        Ok(Self { pool, level })
+        let size = config.macro_tile_size;
+        if !(TILE_SIZE..=MAX_MACRO_TILE_SIZE).contains(&size) || !size.is_multiple_of(TILE_SIZE) {
+            return Err(DeviceError::MacroTileSize(size));
+        }
+        let workers = Workers::new(config.threads)?;
+        Ok(Self {
+            workers,
+            level,
+            config: config.clone(),
+        })
+    }
+
+    /// What was chosen when it was created.
+    pub fn config(&self) -> &Config {
+        &self.config
     }
 
     /// The SIMD level of every kernel.
@@ -122,11 +158,36 @@ impl Device {
 
     /// How many workers it has.
     pub fn threads(&self) -> usize {
-        self.pool.current_num_threads()
+        self.workers
+            .pool()
+            .map_or(1, rayon::ThreadPool::current_num_threads)
     }
 
     /// Runs `work` on the device's workers.
     pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
-        self.pool.install(work)
+        match self.workers.pool() {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn impossible_macro_tiles_are_refused() {
+        for macro_tile_size in [0, 8, 40, 144, u32::MAX] {
+            let config = Config {
+                threads: 1,
+                macro_tile_size,
+                ..Config::default()
+            };
+            assert!(matches!(
+                Device::new(&config),
+                Err(DeviceError::MacroTileSize(size)) if size == macro_tile_size
+            ));
+        }
     }
 }

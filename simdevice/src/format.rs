@@ -1,19 +1,492 @@
 //! Texel and vertex formats: Vulkan's, by Vulkan's names in camel case.
+//!
+//! One table defines them; sizes, aspects and conversions derive from it. Texels are decoded to and encoded from
+//! four 32-bit registers in the order R, G, B, A. Registers of integer formats hold the integer's bits, as shader
+//! registers do; depth and stencil are held in the first register. Components that a format lacks read as
+//! (0, 0, 0, 1). The uncompressed formats of Vulkan 1.0 with components of up to 32 bits are here; which of them
+//! can be used for what is advertised elsewhere.
 
-/// How a texel or a vertex attribute is stored.
+mod convert;
+#[cfg(test)]
+mod tests;
+
+use crate::packet::{Aspect, ClearValue};
+
+/// How the bits of a component are to be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[allow(missing_docs, reason = "the names are Vulkan's")]
-pub enum Format {
-    R8Unorm,
-    R8G8B8A8Unorm,
-    R8G8B8A8Srgb,
-    B8G8R8A8Unorm,
-    B8G8R8A8Srgb,
-    R16G16B16A16Sfloat,
-    R32Sfloat,
-    R32G32Sfloat,
-    R32G32B32Sfloat,
-    R32G32B32A32Sfloat,
-    D16Unorm,
-    D32Sfloat,
+pub enum Numeric {
+    /// 0 to 1.
+    Unorm,
+    /// -1 to 1.
+    Snorm,
+    /// An unsigned integer that is converted to floating point.
+    Uscaled,
+    /// A signed integer that is converted to floating point.
+    Sscaled,
+    /// An unsigned integer.
+    Uint,
+    /// A signed integer.
+    Sint,
+    /// A binary16 or binary32 number.
+    Sfloat,
+    /// A floating-point number without a sign: 5 bits of exponent, 5 or 6 of mantissa.
+    Ufloat,
+    /// 0 to 1 by the sRGB transfer function, alpha linear.
+    Srgb,
+    /// Three 9-bit mantissas with one 5-bit exponent.
+    SharedExponent,
+    /// A depth and a stencil component, which live in planes of their own (see [`Format::plane`]).
+    DepthStencil,
+}
+
+/// A component's meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Channel {
+    /// Red.
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+    /// Alpha.
+    A,
+    /// Depth.
+    D,
+    /// Stencil.
+    S,
+    /// The shared exponent.
+    E,
+    /// Unused bits.
+    X,
+}
+
+impl Channel {
+    /// The register that holds it, if any.
+    fn register(self) -> Option<usize> {
+        match self {
+            Self::R | Self::D | Self::S => Some(0),
+            Self::G => Some(1),
+            Self::B => Some(2),
+            Self::A => Some(3),
+            Self::E | Self::X => None,
+        }
+    }
+}
+
+/// A component: its meaning and its width in bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Component {
+    /// What it means.
+    pub channel: Channel,
+    /// How many bits it has.
+    pub bits: u32,
+}
+
+macro_rules! formats {
+    ($($variant:ident: $numeric:ident, $($channel:ident $bits:literal)+;)*) => {
+        /// How a texel or a vertex attribute is stored.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[allow(missing_docs, reason = "the names are Vulkan's")]
+        pub enum Format {
+            $($variant,)*
+        }
+
+        impl Format {
+            /// Every format, in Vulkan's order.
+            pub const ALL: &[Self] = &[$(Self::$variant,)*];
+
+            /// How its components' bits are read.
+            pub const fn numeric(self) -> Numeric {
+                match self {
+                    $(Self::$variant => Numeric::$numeric,)*
+                }
+            }
+
+            /// Its components, least significant bits first; a texel is little-endian.
+            pub const fn components(self) -> &'static [Component] {
+                match self {
+                    $(Self::$variant => &[$(Component { channel: Channel::$channel, bits: $bits },)+],)*
+                }
+            }
+        }
+    };
+}
+
+formats! {
+    R4G4UnormPack8: Unorm, G 4 R 4;
+    R4G4B4A4UnormPack16: Unorm, A 4 B 4 G 4 R 4;
+    B4G4R4A4UnormPack16: Unorm, A 4 R 4 G 4 B 4;
+    R5G6B5UnormPack16: Unorm, B 5 G 6 R 5;
+    B5G6R5UnormPack16: Unorm, R 5 G 6 B 5;
+    R5G5B5A1UnormPack16: Unorm, A 1 B 5 G 5 R 5;
+    B5G5R5A1UnormPack16: Unorm, A 1 R 5 G 5 B 5;
+    A1R5G5B5UnormPack16: Unorm, B 5 G 5 R 5 A 1;
+    R8Unorm: Unorm, R 8;
+    R8Snorm: Snorm, R 8;
+    R8Uscaled: Uscaled, R 8;
+    R8Sscaled: Sscaled, R 8;
+    R8Uint: Uint, R 8;
+    R8Sint: Sint, R 8;
+    R8Srgb: Srgb, R 8;
+    R8G8Unorm: Unorm, R 8 G 8;
+    R8G8Snorm: Snorm, R 8 G 8;
+    R8G8Uscaled: Uscaled, R 8 G 8;
+    R8G8Sscaled: Sscaled, R 8 G 8;
+    R8G8Uint: Uint, R 8 G 8;
+    R8G8Sint: Sint, R 8 G 8;
+    R8G8Srgb: Srgb, R 8 G 8;
+    R8G8B8Unorm: Unorm, R 8 G 8 B 8;
+    R8G8B8Snorm: Snorm, R 8 G 8 B 8;
+    R8G8B8Uscaled: Uscaled, R 8 G 8 B 8;
+    R8G8B8Sscaled: Sscaled, R 8 G 8 B 8;
+    R8G8B8Uint: Uint, R 8 G 8 B 8;
+    R8G8B8Sint: Sint, R 8 G 8 B 8;
+    R8G8B8Srgb: Srgb, R 8 G 8 B 8;
+    B8G8R8Unorm: Unorm, B 8 G 8 R 8;
+    B8G8R8Snorm: Snorm, B 8 G 8 R 8;
+    B8G8R8Uscaled: Uscaled, B 8 G 8 R 8;
+    B8G8R8Sscaled: Sscaled, B 8 G 8 R 8;
+    B8G8R8Uint: Uint, B 8 G 8 R 8;
+    B8G8R8Sint: Sint, B 8 G 8 R 8;
+    B8G8R8Srgb: Srgb, B 8 G 8 R 8;
+    R8G8B8A8Unorm: Unorm, R 8 G 8 B 8 A 8;
+    R8G8B8A8Snorm: Snorm, R 8 G 8 B 8 A 8;
+    R8G8B8A8Uscaled: Uscaled, R 8 G 8 B 8 A 8;
+    R8G8B8A8Sscaled: Sscaled, R 8 G 8 B 8 A 8;
+    R8G8B8A8Uint: Uint, R 8 G 8 B 8 A 8;
+    R8G8B8A8Sint: Sint, R 8 G 8 B 8 A 8;
+    R8G8B8A8Srgb: Srgb, R 8 G 8 B 8 A 8;
+    B8G8R8A8Unorm: Unorm, B 8 G 8 R 8 A 8;
+    B8G8R8A8Snorm: Snorm, B 8 G 8 R 8 A 8;
+    B8G8R8A8Uscaled: Uscaled, B 8 G 8 R 8 A 8;
+    B8G8R8A8Sscaled: Sscaled, B 8 G 8 R 8 A 8;
+    B8G8R8A8Uint: Uint, B 8 G 8 R 8 A 8;
+    B8G8R8A8Sint: Sint, B 8 G 8 R 8 A 8;
+    B8G8R8A8Srgb: Srgb, B 8 G 8 R 8 A 8;
+    A8B8G8R8UnormPack32: Unorm, R 8 G 8 B 8 A 8;
+    A8B8G8R8SnormPack32: Snorm, R 8 G 8 B 8 A 8;
+    A8B8G8R8UscaledPack32: Uscaled, R 8 G 8 B 8 A 8;
+    A8B8G8R8SscaledPack32: Sscaled, R 8 G 8 B 8 A 8;
+    A8B8G8R8UintPack32: Uint, R 8 G 8 B 8 A 8;
+    A8B8G8R8SintPack32: Sint, R 8 G 8 B 8 A 8;
+    A8B8G8R8SrgbPack32: Srgb, R 8 G 8 B 8 A 8;
+    A2R10G10B10UnormPack32: Unorm, B 10 G 10 R 10 A 2;
+    A2R10G10B10SnormPack32: Snorm, B 10 G 10 R 10 A 2;
+    A2R10G10B10UscaledPack32: Uscaled, B 10 G 10 R 10 A 2;
+    A2R10G10B10SscaledPack32: Sscaled, B 10 G 10 R 10 A 2;
+    A2R10G10B10UintPack32: Uint, B 10 G 10 R 10 A 2;
+    A2R10G10B10SintPack32: Sint, B 10 G 10 R 10 A 2;
+    A2B10G10R10UnormPack32: Unorm, R 10 G 10 B 10 A 2;
+    A2B10G10R10SnormPack32: Snorm, R 10 G 10 B 10 A 2;
+    A2B10G10R10UscaledPack32: Uscaled, R 10 G 10 B 10 A 2;
+    A2B10G10R10SscaledPack32: Sscaled, R 10 G 10 B 10 A 2;
+    A2B10G10R10UintPack32: Uint, R 10 G 10 B 10 A 2;
+    A2B10G10R10SintPack32: Sint, R 10 G 10 B 10 A 2;
+    R16Unorm: Unorm, R 16;
+    R16Snorm: Snorm, R 16;
+    R16Uscaled: Uscaled, R 16;
+    R16Sscaled: Sscaled, R 16;
+    R16Uint: Uint, R 16;
+    R16Sint: Sint, R 16;
+    R16Sfloat: Sfloat, R 16;
+    R16G16Unorm: Unorm, R 16 G 16;
+    R16G16Snorm: Snorm, R 16 G 16;
+    R16G16Uscaled: Uscaled, R 16 G 16;
+    R16G16Sscaled: Sscaled, R 16 G 16;
+    R16G16Uint: Uint, R 16 G 16;
+    R16G16Sint: Sint, R 16 G 16;
+    R16G16Sfloat: Sfloat, R 16 G 16;
+    R16G16B16Unorm: Unorm, R 16 G 16 B 16;
+    R16G16B16Snorm: Snorm, R 16 G 16 B 16;
+    R16G16B16Uscaled: Uscaled, R 16 G 16 B 16;
+    R16G16B16Sscaled: Sscaled, R 16 G 16 B 16;
+    R16G16B16Uint: Uint, R 16 G 16 B 16;
+    R16G16B16Sint: Sint, R 16 G 16 B 16;
+    R16G16B16Sfloat: Sfloat, R 16 G 16 B 16;
+    R16G16B16A16Unorm: Unorm, R 16 G 16 B 16 A 16;
+    R16G16B16A16Snorm: Snorm, R 16 G 16 B 16 A 16;
+    R16G16B16A16Uscaled: Uscaled, R 16 G 16 B 16 A 16;
+    R16G16B16A16Sscaled: Sscaled, R 16 G 16 B 16 A 16;
+    R16G16B16A16Uint: Uint, R 16 G 16 B 16 A 16;
+    R16G16B16A16Sint: Sint, R 16 G 16 B 16 A 16;
+    R16G16B16A16Sfloat: Sfloat, R 16 G 16 B 16 A 16;
+    R32Uint: Uint, R 32;
+    R32Sint: Sint, R 32;
+    R32Sfloat: Sfloat, R 32;
+    R32G32Uint: Uint, R 32 G 32;
+    R32G32Sint: Sint, R 32 G 32;
+    R32G32Sfloat: Sfloat, R 32 G 32;
+    R32G32B32Uint: Uint, R 32 G 32 B 32;
+    R32G32B32Sint: Sint, R 32 G 32 B 32;
+    R32G32B32Sfloat: Sfloat, R 32 G 32 B 32;
+    R32G32B32A32Uint: Uint, R 32 G 32 B 32 A 32;
+    R32G32B32A32Sint: Sint, R 32 G 32 B 32 A 32;
+    R32G32B32A32Sfloat: Sfloat, R 32 G 32 B 32 A 32;
+    B10G11R11UfloatPack32: Ufloat, R 11 G 11 B 10;
+    E5B9G9R9UfloatPack32: SharedExponent, R 9 G 9 B 9 E 5;
+    D16Unorm: Unorm, D 16;
+    X8D24UnormPack32: Unorm, D 24 X 8;
+    D32Sfloat: Sfloat, D 32;
+    S8Uint: Uint, S 8;
+    D16UnormS8Uint: DepthStencil, D 16 S 8;
+    D24UnormS8Uint: DepthStencil, D 24 S 8;
+    D32SfloatS8Uint: DepthStencil, D 32 S 8;
+}
+
+/// A texel has at most this many bytes.
+pub const MAX_TEXEL_SIZE: usize = 16;
+
+/// What registers hold where a format has no component.
+const ABSENT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
+impl Format {
+    /// Bytes per texel. Formats of both depth and stencil have no texel of both: see [`Format::plane`].
+    pub const fn texel_size(self) -> usize {
+        let components = self.components();
+        let (mut bits, mut index) = (0, 0);
+        while index < components.len() {
+            bits += components[index].bits;
+            index += 1;
+        }
+        (bits / 8) as usize
+    }
+
+    /// Whether registers hold integers.
+    pub const fn is_integer(self) -> bool {
+        matches!(self.numeric(), Numeric::Uint | Numeric::Sint)
+    }
+
+    /// Whether a texel has this component.
+    pub fn has(self, channel: Channel) -> bool {
+        self.components().iter().any(|c| c.channel == channel)
+    }
+
+    /// The aspects of an image of this format.
+    pub fn aspects(self) -> &'static [Aspect] {
+        match (self.has(Channel::D), self.has(Channel::S)) {
+            (false, false) => &[Aspect::Color],
+            (true, false) => &[Aspect::Depth],
+            (false, true) => &[Aspect::Stencil],
+            (true, true) => &[Aspect::Depth, Aspect::Stencil],
+        }
+    }
+
+    /// The format of one aspect's texels, in images and in buffers that are copied to and from them.
+    pub fn plane(self, aspect: Aspect) -> Option<Self> {
+        match (self, aspect) {
+            (Self::D16UnormS8Uint, Aspect::Depth) => Some(Self::D16Unorm),
+            (Self::D24UnormS8Uint, Aspect::Depth) => Some(Self::X8D24UnormPack32),
+            (Self::D32SfloatS8Uint, Aspect::Depth) => Some(Self::D32Sfloat),
+            (format, Aspect::Depth) if format.has(Channel::D) => Some(format),
+            (format, Aspect::Stencil) if format.has(Channel::S) => Some(Self::S8Uint),
+            (format, Aspect::Color) if format.aspects() == [Aspect::Color] => Some(format),
+            _ => None,
+        }
+    }
+
+    /// Reads a texel. Bytes that `texel` lacks are zero.
+    pub fn decode(self, texel: &[u8]) -> [f32; 4] {
+        let mut out = [ABSENT];
+        let size = self.texel_size();
+        if texel.len() >= size {
+            self.decode_row(&texel[..size], &mut out);
+        } else {
+            let mut padded = [0; MAX_TEXEL_SIZE];
+            padded[..texel.len()].copy_from_slice(texel);
+            self.decode_row(&padded[..size], &mut out);
+        }
+        out[0]
+    }
+
+    /// The bytes of a texel; only the first [`Format::texel_size`] count.
+    pub fn encode(self, texel: [f32; 4]) -> [u8; MAX_TEXEL_SIZE] {
+        let mut out = [0; MAX_TEXEL_SIZE];
+        self.encode_row(&[texel], &mut out[..self.texel_size()]);
+        out
+    }
+
+    /// Reads the texel of an integer format; signed components are sign-extended.
+    pub fn decode_integer(self, texel: &[u8]) -> [u32; 4] {
+        self.decode(texel).map(f32::to_bits)
+    }
+
+    /// The bytes of an integer format's texel. Components are clamped to what the format can hold.
+    pub fn encode_integer(self, texel: [u32; 4]) -> [u8; MAX_TEXEL_SIZE] {
+        self.encode(texel.map(f32::from_bits))
+    }
+
+    /// Reads consecutive texels, as many as both slices have.
+    pub fn decode_row(self, bytes: &[u8], out: &mut [[f32; 4]]) {
+        match self {
+            Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => {
+                decode_each(bytes, out, |texel: [u8; 4]| texel.map(convert::from_unorm8));
+            }
+            Self::B8G8R8A8Unorm => decode_each(bytes, out, |[b, g, r, a]| {
+                [r, g, b, a].map(convert::from_unorm8)
+            }),
+            Self::R8G8B8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
+                decode_each(bytes, out, convert::from_srgb8);
+            }
+            Self::B8G8R8A8Srgb => {
+                decode_each(bytes, out, |[b, g, r, a]| convert::from_srgb8([r, g, b, a]));
+            }
+            Self::R16G16B16A16Sfloat => {
+                let (texels, _) = bytes.as_chunks::<8>();
+                convert::from_halves(texels.as_flattened(), out.as_flattened_mut());
+            }
+            Self::R32Sfloat => decode_each(bytes, out, |texel: [u8; 4]| {
+                [f32::from_le_bytes(texel), 0.0, 0.0, 1.0]
+            }),
+            Self::R32G32Sfloat => decode_each(bytes, out, |texel: [u8; 8]| {
+                let [x, y] = bytemuck::cast(texel);
+                [x, y, 0.0, 1.0]
+            }),
+            Self::R32G32B32Sfloat => decode_each(bytes, out, |texel: [u8; 12]| {
+                let [x, y, z] = bytemuck::cast(texel);
+                [x, y, z, 1.0]
+            }),
+            Self::R32G32B32A32Sfloat => {
+                decode_each(bytes, out, bytemuck::cast::<[u8; 16], _>);
+            }
+            Self::E5B9G9R9UfloatPack32 => decode_each(bytes, out, |texel| {
+                convert::from_shared_exponent(u32::from_le_bytes(texel))
+            }),
+            _ => {
+                let (numeric, components) = (self.numeric(), self.components());
+                for (texel, out) in bytes.chunks_exact(self.texel_size()).zip(out) {
+                    *out = decode_components(numeric, components, texel);
+                }
+            }
+        }
+    }
+
+    /// Writes consecutive texels, as many as both slices have room for.
+    pub fn encode_row(self, texels: &[[f32; 4]], out: &mut [u8]) {
+        match self {
+            Self::R8G8B8A8Unorm | Self::A8B8G8R8UnormPack32 => {
+                encode_each(texels, out, |texel| texel.map(convert::to_unorm8));
+            }
+            Self::B8G8R8A8Unorm => encode_each(texels, out, |[r, g, b, a]| {
+                [b, g, r, a].map(convert::to_unorm8)
+            }),
+            Self::R8G8B8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
+                encode_each(texels, out, convert::to_srgb8);
+            }
+            Self::B8G8R8A8Srgb => encode_each(texels, out, |texel| {
+                let [r, g, b, a] = convert::to_srgb8(texel);
+                [b, g, r, a]
+            }),
+            Self::R16G16B16A16Sfloat => {
+                let (out, _) = out.as_chunks_mut::<8>();
+                convert::to_halves(texels.as_flattened(), out.as_flattened_mut());
+            }
+            Self::R32G32B32A32Sfloat => {
+                encode_each(texels, out, bytemuck::cast::<_, [u8; 16]>);
+            }
+            Self::E5B9G9R9UfloatPack32 => encode_each(texels, out, |texel| {
+                convert::to_shared_exponent(&texel).to_le_bytes()
+            }),
+            _ => {
+                let (numeric, components) = (self.numeric(), self.components());
+                for (out, texel) in out.chunks_exact_mut(self.texel_size()).zip(texels) {
+                    encode_components(numeric, components, texel, out);
+                }
+            }
+        }
+    }
+
+    /// Replaces texels by what they would be after a store to memory and a load.
+    pub fn quantize_row(self, texels: &mut [[f32; 4]]) {
+        match self {
+            Self::R8G8B8A8Unorm | Self::B8G8R8A8Unorm | Self::A8B8G8R8UnormPack32 => {
+                for component in texels.as_flattened_mut() {
+                    *component = convert::quantize_unorm8(*component);
+                }
+            }
+            Self::R8G8B8A8Srgb | Self::B8G8R8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
+                for texel in texels {
+                    *texel = convert::from_srgb8(convert::to_srgb8(*texel));
+                }
+            }
+            Self::R16G16B16A16Sfloat => convert::quantize_halves(texels.as_flattened_mut()),
+            Self::R32G32B32A32Sfloat => {}
+            _ => {
+                for texel in texels {
+                    *texel = self.decode(&self.encode(*texel));
+                }
+            }
+        }
+    }
+
+    /// The bytes that one aspect of an image of this format is cleared to.
+    pub fn encode_clear(self, aspect: Aspect, value: ClearValue) -> [u8; MAX_TEXEL_SIZE] {
+        let Some(plane) = self.plane(aspect) else {
+            return [0; MAX_TEXEL_SIZE];
+        };
+        let registers = match value {
+            ClearValue::Float(value) => value,
+            ClearValue::Int(value) => value.map(|component| f32::from_bits(component as u32)),
+            ClearValue::Uint(value) => value.map(f32::from_bits),
+            ClearValue::DepthStencil { stencil, .. } if aspect == Aspect::Stencil => {
+                // The value's low bits are what the stencil buffer receives.
+                [f32::from_bits(stencil & 0xFF), 0.0, 0.0, 0.0]
+            }
+            ClearValue::DepthStencil { depth, .. } => [depth, 0.0, 0.0, 0.0],
+        };
+        plane.encode(registers)
+    }
+}
+
+/// Decodes texels of `N` bytes.
+fn decode_each<const N: usize>(
+    bytes: &[u8],
+    out: &mut [[f32; 4]],
+    decode: impl Fn([u8; N]) -> [f32; 4],
+) {
+    let (texels, _) = bytes.as_chunks();
+    for (&texel, out) in texels.iter().zip(out) {
+        *out = decode(texel);
+    }
+}
+
+/// Encodes texels of `N` bytes.
+fn encode_each<const N: usize>(
+    texels: &[[f32; 4]],
+    out: &mut [u8],
+    encode: impl Fn([f32; 4]) -> [u8; N],
+) {
+    let (out, _) = out.as_chunks_mut();
+    for (&texel, out) in texels.iter().zip(out) {
+        *out = encode(texel);
+    }
+}
+
+fn decode_components(numeric: Numeric, components: &[Component], bytes: &[u8]) -> [f32; 4] {
+    let mut texel = [0; MAX_TEXEL_SIZE];
+    texel[..bytes.len()].copy_from_slice(bytes);
+    let mut rest = u128::from_le_bytes(texel);
+    let mut out = match numeric {
+        Numeric::Uint | Numeric::Sint => [0.0, 0.0, 0.0, f32::from_bits(1)],
+        _ => ABSENT,
+    };
+    for component in components {
+        let code = rest as u32 & (u32::MAX >> (32 - component.bits));
+        rest >>= component.bits;
+        if let Some(register) = component.channel.register() {
+            out[register] = convert::decode(numeric, *component, code);
+        }
+    }
+    out
+}
+
+fn encode_components(numeric: Numeric, components: &[Component], texel: &[f32; 4], out: &mut [u8]) {
+    let (mut bits, mut shift) = (0u128, 0);
+    for component in components {
+        if let Some(register) = component.channel.register() {
+            let code = convert::encode(numeric, *component, texel[register]);
+            bits |= u128::from(code) << shift;
+        }
+        shift += component.bits;
+    }
+    out.copy_from_slice(&bits.to_le_bytes()[..out.len()]);
 }

@@ -1,8 +1,19 @@
 //! Images: where each texel of each subresource lies in memory.
+//!
+//! Every aspect is a plane of its own: all of its layers, each holding its mip levels from the largest down. A
+//! level holds its samples one after another, a sample its slices, a slice its rows; rows begin at multiples of
+//! [`ROW_ALIGNMENT`]. So a row of one sample is always consecutive, whatever the image.
 
 use crate::format::Format;
-use devmem::Allocation;
+use crate::packet::Aspect;
+use devmem::{Allocation, OutOfBounds};
 use std::sync::Arc;
+
+/// Every row of texels begins at a multiple of this many bytes, a line of the host's cache.
+pub const ROW_ALIGNMENT: u64 = 64;
+
+/// Every image begins at a multiple of this many bytes.
+pub const IMAGE_ALIGNMENT: u64 = 256;
 
 /// How many dimensions an image has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -32,6 +43,140 @@ pub struct ImageDesc {
     pub samples: u32,
 }
 
+/// Where one subresource (an aspect, a mip level, a layer) lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SubresourceLayout {
+    /// How its texels are stored.
+    pub format: Format,
+    /// Its texels in x, y and z.
+    pub extent: [u32; 3],
+    /// Bytes from the image's beginning to its own.
+    pub offset: u64,
+    /// Bytes that it spans.
+    pub size: u64,
+    /// Bytes from one row to the next.
+    pub row_pitch: u64,
+    /// Bytes from one slice of a 3D image to the next.
+    pub depth_pitch: u64,
+    /// Bytes from one sample's texels to the next sample's.
+    pub sample_pitch: u64,
+    /// Bytes from this subresource to that of the next layer.
+    pub array_pitch: u64,
+}
+
+/// Why an image could not be created.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ImageError {
+    /// A size, level, layer or sample count is zero, more than 32 levels, or the size in bytes overflows.
+    #[error("an image of this shape has no layout")]
+    Shape,
+    /// The memory is too small.
+    #[error("the image does not fit its memory: {0}")]
+    Memory(OutOfBounds),
+}
+
+impl ImageDesc {
+    /// Texels of a mip level in x, y and z.
+    pub fn mip_extent(&self, level: u32) -> [u32; 3] {
+        self.extent
+            .map(|texels| texels.checked_shr(level).unwrap_or(0).max(1))
+    }
+
+    /// Bytes that the image takes, or `None` if it has no layout (see [`ImageError::Shape`]).
+    pub fn memory_size(&self) -> Option<u64> {
+        let shape = [self.mip_levels, self.array_layers, self.samples];
+        if shape.contains(&0) || self.extent.contains(&0) || self.mip_levels > u32::BITS {
+            return None;
+        }
+        self.plane_offset(self.format.aspects().len())
+    }
+
+    /// Where a subresource lies, or `None` if the image does not have it.
+    pub fn subresource(&self, aspect: Aspect, level: u32, layer: u32) -> Option<SubresourceLayout> {
+        self.memory_size()?;
+        let plane = self.format.aspects().iter().position(|&a| a == aspect)?;
+        if level >= self.mip_levels || layer >= self.array_layers {
+            return None;
+        }
+        let array_pitch = self.level_offset(aspect, self.mip_levels)?;
+        let offset = self.plane_offset(plane)?
+            + array_pitch * u64::from(layer)
+            + self.level_offset(aspect, level)?;
+        let mut layout = self.level_layout(aspect, level)?;
+        layout.offset = offset;
+        layout.array_pitch = array_pitch;
+        Some(layout)
+    }
+
+    /// Bytes of the first `planes` aspects.
+    fn plane_offset(&self, planes: usize) -> Option<u64> {
+        self.format.aspects()[..planes]
+            .iter()
+            .try_fold(0u64, |sum, &aspect| {
+                let layer = self.level_offset(aspect, self.mip_levels)?;
+                sum.checked_add(layer.checked_mul(self.array_layers.into())?)
+            })
+    }
+
+    /// Bytes of the first `levels` mip levels of one layer.
+    fn level_offset(&self, aspect: Aspect, levels: u32) -> Option<u64> {
+        (0..levels).try_fold(0u64, |sum, level| {
+            sum.checked_add(self.level_layout(aspect, level)?.size)
+        })
+    }
+
+    /// A mip level's layout, but for its place.
+    fn level_layout(&self, aspect: Aspect, level: u32) -> Option<SubresourceLayout> {
+        let format = self.format.plane(aspect)?;
+        let extent = self.mip_extent(level);
+        let [width, height, depth] = extent.map(u64::from);
+        let row_pitch = (width * format.texel_size() as u64).next_multiple_of(ROW_ALIGNMENT);
+        let depth_pitch = row_pitch.checked_mul(height)?;
+        let sample_pitch = depth_pitch.checked_mul(depth)?;
+        Some(SubresourceLayout {
+            format,
+            extent,
+            offset: 0,
+            size: sample_pitch.checked_mul(self.samples.into())?,
+            row_pitch,
+            depth_pitch,
+            sample_pitch,
+            array_pitch: 0,
+        })
+    }
+}
+
+impl SubresourceLayout {
+    /// The layout of one sample, which is that of an image of one sample.
+    pub fn sample(&self, sample: u32) -> Self {
+        Self {
+            offset: self
+                .offset
+                .saturating_add(self.sample_pitch.saturating_mul(sample.into())),
+            size: self.sample_pitch,
+            ..*self
+        }
+    }
+
+    /// The offset from the image's beginning of texel (x, y, z), and how many bytes of its row begin there; `None`
+    /// outside the subresource.
+    fn texel(&self, [x, y, z]: [u32; 3]) -> Option<(u64, u64)> {
+        let [width, height, depth] = self.extent;
+        if x > width || y >= height || z >= depth {
+            return None;
+        }
+        let texel_size = self.format.texel_size() as u64;
+        // What lies inside the subresource was computed without overflow when it was laid out.
+        let inside = u64::from(z) * self.depth_pitch
+            + u64::from(y) * self.row_pitch
+            + u64::from(x) * texel_size;
+        Some((
+            self.offset.checked_add(inside)?,
+            u64::from(width - x) * texel_size,
+        ))
+    }
+}
+
 /// An image bound to memory.
 #[derive(Clone, Debug)]
 pub struct Image {
@@ -41,6 +186,58 @@ pub struct Image {
     pub memory: Arc<Allocation>,
     /// The byte at which it begins there.
     pub offset: u64,
+}
+
+impl Image {
+    /// Places an image at byte `offset` of `memory`.
+    ///
+    /// # Errors
+    /// [`ImageError`] if it has no layout or does not fit.
+    pub fn new(desc: ImageDesc, memory: Arc<Allocation>, offset: u64) -> Result<Self, ImageError> {
+        let size = desc.memory_size().ok_or(ImageError::Shape)?;
+        if offset
+            .checked_add(size)
+            .is_none_or(|end| end > memory.len())
+        {
+            return Err(ImageError::Memory(OutOfBounds {
+                offset,
+                size,
+                len: memory.len(),
+            }));
+        }
+        Ok(Self {
+            desc,
+            memory,
+            offset,
+        })
+    }
+
+    /// Where a subresource lies, or `None` if the image does not have it.
+    pub fn subresource(&self, aspect: Aspect, level: u32, layer: u32) -> Option<SubresourceLayout> {
+        self.desc.subresource(aspect, level, layer)
+    }
+
+    /// Bytes `size` from texel `at` on, as an offset into the memory, if they lie in one row of the subresource.
+    pub(crate) fn row(&self, layout: &SubresourceLayout, at: [u32; 3], size: u64) -> Option<u64> {
+        let (offset, rest) = layout.texel(at)?;
+        (size <= rest)
+            .then(|| self.offset.checked_add(offset))
+            .flatten()
+    }
+
+    /// Reads the bytes of consecutive texels of a row from texel `at` (x, y, z) on. `None`, and `out` is untouched,
+    /// if they do not lie in that row.
+    pub fn read_row(&self, layout: &SubresourceLayout, at: [u32; 3], out: &mut [u8]) -> Option<()> {
+        let offset = self.row(layout, at, out.len() as u64)?;
+        self.memory.read(offset, out).ok()
+    }
+
+    /// Writes the bytes of consecutive texels of a row from texel `at` (x, y, z) on. `None`, and nothing is
+    /// written, if they do not lie in that row.
+    pub fn write_row(&self, layout: &SubresourceLayout, at: [u32; 3], bytes: &[u8]) -> Option<()> {
+        let offset = self.row(layout, at, bytes.len() as u64)?;
+        self.memory.write(offset, bytes).ok()
+    }
 }
 
 /// A range of an image's subresources, read as a format.
@@ -58,4 +255,118 @@ pub struct ImageView {
     pub base_layer: u32,
     /// How many layers.
     pub layer_count: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn desc() -> ImageDesc {
+        ImageDesc {
+            kind: ImageKind::D2,
+            format: Format::R8G8B8A8Unorm,
+            extent: [33, 7, 1],
+            mip_levels: 3,
+            array_layers: 2,
+            samples: 1,
+        }
+    }
+
+    #[test]
+    fn subresources_tile_the_image_without_gaps() {
+        for format in [
+            Format::R8G8B8A8Unorm,
+            Format::D24UnormS8Uint,
+            Format::R32G32B32Sfloat,
+        ] {
+            for (kind, extent) in [(ImageKind::D2, [33, 7, 1]), (ImageKind::D3, [9, 5, 4])] {
+                let desc = ImageDesc {
+                    kind,
+                    format,
+                    extent,
+                    samples: 4,
+                    ..desc()
+                };
+                let mut end = 0;
+                for &aspect in format.aspects() {
+                    for layer in 0..2 {
+                        for level in 0..3 {
+                            let layout = desc.subresource(aspect, level, layer).unwrap();
+                            assert_eq!(layout.offset, end);
+                            assert_eq!(layout.offset % ROW_ALIGNMENT, 0);
+                            assert_eq!(layout.sample_pitch * 4, layout.size);
+                            end += layout.size;
+                        }
+                    }
+                }
+                assert_eq!(desc.memory_size(), Some(end));
+            }
+        }
+    }
+
+    #[test]
+    fn a_mip_chain_ends_in_single_texels() {
+        let layout = desc().subresource(Aspect::Color, 2, 1).unwrap();
+        assert_eq!(layout.extent, [8, 1, 1]);
+        assert_eq!(layout.array_pitch, (192 * 7) + (64 * 3) + 64);
+        assert_eq!(desc().mip_extent(40), [1, 1, 1]);
+    }
+
+    #[test]
+    fn what_an_image_lacks_has_no_layout() {
+        assert_eq!(desc().subresource(Aspect::Color, 3, 0), None);
+        assert_eq!(desc().subresource(Aspect::Color, 0, 2), None);
+        assert_eq!(desc().subresource(Aspect::Depth, 0, 0), None);
+        let huge = ImageDesc {
+            extent: [u32::MAX; 3],
+            ..desc()
+        };
+        assert_eq!(huge.memory_size(), None);
+        assert_eq!(huge.subresource(Aspect::Color, 0, 0), None);
+        assert_eq!(
+            ImageDesc {
+                samples: 0,
+                ..desc()
+            }
+            .memory_size(),
+            None
+        );
+        assert_eq!(
+            ImageDesc {
+                mip_levels: u32::MAX,
+                ..desc()
+            }
+            .memory_size(),
+            None
+        );
+    }
+
+    #[test]
+    fn an_image_must_fit_its_memory() {
+        let size = desc().memory_size().unwrap();
+        let memory = Allocation::new_zeroed(size).unwrap();
+        assert!(Image::new(desc(), memory.clone(), 0).is_ok());
+        assert!(matches!(
+            Image::new(desc(), memory.clone(), 1),
+            Err(ImageError::Memory(_))
+        ));
+        assert!(Image::new(desc(), memory, u64::MAX).is_err());
+    }
+
+    #[test]
+    fn rows_are_read_and_written_within_the_subresource_only() {
+        let memory = Allocation::new_zeroed(desc().memory_size().unwrap()).unwrap();
+        let image = Image::new(desc(), memory, 0).unwrap();
+        let layout = image.subresource(Aspect::Color, 0, 1).unwrap();
+        image
+            .write_row(&layout, [31, 6, 0], &[1, 2, 3, 4, 5, 6, 7, 8])
+            .unwrap();
+        let mut out = [0; 4];
+        image.read_row(&layout, [32, 6, 0], &mut out).unwrap();
+        assert_eq!(out, [5, 6, 7, 8]);
+        assert_eq!(image.write_row(&layout, [32, 6, 0], &[0; 8]), None);
+        assert_eq!(image.read_row(&layout, [0, 7, 0], &mut out), None);
+        assert_eq!(image.read_row(&layout, [0, 0, 1], &mut out), None);
+        assert_eq!(image.read_row(&layout, [34, 0, 0], &mut out), None);
+    }
 }

@@ -8,6 +8,7 @@
 //! [`counters`] records the work that was done.
 #![forbid(unsafe_code)]
 
+mod binning;
 pub mod command_processor;
 pub mod counters;
 pub mod device;
@@ -20,6 +21,7 @@ pub mod pass;
 pub mod query;
 pub mod raster;
 pub mod transfer;
+mod workers;
 
 pub use command_processor::CommandProcessor;
 pub use device::{Config, Device};

@@ -1,7 +1,14 @@
 //! Query pools: results that packets write and the host reads.
 
 use crate::counters::Counters;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// The host's monotonic time in nanoseconds since the process first asked for it; what timestamps hold.
+pub fn host_time() -> u64 {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    START.elapsed().as_nanos() as u64
+}
 
 /// What the queries of a pool measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,1 +1,321 @@
-//! See the crate's documentation.
+//! Copies, fills and clears outside of render passes.
+//!
+//! Regions are expected to be valid; what reaches outside a buffer is left out row by row, what reaches outside an
+//! image is clipped, so that no packet can harm anything but its own result. Every function marks the memory that
+//! it writes as changed.
+
+#[cfg(test)]
+mod tests;
+
+use crate::image::{Image, SubresourceLayout};
+use crate::packet::{
+    BufferImageRegion, BufferRange, ClearImage, CopyBuffer, CopyBufferImage, CopyImage,
+    ImageCopyRegion, SubresourceLayers,
+};
+use crate::{format::MAX_TEXEL_SIZE, image::ImageKind};
+
+/// The offset into the memory of bytes `offset..offset + size` of a range, if the range has them.
+fn within(range: &BufferRange, offset: u64, size: u64) -> Option<u64> {
+    let end = offset.checked_add(size)?;
+    (end <= range.size)
+        .then(|| range.offset.checked_add(offset))
+        .flatten()
+}
+
+/// Executes [`Packet::CopyBuffer`](crate::Packet::CopyBuffer).
+pub fn copy_buffer(copy: &CopyBuffer) {
+    for region in &copy.regions {
+        let copied = within(&copy.source, region.source_offset, region.size)
+            .zip(within(&copy.target, region.target_offset, region.size))
+            .map(|(from, to)| {
+                let (source, target) = (&copy.source.memory, &copy.target.memory);
+                target.copy_from(to, source, from, region.size)
+            });
+        if !matches!(copied, Some(Ok(()))) {
+            log::warn!("left out a buffer copy that lies outside: {region:?}");
+        }
+    }
+    copy.target.memory.bump_generation();
+}
+
+/// Executes [`Packet::FillBuffer`](crate::Packet::FillBuffer).
+pub fn fill_buffer(target: &BufferRange, word: u32) {
+    const CHUNK: u64 = 1024;
+    let chunk = [word; CHUNK as usize];
+    let available = target.memory.len().saturating_sub(target.offset);
+    let words = target.size.min(available) / 4;
+    for first in (0..words).step_by(CHUNK as usize) {
+        let count = CHUNK.min(words - first) as usize;
+        let offset = target.offset + 4 * first;
+        if target.memory.write(offset, &chunk[..count]).is_err() {
+            return;
+        }
+    }
+    target.memory.bump_generation();
+}
+
+/// Executes [`Packet::UpdateBuffer`](crate::Packet::UpdateBuffer).
+pub fn update_buffer(target: &BufferRange, data: &[u8]) {
+    let written =
+        within(target, 0, data.len() as u64).map(|offset| target.memory.write(offset, data));
+    if !matches!(written, Some(Ok(()))) {
+        log::warn!("left out a buffer update that lies outside");
+    }
+    target.memory.bump_generation();
+}
+
+/// The part of a region that lies in an image, along one axis.
+#[derive(Clone, Copy)]
+struct Clipped {
+    /// Texels of the region before it.
+    skipped: u32,
+    /// Its first texel in the image.
+    first: u32,
+    /// Its texels.
+    count: u32,
+}
+
+/// Clips texels `offset..offset + extent` to an axis of `size` texels.
+fn clip(offset: i32, extent: u32, size: u32) -> Clipped {
+    let offset = i64::from(offset);
+    let first = offset.max(0);
+    let end = (offset + i64::from(extent)).min(size.into());
+    // Both lie in 0..=u32::MAX where the count is positive.
+    Clipped {
+        skipped: (first - offset) as u32,
+        first: first as u32,
+        count: (end - first).max(0) as u32,
+    }
+}
+
+/// Which way a copy between a buffer and an image goes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// [`Packet::CopyBufferToImage`](crate::Packet::CopyBufferToImage).
+    ToImage,
+    /// [`Packet::CopyImageToBuffer`](crate::Packet::CopyImageToBuffer).
+    ToBuffer,
+}
+
+/// Executes a copy between a buffer and an image.
+pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction) {
+    for region in &copy.regions {
+        let layers = &region.subresource;
+        let end = copy.image.desc.array_layers;
+        let first = layers.base_layer.min(end);
+        for index in 0..layers.layer_count.min(end - first) {
+            let layout = copy
+                .image
+                .subresource(layers.aspect, layers.mip_level, first + index);
+            if let Some(layout) = layout {
+                copy_layer(copy, direction, region, &layout, index);
+            }
+        }
+    }
+    match direction {
+        Direction::ToImage => copy.image.memory.bump_generation(),
+        Direction::ToBuffer => copy.buffer.memory.bump_generation(),
+    }
+}
+
+/// Copies layer number `index` of a region.
+fn copy_layer(
+    copy: &CopyBufferImage,
+    direction: Direction,
+    region: &BufferImageRegion,
+    layout: &SubresourceLayout,
+    index: u32,
+) {
+    let texel_size = layout.format.texel_size() as u64;
+    let [width, height, depth] = region.image_extent;
+    let or_tight = |length: u32, tight: u32| u64::from(if length == 0 { tight } else { length });
+    let row_length = or_tight(region.buffer_row_length, width);
+    let image_height = or_tight(region.buffer_image_height, height);
+    let [x, y, z] = [0, 1, 2].map(|axis| {
+        clip(
+            region.image_offset[axis],
+            region.image_extent[axis],
+            layout.extent[axis],
+        )
+    });
+    let size = u64::from(x.count) * texel_size;
+    // Texels, in rows, in slices, from the region's beginning in the buffer; `None` if that overflows.
+    let buffer_offset = |row: u32, slice: u32| {
+        let slice = u64::from(index)
+            .checked_mul(depth.into())?
+            .checked_add(u64::from(z.skipped) + u64::from(slice))?;
+        let row = slice
+            .checked_mul(image_height)?
+            .checked_add(u64::from(y.skipped) + u64::from(row))?;
+        let texel = row.checked_mul(row_length)?.checked_add(x.skipped.into())?;
+        let offset = region
+            .buffer_offset
+            .checked_add(texel.checked_mul(texel_size)?)?;
+        within(&copy.buffer, offset, size)
+    };
+    let (image, buffer) = (&copy.image, &copy.buffer.memory);
+    for slice in 0..z.count {
+        for row in 0..y.count {
+            let at = [x.first, y.first + row, z.first + slice];
+            let copied = buffer_offset(row, slice)
+                .zip(image.row(layout, at, size))
+                .map(|(in_buffer, in_image)| match direction {
+                    Direction::ToImage => image.memory.copy_from(in_image, buffer, in_buffer, size),
+                    Direction::ToBuffer => {
+                        buffer.copy_from(in_buffer, &image.memory, in_image, size)
+                    }
+                });
+            if !matches!(copied, Some(Ok(()))) {
+                log::warn!("left out a row that lies outside the buffer: {region:?}");
+                return;
+            }
+        }
+    }
+}
+
+/// Executes [`Packet::CopyImage`](crate::Packet::CopyImage).
+pub fn copy_image(copy: &CopyImage) {
+    for region in &copy.regions {
+        copy_image_region(copy, region);
+    }
+    copy.target.memory.bump_generation();
+}
+
+/// One side of an image copy.
+struct Side<'a> {
+    image: &'a Image,
+    layers: &'a SubresourceLayers,
+    offset: [i32; 3],
+}
+
+impl Side<'_> {
+    /// The subresource and z of slice number `index`: 3D images have slices, the others layers.
+    fn slice(&self, index: u32) -> Option<(SubresourceLayout, i64)> {
+        let z = i64::from(self.offset[2]);
+        let (layer, z) = match self.image.desc.kind {
+            ImageKind::D3 => (self.layers.base_layer, z + i64::from(index)),
+            ImageKind::D1 | ImageKind::D2 => (self.layers.base_layer.checked_add(index)?, z),
+        };
+        let layout = self
+            .image
+            .subresource(self.layers.aspect, self.layers.mip_level, layer)?;
+        Some((layout, z))
+    }
+
+    /// How many slices or layers there are at most.
+    fn slices(&self) -> u32 {
+        self.image.desc.array_layers.max(self.image.desc.extent[2])
+    }
+}
+
+fn copy_image_region(copy: &CopyImage, region: &ImageCopyRegion) {
+    let source = Side {
+        image: &copy.source,
+        layers: &region.source,
+        offset: region.source_offset,
+    };
+    let target = Side {
+        image: &copy.target,
+        layers: &region.target,
+        offset: region.target_offset,
+    };
+    let slices = region.extent[2].max(region.source.layer_count);
+    // Offsets before the first slice are at most this many slices outside.
+    for index in 0..slices.min(source.slices().max(target.slices())) {
+        if let (Some(source_slice), Some(target_slice)) = (source.slice(index), target.slice(index))
+        {
+            copy_slice(copy, region, source_slice, target_slice);
+        }
+    }
+}
+
+/// Copies one slice of a region; each side is a subresource and a z in it.
+fn copy_slice(
+    copy: &CopyImage,
+    region: &ImageCopyRegion,
+    (source, source_z): (SubresourceLayout, i64),
+    (target, target_z): (SubresourceLayout, i64),
+) {
+    let (Ok(source_z), Ok(target_z)) = (u32::try_from(source_z), u32::try_from(target_z)) else {
+        return;
+    };
+    if source.format.texel_size() != target.format.texel_size() {
+        log::warn!("left out an image copy between texels of different sizes");
+        return;
+    }
+    let texel_size = source.format.texel_size() as u64;
+    // Clipped to the source, then what is left to the target.
+    let axes = [0, 1].map(|axis| {
+        let from = clip(
+            region.source_offset[axis],
+            region.extent[axis],
+            source.extent[axis],
+        );
+        let offset = i64::from(region.target_offset[axis]) + i64::from(from.skipped);
+        let to = clip(
+            i32::try_from(offset).unwrap_or(i32::MAX),
+            from.count,
+            target.extent[axis],
+        );
+        (from.first.saturating_add(to.skipped), to.first, to.count)
+    });
+    let [(from_x, to_x, width), (from_y, to_y, height)] = axes;
+    let size = u64::from(width) * texel_size;
+    for sample in 0..copy.source.desc.samples.min(copy.target.desc.samples) {
+        let (source, target) = (source.sample(sample), target.sample(sample));
+        for row in 0..height {
+            let from = copy
+                .source
+                .row(&source, [from_x, from_y + row, source_z], size);
+            let to = copy.target.row(&target, [to_x, to_y + row, target_z], size);
+            let copied = from.zip(to).map(|(from, to)| {
+                let memory = &copy.target.memory;
+                memory.copy_from(to, &copy.source.memory, from, size)
+            });
+            if !matches!(copied, Some(Ok(()))) {
+                return;
+            }
+        }
+    }
+}
+
+/// Executes [`Packet::ClearImage`](crate::Packet::ClearImage).
+pub fn clear_image(clear: &ClearImage) {
+    let (image, desc) = (&clear.image, &clear.image.desc);
+    for range in &clear.ranges {
+        let texel = desc.format.encode_clear(range.aspect, clear.value);
+        let levels = range.base_mip_level
+            ..range
+                .base_mip_level
+                .saturating_add(range.level_count)
+                .min(desc.mip_levels);
+        let layers = range.base_layer
+            ..range
+                .base_layer
+                .saturating_add(range.layer_count)
+                .min(desc.array_layers);
+        for level in levels {
+            for layer in layers.clone() {
+                if let Some(layout) = image.subresource(range.aspect, level, layer) {
+                    clear_subresource(image, &layout, &texel);
+                }
+            }
+        }
+    }
+    image.memory.bump_generation();
+}
+
+fn clear_subresource(image: &Image, layout: &SubresourceLayout, texel: &[u8; MAX_TEXEL_SIZE]) {
+    let [width, height, depth] = layout.extent;
+    let row = texel[..layout.format.texel_size()].repeat(width as usize);
+    for sample in 0..image.desc.samples {
+        let layout = layout.sample(sample);
+        for z in 0..depth {
+            for y in 0..height {
+                if image.write_row(&layout, [0, y, z], &row).is_none() {
+                    return;
+                }
+            }
+        }
+    }
+}

@@ -1,2 +1,27 @@
-//! The `gaurast` command.
-fn main() {}
+//! `gaurast`: pictures of 3D Gaussian scenes, headless, on a simulated Gaussian rasterizer.
+
+mod args;
+mod progress;
+mod render;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Arguments, Command};
+
+fn main() -> ExitCode {
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
+    let arguments = Arguments::parse();
+    let result = match arguments.command.unwrap_or_default() {
+        Command::Render(arguments) => render::run(&arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("gaurast: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

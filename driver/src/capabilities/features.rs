@@ -1,0 +1,493 @@
+//! Features: one list of those that work, and the structures in which Vulkan asks for them.
+
+use crate::error::Error;
+use crate::pnext;
+use ash::vk::{self, TaggedStructure};
+use gaurast::gaussian_primitive_topology;
+use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
+use std::ffi::{CStr, c_void};
+
+/// The features that work, by the names of their fields. A feature has one name in all structures that hold it, so
+/// this is the only place to state it.
+const SUPPORTED: &[&str] = &[
+    // Core 1.0.
+    "draw_indirect_first_instance",
+    "full_draw_index_uint32",
+    "independent_blend",
+    "multi_draw_indirect",
+    "robust_buffer_access",
+    // Core 1.2. Image layouts don't matter to the device, so that depth and stencil may differ in theirs.
+    "draw_indirect_count",
+    "host_query_reset",
+    "imageless_framebuffer",
+    "separate_depth_stencil_layouts",
+    "timeline_semaphore",
+    // Core 1.3.
+    "dynamic_rendering",
+    "private_data",
+    "synchronization2",
+    // VK_KHR_performance_query.
+    "performance_counter_query_pools",
+    // VK_GAURAST_gaussian_primitive_topology.
+    "gaussian_primitive_topology",
+    "opacity_compensation",
+];
+
+/// The extensions whose features can't be enabled without them. (Features of core need none.)
+const EXTENSIONS: &[(vk::StructureType, &CStr)] = &[
+    (
+        vk::PhysicalDevicePerformanceQueryFeaturesKHR::STRUCTURE_TYPE,
+        ash::khr::performance_query::NAME,
+    ),
+    (
+        PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::STRUCTURE_TYPE,
+        gaussian_primitive_topology::NAME,
+    ),
+];
+
+fn is_supported(feature: &str) -> bool {
+    SUPPORTED.contains(&feature)
+}
+
+/// The features that an application enabled.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct EnabledFeatures(Vec<&'static str>);
+
+impl EnabledFeatures {
+    /// What `vkCreateDevice` was asked to enable, together with `extensions`.
+    ///
+    /// # Errors
+    /// [`Error::FeatureNotPresent`] names the first feature that isn't supported, [`Error::Usage`] one whose extension
+    /// isn't enabled.
+    ///
+    /// # Safety
+    /// The creation info is valid.
+    pub(crate) unsafe fn requested(
+        info: &vk::DeviceCreateInfo<'_>,
+        extensions: &[&CStr],
+    ) -> Result<Self, Error> {
+        let mut enabled = Self::default();
+        // SAFETY: the pointer is null or valid in a valid creation info.
+        if let Some(features) = unsafe { info.p_enabled_features.as_ref() } {
+            enabled.enable(features.requested())?;
+        }
+        // SAFETY: the chain of a valid creation info is valid.
+        for structure in unsafe { pnext::iter(info.p_next) } {
+            if let Some(features) = pnext::cast::<vk::PhysicalDeviceFeatures2<'_>>(structure) {
+                enabled.enable(features.features.requested())?;
+            } else if let Some(requested) = requested_in(structure) {
+                if let Some(feature) = requested.first() {
+                    require_extension(structure.s_type, feature, extensions)?;
+                }
+                enabled.enable(requested)?;
+            }
+        }
+        Ok(enabled)
+    }
+
+    fn enable(&mut self, requested: Vec<&'static str>) -> Result<(), Error> {
+        if let Some(missing) = requested.iter().find(|feature| !is_supported(feature)) {
+            return Err(Error::FeatureNotPresent(format!("the feature {missing}")));
+        }
+        self.0.extend(requested);
+        Ok(())
+    }
+
+    /// Whether the feature, named as ash names its field, was enabled.
+    pub(crate) fn has(&self, feature: &str) -> bool {
+        self.0.contains(&feature)
+    }
+}
+
+/// Refuses a feature of an extension that isn't enabled.
+fn require_extension(
+    structure: vk::StructureType,
+    feature: &str,
+    extensions: &[&CStr],
+) -> Result<(), Error> {
+    let needed = EXTENSIONS.iter().find(|(s_type, _)| *s_type == structure);
+    match needed {
+        Some((_, name)) if !extensions.contains(name) => Err(Error::usage(
+            "VUID-VkDeviceCreateInfo-pNext-extension",
+            format!("the feature {feature} needs {name:?}, which is not enabled"),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// What is supported, as the core structure.
+pub(crate) fn core() -> vk::PhysicalDeviceFeatures {
+    let mut features = vk::PhysicalDeviceFeatures::default();
+    features.fill();
+    features
+}
+
+/// Fills in every structure of an output chain that holds features known here.
+///
+/// # Safety
+/// As [`pnext::for_each_output`].
+pub(crate) unsafe fn fill_chain(first: *mut c_void) {
+    // SAFETY: the caller's promise.
+    unsafe { pnext::for_each_output(first, fill_structure) };
+}
+
+/// A structure whose fields are features.
+trait Features {
+    /// Writes what is supported.
+    fn fill(&mut self);
+    /// The names of the fields that are true.
+    fn requested(&self) -> Vec<&'static str>;
+}
+
+macro_rules! features {
+    ($($type:ty { $($field:ident,)* })*) => {$(
+        impl Features for $type {
+            fn fill(&mut self) {
+                $(self.$field = is_supported(stringify!($field)).into();)*
+            }
+
+            fn requested(&self) -> Vec<&'static str> {
+                [$((self.$field, stringify!($field)),)*]
+                    .into_iter()
+                    .filter_map(|(value, name)| (value != vk::FALSE).then_some(name))
+                    .collect()
+            }
+        }
+    )*};
+}
+
+macro_rules! chained {
+    ($($type:ty,)*) => {
+        /// Writes what is supported, if the structure is one of features.
+        fn fill_structure(mut structure: pnext::Output<'_>) {
+            $(if let Some(features) = structure.cast::<$type>() {
+                features.fill();
+            })*
+        }
+
+        /// What is requested, if the structure is one of features.
+        fn requested_in(structure: &vk::BaseInStructure<'_>) -> Option<Vec<&'static str>> {
+            $(if let Some(features) = pnext::cast::<$type>(structure) {
+                return Some(features.requested());
+            })*
+            None
+        }
+    };
+}
+
+chained! {
+    vk::PhysicalDeviceVulkan11Features<'_>,
+    vk::PhysicalDeviceVulkan12Features<'_>,
+    vk::PhysicalDeviceVulkan13Features<'_>,
+    vk::PhysicalDevicePrivateDataFeatures<'_>,
+    vk::PhysicalDeviceVariablePointersFeatures<'_>,
+    vk::PhysicalDeviceMultiviewFeatures<'_>,
+    vk::PhysicalDevice16BitStorageFeatures<'_>,
+    vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_>,
+    vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_>,
+    vk::PhysicalDeviceProtectedMemoryFeatures<'_>,
+    vk::PhysicalDeviceInlineUniformBlockFeatures<'_>,
+    vk::PhysicalDeviceMaintenance4Features<'_>,
+    vk::PhysicalDeviceShaderDrawParametersFeatures<'_>,
+    vk::PhysicalDeviceShaderFloat16Int8Features<'_>,
+    vk::PhysicalDeviceHostQueryResetFeatures<'_>,
+    vk::PhysicalDeviceDescriptorIndexingFeatures<'_>,
+    vk::PhysicalDeviceTimelineSemaphoreFeatures<'_>,
+    vk::PhysicalDevice8BitStorageFeatures<'_>,
+    vk::PhysicalDeviceVulkanMemoryModelFeatures<'_>,
+    vk::PhysicalDeviceShaderAtomicInt64Features<'_>,
+    vk::PhysicalDeviceScalarBlockLayoutFeatures<'_>,
+    vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_>,
+    vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>,
+    vk::PhysicalDeviceImagelessFramebufferFeatures<'_>,
+    vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_>,
+    vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_>,
+    vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>,
+    vk::PhysicalDeviceSubgroupSizeControlFeatures<'_>,
+    vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_>,
+    vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_>,
+    vk::PhysicalDeviceImageRobustnessFeatures<'_>,
+    vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_>,
+    vk::PhysicalDeviceSynchronization2Features<'_>,
+    vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>,
+    vk::PhysicalDeviceDynamicRenderingFeatures<'_>,
+    vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>,
+    PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+}
+
+features! {
+    vk::PhysicalDeviceFeatures {
+        robust_buffer_access, full_draw_index_uint32, image_cube_array, independent_blend, geometry_shader,
+        tessellation_shader, sample_rate_shading, dual_src_blend, logic_op, multi_draw_indirect,
+        draw_indirect_first_instance, depth_clamp, depth_bias_clamp, fill_mode_non_solid, depth_bounds, wide_lines,
+        large_points, alpha_to_one, multi_viewport, sampler_anisotropy, texture_compression_etc2,
+        texture_compression_astc_ldr, texture_compression_bc, occlusion_query_precise, pipeline_statistics_query,
+        vertex_pipeline_stores_and_atomics, fragment_stores_and_atomics,
+        shader_tessellation_and_geometry_point_size, shader_image_gather_extended,
+        shader_storage_image_extended_formats, shader_storage_image_multisample,
+        shader_storage_image_read_without_format, shader_storage_image_write_without_format,
+        shader_uniform_buffer_array_dynamic_indexing, shader_sampled_image_array_dynamic_indexing,
+        shader_storage_buffer_array_dynamic_indexing, shader_storage_image_array_dynamic_indexing,
+        shader_clip_distance, shader_cull_distance, shader_float64, shader_int64, shader_int16,
+        shader_resource_residency, shader_resource_min_lod, sparse_binding, sparse_residency_buffer,
+        sparse_residency_image2_d, sparse_residency_image3_d, sparse_residency2_samples, sparse_residency4_samples,
+        sparse_residency8_samples, sparse_residency16_samples, sparse_residency_aliased, variable_multisample_rate,
+        inherited_queries,
+    }
+    vk::PhysicalDeviceVulkan11Features<'_> {
+        storage_buffer16_bit_access, uniform_and_storage_buffer16_bit_access, storage_push_constant16,
+        storage_input_output16, multiview, multiview_geometry_shader, multiview_tessellation_shader,
+        variable_pointers_storage_buffer, variable_pointers, protected_memory, sampler_ycbcr_conversion,
+        shader_draw_parameters,
+    }
+    vk::PhysicalDeviceVulkan12Features<'_> {
+        sampler_mirror_clamp_to_edge, draw_indirect_count, storage_buffer8_bit_access,
+        uniform_and_storage_buffer8_bit_access, storage_push_constant8, shader_buffer_int64_atomics,
+        shader_shared_int64_atomics, shader_float16, shader_int8, descriptor_indexing,
+        shader_input_attachment_array_dynamic_indexing, shader_uniform_texel_buffer_array_dynamic_indexing,
+        shader_storage_texel_buffer_array_dynamic_indexing, shader_uniform_buffer_array_non_uniform_indexing,
+        shader_sampled_image_array_non_uniform_indexing, shader_storage_buffer_array_non_uniform_indexing,
+        shader_storage_image_array_non_uniform_indexing, shader_input_attachment_array_non_uniform_indexing,
+        shader_uniform_texel_buffer_array_non_uniform_indexing,
+        shader_storage_texel_buffer_array_non_uniform_indexing, descriptor_binding_uniform_buffer_update_after_bind,
+        descriptor_binding_sampled_image_update_after_bind, descriptor_binding_storage_image_update_after_bind,
+        descriptor_binding_storage_buffer_update_after_bind,
+        descriptor_binding_uniform_texel_buffer_update_after_bind,
+        descriptor_binding_storage_texel_buffer_update_after_bind, descriptor_binding_update_unused_while_pending,
+        descriptor_binding_partially_bound, descriptor_binding_variable_descriptor_count, runtime_descriptor_array,
+        sampler_filter_minmax, scalar_block_layout, imageless_framebuffer, uniform_buffer_standard_layout,
+        shader_subgroup_extended_types, separate_depth_stencil_layouts, host_query_reset, timeline_semaphore,
+        buffer_device_address, buffer_device_address_capture_replay, buffer_device_address_multi_device,
+        vulkan_memory_model, vulkan_memory_model_device_scope, vulkan_memory_model_availability_visibility_chains,
+        shader_output_viewport_index, shader_output_layer, subgroup_broadcast_dynamic_id,
+    }
+    vk::PhysicalDeviceVulkan13Features<'_> {
+        robust_image_access, inline_uniform_block, descriptor_binding_inline_uniform_block_update_after_bind,
+        pipeline_creation_cache_control, private_data, shader_demote_to_helper_invocation,
+        shader_terminate_invocation, subgroup_size_control, compute_full_subgroups, synchronization2,
+        texture_compression_astc_hdr, shader_zero_initialize_workgroup_memory, dynamic_rendering,
+        shader_integer_dot_product, maintenance4,
+    }
+    vk::PhysicalDevicePrivateDataFeatures<'_> {
+        private_data,
+    }
+    vk::PhysicalDeviceVariablePointersFeatures<'_> {
+        variable_pointers_storage_buffer, variable_pointers,
+    }
+    vk::PhysicalDeviceMultiviewFeatures<'_> {
+        multiview, multiview_geometry_shader, multiview_tessellation_shader,
+    }
+    vk::PhysicalDevice16BitStorageFeatures<'_> {
+        storage_buffer16_bit_access, uniform_and_storage_buffer16_bit_access, storage_push_constant16,
+        storage_input_output16,
+    }
+    vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_> {
+        shader_subgroup_extended_types,
+    }
+    vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_> {
+        sampler_ycbcr_conversion,
+    }
+    vk::PhysicalDeviceProtectedMemoryFeatures<'_> {
+        protected_memory,
+    }
+    vk::PhysicalDeviceInlineUniformBlockFeatures<'_> {
+        inline_uniform_block, descriptor_binding_inline_uniform_block_update_after_bind,
+    }
+    vk::PhysicalDeviceMaintenance4Features<'_> {
+        maintenance4,
+    }
+    vk::PhysicalDeviceShaderDrawParametersFeatures<'_> {
+        shader_draw_parameters,
+    }
+    vk::PhysicalDeviceShaderFloat16Int8Features<'_> {
+        shader_float16, shader_int8,
+    }
+    vk::PhysicalDeviceHostQueryResetFeatures<'_> {
+        host_query_reset,
+    }
+    vk::PhysicalDeviceDescriptorIndexingFeatures<'_> {
+        shader_input_attachment_array_dynamic_indexing, shader_uniform_texel_buffer_array_dynamic_indexing,
+        shader_storage_texel_buffer_array_dynamic_indexing, shader_uniform_buffer_array_non_uniform_indexing,
+        shader_sampled_image_array_non_uniform_indexing, shader_storage_buffer_array_non_uniform_indexing,
+        shader_storage_image_array_non_uniform_indexing, shader_input_attachment_array_non_uniform_indexing,
+        shader_uniform_texel_buffer_array_non_uniform_indexing,
+        shader_storage_texel_buffer_array_non_uniform_indexing, descriptor_binding_uniform_buffer_update_after_bind,
+        descriptor_binding_sampled_image_update_after_bind, descriptor_binding_storage_image_update_after_bind,
+        descriptor_binding_storage_buffer_update_after_bind,
+        descriptor_binding_uniform_texel_buffer_update_after_bind,
+        descriptor_binding_storage_texel_buffer_update_after_bind, descriptor_binding_update_unused_while_pending,
+        descriptor_binding_partially_bound, descriptor_binding_variable_descriptor_count, runtime_descriptor_array,
+    }
+    vk::PhysicalDeviceTimelineSemaphoreFeatures<'_> {
+        timeline_semaphore,
+    }
+    vk::PhysicalDevice8BitStorageFeatures<'_> {
+        storage_buffer8_bit_access, uniform_and_storage_buffer8_bit_access, storage_push_constant8,
+    }
+    vk::PhysicalDeviceVulkanMemoryModelFeatures<'_> {
+        vulkan_memory_model, vulkan_memory_model_device_scope, vulkan_memory_model_availability_visibility_chains,
+    }
+    vk::PhysicalDeviceShaderAtomicInt64Features<'_> {
+        shader_buffer_int64_atomics, shader_shared_int64_atomics,
+    }
+    vk::PhysicalDeviceScalarBlockLayoutFeatures<'_> {
+        scalar_block_layout,
+    }
+    vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_> {
+        uniform_buffer_standard_layout,
+    }
+    vk::PhysicalDeviceBufferDeviceAddressFeatures<'_> {
+        buffer_device_address, buffer_device_address_capture_replay, buffer_device_address_multi_device,
+    }
+    vk::PhysicalDeviceImagelessFramebufferFeatures<'_> {
+        imageless_framebuffer,
+    }
+    vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_> {
+        texture_compression_astc_hdr,
+    }
+    vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_> {
+        separate_depth_stencil_layouts,
+    }
+    vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_> {
+        shader_demote_to_helper_invocation,
+    }
+    vk::PhysicalDeviceSubgroupSizeControlFeatures<'_> {
+        subgroup_size_control, compute_full_subgroups,
+    }
+    vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_> {
+        pipeline_creation_cache_control,
+    }
+    vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_> {
+        shader_zero_initialize_workgroup_memory,
+    }
+    vk::PhysicalDeviceImageRobustnessFeatures<'_> {
+        robust_image_access,
+    }
+    vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_> {
+        shader_terminate_invocation,
+    }
+    vk::PhysicalDeviceSynchronization2Features<'_> {
+        synchronization2,
+    }
+    vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_> {
+        shader_integer_dot_product,
+    }
+    vk::PhysicalDeviceDynamicRenderingFeatures<'_> {
+        dynamic_rendering,
+    }
+    vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_> {
+        performance_counter_query_pools, performance_counter_multiple_query_pools,
+    }
+    PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
+        gaussian_primitive_topology, vertex_shader_projection, resolve_fragment_shader, radial_distance_order,
+        primitive_order, per_pixel_order, rasterization_float16, opacity_compensation, orthographic_camera,
+        fisheye_camera, equirectangular_camera, unscented_projection, gaussian_2d, uniform_buffer_camera,
+        merged_draws, gaussian_instancing, gaussian_depth_stencil, gaussian_multisample,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    /// Features that Vulkan 1.3 requires of an implementation and that don't work yet. A feature leaves this list when
+    /// it enters [`SUPPORTED`]; when the list is empty, 1.3's features are complete.
+    const REQUIRED_BUT_MISSING: &[&str] = &[
+        "buffer_device_address",
+        "compute_full_subgroups",
+        "descriptor_binding_inline_uniform_block_update_after_bind",
+        "inline_uniform_block",
+        "maintenance4",
+        "multiview",
+        "pipeline_creation_cache_control",
+        "robust_image_access",
+        "shader_demote_to_helper_invocation",
+        "shader_integer_dot_product",
+        "shader_subgroup_extended_types",
+        "shader_terminate_invocation",
+        "shader_zero_initialize_workgroup_memory",
+        "subgroup_broadcast_dynamic_id",
+        "subgroup_size_control",
+        "uniform_buffer_standard_layout",
+        "vulkan_memory_model",
+        "vulkan_memory_model_device_scope",
+    ];
+
+    fn all_true<T: Default + Features>(count: usize) -> Vec<&'static str> {
+        let mut features = T::default();
+        features.fill();
+        let names = features.requested();
+        assert_eq!(names.len(), count);
+        names
+    }
+
+    #[test]
+    fn supported_features_are_those_of_the_structures() {
+        let mut names = all_true::<vk::PhysicalDeviceFeatures>(5);
+        names.extend(all_true::<vk::PhysicalDeviceVulkan11Features<'_>>(0));
+        names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(5));
+        names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(3));
+        names.extend(all_true::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(1));
+        names.extend(all_true::<
+            PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
+        >(2));
+        let names: HashSet<_> = names.into_iter().collect();
+        assert_eq!(names, SUPPORTED.iter().copied().collect());
+    }
+
+    #[test]
+    fn missing_features_are_listed_truly() {
+        for feature in REQUIRED_BUT_MISSING {
+            assert!(
+                !is_supported(feature),
+                "{feature} works now; take it off the list"
+            );
+        }
+    }
+
+    #[test]
+    fn requests_are_checked_wherever_they_stand() {
+        let requested = |info: &vk::DeviceCreateInfo<'_>| {
+            // SAFETY: ash built the creation info.
+            unsafe { EnabledFeatures::requested(info, &[gaussian_primitive_topology::NAME]) }
+        };
+        let mut works = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
+        let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(true);
+        let info = vk::DeviceCreateInfo::default()
+            .enabled_features(&core)
+            .push_next(&mut works);
+        let enabled = requested(&info).unwrap();
+        assert!(enabled.has("dynamic_rendering") && enabled.has("robust_buffer_access"));
+        assert!(!enabled.has("synchronization2"));
+
+        let refused = |result: Result<EnabledFeatures, Error>, name: &str| {
+            let error = result.unwrap_err();
+            assert_eq!(error.result(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
+            assert!(error.to_string().contains(name), "{error}");
+        };
+        let core = vk::PhysicalDeviceFeatures::default().geometry_shader(true);
+        refused(
+            requested(&vk::DeviceCreateInfo::default().enabled_features(&core)),
+            "geometry_shader",
+        );
+        let mut core = vk::PhysicalDeviceFeatures2::default();
+        core.features.logic_op = vk::TRUE;
+        refused(
+            requested(&vk::DeviceCreateInfo::default().push_next(&mut core)),
+            "logic_op",
+        );
+        let mut missing = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
+            .gaussian_primitive_topology(true)
+            .per_pixel_order(true);
+        refused(
+            requested(&vk::DeviceCreateInfo::default().push_next(&mut missing)),
+            "per_pixel_order",
+        );
+
+        let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()
+            .performance_counter_query_pools(true);
+        let error = requested(&vk::DeviceCreateInfo::default().push_next(&mut other)).unwrap_err();
+        assert!(error.is_usage(), "{error}");
+    }
+}

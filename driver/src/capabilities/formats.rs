@@ -1,0 +1,326 @@
+//! What each format can be used for. The formats themselves, and how texels are stored, are the device's.
+
+use crate::capabilities::{limits, memory};
+use crate::error::Error;
+use ash::vk;
+use simdevice::Format;
+use simdevice::format::{Channel, Numeric};
+use simdevice::packet::Aspect;
+use std::sync::LazyLock;
+
+/// The device's format of the same name, if it has one.
+pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
+    /// By the values of Vulkan's core formats, which are consecutive.
+    static FORMATS: LazyLock<Vec<Option<Format>>> = LazyLock::new(|| {
+        (0..=vk::Format::D32_SFLOAT_S8_UINT.as_raw())
+            .map(|raw| named(&format!("{:?}", vk::Format::from_raw(raw))))
+            .collect()
+    });
+    *FORMATS.get(usize::try_from(format.as_raw()).ok()?)?
+}
+
+/// The device's format that has Vulkan's name in camel case.
+fn named(vulkan_name: &str) -> Option<Format> {
+    let name = vulkan_name.replace('_', "");
+    Format::ALL
+        .iter()
+        .copied()
+        .find(|format| format!("{format:?}").eq_ignore_ascii_case(&name))
+}
+
+fn is_color(format: Format) -> bool {
+    format.aspects() == [Aspect::Color]
+}
+
+/// What images of the format, of either tiling, can do.
+fn image_features(format: Format) -> vk::FormatFeatureFlags {
+    let transfer = vk::FormatFeatureFlags::TRANSFER_SRC | vk::FormatFeatureFlags::TRANSFER_DST;
+    if !is_color(format) {
+        return transfer | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
+    }
+    let is_rendered = match format.numeric() {
+        Numeric::Unorm | Numeric::Snorm | Numeric::Sfloat | Numeric::Ufloat | Numeric::Srgb => {
+            // Formats of three equal components make poor attachments: hardware has none.
+            format.texel_size().is_power_of_two()
+        }
+        _ => false,
+    };
+    if is_rendered {
+        transfer
+            | vk::FormatFeatureFlags::COLOR_ATTACHMENT
+            | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND
+    } else {
+        transfer
+    }
+}
+
+/// What buffers of the format can do: any attribute that converts to floating point feeds a Gaussian. Integer
+/// attributes need vertex shaders, which don't run yet.
+fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
+    let is_attribute = is_color(format)
+        && !format.is_integer()
+        && !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent)
+        && !format.has(Channel::X);
+    if is_attribute {
+        vk::FormatFeatureFlags::VERTEX_BUFFER
+    } else {
+        vk::FormatFeatureFlags::empty()
+    }
+}
+
+/// `VkFormatProperties`. Formats that the device lacks can do nothing.
+pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
+    let Some(format) = device_format(format) else {
+        return vk::FormatProperties::default();
+    };
+    let linear = if is_color(format) {
+        image_features(format)
+    } else {
+        vk::FormatFeatureFlags::empty()
+    };
+    vk::FormatProperties {
+        linear_tiling_features: linear,
+        optimal_tiling_features: image_features(format),
+        buffer_features: buffer_features(format),
+    }
+}
+
+/// The flags that images may be created with.
+const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
+    vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw()
+        | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
+        | vk::ImageCreateFlags::ALIAS.as_raw()
+        | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw(),
+);
+
+/// The features that usages need; other usages are not supported.
+const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
+    (
+        vk::ImageUsageFlags::TRANSFER_SRC,
+        vk::FormatFeatureFlags::TRANSFER_SRC,
+    ),
+    (
+        vk::ImageUsageFlags::TRANSFER_DST,
+        vk::FormatFeatureFlags::TRANSFER_DST,
+    ),
+    (
+        vk::ImageUsageFlags::SAMPLED,
+        vk::FormatFeatureFlags::SAMPLED_IMAGE,
+    ),
+    (
+        vk::ImageUsageFlags::STORAGE,
+        vk::FormatFeatureFlags::STORAGE_IMAGE,
+    ),
+    (
+        vk::ImageUsageFlags::COLOR_ATTACHMENT,
+        vk::FormatFeatureFlags::COLOR_ATTACHMENT,
+    ),
+    (
+        vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+        vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
+    ),
+    // Its contents live in the tile buffers and never matter outside; it goes with an attachment usage.
+    (
+        vk::ImageUsageFlags::TRANSIENT_ATTACHMENT,
+        vk::FormatFeatureFlags::empty(),
+    ),
+];
+
+fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) -> bool {
+    let supported = USAGES
+        .iter()
+        .filter(|(_, needed)| features.contains(*needed))
+        .fold(vk::ImageUsageFlags::empty(), |all, (usage, _)| all | *usage);
+    supported.contains(usage)
+}
+
+/// What an image is asked to be.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ImageQuery {
+    /// Its format.
+    pub(crate) format: vk::Format,
+    /// Its dimensions.
+    pub(crate) ty: vk::ImageType,
+    /// Its tiling.
+    pub(crate) tiling: vk::ImageTiling,
+    /// Its usage.
+    pub(crate) usage: vk::ImageUsageFlags,
+    /// Its creation flags.
+    pub(crate) flags: vk::ImageCreateFlags,
+}
+
+/// `VkImageFormatProperties`: how large such an image may be.
+///
+/// # Errors
+/// [`Error::FormatNotSupported`] if there can be no such image.
+pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatProperties, Error> {
+    let refuse = |what: String| Err(Error::FormatNotSupported(what));
+    let ImageQuery {
+        format,
+        ty,
+        tiling,
+        usage,
+        flags,
+    } = query;
+    let properties = properties(format);
+    let features = match tiling {
+        vk::ImageTiling::OPTIMAL => properties.optimal_tiling_features,
+        vk::ImageTiling::LINEAR => properties.linear_tiling_features,
+        _ => return refuse(format!("image tiling {tiling:?} is not supported")),
+    };
+    if features.is_empty() {
+        return refuse(format!(
+            "{tiling:?} images of format {format:?} are not supported"
+        ));
+    }
+    if !supports_usage(features, usage) {
+        return refuse(format!(
+            "images of format {format:?} do not support all of {usage:?}"
+        ));
+    }
+    if !IMAGE_FLAGS.contains(flags) {
+        return refuse(format!("image flags {flags:?} are not supported"));
+    }
+    let is_depth_stencil = features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT);
+    let (max_extent, layers) = match ty {
+        vk::ImageType::TYPE_1D => (
+            extent(limits::MAX_IMAGE_DIMENSION, 1, 1),
+            limits::MAX_LAYERS,
+        ),
+        vk::ImageType::TYPE_2D => (
+            extent(limits::MAX_IMAGE_DIMENSION, limits::MAX_IMAGE_DIMENSION, 1),
+            limits::MAX_LAYERS,
+        ),
+        vk::ImageType::TYPE_3D if !is_depth_stencil => {
+            let side = limits::MAX_IMAGE_DIMENSION_3D;
+            (extent(side, side, side), 1)
+        }
+        _ => {
+            return refuse(format!(
+                "{ty:?} images of format {format:?} are not supported"
+            ));
+        }
+    };
+    let is_linear = tiling == vk::ImageTiling::LINEAR;
+    if is_linear && ty != vk::ImageType::TYPE_2D {
+        return refuse("linear images have two dimensions".to_owned());
+    }
+    Ok(vk::ImageFormatProperties {
+        max_extent,
+        max_mip_levels: if is_linear {
+            1
+        } else {
+            max_extent.width.ilog2() + 1
+        },
+        max_array_layers: if is_linear { 1 } else { layers },
+        sample_counts: vk::SampleCountFlags::TYPE_1,
+        max_resource_size: memory::heap_size(),
+    })
+}
+
+fn extent(width: u32, height: u32, depth: u32) -> vk::Extent3D {
+    vk::Extent3D {
+        width,
+        height,
+        depth,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_format_of_the_device_has_a_vulkan_name() {
+        let found: Vec<_> = (0..=vk::Format::D32_SFLOAT_S8_UINT.as_raw())
+            .filter_map(|raw| device_format(vk::Format::from_raw(raw)))
+            .collect();
+        assert_eq!(found, Format::ALL);
+        assert_eq!(
+            device_format(vk::Format::A2B10G10R10_UNORM_PACK32),
+            Some(Format::A2B10G10R10UnormPack32)
+        );
+        assert_eq!(device_format(vk::Format::UNDEFINED), None);
+        assert_eq!(device_format(vk::Format::from_raw(-1)), None);
+        assert_eq!(device_format(vk::Format::BC7_UNORM_BLOCK), None);
+    }
+
+    #[test]
+    fn formats_can_do_what_they_are_for() {
+        let float = properties(vk::Format::R32G32B32A32_SFLOAT);
+        assert!(
+            float
+                .optimal_tiling_features
+                .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND)
+        );
+        assert!(
+            float
+                .buffer_features
+                .contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
+        );
+        let depth = properties(vk::Format::D32_SFLOAT);
+        assert!(
+            depth
+                .optimal_tiling_features
+                .contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT)
+        );
+        assert!(depth.linear_tiling_features.is_empty());
+        let vertex = properties(vk::Format::R32G32B32_SFLOAT);
+        assert!(
+            vertex
+                .buffer_features
+                .contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
+        );
+        assert!(
+            !vertex
+                .optimal_tiling_features
+                .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT)
+        );
+    }
+
+    #[test]
+    fn images_that_cannot_be_are_refused() {
+        let query = ImageQuery {
+            format: vk::Format::R8G8B8A8_UNORM,
+            ty: vk::ImageType::TYPE_2D,
+            tiling: vk::ImageTiling::OPTIMAL,
+            usage: vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC,
+            flags: vk::ImageCreateFlags::empty(),
+        };
+        let properties = image_properties(query).unwrap();
+        assert_eq!(properties.max_extent.width, 16384);
+        assert_eq!(properties.max_mip_levels, 15);
+        let refused = [
+            ImageQuery {
+                format: vk::Format::UNDEFINED,
+                ..query
+            },
+            ImageQuery {
+                usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+                ..query
+            },
+            ImageQuery {
+                usage: vk::ImageUsageFlags::STORAGE,
+                ..query
+            },
+            ImageQuery {
+                flags: vk::ImageCreateFlags::SPARSE_BINDING,
+                ..query
+            },
+            ImageQuery {
+                format: vk::Format::D32_SFLOAT,
+                ty: vk::ImageType::TYPE_3D,
+                usage: vk::ImageUsageFlags::TRANSFER_DST,
+                ..query
+            },
+        ];
+        for query in refused {
+            let error = image_properties(query).unwrap_err();
+            assert_eq!(
+                error.result(),
+                vk::Result::ERROR_FORMAT_NOT_SUPPORTED,
+                "{query:?}"
+            );
+        }
+    }
+}

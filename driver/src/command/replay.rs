@@ -1,0 +1,164 @@
+//! Replays recorded commands: the one match from what was recorded to what the device executes.
+
+use super::record::{Command, CopyQueryResults, Draw, DrawIndirect};
+use super::state::{State, bind};
+use crate::lower::gaussian::{self, Undrawn};
+use crate::object::event::Event;
+use crate::object::pipeline::Primitive;
+use simdevice::Packet;
+use simdevice::packet::BufferRange;
+
+/// What a replay needs of the queue that it runs on.
+pub(crate) trait Executor {
+    /// Executes a packet; everything before it has been executed.
+    ///
+    /// # Errors
+    /// [`Lost`] if the device cannot go on.
+    fn execute(&mut self, packet: &Packet) -> Result<(), Lost>;
+
+    /// Waits until `event` is set.
+    ///
+    /// # Errors
+    /// [`Lost`] if the device was lost meanwhile.
+    fn wait_event(&mut self, event: &Event) -> Result<(), Lost>;
+
+    /// Waits until what the copy reads is available, if it asks for that, and gives the bytes to be written.
+    ///
+    /// # Errors
+    /// [`Lost`] if the device was lost meanwhile.
+    fn query_results(&mut self, copy: &CopyQueryResults) -> Result<Vec<Packet>, Lost>;
+
+    /// Tells the application of something that it should not have recorded.
+    fn report(&mut self, message: &str);
+}
+
+/// The device cannot go on.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("the device is lost: {0}")]
+pub(crate) struct Lost(pub String);
+
+/// Replays a command buffer.
+///
+/// # Errors
+/// [`Lost`] if the device is lost while it executes; what follows in the command buffer is then not executed.
+pub(crate) fn replay(commands: &[Command], executor: &mut dyn Executor) -> Result<(), Lost> {
+    let mut state = State::default();
+    for command in commands {
+        step(command, &mut state, executor)?;
+    }
+    Ok(())
+}
+
+fn step(command: &Command, state: &mut State, executor: &mut dyn Executor) -> Result<(), Lost> {
+    match command {
+        Command::Packet(packet) => executor.execute(packet)?,
+        Command::BindPipeline(pipeline) => state.pipeline = Some(pipeline.clone()),
+        Command::BindVertexBuffers { first, buffers } => {
+            bind(&mut state.vertex_buffers, *first, buffers);
+        }
+        Command::BindIndexBuffer(buffer) => state.index_buffer = Some(buffer.clone()),
+        Command::SetViewports { first, viewports } => bind(&mut state.viewports, *first, viewports),
+        Command::SetScissors { first, scissors } => bind(&mut state.scissors, *first, scissors),
+        Command::SetBlendConstants(constants) => state.blend_constants = Some(*constants),
+        Command::SetCamera(camera) => state.camera = Some(**camera),
+        Command::Draw(numbers) => draw(state, numbers, executor)?,
+        Command::DrawIndirect(indirect) => draw_indirect(state, indirect, executor)?,
+        Command::SetEvent(event, value) => event.set(*value),
+        Command::WaitEvents(events) => {
+            for event in events {
+                executor.wait_event(event)?;
+            }
+        }
+        Command::CopyQueryResults(copy) => {
+            for packet in executor.query_results(copy)? {
+                executor.execute(&packet)?;
+            }
+        }
+        Command::Execute(secondaries) => {
+            for commands in secondaries {
+                replay(commands, executor)?;
+            }
+            // Bound state is undefined after secondaries.
+            *state = State::default();
+        }
+    }
+    Ok(())
+}
+
+fn draw(state: &State, numbers: &Draw, executor: &mut dyn Executor) -> Result<(), Lost> {
+    if numbers.count == 0 || numbers.instance_count == 0 {
+        return Ok(());
+    }
+    let packets = match &state.pipeline {
+        None => Err(Undrawn::Pipeline),
+        Some(pipeline) => match &pipeline.primitive {
+            Primitive::Gaussian(gaussian) => gaussian::draw(state, pipeline, gaussian, numbers),
+        },
+    };
+    match packets {
+        Ok(packets) => packets
+            .iter()
+            .try_for_each(|packet| executor.execute(packet)),
+        Err(reason) => {
+            executor.report(&format!("a draw draws nothing: {reason}"));
+            Ok(())
+        }
+    }
+}
+
+fn draw_indirect(
+    state: &State,
+    indirect: &DrawIndirect,
+    executor: &mut dyn Executor,
+) -> Result<(), Lost> {
+    let draw_count = match indirect.count.as_ref().map(read_count) {
+        None => indirect.draw_count,
+        Some(count) => count.unwrap_or(0).min(indirect.draw_count),
+    };
+    for index in 0..u64::from(draw_count) {
+        let offset = index * u64::from(indirect.stride);
+        match read_draw(&indirect.parameters, offset, indirect.indexed) {
+            Some(numbers) => draw(state, &numbers, executor)?,
+            None => {
+                executor.report("an indirect draw's numbers lie outside their buffer");
+                break;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Reads how many draws there are.
+fn read_count(range: &BufferRange) -> Option<u32> {
+    let mut count = [0];
+    range.memory.read(range.offset, &mut count).ok()?;
+    Some(count[0])
+}
+
+/// Reads `VkDrawIndirectCommand` or `VkDrawIndexedIndirectCommand`.
+fn read_draw(parameters: &BufferRange, offset: u64, indexed: bool) -> Option<Draw> {
+    let mut words = [0u32; 5];
+    let words = &mut words[..if indexed { 5 } else { 4 }];
+    if offset.checked_add(size_of_val(words) as u64)? > parameters.size {
+        return None;
+    }
+    let offset = parameters.offset.checked_add(offset)?;
+    parameters.memory.read(offset, words).ok()?;
+    Some(match *words {
+        [count, instance_count, first, vertex_offset, first_instance] => Draw {
+            vertex_offset: Some(vertex_offset as i32),
+            first,
+            count,
+            first_instance,
+            instance_count,
+        },
+        [count, instance_count, first, first_instance] => Draw {
+            vertex_offset: None,
+            first,
+            count,
+            first_instance,
+            instance_count,
+        },
+        _ => return None,
+    })
+}

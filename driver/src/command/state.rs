@@ -1,0 +1,72 @@
+//! The state that a command buffer's draws read, as the commands replayed so far have left it.
+
+use super::record::{IndexBuffer, VertexBuffer};
+use crate::object::pipeline::GraphicsPipeline;
+use simdevice::packet::{Camera, Rect, Viewport};
+use std::sync::Arc;
+
+/// Bound state. All of it is undefined when a command buffer begins; here "undefined" is `None`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct State {
+    /// The graphics pipeline.
+    pub(crate) pipeline: Option<Arc<GraphicsPipeline>>,
+    /// The vertex buffers by binding.
+    pub(crate) vertex_buffers: Vec<Option<VertexBuffer>>,
+    /// The index buffer.
+    pub(crate) index_buffer: Option<IndexBuffer>,
+    /// Dynamic viewports.
+    pub(crate) viewports: Vec<Option<Viewport>>,
+    /// Dynamic scissors.
+    pub(crate) scissors: Vec<Option<Rect>>,
+    /// Dynamic blend constants.
+    pub(crate) blend_constants: Option<[f32; 4]>,
+    /// The camera of Gaussian draws; kept when another pipeline is bound.
+    pub(crate) camera: Option<Camera>,
+}
+
+impl State {
+    /// The viewport in effect: the pipeline's, or the dynamic one.
+    pub(crate) fn viewport(&self, pipeline: &GraphicsPipeline) -> Option<Viewport> {
+        pipeline
+            .viewport
+            .or_else(|| self.viewports.first().copied().flatten())
+    }
+
+    /// The scissor in effect: the pipeline's, or the dynamic one.
+    pub(crate) fn scissor(&self, pipeline: &GraphicsPipeline) -> Option<Rect> {
+        pipeline
+            .scissor
+            .or_else(|| self.scissors.first().copied().flatten())
+    }
+
+    /// The vertex buffer bound at `binding`.
+    pub(crate) fn vertex_buffer(&self, binding: u32) -> Option<&VertexBuffer> {
+        self.vertex_buffers.get(binding as usize)?.as_ref()
+    }
+}
+
+/// Replaces the elements of `slots` from `first` on by `values`, growing it as needed.
+pub(crate) fn bind<T: Clone>(slots: &mut Vec<Option<T>>, first: u32, values: &[T]) {
+    let first = first as usize;
+    let end = first + values.len();
+    if slots.len() < end {
+        slots.resize(end, None);
+    }
+    for (slot, value) in slots[first..end].iter_mut().zip(values) {
+        *slot = Some(value.clone());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn binding_replaces_a_range_and_leaves_the_rest() {
+        let mut slots = Vec::new();
+        bind(&mut slots, 2, &[5, 6]);
+        bind(&mut slots, 1, &[7]);
+        bind(&mut slots, 2, &[8]);
+        assert_eq!(slots, [None, Some(7), Some(8), Some(6)]);
+    }
+}

@@ -1,0 +1,307 @@
+//! Pipelines and what they are made of.
+
+use crate::capabilities::limits;
+use crate::error::Error;
+use crate::object::device::Device;
+use crate::object::pipeline::{
+    GraphicsPipeline, GraphicsPipelineInfo, PipelineCache, PipelineLayout,
+};
+use crate::object::shader_module::ShaderModule;
+use crate::{handle, pnext, pointer};
+use ash::vk;
+use gaurast::vk::PipelineGaussianStateCreateInfoGAURAST;
+use std::ffi::c_void;
+use std::sync::Arc;
+
+crate::entry_points! {
+    fn create_graphics_pipelines(
+        device: vk::Device,
+        _pipeline_cache: vk::PipelineCache,
+        create_info_count: u32,
+        create_infos: *const vk::GraphicsPipelineCreateInfo<'_>,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+        pipelines: *mut vk::Pipeline,
+    ) -> vk::Result {
+        let device = handle::get(device)?;
+        let infos = pointer::slice(create_infos, create_info_count)?;
+        let mut first_error = None;
+        for (index, info) in infos.iter().enumerate() {
+            let created = if first_error.is_none() {
+                new_graphics_pipeline(device, info)
+            } else {
+                // Vulkan lets the rest be skipped; their handles are null.
+                Ok(vk::Pipeline::null())
+            };
+            let created = created.unwrap_or_else(|error| {
+                first_error.get_or_insert(error);
+                vk::Pipeline::null()
+            });
+            pointer::output(pipelines.add(index), created)?;
+        }
+        first_error.map_or(Ok(()), Err)
+    }
+
+    /// Compute needs shader cores. The handles are null, as Vulkan has it for what was not created.
+    fn create_compute_pipelines(
+        _device: vk::Device,
+        _pipeline_cache: vk::PipelineCache,
+        create_info_count: u32,
+        _create_infos: *const vk::ComputePipelineCreateInfo<'_>,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+        pipelines: *mut vk::Pipeline,
+    ) -> vk::Result {
+        for index in 0..create_info_count as usize {
+            pointer::output(pipelines.add(index), vk::Pipeline::null())?;
+        }
+        Err::<(), _>(Error::FeatureNotPresent("a compute pipeline (it needs shader cores)".into()))
+    }
+
+    fn destroy_pipeline(
+        _device: vk::Device,
+        pipeline: vk::Pipeline,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+    ) {
+        handle::destroy(pipeline).map(drop)
+    }
+
+    fn create_pipeline_layout(
+        _device: vk::Device,
+        create_info: *const vk::PipelineLayoutCreateInfo<'_>,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+        pipeline_layout: *mut vk::PipelineLayout,
+    ) -> vk::Result {
+        pointer::input(create_info)?;
+        pointer::output(pipeline_layout, handle::create(Arc::new(PipelineLayout)))
+    }
+
+    fn destroy_pipeline_layout(
+        _device: vk::Device,
+        pipeline_layout: vk::PipelineLayout,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+    ) {
+        handle::destroy(pipeline_layout).map(drop)
+    }
+
+    fn create_shader_module(
+        _device: vk::Device,
+        create_info: *const vk::ShaderModuleCreateInfo<'_>,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+        shader_module: *mut vk::ShaderModule,
+    ) -> vk::Result {
+        let info = pointer::input(create_info)?;
+        let words = u32::try_from(info.code_size / 4).unwrap_or(0);
+        let object = ShaderModule::new(pointer::slice(info.p_code, words)?)?;
+        pointer::output(shader_module, handle::create(Arc::new(object)))
+    }
+
+    fn destroy_shader_module(
+        _device: vk::Device,
+        shader_module: vk::ShaderModule,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+    ) {
+        handle::destroy(shader_module).map(drop)
+    }
+
+    fn create_pipeline_cache(
+        _device: vk::Device,
+        create_info: *const vk::PipelineCacheCreateInfo<'_>,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+        pipeline_cache: *mut vk::PipelineCache,
+    ) -> vk::Result {
+        pointer::input(create_info)?;
+        pointer::output(pipeline_cache, handle::create(Arc::new(PipelineCache)))
+    }
+
+    fn destroy_pipeline_cache(
+        _device: vk::Device,
+        pipeline_cache: vk::PipelineCache,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+    ) {
+        handle::destroy(pipeline_cache).map(drop)
+    }
+
+    fn get_pipeline_cache_data(
+        _device: vk::Device,
+        _pipeline_cache: vk::PipelineCache,
+        data_size: *mut usize,
+        data: *mut c_void,
+    ) -> vk::Result {
+        let header = cache_header();
+        let size = pointer::output_structure(data_size)?;
+        if data.is_null() {
+            *size = header.len();
+            return Ok(vk::Result::SUCCESS);
+        }
+        if *size < header.len() {
+            *size = 0;
+            return Ok(vk::Result::INCOMPLETE);
+        }
+        *size = header.len();
+        std::ptr::copy_nonoverlapping(header.as_ptr(), data.cast::<u8>(), header.len());
+        Ok(vk::Result::SUCCESS)
+    }
+
+    fn merge_pipeline_caches(
+        _device: vk::Device,
+        _dst_cache: vk::PipelineCache,
+        _src_cache_count: u32,
+        _src_caches: *const vk::PipelineCache,
+    ) -> vk::Result {
+        Ok(())
+    }
+}
+
+/// An empty cache's data: `VkPipelineCacheHeaderVersionOne` and nothing more.
+fn cache_header() -> Vec<u8> {
+    let properties = limits::properties();
+    let mut header = Vec::with_capacity(32);
+    header.extend(32u32.to_le_bytes());
+    header.extend(vk::PipelineCacheHeaderVersion::ONE.as_raw().to_le_bytes());
+    header.extend(properties.vendor_id.to_le_bytes());
+    header.extend(properties.device_id.to_le_bytes());
+    header.extend(properties.pipeline_cache_uuid);
+    header
+}
+
+/// Makes one pipeline.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn new_graphics_pipeline(
+    device: &Device,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+) -> Result<vk::Pipeline, Error> {
+    // SAFETY: the caller's promise.
+    let gathered = unsafe {
+        withhold_feedback(info)?;
+        gather(info)?
+    };
+    let pipeline = GraphicsPipeline::new(&gathered, device.features())?;
+    Ok(handle::create(Arc::new(pipeline)))
+}
+
+/// Says of creation feedback that there is none: it takes no time that anybody would want to know.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn withhold_feedback(info: &vk::GraphicsPipelineCreateInfo<'_>) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let Some(feedback) = pnext::find::<vk::PipelineCreationFeedbackCreateInfo>(info.p_next)
+        else {
+            return Ok(());
+        };
+        let none = vk::PipelineCreationFeedback::default();
+        pointer::output(feedback.p_pipeline_creation_feedback, none)?;
+        for index in 0..feedback.pipeline_stage_creation_feedback_count as usize {
+            let place = feedback.p_pipeline_stage_creation_feedbacks.add(index);
+            pointer::output(place, none)?;
+        }
+        Ok(())
+    }
+}
+
+/// Follows a create info's pointers.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn gather<'a>(
+    info: &'a vk::GraphicsPipelineCreateInfo<'a>,
+) -> Result<GraphicsPipelineInfo<'a>, Error> {
+    let mut gathered = GraphicsPipelineInfo::default();
+    // SAFETY: the caller's promise.
+    unsafe {
+        gathered.stages = pointer::slice(info.p_stages, info.stage_count)?;
+        gathered.gaussian =
+            pnext::find::<PipelineGaussianStateCreateInfoGAURAST>(info.p_next).copied();
+        gathered.color_formats = color_formats(info)?;
+        if let Some(state) = pointer::optional(info.p_vertex_input_state) {
+            gathered.bindings = pointer::slice(
+                state.p_vertex_binding_descriptions,
+                state.vertex_binding_description_count,
+            )?;
+            gathered.attributes = pointer::slice(
+                state.p_vertex_attribute_descriptions,
+                state.vertex_attribute_description_count,
+            )?;
+        }
+        if let Some(state) = pointer::optional(info.p_input_assembly_state) {
+            gathered.topology = state.topology;
+            gathered.primitive_restart = state.primitive_restart_enable != vk::FALSE;
+        }
+        if let Some(state) = pointer::optional(info.p_viewport_state) {
+            gather_viewports(state, &mut gathered)?;
+        }
+        if let Some(state) = pointer::optional(info.p_rasterization_state) {
+            gathered.rasterization = *state;
+        }
+        if let Some(state) = pointer::optional(info.p_multisample_state) {
+            gathered.samples = state.rasterization_samples;
+            gathered.alpha_to = state.alpha_to_coverage_enable != vk::FALSE
+                || state.alpha_to_one_enable != vk::FALSE;
+        }
+        if let Some(state) = pointer::optional(info.p_depth_stencil_state) {
+            gathered.depth_stencil = *state;
+        }
+        if let Some(state) = pointer::optional(info.p_color_blend_state) {
+            gathered.logic_op = state.logic_op_enable != vk::FALSE;
+            gathered.blend = pointer::slice(state.p_attachments, state.attachment_count)?;
+            gathered.blend_constants = state.blend_constants;
+        }
+        if let Some(state) = pointer::optional(info.p_dynamic_state) {
+            gathered.dynamic = pointer::slice(state.p_dynamic_states, state.dynamic_state_count)?;
+        }
+    }
+    Ok(gathered)
+}
+
+/// Viewports and scissors; their pointers may be null, or anything, where they are dynamic.
+///
+/// # Safety
+/// The state is valid.
+unsafe fn gather_viewports<'a>(
+    state: &'a vk::PipelineViewportStateCreateInfo<'a>,
+    gathered: &mut GraphicsPipelineInfo<'a>,
+) -> Result<(), Error> {
+    gathered.viewport_count = state.viewport_count;
+    // SAFETY: the caller's promise; a null pointer is not followed.
+    unsafe {
+        if !state.p_viewports.is_null() {
+            gathered.viewports = pointer::slice(state.p_viewports, state.viewport_count)?;
+        }
+        if !state.p_scissors.is_null() {
+            gathered.scissors = pointer::slice(state.p_scissors, state.scissor_count)?;
+        }
+    }
+    Ok(())
+}
+
+/// The colour formats of the subpass, or of dynamic rendering, that a pipeline is for.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn color_formats(
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+) -> Result<Vec<vk::Format>, Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        if let Some(render_pass) = handle::get_optional(info.render_pass)? {
+            return render_pass
+                .color_formats(info.subpass as usize)
+                .ok_or_else(|| {
+                    Error::usage(
+                        "VUID-VkGraphicsPipelineCreateInfo-renderPass-06046",
+                        format!("the render pass has no subpass {}", info.subpass),
+                    )
+                });
+        }
+        let Some(rendering) = pnext::find::<vk::PipelineRenderingCreateInfo>(info.p_next) else {
+            return Ok(Vec::new());
+        };
+        let formats = pointer::slice(
+            rendering.p_color_attachment_formats,
+            rendering.color_attachment_count,
+        )?;
+        Ok(formats.to_vec())
+    }
+}

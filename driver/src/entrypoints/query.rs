@@ -1,0 +1,266 @@
+//! Query pools, and the commands that use them.
+
+use super::command::record;
+use crate::command::record::{Command, CopyQueryResults};
+use crate::error::Error;
+use crate::object::query_pool::QueryPool;
+use crate::object::signals::Signals;
+use crate::{handle, pnext, pointer};
+use ash::vk;
+use simdevice::Packet;
+use simdevice::counters::Counter;
+use simdevice::query::{QueryKind, QueryResult};
+use std::ffi::c_void;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How often a wait for a query looks whether the device was lost.
+const POLL: Duration = Duration::from_millis(20);
+
+crate::entry_points! {
+    fn create_query_pool(
+        _device: vk::Device,
+        create_info: *const vk::QueryPoolCreateInfo<'_>,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+        query_pool: *mut vk::QueryPool,
+    ) -> vk::Result {
+        let object = new_pool(pointer::input(create_info)?)?;
+        pointer::output(query_pool, handle::create(Arc::new(object)))
+    }
+
+    fn destroy_query_pool(
+        _device: vk::Device,
+        query_pool: vk::QueryPool,
+        _allocator: *const vk::AllocationCallbacks<'_>,
+    ) {
+        handle::destroy(query_pool).map(drop)
+    }
+
+    fn reset_query_pool(
+        _device: vk::Device,
+        query_pool: vk::QueryPool,
+        first_query: u32,
+        query_count: u32,
+    ) {
+        handle::get(query_pool)?.queries.reset(first_query, query_count);
+        Ok(())
+    }
+
+    fn get_query_pool_results(
+        device: vk::Device,
+        query_pool: vk::QueryPool,
+        first_query: u32,
+        query_count: u32,
+        data_size: usize,
+        data: *mut c_void,
+        stride: vk::DeviceSize,
+        flags: vk::QueryResultFlags,
+    ) -> vk::Result {
+        let signals = handle::get(device)?.signals();
+        let pool = handle::get(query_pool)?;
+        require_queries(pool, first_query, query_count)?;
+        let mut all_available = true;
+        for index in 0..query_count {
+            let result = result(pool, first_query + index, flags, signals)?;
+            all_available &= result.is_some();
+            for (place, bytes) in pool.written(result.as_ref(), flags) {
+                let offset = u64::from(index) * stride + place;
+                if offset + bytes.len() as u64 > data_size as u64 || data.is_null() {
+                    return Err(Error::usage(
+                        "VUID-vkGetQueryPoolResults-dataSize-00817",
+                        format!("dataSize is {data_size}, too small for {query_count} queries"),
+                    ));
+                }
+                let target = data.cast::<u8>().add(offset as usize);
+                std::ptr::copy_nonoverlapping(bytes.as_ptr(), target, bytes.len());
+            }
+        }
+        Ok(if all_available { vk::Result::SUCCESS } else { vk::Result::NOT_READY })
+    }
+
+    fn cmd_begin_query(
+        command_buffer: vk::CommandBuffer,
+        query_pool: vk::QueryPool,
+        query: u32,
+        _flags: vk::QueryControlFlags,
+    ) {
+        record(command_buffer, |recorder| {
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, query, 1)?;
+            recorder.packet(Packet::BeginQuery { pool: Arc::clone(&pool.queries), index: query });
+            Ok(())
+        })
+    }
+
+    fn cmd_end_query(command_buffer: vk::CommandBuffer, query_pool: vk::QueryPool, query: u32) {
+        record(command_buffer, |recorder| {
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, query, 1)?;
+            recorder.packet(Packet::EndQuery { pool: Arc::clone(&pool.queries), index: query });
+            Ok(())
+        })
+    }
+
+    fn cmd_reset_query_pool(
+        command_buffer: vk::CommandBuffer,
+        query_pool: vk::QueryPool,
+        first_query: u32,
+        query_count: u32,
+    ) {
+        record(command_buffer, |recorder| {
+            recorder.require_outside_pass()?;
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, first_query, query_count)?;
+            recorder.packet(Packet::ResetQueries {
+                pool: Arc::clone(&pool.queries),
+                first: first_query,
+                count: query_count,
+            });
+            Ok(())
+        })
+    }
+
+    fn cmd_write_timestamp(
+        command_buffer: vk::CommandBuffer,
+        _pipeline_stage: vk::PipelineStageFlags,
+        query_pool: vk::QueryPool,
+        query: u32,
+    ) {
+        write_timestamp(command_buffer, query_pool, query)
+    }
+
+    fn cmd_write_timestamp2(
+        command_buffer: vk::CommandBuffer,
+        _stage: vk::PipelineStageFlags2,
+        query_pool: vk::QueryPool,
+        query: u32,
+    ) {
+        write_timestamp(command_buffer, query_pool, query)
+    }
+
+    fn cmd_copy_query_pool_results(
+        command_buffer: vk::CommandBuffer,
+        query_pool: vk::QueryPool,
+        first_query: u32,
+        query_count: u32,
+        dst_buffer: vk::Buffer,
+        dst_offset: vk::DeviceSize,
+        stride: vk::DeviceSize,
+        flags: vk::QueryResultFlags,
+    ) {
+        record(command_buffer, |recorder| {
+            recorder.require_outside_pass()?;
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, first_query, query_count)?;
+            recorder.push(Command::CopyQueryResults(CopyQueryResults {
+                pool: Arc::clone(pool),
+                first: first_query,
+                count: query_count,
+                target: handle::get(dst_buffer)?.range(dst_offset, None)?,
+                stride,
+                flags,
+            }));
+            Ok(())
+        })
+    }
+}
+
+/// A query's result, after a wait where that is asked for.
+fn result(
+    pool: &QueryPool,
+    index: u32,
+    flags: vk::QueryResultFlags,
+    signals: &Signals,
+) -> Result<Option<QueryResult>, Error> {
+    loop {
+        let result = pool.queries.result(index);
+        if result.is_some() || !flags.contains(vk::QueryResultFlags::WAIT) {
+            return Ok(result);
+        }
+        signals.check()?;
+        pool.queries.wait(index, POLL);
+    }
+}
+
+/// Fails unless the pool has the queries.
+///
+/// # Errors
+/// [`Error::Usage`].
+fn require_queries(pool: &QueryPool, first: u32, count: u32) -> Result<(), Error> {
+    if pool.has(first, count) {
+        return Ok(());
+    }
+    Err(Error::usage(
+        "VUID-vkCmd-query-queryCount",
+        format!(
+            "{count} queries from {first} on of a pool of {}",
+            pool.queries.count()
+        ),
+    ))
+}
+
+/// The pool that a create info asks for.
+///
+/// # Safety
+/// The create info's chain is valid.
+unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Error> {
+    match info.query_type {
+        vk::QueryType::TIMESTAMP => Ok(QueryPool::new(
+            QueryKind::Timestamp,
+            info.query_count,
+            Vec::new(),
+        )),
+        vk::QueryType::PERFORMANCE_QUERY_KHR => {
+            // SAFETY: the caller's promise.
+            let counters = unsafe {
+                pnext::find::<vk::QueryPoolPerformanceCreateInfoKHR>(info.p_next)
+                    .map(|info| pointer::slice(info.p_counter_indices, info.counter_index_count))
+                    .transpose()?
+            };
+            let counters = counters.ok_or_else(|| {
+                Error::usage(
+                    "VUID-VkQueryPoolCreateInfo-queryType-03222",
+                    "a performance query pool must chain a VkQueryPoolPerformanceCreateInfoKHR",
+                )
+            })?;
+            let is_known = |&index: &u32| (index as usize) < Counter::ALL.len();
+            if let Some(index) = counters.iter().find(|index| !is_known(index)) {
+                return Err(Error::usage(
+                    "VUID-VkQueryPoolPerformanceCreateInfoKHR-pCounterIndices-03321",
+                    format!("there is no performance counter {index}"),
+                ));
+            }
+            Ok(QueryPool::new(
+                QueryKind::Performance,
+                info.query_count,
+                counters.to_vec(),
+            ))
+        }
+        other => Err(Error::FeatureNotPresent(format!(
+            "a query pool of type {other:?}"
+        ))),
+    }
+}
+
+/// Records a timestamp.
+///
+/// # Safety
+/// The handles are live.
+unsafe fn write_timestamp(
+    command_buffer: vk::CommandBuffer,
+    query_pool: vk::QueryPool,
+    query: u32,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        record(command_buffer, |recorder| {
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, query, 1)?;
+            recorder.packet(Packet::WriteTimestamp {
+                pool: Arc::clone(&pool.queries),
+                index: query,
+            });
+            Ok(())
+        })
+    }
+}

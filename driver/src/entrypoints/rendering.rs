@@ -1,0 +1,154 @@
+//! Commands that begin and end render passes and dynamic rendering.
+
+use super::command::record;
+use crate::error::Error;
+use crate::lower::rendering::{BegunPass, DynamicAttachment, DynamicRendering, rect};
+use crate::{handle, pnext, pointer};
+use ash::vk;
+use simdevice::packet::Rect;
+use std::sync::Arc;
+
+crate::entry_points! {
+    fn cmd_begin_render_pass(
+        command_buffer: vk::CommandBuffer,
+        render_pass_begin: *const vk::RenderPassBeginInfo<'_>,
+        _contents: vk::SubpassContents,
+    ) {
+        record(command_buffer, |recorder| {
+            recorder.begin_render_pass(begun_pass(pointer::input(render_pass_begin)?)?)
+        })
+    }
+
+    fn cmd_begin_render_pass2(
+        command_buffer: vk::CommandBuffer,
+        render_pass_begin: *const vk::RenderPassBeginInfo<'_>,
+        _subpass_begin_info: *const vk::SubpassBeginInfo<'_>,
+    ) {
+        record(command_buffer, |recorder| {
+            recorder.begin_render_pass(begun_pass(pointer::input(render_pass_begin)?)?)
+        })
+    }
+
+    fn cmd_next_subpass(command_buffer: vk::CommandBuffer, _contents: vk::SubpassContents) {
+        record(command_buffer, |recorder| recorder.next_subpass())
+    }
+
+    fn cmd_next_subpass2(
+        command_buffer: vk::CommandBuffer,
+        _subpass_begin_info: *const vk::SubpassBeginInfo<'_>,
+        _subpass_end_info: *const vk::SubpassEndInfo<'_>,
+    ) {
+        record(command_buffer, |recorder| recorder.next_subpass())
+    }
+
+    fn cmd_end_render_pass(command_buffer: vk::CommandBuffer) {
+        record(command_buffer, |recorder| recorder.end_render_pass())
+    }
+
+    fn cmd_end_render_pass2(
+        command_buffer: vk::CommandBuffer,
+        _subpass_end_info: *const vk::SubpassEndInfo<'_>,
+    ) {
+        record(command_buffer, |recorder| recorder.end_render_pass())
+    }
+
+    fn cmd_begin_rendering(
+        command_buffer: vk::CommandBuffer,
+        rendering_info: *const vk::RenderingInfo<'_>,
+    ) {
+        record(command_buffer, |recorder| {
+            let rendering = dynamic_rendering(pointer::input(rendering_info)?)?;
+            recorder.begin_rendering(rendering.packet()?)
+        })
+    }
+
+    fn cmd_end_rendering(command_buffer: vk::CommandBuffer) {
+        record(command_buffer, |recorder| recorder.end_rendering())
+    }
+}
+
+/// The render pass that a begin info begins.
+///
+/// # Safety
+/// The info, its chain and its handles are valid.
+unsafe fn begun_pass(info: &vk::RenderPassBeginInfo<'_>) -> Result<BegunPass, Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let framebuffer = handle::get(info.framebuffer)?;
+        let views = match &framebuffer.views {
+            Some(views) => views.clone(),
+            None => match pnext::find::<vk::RenderPassAttachmentBeginInfo>(info.p_next) {
+                Some(info) => {
+                    handle::get_all(pointer::slice(info.p_attachments, info.attachment_count)?)?
+                }
+                None => Vec::new(),
+            },
+        };
+        let whole = Rect {
+            x: 0,
+            y: 0,
+            width: framebuffer.extent.width,
+            height: framebuffer.extent.height,
+        };
+        Ok(BegunPass {
+            render_pass: Arc::clone(handle::get(info.render_pass)?),
+            views,
+            clear_values: pointer::slice(info.p_clear_values, info.clear_value_count)?.to_vec(),
+            area: rect(info.render_area).intersect(whole),
+            layers: framebuffer.layers,
+        })
+    }
+}
+
+/// The dynamic rendering that an info describes.
+///
+/// # Safety
+/// The info and its handles are valid.
+unsafe fn dynamic_rendering(info: &vk::RenderingInfo<'_>) -> Result<DynamicRendering, Error> {
+    if info.view_mask != 0 {
+        return Err(Error::FeatureNotPresent(
+            "a view mask (feature multiview)".into(),
+        ));
+    }
+    // SAFETY: the caller's promise.
+    unsafe {
+        let color = pointer::slice(info.p_color_attachments, info.color_attachment_count)?;
+        let depth_stencil = |pointer| match pointer::optional(pointer) {
+            Some(info) => attachment(info),
+            None => Ok(None),
+        };
+        Ok(DynamicRendering {
+            flags: info.flags,
+            area: info.render_area,
+            layers: info.layer_count,
+            color: color
+                .iter()
+                .map(|info| attachment(info))
+                .collect::<Result<_, _>>()?,
+            depth: depth_stencil(info.p_depth_attachment)?,
+            stencil: depth_stencil(info.p_stencil_attachment)?,
+        })
+    }
+}
+
+/// An attachment of dynamic rendering, if it is used.
+///
+/// # Safety
+/// The info's handles are live.
+unsafe fn attachment(
+    info: &vk::RenderingAttachmentInfo<'_>,
+) -> Result<Option<DynamicAttachment>, Error> {
+    if info.resolve_mode != vk::ResolveModeFlags::NONE {
+        return Err(Error::FeatureNotPresent(
+            "a resolve attachment (images have one sample)".into(),
+        ));
+    }
+    // SAFETY: the caller's promise.
+    let view = unsafe { handle::get_optional(info.image_view)? };
+    Ok(view.map(|view| DynamicAttachment {
+        view: Arc::clone(view),
+        load: info.load_op,
+        store: info.store_op,
+        clear_value: info.clear_value,
+    }))
+}

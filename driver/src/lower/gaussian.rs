@@ -1,0 +1,166 @@
+//! Lowers Gaussian draws: pipeline, bound buffers, viewport and camera to the three packets of a sorted set.
+
+use crate::command::record::Draw;
+use crate::command::state::State;
+use crate::object::pipeline::{AttributeSource, GaussianPipeline, GraphicsPipeline};
+use simdevice::Packet;
+use simdevice::packet::{
+    AttributeStream, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, IndexStream,
+    Viewport,
+};
+use std::sync::Arc;
+
+/// Why a draw draws nothing: state that it needs is undefined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Undrawn {
+    /// No pipeline.
+    #[error("no graphics pipeline is bound")]
+    Pipeline,
+    /// No camera.
+    #[error("no camera is set: vkCmdSetGaussianCameraGAURAST must be recorded before the draw")]
+    Camera,
+    /// No viewport.
+    #[error("the pipeline's viewport is dynamic and none is set")]
+    Viewport,
+    /// No scissor.
+    #[error("the pipeline's scissor is dynamic and none is set")]
+    Scissor,
+    /// No blend constants.
+    #[error("the pipeline's blend constants are dynamic and none are set")]
+    BlendConstants,
+    /// No vertex buffer.
+    #[error("no vertex buffer is bound at binding {0}")]
+    VertexBuffer(u32),
+    /// No index buffer.
+    #[error("no index buffer is bound")]
+    IndexBuffer,
+}
+
+/// The packets of one draw.
+///
+/// # Errors
+/// [`Undrawn`] where bound state that the draw needs is missing.
+pub(crate) fn draw(
+    state: &State,
+    pipeline: &GraphicsPipeline,
+    gaussian: &GaussianPipeline,
+    draw: &Draw,
+) -> Result<[Packet; 3], Undrawn> {
+    let begin = GaussianBegin {
+        state: fixed_state(state, pipeline, gaussian)?,
+        camera: state.camera.ok_or(Undrawn::Camera)?,
+        viewport: upright(state.viewport(pipeline).ok_or(Undrawn::Viewport)?),
+        scissor: state.scissor(pipeline).ok_or(Undrawn::Scissor)?,
+    };
+    let append = GaussianAppend {
+        attributes: attributes(state, pipeline, gaussian)?,
+        indices: indices(state, draw)?,
+        first: draw.first,
+        count: draw.count,
+        first_instance: draw.first_instance,
+        instance_count: draw.instance_count,
+    };
+    Ok([
+        Packet::GaussianBegin(Box::new(begin)),
+        Packet::GaussianAppend(Box::new(append)),
+        Packet::GaussianResolve,
+    ])
+}
+
+/// What the pipeline fixes, with the dynamic part filled in.
+fn fixed_state(
+    state: &State,
+    pipeline: &GraphicsPipeline,
+    gaussian: &GaussianPipeline,
+) -> Result<Arc<GaussianState>, Undrawn> {
+    if !pipeline.dynamic_blend_constants {
+        return Ok(Arc::clone(&gaussian.state));
+    }
+    let blend_constants = state.blend_constants.ok_or(Undrawn::BlendConstants)?;
+    Ok(Arc::new(GaussianState {
+        blend_constants,
+        ..GaussianState::clone(&gaussian.state)
+    }))
+}
+
+/// A Gaussian's pixels count from the upper left corner of the area that the viewport covers, so a negative
+/// height changes nothing but where that corner is.
+fn upright(viewport: Viewport) -> Viewport {
+    if viewport.height >= 0.0 {
+        return viewport;
+    }
+    Viewport {
+        y: viewport.y + viewport.height,
+        height: -viewport.height,
+        ..viewport
+    }
+}
+
+fn attributes(
+    state: &State,
+    pipeline: &GraphicsPipeline,
+    gaussian: &GaussianPipeline,
+) -> Result<GaussianAttributes, Undrawn> {
+    let stream = |source: &AttributeSource| attribute_stream(state, pipeline, source);
+    Ok(GaussianAttributes {
+        position: stream(&gaussian.position)?,
+        scale: stream(&gaussian.scale)?,
+        rotation: stream(&gaussian.rotation)?,
+        opacity: stream(&gaussian.opacity)?,
+        spherical_harmonics: gaussian
+            .spherical_harmonics
+            .iter()
+            .map(stream)
+            .collect::<Result<_, _>>()?,
+    })
+}
+
+fn attribute_stream(
+    state: &State,
+    pipeline: &GraphicsPipeline,
+    source: &AttributeSource,
+) -> Result<AttributeStream, Undrawn> {
+    let bound = state
+        .vertex_buffer(source.binding)
+        .ok_or(Undrawn::VertexBuffer(source.binding))?;
+    let dynamic_stride = bound.stride.filter(|_| pipeline.dynamic_stride);
+    Ok(AttributeStream {
+        buffer: bound.range.clone(),
+        stride: dynamic_stride.unwrap_or(source.stride),
+        offset: source.offset,
+        format: source.format,
+        instance_divisor: source.instance_divisor,
+    })
+}
+
+fn indices(state: &State, draw: &Draw) -> Result<Option<IndexStream>, Undrawn> {
+    let Some(vertex_offset) = draw.vertex_offset else {
+        return Ok(None);
+    };
+    let bound = state.index_buffer.as_ref().ok_or(Undrawn::IndexBuffer)?;
+    Ok(Some(IndexStream {
+        buffer: bound.range.clone(),
+        index_size: bound.index_size,
+        vertex_offset,
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_negative_height_moves_the_corner() {
+        let viewport = Viewport {
+            x: 3.0,
+            y: 90.0,
+            width: 50.0,
+            height: -80.0,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
+        let upright = upright(viewport);
+        assert_eq!((upright.y, upright.height), (10.0, 80.0));
+        assert_eq!((upright.x, upright.width), (3.0, 50.0));
+    }
+}

@@ -1,0 +1,6 @@
+//! Lowers Vulkan's state to the device's packets.
+
+pub(crate) mod camera;
+pub(crate) mod gaussian;
+pub(crate) mod rendering;
+pub(crate) mod transfer;

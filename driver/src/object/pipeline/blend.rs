@@ -1,0 +1,92 @@
+//! Blend state.
+
+use crate::error::Error;
+use ash::vk;
+use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
+
+/// One attachment's blend state for the device.
+///
+/// # Errors
+/// An [`Error`] for factors and operations that Vulkan does not have, or that take a second source.
+pub(crate) fn blend_state(
+    state: &vk::PipelineColorBlendAttachmentState,
+) -> Result<BlendState, Error> {
+    let equations = if state.blend_enable == vk::FALSE {
+        None
+    } else {
+        let color = equation(
+            state.src_color_blend_factor,
+            state.dst_color_blend_factor,
+            state.color_blend_op,
+        )?;
+        let alpha = equation(
+            state.src_alpha_blend_factor,
+            state.dst_alpha_blend_factor,
+            state.alpha_blend_op,
+        )?;
+        Some((color, alpha))
+    };
+    Ok(BlendState {
+        equations,
+        write_mask: (state.color_write_mask.as_raw() & 0xf) as u8,
+    })
+}
+
+fn equation(
+    source: vk::BlendFactor,
+    destination: vk::BlendFactor,
+    op: vk::BlendOp,
+) -> Result<BlendEquation, Error> {
+    Ok(BlendEquation {
+        source: factor(source)?,
+        destination: factor(destination)?,
+        op: operation(op)?,
+    })
+}
+
+fn factor(factor: vk::BlendFactor) -> Result<BlendFactor, Error> {
+    use vk::BlendFactor as F;
+    Ok(match factor {
+        F::ZERO => BlendFactor::Zero,
+        F::ONE => BlendFactor::One,
+        F::SRC_COLOR => BlendFactor::SrcColor,
+        F::ONE_MINUS_SRC_COLOR => BlendFactor::OneMinusSrcColor,
+        F::DST_COLOR => BlendFactor::DstColor,
+        F::ONE_MINUS_DST_COLOR => BlendFactor::OneMinusDstColor,
+        F::SRC_ALPHA => BlendFactor::SrcAlpha,
+        F::ONE_MINUS_SRC_ALPHA => BlendFactor::OneMinusSrcAlpha,
+        F::DST_ALPHA => BlendFactor::DstAlpha,
+        F::ONE_MINUS_DST_ALPHA => BlendFactor::OneMinusDstAlpha,
+        F::CONSTANT_COLOR => BlendFactor::ConstantColor,
+        F::ONE_MINUS_CONSTANT_COLOR => BlendFactor::OneMinusConstantColor,
+        F::CONSTANT_ALPHA => BlendFactor::ConstantAlpha,
+        F::ONE_MINUS_CONSTANT_ALPHA => BlendFactor::OneMinusConstantAlpha,
+        F::SRC_ALPHA_SATURATE => BlendFactor::SrcAlphaSaturate,
+        F::SRC1_COLOR | F::ONE_MINUS_SRC1_COLOR | F::SRC1_ALPHA | F::ONE_MINUS_SRC1_ALPHA => {
+            return Err(Error::FeatureNotPresent(format!(
+                "blend factor {factor:?} (feature dualSrcBlend)"
+            )));
+        }
+        other => {
+            return Err(Error::usage(
+                "VUID-VkPipelineColorBlendAttachmentState-parameter",
+                format!("{other:?} is not a VkBlendFactor"),
+            ));
+        }
+    })
+}
+
+fn operation(op: vk::BlendOp) -> Result<BlendOp, Error> {
+    Ok(match op {
+        vk::BlendOp::ADD => BlendOp::Add,
+        vk::BlendOp::SUBTRACT => BlendOp::Subtract,
+        vk::BlendOp::REVERSE_SUBTRACT => BlendOp::ReverseSubtract,
+        vk::BlendOp::MIN => BlendOp::Min,
+        vk::BlendOp::MAX => BlendOp::Max,
+        other => {
+            return Err(Error::FeatureNotPresent(format!(
+                "blend operation {other:?}"
+            )));
+        }
+    })
+}

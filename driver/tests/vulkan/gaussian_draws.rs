@@ -1,0 +1,277 @@
+//! Gaussian draws, from pipeline and camera to pixels.
+
+use crate::scene::{
+    CENTER, PipelineRequest, Scene, Splat, assert_close, at, over, pass, premultiplied, splat,
+};
+use ash::vk;
+
+const RED: [f32; 3] = [0.9, 0.2, 0.1];
+const BLUE: [f32; 3] = [0.1, 0.3, 0.8];
+
+fn scene(splats: &[Splat]) -> Scene {
+    Scene::new(splats, &PipelineRequest::default())
+}
+
+#[test]
+fn a_gaussian_is_brightest_at_its_mean() {
+    let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, RED)]);
+    let pixels = scene.draw([0.0; 4], |device, commands| {
+        // SAFETY: see the crate.
+        unsafe { device.cmd_draw(commands, 1, 1, 0, 0) };
+    });
+    let (x, y) = CENTER;
+    assert_close(at(&pixels, CENTER), premultiplied(RED, 0.8));
+    // One pixel away the variance is (100 * 0.1 / 5)^2 + 0.3.
+    let alpha = 0.8 * (-0.5f32 / 4.3).exp();
+    assert_close(at(&pixels, (x + 1, y)), premultiplied(RED, alpha));
+    assert_close(at(&pixels, (x, y - 1)), premultiplied(RED, alpha));
+    assert_eq!(at(&pixels, (0, 0)), [0.0; 4]);
+    assert_eq!(scene.gpu.take_messages(), Vec::<String>::new());
+}
+
+#[test]
+fn gaussians_are_sorted_and_blended_over_the_background() {
+    let splats = [
+        splat([0.0, 0.0, 9.0], 0.1, 0.6, BLUE),
+        splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
+    ];
+    let request = PipelineRequest {
+        blend: vec![over()],
+        ..PipelineRequest::default()
+    };
+    let scene = Scene::new(&splats, &request);
+    let clear = [0.2, 0.4, 0.6, 1.0];
+    let pixels = scene.draw(clear, |device, commands| {
+        // SAFETY: see the crate.
+        unsafe { device.cmd_draw(commands, 2, 1, 0, 0) };
+    });
+    let [r, g, b]: [f32; 3] =
+        std::array::from_fn(|i| 0.5 * RED[i] + 0.5 * 0.6 * BLUE[i] + 0.5 * 0.4 * clear[i]);
+    assert_close(at(&pixels, CENTER), [r, g, b, 1.0]);
+    assert_eq!(at(&pixels, (0, 0)), clear);
+}
+
+#[test]
+fn blend_constants_may_be_dynamic() {
+    let blend = over()
+        .src_color_blend_factor(vk::BlendFactor::CONSTANT_COLOR)
+        .dst_color_blend_factor(vk::BlendFactor::ZERO);
+    let mut request = PipelineRequest {
+        blend: vec![blend],
+        blend_constants: [1.0; 4],
+        ..PipelineRequest::default()
+    };
+    request.dynamic.push(vk::DynamicState::BLEND_CONSTANTS);
+    let scene = Scene::new(&[splat([0.0, 0.0, 5.0], 0.1, 0.5, RED)], &request);
+    let pixels = scene.draw([0.0; 4], |device, commands| {
+        // SAFETY: see the crate.
+        unsafe {
+            device.cmd_set_blend_constants(commands, &[0.5, 0.25, 0.0, 1.0]);
+            device.cmd_draw(commands, 1, 1, 0, 0);
+        }
+    });
+    let expected = [RED[0] * 0.25, RED[1] * 0.125, 0.0, 0.5];
+    assert_close(at(&pixels, CENTER), expected);
+}
+
+#[test]
+fn a_negative_viewport_height_draws_the_same_picture() {
+    let scene = scene(&[splat([0.1, 0.4, 5.0], 0.1, 0.8, RED)]);
+    let draw = |y: f32, height: f32| {
+        scene.draw([0.0; 4], |device, commands| {
+            let viewports = [vk::Viewport {
+                x: 0.0,
+                y,
+                width: 64.0,
+                height,
+                min_depth: 0.0,
+                max_depth: 1.0,
+            }];
+            // SAFETY: see the crate.
+            unsafe {
+                device.cmd_set_viewport(commands, 0, &viewports);
+                device.cmd_draw(commands, 1, 1, 0, 0);
+            }
+        })
+    };
+    let upright = draw(0.0, 48.0);
+    assert_close(at(&upright, (34, 32)), premultiplied(RED, 0.8));
+    assert!(upright == draw(48.0, -48.0));
+}
+
+#[test]
+fn the_scissor_cuts_and_does_not_move() {
+    let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, RED)]);
+    let draw = |scissor: Option<vk::Rect2D>| {
+        scene.draw([0.0; 4], |device, commands| {
+            // SAFETY: see the crate.
+            unsafe {
+                if let Some(scissor) = scissor {
+                    device.cmd_set_scissor(commands, 0, &[scissor]);
+                }
+                device.cmd_draw(commands, 1, 1, 0, 0);
+            }
+        })
+    };
+    let whole = draw(None);
+    let cut = draw(Some(vk::Rect2D {
+        offset: vk::Offset2D { x: 32, y: 20 },
+        extent: vk::Extent2D {
+            width: 3,
+            height: 100,
+        },
+    }));
+    for y in 0..48 {
+        for x in 0..64 {
+            let inside = (32..35).contains(&x) && y >= 20;
+            let expected = if inside { at(&whole, (x, y)) } else { [0.0; 4] };
+            assert_eq!(at(&cut, (x, y)), expected, "{x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn an_index_buffer_picks_gaussians() {
+    let scene = scene(&[
+        splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
+        splat([0.0, 0.0, 5.0], 0.1, 0.7, BLUE),
+    ]);
+    let indices = scene.gpu.buffer_of(&[9u16, 0, 0, 7]);
+    let pixels = scene.draw([0.0; 4], |device, commands| {
+        // SAFETY: see the crate.
+        unsafe {
+            device.cmd_bind_index_buffer(commands, indices.buffer, 2, vk::IndexType::UINT16);
+            device.cmd_draw_indexed(commands, 1, 1, 1, 1, 0);
+        }
+    });
+    assert_close(at(&pixels, CENTER), premultiplied(BLUE, 0.7));
+    scene.gpu.free_buffer(indices);
+}
+
+#[test]
+fn instances_move_gaussians_by_attributes_of_their_own() {
+    // The position advances by instance, everything else by vertex.
+    let mut request = PipelineRequest::default();
+    request.bindings.push(vk::VertexInputBindingDescription {
+        binding: 5,
+        stride: 12,
+        input_rate: vk::VertexInputRate::INSTANCE,
+    });
+    request.attributes[0].binding = 5;
+    let scene = Scene::new(&[splat([f32::NAN; 3], 0.02, 0.8, RED)], &request);
+    let positions = [[0.0f32, 0.0, -1.0], [-1.0, 0.0, 5.0], [1.0, 0.0, 5.0]];
+    let positions = scene.gpu.buffer_of(positions.as_flattened());
+    let pixels = scene.draw([0.0; 4], |device, commands| {
+        // SAFETY: see the crate.
+        unsafe {
+            device.cmd_bind_vertex_buffers(commands, 5, &[positions.buffer], &[0]);
+            device.cmd_draw(commands, 1, 2, 0, 1);
+        }
+    });
+    let (x, y) = CENTER;
+    assert_close(at(&pixels, (x - 20, y)), premultiplied(RED, 0.8));
+    assert_close(at(&pixels, (x + 20, y)), premultiplied(RED, 0.8));
+    assert_eq!(at(&pixels, CENTER), [0.0; 4]);
+    scene.gpu.free_buffer(positions);
+}
+
+#[test]
+fn indirect_draws_read_their_numbers_when_they_execute() {
+    let scene = scene(&[
+        splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
+        splat([0.0, 0.0, 5.0], 0.1, 0.7, BLUE),
+    ]);
+    let numbers = scene.gpu.buffer_of(&[0u32; 5]);
+    let indices = scene.gpu.buffer_of(&[1u32, 0]);
+    let commands = scene
+        .gpu
+        .record(|device, commands| {
+            pass(device, commands, scene.image, [0.0; 4], || {
+                scene.bind(device, commands);
+                let buffer = indices.buffer;
+                // SAFETY: see the crate.
+                unsafe {
+                    device.cmd_bind_index_buffer(commands, buffer, 0, vk::IndexType::UINT32);
+                    device.cmd_draw_indexed_indirect(commands, numbers.buffer, 0, 1, 20);
+                }
+            });
+        })
+        .unwrap();
+    for (now, expected) in [
+        ([0u32, 0, 0, 0, 0], [0.0; 4]),
+        ([1, 1, 0, 0, 0], premultiplied(BLUE, 0.7)),
+        ([1, 1, 1, 0, 0], premultiplied(RED, 0.5)),
+    ] {
+        scene.gpu.write(numbers, bytemuck::cast_slice(&now));
+        scene.gpu.submit(commands);
+        assert_close(at(&scene.pixels(), CENTER), expected);
+    }
+    scene.gpu.free_buffer(numbers);
+    scene.gpu.free_buffer(indices);
+}
+
+#[test]
+fn the_number_of_indirect_draws_may_lie_in_a_buffer() {
+    let scene = scene(&[
+        splat([-1.0, 0.0, 5.0], 0.02, 0.5, RED),
+        splat([1.0, 0.0, 5.0], 0.02, 0.7, BLUE),
+    ]);
+    let numbers = scene.gpu.buffer_of(&[1u32, 1, 0, 0, 1, 1, 1, 0]);
+    for (count, drawn) in [
+        (0u32, [false, false]),
+        (1, [true, false]),
+        (9, [true, true]),
+    ] {
+        let count = scene.gpu.buffer_of(&[count]);
+        let pixels = scene.draw([0.0; 4], |device, commands| {
+            let (numbers, count) = (numbers.buffer, count.buffer);
+            // SAFETY: see the crate.
+            unsafe { device.cmd_draw_indirect_count(commands, numbers, 0, count, 0, 2, 16) };
+        });
+        let (x, y) = CENTER;
+        let [left, right] = [at(&pixels, (x - 20, y)), at(&pixels, (x + 20, y))];
+        assert_eq!([left[3] > 0.4, right[3] > 0.6], drawn);
+        scene.gpu.free_buffer(count);
+    }
+    scene.gpu.free_buffer(numbers);
+}
+
+#[test]
+fn a_draw_without_a_camera_draws_nothing_and_says_so() {
+    let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, RED)]);
+    scene.gpu.run(|device, commands| {
+        pass(device, commands, scene.image, [0.25; 4], || {
+            let splats = [scene.splats.buffer];
+            // SAFETY: see the crate.
+            unsafe {
+                device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, scene.pipeline);
+                device.cmd_bind_vertex_buffers(commands, 0, &splats, &[0]);
+                device.cmd_draw(commands, 1, 1, 0, 0);
+            }
+        });
+    });
+    assert!(scene.pixels().iter().all(|pixel| *pixel == [0.25; 4]));
+    let messages = scene.gpu.take_messages().concat();
+    assert!(
+        messages.contains("vkCmdSetGaussianCameraGAURAST"),
+        "{messages}"
+    );
+}
+
+#[test]
+fn a_camera_that_is_none_fails_the_recording() {
+    let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, RED)]);
+    let camera = crate::scene::camera().near_plane(-1.0);
+    let recorded = scene.gpu.record(|_, commands| {
+        // SAFETY: see the crate.
+        unsafe {
+            let gaussian = &scene.gpu.gaussian;
+            gaussian.cmd_set_gaussian_camera(commands, &camera);
+        }
+    });
+    assert_eq!(
+        recorded.unwrap_err(),
+        vk::Result::ERROR_VALIDATION_FAILED_EXT
+    );
+    assert!(scene.gpu.take_messages().concat().contains("nearPlane"));
+}

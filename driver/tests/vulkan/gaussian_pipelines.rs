@@ -1,0 +1,292 @@
+//! What Gaussian pipelines refuse, and what they say then.
+
+use crate::gpu::Gpu;
+use crate::scene::{PipelineRequest, over, replace};
+use ash::vk;
+use gaurast::vk::{
+    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianGeometryGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
+};
+
+type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
+
+/// Creates a pipeline and says what became of it.
+fn create(gpu: &Gpu, request: &PipelineRequest) -> Result<(), (vk::Result, String)> {
+    match request.create(gpu) {
+        Ok(pipeline) => {
+            // SAFETY: see the crate.
+            unsafe { gpu.device.destroy_pipeline(pipeline, None) };
+            Ok(())
+        }
+        Err(error) => Err((error, gpu.take_messages().concat())),
+    }
+}
+
+fn with_state(change: impl FnOnce(State) -> State) -> PipelineRequest<'static> {
+    let request = PipelineRequest::default();
+    let gaussian = request.gaussian.map(change);
+    PipelineRequest {
+        gaussian,
+        ..request
+    }
+}
+
+fn assert_refused(gpu: &Gpu, request: &PipelineRequest, error: vk::Result, word: &str) {
+    let (result, message) = create(gpu, request).expect_err(word);
+    assert_eq!(result, error, "{word}");
+    assert!(message.contains(word), "{message:?} does not say {word:?}");
+    assert!(message.contains("vkCreateGraphicsPipelines"), "{message:?}");
+}
+
+#[test]
+fn a_pipeline_without_the_structure_is_refused() {
+    let gpu = Gpu::new();
+    let request = PipelineRequest {
+        gaussian: None,
+        ..PipelineRequest::default()
+    };
+    let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+    assert_refused(&gpu, &request, error, "must chain");
+}
+
+#[test]
+fn values_outside_their_ranges_are_refused() {
+    let gpu = Gpu::new();
+    let bad = [
+        (with_state(|s| s.spherical_harmonics_degree(4)), "Degree"),
+        (with_state(|s| s.low_pass_variance(-0.1)), "lowPassVariance"),
+        (
+            with_state(|s| s.low_pass_variance(f32::INFINITY)),
+            "lowPassVariance",
+        ),
+        (
+            with_state(|s| s.low_pass_variance(f32::NAN)),
+            "lowPassVariance",
+        ),
+        (with_state(|s| s.alpha_floor(-0.1)), "alphaFloor"),
+        (with_state(|s| s.alpha_floor(1.5)), "alphaFloor"),
+        (with_state(|s| s.alpha_floor(f32::NAN)), "alphaFloor"),
+        (with_state(|s| s.alpha_ceiling(1.1)), "alphaCeiling"),
+        (with_state(|s| s.alpha_ceiling(0.0)), "alphaCeiling"),
+        (
+            with_state(|s| s.alpha_floor(0.5).alpha_ceiling(0.4)),
+            "alphaCeiling",
+        ),
+        (
+            with_state(|s| s.transmittance_floor(1.0)),
+            "transmittanceFloor",
+        ),
+        (
+            with_state(|s| s.transmittance_floor(-1.0)),
+            "transmittanceFloor",
+        ),
+        (
+            with_state(|s| s.order(GaussianOrderGAURAST::from_raw(9))),
+            "order",
+        ),
+    ];
+    for (request, word) in bad {
+        let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+        assert_refused(&gpu, &request, error, word);
+    }
+    let limits = with_state(|s| {
+        let s = s.low_pass_variance(0.0).transmittance_floor(0.0);
+        s.alpha_floor(0.0).alpha_ceiling(1.0)
+    });
+    create(&gpu, &limits).unwrap();
+}
+
+#[test]
+fn modes_that_are_not_built_are_refused_by_their_feature() {
+    let gpu = Gpu::new();
+    let bad = [
+        (
+            with_state(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)),
+            "vertexShaderProjection",
+        ),
+        (
+            with_state(|s| s.order(GaussianOrderGAURAST::RADIAL_DISTANCE)),
+            "radialDistanceOrder",
+        ),
+        (
+            with_state(|s| s.order(GaussianOrderGAURAST::PRIMITIVE)),
+            "primitiveOrder",
+        ),
+        (
+            with_state(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
+            "perPixelOrder",
+        ),
+        (
+            with_state(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16)),
+            "rasterizationFloat16",
+        ),
+        (
+            with_state(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
+            "gaussian2D",
+        ),
+        (
+            with_state(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)),
+            "unscentedProjection",
+        ),
+        (
+            with_state(|s| s.camera_source(GaussianCameraSourceGAURAST::UNIFORM_BUFFER)),
+            "uniformBufferCamera",
+        ),
+        (
+            with_state(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS)),
+            "mergedDraws",
+        ),
+        (
+            with_state(|s| s.attribute_locations(s.attribute_locations.model_opacity(3))),
+            "gaussianInstancing",
+        ),
+        (
+            PipelineRequest {
+                depth_test: true,
+                ..PipelineRequest::default()
+            },
+            "gaussianDepthStencil",
+        ),
+        (
+            PipelineRequest {
+                samples: vk::SampleCountFlags::TYPE_4,
+                ..PipelineRequest::default()
+            },
+            "gaussianMultisample",
+        ),
+        (
+            PipelineRequest {
+                logic_op: true,
+                ..PipelineRequest::default()
+            },
+            "logicOp",
+        ),
+        (
+            PipelineRequest {
+                blend: vec![over().src_color_blend_factor(vk::BlendFactor::SRC1_COLOR)],
+                ..PipelineRequest::default()
+            },
+            "dualSrcBlend",
+        ),
+        (
+            PipelineRequest {
+                dynamic: vec![vk::DynamicState::DEPTH_TEST_ENABLE],
+                ..PipelineRequest::default()
+            },
+            "DEPTH_TEST_ENABLE",
+        ),
+        (
+            PipelineRequest {
+                topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+                ..PipelineRequest::default()
+            },
+            "TRIANGLE_LIST",
+        ),
+    ];
+    for (request, word) in bad {
+        assert_refused(&gpu, &request, vk::Result::ERROR_FEATURE_NOT_PRESENT, word);
+    }
+    let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
+    create(&gpu, &with_state(|s| s.antialiasing(compensated))).unwrap();
+}
+
+#[test]
+fn attributes_must_be_in_the_vertex_input_state() {
+    let gpu = Gpu::new();
+    let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+    for (index, name) in ["position", "scale", "rotation", "opacity", "coefficient 0"]
+        .into_iter()
+        .enumerate()
+    {
+        let mut missing = PipelineRequest::default();
+        missing.attributes.retain(|a| a.location != index as u32);
+        assert_refused(&gpu, &missing, error, name);
+        let mut unbound = PipelineRequest::default();
+        unbound.attributes[index].binding = 7;
+        assert_refused(&gpu, &unbound, error, name);
+        let mut integers = PipelineRequest::default();
+        integers.attributes[index].format = vk::Format::R32G32B32A32_UINT;
+        assert_refused(&gpu, &integers, error, name);
+    }
+    let mut short = PipelineRequest::default();
+    short.attributes[2].format = vk::Format::R32G32B32_SFLOAT;
+    assert_refused(&gpu, &short, error, "fewer than 4 components");
+    // Degree 1 has four coefficients, and only one is there.
+    let degree1 = with_state(|s| s.spherical_harmonics_degree(1));
+    assert_refused(&gpu, &degree1, error, "coefficient 1");
+}
+
+#[test]
+fn fixed_function_projection_has_no_stages() {
+    let gpu = Gpu::new();
+    // SAFETY: see the crate.
+    unsafe {
+        let code = [0x0723_0203, 0x0001_0000, 0, 1, 0];
+        let info = vk::ShaderModuleCreateInfo::default().code(&code);
+        let module = gpu.device.create_shader_module(&info, None).unwrap();
+        let stage = |stage| {
+            vk::PipelineShaderStageCreateInfo::default()
+                .stage(stage)
+                .module(module)
+                .name(c"main")
+        };
+        let mut request = PipelineRequest {
+            stages: vec![stage(vk::ShaderStageFlags::VERTEX)],
+            ..PipelineRequest::default()
+        };
+        let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+        assert_refused(&gpu, &request, error, "VERTEX");
+        request.stages = vec![stage(vk::ShaderStageFlags::FRAGMENT)];
+        let error = vk::Result::ERROR_FEATURE_NOT_PRESENT;
+        assert_refused(&gpu, &request, error, "resolveFragmentShader");
+        gpu.device.destroy_shader_module(module, None);
+        let text = vk::ShaderModuleCreateInfo::default().code(&[1, 2, 3]);
+        assert!(gpu.device.create_shader_module(&text, None).is_err());
+    }
+}
+
+#[test]
+fn blend_state_and_attachments_correspond() {
+    let gpu = Gpu::new();
+    let request = PipelineRequest {
+        blend: vec![replace(); 2],
+        ..PipelineRequest::default()
+    };
+    let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+    assert_refused(&gpu, &request, error, "attachmentCount");
+    let request = PipelineRequest {
+        dynamic: vec![vk::DynamicState::SCISSOR],
+        ..PipelineRequest::default()
+    };
+    assert_refused(&gpu, &request, error, "viewport");
+}
+
+#[test]
+fn compute_pipelines_are_refused_with_null_handles() {
+    let gpu = Gpu::new();
+    let infos = [vk::ComputePipelineCreateInfo::default(); 2];
+    // SAFETY: see the crate.
+    let created = unsafe {
+        gpu.device
+            .create_compute_pipelines(vk::PipelineCache::null(), &infos, None)
+    };
+    let (pipelines, error) = created.unwrap_err();
+    assert_eq!(error, vk::Result::ERROR_FEATURE_NOT_PRESENT);
+    assert_eq!(pipelines, [vk::Pipeline::null(); 2]);
+}
+
+#[test]
+fn a_pipeline_cache_is_empty_and_says_whose_it_is() {
+    let gpu = Gpu::new();
+    // SAFETY: see the crate.
+    unsafe {
+        let info = vk::PipelineCacheCreateInfo::default();
+        let cache = gpu.device.create_pipeline_cache(&info, None).unwrap();
+        let data = gpu.device.get_pipeline_cache_data(cache).unwrap();
+        assert_eq!(data.len(), 32);
+        assert_eq!(data[..8], [32, 0, 0, 0, 1, 0, 0, 0]);
+        gpu.device.destroy_pipeline_cache(cache, None);
+    }
+}

@@ -1,0 +1,18 @@
+//! The driver as an application sees it: `ash` over the embedded door.
+//!
+//! `unsafe` here has one reason throughout: these are Vulkan calls, and each test follows Vulkan's valid usage or
+//! breaks it in the one way that it is about, which the driver must survive.
+
+mod command_buffers;
+mod gaussian_draws;
+mod gaussian_pipelines;
+mod gpu;
+#[path = "../support/loader.rs"]
+mod loader;
+mod memory;
+mod queries;
+mod render_passes;
+mod scene;
+mod synchronization;
+mod transfers;
+mod validation;

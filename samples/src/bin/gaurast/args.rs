@@ -1,0 +1,215 @@
+//! The command line.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Parser, Subcommand};
+use gaurast_samples::scene::{self, MAX_SH_DEGREE};
+
+/// The greatest width and height of a picture.
+const MAX_SIDE: u32 = 16_384;
+
+/// Renders scenes of 3D Gaussians on a software Vulkan device with a Gaussian primitive topology.
+///
+/// Without a command, `gaurast` does what `gaurast render` does: it draws a generated garden and
+/// writes gaurast.png.
+#[derive(Parser)]
+#[command(version, max_term_width = 100)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Draws a scene and writes the picture.
+    Render(Box<RenderArguments>),
+}
+
+impl Default for Command {
+    fn default() -> Self {
+        Self::Render(Box::default())
+    }
+}
+
+#[derive(Args)]
+#[command(after_help = format!("Scenes are read from {} files, as far as there is a reader. \
+    Their frame is that of 3DGS: x right, y down, z forward.", scene::known_extensions()))]
+pub struct RenderArguments {
+    /// The scene file; a generated garden if there is none
+    pub scene: Option<PathBuf>,
+
+    /// A camera file: cameras.json of 3DGS, or transforms.json of nerfstudio
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["eye", "target", "up", "fov"])]
+    pub cameras: Option<PathBuf>,
+
+    /// Which camera of the file, from 0
+    #[arg(long, value_name = "N", requires = "cameras", default_value_t = 0)]
+    pub view: usize,
+
+    /// The camera's position
+    ///
+    /// Without it, the camera has the whole scene in the picture.
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "target",
+        allow_hyphen_values = true
+    )]
+    pub eye: Option<Triple>,
+
+    /// The point that the camera looks at
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "eye",
+        allow_hyphen_values = true
+    )]
+    pub target: Option<Triple>,
+
+    /// The direction that is upwards in the picture [default: 0,-1,0]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "eye",
+        allow_hyphen_values = true
+    )]
+    pub up: Option<Triple>,
+
+    /// The vertical field of view [default: 50; 42 for the garden]
+    #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
+    pub fov: Option<f64>,
+
+    /// The picture's size in pixels [default: 1280x720, or the camera file's]
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+
+    /// The colour behind the scene, each component 0 to 1
+    ///
+    /// The scene is composited over it: C + T background, with alpha 1. Without it, EXR files
+    /// hold (C, 1 - T), premultiplied, and PNG files are opaque over black.
+    #[arg(long, value_name = "R,G,B", allow_hyphen_values = true)]
+    pub background: Option<Triple>,
+
+    /// Draw with spherical harmonics of at most this degree
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_SH_DEGREE)))]
+    pub sh_degree: Option<u32>,
+
+    /// Print nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+
+    /// Where the picture goes; may be given more than once
+    ///
+    /// PNG has 8 bits, with colours as they are trained; EXR has 32-bit floats.
+    #[arg(short, long, value_name = "FILE.png|FILE.exr", default_value = DEFAULT_OUTPUT)]
+    pub output: Vec<PathBuf>,
+}
+
+const DEFAULT_OUTPUT: &str = "gaurast.png";
+
+impl Default for RenderArguments {
+    fn default() -> Self {
+        Self {
+            scene: None,
+            cameras: None,
+            view: 0,
+            eye: None,
+            target: None,
+            up: None,
+            fov: None,
+            size: None,
+            background: None,
+            sh_degree: None,
+            quiet: false,
+            output: vec![DEFAULT_OUTPUT.into()],
+        }
+    }
+}
+
+/// Three finite numbers with commas between them.
+#[derive(Clone, Copy, Debug)]
+pub struct Triple(pub [f64; 3]);
+
+impl FromStr for Triple {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let numbers: Option<Vec<f64>> = text
+            .split(',')
+            .map(|word| word.trim().parse().ok().filter(|x: &f64| x.is_finite()))
+            .collect();
+        numbers
+            .and_then(|numbers| numbers.try_into().ok())
+            .map(Self)
+            .ok_or("three numbers are needed, with commas between them")
+    }
+}
+
+/// A picture's width and height.
+#[derive(Clone, Copy, Debug)]
+pub struct Size(pub [u32; 2]);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let (width, height) = text
+            .split_once(['x', 'X'])
+            .ok_or("a width and a height are needed, such as 1280x720")?;
+        let side = |word: &str| {
+            word.parse()
+                .ok()
+                .filter(|side| (1..=MAX_SIDE).contains(side))
+                .ok_or(format!("each side is 1 to {MAX_SIDE} pixels"))
+        };
+        Ok(Self([side(width)?, side(height)?]))
+    }
+}
+
+fn field_of_view(text: &str) -> Result<f64, &'static str> {
+    text.parse()
+        .ok()
+        .filter(|degrees| *degrees > 0.0 && *degrees < 180.0)
+        .ok_or("it is more than 0 and less than 180 degrees")
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn no_arguments_are_the_defaults_of_render() {
+        let arguments = Arguments::parse_from(["gaurast", "render"]);
+        let Some(Command::Render(parsed)) = arguments.command else {
+            panic!("not render");
+        };
+        let default = RenderArguments::default();
+        assert_eq!(parsed.output, default.output);
+        assert_eq!(parsed.view, default.view);
+        assert_eq!(parsed.quiet, default.quiet);
+        assert!(parsed.scene.is_none() && parsed.size.is_none() && parsed.fov.is_none());
+    }
+
+    #[test]
+    fn sizes_and_triples() {
+        assert_eq!("640x480".parse::<Size>().map(|s| s.0), Ok([640, 480]));
+        for bad in ["640", "0x1", "1x", "16385x1", "-1x1", "1x99999999999"] {
+            assert!(bad.parse::<Size>().is_err(), "{bad}");
+        }
+        assert_eq!(
+            "1,-2.5, 3e2".parse::<Triple>().map(|t| t.0),
+            Ok([1., -2.5, 300.])
+        );
+        for bad in ["1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", ""] {
+            assert!(bad.parse::<Triple>().is_err(), "{bad}");
+        }
+    }
+}

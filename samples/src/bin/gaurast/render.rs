@@ -1,0 +1,139 @@
+//! `gaurast render`.
+
+use std::io::{Write, stdout};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use gaurast_samples::camera::{self, Camera, CameraError, CameraFileError, DEFAULT_FOV};
+use gaurast_samples::output::{self, OutputError};
+use gaurast_samples::renderer::{RenderError, Renderer};
+use gaurast_samples::scene::{DEFAULT_COUNT, Scene, SceneError};
+use thiserror::Error;
+
+use crate::args::RenderArguments;
+use crate::progress::Progress;
+use crate::report;
+
+/// The picture's size where nothing says otherwise.
+const DEFAULT_SIZE: [u32; 2] = [1280, 720];
+
+/// The generated garden's seed.
+const SEED: u64 = 1;
+
+/// Why there is no picture. Displayed as one sentence.
+#[derive(Debug, Error)]
+pub enum Error {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    CameraFile(#[from] CameraFileError),
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    #[error("{}: view {view}: there are {count} views, counted from 0", path.display())]
+    NoView {
+        path: PathBuf,
+        view: usize,
+        count: usize,
+    },
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// Draws a scene and writes the picture.
+pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
+    for path in &arguments.output {
+        output::check(path)?;
+    }
+    // A camera file is read first: its mistakes should not wait for a large scene.
+    let view = match &arguments.cameras {
+        Some(path) => Some(file_camera(path, arguments)?),
+        None => None,
+    };
+    let progress = Progress {
+        quiet: arguments.quiet,
+    };
+    let start = Instant::now();
+    let scene = match &arguments.scene {
+        Some(path) => load(path, progress)?,
+        None => {
+            let _step = progress.step("generating");
+            Scene::generate(SEED, DEFAULT_COUNT)
+        }
+    };
+    let loading = start.elapsed();
+    let camera = match view {
+        Some(camera) => camera,
+        None => scene_camera(&scene, arguments)?,
+    };
+
+    let step = progress.step("rendering");
+    let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
+    let uploaded = renderer.upload(&scene, arguments.sh_degree)?;
+    let frame = renderer.render(&uploaded, &camera)?;
+    step.finish_and_clear();
+
+    let step = progress.step("writing");
+    let background = arguments
+        .background
+        .map(|background| background.0.map(|c| c as f32));
+    for path in &arguments.output {
+        output::write(path, &frame.picture, background)?;
+    }
+    step.finish_and_clear();
+    if !arguments.quiet {
+        // Whoever reads this may have gone; the picture is there all the same.
+        let _ = print(&report::table(&scene, loading, &frame), &arguments.output);
+    }
+    Ok(())
+}
+
+fn print(table: &comfy_table::Table, outputs: &[PathBuf]) -> std::io::Result<()> {
+    let mut stdout = stdout().lock();
+    writeln!(stdout, "{table}")?;
+    for path in outputs {
+        writeln!(stdout, "wrote {}", path.display())?;
+    }
+    Ok(())
+}
+
+fn load(path: &Path, progress: Progress) -> Result<Scene, Error> {
+    let bar = progress.bytes("reading", 0);
+    let scene = Scene::load_through(path, |file, len| {
+        bar.set_length(len);
+        bar.wrap_read(file)
+    })?;
+    bar.finish_and_clear();
+    Ok(scene)
+}
+
+/// The camera of a camera file, at the size asked for.
+fn file_camera(path: &Path, arguments: &RenderArguments) -> Result<Camera, Error> {
+    let size = arguments.size.map(|size| size.0);
+    let mut views = camera::load(path, size.unwrap_or(DEFAULT_SIZE))?;
+    let (view, count) = (arguments.view, views.len());
+    if view >= count {
+        return Err(Error::NoView {
+            path: path.to_owned(),
+            view,
+            count,
+        });
+    }
+    let camera = views.swap_remove(view).camera;
+    Ok(size.map_or(camera.clone(), |size| camera.resized(size)))
+}
+
+/// The camera given by hand, or one that suits the scene.
+fn scene_camera(scene: &Scene, arguments: &RenderArguments) -> Result<Camera, Error> {
+    let size = arguments.size.map_or(DEFAULT_SIZE, |size| size.0);
+    let fov = arguments.fov;
+    Ok(match (arguments.eye, arguments.target) {
+        (Some(eye), Some(target)) => {
+            let up = arguments.up.map_or([0.0, -1.0, 0.0], |up| up.0);
+            Camera::look_at(eye.0, target.0, up, fov.unwrap_or(DEFAULT_FOV), size)?
+        }
+        _ if arguments.scene.is_none() => Camera::of_generated(fov, size)?,
+        _ => Camera::framing(scene, fov.unwrap_or(DEFAULT_FOV), size),
+    })
+}

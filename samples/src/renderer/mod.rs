@@ -1,0 +1,416 @@
+//! A headless renderer of scenes: an ordinary Vulkan application that draws with the Gaussian
+//! primitive topology.
+//!
+//! ```no_run
+//! # use gaurast_samples::{camera::Camera, renderer::Renderer, scene::Scene};
+//! # fn example(entry: ash::Entry, scene: &Scene, cameras: &[Camera])
+//! # -> Result<(), gaurast_samples::renderer::RenderError> {
+//! let mut renderer = Renderer::new(entry)?;
+//! let scene = renderer.upload(scene, None)?;
+//! for camera in cameras {
+//!     let frame = renderer.render(&scene, camera)?;
+//!     println!("{:?}", frame.picture.pixels[0]);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+
+mod device;
+mod pipeline;
+mod query;
+mod resource;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use ash::vk;
+use thiserror::Error;
+
+use crate::camera::Camera;
+use crate::output::Picture;
+use crate::scene::{Scene, Shape};
+use device::Device;
+use pipeline::{BINDINGS, GaussianPipeline};
+pub use query::Counter;
+use query::CounterQuery;
+use resource::{Buffer, CommandBuffers, Image, Memory};
+
+/// Bytes that go to the device at once.
+const STAGING: u64 = 64 << 20;
+
+/// The colour attachment's format: what a draw leaves is kept as it is.
+const COLOR_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+
+/// Why rendering failed.
+#[derive(Debug, Error)]
+pub enum RenderError {
+    /// A Vulkan call failed.
+    #[error("{call} failed: {result}")]
+    Vulkan {
+        /// The call.
+        call: &'static str,
+        /// Its result.
+        result: vk::Result,
+    },
+    /// No device draws Gaussians.
+    #[error("no Vulkan device draws Gaussians (there is {found})")]
+    NoDevice {
+        /// The devices there are.
+        found: String,
+    },
+    /// No memory type will do.
+    #[error("the device has no {0} memory for a resource")]
+    NoMemory(&'static str),
+    /// The picture is too large or empty.
+    #[error("a picture of {width}x{height} pixels is not within the device's 1x1 to {max}x{max}")]
+    Size {
+        /// The width in pixels.
+        width: u32,
+        /// The height in pixels.
+        height: u32,
+        /// The greatest width and height.
+        max: u32,
+    },
+    /// The scene has more Gaussians than one draw takes.
+    #[error("the scene has {count} Gaussians, and the device draws at most {max} at once")]
+    TooMany {
+        /// The scene's Gaussians.
+        count: u64,
+        /// The most in a draw.
+        max: u64,
+    },
+}
+
+/// Names the call that a Vulkan error came from.
+trait During<T> {
+    fn during(self, call: &'static str) -> Result<T, RenderError>;
+}
+
+impl<T> During<T> for ash::prelude::VkResult<T> {
+    fn during(self, call: &'static str) -> Result<T, RenderError> {
+        self.map_err(|result| RenderError::Vulkan { call, result })
+    }
+}
+
+/// A device that draws Gaussians, and what it needs from frame to frame.
+pub struct Renderer {
+    query: Option<CounterQuery>,
+    target: Option<Target>,
+    commands: CommandBuffers<2>,
+    device: Arc<Device>,
+}
+
+/// A scene in device memory, with its pipeline.
+pub struct DeviceScene {
+    count: u32,
+    pipeline: GaussianPipeline,
+    /// One for each of [`BINDINGS`].
+    buffers: [Buffer; BINDINGS],
+}
+
+/// A rendered picture and what it cost.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// (C, 1 - T) of every pixel, over nothing.
+    pub picture: Picture,
+    /// From the submission to its end, the copy to the host included.
+    pub time: Duration,
+    /// The device's counters of the draw, in its order; none if it has none.
+    pub counters: Vec<Counter>,
+}
+
+/// Where a frame goes.
+struct Target {
+    image: Image,
+    readback: Buffer,
+}
+
+impl Renderer {
+    /// A renderer on the first device of `entry` that draws Gaussians.
+    ///
+    /// # Errors
+    /// If there is none, or Vulkan fails.
+    pub fn new(entry: ash::Entry) -> Result<Self, RenderError> {
+        let device = Arc::new(Device::new(entry)?);
+        Ok(Self {
+            query: CounterQuery::new(&device)?,
+            target: None,
+            commands: CommandBuffers::new(&device)?,
+            device,
+        })
+    }
+
+    /// The device's name.
+    pub fn device_name(&self) -> &str {
+        self.device.name()
+    }
+
+    /// Copies `scene` to the device. Its colours are drawn with the spherical harmonics degree that
+    /// it stores, or `sh_degree`, or the device's greatest, whichever is least.
+    ///
+    /// # Errors
+    /// If the scene is too large for the device, or Vulkan fails.
+    pub fn upload(
+        &mut self,
+        scene: &Scene,
+        sh_degree: Option<u32>,
+    ) -> Result<DeviceScene, RenderError> {
+        let max = self.device.max_gaussians().min(u32::MAX.into());
+        let count = scene.len() as u64;
+        if count > max {
+            return Err(RenderError::TooMany { count, max });
+        }
+        let drawn_degree = scene
+            .sh_degree()
+            .min(sh_degree.unwrap_or(u32::MAX))
+            .min(self.device.max_sh_degree());
+        let strides = [
+            size_of::<[f32; 3]>(),
+            size_of::<Shape>(),
+            scene.sh_stride() * size_of::<[f32; 3]>(),
+        ]
+        .map(|stride| stride as u32);
+        Ok(DeviceScene {
+            count: count as u32,
+            pipeline: GaussianPipeline::new(&self.device, strides, drawn_degree, COLOR_FORMAT)?,
+            buffers: [
+                self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
+                self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
+                self.upload_bytes(bytemuck::cast_slice(scene.sh()))?,
+            ],
+        })
+    }
+
+    /// A device-local vertex buffer of `bytes`, by way of a staging buffer.
+    fn upload_bytes(&mut self, bytes: &[u8]) -> Result<Buffer, RenderError> {
+        use vk::BufferUsageFlags as Usage;
+        let usage = Usage::VERTEX_BUFFER | Usage::TRANSFER_DST;
+        // Vulkan has no empty buffers; an empty scene is drawn with none of this read.
+        let size = (bytes.len() as u64).max(4);
+        let buffer = Buffer::new(&self.device, size, usage, Memory::Device)?;
+        let staging_size = size.min(STAGING);
+        let staging = Buffer::new(
+            &self.device,
+            staging_size,
+            Usage::TRANSFER_SRC,
+            Memory::Host,
+        )?;
+        let mut offset = 0;
+        for chunk in bytes.chunks(staging_size as usize) {
+            staging.write(chunk)?;
+            let region = vk::BufferCopy::default()
+                .dst_offset(offset)
+                .size(chunk.len() as u64);
+            self.commands.record(0, |device, commands| {
+                // SAFETY: the command buffer is recording, and the regions lie within both
+                // buffers, which live until the submission below has ended.
+                unsafe {
+                    device.cmd_copy_buffer(commands, staging.handle(), buffer.handle(), &[region]);
+                }
+                // The next submission's draws read it as vertices.
+                let barrier = vk::MemoryBarrier::default()
+                    .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+                    .dst_access_mask(vk::AccessFlags::VERTEX_ATTRIBUTE_READ);
+                // SAFETY: the command buffer is recording, outside a render pass.
+                unsafe {
+                    device.cmd_pipeline_barrier(
+                        commands,
+                        vk::PipelineStageFlags::TRANSFER,
+                        vk::PipelineStageFlags::VERTEX_INPUT,
+                        vk::DependencyFlags::empty(),
+                        &[barrier],
+                        &[],
+                        &[],
+                    );
+                }
+            })?;
+            self.commands.submit_and_wait(&[0])?;
+            offset += chunk.len() as u64;
+        }
+        Ok(buffer)
+    }
+
+    /// Draws `scene` as `camera` sees it, in a picture of the camera's size.
+    ///
+    /// # Errors
+    /// If the size is not within the device's limits, or Vulkan fails.
+    pub fn render(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<Frame, RenderError> {
+        let (width, height) = (camera.width, camera.height);
+        let max = self.device.max_size();
+        if !(1..=max).contains(&width) || !(1..=max).contains(&height) {
+            return Err(RenderError::Size { width, height, max });
+        }
+        let target = match self.target.take() {
+            Some(target) if target.image.extent() == vk::Extent2D { width, height } => target,
+            _ => Target::new(&self.device, width, height)?,
+        };
+        let target = self.target.insert(target);
+
+        // A query is not reset in the submission that it begins in, and it spans a whole command
+        // buffer, so that counters of any scope will do.
+        if let Some(query) = &self.query {
+            self.commands
+                .record(0, |_, commands| query.reset(commands))?;
+            self.commands.submit_and_wait(&[0])?;
+        }
+        self.commands.record(0, |_, commands| {
+            if let Some(query) = &self.query {
+                query.begin(commands);
+            }
+            record_draw(&self.device, commands, &target.image, scene, camera);
+            if let Some(query) = &self.query {
+                query.end(commands);
+            }
+        })?;
+        self.commands
+            .record(1, |_, commands| record_copy(&self.device, commands, target))?;
+        let start = Instant::now();
+        self.commands.submit_and_wait(&[0, 1])?;
+        let time = start.elapsed();
+
+        let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
+        target.readback.read(&mut pixels)?;
+        let counters = self.query.as_ref().map(CounterQuery::read).transpose()?;
+        Ok(Frame {
+            picture: Picture {
+                width,
+                height,
+                pixels,
+            },
+            time,
+            counters: counters.unwrap_or_default(),
+        })
+    }
+}
+
+impl Target {
+    fn new(device: &Arc<Device>, width: u32, height: u32) -> Result<Self, RenderError> {
+        let bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
+        Ok(Self {
+            image: Image::new(
+                device,
+                vk::Extent2D { width, height },
+                COLOR_FORMAT,
+                vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC,
+            )?,
+            readback: Buffer::new(
+                device,
+                bytes,
+                vk::BufferUsageFlags::TRANSFER_DST,
+                Memory::HostCached,
+            )?,
+        })
+    }
+}
+
+/// Clears `image` to nothing and draws `scene` into it.
+fn record_draw(
+    device: &Device,
+    commands: vk::CommandBuffer,
+    image: &Image,
+    scene: &DeviceScene,
+    camera: &Camera,
+) {
+    let area = vk::Rect2D::default().extent(image.extent());
+    let viewport = vk::Viewport::default()
+        .width(area.extent.width as f32)
+        .height(area.extent.height as f32)
+        .max_depth(1.0);
+    let attachment = vk::RenderingAttachmentInfo::default()
+        .image_view(image.view())
+        .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+        .load_op(vk::AttachmentLoadOp::CLEAR)
+        .store_op(vk::AttachmentStoreOp::STORE);
+    let attachments = [attachment];
+    let rendering = vk::RenderingInfo::default()
+        .render_area(area)
+        .layer_count(1)
+        .color_attachments(&attachments);
+    let to_attachment = image
+        .barrier(
+            vk::ImageLayout::UNDEFINED,
+            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+        )
+        .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE);
+    let buffers = scene.buffers.each_ref().map(Buffer::handle);
+    let raw = device.raw();
+    // SAFETY: the command buffer is recording; image, pipeline and buffers belong to the same
+    // device and live until the submission has ended; the pipeline's dynamic state, vertex
+    // buffers and camera are all set before the draw, whose vertices lie within the buffers.
+    unsafe {
+        raw.cmd_pipeline_barrier(
+            commands,
+            vk::PipelineStageFlags::TRANSFER,
+            vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+            vk::DependencyFlags::empty(),
+            &[],
+            &[],
+            &[to_attachment],
+        );
+        raw.cmd_begin_rendering(commands, &rendering);
+        raw.cmd_bind_pipeline(
+            commands,
+            vk::PipelineBindPoint::GRAPHICS,
+            scene.pipeline.handle(),
+        );
+        raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
+        raw.cmd_set_viewport(commands, 0, &[viewport]);
+        raw.cmd_set_scissor(commands, 0, &[area]);
+        device
+            .gaussian()
+            .cmd_set_gaussian_camera(commands, &camera.to_vulkan());
+        raw.cmd_draw(commands, scene.count, 1, 0, 0);
+        raw.cmd_end_rendering(commands);
+    }
+}
+
+/// Copies the drawn picture to the buffer that the host reads.
+fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target) {
+    let image = &target.image;
+    let to_source = image
+        .barrier(
+            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+        )
+        .src_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE)
+        .dst_access_mask(vk::AccessFlags::TRANSFER_READ);
+    let layers = vk::ImageSubresourceLayers::default()
+        .aspect_mask(vk::ImageAspectFlags::COLOR)
+        .layer_count(1);
+    let region = vk::BufferImageCopy::default()
+        .image_subresource(layers)
+        .image_extent(image.extent().into());
+    let to_host = vk::MemoryBarrier::default()
+        .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+        .dst_access_mask(vk::AccessFlags::HOST_READ);
+    let raw = device.raw();
+    // SAFETY: the command buffer is recording; the buffer holds the whole image without gaps, and
+    // both live until the submission has ended.
+    unsafe {
+        raw.cmd_pipeline_barrier(
+            commands,
+            vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+            vk::PipelineStageFlags::TRANSFER,
+            vk::DependencyFlags::empty(),
+            &[],
+            &[],
+            &[to_source],
+        );
+        raw.cmd_copy_image_to_buffer(
+            commands,
+            image.handle(),
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            target.readback.handle(),
+            &[region],
+        );
+        raw.cmd_pipeline_barrier(
+            commands,
+            vk::PipelineStageFlags::TRANSFER,
+            vk::PipelineStageFlags::HOST,
+            vk::DependencyFlags::empty(),
+            &[to_host],
+            &[],
+            &[],
+        );
+    }
+}

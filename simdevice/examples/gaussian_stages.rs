@@ -1,0 +1,200 @@
+//! Times the stages of a Gaussian draw on a synthetic scene: `gaussian_stages [COUNT] [LEVEL] [THREADS]`.
+//!
+//! The scene: 35 % on a sphere shell, 35 % on a plane, 30 % in a box; log-normal scales (median 0.012, sigma
+//! 0.6), flattened; random rotations; opacity logit N(0.5, 2); degree 3. 1280x720, focal length 1000 px.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use simdevice::counters::{Counter, Counters};
+use simdevice::device::SimdLevel;
+use simdevice::gaussian::{GaussianSet, TILE_SIZE};
+use simdevice::packet::*;
+use simdevice::raster::gaussian::GaussianTile;
+use simdevice::{Allocation, Config, Device, Format};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use std::time::Instant;
+
+const WIDTH: u32 = 1280;
+const HEIGHT: u32 = 720;
+const FLOATS: usize = 3 + 8 + 48;
+
+fn normal(rng: &mut ChaCha8Rng, mean: f64, sigma: f64) -> f64 {
+    let (a, b): (f64, f64) = (rng.random(), rng.random());
+    mean + sigma * (-2.0 * (1.0 - a).ln()).sqrt() * (TAU * b).cos()
+}
+
+fn gaussian(rng: &mut ChaCha8Rng) -> [f32; FLOATS] {
+    let which: f64 = rng.random();
+    let position = if which < 0.35 {
+        let v = [0; 3].map(|_| normal(rng, 0.0, 1.0));
+        let norm = v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        v.map(|v| 1.5 * v / norm)
+    } else if which < 0.7 {
+        [
+            rng.random_range(-5.0..5.0),
+            1.6,
+            rng.random_range(-6.0..6.0),
+        ]
+    } else {
+        [
+            rng.random_range(-4.0..4.0),
+            rng.random_range(-2.2..2.2),
+            rng.random_range(-5.0..5.0),
+        ]
+    };
+    let mut scale = [0; 3].map(|_| normal(rng, 0.012f64.ln(), 0.6).exp());
+    scale[2] *= normal(rng, -0.7, 0.5).exp();
+    let rotation = [0; 4].map(|_| normal(rng, 0.0, 1.0));
+    let opacity = 1.0 / (1.0 + (-normal(rng, 0.5, 2.0)).exp());
+    let mut out = [0.0; FLOATS];
+    let head = position
+        .into_iter()
+        .chain(scale)
+        .chain(rotation)
+        .chain([opacity]);
+    for (out, value) in out.iter_mut().zip(head) {
+        *out = value as f32;
+    }
+    for out in &mut out[11..14] {
+        *out = normal(rng, 0.0, 1.0) as f32;
+    }
+    for out in &mut out[14..] {
+        *out = normal(rng, 0.0, 0.08) as f32;
+    }
+    out
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let count: u32 = arguments.next().map_or(Ok(300_000), |text| text.parse())?;
+    let simd = arguments.next().unwrap_or_else(|| "best".into());
+    let simd = SimdLevel::from_name(&simd).ok_or("an unknown SIMD level")?;
+    let threads = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let device = Device::new(&Config {
+        threads,
+        simd,
+        ..Config::default()
+    })?;
+
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let scene: Vec<[f32; FLOATS]> = (0..count).map(|_| gaussian(&mut rng)).collect();
+    let part = |range: std::ops::Range<usize>| -> Result<_, Box<dyn std::error::Error>> {
+        let floats: Vec<f32> = scene
+            .iter()
+            .flat_map(|g| g[range.clone()].to_vec())
+            .collect();
+        let size = 4 * floats.len() as u64;
+        let memory = Allocation::new(size, false)?;
+        memory.write(0, &floats)?;
+        Ok((
+            BufferRange {
+                memory,
+                offset: 0,
+                size,
+            },
+            4 * range.len() as u32,
+        ))
+    };
+    let stream = |(buffer, stride): &(BufferRange, u32), offset, format| AttributeStream {
+        buffer: buffer.clone(),
+        stride: *stride,
+        offset,
+        format,
+        instance_divisor: None,
+    };
+    let (position, shape, harmonics) = (part(0..3)?, part(3..11)?, part(11..59)?);
+    let append = GaussianAppend {
+        attributes: GaussianAttributes {
+            position: stream(&position, 0, Format::R32G32B32Sfloat),
+            scale: stream(&shape, 0, Format::R32G32B32Sfloat),
+            rotation: stream(&shape, 12, Format::R32G32B32A32Sfloat),
+            opacity: stream(&shape, 28, Format::R32Sfloat),
+            spherical_harmonics: (0..16)
+                .map(|k| stream(&harmonics, 12 * k, Format::R32G32B32Sfloat))
+                .collect(),
+        },
+        indices: None,
+        first: 0,
+        count,
+        first_instance: 0,
+        instance_count: 1,
+    };
+    let area = Rect {
+        x: 0,
+        y: 0,
+        width: WIDTH,
+        height: HEIGHT,
+    };
+    let begin = GaussianBegin {
+        state: Arc::new(GaussianState {
+            sh_degree: 3,
+            order: GaussianOrder::ViewDepth,
+            opacity_compensated: false,
+            low_pass_variance: 0.3,
+            alpha_floor: 1.0 / 255.0,
+            alpha_ceiling: 0.99,
+            transmittance_floor: 1e-4,
+            blend: Vec::new(),
+            blend_constants: [0.0; 4],
+        }),
+        camera: Camera {
+            model: CameraModel::Pinhole,
+            rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            eye: [0.0, 0.0, -6.0],
+            focal_length: [1000.0; 2],
+            principal_point: [WIDTH as f32 / 2.0, HEIGHT as f32 / 2.0],
+            near_plane: 0.2,
+            far_plane: f32::INFINITY,
+            depth_coefficients: [0.0; 2],
+        },
+        viewport: Viewport {
+            x: 0.0,
+            y: 0.0,
+            width: WIDTH as f32,
+            height: HEIGHT as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        },
+        scissor: area,
+    };
+    let mut tile = Box::new(GaussianTile::default());
+    let mut times: Vec<[f64; 4]> = Vec::new();
+    let mut last = Counters::default();
+    for _ in 0..9 {
+        let mut counters = Counters::default();
+        let mut set = GaussianSet::begin(&begin, area);
+        set.append(&append);
+        let draw = set.resolve(&device, &mut counters)?;
+        let started = Instant::now();
+        let mut checksum = 0.0;
+        for y in 0..HEIGHT.div_ceil(TILE_SIZE) {
+            for x in 0..WIDTH.div_ceil(TILE_SIZE) {
+                tile.render(&draw, device.level(), x, y, &mut counters);
+                checksum += tile.pixel(3, 4).map_or(0.0, |color| color[1]);
+            }
+        }
+        let raster = started.elapsed().as_secs_f64() * 1e3;
+        std::hint::black_box(checksum);
+        let ms = |counter| counters.get(counter) as f64 / 1e6;
+        times.push([
+            ms(Counter::PreprocessTime),
+            ms(Counter::SortTime),
+            ms(Counter::BinningTime),
+            raster,
+        ]);
+        last = counters;
+    }
+    for (stage, name) in ["preprocess", "sort", "binning", "raster (1 thread)"]
+        .iter()
+        .enumerate()
+    {
+        let mut stage: Vec<f64> = times.iter().map(|time| time[stage]).collect();
+        stage.sort_by(f64::total_cmp);
+        println!("{name:>18}: {:8.2} ms (median of 9)", stage[4]);
+    }
+    for counter in Counter::ALL {
+        println!("{:>24}: {}", counter.info().name, last.get(*counter));
+    }
+    Ok(())
+}

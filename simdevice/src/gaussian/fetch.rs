@@ -1,0 +1,245 @@
+//! Vertex fetch for Gaussians: attribute streams to structures of arrays. Values are binary32, held as binary64.
+
+use super::lanes::Lanes;
+use crate::format::Format;
+use crate::packet::{AttributeStream, GaussianAppend, IndexStream};
+
+/// Gaussians per batch: what preprocessing holds in its caches at a time.
+pub(super) const BATCH: usize = 256;
+
+/// A contiguous span is read whole where vertices lie at most this far apart, and piecewise beyond.
+const WHOLE_SPAN_STRIDE: u32 = 64;
+
+/// The vertices of one batch of one instance.
+pub(super) struct Batch {
+    /// The vertices, as many as the batch has.
+    vertices: Vertices,
+    pub(super) instance: u32,
+    pub(super) first_instance: u32,
+    pub(super) len: usize,
+}
+
+enum Vertices {
+    /// Consecutive from this one on.
+    From(u64),
+    /// Picked by an index buffer.
+    Listed(Vec<u64>),
+}
+
+impl Batch {
+    /// Vertices `start..start + len` of `append`'s count, for `instance`.
+    pub(super) fn new(append: &GaussianAppend, instance: u32, start: u32, len: usize) -> Self {
+        let first = u64::from(append.first) + u64::from(start);
+        let vertices = match &append.indices {
+            None => Vertices::From(first),
+            Some(stream) => Vertices::Listed(read_indices(stream, first, len)),
+        };
+        Self {
+            vertices,
+            instance,
+            first_instance: append.first_instance,
+            len,
+        }
+    }
+
+    /// The element of `stream` that lane `lane` reads.
+    fn element(&self, stream: &AttributeStream, lane: usize) -> u64 {
+        match stream.instance_divisor {
+            Some(0) => u64::from(self.first_instance),
+            Some(divisor) => {
+                u64::from(self.first_instance)
+                    + u64::from((self.instance - self.first_instance) / divisor)
+            }
+            None => match &self.vertices {
+                Vertices::From(first) => first + lane as u64,
+                Vertices::Listed(list) => list[lane],
+            },
+        }
+    }
+
+    /// Whether lanes read elements that follow one another.
+    fn is_consecutive(&self, stream: &AttributeStream) -> bool {
+        stream.instance_divisor.is_none() && matches!(self.vertices, Vertices::From(_))
+    }
+}
+
+/// Reads `len` indices from number `first` on; those outside the buffer read as zero.
+fn read_indices(stream: &IndexStream, first: u64, len: usize) -> Vec<u64> {
+    let size = u64::from(stream.index_size);
+    (first..first + len as u64)
+        .map(|number| {
+            let mut bytes = [0u8; 4];
+            read_clipped(
+                &stream.buffer,
+                number.saturating_mul(size),
+                &mut bytes[..stream.index_size.min(4) as usize],
+            );
+            let index = i64::from(u32::from_le_bytes(bytes)) + i64::from(stream.vertex_offset);
+            // A negative sum names no vertex; the largest one lies outside every buffer, which reads zero.
+            u64::try_from(index).unwrap_or(u64::from(u32::MAX))
+        })
+        .collect()
+}
+
+/// Reads bytes at `offset` of the range; zeros unless all of them lie inside it.
+fn read_clipped(buffer: &crate::packet::BufferRange, offset: u64, out: &mut [u8]) {
+    let inside = offset
+        .checked_add(out.len() as u64)
+        .is_some_and(|end| end <= buffer.size);
+    let read = inside
+        && buffer
+            .offset
+            .checked_add(offset)
+            .is_some_and(|start| buffer.memory.read(start, out).is_ok());
+    if !read {
+        out.fill(0);
+    }
+}
+
+/// Bytes of the attribute format, and whether it is 32-bit floats.
+fn layout(format: Format) -> (usize, bool) {
+    let floats = matches!(
+        format,
+        Format::R32Sfloat
+            | Format::R32G32Sfloat
+            | Format::R32G32B32Sfloat
+            | Format::R32G32B32A32Sfloat
+    );
+    (format.texel_size(), floats)
+}
+
+/// Reads attribute elements; holds the scratch that this needs.
+#[derive(Default)]
+pub(super) struct Fetcher {
+    bytes: Vec<u8>,
+}
+
+impl Fetcher {
+    /// Reads lanes `0..batch.len` of `stream` into `out[component][lane]`.
+    pub(super) fn read<const COMPONENTS: usize>(
+        &mut self,
+        stream: &AttributeStream,
+        batch: &Batch,
+        mut out: [&mut Lanes; COMPONENTS],
+    ) {
+        let (size, floats) = layout(stream.format);
+        let step = self.read_bytes(stream, batch, size);
+        let elements = self.bytes.chunks(step).take(batch.len).enumerate();
+        if floats && size >= 4 * COMPONENTS {
+            for (lane, bytes) in elements {
+                for (component, out) in out.iter_mut().enumerate() {
+                    out[lane] = float_at(bytes, component).into();
+                }
+            }
+            return;
+        }
+        for (lane, bytes) in elements {
+            let value = stream.format.decode(&bytes[..size]);
+            for (component, out) in out.iter_mut().enumerate() {
+                out[lane] = value[component].into();
+            }
+        }
+    }
+
+    /// Fills the scratch with one element every returned number of bytes.
+    fn read_bytes(&mut self, stream: &AttributeStream, batch: &Batch, size: usize) -> usize {
+        let stride = stream.stride as usize;
+        let at = |lane| {
+            batch
+                .element(stream, lane)
+                .saturating_mul(u64::from(stream.stride))
+                .saturating_add(u64::from(stream.offset))
+        };
+        if batch.is_consecutive(stream)
+            && stream.stride <= WHOLE_SPAN_STRIDE
+            && stride >= size
+            && batch.len > 0
+        {
+            let span = stride * (batch.len - 1) + size;
+            self.bytes.resize(span, 0);
+            let start = at(0);
+            if start.saturating_add(span as u64) <= stream.buffer.size {
+                read_clipped(&stream.buffer, start, &mut self.bytes);
+                return stride;
+            }
+        }
+        self.bytes.resize(size * batch.len, 0);
+        for (lane, element) in self.bytes.chunks_exact_mut(size).enumerate() {
+            read_clipped(&stream.buffer, at(lane), element);
+        }
+        size
+    }
+}
+
+fn float_at(bytes: &[u8], component: usize) -> f32 {
+    let word = &bytes[4 * component..4 * component + 4];
+    f32::from_le_bytes([word[0], word[1], word[2], word[3]])
+}
+
+/// The coefficients of all degrees up to 4.
+pub(super) const MAX_COEFFICIENTS: usize = 25;
+
+/// Three components of each, and what makes it whole vectors.
+pub(super) const COEFFICIENT_FLOATS: usize = 80;
+
+/// Reads the spherical harmonics of single lanes.
+pub(super) struct CoefficientReader<'a> {
+    streams: &'a [AttributeStream],
+    /// The coefficients of a vertex follow one another as 32-bit floats.
+    packed: bool,
+}
+
+impl<'a> CoefficientReader<'a> {
+    /// A reader of these streams, one per coefficient.
+    pub(super) fn new(streams: &'a [AttributeStream]) -> Self {
+        let follows = |a: &AttributeStream, b: &AttributeStream| {
+            std::sync::Arc::ptr_eq(&a.buffer.memory, &b.buffer.memory)
+                && a.buffer.offset == b.buffer.offset
+                && a.buffer.size == b.buffer.size
+                && a.stride == b.stride
+                && a.instance_divisor == b.instance_divisor
+                && b.format == Format::R32G32B32Sfloat
+                && a.offset.checked_add(12) == Some(b.offset)
+        };
+        let packed = streams
+            .first()
+            .is_some_and(|s| s.format == Format::R32G32B32Sfloat)
+            && streams.windows(2).all(|pair| follows(&pair[0], &pair[1]));
+        Self { streams, packed }
+    }
+
+    /// Reads the coefficients of `lane`: red, green, blue of each in turn.
+    pub(super) fn read(&self, batch: &Batch, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
+        let at = |stream: &AttributeStream| {
+            batch
+                .element(stream, lane)
+                .saturating_mul(u64::from(stream.stride))
+                .saturating_add(u64::from(stream.offset))
+        };
+        let count = self.streams.len().min(MAX_COEFFICIENTS);
+        let out = &mut out[..3 * count];
+        if self.packed {
+            let stream = &self.streams[0];
+            let start = at(stream);
+            let size = size_of_val(out) as u64;
+            let inside = start
+                .checked_add(size)
+                .is_some_and(|end| end <= stream.buffer.size);
+            if inside
+                && stream
+                    .buffer
+                    .memory
+                    .read(stream.buffer.offset.saturating_add(start), out)
+                    .is_ok()
+            {
+                return;
+            }
+        }
+        for (stream, out) in self.streams.iter().zip(out.chunks_exact_mut(3)) {
+            let mut bytes = [0u8; 16];
+            let bytes = &mut bytes[..layout(stream.format).0.min(16)];
+            read_clipped(&stream.buffer, at(stream), bytes);
+            out.copy_from_slice(&stream.format.decode(bytes)[..3]);
+        }
+    }
+}

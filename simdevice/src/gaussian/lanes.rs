@@ -1,0 +1,145 @@
+//! A batch's lanes: numbers, sets of lanes, and the logarithm.
+
+use super::fetch::BATCH;
+use fearless_simd::{Simd, prelude::*};
+
+/// A number for each Gaussian of a batch.
+///
+/// Some thirty of these are walked side by side: a cache line more than a power of two keeps them from
+/// competing for the same few sets of the first-level cache.
+pub(super) type Lanes = [f64; BATCH + 8];
+
+/// Lanes before anything is known of them.
+pub(super) const NO_LANES: Lanes = [0.0; BATCH + 8];
+
+const WORDS: usize = BATCH / 64;
+
+/// A set of lanes of a batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Bits([u64; WORDS]);
+
+impl Bits {
+    /// Lanes `0..len`.
+    pub(super) fn first(len: usize) -> Self {
+        let mut bits = Self::default();
+        for (number, word) in bits.0.iter_mut().enumerate() {
+            let from = len.saturating_sub(64 * number);
+            *word = if from >= 64 {
+                u64::MAX
+            } else {
+                (1 << from) - 1
+            };
+        }
+        bits
+    }
+
+    /// Adds the lanes of `mask`, whose first is lane `at`, a multiple of the mask's width.
+    #[inline(always)]
+    pub(super) fn set<S: Simd, M: SimdMask<S>>(&mut self, at: usize, mask: M) {
+        self.0[at / 64 % WORDS] |= mask.to_bitmask() << (at % 64);
+    }
+
+    /// Adds `lane` if `member`.
+    #[inline(always)]
+    pub(super) fn set_one(&mut self, lane: usize, member: bool) {
+        self.0[lane / 64 % WORDS] |= u64::from(member) << (lane % 64);
+    }
+
+    /// The lanes in both.
+    pub(super) fn and(mut self, other: &Self) -> Self {
+        for (word, other) in self.0.iter_mut().zip(other.0) {
+            *word &= other;
+        }
+        self
+    }
+
+    /// The lanes that `other` lacks.
+    pub(super) fn without(mut self, other: &Self) -> Self {
+        for (word, other) in self.0.iter_mut().zip(other.0) {
+            *word &= !other;
+        }
+        self
+    }
+
+    /// How many lanes there are.
+    pub(super) fn count(&self) -> u64 {
+        self.0.iter().map(|word| u64::from(word.count_ones())).sum()
+    }
+
+    /// Calls `f` with each lane, in order.
+    #[inline(always)]
+    pub(super) fn for_each(&self, mut f: impl FnMut(usize)) {
+        for (number, &word) in self.0.iter().enumerate() {
+            let mut rest = word;
+            while rest != 0 {
+                f(64 * number + rest.trailing_zeros() as usize);
+                rest &= rest - 1;
+            }
+        }
+    }
+}
+
+/// Base-2 logarithm, to 1e-13, of positive normal numbers below 2^1000; negative infinity of others.
+#[inline(always)]
+pub(super) fn log2<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
+    let number = |value: f64| S::f64s::splat(simd, value);
+    let bits: S::u64s = x.bitcast();
+    // The mantissa is taken in [sqrt(1/2), sqrt(2)): less the bits of sqrt(1/2), the exponent field tells.
+    let bias = S::u64s::splat(simd, 1023 << 52);
+    let sqrt_half = S::u64s::splat(simd, std::f64::consts::FRAC_1_SQRT_2.to_bits());
+    let biased = (bits - sqrt_half + bias) >> 52;
+    let mantissa: S::f64s = (bits - (biased << 52) + bias).bitcast();
+    // Set below the point of 2^52, an integer becomes a number without a conversion.
+    let shifter = number(4_503_599_627_370_496.0);
+    let shifted: S::f64s = (biased | shifter.bitcast::<S::u64s>()).bitcast();
+    let exponent = shifted - shifter - 1023.0;
+    let s = (mantissa - 1.0) / (mantissa + 1.0);
+    let s2 = s * s;
+    // log2(m) = 2 / ln 2 (s + s^3 / 3 + s^5 / 5 + ...), |s| < 0.1716: what is left out is below 1e-15.
+    let mut series = number(1.0 / 17.0);
+    for denominator in [15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
+        series = series * s2 + 1.0 / denominator;
+    }
+    let value = exponent + s * series * (2.0 / std::f64::consts::LN_2);
+    let normal = x.simd_ge(f64::MIN_POSITIVE);
+    normal.select(value, number(f64::NEG_INFINITY))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::SimdLevel;
+    use fearless_simd::dispatch;
+
+    #[test]
+    fn the_logarithm_is_exact_enough_at_every_level() {
+        for (name, level) in SimdLevel::supported() {
+            let level = level.resolve().unwrap();
+            let of = |x: f64| dispatch!(level, simd => log2(simd, SimdBase::splat(simd, x)).as_slice()[0]);
+            let mut x = 1e-45f64;
+            while x < 4e38 {
+                let error = (of(x) - x.log2()).abs();
+                assert!(
+                    error <= 1e-13 * x.log2().abs().max(1.0),
+                    "{name}: {x}: {error}"
+                );
+                x *= 1.003_7;
+            }
+            assert_eq!(of(0.0), f64::NEG_INFINITY, "{name}");
+            assert_eq!(of(1.0), 0.0, "{name}");
+        }
+    }
+
+    #[test]
+    fn sets_of_lanes_are_sets() {
+        let mut odd = Bits::default();
+        (0..BATCH).for_each(|lane| odd.set_one(lane, lane % 2 == 1));
+        let some = Bits::first(70);
+        assert_eq!(some.count(), 70);
+        assert_eq!(Bits::first(BATCH).count(), BATCH as u64);
+        assert_eq!(some.and(&odd).count(), 35);
+        let mut lanes = Vec::new();
+        some.without(&odd).for_each(|lane| lanes.push(lane));
+        assert_eq!(lanes, (0..70).step_by(2).collect::<Vec<_>>());
+    }
+}

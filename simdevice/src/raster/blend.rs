@@ -1,0 +1,334 @@
+//! Blending: what a fragment's colour makes of an attachment's (Vulkan 1.3, 29.1).
+
+use crate::format::{Format, Numeric};
+use crate::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
+
+/// Premultiplied "over", the equation of most Gaussian draws.
+const OVER: BlendEquation = BlendEquation {
+    source: BlendFactor::One,
+    destination: BlendFactor::OneMinusSrcAlpha,
+    op: BlendOp::Add,
+};
+
+/// The blending of one attachment, prepared for many fragments.
+#[derive(Clone, Debug)]
+pub struct Blender {
+    format: Format,
+    mode: Mode,
+    constants: [f32; 4],
+    /// What sources, destinations and constants are clamped to.
+    range: Option<(f32, f32)>,
+    write: [bool; 4],
+}
+
+/// The equations, those that need no look at factors apart.
+#[derive(Clone, Copy, Debug)]
+enum Mode {
+    Replace,
+    Over,
+    General(BlendEquation, BlendEquation),
+}
+
+impl Blender {
+    /// Prepares `state` for an attachment of `format`.
+    pub fn new(state: &BlendState, constants: [f32; 4], format: Format) -> Self {
+        let range = match format.numeric() {
+            Numeric::Unorm | Numeric::Srgb => Some((0.0, 1.0)),
+            Numeric::Snorm => Some((-1.0, 1.0)),
+            _ => None,
+        };
+        let mode = match state.equations {
+            // Integers are never blended.
+            _ if format.is_integer() => Mode::Replace,
+            None => Mode::Replace,
+            Some((OVER, OVER)) => Mode::Over,
+            Some((color, alpha)) => Mode::General(color, alpha),
+        };
+        Self {
+            format,
+            mode,
+            constants: clamp(constants, range),
+            range,
+            write: std::array::from_fn(|component| state.write_mask >> component & 1 == 1),
+        }
+    }
+
+    /// Whether it never changes the attachment.
+    pub fn writes_nothing(&self) -> bool {
+        self.write == [false; 4]
+    }
+
+    /// What `source` makes of `destination`, before it is quantised to the format.
+    #[inline]
+    pub fn blend(&self, source: [f32; 4], destination: [f32; 4]) -> [f32; 4] {
+        let blended = match self.mode {
+            Mode::Replace => source,
+            Mode::Over => {
+                let (s, d) = (clamp(source, self.range), clamp(destination, self.range));
+                let rest = 1.0 - s[3];
+                std::array::from_fn(|component| s[component] + d[component] * rest)
+            }
+            Mode::General(color, alpha) => {
+                let (s, d) = (clamp(source, self.range), clamp(destination, self.range));
+                let [r, g, b, _] = evaluate(color, s, d, self.constants);
+                let [.., a] = evaluate(alpha, s, d, self.constants);
+                [r, g, b, a]
+            }
+        };
+        std::array::from_fn(|component| {
+            if self.write[component] {
+                blended[component]
+            } else {
+                destination[component]
+            }
+        })
+    }
+
+    /// Blends the fragments that exist, pixel by pixel, into a row of texels, and quantises them.
+    pub fn blend_row(
+        &self,
+        row: &mut [[f32; 4]],
+        fragments: impl Iterator<Item = Option<[f32; 4]>>,
+    ) {
+        let mut any = false;
+        for (texel, fragment) in row.iter_mut().zip(fragments) {
+            if let Some(source) = fragment {
+                *texel = self.blend(source, *texel);
+                any = true;
+            }
+        }
+        // What was not blended is representable already, and quantising leaves it as it is.
+        if any {
+            self.format.quantize_row(row);
+        }
+    }
+}
+
+#[inline]
+fn clamp(color: [f32; 4], range: Option<(f32, f32)>) -> [f32; 4] {
+    match range {
+        Some((low, high)) => color.map(|component| component.clamp(low, high)),
+        None => color,
+    }
+}
+
+/// The blend equation.
+fn evaluate(equation: BlendEquation, s: [f32; 4], d: [f32; 4], constants: [f32; 4]) -> [f32; 4] {
+    let term = |value: [f32; 4], by: BlendFactor| {
+        // A factor of zero removes a term whatever its value, infinities and NaNs included.
+        if by == BlendFactor::Zero {
+            return [0.0; 4];
+        }
+        let factors = factors(by, s, d, constants);
+        std::array::from_fn::<f32, 4, _>(|component| value[component] * factors[component])
+    };
+    let (source, destination) = match equation.op {
+        BlendOp::Min | BlendOp::Max => (s, d),
+        _ => (term(s, equation.source), term(d, equation.destination)),
+    };
+    std::array::from_fn(|component| {
+        let (s, d) = (source[component], destination[component]);
+        match equation.op {
+            BlendOp::Add => s + d,
+            BlendOp::Subtract => s - d,
+            BlendOp::ReverseSubtract => d - s,
+            BlendOp::Min => s.min(d),
+            BlendOp::Max => s.max(d),
+        }
+    })
+}
+
+/// The factor of each component.
+fn factors(factor: BlendFactor, s: [f32; 4], d: [f32; 4], constants: [f32; 4]) -> [f32; 4] {
+    let inverse = |of: [f32; 4]| of.map(|component| 1.0 - component);
+    match factor {
+        BlendFactor::Zero => [0.0; 4],
+        BlendFactor::One => [1.0; 4],
+        BlendFactor::SrcColor => s,
+        BlendFactor::OneMinusSrcColor => inverse(s),
+        BlendFactor::DstColor => d,
+        BlendFactor::OneMinusDstColor => inverse(d),
+        BlendFactor::SrcAlpha => [s[3]; 4],
+        BlendFactor::OneMinusSrcAlpha => [1.0 - s[3]; 4],
+        BlendFactor::DstAlpha => [d[3]; 4],
+        BlendFactor::OneMinusDstAlpha => [1.0 - d[3]; 4],
+        BlendFactor::ConstantColor => constants,
+        BlendFactor::OneMinusConstantColor => inverse(constants),
+        BlendFactor::ConstantAlpha => [constants[3]; 4],
+        BlendFactor::OneMinusConstantAlpha => [1.0 - constants[3]; 4],
+        BlendFactor::SrcAlphaSaturate => {
+            let least = s[3].min(1.0 - d[3]);
+            [least, least, least, 1.0]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FACTORS: [BlendFactor; 15] = [
+        BlendFactor::Zero,
+        BlendFactor::One,
+        BlendFactor::SrcColor,
+        BlendFactor::OneMinusSrcColor,
+        BlendFactor::DstColor,
+        BlendFactor::OneMinusDstColor,
+        BlendFactor::SrcAlpha,
+        BlendFactor::OneMinusSrcAlpha,
+        BlendFactor::DstAlpha,
+        BlendFactor::OneMinusDstAlpha,
+        BlendFactor::ConstantColor,
+        BlendFactor::OneMinusConstantColor,
+        BlendFactor::ConstantAlpha,
+        BlendFactor::OneMinusConstantAlpha,
+        BlendFactor::SrcAlphaSaturate,
+    ];
+    const OPS: [BlendOp; 5] = [
+        BlendOp::Add,
+        BlendOp::Subtract,
+        BlendOp::ReverseSubtract,
+        BlendOp::Min,
+        BlendOp::Max,
+    ];
+    const CONSTANTS: [f32; 4] = [0.2, 1.5, -0.25, 0.75];
+
+    /// The blend equation as tables of (factor, RGB, A) in binary64, straight from the specification.
+    fn model_factor(f: BlendFactor, s: [f64; 4], d: [f64; 4], c: [f64; 4]) -> [f64; 4] {
+        let all = |x: f64| [x; 4];
+        let inverse = |v: [f64; 4]| v.map(|x| 1.0 - x);
+        match f {
+            BlendFactor::Zero => all(0.0),
+            BlendFactor::One => all(1.0),
+            BlendFactor::SrcColor => s,
+            BlendFactor::OneMinusSrcColor => inverse(s),
+            BlendFactor::DstColor => d,
+            BlendFactor::OneMinusDstColor => inverse(d),
+            BlendFactor::SrcAlpha => all(s[3]),
+            BlendFactor::OneMinusSrcAlpha => inverse(all(s[3])),
+            BlendFactor::DstAlpha => all(d[3]),
+            BlendFactor::OneMinusDstAlpha => inverse(all(d[3])),
+            BlendFactor::ConstantColor => c,
+            BlendFactor::OneMinusConstantColor => inverse(c),
+            BlendFactor::ConstantAlpha => all(c[3]),
+            BlendFactor::OneMinusConstantAlpha => inverse(all(c[3])),
+            BlendFactor::SrcAlphaSaturate => {
+                let f = s[3].min(1.0 - d[3]);
+                [f, f, f, 1.0]
+            }
+        }
+    }
+
+    fn model(e: BlendEquation, s: [f64; 4], d: [f64; 4], c: [f64; 4]) -> [f64; 4] {
+        let fs = model_factor(e.source, s, d, c);
+        let fd = model_factor(e.destination, s, d, c);
+        std::array::from_fn(|i| match e.op {
+            BlendOp::Add => s[i] * fs[i] + d[i] * fd[i],
+            BlendOp::Subtract => s[i] * fs[i] - d[i] * fd[i],
+            BlendOp::ReverseSubtract => d[i] * fd[i] - s[i] * fs[i],
+            BlendOp::Min => s[i].min(d[i]),
+            BlendOp::Max => s[i].max(d[i]),
+        })
+    }
+
+    fn blender(color: BlendEquation, alpha: BlendEquation, format: Format) -> Blender {
+        let state = BlendState {
+            equations: Some((color, alpha)),
+            write_mask: 0xF,
+        };
+        Blender::new(&state, CONSTANTS, format)
+    }
+
+    /// Every pair of factors and every operation against the model, clamped to `range` where there is one.
+    fn compare(format: Format, range: Option<(f64, f64)>) {
+        let wide = |v: [f32; 4]| {
+            v.map(|x| match range {
+                Some((low, high)) => f64::from(x).clamp(low, high),
+                None => f64::from(x),
+            })
+        };
+        let source = [0.3, 1.25, -0.5, 0.6];
+        let destination = format.decode(&format.encode([0.9, 0.1, 0.45, 0.7]));
+        let alpha = BlendEquation {
+            source: BlendFactor::DstAlpha,
+            destination: BlendFactor::One,
+            op: BlendOp::ReverseSubtract,
+        };
+        for s in FACTORS {
+            for d in FACTORS {
+                for op in OPS {
+                    let color = BlendEquation {
+                        source: s,
+                        destination: d,
+                        op,
+                    };
+                    let blended = blender(color, alpha, format).blend(source, destination);
+                    let (s, d, c) = (wide(source), wide(destination), wide(CONSTANTS));
+                    let (rgb, a) = (model(color, s, d, c), model(alpha, s, d, c));
+                    let expected = [rgb[0], rgb[1], rgb[2], a[3]];
+                    for (blended, expected) in blended.into_iter().zip(expected) {
+                        let error = (f64::from(blended) - expected).abs();
+                        assert!(error <= 4e-7, "{format:?} {color:?}: {blended} {expected}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_equation_agrees_with_the_specification() {
+        compare(Format::R32G32B32A32Sfloat, None);
+        compare(Format::R8G8B8A8Unorm, Some((0.0, 1.0)));
+        compare(Format::R8G8B8A8Srgb, Some((0.0, 1.0)));
+        compare(Format::R8G8B8A8Snorm, Some((-1.0, 1.0)));
+    }
+
+    #[test]
+    fn over_is_the_general_equation() {
+        let general = Blender {
+            mode: Mode::General(OVER, OVER),
+            ..blender(OVER, OVER, Format::R8G8B8A8Unorm)
+        };
+        let over = blender(OVER, OVER, Format::R8G8B8A8Unorm);
+        assert!(matches!(over.mode, Mode::Over));
+        for (source, destination) in [
+            ([0.1, 0.2, 0.3, 0.4], [0.5, 0.6, 0.7, 0.8]),
+            ([1.5, 0.0, 0.3, 1.0], [0.1, 0.6, 0.0, 1.0]),
+        ] {
+            let expected = general.blend(source, destination);
+            assert_eq!(over.blend(source, destination), expected);
+        }
+    }
+
+    #[test]
+    fn masked_components_and_zero_factors_keep_nothing_they_should_not() {
+        let replace = BlendEquation {
+            source: BlendFactor::One,
+            destination: BlendFactor::Zero,
+            op: BlendOp::Add,
+        };
+        let state = BlendState {
+            equations: Some((replace, replace)),
+            write_mask: 0b0101,
+        };
+        let blender = Blender::new(&state, CONSTANTS, Format::R32G32B32A32Sfloat);
+        let blended = blender.blend([1.0, 2.0, 3.0, 4.0], [f32::INFINITY, 6.0, f32::NAN, 8.0]);
+        assert_eq!(blended, [1.0, 6.0, 3.0, 8.0]);
+        assert!(!blender.writes_nothing());
+    }
+
+    #[test]
+    fn rows_are_quantised_where_fragments_exist() {
+        let over = blender(OVER, OVER, Format::R8G8B8A8Unorm);
+        let background = Format::R8G8B8A8Unorm.decode(&[10, 20, 30, 255]);
+        let mut row = [background; 3];
+        let fragments = [None, Some([0.001, 0.0, 0.0, 0.001]), None];
+        over.blend_row(&mut row, fragments.into_iter());
+        assert_eq!(row, [background; 3], "less than half a code");
+        let fragments = [Some([0.25; 4]), None, None];
+        over.blend_row(&mut row, fragments.into_iter());
+        // In codes: 63.75 + 0.75 d = 71.25, 78.75, 86.25, 255.
+        assert_eq!(Format::R8G8B8A8Unorm.encode(row[0])[..4], [71, 79, 86, 255]);
+        assert_eq!(row[1..], [background; 2]);
+    }
+}

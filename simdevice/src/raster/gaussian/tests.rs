@@ -1,0 +1,306 @@
+use super::*;
+use crate::device::{Config, Device, SimdLevel};
+use crate::format::Format;
+use crate::gaussian::GaussianSet;
+use crate::packet::*;
+use devmem::Allocation;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
+
+/// A vector's worth of one value, its power at a level, and that level's name.
+fn exp2_at(level: Level, x: [f32; LANES]) -> [f32; LANES] {
+    dispatch!(level, simd => exp2(simd, f32x16::simd_from(simd, x)).to_array())
+}
+
+#[test]
+fn powers_of_two_are_within_their_bound_at_every_level() {
+    for (name, level) in SimdLevel::supported() {
+        let level = level.resolve().unwrap();
+        let mut worst = 0.0f64;
+        let mut x = -126.0f32;
+        while x <= 1.0 {
+            let steps: [f32; LANES] = std::array::from_fn(|lane| x + lane as f32 / 1024.0);
+            for (x, power) in steps.into_iter().zip(exp2_at(level, steps)) {
+                let exact = f64::from(x.min(1.0)).exp2();
+                let ulp = f64::from((exact as f32).next_up()) - f64::from(exact as f32);
+                worst = worst.max((f64::from(power) - exact).abs() / ulp);
+            }
+            x += 16.0 / 1024.0;
+        }
+        assert!(worst <= 2.1, "{name}: {worst} ulp");
+        let special = [
+            f32::NEG_INFINITY,
+            -1e30,
+            -127.0,
+            0.0,
+            1.0,
+            2.0,
+            f32::INFINITY,
+        ];
+        let mut lanes = [0.0; LANES];
+        lanes[..7].copy_from_slice(&special);
+        let least = f32::MIN_POSITIVE;
+        assert_eq!(
+            exp2_at(level, lanes)[..7],
+            [least, least, least, 1.0, 2.0, 2.0, 2.0],
+            "{name}"
+        );
+    }
+}
+
+/// A scene of `count` Gaussians before a camera at the origin, from dust to ones that fill the screen.
+fn draw(
+    seed: u64,
+    count: u32,
+    state: GaussianState,
+    device: &Device,
+    bounds: Rect,
+) -> GaussianDraw {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut floats = Vec::new();
+    for _ in 0..count {
+        let z = rng.random_range(1.0..6.0f32);
+        let size = 10.0f32.powf(rng.random_range(-3.0..0.5));
+        floats.extend([
+            rng.random_range(-1.5..1.5) * z,
+            rng.random_range(-1.0..1.0) * z,
+            z,
+        ]);
+        floats.extend([
+            size,
+            size * rng.random_range(0.01..1.0),
+            size * rng.random_range(0.01..1.0),
+        ]);
+        floats.extend([0; 4].map(|_| rng.random_range(-1.0..1.0f32)));
+        floats.push(rng.random_range(0.0..1.2));
+        floats.extend([0; 3].map(|_| rng.random_range(-1.0..2.0f32)));
+    }
+    let size = 4 * floats.len() as u64;
+    let memory = Allocation::new_zeroed(size).unwrap();
+    memory.write(0, &floats).unwrap();
+    let buffer = BufferRange {
+        memory,
+        offset: 0,
+        size,
+    };
+    let stream = |offset, format| AttributeStream {
+        buffer: buffer.clone(),
+        stride: 56,
+        offset,
+        format,
+        instance_divisor: None,
+    };
+    let append = GaussianAppend {
+        attributes: GaussianAttributes {
+            position: stream(0, Format::R32G32B32Sfloat),
+            scale: stream(12, Format::R32G32B32Sfloat),
+            rotation: stream(24, Format::R32G32B32A32Sfloat),
+            opacity: stream(40, Format::R32Sfloat),
+            spherical_harmonics: vec![stream(44, Format::R32G32B32Sfloat)],
+        },
+        indices: None,
+        first: 0,
+        count,
+        first_instance: 0,
+        instance_count: 1,
+    };
+    let begin = GaussianBegin {
+        state: Arc::new(state),
+        camera: Camera {
+            model: CameraModel::Pinhole,
+            rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            eye: [0.0; 3],
+            focal_length: [40.0, 38.0],
+            principal_point: [48.5, 30.0],
+            near_plane: 0.2,
+            far_plane: f32::INFINITY,
+            depth_coefficients: [0.0; 2],
+        },
+        viewport: Viewport {
+            x: 0.0,
+            y: 0.0,
+            width: 96.0,
+            height: 64.0,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        },
+        scissor: bounds,
+    };
+    let mut set = GaussianSet::begin(&begin, bounds);
+    set.append(&append);
+    set.resolve(device, &mut Counters::default()).unwrap()
+}
+
+fn defaults() -> GaussianState {
+    GaussianState {
+        sh_degree: 0,
+        order: GaussianOrder::ViewDepth,
+        opacity_compensated: false,
+        low_pass_variance: 0.3,
+        alpha_floor: 1.0 / 255.0,
+        alpha_ceiling: 0.99,
+        transmittance_floor: 1e-4,
+        blend: Vec::new(),
+        blend_constants: [0.0; 4],
+    }
+}
+
+/// The tile kernel's naive twin: one pixel at a time through the whole list, no blocks, no saturation.
+fn naive_pixel(
+    draw: &GaussianDraw,
+    tile: [u32; 2],
+    x: usize,
+    y: usize,
+    fused: bool,
+) -> Option<[f32; 4]> {
+    let mul_add = |a: f32, b: f32, c: f32| if fused { a.mul_add(b, c) } else { a * b + c };
+    let power = |x: f32| {
+        let x = x.clamp(-126.0, 1.0);
+        let n = (x + 12_582_912.0) - 12_582_912.0;
+        let f = x - n;
+        let p = POWER_OF_TWO.iter().fold(0.0, |p, &c| mul_add(p, f, c));
+        f32::from_bits(p.to_bits().wrapping_add_signed((n as i32) << 23))
+    };
+    let state = &draw.state;
+    let corner = tile.map(|tile| tile * TILE_SIZE);
+    let (mut c, mut t, mut covered) = ([0.0f32; 3], 1.0f32, false);
+    for &primitive in draw.tiles.list(tile[0], tile[1]) {
+        let (batch, place) = locate(primitive);
+        let g = Record::new(&draw.splats[batch][place], corner, 0.0);
+        let (dx, dy) = (x as f32 - g.anchor[0], y as f32 - g.anchor[1]);
+        let u = mul_add(dx, g.factor[0], g.at_anchor[0]);
+        let v = mul_add(dx, g.factor[1], mul_add(dy, g.factor[2], g.at_anchor[1]));
+        let exponent = g.log2_opacity - mul_add(v, v, u * u);
+        let alpha = power(exponent).min(state.alpha_ceiling);
+        if alpha < state.alpha_floor {
+            continue;
+        }
+        let weight = t * alpha;
+        if t - weight < state.transmittance_floor {
+            break;
+        }
+        for (c, color) in c.iter_mut().zip(g.color) {
+            *c = mul_add(weight, color, *c);
+        }
+        t -= weight;
+        covered = true;
+    }
+    covered.then_some([c[0], c[1], c[2], 1.0 - t])
+}
+
+/// Every pixel of every tile equals the naive twin's, bit for bit, at every level.
+fn check(seed: u64, count: u32, state: &GaussianState, bounds: Rect) {
+    for (name, simd) in SimdLevel::supported() {
+        let device = Device::new(&Config {
+            threads: 2,
+            simd,
+            ..Config::default()
+        })
+        .unwrap();
+        let fused = matches!(simd, SimdLevel::Avx2 | SimdLevel::Avx512);
+        let draw = draw(seed, count, state.clone(), &device, bounds);
+        let mut tile = Box::new(GaussianTile::default());
+        let mut covered = 0;
+        for at in (0..4).flat_map(|y| (0..6).map(move |x| [x, y])) {
+            let any = tile.render(
+                &draw,
+                device.level(),
+                at[0],
+                at[1],
+                &mut Counters::default(),
+            );
+            for (x, y) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (x, y))) {
+                let pixel = [at[0] as usize * TILE + x, at[1] as usize * TILE + y];
+                let inside = Rect {
+                    x: pixel[0] as i32,
+                    y: pixel[1] as i32,
+                    width: 1,
+                    height: 1,
+                };
+                let inside = !inside.intersect(bounds).is_empty();
+                let expected = naive_pixel(&draw, at, x, y, fused).filter(|_| inside);
+                let got = tile.pixel(x, y).filter(|_| any);
+                assert_eq!(got, expected, "{name}, seed {seed}, pixel {pixel:?}");
+                covered += u32::from(got.is_some());
+            }
+        }
+        assert!(covered > 0, "{name}, seed {seed}: nothing was drawn");
+    }
+}
+
+const WHOLE: Rect = Rect {
+    x: 0,
+    y: 0,
+    width: 96,
+    height: 64,
+};
+
+#[test]
+fn the_kernel_equals_its_naive_twin() {
+    for seed in 0..4 {
+        check(seed, 400, &defaults(), WHOLE);
+    }
+}
+
+#[test]
+fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint() {
+    let state = GaussianState {
+        alpha_floor: 0.0,
+        alpha_ceiling: 1.0,
+        transmittance_floor: 0.0,
+        low_pass_variance: 0.0,
+        ..defaults()
+    };
+    check(
+        10,
+        150,
+        &state,
+        Rect {
+            x: 5,
+            y: 3,
+            width: 70,
+            height: 51,
+        },
+    );
+}
+
+#[test]
+fn it_does_so_where_pixels_end_at_once() {
+    let state = GaussianState {
+        transmittance_floor: 0.5,
+        opacity_compensated: true,
+        ..defaults()
+    };
+    check(
+        20,
+        400,
+        &state,
+        Rect {
+            x: 17,
+            y: 0,
+            width: 30,
+            height: 64,
+        },
+    );
+}
+
+#[test]
+fn a_saturated_tile_fetches_no_more() {
+    let device = Device::new(&Config::default()).unwrap();
+    let mut tile = Box::new(GaussianTile::default());
+    let mut evaluated = |state| {
+        let draw = draw(30, 4000, state, &device, WHOLE);
+        let mut counters = Counters::default();
+        tile.render(&draw, device.level(), 2, 2, &mut counters);
+        let list = draw.tiles.list(2, 2).len() as u64;
+        (counters.get(Counter::TilePairsEvaluated), list)
+    };
+    let (ends, list) = evaluated(defaults());
+    assert!(ends < list / 4, "{ends} of {list}");
+    let (all, list) = evaluated(GaussianState {
+        transmittance_floor: 0.0,
+        ..defaults()
+    });
+    assert_eq!(all, list);
+}

@@ -1,0 +1,292 @@
+//! The accuracy contract as a yes or no.
+
+use std::fmt;
+use std::path::Path;
+
+use super::write_difference;
+use crate::oracle::Reference;
+
+/// What an image may not exceed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Greatest distance from the envelope, in any channel of any pixel.
+    pub distance: f64,
+    /// Share of pixels that took another branch than binary64.
+    pub other_branch: f64,
+    /// Share of pixels that the reference calls undecidable.
+    pub undecidable: f64,
+}
+
+impl Limits {
+    /// The contract for trained scenes at ordinary sizes.
+    pub const CONTRACT: Self = Self {
+        distance: 5e-6,
+        other_branch: 0.0002,
+        undecidable: 0.01,
+    };
+
+    /// The contract's distance for scenes made to be difficult, or too small for shares of pixels
+    /// to mean anything: still no pixel is excluded, but any number may be undecidable.
+    pub const ENVELOPE_ONLY: Self = Self {
+        other_branch: 1.0,
+        undecidable: 1.0,
+        ..Self::CONTRACT
+    };
+}
+
+/// How an image stands to a reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Verdict {
+    /// What it was judged by.
+    pub limits: Limits,
+    /// Pixels of the image.
+    pub pixels: usize,
+    /// Greatest distance of a channel from the hull of the pixel's outcomes; infinite if a channel
+    /// is not a number.
+    pub max_distance: f64,
+    /// The pixel (x, y) where that is.
+    pub worst_pixel: [u32; 2],
+    /// Pixels further from the envelope than the limit.
+    pub outside: usize,
+    /// Pixels within the envelope that don't match what binary64 says.
+    pub other_branch: usize,
+    /// Those of them that match no single outcome, either: they lie between two.
+    pub between_branches: usize,
+    /// Pixels that the reference calls undecidable.
+    pub undecidable: usize,
+    /// Undecidable pixels for which the reference gave up following every branch.
+    pub exhausted: usize,
+}
+
+impl Verdict {
+    /// Whether the image keeps all limits.
+    pub fn holds(&self) -> bool {
+        let share = |count: usize| count as f64 / self.pixels as f64;
+        self.outside == 0
+            && share(self.other_branch) <= self.limits.other_branch
+            && share(self.undecidable) <= self.limits.undecidable
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |count: usize| 100.0 * count as f64 / self.pixels as f64;
+        let [x, y] = self.worst_pixel;
+        write!(
+            f,
+            "{}: {:.2e} from the envelope at most, at ({x}, {y}) (limit {:.0e}); {} of {} pixels \
+             outside; {} ({:.4} %) took another branch (limit {} %), {} of them between branches; \
+             {} ({:.4} %) undecidable (limit {} %), {} of them exhausted",
+            if self.holds() { "holds" } else { "fails" },
+            self.max_distance,
+            self.limits.distance,
+            self.outside,
+            self.pixels,
+            self.other_branch,
+            percent(self.other_branch),
+            100.0 * self.limits.other_branch,
+            self.between_branches,
+            self.undecidable,
+            percent(self.undecidable),
+            100.0 * self.limits.undecidable,
+            self.exhausted,
+        )
+    }
+}
+
+/// Judges `image`, which has as many pixels as `reference`.
+pub fn verdict(image: &[[f32; 4]], reference: &Reference, limits: Limits) -> Verdict {
+    assert_eq!(image.len(), reference.nominal.len(), "the sizes differ");
+    let mut verdict = Verdict {
+        limits,
+        pixels: image.len(),
+        max_distance: 0.0,
+        worst_pixel: [0, 0],
+        outside: 0,
+        other_branch: 0,
+        between_branches: 0,
+        undecidable: reference.alternatives.len(),
+        exhausted: reference.exhausted,
+    };
+    for (index, rgba) in image.iter().enumerate() {
+        let distance = distance_from_envelope(*rgba, reference, index);
+        if distance > verdict.max_distance {
+            verdict.max_distance = distance;
+            let index = index as u32;
+            verdict.worst_pixel = [index % reference.width, index / reference.width];
+        }
+        if distance > limits.distance {
+            verdict.outside += 1;
+        } else if took_other_branch(*rgba, reference, index, limits.distance) {
+            verdict.other_branch += 1;
+            let matches = |outcome: &[f64; 4]| distance_between(*rgba, *outcome) <= limits.distance;
+            if !reference.outcomes(index).any(matches) {
+                verdict.between_branches += 1;
+            }
+        }
+    }
+    verdict
+}
+
+/// Panics with the verdict unless the image keeps the limits, and leaves a picture of the
+/// difference in `target/differences/<name>.png`.
+#[track_caller]
+pub fn assert_contract(
+    name: &str,
+    image: &[[f32; 4]],
+    reference: &Reference,
+    limits: Limits,
+) -> Verdict {
+    let verdict = verdict(image, reference, limits);
+    if !verdict.holds() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../target/differences")
+            .join(format!("{name}.png"));
+        let picture = match write_difference(&path, image, reference, limits.distance) {
+            Ok(()) => format!("see {}", path.display()),
+            Err(error) => format!("no picture: {error}"),
+        };
+        panic!("{name} {verdict}; {picture}");
+    }
+    verdict
+}
+
+/// Whether a pixel within the envelope differs from what binary64 says.
+pub(super) fn took_other_branch(
+    rgba: [f32; 4],
+    reference: &Reference,
+    index: usize,
+    distance: f64,
+) -> bool {
+    reference.alternatives.contains_key(&index)
+        && distance_between(rgba, reference.nominal[index]) > distance
+}
+
+/// How far a pixel's worst channel is from the hull of its outcomes.
+pub(super) fn distance_from_envelope(rgba: [f32; 4], reference: &Reference, index: usize) -> f64 {
+    let (least, greatest) = reference.envelope(index);
+    let outside = |channel: usize| {
+        let value = f64::from(rgba[channel]);
+        not_nan(
+            (least[channel] - value).max(value - greatest[channel]),
+            value,
+        )
+    };
+    (0..4).map(outside).fold(0.0, f64::max)
+}
+
+/// How far a pixel's worst channel is from `expected`.
+pub(super) fn distance_between(rgba: [f32; 4], expected: [f64; 4]) -> f64 {
+    let difference = |channel: usize| {
+        let value = f64::from(rgba[channel]);
+        not_nan((value - expected[channel]).abs(), value)
+    };
+    (0..4).map(difference).fold(0.0, f64::max)
+}
+
+/// `distance`, or infinity where `value` is not a number.
+fn not_nan(distance: f64, value: f64) -> f64 {
+    if value.is_nan() {
+        f64::INFINITY
+    } else {
+        distance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::oracle::SkipCounts;
+    use std::collections::BTreeMap;
+
+    /// 100 x 100 pixels of 0.5, pixel 7 undecidable between 0.5 and 0.25.
+    fn reference() -> Reference {
+        Reference {
+            width: 100,
+            height: 100,
+            nominal: vec![[0.5; 4]; 10_000],
+            alternatives: BTreeMap::from([(7, vec![[0.25, 0.5, 0.25, 0.25]])]),
+            exhausted: 0,
+            skips: SkipCounts::default(),
+            undecidable_keys: 0,
+        }
+    }
+
+    #[test]
+    fn the_same_image_holds() {
+        let reference = reference();
+        let verdict = verdict(&reference.to_f32(), &reference, Limits::CONTRACT);
+        assert!(verdict.holds(), "{verdict}");
+        assert_eq!((verdict.max_distance, verdict.outside), (0.0, 0));
+        assert_eq!((verdict.other_branch, verdict.undecidable), (0, 1));
+    }
+
+    #[test]
+    fn the_limit_is_5e_6_outside_the_envelope() {
+        let reference = reference();
+        for (value, holds) in [
+            (0.500004, true),
+            (0.500006, false),
+            (0.499994, false),
+            (f32::NAN, false),
+        ] {
+            let mut image = reference.to_f32();
+            image[123][2] = value;
+            let verdict = verdict(&image, &reference, Limits::CONTRACT);
+            assert_eq!(verdict.holds(), holds, "{verdict}");
+            assert_eq!(verdict.worst_pixel, [23, 1]);
+            assert_eq!(verdict.outside, usize::from(!holds));
+        }
+    }
+
+    #[test]
+    fn other_branches_are_accepted_and_counted() {
+        let reference = reference();
+        for (rgba, between) in [([0.25, 0.5, 0.25, 0.25], 0), ([0.4, 0.5, 0.4, 0.4], 1)] {
+            let mut image = reference.to_f32();
+            image[7] = rgba;
+            let verdict = verdict(&image, &reference, Limits::CONTRACT);
+            assert!(verdict.holds(), "{verdict}");
+            assert_eq!(
+                (verdict.other_branch, verdict.between_branches),
+                (1, between)
+            );
+        }
+        let mut image = reference.to_f32();
+        image[7] = [0.2; 4];
+        assert!(!verdict(&image, &reference, Limits::ENVELOPE_ONLY).holds());
+    }
+
+    #[test]
+    fn too_many_branches_fail() {
+        let mut reference = reference();
+        for index in 0..101 {
+            reference.alternatives.insert(index, vec![[0.25; 4]]);
+        }
+        // 1.01 % undecidable.
+        let image = reference.to_f32();
+        assert!(!verdict(&image, &reference, Limits::CONTRACT).holds());
+        assert!(verdict(&image, &reference, Limits::ENVELOPE_ONLY).holds());
+        // 0.03 % on another branch.
+        reference.alternatives.retain(|&index, _| index < 50);
+        let mut image = reference.to_f32();
+        image[10..13].fill([0.25; 4]);
+        let judged = verdict(&image, &reference, Limits::CONTRACT);
+        assert_eq!(judged.other_branch, 3);
+        assert!(!judged.holds());
+    }
+
+    #[test]
+    #[should_panic(expected = "fails")]
+    fn assert_contract_panics_with_the_verdict() {
+        let reference = reference();
+        let mut image = reference.to_f32();
+        image[0][0] = 1.0;
+        assert_contract(
+            "assert_contract_panics",
+            &image,
+            &reference,
+            Limits::CONTRACT,
+        );
+    }
+}

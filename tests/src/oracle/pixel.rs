@@ -1,0 +1,213 @@
+//! Steps 6 and 7: alpha at a pixel centre, and compositing front to back, both ways where a
+//! decision cannot be demanded of binary32.
+
+use super::OracleState;
+use super::error_model::{Transmittance, UNIT_ROUNDOFF};
+use super::project::Splat;
+
+/// How many undecidable decisions are followed both ways along one path; later ones follow
+/// binary64.
+pub const MAX_DECISIONS: u32 = 6;
+
+/// Alpha of a Gaussian at a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Alpha {
+    /// Step 6's value, ceiling applied.
+    pub value: f64,
+    /// How far a binary32 implementation may be from it.
+    pub error: f64,
+}
+
+impl Splat {
+    /// Step 6 at the centre of pixel (x, y).
+    pub fn alpha(&self, x: u32, y: u32, state: &OracleState) -> Alpha {
+        let d = [
+            f64::from(x) + 0.5 - self.mean[0],
+            f64::from(y) + 0.5 - self.mean[1],
+        ];
+        let (q, w) = self.cholesky.solve(d);
+        let unclamped = self.opacity * (-0.5 * q).exp();
+        let error = unclamped * self.error.alpha(w, q);
+        let ceiling = f64::from(state.alpha_ceiling);
+        if unclamped - error > ceiling {
+            Alpha {
+                value: ceiling,
+                error: 0.0,
+            }
+        } else if unclamped > ceiling {
+            Alpha {
+                value: ceiling,
+                error,
+            }
+        } else {
+            Alpha {
+                value: unclamped,
+                error,
+            }
+        }
+    }
+}
+
+/// One way in which a pixel may come about.
+#[derive(Clone, Copy, Debug)]
+struct Path {
+    color: [f64; 3],
+    transmittance: Transmittance,
+    finished: bool,
+    /// Undecidable decisions behind it, each of which was followed both ways.
+    decisions: u32,
+}
+
+impl Path {
+    const START: Self = Self {
+        color: [0.0; 3],
+        transmittance: Transmittance::ONE,
+        finished: false,
+        decisions: 0,
+    };
+
+    fn rgba(&self) -> [f64; 4] {
+        let [r, g, b] = self.color;
+        [r, g, b, 1.0 - self.transmittance.value]
+    }
+}
+
+/// A pixel while Gaussians are added to it, nearest first.
+#[derive(Clone, Debug)]
+pub struct Pixel {
+    /// What binary64 says.
+    nominal: Path,
+    /// The other ways, in the order in which they parted.
+    alternatives: Vec<Path>,
+    /// Whether some path met more than [`MAX_DECISIONS`] undecidable decisions.
+    exhausted: bool,
+}
+
+impl Pixel {
+    /// A pixel with nothing in it.
+    pub const EMPTY: Self = Self {
+        nominal: Path::START,
+        alternatives: Vec::new(),
+        exhausted: false,
+    };
+
+    /// Whether no further Gaussian can change it.
+    pub fn is_finished(&self) -> bool {
+        self.nominal.finished && self.alternatives.iter().all(|path| path.finished)
+    }
+
+    /// Adds the next Gaussian by ascending depth.
+    pub fn add(&mut self, splat: &Splat, alpha: Alpha, state: &OracleState) {
+        if alpha.value + alpha.error < f64::from(state.alpha_floor) {
+            return;
+        }
+        let mut step = Step {
+            color: splat.color,
+            alpha,
+            state,
+            forks: Vec::new(),
+            exhausted: false,
+        };
+        step.contribute_or_not(&mut self.nominal);
+        for path in &mut self.alternatives {
+            step.contribute_or_not(path);
+        }
+        self.exhausted |= step.exhausted;
+        self.alternatives.append(&mut step.forks);
+    }
+
+    /// What binary64 says: (C, 1 - T).
+    pub fn rgba(&self) -> [f64; 4] {
+        self.nominal.rgba()
+    }
+
+    /// What the other ways of undecidable decisions give.
+    pub fn alternatives(&self) -> Vec<[f64; 4]> {
+        self.alternatives.iter().map(Path::rgba).collect()
+    }
+
+    /// Whether some path met more undecidable decisions than are followed.
+    pub fn is_exhausted(&self) -> bool {
+        self.exhausted
+    }
+}
+
+/// One Gaussian being added to all paths of a pixel.
+struct Step<'a> {
+    color: [f64; 3],
+    alpha: Alpha,
+    state: &'a OracleState,
+    /// Paths that part from others at this Gaussian, which is already added to them.
+    forks: Vec<Path>,
+    exhausted: bool,
+}
+
+impl Step<'_> {
+    /// Step 6's decision: `alpha >= alphaFloor`.
+    fn contribute_or_not(&mut self, path: &mut Path) {
+        if path.finished {
+            return;
+        }
+        let floor = f64::from(self.state.alpha_floor);
+        let Alpha { value, error } = self.alpha;
+        let contributes = value >= floor;
+        // No alpha is below a floor of 0, whatever its error.
+        let undecidable = floor > 0.0 && (value - floor).abs() <= error;
+        if let Some(mut other) = self.part(path, undecidable) {
+            if !contributes {
+                self.finish_or_blend(&mut other);
+            }
+            self.forks.push(other);
+        }
+        if contributes {
+            self.finish_or_blend(path);
+        }
+    }
+
+    /// Step 7's decision: `T (1 - alpha) < transmittanceFloor`, and what follows from it.
+    fn finish_or_blend(&mut self, path: &mut Path) {
+        let floor = f64::from(self.state.transmittance_floor);
+        let behind = path
+            .transmittance
+            .behind(self.alpha.value, self.alpha.error);
+        // Where 1 - alpha rounds to 1, T doesn't change, and it has passed this test before.
+        let undecidable = floor > 0.0
+            && self.alpha.value > 0.5 * UNIT_ROUNDOFF
+            && (behind.value - floor).abs() <= behind.error;
+        let finishes = behind.value < floor;
+        if let Some(mut other) = self.part(path, undecidable) {
+            if finishes {
+                self.blend(&mut other, behind);
+            } else {
+                other.finished = true;
+            }
+            self.forks.push(other);
+        }
+        if finishes {
+            path.finished = true;
+        } else {
+            self.blend(path, behind);
+        }
+    }
+
+    fn blend(&self, path: &mut Path, behind: Transmittance) {
+        let weight = path.transmittance.value * self.alpha.value;
+        for (sum, color) in path.color.iter_mut().zip(self.color) {
+            *sum += weight * color;
+        }
+        path.transmittance = behind;
+    }
+
+    /// The path that decides otherwise, if both ways are to be followed.
+    fn part(&mut self, path: &mut Path, undecidable: bool) -> Option<Path> {
+        if !undecidable {
+            return None;
+        }
+        if path.decisions == MAX_DECISIONS {
+            self.exhausted = true;
+            return None;
+        }
+        path.decisions += 1;
+        Some(*path)
+    }
+}

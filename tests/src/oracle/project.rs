@@ -1,0 +1,248 @@
+//! Steps 1 to 5: from a Gaussian in world space to the numbers that a pixel needs.
+
+use super::error_model::ErrorModel;
+use super::spherical_harmonics;
+use super::{OracleCamera, OracleScene, OracleState, SkipReason};
+
+/// A Gaussian as the pixels see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Splat {
+    /// Centre in pixels from the viewport's upper left corner, not clamped to it.
+    pub mean: [f64; 2],
+    /// Covariance `xx, xy, yy` in px^2, low-pass filter included.
+    pub covariance: [f64; 3],
+    /// Its determinant, evaluated without cancellation.
+    pub determinant: f64,
+    /// The factor with which the quadratic form is evaluated.
+    pub cholesky: Cholesky,
+    /// Opacity, compensated if the state says so.
+    pub opacity: f64,
+    /// Colour, at least 0.
+    pub color: [f64; 3],
+    /// Depth key: `t.z` rounded to binary32.
+    pub key: f32,
+    /// Whether `t.z` is within its own error of the middle between two keys.
+    pub key_undecidable: bool,
+    /// How far a binary32 implementation may err on this Gaussian.
+    pub error: ErrorModel,
+}
+
+/// Lower triangular factor of a 2x2 covariance, pivoted on its larger diagonal element.
+#[derive(Clone, Copy, Debug)]
+pub struct Cholesky {
+    /// Whether y comes first.
+    pub swapped: bool,
+    /// The factor's elements `l11, l21, l22`.
+    pub l: [f64; 3],
+}
+
+impl Cholesky {
+    /// Factors `[xx, xy, yy]`. The last pivot comes from the determinant, not from a difference.
+    fn new([xx, xy, yy]: [f64; 3], determinant: f64) -> Self {
+        let swapped = yy > xx;
+        let larger = if swapped { yy } else { xx };
+        let l11 = larger.sqrt();
+        Self {
+            swapped,
+            l: [l11, xy / l11, (determinant / larger).sqrt()],
+        }
+    }
+
+    /// `q = d^T S^-1 d` as a sum of two squares, and `w = S^-1 d`.
+    pub fn solve(&self, d: [f64; 2]) -> (f64, [f64; 2]) {
+        let [l11, l21, l22] = self.l;
+        let (first, second) = if self.swapped {
+            (d[1], d[0])
+        } else {
+            (d[0], d[1])
+        };
+        let y1 = first / l11;
+        let y2 = (second - l21 * y1) / l22;
+        let w2 = y2 / l22;
+        let w1 = (y1 - l21 * w2) / l11;
+        let w = if self.swapped { [w2, w1] } else { [w1, w2] };
+        (y1 * y1 + y2 * y2, w)
+    }
+}
+
+/// Projects Gaussian `index`, or says why it is not drawn.
+pub fn project(
+    scene: &OracleScene,
+    camera: &OracleCamera,
+    state: &OracleState,
+    index: usize,
+) -> Result<Splat, SkipReason> {
+    check_attributes(scene, state, index)?;
+
+    // Step 2. Camera space, and the depth key.
+    let rotation = camera.rotation.map(f64::from);
+    let position = scene.positions[index].map(f64::from);
+    let offset = subtract(position, camera.eye);
+    let t = transform(&rotation, offset);
+    let key = t[2] as f32;
+    // A key that is not a number passes neither.
+    let (beyond_near, before_far) = (camera.near < key, key < camera.far);
+    if !beyond_near {
+        return Err(SkipReason::Near);
+    }
+    if !before_far {
+        return Err(SkipReason::Far);
+    }
+
+    // Step 3. The mean and the Jacobian of the projection, whose point is kept near the viewport.
+    let [fx, fy] = camera.focal.map(f64::from);
+    let [cx, cy] = camera.principal.map(f64::from);
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let (tan_x, tan_y) = (t[0] / t[2], t[1] / t[2]);
+    let mean = [fx * tan_x + cx, fy * tan_y + cy];
+    let u = tan_x
+        .max(-(cx / fx + 0.15 * width / fx))
+        .min((width - cx) / fx + 0.15 * width / fx);
+    let v = tan_y
+        .max(-(cy / fy + 0.15 * height / fy))
+        .min((height - cy) / fy + 0.15 * height / fy);
+    let jacobian = [
+        [fx / t[2], 0.0, -fx * u / t[2]],
+        [0.0, fy / t[2], -fy * v / t[2]],
+    ];
+    let scale = scene.scales[index].map(f64::from);
+    let axes = rotation_matrix(scene.rotations[index].map(f64::from));
+    let m = jacobian.map(|row| {
+        let in_world = multiply_row(row, &rotation);
+        let in_axes = multiply_row(in_world, &axes);
+        [
+            in_axes[0] * scale[0],
+            in_axes[1] * scale[1],
+            in_axes[2] * scale[2],
+        ]
+    });
+
+    // Step 4. Covariance and determinant.
+    let low_pass = f64::from(state.low_pass);
+    let area = length(cross(m[0], m[1]));
+    let (s_xx, s_xy, s_yy) = (dot(m[0], m[0]), dot(m[0], m[1]), dot(m[1], m[1]));
+    let determinant = area * area + low_pass * (s_xx + s_yy) + low_pass * low_pass;
+    if !(determinant > 0.0 && determinant.is_finite()) {
+        return Err(SkipReason::DegenerateCovariance);
+    }
+    let covariance = [s_xx + low_pass, s_xy, s_yy + low_pass];
+    let mut opacity = f64::from(scene.opacities[index]);
+    if state.opacity_compensated {
+        opacity *= area / determinant.sqrt();
+    }
+
+    // Step 5. Colour.
+    let direction = offset.map(|c| c / length(offset));
+    let color = spherical_harmonics::color(scene.degree(), direction, scene.coefficients(index));
+
+    let largest_scale = scale[0].max(scale[1]).max(scale[2]);
+    let spread = jacobian.map(|row| (length(row) * largest_scale).hypot(low_pass.sqrt()));
+    let area_for_opacity = state.opacity_compensated.then_some(area);
+    Ok(Splat {
+        mean,
+        covariance,
+        determinant,
+        cholesky: Cholesky::new(covariance, determinant),
+        opacity,
+        color,
+        key,
+        key_undecidable: key_is_undecidable(&rotation, offset, t[2]),
+        error: ErrorModel::new(spread, opacity, area_for_opacity),
+    })
+}
+
+/// Step 1: what is known without a camera.
+fn check_attributes(
+    scene: &OracleScene,
+    state: &OracleState,
+    index: usize,
+) -> Result<(), SkipReason> {
+    let (scale, quaternion) = (scene.scales[index], scene.rotations[index]);
+    let opacity = scene.opacities[index];
+    let finite = scene.positions[index].iter().all(|c| c.is_finite())
+        && scale.iter().all(|c| c.is_finite())
+        && quaternion.iter().all(|c| c.is_finite())
+        && opacity.is_finite()
+        && scene
+            .coefficients(index)
+            .as_flattened()
+            .iter()
+            .all(|c| c.is_finite());
+    if !finite {
+        return Err(SkipReason::NonFinite);
+    }
+    if quaternion == [0.0; 4] {
+        return Err(SkipReason::ZeroQuaternion);
+    }
+    if scale.iter().any(|&s| s < 0.0) {
+        return Err(SkipReason::NegativeScale);
+    }
+    if opacity < state.alpha_floor {
+        return Err(SkipReason::OpacityBelowFloor);
+    }
+    Ok(())
+}
+
+/// The rotation matrix (row-major) of a quaternion `w, x, y, z` that is not zero. It is divided by
+/// its largest component first, so that no square under- or overflows.
+fn rotation_matrix(quaternion: [f64; 4]) -> [f64; 9] {
+    let largest = quaternion.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
+    let scaled = quaternion.map(|c| c / largest);
+    let norm = scaled.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let [w, x, y, z] = scaled.map(|c| c / norm);
+    [
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    ]
+}
+
+/// Whether the binary64 error of `t.z` reaches across the middle between two binary32 values.
+///
+/// `t.z` is a sum of three products of differences: five roundings at most on each term.
+fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], t_z: f64) -> bool {
+    let magnitude: f64 = (0..3).map(|i| (rotation[6 + i] * offset[i]).abs()).sum();
+    let error = 2.5 * f64::EPSILON * magnitude;
+    (t_z - error) as f32 != (t_z + error) as f32
+}
+
+fn subtract(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn length(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Matrix (row-major) times column.
+fn transform(matrix: &[f64; 9], v: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|row| {
+        dot(
+            [matrix[3 * row], matrix[3 * row + 1], matrix[3 * row + 2]],
+            v,
+        )
+    })
+}
+
+/// Row times matrix (row-major).
+fn multiply_row(v: [f64; 3], matrix: &[f64; 9]) -> [f64; 3] {
+    std::array::from_fn(|column| dot(v, [matrix[column], matrix[3 + column], matrix[6 + column]]))
+}

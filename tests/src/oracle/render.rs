@@ -1,0 +1,225 @@
+//! Whole images: every Gaussian at every pixel, or only where it can matter.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::pixel::Pixel;
+use super::project::{Splat, project};
+use super::{OracleCamera, OracleScene, OracleState, SkipCounts};
+
+/// How far beyond the ellipse on which alpha reaches its floor [`render_bounded`] looks, in px.
+/// It covers the rounding of the bound itself.
+const MARGIN: f64 = 2.0;
+
+/// What a draw means: an image, and where it could mean something else.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// What binary64 says, (C, 1 - T) premultiplied, row by row from the top.
+    pub nominal: Vec<[f64; 4]>,
+    /// The further outcomes of undecidable pixels, by index into `nominal`.
+    pub alternatives: BTreeMap<usize, Vec<[f64; 4]>>,
+    /// Undecidable pixels where more decisions were met than are followed.
+    pub exhausted: usize,
+    /// Gaussians that were not drawn.
+    pub skips: SkipCounts,
+    /// Gaussians that were drawn and whose depth key could be the next one, too.
+    pub undecidable_keys: usize,
+}
+
+impl Reference {
+    /// Every outcome of pixel `index`, what binary64 says first.
+    pub fn outcomes(&self, index: usize) -> impl Iterator<Item = &[f64; 4]> {
+        let alternatives = self.alternatives.get(&index).map_or(&[][..], Vec::as_slice);
+        std::iter::once(&self.nominal[index]).chain(alternatives)
+    }
+
+    /// Least and greatest of each channel over all outcomes of pixel `index`.
+    pub fn envelope(&self, index: usize) -> ([f64; 4], [f64; 4]) {
+        let start = (self.nominal[index], self.nominal[index]);
+        self.outcomes(index).fold(start, |(least, greatest), rgba| {
+            (
+                std::array::from_fn(|c| least[c].min(rgba[c])),
+                std::array::from_fn(|c| greatest[c].max(rgba[c])),
+            )
+        })
+    }
+
+    /// The binary64 image rounded to binary32.
+    pub fn to_f32(&self) -> Vec<[f32; 4]> {
+        self.nominal
+            .iter()
+            .map(|rgba| rgba.map(|c| c as f32))
+            .collect()
+    }
+}
+
+/// Draws every Gaussian at every pixel: the meaning itself, for small scenes.
+pub fn render_literal(
+    scene: &OracleScene,
+    camera: &OracleCamera,
+    state: &OracleState,
+) -> Reference {
+    let projected = Projected::new(scene, camera, state);
+    let rows = (0..camera.height).map(|y| {
+        let mut row = vec![Pixel::EMPTY; camera.width as usize];
+        for (x, pixel) in (0..).zip(&mut row) {
+            for splat in &projected.splats {
+                pixel.add(splat, splat.alpha(x, y, state), state);
+            }
+        }
+        row
+    });
+    collect(camera, &projected, rows.collect())
+}
+
+/// Draws every Gaussian where its alpha can reach the floor, rows in parallel.
+///
+/// Gives the same bits as [`render_literal`]: what is left out has an alpha that is decidably
+/// below the floor.
+pub fn render_bounded(
+    scene: &OracleScene,
+    camera: &OracleCamera,
+    state: &OracleState,
+) -> Reference {
+    let projected = Projected::new(scene, camera, state);
+    let bounds: Vec<Bound> = projected
+        .splats
+        .iter()
+        .map(|splat| Bound::new(splat, state))
+        .collect();
+    let mut members = vec![Vec::new(); camera.height as usize];
+    for (index, bound) in bounds.iter().enumerate() {
+        for y in bound.rows(camera.height) {
+            members[y as usize].push(index);
+        }
+    }
+    let rows = members
+        .par_iter()
+        .enumerate()
+        .map(|(y, members)| {
+            let y = y as u32;
+            let mut row = vec![Pixel::EMPTY; camera.width as usize];
+            for &index in members {
+                let splat = &projected.splats[index];
+                for x in bounds[index].columns(y, camera.width) {
+                    let pixel = &mut row[x as usize];
+                    if !pixel.is_finished() {
+                        pixel.add(splat, splat.alpha(x, y, state), state);
+                    }
+                }
+            }
+            row
+        })
+        .collect();
+    collect(camera, &projected, rows)
+}
+
+/// The Gaussians that are drawn, nearest first, and a tally of the others.
+struct Projected {
+    splats: Vec<Splat>,
+    skips: SkipCounts,
+}
+
+impl Projected {
+    fn new(scene: &OracleScene, camera: &OracleCamera, state: &OracleState) -> Self {
+        let mut skips = SkipCounts::default();
+        let mut splats = Vec::with_capacity(scene.len());
+        for index in 0..scene.len() {
+            match project(scene, camera, state, index) {
+                Ok(splat) => splats.push(splat),
+                Err(reason) => skips.count(reason),
+            }
+        }
+        // Stable, so that ties stay in primitive order.
+        splats.sort_by(|a, b| a.key.total_cmp(&b.key));
+        Self { splats, skips }
+    }
+}
+
+fn collect(camera: &OracleCamera, projected: &Projected, rows: Vec<Vec<Pixel>>) -> Reference {
+    let pixels = || rows.iter().flatten();
+    Reference {
+        width: camera.width,
+        height: camera.height,
+        nominal: pixels().map(Pixel::rgba).collect(),
+        alternatives: pixels()
+            .map(Pixel::alternatives)
+            .enumerate()
+            .filter(|(_, alternatives)| !alternatives.is_empty())
+            .collect(),
+        exhausted: pixels().filter(|pixel| pixel.is_exhausted()).count(),
+        skips: projected.skips,
+        undecidable_keys: projected
+            .splats
+            .iter()
+            .filter(|splat| splat.key_undecidable)
+            .count(),
+    }
+}
+
+/// The ellipse outside which a Gaussian's alpha is decidably below the floor.
+struct Bound {
+    mean: [f64; 2],
+    covariance: [f64; 3],
+    determinant: f64,
+    /// The quadratic form on the ellipse; negative if there is none, infinite if it is the plane.
+    q: f64,
+}
+
+impl Bound {
+    fn new(splat: &Splat, state: &OracleState) -> Self {
+        // Undecidable or better needs opacity exp(-q / 2) (1 + error) >= floor, hence
+        // q <= level + 2 ln(1 + error). The error is at most 1, which bounds q, which bounds it.
+        let level = 2.0 * (splat.opacity / f64::from(state.alpha_floor)).ln();
+        let furthest = (level + 2.0 * std::f64::consts::LN_2).max(0.0);
+        let error = splat
+            .error
+            .alpha_up_to(furthest, splat.covariance, splat.determinant);
+        let q = level + 2.0 * error.ln_1p();
+        Self {
+            mean: splat.mean,
+            covariance: splat.covariance,
+            determinant: splat.determinant,
+            q: if q.is_finite() {
+                q + 1e-9 * (1.0 + q.abs())
+            } else {
+                q
+            },
+        }
+    }
+
+    /// Rows of pixels that the ellipse and its margin reach.
+    fn rows(&self, height: u32) -> Range<u32> {
+        if self.q < 0.0 {
+            return 0..0;
+        }
+        self.pixels(self.mean[1], (self.q * self.covariance[2]).sqrt(), height)
+    }
+
+    /// Pixels of row `y` that the ellipse and its margin reach.
+    fn columns(&self, y: u32, width: u32) -> Range<u32> {
+        let [_, xy, yy] = self.covariance;
+        let dy = f64::from(y) + 0.5 - self.mean[1];
+        let centre = self.mean[0] + xy / yy * dy;
+        let left = (self.q - dy * dy / yy).max(0.0);
+        self.pixels(centre, (self.determinant / yy * left).sqrt(), width)
+    }
+
+    /// The pixels within `reach` and the margin of `centre`, of `count` pixels.
+    fn pixels(&self, centre: f64, reach: f64, count: u32) -> Range<u32> {
+        let reach = reach + MARGIN + 1e-9 * (centre.abs() + reach);
+        if reach.is_nan() {
+            return 0..count;
+        }
+        // Conversions saturate, at 0 too.
+        let first = (centre - reach).floor() as u32;
+        let end = (centre + reach).ceil() as u32;
+        first.min(count)..end.min(count)
+    }
+}
