@@ -293,8 +293,31 @@ fn empty_draws_draw_nothing() {
         c.draw([0, 1, 0, 0]);
         c.draw([bench.scene.count, 0, 0, 0]);
     });
-    // A draw that has Gaussians, all of them skipped, replaces what is there by nothing.
     assert_same(&vec![background; drawn.len()], &drawn);
+}
+
+#[test]
+fn what_is_not_covered_keeps_its_colour_even_where_draws_replace() {
+    let scene = scenes::cloud(31, 12, 0);
+    let bench = Bench::new(&scene);
+    let background = [0.25, 0.5, 0.75, 1.0];
+    let drawn: Vec<[f32; 4]> = bench.draw_to(&bench.target(), &Pass::clear(background), |c| {
+        c.draw([bench.scene.count, 1, 0, 0]);
+    });
+    let reference = render_bounded(&scene.as_oracle(), &camera(), &OracleState::default());
+    let (mut kept, mut replaced) = (0, 0);
+    for (pixel, color) in drawn.iter().enumerate() {
+        if reference
+            .outcomes(pixel)
+            .all(|outcome| *outcome == [0.0; 4])
+        {
+            assert_eq!(*color, background, "pixel {pixel} is not covered");
+            kept += 1;
+        } else {
+            replaced += usize::from(*color != background);
+        }
+    }
+    assert!(kept > 0 && replaced > 0, "{kept} kept, {replaced} replaced");
 }
 
 #[test]
