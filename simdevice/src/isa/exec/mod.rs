@@ -59,6 +59,7 @@ use fearless_simd::{Level, dispatch};
 
 use super::ir::Type;
 use super::op::Op;
+pub(crate) use memory::combine;
 use file::{File, Slot};
 
 /// What an operation gives for constants, by the same kernels that programs run.
