@@ -1,11 +1,12 @@
 //! The image unit: what a program's image and sampler slots are bound to.
 
-use fearless_simd::{Level, dispatch};
+use fearless_simd::Level;
 
+use super::batch::Batch;
 use super::sampler::Sampler;
 use super::surface::Surface;
 use super::view::ImageBinding;
-use super::{batch, fetch, filter, lod};
+use super::{fetch, filter, lod};
 use crate::isa::ir::{AtomicOp, Dimension, ImageShape};
 use crate::isa::resources::{ImageUnit, Lanes, SampleRequest, TexelRequest};
 
@@ -64,12 +65,21 @@ impl ImageUnit for ImageTable {
         let Some((surface, sampler)) = self.pair(image, sampler) else {
             return Default::default();
         };
-        match &surface.packing {
-            Some(packing) if self.batched && batch::handles(request) => {
-                dispatch!(self.level, simd => batch::sample(simd, surface, packing, sampler, request))
-            }
-            _ => filter::sample(surface, sampler, request),
-        }
+        surface
+            .packing
+            .as_ref()
+            .filter(|_| self.batched)
+            .and_then(|packing| {
+                let batch = Batch {
+                    level: self.level,
+                    surface,
+                    packing,
+                    sampler,
+                    request,
+                };
+                batch.sample()
+            })
+            .unwrap_or_else(|| filter::sample(surface, sampler, request))
     }
 
     fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4] {
@@ -91,9 +101,10 @@ impl ImageUnit for ImageTable {
         value: &Lanes,
         comparator: &Lanes,
     ) -> Lanes {
-        self.surface(image).map_or_else(Default::default, |surface| {
-            fetch::atomic(surface, request, op, value, comparator)
-        })
+        self.surface(image)
+            .map_or_else(Default::default, |surface| {
+                fetch::atomic(surface, request, op, value, comparator)
+            })
     }
 
     fn size(&self, image: u32, shape: ImageShape, level: u32) -> [u32; 4] {

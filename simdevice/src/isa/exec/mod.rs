@@ -59,8 +59,8 @@ use fearless_simd::{Level, dispatch};
 
 use super::ir::Type;
 use super::op::Op;
-pub(crate) use memory::combine;
 use file::{File, Slot};
+pub(crate) use memory::combine;
 
 /// What an operation gives for constants, by the same kernels that programs run.
 pub(super) fn evaluate(level: Level, op: Op, operands: &[u64]) -> u64 {
