@@ -8,14 +8,15 @@ use std::sync::atomic::AtomicU32;
 
 use fearless_simd::Level;
 
-use super::address::layer;
+use super::address;
 use super::axis::{Axis, axis};
 use super::cube;
-use super::filter::{border_texel, reference};
+use super::filter::{border_texel, reference_value};
 use super::lod::{self, Floats, Selection};
-use super::packing::{Packing, Rows};
-use super::sampler::{AddressMode, Filter, Sampler};
+use super::packing::{PackedLevel, Packing, Rows};
+use super::sampler::{AddressMode, CompareOp, Filter, Sampler};
 use super::surface::Surface;
+use crate::format::Numeric;
 use crate::isa::ir::{CHUNK_LANES, Dimension};
 use crate::isa::resources::{Lanes, SampleRequest};
 
@@ -23,55 +24,66 @@ use crate::isa::resources::{Lanes, SampleRequest};
 type Texels = [Floats; 4];
 
 /// What a request reads, and how.
-pub(super) struct Batch<'a> {
-    pub level: Level,
-    pub surface: &'a Surface,
-    pub packing: &'a Packing,
-    pub sampler: &'a Sampler,
-    pub request: &'a SampleRequest,
+struct Batch<'a> {
+    level: Level,
+    surface: &'a Surface,
+    packing: &'a Packing,
+    sampler: &'a Sampler,
+    request: &'a SampleRequest,
+    /// The comparison that is asked for.
+    reference: Option<(CompareOp, Floats)>,
 }
 
-/// The texels around the lanes' points in one mip level.
-struct Footprint {
-    /// Along x, y and z.
-    axes: [Axis; 3],
-    /// The first texel of each lane's layer.
-    base: Lanes,
-    row_pitch: Lanes,
-    depth_pitch: Lanes,
+/// Filters for all lanes; None if this request has to be filtered lane by lane.
+pub(super) fn sample(
+    level: Level,
+    surface: &Surface,
+    sampler: &Sampler,
+    request: &SampleRequest,
+) -> Option<[Lanes; 4]> {
+    let packing = surface.packing.as_ref()?;
+    let shape = request.shape;
+    if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() {
+        return None;
+    }
+    let reference = sampler.compare_op.zip(request.compare).map(|(op, bits)| {
+        let unorm = surface.format.numeric() == Numeric::Unorm;
+        (op, bits.map(|bits| reference_value(unorm, bits)))
+    });
+    let batch = Batch {
+        level,
+        surface,
+        packing,
+        sampler,
+        request,
+        reference,
+    };
+    let selection = lod::select(surface, sampler, request);
+    let texels = batch.select_filter(&selection)?;
+    Some(batch.registers(&texels))
 }
 
 impl Batch<'_> {
-    /// Filters for all lanes; None if this request has to be filtered lane by lane.
-    pub fn sample(&self) -> Option<[Lanes; 4]> {
-        let shape = self.request.shape;
-        if shape.multisampled || shape.dimension == Dimension::Buffer {
-            return None;
-        }
-        if self.request.gather.is_some() {
-            return None;
-        }
-        let selection = lod::select(self.surface, self.sampler, self.request);
-        let texels = self.select_filter(&selection)?;
-        Some(self.registers(&texels))
-    }
-
     /// Stored components as a program gets them.
+    #[inline]
     fn registers(&self, texels: &Texels) -> [Lanes; 4] {
-        let mut registers = [[0.0; CHUNK_LANES]; 4];
-        registers[3] = [1.0; CHUNK_LANES];
+        let components = self.packing.kind.components();
+        let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
+        let mut registers = [&zero, &zero, &zero, &one];
         for (register, stored) in registers.iter_mut().zip(self.packing.order) {
-            if stored < self.packing.kind.components() {
-                *register = texels[stored];
+            if stored < components {
+                *register = &texels[stored];
             }
         }
-        let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
-        self.surface
-            .swizzle
-            .map(|from| from.pick(&registers, zero, one).map(f32::to_bits))
+        let mut out = [[0; CHUNK_LANES]; 4];
+        for (out, from) in out.iter_mut().zip(self.surface.swizzle) {
+            *out = bytemuck::cast(*from.pick(&registers, &zero, &one));
+        }
+        out
     }
 
     /// With the filter that each lane asks for.
+    #[inline]
     fn select_filter(&self, selection: &Selection) -> Option<Texels> {
         let first = selection.filter[0];
         let mut texels = self.select_levels(selection, first)?;
@@ -93,6 +105,7 @@ impl Batch<'_> {
     }
 
     /// Mixed between levels.
+    #[inline]
     fn select_levels(&self, selection: &Selection, filter: Filter) -> Option<Texels> {
         let high = self.filter_level(&selection.high, filter)?;
         if selection.weight == [0.0; CHUNK_LANES] {
@@ -113,50 +126,157 @@ impl Batch<'_> {
         Some(texels)
     }
 
-    /// Of one level for each lane.
+    /// Of one level for each lane; None if some lie across the edge of a cube's face.
+    #[inline]
     fn filter_level(&self, levels: &Lanes, filter: Filter) -> Option<Texels> {
-        let footprint = self.footprint(levels, filter)?;
-        let [_, _, z] = &footprint.axes;
-        let slice = self.filter_slice(&footprint, 0, filter);
-        if self.request.shape.dimension == Dimension::D3 && filter == Filter::Linear {
-            let next = self.filter_slice(&footprint, 1, filter);
-            return Some(mix(&slice, &next, &z.weight));
+        let mut coordinate = [
+            self.request.coordinate[0],
+            self.request.coordinate[1],
+            self.request.coordinate[2],
+        ];
+        let layers = self.layers(&mut coordinate);
+        if layers.is_some_and(|layers| layers.iter().any(|layer| *layer >= self.surface.layers)) {
+            return None;
         }
-        Some(slice)
-    }
-
-    /// Of slice `k` of two.
-    fn filter_slice(&self, footprint: &Footprint, k: usize, filter: Filter) -> Texels {
-        let [x, y, z] = &footprint.axes;
-        let words = self.packing.words(self.surface);
+        let sizes = LevelSizes::new(&self.packing.levels, levels);
+        let dimension = self.request.shape.dimension;
+        let x = self.axis(0, filter, &coordinate, &sizes);
+        let (y, z);
+        let (y, z) = match dimension {
+            Dimension::D1 | Dimension::Buffer => (&Axis::FLAT, &Axis::FLAT),
+            Dimension::D2 | Dimension::Cube => {
+                y = self.axis(1, filter, &coordinate, &sizes);
+                (&y, &Axis::FLAT)
+            }
+            Dimension::D3 => {
+                y = self.axis(1, filter, &coordinate, &sizes);
+                z = self.axis(2, filter, &coordinate, &sizes);
+                (&y, &z)
+            }
+        };
+        if dimension == Dimension::Cube {
+            let inside = x.inside[0] & x.inside[1] & y.inside[0] & y.inside[1];
+            if inside | !self.request.mask != u16::MAX {
+                return None;
+            }
+        }
         let mut rows = Rows {
-            base: footprint.base,
-            row_pitch: footprint.row_pitch,
+            base: sizes.of(|level| level.base),
+            row_pitch: sizes.of(|level| level.row_pitch),
             x: &x.index,
             y: &y.index,
         };
-        if self.request.shape.dimension == Dimension::D3 {
+        if let Some(layers) = layers {
+            advance(
+                &mut rows.base,
+                &layers,
+                &sizes.of(|level| level.layer_pitch),
+            );
+        }
+        if dimension != Dimension::D3 {
+            return Some(self.filter_slice(&rows, [&x, y], [u16::MAX; 2], filter));
+        }
+        let first = rows.base;
+        let pitch = sizes.of(|level| level.depth_pitch);
+        advance(&mut rows.base, &z.index[0], &pitch);
+        let slice = self.filter_slice(&rows, [&x, y], [z.inside[0]; 2], filter);
+        if filter == Filter::Nearest {
+            return Some(slice);
+        }
+        rows.base = first;
+        advance(&mut rows.base, &z.index[1], &pitch);
+        let next = self.filter_slice(&rows, [&x, y], [z.inside[1]; 2], filter);
+        Some(mix(&slice, &next, &z.weight))
+    }
+
+    /// The layer of each lane; None if it is the first for all. A cube's directions become coordinates on a face.
+    #[inline]
+    fn layers(&self, coordinate: &mut [Lanes; 3]) -> Option<Lanes> {
+        let shape = self.request.shape;
+        let cube = shape.dimension == Dimension::Cube;
+        if !cube && !shape.arrayed {
+            return None;
+        }
+        let mut layers = [0; CHUNK_LANES];
+        if cube {
             for lane in 0..CHUNK_LANES {
-                let slice = z.index[k][lane].wrapping_mul(footprint.depth_pitch[lane]);
-                rows.base[lane] = rows.base[lane].wrapping_add(slice);
+                let direction = coordinate.map(|lanes| f32::from_bits(lanes[lane]));
+                let hit = cube::Hit::new(direction);
+                let [s, t] = hit.coordinates();
+                layers[lane] = hit.face;
+                [coordinate[0][lane], coordinate[1][lane]] = [s.to_bits(), t.to_bits()];
             }
         }
-        let plain = self.sampler.compare_op.is_none() || self.request.compare.is_none();
-        let bordered = footprint.axes.iter().any(|axis| axis.has_outside);
-        let kind = self.packing.kind;
-        if filter == Filter::Linear
-            && self.request.shape.dimension != Dimension::D1
-            && plain
-            && !bordered
-        {
-            return kind.bilinear(self.level, words, &rows, &x.weight, &y.weight);
+        if shape.arrayed {
+            let per_element = if cube { 6 } else { 1 };
+            let elements = self.surface.layers / per_element;
+            let coordinate = &self.request.coordinate[shape.dimension.coordinates()];
+            for (layer, coordinate) in layers.iter_mut().zip(coordinate) {
+                *layer += address::layer(f32::from_bits(*coordinate), elements) * per_element;
+            }
+        }
+        Some(layers)
+    }
+
+    /// The texels of the lanes' coordinates along an axis.
+    #[inline]
+    fn axis(
+        &self,
+        number: usize,
+        filter: Filter,
+        coordinate: &[Lanes; 3],
+        sizes: &LevelSizes<'_>,
+    ) -> Axis {
+        let size = match number {
+            0 => sizes.of(|level| level.extent[0]),
+            1 => sizes.of(|level| level.extent[1]),
+            _ => sizes.of(|level| level.extent[2]),
+        };
+        let coordinate = &coordinate[number];
+        if self.request.shape.dimension == Dimension::Cube {
+            // What lies across an edge is found out here, and done lane by lane.
+            let mode = match filter {
+                Filter::Nearest => AddressMode::ClampToEdge,
+                Filter::Linear => AddressMode::ClampToBorder,
+            };
+            let offset = [0; CHUNK_LANES];
+            return axis(self.level, mode, filter, true, coordinate, &size, &offset);
+        }
+        axis(
+            self.level,
+            self.sampler.address_modes[number],
+            filter,
+            !self.sampler.unnormalized_coordinates,
+            coordinate,
+            &size,
+            &self.request.offset[number],
+        )
+    }
+
+    /// Of one slice, which lanes have as far as they are `within`.
+    #[inline]
+    fn filter_slice(
+        &self,
+        rows: &Rows<'_>,
+        [x, y]: [&Axis; 2],
+        within: [u16; 2],
+        filter: Filter,
+    ) -> Texels {
+        let dimension = self.request.shape.dimension;
+        let words = self.packing.words(self.surface);
+        let bordered = x.has_outside || y.has_outside || within[0] != u16::MAX;
+        // A cube's outside is that of lanes that nobody asks for.
+        let plain = self.reference.is_none() && (!bordered || dimension == Dimension::Cube);
+        if filter == Filter::Linear && dimension != Dimension::D1 && plain {
+            let kind = self.packing.kind;
+            return kind.bilinear(self.level, words, rows, &x.weight, &y.weight);
         }
         let texel = |i: usize, j: usize| {
-            let inside = x.inside[i] & y.inside[j] & z.inside[k];
-            self.texels(words, &rows, [i, j], inside)
+            let inside = x.inside[i] & y.inside[j] & within[0];
+            self.texels(words, rows, [i, j], inside)
         };
         let row = |j: usize| mix(&texel(0, j), &texel(1, j), &x.weight);
-        match (filter, self.request.shape.dimension) {
+        match (filter, dimension) {
             (Filter::Nearest, _) => texel(0, 0),
             (Filter::Linear, Dimension::D1) => row(0),
             (Filter::Linear, _) => mix(&row(0), &row(1), &y.weight),
@@ -182,113 +302,69 @@ impl Batch<'_> {
                 }
             }
         }
-        if let Some(op) = self.sampler.compare_op {
-            for (lane, depth) in texels[0].iter_mut().enumerate() {
-                if let Some(reference) = reference(self.surface, self.sampler, self.request, lane) {
-                    *depth = if op.holds(reference, *depth) {
-                        1.0
-                    } else {
-                        0.0
-                    };
-                }
-            }
+        if let Some((op, reference)) = &self.reference {
+            compare(*op, reference, &mut texels[0]);
         }
         texels
     }
+}
 
-    /// The texels that the lanes' coordinates mean; None if some lie across the edge of a cube's face.
-    fn footprint(&self, levels: &Lanes, filter: Filter) -> Option<Footprint> {
-        let table = &self.packing.levels;
-        let uniform = levels.iter().all(|level| *level == levels[0]);
-        let of = |value: fn(&super::packing::PackedLevel) -> u32| {
-            if uniform {
-                [value(&table[levels[0] as usize]); CHUNK_LANES]
-            } else {
-                levels.map(|level| value(&table[level as usize]))
-            }
-        };
-        let extents = [
-            of(|level| level.extent[0]),
-            of(|level| level.extent[1]),
-            of(|level| level.extent[2]),
-        ];
-        let mut base = of(|level| level.base);
-        let dimension = self.request.shape.dimension;
-        let cube = dimension == Dimension::Cube;
-        let mut coordinate = [0, 1, 2].map(|axis| self.request.coordinate[axis]);
-        let mut layers = [0; CHUNK_LANES];
-        if cube {
-            for lane in 0..CHUNK_LANES {
-                let direction = coordinate.map(|lanes| f32::from_bits(lanes[lane]));
-                let hit = cube::Hit::new(direction);
-                let [s, t] = hit.coordinates();
-                layers[lane] = hit.face;
-                [coordinate[0][lane], coordinate[1][lane]] = [s.to_bits(), t.to_bits()];
-            }
+/// The mip level of each lane.
+struct LevelSizes<'a> {
+    table: &'a [PackedLevel],
+    levels: &'a Lanes,
+    /// The level of all lanes, if it is one.
+    uniform: Option<&'a PackedLevel>,
+}
+
+impl<'a> LevelSizes<'a> {
+    fn new(table: &'a [PackedLevel], levels: &'a Lanes) -> Self {
+        let uniform = *levels == [levels[0]; CHUNK_LANES];
+        Self {
+            table,
+            levels,
+            uniform: uniform.then(|| &table[levels[0] as usize]),
         }
-        if self.request.shape.arrayed {
-            let elements = self.surface.layers / if cube { 6 } else { 1 };
-            let coordinate = &self.request.coordinate[dimension.coordinates()];
-            for lane in 0..CHUNK_LANES {
-                let element = layer(f32::from_bits(coordinate[lane]), elements);
-                layers[lane] += element * if cube { 6 } else { 1 };
-            }
+    }
+
+    /// A number of each lane's level.
+    #[inline(always)]
+    fn of(&self, value: impl Fn(&PackedLevel) -> u32) -> Lanes {
+        match self.uniform {
+            Some(level) => [value(level); CHUNK_LANES],
+            None => self.levels.map(|level| value(&self.table[level as usize])),
         }
-        if layers != [0; CHUNK_LANES] {
-            if layers.iter().any(|layer| *layer >= self.surface.layers) {
-                return None;
-            }
-            let pitch = of(|level| level.layer_pitch);
-            for lane in 0..CHUNK_LANES {
-                base[lane] = base[lane].wrapping_add(layers[lane].wrapping_mul(pitch[lane]));
-            }
+    }
+}
+
+/// Moves texels on by some steps.
+fn advance(base: &mut Lanes, steps: &Lanes, pitch: &Lanes) {
+    for lane in 0..CHUNK_LANES {
+        base[lane] = base[lane].wrapping_add(steps[lane].wrapping_mul(pitch[lane]));
+    }
+}
+
+/// Replaces depths by 1 where a comparison holds, else 0.
+fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
+    let mut each = |holds: fn(f32, f32) -> bool| {
+        for (depth, reference) in depths.iter_mut().zip(reference) {
+            *depth = if holds(*reference, *depth) { 1.0 } else { 0.0 };
         }
-        let axis = |number: usize| {
-            // A cube has edges, which one would cross to where another face is.
-            let mode = if cube && filter == Filter::Linear {
-                AddressMode::ClampToBorder
-            } else if cube {
-                AddressMode::ClampToEdge
-            } else {
-                self.sampler.address_modes[number]
-            };
-            axis(
-                self.level,
-                mode,
-                filter,
-                !self.sampler.unnormalized_coordinates || cube,
-                &coordinate[number],
-                &extents[number],
-                if cube {
-                    &[0; CHUNK_LANES]
+    };
+    match op {
+        CompareOp::Less => each(|reference, depth| reference < depth),
+        CompareOp::LessOrEqual => each(|reference, depth| reference <= depth),
+        CompareOp::Greater => each(|reference, depth| reference > depth),
+        CompareOp::GreaterOrEqual => each(|reference, depth| reference >= depth),
+        _ => {
+            for (depth, reference) in depths.iter_mut().zip(reference) {
+                *depth = if op.holds(*reference, *depth) {
+                    1.0
                 } else {
-                    &self.request.offset[number]
-                },
-            )
-        };
-        let axes = match dimension {
-            Dimension::D1 | Dimension::Buffer => [axis(0), Axis::FLAT, Axis::FLAT],
-            Dimension::D2 | Dimension::Cube => [axis(0), axis(1), Axis::FLAT],
-            Dimension::D3 => [axis(0), axis(1), axis(2)],
-        };
-        let crosses =
-            |axis: &Axis| (axis.inside[0] & axis.inside[1]) | !self.request.mask != u16::MAX;
-        if cube && axes.iter().any(crosses) {
-            return None;
-        }
-        let mut footprint = Footprint {
-            axes,
-            base,
-            row_pitch: of(|level| level.row_pitch),
-            depth_pitch: of(|level| level.depth_pitch),
-        };
-        if cube {
-            // What lanes that nobody asks for read doesn't matter.
-            for axis in &mut footprint.axes {
-                axis.has_outside = false;
+                    0.0
+                };
             }
         }
-        Some(footprint)
     }
 }
 

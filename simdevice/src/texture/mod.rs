@@ -19,6 +19,8 @@ mod packing;
 mod sampler;
 mod surface;
 mod table;
+#[cfg(test)]
+mod tests;
 mod view;
 
 pub use sampler::{AddressMode, BorderColor, CompareOp, Filter, MAX_LOD_BIAS, MipmapMode, Sampler};

@@ -2,11 +2,10 @@
 
 use fearless_simd::Level;
 
-use super::batch::Batch;
 use super::sampler::Sampler;
 use super::surface::Surface;
 use super::view::ImageBinding;
-use super::{fetch, filter, lod};
+use super::{batch, fetch, filter, lod};
 use crate::isa::ir::{AtomicOp, Dimension, ImageShape};
 use crate::isa::resources::{ImageUnit, Lanes, SampleRequest, TexelRequest};
 
@@ -65,21 +64,12 @@ impl ImageUnit for ImageTable {
         let Some((surface, sampler)) = self.pair(image, sampler) else {
             return Default::default();
         };
-        surface
-            .packing
-            .as_ref()
-            .filter(|_| self.batched)
-            .and_then(|packing| {
-                let batch = Batch {
-                    level: self.level,
-                    surface,
-                    packing,
-                    sampler,
-                    request,
-                };
-                batch.sample()
-            })
-            .unwrap_or_else(|| filter::sample(surface, sampler, request))
+        let batched = if self.batched {
+            batch::sample(self.level, surface, sampler, request)
+        } else {
+            None
+        };
+        batched.unwrap_or_else(|| filter::sample(surface, sampler, request))
     }
 
     fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4] {
