@@ -6,7 +6,7 @@
 
 use std::sync::atomic::AtomicU32;
 
-use fearless_simd::Level;
+use fearless_simd::{Level, dispatch};
 
 use super::address;
 use super::axis::{Axis, axis};
@@ -58,7 +58,8 @@ pub(super) fn sample(
         request,
         reference,
     };
-    let selection = lod::select(surface, sampler, request);
+    // Plain loops, which the compiler makes vectors of; the level's own, inside this.
+    let selection = dispatch!(level, _simd => lod::select(surface, sampler, request));
     let texels = batch.select_filter(&selection)?;
     Some(batch.registers(&texels))
 }
@@ -108,7 +109,8 @@ impl Batch<'_> {
     #[inline]
     fn select_levels(&self, selection: &Selection, filter: Filter) -> Option<Texels> {
         let high = self.filter_level(&selection.high, filter)?;
-        if selection.weight == [0.0; CHUNK_LANES] {
+        let weights = selection.weight.iter().map(|weight| weight.to_bits());
+        if weights.fold(0, |all, bits| all | bits) == 0 {
             return Some(high);
         }
         let low = self.filter_level(&selection.low, filter)?;
@@ -129,28 +131,29 @@ impl Batch<'_> {
     /// Of one level for each lane; None if some lie across the edge of a cube's face.
     #[inline]
     fn filter_level(&self, levels: &Lanes, filter: Filter) -> Option<Texels> {
-        let mut coordinate = [
-            self.request.coordinate[0],
-            self.request.coordinate[1],
-            self.request.coordinate[2],
-        ];
-        let layers = self.layers(&mut coordinate);
-        if layers.is_some_and(|layers| layers.iter().any(|layer| *layer >= self.surface.layers)) {
+        let face = (self.request.shape.dimension == Dimension::Cube).then(|| self.faces());
+        let (faces, coordinate) = match &face {
+            Some((faces, coordinate)) => (Some(faces), coordinate),
+            None => (None, &self.request.coordinate),
+        };
+        let layers = self.layers(faces);
+        let missing = |layer: &u32| *layer >= self.surface.layers;
+        if layers.is_some_and(|layers| layers.iter().any(missing)) {
             return None;
         }
         let sizes = LevelSizes::new(&self.packing.levels, levels);
         let dimension = self.request.shape.dimension;
-        let x = self.axis(0, filter, &coordinate, &sizes);
+        let x = self.axis(0, filter, coordinate, &sizes);
         let (y, z);
         let (y, z) = match dimension {
             Dimension::D1 | Dimension::Buffer => (&Axis::FLAT, &Axis::FLAT),
             Dimension::D2 | Dimension::Cube => {
-                y = self.axis(1, filter, &coordinate, &sizes);
+                y = self.axis(1, filter, coordinate, &sizes);
                 (&y, &Axis::FLAT)
             }
             Dimension::D3 => {
-                y = self.axis(1, filter, &coordinate, &sizes);
-                z = self.axis(2, filter, &coordinate, &sizes);
+                y = self.axis(1, filter, coordinate, &sizes);
+                z = self.axis(2, filter, coordinate, &sizes);
                 (&y, &z)
             }
         };
@@ -189,31 +192,33 @@ impl Batch<'_> {
         Some(mix(&slice, &next, &z.weight))
     }
 
-    /// The layer of each lane; None if it is the first for all. A cube's directions become coordinates on a face.
+    /// Where the lanes' directions meet a cube: the face, and the coordinates on it.
+    fn faces(&self) -> (Lanes, [Lanes; 4]) {
+        let mut faces = [0; CHUNK_LANES];
+        let mut coordinate = [[0; CHUNK_LANES]; 4];
+        for lane in 0..CHUNK_LANES {
+            let direction = [0, 1, 2].map(|axis| self.request.coordinate[axis][lane]);
+            let hit = cube::Hit::new(direction.map(f32::from_bits));
+            let [s, t] = hit.coordinates();
+            faces[lane] = hit.face;
+            [coordinate[0][lane], coordinate[1][lane]] = [s.to_bits(), t.to_bits()];
+        }
+        (faces, coordinate)
+    }
+
+    /// The layer of each lane; None if it is the first for all.
     #[inline]
-    fn layers(&self, coordinate: &mut [Lanes; 3]) -> Option<Lanes> {
+    fn layers(&self, faces: Option<&Lanes>) -> Option<Lanes> {
         let shape = self.request.shape;
-        let cube = shape.dimension == Dimension::Cube;
-        if !cube && !shape.arrayed {
-            return None;
+        if !shape.arrayed {
+            return faces.copied();
         }
-        let mut layers = [0; CHUNK_LANES];
-        if cube {
-            for lane in 0..CHUNK_LANES {
-                let direction = coordinate.map(|lanes| f32::from_bits(lanes[lane]));
-                let hit = cube::Hit::new(direction);
-                let [s, t] = hit.coordinates();
-                layers[lane] = hit.face;
-                [coordinate[0][lane], coordinate[1][lane]] = [s.to_bits(), t.to_bits()];
-            }
-        }
-        if shape.arrayed {
-            let per_element = if cube { 6 } else { 1 };
-            let elements = self.surface.layers / per_element;
-            let coordinate = &self.request.coordinate[shape.dimension.coordinates()];
-            for (layer, coordinate) in layers.iter_mut().zip(coordinate) {
-                *layer += address::layer(f32::from_bits(*coordinate), elements) * per_element;
-            }
+        let per_element = if faces.is_some() { 6 } else { 1 };
+        let elements = self.surface.layers / per_element;
+        let coordinate = &self.request.coordinate[shape.dimension.coordinates()];
+        let mut layers = faces.copied().unwrap_or_default();
+        for (layer, coordinate) in layers.iter_mut().zip(coordinate) {
+            *layer += address::layer(f32::from_bits(*coordinate), elements) * per_element;
         }
         Some(layers)
     }
@@ -224,7 +229,7 @@ impl Batch<'_> {
         &self,
         number: usize,
         filter: Filter,
-        coordinate: &[Lanes; 3],
+        coordinate: &[Lanes; 4],
         sizes: &LevelSizes<'_>,
     ) -> Axis {
         let size = match number {
@@ -319,7 +324,8 @@ struct LevelSizes<'a> {
 
 impl<'a> LevelSizes<'a> {
     fn new(table: &'a [PackedLevel], levels: &'a Lanes) -> Self {
-        let uniform = *levels == [levels[0]; CHUNK_LANES];
+        let differences = levels.iter().map(|level| level ^ levels[0]);
+        let uniform = differences.fold(0, |all, difference| all | difference) == 0;
         Self {
             table,
             levels,

@@ -396,19 +396,22 @@ struct Float16x4;
 /// The low 16 bits of words as binary16 numbers.
 #[inline(always)]
 fn float16<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
+    let splat = |word: u32| u32x16::splat(simd, word);
     let sign = (bits & 0x8000) << 16;
-    // Moved to binary32's place the exponent is short of the biases' difference, which a multiplication mends, exactly,
-    // for denormal numbers too.
-    let magnitude =
-        ((bits & 0x7FFF) << 13).bitcast::<f32x16<S>>() * f32::from_bits((254 - 15) << 23);
-    let magnitude: u32x16<S> = magnitude.bitcast();
-    let infinite = (bits & 0x7FFF).simd_ge(u32x16::splat(simd, 0x7C00));
-    let infinity = u32x16::splat(simd, 0x7F80_0000);
-    let zero = u32x16::splat(simd, 0);
+    let half = bits & 0x7FFF;
+    // In binary32's place, the exponent still has binary16's bias.
+    let shifted = half << 13;
+    let normal = shifted + ((127 - 15) << 23);
+    // A denormal number stands below a leading one that it doesn't have. No operand is denormal, which would be slow.
+    let least = splat((127 - 14) << 23);
+    let denormal = (shifted + least).bitcast::<f32x16<S>>() - least.bitcast::<f32x16<S>>();
+    let infinity = splat(0x7C00);
     // NaN's mantissa is kept, and made quiet.
-    let nan = (bits & 0x7FFF).simd_gt(u32x16::splat(simd, 0x7C00));
-    let quiet = nan.select(u32x16::splat(simd, 1 << 22), zero);
-    let magnitude = infinite.select((magnitude & 0x007F_FFFF) | infinity | quiet, magnitude);
+    let quiet = half.simd_gt(infinity).select(splat(1 << 22), splat(0));
+    let special = shifted | splat(0x7F80_0000) | quiet;
+    let magnitude = half.simd_ge(infinity).select(special, normal);
+    let is_denormal = half.simd_lt(splat(0x0400));
+    let magnitude = is_denormal.select(denormal.bitcast::<u32x16<S>>(), magnitude);
     (magnitude | sign).bitcast()
 }
 
