@@ -6,7 +6,7 @@
 
 use std::sync::atomic::AtomicU32;
 
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Simd, prelude::*};
 
 use super::address;
 use super::axis::{Axis, axis};
@@ -24,8 +24,8 @@ use crate::isa::resources::{Lanes, SampleRequest};
 type Texels = [Floats; 4];
 
 /// What a request reads, and how.
-struct Batch<'a> {
-    level: Level,
+struct Batch<'a, S> {
+    simd: S,
     surface: &'a Surface,
     packing: &'a Packing,
     sampler: &'a Sampler,
@@ -35,8 +35,9 @@ struct Batch<'a> {
 }
 
 /// Filters for all lanes; None if this request has to be filtered lane by lane.
-pub(super) fn sample(
-    level: Level,
+#[inline(always)]
+pub(super) fn sample<S: Simd>(
+    simd: S,
     surface: &Surface,
     sampler: &Sampler,
     request: &SampleRequest,
@@ -51,22 +52,21 @@ pub(super) fn sample(
         (op, bits.map(|bits| reference_value(unorm, bits)))
     });
     let batch = Batch {
-        level,
+        simd,
         surface,
         packing,
         sampler,
         request,
         reference,
     };
-    // Plain loops, which the compiler makes vectors of; the level's own, inside this.
-    let selection = dispatch!(level, _simd => lod::select(surface, sampler, request));
+    let selection = lod::select(surface, sampler, request);
     let texels = batch.select_filter(&selection)?;
     Some(batch.registers(&texels))
 }
 
-impl Batch<'_> {
+impl<S: Simd> Batch<'_, S> {
     /// Stored components as a program gets them.
-    #[inline]
+    #[inline(always)]
     fn registers(&self, texels: &Texels) -> [Lanes; 4] {
         let components = self.packing.kind.components();
         let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
@@ -84,7 +84,7 @@ impl Batch<'_> {
     }
 
     /// With the filter that each lane asks for.
-    #[inline]
+    #[inline(always)]
     fn select_filter(&self, selection: &Selection) -> Option<Texels> {
         let first = selection.filter[0];
         let mut texels = self.select_levels(selection, first)?;
@@ -106,7 +106,7 @@ impl Batch<'_> {
     }
 
     /// Mixed between levels.
-    #[inline]
+    #[inline(always)]
     fn select_levels(&self, selection: &Selection, filter: Filter) -> Option<Texels> {
         let high = self.filter_level(&selection.high, filter)?;
         let weights = selection.weight.iter().map(|weight| weight.to_bits());
@@ -128,9 +128,17 @@ impl Batch<'_> {
         Some(texels)
     }
 
-    /// Of one level for each lane; None if some lie across the edge of a cube's face.
-    #[inline]
+    /// Of one level for each lane; None if some lie across the edge of a cube's face. Compiled on its own.
+    #[inline(always)]
     fn filter_level(&self, levels: &Lanes, filter: Filter) -> Option<Texels> {
+        self.simd.vectorize(
+            #[inline(always)]
+            || self.footprint(levels, filter),
+        )
+    }
+
+    #[inline(always)]
+    fn footprint(&self, levels: &Lanes, filter: Filter) -> Option<Texels> {
         let face = (self.request.shape.dimension == Dimension::Cube).then(|| self.faces());
         let (faces, coordinate) = match &face {
             Some((faces, coordinate)) => (Some(faces), coordinate),
@@ -193,6 +201,7 @@ impl Batch<'_> {
     }
 
     /// Where the lanes' directions meet a cube: the face, and the coordinates on it.
+    #[inline(always)]
     fn faces(&self) -> (Lanes, [Lanes; 4]) {
         let mut faces = [0; CHUNK_LANES];
         let mut coordinate = [[0; CHUNK_LANES]; 4];
@@ -207,7 +216,7 @@ impl Batch<'_> {
     }
 
     /// The layer of each lane; None if it is the first for all.
-    #[inline]
+    #[inline(always)]
     fn layers(&self, faces: Option<&Lanes>) -> Option<Lanes> {
         let shape = self.request.shape;
         if !shape.arrayed {
@@ -224,7 +233,7 @@ impl Batch<'_> {
     }
 
     /// The texels of the lanes' coordinates along an axis.
-    #[inline]
+    #[inline(always)]
     fn axis(
         &self,
         number: usize,
@@ -245,10 +254,10 @@ impl Batch<'_> {
                 Filter::Linear => AddressMode::ClampToBorder,
             };
             let offset = [0; CHUNK_LANES];
-            return axis(self.level, mode, filter, true, coordinate, &size, &offset);
+            return axis(self.simd, mode, filter, true, coordinate, &size, &offset);
         }
         axis(
-            self.level,
+            self.simd,
             self.sampler.address_modes[number],
             filter,
             !self.sampler.unnormalized_coordinates,
@@ -259,7 +268,7 @@ impl Batch<'_> {
     }
 
     /// Of one slice, which lanes have as far as they are `within`.
-    #[inline]
+    #[inline(always)]
     fn filter_slice(
         &self,
         rows: &Rows<'_>,
@@ -274,7 +283,7 @@ impl Batch<'_> {
         let plain = self.reference.is_none() && (!bordered || dimension == Dimension::Cube);
         if filter == Filter::Linear && dimension != Dimension::D1 && plain {
             let kind = self.packing.kind;
-            return kind.bilinear(self.level, words, rows, &x.weight, &y.weight);
+            return kind.bilinear(self.simd, words, rows, &x.weight, &y.weight);
         }
         let texel = |i: usize, j: usize| {
             let inside = x.inside[i] & y.inside[j] & within[0];
@@ -289,6 +298,7 @@ impl Batch<'_> {
     }
 
     /// Texels (i, j) of those around, or the border's where they aren't `inside`; compared, if that is asked for.
+    #[inline(always)]
     fn texels(
         &self,
         words: &[AtomicU32],
@@ -296,7 +306,7 @@ impl Batch<'_> {
         [i, j]: [usize; 2],
         inside: u16,
     ) -> Texels {
-        let mut texels = self.packing.kind.load(self.level, words, rows, i, j);
+        let mut texels = self.packing.kind.load(self.simd, words, rows, i, j);
         if inside != u16::MAX {
             let border = border_texel(self.surface, self.sampler).map(f32::from_bits);
             for (register, stored) in self.packing.order.into_iter().enumerate() {
@@ -323,6 +333,7 @@ struct LevelSizes<'a> {
 }
 
 impl<'a> LevelSizes<'a> {
+    #[inline(always)]
     fn new(table: &'a [PackedLevel], levels: &'a Lanes) -> Self {
         let differences = levels.iter().map(|level| level ^ levels[0]);
         let uniform = differences.fold(0, |all, difference| all | difference) == 0;
@@ -344,6 +355,7 @@ impl<'a> LevelSizes<'a> {
 }
 
 /// Moves texels on by some steps.
+#[inline(always)]
 fn advance(base: &mut Lanes, steps: &Lanes, pitch: &Lanes) {
     for lane in 0..CHUNK_LANES {
         base[lane] = base[lane].wrapping_add(steps[lane].wrapping_mul(pitch[lane]));
@@ -351,6 +363,7 @@ fn advance(base: &mut Lanes, steps: &Lanes, pitch: &Lanes) {
 }
 
 /// Replaces depths by 1 where a comparison holds, else 0.
+#[inline(always)]
 fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
     let mut each = |holds: fn(f32, f32) -> bool| {
         for (depth, reference) in depths.iter_mut().zip(reference) {
@@ -375,6 +388,7 @@ fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
 }
 
 /// The weighted means of texels.
+#[inline(always)]
 fn mix(a: &Texels, b: &Texels, weight: &Floats) -> Texels {
     let mut mixed = *a;
     for (mixed, b) in mixed.iter_mut().zip(b) {

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 
 use super::lod::Floats;
 use super::surface::Surface;
@@ -143,19 +143,25 @@ pub(super) struct Rows<'a> {
     pub y: &'a [Lanes; 2],
 }
 
-/// Calls a kernel for a [`Kind`] at a SIMD level.
+/// Calls a kernel for a [`Kind`], compiled on its own.
 macro_rules! for_kind {
-    ($level:expr, $kind:expr, $kernel:ident($($argument:expr),*)) => {
+    ($simd:expr, $kind:expr, $kernel:ident($($argument:expr),*)) => {
         match $kind {
-            Kind::Unorm8 => dispatch!($level, simd => $kernel::<_, Unorm8>(simd, $($argument),*)),
-            Kind::Unorm8x2 => dispatch!($level, simd => $kernel::<_, Unorm8x2>(simd, $($argument),*)),
-            Kind::Unorm8x4 => dispatch!($level, simd => $kernel::<_, Unorm8x4>(simd, $($argument),*)),
-            Kind::Srgb8x4 => dispatch!($level, simd => $kernel::<_, Srgb8x4>(simd, $($argument),*)),
-            Kind::Unorm16 => dispatch!($level, simd => $kernel::<_, Unorm16>(simd, $($argument),*)),
-            Kind::Float16x4 => dispatch!($level, simd => $kernel::<_, Float16x4>(simd, $($argument),*)),
-            Kind::Float32 => dispatch!($level, simd => $kernel::<_, Float32>(simd, $($argument),*)),
-            Kind::Float32x4 => dispatch!($level, simd => $kernel::<_, Float32x4>(simd, $($argument),*)),
+            Kind::Unorm8 => for_kind!($simd, $kernel, Unorm8, $($argument),*),
+            Kind::Unorm8x2 => for_kind!($simd, $kernel, Unorm8x2, $($argument),*),
+            Kind::Unorm8x4 => for_kind!($simd, $kernel, Unorm8x4, $($argument),*),
+            Kind::Srgb8x4 => for_kind!($simd, $kernel, Srgb8x4, $($argument),*),
+            Kind::Unorm16 => for_kind!($simd, $kernel, Unorm16, $($argument),*),
+            Kind::Float16x4 => for_kind!($simd, $kernel, Float16x4, $($argument),*),
+            Kind::Float32 => for_kind!($simd, $kernel, Float32, $($argument),*),
+            Kind::Float32x4 => for_kind!($simd, $kernel, Float32x4, $($argument),*),
         }
+    };
+    ($simd:expr, $kernel:ident, $kind:ident, $($argument:expr),*) => {
+        $simd.vectorize(
+            #[inline(always)]
+            || $kernel::<S, $kind>($simd, $($argument),*),
+        )
     };
 }
 
@@ -170,27 +176,29 @@ impl Kind {
     }
 
     /// The stored components of texels in column `i` and row `j` of two.
-    pub fn load(
+    #[inline(always)]
+    pub fn load<S: Simd>(
         self,
-        level: Level,
+        simd: S,
         words: &[AtomicU32],
         rows: &Rows<'_>,
         i: usize,
         j: usize,
     ) -> [Floats; 4] {
-        for_kind!(level, self, load(words, rows, i, j))
+        for_kind!(simd, self, load(words, rows, i, j))
     }
 
     /// The weighted mean of all four texels.
-    pub fn bilinear(
+    #[inline(always)]
+    pub fn bilinear<S: Simd>(
         self,
-        level: Level,
+        simd: S,
         words: &[AtomicU32],
         rows: &Rows<'_>,
         weight_x: &Floats,
         weight_y: &Floats,
     ) -> [Floats; 4] {
-        for_kind!(level, self, bilinear(words, rows, weight_x, weight_y))
+        for_kind!(simd, self, bilinear(words, rows, weight_x, weight_y))
     }
 }
 
@@ -464,6 +472,7 @@ impl Texels for Float32x4 {
 mod tests {
     use super::*;
     use crate::device::SimdLevel;
+    use fearless_simd::dispatch;
 
     /// Texels 0.. of these words, as a packing and as their format decodes them.
     fn agree<T: Texels>(format: Format, words: &[u32]) {
