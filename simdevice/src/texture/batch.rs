@@ -6,7 +6,7 @@
 
 use std::sync::atomic::AtomicU32;
 
-use fearless_simd::{Simd, prelude::*};
+use fearless_simd::Simd;
 
 use super::address;
 use super::axis::{Axis, axis};
