@@ -15,6 +15,7 @@ pub mod device;
 pub mod format;
 pub mod gaussian;
 pub mod image;
+pub mod isa;
 pub mod packet;
 pub mod pass;
 pub mod query;

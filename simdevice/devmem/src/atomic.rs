@@ -63,8 +63,19 @@ atomics! {
     u64, AtomicU64, atomic_u64, load_u64, store_u64, update_u64, exchange_u64, compare_exchange_u64;
 }
 
+impl Allocation {
+    /// All whole words of the memory. A shader's bounds check is then an index into a slice.
+    pub fn words(&self) -> &[AtomicU32] {
+        let count = (self.len() / 4) as usize;
+        // SAFETY: the words lie inside the mapping, which lives as long as `self` and is aligned to pages. They are
+        // only ever accessed through atomics or raw pointers, so sharing them is what `AtomicU32` allows.
+        unsafe { std::slice::from_raw_parts(self.host_pointer().cast::<AtomicU32>(), count) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::Relaxed;
     use crate::Allocation;
 
     #[test]
@@ -77,6 +88,14 @@ mod tests {
         assert_eq!(memory.compare_exchange_u32(4, 20, 1), Some(20));
         assert_eq!(memory.load_u64(0), Some(1 << 32));
         assert_eq!(memory.load_u8(4), Some(1));
+    }
+
+    #[test]
+    fn words_are_the_memory() {
+        let memory = Allocation::new_zeroed(10).unwrap();
+        memory.store_u32(4, 9).unwrap();
+        assert_eq!(memory.words().len(), 2);
+        assert_eq!(memory.words()[1].load(Relaxed), 9);
     }
 
     #[test]

@@ -1,0 +1,244 @@
+//! Runs arithmetic: one kernel for each operation.
+//!
+//! 32-bit operations that vectors have are written with vectors of 16 lanes; the rest lane by lane, which the compiler
+//! vectorises where it can.
+
+use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
+
+use super::super::op::Op;
+use super::file::{File, Slot, from_mask, map1, map2, map3, to_mask, vector1, vector2, vector3};
+use super::{integer, transcendental, wide};
+
+type U<S> = u32x16<S>;
+type I<S> = i32x16<S>;
+type F<S> = f32x16<S>;
+
+/// `dst = op(src...)`, all lanes.
+#[inline(always)]
+pub fn compute<S: Simd>(simd: S, file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4]) {
+    // The shapes of operation: what the operands are read as, and what the result is.
+    macro_rules! word {
+        (|$a:ident| $value:expr) => {
+            vector1(
+                simd,
+                file,
+                dst,
+                src,
+                #[inline(always)]
+                |$a: U<S>| $value,
+            )
+        };
+        (|$a:ident, $b:ident| $value:expr) => {
+            vector2(
+                simd,
+                file,
+                dst,
+                src,
+                #[inline(always)]
+                |$a: U<S>, $b: U<S>| $value,
+            )
+        };
+        (|$a:ident, $b:ident, $c:ident| $value:expr) => {
+            vector3(
+                simd,
+                file,
+                dst,
+                src,
+                #[inline(always)]
+                |$a: U<S>, $b: U<S>, $c: U<S>| $value,
+            )
+        };
+    }
+    macro_rules! float {
+        (|$a:ident| $value:expr) => {
+            word!(|a| {
+                let $a = a.bitcast::<F<S>>();
+                let r: F<S> = $value;
+                r.bitcast()
+            })
+        };
+        (|$a:ident, $b:ident| $value:expr) => {
+            word!(|a, b| {
+                let ($a, $b) = (a.bitcast::<F<S>>(), b.bitcast::<F<S>>());
+                let r: F<S> = $value;
+                r.bitcast()
+            })
+        };
+        (|$a:ident, $b:ident, $c:ident| $value:expr) => {
+            word!(|a, b, c| {
+                let ($a, $b, $c) = (
+                    a.bitcast::<F<S>>(),
+                    b.bitcast::<F<S>>(),
+                    c.bitcast::<F<S>>(),
+                );
+                let r: F<S> = $value;
+                r.bitcast()
+            })
+        };
+    }
+    macro_rules! float_test {
+        (|$a:ident| $value:expr) => {
+            word!(|a| {
+                let $a = a.bitcast::<F<S>>();
+                let r: mask32x16<S> = $value;
+                from_mask(r)
+            })
+        };
+        (|$a:ident, $b:ident| $value:expr) => {
+            word!(|a, b| {
+                let ($a, $b) = (a.bitcast::<F<S>>(), b.bitcast::<F<S>>());
+                let r: mask32x16<S> = $value;
+                from_mask(r)
+            })
+        };
+    }
+    macro_rules! signed {
+        (|$a:ident| $value:expr) => {
+            word!(|a| {
+                let $a = a.bitcast::<I<S>>();
+                let r: I<S> = $value;
+                r.bitcast()
+            })
+        };
+        (|$a:ident, $b:ident| $value:expr) => {
+            word!(|a, b| {
+                let ($a, $b) = (a.bitcast::<I<S>>(), b.bitcast::<I<S>>());
+                let r: I<S> = $value;
+                r.bitcast()
+            })
+        };
+    }
+    match op {
+        Op::BAnd | Op::And => word!(|a, b| a & b),
+        Op::BOr | Op::Or => word!(|a, b| a | b),
+        Op::BXor | Op::Xor => word!(|a, b| a ^ b),
+        Op::BNot | Op::Not => word!(|a| !a),
+        Op::BSelect | Op::Select => word!(|c, a, b| to_mask(c).select(a, b)),
+        Op::IAdd => word!(|a, b| a + b),
+        Op::ISub => word!(|a, b| a - b),
+        Op::IMul => word!(|a, b| a * b),
+        Op::INeg => word!(|a| U::splat(simd, 0) - a),
+        Op::SAbs => signed!(|a| a.abs()),
+        Op::SMin => signed!(|a, b| a.min(b)),
+        Op::SMax => signed!(|a, b| a.max(b)),
+        Op::UMin => word!(|a, b| a.min(b)),
+        Op::UMax => word!(|a, b| a.max(b)),
+        Op::IEq => word!(|a, b| from_mask(a.simd_eq(b))),
+        Op::INe => word!(|a, b| !from_mask(a.simd_eq(b))),
+        Op::SLt => word!(|a, b| from_mask(a.bitcast::<I<S>>().simd_lt(b.bitcast::<I<S>>()))),
+        Op::SLe => word!(|a, b| from_mask(a.bitcast::<I<S>>().simd_le(b.bitcast::<I<S>>()))),
+        Op::ULt => word!(|a, b| from_mask(a.simd_lt(b))),
+        Op::ULe => word!(|a, b| from_mask(a.simd_le(b))),
+        Op::Shl => word!(|a, b| a << (b & 31)),
+        Op::UShr => word!(|a, b| a >> (b & 31)),
+        Op::SShr => word!(|a, b| (a.bitcast::<I<S>>() >> (b & 31).bitcast::<I<S>>()).bitcast()),
+        Op::UAddCarry => word!(|a, b| from_mask((a + b).simd_lt(a)) & 1),
+        Op::USubBorrow => word!(|a, b| from_mask(a.simd_lt(b)) & 1),
+
+        Op::FAdd => float!(|a, b| a + b),
+        Op::FSub => float!(|a, b| a - b),
+        Op::FMul => float!(|a, b| a * b),
+        Op::FFma => float!(|a, b, c| a.mul_add(b, c)),
+        Op::FMulSub => float!(|a, b, c| a.mul_sub(b, c)),
+        Op::FNegMulAdd => float!(|a, b, c| (-a).mul_add(b, c)),
+        Op::FDiv => float!(|a, b| a / b),
+        Op::FNeg => float!(|a| -a),
+        Op::FAbs => float!(|a| a.abs()),
+        Op::FSign => float!(|a| {
+            let zero = F::splat(simd, 0.0);
+            let one = a.simd_gt(zero).select(F::splat(simd, 1.0), zero);
+            a.simd_lt(zero).select(F::splat(simd, -1.0), one)
+        }),
+        Op::FFloor => float!(|a| a.floor()),
+        Op::FCeil => float!(|a| a.ceil()),
+        Op::FTrunc => float!(|a| a.trunc()),
+        Op::FRoundEven => float!(|a| a.round_ties_even()),
+        Op::FFract => float!(|a| a - a.floor()),
+        Op::FMin => float!(|a, b| a.min_precise(b)),
+        Op::FMax => float!(|a, b| a.max_precise(b)),
+        Op::FSqrt => float!(|a| a.sqrt()),
+        Op::FInverseSqrt => float!(|a| F::splat(simd, 1.0) / a.sqrt()),
+        Op::FEq => float_test!(|a, b| a.simd_eq(b)),
+        Op::FNe => word!(|a, b| !from_mask(a.bitcast::<F<S>>().simd_eq(b.bitcast::<F<S>>()))),
+        Op::FLt => float_test!(|a, b| a.simd_lt(b)),
+        Op::FLe => float_test!(|a, b| a.simd_le(b)),
+        Op::FLtGt => float_test!(|a, b| a.simd_lt(b) | b.simd_lt(a)),
+        Op::FIsNan => float_test!(|a| a.is_nan()),
+        Op::FIsInf => float_test!(|a| a.is_infinite()),
+
+        Op::FToS => word!(|a| I::truncate_from_precise(a.bitcast::<F<S>>()).bitcast()),
+        Op::FToU => word!(|a| U::truncate_from_precise(a.bitcast::<F<S>>())),
+        Op::SToF => word!(|a| F::float_from(a.bitcast::<I<S>>()).bitcast()),
+        Op::UToF => word!(|a| F::float_from(a).bitcast()),
+        _ => simd.vectorize(
+            #[inline(always)]
+            || uncommon(simd, file, op, dst, src),
+        ),
+    }
+}
+
+/// Operations that are rarer, or long enough that a call doesn't matter.
+#[inline(always)]
+fn uncommon<S: Simd>(simd: S, file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4]) {
+    match op {
+        Op::UDiv => map2(file, dst, src, |a: u32, b: u32| {
+            a.checked_div(b).unwrap_or(u32::MAX)
+        }),
+        Op::URem => map2(file, dst, src, |a: u32, b: u32| {
+            a.checked_rem(b).unwrap_or(a)
+        }),
+        Op::SDiv => map2(
+            file,
+            dst,
+            src,
+            |a: i32, b: i32| if b == 0 { -1 } else { a.wrapping_div(b) },
+        ),
+        Op::SRem => map2(
+            file,
+            dst,
+            src,
+            |a: i32, b: i32| if b == 0 { a } else { a.wrapping_rem(b) },
+        ),
+        Op::SMod => map2(file, dst, src, integer::floor_mod),
+        Op::UMulHi => map2(file, dst, src, |a: u32, b: u32| {
+            ((u64::from(a) * u64::from(b)) >> 32) as u32
+        }),
+        Op::SMulHi => map2(file, dst, src, |a: i32, b: i32| {
+            ((i64::from(a) * i64::from(b)) >> 32) as i32
+        }),
+        Op::SSign => map1(file, dst, src, i32::signum),
+        Op::BitReverse => map1(file, dst, src, u32::reverse_bits),
+        Op::BitCount => map1(file, dst, src, |a: u32| a.count_ones()),
+        Op::FindLsb => map1(file, dst, src, integer::find_lsb),
+        Op::FindUMsb => map1(file, dst, src, integer::find_unsigned_msb),
+        Op::FindSMsb => map1(file, dst, src, integer::find_signed_msb),
+        Op::BitfieldInsert => integer::bitfield_insert(file, dst, src),
+        Op::BitfieldSExtract => map3(file, dst, src, integer::signed_bitfield),
+        Op::BitfieldUExtract => map3(file, dst, src, integer::unsigned_bitfield),
+        Op::SExt8 => map1(file, dst, src, |a: u32| i32::from(a as u8 as i8)),
+        Op::SExt16 => map1(file, dst, src, |a: u32| i32::from(a as u16 as i16)),
+        Op::FRem => map2(file, dst, src, |a: f32, b: f32| a % b),
+        Op::FMod => map2(file, dst, src, |a: f32, b: f32| {
+            let r = a % b;
+            if r != 0.0 && (r < 0.0) != (b < 0.0) {
+                r + b
+            } else {
+                r
+            }
+        }),
+        Op::FLdexp => map2(file, dst, src, transcendental::ldexp),
+        Op::FFrexpSignificand => map1(file, dst, src, |a: f32| transcendental::frexp(a).0),
+        Op::FFrexpExponent => map1(file, dst, src, |a: f32| transcendental::frexp(a).1),
+        Op::FToF16 => map1(file, dst, src, |a: f32| {
+            u32::from(half::f16::from_f32(a).to_bits())
+        }),
+        Op::F16ToF => map1(file, dst, src, |a: u32| {
+            half::f16::from_bits(a as u16).to_f32()
+        }),
+        Op::RoundToF16 => map1(file, dst, src, |a: f32| half::f16::from_f32(a).to_f32()),
+        _ if op.kind() == super::super::op::Kind::Special => {
+            transcendental::run(simd, file, op, dst, src)
+        }
+        _ => wide::run(file, op, dst, src),
+    }
+}

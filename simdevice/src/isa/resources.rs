@@ -1,0 +1,222 @@
+//! What a program reaches besides its registers: buffers, push constants, images, global memory.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use super::ir::{AtomicOp, CHUNK_LANES, ImageShape};
+use crate::packet::BufferRange;
+
+/// What a program is bound to while it runs.
+#[derive(Clone, Copy)]
+pub struct Resources<'a> {
+    /// Buffers by bind point; None, or beyond the end, is a buffer of size zero. Offsets are multiples of 4.
+    pub buffers: &'a [Option<BufferRange>],
+    /// Push constants, as [`words`] makes them.
+    pub push_constants: &'a [AtomicU32],
+    /// Images and samplers.
+    pub images: &'a dyn ImageUnit,
+    /// Device addresses.
+    pub global: &'a dyn GlobalMemory,
+}
+
+impl Default for Resources<'_> {
+    fn default() -> Self {
+        Self {
+            buffers: &[],
+            push_constants: &[],
+            images: &NoImages,
+            global: &NoGlobalMemory,
+        }
+    }
+}
+
+/// Bytes as the words that [`Resources::push_constants`] holds; the last is filled up with zeros.
+pub fn words(bytes: &[u8]) -> Vec<AtomicU32> {
+    bytes
+        .chunks(4)
+        .map(|chunk| {
+            let mut word = [0; 4];
+            word[..chunk.len()].copy_from_slice(chunk);
+            AtomicU32::new(u32::from_le_bytes(word))
+        })
+        .collect()
+}
+
+/// Device addresses of 64 bits: virtual ranges that buffers occupy.
+pub trait GlobalMemory: Sync {
+    /// The buffer that an address lies in, and the address of the buffer's first byte. None if it lies in none.
+    fn find(&self, address: u64) -> Option<(&BufferRange, u64)>;
+}
+
+/// No buffer has an address.
+#[derive(Clone, Copy, Debug)]
+pub struct NoGlobalMemory;
+
+impl GlobalMemory for NoGlobalMemory {
+    fn find(&self, _address: u64) -> Option<(&BufferRange, u64)> {
+        None
+    }
+}
+
+/// The words of a buffer range and its size in bytes. A range that isn't within its memory, or not aligned to words, is
+/// empty.
+pub(super) fn range_words(range: &BufferRange) -> (&[AtomicU32], u32) {
+    let memory = range.memory.words();
+    let end = range
+        .offset
+        .checked_add(range.size)
+        .filter(|end| *end <= range.memory.len());
+    match end {
+        Some(end) if range.offset.is_multiple_of(4) => {
+            let last = (end.div_ceil(4) as usize).min(memory.len());
+            let words = memory
+                .get((range.offset / 4) as usize..last)
+                .unwrap_or_default();
+            (words, u32::try_from(range.size).unwrap_or(u32::MAX))
+        }
+        _ => (&[], 0),
+    }
+}
+
+/// A word, if the slice has it.
+#[inline(always)]
+pub(super) fn load_word(words: &[AtomicU32], index: usize) -> Option<u32> {
+    words.get(index).map(|word| word.load(Ordering::Relaxed))
+}
+
+/// One register for the 16 lanes of a chunk; floats as their bits.
+pub type Lanes = [u32; CHUNK_LANES];
+
+/// How the level of detail of a sample is chosen; see [`super::ir::Lod`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LodRequest {
+    /// From differences within each quad of lanes.
+    Implicit {
+        /// Added to the level; floats.
+        bias: Lanes,
+        /// Least level; floats.
+        minimum: Lanes,
+    },
+    /// Given; floats.
+    Explicit(Lanes),
+    /// From gradients by coordinate; floats.
+    Gradient {
+        /// Along x.
+        dx: [Lanes; 3],
+        /// Along y.
+        dy: [Lanes; 3],
+        /// Least level.
+        minimum: Lanes,
+    },
+}
+
+/// A sample for 16 lanes: four quads, in order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleRequest {
+    /// Lanes whose result is wanted, lane 0 lowest. The coordinates of the others still count for differences.
+    pub mask: u16,
+    /// The image's kind.
+    pub shape: ImageShape,
+    /// Floats; the layer, if any, after the other coordinates; the rest is zero.
+    pub coordinate: [Lanes; 4],
+    /// Level of detail.
+    pub lod: LodRequest,
+    /// Texel offsets; signed integers.
+    pub offset: [Lanes; 3],
+    /// Reference values of a depth comparison; floats.
+    pub compare: Option<Lanes>,
+    /// The component to gather, if this is a gather.
+    pub gather: Option<u8>,
+}
+
+/// An unfiltered access for 16 lanes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TexelRequest {
+    /// Lanes that take part, lane 0 lowest.
+    pub mask: u16,
+    /// The image's kind.
+    pub shape: ImageShape,
+    /// Integers; the layer, if any, after the other coordinates; the rest is zero.
+    pub coordinate: [Lanes; 4],
+    /// Mip levels.
+    pub level: Lanes,
+    /// Sample indices.
+    pub sample: Lanes,
+}
+
+/// The images and samplers that a program is bound to. Indices are bind points; one that isn't bound, or coordinates
+/// out of range, read zero and write nothing. Results are floats or integers as the image's format says.
+pub trait ImageUnit: Sync {
+    /// Filters. Returns red, green, blue, alpha.
+    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 4];
+
+    /// Reads texels. Returns red, green, blue, alpha.
+    fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4];
+
+    /// Writes texels, in order of lanes.
+    fn write(&self, image: u32, request: &TexelRequest, texel: &[Lanes; 4]);
+
+    /// Read-modify-write on texels of one 32-bit component, in order of lanes. Returns the old values.
+    fn atomic(
+        &self,
+        image: u32,
+        request: &TexelRequest,
+        op: AtomicOp,
+        value: &Lanes,
+        comparator: &Lanes,
+    ) -> Lanes;
+
+    /// Width, height, depth as far as the dimension has them, then layers if arrayed; the rest is zero.
+    fn size(&self, image: u32, shape: ImageShape, level: u32) -> [u32; 4];
+
+    /// Number of mip levels.
+    fn levels(&self, image: u32) -> u32;
+
+    /// Number of samples.
+    fn samples(&self, image: u32) -> u32;
+
+    /// The level of detail of an implicit sample, clamped to what exists, and before clamping; floats.
+    fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 2];
+}
+
+/// No image is bound.
+#[derive(Clone, Copy, Debug)]
+pub struct NoImages;
+
+impl ImageUnit for NoImages {
+    fn sample(&self, _image: u32, _sampler: u32, _request: &SampleRequest) -> [Lanes; 4] {
+        Default::default()
+    }
+
+    fn read(&self, _image: u32, _request: &TexelRequest) -> [Lanes; 4] {
+        Default::default()
+    }
+
+    fn write(&self, _image: u32, _request: &TexelRequest, _texel: &[Lanes; 4]) {}
+
+    fn atomic(
+        &self,
+        _image: u32,
+        _request: &TexelRequest,
+        _op: AtomicOp,
+        _value: &Lanes,
+        _comparator: &Lanes,
+    ) -> Lanes {
+        Lanes::default()
+    }
+
+    fn size(&self, _image: u32, _shape: ImageShape, _level: u32) -> [u32; 4] {
+        [0; 4]
+    }
+
+    fn levels(&self, _image: u32) -> u32 {
+        0
+    }
+
+    fn samples(&self, _image: u32) -> u32 {
+        0
+    }
+
+    fn lod(&self, _image: u32, _sampler: u32, _request: &SampleRequest) -> [Lanes; 2] {
+        Default::default()
+    }
+}
