@@ -30,7 +30,7 @@ pub(crate) struct Usage {
 /// The pass that is being recorded.
 enum Pass {
     /// A render pass, at one of its subpasses.
-    RenderPass {
+    Begun {
         begun: Box<BegunPass>,
         subpass: usize,
         formats: Vec<Option<Format>>,
@@ -256,9 +256,8 @@ impl Recorder {
     /// # Errors
     /// [`Error::Usage`] outside a pass.
     pub(crate) fn color_format(&self, index: usize) -> Result<Option<Format>, Error> {
-        let (Pass::RenderPass { formats, .. }
-        | Pass::Dynamic { formats }
-        | Pass::Inherited { formats }) = self.pass()?;
+        let (Pass::Begun { formats, .. } | Pass::Dynamic { formats } | Pass::Inherited { formats }) =
+            self.pass()?;
         Ok(formats.get(index).copied().flatten())
     }
 
@@ -277,7 +276,7 @@ impl Recorder {
     /// [`Error::Usage`] outside a render pass, or after its last subpass.
     pub(crate) fn next_subpass(&mut self) -> Result<(), Error> {
         match self.pass.take() {
-            Some(Pass::RenderPass { begun, subpass, .. }) => {
+            Some(Pass::Begun { begun, subpass, .. }) => {
                 self.packet(Packet::EndRendering);
                 self.enter_subpass(begun, subpass + 1)
             }
@@ -292,7 +291,7 @@ impl Recorder {
         let packet = begun.subpass(subpass)?;
         let formats = color_formats(&packet);
         self.packet(packet);
-        self.pass = Some(Pass::RenderPass {
+        self.pass = Some(Pass::Begun {
             begun,
             subpass,
             formats,
@@ -306,7 +305,7 @@ impl Recorder {
     /// [`Error::Usage`] outside a render pass.
     pub(crate) fn end_render_pass(&mut self) -> Result<(), Error> {
         match self.pass.take() {
-            Some(Pass::RenderPass { .. }) => {
+            Some(Pass::Begun { .. }) => {
                 self.packet(Packet::EndRendering);
                 Ok(())
             }

@@ -181,11 +181,11 @@ commands! {
         PFN_vkCmdResetEvent = command::cmd_reset_event;
         PFN_vkCmdWaitEvents = command::cmd_wait_events;
         PFN_vkCmdPipelineBarrier = command::cmd_pipeline_barrier;
-        PFN_vkCmdBeginQuery = command::cmd_begin_query;
-        PFN_vkCmdEndQuery = command::cmd_end_query;
-        PFN_vkCmdResetQueryPool = command::cmd_reset_query_pool;
-        PFN_vkCmdWriteTimestamp = command::cmd_write_timestamp;
-        PFN_vkCmdCopyQueryPoolResults = command::cmd_copy_query_pool_results;
+        PFN_vkCmdBeginQuery = query::cmd_begin_query;
+        PFN_vkCmdEndQuery = query::cmd_end_query;
+        PFN_vkCmdResetQueryPool = query::cmd_reset_query_pool;
+        PFN_vkCmdWriteTimestamp = query::cmd_write_timestamp;
+        PFN_vkCmdCopyQueryPoolResults = query::cmd_copy_query_pool_results;
         PFN_vkCmdPushConstants = unsupported::cmd_push_constants;
         PFN_vkCmdBeginRenderPass = rendering::cmd_begin_render_pass;
         PFN_vkCmdNextSubpass = rendering::cmd_next_subpass;
@@ -255,7 +255,7 @@ commands! {
         PFN_vkCmdResetEvent2 = command::cmd_reset_event2;
         PFN_vkCmdWaitEvents2 = command::cmd_wait_events2;
         PFN_vkCmdPipelineBarrier2 = command::cmd_pipeline_barrier2;
-        PFN_vkCmdWriteTimestamp2 = command::cmd_write_timestamp2;
+        PFN_vkCmdWriteTimestamp2 = query::cmd_write_timestamp2;
         PFN_vkQueueSubmit2 = queue::queue_submit2;
         PFN_vkCmdCopyBuffer2 = transfer::cmd_copy_buffer2;
         PFN_vkCmdCopyImage2 = transfer::cmd_copy_image2;
@@ -329,7 +329,7 @@ commands! {
         PFN_vkCmdSetEvent2 as "vkCmdSetEvent2KHR" = command::cmd_set_event2;
         PFN_vkCmdResetEvent2 as "vkCmdResetEvent2KHR" = command::cmd_reset_event2;
         PFN_vkCmdWaitEvents2 as "vkCmdWaitEvents2KHR" = command::cmd_wait_events2;
-        PFN_vkCmdWriteTimestamp2 as "vkCmdWriteTimestamp2KHR" = command::cmd_write_timestamp2;
+        PFN_vkCmdWriteTimestamp2 as "vkCmdWriteTimestamp2KHR" = query::cmd_write_timestamp2;
         PFN_vkQueueSubmit2 as "vkQueueSubmit2KHR" = queue::queue_submit2;
     }
     Device, DeviceExtension(GAUSSIAN_PRIMITIVE_TOPOLOGY) => {

@@ -1,11 +1,8 @@
 //! Commands that bind state, draw and synchronise.
 
 use crate::capabilities::limits;
-use crate::command::record::{
-    Command, CopyQueryResults, Draw, DrawIndirect, IndexBuffer, VertexBuffer,
-};
+use crate::command::record::{Command, Draw, DrawIndirect, IndexBuffer, VertexBuffer};
 use crate::command::recorder::Recorder;
-use crate::entrypoints::query::require_queries;
 use crate::error::Error;
 use crate::lower::camera::camera;
 use crate::lower::rendering;
@@ -117,15 +114,7 @@ crate::entry_points! {
         viewport_count: u32,
         viewports: *const vk::Viewport,
     ) {
-        record(command_buffer, |recorder| {
-            require_viewports(first_viewport, viewport_count)?;
-            let viewports = pointer::slice(viewports, viewport_count)?;
-            recorder.push(Command::SetViewports {
-                first: first_viewport,
-                viewports: viewports.iter().copied().map(pipeline::viewport).collect(),
-            });
-            Ok(())
-        })
+        set_viewports(command_buffer, first_viewport, viewport_count, viewports)
     }
 
     fn cmd_set_viewport_with_count(
@@ -133,7 +122,7 @@ crate::entry_points! {
         viewport_count: u32,
         viewports: *const vk::Viewport,
     ) {
-        Ok(cmd_set_viewport(command_buffer, 0, viewport_count, viewports))
+        set_viewports(command_buffer, 0, viewport_count, viewports)
     }
 
     fn cmd_set_scissor(
@@ -142,15 +131,7 @@ crate::entry_points! {
         scissor_count: u32,
         scissors: *const vk::Rect2D,
     ) {
-        record(command_buffer, |recorder| {
-            require_viewports(first_scissor, scissor_count)?;
-            let scissors = pointer::slice(scissors, scissor_count)?;
-            recorder.push(Command::SetScissors {
-                first: first_scissor,
-                scissors: scissors.iter().copied().map(rendering::rect).collect(),
-            });
-            Ok(())
-        })
+        set_scissors(command_buffer, first_scissor, scissor_count, scissors)
     }
 
     fn cmd_set_scissor_with_count(
@@ -158,7 +139,7 @@ crate::entry_points! {
         scissor_count: u32,
         scissors: *const vk::Rect2D,
     ) {
-        Ok(cmd_set_scissor(command_buffer, 0, scissor_count, scissors))
+        set_scissors(command_buffer, 0, scissor_count, scissors)
     }
 
     fn cmd_set_blend_constants(
@@ -340,92 +321,6 @@ crate::entry_points! {
     ) {
         wait_events(command_buffer, event_count, events)
     }
-
-    fn cmd_begin_query(
-        command_buffer: vk::CommandBuffer,
-        query_pool: vk::QueryPool,
-        query: u32,
-        _flags: vk::QueryControlFlags,
-    ) {
-        record(command_buffer, |recorder| {
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, query, 1)?;
-            recorder.packet(Packet::BeginQuery { pool: Arc::clone(&pool.queries), index: query });
-            Ok(())
-        })
-    }
-
-    fn cmd_end_query(command_buffer: vk::CommandBuffer, query_pool: vk::QueryPool, query: u32) {
-        record(command_buffer, |recorder| {
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, query, 1)?;
-            recorder.packet(Packet::EndQuery { pool: Arc::clone(&pool.queries), index: query });
-            Ok(())
-        })
-    }
-
-    fn cmd_reset_query_pool(
-        command_buffer: vk::CommandBuffer,
-        query_pool: vk::QueryPool,
-        first_query: u32,
-        query_count: u32,
-    ) {
-        record(command_buffer, |recorder| {
-            recorder.require_outside_pass()?;
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, first_query, query_count)?;
-            recorder.packet(Packet::ResetQueries {
-                pool: Arc::clone(&pool.queries),
-                first: first_query,
-                count: query_count,
-            });
-            Ok(())
-        })
-    }
-
-    fn cmd_write_timestamp(
-        command_buffer: vk::CommandBuffer,
-        _pipeline_stage: vk::PipelineStageFlags,
-        query_pool: vk::QueryPool,
-        query: u32,
-    ) {
-        write_timestamp(command_buffer, query_pool, query)
-    }
-
-    fn cmd_write_timestamp2(
-        command_buffer: vk::CommandBuffer,
-        _stage: vk::PipelineStageFlags2,
-        query_pool: vk::QueryPool,
-        query: u32,
-    ) {
-        write_timestamp(command_buffer, query_pool, query)
-    }
-
-    fn cmd_copy_query_pool_results(
-        command_buffer: vk::CommandBuffer,
-        query_pool: vk::QueryPool,
-        first_query: u32,
-        query_count: u32,
-        dst_buffer: vk::Buffer,
-        dst_offset: vk::DeviceSize,
-        stride: vk::DeviceSize,
-        flags: vk::QueryResultFlags,
-    ) {
-        record(command_buffer, |recorder| {
-            recorder.require_outside_pass()?;
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, first_query, query_count)?;
-            recorder.push(Command::CopyQueryResults(CopyQueryResults {
-                pool: Arc::clone(pool),
-                first: first_query,
-                count: query_count,
-                target: handle::get(dst_buffer)?.range(dst_offset, None)?,
-                stride,
-                flags,
-            }));
-            Ok(())
-        })
-    }
 }
 
 /// Records vertex buffers; `sizes` and `strides` are empty or have one for each.
@@ -474,6 +369,54 @@ fn require_viewports(first: u32, count: u32) -> Result<(), Error> {
         "VUID-vkCmdSetViewport-firstViewport-01223",
         format!("there are {available} viewports"),
     ))
+}
+
+/// Records viewports.
+///
+/// # Safety
+/// The handle is live and the pointer is valid for the count.
+unsafe fn set_viewports(
+    command_buffer: vk::CommandBuffer,
+    first: u32,
+    count: u32,
+    viewports: *const vk::Viewport,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        record(command_buffer, |recorder| {
+            require_viewports(first, count)?;
+            let viewports = pointer::slice(viewports, count)?;
+            recorder.push(Command::SetViewports {
+                first,
+                viewports: viewports.iter().copied().map(pipeline::viewport).collect(),
+            });
+            Ok(())
+        })
+    }
+}
+
+/// Records scissors.
+///
+/// # Safety
+/// The handle is live and the pointer is valid for the count.
+unsafe fn set_scissors(
+    command_buffer: vk::CommandBuffer,
+    first: u32,
+    count: u32,
+    scissors: *const vk::Rect2D,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        record(command_buffer, |recorder| {
+            require_viewports(first, count)?;
+            let scissors = pointer::slice(scissors, count)?;
+            recorder.push(Command::SetScissors {
+                first,
+                scissors: scissors.iter().copied().map(rendering::rect).collect(),
+            });
+            Ok(())
+        })
+    }
 }
 
 /// Records draws whose numbers lie in a buffer.
@@ -553,29 +496,6 @@ unsafe fn wait_events(
             let events = handle::get_all(pointer::slice(events, count)?)?;
             recorder.push(Command::WaitEvents(events));
             recorder.packet(Packet::Barrier);
-            Ok(())
-        })
-    }
-}
-
-/// Records a timestamp.
-///
-/// # Safety
-/// The handles are live.
-unsafe fn write_timestamp(
-    command_buffer: vk::CommandBuffer,
-    query_pool: vk::QueryPool,
-    query: u32,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, query, 1)?;
-            recorder.packet(Packet::WriteTimestamp {
-                pool: Arc::clone(&pool.queries),
-                index: query,
-            });
             Ok(())
         })
     }

@@ -1,10 +1,13 @@
-//! Query pools.
+//! Query pools, and the commands that use them.
 
+use super::command::record;
+use crate::command::record::{Command, CopyQueryResults};
 use crate::error::Error;
 use crate::object::query_pool::QueryPool;
 use crate::object::signals::Signals;
 use crate::{handle, pnext, pointer};
 use ash::vk;
+use simdevice::Packet;
 use simdevice::counters::Counter;
 use simdevice::query::{QueryKind, QueryResult};
 use std::ffi::c_void;
@@ -74,6 +77,92 @@ crate::entry_points! {
         }
         Ok(if all_available { vk::Result::SUCCESS } else { vk::Result::NOT_READY })
     }
+
+    fn cmd_begin_query(
+        command_buffer: vk::CommandBuffer,
+        query_pool: vk::QueryPool,
+        query: u32,
+        _flags: vk::QueryControlFlags,
+    ) {
+        record(command_buffer, |recorder| {
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, query, 1)?;
+            recorder.packet(Packet::BeginQuery { pool: Arc::clone(&pool.queries), index: query });
+            Ok(())
+        })
+    }
+
+    fn cmd_end_query(command_buffer: vk::CommandBuffer, query_pool: vk::QueryPool, query: u32) {
+        record(command_buffer, |recorder| {
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, query, 1)?;
+            recorder.packet(Packet::EndQuery { pool: Arc::clone(&pool.queries), index: query });
+            Ok(())
+        })
+    }
+
+    fn cmd_reset_query_pool(
+        command_buffer: vk::CommandBuffer,
+        query_pool: vk::QueryPool,
+        first_query: u32,
+        query_count: u32,
+    ) {
+        record(command_buffer, |recorder| {
+            recorder.require_outside_pass()?;
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, first_query, query_count)?;
+            recorder.packet(Packet::ResetQueries {
+                pool: Arc::clone(&pool.queries),
+                first: first_query,
+                count: query_count,
+            });
+            Ok(())
+        })
+    }
+
+    fn cmd_write_timestamp(
+        command_buffer: vk::CommandBuffer,
+        _pipeline_stage: vk::PipelineStageFlags,
+        query_pool: vk::QueryPool,
+        query: u32,
+    ) {
+        write_timestamp(command_buffer, query_pool, query)
+    }
+
+    fn cmd_write_timestamp2(
+        command_buffer: vk::CommandBuffer,
+        _stage: vk::PipelineStageFlags2,
+        query_pool: vk::QueryPool,
+        query: u32,
+    ) {
+        write_timestamp(command_buffer, query_pool, query)
+    }
+
+    fn cmd_copy_query_pool_results(
+        command_buffer: vk::CommandBuffer,
+        query_pool: vk::QueryPool,
+        first_query: u32,
+        query_count: u32,
+        dst_buffer: vk::Buffer,
+        dst_offset: vk::DeviceSize,
+        stride: vk::DeviceSize,
+        flags: vk::QueryResultFlags,
+    ) {
+        record(command_buffer, |recorder| {
+            recorder.require_outside_pass()?;
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, first_query, query_count)?;
+            recorder.push(Command::CopyQueryResults(CopyQueryResults {
+                pool: Arc::clone(pool),
+                first: first_query,
+                count: query_count,
+                target: handle::get(dst_buffer)?.range(dst_offset, None)?,
+                stride,
+                flags,
+            }));
+            Ok(())
+        })
+    }
 }
 
 /// A query's result, after a wait where that is asked for.
@@ -97,7 +186,7 @@ fn result(
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub(crate) fn require_queries(pool: &QueryPool, first: u32, count: u32) -> Result<(), Error> {
+fn require_queries(pool: &QueryPool, first: u32, count: u32) -> Result<(), Error> {
     if pool.has(first, count) {
         return Ok(());
     }
@@ -150,5 +239,28 @@ unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Erro
         other => Err(Error::FeatureNotPresent(format!(
             "a query pool of type {other:?}"
         ))),
+    }
+}
+
+/// Records a timestamp.
+///
+/// # Safety
+/// The handles are live.
+unsafe fn write_timestamp(
+    command_buffer: vk::CommandBuffer,
+    query_pool: vk::QueryPool,
+    query: u32,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        record(command_buffer, |recorder| {
+            let pool = handle::get(query_pool)?;
+            require_queries(pool, query, 1)?;
+            recorder.packet(Packet::WriteTimestamp {
+                pool: Arc::clone(&pool.queries),
+                index: query,
+            });
+            Ok(())
+        })
     }
 }

@@ -239,11 +239,9 @@ fn a_camera_that_is_none_fails_the_recording() {
     let recorded = scene.gpu.record(|_, commands| {
         // SAFETY: see the crate.
         unsafe {
-            scene
-                .gpu
-                .gaussian
-                .cmd_set_gaussian_camera(commands, &camera)
-        };
+            let gaussian = &scene.gpu.gaussian;
+            gaussian.cmd_set_gaussian_camera(commands, &camera);
+        }
     });
     assert_eq!(
         recorded.unwrap_err(),

@@ -17,6 +17,8 @@ pub struct Gpu {
     pub gaussian: gaurast::gaussian_primitive_topology::Device,
     pub queue: vk::Queue,
     pub pool: vk::CommandPool,
+    /// Dropping it unloads the loader.
+    _entry: ash::Entry,
 }
 
 /// A buffer with memory of its own.
@@ -74,6 +76,17 @@ unsafe extern "system" fn keep_message(
     vk::FALSE
 }
 
+/// The environment variable that makes these tests go through the system's loader.
+pub const LOADER: &str = "GAURAST_TEST_LOADER";
+
+fn entry() -> ash::Entry {
+    if std::env::var_os(LOADER).is_none() {
+        return vulkan_gaurast::entry();
+    }
+    // SAFETY: the loader is the system's own.
+    unsafe { ash::Entry::load() }.expect("a Vulkan loader")
+}
+
 impl Gpu {
     /// Opens the device with all that it supports.
     pub fn new() -> Self {
@@ -85,7 +98,7 @@ impl Gpu {
     }
 
     fn with(extensions: &[&CStr]) -> Self {
-        let entry = vulkan_gaurast::entry();
+        let entry = entry();
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
         let instance_extensions = [ash::ext::debug_utils::NAME.as_ptr()];
         let instance_info = vk::InstanceCreateInfo::default()
@@ -147,6 +160,7 @@ impl Gpu {
                 gaussian,
                 queue,
                 pool,
+                _entry: entry,
             }
         }
     }

@@ -139,13 +139,17 @@ fn validate_stages(
         }
         other => return Err(unknown("projectionMode", &other)),
     }
-    for stage in info.stages {
-        if stage.stage == vk::ShaderStageFlags::FRAGMENT {
-            return Err(unbuilt(
-                "the pipeline has a fragment stage",
-                "resolveFragmentShader",
-            ));
-        }
+    let has_fragment_stage = info
+        .stages
+        .iter()
+        .any(|stage| stage.stage == vk::ShaderStageFlags::FRAGMENT);
+    if has_fragment_stage {
+        return Err(unbuilt(
+            "the pipeline has a fragment stage",
+            "resolveFragmentShader",
+        ));
+    }
+    if let Some(stage) = info.stages.first() {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
             format!(
