@@ -1,0 +1,9 @@
+//! Samplers.
+
+use ash::vk;
+
+/// A sampler.
+#[derive(Debug)]
+pub(crate) struct Sampler {}
+
+crate::objects! { vk::Sampler => Sampler; }
