@@ -2,85 +2,16 @@
 //! themselves again with `VK_DRIVER_FILES` set, because the loader reads the environment. They are skipped, aloud, on
 //! machines without a loader.
 
+#[path = "support/loader.rs"]
+mod loader;
 mod support;
 
-use ash::vk::{self, TaggedStructure};
-use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
-use std::ffi::CStr;
-use std::path::{Path, PathBuf};
+use ash::vk;
+use loader::{library, manifest, through_the_loader};
 use std::process::Command;
-use support::{Context, Heard};
+use support::Context;
 
 const VALIDATION: &str = "VK_LAYER_KHRONOS_validation";
-const VALIDATION_NAME: &CStr = c"VK_LAYER_KHRONOS_validation";
-
-/// Set for the process that runs a test's inside.
-const INSIDE: &str = "GAURAST_TEST_INSIDE_LOADER";
-
-/// The shared library that was built with this test.
-fn library() -> PathBuf {
-    let test = std::env::current_exe().expect("the test's own path");
-    let directories = test.ancestors().skip(1).take(2);
-    directories
-        .map(|directory| directory.join("libvulkan_gaurast.so"))
-        .find(|library| library.exists())
-        .expect("cargo builds the shared library beside its tests")
-}
-
-/// Writes a manifest for the library.
-fn manifest(directory: &Path) -> PathBuf {
-    let template = include_str!("../gaurast_icd.json");
-    let library = library().to_string_lossy().into_owned();
-    let text = template.replace("../target/release/libvulkan_gaurast.so", &library);
-    assert!(text.contains(&library), "the template names the library");
-    let path = directory.join("gaurast_icd.json");
-    std::fs::write(&path, text).expect("a writable directory");
-    path
-}
-
-/// The extension's structures as the validation layer wants to be told of them: pairs of type and size.
-fn unregistered_structures() -> String {
-    use gaurast::vk::{
-        PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
-        PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties,
-    };
-    [
-        (Features::STRUCTURE_TYPE, size_of::<Features<'_>>()),
-        (Properties::STRUCTURE_TYPE, size_of::<Properties<'_>>()),
-    ]
-    .map(|(structure, size)| format!("{},{size}", structure.as_raw()))
-    .join(",")
-}
-
-/// Runs `inside` in a process of its own, where the loader finds this driver alone.
-fn through_the_loader(test: &str, inside: impl FnOnce(ash::Entry)) {
-    // SAFETY: the loader is the system's own.
-    let entry = match unsafe { ash::Entry::load() } {
-        Ok(entry) => entry,
-        Err(error) => {
-            eprintln!("skipped: there is no Vulkan loader here ({error})");
-            return;
-        }
-    };
-    if std::env::var_os(INSIDE).is_some() {
-        return inside(entry);
-    }
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let output = Command::new(std::env::current_exe().expect("the test's own path"))
-        .args(["--exact", test, "--nocapture"])
-        .env(INSIDE, "1")
-        .env("VK_DRIVER_FILES", manifest(directory.path()))
-        .env("VK_ICD_FILENAMES", manifest(directory.path()))
-        .env("VK_LAYER_CUSTOM_STYPE_LIST", unregistered_structures())
-        .output()
-        .expect("the test starts itself");
-    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{text}");
-    assert!(text.contains("1 passed"), "{text}");
-    for line in text.lines().filter(|line| line.starts_with("skipped:")) {
-        eprintln!("{line}");
-    }
-}
 
 #[test]
 fn a_device_is_created_and_destroyed() {
@@ -175,57 +106,6 @@ fn vulkaninfo_lists_the_device() {
             "the driver complains: {errors}"
         );
     }
-}
-
-/// The validation layer works over the driver and has nothing against it.
-#[test]
-fn the_validation_layer_is_content() {
-    through_the_loader("the_validation_layer_is_content", |entry| {
-        // SAFETY: the loader is loaded.
-        let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap();
-        if !layers
-            .iter()
-            .any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_NAME))
-        {
-            eprintln!("skipped: there is no validation layer here");
-            return;
-        }
-        let heard = Heard::default();
-        let layers = [VALIDATION_NAME.as_ptr()];
-        let names = [ash::ext::debug_utils::NAME.as_ptr()];
-        let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-        let mut messenger = heard.messenger();
-        messenger.message_severity = vk::DebugUtilsMessageSeverityFlagsEXT::WARNING
-            | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR;
-        let info = vk::InstanceCreateInfo::default()
-            .application_info(&application)
-            .enabled_layer_names(&layers)
-            .enabled_extension_names(&names)
-            .push_next(&mut messenger);
-        // SAFETY: the creation info is valid.
-        let instance = unsafe { entry.create_instance(&info, None) }.unwrap();
-        let context = Context::of(entry, instance);
-        let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default()
-            .dynamic_rendering(true)
-            .synchronization2(true);
-        let mut gaussian = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
-            .gaussian_primitive_topology(true);
-        let mut features = vk::PhysicalDeviceFeatures2::default()
-            .push_next(&mut vulkan13)
-            .push_next(&mut gaussian);
-        let extensions = [
-            ash::khr::performance_query::NAME,
-            gaurast::gaussian_primitive_topology::NAME,
-        ];
-        let device = context.device(&extensions, &mut features).unwrap();
-        // SAFETY: the device is live, and destroyed last.
-        unsafe {
-            device.get_device_queue(0, 0);
-            device.destroy_device(None);
-        }
-        drop(context);
-        assert_eq!(heard.take(), []);
-    });
 }
 
 /// The shared library exports what the loader needs and no Vulkan command.

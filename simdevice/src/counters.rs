@@ -82,10 +82,9 @@ counters! {
     ShaderUniform: "shader cores", "uniform instructions", Count, "Instructions computed once for all lanes of a batch; they are in the counts by kind too";
     ShaderActiveLanes: "shader cores", "active lanes", Count, "Lanes that were active, summed over the instructions that work on each lane";
     ShaderLanes: "shader cores", "lanes", Count, "Lanes that could have been active, summed alike; active lanes by it is the lane occupancy";
-    PreprocessTime: "time", "preprocess", Nanoseconds, "Reading, culling and projecting Gaussians";
+    PreprocessTime: "time", "preprocess", Nanoseconds, "Reading, culling, projecting and colouring Gaussians";
     SortTime: "time", "sort", Nanoseconds, "Sorting by depth";
     BinningTime: "time", "binning", Nanoseconds, "Finding the tiles of each Gaussian, and placing it in their lists";
-    ColorTime: "time", "spherical harmonics", Nanoseconds, "Evaluating the colour of what is drawn";
     ShaderTime: "time", "dispatches", Nanoseconds, "Running the workgroups of compute programs";
     RasterTime: "time", "raster", Nanoseconds, "Rendering tiles: load, evaluate, blend, store";
 }

@@ -9,26 +9,16 @@ use std::thread::JoinHandle;
 pub(crate) struct Workers {
     /// Present until dropped.
     pool: Option<ThreadPool>,
-    threads: Threads,
-}
-
-/// Threads that are joined when this is dropped.
-#[derive(Debug, Default)]
-struct Threads(Vec<JoinHandle<()>>);
-
-impl Drop for Threads {
-    fn drop(&mut self) {
-        for thread in self.0.drain(..) {
-            // A worker that panicked has told the caller of its work already.
-            let _ = thread.join();
-        }
-    }
+    threads: Vec<JoinHandle<()>>,
 }
 
 impl Workers {
     /// Starts `count` threads; 0 means one per processor.
     pub(crate) fn new(count: usize) -> Result<Self, ThreadPoolBuildError> {
-        let mut threads = Threads::default();
+        let mut workers = Self {
+            pool: None,
+            threads: Vec::new(),
+        };
         let pool = ThreadPoolBuilder::new()
             .num_threads(count)
             .spawn_handler(|worker| {
@@ -36,14 +26,12 @@ impl Workers {
                 let spawned = std::thread::Builder::new()
                     .name(name)
                     .spawn(|| worker.run());
-                threads.0.push(spawned?);
+                workers.threads.push(spawned?);
                 Ok(())
             })
             .build()?;
-        Ok(Self {
-            pool: Some(pool),
-            threads,
-        })
+        workers.pool = Some(pool);
+        Ok(workers)
     }
 
     /// The pool, or `None` while it is being dropped.
@@ -54,8 +42,12 @@ impl Workers {
 
 impl Drop for Workers {
     fn drop(&mut self) {
-        // Threads end only when the pool is gone; then `threads` joins them.
+        // Threads end only when the pool is gone.
         self.pool = None;
+        for thread in self.threads.drain(..) {
+            // A worker that panicked has told the caller of its work already.
+            let _ = thread.join();
+        }
     }
 }
 

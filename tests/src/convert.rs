@@ -89,7 +89,7 @@ mod tests {
             };
             let scene = Scene::load(&path).unwrap();
             let size = [192, 144];
-            let camera = Camera::framing(&scene, size).to_vulkan();
+            let camera = Camera::framing(&scene, 50.0, size).to_vulkan();
             let reference = render_bounded(
                 &SceneBuffers::from(&scene).as_oracle(),
                 &OracleCamera::new(&camera, size).unwrap(),

@@ -17,6 +17,7 @@ const SUPPORTED: &[&str] = &[
     "multi_draw_indirect",
     "robust_buffer_access",
     // Core 1.2. Image layouts don't matter to the device, so that depth and stencil may differ in theirs.
+    "draw_indirect_count",
     "host_query_reset",
     "imageless_framebuffer",
     "separate_depth_stencil_layouts",
@@ -425,7 +426,7 @@ mod tests {
     fn supported_features_are_those_of_the_structures() {
         let mut names = all_true::<vk::PhysicalDeviceFeatures>(5);
         names.extend(all_true::<vk::PhysicalDeviceVulkan11Features<'_>>(0));
-        names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(4));
+        names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(5));
         names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(3));
         names.extend(all_true::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(1));
         names.extend(all_true::<

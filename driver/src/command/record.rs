@@ -49,7 +49,8 @@ pub(crate) enum Command {
     SetCamera(Box<Camera>),
     /// `vkCmdDraw` and `vkCmdDrawIndexed`.
     Draw(Draw),
-    /// `vkCmdDrawIndirect` and `vkCmdDrawIndexedIndirect`: the draws are read when they execute.
+    /// `vkCmdDrawIndirect`, `vkCmdDrawIndexedIndirect` and their forms with a count: the draws are read when they
+    /// execute.
     DrawIndirect(DrawIndirect),
     /// `vkCmdBindPipeline` at the compute bind point.
     BindComputePipeline(Arc<ComputePipeline>),
@@ -145,8 +146,10 @@ pub(crate) struct Draw {
 pub(crate) struct DrawIndirect {
     /// The bytes from the first draw's numbers to the end of the buffer.
     pub(crate) parameters: BufferRange,
-    /// How many draws.
+    /// How many draws, at most.
     pub(crate) draw_count: u32,
+    /// Where the number of draws is read from, if it lies in a buffer: four bytes.
+    pub(crate) count: Option<BufferRange>,
     /// Bytes from one draw's numbers to the next.
     pub(crate) stride: u32,
     /// Whether they are those of indexed draws.

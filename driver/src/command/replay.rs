@@ -144,7 +144,11 @@ fn draw_indirect(
     indirect: &DrawIndirect,
     executor: &mut dyn Executor,
 ) -> Result<(), Lost> {
-    for index in 0..u64::from(indirect.draw_count) {
+    let draw_count = match indirect.count.as_ref().map(read_count) {
+        None => indirect.draw_count,
+        Some(count) => count.unwrap_or(0).min(indirect.draw_count),
+    };
+    for index in 0..u64::from(draw_count) {
         let offset = index * u64::from(indirect.stride);
         match read_draw(&indirect.parameters, offset, indirect.indexed) {
             Some(numbers) => draw(state, &numbers, executor)?,
@@ -155,6 +159,13 @@ fn draw_indirect(
         }
     }
     Ok(())
+}
+
+/// Reads how many draws there are.
+fn read_count(range: &BufferRange) -> Option<u32> {
+    let mut count = [0];
+    range.memory.read(range.offset, &mut count).ok()?;
+    Some(count[0])
 }
 
 /// Reads `VkDrawIndirectCommand` or `VkDrawIndexedIndirectCommand`.

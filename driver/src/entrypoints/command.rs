@@ -6,7 +6,7 @@ use crate::command::recorder::Recorder;
 use crate::error::Error;
 use crate::lower::camera::camera;
 use crate::lower::rendering;
-use crate::object::pipeline;
+use crate::object::pipeline::{self, Pipeline};
 use crate::{handle, pointer};
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
@@ -32,13 +32,21 @@ crate::entry_points! {
         pipeline: vk::Pipeline,
     ) {
         record(command_buffer, |recorder| {
-            if pipeline_bind_point != vk::PipelineBindPoint::GRAPHICS {
-                return Err(Error::usage(
-                    "VUID-vkCmdBindPipeline-pipelineBindPoint-00779",
-                    "a graphics pipeline is bound at another bind point",
-                ));
-            }
-            recorder.push(Command::BindPipeline(Arc::clone(handle::get(pipeline)?)));
+            let command = match (&**handle::get(pipeline)?, pipeline_bind_point) {
+                (Pipeline::Graphics(pipeline), vk::PipelineBindPoint::GRAPHICS) => {
+                    Command::BindPipeline(Arc::clone(pipeline))
+                }
+                (Pipeline::Compute(pipeline), vk::PipelineBindPoint::COMPUTE) => {
+                    Command::BindComputePipeline(Arc::clone(pipeline))
+                }
+                (_, other) => {
+                    return Err(Error::usage(
+                        "VUID-vkCmdBindPipeline-pipelineBindPoint-00779",
+                        format!("a pipeline is bound at {other:?}, which is not its bind point"),
+                    ));
+                }
+            };
+            recorder.push(command);
             Ok(())
         })
     }
@@ -201,7 +209,8 @@ crate::entry_points! {
         draw_count: u32,
         stride: u32,
     ) {
-        draw_indirect(command_buffer, buffer, offset, draw_count, stride, false)
+        let parameters = (buffer, offset);
+        draw_indirect(command_buffer, parameters, None, draw_count, stride, false)
     }
 
     fn cmd_draw_indexed_indirect(
@@ -211,7 +220,36 @@ crate::entry_points! {
         draw_count: u32,
         stride: u32,
     ) {
-        draw_indirect(command_buffer, buffer, offset, draw_count, stride, true)
+        let parameters = (buffer, offset);
+        draw_indirect(command_buffer, parameters, None, draw_count, stride, true)
+    }
+
+    fn cmd_draw_indirect_count(
+        command_buffer: vk::CommandBuffer,
+        buffer: vk::Buffer,
+        offset: vk::DeviceSize,
+        count_buffer: vk::Buffer,
+        count_buffer_offset: vk::DeviceSize,
+        max_draw_count: u32,
+        stride: u32,
+    ) {
+        let parameters = (buffer, offset);
+        let count = Some((count_buffer, count_buffer_offset));
+        draw_indirect(command_buffer, parameters, count, max_draw_count, stride, false)
+    }
+
+    fn cmd_draw_indexed_indirect_count(
+        command_buffer: vk::CommandBuffer,
+        buffer: vk::Buffer,
+        offset: vk::DeviceSize,
+        count_buffer: vk::Buffer,
+        count_buffer_offset: vk::DeviceSize,
+        max_draw_count: u32,
+        stride: u32,
+    ) {
+        let parameters = (buffer, offset);
+        let count = Some((count_buffer, count_buffer_offset));
+        draw_indirect(command_buffer, parameters, count, max_draw_count, stride, true)
     }
 
     fn cmd_execute_commands(
@@ -419,14 +457,17 @@ unsafe fn set_scissors(
     }
 }
 
+/// A buffer and an offset in it.
+type Place = (vk::Buffer, vk::DeviceSize);
+
 /// Records draws whose numbers lie in a buffer.
 ///
 /// # Safety
 /// The handles are live.
 unsafe fn draw_indirect(
     command_buffer: vk::CommandBuffer,
-    buffer: vk::Buffer,
-    offset: vk::DeviceSize,
+    (buffer, offset): Place,
+    count: Option<Place>,
     draw_count: u32,
     stride: u32,
     indexed: bool,
@@ -436,9 +477,14 @@ unsafe fn draw_indirect(
         record(command_buffer, |recorder| {
             recorder.require_pass()?;
             let parameters = handle::get(buffer)?.range(offset, None)?;
+            let count = match count {
+                Some((buffer, offset)) => Some(handle::get(buffer)?.range(offset, Some(4))?),
+                None => None,
+            };
             recorder.push(Command::DrawIndirect(DrawIndirect {
                 parameters,
                 draw_count,
+                count,
                 stride,
                 indexed,
             }));

@@ -100,7 +100,7 @@ crate::entry_points! {
     }
 
     fn end_command_buffer(command_buffer: vk::CommandBuffer) -> vk::Result {
-        handle::get(command_buffer)?.recorder().end()
+        handle::get(command_buffer)?.end()
     }
 
     fn reset_command_buffer(

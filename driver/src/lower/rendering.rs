@@ -5,7 +5,7 @@ use crate::object::image::ImageView;
 use crate::object::render_pass::{AttachmentDescription, RenderPass};
 use ash::vk;
 use simdevice::format::{Channel, Numeric};
-use simdevice::packet::{Attachment, ClearValue, LoadOp, Rect, Rendering, StoreOp};
+use simdevice::packet::{Aspect, Attachment, ClearValue, LoadOp, Rect, Rendering, StoreOp};
 use simdevice::{Format, Packet};
 use std::sync::Arc;
 
@@ -51,6 +51,21 @@ pub(crate) fn clear_value(format: Format, value: vk::ClearValue) -> ClearValue {
             clear_color(format, value.color)
         }
     }
+}
+
+/// Checks that a view can be an attachment of `layers` layers for an aspect.
+fn check_attachment(view: &ImageView, aspect: Aspect, layers: u32) -> Result<(), Error> {
+    let view = &view.view;
+    if view.format.aspects().contains(&aspect) && layers <= view.layer_count {
+        return Ok(());
+    }
+    Err(Error::usage(
+        "VUID-vkCmdBeginRendering-attachment",
+        format!(
+            "a view of format {:?} with {} layers is the {aspect:?} attachment of a pass with {layers} layers",
+            view.format, view.layer_count
+        ),
+    ))
 }
 
 /// What an attachment does at the beginning of a pass.
@@ -107,23 +122,25 @@ impl BegunPass {
             ));
         };
         let color = subpass.color.iter().map(|used| {
-            used.map(|number| self.attachment(index, number, AttachmentDescription::main))
+            let ops = AttachmentDescription::main;
+            used.map(|number| self.attachment(index, number, Aspect::Color, ops))
                 .transpose()
         });
-        let depth_stencil = |channel, ops| {
+        let depth_stencil = |aspect, ops| {
+            let has_aspect = |format: Format| format.aspects().contains(&aspect);
             let number = subpass
                 .depth_stencil
-                .filter(|&number| self.format(number).is_some_and(|f| f.has(channel)));
+                .filter(|&number| self.format(number).is_some_and(has_aspect));
             number
-                .map(|number| self.attachment(index, number, ops))
+                .map(|number| self.attachment(index, number, aspect, ops))
                 .transpose()
         };
         Ok(Packet::BeginRendering(Box::new(Rendering {
             area: self.area,
             layer_count: self.layers,
             color: color.collect::<Result<_, _>>()?,
-            depth: depth_stencil(Channel::D, AttachmentDescription::main)?,
-            stencil: depth_stencil(Channel::S, AttachmentDescription::stencil)?,
+            depth: depth_stencil(Aspect::Depth, AttachmentDescription::main)?,
+            stencil: depth_stencil(Aspect::Stencil, AttachmentDescription::stencil)?,
         })))
     }
 
@@ -135,6 +152,7 @@ impl BegunPass {
         &self,
         subpass: usize,
         number: usize,
+        aspect: Aspect,
         ops: fn(&AttachmentDescription) -> Ops,
     ) -> Result<Attachment, Error> {
         let Some(view) = self.views.get(number) else {
@@ -143,6 +161,7 @@ impl BegunPass {
                 format!("the framebuffer has no attachment {number}"),
             ));
         };
+        check_attachment(view, aspect, self.layers)?;
         let (load_op, store_op) = ops(&self.render_pass.attachments[number]);
         // A clear value that is missing is the application's error; zero is as good as any.
         let clear = || {
@@ -215,20 +234,32 @@ impl DynamicRendering {
     /// # Errors
     /// [`Error::Usage`] for operations that Vulkan does not have.
     pub(crate) fn packet(&self) -> Result<Packet, Error> {
-        let optional = |attachment: &Option<DynamicAttachment>| {
-            attachment.as_ref().map(|a| self.attachment(a)).transpose()
+        let optional = |attachment: &Option<DynamicAttachment>, aspect| {
+            attachment
+                .as_ref()
+                .map(|attachment| self.attachment(attachment, aspect))
+                .transpose()
         };
         Ok(Packet::BeginRendering(Box::new(Rendering {
             area: rect(self.area),
             layer_count: self.layers,
-            color: self.color.iter().map(optional).collect::<Result<_, _>>()?,
-            depth: optional(&self.depth)?,
-            stencil: optional(&self.stencil)?,
+            color: self
+                .color
+                .iter()
+                .map(|attachment| optional(attachment, Aspect::Color))
+                .collect::<Result<_, _>>()?,
+            depth: optional(&self.depth, Aspect::Depth)?,
+            stencil: optional(&self.stencil, Aspect::Stencil)?,
         })))
     }
 
     /// Between suspension and resumption attachments are in memory.
-    fn attachment(&self, attachment: &DynamicAttachment) -> Result<Attachment, Error> {
+    fn attachment(
+        &self,
+        attachment: &DynamicAttachment,
+        aspect: Aspect,
+    ) -> Result<Attachment, Error> {
+        check_attachment(&attachment.view, aspect, self.layers)?;
         let format = attachment.view.view.format;
         Ok(Attachment {
             view: attachment.view.view.clone(),

@@ -125,6 +125,22 @@ impl CommandBuffer {
         self.recorder().fail(error);
     }
 
+    /// Ends recording.
+    ///
+    /// # Errors
+    /// That of [`Recorder::end`], or [`Error::Panic`] if a command panicked while it was recorded and so is missing.
+    pub(crate) fn end(&self) -> Result<(), Error> {
+        let panicked = self.recorder.is_poisoned();
+        self.recorder.clear_poison();
+        let mut recorder = self.recorder();
+        if panicked {
+            recorder.fail(Error::Panic(
+                "a command panicked while it was recorded".into(),
+            ));
+        }
+        recorder.end()
+    }
+
     /// Records: an error of `record` is reported now, and `vkEndCommandBuffer` fails with the first.
     ///
     /// # Errors
@@ -136,5 +152,31 @@ impl CommandBuffer {
         let mut recorder = self.recorder();
         recorder.require_recording()?;
         record(&mut recorder).inspect_err(|error| recorder.fail(error.clone()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capabilities::features::EnabledFeatures;
+
+    #[test]
+    fn a_panic_while_recording_fails_the_recording() {
+        let instance = Instance::new(vk::API_VERSION_1_3, &[]).unwrap();
+        let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
+        let features = EnabledFeatures::default();
+        let device = Device::new(instance, Vec::new(), features, simulated, 0).unwrap();
+        let buffer = CommandBuffer {
+            device,
+            level: vk::CommandBufferLevel::PRIMARY,
+            resets_single: true,
+            recorder: Mutex::new(Recorder::new()),
+        };
+        buffer.recorder().begin(Default::default()).unwrap();
+        let record = || buffer.record(|_| panic!("in a test"));
+        assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(record)).is_err());
+        assert!(matches!(buffer.end(), Err(Error::Panic(_))));
+        buffer.recorder().begin(Default::default()).unwrap();
+        buffer.end().unwrap();
     }
 }

@@ -10,6 +10,7 @@ use crate::object::query_pool;
 use crate::object::semaphore::Semaphore;
 use crate::object::signals::{Signals, Waited};
 use ash::vk;
+use simdevice::command_processor::ExecutionError;
 use simdevice::{CommandProcessor, Packet};
 use std::sync::Arc;
 
@@ -98,9 +99,14 @@ impl QueueExecutor<'_> {
 
 impl Executor for QueueExecutor<'_> {
     fn execute(&mut self, packet: &Packet) -> Result<(), Lost> {
-        self.processor
-            .execute(packet)
-            .map_err(|error| Lost(error.to_string()))
+        match self.processor.execute(packet) {
+            // The draw draws nothing, and what follows is as if it weren't there.
+            Err(error @ ExecutionError::TooManyGaussians(_)) => {
+                self.report(&format!("a draw draws nothing: {error}"));
+                Ok(())
+            }
+            executed => executed.map_err(|error| Lost(error.to_string())),
+        }
     }
 
     fn wait_event(&mut self, event: &Event) -> Result<(), Lost> {

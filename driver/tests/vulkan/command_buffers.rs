@@ -2,7 +2,8 @@
 
 use crate::gpu::{Gpu, MAPPABLE};
 use crate::scene::{
-    CENTER, PipelineRequest, Scene, area, assert_close, at, premultiplied, set_viewport, splat,
+    CENTER, PipelineRequest, Scene, area, assert_close, at, pass_with, premultiplied, set_viewport,
+    splat,
 };
 use ash::vk;
 
@@ -155,10 +156,14 @@ fn secondaries_draw_inside_the_primarys_pass() {
         device.cmd_draw(secondary, 1, 1, 0, 0);
         device.end_command_buffer(secondary).unwrap();
     }
-    let pixels = scene.draw([0.5; 4], |device, commands| {
-        // SAFETY: see the crate.
-        unsafe { device.cmd_execute_commands(commands, &[secondary]) };
+    let flags = vk::RenderingFlags::CONTENTS_SECONDARY_COMMAND_BUFFERS;
+    scene.gpu.run(|device, commands| {
+        pass_with(flags, device, commands, scene.image, [0.5; 4], || {
+            // SAFETY: see the crate.
+            unsafe { device.cmd_execute_commands(commands, &[secondary]) };
+        });
     });
+    let pixels = scene.pixels();
     assert_close(at(&pixels, CENTER), premultiplied(RED, 0.8));
     assert_eq!(at(&pixels, (0, 0)), [0.5; 4]);
 }

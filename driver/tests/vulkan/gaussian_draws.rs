@@ -211,6 +211,32 @@ fn indirect_draws_read_their_numbers_when_they_execute() {
 }
 
 #[test]
+fn the_number_of_indirect_draws_may_lie_in_a_buffer() {
+    let scene = scene(&[
+        splat([-1.0, 0.0, 5.0], 0.02, 0.5, RED),
+        splat([1.0, 0.0, 5.0], 0.02, 0.7, BLUE),
+    ]);
+    let numbers = scene.gpu.buffer_of(&[1u32, 1, 0, 0, 1, 1, 1, 0]);
+    for (count, drawn) in [
+        (0u32, [false, false]),
+        (1, [true, false]),
+        (9, [true, true]),
+    ] {
+        let count = scene.gpu.buffer_of(&[count]);
+        let pixels = scene.draw([0.0; 4], |device, commands| {
+            let (numbers, count) = (numbers.buffer, count.buffer);
+            // SAFETY: see the crate.
+            unsafe { device.cmd_draw_indirect_count(commands, numbers, 0, count, 0, 2, 16) };
+        });
+        let (x, y) = CENTER;
+        let [left, right] = [at(&pixels, (x - 20, y)), at(&pixels, (x + 20, y))];
+        assert_eq!([left[3] > 0.4, right[3] > 0.6], drawn);
+        scene.gpu.free_buffer(count);
+    }
+    scene.gpu.free_buffer(numbers);
+}
+
+#[test]
 fn a_draw_without_a_camera_draws_nothing_and_says_so() {
     let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, RED)]);
     scene.gpu.run(|device, commands| {

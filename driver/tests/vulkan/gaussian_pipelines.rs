@@ -261,6 +261,20 @@ fn blend_state_and_attachments_correspond() {
 }
 
 #[test]
+fn compute_pipelines_are_refused_with_null_handles() {
+    let gpu = Gpu::new();
+    let infos = [vk::ComputePipelineCreateInfo::default(); 2];
+    // SAFETY: see the crate.
+    let created = unsafe {
+        gpu.device
+            .create_compute_pipelines(vk::PipelineCache::null(), &infos, None)
+    };
+    let (pipelines, error) = created.unwrap_err();
+    assert_eq!(error, vk::Result::ERROR_FEATURE_NOT_PRESENT);
+    assert_eq!(pipelines, [vk::Pipeline::null(); 2]);
+}
+
+#[test]
 fn a_pipeline_cache_is_empty_and_says_whose_it_is() {
     let gpu = Gpu::new();
     // SAFETY: see the crate.

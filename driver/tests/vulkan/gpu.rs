@@ -9,7 +9,8 @@ pub type Messages = Arc<Mutex<Vec<String>>>;
 
 /// A device, its queue, a command pool, and what its messenger heard.
 pub struct Gpu {
-    instance: ash::Instance,
+    pub physical_device: vk::PhysicalDevice,
+    pub instance: ash::Instance,
     debug_utils: ash::ext::debug_utils::Instance,
     messenger: vk::DebugUtilsMessengerEXT,
     messages: Box<Messages>,
@@ -18,7 +19,7 @@ pub struct Gpu {
     pub queue: vk::Queue,
     pub pool: vk::CommandPool,
     /// Dropping it unloads the loader.
-    _entry: ash::Entry,
+    pub entry: ash::Entry,
 }
 
 /// A buffer with memory of its own.
@@ -76,33 +77,24 @@ unsafe extern "system" fn keep_message(
     vk::FALSE
 }
 
-/// The environment variable that makes these tests go through the system's loader.
-pub const LOADER: &str = "GAURAST_TEST_LOADER";
-
-fn entry() -> ash::Entry {
-    if std::env::var_os(LOADER).is_none() {
-        return vulkan_gaurast::entry();
-    }
-    // SAFETY: the loader is the system's own.
-    unsafe { ash::Entry::load() }.expect("a Vulkan loader")
-}
-
 impl Gpu {
     /// Opens the device with all that it supports.
     pub fn new() -> Self {
+        Self::of(vulkan_gaurast::entry(), &[])
+    }
+
+    /// Opens the device through some door, with layers.
+    pub fn of(entry: ash::Entry, layers: &[&CStr]) -> Self {
         let extensions = [
             gaurast::gaussian_primitive_topology::NAME,
             ash::khr::performance_query::NAME,
         ];
-        Self::with(&extensions)
-    }
-
-    fn with(extensions: &[&CStr]) -> Self {
-        let entry = entry();
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
         let instance_extensions = [ash::ext::debug_utils::NAME.as_ptr()];
+        let layers: Vec<_> = layers.iter().map(|name| name.as_ptr()).collect();
         let instance_info = vk::InstanceCreateInfo::default()
             .application_info(&app)
+            .enabled_layer_names(&layers)
             .enabled_extension_names(&instance_extensions);
         let messages = Box::<Messages>::default();
         let messenger_info = vk::DebugUtilsMessengerCreateInfoEXT::default()
@@ -152,6 +144,7 @@ impl Gpu {
                 .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
             let pool = device.create_command_pool(&pool_info, None).unwrap();
             Self {
+                physical_device,
                 instance,
                 debug_utils,
                 messenger,
@@ -160,7 +153,7 @@ impl Gpu {
                 gaussian,
                 queue,
                 pool,
-                _entry: entry,
+                entry,
             }
         }
     }
@@ -245,7 +238,7 @@ impl Gpu {
             .collect()
     }
 
-    /// A 2D image bound to memory that the host cannot map, with a view.
+    /// A 2D image bound to memory that the host cannot map, in the general layout, with a view.
     pub fn image(&self, format: vk::Format, width: u32, height: u32) -> Image {
         let extent = vk::Extent2D { width, height };
         let depth = matches!(format, vk::Format::D32_SFLOAT | vk::Format::D16_UNORM);
@@ -282,6 +275,15 @@ impl Gpu {
                 .format(format)
                 .subresource_range(range);
             let view = self.device.create_image_view(&view_info, None).unwrap();
+            self.run(|device, commands| {
+                let barriers = [vk::ImageMemoryBarrier::default()
+                    .new_layout(vk::ImageLayout::GENERAL)
+                    .image(image)
+                    .subresource_range(range)];
+                let all = vk::PipelineStageFlags::ALL_COMMANDS;
+                let none = vk::DependencyFlags::empty();
+                device.cmd_pipeline_barrier(commands, all, all, none, &[], &[], &barriers);
+            });
             Image {
                 image,
                 memory,

@@ -7,9 +7,12 @@ mod command_buffers;
 mod gaussian_draws;
 mod gaussian_pipelines;
 mod gpu;
+#[path = "../support/loader.rs"]
+mod loader;
 mod memory;
 mod queries;
 mod render_passes;
 mod scene;
 mod synchronization;
 mod transfers;
+mod validation;

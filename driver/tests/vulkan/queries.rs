@@ -25,8 +25,22 @@ fn counters_are_read_in_the_order_that_the_pool_chose() {
         .query_type(vk::QueryType::PERFORMANCE_QUERY_KHR)
         .query_count(1)
         .push_next(&mut performance);
+    let (instance, device_functions) = (
+        ash::khr::performance_query::Instance::new(&scene.gpu.entry, &scene.gpu.instance),
+        ash::khr::performance_query::Device::new(&scene.gpu.instance, device),
+    );
     // SAFETY: see the crate.
     unsafe {
+        let available = instance
+            .enumerate_physical_device_queue_family_performance_query_counters_len(
+                scene.gpu.physical_device,
+                0,
+            )
+            .unwrap();
+        assert_eq!(available, Counter::ALL.len());
+        device_functions
+            .acquire_profiling_lock(&vk::AcquireProfilingLockInfoKHR::default())
+            .unwrap();
         let pool = device.create_query_pool(&info, None).unwrap();
         device.reset_query_pool(pool, 0, 1);
         let mut results = [[0u64; 2]];
@@ -47,6 +61,7 @@ fn counters_are_read_in_the_order_that_the_pool_chose() {
         read(&mut results, vk::QueryResultFlags::WAIT).unwrap();
         assert_eq!(results, [[1, 3]]);
         device.destroy_query_pool(pool, None);
+        device_functions.release_profiling_lock();
     }
 }
 

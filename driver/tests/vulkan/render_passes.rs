@@ -20,13 +20,14 @@ fn attachment(load: vk::AttachmentLoadOp) -> vk::AttachmentDescription {
         .samples(vk::SampleCountFlags::TYPE_1)
         .load_op(load)
         .store_op(vk::AttachmentStoreOp::STORE)
+        .initial_layout(vk::ImageLayout::GENERAL)
         .final_layout(vk::ImageLayout::GENERAL)
 }
 
 fn reference(attachment: u32) -> vk::AttachmentReference {
     vk::AttachmentReference {
         attachment,
-        layout: vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+        layout: vk::ImageLayout::GENERAL,
     }
 }
 
@@ -102,9 +103,8 @@ fn a_pass_clears_and_stores() {
                 device.cmd_end_render_pass(commands);
             })
             .unwrap();
-        // A recording keeps its render pass, as Vulkan lets it die before submission.
-        gpu.device.destroy_render_pass(pass, None);
         gpu.submit(commands);
+        gpu.device.destroy_render_pass(pass, None);
         gpu.device.destroy_framebuffer(framebuffer, None);
     }
     let mut expected = [GREEN; 8];
@@ -125,7 +125,17 @@ fn subpasses_follow_each_other() {
     let subpasses = references
         .each_ref()
         .map(|references| vk::SubpassDescription::default().color_attachments(references));
+    let writes = vk::AccessFlags::COLOR_ATTACHMENT_WRITE;
+    let stage = vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT;
+    let dependencies = [vk::SubpassDependency::default()
+        .src_subpass(0)
+        .dst_subpass(2)
+        .src_stage_mask(stage)
+        .dst_stage_mask(stage)
+        .src_access_mask(writes)
+        .dst_access_mask(writes)];
     let info = vk::RenderPassCreateInfo::default()
+        .dependencies(&dependencies)
         .attachments(&attachments)
         .subpasses(&subpasses);
     // SAFETY: see the crate.
@@ -175,6 +185,7 @@ fn passes_load_what_is_there_within_their_area() {
     let begin = |device: &ash::Device, commands, load, rect, flags| {
         let attachments = [vk::RenderingAttachmentInfo::default()
             .image_view(image.view)
+            .image_layout(vk::ImageLayout::GENERAL)
             .load_op(load)
             .store_op(vk::AttachmentStoreOp::STORE)
             .clear_value(clear_value([1.0; 4]))];

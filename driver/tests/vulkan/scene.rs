@@ -207,21 +207,37 @@ pub fn pass(
     clear: [f32; 4],
     record: impl FnOnce(),
 ) {
+    let flags = vk::RenderingFlags::empty();
+    pass_with(flags, device, commands, image, clear, || {
+        set_viewport(device, commands, image);
+        record();
+    });
+}
+
+/// Records a pass that clears `image`, and what `record` records in it.
+pub fn pass_with(
+    flags: vk::RenderingFlags,
+    device: &ash::Device,
+    commands: vk::CommandBuffer,
+    image: Image,
+    clear: [f32; 4],
+    record: impl FnOnce(),
+) {
     let attachments = [vk::RenderingAttachmentInfo::default()
         .image_view(image.view)
-        .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+        .image_layout(vk::ImageLayout::GENERAL)
         .load_op(vk::AttachmentLoadOp::CLEAR)
         .store_op(vk::AttachmentStoreOp::STORE)
         .clear_value(vk::ClearValue {
             color: vk::ClearColorValue { float32: clear },
         })];
     let rendering = vk::RenderingInfo::default()
+        .flags(flags)
         .render_area(area(image))
         .layer_count(1)
         .color_attachments(&attachments);
     // SAFETY: see the crate.
     unsafe { device.cmd_begin_rendering(commands, &rendering) };
-    set_viewport(device, commands, image);
     record();
     // SAFETY: see the crate.
     unsafe { device.cmd_end_rendering(commands) };
@@ -237,7 +253,11 @@ pub struct Scene {
 
 impl Scene {
     pub fn new(splats: &[Splat], request: &PipelineRequest) -> Self {
-        let gpu = Gpu::new();
+        Self::on(Gpu::new(), splats, request)
+    }
+
+    /// The scene on a device that was opened before.
+    pub fn on(gpu: Gpu, splats: &[Splat], request: &PipelineRequest) -> Self {
         Self {
             pipeline: request.create(&gpu).unwrap(),
             image: gpu.image(FORMAT, WIDTH, HEIGHT),

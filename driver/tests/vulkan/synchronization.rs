@@ -159,7 +159,8 @@ fn queues_and_hosts_set_events() {
         let commands = gpu
             .record(|device, commands| {
                 let events = [event];
-                device.cmd_wait_events(commands, &events, stages, stages, &[], &[], &[]);
+                let host = vk::PipelineStageFlags::HOST;
+                device.cmd_wait_events(commands, &events, host, stages, &[], &[], &[]);
                 device.cmd_fill_buffer(commands, buffer.buffer, 0, 4, 4);
                 device.cmd_reset_event(commands, event, stages);
             })

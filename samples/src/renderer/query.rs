@@ -25,22 +25,21 @@ pub struct Counter {
     pub value: f64,
 }
 
-/// A query of everything that the device counts.
+/// A query of everything that the device counts. It holds the device's profiling lock as long as
+/// it lives, since the lock must be held from recording to execution.
 pub(super) struct CounterQuery {
     pool: vk::QueryPool,
     counters: Vec<CounterDescription>,
+    locked: bool,
     device: Arc<Device>,
 }
-
-/// Holds the device's profiling lock.
-pub(super) struct ProfilingLock<'a>(&'a Device);
 
 impl CounterQuery {
     /// The query, unless the device counts nothing or not everything at once.
     pub(super) fn new(device: &Arc<Device>) -> Result<Option<Self>, RenderError> {
-        if device.performance().is_none() {
+        let Some(performance_query) = device.performance() else {
             return Ok(None);
-        }
+        };
         let counters = device.counters()?;
         let indices: Vec<u32> = (0..counters.len() as u32).collect();
         let mut performance = vk::QueryPoolPerformanceCreateInfoKHR::default()
@@ -56,22 +55,18 @@ impl CounterQuery {
         // SAFETY: the structures are valid, and the feature is enabled.
         let pool = unsafe { device.raw().create_query_pool(&create_info, None) }
             .during("vkCreateQueryPool")?;
-        Ok(Some(Self {
+        let mut query = Self {
             pool,
             counters,
+            locked: false,
             device: device.clone(),
-        }))
-    }
-
-    /// Takes the profiling lock, to be held from before recording until after execution.
-    pub(super) fn lock(&self) -> Result<ProfilingLock<'_>, RenderError> {
+        };
         let info = vk::AcquireProfilingLockInfoKHR::default().timeout(LOCK_TIMEOUT);
-        if let Some(performance) = self.device.performance() {
-            // SAFETY: the lock is not held: every holder releases it when dropped.
-            unsafe { performance.acquire_profiling_lock(&info) }
-                .during("vkAcquireProfilingLockKHR")?;
-        }
-        Ok(ProfilingLock(&self.device))
+        // SAFETY: the feature is enabled, and the one query of a device doesn't hold the lock yet.
+        unsafe { performance_query.acquire_profiling_lock(&info) }
+            .during("vkAcquireProfilingLockKHR")?;
+        query.locked = true;
+        Ok(Some(query))
     }
 
     /// Records the query's reset.
@@ -163,13 +158,8 @@ impl Drop for CounterQuery {
     fn drop(&mut self) {
         // SAFETY: every submission has been waited for.
         unsafe { self.device.raw().destroy_query_pool(self.pool, None) };
-    }
-}
-
-impl Drop for ProfilingLock<'_> {
-    fn drop(&mut self) {
-        if let Some(performance) = self.0.performance() {
-            // SAFETY: this guard's existence means that the lock is held.
+        if let Some(performance) = self.device.performance().filter(|_| self.locked) {
+            // SAFETY: the lock is held.
             unsafe { performance.release_profiling_lock() };
         }
     }

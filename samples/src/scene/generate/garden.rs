@@ -307,14 +307,14 @@ fn water(brush: &mut Brush) -> Splat {
         0.05 * (8.0 * position.z - 4.0 * position.x).sin(),
     )
     .normalize();
-    let mut splat = Splat::new(position, 0.08, DVec3::new(0.12, 0.17, 0.24));
+    let mut splat = Splat::new(position, 0.08, DVec3::new(0.10, 0.16, 0.24));
     splat.rotation = facing(ripple, brush.even(0.0, TAU));
     splat.scale.z *= 0.12;
     splat.opacity = 0.045;
     let glow = DVec3::new(sun().x, 0.12, sun().z).normalize();
     splat.shine = vec![
-        (mirror(sun(), ripple), DVec3::new(0.34, 0.21, 0.12)),
-        (mirror(glow, ripple), DVec3::new(0.20, 0.10, 0.08)),
+        (mirror(sun(), ripple), DVec3::new(0.22, 0.14, 0.08)),
+        (mirror(glow, ripple), DVec3::new(0.08, 0.05, 0.05)),
         (mirror(DVec3::Y, ripple), DVec3::new(0.02, 0.12, 0.34)),
     ];
     splat
