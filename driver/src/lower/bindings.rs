@@ -3,7 +3,7 @@
 use crate::command::bound::{BoundSet, BoundSets};
 use crate::object::descriptor::layout::Binding;
 use crate::object::descriptor::Descriptor;
-use crate::shader::interface;
+use crate::shader;
 use simdevice::bindings::Bindings;
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub(crate) struct Unbound(u32);
 /// # Errors
 /// [`Unbound`] if a set is missing.
 pub(crate) fn bindings(
-    descriptors: &[interface::Descriptor],
+    descriptors: &[shader::Descriptor],
     sets: &BoundSets,
     push_constants: &[u8],
 ) -> Result<Bindings, Unbound> {
@@ -36,7 +36,7 @@ pub(crate) fn bindings(
 
 /// Binds what one variable of a program uses.
 fn bind(
-    used: &interface::Descriptor,
+    used: &shader::Descriptor,
     bound: &BoundSet,
     binding: &Binding,
     bindings: &mut Bindings,

@@ -5,7 +5,7 @@ use crate::capabilities::limits;
 use crate::error::Error;
 use crate::object::device::Device;
 use crate::object::shader_module::ShaderModule;
-use crate::shader::interface::{self, BuiltIn, InputSource, Interface, Stage};
+use crate::shader::{self, BuiltIn, InputSource, Interface, Stage};
 use crate::shader::{Options, Specialization};
 use simdevice::compute::{ComputeInput, ComputeProgram};
 use std::sync::Arc;
@@ -16,7 +16,7 @@ pub(crate) struct ComputePipeline {
     /// What its workgroups run.
     pub(crate) program: Arc<ComputeProgram>,
     /// What the program is bound to.
-    pub(crate) descriptors: Vec<interface::Descriptor>,
+    pub(crate) descriptors: Vec<shader::Descriptor>,
 }
 
 /// A shader stage with its pointers followed.
@@ -103,7 +103,7 @@ fn invocations(interface: &Interface) -> Result<u32, Error> {
 
 /// What the device puts into the program's inputs.
 fn inputs(interface: &Interface) -> Vec<Option<ComputeInput>> {
-    let input = |input: &interface::Input| match input.source {
+    let input = |input: &shader::Input| match input.source {
         InputSource::BuiltIn {
             built_in: BuiltIn::WorkgroupId,
             component,

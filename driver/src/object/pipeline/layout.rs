@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::object::descriptor::layout::DescriptorSetLayout;
-use crate::shader::interface::{self, DescriptorKind, Interface, Stage};
+use crate::shader::{self, DescriptorKind, Interface, Stage};
 use ash::vk;
 use std::ops::Range;
 use std::sync::Arc;
@@ -89,7 +89,7 @@ impl PipelineLayout {
 
     fn check_descriptor(
         &self,
-        used: &interface::Descriptor,
+        used: &shader::Descriptor,
         stage: vk::ShaderStageFlags,
     ) -> Result<(), Error> {
         let wrong = |vuid, problem: String| {
