@@ -19,7 +19,7 @@ mod lower;
 mod object;
 mod pnext;
 mod pointer;
-mod shader;
+pub mod shader;
 
 pub use embed::entry;
 pub use handle::live_handles;

@@ -128,10 +128,10 @@ fn measure(program: &Program, level: SimdLevel, lanes: usize) -> Option<(f64, f6
     ));
     let (begin, mut done) = (Instant::now(), 0);
     while begin.elapsed() < Duration::from_millis(800) {
-        (0..512 * 64)
+        (0..512 * 512)
             .step_by(lanes)
-            .for_each(|start| run(&mut machine, start * 8));
-        done += 512 * 64;
+            .for_each(|start| run(&mut machine, start));
+        done += 512 * 512;
     }
     Some((
         done as f64 / begin.elapsed().as_secs_f64(),

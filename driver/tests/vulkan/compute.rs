@@ -216,7 +216,7 @@ fn shared_memory_is_ordered_by_barriers() {
 #[test]
 fn atomics_lose_nothing() {
     let gpu = Gpu::new();
-    let kernel = Kernel::new(&gpu, &spirv!("atomics.comp"), &[&[(0, STORAGE, 1)]]);
+    let kernel = Kernel::new(&gpu, &spirv!("atomic_words.comp"), &[&[(0, STORAGE, 1)]]);
     let data = gpu.buffer_of(&[0u32, 0, u32::MAX, 0, u32::MAX, 0, 0, 0]);
     let groups = 20;
     kernel.run(&[kernel.storage_set(&[data])], &[], [groups, 1, 1]);

@@ -512,7 +512,15 @@ impl Builder {
     ///
     /// # Errors
     /// The first misuse of the builder, or what [`validate::validate`] finds.
-    pub fn finish(mut self) -> Result<Program, InvalidProgram> {
+    pub fn finish(self) -> Result<Program, InvalidProgram> {
+        let mut program = self.finish_as_written()?;
+        super::escape::keep_escaping_values(&mut program);
+        validate::validate(&program)?;
+        Ok(program)
+    }
+
+    /// The program as it was built, closed but not checked.
+    pub(super) fn finish_as_written(self) -> Result<Program, InvalidProgram> {
         if let Some(misuse) = self.misuse {
             return Err(misuse);
         }
@@ -521,8 +529,6 @@ impl Builder {
                 problem: "a construct is still open at the end",
             });
         }
-        super::escape::keep_escaping_values(&mut self.program);
-        validate::validate(&self.program)?;
         Ok(self.program)
     }
 

@@ -34,7 +34,7 @@ impl Display for Program {
             {
                 Some(Type::Bool) => writeln!(f, "{} = {}", constant.reg, bits != 0)?,
                 Some(Type::B64) => {
-                    writeln!(f, "{} = {bits} ({:?})", constant.reg, f64::from_bits(bits))?
+                    writeln!(f, "{} = {bits} ({:?})", constant.reg, f64::from_bits(bits))?;
                 }
                 _ => writeln!(
                     f,
@@ -166,7 +166,7 @@ fn statement(it: &Statement, depth: usize, f: &mut Formatter<'_>) -> Result {
         Statement::Subgroup { op, src, index, .. } => {
             match op {
                 SubgroupOp::Reduce { op, cluster } => {
-                    write!(f, "subgroup reduce {} {cluster}", op.name())?
+                    write!(f, "subgroup reduce {} {cluster}", op.name())?;
                 }
                 other => write!(f, "subgroup {other:?}")?,
             }

@@ -2,6 +2,11 @@
 
 use super::op::Op;
 
+mod image;
+pub use image::{
+    Dimension, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Sample,
+};
+
 /// Lanes in a chunk, the unit that registers are stored and computed in. Batches are whole numbers of chunks.
 pub const CHUNK_LANES: usize = 16;
 
@@ -334,171 +339,6 @@ pub fn is_reducible(op: Op) -> bool {
     )
 }
 
-/// An image's shape, without its array layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Dimension {
-    /// One-dimensional.
-    D1,
-    /// Two-dimensional.
-    D2,
-    /// Three-dimensional.
-    D3,
-    /// Six faces, addressed by a direction.
-    Cube,
-    /// A texel buffer.
-    Buffer,
-}
-
-impl Dimension {
-    /// How many coordinates address a texel, without the layer.
-    pub fn coordinates(self) -> usize {
-        match self {
-            Self::D1 | Self::Buffer => 1,
-            Self::D2 => 2,
-            Self::D3 | Self::Cube => 3,
-        }
-    }
-}
-
-/// What kind of image an instruction expects. All operand registers of image statements are `B32`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ImageShape {
-    /// Its dimension.
-    pub dimension: Dimension,
-    /// Whether it has layers; the layer is the last coordinate. (For storage cubes, face and layer are one: 6 layer +
-    /// face, the third coordinate; such an image is a `D2` array.)
-    pub arrayed: bool,
-    /// Whether it has several samples.
-    pub multisampled: bool,
-}
-
-impl ImageShape {
-    /// How many coordinates address a texel, with the layer.
-    pub fn coordinates(self) -> usize {
-        self.dimension.coordinates() + usize::from(self.arrayed)
-    }
-}
-
-/// How a sample's level of detail is chosen.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Lod {
-    /// From the coordinates' differences within the quad, plus a bias.
-    Implicit {
-        /// Added to the level.
-        bias: Option<Reg>,
-        /// The level is at least this.
-        minimum: Option<Reg>,
-    },
-    /// Given.
-    Explicit(Reg),
-    /// From given gradients, one register for each coordinate without the layer.
-    Gradient {
-        /// Along x.
-        dx: Vec<Reg>,
-        /// Along y.
-        dy: Vec<Reg>,
-        /// The level is at least this.
-        minimum: Option<Reg>,
-    },
-}
-
-/// A filtered access through a sampler.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sample {
-    /// Red, green, blue, alpha; None where nobody asks. For a depth comparison only the first.
-    pub dst: [Option<Reg>; 4],
-    /// The image.
-    pub image: Binding,
-    /// The sampler.
-    pub sampler: Binding,
-    /// The image's kind.
-    pub shape: ImageShape,
-    /// Coordinates: floats, already divided for projective access.
-    pub coordinate: Vec<Reg>,
-    /// Level of detail.
-    pub lod: Lod,
-    /// Texel offsets, signed integers, one for each coordinate without the layer; or empty.
-    pub offset: Vec<Reg>,
-    /// Reference value of a depth comparison.
-    pub compare: Option<Reg>,
-    /// Gather this component of the four texels that bilinear filtering would use, instead of filtering.
-    pub gather: Option<u8>,
-}
-
-/// An access to one texel by integer coordinates, unfiltered (a fetch from a sampled image or a read of a storage image).
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImageRead {
-    /// Red, green, blue, alpha; None where nobody asks.
-    pub dst: [Option<Reg>; 4],
-    /// The image.
-    pub image: Binding,
-    /// The image's kind.
-    pub shape: ImageShape,
-    /// Coordinates: integers.
-    pub coordinate: Vec<Reg>,
-    /// Mip level, default 0.
-    pub level: Option<Reg>,
-    /// Sample index, default 0.
-    pub sample: Option<Reg>,
-}
-
-/// A store of one texel.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImageWrite {
-    /// The image.
-    pub image: Binding,
-    /// The image's kind.
-    pub shape: ImageShape,
-    /// Coordinates: integers.
-    pub coordinate: Vec<Reg>,
-    /// Sample index, default 0.
-    pub sample: Option<Reg>,
-    /// Red, green, blue, alpha.
-    pub texel: [Reg; 4],
-}
-
-/// An atomic operation on a texel of one 32-bit component.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImageAtomic {
-    /// The old value, if anybody asks.
-    pub dst: Option<Reg>,
-    /// What to do.
-    pub op: AtomicOp,
-    /// The image.
-    pub image: Binding,
-    /// The image's kind.
-    pub shape: ImageShape,
-    /// Coordinates: integers.
-    pub coordinate: Vec<Reg>,
-    /// Sample index, default 0.
-    pub sample: Option<Reg>,
-    /// The operand.
-    pub value: Reg,
-    /// What [`AtomicOp::CompareExchange`] compares with.
-    pub comparator: Option<Reg>,
-}
-
-/// A question about an image.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ImageQuery {
-    /// Width, height, depth (as far as they exist), then layers, of a mip level (default 0).
-    Size {
-        /// The level.
-        level: Option<Reg>,
-    },
-    /// Number of mip levels.
-    Levels,
-    /// Number of samples.
-    Samples,
-    /// The mip level that an implicit sample would use, clamped, and before clamping.
-    Lod {
-        /// The sampler.
-        sampler: Binding,
-        /// Coordinates: floats, without the layer.
-        coordinate: Vec<Reg>,
-    },
-}
-
 /// One statement.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Statement {
@@ -538,7 +378,7 @@ pub enum Statement {
         format: Format,
     },
     /// Stores consecutive elements, in active lanes that aren't helpers. Out of range vanishes, element by element.
-    /// Where lanes collide, the highest lane wins.
+    /// Where lanes collide, one of them wins.
     Store {
         /// The elements, 1 to 16.
         src: Vec<Reg>,

@@ -62,3 +62,6 @@ pub mod resources;
 mod uniformity;
 pub mod validate;
 mod visit;
+
+#[cfg(test)]
+mod tests;

@@ -88,6 +88,10 @@ pub type Lanes = [u32; CHUNK_LANES];
 
 /// How the level of detail of a sample is chosen; see [`super::ir::Lod`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "one lives on the stack for each sample"
+)]
 pub enum LodRequest {
     /// From differences within each quad of lanes.
     Implicit {

@@ -9,8 +9,6 @@ pub struct Allocation {
     pub slots: Vec<Slot>,
     /// Chunks of the whole file.
     pub chunks: usize,
-    /// A varying place of 64 bits that no register has, for results on their way to a variable.
-    pub scratch: Slot,
 }
 
 /// When a register is live, in ticks: two for each statement, its reads and then its writes.
@@ -59,15 +57,10 @@ pub fn allocate(program: &Program, varying: &[bool], width: usize) -> Allocation
         });
         intervals[reg.0 as usize] = None;
     }
-    let scratch = places.take(Class {
-        varying: true,
-        wide: true,
-    });
     scan(program, varying, &intervals, &mut places, &mut slots);
     Allocation {
         slots,
         chunks: places.next,
-        scratch,
     }
 }
 

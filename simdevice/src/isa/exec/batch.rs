@@ -6,10 +6,8 @@ use std::sync::atomic::AtomicU32;
 use fearless_simd::{Simd, prelude::*};
 
 use super::super::ir::{Reg, Statement, Type};
-use super::super::op::Op;
 use super::super::resources::Resources;
 use super::Executable;
-use super::compute::compute;
 use super::file::{Chunk, File, Slot, load, store};
 use super::mask::{MaskId, Masks};
 
@@ -64,14 +62,6 @@ impl Batch<'_> {
                 store(to, merged);
             }
         }
-    }
-
-    /// `dst = op(src...)` in the active lanes; `scratch` takes the result on its way.
-    #[inline(always)]
-    pub fn compute_masked<S: Simd>(&self, simd: S, op: Op, dst: Slot, src: &[Slot; 4]) {
-        let scratch = self.executable.scratch;
-        compute(simd, self.file, op, scratch, src);
-        self.assign(simd, dst, scratch, op.signature().result);
     }
 
     /// Runs a statement that reaches across lanes or out of the registers.

@@ -237,7 +237,7 @@ fn uncommon<S: Simd>(simd: S, file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4]
         }),
         Op::RoundToF16 => map1(file, dst, src, |a: f32| half::f16::from_f32(a).to_f32()),
         _ if op.kind() == super::super::op::Kind::Special => {
-            transcendental::run(simd, file, op, dst, src)
+            transcendental::run(simd, file, op, dst, src);
         }
         _ => wide::run(file, op, dst, src),
     }

@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 
 use super::super::ir::{
-    CHUNK_LANES, Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Type,
+    CHUNK_LANES, Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Reg, Type,
 };
 use super::super::optimize::optimize;
 use super::super::uniformity::varying_registers;
@@ -11,6 +11,7 @@ use super::super::validate::{InvalidProgram, validate};
 use super::allocate::allocate;
 use super::file::Slot;
 use super::lower::{Lowered, lower};
+use super::mask::MaskId;
 use super::step::{RunCost, Step};
 
 /// The most chunks that a register file may have: 256 MiB.
@@ -52,7 +53,6 @@ pub struct Executable {
     pub(super) inputs: Vec<Input>,
     pub(super) outputs: Vec<Output>,
     pub(super) runs: Vec<RunCost>,
-    pub(super) scratch: Slot,
     pub(super) masks: usize,
     pub(super) chunks: usize,
     pub(super) lanes: usize,
@@ -94,7 +94,6 @@ impl Executable {
             masks,
             runs,
             chunks: allocation.chunks,
-            scratch: allocation.scratch,
             slots: allocation.slots,
             types: program
                 .registers
@@ -110,6 +109,46 @@ impl Executable {
             subgroup_size,
             level,
         })
+    }
+
+    /// An executable of one chunk without steps, with room for one operation's registers.
+    pub(super) fn empty(level: Level) -> Self {
+        Self {
+            steps: Vec::new(),
+            slots: Vec::new(),
+            types: Vec::new(),
+            constants: Vec::new(),
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            runs: Vec::new(),
+            masks: usize::from(MaskId::FIRST_FREE),
+            chunks: 10,
+            lanes: CHUNK_LANES,
+            subgroup_size: 4,
+            shared_bytes: 0,
+            private_bytes: 0,
+            level,
+        }
+    }
+
+    /// Adds a register at a place.
+    fn add_register(&mut self, slot: Slot, ty: Type) -> Reg {
+        self.slots.push(slot);
+        self.types.push(ty);
+        Reg(self.slots.len() as u32 - 1)
+    }
+
+    /// Adds a constant at a place.
+    pub(super) fn add_constant(&mut self, slot: Slot, ty: Type, bits: u64) {
+        let reg = self.add_register(slot, ty);
+        self.constants.push(Constant { reg, bits });
+    }
+
+    /// Adds an output at a place; returns its slot number.
+    pub(super) fn add_output(&mut self, slot: Slot, ty: Type) -> u32 {
+        let (reg, number) = (self.add_register(slot, ty), self.outputs.len() as u32);
+        self.outputs.push(Output { slot: number, reg });
+        number
     }
 
     /// Lanes of a batch.

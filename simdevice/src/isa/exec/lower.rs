@@ -306,7 +306,13 @@ impl Lowering<'_> {
         if let Some(continues) = continues {
             self.control(Step::Clear(continues));
         }
-        self.block(body, at_continuing);
+        // No statement may run without lanes: it would still set uniform registers.
+        let back = if continues.is_some() {
+            at_continuing
+        } else {
+            end
+        };
+        self.block(body, back);
         self.place(at_continuing);
         if let Some(mask) = continues {
             self.control(Step::Join { mask, target: end });

@@ -242,10 +242,6 @@ fn run_steps<S: Simd>(
                 compute(simd, file, *op, *dst, src);
                 None
             }
-            Step::ComputeMasked { op, dst, src } => {
-                batch.compute_masked(simd, *op, *dst, src);
-                None
-            }
             Step::Assign { dst, src, ty } => {
                 batch.assign(simd, *dst, *src, *ty);
                 None

@@ -39,7 +39,7 @@ impl<'a> View<'a> {
     fn load(self, address: u64, format: Format) -> Option<u64> {
         let size = format.bytes();
         if address + u64::from(size) > u64::from(self.bytes)
-            || address % u64::from(size.min(4)) != 0
+            || !address.is_multiple_of(u64::from(size.min(4)))
         {
             return None;
         }
@@ -63,7 +63,7 @@ impl<'a> View<'a> {
     fn store(self, address: u64, format: Format, value: u64) {
         let size = format.bytes();
         if address + u64::from(size) > u64::from(self.bytes)
-            || address % u64::from(size.min(4)) != 0
+            || !address.is_multiple_of(u64::from(size.min(4)))
         {
             return;
         }

@@ -53,29 +53,47 @@ pub use machine::Machine;
 pub use mask::LaneMask;
 pub use watchdog::{Stopped, Watchdog};
 
-use std::cell::Cell;
+use std::sync::Arc;
 
-use fearless_simd::{Level, dispatch};
+use fearless_simd::Level;
 
 use super::ir::Type;
 use super::op::Op;
+use super::resources::Resources;
 use file::{File, Slot};
+use step::Step;
 
 /// What an operation gives for constants, by the same kernels that programs run.
 pub(super) fn evaluate(level: Level, op: Op, operands: &[u64]) -> u64 {
-    let mut chunks = [Chunk::default(); 10];
-    let file = File::new(Cell::from_mut(&mut chunks[..]).as_slice_of_cells(), 1);
-    let place = |index: usize| Slot::uniform(2 * index);
     let signature = op.signature();
+    let place = |index: usize| Slot::uniform(2 * index);
+    let mut src = [Slot::ZERO; 4];
+    let mut executable = Executable::empty(level);
     for (index, (bits, ty)) in operands.iter().zip(signature.operands).enumerate() {
-        set_all(file, place(index + 1), *ty, *bits);
+        src[index] = place(index + 1);
+        executable.add_constant(src[index], *ty, *bits);
     }
-    let src = std::array::from_fn(|index| place(if index < 3 { index + 1 } else { 4 }));
-    dispatch!(level, simd => compute::compute(simd, file, op, place(0), &src));
+    let result = executable.add_output(place(0), signature.result);
+    executable.steps = vec![
+        Step::Compute {
+            op,
+            dst: place(0),
+            src,
+        },
+        Step::End,
+    ];
+    let mut machine = Machine::new(Arc::new(executable));
+    let done = machine.run(
+        &LaneMask::first(1),
+        &LaneMask::none(),
+        &Resources::default(),
+        Watchdog::default(),
+    );
+    debug_assert!(done.is_ok(), "one step always ends");
     match signature.result {
-        Type::Bool => u64::from(file.first::<bool>(place(0))),
-        Type::B32 => u64::from(file.first::<u32>(place(0))),
-        Type::B64 => file.first::<u64>(place(0)),
+        Type::Bool => u64::from(machine.output(result, 0) != 0),
+        Type::B32 => u64::from(machine.output(result, 0)),
+        Type::B64 => machine.output64(result, 0),
     }
 }
 

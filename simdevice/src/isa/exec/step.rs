@@ -13,8 +13,6 @@ pub type Target = u32;
 pub enum Step {
     /// `dst = op(src...)` in all lanes.
     Compute { op: Op, dst: Slot, src: [Slot; 4] },
-    /// The same in the active lanes only.
-    ComputeMasked { op: Op, dst: Slot, src: [Slot; 4] },
     /// `dst = src` in the active lanes (all lanes, if `dst` is uniform).
     Assign { dst: Slot, src: Slot, ty: Type },
     /// Anything that reaches across lanes or out of the registers.

@@ -6,7 +6,7 @@
 //! trigonometric functions).
 
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
-use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
+use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI, SQRT_2};
 
 use super::super::op::Op;
 use super::file::{File, Slot, vector1, vector2};
@@ -115,7 +115,7 @@ fn exp_biased<S: Simd>(x: F<S>, bias: i32) -> F<S> {
             8.333_452e-3,
             4.166_579_6e-2,
             1.666_666_5e-1,
-            5.000_000_1e-1,
+            5e-1,
         ],
     );
     let y = (r * r).mul_add(p, r) + 1.0;
@@ -171,14 +171,14 @@ fn logarithm<S: Simd>(x: F<S>) -> Logarithm<S> {
         f,
         [
             7.037_683_6e-2,
-            -1.151_461_03e-1,
+            -1.151_461e-1,
             1.167_699_8e-1,
             -1.242_014_1e-1,
             1.424_932_3e-1,
             -1.666_805_7e-1,
             2.000_071_5e-1,
             -2.499_999_4e-1,
-            3.333_333_1e-1,
+            3.333_333e-1,
         ],
     );
     let p = z.mul_add(splat(x, -0.5), p * f * z);
@@ -418,10 +418,10 @@ fn tanh<S: Simd>(x: F<S>) -> F<S> {
         z,
         [
             -5.704_988_7e-3,
-            2.063_908_9e-2,
+            2.063_909e-2,
             -5.373_971_6e-2,
             1.333_144_2e-1,
-            -3.333_328_2e-1,
+            -3.333_328e-1,
         ],
     );
     let near = (p * z).mul_add(a, a);
@@ -454,7 +454,7 @@ fn acosh<S: Simd>(x: F<S>) -> F<S> {
             -7.527_288_7e-3,
             2.645_490_5e-2,
             -1.178_474_2e-1,
-            1.414_213_5,
+            SQRT_2,
         ],
     );
     let near = p * t.sqrt();

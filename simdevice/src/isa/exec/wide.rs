@@ -1,5 +1,7 @@
 //! 64-bit operations and conversions, lane by lane.
 
+use std::cmp::Ordering;
+
 use super::super::op::Op;
 use super::file::{File, Slot, map1, map2, map3};
 use super::integer::floor_mod64;
@@ -68,7 +70,9 @@ pub fn run(file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4]) {
         Op::FNe64 => map2(file, dst, src, |a: f64, b: f64| a != b),
         Op::FLt64 => map2(file, dst, src, |a: f64, b: f64| a < b),
         Op::FLe64 => map2(file, dst, src, |a: f64, b: f64| a <= b),
-        Op::FLtGt64 => map2(file, dst, src, |a: f64, b: f64| a < b || a > b),
+        Op::FLtGt64 => map2(file, dst, src, |a: f64, b: f64| {
+            a.partial_cmp(&b).is_some_and(Ordering::is_ne)
+        }),
         Op::FIsNan64 => map1(file, dst, src, f64::is_nan),
         Op::FIsInf64 => map1(file, dst, src, f64::is_infinite),
         Op::FLdexp64 => map2(file, dst, src, ldexp),

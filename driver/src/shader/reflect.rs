@@ -1,0 +1,366 @@
+//! What shaders want of a pipeline, compared with what its layout gives.
+//!
+//! Everything here follows from the [`Interface`] that translation leaves, so reflection and execution can't disagree.
+//! The spirv-reflect crate isn't used at run time: its C code trusts offsets and counts of the module, and its
+//! bindings build Rust references from null pointers, so a hostile module (or any module without descriptors, in a
+//! debug build) is undefined behaviour. It serves in tests, where it reflects on modules that are known to be valid.
+
+use std::collections::HashMap;
+
+use thiserror::Error;
+
+use super::interface::{
+    Descriptor, DescriptorKind, InputSource, Interface, Numeric, OutputTarget, Stage,
+};
+
+/// A binding of a descriptor set layout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LayoutBinding {
+    /// The descriptor set.
+    pub set: u32,
+    /// The binding in it.
+    pub binding: u32,
+    /// What descriptors it holds. Dynamic buffers count as the ordinary ones.
+    pub kind: DescriptorKind,
+    /// How many.
+    pub count: u32,
+    /// Whether the stage may use it.
+    pub visible: bool,
+}
+
+/// A range of push constants, in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PushConstantRange {
+    /// The first byte.
+    pub offset: u32,
+    /// How many.
+    pub size: u32,
+    /// Whether the stage may use it.
+    pub visible: bool,
+}
+
+/// A pipeline layout as one stage sees it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Layout {
+    /// All bindings of all sets.
+    pub bindings: Vec<LayoutBinding>,
+    /// All ranges of push constants.
+    pub push_constants: Vec<PushConstantRange>,
+}
+
+/// A disagreement between a shader and what surrounds it.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum Mismatch {
+    /// The layout has no such binding.
+    #[error(
+        "the {stage} shader uses set {set}, binding {binding}{name}, which the pipeline layout doesn't have"
+    )]
+    NoBinding {
+        /// The shader's stage.
+        stage: Stage,
+        /// The set.
+        set: u32,
+        /// The binding.
+        binding: u32,
+        /// The variable's name.
+        name: Name,
+    },
+    /// The binding isn't for this stage.
+    #[error(
+        "set {set}, binding {binding}{name} of the pipeline layout isn't visible to the {stage} stage"
+    )]
+    NotVisible {
+        /// The shader's stage.
+        stage: Stage,
+        /// The set.
+        set: u32,
+        /// The binding.
+        binding: u32,
+        /// The variable's name.
+        name: Name,
+    },
+    /// The binding holds other descriptors.
+    #[error(
+        "set {set}, binding {binding}{name} is a {wanted:?} in the {stage} shader, but a {given:?} in the pipeline layout"
+    )]
+    Kind {
+        /// The shader's stage.
+        stage: Stage,
+        /// The set.
+        set: u32,
+        /// The binding.
+        binding: u32,
+        /// The variable's name.
+        name: Name,
+        /// What the shader wants.
+        wanted: DescriptorKind,
+        /// What the layout gives.
+        given: DescriptorKind,
+    },
+    /// The binding is too short.
+    #[error(
+        "set {set}, binding {binding}{name} has {given} descriptors in the pipeline layout; the {stage} shader wants {wanted}"
+    )]
+    Count {
+        /// The shader's stage.
+        stage: Stage,
+        /// The set.
+        set: u32,
+        /// The binding.
+        binding: u32,
+        /// The variable's name.
+        name: Name,
+        /// What the shader wants.
+        wanted: u32,
+        /// What the layout gives.
+        given: u32,
+    },
+    /// Push constants that the layout doesn't have.
+    #[error(
+        "the {stage} shader uses push constants {begin} to {end}, which no range of the pipeline layout covers"
+    )]
+    PushConstants {
+        /// The shader's stage.
+        stage: Stage,
+        /// The first byte.
+        begin: u32,
+        /// Past the last byte.
+        end: u32,
+    },
+    /// A vertex attribute that the pipeline doesn't describe.
+    #[error(
+        "the vertex shader reads location {location}, for which the pipeline has no vertex attribute"
+    )]
+    NoAttribute {
+        /// The location.
+        location: u32,
+    },
+    /// A vertex attribute whose format is of another kind.
+    #[error(
+        "the vertex shader reads location {location} as {wanted:?}, but the attribute's format is {given:?}"
+    )]
+    AttributeType {
+        /// The location.
+        location: u32,
+        /// What the shader reads.
+        wanted: Numeric,
+        /// What the format gives.
+        given: Numeric,
+    },
+    /// An input that the stage before doesn't write.
+    #[error(
+        "the fragment shader reads location {location}, component {component}, which the vertex shader doesn't write"
+    )]
+    NoOutput {
+        /// The location.
+        location: u32,
+        /// The component.
+        component: u32,
+    },
+}
+
+/// A variable's name in a message, if it has one.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Name(pub Option<String>);
+
+impl std::fmt::Display for Name {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match &self.0 {
+            Some(name) => write!(f, " (\"{name}\")"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Compares what a shader is bound to with a pipeline layout.
+pub fn check(interface: &Interface, layout: &Layout) -> Vec<Mismatch> {
+    let bindings: HashMap<(u32, u32), &LayoutBinding> = layout
+        .bindings
+        .iter()
+        .map(|it| ((it.set, it.binding), it))
+        .collect();
+    let mut found: Vec<Mismatch> = interface
+        .descriptors
+        .iter()
+        .filter_map(|it| {
+            let given = bindings.get(&(it.set, it.binding)).copied();
+            check_descriptor(interface.stage, it, given)
+        })
+        .collect();
+    if let Some(wanted) = &interface.push_constants
+        && !covers(&layout.push_constants, wanted.start, wanted.end)
+    {
+        found.push(Mismatch::PushConstants {
+            stage: interface.stage,
+            begin: wanted.start,
+            end: wanted.end,
+        });
+    }
+    found
+}
+
+fn check_descriptor(
+    stage: Stage,
+    wanted: &Descriptor,
+    given: Option<&LayoutBinding>,
+) -> Option<Mismatch> {
+    let (set, binding, name) = (wanted.set, wanted.binding, Name(wanted.name.clone()));
+    let Some(given) = given else {
+        return Some(Mismatch::NoBinding {
+            stage,
+            set,
+            binding,
+            name,
+        });
+    };
+    if !given.visible {
+        return Some(Mismatch::NotVisible {
+            stage,
+            set,
+            binding,
+            name,
+        });
+    }
+    // A combined descriptor may serve as either of its parts.
+    let parts = matches!(
+        (wanted.kind, given.kind),
+        (
+            DescriptorKind::SampledImage | DescriptorKind::Sampler,
+            DescriptorKind::CombinedImageSampler
+        )
+    );
+    if wanted.kind != given.kind && !parts {
+        return Some(Mismatch::Kind {
+            stage,
+            set,
+            binding,
+            name,
+            wanted: wanted.kind,
+            given: given.kind,
+        });
+    }
+    (wanted.count > given.count).then_some(Mismatch::Count {
+        stage,
+        set,
+        binding,
+        name,
+        wanted: wanted.count,
+        given: given.count,
+    })
+}
+
+/// Whether visible ranges cover all bytes.
+fn covers(ranges: &[PushConstantRange], begin: u32, end: u32) -> bool {
+    let mut visible: Vec<(u32, u32)> = ranges
+        .iter()
+        .filter(|range| range.visible)
+        .map(|range| (range.offset, range.offset.saturating_add(range.size)))
+        .collect();
+    visible.sort_unstable();
+    let mut covered = begin;
+    for (first, last) in visible {
+        if first <= covered {
+            covered = covered.max(last);
+        }
+    }
+    covered >= end
+}
+
+/// A vertex attribute that the pipeline describes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Attribute {
+    /// The location that it feeds.
+    pub location: u32,
+    /// What the components of its format are read as; normalised and scaled formats are floats.
+    pub numeric: Numeric,
+}
+
+/// Compares what a vertex shader reads with the pipeline's vertex attributes.
+pub fn check_attributes(interface: &Interface, attributes: &[Attribute]) -> Vec<Mismatch> {
+    let mut found = Vec::new();
+    for (location, wanted) in locations_read(interface) {
+        // 64-bit vectors of three or four components go on in the next location.
+        let given = attributes.iter().find(|it| {
+            let spans = if is_wide(it.numeric) { 2 } else { 1 };
+            (it.location..it.location.saturating_add(spans)).contains(&location)
+        });
+        match given {
+            None => found.push(Mismatch::NoAttribute { location }),
+            Some(given) if class(given.numeric) != class(wanted) => {
+                found.push(Mismatch::AttributeType {
+                    location,
+                    wanted,
+                    given: given.numeric,
+                });
+            }
+            Some(_) => {}
+        }
+    }
+    found
+}
+
+/// Compares what a fragment shader reads with what the stage before writes.
+pub fn check_stages(before: &Interface, fragment: &Interface) -> Vec<Mismatch> {
+    let written = |location: u32, component: u32| {
+        before.outputs.iter().any(|output| {
+            matches!(output.target, OutputTarget::Location { location: at, component: part, .. }
+                if (at, part) == (location, component))
+        })
+    };
+    let mut found: Vec<Mismatch> = fragment
+        .inputs
+        .iter()
+        .filter_map(|input| match input.source {
+            InputSource::Location {
+                location,
+                component,
+                ..
+            } if !written(location, component) => Some(Mismatch::NoOutput {
+                location,
+                component,
+            }),
+            _ => None,
+        })
+        .collect();
+    found.dedup();
+    found
+}
+
+/// The locations that a shader reads, in order, each with the type of its first scalar.
+pub fn locations_read(interface: &Interface) -> Vec<(u32, Numeric)> {
+    let mut found: Vec<(u32, u32, Numeric)> = interface
+        .inputs
+        .iter()
+        .filter_map(|input| match input.source {
+            InputSource::Location {
+                location,
+                component,
+                ..
+            } => Some((location, component, input.numeric)),
+            InputSource::BuiltIn { .. } => None,
+        })
+        .collect();
+    found.sort_by_key(|(location, component, _)| (*location, *component));
+    found.dedup_by_key(|(location, ..)| *location);
+    found
+        .into_iter()
+        .map(|(location, _, numeric)| (location, numeric))
+        .collect()
+}
+
+fn is_wide(numeric: Numeric) -> bool {
+    matches!(
+        numeric,
+        Numeric::Float { width: 64 } | Numeric::Int { width: 64 } | Numeric::Uint { width: 64 }
+    )
+}
+
+/// What must agree between a format and an input: the kind of number and whether it has 64 bits.
+fn class(numeric: Numeric) -> (u8, bool) {
+    let kind = match numeric {
+        Numeric::Float { .. } => 0,
+        Numeric::Int { .. } => 1,
+        Numeric::Uint { .. } | Numeric::Bool => 2,
+    };
+    (kind, is_wide(numeric))
+}

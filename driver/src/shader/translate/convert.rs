@@ -1,0 +1,216 @@
+//! Conversions between types.
+
+use rspirv::dr::Instruction;
+use rspirv::spirv::Op;
+use simdevice::isa::ir::Reg;
+use simdevice::isa::op::Op as Ir;
+
+use super::super::error::{Outcome, malformed, unsupported};
+use super::super::module::Operands;
+use super::super::types::Scalar;
+use super::Translator;
+
+impl Translator<'_> {
+    /// Conversions, `OpBitcast`, and between addresses and integers.
+    pub fn conversion(&mut self, it: &Instruction) -> Outcome<()> {
+        let opcode = it.class.opcode;
+        if matches!(opcode, Op::Bitcast | Op::ConvertPtrToU | Op::ConvertUToPtr) {
+            return self.bitcast(it);
+        }
+        let (to, _) = self.globals.types.vector(it.ty()?)?;
+        let (from, regs) = self.vector(it.id(0)?)?;
+        let regs = regs
+            .iter()
+            .map(|reg| self.convert(opcode, from, to, *reg))
+            .collect::<Outcome<_>>()?;
+        self.define(it, regs)
+    }
+
+    fn convert(&mut self, opcode: Op, from: Scalar, to: Scalar, reg: Reg) -> Outcome<Reg> {
+        let wide = (from.is_wide(), to.is_wide());
+        Ok(match opcode {
+            Op::ConvertFToU | Op::ConvertFToS => {
+                let signed = opcode == Op::ConvertFToS;
+                let op = match (signed, wide) {
+                    (true, (false, false)) => Ir::FToS,
+                    (true, (false, true)) => Ir::FToS64,
+                    (true, (true, false)) => Ir::F64ToS,
+                    (true, (true, true)) => Ir::F64ToS64,
+                    (false, (false, false)) => Ir::FToU,
+                    (false, (false, true)) => Ir::FToU64,
+                    (false, (true, false)) => Ir::F64ToU,
+                    (false, (true, true)) => Ir::F64ToU64,
+                };
+                let reg = self.op(op, &[reg]);
+                self.normalize(to, reg)
+            }
+            Op::ConvertSToF | Op::ConvertUToF => {
+                let signed = opcode == Op::ConvertSToF;
+                let reg = if signed {
+                    self.as_signed(from, reg)
+                } else {
+                    self.as_unsigned(from, reg)
+                };
+                let op = match (signed, wide) {
+                    (true, (false, false)) => Ir::SToF,
+                    (true, (false, true)) => Ir::SToF64,
+                    (true, (true, false)) => Ir::S64ToF,
+                    (true, (true, true)) => Ir::S64ToF64,
+                    (false, (false, false)) => Ir::UToF,
+                    (false, (false, true)) => Ir::UToF64,
+                    (false, (true, false)) => Ir::U64ToF,
+                    (false, (true, true)) => Ir::U64ToF64,
+                };
+                let reg = self.op(op, &[reg]);
+                self.normalize(to, reg)
+            }
+            Op::UConvert | Op::SConvert => {
+                let signed = opcode == Op::SConvert;
+                let reg = if signed {
+                    self.as_signed(from, reg)
+                } else {
+                    self.as_unsigned(from, reg)
+                };
+                match wide {
+                    (false, true) if signed => self.op(Ir::SToS64, &[reg]),
+                    (false, true) => self.op(Ir::UToU64, &[reg]),
+                    (true, false) => {
+                        let low = self.op(Ir::Low32, &[reg]);
+                        self.normalize(to, low)
+                    }
+                    (false, false) => self.normalize(to, reg),
+                    (true, true) => reg,
+                }
+            }
+            Op::FConvert => match wide {
+                (false, true) => self.op(Ir::FToF64, &[reg]),
+                (true, false) => {
+                    let narrow = self.op(Ir::F64ToF, &[reg]);
+                    self.normalize(to, narrow)
+                }
+                (false, false) => self.normalize(to, reg),
+                (true, true) => reg,
+            },
+            Op::QuantizeToF16 => self.quantize(reg),
+            other => return unsupported(format!("Op{other:?}")),
+        })
+    }
+
+    /// `OpQuantizeToF16`: to what a half can hold, with denormals flushed to zero of the same sign.
+    fn quantize(&mut self, reg: Reg) -> Reg {
+        let rounded = self.op(Ir::RoundToF16, &[reg]);
+        let size = self.op(Ir::FAbs, &[rounded]);
+        let least = self.f32(f32::from_bits(0x3880_0000));
+        let denormal = self.op(Ir::FLt, &[size, least]);
+        let mask = self.u32(0x8000_0000);
+        let zero = self.op(Ir::And, &[rounded, mask]);
+        self.select(denormal, zero, rounded)
+    }
+
+    /// Reads the same bits as another type; what has fewer components has wider ones.
+    fn bitcast(&mut self, it: &Instruction) -> Outcome<()> {
+        let from = match self.globals.types.vector(self.type_of(it.id(0)?)?) {
+            Ok((scalar, _)) => scalar,
+            Err(_) => return unsupported("this pointer"),
+        };
+        let regs = self.regs(it.id(0)?)?;
+        let (to, count) = self.globals.types.vector(it.ty()?)?;
+        let (from_bits, to_bits) = (bits(from), bits(to));
+        if from_bits * regs.len() as u32 != to_bits * count || from_bits == 0 {
+            return malformed("the types differ in size");
+        }
+        if from == to {
+            return self.define(it, regs.to_vec());
+        }
+        if from_bits == to_bits {
+            let regs = regs.iter().map(|reg| {
+                let raw = self.to_bits(from, *reg);
+                self.from_bits(to, raw)
+            });
+            let regs = regs.collect();
+            return self.define(it, regs);
+        }
+        let words = self.pack_words(from, &regs);
+        let regs = self.unpack_words(to, count, &words);
+        self.define(it, regs)
+    }
+
+    /// A scalar's own bits, zero-extended: 32 of them, or 64 if it is wide.
+    fn to_bits(&mut self, scalar: Scalar, reg: Reg) -> Reg {
+        match scalar {
+            Scalar::Float { width: 16 } => self.op(Ir::FToF16, &[reg]),
+            _ => self.as_unsigned(scalar, reg),
+        }
+    }
+
+    fn from_bits(&mut self, scalar: Scalar, reg: Reg) -> Reg {
+        match scalar {
+            Scalar::Float { width: 16 } => self.op(Ir::F16ToF, &[reg]),
+            _ => self.normalize(scalar, reg),
+        }
+    }
+
+    /// The bits of scalars in order, in words of 32.
+    pub fn pack_words(&mut self, scalar: Scalar, regs: &[Reg]) -> Vec<Reg> {
+        let width = bits(scalar);
+        if width == 64 {
+            return regs
+                .iter()
+                .flat_map(|reg| [Ir::Low32, Ir::High32].map(|half| self.op(half, &[*reg])))
+                .collect();
+        }
+        let mut words = Vec::new();
+        for group in regs.chunks((32 / width.max(8)) as usize) {
+            let mut word = None;
+            for (index, reg) in group.iter().enumerate() {
+                let mut part = self.to_bits(scalar, *reg);
+                if index > 0 {
+                    let by = self.u32(width * index as u32);
+                    part = self.op(Ir::Shl, &[part, by]);
+                }
+                word = Some(match word {
+                    Some(word) => self.op(Ir::Or, &[word, part]),
+                    None => part,
+                });
+            }
+            words.extend(word);
+        }
+        words
+    }
+
+    /// Scalars from words of 32 bits.
+    fn unpack_words(&mut self, scalar: Scalar, count: u32, words: &[Reg]) -> Vec<Reg> {
+        let width = bits(scalar);
+        if width == 64 {
+            return words
+                .chunks_exact(2)
+                .map(|pair| self.op(Ir::Join64, pair))
+                .collect();
+        }
+        (0..count)
+            .filter_map(|index| {
+                let bit = index * width;
+                let word = *words.get((bit / 32) as usize)?;
+                let by = self.u32(bit % 32);
+                let part = self.op(Ir::UShr, &[word, by]);
+                let part = match scalar {
+                    Scalar::Float { width: 16 } => {
+                        let mask = self.u32(0xffff);
+                        self.op(Ir::And, &[part, mask])
+                    }
+                    _ => part,
+                };
+                Some(self.from_bits(scalar, part))
+            })
+            .collect()
+    }
+}
+
+/// Bits of a scalar; 0 for a truth value, which has none.
+fn bits(scalar: Scalar) -> u32 {
+    match scalar {
+        Scalar::Bool => 0,
+        Scalar::Int { width, .. } | Scalar::Float { width } => width,
+        Scalar::Address => 64,
+    }
+}

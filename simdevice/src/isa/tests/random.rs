@@ -1,0 +1,451 @@
+//! Random structured programs: the batch engine must give what the scalar interpreter gives, lane by lane.
+
+use crate::isa::builder::Builder;
+use crate::isa::exec::LaneMask;
+use crate::isa::ir::{Address, Format, Label, Program, Rate, Reg, Space, Type};
+use crate::isa::op::Op;
+use crate::isa::resources::Resources;
+
+use super::reference::Lane;
+use super::{Random, fuses, levels, machine, run};
+
+const LANES: usize = 80;
+/// A partial batch: the last lanes are not active.
+const ACTIVE: usize = 75;
+const INPUTS: usize = 4;
+const PRIVATE_WORDS: u32 = 8;
+
+const INTEGER: &[Op] = &[
+    Op::IAdd,
+    Op::ISub,
+    Op::IMul,
+    Op::And,
+    Op::Or,
+    Op::Xor,
+    Op::Shl,
+    Op::UShr,
+    Op::SShr,
+    Op::SMin,
+    Op::UMax,
+    Op::UDiv,
+    Op::SMod,
+    Op::URem,
+];
+const FLOAT: &[Op] = &[Op::FAdd, Op::FSub, Op::FMul, Op::FDiv];
+const INTEGER_TEST: &[Op] = &[Op::IEq, Op::INe, Op::SLt, Op::ULe];
+const FLOAT_TEST: &[Op] = &[Op::FEq, Op::FLt, Op::FLe, Op::FNe];
+
+/// Grows a program. Integers and floats are kept apart, so that no NaN's bits are looked at.
+struct Grower {
+    b: Builder,
+    random: Random,
+    integers: Vec<Reg>,
+    floats: Vec<Reg>,
+    bools: Vec<Reg>,
+    integer_variables: Vec<Reg>,
+    float_variables: Vec<Reg>,
+    loops: Vec<Label>,
+    breakable: Vec<Label>,
+    budget: usize,
+}
+
+/// How many registers of each kind are in scope.
+struct Scope(usize, usize, usize);
+
+impl Grower {
+    fn new(seed: u64, budget: usize) -> Self {
+        let mut b = Builder::new();
+        let random = Random(seed);
+        let mut integers: Vec<Reg> = (0..INPUTS as u32)
+            .map(|slot| {
+                b.input(
+                    slot,
+                    Type::B32,
+                    if slot == 0 {
+                        Rate::Uniform
+                    } else {
+                        Rate::Varying
+                    },
+                )
+            })
+            .collect();
+        integers.extend([0, 1, 3, 0xffff_ffff].map(|value| b.u32(value)));
+        let floats: Vec<Reg> = [0.5, -3.0, 1e20].map(|value| b.f32(value)).to_vec();
+        let bools = vec![b.bool(true)];
+        let integer_variables: Vec<Reg> = (0..4).map(|_| b.variable(Type::B32)).collect();
+        let float_variables: Vec<Reg> = (0..3).map(|_| b.variable(Type::B32)).collect();
+        b.allocate_private(4 * PRIVATE_WORDS);
+        let mut grower = Self {
+            b,
+            random,
+            integers,
+            floats,
+            bools,
+            integer_variables,
+            float_variables,
+            loops: Vec::new(),
+            breakable: Vec::new(),
+            budget,
+        };
+        for word in 0..PRIVATE_WORDS {
+            let zero = grower.b.u32(0);
+            grower.b.store(
+                Address {
+                    space: Space::Private,
+                    base: None,
+                    offset: 4 * word,
+                },
+                Format::B32,
+                &[zero],
+            );
+        }
+        for index in 0..4 {
+            let value = grower.random.pick(&grower.integers);
+            grower.b.assign(grower.integer_variables[index], value);
+        }
+        for index in 0..3 {
+            let value = grower.random.pick(&grower.floats);
+            grower.b.assign(grower.float_variables[index], value);
+        }
+        grower
+    }
+
+    fn enter(&self) -> Scope {
+        Scope(self.integers.len(), self.floats.len(), self.bools.len())
+    }
+
+    fn leave(&mut self, scope: &Scope) {
+        self.integers.truncate(scope.0);
+        self.floats.truncate(scope.1);
+        self.bools.truncate(scope.2);
+    }
+
+    fn integer(&mut self) -> Reg {
+        if self.random.once_in(3) {
+            self.random.pick(&self.integer_variables)
+        } else {
+            self.random.pick(&self.integers)
+        }
+    }
+
+    fn float(&mut self) -> Reg {
+        if self.random.once_in(3) {
+            self.random.pick(&self.float_variables)
+        } else {
+            self.random.pick(&self.floats)
+        }
+    }
+
+    fn condition(&mut self) -> Reg {
+        match self.random.below(5) {
+            0 => self.random.pick(&self.bools),
+            1 => {
+                let (a, c) = (self.float(), self.float());
+                let op = self.random.pick(FLOAT_TEST);
+                self.b.compute(op, &[a, c])
+            }
+            _ => {
+                let (a, c) = (self.integer(), self.integer());
+                let op = self.random.pick(INTEGER_TEST);
+                self.b.compute(op, &[a, c])
+            }
+        }
+    }
+
+    fn value(&mut self) {
+        match self.random.below(8) {
+            0 => {
+                let (a, c) = (self.float(), self.float());
+                let op = self.random.pick(FLOAT);
+                let value = self.b.compute(op, &[a, c]);
+                self.floats.push(value);
+            }
+            1 => {
+                let (a, c, d) = (self.float(), self.float(), self.float());
+                let value = self.b.compute(Op::FFma, &[a, c, d]);
+                self.floats.push(value);
+            }
+            2 => {
+                let a = self.float();
+                let value = self.b.compute(Op::FToS, &[a]);
+                self.integers.push(value);
+            }
+            3 => {
+                let a = self.integer();
+                let value = self.b.compute(Op::SToF, &[a]);
+                self.floats.push(value);
+            }
+            4 => {
+                let condition = self.condition();
+                self.bools.push(condition);
+                let (a, c) = (self.integer(), self.integer());
+                let value = self.b.compute(Op::Select, &[condition, a, c]);
+                self.integers.push(value);
+            }
+            _ => {
+                let (a, c) = (self.integer(), self.integer());
+                let op = self.random.pick(INTEGER);
+                let value = self.b.compute(op, &[a, c]);
+                self.integers.push(value);
+            }
+        }
+    }
+
+    fn assign(&mut self) {
+        if self.random.once_in(3) {
+            let (dst, src) = (self.random.pick(&self.float_variables), self.float());
+            self.b.assign(dst, src);
+        } else if self.random.once_in(4) {
+            let [a, c] = [self.integer_variables[0], self.integer_variables[1]];
+            self.b.assign_parallel(&[(a, c), (c, a)]);
+        } else {
+            let (dst, src) = (self.random.pick(&self.integer_variables), self.integer());
+            self.b.assign(dst, src);
+        }
+    }
+
+    fn private(&mut self) {
+        let index = self.integer();
+        // A little beyond the end, too.
+        let bound = self.b.u32(PRIVATE_WORDS + 1);
+        let word = self.b.compute(Op::URem, &[index, bound]);
+        let two = self.b.u32(2);
+        let base = self.b.compute(Op::Shl, &[word, two]);
+        let address = Address {
+            space: Space::Private,
+            base: Some(base),
+            offset: 4 * self.random.below(2) as u32,
+        };
+        if self.random.once_in(2) {
+            let value = self.integer();
+            self.b.store(address, Format::B32, &[value]);
+        } else {
+            let value = self.b.load(address, Format::B32, 1)[0];
+            self.integers.push(value);
+        }
+    }
+
+    /// A block; true if it ends by leaving.
+    fn block(&mut self, depth: usize) {
+        let scope = self.enter();
+        for _ in 0..1 + self.random.below(6) {
+            if self.budget == 0 {
+                break;
+            }
+            self.budget -= 1;
+            match self.random.below(if depth < 5 { 16 } else { 9 }) {
+                0..4 => self.value(),
+                4..7 => self.assign(),
+                7 => self.private(),
+                8 => {
+                    if self.leave_statement() {
+                        break;
+                    }
+                }
+                9..11 => self.branch(depth),
+                11..14 => self.repeat(depth),
+                14 => self.switch(depth),
+                _ => {
+                    let label = self.b.begin_scope();
+                    self.breakable.push(label);
+                    self.block(depth + 1);
+                    self.breakable.pop();
+                    self.b.end();
+                }
+            }
+        }
+        self.leave(&scope);
+    }
+
+    /// A statement that leaves, if any may be.
+    fn leave_statement(&mut self) -> bool {
+        match self.random.below(8) {
+            0 => self.b.ret(),
+            1 => self.b.kill(),
+            2 => {
+                self.b.demote();
+                return false;
+            }
+            3..5 if !self.loops.is_empty() => {
+                let label = self.random.pick(&self.loops);
+                self.b.continue_to(label);
+            }
+            _ if !self.breakable.is_empty() => {
+                let label = self.random.pick(&self.breakable);
+                self.b.break_to(label);
+            }
+            _ => return false,
+        }
+        true
+    }
+
+    fn branch(&mut self, depth: usize) {
+        let condition = self.condition();
+        self.b.begin_if(condition);
+        if !(self.random.once_in(4) && self.leave_statement()) {
+            self.block(depth + 1);
+        }
+        if self.random.once_in(2) {
+            self.b.begin_else();
+            self.block(depth + 1);
+        }
+        self.b.end();
+    }
+
+    /// A loop that ends after a few rounds, however many its body adds by continuing.
+    fn repeat(&mut self, depth: usize) {
+        let scope = self.enter();
+        let count = self.b.variable(Type::B32);
+        let (zero, one, most) = (self.b.u32(0), self.b.u32(1), self.b.u32(4));
+        let limit = self.integer();
+        let limit = self.b.compute(Op::URem, &[limit, most]);
+        self.b.assign(count, zero);
+        let label = self.b.begin_loop();
+        // Values of the last round that a lane was in: they may be read after the loop.
+        let source = self.integer();
+        let escaping = self.b.compute(Op::IAdd, &[source, count]);
+        let enough = self.b.compute(Op::ULe, &[limit, count]);
+        let next = self.b.compute(Op::IAdd, &[count, one]);
+        self.b.assign(count, next);
+        self.b.begin_if(enough);
+        self.b.break_to(label);
+        self.b.end();
+        self.loops.push(label);
+        self.breakable.push(label);
+        self.block(depth + 1);
+        self.loops.pop();
+        if self.random.once_in(2) {
+            self.b.begin_continuing();
+            self.block_without_exits();
+            if self.random.once_in(2) {
+                let condition = self.condition();
+                self.b.begin_if(condition);
+                self.b.break_to(label);
+                self.b.end();
+            }
+        }
+        self.breakable.pop();
+        self.b.end();
+        self.leave(&scope);
+        self.integers.push(escaping);
+    }
+
+    fn block_without_exits(&mut self) {
+        let scope = self.enter();
+        for _ in 0..self.random.below(4) {
+            if self.random.once_in(2) {
+                self.value();
+            } else {
+                self.assign();
+            }
+        }
+        self.leave(&scope);
+    }
+
+    fn switch(&mut self, depth: usize) {
+        let (selector, bound) = (self.integer(), self.b.u32(6));
+        let selector = self.b.compute(Op::URem, &[selector, bound]);
+        let label = self.b.begin_switch(selector);
+        self.breakable.push(label);
+        let default = self.random.below(5);
+        for case in 0..3usize {
+            self.b.begin_case(
+                &[2 * case as u32, 2 * case as u32 + 1][..1 + self.random.below(2)],
+                case == default,
+            );
+            if self.random.once_in(3) {
+                self.b.fall_through();
+            }
+            self.block(depth + 1);
+        }
+        self.breakable.pop();
+        self.b.end();
+    }
+
+    fn finish(mut self) -> Builder {
+        while self.budget > 0 {
+            self.block(0);
+        }
+        let values: Vec<Reg> = self
+            .integer_variables
+            .iter()
+            .chain(&self.float_variables)
+            .copied()
+            .collect();
+        for (slot, value) in values.into_iter().enumerate() {
+            let out = self.b.output(slot as u32, Type::B32);
+            self.b.assign(out, value);
+        }
+        if let Some(value) = self.integers.last().copied() {
+            let out = self.b.output(99, Type::B32);
+            self.b.assign(out, value);
+        }
+        self.b
+    }
+}
+
+fn equal(got: u32, expected: u32) -> bool {
+    got == expected || f32::from_bits(got).is_nan() && f32::from_bits(expected).is_nan()
+}
+
+/// The inputs of a lane.
+fn inputs(seed: u64, lane: usize) -> [u64; INPUTS] {
+    let mut random = Random(seed.wrapping_mul(31).wrapping_add(lane as u64));
+    let mut uniform = Random(seed);
+    [
+        uniform.next() & 7,
+        random.next() & 7,
+        random.next() & 0xffff_ffff,
+        (lane / 5) as u64,
+    ]
+}
+
+fn check(seed: u64, budget: usize) {
+    let as_written: Program = Grower::new(seed, budget)
+        .finish()
+        .finish_as_written()
+        .expect("well formed");
+    let program = Grower::new(seed, budget)
+        .finish()
+        .finish()
+        .unwrap_or_else(|problem| panic!("seed {seed}: {problem}"));
+    for (name, level) in levels() {
+        let mut machine = machine(&program, level, LANES);
+        // Twice, so that nothing may hang on what an earlier batch left behind.
+        for round in 0..2 {
+            for lane in 0..LANES {
+                for (slot, value) in inputs(seed + round, lane).into_iter().enumerate() {
+                    machine.set_input(slot as u32, lane, value as u32);
+                }
+            }
+            machine.fill_input(0, inputs(seed + round, 0)[0] as u32);
+            run(&mut machine, ACTIVE, &Resources::default());
+            let killed: LaneMask = machine.killed();
+            for lane in 0..ACTIVE {
+                let mut scalar = Lane::new(&as_written, &inputs(seed + round, lane), fuses(name));
+                let expected = scalar.run();
+                for (output, expected) in as_written.outputs.iter().zip(expected) {
+                    let got = machine.output(output.slot, lane);
+                    assert!(
+                        equal(got, expected as u32),
+                        "seed {seed}, lane {lane}, output {} at {name}: {got:#x}, not {expected:#x}\n{program}",
+                        output.slot
+                    );
+                }
+                assert_eq!(
+                    killed.contains(lane),
+                    scalar.killed,
+                    "seed {seed}, lane {lane} at {name}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn random_programs_equal_the_scalar_interpreter() {
+    // Short programs first: they are easier to read when they fail.
+    for seed in 0..2500 {
+        check(seed, 4 + seed as usize / 25);
+    }
+}
