@@ -185,10 +185,10 @@ pub struct PipelineGaussianStateCreateInfoGAURAST<'a> {
     /// What is added to the diagonal of each projected covariance, in px^2; finite and not
     /// negative. 0.3 by default.
     pub low_pass_variance: f32,
-    /// A Gaussian contributes to a pixel where its alpha is at least this; in (0, 1]. 1/255 by
-    /// default.
+    /// A Gaussian contributes to a pixel where its alpha is at least this; in \[0, 1\]. With 0 it
+    /// contributes wherever its alpha does not underflow binary32. 1/255 by default.
     pub alpha_floor: f32,
-    /// Alpha is limited to this; in (0, 1), and not below `alpha_floor`. 0.99 by default.
+    /// Alpha is limited to this; in (0, 1], and not below `alpha_floor`. 0.99 by default.
     pub alpha_ceiling: f32,
     /// A pixel is finished before the Gaussian that would bring its transmittance below this; in
     /// [0, 1). 0.0001 by default.

@@ -65,10 +65,10 @@ fn values_outside_their_ranges_are_refused() {
             with_state(|s| s.low_pass_variance(f32::NAN)),
             "lowPassVariance",
         ),
-        (with_state(|s| s.alpha_floor(0.0)), "alphaFloor"),
+        (with_state(|s| s.alpha_floor(-0.1)), "alphaFloor"),
         (with_state(|s| s.alpha_floor(1.5)), "alphaFloor"),
         (with_state(|s| s.alpha_floor(f32::NAN)), "alphaFloor"),
-        (with_state(|s| s.alpha_ceiling(1.0)), "alphaCeiling"),
+        (with_state(|s| s.alpha_ceiling(1.1)), "alphaCeiling"),
         (with_state(|s| s.alpha_ceiling(0.0)), "alphaCeiling"),
         (
             with_state(|s| s.alpha_floor(0.5).alpha_ceiling(0.4)),
@@ -91,7 +91,10 @@ fn values_outside_their_ranges_are_refused() {
         let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
         assert_refused(&gpu, &request, error, word);
     }
-    let limits = with_state(|s| s.low_pass_variance(0.0).transmittance_floor(0.0));
+    let limits = with_state(|s| {
+        let s = s.low_pass_variance(0.0).transmittance_floor(0.0);
+        s.alpha_floor(0.0).alpha_ceiling(1.0)
+    });
     create(&gpu, &limits).unwrap();
 }
 

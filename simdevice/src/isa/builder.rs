@@ -1,5 +1,7 @@
 //! Builds programs: a cursor in a tree of blocks, with a method for each statement.
 
+mod contract;
+
 use std::collections::HashMap;
 
 use super::ir::{
@@ -38,6 +40,10 @@ pub struct Builder {
     constants: HashMap<(Type, u64), Reg>,
     open: Vec<Frame>,
     labels: u32,
+    /// Products that sums may be fused with.
+    products: HashMap<Reg, contract::Product>,
+    /// The straight run of statements without assignments that is being built.
+    segment: u32,
     misuse: Option<InvalidProgram>,
 }
 
@@ -180,6 +186,9 @@ impl Builder {
 
     /// Appends a statement as it is.
     pub fn statement(&mut self, statement: Statement) {
+        if matches!(statement, Statement::Assign { .. }) {
+            self.segment += 1;
+        }
         self.program.body.push(statement);
     }
 
@@ -553,12 +562,14 @@ impl Builder {
             self.misuse("constructs are nested too deeply");
             return;
         }
+        self.segment += 1;
         let before = std::mem::take(&mut self.program.body);
         self.open.push(Frame { before, construct });
     }
 
     /// Closes the innermost frame: what was before it, what it is, and the block built in it.
     fn pop(&mut self) -> Option<(Block, Construct, Block)> {
+        self.segment += 1;
         let Frame { before, construct } = self.open.pop()?;
         Some((before, construct, std::mem::take(&mut self.program.body)))
     }

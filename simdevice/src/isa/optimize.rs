@@ -12,6 +12,64 @@ use super::op::Op;
 pub fn optimize(program: &mut Program, level: Level) {
     fold(program, level);
     remove_dead(program);
+    let Program {
+        registers, body, ..
+    } = program;
+    sink(body, registers);
+}
+
+/// How many statements [`sink`] looks back over.
+const NEARBY: usize = 64;
+
+/// Moves each computation whose result is only assigned to a variable to just before that assignment, so that the two can
+/// be one step.
+fn sink(block: &mut Block, registers: &[Register]) {
+    for statement in block.iter_mut() {
+        statement
+            .blocks_mut()
+            .into_iter()
+            .for_each(|inner| sink(inner, registers));
+    }
+    for at in 0..block.len() {
+        let Statement::Assign { src, .. } = block[at] else {
+            continue;
+        };
+        let defines = |statement: &Statement| matches!(statement, Statement::Compute { dst, .. } if *dst == src);
+        let start = at.saturating_sub(NEARBY);
+        let Some(from) = block[start..at]
+            .iter()
+            .position(defines)
+            .map(|index| start + index)
+        else {
+            continue;
+        };
+        let between = &block[from + 1..at];
+        let movable = block[from].uses().into_iter().all(|operand| {
+            registers[operand.0 as usize].role == Role::Value
+                || !between.iter().any(|other| touches(other, operand))
+        });
+        if movable && !between.iter().any(|other| reads(other, src)) {
+            block[from..at].rotate_left(1);
+        }
+    }
+}
+
+/// Whether a statement, or one within, assigns to a register.
+fn touches(statement: &Statement, reg: Reg) -> bool {
+    statement.definitions().contains(&reg)
+        || statement
+            .blocks()
+            .iter()
+            .any(|block| block.iter().any(|inner| touches(inner, reg)))
+}
+
+/// Whether a statement, or one within, reads a register.
+fn reads(statement: &Statement, reg: Reg) -> bool {
+    statement.uses().contains(&reg)
+        || statement
+            .blocks()
+            .iter()
+            .any(|block| block.iter().any(|inner| reads(inner, reg)))
 }
 
 /// Folds constants, takes branches on constants, and shares equal computations.

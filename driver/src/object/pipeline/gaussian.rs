@@ -248,16 +248,16 @@ fn validate_values(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<
         "finite and not negative",
     )?;
     check(
-        g.alpha_floor > 0.0 && g.alpha_floor <= 1.0,
+        (0.0..=1.0).contains(&g.alpha_floor),
         named!("alphaFloor"),
         &g.alpha_floor,
-        "greater than 0 and at most 1",
+        "at least 0 and at most 1",
     )?;
     check(
-        g.alpha_ceiling > 0.0 && g.alpha_ceiling < 1.0,
+        g.alpha_ceiling > 0.0 && g.alpha_ceiling <= 1.0,
         named!("alphaCeiling"),
         &g.alpha_ceiling,
-        "greater than 0 and less than 1",
+        "greater than 0 and at most 1",
     )?;
     check(
         g.alpha_ceiling >= g.alpha_floor,

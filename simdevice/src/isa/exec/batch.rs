@@ -64,6 +64,15 @@ impl Batch<'_> {
         }
     }
 
+    /// `dst = src` in all lanes.
+    #[inline(always)]
+    pub fn copy(&self, dst: Slot, src: Slot, ty: Type) {
+        match ty {
+            Type::B64 => copy_chunks(self.file.wide(dst), self.file.wide(src), 2),
+            Type::B32 | Type::Bool => copy_chunks(self.file.narrow(dst), self.file.narrow(src), 1),
+        }
+    }
+
     /// Runs a statement that reaches across lanes or out of the registers.
     pub fn other(&self, statement: &Statement) {
         match statement {
@@ -126,6 +135,16 @@ impl Batch<'_> {
             // The rest is arithmetic or control flow, which has steps of its own.
             _ => {}
         }
+    }
+}
+
+/// Copies all chunks of a register; a uniform source has only the first `per_16`.
+#[inline(always)]
+fn copy_chunks(dst: &[Cell<Chunk>], src: &[Cell<Chunk>], per_16: usize) {
+    for (dst, src) in dst.chunks(per_16).zip(src.chunks(per_16).cycle()) {
+        dst.iter()
+            .zip(src)
+            .for_each(|(dst, src)| dst.set(src.get()));
     }
 }
 

@@ -1,11 +1,12 @@
 //! Lowers a program's tree of statements to steps, with masks made explicit.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::super::ir::{Block, Case, Label, Program, Reg, Statement, Type};
 use super::super::op::{Kind, Op};
 use super::allocate::Allocation;
 use super::file::Slot;
+use super::loop_private::loop_private_variables;
 use super::mask::MaskId;
 use super::step::{RunCost, Step, Target};
 
@@ -32,6 +33,9 @@ pub fn lower(program: &Program, allocation: &Allocation, count: bool) -> Lowered
         constructs: HashMap::new(),
         runs: Vec::new(),
         run: None,
+        loop_private: loop_private_variables(program),
+        unmasked: HashSet::new(),
+        uses: count_uses(program),
     };
     let end = lowering.mark();
     lowering.block(&program.body, end);
@@ -63,6 +67,12 @@ struct Lowering<'a> {
     runs: Vec<RunCost>,
     /// The run that instructions are being added to.
     run: Option<usize>,
+    /// Variables that only a loop looks at.
+    loop_private: HashMap<Label, HashSet<Reg>>,
+    /// Variables to which assignments, where lowering is now, need no mask.
+    unmasked: HashSet<Reg>,
+    /// How often each register is read.
+    uses: Vec<u32>,
 }
 
 impl Lowering<'_> {
@@ -134,12 +144,75 @@ impl Lowering<'_> {
 
     /// Lowers a block. `empty` is where to go when no lane is active: it is before, or at, a place where lanes come back.
     fn block(&mut self, block: &Block, empty: Mark) {
-        for statement in block {
-            self.statement(statement, empty);
+        let unmasked = std::mem::take(&mut self.unmasked);
+        self.block_of_loop(block, empty, unmasked);
+    }
+
+    /// Lowers a block in which assignments to some variables need no mask.
+    fn block_of_loop(&mut self, block: &Block, empty: Mark, unmasked: HashSet<Reg>) {
+        let mut rest = block.iter().peekable();
+        while let Some(statement) = rest.next() {
+            let outer = std::mem::replace(&mut self.unmasked, unmasked.clone());
+            if let Some(assign) = rest.next_if(|next| self.is_assigned_at_once(statement, next)) {
+                self.compute_and_assign(statement, assign);
+            } else {
+                self.statement(statement, empty);
+            }
+            self.unmasked = outer;
             if leaves(statement) {
                 break;
             }
         }
+    }
+
+    /// Whether a computation's only use is the assignment that follows it.
+    fn is_assigned_at_once(&self, statement: &Statement, next: &Statement) -> bool {
+        match (statement, next) {
+            (Statement::Compute { dst: value, .. }, Statement::Assign { dst, src }) => {
+                let same_kind = self.slot(*dst).is_varying() == self.slot(*value).is_varying();
+                value == src && same_kind && self.uses[value.0 as usize] == 1
+            }
+            _ => false,
+        }
+    }
+
+    fn compute_and_assign(&mut self, compute: &Statement, assign: &Statement) {
+        let (
+            Statement::Compute {
+                op,
+                dst: value,
+                src,
+            },
+            Statement::Assign { dst, .. },
+        ) = (compute, assign)
+        else {
+            return;
+        };
+        let (to, via) = (self.slot(*dst), self.slot(*value));
+        let src = self.operands(src);
+        let step = if self.unmasked.contains(dst) || !to.is_varying() {
+            Step::Compute {
+                op: *op,
+                dst: to,
+                src,
+            }
+        } else {
+            Step::ComputeAssign {
+                op: *op,
+                dst: to,
+                via,
+                src,
+            }
+        };
+        self.instruction(step, op.kind(), !to.is_varying());
+    }
+
+    fn operands(&self, src: &[Reg]) -> [Slot; 4] {
+        let mut slots = [Slot::ZERO; 4];
+        for (slot, reg) in slots.iter_mut().zip(src) {
+            *slot = self.slot(*reg);
+        }
+        slots
     }
 
     fn statement(&mut self, statement: &Statement, empty: Mark) {
@@ -147,15 +220,20 @@ impl Lowering<'_> {
             Statement::Compute { op, dst, src } => self.compute(*op, *dst, src),
             Statement::Assign { dst, src } => {
                 let (to, from, ty) = (self.slot(*dst), self.slot(*src), self.ty(*dst));
-                self.instruction(
+                let step = if self.unmasked.contains(dst) {
+                    Step::Copy {
+                        dst: to,
+                        src: from,
+                        ty,
+                    }
+                } else {
                     Step::Assign {
                         dst: to,
                         src: from,
                         ty,
-                    },
-                    Kind::Move,
-                    !to.is_varying(),
-                );
+                    }
+                };
+                self.instruction(step, Kind::Move, !to.is_varying());
             }
             Statement::If {
                 condition,
@@ -198,20 +276,8 @@ impl Lowering<'_> {
     }
 
     fn compute(&mut self, op: Op, dst: Reg, src: &[Reg]) {
-        let mut slots = [Slot::ZERO; 4];
-        for (slot, reg) in slots.iter_mut().zip(src) {
-            *slot = self.slot(*reg);
-        }
-        let dst = self.slot(dst);
-        self.instruction(
-            Step::Compute {
-                op,
-                dst,
-                src: slots,
-            },
-            op.kind(),
-            !dst.is_varying(),
-        );
+        let (dst, src) = (self.slot(dst), self.operands(src));
+        self.instruction(Step::Compute { op, dst, src }, op.kind(), !dst.is_varying());
     }
 
     /// The mask that lanes go to which leave by this statement.
@@ -312,12 +378,19 @@ impl Lowering<'_> {
         } else {
             end
         };
-        self.block(body, back);
+        // Lanes that continue early must keep what they have until then.
+        let private = self.loop_private.remove(&label).unwrap_or_default();
+        let in_body = if continues.is_some() {
+            HashSet::new()
+        } else {
+            private.clone()
+        };
+        self.block_of_loop(body, back, in_body);
         self.place(at_continuing);
         if let Some(mask) = continues {
             self.control(Step::Join { mask, target: end });
         }
-        self.block(continuing, end);
+        self.block_of_loop(continuing, end, private);
         self.place(end);
         self.control(Step::Repeat(head));
         self.control(Step::Join {
@@ -411,6 +484,25 @@ fn leaves(statement: &Statement) -> bool {
         statement,
         Statement::Break(_) | Statement::Continue(_) | Statement::Return | Statement::Kill
     )
+}
+
+/// How often each register is read.
+fn count_uses(program: &Program) -> Vec<u32> {
+    fn count(block: &Block, uses: &mut [u32]) {
+        for statement in block {
+            statement
+                .uses()
+                .into_iter()
+                .for_each(|reg| uses[reg.0 as usize] += 1);
+            statement
+                .blocks()
+                .into_iter()
+                .for_each(|block| count(block, uses));
+        }
+    }
+    let mut uses = vec![0; program.registers.len()];
+    count(&program.body, &mut uses);
+    uses
 }
 
 fn contains(block: &Block, wanted: &Statement) -> bool {

@@ -214,6 +214,7 @@ impl Machine {
         for (index, whole) in whole.words().iter().enumerate() {
             let word = |mask: &LaneMask| mask.words().get(index).copied().unwrap_or(0) & whole;
             self.masks[usize::from(MaskId::ACTIVE.0) * width + index] = word(active);
+            self.masks[usize::from(MaskId::ENTRY.0) * width + index] = word(active);
             self.masks[usize::from(MaskId::HELPER.0) * width + index] = word(helpers);
         }
         for index in 0..self.executable.outputs.len() {
@@ -237,13 +238,29 @@ fn run_steps<S: Simd>(
     let mut next = 0;
     while let Some(step) = steps.get(next) {
         next += 1;
-        let jump = match step {
-            Step::Compute { op, dst, src } => {
-                compute(simd, file, *op, *dst, src);
-                None
+        // There is one copy of the kernels, so both kinds of computation meet here.
+        let computation = match step {
+            Step::Compute { op, dst, src } => Some((*op, *dst, src, None)),
+            Step::ComputeAssign { op, dst, src, .. } if masks.is_whole() => {
+                Some((*op, *dst, src, None))
             }
+            Step::ComputeAssign { op, dst, via, src } => Some((*op, *via, src, Some(*dst))),
+            _ => None,
+        };
+        if let Some((op, target, src, assigned)) = computation {
+            compute(simd, file, op, target, src);
+            if let Some(dst) = assigned {
+                batch.assign(simd, dst, target, op.signature().result);
+            }
+            continue;
+        }
+        let jump = match step {
             Step::Assign { dst, src, ty } => {
                 batch.assign(simd, *dst, *src, *ty);
+                None
+            }
+            Step::Copy { dst, src, ty } => {
+                batch.copy(*dst, *src, *ty);
                 None
             }
             Step::Other(statement) => {

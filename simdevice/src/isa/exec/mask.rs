@@ -78,8 +78,10 @@ impl MaskId {
     pub const KILLED: Self = Self(2);
     /// Lanes that are done; nobody reads it.
     pub const DONE: Self = Self(3);
+    /// The lanes that were active when the batch began; the others never matter.
+    pub const ENTRY: Self = Self(4);
     /// The first that constructs may use.
-    pub const FIRST_FREE: u16 = 4;
+    pub const FIRST_FREE: u16 = 5;
 }
 
 /// The masks of a batch.
@@ -103,6 +105,15 @@ impl<'a> Masks<'a> {
     #[inline(always)]
     pub fn any(self, mask: MaskId) -> bool {
         self.get(mask).iter().any(|word| word.get() != 0)
+    }
+
+    /// Whether all lanes are active that ever were.
+    #[inline(always)]
+    pub fn is_whole(self) -> bool {
+        let entry = self.get(MaskId::ENTRY).iter();
+        entry
+            .zip(self.get(MaskId::ACTIVE))
+            .all(|(entry, active)| entry == active)
     }
 
     #[inline(always)]

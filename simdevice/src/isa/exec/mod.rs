@@ -37,6 +37,7 @@ mod executable;
 mod file;
 mod image;
 mod integer;
+mod loop_private;
 mod lower;
 mod machine;
 mod mask;

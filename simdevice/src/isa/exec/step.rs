@@ -13,6 +13,15 @@ pub type Target = u32;
 pub enum Step {
     /// `dst = op(src...)` in all lanes.
     Compute { op: Op, dst: Slot, src: [Slot; 4] },
+    /// `dst = op(src...)` in the active lanes, by way of `via` if not all lanes are active.
+    ComputeAssign {
+        op: Op,
+        dst: Slot,
+        via: Slot,
+        src: [Slot; 4],
+    },
+    /// `dst = src` in all lanes.
+    Copy { dst: Slot, src: Slot, ty: Type },
     /// `dst = src` in the active lanes (all lanes, if `dst` is uniform).
     Assign { dst: Slot, src: Slot, ty: Type },
     /// Anything that reaches across lanes or out of the registers.

@@ -1,8 +1,13 @@
 //! Random structured programs: the batch engine must give what the scalar interpreter gives, lane by lane.
 
+use std::sync::Arc;
+use std::time::Duration;
+
+use fearless_simd::Level;
+
 use crate::isa::builder::Builder;
-use crate::isa::exec::LaneMask;
-use crate::isa::ir::{Address, Format, Label, Program, Rate, Reg, Space, Type};
+use crate::isa::exec::{Executable, LaneMask, Machine, Options, Watchdog};
+use crate::isa::ir::{Address, Block, Format, Label, Program, Rate, Reg, Space, Type};
 use crate::isa::op::Op;
 use crate::isa::resources::Resources;
 
@@ -400,8 +405,26 @@ fn inputs(seed: u64, lane: usize) -> [u64; INPUTS] {
     ]
 }
 
+/// What the scalar interpreter gives each lane: outputs and whether it was killed.
+fn expected(program: &Program, seed: u64, fused: bool) -> Vec<(Vec<u64>, bool)> {
+    let lane = |lane| {
+        let mut scalar = Lane::new(program, &inputs(seed, lane), fused);
+        (scalar.run(), scalar.killed)
+    };
+    (0..ACTIVE).map(lane).collect()
+}
+
+fn set_inputs(machine: &mut Machine, seed: u64) {
+    for lane in 0..LANES {
+        for (slot, value) in inputs(seed, lane).into_iter().enumerate() {
+            machine.set_input(slot as u32, lane, value as u32);
+        }
+    }
+    machine.fill_input(0, inputs(seed, 0)[0] as u32);
+}
+
 fn check(seed: u64, budget: usize) {
-    let as_written: Program = Grower::new(seed, budget)
+    let as_written = Grower::new(seed, budget)
         .finish()
         .finish_as_written()
         .expect("well formed");
@@ -409,32 +432,33 @@ fn check(seed: u64, budget: usize) {
         .finish()
         .finish()
         .unwrap_or_else(|problem| panic!("seed {seed}: {problem}"));
+    // Two batches, so that nothing may hang on what an earlier batch left behind.
+    let rounds = [seed, seed + 1];
+    let [separate, fused] =
+        [false, true].map(|fused| rounds.map(|seed| expected(&as_written, seed, fused)));
     for (name, level) in levels() {
         let mut machine = machine(&program, level, LANES);
-        // Twice, so that nothing may hang on what an earlier batch left behind.
-        for round in 0..2 {
-            for lane in 0..LANES {
-                for (slot, value) in inputs(seed + round, lane).into_iter().enumerate() {
-                    machine.set_input(slot as u32, lane, value as u32);
-                }
-            }
-            machine.fill_input(0, inputs(seed + round, 0)[0] as u32);
+        for (round, seed) in rounds.into_iter().enumerate() {
+            set_inputs(&mut machine, seed);
             run(&mut machine, ACTIVE, &Resources::default());
             let killed: LaneMask = machine.killed();
-            for lane in 0..ACTIVE {
-                let mut scalar = Lane::new(&as_written, &inputs(seed + round, lane), fuses(name));
-                let expected = scalar.run();
-                for (output, expected) in as_written.outputs.iter().zip(expected) {
+            let wanted = if fuses(name) {
+                &fused[round]
+            } else {
+                &separate[round]
+            };
+            for (lane, (outputs, was_killed)) in wanted.iter().enumerate() {
+                for (output, expected) in as_written.outputs.iter().zip(outputs) {
                     let got = machine.output(output.slot, lane);
                     assert!(
-                        equal(got, expected as u32),
+                        equal(got, *expected as u32),
                         "seed {seed}, lane {lane}, output {} at {name}: {got:#x}, not {expected:#x}\n{program}",
                         output.slot
                     );
                 }
                 assert_eq!(
                     killed.contains(lane),
-                    scalar.killed,
+                    *was_killed,
                     "seed {seed}, lane {lane} at {name}"
                 );
             }
@@ -448,4 +472,71 @@ fn random_programs_equal_the_scalar_interpreter() {
     for seed in 0..2500 {
         check(seed, 4 + seed as usize / 25);
     }
+}
+
+/// Changes a statement somewhere within a block: a register it names, or its place.
+fn mutate(block: &mut Block, registers: usize, random: &mut Random) {
+    if block.is_empty() {
+        return;
+    }
+    let (at, other) = (random.below(block.len()), random.below(block.len()));
+    let mut inner = block[at].blocks_mut();
+    if !inner.is_empty() && !random.once_in(4) {
+        let within = random.below(inner.len());
+        return mutate(inner[within], registers, random);
+    }
+    match random.below(5) {
+        0 => drop(block.remove(at)),
+        1 => block.swap(at, other),
+        2 => {
+            let copy = block[at].clone();
+            block.insert(other, copy);
+        }
+        3 => {
+            block[at].for_each_definition(&mut |reg| *reg = Reg(random.below(registers + 1) as u32))
+        }
+        _ => block[at].for_each_use(&mut |reg| *reg = Reg(random.below(registers + 1) as u32)),
+    }
+}
+
+#[test]
+fn broken_programs_are_refused_or_run_without_harm() {
+    let (mut refused, mut ended) = (0, 0);
+    let watchdog = Watchdog {
+        limit: Duration::from_millis(2),
+        cancel: None,
+    };
+    for seed in 0..1500 {
+        let mut program = Grower::new(seed, 30)
+            .finish()
+            .finish()
+            .expect("a valid program");
+        let mut random = Random(seed);
+        let registers = program.registers.len();
+        (0..1 + random.below(3)).for_each(|_| mutate(&mut program.body, registers, &mut random));
+        match Executable::new(
+            program,
+            &Options {
+                lanes: 32,
+                ..Options::new(Level::new())
+            },
+        ) {
+            Err(_) => refused += 1,
+            Ok(executable) => {
+                let mut machine = Machine::new(Arc::new(executable));
+                set_inputs(&mut machine, seed);
+                let done = machine.run(
+                    &LaneMask::first(32),
+                    &LaneMask::none(),
+                    &Resources::default(),
+                    watchdog,
+                );
+                ended += u32::from(done.is_ok());
+            }
+        }
+    }
+    assert!(
+        refused > 100 && ended > 100,
+        "{refused} refused, {ended} ended"
+    );
 }
