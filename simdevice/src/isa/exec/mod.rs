@@ -61,6 +61,7 @@ use fearless_simd::Level;
 use super::ir::Type;
 use super::op::Op;
 use super::resources::Resources;
+pub(crate) use memory::combine;
 use file::{File, Slot};
 use step::Step;
 

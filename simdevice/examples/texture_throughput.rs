@@ -1,0 +1,158 @@
+//! How fast the texture unit samples, at every SIMD level of this processor: quads that sweep over a 1024x1024 image as
+//! a slightly turned, slightly minified surface does.
+//!
+//! `cargo run --release -p simdevice --example texture_throughput`
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use simdevice::device::SimdLevel;
+use simdevice::image::{ImageDesc, ImageKind};
+use simdevice::isa::ir::{Dimension, ImageShape};
+use simdevice::isa::resources::{ImageUnit, LodRequest, SampleRequest};
+use simdevice::packet::Aspect;
+use simdevice::texture::{
+    AddressMode, CompareOp, Filter, IDENTITY, ImageBinding, ImageTable, MipmapMode, SampledImage,
+    Sampler,
+};
+use simdevice::{Allocation, Format, Image, ImageView};
+
+const SIZE: u32 = 1024;
+const LEVELS: u32 = 11;
+
+fn image(format: Format) -> ImageBinding {
+    let desc = ImageDesc {
+        kind: ImageKind::D2,
+        format,
+        extent: [SIZE, SIZE, 1],
+        mip_levels: LEVELS,
+        array_layers: 1,
+        samples: 1,
+    };
+    let size = desc.memory_size().expect("a valid image");
+    let memory = Allocation::new_zeroed(size).expect("enough memory");
+    let mut state = 1u32;
+    for offset in (0..size).step_by(4) {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let word = if format == Format::D32Sfloat {
+            ((state >> 8) as f32 / 16_777_216.0).to_bits()
+        } else {
+            state
+        };
+        memory.store_u32(offset, word);
+    }
+    let image = Image::new(desc, memory, 0).expect("it fits");
+    ImageBinding::Sampled(SampledImage {
+        view: ImageView {
+            image: Arc::new(image),
+            format,
+            base_mip_level: 0,
+            level_count: LEVELS,
+            base_layer: 0,
+            layer_count: 1,
+        },
+        aspect: format.aspects()[0],
+        swizzle: IDENTITY,
+    })
+}
+
+/// Sixteen lanes at (x, y): four quads side by side.
+fn request(x: u32, y: u32, texels_per_pixel: f32) -> SampleRequest {
+    let scale = texels_per_pixel / SIZE as f32;
+    let (sin, cos) = 0.3f32.sin_cos();
+    let at = |lane: usize| {
+        let px = (x + 2 * (lane as u32 / 4) + (lane as u32 & 1)) as f32 + 0.5;
+        let py = (y + (lane as u32 >> 1 & 1)) as f32 + 0.5;
+        [(cos * px - sin * py) * scale, (sin * px + cos * py) * scale]
+    };
+    SampleRequest {
+        mask: u16::MAX,
+        shape: ImageShape {
+            dimension: Dimension::D2,
+            arrayed: false,
+            multisampled: false,
+        },
+        coordinate: [
+            std::array::from_fn(|lane| at(lane)[0].to_bits()),
+            std::array::from_fn(|lane| at(lane)[1].to_bits()),
+            [0; 16],
+            [0; 16],
+        ],
+        lod: LodRequest::Implicit {
+            bias: [0; 16],
+            minimum: [0; 16],
+        },
+        offset: [[0; 16]; 3],
+        compare: None,
+        gather: None,
+    }
+}
+
+/// Million samples a second.
+fn measure(table: &ImageTable, requests: &[SampleRequest]) -> f64 {
+    let (begin, mut done) = (Instant::now(), 0);
+    while begin.elapsed() < Duration::from_millis(300) {
+        for request in requests {
+            black_box(table.sample(0, 0, black_box(request)));
+        }
+        done += 16 * requests.len();
+    }
+    done as f64 / begin.elapsed().as_secs_f64() / 1e6
+}
+
+fn main() {
+    assert_eq!(Format::R8G8B8A8Unorm.aspects(), [Aspect::Color]);
+    let linear = Sampler {
+        mag_filter: Filter::Linear,
+        min_filter: Filter::Linear,
+        ..Sampler::default()
+    };
+    let trilinear = Sampler {
+        mipmap_mode: MipmapMode::Linear,
+        ..linear
+    };
+    let clamped = Sampler {
+        address_modes: [AddressMode::ClampToEdge; 3],
+        ..linear
+    };
+    let shadow = Sampler {
+        address_modes: [AddressMode::ClampToBorder; 3],
+        compare_op: Some(CompareOp::LessOrEqual),
+        ..linear
+    };
+    let rgba = Format::R8G8B8A8Unorm;
+    let cases = [
+        ("nearest RGBA8", rgba, Sampler::default(), 0.8),
+        ("bilinear RGBA8 repeat", rgba, linear, 0.8),
+        ("bilinear RGBA8 clamp", rgba, clamped, 0.8),
+        ("bilinear sRGBA8 repeat", Format::R8G8B8A8Srgb, linear, 0.8),
+        ("trilinear RGBA8", rgba, trilinear, 1.4),
+        ("trilinear sRGBA8", Format::R8G8B8A8Srgb, trilinear, 1.4),
+        ("bilinear RGBA16F", Format::R16G16B16A16Sfloat, linear, 0.8),
+        ("shadow D32", Format::D32Sfloat, shadow, 0.8),
+    ];
+    for (name, format, sampler, texels_per_pixel) in cases {
+        let compare = sampler.compare_op.map(|_| [0.5f32.to_bits(); 16]);
+        let requests: Vec<SampleRequest> = (0..64 * 64)
+            .map(|block| SampleRequest {
+                compare,
+                ..request(block % 64 * 8, block / 64 * 2, texels_per_pixel)
+            })
+            .collect();
+        let mut line = format!("{name:24}");
+        for (level_name, level) in SimdLevel::supported() {
+            let Some(level) = level.resolve() else {
+                continue;
+            };
+            let table = ImageTable::new(level, [image(format)], [Some(sampler)]);
+            let rate = measure(&table, &requests);
+            line += &format!("  {level_name} {rate:6.1}");
+            if level_name == "sse2" {
+                let rate = measure(&table.lane_by_lane(), &requests);
+                line += &format!("  lane by lane {rate:6.1}");
+            }
+        }
+        println!("{line}  M samples/s");
+    }
+}

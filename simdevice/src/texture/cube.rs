@@ -1,0 +1,197 @@
+//! Cube maps: which face a direction meets, and which texels lie across an edge.
+
+/// Where a direction meets the cube.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Hit {
+    /// The face: +x, -x, +y, -y, +z, -z.
+    pub face: u32,
+    /// The direction's coordinates on the face, not yet divided by `major`.
+    pub sc: f32,
+    /// See `sc`.
+    pub tc: f32,
+    /// The magnitude of the coordinate along the face's axis.
+    pub major: f32,
+}
+
+/// The vector's components along a face's own axes: s, t and outwards.
+fn face_axes(face: u32, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    match face {
+        0 => [-z, -y, x],
+        1 => [z, -y, -x],
+        2 => [x, z, y],
+        3 => [x, -z, -y],
+        4 => [x, -y, z],
+        _ => [-x, -y, -z],
+    }
+}
+
+/// The inverse of [`face_axes`].
+fn from_face_axes(face: u32, [s, t, outwards]: [f32; 3]) -> [f32; 3] {
+    match face {
+        0 => [outwards, -t, -s],
+        1 => [-outwards, -t, s],
+        2 => [s, outwards, t],
+        3 => [s, -outwards, -t],
+        4 => [s, -t, outwards],
+        _ => [-s, -t, -outwards],
+    }
+}
+
+impl Hit {
+    /// Where a direction meets the cube; of equal components z wins over y, and y over x.
+    pub fn new(direction: [f32; 3]) -> Self {
+        let [x, y, z] = direction;
+        let (axis, component) = if z.abs() >= x.abs() && z.abs() >= y.abs() {
+            (2, z)
+        } else if y.abs() >= x.abs() {
+            (1, y)
+        } else {
+            (0, x)
+        };
+        let face = 2 * axis + u32::from(component < 0.0);
+        let [sc, tc, major] = face_axes(face, direction);
+        Self {
+            face,
+            sc,
+            tc,
+            major,
+        }
+    }
+
+    /// The coordinates on the face, 0 to 1.
+    pub fn coordinates(&self) -> [f32; 2] {
+        [
+            0.5 * (self.sc / self.major) + 0.5,
+            0.5 * (self.tc / self.major) + 0.5,
+        ]
+    }
+
+    /// What a change of the direction changes of the coordinates on the face.
+    pub fn derivative(&self, change: [f32; 3]) -> [f32; 2] {
+        let [ds, dt, dm] = face_axes(self.face, change);
+        let scale = 0.5 / (self.major * self.major);
+        [
+            scale * (self.major * ds - self.sc * dm),
+            scale * (self.major * dt - self.tc * dm),
+        ]
+    }
+}
+
+/// The face and texel of (i, j), of which one lies a texel beyond `face`'s `size`.
+fn across_edge(face: u32, [i, j]: [i32; 2], size: u32) -> (u32, [u32; 2]) {
+    // In half texels from the face's centre all centres of texels are integers.
+    let n = size as f32;
+    let [s, t] = [i, j].map(|index| (2 * index + 1) as f32 - n);
+    // What stands over is the face next door; there the texel lies half a texel from the edge.
+    let around = if s.abs() > n {
+        [n.copysign(s), t, n - 1.0]
+    } else {
+        [s, n.copysign(t), n - 1.0]
+    };
+    let hit = Hit::new(from_face_axes(face, around));
+    let index = |c: f32| (((c + n - 1.0) * 0.5) as u32).min(size.saturating_sub(1));
+    (hit.face, [index(hit.sc), index(hit.tc)])
+}
+
+/// The texels of a cube that stand for texel (i, j) of a face, which may lie one beyond its edges: one, or, beyond a
+/// corner, the three around it, whose mean is to be taken.
+pub(super) fn texels(face: u32, at: [i32; 2], size: u32) -> ([(u32, [u32; 2]); 3], usize) {
+    let last = size as i32 - 1;
+    let at = at.map(|index| index.clamp(-1, last + 1));
+    let clamped = at.map(|index| index.clamp(0, last));
+    let inside = (face, clamped.map(|index| index as u32));
+    match (at[0] != clamped[0], at[1] != clamped[1]) {
+        (false, false) => ([inside; 3], 1),
+        (true, true) => {
+            let beyond_s = across_edge(face, [at[0], clamped[1]], size);
+            let beyond_t = across_edge(face, [clamped[0], at[1]], size);
+            ([inside, beyond_s, beyond_t], 3)
+        }
+        _ => ([across_edge(face, at, size); 3], 1),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A texel's centre as a point on the cube of half side `size`.
+    fn center(face: u32, [i, j]: [u32; 2], size: u32) -> [f32; 3] {
+        let n = size as f32;
+        from_face_axes(face, [(2 * i + 1) as f32 - n, (2 * j + 1) as f32 - n, n])
+    }
+
+    #[test]
+    fn every_direction_meets_the_face_of_its_greatest_component() {
+        let faces = [
+            ([1.0, 0.2, -0.3], 0, [0.3, -0.2]),
+            ([-1.0, 0.2, -0.3], 1, [-0.3, -0.2]),
+            ([0.2, 1.0, -0.3], 2, [0.2, -0.3]),
+            ([0.2, -1.0, -0.3], 3, [0.2, 0.3]),
+            ([0.2, -0.3, 1.0], 4, [0.2, 0.3]),
+            ([0.2, -0.3, -1.0], 5, [-0.2, 0.3]),
+        ];
+        for (direction, face, [sc, tc]) in faces {
+            let hit = Hit::new(direction);
+            assert_eq!((hit.face, hit.sc, hit.tc, hit.major), (face, sc, tc, 1.0));
+        }
+        assert_eq!(Hit::new([1.0, 1.0, -1.0]).face, 5);
+        assert_eq!(Hit::new([1.0, -1.0, 0.0]).face, 3);
+    }
+
+    #[test]
+    fn texels_across_an_edge_touch_it() {
+        for size in [1, 2, 5] {
+            for face in 0..6 {
+                for along in 0..size {
+                    let last = size as i32;
+                    let along_edge = along as i32;
+                    let pairs = [
+                        ([-1, along_edge], [0, along]),
+                        ([last, along_edge], [size - 1, along]),
+                        ([along_edge, -1], [along, 0]),
+                        ([along_edge, last], [along, size - 1]),
+                    ];
+                    for (outside, inside) in pairs {
+                        let ([(other, texel), ..], count) = texels(face, outside, size);
+                        assert_eq!(count, 1);
+                        assert_ne!(other, face);
+                        let (a, b) = (center(face, inside, size), center(other, texel, size));
+                        let distance: f32 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
+                        assert_eq!(distance, 2.0, "half a texel from the edge each");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn corners_are_shared_by_three_faces() {
+        for face in 0..6 {
+            let (around, count) = texels(face, [4, -1], 4);
+            assert_eq!(count, 3);
+            let corners = around.map(|(face, texel)| center(face, texel, 4));
+            for axis in 0..3 {
+                let signs = corners.map(|corner| corner[axis] > 0.0);
+                assert!(signs.iter().all(|sign| *sign == signs[0]));
+            }
+            assert_ne!(around[1].0, around[2].0);
+        }
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_coordinates() {
+        for direction in [[1.0, 0.3, -0.2], [0.1, -2.0, 0.5], [-0.3, 0.4, 0.9]] {
+            for change in [[0.1, 0.0, 0.0], [0.02, -0.1, 0.3]] {
+                let hit = Hit::new(direction);
+                let h = 1e-3;
+                let moved = Hit::new(std::array::from_fn(|c| direction[c] + h * change[c]));
+                let derivative = hit.derivative(change);
+                for c in 0..2 {
+                    let difference = (moved.coordinates()[c] - hit.coordinates()[c]) / h;
+                    assert!((difference - derivative[c]).abs() < 1e-3);
+                }
+            }
+        }
+    }
+}

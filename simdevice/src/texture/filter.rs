@@ -1,0 +1,270 @@
+//! Samples and gathers, lane by lane: any format, shape and sampler. [`super::batch`] does the common ones faster, bit
+//! for bit.
+
+use super::address::{self, Taps};
+use super::cube;
+use super::lod;
+use super::sampler::{AddressMode, BorderColor, Filter, Sampler};
+use super::surface::{Surface, Texel};
+use crate::format::{Channel, Numeric};
+use crate::isa::ir::{CHUNK_LANES, Dimension};
+use crate::isa::resources::{Lanes, SampleRequest};
+
+/// What is read of an image: where, and through which sampler.
+struct Reader<'a> {
+    surface: &'a Surface,
+    sampler: &'a Sampler,
+    /// The border colour as a texel.
+    border: [u32; 4],
+    /// The reference of a comparison.
+    reference: Option<f32>,
+    level: usize,
+    layer: u32,
+}
+
+/// Filters or gathers for every lane of the mask.
+pub(super) fn sample(
+    surface: &Surface,
+    sampler: &Sampler,
+    request: &SampleRequest,
+) -> [Lanes; 4] {
+    let selection = lod::select(surface, sampler, request);
+    let border = border_texel(surface, sampler);
+    let mut out = [[0; CHUNK_LANES]; 4];
+    for lane in (0..CHUNK_LANES).filter(|lane| request.mask >> lane & 1 != 0) {
+        let mut reader = Reader {
+            surface,
+            sampler,
+            border,
+            reference: reference(surface, sampler, request, lane),
+            level: selection.high[lane] as usize,
+            layer: 0,
+        };
+        let texel = if let Some(component) = request.gather {
+            reader.level = 0;
+            reader
+                .footprint(request, lane, Filter::Linear)
+                .gather(&reader, component)
+        } else {
+            let filter = selection.filter[lane];
+            let mut texel = reader.footprint(request, lane, filter).filter(&reader);
+            let weight = selection.weight[lane];
+            if weight > 0.0 {
+                reader.level = selection.low[lane] as usize;
+                let low = reader.footprint(request, lane, filter).filter(&reader);
+                texel = mix(texel, low, weight);
+            }
+            surface.swizzled(texel)
+        };
+        for (out, component) in out.iter_mut().zip(texel) {
+            out[lane] = component;
+        }
+    }
+    out
+}
+
+/// The reference value that a lane compares with, if it compares.
+fn reference(
+    surface: &Surface,
+    sampler: &Sampler,
+    request: &SampleRequest,
+    lane: usize,
+) -> Option<f32> {
+    sampler.compare_op?;
+    let reference = f32::from_bits(request.compare?[lane]);
+    Some(if surface.format.numeric() == Numeric::Unorm {
+        reference.clamp(0.0, 1.0)
+    } else {
+        reference
+    })
+}
+
+/// The border colour as a texel of the format: what it lacks is as ever.
+pub(super) fn border_texel(surface: &Surface, sampler: &Sampler) -> [u32; 4] {
+    let BorderColor([r, g, b, a]) = sampler.border_color;
+    let format = surface.format;
+    let or = |channels: &[Channel], value: u32, otherwise: u32| {
+        let has = channels.iter().any(|channel| format.has(*channel));
+        if has { value } else { otherwise }
+    };
+    [
+        or(&[Channel::R, Channel::D, Channel::S], r, 0),
+        or(&[Channel::G], g, 0),
+        or(&[Channel::B], b, 0),
+        or(&[Channel::A], a, surface.one()),
+    ]
+}
+
+/// The texels around a point of one level.
+enum Footprint {
+    /// Of an image with edges: along x, y and z.
+    Grid { axes: [Taps; 3], filters: [Filter; 3] },
+    /// Of a cube: the face, the first texel, and weights.
+    Cube {
+        face: u32,
+        first: [i32; 2],
+        weights: [f32; 2],
+        filter: Filter,
+    },
+}
+
+impl Reader<'_> {
+    /// The texels that a lane's coordinates mean. Sets the layer.
+    fn footprint(&mut self, request: &SampleRequest, lane: usize, filter: Filter) -> Footprint {
+        let coordinate = request.coordinate.map(|lanes| f32::from_bits(lanes[lane]));
+        let dimension = request.shape.dimension;
+        let count = dimension.coordinates();
+        let layers = self.surface.layers;
+        let layer = |layers| {
+            if request.shape.arrayed {
+                address::layer(coordinate[count], layers)
+            } else {
+                0
+            }
+        };
+        let extent = self.surface.levels[self.level].extent;
+        if dimension == Dimension::Cube {
+            let hit = cube::Hit::new([coordinate[0], coordinate[1], coordinate[2]]);
+            self.layer = 6 * layer(layers / 6);
+            let taps = hit.coordinates().map(|s| {
+                let u = address::texel_coordinate(AddressMode::ClampToEdge, s, true, extent[0]);
+                address::first_texel(filter, u)
+            });
+            return Footprint::Cube {
+                face: hit.face,
+                first: taps.map(|(first, _)| first),
+                weights: taps.map(|(_, weight)| weight),
+                filter,
+            };
+        }
+        self.layer = layer(layers);
+        let axis = |axis: usize| {
+            if axis >= count {
+                return (Taps::FLAT, Filter::Nearest);
+            }
+            let taps = Taps::new(
+                self.sampler.address_modes[axis],
+                filter,
+                coordinate[axis],
+                !self.sampler.unnormalized_coordinates,
+                extent[axis],
+                request.offset[axis][lane].cast_signed(),
+            );
+            (taps, filter)
+        };
+        let axes = [0, 1, 2].map(axis);
+        Footprint::Grid {
+            axes: axes.map(|(taps, _)| taps),
+            filters: axes.map(|(_, filter)| filter),
+        }
+    }
+
+    /// A texel, or what stands for it; compared, if that is asked for.
+    fn texel(&self, at: [Option<u32>; 3], layer: u32) -> [u32; 4] {
+        let texel = match at {
+            [Some(x), Some(y), Some(z)] => {
+                let place = Texel {
+                    at: [x, y, z],
+                    layer,
+                    sample: 0,
+                };
+                self.surface.texel(self.level, place).unwrap_or_default()
+            }
+            _ => self.border,
+        };
+        match (self.reference, self.sampler.compare_op) {
+            (Some(reference), Some(op)) => {
+                let passes = op.holds(reference, f32::from_bits(texel[0]));
+                let depth = if passes { 1f32 } else { 0.0 };
+                [depth.to_bits(), texel[1], texel[2], texel[3]]
+            }
+            _ => texel,
+        }
+    }
+
+    /// A texel of a cube's face, or what stands for it beyond an edge.
+    fn cube_texel(&self, face: u32, at: [i32; 2]) -> [u32; 4] {
+        let size = self.surface.levels[self.level].extent[0];
+        let (texels, count) = cube::texels(face, at, size);
+        let texel = |(face, [x, y]): (u32, [u32; 2])| {
+            self.texel([Some(x), Some(y), Some(0)], self.layer + face)
+        };
+        if count == 1 || self.surface.is_integer() {
+            return texel(texels[0]);
+        }
+        let [a, b, c] = texels.map(|place| texel(place).map(f32::from_bits));
+        std::array::from_fn(|component| {
+            ((a[component] + b[component] + c[component]) / 3.0).to_bits()
+        })
+    }
+}
+
+impl Footprint {
+    /// The weighted mean.
+    fn filter(&self, reader: &Reader<'_>) -> [u32; 4] {
+        match self {
+            Self::Grid { axes, filters } => {
+                let [x, y, z] = axes;
+                let row = |j: usize, k: usize| {
+                    let texel = |i: usize| {
+                        reader.texel([x.index[i], y.index[j], z.index[k]], reader.layer)
+                    };
+                    along(filters[0], x.weight, texel)
+                };
+                let slice = |k: usize| along(filters[1], y.weight, |j| row(j, k));
+                along(filters[2], z.weight, slice)
+            }
+            Self::Cube {
+                face,
+                first: [i, j],
+                weights,
+                filter: Filter::Linear,
+            } => {
+                let row = |dj: usize| {
+                    along(Filter::Linear, weights[0], |di| {
+                        reader.cube_texel(*face, [i + di as i32, j + dj as i32])
+                    })
+                };
+                along(Filter::Linear, weights[1], row)
+            }
+            Self::Cube { face, first, .. } => {
+                let last = reader.surface.levels[reader.level].extent[0] as i32 - 1;
+                reader.cube_texel(*face, first.map(|index| index.clamp(0, last)))
+            }
+        }
+    }
+
+    /// One component of the four texels, counter-clockwise from the lower left one.
+    fn gather(&self, reader: &Reader<'_>, component: u8) -> [u32; 4] {
+        [[0, 1], [1, 1], [1, 0], [0, 0]].map(|[di, dj]: [usize; 2]| {
+            let texel = match self {
+                Self::Grid { axes, .. } => {
+                    let [x, y, z] = axes;
+                    reader.texel([x.index[di], y.index[dj], z.index[0]], reader.layer)
+                }
+                Self::Cube {
+                    face,
+                    first: [i, j],
+                    ..
+                } => reader.cube_texel(*face, [i + di as i32, j + dj as i32]),
+            };
+            reader.surface.component(&texel, component)
+        })
+    }
+}
+
+/// Mixes two texels along an axis, or takes the first.
+fn along(filter: Filter, weight: f32, texel: impl Fn(usize) -> [u32; 4]) -> [u32; 4] {
+    match filter {
+        Filter::Nearest => texel(0),
+        Filter::Linear => mix(texel(0), texel(1), weight),
+    }
+}
+
+/// The weighted mean of two texels.
+fn mix(a: [u32; 4], b: [u32; 4], weight: f32) -> [u32; 4] {
+    std::array::from_fn(|component| {
+        let (a, b) = (f32::from_bits(a[component]), f32::from_bits(b[component]));
+        (a + weight * (b - a)).to_bits()
+    })
+}

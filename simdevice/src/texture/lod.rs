@@ -1,0 +1,244 @@
+//! Levels of detail: from derivatives to the mip levels that are read.
+//!
+//! Vulkan 1.3, "Scale Factor Operation", "LOD Operation" and "Image Level(s) Selection". Plain loops over 16 lanes or
+//! four quads, without fused operations, so that every SIMD level chooses the same levels.
+
+use super::cube::Hit;
+use super::sampler::{Filter, MAX_LOD_BIAS, MipmapMode, Sampler};
+use super::surface::Surface;
+use crate::isa::ir::{CHUNK_LANES, Dimension};
+use crate::isa::resources::{Lanes, LodRequest, SampleRequest};
+
+/// A float for each of 16 lanes.
+pub(super) type Floats = [f32; CHUNK_LANES];
+
+/// The mip levels of 16 lanes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Selection {
+    /// The level, or the larger of two.
+    pub high: [u32; CHUNK_LANES],
+    /// The smaller of two.
+    pub low: [u32; CHUNK_LANES],
+    /// The weight of `low`; if it is zero, `low` isn't read.
+    pub weight: Floats,
+    /// The filter within levels.
+    pub filter: [Filter; CHUNK_LANES],
+}
+
+impl Selection {
+    /// The first level for all.
+    fn base(filter: Filter) -> Self {
+        Self {
+            high: [0; CHUNK_LANES],
+            low: [0; CHUNK_LANES],
+            weight: [0.0; CHUNK_LANES],
+            filter: [filter; CHUNK_LANES],
+        }
+    }
+}
+
+/// The filter that a sampler asks for is done only for what can be mixed.
+fn possible(surface: &Surface, filter: Filter) -> Filter {
+    if surface.is_integer() {
+        Filter::Nearest
+    } else {
+        filter
+    }
+}
+
+/// The mip levels and filters that a request means.
+#[inline(always)]
+pub(super) fn select(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Selection {
+    let magnify = possible(surface, sampler.mag_filter);
+    let minify = possible(surface, sampler.min_filter);
+    let last = surface.levels.len() as u32 - 1;
+    if sampler.unnormalized_coordinates || last == 0 && magnify == minify {
+        return Selection::base(magnify);
+    }
+    let lambda = clamped(sampler, request, &biased(surface, sampler, request));
+    let mut selection = Selection::base(magnify);
+    // Integers aren't mixed between levels either.
+    let linear = sampler.mipmap_mode == MipmapMode::Linear && !surface.is_integer();
+    for lane in 0..CHUNK_LANES {
+        let level = lambda[lane].max(0.0).min(last as f32);
+        let high = if linear {
+            level as u32
+        } else {
+            nearest_level(level)
+        };
+        selection.high[lane] = high;
+        selection.low[lane] = (high + 1).min(last);
+        selection.weight[lane] = if linear { level - high as f32 } else { 0.0 };
+    }
+    if magnify != minify {
+        selection.filter = lambda.map(|lambda| if lambda <= 0.0 { magnify } else { minify });
+    }
+    selection
+}
+
+/// The answer to a query: the level that is read, relative to the view's first, and the level of detail before it is
+/// clamped.
+pub(super) fn query(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> [Lanes; 2] {
+    let biased = biased(surface, sampler, request);
+    let last = surface.levels.len() as f32 - 1.0;
+    let level = clamped(sampler, request, &biased).map(|lambda| {
+        let level = lambda.max(0.0).min(last);
+        if sampler.mipmap_mode == MipmapMode::Linear {
+            level
+        } else {
+            nearest_level(level) as f32
+        }
+    });
+    [level, biased].map(|lanes| lanes.map(f32::to_bits))
+}
+
+/// The level nearest to `level`, which isn't negative; of two, the larger one.
+#[inline(always)]
+fn nearest_level(level: f32) -> u32 {
+    let whole = level as u32;
+    whole + u32::from(level - whole as f32 > 0.5)
+}
+
+/// The level of detail with its bias.
+#[inline(always)]
+fn biased(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Floats {
+    let base: Floats = match &request.lod {
+        LodRequest::Explicit(lod) => lod.map(f32::from_bits),
+        LodRequest::Implicit { .. } => implicit(surface, request),
+        LodRequest::Gradient { dx, dy, .. } => std::array::from_fn(|lane| {
+            let along = |d: &[Lanes; 3]| d.map(|lanes| f32::from_bits(lanes[lane]));
+            let (x, y) = (along(dx), along(dy));
+            scale_lod(surface, request, lane, x, y)
+        }),
+    };
+    let bias: Floats = match &request.lod {
+        LodRequest::Implicit { bias, .. } => bias.map(f32::from_bits),
+        _ => [0.0; CHUNK_LANES],
+    };
+    std::array::from_fn(|lane| {
+        let bias = sampler.mip_lod_bias + bias[lane];
+        base[lane] + bias.max(-MAX_LOD_BIAS).min(MAX_LOD_BIAS)
+    })
+}
+
+/// The level of detail within what sampler and instruction allow; NaN becomes the least.
+#[inline(always)]
+fn clamped(sampler: &Sampler, request: &SampleRequest, biased: &Floats) -> Floats {
+    let minimum: Floats = match &request.lod {
+        LodRequest::Implicit { minimum, .. } | LodRequest::Gradient { minimum, .. } => {
+            minimum.map(f32::from_bits)
+        }
+        LodRequest::Explicit(_) => [0.0; CHUNK_LANES],
+    };
+    let operand = !matches!(request.lod, LodRequest::Explicit(_));
+    std::array::from_fn(|lane| {
+        let mut least = sampler.min_lod;
+        if operand {
+            least = least.max(minimum[lane]);
+        }
+        biased[lane].max(least).min(sampler.max_lod)
+    })
+}
+
+/// The level of detail of differences within quads: from the first lane to the next, and to the one below.
+#[inline(always)]
+fn implicit(surface: &Surface, request: &SampleRequest) -> Floats {
+    let value = |axis: usize, lane: usize| f32::from_bits(request.coordinate[axis][lane]);
+    if request.shape.dimension == Dimension::Cube {
+        return std::array::from_fn(|lane| {
+            let first = lane & !3;
+            let dx = [0, 1, 2].map(|axis| value(axis, first + 1) - value(axis, first));
+            let dy = [0, 1, 2].map(|axis| value(axis, first + 2) - value(axis, first));
+            scale_lod(surface, request, lane, dx, dy)
+        });
+    }
+    let quads: [f32; CHUNK_LANES / 4] = std::array::from_fn(|quad| {
+        let first = 4 * quad;
+        let along = |step: usize| {
+            let mut squares = 0.0;
+            for axis in 0..request.shape.dimension.coordinates() {
+                let size = surface.levels[0].extent[axis] as f32;
+                let change = (value(axis, first + step) - value(axis, first)) * size;
+                squares += change * change;
+            }
+            squares
+        };
+        half_log2(along(1).max(along(2)))
+    });
+    std::array::from_fn(|lane| quads[lane / 4])
+}
+
+/// The level of detail of given changes of the coordinates.
+fn scale_lod(
+    surface: &Surface,
+    request: &SampleRequest,
+    lane: usize,
+    dx: [f32; 3],
+    dy: [f32; 3],
+) -> f32 {
+    let extent = surface.levels[0].extent;
+    let dimension = request.shape.dimension;
+    let (dx, dy, axes) = if dimension == Dimension::Cube {
+        let direction = [0, 1, 2].map(|axis| f32::from_bits(request.coordinate[axis][lane]));
+        let hit = Hit::new(direction);
+        let on_face = |change| {
+            let [s, t] = hit.derivative(change);
+            [s, t, 0.0]
+        };
+        (on_face(dx), on_face(dy), 2)
+    } else {
+        (dx, dy, dimension.coordinates())
+    };
+    let along = |change: [f32; 3]| {
+        let mut squares = 0.0;
+        for axis in 0..axes {
+            let texels = change[axis] * extent[axis] as f32;
+            squares += texels * texels;
+        }
+        squares
+    };
+    half_log2(along(dx).max(along(dy)))
+}
+
+/// Half the base-2 logarithm, to 2e-6, and exact for powers of four; -64 or so for zero, 64 for infinity.
+#[inline(always)]
+fn half_log2(x: f32) -> f32 {
+    // The mantissa is taken in [sqrt(1/2), sqrt(2)): less the bits of sqrt(1/2), the exponent field tells.
+    const BIAS: i32 = 127 << 23;
+    let bits = (x.to_bits() & (u32::MAX >> 1)) as i32;
+    let exponent = (bits - std::f32::consts::FRAC_1_SQRT_2.to_bits() as i32 + BIAS) >> 23;
+    let exponent = exponent - 127;
+    let mantissa = f32::from_bits((bits - (exponent << 23)) as u32);
+    let s = (mantissa - 1.0) / (mantissa + 1.0);
+    let s2 = s * s;
+    // log2(m) / 2 = (s + s^3 / 3 + s^5 / 5 + ...) / ln 2, |s| < 0.1716: what is left out is below 2e-7.
+    let series = 1.0 + s2 * (1.0 / 3.0 + s2 * (0.2 + s2 * (1.0 / 7.0)));
+    0.5 * exponent as f32 + s * series * std::f32::consts::LOG2_E
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_logarithm_is_exact_enough() {
+        let mut x = 1e-37f32;
+        while x < 1e38 {
+            let exact = 0.5 * f64::from(x).log2();
+            let error = (f64::from(half_log2(x)) - exact).abs();
+            assert!(error < 2e-6 * exact.abs().max(1.0), "{x}: {error}");
+            x *= 1.003;
+        }
+        for power in -60..60 {
+            assert_eq!(half_log2(2f32.powi(power)), 0.5 * power as f32);
+        }
+        assert!(half_log2(0.0) < -60.0);
+        assert!(half_log2(f32::INFINITY) >= 64.0);
+    }
+
+    #[test]
+    fn ties_go_to_the_larger_level() {
+        let levels = [0.0, 0.5, 0.500_1, 1.5, 1.6, 2.0].map(nearest_level);
+        assert_eq!(levels, [0, 0, 1, 1, 2, 2]);
+    }
+}

@@ -1,0 +1,29 @@
+//! The texture unit: what shader cores sample, fetch, read and write of images.
+//!
+//! An [`ImageTable`] holds a draw's images and samplers and answers a program's image instructions
+//! ([`crate::isa::resources::ImageUnit`]), 16 lanes at a time, as the chapter "Image Operations" of the Vulkan
+//! specification says. Weights are binary32 throughout, sRGB is decoded before it is filtered, cubes are seamless.
+//! Hostile coordinates are safe: NaN counts as 0, and everything is bounds-checked.
+//!
+//! There are two ways to filter: lane by lane (`filter`), which does everything, and 16 lanes at once (`batch`), which
+//! does the common formats of one- and two-dimensional images. They agree bit for bit, at every SIMD level.
+
+mod address;
+mod batch;
+mod cube;
+mod fetch;
+mod filter;
+mod lod;
+mod packing;
+mod sampler;
+mod surface;
+mod table;
+mod view;
+
+pub use sampler::{
+    AddressMode, BorderColor, CompareOp, Filter, MAX_LOD_BIAS, MipmapMode, Sampler,
+};
+pub use table::ImageTable;
+pub use view::{
+    ComponentSwizzle, IDENTITY, ImageBinding, SampledImage, StorageImage, Swizzle, TexelBuffer,
+};

@@ -1,0 +1,359 @@
+//! Texels of 16 lanes at once: how the common formats lie in words, and their decoding.
+//!
+//! Decoding gives the same bits as [`crate::Format::decode`].
+
+use std::ops::Range;
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+
+use super::surface::Surface;
+use crate::format::{Channel, Format};
+
+/// How texels lie in words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Unorm8,
+    Unorm8x2,
+    Unorm8x4,
+    Srgb8x4,
+    Unorm16,
+    Float16x4,
+    Float32,
+    Float32x4,
+}
+
+/// A mip level: extents in texels; place and pitches in texels, from the first of `Packing::words`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PackedLevel {
+    pub width: f32,
+    pub height: f32,
+    pub base: u32,
+    pub row_pitch: u32,
+    pub layer_pitch: u32,
+}
+
+/// How the texels of a surface are read 16 at a time.
+#[derive(Clone, Debug)]
+pub(super) struct Packing {
+    pub kind: Kind,
+    /// The words of the memory that the surface begins and ends within.
+    pub words: Range<usize>,
+    pub levels: Vec<PackedLevel>,
+    /// For red, green, blue and alpha, which stored component it is.
+    pub order: [usize; 4],
+}
+
+/// Larger images are read lane by lane: up to here, texel indices are exact as floats.
+const MAX_EXTENT: u32 = 1 << 16;
+
+/// Every image begins at a multiple of as many bytes as the largest texel has.
+const ALIGNMENT: u64 = 16;
+
+impl Packing {
+    /// The packing of a surface; None if its texels are to be read one by one.
+    pub fn of(surface: &Surface) -> Option<Self> {
+        let kind = match surface.format {
+            Format::R8Unorm => Kind::Unorm8,
+            Format::R8G8Unorm => Kind::Unorm8x2,
+            Format::R8G8B8A8Unorm | Format::B8G8R8A8Unorm | Format::A8B8G8R8UnormPack32 => {
+                Kind::Unorm8x4
+            }
+            Format::R8G8B8A8Srgb | Format::B8G8R8A8Srgb | Format::A8B8G8R8SrgbPack32 => {
+                Kind::Srgb8x4
+            }
+            Format::R16Unorm | Format::D16Unorm => Kind::Unorm16,
+            Format::R16G16B16A16Sfloat => Kind::Float16x4,
+            Format::R32Sfloat | Format::D32Sfloat => Kind::Float32,
+            Format::R32G32B32A32Sfloat => Kind::Float32x4,
+            _ => return None,
+        };
+        let begin = surface.levels.iter().map(|level| level.offset).min()?;
+        let end = surface
+            .levels
+            .iter()
+            .map(|level| {
+                let [_, height, depth] = level.extent.map(u64::from);
+                level.offset
+                    + level.layer_pitch * u64::from(surface.layers - 1)
+                    + level.depth_pitch * depth.max(1)
+                    + level.row_pitch * height
+            })
+            .max()?;
+        let size = surface.texel_size as u64;
+        let texels = |bytes: u64| u32::try_from(bytes / size).ok();
+        let exact = |level: &super::surface::Level| {
+            level.offset.is_multiple_of(ALIGNMENT)
+                && level.extent.iter().all(|texels| *texels <= MAX_EXTENT)
+        };
+        if surface.samples != 1 || !surface.levels.iter().all(exact) || texels(end - begin).is_none()
+        {
+            return None;
+        }
+        let levels = surface.levels.iter().map(|level| {
+            Some(PackedLevel {
+                width: level.extent[0] as f32,
+                height: level.extent[1] as f32,
+                base: texels(level.offset - begin)?,
+                row_pitch: texels(level.row_pitch)?,
+                layer_pitch: texels(level.layer_pitch)?,
+            })
+        });
+        let components = surface.format.components();
+        let position = |channel: Channel, otherwise: usize| {
+            let found = components.iter().position(|c| c.channel == channel);
+            found.unwrap_or(otherwise)
+        };
+        Some(Self {
+            kind,
+            words: (begin / 4) as usize..(end.min(surface.memory.len()) / 4) as usize,
+            levels: levels.collect::<Option<_>>()?,
+            order: [
+                position(Channel::R, 0),
+                position(Channel::G, 1),
+                position(Channel::B, 2),
+                position(Channel::A, 3),
+            ],
+        })
+    }
+
+    /// The words that texels are read from.
+    pub fn words<'a>(&self, surface: &'a Surface) -> &'a [AtomicU32] {
+        surface
+            .memory
+            .words()
+            .get(self.words.clone())
+            .unwrap_or_default()
+    }
+}
+
+/// A [`Kind`] as a type.
+pub(super) trait Texels {
+    /// How many components are stored.
+    const COMPONENTS: usize;
+
+    /// The stored components of texels; those beyond [`Texels::COMPONENTS`] are zero.
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4];
+}
+
+/// The words at 16 places; zero beyond the end.
+#[inline(always)]
+fn gather<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> u32x16<S> {
+    let index: [u32; 16] = index.into();
+    let found: [u32; 16] = std::array::from_fn(|lane| {
+        words
+            .get(index[lane] as usize)
+            .map_or(0, |word| word.load(Relaxed))
+    });
+    u32x16::simd_from(simd, found)
+}
+
+/// Of texels smaller than a word: their bits, moved to the low end.
+#[inline(always)]
+fn gather_narrow<S: Simd>(
+    simd: S,
+    words: &[AtomicU32],
+    index: u32x16<S>,
+    texels_per_word: u32,
+) -> u32x16<S> {
+    let word = gather(simd, words, index >> texels_per_word.trailing_zeros());
+    let shift = (index & (texels_per_word - 1)) * (32 / texels_per_word);
+    word >> shift
+}
+
+/// 1/255 as the sum of a number of 16 bits, whose product with a code is exact, and the rest: the sum of the two
+/// products rounds as the quotient does.
+const INV_255: [f32; 2] = {
+    let high = f32::from_bits((1f32 / 255.0).to_bits() & !0xFF);
+    [high, (1.0 / 255.0 - high as f64) as f32]
+};
+
+/// One byte of each word as a fraction of 255.
+#[inline(always)]
+fn unorm8<S: Simd>(word: u32x16<S>, shift: u32) -> f32x16<S> {
+    let code = if shift == 24 {
+        word >> 24
+    } else {
+        (word >> shift) & 0xFF
+    };
+    let code = f32x16::float_from(code.bitcast::<fearless_simd::i32x16<S>>());
+    code * INV_255[0] + code * INV_255[1]
+}
+
+/// Linear values of sRGB codes.
+static LINEAR: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|code| Format::R8Srgb.decode(&[code as u8])[0]));
+
+pub(super) struct Unorm8;
+
+impl Texels for Unorm8 {
+    const COMPONENTS: usize = 1;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+        let zero = f32x16::splat(simd, 0.0);
+        let word = gather_narrow(simd, words, index, 4);
+        [unorm8(word, 0), zero, zero, zero]
+    }
+}
+
+pub(super) struct Unorm8x2;
+
+impl Texels for Unorm8x2 {
+    const COMPONENTS: usize = 2;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+        let zero = f32x16::splat(simd, 0.0);
+        let word = gather_narrow(simd, words, index, 2);
+        [unorm8(word, 0), unorm8(word, 8), zero, zero]
+    }
+}
+
+pub(super) struct Unorm8x4;
+
+impl Texels for Unorm8x4 {
+    const COMPONENTS: usize = 4;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+        let word = gather(simd, words, index);
+        [0, 8, 16, 24].map(|shift| unorm8(word, shift))
+    }
+}
+
+pub(super) struct Srgb8x4;
+
+impl Texels for Srgb8x4 {
+    const COMPONENTS: usize = 4;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+        let linear = &*LINEAR;
+        let word = gather(simd, words, index);
+        let codes: [u32; 16] = word.into();
+        let component = |shift: u32| {
+            let values: [f32; 16] =
+                std::array::from_fn(|lane| linear[usize::from((codes[lane] >> shift) as u8)]);
+            f32x16::simd_from(simd, values)
+        };
+        [component(0), component(8), component(16), unorm8(word, 24)]
+    }
+}
+
+pub(super) struct Unorm16;
+
+impl Texels for Unorm16 {
+    const COMPONENTS: usize = 1;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+        let zero = f32x16::splat(simd, 0.0);
+        let code = gather_narrow(simd, words, index, 2) & 0xFFFF;
+        let code = f32x16::float_from(code.bitcast::<fearless_simd::i32x16<S>>());
+        [code / 65_535.0, zero, zero, zero]
+    }
+}
+
+pub(super) struct Float16x4;
+
+/// The low 16 bits of words as binary16 numbers.
+#[inline(always)]
+fn float16<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
+    let sign = (bits & 0x8000) << 16;
+    // Moved to binary32's place the exponent is short of the biases' difference, which a multiplication mends, exactly,
+    // for denormal numbers too.
+    let magnitude = ((bits & 0x7FFF) << 13).bitcast::<f32x16<S>>() * f32::from_bits((254 - 15) << 23);
+    let magnitude: u32x16<S> = magnitude.bitcast();
+    let infinite = (bits & 0x7FFF).simd_ge(u32x16::splat(simd, 0x7C00));
+    let infinity = u32x16::splat(simd, 0x7F80_0000);
+    let zero = u32x16::splat(simd, 0);
+    // NaN's mantissa is kept, and made quiet.
+    let nan = (bits & 0x7FFF).simd_gt(u32x16::splat(simd, 0x7C00));
+    let quiet = nan.select(u32x16::splat(simd, 1 << 22), zero);
+    let magnitude = infinite.select((magnitude & 0x007F_FFFF) | infinity | quiet, magnitude);
+    (magnitude | sign).bitcast()
+}
+
+impl Texels for Float16x4 {
+    const COMPONENTS: usize = 4;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+        let low = gather(simd, words, index * 2);
+        let high = gather(simd, words, index * 2 + 1);
+        [low, low >> 16, high, high >> 16].map(|bits| float16(simd, bits))
+    }
+}
+
+pub(super) struct Float32;
+
+impl Texels for Float32 {
+    const COMPONENTS: usize = 1;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+        let zero = f32x16::splat(simd, 0.0);
+        [gather(simd, words, index).bitcast(), zero, zero, zero]
+    }
+}
+
+pub(super) struct Float32x4;
+
+impl Texels for Float32x4 {
+    const COMPONENTS: usize = 4;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+        [0, 1, 2, 3].map(|word| gather(simd, words, index * 4 + word).bitcast())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::SimdLevel;
+    use fearless_simd::dispatch;
+
+    /// Texels 0.. of these words, as a packing and as their format decodes them.
+    fn agree<T: Texels>(format: Format, words: &[u32]) {
+        let atomics: Vec<AtomicU32> = words.iter().copied().map(AtomicU32::new).collect();
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let size = format.texel_size();
+        for (name, level) in SimdLevel::supported() {
+            let level = level.resolve().unwrap();
+            for first in (0..bytes.len() / size).step_by(16) {
+                let found: [[f32; 16]; 4] = dispatch!(level, simd => {
+                    let index: [u32; 16] = std::array::from_fn(|lane| (first + lane) as u32);
+                    T::load(simd, &atomics, u32x16::simd_from(simd, index)).map(Into::into)
+                });
+                for lane in 0..16.min(bytes.len() / size - first) {
+                    let texel = &bytes[size * (first + lane)..][..size];
+                    let expected = format.decode(texel);
+                    for component in 0..T::COMPONENTS {
+                        let (a, b) = (found[component][lane], expected[component]);
+                        assert!(
+                            a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan(),
+                            "{format:?} {name} {texel:?}: {a} {b}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn decoding_is_that_of_the_formats() {
+        let bytes: Vec<u32> = (0..256).map(|code| code * 0x0101_0101).collect();
+        agree::<Unorm8>(Format::R8Unorm, &bytes);
+        agree::<Unorm8x2>(Format::R8G8Unorm, &bytes);
+        agree::<Unorm8x4>(Format::R8G8B8A8Unorm, &bytes);
+        agree::<Srgb8x4>(Format::R8G8B8A8Srgb, &bytes);
+        let halves: Vec<u32> = (0..1 << 16).map(|half| half << 16 | (half ^ 0xFFFF)).collect();
+        agree::<Unorm16>(Format::R16Unorm, &halves);
+        agree::<Float16x4>(Format::R16G16B16A16Sfloat, &halves);
+        agree::<Float32>(Format::R32Sfloat, &halves);
+        agree::<Float32x4>(Format::R32G32B32A32Sfloat, &halves);
+    }
+}

@@ -1,0 +1,144 @@
+//! Samplers: how coordinates become texels and how texels are mixed.
+
+/// How texels of one mip level are mixed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Filter {
+    /// The texel that the coordinates lie in.
+    #[default]
+    Nearest,
+    /// The weighted mean of the texels around. Integer formats are read as [`Filter::Nearest`].
+    Linear,
+}
+
+/// How mip levels are mixed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum MipmapMode {
+    /// The nearest level.
+    #[default]
+    Nearest,
+    /// The weighted mean of two levels.
+    Linear,
+}
+
+/// What coordinates outside the image mean, along one axis. Cubes have no outside and ignore it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum AddressMode {
+    /// The image repeats.
+    #[default]
+    Repeat,
+    /// The image repeats, every other time mirrored.
+    MirroredRepeat,
+    /// The texel at the edge.
+    ClampToEdge,
+    /// The border colour.
+    ClampToBorder,
+    /// The image is mirrored once, then its edge goes on.
+    MirrorClampToEdge,
+}
+
+/// A comparison of a reference with what memory holds: `reference op texel`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CompareOp {
+    /// False.
+    Never,
+    /// `reference < texel`.
+    Less,
+    /// `reference == texel`.
+    Equal,
+    /// `reference <= texel`.
+    LessOrEqual,
+    /// `reference > texel`.
+    Greater,
+    /// `reference != texel`.
+    NotEqual,
+    /// `reference >= texel`.
+    GreaterOrEqual,
+    /// True.
+    Always,
+}
+
+impl CompareOp {
+    /// Whether it holds. A comparison with NaN is false, but for [`CompareOp::NotEqual`] and [`CompareOp::Always`].
+    #[inline(always)]
+    pub fn holds(self, reference: f32, texel: f32) -> bool {
+        match self {
+            Self::Never => false,
+            Self::Less => reference < texel,
+            Self::Equal => reference == texel,
+            Self::LessOrEqual => reference <= texel,
+            Self::Greater => reference > texel,
+            Self::NotEqual => reference != texel,
+            Self::GreaterOrEqual => reference >= texel,
+            Self::Always => true,
+        }
+    }
+}
+
+/// What [`AddressMode::ClampToBorder`] reads outside the image: the bits of red, green, blue, alpha. Floats or
+/// integers, as the image's format is. Components that the format lacks read as ever.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct BorderColor(pub [u32; 4]);
+
+impl BorderColor {
+    /// Zeros, of any format.
+    pub const TRANSPARENT_BLACK: Self = Self([0; 4]);
+    /// (0, 0, 0, 1), for float formats.
+    pub const FLOAT_OPAQUE_BLACK: Self = Self::float([0.0, 0.0, 0.0, 1.0]);
+    /// Ones, for float formats.
+    pub const FLOAT_OPAQUE_WHITE: Self = Self::float([1.0; 4]);
+    /// (0, 0, 0, 1), for integer formats.
+    pub const INT_OPAQUE_BLACK: Self = Self([0, 0, 0, 1]);
+    /// Ones, for integer formats.
+    pub const INT_OPAQUE_WHITE: Self = Self([1; 4]);
+
+    /// Any colour, for float formats.
+    pub const fn float([r, g, b, a]: [f32; 4]) -> Self {
+        Self([r.to_bits(), g.to_bits(), b.to_bits(), a.to_bits()])
+    }
+}
+
+/// The greatest magnitude of the sum of a sampler's and an instruction's bias.
+pub const MAX_LOD_BIAS: f32 = 16.0;
+
+/// A sampler. Anisotropic filtering is not done: such a sampler is read as an isotropic one, which minifies along the
+/// longer axis of a pixel's footprint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampler {
+    /// Where an image is magnified: the level of detail is zero or less.
+    pub mag_filter: Filter,
+    /// Where it is minified.
+    pub min_filter: Filter,
+    /// Between levels.
+    pub mipmap_mode: MipmapMode,
+    /// Along u, v and w.
+    pub address_modes: [AddressMode; 3],
+    /// Added to the level of detail.
+    pub mip_lod_bias: f32,
+    /// The least level of detail.
+    pub min_lod: f32,
+    /// The greatest level of detail.
+    pub max_lod: f32,
+    /// The comparison with a reference value. Only instructions that bring a reference compare.
+    pub compare_op: Option<CompareOp>,
+    /// The colour outside.
+    pub border_color: BorderColor,
+    /// Coordinates count texels of the view's first level, the only one that is read.
+    pub unnormalized_coordinates: bool,
+}
+
+impl Default for Sampler {
+    fn default() -> Self {
+        Self {
+            mag_filter: Filter::default(),
+            min_filter: Filter::default(),
+            mipmap_mode: MipmapMode::default(),
+            address_modes: [AddressMode::default(); 3],
+            mip_lod_bias: 0.0,
+            min_lod: 0.0,
+            max_lod: f32::MAX,
+            compare_op: None,
+            border_color: BorderColor::default(),
+            unnormalized_coordinates: false,
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! A bound image made ready: where each texel lies in memory, and how it is read.
+
+use devmem::Allocation;
+use std::sync::Arc;
+
+use super::packing::Packing;
+use super::view::{ComponentSwizzle, IDENTITY, SampledImage, StorageImage, Swizzle, TexelBuffer};
+use crate::format::{Format, MAX_TEXEL_SIZE};
+use crate::image::ImageView;
+use crate::packet::Aspect;
+
+/// A mip level of a view: extents in texels, places and pitches in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Level {
+    /// Width, height, depth; at least 1 but for empty buffers.
+    pub extent: [u32; 3],
+    /// From the memory's beginning to the first layer's first texel.
+    pub offset: u64,
+    pub row_pitch: u64,
+    pub depth_pitch: u64,
+    pub sample_pitch: u64,
+    pub layer_pitch: u64,
+}
+
+/// Where a texel is: x, y, z, layer, sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Texel {
+    pub at: [u32; 3],
+    pub layer: u32,
+    pub sample: u32,
+}
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub(super) struct Surface {
+    pub memory: Arc<Allocation>,
+    /// How texels are read: one aspect's format.
+    pub format: Format,
+    pub texel_size: usize,
+    /// The view's levels, the largest first; at least one.
+    pub levels: Vec<Level>,
+    pub layers: u32,
+    pub samples: u32,
+    pub swizzle: Swizzle,
+    /// How 16 texels are decoded at once, if that is known.
+    pub packing: Option<Packing>,
+    /// Texels may be written.
+    pub writable: bool,
+}
+
+impl Surface {
+    /// A sampled image; None if the view has no texels of this aspect and format.
+    pub fn sampled(image: &SampledImage) -> Option<Self> {
+        let mut surface = Self::image(&image.view, image.aspect)?;
+        surface.swizzle = image.swizzle;
+        Some(surface)
+    }
+
+    /// A storage image; None if the view has no texels of this format.
+    pub fn storage(image: &StorageImage) -> Option<Self> {
+        let mut surface = Self::image(&image.view, Aspect::Color)?;
+        surface.writable = true;
+        surface.levels.truncate(1);
+        Some(surface)
+    }
+
+    fn image(view: &ImageView, aspect: Aspect) -> Option<Self> {
+        let image = &view.image;
+        let format = view.format.plane(aspect)?;
+        let levels: Vec<Level> = (0..view.level_count.min(image.desc.mip_levels))
+            .map_while(|level| {
+                let level = view.base_mip_level.checked_add(level)?;
+                let layout = image.subresource(aspect, level, view.base_layer)?;
+                (layout.format.texel_size() == format.texel_size()).then_some(Level {
+                    extent: layout.extent,
+                    offset: image.offset + layout.offset,
+                    row_pitch: layout.row_pitch,
+                    depth_pitch: layout.depth_pitch,
+                    sample_pitch: layout.sample_pitch,
+                    layer_pitch: layout.array_pitch,
+                })
+            })
+            .collect();
+        if levels.is_empty() {
+            return None;
+        }
+        let layers = image.desc.array_layers.saturating_sub(view.base_layer);
+        let layers = layers.min(view.layer_count);
+        if layers == 0 {
+            return None;
+        }
+        let mut surface = Self {
+            memory: image.memory.clone(),
+            format,
+            texel_size: format.texel_size(),
+            levels,
+            layers,
+            samples: image.desc.samples,
+            swizzle: IDENTITY,
+            packing: None,
+            writable: false,
+        };
+        surface.packing = Packing::of(&surface);
+        Some(surface)
+    }
+
+    /// A texel buffer: one row. None if the range doesn't lie within its memory.
+    pub fn buffer(buffer: &TexelBuffer) -> Option<Self> {
+        let range = &buffer.range;
+        let end = range.offset.checked_add(range.size)?;
+        let texel_size = buffer.format.texel_size();
+        if end > range.memory.len() || texel_size == 0 {
+            return None;
+        }
+        let texels = u32::try_from(range.size / texel_size as u64).unwrap_or(u32::MAX);
+        Some(Self {
+            memory: range.memory.clone(),
+            format: buffer.format,
+            texel_size,
+            levels: vec![Level {
+                extent: [texels, 1, 1],
+                offset: range.offset,
+                row_pitch: range.size,
+                depth_pitch: range.size,
+                sample_pitch: range.size,
+                layer_pitch: range.size,
+            }],
+            layers: 1,
+            samples: 1,
+            swizzle: IDENTITY,
+            packing: None,
+            writable: true,
+        })
+    }
+
+    /// The byte at which a texel begins; None if there is no such texel.
+    #[inline]
+    pub fn offset(&self, level: usize, texel: Texel) -> Option<u64> {
+        let level = self.levels.get(level)?;
+        let [x, y, z] = texel.at;
+        let inside = x < level.extent[0]
+            && y < level.extent[1]
+            && z < level.extent[2]
+            && texel.layer < self.layers
+            && texel.sample < self.samples;
+        inside.then(|| {
+            level.offset
+                + u64::from(texel.layer) * level.layer_pitch
+                + u64::from(texel.sample) * level.sample_pitch
+                + u64::from(z) * level.depth_pitch
+                + u64::from(y) * level.row_pitch
+                + u64::from(x) * self.texel_size as u64
+        })
+    }
+
+    /// A texel's registers, not swizzled; None if there is no such texel.
+    pub fn texel(&self, level: usize, texel: Texel) -> Option<[u32; 4]> {
+        let mut bytes = [0; MAX_TEXEL_SIZE];
+        let bytes = &mut bytes[..self.texel_size];
+        let offset = self.offset(level, texel)?;
+        self.memory.read(offset, bytes).ok()?;
+        Some(self.format.decode(bytes).map(f32::to_bits))
+    }
+
+    /// What a component that isn't there is, or a swizzle's one.
+    pub fn one(&self) -> u32 {
+        if self.is_integer() {
+            1
+        } else {
+            1f32.to_bits()
+        }
+    }
+
+    /// Whether registers hold integers, which are never mixed.
+    pub fn is_integer(&self) -> bool {
+        self.format.is_integer()
+    }
+
+    /// Registers as a program gets them.
+    pub fn swizzled(&self, texel: [u32; 4]) -> [u32; 4] {
+        let one = self.one();
+        self.swizzle.map(|from| from.pick(&texel, 0, one))
+    }
+
+    /// One swizzled component.
+    pub fn component(&self, texel: &[u32; 4], component: u8) -> u32 {
+        let from = self.swizzle.get(usize::from(component));
+        from.unwrap_or(&ComponentSwizzle::Zero)
+            .pick(texel, 0, self.one())
+    }
+}

@@ -1,0 +1,133 @@
+//! The image unit: what a program's image and sampler slots are bound to.
+
+use fearless_simd::{Level, dispatch};
+
+use super::sampler::Sampler;
+use super::surface::Surface;
+use super::view::ImageBinding;
+use super::{batch, fetch, filter, lod};
+use crate::isa::ir::{AtomicOp, Dimension, ImageShape};
+use crate::isa::resources::{ImageUnit, Lanes, SampleRequest, TexelRequest};
+
+/// The images and samplers of a draw or a dispatch, by the slots that its program names.
+///
+/// Where texels lie and how they are decoded is worked out once, when the table is made. The table doesn't mark memory
+/// that it writes as changed: that is up to whoever executes the draw (see [`devmem::Allocation::bump_generation`]).
+#[derive(Clone, Debug)]
+pub struct ImageTable {
+    level: Level,
+    surfaces: Vec<Option<Surface>>,
+    samplers: Vec<Option<Sampler>>,
+    batched: bool,
+}
+
+impl ImageTable {
+    /// A table of what slots 0.. are bound to. An image that its memory doesn't hold is as if it were not bound.
+    pub fn new(
+        level: Level,
+        images: impl IntoIterator<Item = ImageBinding>,
+        samplers: impl IntoIterator<Item = Option<Sampler>>,
+    ) -> Self {
+        let surface = |binding| match binding {
+            ImageBinding::Unbound => None,
+            ImageBinding::Sampled(image) => Surface::sampled(&image),
+            ImageBinding::Storage(image) => Surface::storage(&image),
+            ImageBinding::TexelBuffer(buffer) => Surface::buffer(&buffer),
+        };
+        Self {
+            level,
+            surfaces: images.into_iter().map(surface).collect(),
+            samplers: samplers.into_iter().collect(),
+            batched: true,
+        }
+    }
+
+    /// The same table, but every lane is filtered by itself: the same bits, slower. For tests.
+    #[must_use]
+    pub fn lane_by_lane(mut self) -> Self {
+        self.batched = false;
+        self
+    }
+
+    fn surface(&self, image: u32) -> Option<&Surface> {
+        self.surfaces.get(image as usize)?.as_ref()
+    }
+
+    fn pair(&self, image: u32, sampler: u32) -> Option<(&Surface, &Sampler)> {
+        let sampler = self.samplers.get(sampler as usize)?.as_ref()?;
+        Some((self.surface(image)?, sampler))
+    }
+}
+
+impl ImageUnit for ImageTable {
+    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 4] {
+        let Some((surface, sampler)) = self.pair(image, sampler) else {
+            return Default::default();
+        };
+        match &surface.packing {
+            Some(packing) if self.batched && batch::handles(request) => {
+                dispatch!(self.level, simd => batch::sample(simd, surface, packing, sampler, request))
+            }
+            _ => filter::sample(surface, sampler, request),
+        }
+    }
+
+    fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4] {
+        self.surface(image)
+            .map_or_else(Default::default, |surface| fetch::read(surface, request))
+    }
+
+    fn write(&self, image: u32, request: &TexelRequest, texel: &[Lanes; 4]) {
+        if let Some(surface) = self.surface(image) {
+            fetch::write(surface, request, texel);
+        }
+    }
+
+    fn atomic(
+        &self,
+        image: u32,
+        request: &TexelRequest,
+        op: AtomicOp,
+        value: &Lanes,
+        comparator: &Lanes,
+    ) -> Lanes {
+        self.surface(image).map_or_else(Default::default, |surface| {
+            fetch::atomic(surface, request, op, value, comparator)
+        })
+    }
+
+    fn size(&self, image: u32, shape: ImageShape, level: u32) -> [u32; 4] {
+        let mut size = [0; 4];
+        let Some(surface) = self.surface(image) else {
+            return size;
+        };
+        let Some(level) = surface.levels.get(level as usize) else {
+            return size;
+        };
+        let (axes, layers) = match shape.dimension {
+            Dimension::Cube => (2, surface.layers / 6),
+            dimension => (dimension.coordinates(), surface.layers),
+        };
+        size[..axes].copy_from_slice(&level.extent[..axes]);
+        if shape.arrayed {
+            size[axes] = layers;
+        }
+        size
+    }
+
+    fn levels(&self, image: u32) -> u32 {
+        self.surface(image)
+            .map_or(0, |surface| surface.levels.len() as u32)
+    }
+
+    fn samples(&self, image: u32) -> u32 {
+        self.surface(image).map_or(0, |surface| surface.samples)
+    }
+
+    fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 2] {
+        self.pair(image, sampler)
+            .map_or_else(Default::default, |(surface, sampler)| {
+                lod::query(surface, sampler, request)
+            })
+    }
+}
