@@ -5,9 +5,10 @@ use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::isa::exec::{Executable, LaneMask, Machine, Options, Stopped, Watchdog, Work};
 use crate::isa::ir::{CHUNK_LANES, Program};
+use crate::isa::resources::Resources;
 use crate::isa::validate::InvalidProgram;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -103,7 +104,7 @@ pub(crate) fn dispatch(
     let Some(groups) = group_count(dispatch.count).filter(|&groups| groups > 0) else {
         return Ok(());
     };
-    let push_constants = dispatch.bindings.push_constant_words();
+    let prepared = dispatch.bindings.prepare(device.level());
     let threads = device.threads() as u64;
     let job = Job {
         dispatch,
@@ -111,7 +112,7 @@ pub(crate) fn dispatch(
         piece: (groups / (threads * PIECES_PER_WORKER)).max(1),
         next: AtomicU64::new(0),
         cancel: AtomicBool::new(false),
-        push_constants: &push_constants,
+        resources: prepared.resources(),
         limit: device.config().shader_timeout,
     };
     let started = Instant::now();
@@ -158,7 +159,7 @@ struct Job<'a> {
     next: AtomicU64,
     /// Set when one worker stopped, so that the others do, too.
     cancel: AtomicBool,
-    push_constants: &'a [AtomicU32],
+    resources: Resources<'a>,
     limit: Duration,
 }
 
@@ -197,7 +198,7 @@ impl Job<'_> {
         machine.run(
             &LaneMask::first(self.dispatch.program.invocations),
             &LaneMask::none(),
-            &self.dispatch.bindings.resources(self.push_constants),
+            &self.resources,
             Watchdog {
                 limit: self.limit,
                 cancel: Some(&self.cancel),

@@ -38,6 +38,9 @@ pub(crate) const MAX_LAYERS: u32 = 2048;
 /// The most colour attachments.
 pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
 
+/// The greatest magnitude of a sampler's bias of the level of detail.
+pub(crate) const MAX_SAMPLER_LOD_BIAS: f32 = simdevice::texture::MAX_LOD_BIAS;
+
 /// The bytes of push constants.
 pub(crate) const MAX_PUSH_CONSTANTS_SIZE: u32 = 256;
 
@@ -154,7 +157,7 @@ fn limits() -> vk::PhysicalDeviceLimits {
         mipmap_precision_bits: 8,
         max_draw_indexed_index_value: u32::MAX,
         max_draw_indirect_count: u32::MAX,
-        max_sampler_lod_bias: 2.0,
+        max_sampler_lod_bias: MAX_SAMPLER_LOD_BIAS,
         max_sampler_anisotropy: 1.0,
         max_viewports: 1,
         max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],

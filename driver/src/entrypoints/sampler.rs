@@ -12,8 +12,8 @@ crate::entry_points! {
         _allocator: *const vk::AllocationCallbacks<'_>,
         sampler: *mut vk::Sampler,
     ) -> vk::Result {
-        pointer::input(create_info)?;
-        pointer::output(sampler, handle::create(Arc::new(Sampler {})))
+        let object = Sampler::new(pointer::input(create_info)?)?;
+        pointer::output(sampler, handle::create(Arc::new(object)))
     }
 
     fn destroy_sampler(

@@ -3,8 +3,11 @@
 use crate::command::bound::{BoundSet, BoundSets};
 use crate::object::descriptor::layout::Binding;
 use crate::object::descriptor::Descriptor;
-use crate::shader;
+use crate::object::image::ImageView;
+use crate::shader::{self, DescriptorKind};
+use simdevice::Allocation;
 use simdevice::bindings::Bindings;
+use simdevice::texture::{ImageBinding, SampledImage, StorageImage, TexelBuffer};
 use std::sync::Arc;
 
 /// A set that is not bound.
@@ -45,24 +48,70 @@ fn bind(
     let count = used.count.min(binding.count) as usize;
     for (element, descriptor) in held[binding.first..][..count].iter().enumerate() {
         let slot = used.slot as usize + element;
-        match descriptor {
-            Descriptor::Empty | Descriptor::TexelBuffer(_) | Descriptor::Image { .. } => {}
-            Descriptor::Buffer(buffer) => {
-                let dynamic = binding.first_dynamic.map(|first| first + element);
-                let offset = dynamic.and_then(|index| bound.dynamic_offsets.get(index));
-                let range = buffer.range(offset.copied().unwrap_or(0));
-                if used.writable {
-                    bindings.written.push(Arc::clone(&range.memory));
-                }
-                place(&mut bindings.buffers, slot, range);
+        let dynamic = binding.first_dynamic.map(|first| first + element);
+        let offset = dynamic.and_then(|index| bound.dynamic_offsets.get(index));
+        place(used, slot, descriptor, offset.copied(), bindings);
+    }
+}
+
+/// Puts what a descriptor holds at a bind point.
+fn place(
+    used: &shader::Descriptor,
+    slot: usize,
+    descriptor: &Descriptor,
+    dynamic_offset: Option<u32>,
+    bindings: &mut Bindings,
+) {
+    match descriptor {
+        Descriptor::Empty => {}
+        Descriptor::Buffer(buffer) => {
+            let range = buffer.range(dynamic_offset.unwrap_or(0));
+            note_written(used, &range.memory, bindings);
+            *element(&mut bindings.buffers, slot) = Some(range);
+        }
+        Descriptor::TexelBuffer(view) => {
+            note_written(used, &view.range.memory, bindings);
+            *element(&mut bindings.images, slot) = ImageBinding::TexelBuffer(TexelBuffer {
+                range: view.range.clone(),
+                format: view.format,
+            });
+        }
+        Descriptor::Image { view, sampler } => {
+            if let Some(view) = view {
+                note_written(used, &view.view.image.memory, bindings);
+                *element(&mut bindings.images, slot) = image(used.kind, view);
+            }
+            if let Some(sampler) = sampler {
+                *element(&mut bindings.samplers, slot) = Some(sampler.state);
             }
         }
     }
 }
 
-fn place<T>(slots: &mut Vec<Option<T>>, index: usize, value: T) {
-    if slots.len() <= index {
-        slots.resize_with(index + 1, || None);
+/// An image's view as a variable of this kind reads it.
+fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
+    let (aspect, swizzle) = (view.aspect, view.swizzle);
+    let view = view.view.clone();
+    match kind {
+        DescriptorKind::StorageImage => ImageBinding::Storage(StorageImage { view }),
+        _ => ImageBinding::Sampled(SampledImage {
+            view,
+            aspect,
+            swizzle,
+        }),
     }
-    slots[index] = Some(value);
+}
+
+fn note_written(used: &shader::Descriptor, memory: &Arc<Allocation>, bindings: &mut Bindings) {
+    if used.writable && !bindings.written.iter().any(|known| Arc::ptr_eq(known, memory)) {
+        bindings.written.push(Arc::clone(memory));
+    }
+}
+
+/// The element at a bind point, of a list that grows as needed.
+fn element<T: Default>(slots: &mut Vec<T>, index: usize) -> &mut T {
+    if slots.len() <= index {
+        slots.resize_with(index + 1, T::default);
+    }
+    &mut slots[index]
 }

@@ -260,7 +260,7 @@ fn pipelines_that_do_not_fit_their_layout_are_refused() {
     };
     refused(&[], "set 0, binding 0");
     refused(&[&[(0, STORAGE, 4)]], "set 1, binding");
-    refused(&[&[(0, STORAGE, 3)], &[(0, UNIFORM, 2), (3, STORAGE, 1)]], "3 descriptors, not 4");
+    refused(&[&[(0, STORAGE, 3)], &[(0, UNIFORM, 2), (3, STORAGE, 1)]], "has 3 descriptors in the pipeline layout");
     refused(&[&[(0, STORAGE, 4)], &[(0, STORAGE, 2), (3, STORAGE, 1)]], "UniformBuffer");
 }
 

@@ -144,6 +144,12 @@ impl DescriptorSetLayout {
         self.bindings.values()
     }
 
+    /// The bindings that have descriptors, with their numbers.
+    pub(crate) fn numbered(&self) -> impl Iterator<Item = (u32, &Binding)> {
+        let bindings = self.bindings.iter().map(|(&number, binding)| (number, binding));
+        bindings.filter(|(_, binding)| binding.count > 0)
+    }
+
     /// How many descriptors a set has.
     pub(crate) fn count(&self) -> usize {
         self.count

@@ -2,9 +2,8 @@
 
 use crate::error::Error;
 use crate::object::descriptor::layout::DescriptorSetLayout;
-use crate::shader::{self, DescriptorKind, Interface, Stage};
+use crate::shader::{DescriptorKind, Interface, Stage, reflect};
 use ash::vk;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// A pipeline's layout: what its programs may be bound to.
@@ -68,64 +67,39 @@ impl PipelineLayout {
     /// Checks that what a shader uses is there.
     ///
     /// # Errors
-    /// [`Error::Usage`] names what is missing.
+    /// [`Error::Usage`] names all that is missing.
     pub(crate) fn check(&self, interface: &Interface) -> Result<(), Error> {
         let stage = stage_flag(interface.stage);
-        interface
-            .descriptors
-            .iter()
-            .try_for_each(|used| self.check_descriptor(used, stage))?;
-        match &interface.push_constants {
-            Some(range) if !self.has_push_constants(stage, range) => Err(Error::usage(
-                "VUID-VkComputePipelineCreateInfo-layout-07987",
-                format!(
-                    "the {} shader reads bytes {range:?} of push constants, which the pipeline layout does not give it",
-                    interface.stage
-                ),
-            )),
-            _ => Ok(()),
-        }
-    }
-
-    fn check_descriptor(
-        &self,
-        used: &shader::Descriptor,
-        stage: vk::ShaderStageFlags,
-    ) -> Result<(), Error> {
-        let wrong = |vuid, problem: String| {
-            let name = used.name.as_deref().unwrap_or("a variable");
-            let place = format!("set {}, binding {}", used.set, used.binding);
-            Err(Error::usage(
-                vuid,
-                format!("the shader's {name} is at {place}, {problem}"),
-            ))
+        let bindings = (0..).zip(&self.set_layouts).flat_map(|(set, layout)| {
+            let bindings = layout.iter().flat_map(|layout| layout.numbered());
+            bindings.filter_map(move |(number, binding)| {
+                Some(reflect::LayoutBinding {
+                    set,
+                    binding: number,
+                    kind: kind(binding.kind)?,
+                    count: binding.count,
+                    visible: binding.stages.contains(stage),
+                })
+            })
+        });
+        let push_constants = self.push_constants.iter().map(|range| reflect::PushConstantRange {
+            offset: range.offset,
+            size: range.size,
+            visible: range.stage_flags.contains(stage),
+        });
+        let layout = reflect::Layout {
+            bindings: bindings.collect(),
+            push_constants: push_constants.collect(),
         };
-        let missing = "VUID-VkComputePipelineCreateInfo-layout-07988";
-        let set = self.set_layouts.get(used.set as usize).and_then(Option::as_ref);
-        let Some(binding) = set.and_then(|set| set.binding(used.binding)) else {
-            return wrong(missing, "which the pipeline layout does not have".into());
-        };
-        if !binding.stages.contains(stage) {
-            return wrong(missing, format!("which is for stages {:?}", binding.stages));
+        let mismatches = reflect::check(interface, &layout);
+        if mismatches.is_empty() {
+            return Ok(());
         }
-        if !holds(binding.kind, used.kind) {
-            let problem = format!("which holds {:?}, not {:?}", binding.kind, used.kind);
-            return wrong("VUID-VkComputePipelineCreateInfo-layout-07990", problem);
-        }
-        if binding.count < used.count {
-            let problem = format!("which has {} descriptors, not {}", binding.count, used.count);
-            return wrong("VUID-VkComputePipelineCreateInfo-layout-07991", problem);
-        }
-        Ok(())
-    }
-
-    /// Whether the stage may read all of the range's bytes of push constants.
-    fn has_push_constants(&self, stage: vk::ShaderStageFlags, range: &Range<u32>) -> bool {
-        self.push_constants.iter().any(|declared| {
-            declared.stage_flags.contains(stage)
-                && declared.offset <= range.start
-                && range.end <= declared.offset + declared.size
-        })
+        let messages: Vec<_> = mismatches.iter().map(ToString::to_string).collect();
+        Err(Error::usage(
+            "VUID-VkComputePipelineCreateInfo-layout-07988",
+            messages.join("; "),
+        ))
     }
 }
 
@@ -137,24 +111,22 @@ fn stage_flag(stage: Stage) -> vk::ShaderStageFlags {
     }
 }
 
-/// Whether descriptors of this type are what a shader's variable of this kind needs.
-fn holds(ty: vk::DescriptorType, kind: DescriptorKind) -> bool {
-    use vk::DescriptorType as Type;
-    match kind {
-        DescriptorKind::Sampler => matches!(ty, Type::SAMPLER | Type::COMBINED_IMAGE_SAMPLER),
-        DescriptorKind::SampledImage => {
-            matches!(ty, Type::SAMPLED_IMAGE | Type::COMBINED_IMAGE_SAMPLER)
+/// What a shader's variable must be to use descriptors of a type.
+fn kind(ty: vk::DescriptorType) -> Option<DescriptorKind> {
+    match ty {
+        vk::DescriptorType::SAMPLER => Some(DescriptorKind::Sampler),
+        vk::DescriptorType::COMBINED_IMAGE_SAMPLER => Some(DescriptorKind::CombinedImageSampler),
+        vk::DescriptorType::SAMPLED_IMAGE => Some(DescriptorKind::SampledImage),
+        vk::DescriptorType::STORAGE_IMAGE => Some(DescriptorKind::StorageImage),
+        vk::DescriptorType::UNIFORM_TEXEL_BUFFER => Some(DescriptorKind::UniformTexelBuffer),
+        vk::DescriptorType::STORAGE_TEXEL_BUFFER => Some(DescriptorKind::StorageTexelBuffer),
+        vk::DescriptorType::UNIFORM_BUFFER | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC => {
+            Some(DescriptorKind::UniformBuffer)
         }
-        DescriptorKind::CombinedImageSampler => ty == Type::COMBINED_IMAGE_SAMPLER,
-        DescriptorKind::StorageImage => ty == Type::STORAGE_IMAGE,
-        DescriptorKind::UniformTexelBuffer => ty == Type::UNIFORM_TEXEL_BUFFER,
-        DescriptorKind::StorageTexelBuffer => ty == Type::STORAGE_TEXEL_BUFFER,
-        DescriptorKind::UniformBuffer => {
-            matches!(ty, Type::UNIFORM_BUFFER | Type::UNIFORM_BUFFER_DYNAMIC)
+        vk::DescriptorType::STORAGE_BUFFER | vk::DescriptorType::STORAGE_BUFFER_DYNAMIC => {
+            Some(DescriptorKind::StorageBuffer)
         }
-        DescriptorKind::StorageBuffer => {
-            matches!(ty, Type::STORAGE_BUFFER | Type::STORAGE_BUFFER_DYNAMIC)
-        }
-        DescriptorKind::InputAttachment => ty == Type::INPUT_ATTACHMENT,
+        vk::DescriptorType::INPUT_ATTACHMENT => Some(DescriptorKind::InputAttachment),
+        _ => None,
     }
 }
