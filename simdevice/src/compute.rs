@@ -82,7 +82,11 @@ impl ComputeProgram {
     }
 
     fn machine(&self) -> Machine {
-        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let idle = self
+            .idle
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .pop();
         idle.unwrap_or_else(|| Machine::new(Arc::clone(&self.executable)))
     }
 
@@ -189,7 +193,11 @@ impl Job<'_> {
 
     fn run(&self, machine: &mut Machine, group: u64) -> Result<(), Stopped> {
         let [width, height, _] = self.dispatch.count.map(u64::from);
-        let number = [group % width, group / width % height, group / width / height];
+        let number = [
+            group % width,
+            group / width % height,
+            group / width / height,
+        ];
         let base = self.dispatch.base;
         self.set_inputs(machine, |input| match input {
             ComputeInput::WorkgroupId(axis) => Some(base[axis].wrapping_add(number[axis] as u32)),

@@ -58,7 +58,9 @@ impl BoundSets {
         layout: &Arc<DescriptorSetLayout>,
         writes: &[Write],
     ) -> Result<(), Error> {
-        let same = |bound: &&BoundSet| bound.set.layout().is_push() && Arc::ptr_eq(bound.set.layout(), layout);
+        let same = |bound: &&BoundSet| {
+            bound.set.layout().is_push() && Arc::ptr_eq(bound.set.layout(), layout)
+        };
         let set = match self.get(number).filter(same) {
             Some(bound) => Arc::clone(&bound.set),
             None => {

@@ -1,7 +1,7 @@
 //! The state that a command buffer's draws read, as the commands replayed so far have left it.
 
-use super::record::{IndexBuffer, VertexBuffer};
 use super::bound::{BindPoint, BoundSets};
+use super::record::{IndexBuffer, VertexBuffer};
 use crate::object::pipeline::GraphicsPipeline;
 use crate::object::pipeline::compute::ComputePipeline;
 use simdevice::packet::{Camera, Rect, Viewport};

@@ -140,7 +140,9 @@ unsafe fn new_layout(
             pnext::find::<vk::DescriptorSetLayoutBindingFlagsCreateInfo<'_>>(info.p_next)
         {
             let flags = pointer::slice(flags.p_binding_flags, flags.binding_count)?;
-            if let Some(flags) = flags.iter().find(|flags| !flags.is_empty()) {
+            let known = vk::DescriptorBindingFlags::PARTIALLY_BOUND
+                | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING;
+            if let Some(flags) = flags.iter().find(|&&flags| !known.contains(flags)) {
                 return Err(Error::FeatureNotPresent(format!(
                     "a descriptor binding with flags {flags:?}"
                 )));
@@ -167,9 +169,7 @@ unsafe fn new_layout(
 ///
 /// # Safety
 /// The binding is valid.
-unsafe fn binding_info(
-    binding: &vk::DescriptorSetLayoutBinding<'_>,
-) -> Result<BindingInfo, Error> {
+unsafe fn binding_info(binding: &vk::DescriptorSetLayoutBinding<'_>) -> Result<BindingInfo, Error> {
     let has_samplers = matches!(
         binding.descriptor_type,
         vk::DescriptorType::SAMPLER | vk::DescriptorType::COMBINED_IMAGE_SAMPLER

@@ -84,8 +84,14 @@ pub(super) unsafe fn write(
     let kind = info.descriptor_type;
     let contents = Contents::of(kind, layout, info.dst_binding)?;
     let (data, stride) = match contents {
-        Contents::Image { .. } => (info.p_image_info.cast(), size_of::<vk::DescriptorImageInfo>()),
-        Contents::Buffer => (info.p_buffer_info.cast(), size_of::<vk::DescriptorBufferInfo>()),
+        Contents::Image { .. } => (
+            info.p_image_info.cast(),
+            size_of::<vk::DescriptorImageInfo>(),
+        ),
+        Contents::Buffer => (
+            info.p_buffer_info.cast(),
+            size_of::<vk::DescriptorBufferInfo>(),
+        ),
         Contents::TexelBuffer => (info.p_texel_buffer_view.cast(), size_of::<vk::BufferView>()),
     };
     // SAFETY: the caller's promise: the array that belongs to the kind has as many elements.
@@ -199,7 +205,11 @@ unsafe fn descriptors(
     let one = |index: u32| unsafe {
         let data = data.byte_add(index as usize * stride);
         match contents {
-            Contents::Image { view, sampler } => image(view, sampler, &data.cast::<vk::DescriptorImageInfo>().read_unaligned()),
+            Contents::Image { view, sampler } => image(
+                view,
+                sampler,
+                &data.cast::<vk::DescriptorImageInfo>().read_unaligned(),
+            ),
             Contents::Buffer => buffer(&data.cast::<vk::DescriptorBufferInfo>().read_unaligned()),
             Contents::TexelBuffer => {
                 let view = data.cast::<vk::BufferView>().read_unaligned();
@@ -220,8 +230,16 @@ unsafe fn image(
     sampler: bool,
     info: &vk::DescriptorImageInfo,
 ) -> Result<Descriptor, Error> {
-    let view = if view { info.image_view } else { vk::ImageView::null() };
-    let sampler = if sampler { info.sampler } else { vk::Sampler::null() };
+    let view = if view {
+        info.image_view
+    } else {
+        vk::ImageView::null()
+    };
+    let sampler = if sampler {
+        info.sampler
+    } else {
+        vk::Sampler::null()
+    };
     // SAFETY: the caller's promise.
     unsafe {
         Ok(Descriptor::Image {

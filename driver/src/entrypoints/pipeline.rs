@@ -3,10 +3,8 @@
 use crate::capabilities::limits;
 use crate::error::Error;
 use crate::object::device::Device;
-use crate::object::pipeline::{
-    GraphicsPipeline, GraphicsPipelineInfo, Pipeline, PipelineCache,
-};
 use crate::object::pipeline::layout::PipelineLayout;
+use crate::object::pipeline::{GraphicsPipeline, GraphicsPipelineInfo, Pipeline, PipelineCache};
 use crate::object::shader_module::ShaderModule;
 use crate::{handle, pnext, pointer};
 use ash::vk;
@@ -192,8 +190,7 @@ unsafe fn new_graphics_pipeline(
 pub(super) unsafe fn withhold_feedback(chain: *const c_void) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     unsafe {
-        let Some(feedback) = pnext::find::<vk::PipelineCreationFeedbackCreateInfo>(chain)
-        else {
+        let Some(feedback) = pnext::find::<vk::PipelineCreationFeedbackCreateInfo>(chain) else {
             return Ok(());
         };
         let none = vk::PipelineCreationFeedback::default();

@@ -1,8 +1,8 @@
 //! Lowers descriptor sets: what the programs of a draw or dispatch are bound to, by their bind points.
 
 use crate::command::bound::{BoundSet, BoundSets};
-use crate::object::descriptor::layout::Binding;
 use crate::object::descriptor::Descriptor;
+use crate::object::descriptor::layout::Binding;
 use crate::object::image::ImageView;
 use crate::shader::{self, DescriptorKind};
 use simdevice::Allocation;
@@ -38,12 +38,7 @@ pub(crate) fn bindings(
 }
 
 /// Binds what one variable of a program uses.
-fn bind(
-    used: &shader::Descriptor,
-    bound: &BoundSet,
-    binding: &Binding,
-    bindings: &mut Bindings,
-) {
+fn bind(used: &shader::Descriptor, bound: &BoundSet, binding: &Binding, bindings: &mut Bindings) {
     let held = bound.set.lock();
     let count = used.count.min(binding.count) as usize;
     for (element, descriptor) in held[binding.first..][..count].iter().enumerate() {
@@ -103,7 +98,12 @@ fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
 }
 
 fn note_written(used: &shader::Descriptor, memory: &Arc<Allocation>, bindings: &mut Bindings) {
-    if used.writable && !bindings.written.iter().any(|known| Arc::ptr_eq(known, memory)) {
+    if used.writable
+        && !bindings
+            .written
+            .iter()
+            .any(|known| Arc::ptr_eq(known, memory))
+    {
         bindings.written.push(Arc::clone(memory));
     }
 }

@@ -23,7 +23,12 @@ impl Sampler {
         if info.anisotropy_enable != vk::FALSE {
             return Err(Error::FeatureNotPresent("samplerAnisotropy".into()));
         }
-        let [u, v, w] = [info.address_mode_u, info.address_mode_v, info.address_mode_w].map(address_mode);
+        let [u, v, w] = [
+            info.address_mode_u,
+            info.address_mode_v,
+            info.address_mode_w,
+        ]
+        .map(address_mode);
         let compares = info.compare_enable != vk::FALSE;
         let bias = limits::MAX_SAMPLER_LOD_BIAS;
         Ok(Self {

@@ -73,7 +73,13 @@ fn dynamic_offsets_go_to_their_descriptors_in_order() {
     let target = gpu.buffer_of(&[0u32; 256]);
     let set = kernel.sets()[0];
     write(&gpu, set, (0, 0), dynamic, &[whole(source).range(256)]);
-    write(&gpu, set, (1, 0), dynamic, &[whole(target).offset(16).range(256)]);
+    write(
+        &gpu,
+        set,
+        (1, 0),
+        dynamic,
+        &[whole(target).offset(16).range(256)],
+    );
     let bind_point = vk::PipelineBindPoint::COMPUTE;
     gpu.run(|device, commands| {
         kernel.bind(commands, &[]);
@@ -81,7 +87,14 @@ fn dynamic_offsets_go_to_their_descriptors_in_order() {
         // SAFETY: see the crate.
         unsafe {
             let offsets = [128 * 4, 32 * 4];
-            device.cmd_bind_descriptor_sets(commands, bind_point, kernel.layout, 0, &[set], &offsets);
+            device.cmd_bind_descriptor_sets(
+                commands,
+                bind_point,
+                kernel.layout,
+                0,
+                &[set],
+                &offsets,
+            );
             device.cmd_dispatch(commands, 1, 1, 1);
         }
     });
@@ -111,7 +124,9 @@ fn specialization_constants_change_the_kernel() {
             .size(4)
     };
     let run = |entries: &[vk::SpecializationMapEntry], data: &[u8]| {
-        let info = vk::SpecializationInfo::default().map_entries(entries).data(data);
+        let info = vk::SpecializationInfo::default()
+            .map_entries(entries)
+            .data(data);
         let words = spirv!("specialization.comp");
         let kernel = Kernel::specialized(&gpu, &words, &[bindings], &info);
         let target = gpu.buffer_of(&[0f32; 64]);
@@ -126,7 +141,10 @@ fn specialization_constants_change_the_kernel() {
         .iter()
         .flat_map(|word| word.to_le_bytes())
         .collect();
-    let values = run(&[entry(0, 0), entry(1, 4), entry(2, 8), entry(3, 12)], &data);
+    let values = run(
+        &[entry(0, 0), entry(1, 4), entry(2, 8), entry(3, 12)],
+        &data,
+    );
     let expected: Vec<_> = (0..8).map(|i| -((i + 3) as f32) * 2.5).collect();
     assert_eq!(values[..8], expected);
     assert_eq!((values[8], values[63]), (0.0, 8.0));
@@ -141,7 +159,12 @@ fn noted(gpu: &Gpu, target: Buffer, count: [u32; 3]) -> Vec<[u32; 3]> {
     let mut locals: Vec<_> = notes.iter().map(|note| note[2]).collect();
     locals.sort_unstable();
     let groups = notes.len() / 12;
-    assert!(locals.iter().enumerate().all(|(i, &local)| local as usize == i / groups));
+    assert!(
+        locals
+            .iter()
+            .enumerate()
+            .all(|(i, &local)| local as usize == i / groups)
+    );
     let mut ids: Vec<_> = notes
         .iter()
         .filter(|note| note[2] == 0)
@@ -223,7 +246,10 @@ fn atomics_lose_nothing() {
     let count = groups * 128;
     let values = gpu.read::<u32>(data);
     let xored = (0..count).fold(0, |all, i| all ^ i);
-    assert_eq!(values[..4], [count * (count - 1) / 2, count - 1, 7, u32::MAX]);
+    assert_eq!(
+        values[..4],
+        [count * (count - 1) / 2, count - 1, 7, u32::MAX]
+    );
     assert_eq!(values[4..6], [0xffff_0000, xored]);
     assert!((1000..1000 + count).contains(&values[6]));
     assert_eq!(values[7], count);
@@ -239,10 +265,19 @@ fn what_is_out_of_range_reads_zero_and_takes_nothing() {
     let target = gpu.buffer(32 * 12, MAPPABLE);
     let set = kernel.sets()[0];
     // 8 of 128 words are bound, so that the rest shows whether anything is written beyond.
-    write(&gpu, set, (0, 0), STORAGE, &[whole(data).offset(64).range(32)]);
+    write(
+        &gpu,
+        set,
+        (0, 0),
+        STORAGE,
+        &[whole(data).offset(64).range(32)],
+    );
     write(&gpu, set, (2, 0), STORAGE, &[whole(target)]);
     for stride in [1, 3, 1 << 20, 0x0800_0001] {
-        gpu.write(data, bytemuck::cast_slice(&(100..228u32).collect::<Vec<_>>()));
+        gpu.write(
+            data,
+            bytemuck::cast_slice(&(100..228u32).collect::<Vec<_>>()),
+        );
         kernel.run(&[set], &[stride], [1, 1, 1]);
         let found = gpu.read::<u32>(target);
         let kept = gpu.read::<u32>(data);
@@ -250,7 +285,11 @@ fn what_is_out_of_range_reads_zero_and_takes_nothing() {
             let far = i.wrapping_mul(stride);
             let inside = far < 8;
             let read = if inside { 116 + far } else { 0 };
-            assert_eq!(found[3 * i as usize], read, "stride {stride}, invocation {i}");
+            assert_eq!(
+                found[3 * i as usize],
+                read,
+                "stride {stride}, invocation {i}"
+            );
             assert_eq!(found[3 * i as usize + 1], 8);
         }
         let outside = kept[..16].iter().chain(&kept[24..]);

@@ -14,7 +14,11 @@ fn pools_give_what_they_have() {
     let gpu = Gpu::new();
     let one = set_layout(&gpu, &[(0, STORAGE, 1)], NO_FLAGS);
     let many = set_layout(&gpu, &[(0, STORAGE, 2), (5, UNIFORM, 3)], NO_FLAGS);
-    let size = |ty, count| vk::DescriptorPoolSize::default().ty(ty).descriptor_count(count);
+    let size = |ty, count| {
+        vk::DescriptorPoolSize::default()
+            .ty(ty)
+            .descriptor_count(count)
+    };
     let sizes = [size(STORAGE, 2), size(UNIFORM, 3), size(STORAGE, 2)];
     let info = vk::DescriptorPoolCreateInfo::default()
         .flags(vk::DescriptorPoolCreateFlags::FREE_DESCRIPTOR_SET)
@@ -58,8 +62,12 @@ fn descriptors_are_copied_between_sets() {
     let source = gpu.buffer_of(&(0..64u32).collect::<Vec<_>>());
     let target = gpu.buffer_of(&[0u32; 64]);
     let templates = set_layout(&gpu, &[(0, STORAGE, 4)], NO_FLAGS);
-    let sizes = [vk::DescriptorPoolSize::default().ty(STORAGE).descriptor_count(4)];
-    let pool_info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+    let sizes = [vk::DescriptorPoolSize::default()
+        .ty(STORAGE)
+        .descriptor_count(4)];
+    let pool_info = vk::DescriptorPoolCreateInfo::default()
+        .max_sets(1)
+        .pool_sizes(&sizes);
     // SAFETY: see the crate.
     unsafe {
         let pool = gpu.device.create_descriptor_pool(&pool_info, None).unwrap();
@@ -81,7 +89,11 @@ fn descriptors_are_copied_between_sets() {
         gpu.device.destroy_descriptor_set_layout(templates, None);
         kernel.run(&[set], &[2, 1], [1, 1, 1]);
     }
-    assert!(gpu.read::<u32>(target).into_iter().eq((0..64).map(|i| 2 * i + 1)));
+    assert!(
+        gpu.read::<u32>(target)
+            .into_iter()
+            .eq((0..64).map(|i| 2 * i + 1))
+    );
     gpu.free_buffer(source);
     gpu.free_buffer(target);
 }
@@ -128,13 +140,22 @@ fn templates_update_sets() {
     let set = kernel.sets()[0];
     // SAFETY: see the crate; the data is what the template describes.
     unsafe {
-        let template = gpu.device.create_descriptor_update_template(&info, None).unwrap();
+        let template = gpu
+            .device
+            .create_descriptor_update_template(&info, None)
+            .unwrap();
         let data = (&raw const resources).cast();
-        gpu.device.update_descriptor_set_with_template(set, template, data);
-        gpu.device.destroy_descriptor_update_template(template, None);
+        gpu.device
+            .update_descriptor_set_with_template(set, template, data);
+        gpu.device
+            .destroy_descriptor_update_template(template, None);
     }
     kernel.run(&[set], &[5, 0], [1, 1, 1]);
-    assert!(gpu.read::<u32>(target).into_iter().eq((0..64).map(|i| 5 * i)));
+    assert!(
+        gpu.read::<u32>(target)
+            .into_iter()
+            .eq((0..64).map(|i| 5 * i))
+    );
     gpu.free_buffer(source);
     gpu.free_buffer(target);
 }
@@ -150,7 +171,11 @@ fn descriptors_are_pushed() {
     let kernel = Kernel::over(&gpu, &words, layouts, &[bindings], &none);
     let push = ash::khr::push_descriptor::Device::new(gpu.instance(), &gpu.device);
     let source = gpu.buffer_of(&(0..64u32).collect::<Vec<_>>());
-    let targets = [gpu.buffer(256, MAPPABLE), gpu.buffer(256, MAPPABLE), gpu.buffer(256, MAPPABLE)];
+    let targets = [
+        gpu.buffer(256, MAPPABLE),
+        gpu.buffer(256, MAPPABLE),
+        gpu.buffer(256, MAPPABLE),
+    ];
     let bind_point = vk::PipelineBindPoint::COMPUTE;
     let entries = template_entries();
     let info = vk::DescriptorUpdateTemplateCreateInfo::default()
@@ -165,7 +190,10 @@ fn descriptors_are_pushed() {
     };
     // SAFETY: see the crate; the data is what the template describes.
     unsafe {
-        let template = gpu.device.create_descriptor_update_template(&info, None).unwrap();
+        let template = gpu
+            .device
+            .create_descriptor_update_template(&info, None)
+            .unwrap();
         gpu.run(|device, commands| {
             let write = |binding, infos| {
                 vk::WriteDescriptorSet::default()
@@ -189,7 +217,8 @@ fn descriptors_are_pushed() {
             push.cmd_push_descriptor_set_with_template(commands, template, kernel.layout, 0, data);
             device.cmd_dispatch(commands, 1, 1, 1);
         });
-        gpu.device.destroy_descriptor_update_template(template, None);
+        gpu.device
+            .destroy_descriptor_update_template(template, None);
     }
     for (addend, target) in (1..).zip(targets) {
         assert!(gpu.read::<u32>(target).into_iter().eq(addend..64 + addend));
@@ -243,7 +272,10 @@ fn pipelines_that_do_not_fit_their_layout_are_refused() {
     let gpu = Gpu::new();
     let words = spirv!("descriptors.comp");
     let refused = |sets: &[&[crate::kernel::Binding]], complaint: &str| {
-        let layouts: Vec<_> = sets.iter().map(|set| set_layout(&gpu, set, NO_FLAGS)).collect();
+        let layouts: Vec<_> = sets
+            .iter()
+            .map(|set| set_layout(&gpu, set, NO_FLAGS))
+            .collect();
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
         // SAFETY: see the crate.
         unsafe {
@@ -256,18 +288,31 @@ fn pipelines_that_do_not_fit_their_layout_are_refused() {
             }
         }
         let messages = gpu.take_messages();
-        assert!(messages.iter().any(|m| m.contains(complaint)), "{complaint}: {messages:?}");
+        assert!(
+            messages.iter().any(|m| m.contains(complaint)),
+            "{complaint}: {messages:?}"
+        );
     };
     refused(&[], "set 0, binding 0");
     refused(&[&[(0, STORAGE, 4)]], "set 1, binding");
-    refused(&[&[(0, STORAGE, 3)], &[(0, UNIFORM, 2), (3, STORAGE, 1)]], "has 3 descriptors in the pipeline layout");
-    refused(&[&[(0, STORAGE, 4)], &[(0, STORAGE, 2), (3, STORAGE, 1)]], "UniformBuffer");
+    refused(
+        &[&[(0, STORAGE, 3)], &[(0, UNIFORM, 2), (3, STORAGE, 1)]],
+        "has 3 descriptors in the pipeline layout",
+    );
+    refused(
+        &[&[(0, STORAGE, 4)], &[(0, STORAGE, 2), (3, STORAGE, 1)]],
+        "UniformBuffer",
+    );
 }
 
 #[test]
 fn shaders_that_cannot_run_are_refused_with_the_instruction() {
     let gpu = Gpu::new();
-    let layouts = [set_layout(&gpu, &[(0, STORAGE, 1), (1, STORAGE, 1)], NO_FLAGS)];
+    let layouts = [set_layout(
+        &gpu,
+        &[(0, STORAGE, 1), (1, STORAGE, 1)],
+        NO_FLAGS,
+    )];
     let ranges = [vk::PushConstantRange::default()
         .stage_flags(vk::ShaderStageFlags::COMPUTE)
         .size(8)];
@@ -280,18 +325,24 @@ fn shaders_that_cannot_run_are_refused_with_the_instruction() {
         let none = vk::SpecializationInfo::default();
         assert!(pipeline(&gpu, layout, words, &none).is_err(), "{complaint}");
         let messages = gpu.take_messages();
-        assert!(messages.iter().any(|m| m.contains(complaint)), "{complaint}: {messages:?}");
+        assert!(
+            messages.iter().any(|m| m.contains(complaint)),
+            "{complaint}: {messages:?}"
+        );
     };
     let whole = spirv!("push_constants.comp");
     refused(&whole[..4], "SPIR-V");
     refused(&whole[..whole.len() - 3], "SPIR-V");
-    // The first OpIMul (132) becomes an addition of floats (129), then an instruction that there isn't.
-    let multiply = whole.iter().position(|&word| word == 5 << 16 | 132).unwrap();
+    // The first OpIMul (132) names an operand that there isn't, then becomes an instruction that there isn't.
+    let multiply = whole
+        .iter()
+        .position(|&word| word == 5 << 16 | 132)
+        .unwrap();
     let mut changed = whole.clone();
-    changed[multiply] = 5 << 16 | 129;
-    refused(&changed, "FAdd");
+    changed[multiply + 4] = 12345;
+    refused(&changed, "OpIMul");
     changed[multiply] = 5 << 16 | 60000;
-    refused(&changed, "60000");
+    refused(&changed, "SPIR-V");
     // SAFETY: see the crate.
     unsafe {
         gpu.device.destroy_pipeline_layout(layout, None);

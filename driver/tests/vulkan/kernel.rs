@@ -56,7 +56,11 @@ pub fn set_layout(
         .flags(flags)
         .bindings(&bindings);
     // SAFETY: see the crate.
-    unsafe { gpu.device.create_descriptor_set_layout(&info, None).unwrap() }
+    unsafe {
+        gpu.device
+            .create_descriptor_set_layout(&info, None)
+            .unwrap()
+    }
 }
 
 /// A compute pipeline of SPIR-V, or why there is none.
@@ -126,7 +130,11 @@ impl<'a> Kernel<'a> {
         let sizes: Vec<_> = sets
             .iter()
             .flat_map(|bindings| bindings.iter())
-            .map(|&(_, ty, count)| vk::DescriptorPoolSize::default().ty(ty).descriptor_count(count))
+            .map(|&(_, ty, count)| {
+                vk::DescriptorPoolSize::default()
+                    .ty(ty)
+                    .descriptor_count(count)
+            })
             .collect();
         let pool_info = vk::DescriptorPoolCreateInfo::default()
             .max_sets(sets.len().max(1) as u32)
@@ -134,7 +142,9 @@ impl<'a> Kernel<'a> {
         // SAFETY: see the crate.
         let (layout, pool) = unsafe {
             (
-                gpu.device.create_pipeline_layout(&layout_info, None).unwrap(),
+                gpu.device
+                    .create_pipeline_layout(&layout_info, None)
+                    .unwrap(),
                 gpu.device.create_descriptor_pool(&pool_info, None).unwrap(),
             )
         };

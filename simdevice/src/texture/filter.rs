@@ -23,11 +23,7 @@ struct Reader<'a> {
 }
 
 /// Filters or gathers for every lane of the mask.
-pub(super) fn sample(
-    surface: &Surface,
-    sampler: &Sampler,
-    request: &SampleRequest,
-) -> [Lanes; 4] {
+pub(super) fn sample(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> [Lanes; 4] {
     let selection = lod::select(surface, sampler, request);
     let border = border_texel(surface, sampler);
     let mut out = [[0; CHUNK_LANES]; 4];
@@ -98,7 +94,10 @@ pub(super) fn border_texel(surface: &Surface, sampler: &Sampler) -> [u32; 4] {
 /// The texels around a point of one level.
 enum Footprint {
     /// Of an image with edges: along x, y and z.
-    Grid { axes: [Taps; 3], filters: [Filter; 3] },
+    Grid {
+        axes: [Taps; 3],
+        filters: [Filter; 3],
+    },
     /// Of a cube: the face, the first texel, and weights.
     Cube {
         face: u32,
@@ -206,9 +205,8 @@ impl Footprint {
             Self::Grid { axes, filters } => {
                 let [x, y, z] = axes;
                 let row = |j: usize, k: usize| {
-                    let texel = |i: usize| {
-                        reader.texel([x.index[i], y.index[j], z.index[k]], reader.layer)
-                    };
+                    let texel =
+                        |i: usize| reader.texel([x.index[i], y.index[j], z.index[k]], reader.layer);
                     along(filters[0], x.weight, texel)
                 };
                 let slice = |k: usize| along(filters[1], y.weight, |j| row(j, k));

@@ -20,9 +20,7 @@ mod surface;
 mod table;
 mod view;
 
-pub use sampler::{
-    AddressMode, BorderColor, CompareOp, Filter, MAX_LOD_BIAS, MipmapMode, Sampler,
-};
+pub use sampler::{AddressMode, BorderColor, CompareOp, Filter, MAX_LOD_BIAS, MipmapMode, Sampler};
 pub use table::ImageTable;
 pub use view::{
     ComponentSwizzle, IDENTITY, ImageBinding, SampledImage, StorageImage, Swizzle, TexelBuffer,

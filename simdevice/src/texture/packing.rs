@@ -87,7 +87,9 @@ impl Packing {
             level.offset.is_multiple_of(ALIGNMENT)
                 && level.extent.iter().all(|texels| *texels <= MAX_EXTENT)
         };
-        if surface.samples != 1 || !surface.levels.iter().all(exact) || texels(end - begin).is_none()
+        if surface.samples != 1
+            || !surface.levels.iter().all(exact)
+            || texels(end - begin).is_none()
         {
             return None;
         }
@@ -264,7 +266,8 @@ fn float16<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
     let sign = (bits & 0x8000) << 16;
     // Moved to binary32's place the exponent is short of the biases' difference, which a multiplication mends, exactly,
     // for denormal numbers too.
-    let magnitude = ((bits & 0x7FFF) << 13).bitcast::<f32x16<S>>() * f32::from_bits((254 - 15) << 23);
+    let magnitude =
+        ((bits & 0x7FFF) << 13).bitcast::<f32x16<S>>() * f32::from_bits((254 - 15) << 23);
     let magnitude: u32x16<S> = magnitude.bitcast();
     let infinite = (bits & 0x7FFF).simd_ge(u32x16::splat(simd, 0x7C00));
     let infinity = u32x16::splat(simd, 0x7F80_0000);
@@ -350,7 +353,9 @@ mod tests {
         agree::<Unorm8x2>(Format::R8G8Unorm, &bytes);
         agree::<Unorm8x4>(Format::R8G8B8A8Unorm, &bytes);
         agree::<Srgb8x4>(Format::R8G8B8A8Srgb, &bytes);
-        let halves: Vec<u32> = (0..1 << 16).map(|half| half << 16 | (half ^ 0xFFFF)).collect();
+        let halves: Vec<u32> = (0..1 << 16)
+            .map(|half| half << 16 | (half ^ 0xFFFF))
+            .collect();
         agree::<Unorm16>(Format::R16Unorm, &halves);
         agree::<Float16x4>(Format::R16G16B16A16Sfloat, &halves);
         agree::<Float32>(Format::R32Sfloat, &halves);

@@ -164,11 +164,7 @@ impl Surface {
 
     /// What a component that isn't there is, or a swizzle's one.
     pub fn one(&self) -> u32 {
-        if self.is_integer() {
-            1
-        } else {
-            1f32.to_bits()
-        }
+        if self.is_integer() { 1 } else { 1f32.to_bits() }
     }
 
     /// Whether registers hold integers, which are never mixed.

@@ -91,9 +91,10 @@ impl ImageUnit for ImageTable {
         value: &Lanes,
         comparator: &Lanes,
     ) -> Lanes {
-        self.surface(image).map_or_else(Default::default, |surface| {
-            fetch::atomic(surface, request, op, value, comparator)
-        })
+        self.surface(image)
+            .map_or_else(Default::default, |surface| {
+                fetch::atomic(surface, request, op, value, comparator)
+            })
     }
 
     fn size(&self, image: u32, shape: ImageShape, level: u32) -> [u32; 4] {

@@ -146,7 +146,10 @@ impl DescriptorSetLayout {
 
     /// The bindings that have descriptors, with their numbers.
     pub(crate) fn numbered(&self) -> impl Iterator<Item = (u32, &Binding)> {
-        let bindings = self.bindings.iter().map(|(&number, binding)| (number, binding));
+        let bindings = self
+            .bindings
+            .iter()
+            .map(|(&number, binding)| (number, binding));
         bindings.filter(|(_, binding)| binding.count > 0)
     }
 

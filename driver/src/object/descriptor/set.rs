@@ -33,10 +33,13 @@ impl DescriptorSet {
     pub(crate) fn new(layout: Arc<DescriptorSetLayout>) -> Self {
         let mut descriptors = Vec::with_capacity(layout.count());
         for binding in layout.bindings() {
-            let samplers = binding.immutable_samplers.iter().map(|sampler| Descriptor::Image {
-                view: None,
-                sampler: Some(Arc::clone(sampler)),
-            });
+            let samplers = binding
+                .immutable_samplers
+                .iter()
+                .map(|sampler| Descriptor::Image {
+                    view: None,
+                    sampler: Some(Arc::clone(sampler)),
+                });
             descriptors.extend(samplers);
             descriptors.resize(binding.first + binding.count as usize, Descriptor::Empty);
         }

@@ -42,18 +42,18 @@ impl ComputePipeline {
         layout: &PipelineLayout,
         stage: &StageInfo<'_>,
     ) -> Result<Self, Error> {
-        let subgroup_size = stage.required_subgroup_size.unwrap_or(limits::SUBGROUP_SIZE);
+        let subgroup_size = stage
+            .required_subgroup_size
+            .unwrap_or(limits::SUBGROUP_SIZE);
         let options = Options {
             subgroup_size,
             unsized_descriptors: layout.longest_binding(),
             ..Options::default()
         };
-        let shader = stage.module.translate(
-            stage.name,
-            Stage::Compute,
-            &stage.specialization,
-            &options,
-        )?;
+        let shader =
+            stage
+                .module
+                .translate(stage.name, Stage::Compute, &stage.specialization, &options)?;
         let interface = &shader.interface;
         layout.check(interface)?;
         let invocations = invocations(interface)?;

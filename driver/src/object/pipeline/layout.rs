@@ -60,8 +60,16 @@ impl PipelineLayout {
 
     /// The most descriptors of a binding: what a descriptor array without a length may have.
     pub(crate) fn longest_binding(&self) -> u32 {
-        let bindings = self.set_layouts.iter().flatten().flat_map(|set| set.bindings());
-        bindings.map(|binding| binding.count).max().unwrap_or(0).max(1)
+        let bindings = self
+            .set_layouts
+            .iter()
+            .flatten()
+            .flat_map(|set| set.bindings());
+        bindings
+            .map(|binding| binding.count)
+            .max()
+            .unwrap_or(0)
+            .max(1)
     }
 
     /// Checks that what a shader uses is there.
@@ -82,11 +90,14 @@ impl PipelineLayout {
                 })
             })
         });
-        let push_constants = self.push_constants.iter().map(|range| reflect::PushConstantRange {
-            offset: range.offset,
-            size: range.size,
-            visible: range.stage_flags.contains(stage),
-        });
+        let push_constants = self
+            .push_constants
+            .iter()
+            .map(|range| reflect::PushConstantRange {
+                offset: range.offset,
+                size: range.size,
+                visible: range.stage_flags.contains(stage),
+            });
         let layout = reflect::Layout {
             bindings: bindings.collect(),
             push_constants: push_constants.collect(),

@@ -61,8 +61,8 @@ use fearless_simd::Level;
 use super::ir::Type;
 use super::op::Op;
 use super::resources::Resources;
-pub(crate) use memory::combine;
 use file::{File, Slot};
+pub(crate) use memory::combine;
 use step::Step;
 
 /// What an operation gives for constants, by the same kernels that programs run.
