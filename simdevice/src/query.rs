@@ -23,7 +23,7 @@ pub enum QueryKind {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum QueryResult {
     /// The counters' differences between end and beginning.
-    Performance(Counters),
+    Performance(Box<Counters>),
     /// Nanoseconds.
     Timestamp(u64),
 }
@@ -103,7 +103,7 @@ impl QueryPool {
         };
         self.set(
             index,
-            Slot::Available(QueryResult::Performance(now.since(&begun))),
+            Slot::Available(QueryResult::Performance(Box::new(now.since(&begun)))),
         );
     }
 

@@ -1,380 +1,380 @@
-//! Samples of one- and two-dimensional images and arrays of them, 16 lanes at once. The bits are those of
-//! [`super::filter`], which does everything else; nothing here is fused, so that every SIMD level gives them.
+//! Samples of 16 lanes at once. The bits are those of [`super::filter`], which does what this cannot; nothing here is
+//! fused, so that every SIMD level gives them.
+//!
+//! Work goes in phases that hand arrays to each other: levels of detail, the texels along each axis, the texels'
+//! contents and their mean. Only the first depends on everything, so that few kernels are compiled for each SIMD level.
 
 use std::sync::atomic::AtomicU32;
 
-use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::Level;
 
-use super::address::{FAR, MAX_OFFSET, WHOLE, layer};
-use super::filter::border_texel;
-use super::lod::{self, Selection};
-use super::packing::{
-    Float16x4, Float32, Float32x4, Kind, Packing, Srgb8x4, Texels, Unorm8, Unorm8x2, Unorm8x4,
-    Unorm16,
-};
+use super::address;
+use super::axis::{Axis, axis};
+use super::cube;
+use super::filter::{border_texel, reference_value};
+use super::lod::{self, Floats, Selection};
+use super::packing::{PackedLevel, Packing, Rows};
 use super::sampler::{AddressMode, CompareOp, Filter, Sampler};
 use super::surface::Surface;
 use crate::format::Numeric;
 use crate::isa::ir::{CHUNK_LANES, Dimension};
 use crate::isa::resources::{Lanes, SampleRequest};
 
-/// Whether 16 lanes of such a request can be done at once.
-pub(super) fn handles(request: &SampleRequest) -> bool {
-    let shape = request.shape;
-    matches!(shape.dimension, Dimension::D1 | Dimension::D2)
-        && !shape.multisampled
-        && request.gather.is_none()
-}
+/// The components of 16 texels.
+type Texels = [Floats; 4];
 
-/// Filters for all lanes.
-#[inline(always)]
-pub(super) fn sample<S: Simd>(
-    simd: S,
-    surface: &Surface,
-    packing: &Packing,
-    sampler: &Sampler,
-    request: &SampleRequest,
-) -> [Lanes; 4] {
-    let selection = lod::select(surface, sampler, request);
-    let batch = Batch {
-        simd,
-        surface,
-        packing,
-        words: packing.words(surface),
-        sampler,
-        request,
-    };
-    let texel = match packing.kind {
-        Kind::Unorm8 => batch.select_filter::<Unorm8>(&selection),
-        Kind::Unorm8x2 => batch.select_filter::<Unorm8x2>(&selection),
-        Kind::Unorm8x4 => batch.select_filter::<Unorm8x4>(&selection),
-        Kind::Srgb8x4 => batch.select_filter::<Srgb8x4>(&selection),
-        Kind::Unorm16 => batch.select_filter::<Unorm16>(&selection),
-        Kind::Float16x4 => batch.select_filter::<Float16x4>(&selection),
-        Kind::Float32 => batch.select_filter::<Float32>(&selection),
-        Kind::Float32x4 => batch.select_filter::<Float32x4>(&selection),
-    };
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    surface.swizzle.map(|from| {
-        let component = from.pick(&texel, zero, one);
-        component.bitcast::<u32x16<S>>().into()
-    })
-}
-
-/// The texels of 16 coordinates along one axis.
-#[derive(Clone, Copy)]
-struct Axis<S: Simd> {
-    index: [u32x16<S>; 2],
-    /// Lanes whose texel the image has; if there is a border at all.
-    inside: Option<[mask32x16<S>; 2]>,
-    weight: f32x16<S>,
-}
-
-/// A mip level for each lane.
-#[derive(Clone, Copy)]
-struct Place<S: Simd> {
-    size: [f32x16<S>; 2],
-    /// The first texel of the lane's layer.
-    base: u32x16<S>,
-    row_pitch: u32x16<S>,
-}
-
-#[derive(Clone, Copy)]
-struct Batch<'a, S> {
-    simd: S,
+/// What a request reads, and how.
+struct Batch<'a> {
+    level: Level,
     surface: &'a Surface,
     packing: &'a Packing,
-    words: &'a [AtomicU32],
     sampler: &'a Sampler,
     request: &'a SampleRequest,
+    /// The comparison that is asked for.
+    reference: Option<(CompareOp, Floats)>,
 }
 
-/// The greatest integers that aren't greater; of numbers within 2^30.
-#[inline(always)]
-fn floor<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
-    let truncated = f32x16::float_from(i32x16::truncate_from(x));
-    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-    truncated - truncated.simd_gt(x).select(one, zero)
-}
-
-/// `x` within a magnitude.
-#[inline(always)]
-fn clamp<S: Simd>(x: f32x16<S>, magnitude: f32) -> f32x16<S> {
-    x.max(-magnitude).min(magnitude)
-}
-
-/// The weighted mean.
-#[inline(always)]
-fn mix<S: Simd>(a: f32x16<S>, b: f32x16<S>, weight: f32x16<S>) -> f32x16<S> {
-    a + weight * (b - a)
-}
-
-/// An index reduced to 0.. of a period; if it isn't `far`, it is known to be within a period of that.
-#[inline(always)]
-fn reduce<S: Simd>(simd: S, i: f32x16<S>, period: f32x16<S>, far: bool) -> f32x16<S> {
-    let zero = f32x16::splat(simd, 0.0);
-    let i = if far {
-        i - floor(simd, i / period) * period
-    } else {
-        i
+/// Filters for all lanes; None if this request has to be filtered lane by lane.
+pub(super) fn sample(
+    level: Level,
+    surface: &Surface,
+    sampler: &Sampler,
+    request: &SampleRequest,
+) -> Option<[Lanes; 4]> {
+    let packing = surface.packing.as_ref()?;
+    let shape = request.shape;
+    if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() {
+        return None;
+    }
+    let reference = sampler.compare_op.zip(request.compare).map(|(op, bits)| {
+        let unorm = surface.format.numeric() == Numeric::Unorm;
+        (op, bits.map(|bits| reference_value(unorm, bits)))
+    });
+    let batch = Batch {
+        level,
+        surface,
+        packing,
+        sampler,
+        request,
+        reference,
     };
-    let i = i + i.simd_lt(zero).select(period, zero);
-    i - i.simd_ge(period).select(period, zero)
+    let selection = lod::select(surface, sampler, request);
+    let texels = batch.select_filter(&selection)?;
+    Some(batch.registers(&texels))
 }
 
-impl<S: Simd> Batch<'_, S> {
-    /// Red, green, blue and alpha, with the filter that each lane asks for.
-    #[inline(always)]
-    fn select_filter<P: Texels>(&self, selection: &Selection) -> [f32x16<S>; 4] {
-        let simd = self.simd;
-        let linear = selection
-            .filter
-            .map(|filter| u32::from(filter == Filter::Linear));
-        let count: u32 = linear.iter().sum();
-        let texel = match count {
-            0 => self.select_levels::<P>(selection, Filter::Nearest),
-            16 => self.select_levels::<P>(selection, Filter::Linear),
-            _ => {
-                let nearest = self.select_levels::<P>(selection, Filter::Nearest);
-                let mixed = self.select_levels::<P>(selection, Filter::Linear);
-                let linear = u32x16::simd_from(simd, linear).simd_gt(u32x16::splat(simd, 0));
-                std::array::from_fn(|c| linear.select(mixed[c], nearest[c]))
-            }
-        };
-        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-        std::array::from_fn(|register| match self.packing.order[register] {
-            stored if stored < P::COMPONENTS => texel[stored],
-            _ if register == 3 => one,
-            _ => zero,
-        })
-    }
-
-    /// The stored components, mixed between levels.
-    #[inline(always)]
-    fn select_levels<P: Texels>(&self, selection: &Selection, filter: Filter) -> [f32x16<S>; 4] {
-        let simd = self.simd;
-        let high = self.filter_level::<P>(&selection.high, filter);
-        let weight = f32x16::simd_from(simd, selection.weight);
-        let between = weight.simd_gt(f32x16::splat(simd, 0.0));
-        if !between.any_true() {
-            return high;
-        }
-        let low = self.filter_level::<P>(&selection.low, filter);
-        let mut texel = high;
-        for c in 0..P::COMPONENTS {
-            texel[c] = between.select(mix(high[c], low[c], weight), high[c]);
-        }
-        texel
-    }
-
-    /// The stored components, of one level for each lane.
-    #[inline(always)]
-    fn filter_level<P: Texels>(
-        &self,
-        levels: &[u32; CHUNK_LANES],
-        filter: Filter,
-    ) -> [f32x16<S>; 4] {
-        let place = self.place(levels);
-        let x = self.axis(0, filter, place.size[0]);
-        let y = if self.request.shape.dimension == Dimension::D1 {
-            let (zero, all) = (f32x16::splat(self.simd, 0.0), u32x16::splat(self.simd, 0));
-            Axis {
-                index: [all; 2],
-                inside: None,
-                weight: zero,
-            }
-        } else {
-            self.axis(1, filter, place.size[1])
-        };
-        let row = |j: usize| place.base + y.index[j] * place.row_pitch;
-        let top = row(0);
-        let at = |row: u32x16<S>, i: usize, j: usize| {
-            let texel = P::load(self.simd, self.words, row + x.index[i]);
-            self.finish::<P>(texel, &x, &y, i, j)
-        };
-        match filter {
-            Filter::Nearest => at(top, 0, 0),
-            Filter::Linear => {
-                let mut texel = at(top, 0, 0);
-                let right = at(top, 1, 0);
-                for c in 0..P::COMPONENTS {
-                    texel[c] = mix(texel[c], right[c], x.weight);
-                }
-                if self.request.shape.dimension == Dimension::D1 {
-                    return texel;
-                }
-                let bottom = row(1);
-                let (left, right) = (at(bottom, 0, 1), at(bottom, 1, 1));
-                for c in 0..P::COMPONENTS {
-                    texel[c] = mix(texel[c], mix(left[c], right[c], x.weight), y.weight);
-                }
-                texel
+impl Batch<'_> {
+    /// Stored components as a program gets them.
+    #[inline]
+    fn registers(&self, texels: &Texels) -> [Lanes; 4] {
+        let components = self.packing.kind.components();
+        let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
+        let mut registers = [&zero, &zero, &zero, &one];
+        for (register, stored) in registers.iter_mut().zip(self.packing.order) {
+            if stored < components {
+                *register = &texels[stored];
             }
         }
+        let mut out = [[0; CHUNK_LANES]; 4];
+        for (out, from) in out.iter_mut().zip(self.surface.swizzle) {
+            *out = bytemuck::cast(*from.pick(&registers, &zero, &one));
+        }
+        out
     }
 
-    /// The border and the comparison.
-    #[inline(always)]
-    fn finish<P: Texels>(
-        &self,
-        mut texel: [f32x16<S>; 4],
-        x: &Axis<S>,
-        y: &Axis<S>,
-        i: usize,
-        j: usize,
-    ) -> [f32x16<S>; 4] {
-        let inside = match (&x.inside, &y.inside) {
-            (Some(x), Some(y)) => Some(x[i] & y[j]),
-            (Some(x), None) => Some(x[i]),
-            (None, Some(y)) => Some(y[j]),
-            (None, None) => None,
-        };
-        if let Some(inside) = inside {
-            let border = border_texel(self.surface, self.sampler).map(f32::from_bits);
-            for (register, stored) in self.packing.order.into_iter().enumerate() {
-                if stored < P::COMPONENTS {
-                    let border = f32x16::splat(self.simd, border[register]);
-                    texel[stored] = inside.select(texel[stored], border);
-                }
-            }
-        }
-        if let (Some(op), Some(reference)) = (self.sampler.compare_op, self.request.compare) {
-            texel[0] = self.compare(op, reference, texel[0]);
-        }
-        texel
-    }
-
-    /// 1 where a comparison holds, else 0.
-    #[inline(always)]
-    fn compare(&self, op: CompareOp, reference: Lanes, texel: f32x16<S>) -> f32x16<S> {
-        let simd = self.simd;
-        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-        let mut reference: f32x16<S> = u32x16::simd_from(simd, reference).bitcast();
-        if self.surface.format.numeric() == Numeric::Unorm {
-            reference = reference.simd_gt(one).select(one, reference);
-            reference = reference.simd_lt(zero).select(zero, reference);
-        }
-        match op {
-            CompareOp::Never => zero,
-            CompareOp::Less => reference.simd_lt(texel).select(one, zero),
-            CompareOp::Equal => reference.simd_eq(texel).select(one, zero),
-            CompareOp::LessOrEqual => reference.simd_le(texel).select(one, zero),
-            CompareOp::Greater => reference.simd_gt(texel).select(one, zero),
-            CompareOp::NotEqual => reference.simd_eq(texel).select(zero, one),
-            CompareOp::GreaterOrEqual => reference.simd_ge(texel).select(one, zero),
-            CompareOp::Always => one,
-        }
-    }
-
-    /// Where the lanes' levels and layers lie.
-    #[inline(always)]
-    fn place(&self, levels: &[u32; CHUNK_LANES]) -> Place<S> {
-        let simd = self.simd;
-        let table = &self.packing.levels;
-        let first = &table[levels[0] as usize];
-        let uniform = levels.iter().all(|level| *level == levels[0]);
-        let (mut place, layer_pitch) = if uniform {
-            let place = Place {
-                size: [first.width, first.height].map(|size| f32x16::splat(simd, size)),
-                base: u32x16::splat(simd, first.base),
-                row_pitch: u32x16::splat(simd, first.row_pitch),
+    /// With the filter that each lane asks for.
+    #[inline]
+    fn select_filter(&self, selection: &Selection) -> Option<Texels> {
+        let first = selection.filter[0];
+        let mut texels = self.select_levels(selection, first)?;
+        if selection.filter != [first; CHUNK_LANES] {
+            let other = match first {
+                Filter::Nearest => Filter::Linear,
+                Filter::Linear => Filter::Nearest,
             };
-            (place, u32x16::splat(simd, first.layer_pitch))
-        } else {
-            let of = levels.map(|level| &table[level as usize]);
-            let place = Place {
-                size: [
-                    f32x16::simd_from(simd, of.map(|level| level.width)),
-                    f32x16::simd_from(simd, of.map(|level| level.height)),
-                ],
-                base: u32x16::simd_from(simd, of.map(|level| level.base)),
-                row_pitch: u32x16::simd_from(simd, of.map(|level| level.row_pitch)),
-            };
-            let layer_pitch = of.map(|level| level.layer_pitch);
-            (place, u32x16::simd_from(simd, layer_pitch))
-        };
-        if self.request.shape.arrayed && self.surface.layers > 1 {
-            let coordinate = self.request.coordinate[self.request.shape.dimension.coordinates()];
-            let layers = coordinate.map(|bits| layer(f32::from_bits(bits), self.surface.layers));
-            place.base = place.base + u32x16::simd_from(simd, layers) * layer_pitch;
+            let others = self.select_levels(selection, other)?;
+            for (texel, other) in texels.iter_mut().zip(&others) {
+                for lane in 0..CHUNK_LANES {
+                    if selection.filter[lane] != first {
+                        texel[lane] = other[lane];
+                    }
+                }
+            }
         }
-        place
+        Some(texels)
+    }
+
+    /// Mixed between levels.
+    #[inline]
+    fn select_levels(&self, selection: &Selection, filter: Filter) -> Option<Texels> {
+        let high = self.filter_level(&selection.high, filter)?;
+        if selection.weight == [0.0; CHUNK_LANES] {
+            return Some(high);
+        }
+        let low = self.filter_level(&selection.low, filter)?;
+        let mut texels = mix(&high, &low, &selection.weight);
+        for (texel, high) in texels.iter_mut().zip(&high) {
+            for lane in 0..CHUNK_LANES {
+                // A level of weight zero isn't read, though it be infinite.
+                texel[lane] = if selection.weight[lane] > 0.0 {
+                    texel[lane]
+                } else {
+                    high[lane]
+                };
+            }
+        }
+        Some(texels)
+    }
+
+    /// Of one level for each lane; None if some lie across the edge of a cube's face.
+    #[inline]
+    fn filter_level(&self, levels: &Lanes, filter: Filter) -> Option<Texels> {
+        let mut coordinate = [
+            self.request.coordinate[0],
+            self.request.coordinate[1],
+            self.request.coordinate[2],
+        ];
+        let layers = self.layers(&mut coordinate);
+        if layers.is_some_and(|layers| layers.iter().any(|layer| *layer >= self.surface.layers)) {
+            return None;
+        }
+        let sizes = LevelSizes::new(&self.packing.levels, levels);
+        let dimension = self.request.shape.dimension;
+        let x = self.axis(0, filter, &coordinate, &sizes);
+        let (y, z);
+        let (y, z) = match dimension {
+            Dimension::D1 | Dimension::Buffer => (&Axis::FLAT, &Axis::FLAT),
+            Dimension::D2 | Dimension::Cube => {
+                y = self.axis(1, filter, &coordinate, &sizes);
+                (&y, &Axis::FLAT)
+            }
+            Dimension::D3 => {
+                y = self.axis(1, filter, &coordinate, &sizes);
+                z = self.axis(2, filter, &coordinate, &sizes);
+                (&y, &z)
+            }
+        };
+        if dimension == Dimension::Cube {
+            let inside = x.inside[0] & x.inside[1] & y.inside[0] & y.inside[1];
+            if inside | !self.request.mask != u16::MAX {
+                return None;
+            }
+        }
+        let mut rows = Rows {
+            base: sizes.of(|level| level.base),
+            row_pitch: sizes.of(|level| level.row_pitch),
+            x: &x.index,
+            y: &y.index,
+        };
+        if let Some(layers) = layers {
+            advance(
+                &mut rows.base,
+                &layers,
+                &sizes.of(|level| level.layer_pitch),
+            );
+        }
+        if dimension != Dimension::D3 {
+            return Some(self.filter_slice(&rows, [&x, y], [u16::MAX; 2], filter));
+        }
+        let first = rows.base;
+        let pitch = sizes.of(|level| level.depth_pitch);
+        advance(&mut rows.base, &z.index[0], &pitch);
+        let slice = self.filter_slice(&rows, [&x, y], [z.inside[0]; 2], filter);
+        if filter == Filter::Nearest {
+            return Some(slice);
+        }
+        rows.base = first;
+        advance(&mut rows.base, &z.index[1], &pitch);
+        let next = self.filter_slice(&rows, [&x, y], [z.inside[1]; 2], filter);
+        Some(mix(&slice, &next, &z.weight))
+    }
+
+    /// The layer of each lane; None if it is the first for all. A cube's directions become coordinates on a face.
+    #[inline]
+    fn layers(&self, coordinate: &mut [Lanes; 3]) -> Option<Lanes> {
+        let shape = self.request.shape;
+        let cube = shape.dimension == Dimension::Cube;
+        if !cube && !shape.arrayed {
+            return None;
+        }
+        let mut layers = [0; CHUNK_LANES];
+        if cube {
+            for lane in 0..CHUNK_LANES {
+                let direction = coordinate.map(|lanes| f32::from_bits(lanes[lane]));
+                let hit = cube::Hit::new(direction);
+                let [s, t] = hit.coordinates();
+                layers[lane] = hit.face;
+                [coordinate[0][lane], coordinate[1][lane]] = [s.to_bits(), t.to_bits()];
+            }
+        }
+        if shape.arrayed {
+            let per_element = if cube { 6 } else { 1 };
+            let elements = self.surface.layers / per_element;
+            let coordinate = &self.request.coordinate[shape.dimension.coordinates()];
+            for (layer, coordinate) in layers.iter_mut().zip(coordinate) {
+                *layer += address::layer(f32::from_bits(*coordinate), elements) * per_element;
+            }
+        }
+        Some(layers)
     }
 
     /// The texels of the lanes' coordinates along an axis.
-    #[inline(always)]
-    fn axis(&self, axis: usize, filter: Filter, size: f32x16<S>) -> Axis<S> {
-        let simd = self.simd;
-        let mode = self.sampler.address_modes[axis];
-        let zero = f32x16::splat(simd, 0.0);
-        let half = f32x16::splat(simd, 0.5);
-        let coordinate: f32x16<S> =
-            u32x16::simd_from(simd, self.request.coordinate[axis]).bitcast();
-        let u = self.texel_coordinate(mode, coordinate, size);
-        let shifted = match filter {
-            Filter::Nearest => u,
-            Filter::Linear => u - half,
+    #[inline]
+    fn axis(
+        &self,
+        number: usize,
+        filter: Filter,
+        coordinate: &[Lanes; 3],
+        sizes: &LevelSizes<'_>,
+    ) -> Axis {
+        let size = match number {
+            0 => sizes.of(|level| level.extent[0]),
+            1 => sizes.of(|level| level.extent[1]),
+            _ => sizes.of(|level| level.extent[2]),
         };
-        let whole = floor(simd, shifted);
-        let weight = shifted - whole;
-        let offsets = &self.request.offset[axis];
-        let far = self.sampler.unnormalized_coordinates || *offsets != [0; CHUNK_LANES];
-        let first = if far {
-            let clamped =
-                offsets.map(|offset| offset.cast_signed().clamp(-MAX_OFFSET, MAX_OFFSET) as f32);
-            whole + f32x16::simd_from(simd, clamped)
-        } else {
-            whole
-        };
-        let steps = [first, first + 1.0];
-        let last = size - 1.0;
-        let clamped = |i: f32x16<S>| i.max(zero).min(last);
-        let inside = (mode == AddressMode::ClampToBorder)
-            .then(|| steps.map(|i| i.simd_ge(zero) & i.simd_le(last)));
-        let index = steps.map(|i| {
-            let wrapped = match mode {
-                AddressMode::Repeat => reduce(simd, i, size, far),
-                AddressMode::MirroredRepeat => {
-                    let period = size + size;
-                    let within = reduce(simd, i, period, far);
-                    within.min(period - 1.0 - within)
-                }
-                AddressMode::ClampToEdge | AddressMode::ClampToBorder => clamped(i),
-                AddressMode::MirrorClampToEdge => {
-                    clamped(i.simd_lt(zero).select(zero - 1.0 - i, i))
-                }
+        let coordinate = &coordinate[number];
+        if self.request.shape.dimension == Dimension::Cube {
+            // What lies across an edge is found out here, and done lane by lane.
+            let mode = match filter {
+                Filter::Nearest => AddressMode::ClampToEdge,
+                Filter::Linear => AddressMode::ClampToBorder,
             };
-            i32x16::truncate_from(wrapped).bitcast::<u32x16<S>>()
-        });
-        Axis {
-            index,
-            inside,
-            weight,
+            let offset = [0; CHUNK_LANES];
+            return axis(self.level, mode, filter, true, coordinate, &size, &offset);
+        }
+        axis(
+            self.level,
+            self.sampler.address_modes[number],
+            filter,
+            !self.sampler.unnormalized_coordinates,
+            coordinate,
+            &size,
+            &self.request.offset[number],
+        )
+    }
+
+    /// Of one slice, which lanes have as far as they are `within`.
+    #[inline]
+    fn filter_slice(
+        &self,
+        rows: &Rows<'_>,
+        [x, y]: [&Axis; 2],
+        within: [u16; 2],
+        filter: Filter,
+    ) -> Texels {
+        let dimension = self.request.shape.dimension;
+        let words = self.packing.words(self.surface);
+        let bordered = x.has_outside || y.has_outside || within[0] != u16::MAX;
+        // A cube's outside is that of lanes that nobody asks for.
+        let plain = self.reference.is_none() && (!bordered || dimension == Dimension::Cube);
+        if filter == Filter::Linear && dimension != Dimension::D1 && plain {
+            let kind = self.packing.kind;
+            return kind.bilinear(self.level, words, rows, &x.weight, &y.weight);
+        }
+        let texel = |i: usize, j: usize| {
+            let inside = x.inside[i] & y.inside[j] & within[0];
+            self.texels(words, rows, [i, j], inside)
+        };
+        let row = |j: usize| mix(&texel(0, j), &texel(1, j), &x.weight);
+        match (filter, dimension) {
+            (Filter::Nearest, _) => texel(0, 0),
+            (Filter::Linear, Dimension::D1) => row(0),
+            (Filter::Linear, _) => mix(&row(0), &row(1), &y.weight),
         }
     }
 
-    /// As [`super::address::texel_coordinate`].
-    #[inline(always)]
-    fn texel_coordinate(
+    /// Texels (i, j) of those around, or the border's where they aren't `inside`; compared, if that is asked for.
+    fn texels(
         &self,
-        mode: AddressMode,
-        coordinate: f32x16<S>,
-        size: f32x16<S>,
-    ) -> f32x16<S> {
-        let simd = self.simd;
-        let zero = f32x16::splat(simd, 0.0);
-        let s = coordinate.simd_eq(coordinate).select(coordinate, zero);
-        match mode {
-            _ if self.sampler.unnormalized_coordinates => clamp(s, FAR),
-            AddressMode::Repeat => {
-                let s = clamp(s, WHOLE);
-                (s - floor(simd, s)) * size
+        words: &[AtomicU32],
+        rows: &Rows<'_>,
+        [i, j]: [usize; 2],
+        inside: u16,
+    ) -> Texels {
+        let mut texels = self.packing.kind.load(self.level, words, rows, i, j);
+        if inside != u16::MAX {
+            let border = border_texel(self.surface, self.sampler).map(f32::from_bits);
+            for (register, stored) in self.packing.order.into_iter().enumerate() {
+                if stored < self.packing.kind.components() {
+                    for lane in (0..CHUNK_LANES).filter(|lane| inside >> lane & 1 == 0) {
+                        texels[stored][lane] = border[register];
+                    }
+                }
             }
-            AddressMode::MirroredRepeat => {
-                let half = clamp(s, WHOLE) * 0.5;
-                (half - floor(simd, half)) * 2.0 * size
-            }
-            _ => clamp(s * size, FAR),
+        }
+        if let Some((op, reference)) = &self.reference {
+            compare(*op, reference, &mut texels[0]);
+        }
+        texels
+    }
+}
+
+/// The mip level of each lane.
+struct LevelSizes<'a> {
+    table: &'a [PackedLevel],
+    levels: &'a Lanes,
+    /// The level of all lanes, if it is one.
+    uniform: Option<&'a PackedLevel>,
+}
+
+impl<'a> LevelSizes<'a> {
+    fn new(table: &'a [PackedLevel], levels: &'a Lanes) -> Self {
+        let uniform = *levels == [levels[0]; CHUNK_LANES];
+        Self {
+            table,
+            levels,
+            uniform: uniform.then(|| &table[levels[0] as usize]),
         }
     }
+
+    /// A number of each lane's level.
+    #[inline(always)]
+    fn of(&self, value: impl Fn(&PackedLevel) -> u32) -> Lanes {
+        match self.uniform {
+            Some(level) => [value(level); CHUNK_LANES],
+            None => self.levels.map(|level| value(&self.table[level as usize])),
+        }
+    }
+}
+
+/// Moves texels on by some steps.
+fn advance(base: &mut Lanes, steps: &Lanes, pitch: &Lanes) {
+    for lane in 0..CHUNK_LANES {
+        base[lane] = base[lane].wrapping_add(steps[lane].wrapping_mul(pitch[lane]));
+    }
+}
+
+/// Replaces depths by 1 where a comparison holds, else 0.
+fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
+    let mut each = |holds: fn(f32, f32) -> bool| {
+        for (depth, reference) in depths.iter_mut().zip(reference) {
+            *depth = if holds(*reference, *depth) { 1.0 } else { 0.0 };
+        }
+    };
+    match op {
+        CompareOp::Less => each(|reference, depth| reference < depth),
+        CompareOp::LessOrEqual => each(|reference, depth| reference <= depth),
+        CompareOp::Greater => each(|reference, depth| reference > depth),
+        CompareOp::GreaterOrEqual => each(|reference, depth| reference >= depth),
+        _ => {
+            for (depth, reference) in depths.iter_mut().zip(reference) {
+                *depth = if op.holds(*reference, *depth) {
+                    1.0
+                } else {
+                    0.0
+                };
+            }
+        }
+    }
+}
+
+/// The weighted means of texels.
+fn mix(a: &Texels, b: &Texels, weight: &Floats) -> Texels {
+    let mut mixed = *a;
+    for (mixed, b) in mixed.iter_mut().zip(b) {
+        for lane in 0..CHUNK_LANES {
+            mixed[lane] += weight[lane] * (b[lane] - mixed[lane]);
+        }
+    }
+    mixed
 }

@@ -67,12 +67,19 @@ fn reference(
     lane: usize,
 ) -> Option<f32> {
     sampler.compare_op?;
-    let reference = f32::from_bits(request.compare?[lane]);
-    Some(if surface.format.numeric() == Numeric::Unorm {
+    let unorm = surface.format.numeric() == Numeric::Unorm;
+    Some(reference_value(unorm, request.compare?[lane]))
+}
+
+/// A reference value from its bits: clamped for unsigned normalized formats.
+#[inline(always)]
+pub(super) fn reference_value(unorm: bool, bits: u32) -> f32 {
+    let reference = f32::from_bits(bits);
+    if unorm {
         reference.clamp(0.0, 1.0)
     } else {
         reference
-    })
+    }
 }
 
 /// The border colour as a texel of the format: what it lacks is as ever.

@@ -61,17 +61,19 @@ pub(super) fn select(surface: &Surface, sampler: &Sampler, request: &SampleReque
     let linear = sampler.mipmap_mode == MipmapMode::Linear && !surface.is_integer();
     for lane in 0..CHUNK_LANES {
         let level = lambda[lane].max(0.0).min(last as f32);
-        let high = if linear {
-            level as u32
-        } else {
-            nearest_level(level)
-        };
-        selection.high[lane] = high;
-        selection.low[lane] = (high + 1).min(last);
-        selection.weight[lane] = if linear { level - high as f32 } else { 0.0 };
+        let whole = level as i32;
+        let fraction = level - whole as f32;
+        let up = i32::from(!linear && fraction > 0.5);
+        selection.high[lane] = (whole + up) as u32;
+        selection.low[lane] = (whole + 1).min(last as i32) as u32;
+        selection.weight[lane] = if linear { fraction } else { 0.0 };
     }
     if magnify != minify {
-        selection.filter = lambda.map(|lambda| if lambda <= 0.0 { magnify } else { minify });
+        for lane in 0..CHUNK_LANES {
+            if lambda[lane] > 0.0 {
+                selection.filter[lane] = minify;
+            }
+        }
     }
     selection
 }
@@ -111,33 +113,31 @@ fn biased(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Floa
             scale_lod(surface, request, lane, x, y)
         }),
     };
-    let bias: Floats = match &request.lod {
-        LodRequest::Implicit { bias, .. } => bias.map(f32::from_bits),
-        _ => [0.0; CHUNK_LANES],
+    let mut biased = base;
+    let operand = match &request.lod {
+        LodRequest::Implicit { bias, .. } => bias,
+        _ => &[0; CHUNK_LANES],
     };
-    std::array::from_fn(|lane| {
-        let bias = sampler.mip_lod_bias + bias[lane];
-        base[lane] + bias.max(-MAX_LOD_BIAS).min(MAX_LOD_BIAS)
-    })
+    for (lod, operand) in biased.iter_mut().zip(operand) {
+        let bias = sampler.mip_lod_bias + f32::from_bits(*operand);
+        *lod += bias.max(-MAX_LOD_BIAS).min(MAX_LOD_BIAS);
+    }
+    biased
 }
 
 /// The level of detail within what sampler and instruction allow; NaN becomes the least.
 #[inline(always)]
 fn clamped(sampler: &Sampler, request: &SampleRequest, biased: &Floats) -> Floats {
-    let minimum: Floats = match &request.lod {
-        LodRequest::Implicit { minimum, .. } | LodRequest::Gradient { minimum, .. } => {
-            minimum.map(f32::from_bits)
-        }
-        LodRequest::Explicit(_) => [0.0; CHUNK_LANES],
+    let minimum = match &request.lod {
+        LodRequest::Implicit { minimum, .. } | LodRequest::Gradient { minimum, .. } => minimum,
+        LodRequest::Explicit(_) => &[f32::NEG_INFINITY.to_bits(); CHUNK_LANES],
     };
-    let operand = !matches!(request.lod, LodRequest::Explicit(_));
-    std::array::from_fn(|lane| {
-        let mut least = sampler.min_lod;
-        if operand {
-            least = least.max(minimum[lane]);
-        }
-        biased[lane].max(least).min(sampler.max_lod)
-    })
+    let mut clamped = *biased;
+    for (lod, minimum) in clamped.iter_mut().zip(minimum) {
+        let least = sampler.min_lod.max(f32::from_bits(*minimum));
+        *lod = lod.max(least).min(sampler.max_lod);
+    }
+    clamped
 }
 
 /// The level of detail of differences within quads: from the first lane to the next, and to the one below.
@@ -152,20 +152,23 @@ fn implicit(surface: &Surface, request: &SampleRequest) -> Floats {
             scale_lod(surface, request, lane, dx, dy)
         });
     }
-    let quads: [f32; CHUNK_LANES / 4] = std::array::from_fn(|quad| {
-        let first = 4 * quad;
-        let along = |step: usize| {
-            let mut squares = 0.0;
-            for axis in 0..request.shape.dimension.coordinates() {
-                let size = surface.levels[0].extent[axis] as f32;
-                let change = (value(axis, first + step) - value(axis, first)) * size;
-                squares += change * change;
-            }
-            squares
-        };
-        half_log2(along(1).max(along(2)))
-    });
-    std::array::from_fn(|lane| quads[lane / 4])
+    let mut squares = [[0.0; CHUNK_LANES / 4]; 2];
+    for axis in 0..request.shape.dimension.coordinates() {
+        let size = surface.levels[0].extent[axis] as f32;
+        for quad in 0..CHUNK_LANES / 4 {
+            let first = value(axis, 4 * quad);
+            let right = (value(axis, 4 * quad + 1) - first) * size;
+            let below = (value(axis, 4 * quad + 2) - first) * size;
+            squares[0][quad] += right * right;
+            squares[1][quad] += below * below;
+        }
+    }
+    let mut lods = [0.0; CHUNK_LANES];
+    for quad in 0..CHUNK_LANES / 4 {
+        let lod = half_log2(squares[0][quad].max(squares[1][quad]));
+        lods[4 * quad..][..4].fill(lod);
+    }
+    lods
 }
 
 /// The level of detail of given changes of the coordinates.
@@ -200,12 +203,12 @@ fn scale_lod(
     half_log2(along(dx).max(along(dy)))
 }
 
-/// Half the base-2 logarithm, to 2e-6, and exact for powers of four; -64 or so for zero, 64 for infinity.
+/// Half the base-2 logarithm, to 2e-6, and exact for powers of four; -64 or so for zero and NaN, 64 for infinity.
 #[inline(always)]
 fn half_log2(x: f32) -> f32 {
     // The mantissa is taken in [sqrt(1/2), sqrt(2)): less the bits of sqrt(1/2), the exponent field tells.
     const BIAS: i32 = 127 << 23;
-    let bits = (x.to_bits() & (u32::MAX >> 1)) as i32;
+    let bits = x.max(0.0).min(f32::MAX).to_bits() as i32;
     let exponent = (bits - std::f32::consts::FRAC_1_SQRT_2.to_bits() as i32 + BIAS) >> 23;
     let exponent = exponent - 127;
     let mantissa = f32::from_bits((bits - (exponent << 23)) as u32);

@@ -6,9 +6,10 @@
 //! Hostile coordinates are safe: NaN counts as 0, and everything is bounds-checked.
 //!
 //! There are two ways to filter: lane by lane (`filter`), which does everything, and 16 lanes at once (`batch`), which
-//! does the common formats of one- and two-dimensional images. They agree bit for bit, at every SIMD level.
+//! does the common formats. They agree bit for bit, at every SIMD level.
 
 mod address;
+mod axis;
 mod batch;
 mod cube;
 mod fetch;
@@ -18,6 +19,8 @@ mod packing;
 mod sampler;
 mod surface;
 mod table;
+#[cfg(test)]
+mod tests;
 mod view;
 
 pub use sampler::{AddressMode, BorderColor, CompareOp, Filter, MAX_LOD_BIAS, MipmapMode, Sampler};

@@ -1,15 +1,19 @@
 //! Texels of 16 lanes at once: how the common formats lie in words, and their decoding.
 //!
-//! Decoding gives the same bits as [`crate::Format::decode`].
+//! Decoding gives the same bits as [`crate::Format::decode`]. Vectors stay out of closures: one that isn't inlined would
+//! be compiled without the SIMD level's instructions.
 
 use std::ops::Range;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 
+use super::lod::Floats;
 use super::surface::Surface;
 use crate::format::{Channel, Format};
+use crate::isa::ir::CHUNK_LANES;
+use crate::isa::resources::Lanes;
 
 /// How texels lie in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,10 +31,10 @@ pub(super) enum Kind {
 /// A mip level: extents in texels; place and pitches in texels, from the first of `Packing::words`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PackedLevel {
-    pub width: f32,
-    pub height: f32,
+    pub extent: [u32; 3],
     pub base: u32,
     pub row_pitch: u32,
+    pub depth_pitch: u32,
     pub layer_pitch: u32,
 }
 
@@ -95,10 +99,10 @@ impl Packing {
         }
         let levels = surface.levels.iter().map(|level| {
             Some(PackedLevel {
-                width: level.extent[0] as f32,
-                height: level.extent[1] as f32,
+                extent: level.extent,
                 base: texels(level.offset - begin)?,
                 row_pitch: texels(level.row_pitch)?,
+                depth_pitch: texels(level.depth_pitch)?,
                 layer_pitch: texels(level.layer_pitch)?,
             })
         });
@@ -130,8 +134,123 @@ impl Packing {
     }
 }
 
+/// Two columns and two rows of texels for each of 16 lanes.
+pub(super) struct Rows<'a> {
+    /// The first texel of the lane's level, layer and slice.
+    pub base: Lanes,
+    pub row_pitch: Lanes,
+    pub x: &'a [Lanes; 2],
+    pub y: &'a [Lanes; 2],
+}
+
+/// Calls a kernel for a [`Kind`] at a SIMD level.
+macro_rules! for_kind {
+    ($level:expr, $kind:expr, $kernel:ident($($argument:expr),*)) => {
+        match $kind {
+            Kind::Unorm8 => dispatch!($level, simd => $kernel::<_, Unorm8>(simd, $($argument),*)),
+            Kind::Unorm8x2 => dispatch!($level, simd => $kernel::<_, Unorm8x2>(simd, $($argument),*)),
+            Kind::Unorm8x4 => dispatch!($level, simd => $kernel::<_, Unorm8x4>(simd, $($argument),*)),
+            Kind::Srgb8x4 => dispatch!($level, simd => $kernel::<_, Srgb8x4>(simd, $($argument),*)),
+            Kind::Unorm16 => dispatch!($level, simd => $kernel::<_, Unorm16>(simd, $($argument),*)),
+            Kind::Float16x4 => dispatch!($level, simd => $kernel::<_, Float16x4>(simd, $($argument),*)),
+            Kind::Float32 => dispatch!($level, simd => $kernel::<_, Float32>(simd, $($argument),*)),
+            Kind::Float32x4 => dispatch!($level, simd => $kernel::<_, Float32x4>(simd, $($argument),*)),
+        }
+    };
+}
+
+impl Kind {
+    /// How many components are stored.
+    pub fn components(self) -> usize {
+        match self {
+            Self::Unorm8 | Self::Unorm16 | Self::Float32 => 1,
+            Self::Unorm8x2 => 2,
+            Self::Unorm8x4 | Self::Srgb8x4 | Self::Float16x4 | Self::Float32x4 => 4,
+        }
+    }
+
+    /// The stored components of texels in column `i` and row `j` of two.
+    pub fn load(
+        self,
+        level: Level,
+        words: &[AtomicU32],
+        rows: &Rows<'_>,
+        i: usize,
+        j: usize,
+    ) -> [Floats; 4] {
+        for_kind!(level, self, load(words, rows, i, j))
+    }
+
+    /// The weighted mean of all four texels.
+    pub fn bilinear(
+        self,
+        level: Level,
+        words: &[AtomicU32],
+        rows: &Rows<'_>,
+        weight_x: &Floats,
+        weight_y: &Floats,
+    ) -> [Floats; 4] {
+        for_kind!(level, self, bilinear(words, rows, weight_x, weight_y))
+    }
+}
+
+#[inline(always)]
+fn load<S: Simd, T: Texels>(
+    simd: S,
+    words: &[AtomicU32],
+    rows: &Rows<'_>,
+    i: usize,
+    j: usize,
+) -> [Floats; 4] {
+    let row = row_start(simd, rows, j);
+    let texel = T::load(simd, words, row + u32x16::simd_from(simd, rows.x[i]));
+    [
+        texel[0].into(),
+        texel[1].into(),
+        texel[2].into(),
+        texel[3].into(),
+    ]
+}
+
+#[inline(always)]
+fn bilinear<S: Simd, T: Texels>(
+    simd: S,
+    words: &[AtomicU32],
+    rows: &Rows<'_>,
+    weight_x: &Floats,
+    weight_y: &Floats,
+) -> [Floats; 4] {
+    let (top, bottom) = (row_start(simd, rows, 0), row_start(simd, rows, 1));
+    let (left, right) = (
+        u32x16::simd_from(simd, rows.x[0]),
+        u32x16::simd_from(simd, rows.x[1]),
+    );
+    let x = f32x16::simd_from(simd, *weight_x);
+    let y = f32x16::simd_from(simd, *weight_y);
+    let mut upper = T::load(simd, words, top + left);
+    let other = T::load(simd, words, top + right);
+    for c in 0..T::COMPONENTS {
+        upper[c] = upper[c] + x * (other[c] - upper[c]);
+    }
+    let mut lower = T::load(simd, words, bottom + left);
+    let other = T::load(simd, words, bottom + right);
+    let mut out = [[0.0; CHUNK_LANES]; 4];
+    for c in 0..T::COMPONENTS {
+        lower[c] = lower[c] + x * (other[c] - lower[c]);
+        out[c] = (upper[c] + y * (lower[c] - upper[c])).into();
+    }
+    out
+}
+
+/// Where the lanes' row `j` of two begins.
+#[inline(always)]
+fn row_start<S: Simd>(simd: S, rows: &Rows<'_>, j: usize) -> u32x16<S> {
+    let y = u32x16::simd_from(simd, rows.y[j]);
+    u32x16::simd_from(simd, rows.base) + y * u32x16::simd_from(simd, rows.row_pitch)
+}
+
 /// A [`Kind`] as a type.
-pub(super) trait Texels {
+trait Texels {
     /// How many components are stored.
     const COMPONENTS: usize;
 
@@ -143,11 +262,12 @@ pub(super) trait Texels {
 #[inline(always)]
 fn gather<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> u32x16<S> {
     let index: [u32; 16] = index.into();
-    let found: [u32; 16] = std::array::from_fn(|lane| {
-        words
-            .get(index[lane] as usize)
-            .map_or(0, |word| word.load(Relaxed))
-    });
+    let mut found = [0; 16];
+    for lane in 0..16 {
+        if let Some(word) = words.get(index[lane] as usize) {
+            found[lane] = word.load(Relaxed);
+        }
+    }
     u32x16::simd_from(simd, found)
 }
 
@@ -187,7 +307,7 @@ fn unorm8<S: Simd>(word: u32x16<S>, shift: u32) -> f32x16<S> {
 static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| Format::R8Srgb.decode(&[code as u8])[0]));
 
-pub(super) struct Unorm8;
+struct Unorm8;
 
 impl Texels for Unorm8 {
     const COMPONENTS: usize = 1;
@@ -200,7 +320,7 @@ impl Texels for Unorm8 {
     }
 }
 
-pub(super) struct Unorm8x2;
+struct Unorm8x2;
 
 impl Texels for Unorm8x2 {
     const COMPONENTS: usize = 2;
@@ -213,7 +333,7 @@ impl Texels for Unorm8x2 {
     }
 }
 
-pub(super) struct Unorm8x4;
+struct Unorm8x4;
 
 impl Texels for Unorm8x4 {
     const COMPONENTS: usize = 4;
@@ -221,11 +341,16 @@ impl Texels for Unorm8x4 {
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
         let word = gather(simd, words, index);
-        [0, 8, 16, 24].map(|shift| unorm8(word, shift))
+        [
+            unorm8(word, 0),
+            unorm8(word, 8),
+            unorm8(word, 16),
+            unorm8(word, 24),
+        ]
     }
 }
 
-pub(super) struct Srgb8x4;
+struct Srgb8x4;
 
 impl Texels for Srgb8x4 {
     const COMPONENTS: usize = 4;
@@ -235,16 +360,24 @@ impl Texels for Srgb8x4 {
         let linear = &*LINEAR;
         let word = gather(simd, words, index);
         let codes: [u32; 16] = word.into();
-        let component = |shift: u32| {
-            let values: [f32; 16] =
-                std::array::from_fn(|lane| linear[usize::from((codes[lane] >> shift) as u8)]);
-            f32x16::simd_from(simd, values)
-        };
-        [component(0), component(8), component(16), unorm8(word, 24)]
+        let mut values = [[0.0; 16]; 3];
+        for lane in 0..16 {
+            let [r, g, b, _] = codes[lane].to_le_bytes();
+            values[0][lane] = linear[usize::from(r)];
+            values[1][lane] = linear[usize::from(g)];
+            values[2][lane] = linear[usize::from(b)];
+        }
+        let [r, g, b] = values;
+        [
+            f32x16::simd_from(simd, r),
+            f32x16::simd_from(simd, g),
+            f32x16::simd_from(simd, b),
+            unorm8(word, 24),
+        ]
     }
 }
 
-pub(super) struct Unorm16;
+struct Unorm16;
 
 impl Texels for Unorm16 {
     const COMPONENTS: usize = 1;
@@ -258,7 +391,7 @@ impl Texels for Unorm16 {
     }
 }
 
-pub(super) struct Float16x4;
+struct Float16x4;
 
 /// The low 16 bits of words as binary16 numbers.
 #[inline(always)]
@@ -286,11 +419,16 @@ impl Texels for Float16x4 {
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
         let low = gather(simd, words, index * 2);
         let high = gather(simd, words, index * 2 + 1);
-        [low, low >> 16, high, high >> 16].map(|bits| float16(simd, bits))
+        [
+            float16(simd, low),
+            float16(simd, low >> 16),
+            float16(simd, high),
+            float16(simd, high >> 16),
+        ]
     }
 }
 
-pub(super) struct Float32;
+struct Float32;
 
 impl Texels for Float32 {
     const COMPONENTS: usize = 1;
@@ -302,14 +440,20 @@ impl Texels for Float32 {
     }
 }
 
-pub(super) struct Float32x4;
+struct Float32x4;
 
 impl Texels for Float32x4 {
     const COMPONENTS: usize = 4;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
-        [0, 1, 2, 3].map(|word| gather(simd, words, index * 4 + word).bitcast())
+        let first = index * 4;
+        [
+            gather(simd, words, first).bitcast(),
+            gather(simd, words, first + 1).bitcast(),
+            gather(simd, words, first + 2).bitcast(),
+            gather(simd, words, first + 3).bitcast(),
+        ]
     }
 }
 
@@ -317,7 +461,6 @@ impl Texels for Float32x4 {
 mod tests {
     use super::*;
     use crate::device::SimdLevel;
-    use fearless_simd::dispatch;
 
     /// Texels 0.. of these words, as a packing and as their format decodes them.
     fn agree<T: Texels>(format: Format, words: &[u32]) {

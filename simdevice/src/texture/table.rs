@@ -1,6 +1,6 @@
 //! The image unit: what a program's image and sampler slots are bound to.
 
-use fearless_simd::{Level, dispatch};
+use fearless_simd::Level;
 
 use super::sampler::Sampler;
 use super::surface::Surface;
@@ -64,12 +64,12 @@ impl ImageUnit for ImageTable {
         let Some((surface, sampler)) = self.pair(image, sampler) else {
             return Default::default();
         };
-        match &surface.packing {
-            Some(packing) if self.batched && batch::handles(request) => {
-                dispatch!(self.level, simd => batch::sample(simd, surface, packing, sampler, request))
-            }
-            _ => filter::sample(surface, sampler, request),
-        }
+        let batched = if self.batched {
+            batch::sample(self.level, surface, sampler, request)
+        } else {
+            None
+        };
+        batched.unwrap_or_else(|| filter::sample(surface, sampler, request))
     }
 
     fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4] {
