@@ -1,5 +1,6 @@
 //! Kept compute shaders run on the shader cores and give what the host computes.
 
+#[path = "common/mod.rs"]
 mod common;
 
 use common::{Dispatch, Random, buffer, contents, float_contents, floats, translated};
@@ -303,4 +304,270 @@ fn control_flow() {
         ];
         assert_eq!(found, expected, "x = {x}");
     }
+}
+
+#[test]
+fn dynamic_indices_and_layouts() {
+    let shader = translated("dynamic_index.comp", &Specialization::default());
+    let keys: Vec<u32> = (0..32).map(|i| i * 7 % 23).collect();
+    let (index, results) = (buffer(&keys), floats(&[0.0; 320]));
+    // rows: a row-major mat3x2, two rows of three with a stride of 16 bytes; columns: two mat2 of stride 16; v.
+    let mut block = vec![0.0_f32; 8 + 16 + 12];
+    for row in 0..2 {
+        for column in 0..3 {
+            block[4 * row + column] = (10 * row + column) as f32;
+        }
+    }
+    for matrix in 0..2 {
+        for column in 0..2 {
+            for row in 0..2 {
+                block[8 + 8 * matrix + 4 * column + row] =
+                    (100 * matrix + 10 * column + row) as f32;
+            }
+        }
+    }
+    for element in 0..3 {
+        block[24 + 4 * element + 1] = 0.5 + element as f32;
+    }
+    // An item: id, three weights, and a mat2x3 of stride 16 at byte 16.
+    let item = |number: usize| {
+        let mut words = [0_u32; 12];
+        words[0] = number as u32;
+        for k in 0..3 {
+            words[1 + k] = (number as f32 + 0.25 * k as f32).to_bits();
+        }
+        for column in 0..2 {
+            for row in 0..3 {
+                words[4 + 4 * column + row] = ((number + 3 * column + row) as f32).to_bits();
+            }
+        }
+        words
+    };
+    let mut items: Vec<u32> = (0..4).flat_map(item).collect();
+    items.resize(12 * 36, 0);
+    let (block, items) = (floats(&block), buffer(&items));
+    Dispatch {
+        buffers: &[
+            ((0, 0, 0), &index),
+            ((0, 1, 0), &results),
+            ((0, 2, 0), &block),
+            ((0, 3, 0), &items),
+        ],
+        ..Dispatch::new(&shader, [1, 1, 1])
+    }
+    .run()
+    .unwrap();
+    let (results, items) = (float_contents(&results), contents(&items));
+    for (i, k) in keys.iter().map(|k| *k as usize).enumerate() {
+        let mut vector = [1.0, 2.0, 3.0, 4.0];
+        vector[k & 3] = 9.0;
+        let mut m = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.0_f32]];
+        m[k % 3][(k + 1) % 3] += 0.5;
+        let determinant = m[0][0] * (m[1][1] * m[2][2] - m[2][1] * m[1][2])
+            - m[1][0] * (m[0][1] * m[2][2] - m[2][1] * m[0][2])
+            + m[2][0] * (m[0][1] * m[1][2] - m[1][1] * m[0][2]);
+        let flags = 0b00_1101 ^ 1 << (k % 6);
+        let number = k % 4;
+        let expected = [
+            (k % 12 * (k % 12)) as f32,
+            vector[(k + 1) & 3] + vector.iter().sum::<f32>(),
+            determinant,
+            (10 + k % 3) as f32,
+            (100 * (k & 1) + 10 + (k >> 1 & 1)) as f32,
+            0.5 + (k % 3) as f32,
+            number as f32 + 0.25 * (k % 3) as f32 + number as f32,
+            (number + 2) as f32 + 2.0 * (number + 5) as f32,
+            flags as f32,
+            2.0 + 10.0 * 12.0,
+        ];
+        close(&results[10 * i..10 * i + 10], &expected, 1e-5);
+        let stored = &items[12 * (4 + i)..12 * (5 + i)];
+        assert_eq!(stored[0] as usize, k);
+        let stored: Vec<f32> = stored.iter().map(|bits| f32::from_bits(*bits)).collect();
+        close(
+            &stored[1..7],
+            &[&expected[6..9], &expected[..3]].concat(),
+            1e-5,
+        );
+        close(&stored[8..11], &expected[3..6], 1e-5);
+    }
+}
+
+#[test]
+fn atomics() {
+    let shader = translated("atomics.comp", &Specialization::default());
+    let cells = buffer(&[0; 20]);
+    Dispatch {
+        buffers: &[((0, 0, 0), &cells)],
+        ..Dispatch::new(&shader, [2, 1, 1])
+    }
+    .run()
+    .unwrap();
+    let found = contents(&cells);
+    for (cell, sum) in found[..16].iter().enumerate() {
+        let expected: u32 = (0..128).filter(|i| i % 16 == cell as u32).sum();
+        assert_eq!(*sum, expected);
+    }
+    assert_eq!(found[16..], [(-20_i32).cast_unsigned(), 107, 0, 63]);
+}
+
+#[test]
+fn subgroups() {
+    let shader = translated("subgroup.comp", &Specialization::default());
+    let results = buffer(&[0; 24 * 64]);
+    Dispatch {
+        buffers: &[((0, 0, 0), &results)],
+        ..Dispatch::new(&shader, [1, 1, 1])
+    }
+    .run()
+    .unwrap();
+    for (i, found) in (0..).zip(contents(&results).chunks(24)) {
+        let (lane, group) = (i % 16, i / 16);
+        let first = 16 * group;
+        let members = first..first + 16;
+        let odd_below = (0..lane).filter(|lane| lane & 1 == 1).count() as u32;
+        let expected = [
+            lane,
+            group,
+            members.clone().sum(),
+            (first..=i).sum(),
+            (first..i).sum(),
+            members.clone().map(|i| i ^ 5).max().unwrap(),
+            1 | u32::from(group == 0) << 1,
+            0xaaaa,
+            8,
+            1,
+            15,
+            2 * (first + 3),
+            i ^ 1,
+            (0..4).map(|k| (i & !3) + k).sum(),
+            i ^ 1,
+            (i & !3) + 2,
+            (1 << lane) - 1,
+            0xffff & !((1 << lane) - 1),
+            odd_below,
+            lane & 1,
+            if lane == 0 { found[20] } else { i - 1 },
+            first + 7,
+            u32::from(lane == 0),
+            4016,
+        ];
+        assert_eq!(found, expected, "lane {i}");
+    }
+}
+
+#[test]
+fn descriptor_arrays_and_runtime_lengths() {
+    let shader = translated("descriptor_arrays.comp", &Specialization::default());
+    let arrays: Vec<_> = (0..4)
+        .map(|n| buffer(&vec![n + 1; 3 + n as usize]))
+        .collect();
+    let results = buffer(&[0; 4]);
+    Dispatch {
+        buffers: &[
+            ((0, 2, 0), &results),
+            ((1, 3, 0), &arrays[0]),
+            ((1, 3, 1), &arrays[1]),
+            ((1, 3, 2), &arrays[2]),
+            ((1, 3, 3), &arrays[3]),
+        ],
+        ..Dispatch::new(&shader, [1, 1, 1])
+    }
+    .run()
+    .unwrap();
+    assert_eq!(contents(&results), [44, 34, 24, 14]);
+    for (n, array) in (0..).zip(&arrays) {
+        assert_eq!(contents(array)[2], n + 50);
+    }
+}
+
+#[test]
+fn wide_and_narrow_types() {
+    let shader = translated("wide.comp", &Specialization::default());
+    let mut random = Random(99);
+    let mut bytes = Vec::new();
+    let d: Vec<f64> = (0..16).map(|i| f64::from(i) * 1.7).collect();
+    let l: Vec<i64> = (0..16).map(|_| i64::from(random.next()) << 20).collect();
+    let u: Vec<u64> = (0..16).map(|_| u64::from(random.next())).collect();
+    let h: Vec<half::f16> = (0..16)
+        .map(|i| half::f16::from_f32(i as f32 * 0.3))
+        .collect();
+    let s: Vec<i16> = (0..16).map(|_| random.next() as i16).collect();
+    let b: Vec<u8> = (0..16).map(|_| random.next() as u8).collect();
+    let c: Vec<i8> = (0..16).map(|_| random.next() as i8).collect();
+    bytes.extend(d.iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(l.iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(u.iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(h.iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(s.iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(b.iter());
+    bytes.extend(c.iter().map(|x| x.cast_unsigned()));
+    let data: Vec<u32> = bytes
+        .chunks_exact(4)
+        .map(|word| u32::from_le_bytes(word.try_into().unwrap()))
+        .collect();
+    let range = buffer(&data);
+    Dispatch {
+        buffers: &[((0, 0, 0), &range)],
+        ..Dispatch::new(&shader, [1, 1, 1])
+    }
+    .run()
+    .unwrap();
+    let found: Vec<u8> = contents(&range)
+        .iter()
+        .flat_map(|word| word.to_le_bytes())
+        .collect();
+    for i in 0..16 {
+        let wide = |base: usize| -> [u8; 8] { found[base + 8 * i..][..8].try_into().unwrap() };
+        let pair = |base: usize| -> [u8; 2] { found[base + 2 * i..][..2].try_into().unwrap() };
+        assert_eq!(f64::from_le_bytes(wide(0)), d[i].sqrt() * 2.0 + i as f64);
+        assert_eq!(
+            i64::from_le_bytes(wide(128)),
+            l[i] / -3 + ((i as i64) << 40)
+        );
+        assert_eq!(
+            u64::from_le_bytes(wide(256)),
+            u[i].wrapping_mul(0x1_0000_0001) >> 3
+        );
+        let product = half::f16::from_f32(h[i].to_f32() * 1.5);
+        let expected = half::f16::from_f32(product.to_f32() + 0.25);
+        assert_eq!(half::f16::from_le_bytes(pair(384)), expected);
+        assert_eq!(i16::from_le_bytes(pair(416)), s[i].wrapping_mul(3));
+        assert_eq!(found[448 + i], b[i].wrapping_add(200));
+        assert_eq!(found[464 + i].cast_signed(), c[i].wrapping_sub(100));
+    }
+}
+
+#[test]
+fn device_addresses() {
+    struct OneBuffer(simdevice::packet::BufferRange);
+    impl simdevice::isa::resources::GlobalMemory for OneBuffer {
+        fn find(&self, address: u64) -> Option<(&simdevice::packet::BufferRange, u64)> {
+            let begin = 1 << 40;
+            (begin..begin + self.0.size)
+                .contains(&address)
+                .then_some((&self.0, begin))
+        }
+    }
+    let shader = translated("addresses.comp", &Specialization::default());
+    // A circle of nodes, each a value and the address of the next, 16 bytes apart.
+    let address = |node: u32| -> u64 { (1 << 40) + 16 * u64::from(node % 5) };
+    let nodes: Vec<u32> = (0..5)
+        .flat_map(|node| {
+            let next = address(node + 2);
+            [100 + node, 0, next as u32, (next >> 32) as u32]
+        })
+        .collect();
+    let memory = OneBuffer(buffer(&nodes));
+    let results = buffer(&[0; 16]);
+    Dispatch {
+        buffers: &[((0, 0, 0), &results)],
+        push: &address(0).to_le_bytes(),
+        global: &memory,
+        ..Dispatch::new(&shader, [1, 1, 1])
+    }
+    .run()
+    .unwrap();
+    let expected: Vec<u32> = (0..16).map(|i| 100 + 2 * i % 5).collect();
+    assert_eq!(contents(&results), expected);
 }

@@ -26,6 +26,18 @@ fn comparable(bytes: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// Whether spirv-opt is there, in the version that the kept binaries are of.
+fn spirv_opt_is_as_kept() -> bool {
+    let version = Command::new("spirv-opt").arg("--version").output();
+    let found = version.is_ok_and(|output| {
+        String::from_utf8_lossy(&output.stdout).contains("SPIRV-Tools v2023.1")
+    });
+    if !found {
+        eprintln!("skipped what spirv-opt makes: SPIRV-Tools v2023.1 isn't there");
+    }
+    found
+}
+
 #[test]
 fn kept_binaries_match_their_sources() {
     let compiler = "glslangValidator";
@@ -46,19 +58,52 @@ fn kept_binaries_match_their_sources() {
     }
     let scratch = tempfile::tempdir().unwrap();
     for name in all_shaders() {
+        let source = name.strip_suffix(".opt").unwrap_or(&name);
         let binary = scratch.path().join("out.spv");
         let output = Command::new(compiler)
             .args(["-V", "--target-env", "vulkan1.3", "-o"])
             .arg(&binary)
-            .arg(folder().join(&name))
+            .arg(folder().join(source))
             .output()
             .unwrap();
-        assert!(output.status.success(), "{name} doesn't compile");
+        assert!(output.status.success(), "{source} doesn't compile");
+        if source != name {
+            if !spirv_opt_is_as_kept() {
+                continue;
+            }
+            let mut optimizer = Command::new("spirv-opt");
+            optimizer
+                .args(["-O", "--target-env=vulkan1.3"])
+                .arg(&binary);
+            let output = optimizer.arg("-o").arg(&binary).output().unwrap();
+            assert!(output.status.success(), "{source} can't be optimized");
+        }
         let kept = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
         let fresh = std::fs::read(&binary).unwrap();
         assert!(
             comparable(&kept) == comparable(&fresh),
-            "{name}.spv isn't what {name} compiles to"
+            "{name}.spv isn't what {source} compiles to"
+        );
+    }
+}
+
+/// Disassemblies that are kept, to be looked at when the translation changes.
+const KEPT: [&str; 3] = ["triangle.vert", "mandelbrot.comp", "matrix_product.comp"];
+
+#[test]
+fn disassemblies_are_as_kept() {
+    for name in KEPT {
+        let text = translated(name, &Specialization::default())
+            .program
+            .to_string();
+        let path = folder().join(format!("{name}.ir"));
+        if std::env::var_os("GAURAST_BLESS").is_some() {
+            std::fs::write(&path, &text).unwrap();
+        }
+        let kept = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(
+            text, kept,
+            "{name}: run with GAURAST_BLESS=1 to keep the new disassembly"
         );
     }
 }

@@ -126,7 +126,7 @@ fn measure(program: &Program, level: SimdLevel, lanes: usize) -> Option<(f64, f6
     let mut machine = Machine::new(Arc::new(
         Executable::new(program.clone(), &options).expect("a valid program"),
     ));
-    let (begin, mut done) = (Instant::now(), 0);
+    let (begin, mut done) = (Instant::now(), 0u32);
     while begin.elapsed() < Duration::from_millis(800) {
         (0..512 * 512)
             .step_by(lanes)
@@ -134,7 +134,7 @@ fn measure(program: &Program, level: SimdLevel, lanes: usize) -> Option<(f64, f6
         done += 512 * 512;
     }
     Some((
-        done as f64 / begin.elapsed().as_secs_f64(),
+        f64::from(done) / begin.elapsed().as_secs_f64(),
         instructions,
         work.occupancy(),
     ))

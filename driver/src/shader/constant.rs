@@ -23,12 +23,12 @@ fn normalize(scalar: Scalar, bits: u64) -> u64 {
         Scalar::Int {
             width: 8,
             signed: true,
-        } => u64::from((bits as i8 as i32).cast_unsigned()),
+        } => u64::from(i32::from(bits as i8).cast_unsigned()),
         Scalar::Int { width: 8, .. } => bits & 0xff,
         Scalar::Int {
             width: 16,
             signed: true,
-        } => u64::from((bits as i16 as i32).cast_unsigned()),
+        } => u64::from(i32::from(bits as i16).cast_unsigned()),
         Scalar::Int { width: 16, .. } => bits & 0xffff,
         _ if scalar.is_wide() => bits,
         _ => bits & 0xffff_ffff,

@@ -90,6 +90,12 @@ pub enum Error {
         /// Bytes it was given.
         given: usize,
     },
+    /// The system gave no thread to translate on.
+    #[error("there is no thread to translate on: {reason}")]
+    NoThread {
+        /// What the system says.
+        reason: String,
+    },
     /// The translation broke a rule of the device's IR.
     #[error("the shader can't be translated: {0}")]
     Program(#[from] InvalidProgram),

@@ -123,11 +123,15 @@ impl Globals {
             self.variables.insert(it.result()?, variable);
             return Ok(());
         }
-        if it.class.opcode.is_type() {
-            return match self.read_type(module, it)? {
-                Some(ty) => self.types.declare(it.result()?, ty),
-                None => Ok(()),
+        if it.class.opcode == Op::TypeForwardPointer {
+            return match it.operands.get(1) {
+                Some(Operand::StorageClass(class)) => self.types.forward(it.id(0)?, *class),
+                _ => malformed("there is no storage class"),
             };
+        }
+        if it.class.opcode.is_type() {
+            let ty = self.read_type(module, it)?;
+            return self.types.declare(it.result()?, ty);
         }
         if matches!(it.class.opcode, Op::Line | Op::NoLine) {
             return Ok(());
@@ -135,9 +139,9 @@ impl Globals {
         self.constant(module, specialization, it)
     }
 
-    fn read_type(&self, module: &Module, it: &Instruction) -> Outcome<Option<Type>> {
+    fn read_type(&self, module: &Module, it: &Instruction) -> Outcome<Type> {
         let stride = |id| module.literal(id, Decoration::ArrayStride);
-        Ok(Some(match it.class.opcode {
+        Ok(match it.class.opcode {
             Op::TypeVoid => Type::Void,
             Op::TypeBool => Type::Scalar(Scalar::Bool),
             Op::TypeInt => {
@@ -193,13 +197,12 @@ impl Globals {
                 },
                 _ => return malformed("there is no storage class"),
             },
-            Op::TypeForwardPointer => return Ok(None),
             Op::TypeImage => Type::Image(image_type(it)?),
             Op::TypeSampler => Type::Sampler,
             Op::TypeSampledImage => Type::SampledImage { image: it.id(0)? },
             Op::TypeFunction => Type::Function,
             _ => return unsupported("this type"),
-        }))
+        })
     }
 
     fn members(&self, module: &Module, it: &Instruction) -> Outcome<Rc<[Member]>> {

@@ -1,6 +1,6 @@
 //! SPIR-V's types as the translation sees them: each value type is a flat run of scalars.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 use rspirv::spirv::{self, BuiltIn, StorageClass};
@@ -150,11 +150,30 @@ struct Entry {
 #[derive(Debug, Default)]
 pub(super) struct Types {
     entries: HashMap<u32, Entry>,
+    /// Pointers announced, not declared yet.
+    forward: HashSet<u32>,
 }
 
 impl Types {
+    /// Announces a pointer type whose pointee isn't declared yet.
+    pub fn forward(&mut self, id: u32, class: StorageClass) -> Outcome<()> {
+        if class != StorageClass::PhysicalStorageBuffer {
+            return unsupported(format!("a forward pointer of storage class {class:?}"));
+        }
+        self.forward.insert(id);
+        self.declare(id, Type::Pointer { class, pointee: 0 })
+    }
+
     /// Declares a type whose parts are declared already.
     pub fn declare(&mut self, id: u32, ty: Type) -> Outcome<()> {
+        // Sizes of types are kept, so what they were made of must not change.
+        let announced = matches!(
+            ty,
+            Type::Pointer { class: StorageClass::PhysicalStorageBuffer, pointee } if pointee != 0
+        ) && self.forward.remove(&id);
+        if self.entries.contains_key(&id) && !announced {
+            return malformed("the type is declared twice");
+        }
         let parts: Vec<u32> = match &ty {
             Type::Vector { element, .. }
             | Type::Array { element, .. }

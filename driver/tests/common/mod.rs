@@ -22,7 +22,7 @@ pub fn folder() -> PathBuf {
         .collect()
 }
 
-/// The checked-in SPIR-V of a shader.
+/// The checked-in SPIR-V of a shader; with `.opt` after its name, as spirv-opt rewrote it.
 pub fn words_of(name: &str) -> Vec<u32> {
     let bytes = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
     bytes
@@ -58,9 +58,13 @@ pub const OPTIONS: Options = Options {
     unsized_descriptors: 1,
 };
 
+/// Whether this test runs what spirv-opt made of the shaders.
+const OPTIMIZED: bool = matches!(env!("CARGO_CRATE_NAME").as_bytes(), b"shader_optimized");
+
 /// Translates a kept shader.
 pub fn translated(name: &str, specialization: &Specialization) -> Shader {
-    let module = Module::parse(&words_of(name)).unwrap();
+    let binary = format!("{name}{}", if OPTIMIZED { ".opt" } else { "" });
+    let module = Module::parse(&words_of(&binary)).unwrap();
     translate(&module, "main", stage_of(name), specialization, &OPTIONS)
         .unwrap_or_else(|error| panic!("{name}: {error}"))
 }

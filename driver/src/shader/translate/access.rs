@@ -144,7 +144,7 @@ impl Translator<'_> {
         }
         for id in it.ids(1 + usize::from(by_element)) {
             let index = self.index(id)?;
-            pointer = self.into_part(pointer, index)?;
+            pointer = self.pointer_to_part(pointer, index)?;
         }
         self.define_as(it, Value::Pointer(pointer.into()))
     }
@@ -180,7 +180,7 @@ impl Translator<'_> {
         }
     }
 
-    fn into_part(&mut self, pointer: Pointer, index: Index) -> Outcome<Pointer> {
+    fn pointer_to_part(&mut self, pointer: Pointer, index: Index) -> Outcome<Pointer> {
         match pointer {
             Pointer::Slot {
                 slot,
@@ -211,7 +211,7 @@ impl Translator<'_> {
                     ty: part,
                 })
             }
-            Pointer::Memory(place) => Ok(Pointer::Memory(self.into_place(place, index)?)),
+            Pointer::Memory(place) => Ok(Pointer::Memory(self.place_of_part(place, index)?)),
             Pointer::Resource { binding, class, ty } => {
                 let (element, _) = self.descriptors(ty)?;
                 let each = self.descriptor_count(element)?;
@@ -235,7 +235,7 @@ impl Translator<'_> {
         }
     }
 
-    fn into_place(&mut self, mut place: Place, index: Index) -> Outcome<Place> {
+    fn place_of_part(&mut self, mut place: Place, index: Index) -> Outcome<Place> {
         let types = &self.globals.types;
         match types.get(place.ty)? {
             Type::Struct(members) => {

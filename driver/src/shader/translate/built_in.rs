@@ -2,13 +2,13 @@
 
 use std::rc::Rc;
 
-use rspirv::spirv::{BuiltIn as Spirv, Decoration, StorageClass};
+use rspirv::spirv::{BuiltIn as Spirv, Decoration};
 use simdevice::isa::ir::{Rate, Reg};
 use simdevice::isa::op::Op as Ir;
 
 use super::super::error::{Outcome, malformed, unsupported};
 use super::super::interface::{
-    BuiltIn, Input, InputSource, Interpolation, Numeric, Output, OutputTarget, Sampling, Stage,
+    BuiltIn, Input, InputSource, Interpolation, Numeric, Sampling, Stage,
 };
 use super::super::types::{Member, Scalar, Type};
 use super::Translator;
@@ -18,9 +18,12 @@ use super::resource::numeric;
 /// The most locations of an interface.
 const MAX_LOCATIONS: u32 = 1 << 10;
 
+/// The most scalars of a built-in.
+const MAX_BUILT_IN_SCALARS: u32 = 64;
+
 /// Where a scalar of an input or output comes from or goes.
 #[derive(Clone, Copy, Debug)]
-enum Origin {
+pub enum Origin {
     Location {
         location: u32,
         component: u32,
@@ -46,12 +49,24 @@ struct Cursor {
 
 impl Translator<'_> {
     /// Where each scalar of an input or output variable belongs.
-    fn origins(&self, variable: u32) -> Outcome<Rc<[Origin]>> {
+    pub fn origins(&mut self, variable: u32) -> Outcome<Rc<[Origin]>> {
+        if let Some(origins) = self.origins.get(&variable) {
+            return Ok(origins.clone());
+        }
+        let origins = self.find_origins(variable)?;
+        self.origins.insert(variable, origins.clone());
+        Ok(origins)
+    }
+
+    fn find_origins(&self, variable: u32) -> Outcome<Rc<[Origin]>> {
         let Some(global) = self.globals.variables.get(&variable) else {
             return malformed(format!("%{variable} isn't an input or output"));
         };
         let scalars = self.globals.types.scalars(global.pointee)?;
         if let Some(built_in) = self.module.built_in(variable) {
+            if scalars > MAX_BUILT_IN_SCALARS {
+                return unsupported("a built-in of this many elements");
+            }
             let one = |component| Origin::BuiltIn {
                 built_in,
                 component,
@@ -307,7 +322,7 @@ impl Translator<'_> {
         Some((variable, *start, *ty))
     }
 
-    fn interpolation_of(&self, pointer: &Pointer) -> Option<Interpolation> {
+    fn interpolation_of(&mut self, pointer: &Pointer) -> Option<Interpolation> {
         let (variable, start, _) = self.interpolant(pointer)?;
         match self.origins(variable).ok()?.get(start)? {
             Origin::Location { interpolation, .. } => Some(*interpolation),
@@ -316,12 +331,12 @@ impl Translator<'_> {
     }
 
     /// Whether an input isn't interpolated.
-    pub fn is_flat(&self, pointer: &Pointer) -> bool {
+    pub fn is_flat(&mut self, pointer: &Pointer) -> bool {
         self.interpolation_of(pointer) == Some(Interpolation::Flat)
     }
 
     /// Whether an input is interpolated without perspective.
-    pub fn is_linear(&self, pointer: &Pointer) -> bool {
+    pub fn is_linear(&mut self, pointer: &Pointer) -> bool {
         self.interpolation_of(pointer) == Some(Interpolation::Linear)
     }
 
@@ -480,75 +495,6 @@ impl Translator<'_> {
             self.interface.workgroup_size = [x as u32, y as u32, z as u32];
         }
     }
-
-    /// Assigns what was stored to the output variables.
-    pub fn assign_outputs(&mut self) -> Outcome<()> {
-        let mut outputs: Vec<u32> = self.analysis.used.iter().copied().collect();
-        outputs.retain(|id| {
-            let class = self.globals.variables.get(id).map(|it| it.class);
-            class == Some(StorageClass::Output)
-        });
-        outputs.sort_unstable();
-        for variable in outputs {
-            let Some(slot) = self.slot_of_root(variable) else {
-                continue;
-            };
-            let origins = self.origins(variable)?;
-            for (index, origin) in origins.iter().enumerate() {
-                if !self.slots[slot].written[index] {
-                    continue;
-                }
-                let scalar = self.slots[slot].scalars[index];
-                let target = output_target(*origin)?;
-                if self.interface.outputs.iter().any(|it| it.target == target) {
-                    return malformed(format!("two outputs at {target:?}"));
-                }
-                let reg = self.read_scalar(slot, index)?;
-                let output = self
-                    .builder
-                    .output(self.interface.outputs.len() as u32, scalar.register());
-                self.interface.outputs.push(Output {
-                    target,
-                    numeric: numeric(scalar),
-                });
-                self.builder.assign(output, reg);
-            }
-        }
-        Ok(())
-    }
-}
-
-fn output_target(origin: Origin) -> Outcome<OutputTarget> {
-    Ok(match origin {
-        Origin::Location {
-            location,
-            component,
-            index,
-            ..
-        } => OutputTarget::Location {
-            location,
-            component,
-            index,
-        },
-        Origin::BuiltIn {
-            built_in,
-            component,
-        } => OutputTarget::BuiltIn {
-            built_in: match built_in {
-                Spirv::Position => BuiltIn::Position,
-                Spirv::PointSize => BuiltIn::PointSize,
-                Spirv::ClipDistance => BuiltIn::ClipDistance,
-                Spirv::CullDistance => BuiltIn::CullDistance,
-                Spirv::Layer => BuiltIn::Layer,
-                Spirv::ViewportIndex => BuiltIn::ViewportIndex,
-                Spirv::FragDepth => BuiltIn::FragDepth,
-                Spirv::SampleMask => BuiltIn::SampleMask,
-                Spirv::FragStencilRefEXT => BuiltIn::FragStencilRef,
-                other => return unsupported(format!("output built-in {other:?}")),
-            },
-            component,
-        },
-    })
 }
 
 /// Whether a built-in input follows from the lane.

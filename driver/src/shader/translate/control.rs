@@ -4,17 +4,20 @@
 //! variables of the IR, which every edge assigns; so do phis. If only one edge reaches it, what the edge brought is
 //! what the variables are.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 use std::rc::Rc;
 
 use rspirv::dr::{Block, Instruction};
 use rspirv::spirv::Op;
-use simdevice::isa::ir::{Label, Reg};
+use simdevice::isa::ir::{Label, MAX_NESTING, Reg};
 
-use super::super::error::{Error, Fault, Outcome, malformed};
+use super::super::error::{Error, Fault, Outcome, malformed, unsupported};
 use super::super::module::Operands;
 use super::structure::{Case, Construct, Edge, Join, Jump, Node, Tree};
 use super::{Translator, Value};
+
+/// What inlining a function counts for, even if it is empty: nested calls multiply.
+const CALL_COST: usize = 16;
 
 /// A function being inlined.
 pub struct Call {
@@ -102,6 +105,7 @@ impl<'a> Translator<'a> {
         let Some(tree) = self.analysis.tree(function) else {
             return malformed("the function isn't structured");
         };
+        self.spend(CALL_COST)?;
         self.declare_phis(function)?;
         let modified: Vec<u32> = tree
             .modified
@@ -162,7 +166,14 @@ impl<'a> Translator<'a> {
     }
 
     fn nodes(&mut self, nodes: &[Node]) -> Outcome<()> {
-        nodes.iter().try_for_each(|node| self.node(node))
+        // Constructs of inlined functions add up.
+        if self.depth >= MAX_NESTING {
+            return unsupported("constructs are nested too deeply");
+        }
+        self.depth += 1;
+        let done = nodes.iter().try_for_each(|node| self.node(node));
+        self.depth -= 1;
+        done
     }
 
     fn node(&mut self, node: &Node) -> Outcome<()> {
@@ -538,59 +549,6 @@ impl<'a> Translator<'a> {
     fn restore(&mut self, saved: &Saved) {
         for (slot, now) in saved {
             self.slots[*slot].now.clone_from(now);
-        }
-    }
-
-    /// Assignments at once: every source is read before any destination is written.
-    fn assign(&mut self, mut pairs: Vec<(Reg, Reg)>) -> Outcome<()> {
-        pairs.retain(|(dst, src)| dst != src);
-        self.spend(pairs.len())?;
-        let mut readers: HashMap<Reg, Vec<usize>> = HashMap::new();
-        for (index, (_, src)) in pairs.iter().enumerate() {
-            readers.entry(*src).or_default().push(index);
-        }
-        let mut waiting: HashMap<Reg, usize> = readers
-            .iter()
-            .map(|(reg, readers)| (*reg, readers.len()))
-            .collect();
-        let by_dst: HashMap<Reg, usize> = pairs
-            .iter()
-            .enumerate()
-            .map(|(index, (dst, _))| (*dst, index))
-            .collect();
-        let mut done = vec![false; pairs.len()];
-        let mut ready: VecDeque<usize> = (0..pairs.len())
-            .filter(|index| !readers.contains_key(&pairs[*index].0))
-            .collect();
-        let mut next_cycle = 0;
-        loop {
-            while let Some(index) = ready.pop_front() {
-                let (dst, src) = pairs[index];
-                done[index] = true;
-                self.builder.assign(dst, src);
-                if let Some(left) = waiting.get_mut(&src) {
-                    *left -= 1;
-                    if *left == 0
-                        && let Some(freed) = by_dst.get(&src)
-                        && !done[*freed]
-                    {
-                        ready.push_back(*freed);
-                    }
-                }
-            }
-            // What is left are cycles: hold one register's old value for its readers.
-            while next_cycle < pairs.len() && done[next_cycle] {
-                next_cycle += 1;
-            }
-            let Some((held, _)) = pairs.get(next_cycle).copied() else {
-                return Ok(());
-            };
-            let copy = self.builder.variable(self.builder.type_of(held));
-            self.builder.assign(copy, held);
-            for index in readers.remove(&held).unwrap_or_default() {
-                pairs[index].1 = copy;
-            }
-            ready.push_back(next_cycle);
         }
     }
 }

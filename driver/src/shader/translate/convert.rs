@@ -124,8 +124,8 @@ impl Translator<'_> {
         }
         if from_bits == to_bits {
             let regs = regs.iter().map(|reg| {
-                let raw = self.to_bits(from, *reg);
-                self.from_bits(to, raw)
+                let raw = self.raw_bits(from, *reg);
+                self.typed_bits(to, raw)
             });
             let regs = regs.collect();
             return self.define(it, regs);
@@ -136,14 +136,14 @@ impl Translator<'_> {
     }
 
     /// A scalar's own bits, zero-extended: 32 of them, or 64 if it is wide.
-    fn to_bits(&mut self, scalar: Scalar, reg: Reg) -> Reg {
+    fn raw_bits(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Float { width: 16 } => self.op(Ir::FToF16, &[reg]),
             _ => self.as_unsigned(scalar, reg),
         }
     }
 
-    fn from_bits(&mut self, scalar: Scalar, reg: Reg) -> Reg {
+    fn typed_bits(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Float { width: 16 } => self.op(Ir::F16ToF, &[reg]),
             _ => self.normalize(scalar, reg),
@@ -163,7 +163,7 @@ impl Translator<'_> {
         for group in regs.chunks((32 / width.max(8)) as usize) {
             let mut word = None;
             for (index, reg) in group.iter().enumerate() {
-                let mut part = self.to_bits(scalar, *reg);
+                let mut part = self.raw_bits(scalar, *reg);
                 if index > 0 {
                     let by = self.u32(width * index as u32);
                     part = self.op(Ir::Shl, &[part, by]);
@@ -200,7 +200,7 @@ impl Translator<'_> {
                     }
                     _ => part,
                 };
-                Some(self.from_bits(scalar, part))
+                Some(self.typed_bits(scalar, part))
             })
             .collect()
     }

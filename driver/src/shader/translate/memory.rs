@@ -101,7 +101,7 @@ impl Translator<'_> {
                 .builder
                 .load(place.at(run.offset), run.format, run.places.len());
             for (reg, index) in regs.into_iter().zip(run.places) {
-                loaded[index] = Some(self.from_memory(scalars[index], place.layout, reg));
+                loaded[index] = Some(self.loaded_scalar(scalars[index], place.layout, reg));
             }
         }
         match loaded.into_iter().collect() {
@@ -121,7 +121,7 @@ impl Translator<'_> {
             let src: Vec<Reg> = run
                 .places
                 .iter()
-                .map(|index| self.to_memory(scalars[*index], place.layout, regs[*index]))
+                .map(|index| self.stored_scalar(scalars[*index], place.layout, regs[*index]))
                 .collect();
             self.builder.store(place.at(run.offset), run.format, &src);
         }
@@ -244,7 +244,7 @@ impl Translator<'_> {
     }
 
     /// A scalar's register from what was loaded.
-    fn from_memory(&mut self, scalar: Scalar, layout: Layout, loaded: Reg) -> Reg {
+    fn loaded_scalar(&mut self, scalar: Scalar, layout: Layout, loaded: Reg) -> Reg {
         match scalar {
             Scalar::Bool => {
                 let zero = self.u32(0);
@@ -256,7 +256,7 @@ impl Translator<'_> {
     }
 
     /// What to store for a scalar.
-    fn to_memory(&mut self, scalar: Scalar, layout: Layout, reg: Reg) -> Reg {
+    fn stored_scalar(&mut self, scalar: Scalar, layout: Layout, reg: Reg) -> Reg {
         match scalar {
             Scalar::Bool => {
                 let (one, zero) = (self.u32(1), self.u32(0));

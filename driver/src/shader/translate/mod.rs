@@ -11,8 +11,10 @@
 mod access;
 mod analysis;
 mod arithmetic;
+mod assign;
 mod atomic;
 mod built_in;
+mod cases;
 mod composite;
 mod control;
 mod convert;
@@ -21,6 +23,7 @@ mod image;
 mod instruction;
 mod matrix;
 mod memory;
+mod output;
 mod resource;
 mod structure;
 mod subgroup;
@@ -43,7 +46,10 @@ use super::types::{ImageType, Scalar};
 use analysis::Analysis;
 
 /// The most instructions that a shader may become.
-const MAX_STATEMENTS: u64 = 1 << 21;
+const MAX_STATEMENTS: u64 = 1 << 22;
+
+/// The stack that a translation runs on.
+const STACK_BYTES: usize = 16 << 20;
 
 /// How a shader is translated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +65,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            subgroup_size: 16,
+            subgroup_size: 64,
             samples: 1,
             unsized_descriptors: 1,
         }
@@ -68,9 +74,36 @@ impl Default for Options {
 
 /// Translates an entry point.
 ///
+/// That is done on a thread of its own, whose stack is large enough for all nesting that is allowed, whatever the
+/// application's stack is.
+///
 /// # Errors
 /// What is malformed, unsupported or too large.
 pub fn translate(
+    module: &Module,
+    name: &str,
+    stage: Stage,
+    specialization: &Specialization,
+    options: &Options,
+) -> Result<Shader, Error> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new()
+            .name("gaurast-shader".into())
+            .stack_size(STACK_BYTES);
+        let translation = thread
+            .spawn_scoped(scope, || {
+                translate_here(module, name, stage, specialization, options)
+            })
+            .map_err(|error| Error::NoThread {
+                reason: error.to_string(),
+            })?;
+        translation
+            .join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+fn translate_here(
     module: &Module,
     name: &str,
     stage: Stage,
@@ -102,7 +135,9 @@ pub fn translate(
         phis: HashMap::new(),
         calls: Vec::new(),
         inputs: HashMap::new(),
+        origins: HashMap::new(),
         bind_points: 0,
+        depth: 0,
         statements: 0,
     };
     translator.modes(entry)?;
@@ -143,7 +178,11 @@ struct Translator<'a> {
     /// Functions being inlined, innermost last.
     calls: Vec<control::Call>,
     inputs: HashMap<super::interface::InputSource, Reg>,
+    /// Where the scalars of inputs and outputs belong.
+    origins: HashMap<u32, Rc<[built_in::Origin]>>,
     bind_points: u32,
+    /// Lists of nodes around the one being translated.
+    depth: usize,
     statements: u64,
 }
 
@@ -219,11 +258,9 @@ impl Translator<'_> {
 
     /// The type of an id.
     fn type_of(&self, id: u32) -> Outcome<u32> {
-        if let Some(constant) = self.globals.constants.get(&id) {
-            return Ok(constant.ty);
-        }
-        match self.types.get(&id) {
-            Some(ty) => Ok(*ty),
+        let constant = || self.globals.constants.get(&id).map(|constant| constant.ty);
+        match self.types.get(&id).copied().or_else(constant) {
+            Some(ty) => Ok(ty),
             None => malformed(format!("%{id} has no type here")),
         }
     }
@@ -292,6 +329,7 @@ impl Translator<'_> {
     /// Gives an instruction's result its registers, which must fit its type.
     fn define(&mut self, it: &Instruction, regs: Vec<Reg>) -> Outcome<()> {
         let (id, ty) = (it.result()?, it.ty()?);
+        self.spend(regs.len())?;
         let scalars = self.globals.types.flatten(ty)?;
         let fits = scalars.len() == regs.len()
             && scalars
@@ -350,10 +388,8 @@ impl Translator<'_> {
                 ];
             }
             ExecutionMode::EarlyFragmentTests => self.interface.early_fragment_tests = true,
-            ExecutionMode::DepthReplacing => {
-                if self.interface.depth == DepthMode::Fixed {
-                    self.interface.depth = DepthMode::Any;
-                }
+            ExecutionMode::DepthReplacing if self.interface.depth == DepthMode::Fixed => {
+                self.interface.depth = DepthMode::Any;
             }
             ExecutionMode::DepthGreater => self.interface.depth = DepthMode::Greater,
             ExecutionMode::DepthLess => self.interface.depth = DepthMode::Less,

@@ -7,15 +7,13 @@
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-use rspirv::dr::{Function, Instruction, Operand};
+use rspirv::dr::{Function, Instruction};
 use rspirv::spirv::Op;
 use simdevice::isa::ir::MAX_NESTING;
 
 use super::super::error::{Outcome, malformed, unsupported};
 use super::super::module::Operands;
-
-/// The most blocks looked at while ordering the cases of switches.
-const MAX_STEPS: usize = 1 << 22;
+use super::cases::Target;
 
 /// A construct that can be left by a break: an index, unique in the function.
 pub type Construct = usize;
@@ -164,10 +162,12 @@ enum Frame {
     },
 }
 
-struct Walker<'a> {
+/// Walks a function's blocks.
+pub struct Walker<'a> {
     function: &'a Function,
     stores: &'a [Vec<u32>],
-    index: HashMap<u32, usize>,
+    /// Blocks by the ids of their labels.
+    pub index: HashMap<u32, usize>,
     frames: Vec<Frame>,
     edges: Vec<usize>,
     constructs: usize,
@@ -176,7 +176,8 @@ struct Walker<'a> {
     modified: Vec<HashSet<u32>>,
     returns: usize,
     early_return: bool,
-    steps: usize,
+    /// Blocks looked at while ordering cases.
+    pub steps: usize,
     depth: usize,
 }
 
@@ -205,14 +206,14 @@ impl Walker<'_> {
         sorted.into()
     }
 
-    fn block_of(&self, label: u32) -> Outcome<usize> {
+    pub fn block_of(&self, label: u32) -> Outcome<usize> {
         match self.index.get(&label) {
             Some(index) => Ok(*index),
             None => malformed(format!("%{label} isn't a block of this function")),
         }
     }
 
-    fn terminator(&self, block: usize) -> Outcome<&Instruction> {
+    pub fn terminator(&self, block: usize) -> Outcome<&Instruction> {
         match self.function.blocks[block].instructions.last() {
             Some(last) => Ok(last),
             None => malformed("a block is empty"),
@@ -331,7 +332,7 @@ impl Walker<'_> {
     }
 
     /// Whether a block is where some construct around ends.
-    fn is_target(&self, block: usize) -> bool {
+    pub fn is_target(&self, block: usize) -> bool {
         self.natural(block).is_some() || self.jump(block).is_some()
     }
 
@@ -565,118 +566,4 @@ impl Walker<'_> {
         });
         Ok(join.filter(|join| self.edges[*join] > 0).map(|_| merge))
     }
-
-    /// The targets of a switch, each once.
-    fn switch_targets(&self, terminator: &Instruction) -> Outcome<Vec<Target>> {
-        let mut targets: Vec<Target> = Vec::new();
-        let mut by_block = HashMap::new();
-        let mut values = HashSet::new();
-        let mut target = |block| -> usize {
-            *by_block.entry(block).or_insert_with(|| {
-                targets.push(Target {
-                    block,
-                    ..Target::default()
-                });
-                targets.len() - 1
-            })
-        };
-        let default = target(self.block_of(terminator.id(1)?)?);
-        let mut found = Vec::new();
-        for pair in terminator.operands.get(2..).unwrap_or_default().chunks(2) {
-            match pair {
-                [Operand::LiteralBit32(value), Operand::IdRef(label)] => {
-                    if !values.insert(*value) {
-                        return malformed(format!("two cases for {value}"));
-                    }
-                    found.push((target(self.block_of(*label)?), *value));
-                }
-                _ => return unsupported("a selector that isn't 32 bits"),
-            }
-        }
-        targets[default].default = true;
-        for (which, value) in found {
-            targets[which].values.push(value);
-        }
-        Ok(targets)
-    }
-
-    /// The cases in an order in which each that falls through is followed by the one that it falls into; with each,
-    /// whether it does.
-    fn order_cases(&mut self, merge: usize, cases: &[Target]) -> Outcome<Vec<(usize, bool)>> {
-        let which: HashMap<usize, usize> = cases
-            .iter()
-            .enumerate()
-            .filter(|(_, case)| case.block != merge)
-            .map(|(index, case)| (case.block, index))
-            .collect();
-        let mut falls_into = vec![None; cases.len()];
-        let mut fallen_into = vec![false; cases.len()];
-        for (index, case) in cases.iter().enumerate() {
-            if case.block == merge || self.is_target(case.block) {
-                continue;
-            }
-            for next in self.reachable_cases(case.block, merge, &which)? {
-                if falls_into[index]
-                    .replace(next)
-                    .is_some_and(|other| other != next)
-                    || std::mem::replace(&mut fallen_into[next], true)
-                {
-                    return malformed("cases fall through to each other in no order");
-                }
-            }
-        }
-        let mut order = Vec::with_capacity(cases.len());
-        for head in (0..cases.len()).filter(|case| !fallen_into[*case]) {
-            let mut at = Some(head);
-            while let Some(case) = at {
-                at = falls_into[case];
-                order.push((case, at.is_some()));
-            }
-        }
-        if order.len() != cases.len() {
-            return malformed("cases fall through to each other in a circle");
-        }
-        Ok(order)
-    }
-
-    /// The other cases that a case reaches without leaving the switch.
-    fn reachable_cases(
-        &mut self,
-        start: usize,
-        merge: usize,
-        which: &HashMap<usize, usize>,
-    ) -> Outcome<HashSet<usize>> {
-        let mut found = HashSet::new();
-        let mut seen = HashSet::from([start]);
-        let mut waiting = vec![start];
-        while let Some(block) = waiting.pop() {
-            self.steps += 1;
-            if self.steps > MAX_STEPS {
-                return unsupported("too many blocks in switches");
-            }
-            let terminator = self.terminator(block)?.clone();
-            for label in terminator.operands.iter().filter_map(Operand::id_ref_any) {
-                let Some(next) = self.index.get(&label).copied() else {
-                    continue;
-                };
-                if next == merge || next == start || self.is_target(next) {
-                    continue;
-                }
-                if let Some(case) = which.get(&next) {
-                    found.insert(*case);
-                } else if seen.insert(next) {
-                    waiting.push(next);
-                }
-            }
-        }
-        Ok(found)
-    }
-}
-
-/// A target of a switch.
-#[derive(Default)]
-struct Target {
-    block: usize,
-    values: Vec<u32>,
-    default: bool,
 }

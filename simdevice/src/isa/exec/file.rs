@@ -1,7 +1,4 @@
 //! The register file: chunks of 16 lanes, and views of them as vectors and as typed lanes.
-//!
-//! The loops over chunks are inlined into the code of each SIMD level, but not in debug builds, where a frame with all of
-//! them would be larger than a thread's stack.
 
 use std::cell::Cell;
 
@@ -182,7 +179,7 @@ fn rounds(file: File<'_>, dst: Slot) -> usize {
 }
 
 /// Lane by lane, one operand.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub fn map1<A: Lane, R: Lane>(file: File<'_>, dst: Slot, src: &[Slot; 4], f: impl Fn(A) -> R) {
     for index in 0..rounds(file, dst) {
         file.set(dst, index, file.lanes(src[0], index).map(&f));
@@ -190,7 +187,7 @@ pub fn map1<A: Lane, R: Lane>(file: File<'_>, dst: Slot, src: &[Slot; 4], f: imp
 }
 
 /// Lane by lane, two operands.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub fn map2<A: Lane, B: Lane, R: Lane>(
     file: File<'_>,
     dst: Slot,
@@ -204,7 +201,7 @@ pub fn map2<A: Lane, B: Lane, R: Lane>(
 }
 
 /// Lane by lane, three operands.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub fn map3<A: Lane, B: Lane, C: Lane, R: Lane>(
     file: File<'_>,
     dst: Slot,
@@ -267,7 +264,7 @@ fn cut<const VARYING: bool>(chunks: &[Cell<Chunk>], rounds: usize) -> &[Cell<Chu
 }
 
 /// Vector by vector, one operand.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub fn vector1<S: Simd>(
     simd: S,
     file: File<'_>,
@@ -287,7 +284,7 @@ pub fn vector1<S: Simd>(
 }
 
 /// Vector by vector, two operands.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub fn vector2<S: Simd>(
     simd: S,
     file: File<'_>,
@@ -323,7 +320,7 @@ fn rounds2<S: Simd, const A: bool, const B: bool>(
 }
 
 /// Vector by vector, three operands.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub fn vector3<S: Simd>(
     simd: S,
     file: File<'_>,

@@ -493,7 +493,8 @@ fn mutate(block: &mut Block, registers: usize, random: &mut Random) {
             block.insert(other, copy);
         }
         3 => {
-            block[at].for_each_definition(&mut |reg| *reg = Reg(random.below(registers + 1) as u32))
+            block[at]
+                .for_each_definition(&mut |reg| *reg = Reg(random.below(registers + 1) as u32));
         }
         _ => block[at].for_each_use(&mut |reg| *reg = Reg(random.below(registers + 1) as u32)),
     }
