@@ -38,6 +38,17 @@ impl OracleCamera {
             far: camera.far_plane,
         })
     }
+
+    /// The camera as a draw takes it.
+    pub fn to_vulkan(&self) -> GaussianCameraGAURAST<'static> {
+        GaussianCameraGAURAST::default()
+            .rotation(self.rotation)
+            .eye(self.eye)
+            .focal_length(self.focal)
+            .principal_point(self.principal)
+            .near_plane(self.near)
+            .far_plane(self.far)
+    }
 }
 
 impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
@@ -59,7 +70,7 @@ mod tests {
     use crate::compare::Statistics;
     use crate::data::require_data;
     use crate::oracle::render_bounded;
-    use gaurast_samples::camera::Camera;
+    use gaurast_samples::camera::{Camera, DEFAULT_FOV};
 
     #[test]
     fn defaults_are_those_of_the_extension() {
@@ -73,6 +84,8 @@ mod tests {
     fn other_cameras_are_refused() {
         let camera = GaussianCameraGAURAST::default();
         assert!(OracleCamera::new(&camera, [8, 8]).is_some());
+        let own = crate::scenes::camera(8, 8);
+        assert_eq!(OracleCamera::new(&own.to_vulkan(), [8, 8]), Some(own));
         let camera = camera.model(GaussianCameraModelGAURAST::ORTHOGRAPHIC);
         assert_eq!(OracleCamera::new(&camera, [8, 8]), None);
     }
@@ -89,7 +102,7 @@ mod tests {
             };
             let scene = Scene::load(&path).unwrap();
             let size = [192, 144];
-            let camera = Camera::framing(&scene, 50.0, size).to_vulkan();
+            let camera = Camera::framing(&scene, DEFAULT_FOV, size).to_vulkan();
             let reference = render_bounded(
                 &SceneBuffers::from(&scene).as_oracle(),
                 &OracleCamera::new(&camera, size).unwrap(),

@@ -1,7 +1,8 @@
-//! What the project's tests share: the reference renderer, generated scenes, image comparison and
-//! the place of test data.
+//! What the project's tests share: the reference renderer, generated scenes, image comparison,
+//! devices to draw on, and the place of test data.
 
 pub mod compare;
+pub mod contexts;
 pub mod convert;
 pub mod data;
 pub mod oracle;

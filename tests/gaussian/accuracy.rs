@@ -1,0 +1,264 @@
+//! Gaussian draws through the driver against the binary64 oracle, at every SIMD level, with one
+//! worker thread and with two: the accuracy contract.
+//!
+//! `--nocapture` shows a line of figures for every picture.
+
+use std::time::Instant;
+
+use gaurast::vk::{
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use gaurast_samples::camera::{Camera, DEFAULT_FOV};
+use gaurast_samples::scene::Scene;
+use gaurast_tests::compare::{Limits, assert_contract};
+use gaurast_tests::contexts::{
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, simd_levels,
+};
+use gaurast_tests::data::require_data;
+use gaurast_tests::oracle::{OracleCamera, OracleState, Reference, render_bounded};
+use gaurast_tests::scenes::{self, SceneBuffers};
+use glam::DVec3;
+
+type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
+
+/// One device for each SIMD level and each of one and two threads.
+struct Devices(Vec<(&'static str, [Context; 2])>);
+
+impl Devices {
+    fn new() -> Self {
+        let devices = |simd| {
+            [1, 2].map(|threads| {
+                Context::embedded(&Settings {
+                    simd: Some(simd),
+                    threads: Some(threads),
+                })
+            })
+        };
+        let levels = simd_levels().into_iter();
+        Self(levels.map(|level| (level, devices(level))).collect())
+    }
+
+    /// Draws `scene` in `state` from each of `views` on every device and judges the pictures.
+    fn judge(&self, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
+        let references: Vec<Reference> = views
+            .iter()
+            .map(|view| {
+                let start = Instant::now();
+                let camera = OracleCamera::new(&view.camera, view.size).expect("a pinhole");
+                let reference =
+                    render_bounded(&scene.as_oracle(), &camera, &OracleState::from(&state));
+                let seconds = start.elapsed().as_secs_f64();
+                eprintln!("{name}, {}: oracle, {seconds:.1} s", view.name);
+                let covered = reference
+                    .nominal
+                    .iter()
+                    .filter(|rgba| rgba[3] > 0.1)
+                    .count();
+                let least = reference.nominal.len() / 20;
+                let is_made_up = view.limits == Limits::ENVELOPE_ONLY;
+                assert!(
+                    is_made_up || covered > least,
+                    "{name}: hardly anything is seen"
+                );
+                reference
+            })
+            .collect();
+        for (level, contexts) in &self.0 {
+            let [images, same] = contexts
+                .each_ref()
+                .map(|context| draw(context, scene, state, views));
+            for (((view, reference), (image, time)), (same, _)) in
+                views.iter().zip(&references).zip(images).zip(same)
+            {
+                let name = format!("{name}, {}, {level}", view.name);
+                assert!(image == same, "{name}: two threads give another picture");
+                let verdict = assert_contract(&name, &image, reference, view.limits);
+                eprintln!("{name}: {:.0} ms, {verdict}", 1e3 * time);
+            }
+        }
+    }
+}
+
+/// Where a scene is seen from, and how its picture is judged.
+struct View {
+    name: String,
+    camera: GaussianCameraGAURAST<'static>,
+    size: [u32; 2],
+    limits: Limits,
+}
+
+/// Pictures of `scene`, each with the seconds that it took.
+fn draw(
+    context: &Context,
+    scene: &SceneBuffers,
+    state: State,
+    views: &[View],
+) -> Vec<(Vec<[f32; 4]>, f64)> {
+    let options = PipelineOptions {
+        state,
+        // The device draws degree 3 at most; the oracle is asked for no more.
+        ..PipelineOptions::new(scene.degree)
+    };
+    let pipeline = Pipeline::new(context, &options);
+    let on_device = DeviceScene::new(context, scene);
+    let draw = |view: &View| {
+        let target = Target::new(context, options.format, view.size);
+        let start = Instant::now();
+        context.run(|commands| {
+            commands.pass(&target, &Pass::clear([0.0; 4]), || {
+                commands.bind(&pipeline, &on_device, &view.camera);
+                commands.draw([on_device.count, 1, 0, 0]);
+            });
+        });
+        (target.read(), start.elapsed().as_secs_f64())
+    };
+    let images = views.iter().map(draw).collect();
+    assert_eq!(context.messages(), []);
+    images
+}
+
+/// The states in which generated scenes are drawn.
+fn states() -> [(&'static str, State); 4] {
+    let default = State::default();
+    [
+        ("default", default),
+        (
+            "opacity-compensated",
+            default.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED),
+        ),
+        (
+            "lax floors",
+            default.alpha_floor(1e-4).transmittance_floor(0.0),
+        ),
+        (
+            "strict floors",
+            default
+                .low_pass_variance(0.05)
+                .alpha_floor(0.05)
+                .alpha_ceiling(0.9)
+                .transmittance_floor(0.02),
+        ),
+    ]
+}
+
+/// The view of a generated scene, with an odd size, so that tiles are cut.
+fn generated_view(limits: Limits) -> View {
+    let size = [211, 157];
+    View {
+        name: "in front".to_owned(),
+        camera: scenes::camera(size[0], size[1]).to_vulkan(),
+        size,
+        limits,
+    }
+}
+
+#[test]
+fn generated_scenes_keep_the_contract_in_every_state() {
+    let devices = Devices::new();
+    for (seed, degree) in [(1, 0), (2, 1), (3, 2), (4, 3)] {
+        let scene = scenes::cloud(seed, 3000, degree);
+        for (name, state) in states() {
+            let name = format!("cloud {seed} {name}");
+            devices.judge(
+                &name,
+                &scene,
+                state,
+                &[generated_view(Limits::ENVELOPE_ONLY)],
+            );
+        }
+    }
+}
+
+#[test]
+fn awkward_scenes_stay_within_the_envelope_in_every_state() {
+    let devices = Devices::new();
+    // Few at a time: a huge opaque one hides the others.
+    for seed in 100..120 {
+        let scene = scenes::awkward(seed, 10 + 2 * (seed - 100) as usize, (seed % 4) as u32);
+        for (name, state) in states() {
+            let name = format!("awkward {seed} {name}");
+            devices.judge(
+                &name,
+                &scene,
+                state,
+                &[generated_view(Limits::ENVELOPE_ONLY)],
+            );
+        }
+    }
+}
+
+/// The cameras that real scenes are seen by: the whole of it, a side of it from nearby, and one in
+/// its middle.
+fn views(scene: &Scene) -> Vec<View> {
+    let (centre, radius) = bulk(scene);
+    let look = |from: [f64; 3], to: [f64; 3], fov, size| {
+        let [eye, target] = [from, to].map(|at| (centre + radius * DVec3::from(at)).into());
+        Camera::look_at(eye, target, [0.0, -1.0, 0.0], fov, size).expect("a camera")
+    };
+    [[640, 480], [1920, 1080]]
+        .into_iter()
+        .flat_map(|size| {
+            let cameras = [
+                ("whole", Camera::framing(scene, DEFAULT_FOV, size)),
+                ("side", look([1.4, -0.5, 0.9], [0.0, 0.1, 0.1], 60.0, size)),
+                (
+                    "inside",
+                    look([0.1, 0.0, 0.1], [-1.0, 0.2, 0.6], 75.0, size),
+                ),
+            ];
+            cameras.map(|(name, camera)| View {
+                name: format!("{name}, {}x{}", size[0], size[1]),
+                camera: camera.to_vulkan(),
+                size,
+                limits: Limits::CONTRACT,
+            })
+        })
+        .collect()
+}
+
+/// The middle of a scene's opaque Gaussians and the distance within which half of them are.
+fn bulk(scene: &Scene) -> (DVec3, f64) {
+    let opaque: Vec<DVec3> = scene
+        .positions()
+        .iter()
+        .zip(scene.shapes())
+        .filter(|(_, shape)| shape.opacity > 0.5)
+        .map(|(position, _)| DVec3::from(position.map(f64::from)))
+        .collect();
+    let median = |mut values: Vec<f64>| {
+        let middle = values.len() / 2;
+        *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    };
+    let centre: [f64; 3] =
+        std::array::from_fn(|axis| median(opaque.iter().map(|p| p[axis]).collect()));
+    let centre = DVec3::from(centre);
+    (
+        centre,
+        median(opaque.iter().map(|p| p.distance(centre)).collect()),
+    )
+}
+
+/// Judges the pictures of a file.
+fn file_keeps_the_contract(name: &str) {
+    let Some(path) = require_data(&format!("splats/{name}")) else {
+        return;
+    };
+    let scene = Scene::load(&path).expect("a scene");
+    let views = views(&scene);
+    Devices::new().judge(name, &SceneBuffers::from(&scene), State::default(), &views);
+}
+
+#[test]
+fn skull_keeps_the_contract() {
+    file_keeps_the_contract("skull.ply");
+}
+
+#[test]
+fn playbot_keeps_the_contract() {
+    file_keeps_the_contract("playbot-125k.ply");
+}
+
+#[test]
+fn plant_keeps_the_contract() {
+    file_keeps_the_contract("plant.splat");
+}

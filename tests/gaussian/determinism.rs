@@ -1,0 +1,573 @@
+//! What must not change a picture, and what must change it in just one way: threads, ways of
+//! drawing the same Gaussians, parts of the target, targets' formats and backgrounds.
+
+use ash::vk;
+use gaurast::vk::GaussianCameraGAURAST;
+use gaurast_tests::compare::{Limits, assert_contract};
+use gaurast_tests::contexts::{
+    Buffer, Commands, Context, DeviceScene, Pass, PassObject, Pipeline, PipelineOptions, Settings,
+    Target, over, simd_levels,
+};
+use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
+use gaurast_tests::scenes::{self, SceneBuffers};
+use half::f16;
+
+/// Not whole tiles.
+const SIZE: [u32; 2] = [203, 139];
+
+fn camera() -> OracleCamera {
+    scenes::camera(SIZE[0], SIZE[1])
+}
+
+fn rect(x: i32, y: i32, width: u32, height: u32) -> vk::Rect2D {
+    vk::Rect2D {
+        offset: vk::Offset2D { x, y },
+        extent: vk::Extent2D { width, height },
+    }
+}
+
+/// Gaussians `range` of a scene.
+fn part(scene: &SceneBuffers, range: std::ops::Range<usize>) -> SceneBuffers {
+    let triples = (scene.degree as usize + 1).pow(2);
+    SceneBuffers {
+        positions: scene.positions[range.clone()].to_vec(),
+        scales: scene.scales[range.clone()].to_vec(),
+        rotations: scene.rotations[range.clone()].to_vec(),
+        opacities: scene.opacities[range.clone()].to_vec(),
+        sh: scene.sh[triples * range.start..triples * range.end].to_vec(),
+        degree: scene.degree,
+    }
+}
+
+/// The Gaussians of both scenes, in this order.
+fn joined(mut a: SceneBuffers, b: &SceneBuffers) -> SceneBuffers {
+    assert_eq!(a.degree, b.degree);
+    a.positions.extend(&b.positions);
+    a.scales.extend(&b.scales);
+    a.rotations.extend(&b.rotations);
+    a.opacities.extend(&b.opacities);
+    a.sh.extend(&b.sh);
+    a
+}
+
+/// A device, a scene on it, and what draws it into a 32-bit float target of [`SIZE`].
+struct Bench {
+    context: Context,
+    pipeline: Pipeline,
+    scene: DeviceScene,
+    camera: GaussianCameraGAURAST<'static>,
+}
+
+impl Bench {
+    fn new(scene: &SceneBuffers) -> Self {
+        Self::with(
+            scene,
+            &Settings::default(),
+            &PipelineOptions::new(scene.degree),
+        )
+    }
+
+    fn with(scene: &SceneBuffers, settings: &Settings, options: &PipelineOptions) -> Self {
+        let context = Context::embedded(settings);
+        Self {
+            pipeline: Pipeline::new(&context, options),
+            scene: DeviceScene::new(&context, scene),
+            camera: camera().to_vulkan(),
+            context,
+        }
+    }
+
+    fn target(&self) -> Target {
+        Target::new(&self.context, vk::Format::R32G32B32A32_SFLOAT, SIZE)
+    }
+
+    /// The texels after `record` in a pass over nothing, with the scene bound.
+    fn draw(&self, record: impl FnOnce(&Commands<'_>)) -> Vec<[f32; 4]> {
+        self.draw_to(&self.target(), &Pass::clear([0.0; 4]), record)
+    }
+
+    fn draw_to<T: bytemuck::AnyBitPattern>(
+        &self,
+        target: &Target,
+        pass: &Pass,
+        record: impl FnOnce(&Commands<'_>),
+    ) -> Vec<T> {
+        self.context.run(|commands| {
+            commands.pass(target, pass, || {
+                commands.bind(&self.pipeline, &self.scene, &self.camera);
+                record(commands);
+            });
+        });
+        assert_eq!(self.context.messages(), []);
+        target.read()
+    }
+
+    /// The whole scene, with one `vkCmdDraw`.
+    fn whole(&self) -> Vec<[f32; 4]> {
+        self.draw(|commands| commands.draw([self.scene.count, 1, 0, 0]))
+    }
+}
+
+/// A scene of trained shapes with some hard ones among them, and ties in depth.
+fn scene() -> SceneBuffers {
+    joined(scenes::cloud(21, 3000, 1), &scenes::awkward(22, 100, 1))
+}
+
+#[track_caller]
+fn assert_same(a: &[[f32; 4]], b: &[[f32; 4]]) {
+    assert_eq!(a.len(), b.len());
+    if let Some(index) = (0..a.len()).find(|&i| a[i] != b[i]) {
+        let (x, y) = (index % SIZE[0] as usize, index / SIZE[0] as usize);
+        panic!("({x}, {y}) is {:?} and {:?}", a[index], b[index]);
+    }
+}
+
+#[track_caller]
+fn assert_close(a: &[[f32; 4]], b: &[[f64; 4]], tolerance: f64) {
+    assert_eq!(a.len(), b.len());
+    let worst = a
+        .iter()
+        .zip(b)
+        .map(|(a, b)| distance(*a, *b))
+        .fold(0.0, f64::max);
+    assert!(worst <= tolerance, "{worst:e} exceeds {tolerance:e}");
+}
+
+/// The greatest difference of a channel.
+fn distance(a: [f32; 4], b: [f64; 4]) -> f64 {
+    let channels = a.iter().zip(b).map(|(a, b)| (f64::from(*a) - b).abs());
+    channels.fold(0.0, f64::max)
+}
+
+#[test]
+fn threads_change_nothing() {
+    let scene = scene();
+    for simd in simd_levels() {
+        let draw = |threads| {
+            let settings = Settings {
+                simd: Some(simd),
+                threads: Some(threads),
+            };
+            Bench::with(&scene, &settings, &PipelineOptions::new(scene.degree)).whole()
+        };
+        let one = draw(1);
+        for threads in [2, 3, 8] {
+            assert_same(&one, &draw(threads));
+        }
+        assert!(one.iter().filter(|rgba| rgba[3] > 0.5).count() > one.len() / 10);
+    }
+}
+
+#[test]
+fn drawing_again_changes_nothing() {
+    let bench = Bench::new(&scene());
+    let first = bench.whole();
+    for _ in 0..3 {
+        assert_same(&first, &bench.whole());
+    }
+}
+
+#[test]
+fn indices_that_name_every_gaussian_are_a_draw_without_indices() {
+    let bench = Bench::new(&scene());
+    let indices: Vec<u32> = (0..bench.scene.count).collect();
+    let indices = Buffer::of(&bench.context, &indices);
+    let indexed = bench.draw(|commands| {
+        commands.bind_indices(&indices);
+        commands.draw_indexed(bench.scene.count, 0, 0);
+    });
+    assert_same(&bench.whole(), &indexed);
+}
+
+#[test]
+fn the_order_of_indices_matters_for_ties_only() {
+    // All depths differ: sorting undoes any order of the indices.
+    let mut scene = scenes::cloud(23, 2000, 0);
+    scene.positions.sort_by(|a, b| a[2].total_cmp(&b[2]));
+    scene.positions.dedup_by_key(|position| position[2]);
+    let count = scene.positions.len();
+    let scene = part(&scene, 0..count);
+    let bench = Bench::new(&scene);
+    assert_ne!(count % 1009, 0, "what follows is a permutation");
+    let shuffled: Vec<u32> = (0..count).map(|i| (i * 1009 % count) as u32).collect();
+    let indices = Buffer::of(&bench.context, &shuffled);
+    let indexed = bench.draw(|commands| {
+        commands.bind_indices(&indices);
+        commands.draw_indexed(bench.scene.count, 0, 0);
+    });
+    assert_same(&bench.whole(), &indexed);
+
+    // All depths are equal: the picture is the one of the order that the indices give.
+    let mut flat = part(&scene, 0..200);
+    flat.positions.iter_mut().for_each(|p| {
+        let scale = 5.0 / p[2];
+        *p = [p[0] * scale, p[1] * scale, 5.0];
+    });
+    let backwards: Vec<u32> = (0..200).rev().collect();
+    let bench = Bench::new(&flat);
+    let indices = Buffer::of(&bench.context, &backwards);
+    let indexed = bench.draw(|commands| {
+        commands.bind_indices(&indices);
+        commands.draw_indexed(200, 0, 0);
+    });
+    let reversed = (0..200).rev().map(|i| part(&flat, i..i + 1));
+    let reversed = reversed.reduce(|a, b| joined(a, &b)).expect("some");
+    assert_same(&Bench::new(&reversed).whole(), &indexed);
+    assert_ne!(bench.whole(), indexed);
+}
+
+#[test]
+fn a_part_of_the_buffers_is_a_scene_of_its_own() {
+    let scene = scene();
+    let bench = Bench::new(&scene);
+    let (first, count) = (700, 1500);
+    let expected = Bench::new(&part(&scene, first..first + count)).whole();
+    let (first, count) = (first as u32, count as u32);
+
+    let with_first = bench.draw(|commands| commands.draw([count, 1, first, 0]));
+    assert_same(&expected, &with_first);
+
+    let indices: Vec<u32> = (0..bench.scene.count).collect();
+    let indices = Buffer::of(&bench.context, &indices);
+    let with_first_index = bench.draw(|commands| {
+        commands.bind_indices(&indices);
+        commands.draw_indexed(count, first, 0);
+    });
+    assert_same(&expected, &with_first_index);
+    let with_offset = bench.draw(|commands| {
+        commands.bind_indices(&indices);
+        commands.draw_indexed(count, 0, first as i32);
+    });
+    assert_same(&expected, &with_offset);
+    let with_both = bench.draw(|commands| {
+        commands.bind_indices(&indices);
+        commands.draw_indexed(count, first + 300, -300);
+    });
+    assert_same(&expected, &with_both);
+    let indirect = Buffer::of(&bench.context, &[[count, 1, first, 0_u32]]);
+    let with_indirect = bench.draw(|commands| commands.draw_indirect(&indirect, 1));
+    assert_same(&expected, &with_indirect);
+}
+
+#[test]
+fn instances_draw_every_gaussian_again() {
+    // Each instance is the whole scene, and ties go by instance first.
+    let scene = scene();
+    let twice = joined(scene.clone(), &scene);
+    let expected = Bench::new(&twice).whole();
+    let bench = Bench::new(&scene);
+    let drawn = bench.draw(|commands| commands.draw([bench.scene.count, 2, 0, 5]));
+    assert_same(&expected, &drawn);
+}
+
+#[test]
+fn attributes_advance_by_instance() {
+    // Two Gaussians' positions, scales and rotations, three instances' opacities and colours.
+    let shapes = scenes::cloud(24, 300, 0);
+    let looks = scenes::cloud(25, 4, 0);
+    let mut mixed = shapes.clone();
+    mixed.opacities.clone_from(&looks.opacities);
+    mixed.sh.clone_from(&looks.sh);
+    let options = PipelineOptions {
+        looks_by_instance: true,
+        ..PipelineOptions::new(0)
+    };
+    // The first instance is 1.
+    let mut expected = SceneBuffers::default();
+    for instance in 1..4 {
+        let mut copy = shapes.clone();
+        copy.opacities.fill(looks.opacities[instance]);
+        copy.sh.fill(looks.sh[instance]);
+        expected = joined(expected, &copy);
+    }
+    let bench = Bench::with(&mixed, &Settings::default(), &options);
+    let drawn = bench.draw(|commands| commands.draw([300, 3, 0, 1]));
+    assert_same(&Bench::new(&expected).whole(), &drawn);
+}
+
+#[test]
+fn empty_draws_draw_nothing() {
+    let bench = Bench::new(&scene());
+    let background = [0.25, 0.5, 0.75, 1.0];
+    let drawn: Vec<[f32; 4]> = bench.draw_to(&bench.target(), &Pass::clear(background), |c| {
+        c.draw([0, 1, 0, 0]);
+        c.draw([bench.scene.count, 0, 0, 0]);
+    });
+    // A draw that has Gaussians, all of them skipped, replaces what is there by nothing.
+    assert_same(&vec![background; drawn.len()], &drawn);
+}
+
+#[test]
+fn the_viewport_says_where_the_camera_s_picture_is() {
+    let scene = scene();
+    let bench = Bench::new(&scene);
+    let reference = render_bounded(&scene.as_oracle(), &camera(), &OracleState::default());
+    let [width, height] = SIZE;
+    for [x, y] in [[0, 0], [16, 32], [7, 5], [64, 64]] {
+        let size = [width + 70, height + 70];
+        let target = Target::new(&bench.context, vk::Format::R32G32B32A32_SFLOAT, size);
+        let corner = [x as f32, y as f32];
+        let whole_size = [width as f32, height as f32];
+        let draw = |viewport| -> Vec<[f32; 4]> {
+            bench.draw_to(&target, &Pass::clear([0.0; 4]), |commands| {
+                commands.viewport(viewport);
+                commands.draw([bench.scene.count, 1, 0, 0]);
+            })
+        };
+        let drawn = draw(vk::Viewport {
+            x: corner[0],
+            y: corner[1],
+            width: whole_size[0],
+            height: whole_size[1],
+            min_depth: 0.0,
+            max_depth: 1.0,
+        });
+        let rows = drawn
+            .chunks(size[0] as usize)
+            .skip(y as usize)
+            .take(height as usize);
+        let within: Vec<[f32; 4]> = rows
+            .flat_map(|row| row[x as usize..][..width as usize].to_vec())
+            .collect();
+        let name = format!("viewport at {x}, {y}");
+        assert_contract(&name, &within, &reference, Limits::ENVELOPE_ONLY);
+
+        // A flipped viewport covers the same pixels, and cameras don't flip.
+        let flipped = draw(vk::Viewport {
+            x: corner[0],
+            y: corner[1] + whole_size[1],
+            width: whole_size[0],
+            height: -whole_size[1],
+            min_depth: 0.0,
+            max_depth: 1.0,
+        });
+        assert!(drawn == flipped, "{name}");
+    }
+}
+
+#[test]
+fn the_scissor_cuts_and_changes_nothing_else() {
+    let bench = Bench::new(&scene());
+    let whole = bench.whole();
+    let (width, height) = (SIZE[0] as i32, SIZE[1] as i32);
+    for scissor in [
+        rect(0, 0, 1, 1),
+        rect(13, 7, 64, 64),
+        rect(31, 95, 100, 9),
+        rect(width - 5, height - 3, 1000, 1000),
+        rect(50, 50, 0, 10),
+    ] {
+        let background = [0.25, 0.5, 0.75, 1.0];
+        let cut: Vec<[f32; 4]> =
+            bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
+                commands.scissor(scissor);
+                commands.draw([bench.scene.count, 1, 0, 0]);
+            });
+        assert_same(&inside(&whole, scissor, background), &cut);
+    }
+}
+
+#[test]
+fn the_render_area_cuts_and_changes_nothing_else() {
+    let bench = Bench::new(&scene());
+    let whole = bench.whole();
+    for area in [
+        rect(16, 16, 64, 32),
+        rect(3, 61, 150, 70),
+        rect(202, 138, 1, 1),
+    ] {
+        let target = bench.target();
+        let background = [0.25, 0.5, 0.75, 1.0];
+        let none = bench.draw_to(&target, &Pass::clear(background), |_| ());
+        assert_same(&vec![background; whole.len()], &none);
+        let pass = Pass {
+            area: Some(area),
+            ..Pass::clear([0.0; 4])
+        };
+        let cut: Vec<[f32; 4]> = bench.draw_to(&target, &pass, |commands| {
+            commands.draw([bench.scene.count, 1, 0, 0]);
+        });
+        assert_same(&inside(&whole, area, background), &cut);
+    }
+}
+
+/// `image` within `rect`, `outside` around it.
+fn inside(image: &[[f32; 4]], rect: vk::Rect2D, outside: [f32; 4]) -> Vec<[f32; 4]> {
+    let within = |at: usize, offset: i32, length: u32| {
+        let at = at as i64 - i64::from(offset);
+        (0..i64::from(length)).contains(&at)
+    };
+    let pixel = |(index, rgba): (usize, &[f32; 4])| {
+        let (x, y) = (index % SIZE[0] as usize, index / SIZE[0] as usize);
+        let is_in = within(x, rect.offset.x, rect.extent.width)
+            && within(y, rect.offset.y, rect.extent.height);
+        if is_in { *rgba } else { outside }
+    };
+    image.iter().enumerate().map(pixel).collect()
+}
+
+#[test]
+fn blending_composites_over_the_background() {
+    let scene = scene();
+    let alone = Bench::new(&scene).whole();
+    let options = PipelineOptions {
+        blend: over(),
+        ..PipelineOptions::new(scene.degree)
+    };
+    let bench = Bench::with(&scene, &Settings::default(), &options);
+    for background in [[0.2, 0.4, 0.6, 1.0], [0.0; 4], [3.0, 0.1, 0.05, 0.3]] {
+        let blended = bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
+            commands.draw([bench.scene.count, 1, 0, 0]);
+        });
+        let expected: Vec<[f64; 4]> = alone
+            .iter()
+            .map(|rgba| composite(rgba.map(f64::from), background.map(f64::from)))
+            .collect();
+        // One product and one sum of numbers up to 3.
+        assert_close(&blended, &expected, 4e-7);
+    }
+}
+
+/// Premultiplied `front` over `behind`.
+fn composite(front: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|c| front[c] + (1.0 - front[3]) * behind[c])
+}
+
+#[test]
+fn draws_of_a_pass_are_composited_in_their_order() {
+    // Each draw is sorted within itself: a later one is over an earlier one at any depth.
+    let scene = scenes::cloud(26, 3000, 1);
+    let options = PipelineOptions {
+        blend: over(),
+        ..PipelineOptions::new(scene.degree)
+    };
+    let bench = Bench::with(&scene, &Settings::default(), &options);
+    let background = [0.1, 0.2, 0.3, 0.4];
+    let parts = [0..1000_usize, 1000..1003, 1003..2500, 2500..3000];
+    // Every outcome of every pixel: a few are undecidable in one of the draws.
+    let nothing = vec![vec![background.map(f64::from)]; (SIZE[0] * SIZE[1]) as usize];
+    let expected = parts.iter().fold(nothing, |behind, range| {
+        let part = part(&scene, range.clone());
+        let front = render_bounded(&part.as_oracle(), &camera(), &OracleState::default());
+        let over = |(pixel, behind): (usize, Vec<[f64; 4]>)| {
+            let fronts = front.outcomes(pixel);
+            fronts
+                .flat_map(|front| behind.iter().map(|behind| composite(*front, *behind)))
+                .collect()
+        };
+        behind.into_iter().enumerate().map(over).collect()
+    });
+    let record = |commands: &Commands<'_>| {
+        for range in &parts {
+            commands.draw([range.len() as u32, 1, range.start as u32, 0]);
+        }
+    };
+    let drawn: Vec<[f32; 4]> = bench.draw_to(&bench.target(), &Pass::clear(background), record);
+    for (rgba, outcomes) in drawn.iter().zip(&expected) {
+        let nearest = outcomes.iter().map(|outcome| distance(*rgba, *outcome));
+        let nearest = nearest.fold(f64::INFINITY, f64::min);
+        assert!(nearest <= 5e-6, "{rgba:?} is {nearest:e} from {outcomes:?}");
+    }
+
+    // The same as several draws of one indirect command.
+    let numbers: Vec<[u32; 4]> = parts
+        .iter()
+        .map(|range| [range.len() as u32, 1, range.start as u32, 0])
+        .collect();
+    let numbers = Buffer::of(&bench.context, &numbers);
+    let indirect = bench.draw_to(&bench.target(), &Pass::clear(background), |commands| {
+        commands.draw_indirect(&numbers, parts.len() as u32);
+    });
+    assert_same(&drawn, &indirect);
+
+    // And as passes of their own, each loading what the one before left.
+    let target = bench.target();
+    bench.draw_to::<[f32; 4]>(&target, &Pass::clear(background), |_| ());
+    let mut passes = Vec::new();
+    for range in &parts {
+        passes = bench.draw_to(&target, &Pass::default(), |commands| {
+            commands.draw([range.len() as u32, 1, range.start as u32, 0]);
+        });
+    }
+    assert_same(&drawn, &passes);
+}
+
+#[test]
+fn a_render_pass_object_is_dynamic_rendering() {
+    let scene = scene();
+    let dynamic = Bench::new(&scene);
+    let background = [0.5, 0.25, 0.125, 1.0];
+    let pass = Pass::clear(background);
+    let expected: Vec<[f32; 4]> = dynamic.draw_to(&dynamic.target(), &pass, |commands| {
+        commands.draw([dynamic.scene.count, 1, 0, 0]);
+    });
+
+    let Bench {
+        context,
+        scene: on_device,
+        camera,
+        ..
+    } = dynamic;
+    let target = Target::new(&context, vk::Format::R32G32B32A32_SFLOAT, SIZE);
+    let object = PassObject::new(&context, &target);
+    let options = PipelineOptions {
+        render_pass: object.render_pass,
+        ..PipelineOptions::new(scene.degree)
+    };
+    let pipeline = Pipeline::new(&context, &options);
+    let pass = Pass {
+        object: Some(&object),
+        ..pass
+    };
+    context.run(|commands| {
+        commands.pass(&target, &pass, || {
+            commands.bind(&pipeline, &on_device, &camera);
+            commands.draw([on_device.count, 1, 0, 0]);
+        });
+    });
+    assert_same(&expected, &target.read());
+    assert_eq!(context.messages(), []);
+}
+
+#[test]
+fn formats_differ_by_their_quantisation_alone() {
+    let scene = scene();
+    let exact = Bench::new(&scene).whole();
+    let draw = |format| {
+        let options = PipelineOptions {
+            format,
+            ..PipelineOptions::new(scene.degree)
+        };
+        let bench = Bench::with(&scene, &Settings::default(), &options);
+        let target = Target::new(&bench.context, format, SIZE);
+        let pass = Pass::clear([0.0; 4]);
+        bench.draw_to::<u8>(&target, &pass, |commands| {
+            commands.draw([bench.scene.count, 1, 0, 0]);
+        });
+        (bench, target)
+    };
+    let quantised = |value: f32| (255.0 * value.clamp(0.0, 1.0)).round() as u8;
+    let bytes = exact.iter().map(|rgba| rgba.map(quantised));
+
+    let (_bench, target) = draw(vk::Format::R8G8B8A8_UNORM);
+    let rgba: Vec<[u8; 4]> = target.read();
+    // Half a step is where rounding may go either way.
+    for (expected, texel) in bytes.clone().zip(&rgba) {
+        let steps = expected.iter().zip(texel).map(|(a, b)| a.abs_diff(*b));
+        assert!(steps.max() <= Some(1), "{texel:?} for {expected:?}");
+    }
+    let differing = bytes.zip(&rgba).filter(|(a, b)| a != *b).count();
+    assert!(differing <= 2, "{differing} texels are rounded another way");
+
+    let (_bench, target) = draw(vk::Format::B8G8R8A8_UNORM);
+    let bgra: Vec<[u8; 4]> = target.read();
+    let swapped: Vec<[u8; 4]> = bgra.iter().map(|&[b, g, r, a]| [r, g, b, a]).collect();
+    assert!(rgba == swapped);
+
+    let (_bench, target) = draw(vk::Format::R16G16B16A16_SFLOAT);
+    let halves: Vec<[u16; 4]> = target.read();
+    for (expected, texel) in exact.iter().zip(&halves) {
+        let nearest = expected.map(|value| f16::from_f32(value).to_bits());
+        assert_eq!(nearest, *texel, "{expected:?}");
+    }
+}

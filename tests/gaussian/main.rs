@@ -1,0 +1,5 @@
+//! Gaussian draws, from an application's calls to pixels.
+
+mod accuracy;
+mod determinism;
+mod reference;

@@ -1,0 +1,74 @@
+//! How a device of the embedded driver works: the environment variables that it reads when it is
+//! created.
+
+use std::ffi::OsString;
+use std::sync::{Mutex, PoisonError};
+
+/// What a device is told by the environment.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Settings {
+    /// The SIMD level by name, `GAURAST_SIMD`; as it is by default.
+    pub simd: Option<&'static str>,
+    /// Worker threads, `GAURAST_THREADS`; as it is by default.
+    pub threads: Option<usize>,
+}
+
+/// The names of the SIMD levels that this processor has, the simplest first.
+pub fn simd_levels() -> Vec<&'static str> {
+    let mut levels = vec!["sse2"];
+    #[cfg(target_arch = "x86_64")]
+    {
+        // The features that the levels are named after stand for all that each needs.
+        let tests = [
+            ("sse4.2", std::arch::is_x86_feature_detected!("sse4.2")),
+            ("avx2", std::arch::is_x86_feature_detected!("avx2")),
+            ("avx512", std::arch::is_x86_feature_detected!("avx512vbmi2")),
+        ];
+        levels.extend(tests.iter().filter(|(_, has)| *has).map(|(name, _)| *name));
+    }
+    levels
+}
+
+/// Calls `create`, which creates devices, while the environment says `settings`.
+///
+/// Calls wait for each other. What creates devices by other ways at the same time may get these
+/// settings, too.
+pub fn with_settings<R>(settings: &Settings, create: impl FnOnce() -> R) -> R {
+    static LOCK: Mutex<()> = Mutex::new(());
+    let _lock = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
+    let _simd = settings
+        .simd
+        .map(|simd| Variable::set("GAURAST_SIMD", simd));
+    let _threads = settings
+        .threads
+        .map(|threads| Variable::set("GAURAST_THREADS", &threads.to_string()));
+    create()
+}
+
+/// An environment variable that gets its old value back.
+struct Variable {
+    name: &'static str,
+    before: Option<OsString>,
+}
+
+impl Variable {
+    fn set(name: &'static str, value: &str) -> Self {
+        let before = std::env::var_os(name);
+        // SAFETY: the standard library guards the environment against its own readers and writers,
+        // and the embedded driver, the only other code that reads it meanwhile, uses those.
+        unsafe { std::env::set_var(name, value) };
+        Self { name, before }
+    }
+}
+
+impl Drop for Variable {
+    fn drop(&mut self) {
+        // SAFETY: as above.
+        unsafe {
+            match &self.before {
+                Some(value) => std::env::set_var(self.name, value),
+                None => std::env::remove_var(self.name),
+            }
+        }
+    }
+}
