@@ -34,7 +34,7 @@ enum Slot {
     #[default]
     Unavailable,
     /// Begun, with the counters at that moment.
-    Active(Counters),
+    Active(Box<Counters>),
     Available(QueryResult),
 }
 
@@ -92,7 +92,7 @@ impl QueryPool {
 
     /// Starts a query.
     pub(crate) fn begin(&self, index: u32, now: &Counters) {
-        self.set(index, Slot::Active(now.clone()));
+        self.set(index, Slot::Active(Box::new(now.clone())));
     }
 
     /// Ends a query that was begun.

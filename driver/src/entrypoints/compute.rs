@@ -74,7 +74,7 @@ crate::entry_points! {
         record(command_buffer, |recorder| {
             handle::get(layout)?;
             let end = offset.checked_add(size);
-            if !end.is_some_and(|end| end <= limits::MAX_PUSH_CONSTANTS_SIZE) {
+            if end.is_none_or(|end| end > limits::MAX_PUSH_CONSTANTS_SIZE) {
                 return Err(Error::usage(
                     "VUID-vkCmdPushConstants-offset-00370",
                     format!(
