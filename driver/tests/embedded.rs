@@ -393,7 +393,10 @@ fn core_commands_that_do_not_work_yet_fail() {
         assert_eq!(error, Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
         let messages = heard.take();
         assert_eq!(messages[0].0, "GAURAST-unsupported-command");
-        assert!(messages[0].1.contains("vkCreateSamplerYcbcrConversion"), "{messages:?}");
+        assert!(
+            messages[0].1.contains("vkCreateSamplerYcbcrConversion"),
+            "{messages:?}"
+        );
 
         let pool = device
             .create_command_pool(&vk::CommandPoolCreateInfo::default(), None)
