@@ -206,7 +206,7 @@ impl Buffer {
         let count = words.len().min(self.words);
         // SAFETY: the mapping has as many words.
         self.mapped(device, |to| unsafe {
-            to.copy_from_nonoverlapping(words.as_ptr(), count)
+            to.copy_from_nonoverlapping(words.as_ptr(), count);
         })
     }
 
@@ -214,7 +214,7 @@ impl Buffer {
         let mut words = vec![0; self.words];
         // SAFETY: the mapping has as many words.
         self.mapped(device, |from| unsafe {
-            from.copy_to_nonoverlapping(words.as_mut_ptr(), self.words)
+            from.copy_to_nonoverlapping(words.as_mut_ptr(), self.words);
         })?;
         Ok(words)
     }
