@@ -118,7 +118,7 @@ operations! {
     /// `if a { b } else { c }`.
     Select(b w w) -> w, Move;
     /// `if a { b } else { c }`, 64 bits.
-    Select64(b d d) -> d, Move;
+    Select64(b d d) -> d, Wide;
     /// Bitwise and.
     And(w w) -> w, Integer;
     /// Bitwise or.
@@ -264,7 +264,7 @@ operations! {
     /// Whether it is an infinity.
     FIsInf(w) -> b, Float;
 
-    // Transcendental functions, 32-bit floats. Errors are stated and tested in `exec::transcendental`.
+    // Transcendental functions, 32-bit floats, FExp to FAtanh. Errors are stated and tested in `exec::transcendental`.
     /// e to the power of `a`.
     FExp(w) -> w, Special;
     /// 2 to the power of `a`.

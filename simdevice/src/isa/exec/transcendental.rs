@@ -16,6 +16,11 @@ type I<S> = i32x16<S>;
 type U<S> = u32x16<S>;
 type M<S> = mask32x16<S>;
 
+/// Whether an operation is one of these functions.
+pub fn is_one(op: Op) -> bool {
+    (Op::FExp as u8..=Op::FAtanh as u8).contains(&(op as u8))
+}
+
 /// `dst = op(src...)`, all lanes.
 #[inline(always)]
 pub fn run<S: Simd>(simd: S, file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4]) {
