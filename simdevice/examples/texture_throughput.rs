@@ -1,5 +1,5 @@
-//! How fast the texture unit samples, at every SIMD level of this processor: quads that sweep over a 1024x1024 image as
-//! a slightly turned, slightly minified surface does.
+//! How fast the texture unit samples, at every SIMD level of this processor: quads of a slightly turned surface
+//! all over a 1024x1024 image. Processor time, so that other programs don't count.
 //!
 //! `cargo run --release -p simdevice --example texture_throughput`
 
@@ -57,14 +57,18 @@ fn image(format: Format) -> ImageBinding {
     })
 }
 
-/// Sixteen lanes at (x, y): four quads side by side.
-fn request(x: u32, y: u32, texels_per_pixel: f32) -> SampleRequest {
+/// Texels along x and y of a way of (x, y) pixels on the surface, as fractions of the image.
+fn texture_coordinate([x, y]: [f32; 2], texels_per_pixel: f32) -> [f32; 2] {
     let scale = texels_per_pixel / SIZE as f32;
     let (sin, cos) = 0.3f32.sin_cos();
+    [(cos * x - sin * y) * scale, (sin * x + cos * y) * scale]
+}
+
+/// Sixteen lanes: four quads side by side.
+fn request(texels_per_pixel: f32) -> SampleRequest {
     let at = |lane: usize| {
-        let px = (x + 2 * (lane as u32 / 4) + (lane as u32 & 1)) as f32 + 0.5;
-        let py = (y + (lane as u32 >> 1 & 1)) as f32 + 0.5;
-        [(cos * px - sin * py) * scale, (sin * px + cos * py) * scale]
+        let x = (2 * (lane / 4) + (lane & 1)) as f32 + 0.5;
+        texture_coordinate([x, (lane >> 1 & 1) as f32 + 0.5], texels_per_pixel)
     };
     SampleRequest {
         mask: u16::MAX,
@@ -96,14 +100,28 @@ fn processor_seconds() -> Option<f64> {
     Some(nanoseconds * 1e-9)
 }
 
-/// Million samples a second.
-fn measure(table: &ImageTable, requests: &[SampleRequest]) -> f64 {
+/// Million samples a second, of requests like `first` in tiles of 64x64 pixels all over the surface.
+fn measure(table: &ImageTable, first: &SampleRequest, texels_per_pixel: f32) -> f64 {
+    let tiles = 16 * 16;
+    let offsets: Vec<[f32; 2]> = (0..tiles * 8 * 32)
+        .map(|block| {
+            let (tile, inside) = (block / 256, block % 256);
+            let x = tile % 16 * 64 + inside % 8 * 8;
+            let y = tile / 16 * 64 + inside / 8 * 2;
+            texture_coordinate([x as f32, y as f32], texels_per_pixel)
+        })
+        .collect();
     let (begin, processor_begin, mut done) = (Instant::now(), processor_seconds(), 0);
+    let mut request = *first;
     while begin.elapsed() < Duration::from_millis(300) {
-        for request in requests {
-            black_box(table.sample(0, 0, black_box(request)));
+        for offset in &offsets {
+            for (axis, offset) in offset.iter().enumerate() {
+                let from = first.coordinate[axis].map(f32::from_bits);
+                request.coordinate[axis] = from.map(|at| (at + offset).to_bits());
+            }
+            black_box(table.sample(0, 0, black_box(&request)));
         }
-        done += 16 * requests.len();
+        done += 16 * offsets.len();
     }
     let seconds = match (processor_begin, processor_seconds()) {
         (Some(begin), Some(end)) if end > begin => end - begin,
@@ -155,22 +173,20 @@ fn main() {
             continue;
         }
         let compare = sampler.compare_op.map(|_| [0.5f32.to_bits(); 16]);
-        let requests: Vec<SampleRequest> = (0..64 * 64)
-            .map(|block| SampleRequest {
-                compare,
-                ..request(block % 64 * 8, block / 64 * 2, texels_per_pixel)
-            })
-            .collect();
+        let first = SampleRequest {
+            compare,
+            ..request(texels_per_pixel)
+        };
         let mut line = format!("{name:24}");
         for (level_name, level) in SimdLevel::supported() {
             let Some(level) = level.resolve().filter(|_| !skipped(1, level_name)) else {
                 continue;
             };
             let table = ImageTable::new(level, [image(format)], [Some(sampler)]);
-            let rate = measure(&table, &requests);
+            let rate = measure(&table, &first, texels_per_pixel);
             line += &format!("  {level_name} {rate:6.1}");
             if level_name == "sse2" && wanted.is_empty() {
-                let rate = measure(&table.lane_by_lane(), &requests);
+                let rate = measure(&table.lane_by_lane(), &first, texels_per_pixel);
                 line += &format!("  lane by lane {rate:6.1}");
             }
         }

@@ -1,6 +1,6 @@
 //! Coordinates along one axis, 16 lanes at once: as [`super::address`], bit for bit.
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 
 use super::address::{FAR, MAX_OFFSET, WHOLE};
 use super::lod::Floats;
@@ -31,9 +31,10 @@ impl Axis {
     };
 }
 
-/// The texels of `coordinate`, whose bits these are, along an axis of `size` texels.
-pub(super) fn axis(
-    level: Level,
+/// The texels of `coordinate`, whose bits these are, along an axis of `size` texels. Compiled on its own.
+#[inline(always)]
+pub(super) fn axis<S: Simd>(
+    simd: S,
     mode: AddressMode,
     filter: Filter,
     normalized: bool,
@@ -41,11 +42,10 @@ pub(super) fn axis(
     size: &Lanes,
     offset: &Lanes,
 ) -> Axis {
-    let offset = (*offset != [0; CHUNK_LANES])
-        .then(|| offset.map(|offset| offset.cast_signed().clamp(-MAX_OFFSET, MAX_OFFSET) as f32));
-    dispatch!(level, simd => {
-        vector_axis(simd, mode, filter, normalized, coordinate, size, offset)
-    })
+    simd.vectorize(
+        #[inline(always)]
+        || vector_axis(simd, mode, filter, normalized, coordinate, size, offset),
+    )
 }
 
 #[inline(always)]
@@ -56,7 +56,7 @@ fn vector_axis<S: Simd>(
     normalized: bool,
     coordinate: &Lanes,
     size: &Lanes,
-    offset: Option<Floats>,
+    offset: &Lanes,
 ) -> Axis {
     let size = u32x16::simd_from(simd, *size).bitcast::<i32x16<S>>();
     let size = f32x16::float_from(size);
@@ -67,11 +67,10 @@ fn vector_axis<S: Simd>(
     };
     let whole = floor(simd, shifted);
     let weight = shifted - whole;
-    let far = !normalized || offset.is_some();
-    let first = match offset {
-        Some(offset) => whole + f32x16::simd_from(simd, offset),
-        None => whole,
-    };
+    let offset = u32x16::simd_from(simd, *offset).bitcast::<i32x16<S>>();
+    let offset = f32x16::float_from(offset.max(-MAX_OFFSET).min(MAX_OFFSET));
+    let far = !normalized || offset.simd_eq(0.0).to_bitmask() != u64::from(u16::MAX);
+    let first = whole + offset;
     let second = first + 1.0;
     let inside = if mode == AddressMode::ClampToBorder {
         [within(simd, first, size), within(simd, second, size)]

@@ -6,7 +6,7 @@
 
 use std::sync::atomic::AtomicU32;
 
-use fearless_simd::Level;
+use fearless_simd::Simd;
 
 use super::address;
 use super::axis::{Axis, axis};
@@ -24,8 +24,8 @@ use crate::isa::resources::{Lanes, SampleRequest};
 type Texels = [Floats; 4];
 
 /// What a request reads, and how.
-struct Batch<'a> {
-    level: Level,
+struct Batch<'a, S> {
+    simd: S,
     surface: &'a Surface,
     packing: &'a Packing,
     sampler: &'a Sampler,
@@ -35,8 +35,9 @@ struct Batch<'a> {
 }
 
 /// Filters for all lanes; None if this request has to be filtered lane by lane.
-pub(super) fn sample(
-    level: Level,
+#[inline(always)]
+pub(super) fn sample<S: Simd>(
+    simd: S,
     surface: &Surface,
     sampler: &Sampler,
     request: &SampleRequest,
@@ -51,7 +52,7 @@ pub(super) fn sample(
         (op, bits.map(|bits| reference_value(unorm, bits)))
     });
     let batch = Batch {
-        level,
+        simd,
         surface,
         packing,
         sampler,
@@ -63,9 +64,9 @@ pub(super) fn sample(
     Some(batch.registers(&texels))
 }
 
-impl Batch<'_> {
+impl<S: Simd> Batch<'_, S> {
     /// Stored components as a program gets them.
-    #[inline]
+    #[inline(always)]
     fn registers(&self, texels: &Texels) -> [Lanes; 4] {
         let components = self.packing.kind.components();
         let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
@@ -83,7 +84,7 @@ impl Batch<'_> {
     }
 
     /// With the filter that each lane asks for.
-    #[inline]
+    #[inline(always)]
     fn select_filter(&self, selection: &Selection) -> Option<Texels> {
         let first = selection.filter[0];
         let mut texels = self.select_levels(selection, first)?;
@@ -105,10 +106,11 @@ impl Batch<'_> {
     }
 
     /// Mixed between levels.
-    #[inline]
+    #[inline(always)]
     fn select_levels(&self, selection: &Selection, filter: Filter) -> Option<Texels> {
         let high = self.filter_level(&selection.high, filter)?;
-        if selection.weight == [0.0; CHUNK_LANES] {
+        let weights = selection.weight.iter().map(|weight| weight.to_bits());
+        if weights.fold(0, |all, bits| all | bits) == 0 {
             return Some(high);
         }
         let low = self.filter_level(&selection.low, filter)?;
@@ -126,31 +128,40 @@ impl Batch<'_> {
         Some(texels)
     }
 
-    /// Of one level for each lane; None if some lie across the edge of a cube's face.
-    #[inline]
+    /// Of one level for each lane; None if some lie across the edge of a cube's face. Compiled on its own.
+    #[inline(always)]
     fn filter_level(&self, levels: &Lanes, filter: Filter) -> Option<Texels> {
-        let mut coordinate = [
-            self.request.coordinate[0],
-            self.request.coordinate[1],
-            self.request.coordinate[2],
-        ];
-        let layers = self.layers(&mut coordinate);
-        if layers.is_some_and(|layers| layers.iter().any(|layer| *layer >= self.surface.layers)) {
+        self.simd.vectorize(
+            #[inline(always)]
+            || self.footprint(levels, filter),
+        )
+    }
+
+    #[inline(always)]
+    fn footprint(&self, levels: &Lanes, filter: Filter) -> Option<Texels> {
+        let face = (self.request.shape.dimension == Dimension::Cube).then(|| self.faces());
+        let (faces, coordinate) = match &face {
+            Some((faces, coordinate)) => (Some(faces), coordinate),
+            None => (None, &self.request.coordinate),
+        };
+        let layers = self.layers(faces);
+        let missing = |layer: &u32| *layer >= self.surface.layers;
+        if layers.is_some_and(|layers| layers.iter().any(missing)) {
             return None;
         }
         let sizes = LevelSizes::new(&self.packing.levels, levels);
         let dimension = self.request.shape.dimension;
-        let x = self.axis(0, filter, &coordinate, &sizes);
+        let x = self.axis(0, filter, coordinate, &sizes);
         let (y, z);
         let (y, z) = match dimension {
             Dimension::D1 | Dimension::Buffer => (&Axis::FLAT, &Axis::FLAT),
             Dimension::D2 | Dimension::Cube => {
-                y = self.axis(1, filter, &coordinate, &sizes);
+                y = self.axis(1, filter, coordinate, &sizes);
                 (&y, &Axis::FLAT)
             }
             Dimension::D3 => {
-                y = self.axis(1, filter, &coordinate, &sizes);
-                z = self.axis(2, filter, &coordinate, &sizes);
+                y = self.axis(1, filter, coordinate, &sizes);
+                z = self.axis(2, filter, coordinate, &sizes);
                 (&y, &z)
             }
         };
@@ -189,42 +200,45 @@ impl Batch<'_> {
         Some(mix(&slice, &next, &z.weight))
     }
 
-    /// The layer of each lane; None if it is the first for all. A cube's directions become coordinates on a face.
-    #[inline]
-    fn layers(&self, coordinate: &mut [Lanes; 3]) -> Option<Lanes> {
+    /// Where the lanes' directions meet a cube: the face, and the coordinates on it.
+    #[inline(always)]
+    fn faces(&self) -> (Lanes, [Lanes; 4]) {
+        let mut faces = [0; CHUNK_LANES];
+        let mut coordinate = [[0; CHUNK_LANES]; 4];
+        for lane in 0..CHUNK_LANES {
+            let direction = [0, 1, 2].map(|axis| self.request.coordinate[axis][lane]);
+            let hit = cube::Hit::new(direction.map(f32::from_bits));
+            let [s, t] = hit.coordinates();
+            faces[lane] = hit.face;
+            [coordinate[0][lane], coordinate[1][lane]] = [s.to_bits(), t.to_bits()];
+        }
+        (faces, coordinate)
+    }
+
+    /// The layer of each lane; None if it is the first for all.
+    #[inline(always)]
+    fn layers(&self, faces: Option<&Lanes>) -> Option<Lanes> {
         let shape = self.request.shape;
-        let cube = shape.dimension == Dimension::Cube;
-        if !cube && !shape.arrayed {
-            return None;
+        if !shape.arrayed {
+            return faces.copied();
         }
-        let mut layers = [0; CHUNK_LANES];
-        if cube {
-            for lane in 0..CHUNK_LANES {
-                let direction = coordinate.map(|lanes| f32::from_bits(lanes[lane]));
-                let hit = cube::Hit::new(direction);
-                let [s, t] = hit.coordinates();
-                layers[lane] = hit.face;
-                [coordinate[0][lane], coordinate[1][lane]] = [s.to_bits(), t.to_bits()];
-            }
-        }
-        if shape.arrayed {
-            let per_element = if cube { 6 } else { 1 };
-            let elements = self.surface.layers / per_element;
-            let coordinate = &self.request.coordinate[shape.dimension.coordinates()];
-            for (layer, coordinate) in layers.iter_mut().zip(coordinate) {
-                *layer += address::layer(f32::from_bits(*coordinate), elements) * per_element;
-            }
+        let per_element = if faces.is_some() { 6 } else { 1 };
+        let elements = self.surface.layers / per_element;
+        let coordinate = &self.request.coordinate[shape.dimension.coordinates()];
+        let mut layers = faces.copied().unwrap_or_default();
+        for (layer, coordinate) in layers.iter_mut().zip(coordinate) {
+            *layer += address::layer(f32::from_bits(*coordinate), elements) * per_element;
         }
         Some(layers)
     }
 
     /// The texels of the lanes' coordinates along an axis.
-    #[inline]
+    #[inline(always)]
     fn axis(
         &self,
         number: usize,
         filter: Filter,
-        coordinate: &[Lanes; 3],
+        coordinate: &[Lanes; 4],
         sizes: &LevelSizes<'_>,
     ) -> Axis {
         let size = match number {
@@ -240,10 +254,10 @@ impl Batch<'_> {
                 Filter::Linear => AddressMode::ClampToBorder,
             };
             let offset = [0; CHUNK_LANES];
-            return axis(self.level, mode, filter, true, coordinate, &size, &offset);
+            return axis(self.simd, mode, filter, true, coordinate, &size, &offset);
         }
         axis(
-            self.level,
+            self.simd,
             self.sampler.address_modes[number],
             filter,
             !self.sampler.unnormalized_coordinates,
@@ -254,7 +268,7 @@ impl Batch<'_> {
     }
 
     /// Of one slice, which lanes have as far as they are `within`.
-    #[inline]
+    #[inline(always)]
     fn filter_slice(
         &self,
         rows: &Rows<'_>,
@@ -269,7 +283,7 @@ impl Batch<'_> {
         let plain = self.reference.is_none() && (!bordered || dimension == Dimension::Cube);
         if filter == Filter::Linear && dimension != Dimension::D1 && plain {
             let kind = self.packing.kind;
-            return kind.bilinear(self.level, words, rows, &x.weight, &y.weight);
+            return kind.bilinear(self.simd, words, rows, &x.weight, &y.weight);
         }
         let texel = |i: usize, j: usize| {
             let inside = x.inside[i] & y.inside[j] & within[0];
@@ -284,6 +298,7 @@ impl Batch<'_> {
     }
 
     /// Texels (i, j) of those around, or the border's where they aren't `inside`; compared, if that is asked for.
+    #[inline(always)]
     fn texels(
         &self,
         words: &[AtomicU32],
@@ -291,7 +306,7 @@ impl Batch<'_> {
         [i, j]: [usize; 2],
         inside: u16,
     ) -> Texels {
-        let mut texels = self.packing.kind.load(self.level, words, rows, i, j);
+        let mut texels = self.packing.kind.load(self.simd, words, rows, i, j);
         if inside != u16::MAX {
             let border = border_texel(self.surface, self.sampler).map(f32::from_bits);
             for (register, stored) in self.packing.order.into_iter().enumerate() {
@@ -318,8 +333,10 @@ struct LevelSizes<'a> {
 }
 
 impl<'a> LevelSizes<'a> {
+    #[inline(always)]
     fn new(table: &'a [PackedLevel], levels: &'a Lanes) -> Self {
-        let uniform = *levels == [levels[0]; CHUNK_LANES];
+        let differences = levels.iter().map(|level| level ^ levels[0]);
+        let uniform = differences.fold(0, |all, difference| all | difference) == 0;
         Self {
             table,
             levels,
@@ -338,6 +355,7 @@ impl<'a> LevelSizes<'a> {
 }
 
 /// Moves texels on by some steps.
+#[inline(always)]
 fn advance(base: &mut Lanes, steps: &Lanes, pitch: &Lanes) {
     for lane in 0..CHUNK_LANES {
         base[lane] = base[lane].wrapping_add(steps[lane].wrapping_mul(pitch[lane]));
@@ -345,6 +363,7 @@ fn advance(base: &mut Lanes, steps: &Lanes, pitch: &Lanes) {
 }
 
 /// Replaces depths by 1 where a comparison holds, else 0.
+#[inline(always)]
 fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
     let mut each = |holds: fn(f32, f32) -> bool| {
         for (depth, reference) in depths.iter_mut().zip(reference) {
@@ -369,6 +388,7 @@ fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
 }
 
 /// The weighted means of texels.
+#[inline(always)]
 fn mix(a: &Texels, b: &Texels, weight: &Floats) -> Texels {
     let mut mixed = *a;
     for (mixed, b) in mixed.iter_mut().zip(b) {

@@ -187,9 +187,10 @@ mod tests {
                 let h = 1e-3;
                 let moved = Hit::new(std::array::from_fn(|c| direction[c] + h * change[c]));
                 let derivative = hit.derivative(change);
-                for c in 0..2 {
-                    let difference = (moved.coordinates()[c] - hit.coordinates()[c]) / h;
-                    assert!((difference - derivative[c]).abs() < 1e-3);
+                let (from, to) = (hit.coordinates(), moved.coordinates());
+                for (derivative, (from, to)) in derivative.into_iter().zip(from.into_iter().zip(to))
+                {
+                    assert!(((to - from) / h - derivative).abs() < 1e-3);
                 }
             }
         }

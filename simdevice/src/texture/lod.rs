@@ -59,8 +59,8 @@ pub(super) fn select(surface: &Surface, sampler: &Sampler, request: &SampleReque
     let mut selection = Selection::base(magnify);
     // Integers aren't mixed between levels either.
     let linear = sampler.mipmap_mode == MipmapMode::Linear && !surface.is_integer();
-    for lane in 0..CHUNK_LANES {
-        let level = lambda[lane].max(0.0).min(last as f32);
+    for (lane, lambda) in lambda.iter().enumerate() {
+        let level = lambda.clamp(0.0, last as f32);
         let whole = level as i32;
         let fraction = level - whole as f32;
         let up = i32::from(!linear && fraction > 0.5);
@@ -69,9 +69,9 @@ pub(super) fn select(surface: &Surface, sampler: &Sampler, request: &SampleReque
         selection.weight[lane] = if linear { fraction } else { 0.0 };
     }
     if magnify != minify {
-        for lane in 0..CHUNK_LANES {
-            if lambda[lane] > 0.0 {
-                selection.filter[lane] = minify;
+        for (filter, lambda) in selection.filter.iter_mut().zip(lambda) {
+            if lambda > 0.0 {
+                *filter = minify;
             }
         }
     }
@@ -84,7 +84,7 @@ pub(super) fn query(surface: &Surface, sampler: &Sampler, request: &SampleReques
     let biased = biased(surface, sampler, request);
     let last = surface.levels.len() as f32 - 1.0;
     let level = clamped(sampler, request, &biased).map(|lambda| {
-        let level = lambda.max(0.0).min(last);
+        let level = lambda.clamp(0.0, last);
         if sampler.mipmap_mode == MipmapMode::Linear {
             level
         } else {
@@ -120,7 +120,7 @@ fn biased(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Floa
     };
     for (lod, operand) in biased.iter_mut().zip(operand) {
         let bias = sampler.mip_lod_bias + f32::from_bits(*operand);
-        *lod += bias.max(-MAX_LOD_BIAS).min(MAX_LOD_BIAS);
+        *lod += bias.clamp(-MAX_LOD_BIAS, MAX_LOD_BIAS);
     }
     biased
 }
@@ -152,21 +152,21 @@ fn implicit(surface: &Surface, request: &SampleRequest) -> Floats {
             scale_lod(surface, request, lane, dx, dy)
         });
     }
-    let mut squares = [[0.0; CHUNK_LANES / 4]; 2];
+    let mut right = [0.0; CHUNK_LANES / 4];
+    let mut below = right;
     for axis in 0..request.shape.dimension.coordinates() {
         let size = surface.levels[0].extent[axis] as f32;
-        for quad in 0..CHUNK_LANES / 4 {
+        for (quad, (right, below)) in right.iter_mut().zip(&mut below).enumerate() {
             let first = value(axis, 4 * quad);
-            let right = (value(axis, 4 * quad + 1) - first) * size;
-            let below = (value(axis, 4 * quad + 2) - first) * size;
-            squares[0][quad] += right * right;
-            squares[1][quad] += below * below;
+            let to_right = (value(axis, 4 * quad + 1) - first) * size;
+            let to_below = (value(axis, 4 * quad + 2) - first) * size;
+            *right += to_right * to_right;
+            *below += to_below * to_below;
         }
     }
     let mut lods = [0.0; CHUNK_LANES];
-    for quad in 0..CHUNK_LANES / 4 {
-        let lod = half_log2(squares[0][quad].max(squares[1][quad]));
-        lods[4 * quad..][..4].fill(lod);
+    for (lods, (right, below)) in lods.chunks_exact_mut(4).zip(right.iter().zip(below)) {
+        lods.fill(half_log2(right.max(below)));
     }
     lods
 }
@@ -203,12 +203,13 @@ fn scale_lod(
     half_log2(along(dx).max(along(dy)))
 }
 
-/// Half the base-2 logarithm, to 2e-6, and exact for powers of four; -64 or so for zero and NaN, 64 for infinity.
+/// Half the base-2 logarithm, to 2e-6, and exact for powers of four; -64 or so for zero, 64 for infinity and NaN. Not of
+/// negative numbers.
 #[inline(always)]
 fn half_log2(x: f32) -> f32 {
     // The mantissa is taken in [sqrt(1/2), sqrt(2)): less the bits of sqrt(1/2), the exponent field tells.
     const BIAS: i32 = 127 << 23;
-    let bits = x.max(0.0).min(f32::MAX).to_bits() as i32;
+    let bits = x.min(f32::MAX).to_bits() as i32;
     let exponent = (bits - std::f32::consts::FRAC_1_SQRT_2.to_bits() as i32 + BIAS) >> 23;
     let exponent = exponent - 127;
     let mantissa = f32::from_bits((bits - (exponent << 23)) as u32);

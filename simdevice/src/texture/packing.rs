@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 
 use super::lod::Floats;
 use super::surface::Surface;
@@ -143,19 +143,25 @@ pub(super) struct Rows<'a> {
     pub y: &'a [Lanes; 2],
 }
 
-/// Calls a kernel for a [`Kind`] at a SIMD level.
+/// Calls a kernel for a [`Kind`], compiled on its own.
 macro_rules! for_kind {
-    ($level:expr, $kind:expr, $kernel:ident($($argument:expr),*)) => {
+    ($simd:expr, $kind:expr, $kernel:ident($($argument:expr),*)) => {
         match $kind {
-            Kind::Unorm8 => dispatch!($level, simd => $kernel::<_, Unorm8>(simd, $($argument),*)),
-            Kind::Unorm8x2 => dispatch!($level, simd => $kernel::<_, Unorm8x2>(simd, $($argument),*)),
-            Kind::Unorm8x4 => dispatch!($level, simd => $kernel::<_, Unorm8x4>(simd, $($argument),*)),
-            Kind::Srgb8x4 => dispatch!($level, simd => $kernel::<_, Srgb8x4>(simd, $($argument),*)),
-            Kind::Unorm16 => dispatch!($level, simd => $kernel::<_, Unorm16>(simd, $($argument),*)),
-            Kind::Float16x4 => dispatch!($level, simd => $kernel::<_, Float16x4>(simd, $($argument),*)),
-            Kind::Float32 => dispatch!($level, simd => $kernel::<_, Float32>(simd, $($argument),*)),
-            Kind::Float32x4 => dispatch!($level, simd => $kernel::<_, Float32x4>(simd, $($argument),*)),
+            Kind::Unorm8 => for_kind!($simd, $kernel, Unorm8, $($argument),*),
+            Kind::Unorm8x2 => for_kind!($simd, $kernel, Unorm8x2, $($argument),*),
+            Kind::Unorm8x4 => for_kind!($simd, $kernel, Unorm8x4, $($argument),*),
+            Kind::Srgb8x4 => for_kind!($simd, $kernel, Srgb8x4, $($argument),*),
+            Kind::Unorm16 => for_kind!($simd, $kernel, Unorm16, $($argument),*),
+            Kind::Float16x4 => for_kind!($simd, $kernel, Float16x4, $($argument),*),
+            Kind::Float32 => for_kind!($simd, $kernel, Float32, $($argument),*),
+            Kind::Float32x4 => for_kind!($simd, $kernel, Float32x4, $($argument),*),
         }
+    };
+    ($simd:expr, $kernel:ident, $kind:ident, $($argument:expr),*) => {
+        $simd.vectorize(
+            #[inline(always)]
+            || $kernel::<S, $kind>($simd, $($argument),*),
+        )
     };
 }
 
@@ -170,27 +176,29 @@ impl Kind {
     }
 
     /// The stored components of texels in column `i` and row `j` of two.
-    pub fn load(
+    #[inline(always)]
+    pub fn load<S: Simd>(
         self,
-        level: Level,
+        simd: S,
         words: &[AtomicU32],
         rows: &Rows<'_>,
         i: usize,
         j: usize,
     ) -> [Floats; 4] {
-        for_kind!(level, self, load(words, rows, i, j))
+        for_kind!(simd, self, load(words, rows, i, j))
     }
 
     /// The weighted mean of all four texels.
-    pub fn bilinear(
+    #[inline(always)]
+    pub fn bilinear<S: Simd>(
         self,
-        level: Level,
+        simd: S,
         words: &[AtomicU32],
         rows: &Rows<'_>,
         weight_x: &Floats,
         weight_y: &Floats,
     ) -> [Floats; 4] {
-        for_kind!(level, self, bilinear(words, rows, weight_x, weight_y))
+        for_kind!(simd, self, bilinear(words, rows, weight_x, weight_y))
     }
 }
 
@@ -396,19 +404,22 @@ struct Float16x4;
 /// The low 16 bits of words as binary16 numbers.
 #[inline(always)]
 fn float16<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
+    let splat = |word: u32| u32x16::splat(simd, word);
     let sign = (bits & 0x8000) << 16;
-    // Moved to binary32's place the exponent is short of the biases' difference, which a multiplication mends, exactly,
-    // for denormal numbers too.
-    let magnitude =
-        ((bits & 0x7FFF) << 13).bitcast::<f32x16<S>>() * f32::from_bits((254 - 15) << 23);
-    let magnitude: u32x16<S> = magnitude.bitcast();
-    let infinite = (bits & 0x7FFF).simd_ge(u32x16::splat(simd, 0x7C00));
-    let infinity = u32x16::splat(simd, 0x7F80_0000);
-    let zero = u32x16::splat(simd, 0);
+    let half = bits & 0x7FFF;
+    // In binary32's place, the exponent still has binary16's bias.
+    let shifted = half << 13;
+    let normal = shifted + ((127 - 15) << 23);
+    // A denormal number stands below a leading one that it doesn't have. No operand is denormal, which would be slow.
+    let least = splat((127 - 14) << 23);
+    let denormal = (shifted + least).bitcast::<f32x16<S>>() - least.bitcast::<f32x16<S>>();
+    let infinity = splat(0x7C00);
     // NaN's mantissa is kept, and made quiet.
-    let nan = (bits & 0x7FFF).simd_gt(u32x16::splat(simd, 0x7C00));
-    let quiet = nan.select(u32x16::splat(simd, 1 << 22), zero);
-    let magnitude = infinite.select((magnitude & 0x007F_FFFF) | infinity | quiet, magnitude);
+    let quiet = half.simd_gt(infinity).select(splat(1 << 22), splat(0));
+    let special = shifted | splat(0x7F80_0000) | quiet;
+    let magnitude = half.simd_ge(infinity).select(special, normal);
+    let is_denormal = half.simd_lt(splat(0x0400));
+    let magnitude = is_denormal.select(denormal.bitcast::<u32x16<S>>(), magnitude);
     (magnitude | sign).bitcast()
 }
 
@@ -461,6 +472,7 @@ impl Texels for Float32x4 {
 mod tests {
     use super::*;
     use crate::device::SimdLevel;
+    use fearless_simd::dispatch;
 
     /// Texels 0.. of these words, as a packing and as their format decodes them.
     fn agree<T: Texels>(format: Format, words: &[u32]) {

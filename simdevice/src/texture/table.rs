@@ -1,6 +1,6 @@
 //! The image unit: what a program's image and sampler slots are bound to.
 
-use fearless_simd::Level;
+use fearless_simd::{Level, dispatch};
 
 use super::sampler::Sampler;
 use super::surface::Surface;
@@ -65,7 +65,7 @@ impl ImageUnit for ImageTable {
             return Default::default();
         };
         let batched = if self.batched {
-            batch::sample(self.level, surface, sampler, request)
+            dispatch!(self.level, simd => batch::sample(simd, surface, sampler, request))
         } else {
             None
         };
