@@ -173,8 +173,8 @@ fn generated_scenes_keep_the_contract_in_every_state() {
 fn awkward_scenes_stay_within_the_envelope_in_every_state() {
     let devices = Devices::new();
     // Few at a time: a huge opaque one hides the others.
-    for seed in 100..120 {
-        let scene = scenes::awkward(seed, 10 + 2 * (seed - 100) as usize, (seed % 4) as u32);
+    for seed in 100..160 {
+        let scene = scenes::awkward(seed, 10 + 2 * (seed % 20) as usize, (seed % 4) as u32);
         for (name, state) in states() {
             let name = format!("awkward {seed} {name}");
             devices.judge(

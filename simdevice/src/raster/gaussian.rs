@@ -5,16 +5,16 @@
 //! conservatively, and appends (Gaussian, block) items; phase 2 is a flat loop over the items, each evaluating
 //! 16 pixels, without a branch that is hard to predict.
 //!
-//! Exponents are formed from the pixel of the tile nearest the mean: the factor times the offset of that pixel
-//! is computed in binary64 and rounded once, and from there on pixels are small integers away. Needles that
-//! cross many tiles and dust smaller than a pixel lose nothing alike, and no position is ever rounded to
-//! binary32.
+//! Exponents are formed from the block's middle: the Cholesky factor times its offset from the mean is computed in
+//! binary64 and rounded once, and from there pixels are at most 1.5 away in x and y. Needles that cross many tiles
+//! and dust smaller than a pixel lose nothing alike; no position is ever rounded to binary32, and no value depends
+//! on where tiles begin.
 
 use crate::counters::{Counter, Counters};
 use crate::gaussian::project::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::packet::{GaussianState, Rect};
-use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 
 const TILE: usize = TILE_SIZE as usize;
 /// Pixels of a block, which are the lanes of a vector.
@@ -45,15 +45,13 @@ pub struct GaussianTile {
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 struct Record {
-    /// The pixel of the tile nearest the mean, from the tile's corner.
-    anchor: [f32; 2],
-    /// `u` and `v` at its centre.
-    at_anchor: [f32; 2],
+    /// `u` and `v` at the middle of each block.
+    u: [f32; BLOCKS],
+    v: [f32; BLOCKS],
+    /// How `u` grows with x, and `v` with x and y.
     factor: [f32; 3],
     log2_opacity: f32,
     color: [f32; 3],
-    /// How far below `log2_opacity` the exponent may fall, with a margin for rounding.
-    room: f32,
 }
 
 /// The constants of a draw.
@@ -174,11 +172,19 @@ impl GaussianTile {
             if open == 0 {
                 break;
             }
-            for (record, &primitive) in self.chunk.iter_mut().zip(chunk) {
+            let open = mask32x16::from_bitmask(simd, open);
+            let mut items = 0;
+            for (number, &primitive) in chunk.iter().enumerate() {
                 let (batch, place) = locate(primitive);
-                *record = Record::new(&splats[batch][place], corner, thresholds.log2_floor);
+                let splat = &splats[batch][place];
+                let record = &mut self.chunk[number % CHUNK];
+                let reached = record.place(simd, splat, corner, thresholds.log2_floor);
+                let Some(room) = self.items.get_mut(items..items + LANES) else {
+                    // There is room for all blocks of all records, and for a vector more.
+                    break;
+                };
+                items += append_items(simd, number, reached & open, room);
             }
-            let items = find_items(simd, &self.chunk[..chunk.len()], open, &mut self.items);
             work.pairs += chunk.len() as u64;
             work.items += items as u64;
             work.contributions += self.evaluate(simd, items, thresholds);
@@ -212,17 +218,10 @@ impl GaussianTile {
         for &item in &self.items[..count] {
             let block = item as usize % BLOCKS;
             let g = &self.chunk[item as usize / BLOCKS % CHUNK];
-            let dx = across + f32x16::splat(simd, BLOCK_X[block] - g.anchor[0]);
-            let dy = down + f32x16::splat(simd, BLOCK_Y[block] - g.anchor[1]);
-            let u = dx.mul_add(
-                f32x16::splat(simd, g.factor[0]),
-                f32x16::splat(simd, g.at_anchor[0]),
-            );
-            let v = dy.mul_add(
-                f32x16::splat(simd, g.factor[2]),
-                f32x16::splat(simd, g.at_anchor[1]),
-            );
-            let v = dx.mul_add(f32x16::splat(simd, g.factor[1]), v);
+            let [a, b, c] = g.factor;
+            let u = across.mul_add(f32x16::splat(simd, a), f32x16::splat(simd, g.u[block]));
+            let v = down.mul_add(f32x16::splat(simd, c), f32x16::splat(simd, g.v[block]));
+            let v = across.mul_add(f32x16::splat(simd, b), v);
             let exponent = f32x16::splat(simd, g.log2_opacity) - v.mul_add(v, u * u);
             let alpha = exp2(simd, exponent).min(ceiling);
 
@@ -256,80 +255,86 @@ struct Work {
     contributions: u64,
 }
 
-/// The offset of each lane's pixel from its block's corner.
-const LANE_X: [f32; LANES] = grid(1.0, true);
-const LANE_Y: [f32; LANES] = grid(1.0, false);
-/// The offset of each block's corner from its tile's corner.
-const BLOCK_X: [f32; BLOCKS] = grid(4.0, true);
-const BLOCK_Y: [f32; BLOCKS] = grid(4.0, false);
+/// Half of the distance between a block's first and last pixel centres.
+const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;
+/// The offset of each lane's pixel from the middle of its block.
+const LANE_X: [f32; LANES] = grid(true);
+const LANE_Y: [f32; LANES] = grid(false);
+/// The offset of the middle of each block from its tile's corner.
+const BLOCK_X: [f64; BLOCKS] = middles(true);
+const BLOCK_Y: [f64; BLOCKS] = middles(false);
 
-/// The column or row, times `step`, of each cell of a 4x4 grid.
-const fn grid(step: f32, column: bool) -> [f32; 16] {
-    let mut out = [0.0; 16];
+const BLOCK_NUMBERS: [u32; BLOCKS] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
+/// The column or row of each cell of a 4x4 grid, from the grid's middle.
+const fn grid(column: bool) -> [f32; LANES] {
+    let mut out = [0.0; LANES];
     let mut cell = 0;
-    while cell < 16 {
-        out[cell] = step * (if column { cell % 4 } else { cell / 4 }) as f32;
+    while cell < LANES {
+        let at = if column { cell % BLOCK } else { cell / BLOCK };
+        out[cell] = at as f32 - HALF;
         cell += 1;
     }
     out
 }
 
+/// The middle, in x or y, of each block of a tile.
+const fn middles(column: bool) -> [f64; BLOCKS] {
+    let mut out = [0.0; BLOCKS];
+    let mut block = 0;
+    while block < BLOCKS {
+        let at = if column { block % 4 } else { block / 4 };
+        out[block] = (BLOCK * at) as f64 + BLOCK as f64 / 2.0;
+        block += 1;
+    }
+    out
+}
+
 impl Record {
+    /// Phase 1: makes this the record of `splat` in the tile at `corner`. Returns which blocks it may reach.
     #[inline(always)]
-    fn new(splat: &Splat, corner: [u32; 2], log2_floor: f32) -> Self {
-        let [left, top] = corner.map(f64::from);
-        let at = [splat.mean[0] - left, splat.mean[1] - top];
-        // The index of the pixel that the mean lies in, or of the nearest one of this tile.
-        // Truncation is the floor of what is not negative, and what is becomes zero.
-        let nearest = |at: f64| f64::from(at.clamp(0.0, TILE as f64 - 1.0) as i32);
-        let anchor = [nearest(at[0]), nearest(at[1])];
-        let d = [anchor[0] + 0.5 - at[0], anchor[1] + 0.5 - at[1]];
+    fn place<S: Simd>(
+        &mut self,
+        simd: S,
+        splat: &Splat,
+        corner: [u32; 2],
+        log2_floor: f32,
+    ) -> mask32x16<S> {
         let [a, b, c] = splat.factor;
+        let from_mean = |axis: usize| f64::from(corner[axis]) - splat.mean[axis];
+        let (from_x, from_y) = (from_mean(0), from_mean(1));
+        // Columns repeat in both halves of the blocks.
+        let dx = f64x8::from_slice(simd, &BLOCK_X[..8]) + from_x;
+        let upper = f64x8::from_slice(simd, &BLOCK_Y[..8]) + from_y;
+        let lower = f64x8::from_slice(simd, &BLOCK_Y[8..]) + from_y;
+        let u = dx * a;
+        let sheared = dx * b;
+        let u: f32x16<S> = u.narrow(u);
+        let v: f32x16<S> = (sheared + upper * c).narrow(sheared + lower * c);
+        u.store_slice(&mut self.u);
+        v.store_slice(&mut self.v);
+        let [a, b, c] = [a as f32, b as f32, c as f32];
+        self.factor = [a, b, c];
+        self.log2_opacity = splat.log2_opacity;
+        self.color = splat.color;
+        // How far the exponent may fall, with a margin for rounding.
         let room = splat.log2_opacity - log2_floor;
-        Self {
-            anchor: [anchor[0] as f32, anchor[1] as f32],
-            at_anchor: [(a * d[0]) as f32, (b * d[0] + c * d[1]) as f32],
-            factor: [a as f32, b as f32, c as f32],
-            log2_opacity: splat.log2_opacity,
-            color: splat.color,
-            room: room + 1e-3 + 1e-5 * room.abs(),
-        }
+        let room = room + 1e-3 + 1e-5 * room.abs();
+        // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
+        let least_u = (u.abs() - HALF * a.abs()).max(0.0);
+        let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
+        let least = least_v.mul_add(least_v, least_u * least_u);
+        least.simd_le(room)
     }
 }
 
-/// Phase 1: writes an item `record * BLOCKS + block` for every open block that a record may reach, in the
-/// records' order. Returns how many there are.
+/// Writes an item `number * BLOCKS + block` for each of `blocks` to the front of `items`, in order; returns how many
+/// there are.
 #[inline(always)]
-fn find_items<S: Simd>(simd: S, records: &[Record], open: u64, items: &mut [u32]) -> usize {
-    let open = mask32x16::from_bitmask(simd, open);
-    let blocks = u32x16::from_fn(simd, |block| block as u32);
-    // Half of the distance between a block's first and last pixel centres, and its middle.
-    let half = (BLOCK as f32 - 1.0) / 2.0;
-    let middle_x = f32x16::simd_from(simd, BLOCK_X) + f32x16::splat(simd, half);
-    let middle_y = f32x16::simd_from(simd, BLOCK_Y) + f32x16::splat(simd, half);
-    let zero = f32x16::splat(simd, 0.0);
-    let mut count = 0;
-    for (number, g) in records.iter().enumerate() {
-        let dx = middle_x - f32x16::splat(simd, g.anchor[0]);
-        let dy = middle_y - f32x16::splat(simd, g.anchor[1]);
-        let [a, b, c] = g.factor;
-        let u = dx.mul_add(f32x16::splat(simd, a), f32x16::splat(simd, g.at_anchor[0]));
-        let v = dy.mul_add(f32x16::splat(simd, c), f32x16::splat(simd, g.at_anchor[1]));
-        let v = dx.mul_add(f32x16::splat(simd, b), v);
-        // The least |u| and |v| over the block's centres, each for itself: together they bound u^2 + v^2.
-        let least_u = (u.abs() - f32x16::splat(simd, half * a.abs())).max(zero);
-        let least_v = (v.abs() - f32x16::splat(simd, half * (b.abs() + c.abs()))).max(zero);
-        let least = least_v.mul_add(least_v, least_u * least_u);
-        let reached = least.simd_le(f32x16::splat(simd, g.room)) & open;
-        let named = blocks + u32x16::splat(simd, (number * BLOCKS) as u32);
-        let Some(room) = items.get_mut(count..count + LANES) else {
-            // Items have room for all blocks of all records and one vector more.
-            return count;
-        };
-        named.compress(reached).store_slice(room);
-        count += reached.to_bitmask().count_ones() as usize;
-    }
-    count
+fn append_items<S: Simd>(simd: S, number: usize, blocks: mask32x16<S>, items: &mut [u32]) -> usize {
+    let named = u32x16::simd_from(simd, BLOCK_NUMBERS) + (number * BLOCKS) as u32;
+    named.compress(blocks).store_slice(items);
+    blocks.to_bitmask().count_ones() as usize
 }
 
 /// A polynomial fitted to 2^f for f in [-1/2, 1/2], highest power first; relative error 9.2e-8.

@@ -167,10 +167,19 @@ fn naive_pixel(
     let (mut c, mut t, mut covered) = ([0.0f32; 3], 1.0f32, false);
     for &primitive in draw.tiles.list(tile[0], tile[1]) {
         let (batch, place) = locate(primitive);
-        let g = Record::new(&draw.splats[batch][place], corner, 0.0);
-        let (dx, dy) = (x as f32 - g.anchor[0], y as f32 - g.anchor[1]);
-        let u = mul_add(dx, g.factor[0], g.at_anchor[0]);
-        let v = mul_add(dx, g.factor[1], mul_add(dy, g.factor[2], g.at_anchor[1]));
+        let g = &draw.splats[batch][place];
+        let middle = |at: usize, corner: u32, mean: f64| {
+            (4 * (at / 4)) as f64 + 2.0 + (f64::from(corner) - mean)
+        };
+        let (mx, my) = (
+            middle(x, corner[0], g.mean[0]),
+            middle(y, corner[1], g.mean[1]),
+        );
+        let f = g.factor;
+        let (u, v) = ((mx * f[0]) as f32, (mx * f[1] + my * f[2]) as f32);
+        let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
+        let u = mul_add(dx, f[0] as f32, u);
+        let v = mul_add(dx, f[1] as f32, mul_add(dy, f[2] as f32, v));
         let exponent = g.log2_opacity - mul_add(v, v, u * u);
         let alpha = power(exponent).min(state.alpha_ceiling);
         if alpha < state.alpha_floor {
