@@ -3,20 +3,61 @@
 //!
 //! - `GAURAST_SIMD`: the SIMD level, by name: best (the default), sse2, sse4.2, avx2 or avx512.
 //! - `GAURAST_THREADS`: how many worker threads a device has; 0 (the default) means one per processor.
+//! - `GAURAST_TIMEOUT_MS`: how many milliseconds one batch of shader invocations may take before the device is lost; a
+//!   loop without end is stopped so. A batch is a workgroup, or some 64 vertices or fragments.
+//! - `GAURAST_DUMP`: what is printed to standard error for people, by name: ir (the device's programs, as pipelines are
+//!   created).
 
 use crate::error::Error;
 use simdevice::device::{Config, SimdLevel};
+use std::time::Duration;
 
 const SIMD: &str = "GAURAST_SIMD";
 const THREADS: &str = "GAURAST_THREADS";
+const TIMEOUT: &str = "GAURAST_TIMEOUT_MS";
+const DUMP: &str = "GAURAST_DUMP";
 
 /// Opens a simulated device as the environment says.
 ///
 /// # Errors
 /// [`Error::InitializationFailed`] for a value that means nothing or that this machine can't satisfy.
 pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
-    let config = config(variable(SIMD)?.as_deref(), variable(THREADS)?.as_deref())?;
+    let config = config(
+        variable(SIMD)?.as_deref(),
+        variable(THREADS)?.as_deref(),
+        variable(TIMEOUT)?.as_deref(),
+    )?;
     simdevice::Device::new(&config).map_err(|error| Error::InitializationFailed(error.to_string()))
+}
+
+/// What is printed for people.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Dump {
+    /// The device's programs, as pipelines are created.
+    pub(crate) ir: bool,
+}
+
+/// What the environment wants printed.
+///
+/// # Errors
+/// [`Error::InitializationFailed`] for a name that means nothing.
+pub(crate) fn dump() -> Result<Dump, Error> {
+    parse_dump(variable(DUMP)?.as_deref().unwrap_or_default())
+}
+
+fn parse_dump(names: &str) -> Result<Dump, Error> {
+    let mut dump = Dump::default();
+    for name in names.split(',').filter(|name| !name.is_empty()) {
+        match name {
+            "ir" => dump.ir = true,
+            other => {
+                return Err(Error::InitializationFailed(format!(
+                    "{DUMP}={other} is not ir"
+                )));
+            }
+        }
+    }
+    Ok(dump)
 }
 
 fn variable(name: &str) -> Result<Option<String>, Error> {
@@ -30,7 +71,11 @@ fn variable(name: &str) -> Result<Option<String>, Error> {
 }
 
 /// The configuration that the variables' values choose.
-fn config(simd: Option<&str>, threads: Option<&str>) -> Result<Config, Error> {
+fn config(
+    simd: Option<&str>,
+    threads: Option<&str>,
+    timeout: Option<&str>,
+) -> Result<Config, Error> {
     let mut config = Config::default();
     if let Some(name) = simd {
         config.simd = SimdLevel::from_name(name).ok_or_else(|| {
@@ -43,6 +88,12 @@ fn config(simd: Option<&str>, threads: Option<&str>) -> Result<Config, Error> {
             Error::InitializationFailed(format!("{THREADS}={count} is not a number of threads"))
         })?;
     }
+    if let Some(milliseconds) = timeout {
+        let milliseconds = milliseconds.parse().map_err(|_| {
+            Error::InitializationFailed(format!("{TIMEOUT}={milliseconds} is not a number"))
+        })?;
+        config.shader_timeout = Duration::from_millis(milliseconds);
+    }
     Ok(config)
 }
 
@@ -52,12 +103,17 @@ mod tests {
 
     #[test]
     fn values_are_understood_or_refused() {
-        assert_eq!(config(None, None).unwrap().threads, 0);
-        let chosen = config(Some("sse2"), Some("3")).unwrap();
+        assert_eq!(config(None, None, None).unwrap().threads, 0);
+        let chosen = config(Some("sse2"), Some("3"), Some("250")).unwrap();
+        assert_eq!(chosen.shader_timeout, Duration::from_millis(250));
         assert_eq!((chosen.simd, chosen.threads), (SimdLevel::Baseline, 3));
-        let error = config(Some("mmx"), None).unwrap_err();
+        let error = config(Some("mmx"), None, None).unwrap_err();
         assert_eq!(error.result(), ash::vk::Result::ERROR_INITIALIZATION_FAILED);
         assert!(error.to_string().contains("GAURAST_SIMD=mmx"));
-        assert!(config(None, Some("-1")).is_err());
+        assert!(config(None, Some("-1"), None).is_err());
+        assert!(config(None, None, Some("soon")).is_err());
+        assert!(parse_dump("ir").unwrap().ir);
+        assert!(!parse_dump("").unwrap().ir);
+        assert!(parse_dump("ir,everything").is_err());
     }
 }

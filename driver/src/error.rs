@@ -29,6 +29,12 @@ pub(crate) enum Error {
     /// The device has no memory for it.
     #[error("out of device memory: {0}")]
     OutOfDeviceMemory(String),
+    /// A descriptor pool has nothing left of what is wanted.
+    #[error("out of pool memory: {0}")]
+    OutOfPoolMemory(String),
+    /// A shader that is malformed, or that asks for what the device lacks.
+    #[error("invalid shader: {0}")]
+    InvalidShader(String),
     /// An object could not be made.
     #[error("{0}")]
     InitializationFailed(String),
@@ -82,6 +88,8 @@ impl Error {
                 vk::Result::ERROR_FEATURE_NOT_PRESENT
             }
             Self::OutOfDeviceMemory(_) => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+            Self::OutOfPoolMemory(_) => vk::Result::ERROR_OUT_OF_POOL_MEMORY,
+            Self::InvalidShader(_) => vk::Result::ERROR_INVALID_SHADER_NV,
             Self::InitializationFailed(_) => vk::Result::ERROR_INITIALIZATION_FAILED,
             Self::DeviceLost(_) => vk::Result::ERROR_DEVICE_LOST,
             Self::MemoryMapFailed(_) => vk::Result::ERROR_MEMORY_MAP_FAILED,
@@ -99,6 +107,7 @@ impl Error {
             Self::InvalidHandle { .. } => "GAURAST-invalid-handle",
             Self::NullPointer { .. } => "GAURAST-null-pointer",
             Self::Unsupported { .. } => "GAURAST-unsupported-command",
+            Self::InvalidShader(_) => "GAURAST-invalid-shader",
             Self::Panic(_) | Self::DeviceLost(_) => "GAURAST-driver-defect",
             _ => "GAURAST-error",
         }

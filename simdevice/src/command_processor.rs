@@ -1,8 +1,10 @@
 //! The command processor: the one match over [`Packet`].
 
+use crate::compute;
 use crate::counters::Counters;
 use crate::device::Device;
 use crate::gaussian::{GaussianSet, TooManyGaussians};
+use crate::isa::exec::Stopped;
 use crate::packet::Packet;
 use crate::pass::{Pass, PassDraw};
 use crate::query::host_time;
@@ -10,8 +12,8 @@ use crate::raster::tile::AttachmentError;
 use crate::transfer::{self, Direction};
 use std::sync::Arc;
 
-/// Why a packet could not be executed. The command processor stays usable: nothing of the packet was done, and a
-/// Gaussian set or a pass that it would have ended has ended.
+/// Why a packet could not be executed. The command processor stays usable: nothing of the packet was done, unless the error
+/// says otherwise, and a Gaussian set or a pass that it would have ended has ended.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ExecutionError {
     /// The packet belongs in a render pass.
@@ -32,6 +34,9 @@ pub enum ExecutionError {
     /// A set is too large.
     #[error(transparent)]
     TooManyGaussians(#[from] TooManyGaussians),
+    /// A program ran for too long; what it wrote until then stays written.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// Executes packets in order. Dropping it in the middle of a pass drops what was not flushed.
@@ -114,6 +119,16 @@ impl CommandProcessor {
                 let set = self.gaussians.take().ok_or(ExecutionError::NoGaussianSet)?;
                 let draw = set.resolve(&self.device, &mut self.counters)?;
                 self.draw(PassDraw::Gaussians(draw))
+            }
+            Packet::Dispatch(dispatch) => {
+                if self.pass.is_some() {
+                    return Err(ExecutionError::InsidePass);
+                }
+                Ok(compute::dispatch(
+                    dispatch,
+                    &self.device,
+                    &mut self.counters,
+                )?)
             }
             Packet::TriangleDraw(draw) => match *draw {},
             Packet::Barrier => {

@@ -1,6 +1,9 @@
 //! Counters of the work that the device does. They accumulate over a command processor's life; a query reads
 //! the difference between its end and its beginning.
 
+use crate::isa::exec::Work;
+use crate::isa::op::Kind;
+
 /// What a counter counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
@@ -65,10 +68,41 @@ counters! {
     TilePairsEvaluated: "raster", "tile pairs evaluated", Count, "Tile pairs that were fetched before their tile was saturated";
     BlockEvaluations: "raster", "block evaluations", Count, "Pairs of a 4x4 block and a Gaussian whose alpha was evaluated";
     PixelContributions: "raster", "pixel contributions", Count, "Pairs of a pixel and a Gaussian that contributed to it";
+    ShaderBatches: "shader cores", "batches", Count, "Batches of shader invocations run";
+    ShaderFloat: "shader cores", "float instructions", Count, "32-bit float instructions, each counted once for a batch";
+    ShaderInteger: "shader cores", "integer instructions", Count, "32-bit integer and bit instructions, each counted once for a batch";
+    ShaderSpecial: "shader cores", "special function instructions", Count, "Divisions, roots and transcendental functions, each counted once for a batch";
+    ShaderWide: "shader cores", "64-bit instructions", Count, "64-bit instructions, each counted once for a batch";
+    ShaderMove: "shader cores", "move instructions", Count, "Moves, selections and conversions, each counted once for a batch";
+    ShaderCrossLane: "shader cores", "cross-lane instructions", Count, "Derivatives and subgroup operations, each counted once for a batch";
+    ShaderMemory: "shader cores", "memory instructions", Count, "Loads and stores, each counted once for a batch";
+    ShaderAtomic: "shader cores", "atomic instructions", Count, "Atomic operations, each counted once for a batch";
+    ShaderImage: "shader cores", "image instructions", Count, "Image samples, reads and writes, each counted once for a batch";
+    ShaderControl: "shader cores", "control flow instructions", Count, "Branches, loops and mask updates, each counted once for a batch";
+    ShaderUniform: "shader cores", "uniform instructions", Count, "Instructions computed once for all lanes of a batch; they are in the counts by kind too";
+    ShaderActiveLanes: "shader cores", "active lanes", Count, "Lanes that were active, summed over the instructions that work on each lane";
+    ShaderLanes: "shader cores", "lanes", Count, "Lanes that could have been active, summed alike; active lanes by it is the lane occupancy";
     PreprocessTime: "time", "preprocess", Nanoseconds, "Reading, culling, projecting and colouring Gaussians";
     SortTime: "time", "sort", Nanoseconds, "Sorting by depth";
     BinningTime: "time", "binning", Nanoseconds, "Finding the tiles of each Gaussian, and placing it in their lists";
+    ShaderTime: "time", "dispatches", Nanoseconds, "Running the workgroups of compute programs";
     RasterTime: "time", "raster", Nanoseconds, "Rendering tiles: load, evaluate, blend, store";
+}
+
+/// The counter of a kind of instruction.
+fn of_kind(kind: Kind) -> Counter {
+    match kind {
+        Kind::Float => Counter::ShaderFloat,
+        Kind::Integer => Counter::ShaderInteger,
+        Kind::Special => Counter::ShaderSpecial,
+        Kind::Wide => Counter::ShaderWide,
+        Kind::Move => Counter::ShaderMove,
+        Kind::CrossLane => Counter::ShaderCrossLane,
+        Kind::Memory => Counter::ShaderMemory,
+        Kind::Atomic => Counter::ShaderAtomic,
+        Kind::Image => Counter::ShaderImage,
+        Kind::Control => Counter::ShaderControl,
+    }
 }
 
 /// A value for every [`Counter`].
@@ -95,6 +129,18 @@ impl Counters {
     pub fn add(&mut self, counter: Counter, amount: u64) {
         let value = &mut self.values[counter as usize];
         *value = value.wrapping_add(amount);
+    }
+
+    /// Adds what shader cores did.
+    pub fn add_work(&mut self, work: &Work) {
+        for kind in Kind::ALL {
+            self.add(of_kind(kind), work.instructions[kind as usize]);
+        }
+        self.add(Counter::ShaderBatches, work.batches);
+        let uniform = work.uniform_instructions.iter().sum();
+        self.add(Counter::ShaderUniform, uniform);
+        self.add(Counter::ShaderActiveLanes, work.active_lanes);
+        self.add(Counter::ShaderLanes, work.lanes);
     }
 
     /// Adds every counter of `other`.

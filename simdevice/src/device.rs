@@ -3,6 +3,7 @@
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
 use crate::workers::Workers;
 use fearless_simd::Level;
+use std::time::Duration;
 
 /// What can be chosen when a device is created.
 #[derive(Clone, Debug)]
@@ -18,6 +19,8 @@ pub struct Config {
     pub bin_budget_bytes: u64,
     /// When a pass is flushed.
     pub flush: FlushPolicy,
+    /// The longest time that one batch of shader invocations may take.
+    pub shader_timeout: Duration,
 }
 
 /// When a pass's bins are rendered. It never changes an image.
@@ -37,6 +40,7 @@ impl Default for Config {
             macro_tile_size: 64,
             bin_budget_bytes: 256 << 20,
             flush: FlushPolicy::WhenFull,
+            shader_timeout: Duration::from_secs(5),
         }
     }
 }

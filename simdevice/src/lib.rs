@@ -8,8 +8,10 @@
 //! [`counters`] records the work that was done.
 #![forbid(unsafe_code)]
 
+pub mod bindings;
 mod binning;
 pub mod command_processor;
+pub mod compute;
 pub mod counters;
 pub mod device;
 pub mod format;

@@ -1,5 +1,6 @@
 //! Packets: what the driver asks of the device. Plain data; everything a packet needs it holds by [`Arc`].
 
+use crate::compute::Dispatch;
 use crate::format::Format;
 use crate::image::{Image, ImageView};
 use crate::query::QueryPool;
@@ -43,6 +44,8 @@ pub enum Packet {
     GaussianAppend(Box<GaussianAppend>),
     /// Ends the set: it is sorted, binned and becomes one draw of the current pass.
     GaussianResolve,
+    /// Runs workgroups of a compute program.
+    Dispatch(Box<Dispatch>),
     /// A triangle draw.
     TriangleDraw(TriangleDraw),
     /// Makes everything before visible to everything after; flushes a pass's bins if it is inside one.

@@ -23,7 +23,7 @@ pub enum QueryKind {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum QueryResult {
     /// The counters' differences between end and beginning.
-    Performance(Counters),
+    Performance(Box<Counters>),
     /// Nanoseconds.
     Timestamp(u64),
 }
@@ -34,7 +34,7 @@ enum Slot {
     #[default]
     Unavailable,
     /// Begun, with the counters at that moment.
-    Active(Counters),
+    Active(Box<Counters>),
     Available(QueryResult),
 }
 
@@ -92,7 +92,7 @@ impl QueryPool {
 
     /// Starts a query.
     pub(crate) fn begin(&self, index: u32, now: &Counters) {
-        self.set(index, Slot::Active(now.clone()));
+        self.set(index, Slot::Active(Box::new(now.clone())));
     }
 
     /// Ends a query that was begun.
@@ -103,7 +103,7 @@ impl QueryPool {
         };
         self.set(
             index,
-            Slot::Available(QueryResult::Performance(now.since(&begun))),
+            Slot::Available(QueryResult::Performance(Box::new(now.since(&begun)))),
         );
     }
 

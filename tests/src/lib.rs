@@ -1,9 +1,10 @@
 //! What the project's tests share: the reference renderer, generated scenes, image comparison,
-//! devices to draw on, and the place of test data.
+//! devices to draw on, compute kernels, and the place of test data.
 
 pub mod compare;
 pub mod contexts;
 pub mod convert;
 pub mod data;
+pub mod kernels;
 pub mod oracle;
 pub mod scenes;

@@ -44,6 +44,10 @@ pub(crate) const DEVICE: &[Extension] = &[
         ash::khr::performance_query::SPEC_VERSION,
     ),
     (
+        ash::khr::push_descriptor::NAME,
+        ash::khr::push_descriptor::SPEC_VERSION,
+    ),
+    (
         ash::khr::synchronization2::NAME,
         ash::khr::synchronization2::SPEC_VERSION,
     ),

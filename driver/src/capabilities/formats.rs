@@ -34,9 +34,20 @@ fn is_color(format: Format) -> bool {
 
 /// What images of the format, of either tiling, can do.
 fn image_features(format: Format) -> vk::FormatFeatureFlags {
-    let transfer = vk::FormatFeatureFlags::TRANSFER_SRC | vk::FormatFeatureFlags::TRANSFER_DST;
+    let mut features = vk::FormatFeatureFlags::TRANSFER_SRC
+        | vk::FormatFeatureFlags::TRANSFER_DST
+        | vk::FormatFeatureFlags::SAMPLED_IMAGE;
+    if !format.is_integer() && format.aspects() != [Aspect::Stencil] {
+        features |= vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
+    }
     if !is_color(format) {
-        return transfer | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
+        return features | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
+    }
+    if is_stored(format) {
+        features |= vk::FormatFeatureFlags::STORAGE_IMAGE;
+    }
+    if is_atomic(format) {
+        features |= vk::FormatFeatureFlags::STORAGE_IMAGE_ATOMIC;
     }
     let is_rendered = match format.numeric() {
         Numeric::Unorm | Numeric::Snorm | Numeric::Sfloat | Numeric::Ufloat | Numeric::Srgb => {
@@ -46,26 +57,45 @@ fn image_features(format: Format) -> vk::FormatFeatureFlags {
         _ => false,
     };
     if is_rendered {
-        transfer
-            | vk::FormatFeatureFlags::COLOR_ATTACHMENT
-            | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND
-    } else {
-        transfer
+        features |= vk::FormatFeatureFlags::COLOR_ATTACHMENT
+            | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
     }
+    features
+}
+
+/// Whether programs write texels of a colour format. sRGB and shared exponents are only read.
+fn is_stored(format: Format) -> bool {
+    !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent)
+        && format.texel_size().is_power_of_two()
+        && !format.has(Channel::X)
+}
+
+/// Whether programs update texels atomically: integers of one word.
+fn is_atomic(format: Format) -> bool {
+    format.is_integer() && format.texel_size() == 4 && format.components().len() == 1
 }
 
 /// What buffers of the format can do: any attribute that converts to floating point feeds a Gaussian. Integer
-/// attributes need vertex shaders, which don't run yet.
+/// attributes need vertex shaders, which don't run yet. Programs read texels of any format.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
     let is_attribute = is_color(format)
         && !format.is_integer()
         && !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent)
         && !format.has(Channel::X);
+    let mut features = vk::FormatFeatureFlags::empty();
     if is_attribute {
-        vk::FormatFeatureFlags::VERTEX_BUFFER
-    } else {
-        vk::FormatFeatureFlags::empty()
+        features |= vk::FormatFeatureFlags::VERTEX_BUFFER;
     }
+    if is_color(format) {
+        features |= vk::FormatFeatureFlags::UNIFORM_TEXEL_BUFFER;
+        if is_stored(format) {
+            features |= vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
+        }
+        if is_atomic(format) {
+            features |= vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER_ATOMIC;
+        }
+    }
+    features
 }
 
 /// `VkFormatProperties`. Formats that the device lacks can do nothing.
@@ -300,6 +330,7 @@ mod tests {
                 ..query
             },
             ImageQuery {
+                format: vk::Format::R8G8B8A8_SRGB,
                 usage: vk::ImageUsageFlags::STORAGE,
                 ..query
             },

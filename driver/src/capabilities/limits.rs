@@ -1,7 +1,7 @@
 //! The physical device's properties and limits.
 //!
 //! Limits are at least what Vulkan requires, except that there is no multisampling yet, so that every sample count is
-//! 1. Limits of what doesn't work yet (shaders, descriptors, compute) are Vulkan's minima.
+//! 1.
 
 use crate::capabilities::extensions::{API_VERSION, fill_string};
 use crate::capabilities::memory;
@@ -37,6 +37,42 @@ pub(crate) const MAX_LAYERS: u32 = 2048;
 
 /// The most colour attachments.
 pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
+
+/// The greatest magnitude of a sampler's bias of the level of detail.
+pub(crate) const MAX_SAMPLER_LOD_BIAS: f32 = simdevice::texture::MAX_LOD_BIAS;
+
+/// The bytes of push constants.
+pub(crate) const MAX_PUSH_CONSTANTS_SIZE: u32 = 256;
+
+/// The most descriptors of a set that is pushed.
+pub(crate) const MAX_PUSH_DESCRIPTORS: u32 = 32;
+
+/// The most descriptors of a set of any mix of kinds.
+pub(crate) const MAX_PER_SET_DESCRIPTORS: u32 = DESCRIPTORS;
+
+/// The most descriptors of a kind that a stage, or a set, may have. Nothing but memory bounds them.
+const DESCRIPTORS: u32 = 1 << 16;
+
+/// The most descriptors with dynamic offsets.
+const DYNAMIC_DESCRIPTORS: u32 = 64;
+
+/// Offsets of uniform, storage and texel buffers must be multiples of this.
+pub(crate) const MIN_BUFFER_OFFSET_ALIGNMENT: u64 = 16;
+
+/// The most invocations of a workgroup in x, y and z.
+pub(crate) const MAX_WORKGROUP_SIZE: [u32; 3] = [MAX_WORKGROUP_INVOCATIONS; 3];
+
+/// The most invocations of a workgroup.
+pub(crate) const MAX_WORKGROUP_INVOCATIONS: u32 = simdevice::compute::MAX_WORKGROUP_INVOCATIONS;
+
+/// The most bytes of a workgroup's shared memory.
+pub(crate) const MAX_SHARED_BYTES: u32 = simdevice::compute::MAX_SHARED_BYTES;
+
+/// Invocations of a subgroup, unless a pipeline requires another size.
+pub(crate) const SUBGROUP_SIZE: u32 = 32;
+
+/// The least and the greatest size that a pipeline may require.
+pub(crate) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=128;
 
 /// The most vertex attributes and vertex bindings. Gaussians of degree 3 take 20 attributes.
 pub(crate) const MAX_VERTEX_INPUTS: u32 = 32;
@@ -84,26 +120,26 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_texel_buffer_elements: 1 << 16,
         max_uniform_buffer_range: 1 << 16,
         max_storage_buffer_range: u32::MAX,
-        max_push_constants_size: 256,
+        max_push_constants_size: MAX_PUSH_CONSTANTS_SIZE,
         max_memory_allocation_count: u32::MAX,
         max_sampler_allocation_count: 1 << 16,
         buffer_image_granularity: 1,
         max_bound_descriptor_sets: 8,
-        max_per_stage_descriptor_samplers: 16,
-        max_per_stage_descriptor_uniform_buffers: 12,
-        max_per_stage_descriptor_storage_buffers: 8,
-        max_per_stage_descriptor_sampled_images: 16,
-        max_per_stage_descriptor_storage_images: 4,
-        max_per_stage_descriptor_input_attachments: 4,
-        max_per_stage_resources: 128,
-        max_descriptor_set_samplers: 96,
-        max_descriptor_set_uniform_buffers: 72,
-        max_descriptor_set_uniform_buffers_dynamic: 8,
-        max_descriptor_set_storage_buffers: 24,
-        max_descriptor_set_storage_buffers_dynamic: 4,
-        max_descriptor_set_sampled_images: 96,
-        max_descriptor_set_storage_images: 24,
-        max_descriptor_set_input_attachments: 4,
+        max_per_stage_descriptor_samplers: DESCRIPTORS,
+        max_per_stage_descriptor_uniform_buffers: DESCRIPTORS,
+        max_per_stage_descriptor_storage_buffers: DESCRIPTORS,
+        max_per_stage_descriptor_sampled_images: DESCRIPTORS,
+        max_per_stage_descriptor_storage_images: DESCRIPTORS,
+        max_per_stage_descriptor_input_attachments: DESCRIPTORS,
+        max_per_stage_resources: DESCRIPTORS,
+        max_descriptor_set_samplers: DESCRIPTORS,
+        max_descriptor_set_uniform_buffers: DESCRIPTORS,
+        max_descriptor_set_uniform_buffers_dynamic: DYNAMIC_DESCRIPTORS,
+        max_descriptor_set_storage_buffers: DESCRIPTORS,
+        max_descriptor_set_storage_buffers_dynamic: DYNAMIC_DESCRIPTORS,
+        max_descriptor_set_sampled_images: DESCRIPTORS,
+        max_descriptor_set_storage_images: DESCRIPTORS,
+        max_descriptor_set_input_attachments: DESCRIPTORS,
         max_vertex_input_attributes: MAX_VERTEX_INPUTS,
         max_vertex_input_bindings: MAX_VERTEX_INPUTS,
         max_vertex_input_attribute_offset: 65535,
@@ -112,16 +148,16 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_fragment_input_components: 64,
         max_fragment_output_attachments: MAX_COLOR_ATTACHMENTS,
         max_fragment_combined_output_resources: MAX_COLOR_ATTACHMENTS,
-        max_compute_shared_memory_size: 16384,
-        max_compute_work_group_count: [65535; 3],
-        max_compute_work_group_invocations: 128,
-        max_compute_work_group_size: [128, 128, 64],
+        max_compute_shared_memory_size: MAX_SHARED_BYTES,
+        max_compute_work_group_count: [u32::MAX; 3],
+        max_compute_work_group_invocations: MAX_WORKGROUP_INVOCATIONS,
+        max_compute_work_group_size: MAX_WORKGROUP_SIZE,
         sub_pixel_precision_bits: 8,
         sub_texel_precision_bits: 8,
         mipmap_precision_bits: 8,
         max_draw_indexed_index_value: u32::MAX,
         max_draw_indirect_count: u32::MAX,
-        max_sampler_lod_bias: 2.0,
+        max_sampler_lod_bias: MAX_SAMPLER_LOD_BIAS,
         max_sampler_anisotropy: 1.0,
         max_viewports: 1,
         max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],
@@ -131,11 +167,13 @@ fn limits() -> vk::PhysicalDeviceLimits {
         ],
         viewport_sub_pixel_bits: 8,
         min_memory_map_alignment: memory::ALIGNMENT as usize,
-        min_texel_buffer_offset_alignment: 16,
-        min_uniform_buffer_offset_alignment: 16,
-        min_storage_buffer_offset_alignment: 16,
+        min_texel_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
+        min_uniform_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
+        min_storage_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
         min_texel_offset: -8,
         max_texel_offset: 7,
+        min_texel_gather_offset: -8,
+        max_texel_gather_offset: 7,
         max_framebuffer_width: MAX_IMAGE_DIMENSION,
         max_framebuffer_height: MAX_IMAGE_DIMENSION,
         max_framebuffer_layers: MAX_LAYERS,
@@ -168,10 +206,18 @@ fn vulkan11() -> vk::PhysicalDeviceVulkan11Properties<'static> {
     vk::PhysicalDeviceVulkan11Properties {
         device_uuid: uuid(b"GauRastDevice", [0; 3]),
         driver_uuid: uuid(b"GauRastDriver", driver_version()),
-        // No shader stage runs yet, so that none has subgroup operations.
-        subgroup_size: 1,
+        subgroup_size: SUBGROUP_SIZE,
+        subgroup_supported_stages: vk::ShaderStageFlags::COMPUTE,
+        subgroup_supported_operations: vk::SubgroupFeatureFlags::BASIC
+            | vk::SubgroupFeatureFlags::VOTE
+            | vk::SubgroupFeatureFlags::ARITHMETIC
+            | vk::SubgroupFeatureFlags::BALLOT
+            | vk::SubgroupFeatureFlags::SHUFFLE
+            | vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE
+            | vk::SubgroupFeatureFlags::CLUSTERED
+            | vk::SubgroupFeatureFlags::QUAD,
         point_clipping_behavior: vk::PointClippingBehavior::ALL_CLIP_PLANES,
-        max_per_set_descriptors: 1024,
+        max_per_set_descriptors: MAX_PER_SET_DESCRIPTORS,
         max_memory_allocation_size: memory::heap_size(),
         ..Default::default()
     }
@@ -183,6 +229,21 @@ fn vulkan12() -> vk::PhysicalDeviceVulkan12Properties<'static> {
         driver_id: vk::DriverId::from_raw(0),
         conformance_version: vk::ConformanceVersion::default(),
         max_timeline_semaphore_value_difference: u64::MAX,
+        denorm_behavior_independence: vk::ShaderFloatControlsIndependence::ALL,
+        rounding_mode_independence: vk::ShaderFloatControlsIndependence::ALL,
+        shader_signed_zero_inf_nan_preserve_float16: vk::TRUE,
+        shader_signed_zero_inf_nan_preserve_float32: vk::TRUE,
+        shader_signed_zero_inf_nan_preserve_float64: vk::TRUE,
+        shader_denorm_preserve_float16: vk::TRUE,
+        shader_denorm_preserve_float32: vk::TRUE,
+        shader_denorm_preserve_float64: vk::TRUE,
+        shader_rounding_mode_rte_float16: vk::TRUE,
+        shader_rounding_mode_rte_float32: vk::TRUE,
+        shader_rounding_mode_rte_float64: vk::TRUE,
+        shader_uniform_buffer_array_non_uniform_indexing_native: vk::TRUE,
+        shader_sampled_image_array_non_uniform_indexing_native: vk::TRUE,
+        shader_storage_buffer_array_non_uniform_indexing_native: vk::TRUE,
+        shader_storage_image_array_non_uniform_indexing_native: vk::TRUE,
         framebuffer_integer_color_sample_counts: vk::SampleCountFlags::TYPE_1,
         ..Default::default()
     };
@@ -197,10 +258,12 @@ fn vulkan12() -> vk::PhysicalDeviceVulkan12Properties<'static> {
 
 fn vulkan13() -> vk::PhysicalDeviceVulkan13Properties<'static> {
     vk::PhysicalDeviceVulkan13Properties {
-        min_subgroup_size: 1,
-        max_subgroup_size: 1,
-        storage_texel_buffer_offset_alignment_bytes: 16,
-        uniform_texel_buffer_offset_alignment_bytes: 16,
+        min_subgroup_size: *SUBGROUP_SIZES.start(),
+        max_subgroup_size: *SUBGROUP_SIZES.end(),
+        max_compute_workgroup_subgroups: MAX_WORKGROUP_INVOCATIONS / *SUBGROUP_SIZES.start(),
+        required_subgroup_size_stages: vk::ShaderStageFlags::COMPUTE,
+        storage_texel_buffer_offset_alignment_bytes: MIN_BUFFER_OFFSET_ALIGNMENT,
+        uniform_texel_buffer_offset_alignment_bytes: MIN_BUFFER_OFFSET_ALIGNMENT,
         max_buffer_size: memory::heap_size(),
         ..Default::default()
     }
@@ -261,6 +324,9 @@ properties! {
     PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> = gaussian;
     }
     parts {
+    vk::PhysicalDevicePushDescriptorPropertiesKHR<'_> {
+        max_push_descriptors: MAX_PUSH_DESCRIPTORS,
+    }
     vk::PhysicalDevicePerformanceQueryPropertiesKHR<'_> {
         allow_command_buffer_query_copies: vk::FALSE,
     }

@@ -1,7 +1,4 @@
-//! The queue family: one, with one queue.
-//!
-//! Vulkan demands that a family with graphics operations, of some device, also has compute operations, so the family
-//! says that it does; compute pipelines are refused until there are shader cores.
+//! The queue family: one, with one queue that does everything.
 
 use ash::vk;
 

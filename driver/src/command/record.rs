@@ -1,8 +1,12 @@
 //! What a command buffer holds. Everything that the application passed by pointer has been copied, and every
 //! object that a command names is held by [`Arc`].
 
+use super::bound::{BindPoint, BoundSet};
+use crate::object::descriptor::layout::DescriptorSetLayout;
+use crate::object::descriptor::set::Write;
 use crate::object::event::Event;
 use crate::object::pipeline::GraphicsPipeline;
+use crate::object::pipeline::compute::ComputePipeline;
 use crate::object::query_pool::QueryPool;
 use simdevice::Packet;
 use simdevice::packet::{BufferRange, Camera, Rect, Viewport};
@@ -48,6 +52,28 @@ pub(crate) enum Command {
     /// `vkCmdDrawIndirect`, `vkCmdDrawIndexedIndirect` and their forms with a count: the draws are read when they
     /// execute.
     DrawIndirect(DrawIndirect),
+    /// `vkCmdBindPipeline` at the compute bind point.
+    BindComputePipeline(Arc<ComputePipeline>),
+    /// `vkCmdBindDescriptorSets`.
+    BindSets(Box<BindSets>),
+    /// `vkCmdPushDescriptorSetKHR` and its form with a template.
+    PushDescriptors(Box<PushDescriptors>),
+    /// `vkCmdPushConstants`. Whatever stages they are for, they have one memory.
+    PushConstants {
+        /// The first byte.
+        offset: u32,
+        /// The bytes.
+        bytes: Box<[u8]>,
+    },
+    /// `vkCmdDispatch` and `vkCmdDispatchBase`.
+    Dispatch {
+        /// The first workgroup in x, y and z.
+        base: [u32; 3],
+        /// How many workgroups in x, y and z.
+        count: [u32; 3],
+    },
+    /// `vkCmdDispatchIndirect`: the workgroups are counted when it executes.
+    DispatchIndirect(BufferRange),
     /// `vkCmdSetEvent` (true) and `vkCmdResetEvent` (false).
     SetEvent(Arc<Event>, bool),
     /// `vkCmdWaitEvents`.
@@ -56,6 +82,30 @@ pub(crate) enum Command {
     CopyQueryResults(CopyQueryResults),
     /// `vkCmdExecuteCommands`: what the secondary command buffers held when this was recorded.
     Execute(Vec<Arc<[Command]>>),
+}
+
+/// Descriptor sets to be bound.
+#[derive(Clone, Debug)]
+pub(crate) struct BindSets {
+    /// Where.
+    pub(crate) bind_point: BindPoint,
+    /// The first set's number.
+    pub(crate) first: u32,
+    /// The sets.
+    pub(crate) sets: Vec<BoundSet>,
+}
+
+/// Descriptors that are pushed.
+#[derive(Clone, Debug)]
+pub(crate) struct PushDescriptors {
+    /// Where.
+    pub(crate) bind_point: BindPoint,
+    /// The set's number.
+    pub(crate) set: u32,
+    /// The set's layout.
+    pub(crate) layout: Arc<DescriptorSetLayout>,
+    /// What changes.
+    pub(crate) writes: Vec<Write>,
 }
 
 /// A vertex buffer binding.

@@ -2,6 +2,7 @@
 
 use super::record::{Command, CopyQueryResults, Draw, DrawIndirect};
 use super::state::{State, bind};
+use crate::lower::compute;
 use crate::lower::gaussian::{self, Undrawn};
 use crate::object::event::Event;
 use crate::object::pipeline::Primitive;
@@ -63,6 +64,23 @@ fn step(command: &Command, state: &mut State, executor: &mut dyn Executor) -> Re
         Command::SetCamera(camera) => state.camera = Some(**camera),
         Command::Draw(numbers) => draw(state, numbers, executor)?,
         Command::DrawIndirect(indirect) => draw_indirect(state, indirect, executor)?,
+        Command::BindComputePipeline(pipeline) => state.compute_pipeline = Some(pipeline.clone()),
+        Command::BindSets(bind) => state.sets_mut(bind.bind_point).bind(bind.first, &bind.sets),
+        Command::PushDescriptors(push) => {
+            let sets = state.sets_mut(push.bind_point);
+            if let Err(error) = sets.push(push.set, &push.layout, &push.writes) {
+                executor.report(&format!("descriptors are not pushed: {error}"));
+            }
+        }
+        Command::PushConstants { offset, bytes } => state.push_constants(*offset, bytes),
+        Command::Dispatch { base, count } => dispatch(state, *base, *count, executor)?,
+        Command::DispatchIndirect(range) => {
+            let mut count = [0; 3];
+            // The range was checked when the command was recorded.
+            if range.memory.read(range.offset, &mut count).is_ok() {
+                dispatch(state, [0; 3], count, executor)?;
+            }
+        }
         Command::SetEvent(event, value) => event.set(*value),
         Command::WaitEvents(events) => {
             for event in events {
@@ -101,6 +119,21 @@ fn draw(state: &State, numbers: &Draw, executor: &mut dyn Executor) -> Result<()
             .try_for_each(|packet| executor.execute(packet)),
         Err(reason) => {
             executor.report(&format!("a draw draws nothing: {reason}"));
+            Ok(())
+        }
+    }
+}
+
+fn dispatch(
+    state: &State,
+    base: [u32; 3],
+    count: [u32; 3],
+    executor: &mut dyn Executor,
+) -> Result<(), Lost> {
+    match compute::dispatch(state, base, count) {
+        Ok(packet) => executor.execute(&packet),
+        Err(reason) => {
+            executor.report(&format!("a dispatch does nothing: {reason}"));
             Ok(())
         }
     }

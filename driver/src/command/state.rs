@@ -1,7 +1,9 @@
 //! The state that a command buffer's draws read, as the commands replayed so far have left it.
 
+use super::bound::{BindPoint, BoundSets};
 use super::record::{IndexBuffer, VertexBuffer};
 use crate::object::pipeline::GraphicsPipeline;
+use crate::object::pipeline::compute::ComputePipeline;
 use simdevice::packet::{Camera, Rect, Viewport};
 use std::sync::Arc;
 
@@ -10,6 +12,14 @@ use std::sync::Arc;
 pub(crate) struct State {
     /// The graphics pipeline.
     pub(crate) pipeline: Option<Arc<GraphicsPipeline>>,
+    /// The compute pipeline.
+    pub(crate) compute_pipeline: Option<Arc<ComputePipeline>>,
+    /// The descriptor sets of draws.
+    pub(crate) graphics_sets: BoundSets,
+    /// The descriptor sets of dispatches.
+    pub(crate) compute_sets: BoundSets,
+    /// Push constants, as far as any were pushed.
+    pub(crate) push_constants: Vec<u8>,
     /// The vertex buffers by binding.
     pub(crate) vertex_buffers: Vec<Option<VertexBuffer>>,
     /// The index buffer.
@@ -37,6 +47,23 @@ impl State {
         pipeline
             .scissor
             .or_else(|| self.scissors.first().copied().flatten())
+    }
+
+    /// The descriptor sets of a bind point.
+    pub(crate) fn sets_mut(&mut self, bind_point: BindPoint) -> &mut BoundSets {
+        match bind_point {
+            BindPoint::Graphics => &mut self.graphics_sets,
+            BindPoint::Compute => &mut self.compute_sets,
+        }
+    }
+
+    /// Replaces push constants from byte `offset` on.
+    pub(crate) fn push_constants(&mut self, offset: u32, bytes: &[u8]) {
+        let range = offset as usize..offset as usize + bytes.len();
+        if self.push_constants.len() < range.end {
+            self.push_constants.resize(range.end, 0);
+        }
+        self.push_constants[range].copy_from_slice(bytes);
     }
 
     /// The vertex buffer bound at `binding`.

@@ -13,6 +13,7 @@ use std::ffi::CStr;
 const DEBUG_UTILS: &CStr = ash::ext::debug_utils::NAME;
 const GET_PHYSICAL_DEVICE_PROPERTIES2: &CStr = ash::khr::get_physical_device_properties2::NAME;
 const PERFORMANCE_QUERY: &CStr = ash::khr::performance_query::NAME;
+const PUSH_DESCRIPTOR: &CStr = ash::khr::push_descriptor::NAME;
 const DYNAMIC_RENDERING: &CStr = ash::khr::dynamic_rendering::NAME;
 const SYNCHRONIZATION2: &CStr = ash::khr::synchronization2::NAME;
 const GAUSSIAN_PRIMITIVE_TOPOLOGY: &CStr = gaussian_primitive_topology::NAME;
@@ -106,8 +107,8 @@ commands! {
         PFN_vkGetQueryPoolResults = query::get_query_pool_results;
         PFN_vkCreateBuffer = buffer::create_buffer;
         PFN_vkDestroyBuffer = buffer::destroy_buffer;
-        PFN_vkCreateBufferView = unsupported::create_buffer_view;
-        PFN_vkDestroyBufferView = unsupported::destroy_buffer_view;
+        PFN_vkCreateBufferView = buffer_view::create_buffer_view;
+        PFN_vkDestroyBufferView = buffer_view::destroy_buffer_view;
         PFN_vkCreateImage = image::create_image;
         PFN_vkDestroyImage = image::destroy_image;
         PFN_vkGetImageSubresourceLayout = image::get_image_subresource_layout;
@@ -120,20 +121,20 @@ commands! {
         PFN_vkGetPipelineCacheData = pipeline::get_pipeline_cache_data;
         PFN_vkMergePipelineCaches = pipeline::merge_pipeline_caches;
         PFN_vkCreateGraphicsPipelines = pipeline::create_graphics_pipelines;
-        PFN_vkCreateComputePipelines = pipeline::create_compute_pipelines;
+        PFN_vkCreateComputePipelines = compute_pipeline::create_compute_pipelines;
         PFN_vkDestroyPipeline = pipeline::destroy_pipeline;
         PFN_vkCreatePipelineLayout = pipeline::create_pipeline_layout;
         PFN_vkDestroyPipelineLayout = pipeline::destroy_pipeline_layout;
-        PFN_vkCreateSampler = unsupported::create_sampler;
-        PFN_vkDestroySampler = unsupported::destroy_sampler;
-        PFN_vkCreateDescriptorSetLayout = unsupported::create_descriptor_set_layout;
-        PFN_vkDestroyDescriptorSetLayout = unsupported::destroy_descriptor_set_layout;
-        PFN_vkCreateDescriptorPool = unsupported::create_descriptor_pool;
-        PFN_vkDestroyDescriptorPool = unsupported::destroy_descriptor_pool;
-        PFN_vkResetDescriptorPool = unsupported::reset_descriptor_pool;
-        PFN_vkAllocateDescriptorSets = unsupported::allocate_descriptor_sets;
-        PFN_vkFreeDescriptorSets = unsupported::free_descriptor_sets;
-        PFN_vkUpdateDescriptorSets = unsupported::update_descriptor_sets;
+        PFN_vkCreateSampler = sampler::create_sampler;
+        PFN_vkDestroySampler = sampler::destroy_sampler;
+        PFN_vkCreateDescriptorSetLayout = descriptor::create_descriptor_set_layout;
+        PFN_vkDestroyDescriptorSetLayout = descriptor::destroy_descriptor_set_layout;
+        PFN_vkCreateDescriptorPool = descriptor::create_descriptor_pool;
+        PFN_vkDestroyDescriptorPool = descriptor::destroy_descriptor_pool;
+        PFN_vkResetDescriptorPool = descriptor::reset_descriptor_pool;
+        PFN_vkAllocateDescriptorSets = descriptor::allocate_descriptor_sets;
+        PFN_vkFreeDescriptorSets = descriptor::free_descriptor_sets;
+        PFN_vkUpdateDescriptorSets = descriptor_update::update_descriptor_sets;
         PFN_vkCreateFramebuffer = render_pass::create_framebuffer;
         PFN_vkDestroyFramebuffer = render_pass::destroy_framebuffer;
         PFN_vkCreateRenderPass = render_pass::create_render_pass;
@@ -157,15 +158,15 @@ commands! {
         PFN_vkCmdSetStencilCompareMask = dynamic_state::cmd_set_stencil_compare_mask;
         PFN_vkCmdSetStencilWriteMask = dynamic_state::cmd_set_stencil_write_mask;
         PFN_vkCmdSetStencilReference = dynamic_state::cmd_set_stencil_reference;
-        PFN_vkCmdBindDescriptorSets = unsupported::cmd_bind_descriptor_sets;
+        PFN_vkCmdBindDescriptorSets = compute::cmd_bind_descriptor_sets;
         PFN_vkCmdBindIndexBuffer = command::cmd_bind_index_buffer;
         PFN_vkCmdBindVertexBuffers = command::cmd_bind_vertex_buffers;
         PFN_vkCmdDraw = command::cmd_draw;
         PFN_vkCmdDrawIndexed = command::cmd_draw_indexed;
         PFN_vkCmdDrawIndirect = command::cmd_draw_indirect;
         PFN_vkCmdDrawIndexedIndirect = command::cmd_draw_indexed_indirect;
-        PFN_vkCmdDispatch = unsupported::cmd_dispatch;
-        PFN_vkCmdDispatchIndirect = unsupported::cmd_dispatch_indirect;
+        PFN_vkCmdDispatch = compute::cmd_dispatch;
+        PFN_vkCmdDispatchIndirect = compute::cmd_dispatch_indirect;
         PFN_vkCmdCopyBuffer = transfer::cmd_copy_buffer;
         PFN_vkCmdCopyImage = transfer::cmd_copy_image;
         PFN_vkCmdBlitImage = unsupported::cmd_blit_image;
@@ -186,7 +187,7 @@ commands! {
         PFN_vkCmdResetQueryPool = query::cmd_reset_query_pool;
         PFN_vkCmdWriteTimestamp = query::cmd_write_timestamp;
         PFN_vkCmdCopyQueryPoolResults = query::cmd_copy_query_pool_results;
-        PFN_vkCmdPushConstants = unsupported::cmd_push_constants;
+        PFN_vkCmdPushConstants = compute::cmd_push_constants;
         PFN_vkCmdBeginRenderPass = rendering::cmd_begin_render_pass;
         PFN_vkCmdNextSubpass = rendering::cmd_next_subpass;
         PFN_vkCmdEndRenderPass = rendering::cmd_end_render_pass;
@@ -215,7 +216,7 @@ commands! {
         PFN_vkBindImageMemory2 = memory::bind_image_memory2;
         PFN_vkGetDeviceGroupPeerMemoryFeatures = device::get_device_group_peer_memory_features;
         PFN_vkCmdSetDeviceMask = dynamic_state::cmd_set_device_mask;
-        PFN_vkCmdDispatchBase = unsupported::cmd_dispatch_base;
+        PFN_vkCmdDispatchBase = compute::cmd_dispatch_base;
         PFN_vkGetImageMemoryRequirements2 = image::get_image_memory_requirements2;
         PFN_vkGetBufferMemoryRequirements2 = buffer::get_buffer_memory_requirements2;
         PFN_vkGetImageSparseMemoryRequirements2 = image::get_image_sparse_memory_requirements2;
@@ -223,10 +224,10 @@ commands! {
         PFN_vkGetDeviceQueue2 = device::get_device_queue2;
         PFN_vkCreateSamplerYcbcrConversion = unsupported::create_sampler_ycbcr_conversion;
         PFN_vkDestroySamplerYcbcrConversion = unsupported::destroy_sampler_ycbcr_conversion;
-        PFN_vkCreateDescriptorUpdateTemplate = unsupported::create_descriptor_update_template;
-        PFN_vkDestroyDescriptorUpdateTemplate = unsupported::destroy_descriptor_update_template;
-        PFN_vkUpdateDescriptorSetWithTemplate = unsupported::update_descriptor_set_with_template;
-        PFN_vkGetDescriptorSetLayoutSupport = unsupported::get_descriptor_set_layout_support;
+        PFN_vkCreateDescriptorUpdateTemplate = descriptor_update::create_descriptor_update_template;
+        PFN_vkDestroyDescriptorUpdateTemplate = descriptor_update::destroy_descriptor_update_template;
+        PFN_vkUpdateDescriptorSetWithTemplate = descriptor_update::update_descriptor_set_with_template;
+        PFN_vkGetDescriptorSetLayoutSupport = descriptor::get_descriptor_set_layout_support;
     }
     Device, Core(API_VERSION_1_2) => {
         PFN_vkCmdDrawIndirectCount = command::cmd_draw_indirect_count;
@@ -318,6 +319,11 @@ commands! {
     Device, DeviceExtension(PERFORMANCE_QUERY) => {
         PFN_vkAcquireProfilingLockKHR = device::acquire_profiling_lock_khr;
         PFN_vkReleaseProfilingLockKHR = device::release_profiling_lock_khr;
+    }
+
+    Device, DeviceExtension(PUSH_DESCRIPTOR) => {
+        PFN_vkCmdPushDescriptorSetKHR = compute::cmd_push_descriptor_set_khr;
+        PFN_vkCmdPushDescriptorSetWithTemplateKHR = compute::cmd_push_descriptor_set_with_template_khr;
     }
 
     Device, DeviceExtension(DYNAMIC_RENDERING) => {

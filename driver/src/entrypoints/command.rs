@@ -6,7 +6,7 @@ use crate::command::recorder::Recorder;
 use crate::error::Error;
 use crate::lower::camera::camera;
 use crate::lower::rendering;
-use crate::object::pipeline;
+use crate::object::pipeline::{self, Pipeline};
 use crate::{handle, pointer};
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
@@ -32,13 +32,21 @@ crate::entry_points! {
         pipeline: vk::Pipeline,
     ) {
         record(command_buffer, |recorder| {
-            if pipeline_bind_point != vk::PipelineBindPoint::GRAPHICS {
-                return Err(Error::usage(
-                    "VUID-vkCmdBindPipeline-pipelineBindPoint-00779",
-                    "a graphics pipeline is bound at another bind point",
-                ));
-            }
-            recorder.push(Command::BindPipeline(Arc::clone(handle::get(pipeline)?)));
+            let command = match (&**handle::get(pipeline)?, pipeline_bind_point) {
+                (Pipeline::Graphics(pipeline), vk::PipelineBindPoint::GRAPHICS) => {
+                    Command::BindPipeline(Arc::clone(pipeline))
+                }
+                (Pipeline::Compute(pipeline), vk::PipelineBindPoint::COMPUTE) => {
+                    Command::BindComputePipeline(Arc::clone(pipeline))
+                }
+                (_, other) => {
+                    return Err(Error::usage(
+                        "VUID-vkCmdBindPipeline-pipelineBindPoint-00779",
+                        format!("a pipeline is bound at {other:?}, which is not its bind point"),
+                    ));
+                }
+            };
+            recorder.push(command);
             Ok(())
         })
     }

@@ -132,7 +132,13 @@ crate::entry_points! {
                 info.view_type
             )));
         }
-        let object = ImageView::new(image, info.format, format, &info.subresource_range)?;
+        let object = ImageView::new(
+            image,
+            info.format,
+            format,
+            info.components,
+            &info.subresource_range,
+        )?;
         pointer::output(view, handle::create(Arc::new(object)))
     }
 

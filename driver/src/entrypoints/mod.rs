@@ -14,9 +14,14 @@
 //! - allocation callbacks are accepted and ignored, as Vulkan allows.
 
 pub(crate) mod buffer;
+pub(crate) mod buffer_view;
 pub(crate) mod command;
 pub(crate) mod command_buffer;
+pub(crate) mod compute;
+pub(crate) mod compute_pipeline;
 pub(crate) mod debug_utils;
+pub(crate) mod descriptor;
+pub(crate) mod descriptor_update;
 pub(crate) mod device;
 pub(crate) mod dynamic_state;
 pub(crate) mod image;
@@ -29,6 +34,7 @@ pub(crate) mod query;
 pub(crate) mod queue;
 pub(crate) mod render_pass;
 pub(crate) mod rendering;
+pub(crate) mod sampler;
 pub(crate) mod sync;
 pub(crate) mod transfer;
 pub(crate) mod unsupported;

@@ -3,9 +3,8 @@
 use crate::capabilities::limits;
 use crate::error::Error;
 use crate::object::device::Device;
-use crate::object::pipeline::{
-    GraphicsPipeline, GraphicsPipelineInfo, PipelineCache, PipelineLayout,
-};
+use crate::object::pipeline::layout::PipelineLayout;
+use crate::object::pipeline::{GraphicsPipeline, GraphicsPipelineInfo, Pipeline, PipelineCache};
 use crate::object::shader_module::ShaderModule;
 use crate::{handle, pnext, pointer};
 use ash::vk;
@@ -24,36 +23,7 @@ crate::entry_points! {
     ) -> vk::Result {
         let device = handle::get(device)?;
         let infos = pointer::slice(create_infos, create_info_count)?;
-        let mut first_error = None;
-        for (index, info) in infos.iter().enumerate() {
-            let created = if first_error.is_none() {
-                new_graphics_pipeline(device, info)
-            } else {
-                // Vulkan lets the rest be skipped; their handles are null.
-                Ok(vk::Pipeline::null())
-            };
-            let created = created.unwrap_or_else(|error| {
-                first_error.get_or_insert(error);
-                vk::Pipeline::null()
-            });
-            pointer::output(pipelines.add(index), created)?;
-        }
-        first_error.map_or(Ok(()), Err)
-    }
-
-    /// Compute needs shader cores. The handles are null, as Vulkan has it for what was not created.
-    fn create_compute_pipelines(
-        _device: vk::Device,
-        _pipeline_cache: vk::PipelineCache,
-        create_info_count: u32,
-        _create_infos: *const vk::ComputePipelineCreateInfo<'_>,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-        pipelines: *mut vk::Pipeline,
-    ) -> vk::Result {
-        for index in 0..create_info_count as usize {
-            pointer::output(pipelines.add(index), vk::Pipeline::null())?;
-        }
-        Err::<(), _>(Error::FeatureNotPresent("a compute pipeline (it needs shader cores)".into()))
+        create_each(infos, pipelines, |info| new_graphics_pipeline(device, info))
     }
 
     fn destroy_pipeline(
@@ -70,8 +40,16 @@ crate::entry_points! {
         _allocator: *const vk::AllocationCallbacks<'_>,
         pipeline_layout: *mut vk::PipelineLayout,
     ) -> vk::Result {
-        pointer::input(create_info)?;
-        pointer::output(pipeline_layout, handle::create(Arc::new(PipelineLayout)))
+        let info = pointer::input(create_info)?;
+        let set_layouts = pointer::slice(info.p_set_layouts, info.set_layout_count)?
+            .iter()
+            .map(|&layout| Ok(handle::get_optional(layout)?.cloned()));
+        let layout = PipelineLayout::new(
+            set_layouts.collect::<Result<_, Error>>()?,
+            pointer::slice(info.p_push_constant_ranges, info.push_constant_range_count)?,
+            limits::MAX_PUSH_CONSTANTS_SIZE,
+        )?;
+        pointer::output(pipeline_layout, handle::create(Arc::new(layout)))
     }
 
     fn destroy_pipeline_layout(
@@ -163,6 +141,30 @@ fn cache_header() -> Vec<u8> {
     header
 }
 
+/// Makes a pipeline of each create info. Vulkan lets the rest be skipped once one fails; their handles are null.
+///
+/// # Safety
+/// There is room for as many pipelines as create infos.
+pub(super) unsafe fn create_each<T>(
+    infos: &[T],
+    pipelines: *mut vk::Pipeline,
+    mut create: impl FnMut(&T) -> Result<vk::Pipeline, Error>,
+) -> Result<(), Error> {
+    let mut first_error = None;
+    for (index, info) in infos.iter().enumerate() {
+        let created = match first_error {
+            None => create(info).unwrap_or_else(|error| {
+                first_error = Some(error);
+                vk::Pipeline::null()
+            }),
+            Some(_) => vk::Pipeline::null(),
+        };
+        // SAFETY: the caller's promise.
+        unsafe { pointer::output(pipelines.add(index), created)? };
+    }
+    first_error.map_or(Ok(()), Err)
+}
+
 /// Makes one pipeline.
 ///
 /// # Safety
@@ -173,22 +175,22 @@ unsafe fn new_graphics_pipeline(
 ) -> Result<vk::Pipeline, Error> {
     // SAFETY: the caller's promise.
     let gathered = unsafe {
-        withhold_feedback(info)?;
+        withhold_feedback(info.p_next)?;
         gather(info)?
     };
     let pipeline = GraphicsPipeline::new(&gathered, device.features())?;
+    let pipeline = Pipeline::Graphics(Arc::new(pipeline));
     Ok(handle::create(Arc::new(pipeline)))
 }
 
 /// Says of creation feedback that there is none: it takes no time that anybody would want to know.
 ///
 /// # Safety
-/// The create info and its chain are valid.
-unsafe fn withhold_feedback(info: &vk::GraphicsPipelineCreateInfo<'_>) -> Result<(), Error> {
+/// The create info's chain is valid.
+pub(super) unsafe fn withhold_feedback(chain: *const c_void) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     unsafe {
-        let Some(feedback) = pnext::find::<vk::PipelineCreationFeedbackCreateInfo>(info.p_next)
-        else {
+        let Some(feedback) = pnext::find::<vk::PipelineCreationFeedbackCreateInfo>(chain) else {
             return Ok(());
         };
         let none = vk::PipelineCreationFeedback::default();

@@ -1,6 +1,8 @@
 //! Lowers Vulkan's state to the device's packets.
 
+pub(crate) mod bindings;
 pub(crate) mod camera;
+pub(crate) mod compute;
 pub(crate) mod gaussian;
 pub(crate) mod rendering;
 pub(crate) mod transfer;

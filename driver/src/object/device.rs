@@ -3,6 +3,7 @@
 use crate::capabilities::features::EnabledFeatures;
 use crate::capabilities::memory;
 use crate::dispatch::Enabled;
+use crate::environment::{self, Dump};
 use crate::error::Error;
 use crate::handle;
 use crate::object::instance::Instance;
@@ -20,6 +21,7 @@ pub(crate) struct Device {
     extensions: Vec<&'static CStr>,
     features: EnabledFeatures,
     simulated: Arc<simdevice::Device>,
+    dump: Dump,
     signals: Arc<Signals>,
     heap: Arc<Heap>,
     queues: OnceLock<Vec<vk::Queue>>,
@@ -37,7 +39,7 @@ impl Device {
     /// Opens a device with `queue_count` queues.
     ///
     /// # Errors
-    /// [`Error::InitializationFailed`] if the host gives no thread for a queue.
+    /// [`Error::InitializationFailed`] if the host gives no thread for a queue, or the environment makes no sense.
     pub(crate) fn new(
         instance: Arc<Instance>,
         extensions: Vec<&'static CStr>,
@@ -50,6 +52,7 @@ impl Device {
             extensions,
             features,
             simulated: Arc::new(simulated),
+            dump: environment::dump()?,
             signals: Arc::default(),
             heap: Arc::new(Heap::new(memory::heap_size())),
             queues: OnceLock::new(),
@@ -72,6 +75,16 @@ impl Device {
     /// The features that the application enabled.
     pub(crate) fn features(&self) -> &EnabledFeatures {
         &self.features
+    }
+
+    /// The simulated device.
+    pub(crate) fn simulated(&self) -> &simdevice::Device {
+        &self.simulated
+    }
+
+    /// Whether the device's programs are printed as pipelines are created.
+    pub(crate) fn dumps_ir(&self) -> bool {
+        self.dump.ir
     }
 
     /// What is waited for on it, and whether it is lost.

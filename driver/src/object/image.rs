@@ -5,6 +5,8 @@ use crate::error::Error;
 use ash::vk;
 use simdevice::Allocation;
 use simdevice::image::{self, ImageDesc};
+use simdevice::packet::Aspect;
+use simdevice::texture::{ComponentSwizzle, IDENTITY, Swizzle};
 use std::sync::{Arc, OnceLock};
 
 /// An image.
@@ -89,6 +91,10 @@ impl Image {
 pub(crate) struct ImageView {
     /// The device's half.
     pub(crate) view: image::ImageView,
+    /// The aspect that shaders read.
+    pub(crate) aspect: Aspect,
+    /// How shaders see components rearranged.
+    pub(crate) swizzle: Swizzle,
 }
 
 impl ImageView {
@@ -100,6 +106,7 @@ impl ImageView {
         image: &Image,
         view_format: vk::Format,
         format: simdevice::Format,
+        components: vk::ComponentMapping,
         range: &vk::ImageSubresourceRange,
     ) -> Result<Self, Error> {
         let desc = &image.desc;
@@ -138,8 +145,35 @@ impl ImageView {
                 base_layer,
                 layer_count,
             },
+            aspect: aspect(range.aspect_mask),
+            swizzle: swizzle(components),
         })
     }
+}
+
+/// The aspect that shaders read of a view.
+fn aspect(mask: vk::ImageAspectFlags) -> Aspect {
+    if mask.contains(vk::ImageAspectFlags::DEPTH) {
+        Aspect::Depth
+    } else if mask.contains(vk::ImageAspectFlags::STENCIL) {
+        Aspect::Stencil
+    } else {
+        Aspect::Color
+    }
+}
+
+/// A component mapping for the device.
+fn swizzle(mapping: vk::ComponentMapping) -> Swizzle {
+    let components = [mapping.r, mapping.g, mapping.b, mapping.a];
+    std::array::from_fn(|index| match components[index] {
+        vk::ComponentSwizzle::ZERO => ComponentSwizzle::Zero,
+        vk::ComponentSwizzle::ONE => ComponentSwizzle::One,
+        vk::ComponentSwizzle::R => ComponentSwizzle::Red,
+        vk::ComponentSwizzle::G => ComponentSwizzle::Green,
+        vk::ComponentSwizzle::B => ComponentSwizzle::Blue,
+        vk::ComponentSwizzle::A => ComponentSwizzle::Alpha,
+        _ => IDENTITY[index],
+    })
 }
 
 /// How many of `available` things a range from `base` on has, if it has any and all exist.

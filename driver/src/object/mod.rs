@@ -1,8 +1,10 @@
 //! The objects behind the handles. Each is shared by [`Arc`](std::sync::Arc) and locks what changes.
 
 pub(crate) mod buffer;
+pub(crate) mod buffer_view;
 pub(crate) mod command_buffer;
 pub(crate) mod debug_messenger;
+pub(crate) mod descriptor;
 pub(crate) mod device;
 pub(crate) mod event;
 pub(crate) mod fence;
@@ -15,6 +17,7 @@ pub(crate) mod private_data;
 pub(crate) mod query_pool;
 pub(crate) mod queue;
 pub(crate) mod render_pass;
+pub(crate) mod sampler;
 pub(crate) mod semaphore;
 pub(crate) mod shader_module;
 pub(crate) mod signals;

@@ -115,7 +115,7 @@ mod tests {
             Counter::GaussiansRead as u32,
         ];
         let pool = QueryPool::new(QueryKind::Performance, 1, order);
-        let result = QueryResult::Performance(counters);
+        let result = QueryResult::Performance(Box::new(counters));
         let written = pool.written(Some(&result), QueryResultFlags::empty());
         let expected = [5u64.to_ne_bytes(), 7u64.to_ne_bytes()].concat();
         assert_eq!(written, [(0, expected)]);

@@ -1,6 +1,7 @@
 //! Shader modules: SPIR-V, kept as words until a pipeline is made of it.
 
 use crate::error::Error;
+use crate::shader::{self, Module, Options, Shader, Specialization, Stage};
 
 /// The first word of SPIR-V.
 const MAGIC: u32 = 0x0723_0203;
@@ -9,7 +10,6 @@ const MAGIC: u32 = 0x0723_0203;
 #[derive(Debug)]
 pub(crate) struct ShaderModule {
     /// Its SPIR-V.
-    #[allow(dead_code, reason = "no pipeline has a shader stage yet")]
     words: Box<[u32]>,
 }
 
@@ -30,5 +30,21 @@ impl ShaderModule {
         Ok(Self {
             words: words.into(),
         })
+    }
+
+    /// Translates an entry point for the device.
+    ///
+    /// # Errors
+    /// [`Error::InvalidShader`] names the instruction that is malformed or not supported.
+    pub(crate) fn translate(
+        &self,
+        name: &str,
+        stage: Stage,
+        specialization: &Specialization,
+        options: &Options,
+    ) -> Result<Shader, Error> {
+        Module::parse(&self.words)
+            .and_then(|module| shader::translate(&module, name, stage, specialization, options))
+            .map_err(|error| Error::InvalidShader(error.to_string()))
     }
 }

@@ -103,10 +103,13 @@ fn commands_that_are_not_there_yet_fail_the_recording() {
     let gpu = Gpu::new();
     let recorded = gpu.record(|device, commands| {
         // SAFETY: see the crate.
-        unsafe { device.cmd_dispatch(commands, 1, 1, 1) };
+        unsafe {
+            let (image, layout) = (vk::Image::null(), vk::ImageLayout::GENERAL);
+            device.cmd_resolve_image(commands, image, layout, image, layout, &[]);
+        }
     });
     assert_eq!(recorded.unwrap_err(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
-    assert!(gpu.take_messages().concat().contains("vkCmdDispatch"));
+    assert!(gpu.take_messages().concat().contains("vkCmdResolveImage"));
 }
 
 #[test]

@@ -88,6 +88,7 @@ impl Gpu {
         let extensions = [
             gaurast::gaussian_primitive_topology::NAME,
             ash::khr::performance_query::NAME,
+            ash::khr::push_descriptor::NAME,
         ];
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
         let instance_extensions = [ash::ext::debug_utils::NAME.as_ptr()];
@@ -158,6 +159,11 @@ impl Gpu {
         }
     }
 
+    /// The instance, to load extensions by.
+    pub fn instance(&self) -> &ash::Instance {
+        &self.instance
+    }
+
     /// What the messenger heard since the last call.
     pub fn take_messages(&self) -> Vec<String> {
         std::mem::take(&mut self.messages.lock().unwrap())
@@ -178,7 +184,11 @@ impl Gpu {
             | vk::BufferUsageFlags::TRANSFER_DST
             | vk::BufferUsageFlags::VERTEX_BUFFER
             | vk::BufferUsageFlags::INDEX_BUFFER
-            | vk::BufferUsageFlags::INDIRECT_BUFFER;
+            | vk::BufferUsageFlags::INDIRECT_BUFFER
+            | vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::UNIFORM_BUFFER
+            | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+            | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER;
         let info = vk::BufferCreateInfo::default().size(size).usage(usage);
         // SAFETY: see the crate.
         unsafe {
@@ -246,6 +256,8 @@ impl Gpu {
             vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
         } else {
             vk::ImageUsageFlags::COLOR_ATTACHMENT
+                | vk::ImageUsageFlags::SAMPLED
+                | vk::ImageUsageFlags::STORAGE
         };
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)

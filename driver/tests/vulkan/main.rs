@@ -4,9 +4,13 @@
 //! breaks it in the one way that it is about, which the driver must survive.
 
 mod command_buffers;
+mod compute;
+mod descriptors;
 mod gaussian_draws;
 mod gaussian_pipelines;
 mod gpu;
+mod images_in_shaders;
+mod kernel;
 #[path = "../support/loader.rs"]
 mod loader;
 mod memory;

@@ -200,7 +200,8 @@ fn images_beyond_the_limits_are_refused() {
         good.array_layers(u32::MAX),
         good.samples(vk::SampleCountFlags::TYPE_4),
         good.format(vk::Format::G8_B8R8_2PLANE_420_UNORM),
-        good.usage(vk::ImageUsageFlags::STORAGE),
+        good.format(vk::Format::R8G8B8A8_SRGB)
+            .usage(vk::ImageUsageFlags::STORAGE),
         good.flags(vk::ImageCreateFlags::SPARSE_BINDING),
     ];
     for info in bad {

@@ -1,21 +1,34 @@
-//! Graphics pipelines: what a draw needs of its create info, converted and validated once.
+//! Pipelines: what draws and dispatches need of their create infos, converted and validated once.
 //!
-//! The entry point gathers the create info's pointers into a [`GraphicsPipelineInfo`]; everything here is safe.
+//! The entry points gather the create infos' pointers into a [`GraphicsPipelineInfo`] or a
+//! [`StageInfo`](compute::StageInfo); everything here is safe.
 
 mod blend;
+pub(crate) mod compute;
 mod gaussian;
+pub(crate) mod layout;
 mod vertex_input;
 
 use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
 use crate::lower::rendering;
 use ash::vk;
+use compute::ComputePipeline;
 use gaurast::vk::{
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::packet::{GaussianState, Rect, Viewport};
 use std::sync::Arc;
 pub(crate) use vertex_input::AttributeSource;
+
+/// What a `VkPipeline` is.
+#[derive(Debug)]
+pub(crate) enum Pipeline {
+    /// For draws.
+    Graphics(Arc<GraphicsPipeline>),
+    /// For dispatches.
+    Compute(Arc<ComputePipeline>),
+}
 
 /// A graphics pipeline.
 #[derive(Debug)]
@@ -98,7 +111,7 @@ pub(crate) struct GraphicsPipelineInfo<'a> {
     pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
 }
 
-crate::objects! { vk::Pipeline => GraphicsPipeline; }
+crate::objects! { vk::Pipeline => Pipeline; }
 
 impl GraphicsPipeline {
     /// Creates a pipeline.
@@ -155,16 +168,11 @@ fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, 
     }
 }
 
-/// A pipeline's layout. No pipeline reads descriptors or push constants yet, so there is nothing to keep.
-#[derive(Debug)]
-pub(crate) struct PipelineLayout;
-
 /// A pipeline cache. Pipelines are cheap to make, so it stays empty.
 #[derive(Debug)]
 pub(crate) struct PipelineCache;
 
 crate::objects! {
-    vk::PipelineLayout => PipelineLayout;
     vk::PipelineCache => PipelineCache;
 }
 

@@ -1,0 +1,8 @@
+#!/bin/sh
+# Compiles every shader here to SPIR-V, which is checked in beside it, so that tests need no compiler. A test compares
+# the two where there is a compiler.
+set -e
+cd "$(dirname "$0")"
+for shader in *.comp *.vert *.frag; do
+    glslangValidator --quiet -V --target-env vulkan1.3 -o "$shader.spv" "$shader"
+done

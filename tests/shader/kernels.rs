@@ -1,0 +1,37 @@
+//! Real kernels give what the host computes, on this driver and on lavapipe.
+
+use gaurast_tests::kernels::{Context, Size, all};
+
+fn check(context: &Context) {
+    for kernel in all(Size::Small) {
+        let place = format!("{} on {}", kernel.name, context.name);
+        let prepared = context
+            .prepare(&kernel)
+            .unwrap_or_else(|error| panic!("{place}: {error}"));
+        prepared
+            .run()
+            .unwrap_or_else(|error| panic!("{place}: {error}"));
+        for expected in &kernel.expected {
+            let found = prepared.read(expected.binding).unwrap();
+            if let Some((index, difference)) = expected.values.difference(&found) {
+                panic!(
+                    "{place}: word {index} of binding {}: {difference}",
+                    expected.binding
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn kernels_give_what_the_host_computes() {
+    check(&Context::gaurast().unwrap());
+}
+
+#[test]
+fn kernels_give_the_same_on_lavapipe() {
+    match Context::lavapipe().unwrap() {
+        Some(lavapipe) => check(&lavapipe),
+        None => eprintln!("skipped: the Vulkan loader does not know lavapipe"),
+    }
+}

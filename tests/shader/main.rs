@@ -1,0 +1,3 @@
+//! Shader cores as a Vulkan application sees them.
+
+mod kernels;
