@@ -544,8 +544,8 @@ pub struct GaussianAppend {
     pub instance_count: u32,
 }
 
-/// A triangle draw. There is none yet: it needs the shader cores, so the driver refuses its pipeline.
+/// A triangle draw. There is none yet, so the driver refuses its pipeline.
 ///
-/// The command processor, the binner and the tile engine already have an arm for it.
+/// The command processor and the pass already have an arm for it.
 #[derive(Clone, Copy, Debug)]
 pub enum TriangleDraw {}

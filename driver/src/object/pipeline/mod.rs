@@ -45,7 +45,7 @@ pub(crate) struct GraphicsPipeline {
     pub(crate) dynamic_stride: bool,
 }
 
-/// What a pipeline draws. Triangles need shader cores, so there is one kind so far.
+/// What a pipeline draws. Triangles are not drawn yet, so there is one kind so far.
 #[derive(Debug)]
 pub(crate) enum Primitive {
     /// Gaussians with fixed-function projection.
@@ -130,7 +130,7 @@ impl GraphicsPipeline {
             }
             topology => {
                 return Err(Error::FeatureNotPresent(format!(
-                    "a pipeline of topology {topology:?} (it needs shader cores)"
+                    "a pipeline of topology {topology:?} (only the Gaussian list is drawn so far)"
                 )));
             }
         };
