@@ -1,10 +1,10 @@
 //! What a draw or dispatch binds its programs to.
 
-use crate::isa::resources::{NoGlobalMemory, Resources, words};
 use crate::packet::BufferRange;
 use crate::texture::{ImageBinding, ImageTable, Sampler};
 use devmem::Allocation;
 use fearless_simd::Level;
+use isa::resources::{NoGlobalMemory, Resources, words};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
 

@@ -4,12 +4,12 @@ use crate::compute;
 use crate::counters::Counters;
 use crate::device::Device;
 use crate::gaussian::{GaussianSet, TooManyGaussians};
-use crate::isa::exec::Stopped;
 use crate::packet::Packet;
 use crate::pass::{Pass, PassDraw};
 use crate::query::host_time;
 use crate::raster::tile::AttachmentError;
 use crate::transfer::{self, Direction};
+use isa::exec::Stopped;
 use std::sync::Arc;
 
 /// Why a packet could not be executed. The command processor stays usable: nothing of the packet was done, unless the error

@@ -3,10 +3,10 @@
 use crate::bindings::Bindings;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
-use crate::isa::exec::{Executable, LaneMask, Machine, Options, Stopped, Watchdog, Work};
-use crate::isa::ir::{CHUNK_LANES, Program};
-use crate::isa::resources::Resources;
-use crate::isa::validate::InvalidProgram;
+use isa::exec::{Executable, LaneMask, Machine, Options, Stopped, Watchdog, Work};
+use isa::ir::{CHUNK_LANES, Program};
+use isa::resources::Resources;
+use isa::validate::InvalidProgram;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,8 +1,8 @@
 //! Counters of the work that the device does. They accumulate over a command processor's life; a query reads
 //! the difference between its end and its beginning.
 
-use crate::isa::exec::Work;
-use crate::isa::op::Kind;
+use isa::exec::Work;
+use isa::op::Kind;
 
 /// What a counter counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use crate::compute::Dispatch;
 use crate::format::Format;
 use crate::image::{Image, ImageView};
 use crate::query::QueryPool;
-use devmem::Allocation;
+pub use devmem::BufferRange;
 use std::sync::Arc;
 
 /// One command for the [`CommandProcessor`](crate::CommandProcessor).
@@ -82,17 +82,6 @@ pub enum Packet {
         /// The query's index in it.
         index: u32,
     },
-}
-
-/// Bytes `offset..offset + size` of an allocation.
-#[derive(Clone, Debug)]
-pub struct BufferRange {
-    /// The memory.
-    pub memory: Arc<Allocation>,
-    /// The first byte.
-    pub offset: u64,
-    /// How many bytes.
-    pub size: u64,
 }
 
 /// A region of a buffer-to-buffer copy; offsets are relative to the packet's ranges.

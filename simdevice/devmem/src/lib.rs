@@ -188,6 +188,17 @@ impl Allocation {
     }
 }
 
+/// Bytes `offset..offset + size` of an allocation.
+#[derive(Clone, Debug)]
+pub struct BufferRange {
+    /// The memory.
+    pub memory: Arc<Allocation>,
+    /// The first byte.
+    pub offset: u64,
+    /// How many bytes.
+    pub size: u64,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

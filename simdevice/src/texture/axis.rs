@@ -5,8 +5,8 @@ use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 use super::address::{FAR, MAX_OFFSET, WHOLE};
 use super::lod::Floats;
 use super::sampler::{AddressMode, Filter};
-use crate::isa::ir::CHUNK_LANES;
-use crate::isa::resources::Lanes;
+use isa::ir::CHUNK_LANES;
+use isa::resources::Lanes;
 
 /// The texels of 16 coordinates along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,8 +17,8 @@ use super::packing::{PackedLevel, Packing, Rows};
 use super::sampler::{AddressMode, CompareOp, Filter, Sampler};
 use super::surface::Surface;
 use crate::format::Numeric;
-use crate::isa::ir::{CHUNK_LANES, Dimension};
-use crate::isa::resources::{Lanes, SampleRequest};
+use isa::ir::{CHUNK_LANES, Dimension};
+use isa::resources::{Lanes, SampleRequest};
 
 /// The components of 16 texels.
 type Texels = [Floats; 4];

@@ -2,9 +2,9 @@
 //! and writes there vanish.
 
 use super::surface::{Surface, Texel};
-use crate::isa::exec::combine;
-use crate::isa::ir::{AtomicOp, CHUNK_LANES, Dimension, Format as Word, ImageShape};
-use crate::isa::resources::{Lanes, TexelRequest};
+use isa::exec::combine;
+use isa::ir::{AtomicOp, CHUNK_LANES, Dimension, Format as Word, ImageShape};
+use isa::resources::{Lanes, TexelRequest};
 
 /// The texel that a lane means.
 fn place(shape: ImageShape, request: &TexelRequest, lane: usize) -> Texel {

@@ -7,8 +7,8 @@ use super::lod;
 use super::sampler::{AddressMode, BorderColor, Filter, Sampler};
 use super::surface::{Surface, Texel};
 use crate::format::{Channel, Numeric};
-use crate::isa::ir::{CHUNK_LANES, Dimension};
-use crate::isa::resources::{Lanes, SampleRequest};
+use isa::ir::{CHUNK_LANES, Dimension};
+use isa::resources::{Lanes, SampleRequest};
 
 /// What is read of an image: where, and through which sampler.
 struct Reader<'a> {

@@ -6,8 +6,8 @@
 use super::cube::Hit;
 use super::sampler::{Filter, MAX_LOD_BIAS, MipmapMode, Sampler};
 use super::surface::Surface;
-use crate::isa::ir::{CHUNK_LANES, Dimension};
-use crate::isa::resources::{Lanes, LodRequest, SampleRequest};
+use isa::ir::{CHUNK_LANES, Dimension};
+use isa::resources::{Lanes, LodRequest, SampleRequest};
 
 /// A float for each of 16 lanes.
 pub(super) type Floats = [f32; CHUNK_LANES];

@@ -1,7 +1,7 @@
 //! The texture unit: what shader cores sample, fetch, read and write of images.
 //!
 //! An [`ImageTable`] holds a draw's images and samplers and answers a program's image instructions
-//! ([`crate::isa::resources::ImageUnit`]), 16 lanes at a time, as the chapter "Image Operations" of the Vulkan
+//! ([`isa::resources::ImageUnit`]), 16 lanes at a time, as the chapter "Image Operations" of the Vulkan
 //! specification says. Weights are binary32 throughout, sRGB is decoded before it is filtered, cubes are seamless.
 //! Hostile coordinates are safe: NaN counts as 0, and everything is bounds-checked.
 //!

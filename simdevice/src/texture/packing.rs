@@ -12,8 +12,8 @@ use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use super::lod::Floats;
 use super::surface::Surface;
 use crate::format::{Channel, Format};
-use crate::isa::ir::CHUNK_LANES;
-use crate::isa::resources::Lanes;
+use isa::ir::CHUNK_LANES;
+use isa::resources::Lanes;
 
 /// How texels lie in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

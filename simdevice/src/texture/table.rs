@@ -6,8 +6,8 @@ use super::sampler::Sampler;
 use super::surface::Surface;
 use super::view::ImageBinding;
 use super::{batch, fetch, filter, lod};
-use crate::isa::ir::{AtomicOp, Dimension, ImageShape};
-use crate::isa::resources::{ImageUnit, Lanes, SampleRequest, TexelRequest};
+use isa::ir::{AtomicOp, Dimension, ImageShape};
+use isa::resources::{ImageUnit, Lanes, SampleRequest, TexelRequest};
 
 /// The images and samplers of a draw or a dispatch, by the slots that its program names.
 ///

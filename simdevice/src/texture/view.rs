@@ -48,7 +48,7 @@ pub const IDENTITY: Swizzle = [
 ];
 
 /// An image that is sampled or fetched from, or an input attachment. The instruction says of what kind it is
-/// ([`crate::isa::ir::ImageShape`]); a cube's faces are six consecutive layers.
+/// ([`isa::ir::ImageShape`]); a cube's faces are six consecutive layers.
 #[derive(Clone, Debug)]
 pub struct SampledImage {
     /// Its subresources.

@@ -10,10 +10,10 @@ use std::sync::Arc;
 use super::*;
 use crate::device::SimdLevel;
 use crate::image::{ImageDesc, ImageKind};
-use crate::isa::ir::{Dimension, ImageShape};
-use crate::isa::resources::{ImageUnit, Lanes, LodRequest, SampleRequest, TexelRequest};
 use crate::packet::Aspect;
 use crate::{Allocation, Format, Image, ImageView};
+use isa::ir::{Dimension, ImageShape};
+use isa::resources::{ImageUnit, Lanes, LodRequest, SampleRequest, TexelRequest};
 
 /// A shape that is neither arrayed nor multisampled.
 fn shape(dimension: Dimension) -> ImageShape {

@@ -1,8 +1,8 @@
 //! Fetches, storage images, texel buffers and queries.
 
 use super::*;
-use crate::isa::ir::AtomicOp;
 use crate::packet::BufferRange;
+use isa::ir::AtomicOp;
 
 /// An access of lanes at these coordinates; the last repeats, but only lanes that are given take part.
 fn texels(shape: ImageShape, coordinates: &[[u32; 4]]) -> TexelRequest {

@@ -1,9 +1,9 @@
 //! Elementary functions against `f64`: dense samples over all floats, in units in the last place.
 
-use crate::isa::builder::Builder;
-use crate::isa::ir::{Program, Rate, Type};
-use crate::isa::op::Op;
-use crate::isa::resources::Resources;
+use crate::builder::Builder;
+use crate::ir::{Program, Rate, Type};
+use crate::op::Op;
+use crate::resources::Resources;
 
 use super::{Random, levels, machine, run};
 

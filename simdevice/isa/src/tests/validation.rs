@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use fearless_simd::Level;
 
-use crate::isa::builder::Builder;
-use crate::isa::exec::{Executable, LaneMask, Machine, Options, Stopped, Watchdog};
-use crate::isa::ir::{Address, Format, Label, Rate, Reg, Space, Statement, Type};
-use crate::isa::op::Op;
-use crate::isa::resources::Resources;
+use crate::builder::Builder;
+use crate::exec::{Executable, LaneMask, Machine, Options, Stopped, Watchdog};
+use crate::ir::{Address, Format, Label, Rate, Reg, Space, Statement, Type};
+use crate::op::Op;
+use crate::resources::Resources;
 
 #[test]
 fn misuse_of_the_builder_is_an_error() {

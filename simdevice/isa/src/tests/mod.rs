@@ -15,7 +15,7 @@ use fearless_simd::Level;
 use super::exec::{Executable, LaneMask, Machine, Options, Watchdog};
 use super::ir::Program;
 use super::resources::Resources;
-use crate::device::SimdLevel;
+use crate::level::SimdLevel;
 
 /// The SIMD levels of this processor, by name.
 fn levels() -> Vec<(&'static str, Level)> {

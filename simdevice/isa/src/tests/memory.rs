@@ -2,18 +2,18 @@
 
 use std::sync::{Arc, Mutex};
 
-use crate::isa::builder::Builder;
-use crate::isa::exec::{LaneMask, Watchdog};
-use crate::isa::ir::{
+use crate::builder::Builder;
+use crate::exec::{LaneMask, Watchdog};
+use crate::ir::{
     Address, AtomicOp, Binding, Dimension, Format, ImageRead, ImageShape, ImageWrite, Program,
     Rate, Reg, Space, Statement, Type,
 };
-use crate::isa::op::Op;
-use crate::isa::resources::{
+use crate::op::Op;
+use crate::resources::{
     GlobalMemory, ImageUnit, Lanes, NoImages, Resources, SampleRequest, TexelRequest, words,
 };
-use crate::packet::BufferRange;
 use devmem::Allocation;
+use devmem::BufferRange;
 
 use super::{levels, machine, run};
 

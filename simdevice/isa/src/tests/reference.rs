@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::isa::ir::{Address, Block, Format, Label, Program, Reg, Space, Statement, Type};
-use crate::isa::op::Op;
+use crate::ir::{Address, Block, Format, Label, Program, Reg, Space, Statement, Type};
+use crate::op::Op;
 
 /// One lane's run of a program. Programs may use registers, control flow and private memory.
 pub struct Lane<'a> {

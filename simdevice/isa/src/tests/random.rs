@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use fearless_simd::Level;
 
-use crate::isa::builder::Builder;
-use crate::isa::exec::{Executable, LaneMask, Machine, Options, Watchdog};
-use crate::isa::ir::{Address, Block, Format, Label, Program, Rate, Reg, Space, Type};
-use crate::isa::op::Op;
-use crate::isa::resources::Resources;
+use crate::builder::Builder;
+use crate::exec::{Executable, LaneMask, Machine, Options, Watchdog};
+use crate::ir::{Address, Block, Format, Label, Program, Rate, Reg, Space, Type};
+use crate::op::Op;
+use crate::resources::Resources;
 
 use super::reference::Lane;
 use super::{Random, fuses, levels, machine, run};

@@ -51,11 +51,14 @@
 //! [`builder::Builder`] → [`ir::Program`], checked → [`exec::Executable`] (optimized, registers allocated, control flow
 //! flattened, lanes fixed) → [`exec::Machine::run`], once a batch.
 
+#![forbid(unsafe_code)]
+
 pub mod builder;
 mod display;
 mod escape;
 pub mod exec;
 pub mod ir;
+pub mod level;
 pub mod op;
 mod optimize;
 pub mod resources;

@@ -7,7 +7,7 @@ use super::super::resources::{load_word, range_words};
 use super::batch::Batch;
 use super::file::Slot;
 use super::mask::{MaskId, lanes_of};
-use crate::packet::BufferRange;
+use devmem::BufferRange;
 
 /// Memory that an access goes to: words, and how many bytes of them count.
 #[derive(Clone, Copy)]

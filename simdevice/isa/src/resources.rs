@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::ir::{AtomicOp, CHUNK_LANES, ImageShape};
-use crate::packet::BufferRange;
+use devmem::BufferRange;
 
 /// What a program is bound to while it runs.
 #[derive(Clone, Copy)]

@@ -1,16 +1,16 @@
 //! How fast the shader cores run: an arithmetic loop and a divergent one, at every SIMD level of this processor.
 //!
-//! `cargo run --release -p simdevice --example isa_throughput`
+//! `cargo run --release -p isa --example throughput`
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use simdevice::device::SimdLevel;
-use simdevice::isa::builder::Builder;
-use simdevice::isa::exec::{Executable, LaneMask, Machine, Options, Watchdog};
-use simdevice::isa::ir::{Program, Rate, Type};
-use simdevice::isa::op::Op;
-use simdevice::isa::resources::Resources;
+use isa::builder::Builder;
+use isa::exec::{Executable, LaneMask, Machine, Options, Watchdog};
+use isa::ir::{Program, Rate, Type};
+use isa::level::SimdLevel;
+use isa::op::Op;
+use isa::resources::Resources;
 
 /// 100 rounds of sixteen fused multiply-adds in four chains.
 fn arithmetic() -> Program {

@@ -1,9 +1,9 @@
 //! Every operation with exact results, on a table of awkward operands, in each uniform and varying combination.
 
-use crate::isa::builder::Builder;
-use crate::isa::ir::{Rate, Reg, Type};
-use crate::isa::op::{Kind, Op};
-use crate::isa::resources::Resources;
+use crate::builder::Builder;
+use crate::ir::{Rate, Reg, Type};
+use crate::op::{Kind, Op};
+use crate::resources::Resources;
 
 use super::reference::{apply, bool_bits};
 use super::{Random, fuses, levels, machine, run};
@@ -274,7 +274,7 @@ fn folding_gives_what_running_gives() {
             .collect();
         for (name, level) in levels() {
             let as_bool = |bits: u64| u64::from(bits != 0);
-            let folded = crate::isa::exec::evaluate(level, op, &operands);
+            let folded = crate::exec::evaluate(level, op, &operands);
             let expected = apply(op, &operands, fuses(name));
             let expected = if op.signature().result == Type::Bool {
                 as_bool(expected)

@@ -1,8 +1,8 @@
 //! Contraction: a product and a sum become one fused operation.
 
 use super::Builder;
-use crate::isa::ir::{Reg, Role};
-use crate::isa::op::Op;
+use crate::ir::{Reg, Role};
+use crate::op::Op;
 
 /// A product that may be fused into a sum.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,10 @@
 //! Operations across lanes.
 
-use crate::isa::builder::Builder;
-use crate::isa::exec::{Executable, LaneMask, Machine, Options, Watchdog};
-use crate::isa::ir::{Axis, Program, Rate, Reg, SubgroupOp, Type};
-use crate::isa::op::Op;
-use crate::isa::resources::Resources;
+use crate::builder::Builder;
+use crate::exec::{Executable, LaneMask, Machine, Options, Watchdog};
+use crate::ir::{Axis, Program, Rate, Reg, SubgroupOp, Type};
+use crate::op::Op;
+use crate::resources::Resources;
 
 use super::{levels, machine, run};
 use std::sync::Arc;

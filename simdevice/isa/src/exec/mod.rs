@@ -62,7 +62,7 @@ use super::ir::Type;
 use super::op::Op;
 use super::resources::Resources;
 use file::{File, Slot};
-pub(crate) use memory::combine;
+pub use memory::combine;
 use step::Step;
 
 /// What an operation gives for constants, by the same kernels that programs run.
