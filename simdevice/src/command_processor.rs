@@ -4,6 +4,7 @@ use crate::compute;
 use crate::counters::Counters;
 use crate::device::Device;
 use crate::gaussian::{GaussianSet, TooManyGaussians};
+use crate::geometry;
 use crate::packet::Packet;
 use crate::pass::{Pass, PassDraw};
 use crate::query::host_time;
@@ -130,7 +131,14 @@ impl CommandProcessor {
                     &mut self.counters,
                 )?)
             }
-            Packet::TriangleDraw(draw) => match *draw {},
+            Packet::Draw(draw) => {
+                let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
+                self.outside_gaussian_set()?;
+                let (area, layers) = (pass.area(), pass.layer_count());
+                let (device, counters) = (&self.device, &mut self.counters);
+                let draw = geometry::process(draw, area, layers, device, counters)?;
+                self.draw(PassDraw::Primitives(draw))
+            }
             Packet::Barrier => {
                 self.flush();
                 Ok(())

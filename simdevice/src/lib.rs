@@ -16,6 +16,7 @@ pub mod counters;
 pub mod device;
 pub mod format;
 pub mod gaussian;
+pub mod geometry;
 pub mod image;
 pub mod packet;
 pub mod pass;

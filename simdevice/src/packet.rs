@@ -1,5 +1,7 @@
 //! Packets: what the driver asks of the device. Plain data; everything a packet needs it holds by [`Arc`].
 
+pub mod draw;
+
 use crate::compute::Dispatch;
 use crate::format::Format;
 use crate::image::{Image, ImageView};
@@ -46,8 +48,8 @@ pub enum Packet {
     GaussianResolve,
     /// Runs workgroups of a compute program.
     Dispatch(Box<Dispatch>),
-    /// A triangle draw.
-    TriangleDraw(TriangleDraw),
+    /// Draws points, lines or triangles in the current pass.
+    Draw(Box<draw::Draw>),
     /// Makes everything before visible to everything after; flushes a pass's bins if it is inside one.
     Barrier,
     /// Ends the render pass: its bins are rendered and its attachments stored.
@@ -532,9 +534,3 @@ pub struct GaussianAppend {
     /// How many instances.
     pub instance_count: u32,
 }
-
-/// A triangle draw. There is none yet, so the driver refuses its pipeline.
-///
-/// The command processor and the pass already have an arm for it.
-#[derive(Clone, Copy, Debug)]
-pub enum TriangleDraw {}

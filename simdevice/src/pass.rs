@@ -7,9 +7,10 @@ use crate::counters::{Counter, Counters};
 use crate::device::{Device, FlushPolicy};
 use crate::format::Format;
 use crate::gaussian::GaussianDraw;
+use crate::geometry::PrimitiveDraw;
 use crate::packet::{
     Aspect, Attachment, AttachmentClear, BlendState, ClearAttachments, LoadOp, Rect, Rendering,
-    StoreOp, TriangleDraw,
+    StoreOp,
 };
 use crate::raster::TILE_SIZE;
 use crate::raster::blend::Blender;
@@ -25,8 +26,8 @@ pub enum PassDraw {
     Clear(ClearAttachments),
     /// A sorted and binned set of Gaussians.
     Gaussians(GaussianDraw),
-    /// Triangles.
-    Triangles(TriangleDraw),
+    /// Points, lines or triangles.
+    Primitives(PrimitiveDraw),
 }
 
 impl PassDraw {
@@ -35,7 +36,7 @@ impl PassDraw {
         match self {
             Self::Clear(clear) => (size_of_val(&*clear.clears) + size_of_val(&*clear.rects)) as u64,
             Self::Gaussians(draw) => draw.memory_bytes(),
-            Self::Triangles(draw) => match *draw {},
+            Self::Primitives(draw) => draw.memory_bytes(),
         }
     }
 }
@@ -101,6 +102,11 @@ impl Pass {
     /// The pixels that it may touch: its area, within all of its attachments.
     pub fn area(&self) -> Rect {
         self.area
+    }
+
+    /// How many layers are rendered.
+    pub fn layer_count(&self) -> u32 {
+        self.layer_count
     }
 
     /// Adds a draw, and flushes the pass if the policy says so.
@@ -215,7 +221,7 @@ impl Pass {
                 let blender = Blender::new(state, draw.state.blend_constants, format);
                 (!blender.writes_nothing()).then_some(blender)
             }
-            PassDraw::Triangles(draw) => match *draw {},
+            PassDraw::Primitives(_) => None,
         };
         self.draws.iter().map(blender).collect()
     }
@@ -288,7 +294,7 @@ impl Frame<'_> {
                         tiles().for_each(|tile| self.gaussians(worker, draw, blender, &tile));
                     }
                 }
-                PassDraw::Triangles(draw) => match *draw {},
+                PassDraw::Primitives(_) => {}
             }
         }
         let keep = |target: &Target| !self.last || target.store == StoreOp::Store;
