@@ -139,9 +139,7 @@ impl CommandProcessor {
                 let draw = geometry::process(draw, area, layers, device, counters)?;
                 self.draw(PassDraw::Primitives(draw))
             }
-            Packet::Barrier => {
-                self.flush()
-            }
+            Packet::Barrier => self.flush(),
             Packet::EndRendering => {
                 let pass = self.pass.take().ok_or(ExecutionError::OutsidePass)?;
                 if self.gaussians.take().is_some() {

@@ -100,7 +100,12 @@ impl<S: Simd> BlockValues<S> {
     #[inline(always)]
     pub fn lanes(self) -> [[f32; 16]; 4] {
         let [b1, b2] = self.barycentrics;
-        [b1.into(), b2.into(), self.depth.into(), self.inverse_w.into()]
+        [
+            b1.into(),
+            b2.into(),
+            self.depth.into(),
+            self.inverse_w.into(),
+        ]
     }
 }
 
@@ -248,9 +253,9 @@ impl Batch {
     pub fn overlaps(&self, chunk: usize) -> bool {
         let quads = self.chunk_quads(chunk);
         quads.iter().enumerate().any(|(index, a)| {
-            quads[index + 1..].iter().any(|b| {
-                (a.tile, a.place) == (b.tile, b.place) && a.cover & b.cover != 0
-            })
+            quads[index + 1..]
+                .iter()
+                .any(|b| (a.tile, a.place) == (b.tile, b.place) && a.cover & b.cover != 0)
         })
     }
 
@@ -385,11 +390,9 @@ impl Batch {
                     .iter()
                     .position(|&varying| varying == (index, interpolation))
                     .unwrap_or(0);
-                let [a, da, db] =
-                    self.attribute(simd, chunk, varying, interface.varyings.len());
-                let centroid = sampling == Sampling::Centroid
-                    && positions.len() > 1
-                    && !interface.per_sample;
+                let [a, da, db] = self.attribute(simd, chunk, varying, interface.varyings.len());
+                let centroid =
+                    sampling == Sampling::Centroid && positions.len() > 1 && !interface.per_sample;
                 let [b1, b2] = match interpolation {
                     Interpolation::Flat => return a.to_bits().into(),
                     Interpolation::Linear if centroid => {

@@ -268,13 +268,7 @@ mod tests {
         }
     }
 
-    fn model(
-        e: BlendEquation,
-        s: [f64; 4],
-        s1: [f64; 4],
-        d: [f64; 4],
-        c: [f64; 4],
-    ) -> [f64; 4] {
+    fn model(e: BlendEquation, s: [f64; 4], s1: [f64; 4], d: [f64; 4], c: [f64; 4]) -> [f64; 4] {
         let fs = model_factor(e.source, s, s1, d, c);
         let fd = model_factor(e.destination, s, s1, d, c);
         std::array::from_fn(|i| match e.op {
@@ -318,7 +312,8 @@ mod tests {
                         destination: d,
                         op,
                     };
-                    let blended = blender(color, alpha, format).blend_dual(source, second, destination);
+                    let blended =
+                        blender(color, alpha, format).blend_dual(source, second, destination);
                     let (s, d, c) = (wide(source), wide(destination), wide(CONSTANTS));
                     let s1 = wide(second);
                     let (rgb, a) = (model(color, s, s1, d, c), model(alpha, s, s1, d, c));

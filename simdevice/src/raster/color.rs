@@ -101,6 +101,8 @@ impl ColorOutput {
         format: Format,
     ) -> Option<Self> {
         let written = written_bits(format, state.write_mask);
+        // An enabled logic operation disables blending even where it does nothing itself.
+        let blends = logic.is_none() && !format.is_integer();
         let logic = logic.filter(|_| {
             matches!(
                 format.numeric(),
@@ -108,14 +110,13 @@ impl ColorOutput {
             )
         });
         let range = clamp_range(format);
-        let blends = logic.is_none() && !format.is_integer();
         let codec = match format {
             _ if logic.is_some() => Codec::Other,
             Format::R8G8B8A8Unorm | Format::A8B8G8R8UnormPack32 => Codec::Unorm8 { bgra: false },
             Format::B8G8R8A8Unorm => Codec::Unorm8 { bgra: true },
-            Format::R32G32B32A32Sfloat
-            | Format::R32G32B32A32Uint
-            | Format::R32G32B32A32Sint => Codec::Words,
+            Format::R32G32B32A32Sfloat | Format::R32G32B32A32Uint | Format::R32G32B32A32Sint => {
+                Codec::Words
+            }
             Format::R32Sfloat | Format::R32Uint | Format::R32Sint => Codec::Word,
             _ => Codec::Other,
         };
@@ -475,7 +476,11 @@ fn transpose(texels: [[f32; 4]; 16]) -> [[f32; 16]; 4] {
 /// The bits of a texel that a write mask lets through.
 fn written_bits(format: Format, write_mask: u8) -> u128 {
     let (mut bits, mut shift) = (0, 0);
-    for &Component { channel, bits: width } in format.components() {
+    for &Component {
+        channel,
+        bits: width,
+    } in format.components()
+    {
         let written = channel
             .register()
             .is_some_and(|register| write_mask >> register & 1 == 1);

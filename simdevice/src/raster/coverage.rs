@@ -146,8 +146,8 @@ impl<const N: usize> Coverage<N> {
                 let below = |limit: i32| table[(limit - at).clamp(0, 4) as usize];
                 below(end) & !below(first)
             };
-            let inside = within(&COLUMNS_BELOW, left, right, x)
-                & within(&ROWS_BELOW, top, bottom, y);
+            let inside =
+                within(&COLUMNS_BELOW, left, right, x) & within(&ROWS_BELOW, top, bottom, y);
             for lanes in &mut self.lanes[block] {
                 *lanes &= inside;
             }
@@ -183,7 +183,8 @@ impl<const N: usize> Coverage<N> {
         (whole, some) = (whole.map(|_| u32::MAX), some.map(|_| u32::MAX));
         for (crossing, values) in crossings.iter().zip(&mut values) {
             let (a, b) = (crossing.edge.a as i32, crossing.edge.b as i32);
-            let blocks = i32x16::simd_from(simd, BLOCK_X) * a + i32x16::simd_from(simd, BLOCK_Y) * b;
+            let blocks =
+                i32x16::simd_from(simd, BLOCK_X) * a + i32x16::simd_from(simd, BLOCK_Y) * b;
             blocks.store_slice(values);
             let (low, high) = (3 * (a.min(0) + b.min(0)), 3 * (a.max(0) + b.max(0)));
             for sample in 0..N {

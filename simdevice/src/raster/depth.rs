@@ -40,10 +40,9 @@ impl DepthCode {
                 // (2^n - 1) d = 2^n d - d: the first is exact, so the nearest integer to it is the result or one more.
                 let nearest = scaled.round_ties_even();
                 let excess = (scaled - nearest + 0.5) - depth;
-                let one = excess.simd_lt(0.0).select(
-                    f32x16::splat(simd, 1.0),
-                    f32x16::splat(simd, 0.0),
-                );
+                let one = excess
+                    .simd_lt(0.0)
+                    .select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
                 (nearest - one).to_int::<u32x16<S>>()
             }
         }

@@ -1,6 +1,8 @@
 //! Fragment programs made ready for draws.
 
-use crate::packet::draw::{FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling};
+use crate::packet::draw::{
+    FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+};
 use fearless_simd::Level;
 use isa::exec::{Executable, Machine, Options};
 use isa::validate::InvalidProgram;
@@ -127,7 +129,9 @@ impl Interface {
                     index,
                 } => {
                     if interface.colors.len() <= attachment {
-                        interface.colors.resize(attachment + 1, ColorSlots::default());
+                        interface
+                            .colors
+                            .resize(attachment + 1, ColorSlots::default());
                     }
                     let sources = &mut interface.colors[attachment];
                     if let Some(slot) = sources.get_mut(index).and_then(|s| s.get_mut(component)) {

@@ -82,7 +82,9 @@ pub fn write<S: Simd>(
                     *lanes = test(simd, &draw.tests, *lanes, front, code, &quads, buffers);
                 }
                 passed += u64::from(lanes.count_ones());
-                write_colors(simd, draw, interface, machine, chunk, *lanes, &quads, buffers);
+                write_colors(
+                    simd, draw, interface, machine, chunk, *lanes, &quads, buffers,
+                );
             }
         }
     }

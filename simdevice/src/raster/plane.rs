@@ -251,7 +251,10 @@ impl Plane {
             for (y, columns) in tile.rows(rect) {
                 let mut bytes = [0; SIDE * MAX_TEXEL_SIZE];
                 let mut row = [[0.0; 4]; SIDE];
-                let (bytes, row) = (&mut bytes[..columns.len() * size], &mut row[..columns.len()]);
+                let (bytes, row) = (
+                    &mut bytes[..columns.len() * size],
+                    &mut row[..columns.len()],
+                );
                 for (x, out) in columns.clone().zip(bytes.chunks_exact_mut(size)) {
                     out.copy_from_slice(&texels[place(x, y) * size..][..size]);
                 }

@@ -123,9 +123,8 @@ impl<'a> TileDraw<'a> {
         let colors: Vec<_> = targets.color.iter().enumerate().map(color).collect();
         let (mut timing, mut count_late) = (Timing::Early, false);
         if let Some(interface) = stage.map(|stage| &stage.interface) {
-            let removes = interface.discards
-                || interface.sample_mask.is_some()
-                || state.alpha_to_coverage;
+            let removes =
+                interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
             let changes = interface.depth.is_some() || interface.stencil_reference.is_some();
             let late = !interface.early_tests
                 && (changes
@@ -147,9 +146,8 @@ impl<'a> TileDraw<'a> {
         let per_sample = multisampled
             && (state.sample_shading || interface.is_some_and(|interface| interface.per_sample));
         let reads = |wanted: fn(FragmentInput) -> bool| {
-            interface.is_some_and(|interface| {
-                interface.inputs.iter().any(|&(_, input)| wanted(input))
-            })
+            interface
+                .is_some_and(|interface| interface.inputs.iter().any(|&(_, input)| wanted(input)))
         };
         let viewports = state.viewports.iter();
         Self {
@@ -213,7 +211,10 @@ impl<'a> TileDraw<'a> {
         counters: &mut Counters,
         cancel: &AtomicBool,
     ) -> Result<(), Stopped> {
-        let mut machines = self.stage.map(FragmentStage::take_machines).unwrap_or_default();
+        let mut machines = self
+            .stage
+            .map(FragmentStage::take_machines)
+            .unwrap_or_default();
         let mut renderer = Renderer {
             draw: self,
             place,
@@ -314,7 +315,10 @@ impl<'d> Renderer<'_, 'd> {
         corner: [i32; 2],
     ) -> Result<(), Stopped> {
         let bounds = current.setup.bounds;
-        let first = [(bounds.x - corner[0]) / SIDE as i32, (bounds.y - corner[1]) / SIDE as i32];
+        let first = [
+            (bounds.x - corner[0]) / SIDE as i32,
+            (bounds.y - corner[1]) / SIDE as i32,
+        ];
         let last = [
             (bounds.x + bounds.width as i32 - 1 - corner[0]) / SIDE as i32,
             (bounds.y + bounds.height as i32 - 1 - corner[1]) / SIDE as i32,
@@ -519,11 +523,17 @@ impl<'d> Renderer<'_, 'd> {
     /// Makes sure that depth and stencil of a tile are there.
     fn touch_tests(&mut self, tile: usize) {
         let (targets, layer) = (self.draw.targets, self.place.layer);
-        if let Some(target) = targets.depth.filter(|_| !self.buffers.depth.is_touched(tile)) {
+        if let Some(target) = targets
+            .depth
+            .filter(|_| !self.buffers.depth.is_touched(tile))
+        {
             let tile = self.tile_of(tile);
             self.buffers.depth.touch(target, layer, &tile);
         }
-        if let Some(target) = targets.stencil.filter(|_| !self.buffers.stencil.is_touched(tile)) {
+        if let Some(target) = targets
+            .stencil
+            .filter(|_| !self.buffers.stencil.is_touched(tile))
+        {
             let tile = self.tile_of(tile);
             self.buffers.stencil.touch(target, layer, &tile);
         }
@@ -583,7 +593,12 @@ impl<'d> Renderer<'_, 'd> {
             limit: draw.limit,
             cancel: Some(self.cancel),
         };
-        machine.run(&batch.active, &batch.helpers, &draw.bindings.resources(), watchdog)?;
+        machine.run(
+            &batch.active,
+            &batch.helpers,
+            &draw.bindings.resources(),
+            watchdog,
+        )?;
         self.counters.add_work(&machine.take_work());
         let lanes = (4 * batch.count - batch.helpers.count()) as u64;
         self.counters.add(Counter::FragmentInvocations, lanes);

@@ -117,7 +117,11 @@ impl Setup {
         }
         let mut edges = [Edge::default(); 4];
         for (index, edge) in edges.iter_mut().enumerate().take(edge_count) {
-            let next = if index + 1 == edge_count { 0 } else { index + 1 };
+            let next = if index + 1 == edge_count {
+                0
+            } else {
+                index + 1
+            };
             *edge = Edge::new(simd, wide(corners[index]), wide(corners[next]), positions);
         }
         let numerators = [

@@ -75,7 +75,6 @@ impl Tile {
     }
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;

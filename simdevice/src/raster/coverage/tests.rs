@@ -135,7 +135,10 @@ fn corners(rng: &mut ChaCha8Rng) -> [[i32; 2]; 3] {
         4 => 1 << 28,
         _ => 8192,
     };
-    let middle = [rng.random_range(-2000..18_000), rng.random_range(-2000..18_000)];
+    let middle = [
+        rng.random_range(-2000..18_000),
+        rng.random_range(-2000..18_000),
+    ];
     let mut corners: [[i32; 2]; 3] = std::array::from_fn(|_| {
         middle.map(|middle: i32| middle + rng.random_range(-spread..=spread))
     });
@@ -149,7 +152,10 @@ fn corners(rng: &mut ChaCha8Rng) -> [[i32; 2]; 3] {
         // A sliver.
         6 => {
             let step = rng.random_range(-3..=3);
-            corners[2] = [corners[1][0] + step, corners[1][1] + rng.random_range(-3..=3)];
+            corners[2] = [
+                corners[1][0] + step,
+                corners[1][1] + rng.random_range(-3..=3),
+            ];
         }
         _ => {}
     }
@@ -217,10 +223,7 @@ fn neighbours_share_no_sample_and_leave_none() {
 #[test]
 fn a_point_covers_a_half_open_square() {
     // From (1.5, 1.5) to (3.5, 3.5): the centres at 1.5 and 2.5 are inside, those at 3.5 are not.
-    let square = primitive(
-        [[384, 384], [896, 384], [896, 896]],
-        PrimitiveKind::Point,
-    );
+    let square = primitive([[384, 384], [896, 384], [896, 896]], PrimitiveKind::Point);
     let covered = fast::<1>(Level::new(), &square, &CENTER, EVERYTHING);
     let pixels: Vec<_> = (0..SIZE * SIZE)
         .filter(|at| covered[*at as usize][0])

@@ -88,7 +88,9 @@ fn texels_of_every_size_survive_a_load_and_a_store() {
                     // The unused bits may become anything.
                     let layout = view.image.subresource(aspect, 0, 0).unwrap();
                     let end = (layout.offset + layout.size) as usize;
-                    (layout.offset as usize + 3..end).step_by(4).for_each(|at| after[at] = before[at]);
+                    (layout.offset as usize + 3..end)
+                        .step_by(4)
+                        .for_each(|at| after[at] = before[at]);
                 }
                 assert_eq!(after, before, "{format:?}");
             }

@@ -231,7 +231,8 @@ fn run(
     let mut counters = Counters::default();
     let mut pass = Pass::begin(rendering).unwrap();
     for draw in draws(&device) {
-        pass.push(PassDraw::Primitives(draw), &device, &mut counters).unwrap();
+        pass.push(PassDraw::Primitives(draw), &device, &mut counters)
+            .unwrap();
     }
     pass.end(&device, &mut counters).unwrap();
     counters
@@ -311,7 +312,14 @@ fn interpolate(samples: u32, simd: SimdLevel) {
         };
         let bits = values.as_flattened().iter().map(|v| v.to_bits()).collect();
         let stage = fragments(inputs.clone(), color(0, 0), false);
-        vec![draw(device, Some(stage), state(samples), vec![primitive], bits, 2)]
+        vec![draw(
+            device,
+            Some(stage),
+            state(samples),
+            vec![primitive],
+            bits,
+            2,
+        )]
     });
     let [a, b, c] = corners.map(|corner| corner.map(f64::from));
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -328,7 +336,11 @@ fn interpolate(samples: u32, simd: SimdLevel) {
             let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
                 (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
             };
-            let weights = [side(b, c, p) / area, side(c, a, p) / area, side(a, b, p) / area];
+            let weights = [
+                side(b, c, p) / area,
+                side(c, a, p) / area,
+                side(a, b, p) / area,
+            ];
             let sum = |of: [f64; 3]| (0..3).map(|i| weights[i] * of[i]).sum::<f64>();
             let w = sum(inverse_w.map(f64::from));
             let perspective = (0..3)
@@ -340,7 +352,12 @@ fn interpolate(samples: u32, simd: SimdLevel) {
             let tolerance = [1e-6, 2e-5, 1.2e-7, 4e-7 * w.abs().max(0.1)];
             for i in 0..4 {
                 let error = (f64::from(found[i]) - expected[i]).abs();
-                assert!(error <= tolerance[i], "{x} {y} {i}: {} {}", found[i], expected[i]);
+                assert!(
+                    error <= tolerance[i],
+                    "{x} {y} {i}: {} {}",
+                    found[i],
+                    expected[i]
+                );
             }
         }
     }

@@ -237,11 +237,17 @@ fn depth_code(format: Format, depth: f32) -> u32 {
 
 /// The scene, sample by sample.
 fn naive(scene: &Scene) -> Picture {
-    let positions: &[[i32; 2]] = if scene.samples == 1 { &CENTER } else { &SAMPLES_4 };
+    let positions: &[[i32; 2]] = if scene.samples == 1 {
+        &CENTER
+    } else {
+        &SAMPLES_4
+    };
     let count = (WIDTH * HEIGHT * scene.samples) as usize;
     let size = scene.color.texel_size();
     let clear = scene.color.encode_clear(Aspect::Color, color_clear(scene));
-    let depth = scene.depth.map_or(0, |format| depth_code(format, CLEAR_DEPTH));
+    let depth = scene
+        .depth
+        .map_or(0, |format| depth_code(format, CLEAR_DEPTH));
     let has_stencil = scene
         .depth
         .is_some_and(|format| format.plane(Aspect::Stencil).is_some());
@@ -252,7 +258,11 @@ fn naive(scene: &Scene) -> Picture {
         passed: 0,
     };
     for draw in &scene.draws {
-        let blender = Blender::new(&draw.state.blend[0], draw.state.blend_constants, scene.color);
+        let blender = Blender::new(
+            &draw.state.blend[0],
+            draw.state.blend_constants,
+            scene.color,
+        );
         for (primitive, values) in draw.primitives.iter().zip(&draw.values) {
             let left = primitive.corners.map(|c| c[0]).into_iter().min().unwrap() >> 8;
             let right = primitive.corners.map(|c| c[0]).into_iter().max().unwrap() >> 8;
@@ -277,7 +287,17 @@ fn naive(scene: &Scene) -> Picture {
                 {
                     continue;
                 }
-                fragment(scene, draw, &blender, primitive, values, at, sample, has_stencil, &mut picture);
+                fragment(
+                    scene,
+                    draw,
+                    &blender,
+                    primitive,
+                    values,
+                    at,
+                    sample,
+                    has_stencil,
+                    &mut picture,
+                );
             }
         }
     }
@@ -327,7 +347,9 @@ fn fragment(
             stencil & face.compare_mask,
         )
     });
-    let code = scene.depth.map(|format| depth_code(format, primitive.depth[0]));
+    let code = scene
+        .depth
+        .map(|format| depth_code(format, primitive.depth[0]));
     let depth_passes = match (code, tests.depth) {
         (Some(code), Some(test)) => compare(test.compare, code, picture.depth[at]),
         _ => true,
@@ -374,7 +396,20 @@ fn blend(scene: &Scene, draw: &SceneDraw, blender: &Blender, values: &[u32; 9], 
     let value = match (logic, draw.state.logic_op) {
         (Some(op), _) => {
             let new = format.encode(source);
-            let bytes: Vec<u8> = stored.iter().zip(new).map(|(&d, s)| logic_byte(op, s, d)).collect();
+            let bytes: Vec<u8> = stored
+                .iter()
+                .zip(new)
+                .map(|(&d, s)| logic_byte(op, s, d))
+                .collect();
+            // -1 has two codes, of which this may give either.
+            if format == Format::R8G8B8A8Snorm {
+                for (byte, new) in bytes.into_iter().enumerate() {
+                    if draw.state.blend[0].write_mask >> byte & 1 == 1 {
+                        stored[byte] = new;
+                    }
+                }
+                return;
+            }
             format.decode(&bytes)
         }
         // Other formats take the source as it is.
@@ -389,8 +424,12 @@ fn blend(scene: &Scene, draw: &SceneDraw, blender: &Blender, values: &[u32; 9], 
             destination[component]
         }
     });
-    let size = stored.len();
-    stored.copy_from_slice(&format.encode(masked)[..size]);
+    for (byte, new) in format.encode(masked)[..stored.len()].iter().enumerate() {
+        // -1 has two codes, of which a component that is not written keeps its own.
+        if format != Format::R8G8B8A8Snorm || mask >> byte & 1 == 1 {
+            stored[byte] = *new;
+        }
+    }
 }
 
 /// A logic operation by its truth table: bit `2 s + d` of the entry.
@@ -450,15 +489,17 @@ fn render(scene: &Scene, config: &Config) -> Picture {
     for at in 0..WIDTH * HEIGHT * scene.samples {
         let (pixel, sample) = (at / scene.samples, at % scene.samples);
         let place = [pixel % WIDTH, pixel / WIDTH];
-        picture.color.push(texel(&target, Aspect::Color, 0, sample, place));
+        picture
+            .color
+            .push(texel(&target, Aspect::Color, 0, sample, place));
         picture.depth.push(depth.as_ref().map_or(0, |view| {
             let mut bytes = texel(view, Aspect::Depth, 0, sample, place);
             bytes.resize(4, 0);
             u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
         }));
-        picture.stencil.push(stencil.map_or(0, |view| {
-            texel(view, Aspect::Stencil, 0, sample, place)[0]
-        }));
+        picture
+            .stencil
+            .push(stencil.map_or(0, |view| texel(view, Aspect::Stencil, 0, sample, place)[0]));
     }
     picture
 }
@@ -481,7 +522,11 @@ fn random_states_agree_with_the_twin_whatever_the_configuration() {
                     scene.color,
                     scene.depth,
                     scene.samples,
-                    scene.draws.iter().map(|d| (&d.state, d.discards, d.early_tests)).collect::<Vec<_>>()
+                    scene
+                        .draws
+                        .iter()
+                        .map(|d| (&d.state, d.discards, d.early_tests))
+                        .collect::<Vec<_>>()
                 );
             }
             assert_eq!(found.passed, expected.passed, "seed {seed}, {config:?}");
