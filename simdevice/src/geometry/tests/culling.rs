@@ -67,7 +67,9 @@ fn only_what_covers_nothing_is_dropped() {
     let device = device(1);
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut positions = Vec::new();
-    for _ in 0..400 {
+    for number in 0..800 {
+        // Every other one spans at most two pixels.
+        let reach = if number % 2 == 0 { 0.9 } else { 2.5 };
         // Many lie on pixel centres and edges.
         let grid = [0.5, 0.25, 1.0 / 256.0][rng.random_range(0..3)];
         let mut at =
@@ -75,8 +77,8 @@ fn only_what_covers_nothing_is_dropped() {
         let center = [at(-2.0, WIDTH as f32 + 2.0), at(-2.0, HEIGHT as f32 + 2.0)];
         for _ in 0..3 {
             positions.push(at_pixel(
-                center[0] + at(-1.5, 1.5),
-                center[1] + at(-1.5, 1.5),
+                center[0] + at(-reach, reach),
+                center[1] + at(-reach, reach),
                 0.5,
             ));
         }
@@ -99,7 +101,11 @@ fn only_what_covers_nothing_is_dropped() {
         }
     }
     // Small ones are looked at exactly.
-    for primitive in &found.primitives {
+    for primitive in found
+        .primitives
+        .iter()
+        .filter(|primitive| primitive.id % 2 == 0)
+    {
         assert!(covers(primitive.corners), "{:?}", primitive.corners);
     }
 }

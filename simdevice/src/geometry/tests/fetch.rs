@@ -152,7 +152,7 @@ fn built_in_inputs_are_what_vulkan_says() {
         &[[0.0, 0.0, 0.5, 1.0]; 20],
     );
     (draw.first, draw.count, draw.first_instance, draw.draw_index) = (3, 4, 11, 6);
-    let of = |draw| {
+    let of = |draw: &crate::packet::draw::Draw| {
         let found = run(&device, draw);
         let vertex = found.primitives[1].provoking;
         [0, 1, 2, 3].map(|number| varying_bits(&found, vertex, number))
