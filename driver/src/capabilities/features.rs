@@ -92,7 +92,8 @@ const EXTENSIONS: &[(vk::StructureType, &CStr)] = &[
     ),
 ];
 
-fn is_supported(feature: &str) -> bool {
+/// Whether the feature, named as ash names its field, works.
+pub(crate) fn is_supported(feature: &str) -> bool {
     SUPPORTED.contains(&feature)
 }
 
