@@ -43,10 +43,7 @@ pub(crate) fn draw(
 }
 
 /// What the pipeline fixes, with the dynamic part filled in.
-fn fixed_state(
-    state: &State,
-    gaussian: &GaussianPipeline,
-) -> Result<Arc<GaussianState>, Undrawn> {
+fn fixed_state(state: &State, gaussian: &GaussianPipeline) -> Result<Arc<GaussianState>, Undrawn> {
     if !gaussian.dynamic_blend_constants {
         return Ok(Arc::clone(&gaussian.state));
     }

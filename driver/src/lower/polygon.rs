@@ -25,9 +25,8 @@ pub(crate) fn draw(
         .attributes
         .iter()
         .map(|source| attribute_stream(state, pipeline, source));
-    let bindings = |descriptors| {
-        bindings::bindings(descriptors, &state.graphics_sets, &state.push_constants)
-    };
+    let bindings =
+        |descriptors| bindings::bindings(descriptors, &state.graphics_sets, &state.push_constants);
     Ok(Packet::Draw(Box::new(draw::Draw {
         pipeline: Arc::clone(&polygons.programs),
         attributes: attributes.collect::<Result<_, _>>()?,

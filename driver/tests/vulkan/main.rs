@@ -14,6 +14,8 @@ mod kernel;
 #[path = "../support/loader.rs"]
 mod loader;
 mod memory;
+mod polygon_pipelines;
+mod polygons;
 mod queries;
 mod render_passes;
 mod scene;

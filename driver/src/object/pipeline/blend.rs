@@ -45,9 +45,7 @@ pub(super) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState)
 ///
 /// # Errors
 /// An [`Error`] for factors and operations that Vulkan does not have, or that take a second source.
-fn blend_state(
-    state: &vk::PipelineColorBlendAttachmentState,
-) -> Result<BlendState, Error> {
+fn blend_state(state: &vk::PipelineColorBlendAttachmentState) -> Result<BlendState, Error> {
     let equations = if state.blend_enable == vk::FALSE {
         None
     } else {

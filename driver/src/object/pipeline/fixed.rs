@@ -62,8 +62,16 @@ impl FixedState {
         let raster = &info.rasterization;
         let polygon_mode = convert::polygon_mode(raster.polygon_mode)?;
         let needs = [
-            (polygon_mode != PolygonMode::Fill, "fill_mode_non_solid", "a polygon mode but FILL"),
-            (raster.depth_clamp_enable != vk::FALSE, "depth_clamp", "depthClampEnable"),
+            (
+                polygon_mode != PolygonMode::Fill,
+                "fill_mode_non_solid",
+                "a polygon mode but FILL",
+            ),
+            (
+                raster.depth_clamp_enable != vk::FALSE,
+                "depth_clamp",
+                "depthClampEnable",
+            ),
             (
                 raster.depth_bias_enable != vk::FALSE && raster.depth_bias_clamp != 0.0,
                 "depth_bias_clamp",
@@ -77,7 +85,9 @@ impl FixedState {
             topology,
             Topology::PointList | Topology::LineList | Topology::TriangleList
         );
-        if info.primitive_restart && is_list && !info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
+        if info.primitive_restart
+            && is_list
+            && !info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
         {
             return Err(Error::usage(
                 "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-06252",
@@ -157,7 +167,10 @@ impl FixedState {
         if counts[0] != counts[1] && dynamic == [false; 2] {
             return Err(Error::usage(
                 "VUID-VkPipelineViewportStateCreateInfo-scissorCount-04134",
-                format!("there are {} viewports, but {} scissors", counts[0], counts[1]),
+                format!(
+                    "there are {} viewports, but {} scissors",
+                    counts[0], counts[1]
+                ),
             ));
         }
         let has = |given: usize, count: u32| given == count as usize;
@@ -183,7 +196,9 @@ impl FixedState {
     fn set_samples(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
         let multisample = &info.multisample;
         let samples = multisample.rasterization_samples;
-        let supported = limits::properties().limits.framebuffer_no_attachments_sample_counts;
+        let supported = limits::properties()
+            .limits
+            .framebuffer_no_attachments_sample_counts;
         let count = samples.as_raw();
         if !count.is_power_of_two() || !supported.contains(samples) {
             return Err(Error::FeatureNotPresent(format!(
@@ -196,7 +211,11 @@ impl FixedState {
                 "sample_rate_shading",
                 "sampleShadingEnable",
             ),
-            (multisample.alpha_to_one_enable != vk::FALSE, "alpha_to_one", "alphaToOneEnable"),
+            (
+                multisample.alpha_to_one_enable != vk::FALSE,
+                "alpha_to_one",
+                "alphaToOneEnable",
+            ),
         ];
         require_all(&needs)?;
         let draw = &mut self.draw;
@@ -318,7 +337,9 @@ impl FixedState {
         use vk::DynamicState as S;
         let draw = &self.draw;
         match state {
-            S::PRIMITIVE_TOPOLOGY | S::PRIMITIVE_RESTART_ENABLE | S::RASTERIZER_DISCARD_ENABLE => true,
+            S::PRIMITIVE_TOPOLOGY | S::PRIMITIVE_RESTART_ENABLE | S::RASTERIZER_DISCARD_ENABLE => {
+                true
+            }
             _ if draw.rasterizer_discard => false,
             S::LINE_WIDTH => {
                 draw.polygon_mode == PolygonMode::Line || class(draw.topology) == Class::Lines
@@ -356,7 +377,14 @@ impl FixedState {
 fn blends_by_constants(state: &DrawState) -> bool {
     let equations = state.blend.iter().filter_map(|blend| blend.equations);
     equations
-        .flat_map(|(color, alpha)| [color.source, color.destination, alpha.source, alpha.destination])
+        .flat_map(|(color, alpha)| {
+            [
+                color.source,
+                color.destination,
+                alpha.source,
+                alpha.destination,
+            ]
+        })
         .any(|factor| {
             matches!(
                 factor,
@@ -398,7 +426,10 @@ pub(crate) fn class(topology: Topology) -> Class {
 /// Fails for the first need whose feature the device lacks.
 fn require_all(needs: &[(bool, &str, &str)]) -> Result<(), Error> {
     let lacks = |needed: bool, feature: &str| needed && !features::is_supported(feature);
-    match needs.iter().find(|(needed, feature, _)| lacks(*needed, feature)) {
+    match needs
+        .iter()
+        .find(|(needed, feature, _)| lacks(*needed, feature))
+    {
         None => Ok(()),
         Some((_, feature, what)) => Err(Error::FeatureNotPresent(format!(
             "{what} (feature {feature})"

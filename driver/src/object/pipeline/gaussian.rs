@@ -323,6 +323,11 @@ fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
             "the dynamic state {state:?} with Gaussians"
         )));
     }
+    if info.blend.iter().any(blend::reads_second_source) {
+        return Err(Error::FeatureNotPresent(
+            "a second source of blending (feature dualSrcBlend) with Gaussians".into(),
+        ));
+    }
     if info.logic_op.is_some() {
         return Err(Error::FeatureNotPresent(
             "logicOpEnable with Gaussians".into(),

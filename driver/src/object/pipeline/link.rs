@@ -458,9 +458,6 @@ mod tests {
         wide.numeric = Numeric::Float { width: 64 };
         let vertex = shader(Stage::Vertex, vec![], vec![wide]);
         let error = link(vertex, None, |_| None, Effects::default()).unwrap_err();
-        assert_eq!(
-            error.result(),
-            ash::vk::Result::ERROR_FEATURE_NOT_PRESENT
-        );
+        assert_eq!(error.result(), ash::vk::Result::ERROR_FEATURE_NOT_PRESENT);
     }
 }

@@ -117,11 +117,20 @@ struct Stages<'a> {
 impl<'a> Stages<'a> {
     fn find(info: &'a GraphicsPipelineInfo) -> Result<Self, Error> {
         let known = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
-        if let Some((stage, _)) = info.stages.iter().find(|(stage, _)| !known.contains(*stage)) {
-            return Err(Error::FeatureNotPresent(format!("a shader stage {stage:?}")));
+        if let Some((stage, _)) = info
+            .stages
+            .iter()
+            .find(|(stage, _)| !known.contains(*stage))
+        {
+            return Err(Error::FeatureNotPresent(format!(
+                "a shader stage {stage:?}"
+            )));
         }
         let find = |wanted| {
-            let mut found = info.stages.iter().filter(move |(stage, _)| *stage == wanted);
+            let mut found = info
+                .stages
+                .iter()
+                .filter(move |(stage, _)| *stage == wanted);
             match (found.next(), found.next()) {
                 (_, Some(_)) => Err(Error::usage(
                     "VUID-VkGraphicsPipelineCreateInfo-stage-06897",
@@ -133,7 +142,10 @@ impl<'a> Stages<'a> {
         let vertex = find(vk::ShaderStageFlags::VERTEX)?.ok_or_else(|| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-stage-02096",
-                format!("a pipeline of topology {:?} has no vertex stage", info.topology),
+                format!(
+                    "a pipeline of topology {:?} has no vertex stage",
+                    info.topology
+                ),
             )
         })?;
         let fragment = find(vk::ShaderStageFlags::FRAGMENT)?;
@@ -251,9 +263,7 @@ fn color_effects(info: &GraphicsPipelineInfo, fixed: &FixedState) -> Vec<bool> {
 }
 
 /// What is dynamic, and where viewports and scissors come from.
-fn dynamic(
-    info: &GraphicsPipelineInfo,
-) -> Result<(Vec<vk::DynamicState>, Origin, Origin), Error> {
+fn dynamic(info: &GraphicsPipelineInfo) -> Result<(Vec<vk::DynamicState>, Origin, Origin), Error> {
     use vk::DynamicState as S;
     let (mut viewports, mut scissors) = (Origin::Static, Origin::Static);
     let mut dynamic = Vec::new();
@@ -285,7 +295,9 @@ fn dynamic(
             | S::DEPTH_BIAS_ENABLE
             | S::PRIMITIVE_RESTART_ENABLE => dynamic.push(state),
             other => {
-                return Err(Error::FeatureNotPresent(format!("the dynamic state {other:?}")));
+                return Err(Error::FeatureNotPresent(format!(
+                    "the dynamic state {other:?}"
+                )));
             }
         }
     }

@@ -88,7 +88,9 @@ impl Setting {
 /// The faces that a mask names.
 pub(crate) fn faces(mask: vk::StencilFaceFlags) -> impl Iterator<Item = Face> {
     let flags = [vk::StencilFaceFlags::FRONT, vk::StencilFaceFlags::BACK];
-    (0..).zip(flags).filter_map(move |(face, flag)| mask.contains(flag).then_some(face))
+    (0..)
+        .zip(flags)
+        .filter_map(move |(face, flag)| mask.contains(flag).then_some(face))
 }
 
 /// Which faces a cull mode culls.
@@ -159,7 +161,10 @@ mod tests {
         let of = |state| settings.of(state).collect::<Vec<_>>();
         assert_eq!(
             of(vk::DynamicState::STENCIL_REFERENCE),
-            [Setting::StencilReference(0, 1), Setting::StencilReference(1, 2)]
+            [
+                Setting::StencilReference(0, 1),
+                Setting::StencilReference(1, 2)
+            ]
         );
         assert_eq!(of(vk::DynamicState::LINE_WIDTH), [Setting::LineWidth(3.0)]);
         assert!(of(vk::DynamicState::DEPTH_BIAS).is_empty());
