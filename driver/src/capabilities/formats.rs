@@ -75,10 +75,11 @@ fn is_atomic(format: Format) -> bool {
     format.is_integer() && format.texel_size() == 4 && format.components().len() == 1
 }
 
-/// What buffers of the format can do. Attributes of Gaussians must convert to floating point, too, which their pipelines
-/// check. Programs read texels of any format.
+/// What buffers of the format can do: any attribute that converts to floating point feeds a Gaussian. Integer
+/// attributes need vertex shaders, which don't run yet. Programs read texels of any format.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
     let is_attribute = is_color(format)
+        && !format.is_integer()
         && !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent)
         && !format.has(Channel::X);
     let mut features = vk::FormatFeatureFlags::empty();
