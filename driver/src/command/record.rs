@@ -127,7 +127,7 @@ pub(crate) struct VertexBuffer {
 pub(crate) struct IndexBuffer {
     /// The bytes that indices are read from.
     pub(crate) range: BufferRange,
-    /// Bytes per index: 2 or 4 (1 with 8-bit indices).
+    /// Bytes per index: 1, 2 or 4.
     pub(crate) index_size: u32,
 }
 

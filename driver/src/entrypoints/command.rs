@@ -104,6 +104,7 @@ crate::entry_points! {
     ) {
         record(command_buffer, |recorder| {
             let index_size = match index_type {
+                vk::IndexType::UINT8_KHR => 1,
                 vk::IndexType::UINT16 => 2,
                 vk::IndexType::UINT32 => 4,
                 other => {

@@ -49,10 +49,12 @@ pub struct Request {
     pub shaders: Vec<Shader>,
     pub set_layouts: Vec<vk::DescriptorSetLayout>,
     pub bindings: Vec<vk::VertexInputBindingDescription>,
+    pub divisors: Vec<vk::VertexInputBindingDivisorDescriptionKHR>,
     pub attributes: Vec<vk::VertexInputAttributeDescription>,
     pub topology: vk::PrimitiveTopology,
     pub restart: bool,
     pub viewports: u32,
+    pub provoking_last: bool,
     pub raster: vk::PipelineRasterizationStateCreateInfo<'static>,
     pub multisample: vk::PipelineMultisampleStateCreateInfo<'static>,
     pub depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'static>,
@@ -84,10 +86,12 @@ impl Default for Request {
                 stride: size_of::<Vertex>() as u32,
                 input_rate: vk::VertexInputRate::VERTEX,
             }],
+            divisors: Vec::new(),
             attributes: vec![attribute(0), attribute(1)],
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             restart: false,
             viewports: 1,
+            provoking_last: false,
             raster: vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0),
             multisample: vk::PipelineMultisampleStateCreateInfo::default()
                 .rasterization_samples(vk::SampleCountFlags::TYPE_1),
@@ -207,9 +211,20 @@ impl Request {
         layout: vk::PipelineLayout,
         stages: &[vk::PipelineShaderStageCreateInfo],
     ) -> Result<vk::Pipeline, vk::Result> {
-        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
+        let mut divisors = vk::PipelineVertexInputDivisorStateCreateInfoKHR::default()
+            .vertex_binding_divisors(&self.divisors);
+        let mut vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&self.bindings)
             .vertex_attribute_descriptions(&self.attributes);
+        if !self.divisors.is_empty() {
+            vertex_input = vertex_input.push_next(&mut divisors);
+        }
+        let mut provoking = vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT::default()
+            .provoking_vertex_mode(vk::ProvokingVertexModeEXT::LAST_VERTEX);
+        let mut raster = self.raster;
+        if self.provoking_last {
+            raster = raster.push_next(&mut provoking);
+        }
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
             .topology(self.topology)
             .primitive_restart_enable(self.restart);
@@ -224,13 +239,18 @@ impl Request {
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&self.dynamic);
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
             .color_attachment_formats(&self.formats)
-            .depth_attachment_format(self.depth_format);
+            .depth_attachment_format(self.depth_format)
+            .stencil_attachment_format(if self.depth_format == crate::canvas::DEPTH_FORMAT {
+                self.depth_format
+            } else {
+                vk::Format::UNDEFINED
+            });
         let info = vk::GraphicsPipelineCreateInfo::default()
             .stages(stages)
             .vertex_input_state(&vertex_input)
             .input_assembly_state(&assembly)
             .viewport_state(&viewport)
-            .rasterization_state(&self.raster)
+            .rasterization_state(&raster)
             .multisample_state(&self.multisample)
             .depth_stencil_state(&self.depth_stencil)
             .color_blend_state(&blend)
