@@ -109,6 +109,11 @@ impl Pass {
         self.layer_count
     }
 
+    /// The depth attachment's format, if there is one.
+    pub fn depth_format(&self) -> Option<Format> {
+        self.depth.as_ref().map(Target::format)
+    }
+
     /// Adds a draw, and flushes the pass if the policy says so.
     pub fn push(&mut self, draw: PassDraw, device: &Device, counters: &mut Counters) {
         self.bin_bytes = self.bin_bytes.saturating_add(draw.memory_bytes());
