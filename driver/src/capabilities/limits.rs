@@ -35,6 +35,16 @@ pub(crate) const MAX_IMAGE_DIMENSION_3D: u32 = 2048;
 /// The most array layers of an image or framebuffer.
 pub(crate) const MAX_LAYERS: u32 = 2048;
 
+/// The greatest side of a point and the greatest width of a line, in pixels.
+const MAX_POINT_SIZE: f32 = 256.0;
+const MAX_LINE_WIDTH: f32 = 64.0;
+
+/// The steps of points' and lines' sizes: those of coordinates.
+const SIZE_GRANULARITY: f32 = 1.0 / 256.0;
+
+/// The most clip and cull distances, together and each.
+const MAX_CLIP_CULL_DISTANCES: u32 = simdevice::packet::draw::MAX_CLIP_CULL_DISTANCES as u32;
+
 /// The most colour attachments.
 pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
 
@@ -159,7 +169,7 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_draw_indirect_count: u32::MAX,
         max_sampler_lod_bias: MAX_SAMPLER_LOD_BIAS,
         max_sampler_anisotropy: 1.0,
-        max_viewports: 1,
+        max_viewports: simdevice::packet::draw::MAX_VIEWPORTS as u32,
         max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],
         viewport_bounds_range: [
             -2.0 * MAX_IMAGE_DIMENSION as f32,
@@ -191,13 +201,24 @@ fn limits() -> vk::PhysicalDeviceLimits {
         timestamp_compute_and_graphics: vk::TRUE,
         timestamp_period: 1.0,
         discrete_queue_priorities: 2,
-        point_size_range: [1.0, 1.0],
-        line_width_range: [1.0, 1.0],
+        point_size_range: [1.0, MAX_POINT_SIZE],
+        line_width_range: [1.0, MAX_LINE_WIDTH],
+        point_size_granularity: SIZE_GRANULARITY,
+        line_width_granularity: SIZE_GRANULARITY,
+        strict_lines: vk::TRUE,
         standard_sample_locations: vk::TRUE,
+        min_interpolation_offset: -0.5,
+        // The greatest offset is less than half a pixel by one step of its precision.
+        max_interpolation_offset: 0.5 - 1.0 / 16.0,
+        sub_pixel_interpolation_offset_bits: 4,
+        max_fragment_dual_src_attachments: 1,
+        max_clip_distances: MAX_CLIP_CULL_DISTANCES,
+        max_cull_distances: MAX_CLIP_CULL_DISTANCES,
+        max_combined_clip_and_cull_distances: MAX_CLIP_CULL_DISTANCES,
         optimal_buffer_copy_offset_alignment: 1,
         optimal_buffer_copy_row_pitch_alignment: 1,
         non_coherent_atom_size: 1,
-        // No tessellation, geometry shaders, clip distances, wide lines, sparse memory or interpolation offsets.
+        // No tessellation, geometry shaders or sparse memory.
         ..Default::default()
     }
 }
@@ -326,6 +347,13 @@ properties! {
     parts {
     vk::PhysicalDevicePushDescriptorPropertiesKHR<'_> {
         max_push_descriptors: MAX_PUSH_DESCRIPTORS,
+    }
+    vk::PhysicalDeviceProvokingVertexPropertiesEXT<'_> {
+        provoking_vertex_mode_per_pipeline: vk::TRUE,
+        transform_feedback_preserves_triangle_fan_provoking_vertex: vk::FALSE,
+    }
+    vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT<'_> {
+        max_vertex_attrib_divisor: u32::MAX,
     }
     vk::PhysicalDevicePerformanceQueryPropertiesKHR<'_> {
         allow_command_buffer_query_copies: vk::FALSE,

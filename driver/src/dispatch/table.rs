@@ -120,7 +120,7 @@ commands! {
         PFN_vkDestroyPipelineCache = pipeline::destroy_pipeline_cache;
         PFN_vkGetPipelineCacheData = pipeline::get_pipeline_cache_data;
         PFN_vkMergePipelineCaches = pipeline::merge_pipeline_caches;
-        PFN_vkCreateGraphicsPipelines = pipeline::create_graphics_pipelines;
+        PFN_vkCreateGraphicsPipelines = graphics_pipeline::create_graphics_pipelines;
         PFN_vkCreateComputePipelines = compute_pipeline::create_compute_pipelines;
         PFN_vkDestroyPipeline = pipeline::destroy_pipeline;
         PFN_vkCreatePipelineLayout = pipeline::create_pipeline_layout;
@@ -153,7 +153,7 @@ commands! {
         PFN_vkCmdSetScissor = command::cmd_set_scissor;
         PFN_vkCmdSetLineWidth = dynamic_state::cmd_set_line_width;
         PFN_vkCmdSetDepthBias = dynamic_state::cmd_set_depth_bias;
-        PFN_vkCmdSetBlendConstants = command::cmd_set_blend_constants;
+        PFN_vkCmdSetBlendConstants = dynamic_state::cmd_set_blend_constants;
         PFN_vkCmdSetDepthBounds = dynamic_state::cmd_set_depth_bounds;
         PFN_vkCmdSetStencilCompareMask = dynamic_state::cmd_set_stencil_compare_mask;
         PFN_vkCmdSetStencilWriteMask = dynamic_state::cmd_set_stencil_write_mask;
