@@ -180,6 +180,7 @@ impl BegunPass {
             } else {
                 StoreOp::Store
             },
+            resolve: None,
         })
     }
 }
@@ -275,6 +276,7 @@ impl DynamicRendering {
             } else {
                 store(attachment.store)?
             },
+            resolve: None,
         })
     }
 }
