@@ -3,6 +3,9 @@
 //! Vulkan 1.3, "Image Copies With Scaling". Where a texel's centre lies in the source is worked out exactly, in
 //! integers, along each axis by itself. Beyond the source's edges its texels at the edge go on.
 
+#[cfg(test)]
+mod tests;
+
 use crate::format::Format;
 use crate::image::{Image, SubresourceLayout};
 use crate::packet::{Aspect, BlitImage, ImageBlitRegion};

@@ -1,5 +1,8 @@
 //! Resolves: many samples of a texel become one.
 
+#[cfg(test)]
+mod tests;
+
 use super::image_copy::{SlicePair, below, for_each_slice};
 use crate::format::{Format, Numeric};
 use crate::packet::{ResolveImage, ResolveMode};
