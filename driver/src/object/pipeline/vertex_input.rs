@@ -51,8 +51,10 @@ pub(crate) fn attribute(
         ));
     };
     let features = formats::properties(attribute.format).buffer_features;
-    let format = formats::device_format(attribute.format)
-        .filter(|_| features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
+    // Integers mean nothing to Gaussians.
+    let format = formats::device_format(attribute.format).filter(|format| {
+        features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER) && !format.is_integer()
+    });
     let Some(format) = format else {
         return refuse(format!(
             "whose format {:?} this device does not read as a vertex attribute",
