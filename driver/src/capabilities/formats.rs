@@ -37,8 +37,16 @@ fn is_color(format: Format) -> bool {
     format.aspects() == [Aspect::Color]
 }
 
+/// Whether components are integers that are read as floating point: these are attributes of vertices only.
+fn is_scaled(format: Format) -> bool {
+    matches!(format.numeric(), Numeric::Uscaled | Numeric::Sscaled)
+}
+
 /// What images of the format, of either tiling, can do.
 fn image_features(format: Format) -> vk::FormatFeatureFlags {
+    if is_scaled(format) {
+        return vk::FormatFeatureFlags::empty();
+    }
     let mut features = vk::FormatFeatureFlags::TRANSFER_SRC
         | vk::FormatFeatureFlags::TRANSFER_DST
         | vk::FormatFeatureFlags::BLIT_SRC
@@ -80,11 +88,7 @@ fn is_atomic(format: Format) -> bool {
 /// Whether texels of a colour format are rendered to. Formats of three equal components make poor attachments:
 /// hardware has none.
 fn is_rendered(format: Format) -> bool {
-    let has_kind = !matches!(
-        format.numeric(),
-        Numeric::Uscaled | Numeric::Sscaled | Numeric::SharedExponent
-    );
-    has_kind && format.texel_size().is_power_of_two()
+    format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two()
 }
 
 /// What buffers of the format can do: any colour is a vertex attribute, unless it takes more than its component to
@@ -92,6 +96,9 @@ fn is_rendered(format: Format) -> bool {
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
     if !is_color(format) {
         return vk::FormatFeatureFlags::empty();
+    }
+    if is_scaled(format) {
+        return vk::FormatFeatureFlags::VERTEX_BUFFER;
     }
     let mut features = vk::FormatFeatureFlags::UNIFORM_TEXEL_BUFFER;
     if !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent) {

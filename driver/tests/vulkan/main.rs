@@ -9,6 +9,7 @@ mod descriptors;
 mod gaussian_draws;
 mod gaussian_pipelines;
 mod gpu;
+mod image_transfers;
 mod images_in_shaders;
 mod kernel;
 #[path = "../support/loader.rs"]
