@@ -227,6 +227,7 @@ fn measure(name: &str, device: &Arc<Device>, draw: &Draw) {
     for _ in 0..9 {
         let mut processor = CommandProcessor::new(Arc::clone(device));
         let attachment = Attachment {
+            resolve: None,
             view: view.clone(),
             load: LoadOp::DontCare,
             store: StoreOp::DontCare,

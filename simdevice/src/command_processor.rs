@@ -90,6 +90,8 @@ impl CommandProcessor {
                 self.transfer(|| transfer::copy_buffer_image(copy, Direction::ToBuffer))
             }
             Packet::CopyImage(copy) => self.transfer(|| transfer::copy_image(copy)),
+            Packet::BlitImage(blit) => self.transfer(|| transfer::blit_image(blit)),
+            Packet::ResolveImage(resolve) => self.transfer(|| transfer::resolve_image(resolve)),
             Packet::FillBuffer { target, word } => {
                 self.transfer(|| transfer::fill_buffer(target, *word))
             }

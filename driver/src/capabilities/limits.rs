@@ -1,7 +1,6 @@
 //! The physical device's properties and limits.
 //!
-//! Limits are at least what Vulkan requires, except that there is no multisampling yet, so that every sample count is
-//! 1.
+//! Limits are at least what Vulkan requires.
 
 use crate::capabilities::extensions::{API_VERSION, fill_string};
 use crate::capabilities::memory;
@@ -44,6 +43,11 @@ const SIZE_GRANULARITY: f32 = 1.0 / 256.0;
 
 /// The most clip and cull distances, together and each.
 const MAX_CLIP_CULL_DISTANCES: u32 = simdevice::packet::draw::MAX_CLIP_CULL_DISTANCES as u32;
+
+/// The samples that texels of attachments may have.
+pub(crate) const SAMPLE_COUNTS: vk::SampleCountFlags = vk::SampleCountFlags::from_raw(
+    vk::SampleCountFlags::TYPE_1.as_raw() | vk::SampleCountFlags::TYPE_4.as_raw(),
+);
 
 /// The most colour attachments.
 pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
@@ -120,7 +124,6 @@ pub(crate) fn properties() -> vk::PhysicalDeviceProperties {
 }
 
 fn limits() -> vk::PhysicalDeviceLimits {
-    let one_sample = vk::SampleCountFlags::TYPE_1;
     vk::PhysicalDeviceLimits {
         max_image_dimension1_d: MAX_IMAGE_DIMENSION,
         max_image_dimension2_d: MAX_IMAGE_DIMENSION,
@@ -187,16 +190,16 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_framebuffer_width: MAX_IMAGE_DIMENSION,
         max_framebuffer_height: MAX_IMAGE_DIMENSION,
         max_framebuffer_layers: MAX_LAYERS,
-        framebuffer_color_sample_counts: one_sample,
-        framebuffer_depth_sample_counts: one_sample,
-        framebuffer_stencil_sample_counts: one_sample,
-        framebuffer_no_attachments_sample_counts: one_sample,
+        framebuffer_color_sample_counts: SAMPLE_COUNTS,
+        framebuffer_depth_sample_counts: SAMPLE_COUNTS,
+        framebuffer_stencil_sample_counts: SAMPLE_COUNTS,
+        framebuffer_no_attachments_sample_counts: SAMPLE_COUNTS,
         max_color_attachments: MAX_COLOR_ATTACHMENTS,
-        sampled_image_color_sample_counts: one_sample,
-        sampled_image_integer_sample_counts: one_sample,
-        sampled_image_depth_sample_counts: one_sample,
-        sampled_image_stencil_sample_counts: one_sample,
-        storage_image_sample_counts: one_sample,
+        sampled_image_color_sample_counts: SAMPLE_COUNTS,
+        sampled_image_integer_sample_counts: SAMPLE_COUNTS,
+        sampled_image_depth_sample_counts: SAMPLE_COUNTS,
+        sampled_image_stencil_sample_counts: SAMPLE_COUNTS,
+        storage_image_sample_counts: vk::SampleCountFlags::TYPE_1,
         max_sample_mask_words: 1,
         timestamp_compute_and_graphics: vk::TRUE,
         timestamp_period: 1.0,
@@ -265,7 +268,16 @@ fn vulkan12() -> vk::PhysicalDeviceVulkan12Properties<'static> {
         shader_sampled_image_array_non_uniform_indexing_native: vk::TRUE,
         shader_storage_buffer_array_non_uniform_indexing_native: vk::TRUE,
         shader_storage_image_array_non_uniform_indexing_native: vk::TRUE,
-        framebuffer_integer_color_sample_counts: vk::SampleCountFlags::TYPE_1,
+        framebuffer_integer_color_sample_counts: SAMPLE_COUNTS,
+        supported_depth_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
+            | vk::ResolveModeFlags::AVERAGE
+            | vk::ResolveModeFlags::MIN
+            | vk::ResolveModeFlags::MAX,
+        supported_stencil_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
+            | vk::ResolveModeFlags::MIN
+            | vk::ResolveModeFlags::MAX,
+        independent_resolve_none: vk::TRUE,
+        independent_resolve: vk::TRUE,
         ..Default::default()
     };
     fill_string(&mut properties.driver_name, DRIVER_NAME);

@@ -11,6 +11,7 @@ mod dynamic_states;
 mod gaussian_draws;
 mod gaussian_pipelines;
 mod gpu;
+mod image_transfers;
 mod images_in_shaders;
 mod kernel;
 #[path = "../support/loader.rs"]
