@@ -146,26 +146,22 @@ impl CommandProcessor {
                 }
                 Ok(())
             }
-            Packet::Barrier => {
-                self.flush();
-                Ok(())
-            }
+            Packet::Barrier => self.flush(),
             Packet::EndRendering => {
                 let pass = self.pass.take().ok_or(ExecutionError::OutsidePass)?;
                 if self.gaussians.take().is_some() {
                     return Err(ExecutionError::GaussianSetOpen);
                 }
-                pass.end(&self.device, &mut self.counters);
-                Ok(())
+                Ok(pass.end(&self.device, &mut self.counters)?)
             }
             // What a query measures is what was done, not what waits.
             Packet::BeginQuery { pool, index } => {
-                self.flush();
+                self.flush()?;
                 pool.begin(*index, &self.counters);
                 Ok(())
             }
             Packet::EndQuery { pool, index } => {
-                self.flush();
+                self.flush()?;
                 pool.end(*index, &self.counters);
                 Ok(())
             }
@@ -174,7 +170,7 @@ impl CommandProcessor {
                 Ok(())
             }
             Packet::WriteTimestamp { pool, index } => {
-                self.flush();
+                self.flush()?;
                 pool.write_timestamp(*index, host_time());
                 Ok(())
             }
@@ -201,14 +197,14 @@ impl CommandProcessor {
     fn draw(&mut self, draw: PassDraw) -> Result<(), ExecutionError> {
         self.outside_gaussian_set()?;
         let pass = self.pass.as_mut().ok_or(ExecutionError::OutsidePass)?;
-        pass.push(draw, &self.device, &mut self.counters);
-        Ok(())
+        Ok(pass.push(draw, &self.device, &mut self.counters)?)
     }
 
     /// Renders what waits in the pass, if there is one.
-    fn flush(&mut self) {
+    fn flush(&mut self) -> Result<(), ExecutionError> {
         if let Some(pass) = &mut self.pass {
-            pass.flush(&self.device, &mut self.counters);
+            pass.flush(&self.device, &mut self.counters)?;
         }
+        Ok(())
     }
 }

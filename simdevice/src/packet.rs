@@ -295,6 +295,9 @@ pub struct Attachment {
     pub load: LoadOp,
     /// What happens at the end.
     pub store: StoreOp,
+    /// The image of one sample per texel that its samples are resolved to at the end: their average, or sample 0 of
+    /// integers, depths and stencils.
+    pub resolve: Option<ImageView>,
 }
 
 /// See [`Packet::BeginRendering`].
@@ -431,6 +434,10 @@ pub enum BlendFactor {
     ConstantAlpha,
     OneMinusConstantAlpha,
     SrcAlphaSaturate,
+    Src1Color,
+    OneMinusSrc1Color,
+    Src1Alpha,
+    OneMinusSrc1Alpha,
 }
 
 /// The operation of the blend equation.

@@ -180,6 +180,7 @@ impl BegunPass {
             } else {
                 StoreOp::Store
             },
+            resolve: None,
         })
     }
 }
@@ -268,7 +269,8 @@ impl DynamicRendering {
             } else {
                 load(attachment.load, || {
                     clear_value(format, attachment.clear_value)
-                })?
+                    resolve: None,
+        })?
             },
             store: if self.flags.contains(vk::RenderingFlags::SUSPENDING) {
                 StoreOp::Store

@@ -193,6 +193,23 @@ impl Bins {
         }
     }
 
+    /// Every primitive in every macro-tile of its layer, for tests that set up primitives by hand.
+    #[cfg(test)]
+    pub(crate) fn everywhere(primitives: &[Primitive], area: Rect, size: u32, layers: u32) -> Self {
+        let grid = Grid::new(area, size);
+        let mut pairs = Vec::new();
+        for (number, primitive) in primitives.iter().enumerate() {
+            for row in 0..grid.rows {
+                for column in 0..grid.columns {
+                    let at = [grid.first[0] + column, grid.first[1] + row];
+                    let tile = grid.tile(at[0], at[1], primitive.layer.into());
+                    pairs.push((tile, number as u32));
+                }
+            }
+        }
+        Self::new(grid, layers, std::iter::once((0, &pairs[..])))
+    }
+
     /// How many pairs of a macro-tile and a primitive there are.
     pub fn pairs(&self) -> u64 {
         self.primitives.len() as u64

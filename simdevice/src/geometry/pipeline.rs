@@ -4,6 +4,7 @@ use crate::device::Device;
 use crate::packet::draw::{
     DrawPrograms, FragmentInput, Interpolation, MAX_CLIP_CULL_DISTANCES, VertexInput, VertexOutput,
 };
+use crate::raster::fragment::FragmentStage;
 use isa::exec::{Executable, Machine, Options};
 use isa::ir::{Rate, Type};
 use isa::validate::InvalidProgram;
@@ -16,9 +17,10 @@ pub(super) const LANES: usize = 128;
 /// A vertex and a fragment program ready for one device.
 #[derive(Debug)]
 pub struct DrawPipeline {
-    #[allow(dead_code, reason = "the rasterizer reads the fragment stage")]
     pub(crate) programs: DrawPrograms,
     pub(super) vertex: VertexProgram,
+    /// The fragment program.
+    pub(crate) fragment: Option<FragmentStage>,
 }
 
 /// The vertex program, and what its slots mean.
@@ -53,7 +55,15 @@ impl DrawPipeline {
     /// [`InvalidProgram`] if one of them cannot run on the device.
     pub fn new(device: &Device, programs: DrawPrograms) -> Result<Self, InvalidProgram> {
         let vertex = VertexProgram::new(device, &programs)?;
-        Ok(Self { programs, vertex })
+        let fragment = programs.fragment.as_ref();
+        let fragment = fragment
+            .map(|fragment| FragmentStage::new(device.level(), fragment))
+            .transpose()?;
+        Ok(Self {
+            programs,
+            vertex,
+            fragment,
+        })
     }
 }
 
