@@ -517,9 +517,13 @@ mod tests {
         names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(32));
         names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(10));
         names.extend(all_true::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(1));
-        names.extend(all_true::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(1));
+        names.extend(all_true::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(
+            1,
+        ));
         names.extend(all_true::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(1));
-        names.extend(all_true::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(2));
+        names.extend(all_true::<
+            vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>,
+        >(2));
         names.extend(all_true::<
             PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
         >(2));

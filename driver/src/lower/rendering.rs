@@ -269,14 +269,14 @@ impl DynamicRendering {
             } else {
                 load(attachment.load, || {
                     clear_value(format, attachment.clear_value)
-                    resolve: None,
-        })?
+                })?
             },
             store: if self.flags.contains(vk::RenderingFlags::SUSPENDING) {
                 StoreOp::Store
             } else {
                 store(attachment.store)?
             },
+            resolve: None,
         })
     }
 }

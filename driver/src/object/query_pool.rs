@@ -37,17 +37,38 @@ impl Contents {
     /// Pipeline statistics, from the lowest flag to the highest.
     pub(crate) fn statistics(flags: Statistic) -> Self {
         const ALL: [(Statistic, Option<Counter>); 11] = [
-            (Statistic::INPUT_ASSEMBLY_VERTICES, Some(Counter::InputVertices)),
-            (Statistic::INPUT_ASSEMBLY_PRIMITIVES, Some(Counter::InputPrimitives)),
-            (Statistic::VERTEX_SHADER_INVOCATIONS, Some(Counter::VertexInvocations)),
+            (
+                Statistic::INPUT_ASSEMBLY_VERTICES,
+                Some(Counter::InputVertices),
+            ),
+            (
+                Statistic::INPUT_ASSEMBLY_PRIMITIVES,
+                Some(Counter::InputPrimitives),
+            ),
+            (
+                Statistic::VERTEX_SHADER_INVOCATIONS,
+                Some(Counter::VertexInvocations),
+            ),
             (Statistic::GEOMETRY_SHADER_INVOCATIONS, None),
             (Statistic::GEOMETRY_SHADER_PRIMITIVES, None),
-            (Statistic::CLIPPING_INVOCATIONS, Some(Counter::ClippingInvocations)),
-            (Statistic::CLIPPING_PRIMITIVES, Some(Counter::ClippingPrimitives)),
-            (Statistic::FRAGMENT_SHADER_INVOCATIONS, Some(Counter::FragmentInvocations)),
+            (
+                Statistic::CLIPPING_INVOCATIONS,
+                Some(Counter::ClippingInvocations),
+            ),
+            (
+                Statistic::CLIPPING_PRIMITIVES,
+                Some(Counter::ClippingPrimitives),
+            ),
+            (
+                Statistic::FRAGMENT_SHADER_INVOCATIONS,
+                Some(Counter::FragmentInvocations),
+            ),
             (Statistic::TESSELLATION_CONTROL_SHADER_PATCHES, None),
             (Statistic::TESSELLATION_EVALUATION_SHADER_INVOCATIONS, None),
-            (Statistic::COMPUTE_SHADER_INVOCATIONS, Some(Counter::ComputeInvocations)),
+            (
+                Statistic::COMPUTE_SHADER_INVOCATIONS,
+                Some(Counter::ComputeInvocations),
+            ),
         ];
         let counted = ALL.iter().filter(|(flag, _)| flags.contains(*flag));
         Self::Words(counted.map(|(_, counter)| *counter).collect())

@@ -233,7 +233,13 @@ impl Canvas {
         let kind = vk::DescriptorType::STORAGE_BUFFER;
         let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
         let set = self.set(&[kind], stages);
-        crate::kernel::write(&self.gpu, set.set, (0, 0), kind, &[crate::kernel::whole(buffer)]);
+        crate::kernel::write(
+            &self.gpu,
+            set.set,
+            (0, 0),
+            kind,
+            &[crate::kernel::whole(buffer)],
+        );
         set
     }
 
@@ -251,7 +257,11 @@ impl Canvas {
             .collect();
         let sizes: Vec<_> = kinds
             .iter()
-            .map(|&kind| vk::DescriptorPoolSize::default().ty(kind).descriptor_count(1))
+            .map(|&kind| {
+                vk::DescriptorPoolSize::default()
+                    .ty(kind)
+                    .descriptor_count(1)
+            })
             .collect();
         let device = &self.gpu.device;
         // SAFETY: see the crate.

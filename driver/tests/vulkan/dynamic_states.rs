@@ -120,11 +120,19 @@ fn cases() -> Vec<Case> {
             vertices: flat(),
             base: |_| {},
             fixed: |request, on| {
-                let mode = if on { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
+                let mode = if on {
+                    vk::CullModeFlags::BACK
+                } else {
+                    vk::CullModeFlags::NONE
+                };
                 request.raster.cull_mode = mode;
             },
             dynamic: |device, commands, on| {
-                let mode = if on { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
+                let mode = if on {
+                    vk::CullModeFlags::BACK
+                } else {
+                    vk::CullModeFlags::NONE
+                };
                 unsafe { device.cmd_set_cull_mode(commands, mode) };
             },
         },
@@ -316,19 +324,35 @@ fn cases() -> Vec<Case> {
 }
 
 fn face(on: bool) -> vk::FrontFace {
-    if on { vk::FrontFace::CLOCKWISE } else { vk::FrontFace::COUNTER_CLOCKWISE }
+    if on {
+        vk::FrontFace::CLOCKWISE
+    } else {
+        vk::FrontFace::COUNTER_CLOCKWISE
+    }
 }
 
 fn topology(on: bool) -> vk::PrimitiveTopology {
-    if on { vk::PrimitiveTopology::TRIANGLE_STRIP } else { vk::PrimitiveTopology::TRIANGLE_LIST }
+    if on {
+        vk::PrimitiveTopology::TRIANGLE_STRIP
+    } else {
+        vk::PrimitiveTopology::TRIANGLE_LIST
+    }
 }
 
 fn compare(on: bool) -> vk::CompareOp {
-    if on { vk::CompareOp::LESS } else { vk::CompareOp::GREATER }
+    if on {
+        vk::CompareOp::LESS
+    } else {
+        vk::CompareOp::GREATER
+    }
 }
 
 fn pass_op(on: bool) -> vk::StencilOp {
-    if on { vk::StencilOp::INVERT } else { vk::StencilOp::KEEP }
+    if on {
+        vk::StencilOp::INVERT
+    } else {
+        vk::StencilOp::KEEP
+    }
 }
 
 fn mask(on: bool) -> u32 {
@@ -340,12 +364,7 @@ fn constants(on: bool) -> [f32; 4] {
 }
 
 /// Draws a case's vertices: one by one, with a restart in the middle.
-fn draw(
-    canvas: &Canvas,
-    case: &Case,
-    request: &Request,
-    set: Option<bool>,
-) -> Vec<[f32; 4]> {
+fn draw(canvas: &Canvas, case: &Case, request: &Request, set: Option<bool>) -> Vec<[f32; 4]> {
     let count = case.vertices.len() as u16;
     let mut order: Vec<u16> = (0..count).collect();
     if case.state == S::PRIMITIVE_RESTART_ENABLE {
@@ -447,7 +466,14 @@ fn strides_come_with_vertex_buffers() {
         let stride = [2 * size_of::<Vertex>() as u64];
         // SAFETY: see the crate.
         unsafe {
-            device.cmd_bind_vertex_buffers2(commands, 0, &[buffer.buffer], &[0], None, Some(&stride));
+            device.cmd_bind_vertex_buffers2(
+                commands,
+                0,
+                &[buffer.buffer],
+                &[0],
+                None,
+                Some(&stride),
+            );
             device.cmd_draw(commands, 3, 1, 0, 0);
         }
     });

@@ -64,7 +64,13 @@ fn push_constants_move_vertices() {
         let offset = [1.0f32, 0.0, 0.0, 0.0];
         // SAFETY: see the crate.
         unsafe {
-            device.cmd_push_constants(commands, made.layout, stages, 0, bytemuck::cast_slice(&offset));
+            device.cmd_push_constants(
+                commands,
+                made.layout,
+                stages,
+                0,
+                bytemuck::cast_slice(&offset),
+            );
             device.cmd_draw(commands, 3, 1, 0, 0);
         }
     });
@@ -167,27 +173,39 @@ fn indirect_draws_are_numbered() {
     let one = gpu.buffer_of(&[1u32]);
     let indices = gpu.buffer_of(&[0u16, 1, 2, 3]);
     let indexed = gpu.buffer_of(&[4u32, 1, 0, 5, 3]);
-    let pixels = canvas.draw_of(&cells(None), places.as_flattened(), |device, commands, _| {
-        // SAFETY: see the crate.
-        unsafe { device.cmd_draw_indirect(commands, draws.buffer, 0, 2, 20) };
-    });
+    let pixels = canvas.draw_of(
+        &cells(None),
+        places.as_flattened(),
+        |device, commands, _| {
+            // SAFETY: see the crate.
+            unsafe { device.cmd_draw_indirect(commands, draws.buffer, 0, 2, 20) };
+        },
+    );
     assert_eq!(cell(&pixels, 0, 0), [0.0, 0.0, 0.0, 1.0]);
     assert_eq!(cell(&pixels, 2, 1), [2.0, 2.0, 1.0, 1.0]);
     assert_eq!(cell(&pixels, 3, 3), [3.0, 2.0, 1.0, 1.0]);
-    let pixels = canvas.draw_of(&cells(None), places.as_flattened(), |device, commands, _| {
-        let (draws, one) = (draws.buffer, one.buffer);
-        // SAFETY: see the crate.
-        unsafe { device.cmd_draw_indirect_count(commands, draws, 0, one, 0, 2, 20) };
-    });
+    let pixels = canvas.draw_of(
+        &cells(None),
+        places.as_flattened(),
+        |device, commands, _| {
+            let (draws, one) = (draws.buffer, one.buffer);
+            // SAFETY: see the crate.
+            unsafe { device.cmd_draw_indirect_count(commands, draws, 0, one, 0, 2, 20) };
+        },
+    );
     assert_eq!(cell(&pixels, 0, 0), [0.0, 0.0, 0.0, 1.0]);
     assert_eq!(cell(&pixels, 2, 1), CLEAR);
-    let pixels = canvas.draw_of(&cells(None), places.as_flattened(), |device, commands, _| {
-        // SAFETY: see the crate.
-        unsafe {
-            device.cmd_bind_index_buffer(commands, indices.buffer, 0, vk::IndexType::UINT16);
-            device.cmd_draw_indexed_indirect(commands, indexed.buffer, 0, 1, 20);
-        }
-    });
+    let pixels = canvas.draw_of(
+        &cells(None),
+        places.as_flattened(),
+        |device, commands, _| {
+            // SAFETY: see the crate.
+            unsafe {
+                device.cmd_bind_index_buffer(commands, indices.buffer, 0, vk::IndexType::UINT16);
+                device.cmd_draw_indexed_indirect(commands, indexed.buffer, 0, 1, 20);
+            }
+        },
+    );
     assert_eq!(cell(&pixels, 3, 3), [3.0, 3.0, 0.0, 1.0]);
     for buffer in [draws, one, indices, indexed] {
         gpu.free_buffer(buffer);
@@ -237,7 +255,10 @@ fn two_sources_are_blended() {
     ];
     let pixels = canvas.draw_vertices(&request, &everything([1.0, 1.0, 1.0, 0.5]));
     let blend = |factor: f32| factor + 0.25 * (1.0 - factor);
-    assert_close(at(&pixels, (5, 5)), [blend(0.5), blend(0.25), blend(0.125), 0.5]);
+    assert_close(
+        at(&pixels, (5, 5)),
+        [blend(0.5), blend(0.25), blend(0.125), 0.5],
+    );
 }
 
 #[test]
@@ -262,7 +283,11 @@ fn a_logic_operation_works_on_bits() {
     let clear = 64u8;
     let expected = [clear ^ 15, clear ^ 255, clear, 51];
     let texels: Vec<[u8; 4]> = canvas.gpu.read_image(canvas.image, 4);
-    assert!(texels.iter().all(|texel| *texel == expected), "{:?}", texels[0]);
+    assert!(
+        texels.iter().all(|texel| *texel == expected),
+        "{:?}",
+        texels[0]
+    );
     canvas.gpu.free_buffer(vertices);
     made.destroy(&canvas.gpu);
 }
@@ -273,9 +298,15 @@ fn the_provoking_vertex_is_chosen() {
     let mut vertices = everything(RED);
     vertices[2] = vertex(-1.0, 3.0, BLUE);
     let mut request = Request::default().with_fragment(spirv!("flat.frag"));
-    assert_eq!(count(&canvas.draw_vertices(&request, &vertices), RED), PIXELS);
+    assert_eq!(
+        count(&canvas.draw_vertices(&request, &vertices), RED),
+        PIXELS
+    );
     request.provoking_last = true;
-    assert_eq!(count(&canvas.draw_vertices(&request, &vertices), BLUE), PIXELS);
+    assert_eq!(
+        count(&canvas.draw_vertices(&request, &vertices), BLUE),
+        PIXELS
+    );
 }
 
 #[test]
@@ -336,7 +367,11 @@ fn primitives_go_to_their_viewport_and_layer() {
         let pixels = read_layer(gpu, layers, layer);
         for side in 0..2 {
             let expected = [(layer * 2 + side + 1) as f32; 4];
-            assert_eq!(at(&pixels, (side * half + 3, 7)), expected, "{layer} {side}");
+            assert_eq!(
+                at(&pixels, (side * half + 3, 7)),
+                expected,
+                "{layer} {side}"
+            );
         }
     }
     gpu.free_image(layers);
@@ -424,7 +459,11 @@ fn queries_count_samples_and_invocations() {
         | vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS;
     let pool = |info: vk::QueryPoolCreateInfo| {
         // SAFETY: see the crate.
-        unsafe { device.create_query_pool(&info.query_count(1), None).unwrap() }
+        unsafe {
+            device
+                .create_query_pool(&info.query_count(1), None)
+                .unwrap()
+        }
     };
     let occlusion = pool(vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION));
     let counted = pool(
@@ -455,9 +494,13 @@ fn queries_count_samples_and_invocations() {
     let flags = vk::QueryResultFlags::WAIT;
     // SAFETY: see the crate.
     unsafe {
-        device.get_query_pool_results(occlusion, 0, &mut samples, flags).unwrap();
+        device
+            .get_query_pool_results(occlusion, 0, &mut samples, flags)
+            .unwrap();
         let flags = flags | vk::QueryResultFlags::TYPE_64;
-        device.get_query_pool_results(counted, 0, &mut statistics, flags).unwrap();
+        device
+            .get_query_pool_results(counted, 0, &mut statistics, flags)
+            .unwrap();
         device.destroy_query_pool(occlusion, None);
         device.destroy_query_pool(counted, None);
     }
@@ -573,7 +616,10 @@ fn several_samples_make_smooth_edges() {
     let (inside, outside) = (count(&pixels, RED), count(&pixels, CLEAR));
     assert_eq!(at(&pixels, (0, 0)), RED);
     let edge = PIXELS - inside - outside;
-    assert!((HEIGHT as usize..3 * WIDTH as usize).contains(&edge), "{edge}");
+    assert!(
+        (HEIGHT as usize..3 * WIDTH as usize).contains(&edge),
+        "{edge}"
+    );
     for pixel in &pixels {
         let covered = (pixel[0] - CLEAR[0]) / (RED[0] - CLEAR[0]) * 4.0;
         assert!((covered - covered.round()).abs() < 1e-5, "{pixel:?}");
