@@ -77,6 +77,7 @@ counters! {
     PixelContributions: "raster", "pixel contributions", Count, "Pairs of a pixel and a Gaussian that contributed to it";
     FragmentInvocations: "raster", "fragment invocations", Count, "Invocations of fragment programs, those that only help with derivatives apart";
     SamplesPassed: "raster", "samples passed", Count, "Samples of primitives that passed all tests";
+    ComputeInvocations: "shader cores", "compute invocations", Count, "Invocations of compute programs";
     ShaderBatches: "shader cores", "batches", Count, "Batches of shader invocations run";
     ShaderFloat: "shader cores", "float instructions", Count, "32-bit float instructions, each counted once for a batch";
     ShaderInteger: "shader cores", "integer instructions", Count, "32-bit integer and bit instructions, each counted once for a batch";

@@ -7,6 +7,7 @@ use crate::capabilities::memory;
 use crate::pnext;
 use ash::vk;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST;
+use simdevice::geometry;
 use std::ffi::{CStr, c_void};
 
 const DEVICE_NAME: &CStr = c"GauRast simulated device";
@@ -33,10 +34,6 @@ pub(crate) const MAX_IMAGE_DIMENSION_3D: u32 = 2048;
 
 /// The most array layers of an image or framebuffer.
 pub(crate) const MAX_LAYERS: u32 = 2048;
-
-/// The greatest side of a point and the greatest width of a line, in pixels.
-const MAX_POINT_SIZE: f32 = 256.0;
-const MAX_LINE_WIDTH: f32 = 64.0;
 
 /// The steps of points' and lines' sizes: those of coordinates.
 const SIZE_GRANULARITY: f32 = 1.0 / 256.0;
@@ -204,8 +201,8 @@ fn limits() -> vk::PhysicalDeviceLimits {
         timestamp_compute_and_graphics: vk::TRUE,
         timestamp_period: 1.0,
         discrete_queue_priorities: 2,
-        point_size_range: [1.0, MAX_POINT_SIZE],
-        line_width_range: [1.0, MAX_LINE_WIDTH],
+        point_size_range: [1.0, geometry::MAX_POINT_SIZE],
+        line_width_range: [1.0, geometry::MAX_LINE_WIDTH],
         point_size_granularity: SIZE_GRANULARITY,
         line_width_granularity: SIZE_GRANULARITY,
         strict_lines: vk::TRUE,

@@ -44,7 +44,7 @@ pub(super) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState)
 /// One attachment's blend state for the device.
 ///
 /// # Errors
-/// An [`Error`] for factors and operations that Vulkan does not have, or that take a second source.
+/// An [`Error`] for factors and operations that Vulkan does not have.
 fn blend_state(state: &vk::PipelineColorBlendAttachmentState) -> Result<BlendState, Error> {
     let equations = if state.blend_enable == vk::FALSE {
         None
@@ -97,11 +97,10 @@ fn factor(factor: vk::BlendFactor) -> Result<BlendFactor, Error> {
         F::CONSTANT_ALPHA => BlendFactor::ConstantAlpha,
         F::ONE_MINUS_CONSTANT_ALPHA => BlendFactor::OneMinusConstantAlpha,
         F::SRC_ALPHA_SATURATE => BlendFactor::SrcAlphaSaturate,
-        F::SRC1_COLOR | F::ONE_MINUS_SRC1_COLOR | F::SRC1_ALPHA | F::ONE_MINUS_SRC1_ALPHA => {
-            return Err(Error::FeatureNotPresent(format!(
-                "blend factor {factor:?} (feature dualSrcBlend)"
-            )));
-        }
+        F::SRC1_COLOR => BlendFactor::Src1Color,
+        F::ONE_MINUS_SRC1_COLOR => BlendFactor::OneMinusSrc1Color,
+        F::SRC1_ALPHA => BlendFactor::Src1Alpha,
+        F::ONE_MINUS_SRC1_ALPHA => BlendFactor::OneMinusSrc1Alpha,
         other => {
             return Err(Error::usage(
                 "VUID-VkPipelineColorBlendAttachmentState-parameter",
