@@ -269,6 +269,10 @@ pub struct Viewport {
 pub enum CameraModel {
     /// Perspective with a principal point anywhere.
     Pinhole,
+    /// Parallel: focal lengths are pixels per unit of length.
+    Orthographic,
+    /// Equidistant: focal lengths are pixels per radian from the axis.
+    Fisheye,
 }
 
 /// The camera of a Gaussian draw: +x right, +y down, +z forward.
@@ -284,19 +288,23 @@ pub struct Camera {
     pub focal_length: [f32; 2],
     /// The principal point in pixels from the viewport's corner.
     pub principal_point: [f32; 2],
-    /// Gaussians must lie beyond this depth, in world units; greater than 0.
+    /// Gaussians must lie beyond this depth variable, in world units; greater than 0 unless the camera is orthographic.
     pub near_plane: f32,
     /// Gaussians must lie before this depth, in world units; may be infinite.
     pub far_plane: f32,
-    /// Fragment depth is `c0 + c1 / t.z`.
+    /// Fragment depth is `c0 + c1 / z`, or `c0 + c1 z` for an orthographic camera, with the depth variable z.
     pub depth_coefficients: [f32; 2],
 }
 
 /// What Gaussians are sorted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GaussianOrder {
-    /// The camera-space z of the centre.
+    /// The centre's depth variable: camera-space z, or the distance for a fisheye.
     ViewDepth,
+    /// The centre's distance from the eye.
+    RadialDistance,
+    /// Nothing: the order of the draw.
+    Primitive,
 }
 
 /// The state of a Gaussian draw that its pipeline fixes. See the extension for each value's meaning.
