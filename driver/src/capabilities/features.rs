@@ -105,7 +105,11 @@ const SUPPORTED: &[&str] = &[
     "performance_counter_query_pools",
     // VK_GAURAST_gaussian_primitive_topology.
     "gaussian_primitive_topology",
+    "fisheye_camera",
     "opacity_compensation",
+    "orthographic_camera",
+    "primitive_order",
+    "radial_distance_order",
 ];
 
 /// The extensions whose features can't be enabled without them. (Features of core need none.)

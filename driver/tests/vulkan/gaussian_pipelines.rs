@@ -107,14 +107,6 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
             "vertexShaderProjection",
         ),
         (
-            with_state(|s| s.order(GaussianOrderGAURAST::RADIAL_DISTANCE)),
-            "radialDistanceOrder",
-        ),
-        (
-            with_state(|s| s.order(GaussianOrderGAURAST::PRIMITIVE)),
-            "primitiveOrder",
-        ),
-        (
             with_state(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
             "perPixelOrder",
         ),

@@ -116,10 +116,12 @@ fn state(
     let order = match gaussian.order {
         GaussianOrderGAURAST::VIEW_DEPTH => GaussianOrder::ViewDepth,
         GaussianOrderGAURAST::RADIAL_DISTANCE => {
-            return Err(unbuilt("order is RADIAL_DISTANCE", "radialDistanceOrder"));
+            require("radialDistanceOrder", features.has("radial_distance_order"))?;
+            GaussianOrder::RadialDistance
         }
         GaussianOrderGAURAST::PRIMITIVE => {
-            return Err(unbuilt("order is PRIMITIVE", "primitiveOrder"));
+            require("primitiveOrder", features.has("primitive_order"))?;
+            GaussianOrder::Primitive
         }
         GaussianOrderGAURAST::PER_PIXEL => {
             return Err(unbuilt("order is PER_PIXEL", "perPixelOrder"));
