@@ -4,7 +4,7 @@ use crate::compute;
 use crate::counters::Counters;
 use crate::device::Device;
 use crate::gaussian::{GaussianSet, TooManyGaussians};
-use crate::geometry;
+use crate::geometry::{FrontEnd, Surface};
 use crate::packet::Packet;
 use crate::pass::{Pass, PassDraw};
 use crate::query::host_time;
@@ -90,6 +90,8 @@ impl CommandProcessor {
                 self.transfer(|| transfer::copy_buffer_image(copy, Direction::ToBuffer))
             }
             Packet::CopyImage(copy) => self.transfer(|| transfer::copy_image(copy)),
+            Packet::BlitImage(blit) => self.transfer(|| transfer::blit_image(blit)),
+            Packet::ResolveImage(resolve) => self.transfer(|| transfer::resolve_image(resolve)),
             Packet::FillBuffer { target, word } => {
                 self.transfer(|| transfer::fill_buffer(target, *word))
             }
@@ -134,10 +136,17 @@ impl CommandProcessor {
             Packet::Draw(draw) => {
                 let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
                 self.outside_gaussian_set()?;
-                let (area, layers) = (pass.area(), pass.layer_count());
-                let (device, counters) = (&self.device, &mut self.counters);
-                let draw = geometry::process(draw, area, layers, device, counters)?;
-                self.draw(PassDraw::Primitives(draw))
+                let surface = Surface {
+                    area: pass.area(),
+                    layers: pass.layer_count(),
+                    depth: pass.depth_format(),
+                };
+                let device = Arc::clone(&self.device);
+                let mut front = FrontEnd::new(draw, surface, &device, &mut self.counters);
+                while let Some(part) = front.next_part(&mut self.counters)? {
+                    self.draw(PassDraw::Primitives(part))?;
+                }
+                Ok(())
             }
             Packet::Barrier => self.flush(),
             Packet::EndRendering => {

@@ -5,13 +5,13 @@
 
 use crate::counters::{Counter, Counters};
 use crate::device::{Device, FlushPolicy};
-use crate::format::{Format, Numeric};
+use crate::format::Format;
 use crate::gaussian::GaussianDraw;
 use crate::geometry::PrimitiveDraw;
 use crate::image::ImageView;
 use crate::packet::{
     Aspect, Attachment, AttachmentClear, BlendState, ClearAttachments, ClearValue, LoadOp, Rect,
-    Rendering, StoreOp,
+    Rendering, ResolveMode, StoreOp,
 };
 use crate::raster::Plane;
 use crate::raster::blend::Blender;
@@ -47,10 +47,13 @@ impl PassDraw {
 /// What attachments are resolved to when the pass ends.
 #[derive(Debug, Default)]
 struct Resolves {
-    color: Vec<Option<Target>>,
-    depth: Option<Target>,
-    stencil: Option<Target>,
+    color: Vec<Option<Resolve>>,
+    depth: Option<Resolve>,
+    stencil: Option<Resolve>,
 }
+
+/// What an attachment is resolved to, and how.
+type Resolve = (Target, ResolveMode);
 
 /// A render pass between its beginning and its end.
 #[derive(Debug)]
@@ -84,7 +87,7 @@ impl Pass {
             attachment
                 .as_ref()
                 .and_then(|attachment| Some((attachment, attachment.resolve.as_ref()?)))
-                .map(|(attachment, view)| bind_resolve(attachment, view, aspect, rendering))
+                .map(|(attachment, resolve)| bind_resolve(attachment, resolve, aspect, rendering))
                 .transpose()
         };
         let mut pass = Self {
@@ -149,6 +152,11 @@ impl Pass {
         self.layer_count
     }
 
+    /// The depth attachment's format, if there is one.
+    pub fn depth_format(&self) -> Option<Format> {
+        self.depth.as_ref().map(Target::format)
+    }
+
     /// Adds a draw, and flushes the pass if the policy says so.
     ///
     /// # Errors
@@ -190,7 +198,8 @@ impl Pass {
 
     fn resolve_targets(&self) -> impl Iterator<Item = &Target> {
         let rest = [&self.resolve.depth, &self.resolve.stencil];
-        self.resolve.color.iter().chain(rest).flatten()
+        let all = self.resolve.color.iter().chain(rest).flatten();
+        all.map(|(target, _)| target)
     }
 
     fn targets(&self) -> impl Iterator<Item = &Target> {
@@ -345,10 +354,10 @@ enum Ready<'a> {
 /// Prepares what an attachment's aspect is resolved to.
 fn bind_resolve(
     attachment: &Attachment,
-    view: &ImageView,
+    (view, mode): &(ImageView, ResolveMode),
     aspect: Aspect,
     rendering: &Rendering,
-) -> Result<Target, AttachmentError> {
+) -> Result<Resolve, AttachmentError> {
     let target = Target::new(view, aspect, rendering.layer_count, StoreOp::Store)?;
     let of = attachment.view.format.plane(aspect);
     if of.map(Format::texel_size) != Some(target.format().texel_size()) {
@@ -357,7 +366,7 @@ fn bind_resolve(
     if target.samples() != 1 {
         return Err(AttachmentError::Samples(target.samples()));
     }
-    Ok(target)
+    Ok((target, *mode))
 }
 
 /// Prepares an attachment's aspect.
@@ -471,9 +480,9 @@ impl Frame<'_> {
             ]);
         for (plane, target, resolve) in planes {
             let Some(target) = target else { continue };
-            if let Some(resolve) = resolve.filter(|_| self.last) {
+            if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
                 plane.touch(target, layer, tile);
-                plane.resolve(target, resolve, averages(target), layer, tile);
+                plane.resolve(target, (resolve, *mode), layer, tile);
             }
             let keep = !self.last || target.store == StoreOp::Store;
             plane.finish(target, layer, tile, keep);
@@ -543,11 +552,4 @@ impl Frame<'_> {
             blender.blend_row(row, columns.map(|x| fragments.pixel(x, y)))
         });
     }
-}
-
-/// Whether samples of an attachment are resolved to their average.
-fn averages(target: &Target) -> bool {
-    let format = target.format();
-    let color = format.aspects() == [Aspect::Color];
-    color && !format.is_integer() && format.numeric() != Numeric::DepthStencil
 }

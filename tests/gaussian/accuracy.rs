@@ -6,7 +6,8 @@
 use std::time::Instant;
 
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
+    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_samples::camera::{Camera, DEFAULT_FOV};
 use gaurast_samples::scene::Scene;
@@ -167,6 +168,75 @@ fn generated_scenes_keep_the_contract_in_every_state() {
             );
         }
     }
+}
+
+/// Views of a generated scene by cameras that are no pinholes, one of them with Gaussians behind it.
+fn other_cameras() -> Vec<View> {
+    let size = [211, 157];
+    let view = |name: &str, camera| View {
+        name: name.to_owned(),
+        camera,
+        size,
+        limits: Limits::ENVELOPE_ONLY,
+    };
+    let pinhole = scenes::camera(size[0], size[1]).to_vulkan();
+    let parallel = pinhole
+        .model(GaussianCameraModelGAURAST::ORTHOGRAPHIC)
+        .focal_length([31.0, 29.0])
+        .depth_coefficients([0.0, 0.05]);
+    let fisheye = pinhole.model(GaussianCameraModelGAURAST::FISHEYE);
+    vec![
+        view("parallel", parallel),
+        view(
+            "parallel, from its middle",
+            parallel.eye([0.2, -0.1, 5.0]).near_plane(-4.0),
+        ),
+        view("fisheye", fisheye.focal_length([120.0, 110.0])),
+        view(
+            "fisheye, from its middle",
+            fisheye.eye([0.2, -0.1, 5.0]).focal_length([32.0; 2]),
+        ),
+    ]
+}
+
+#[test]
+fn every_camera_and_every_order_keep_the_contract() {
+    let devices = Devices::new();
+    let scene = scenes::cloud(11, 3000, 2);
+    let orders = [
+        ("by view depth", GaussianOrderGAURAST::VIEW_DEPTH),
+        ("by distance", GaussianOrderGAURAST::RADIAL_DISTANCE),
+        ("as drawn", GaussianOrderGAURAST::PRIMITIVE),
+    ];
+    for (name, order) in orders {
+        let mut views = other_cameras();
+        views.push(generated_view(Limits::ENVELOPE_ONLY));
+        devices.judge(
+            &format!("cloud 11 {name}"),
+            &scene,
+            State::default().order(order),
+            &views,
+        );
+    }
+}
+
+#[test]
+fn orders_give_different_pictures() {
+    let context = Context::embedded(&Settings::default());
+    let scene = scenes::cloud(12, 3000, 0);
+    let view = generated_view(Limits::ENVELOPE_ONLY);
+    let picture = |order| {
+        let mut drawn = draw(
+            &context,
+            &scene,
+            State::default().order(order),
+            std::slice::from_ref(&view),
+        );
+        drawn.remove(0).0
+    };
+    let by_depth = picture(GaussianOrderGAURAST::VIEW_DEPTH);
+    assert!(by_depth != picture(GaussianOrderGAURAST::RADIAL_DISTANCE));
+    assert!(by_depth != picture(GaussianOrderGAURAST::PRIMITIVE));
 }
 
 #[test]

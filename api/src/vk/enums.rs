@@ -72,7 +72,7 @@ vk_enum! {
     /// `VkGaussianOrderGAURAST`: the order, front to back, in which a draw's Gaussians are
     /// accumulated. Ties are broken by draw, instance and position in the draw.
     pub struct GaussianOrderGAURAST {
-        /// Ascending distance along the view axis, or the vertex shader's depth key.
+        /// Ascending depth variable z of the camera's model, or the vertex shader's depth key.
         VIEW_DEPTH = 0,
         /// Ascending distance from the eye. Needs `radialDistanceOrder`.
         RADIAL_DISTANCE = 1,

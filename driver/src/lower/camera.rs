@@ -12,9 +12,9 @@ use simdevice::packet::{Camera, CameraModel};
 pub(crate) fn camera(camera: &GaussianCameraGAURAST) -> Result<Camera, Error> {
     let model = match camera.model {
         GaussianCameraModelGAURAST::PINHOLE => CameraModel::Pinhole,
-        GaussianCameraModelGAURAST::ORTHOGRAPHIC
-        | GaussianCameraModelGAURAST::FISHEYE
-        | GaussianCameraModelGAURAST::EQUIRECTANGULAR => {
+        GaussianCameraModelGAURAST::ORTHOGRAPHIC => CameraModel::Orthographic,
+        GaussianCameraModelGAURAST::FISHEYE => CameraModel::Fisheye,
+        GaussianCameraModelGAURAST::EQUIRECTANGULAR => {
             return Err(Error::FeatureNotPresent(format!(
                 "the camera model {:?}",
                 camera.model
@@ -27,7 +27,7 @@ pub(crate) fn camera(camera: &GaussianCameraGAURAST) -> Result<Camera, Error> {
             ));
         }
     };
-    validate(camera)?;
+    validate(camera, model)?;
     Ok(Camera {
         model,
         rotation: camera.rotation,
@@ -40,7 +40,7 @@ pub(crate) fn camera(camera: &GaussianCameraGAURAST) -> Result<Camera, Error> {
     })
 }
 
-fn validate(camera: &GaussianCameraGAURAST) -> Result<(), Error> {
+fn validate(camera: &GaussianCameraGAURAST, model: CameraModel) -> Result<(), Error> {
     let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
     let c = camera;
     let rules = [
@@ -65,9 +65,9 @@ fn validate(camera: &GaussianCameraGAURAST) -> Result<(), Error> {
             "principalPoint must be finite",
         ),
         (
-            c.near_plane > 0.0 && c.near_plane.is_finite(),
+            (c.near_plane > 0.0 || model == CameraModel::Orthographic) && c.near_plane.is_finite(),
             "VUID-VkGaussianCameraGAURAST-nearPlane-value",
-            "nearPlane must be finite and greater than 0",
+            "nearPlane must be finite, and greater than 0 unless the camera is orthographic",
         ),
         (
             c.far_plane > c.near_plane,
@@ -108,6 +108,14 @@ mod tests {
     }
 
     #[test]
+    fn only_an_orthographic_camera_sees_what_is_behind_it() {
+        let behind = good().near_plane(-5.0);
+        assert!(camera(&behind).is_err());
+        let parallel = behind.model(GaussianCameraModelGAURAST::ORTHOGRAPHIC);
+        assert_eq!(camera(&parallel).unwrap().model, CameraModel::Orthographic);
+    }
+
+    #[test]
     fn what_is_no_camera_is_refused() {
         let bad = [
             good().focal_length([0.0, 1.0]),
@@ -119,7 +127,7 @@ mod tests {
             good().near_plane(2.0).far_plane(1.0),
             good().far_plane(f32::NAN),
             good().depth_coefficients([f32::NAN, 0.0]),
-            good().model(GaussianCameraModelGAURAST::FISHEYE),
+            good().model(GaussianCameraModelGAURAST::EQUIRECTANGULAR),
             good().model(GaussianCameraModelGAURAST::from_raw(77)),
         ];
         for bad in bad {

@@ -107,14 +107,6 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
             "vertexShaderProjection",
         ),
         (
-            with_state(|s| s.order(GaussianOrderGAURAST::RADIAL_DISTANCE)),
-            "radialDistanceOrder",
-        ),
-        (
-            with_state(|s| s.order(GaussianOrderGAURAST::PRIMITIVE)),
-            "primitiveOrder",
-        ),
-        (
             with_state(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
             "perPixelOrder",
         ),
@@ -176,13 +168,6 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
                 ..PipelineRequest::default()
             },
             "DEPTH_TEST_ENABLE",
-        ),
-        (
-            PipelineRequest {
-                topology: vk::PrimitiveTopology::TRIANGLE_LIST,
-                ..PipelineRequest::default()
-            },
-            "TRIANGLE_LIST",
         ),
     ];
     for (request, word) in bad {

@@ -8,7 +8,11 @@
 
 use super::tile::{AREA, SIDE, Target, Tile, place};
 use crate::format::{Format, MAX_TEXEL_SIZE};
-use crate::packet::Rect;
+use crate::packet::{Rect, ResolveMode};
+use crate::transfer::resolve_row;
+
+/// The most samples of a pixel.
+const MAX_SAMPLES: usize = 4;
 
 /// One attachment's texels of a macro-tile: by tile, then sample, then pixel (see [`place`]).
 #[derive(Debug, Default)]
@@ -180,45 +184,41 @@ impl Plane {
         }
     }
 
-    /// Resolves a tile that was touched: the average of its samples, or sample 0, is written to `resolve`.
+    /// Resolves a tile that was touched: one sample for each of its pixels is written to `resolve`.
     pub fn resolve(
         &mut self,
         target: &Target,
-        resolve: &Target,
-        average: bool,
+        (resolve, mode): (&Target, ResolveMode),
         layer: u32,
         tile: &Tile,
     ) {
-        let (size, stride, samples) = (target.format().texel_size(), self.stride, self.samples);
-        let count = if average { samples } else { 1 };
+        let (format, samples, stride) = (target.format(), self.samples, self.stride);
+        let (size, resolved_size) = (format.texel_size(), resolve.format().texel_size());
+        let has_mean = mode != ResolveMode::Average || !format.is_integer();
+        let copied = mode == ResolveMode::SampleZero || !has_mean || samples == 1;
         for (y, columns) in tile.rows(tile.pixels) {
-            let mut rows = [[[0f32; 4]; SIDE]; 4];
+            let count = columns.len();
+            let mut decoded = [[[0f32; 4]; SIDE]; MAX_SAMPLES];
             let mut row = [0; SIDE * MAX_TEXEL_SIZE];
-            let bytes = &mut row[..columns.len() * size];
-            for (sample, decoded) in rows.iter_mut().enumerate().take(count) {
+            let used = if copied { 1 } else { samples };
+            for (sample, decoded) in decoded.iter_mut().enumerate().take(used) {
                 let texels = self.sample_mut(tile.index, sample);
+                let bytes = &mut row[..count * size];
                 for (x, out) in columns.clone().zip(bytes.chunks_exact_mut(size)) {
                     out.copy_from_slice(&texels[place(x, y) * stride..][..size]);
                 }
-                target.format().decode_row(bytes, decoded);
-            }
-            if count > 1 {
-                let [mut sums, rest @ ..] = rows;
-                for row in rest.iter().take(count - 1) {
-                    for (sum, texel) in sums.iter_mut().zip(row) {
-                        *sum = std::array::from_fn(|c| sum[c] + texel[c]);
-                    }
+                if !copied {
+                    format.decode_row(bytes, &mut decoded[..count]);
                 }
-                let scale = 1.0 / count as f32;
-                let sums = sums.map(|sum| sum.map(|component| component * scale));
-                let size = resolve.format().texel_size();
-                let mut row = [0; SIDE * MAX_TEXEL_SIZE];
-                let bytes = &mut row[..columns.len() * size];
-                resolve.format().encode_row(&sums[..columns.len()], bytes);
-                resolve.write(layer, 0, tile.pixel(columns.start, y), bytes);
-            } else {
-                resolve.write(layer, 0, tile.pixel(columns.start, y), bytes);
             }
+            let bytes = &mut row[..count * resolved_size];
+            if !copied {
+                let mut resolved = [[0f32; 4]; SIDE];
+                let rows = decoded[..used].iter().map(|row| &row[..count]);
+                resolve_row(format, mode, rows, &mut resolved[..count]);
+                resolve.format().encode_row(&resolved[..count], bytes);
+            }
+            resolve.write(layer, 0, tile.pixel(columns.start, y), bytes);
         }
     }
 

@@ -278,11 +278,10 @@ impl<'d> Renderer<'_, 'd> {
         let mut coverage = Coverage::<N>::default();
         let draw = self.draw;
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
-        // Until there are bins: every primitive of the layer.
-        for (index, primitive) in draw.draw.primitives.iter().enumerate() {
-            if u32::from(primitive.layer) != self.place.layer {
+        for &index in draw.draw.bins.of(self.place.at, self.place.layer) {
+            let Some(primitive) = draw.draw.primitives.get(index as usize) else {
                 continue;
-            }
+            };
             if clip.0 != primitive.viewport {
                 let Some(pixels) = draw.clips.get(usize::from(primitive.viewport)) else {
                     continue;
@@ -294,7 +293,7 @@ impl<'d> Renderer<'_, 'd> {
             };
             let range = draw.ranges.get(usize::from(primitive.viewport));
             let mut current = Current {
-                index: index as u32,
+                index,
                 primitive,
                 setup,
                 record: None,

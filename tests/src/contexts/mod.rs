@@ -78,7 +78,11 @@ impl Context {
         let extensions = [gaussian_primitive_topology::NAME.as_ptr()];
         let mut gaussian = GaussianFeatures::default()
             .gaussian_primitive_topology(true)
-            .opacity_compensation(true);
+            .opacity_compensation(true)
+            .radial_distance_order(true)
+            .primitive_order(true)
+            .orthographic_camera(true)
+            .fisheye_camera(true);
         let mut vulkan_1_3 = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
         let device_info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)

@@ -6,7 +6,7 @@ use super::*;
 use crate::bindings::Bindings;
 use crate::device::{Config, FlushPolicy};
 use crate::format::Format;
-use crate::geometry::{DrawPipeline, PrimitiveKind, Varyings};
+use crate::geometry::{Bins, DrawPipeline, PrimitiveKind, Varyings};
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::draw::*;
 use crate::packet::*;
@@ -182,10 +182,24 @@ fn draw(
         varyings: per_vertex as u32,
         fragment,
     };
+    let area = Rect {
+        x: 0,
+        y: 0,
+        width: WIDTH,
+        height: HEIGHT,
+    };
+    let layers = primitives.iter().map(|p| u32::from(p.layer) + 1).max();
     PrimitiveDraw {
         pipeline: Arc::new(DrawPipeline::new(device, programs).unwrap()),
         state: Arc::new(state),
         bindings: Bindings::default(),
+        bins: Bins::everywhere(
+            &primitives,
+            area,
+            device.config().macro_tile_size,
+            layers.unwrap_or(1),
+        ),
+        regions: Vec::new(),
         primitives,
         varyings: Varyings { values, per_vertex },
     }
