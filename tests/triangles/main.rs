@@ -1,0 +1,4 @@
+//! Triangles, held against lavapipe's.
+
+mod devices;
+mod sweep;
