@@ -246,18 +246,13 @@ fn over_stripes(
     target.draw(gpu, &Pass::default(), |commands| {
         commands.vertices(&buffer);
         commands.bind(&stripes);
-        for value in 0..8 {
-            let x = 16 * value.cast_signed();
+        for (x, value) in (0..).step_by(16).zip([0, 1, 2, 3, 127, 128, 254, 255]) {
             commands.scissor([x, 0], [16, 128]);
             let faces = vk::StencilFaceFlags::FRONT_AND_BACK;
-            let values = [0, 1, 2, 3, 127, 128, 254, 255];
             // SAFETY: see `triangles`.
             unsafe {
-                commands.device().cmd_set_stencil_reference(
-                    commands.raw,
-                    faces,
-                    values[value as usize],
-                );
+                let device = commands.device();
+                device.cmd_set_stencil_reference(commands.raw, faces, value);
             }
             commands.draw(0..6);
         }
