@@ -241,6 +241,10 @@ fn create_device(
         instance.get_physical_device_features2(physical_device, &mut features);
         let mut core = features.features;
         core.robust_buffer_access = vk::FALSE;
+        // They are in a chain already.
+        vulkan_1_1.p_next = std::ptr::null_mut();
+        vulkan_1_2.p_next = std::ptr::null_mut();
+        vulkan_1_3.p_next = std::ptr::null_mut();
         vulkan_1_3.robust_image_access = vk::FALSE;
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
