@@ -1,4 +1,5 @@
 //! Triangles, held against lavapipe's.
 
+mod coverage;
 mod devices;
 mod sweep;

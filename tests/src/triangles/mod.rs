@@ -7,7 +7,9 @@
 //! within Vulkan's valid usage (`VK_INSTANCE_LAYERS=VK_LAYER_KHRONOS_validation` shows where it
 //! doesn't).
 
+pub mod checksum;
 mod commands;
+pub mod edges;
 mod expected;
 mod gpu;
 mod output;
