@@ -11,6 +11,8 @@ need() { # need PACKAGE COMMAND-OR-FILE
     command -v "$2" >/dev/null 2>&1 || [ -e "$2" ] || missing+=("$1")
 }
 need gcc cc
+need g++ c++
+need libvulkan-dev /usr/include/vulkan/vulkan.h
 need mesa-vulkan-drivers /usr/share/vulkan/icd.d/lvp_icd.x86_64.json
 need libvulkan1 "/usr/lib/$(uname -m)-linux-gnu/libvulkan.so.1"
 need vulkan-tools vulkaninfo

@@ -4,7 +4,7 @@ use crate::compute;
 use crate::counters::Counters;
 use crate::device::Device;
 use crate::gaussian::{GaussianSet, TooManyGaussians};
-use crate::geometry;
+use crate::geometry::{FrontEnd, Surface};
 use crate::packet::Packet;
 use crate::pass::{Pass, PassDraw};
 use crate::query::host_time;
@@ -90,6 +90,8 @@ impl CommandProcessor {
                 self.transfer(|| transfer::copy_buffer_image(copy, Direction::ToBuffer))
             }
             Packet::CopyImage(copy) => self.transfer(|| transfer::copy_image(copy)),
+            Packet::BlitImage(blit) => self.transfer(|| transfer::blit_image(blit)),
+            Packet::ResolveImage(resolve) => self.transfer(|| transfer::resolve_image(resolve)),
             Packet::FillBuffer { target, word } => {
                 self.transfer(|| transfer::fill_buffer(target, *word))
             }
@@ -134,31 +136,34 @@ impl CommandProcessor {
             Packet::Draw(draw) => {
                 let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
                 self.outside_gaussian_set()?;
-                let (area, layers) = (pass.area(), pass.layer_count());
-                let (device, counters) = (&self.device, &mut self.counters);
-                let draw = geometry::process(draw, area, layers, device, counters)?;
-                self.draw(PassDraw::Primitives(draw))
-            }
-            Packet::Barrier => {
-                self.flush();
+                let surface = Surface {
+                    area: pass.area(),
+                    layers: pass.layer_count(),
+                    depth: pass.depth_format(),
+                };
+                let device = Arc::clone(&self.device);
+                let mut front = FrontEnd::new(draw, surface, &device, &mut self.counters);
+                while let Some(part) = front.next_part(&mut self.counters)? {
+                    self.draw(PassDraw::Primitives(part))?;
+                }
                 Ok(())
             }
+            Packet::Barrier => self.flush(),
             Packet::EndRendering => {
                 let pass = self.pass.take().ok_or(ExecutionError::OutsidePass)?;
                 if self.gaussians.take().is_some() {
                     return Err(ExecutionError::GaussianSetOpen);
                 }
-                pass.end(&self.device, &mut self.counters);
-                Ok(())
+                Ok(pass.end(&self.device, &mut self.counters)?)
             }
             // What a query measures is what was done, not what waits.
             Packet::BeginQuery { pool, index } => {
-                self.flush();
+                self.flush()?;
                 pool.begin(*index, &self.counters);
                 Ok(())
             }
             Packet::EndQuery { pool, index } => {
-                self.flush();
+                self.flush()?;
                 pool.end(*index, &self.counters);
                 Ok(())
             }
@@ -167,7 +172,7 @@ impl CommandProcessor {
                 Ok(())
             }
             Packet::WriteTimestamp { pool, index } => {
-                self.flush();
+                self.flush()?;
                 pool.write_timestamp(*index, host_time());
                 Ok(())
             }
@@ -194,14 +199,14 @@ impl CommandProcessor {
     fn draw(&mut self, draw: PassDraw) -> Result<(), ExecutionError> {
         self.outside_gaussian_set()?;
         let pass = self.pass.as_mut().ok_or(ExecutionError::OutsidePass)?;
-        pass.push(draw, &self.device, &mut self.counters);
-        Ok(())
+        Ok(pass.push(draw, &self.device, &mut self.counters)?)
     }
 
     /// Renders what waits in the pass, if there is one.
-    fn flush(&mut self) {
+    fn flush(&mut self) -> Result<(), ExecutionError> {
         if let Some(pass) = &mut self.pass {
-            pass.flush(&self.device, &mut self.counters);
+            pass.flush(&self.device, &mut self.counters)?;
         }
+        Ok(())
     }
 }

@@ -129,6 +129,10 @@ pub(crate) fn dispatch(
     };
     dispatch.bindings.bump_generations();
     counters.add(Counter::ShaderTime, started.elapsed().as_nanos() as u64);
+    counters.add(
+        Counter::ComputeInvocations,
+        groups.saturating_mul(dispatch.program.invocations as u64),
+    );
     counters.add_work(&ran?);
     Ok(())
 }

@@ -64,10 +64,20 @@ counters! {
     SkippedFar: "gaussians skipped", "beyond far plane", Count, "Gaussians not before the far plane";
     SkippedDegenerate: "gaussians skipped", "degenerate covariance", Count, "Gaussians whose screen-space covariance is not positive and finite";
     SkippedOffScreen: "gaussians skipped", "off screen", Count, "Gaussians that reach no pixel of the scissored viewport at the alpha floor";
+    InputVertices: "geometry", "input vertices", Count, "Vertices or indices of draws of points, lines and triangles";
+    InputPrimitives: "geometry", "input primitives", Count, "Points, lines and triangles that were assembled";
+    VertexInvocations: "geometry", "vertex invocations", Count, "Vertices shaded";
+    ClippingInvocations: "geometry", "clipping invocations", Count, "Primitives that reached clipping";
+    ClippingPrimitives: "geometry", "clipping primitives", Count, "Primitives that clipping left, as it cut them";
+    PrimitivesDrawn: "geometry", "primitives drawn", Count, "Primitives that were not culled and may cover a sample";
+    BinnedPairs: "geometry", "binned pairs", Count, "Pairs of a macro-tile and a primitive that may touch it";
     TilePairs: "raster", "tile pairs", Count, "Pairs of a 16x16 tile and a Gaussian that reaches a pixel centre's rectangle of it";
     TilePairsEvaluated: "raster", "tile pairs evaluated", Count, "Tile pairs that were fetched before their tile was saturated";
     BlockEvaluations: "raster", "block evaluations", Count, "Pairs of a 4x4 block and a Gaussian whose alpha was evaluated";
     PixelContributions: "raster", "pixel contributions", Count, "Pairs of a pixel and a Gaussian that contributed to it";
+    FragmentInvocations: "raster", "fragment invocations", Count, "Invocations of fragment programs, those that only help with derivatives apart";
+    SamplesPassed: "raster", "samples passed", Count, "Samples of primitives that passed all tests";
+    ComputeInvocations: "shader cores", "compute invocations", Count, "Invocations of compute programs";
     ShaderBatches: "shader cores", "batches", Count, "Batches of shader invocations run";
     ShaderFloat: "shader cores", "float instructions", Count, "32-bit float instructions, each counted once for a batch";
     ShaderInteger: "shader cores", "integer instructions", Count, "32-bit integer and bit instructions, each counted once for a batch";
@@ -82,9 +92,10 @@ counters! {
     ShaderUniform: "shader cores", "uniform instructions", Count, "Instructions computed once for all lanes of a batch; they are in the counts by kind too";
     ShaderActiveLanes: "shader cores", "active lanes", Count, "Lanes that were active, summed over the instructions that work on each lane";
     ShaderLanes: "shader cores", "lanes", Count, "Lanes that could have been active, summed alike; active lanes by it is the lane occupancy";
+    GeometryTime: "time", "geometry", Nanoseconds, "All of points, lines and triangles before tiles: vertices, set-up, binning";
     PreprocessTime: "time", "preprocess", Nanoseconds, "Reading, culling, projecting and colouring Gaussians";
     SortTime: "time", "sort", Nanoseconds, "Sorting by depth";
-    BinningTime: "time", "binning", Nanoseconds, "Finding the tiles of each Gaussian, and placing it in their lists";
+    BinningTime: "time", "binning", Nanoseconds, "Placing Gaussians and primitives in the lists of their tiles";
     ShaderTime: "time", "dispatches", Nanoseconds, "Running the workgroups of compute programs";
     RasterTime: "time", "raster", Nanoseconds, "Rendering tiles: load, evaluate, blend, store";
 }

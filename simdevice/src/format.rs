@@ -62,7 +62,7 @@ pub enum Channel {
 
 impl Channel {
     /// The register that holds it, if any.
-    fn register(self) -> Option<usize> {
+    pub(crate) fn register(self) -> Option<usize> {
         match self {
             Self::R | Self::D | Self::S => Some(0),
             Self::G => Some(1),

@@ -1,13 +1,18 @@
 //! Packets: what the driver asks of the device. Plain data; everything a packet needs it holds by [`Arc`].
 
 pub mod draw;
+mod transfer;
 
 use crate::compute::Dispatch;
 use crate::format::Format;
-use crate::image::{Image, ImageView};
+use crate::image::ImageView;
 use crate::query::QueryPool;
 pub use devmem::BufferRange;
 use std::sync::Arc;
+pub use transfer::{
+    BlitImage, BufferCopyRegion, BufferImageRegion, ClearImage, CopyBuffer, CopyBufferImage,
+    CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers, SubresourceRange,
+};
 
 /// One command for the [`CommandProcessor`](crate::CommandProcessor).
 #[derive(Clone, Debug)]
@@ -20,6 +25,10 @@ pub enum Packet {
     CopyImageToBuffer(CopyBufferImage),
     /// Copies texels between images whose formats have equal texel sizes.
     CopyImage(CopyImage),
+    /// Copies texels between images, scaling and converting them.
+    BlitImage(BlitImage),
+    /// Copies colour texels of several samples to texels of one.
+    ResolveImage(ResolveImage),
     /// Fills a buffer range with a repeated 32-bit word.
     FillBuffer {
         /// The range; offset and size are multiples of four.
@@ -86,28 +95,6 @@ pub enum Packet {
     },
 }
 
-/// A region of a buffer-to-buffer copy; offsets are relative to the packet's ranges.
-#[derive(Clone, Copy, Debug)]
-pub struct BufferCopyRegion {
-    /// The first byte in the source range.
-    pub source_offset: u64,
-    /// The first byte in the target range.
-    pub target_offset: u64,
-    /// How many bytes.
-    pub size: u64,
-}
-
-/// See [`Packet::CopyBuffer`].
-#[derive(Clone, Debug)]
-pub struct CopyBuffer {
-    /// Where bytes come from.
-    pub source: BufferRange,
-    /// Where they go.
-    pub target: BufferRange,
-    /// What is copied.
-    pub regions: Vec<BufferCopyRegion>,
-}
-
 /// Which half of a depth and stencil image is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Aspect {
@@ -117,73 +104,6 @@ pub enum Aspect {
     Depth,
     /// The stencil component.
     Stencil,
-}
-
-/// One mip level of a run of array layers, one aspect.
-#[derive(Clone, Copy, Debug)]
-pub struct SubresourceLayers {
-    /// The aspect.
-    pub aspect: Aspect,
-    /// The mip level.
-    pub mip_level: u32,
-    /// The first array layer.
-    pub base_layer: u32,
-    /// How many layers.
-    pub layer_count: u32,
-}
-
-/// A region of a copy between a buffer and an image.
-#[derive(Clone, Copy, Debug)]
-pub struct BufferImageRegion {
-    /// Byte offset in the buffer range.
-    pub buffer_offset: u64,
-    /// Texels from one row to the next in the buffer; 0 means tightly packed.
-    pub buffer_row_length: u32,
-    /// Rows from one slice or layer to the next in the buffer; 0 means tightly packed.
-    pub buffer_image_height: u32,
-    /// What part of the image.
-    pub subresource: SubresourceLayers,
-    /// The first texel: x, y, z.
-    pub image_offset: [i32; 3],
-    /// Texels in x, y and z.
-    pub image_extent: [u32; 3],
-}
-
-/// See [`Packet::CopyBufferToImage`] and [`Packet::CopyImageToBuffer`].
-#[derive(Clone, Debug)]
-pub struct CopyBufferImage {
-    /// The buffer side.
-    pub buffer: BufferRange,
-    /// The image side.
-    pub image: Arc<Image>,
-    /// What is copied.
-    pub regions: Vec<BufferImageRegion>,
-}
-
-/// A region of an image-to-image copy.
-#[derive(Clone, Copy, Debug)]
-pub struct ImageCopyRegion {
-    /// What part of the source.
-    pub source: SubresourceLayers,
-    /// The first texel there: x, y, z.
-    pub source_offset: [i32; 3],
-    /// What part of the target.
-    pub target: SubresourceLayers,
-    /// The first texel there: x, y, z.
-    pub target_offset: [i32; 3],
-    /// Texels in x, y and z.
-    pub extent: [u32; 3],
-}
-
-/// See [`Packet::CopyImage`].
-#[derive(Clone, Debug)]
-pub struct CopyImage {
-    /// Where texels come from.
-    pub source: Arc<Image>,
-    /// Where they go.
-    pub target: Arc<Image>,
-    /// What is copied.
-    pub regions: Vec<ImageCopyRegion>,
 }
 
 /// A clear value, as bits: how they are read depends on the format cleared.
@@ -202,32 +122,6 @@ pub enum ClearValue {
         /// Stencil.
         stencil: u32,
     },
-}
-
-/// A range of an image's subresources, one aspect.
-#[derive(Clone, Copy, Debug)]
-pub struct SubresourceRange {
-    /// The aspect.
-    pub aspect: Aspect,
-    /// The first mip level.
-    pub base_mip_level: u32,
-    /// How many levels.
-    pub level_count: u32,
-    /// The first array layer.
-    pub base_layer: u32,
-    /// How many layers.
-    pub layer_count: u32,
-}
-
-/// See [`Packet::ClearImage`].
-#[derive(Clone, Debug)]
-pub struct ClearImage {
-    /// The image.
-    pub image: Arc<Image>,
-    /// The value.
-    pub value: ClearValue,
-    /// What is cleared.
-    pub ranges: Vec<SubresourceRange>,
 }
 
 /// A rectangle of framebuffer pixels.
@@ -286,6 +180,19 @@ pub enum StoreOp {
     None,
 }
 
+/// How the samples of a texel become one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ResolveMode {
+    /// The first sample. What integer and stencil attachments, which have no mean, are commonly resolved by.
+    SampleZero,
+    /// The mean of all samples, of what they mean rather than of their codes: sRGB is decoded first.
+    Average,
+    /// The least sample, component by component.
+    Min,
+    /// The greatest sample, component by component.
+    Max,
+}
+
 /// An attachment of a pass.
 #[derive(Clone, Debug)]
 pub struct Attachment {
@@ -295,6 +202,9 @@ pub struct Attachment {
     pub load: LoadOp,
     /// What happens at the end.
     pub store: StoreOp,
+    /// Where the pass leaves one sample for each texel of its area when it ends, if anywhere: a view of an image of
+    /// one sample, as large as `view`. What `store` says doesn't matter to it.
+    pub resolve: Option<(ImageView, ResolveMode)>,
 }
 
 /// See [`Packet::BeginRendering`].
@@ -359,6 +269,10 @@ pub struct Viewport {
 pub enum CameraModel {
     /// Perspective with a principal point anywhere.
     Pinhole,
+    /// Parallel: focal lengths are pixels per unit of length.
+    Orthographic,
+    /// Equidistant: focal lengths are pixels per radian from the axis.
+    Fisheye,
 }
 
 /// The camera of a Gaussian draw: +x right, +y down, +z forward.
@@ -374,19 +288,23 @@ pub struct Camera {
     pub focal_length: [f32; 2],
     /// The principal point in pixels from the viewport's corner.
     pub principal_point: [f32; 2],
-    /// Gaussians must lie beyond this depth, in world units; greater than 0.
+    /// Gaussians must lie beyond this depth variable, in world units; greater than 0 unless the camera is orthographic.
     pub near_plane: f32,
     /// Gaussians must lie before this depth, in world units; may be infinite.
     pub far_plane: f32,
-    /// Fragment depth is `c0 + c1 / t.z`.
+    /// Fragment depth is `c0 + c1 / z`, or `c0 + c1 z` for an orthographic camera, with the depth variable z.
     pub depth_coefficients: [f32; 2],
 }
 
 /// What Gaussians are sorted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GaussianOrder {
-    /// The camera-space z of the centre.
+    /// The centre's depth variable: camera-space z, or the distance for a fisheye.
     ViewDepth,
+    /// The centre's distance from the eye.
+    RadialDistance,
+    /// Nothing: the order of the draw.
+    Primitive,
 }
 
 /// The state of a Gaussian draw that its pipeline fixes. See the extension for each value's meaning.
@@ -431,6 +349,10 @@ pub enum BlendFactor {
     ConstantAlpha,
     OneMinusConstantAlpha,
     SrcAlphaSaturate,
+    Src1Color,
+    OneMinusSrc1Color,
+    Src1Alpha,
+    OneMinusSrc1Alpha,
 }
 
 /// The operation of the blend equation.

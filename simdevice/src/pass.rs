@@ -8,15 +8,18 @@ use crate::device::{Device, FlushPolicy};
 use crate::format::Format;
 use crate::gaussian::GaussianDraw;
 use crate::geometry::PrimitiveDraw;
+use crate::image::ImageView;
 use crate::packet::{
-    Aspect, Attachment, AttachmentClear, BlendState, ClearAttachments, LoadOp, Rect, Rendering,
-    StoreOp,
+    Aspect, Attachment, AttachmentClear, BlendState, ClearAttachments, ClearValue, LoadOp, Rect,
+    Rendering, ResolveMode, StoreOp,
 };
-use crate::raster::TILE_SIZE;
+use crate::raster::Plane;
 use crate::raster::blend::Blender;
 use crate::raster::gaussian::GaussianTile;
-use crate::raster::tile::{AttachmentError, Plane, Target, Tile, fill_rect};
-use std::sync::atomic::{AtomicU64, Ordering};
+use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
+use crate::raster::tile::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target, Tile};
+use isa::exec::Stopped;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
 /// A draw that waits in a pass.
@@ -41,6 +44,17 @@ impl PassDraw {
     }
 }
 
+/// What attachments are resolved to when the pass ends.
+#[derive(Debug, Default)]
+struct Resolves {
+    color: Vec<Option<Resolve>>,
+    depth: Option<Resolve>,
+    stencil: Option<Resolve>,
+}
+
+/// What an attachment is resolved to, and how.
+type Resolve = (Target, ResolveMode);
+
 /// A render pass between its beginning and its end.
 #[derive(Debug)]
 pub struct Pass {
@@ -49,6 +63,10 @@ pub struct Pass {
     color: Vec<Option<Target>>,
     depth: Option<Target>,
     stencil: Option<Target>,
+    /// What the colour attachments, depth and stencil are resolved to.
+    resolve: Resolves,
+    /// Samples per pixel of the attachments, if there are any.
+    samples: Option<u32>,
     draws: Vec<PassDraw>,
     bin_bytes: u64,
 }
@@ -65,6 +83,13 @@ impl Pass {
                 .map(|attachment| bind(attachment, aspect, rendering.layer_count))
                 .transpose()
         };
+        let resolve = |attachment: &Option<Attachment>, aspect| {
+            attachment
+                .as_ref()
+                .and_then(|attachment| Some((attachment, attachment.resolve.as_ref()?)))
+                .map(|(attachment, resolve)| bind_resolve(attachment, resolve, aspect, rendering))
+                .transpose()
+        };
         let mut pass = Self {
             area: rendering.area,
             layer_count: rendering.layer_count.max(1),
@@ -75,19 +100,37 @@ impl Pass {
                 .collect::<Result<_, _>>()?,
             depth: target(&rendering.depth, Aspect::Depth)?,
             stencil: target(&rendering.stencil, Aspect::Stencil)?,
+            resolve: Resolves {
+                color: rendering
+                    .color
+                    .iter()
+                    .map(|attachment| resolve(attachment, Aspect::Color))
+                    .collect::<Result<_, _>>()?,
+                depth: resolve(&rendering.depth, Aspect::Depth)?,
+                stencil: resolve(&rendering.stencil, Aspect::Stencil)?,
+            },
+            samples: None,
             draws: Vec::new(),
             bin_bytes: 0,
         };
-        let (mut extent, mut layers) = ([0; 2], 0);
-        for (number, target) in pass.targets().enumerate() {
+        // The smallest attachment bounds the others; without any the area is all there is.
+        let (mut extent, mut layers) = ([MAX_FRAMEBUFFER_SIZE; 2], pass.layer_count);
+        let mut samples = None;
+        for target in pass.targets() {
             let [width, height] = target.extent();
-            // Without attachments there is nothing to render; the smallest one bounds the others.
-            if number == 0 {
-                (extent, layers) = ([width, height], target.layer_count());
+            extent = [extent[0].min(width), extent[1].min(height)];
+            layers = layers.min(target.layer_count());
+            if samples.is_some_and(|samples| samples != target.samples()) {
+                return Err(AttachmentError::Samples(target.samples()));
             }
+            samples = Some(target.samples());
+        }
+        for target in pass.resolve_targets() {
+            let [width, height] = target.extent();
             extent = [extent[0].min(width), extent[1].min(height)];
             layers = layers.min(target.layer_count());
         }
+        pass.samples = samples;
         let [width, height] = extent;
         pass.area = pass.area.intersect(Rect {
             x: 0,
@@ -109,8 +152,21 @@ impl Pass {
         self.layer_count
     }
 
+    /// The depth attachment's format, if there is one.
+    pub fn depth_format(&self) -> Option<Format> {
+        self.depth.as_ref().map(Target::format)
+    }
+
     /// Adds a draw, and flushes the pass if the policy says so.
-    pub fn push(&mut self, draw: PassDraw, device: &Device, counters: &mut Counters) {
+    ///
+    /// # Errors
+    /// As [`Pass::flush`].
+    pub fn push(
+        &mut self,
+        draw: PassDraw,
+        device: &Device,
+        counters: &mut Counters,
+    ) -> Result<(), Stopped> {
         self.bin_bytes = self.bin_bytes.saturating_add(draw.memory_bytes());
         self.draws.push(draw);
         let config = device.config();
@@ -119,18 +175,31 @@ impl Pass {
             FlushPolicy::EveryDraw => true,
         };
         if full {
-            self.flush(device, counters);
+            self.flush(device, counters)?;
         }
+        Ok(())
     }
 
     /// Renders all draws that wait, and stores the attachments.
-    pub fn flush(&mut self, device: &Device, counters: &mut Counters) {
-        self.render(device, counters, false);
+    ///
+    /// # Errors
+    /// [`Stopped`] if a fragment program ran for too long; the image is then undefined.
+    pub fn flush(&mut self, device: &Device, counters: &mut Counters) -> Result<(), Stopped> {
+        self.render(device, counters, false)
     }
 
-    /// Renders all draws that wait, and stores the attachments that are to be stored.
-    pub fn end(mut self, device: &Device, counters: &mut Counters) {
-        self.render(device, counters, true);
+    /// Renders all draws that wait, and stores and resolves the attachments as they are to be.
+    ///
+    /// # Errors
+    /// As [`Pass::flush`].
+    pub fn end(mut self, device: &Device, counters: &mut Counters) -> Result<(), Stopped> {
+        self.render(device, counters, true)
+    }
+
+    fn resolve_targets(&self) -> impl Iterator<Item = &Target> {
+        let rest = [&self.resolve.depth, &self.resolve.stencil];
+        let all = self.resolve.color.iter().chain(rest).flatten();
+        all.map(|(target, _)| target)
     }
 
     fn targets(&self) -> impl Iterator<Item = &Target> {
@@ -143,14 +212,25 @@ impl Pass {
         self.color.iter_mut().chain(rest).flatten()
     }
 
-    fn render(&mut self, device: &Device, counters: &mut Counters, last: bool) {
-        let pending = self.targets().any(|target| target.clear.is_some());
+    fn render(
+        &mut self,
+        device: &Device,
+        counters: &mut Counters,
+        last: bool,
+    ) -> Result<(), Stopped> {
+        let pending = self.targets().any(|target| target.clear.is_some())
+            || last && self.resolve_targets().next().is_some();
+        let mut done = Ok(());
         if !self.area.is_empty() && (pending || !self.draws.is_empty()) {
             let started = Instant::now();
-            for work in self.render_macro_tiles(device, last) {
+            for (work, result) in self.render_macro_tiles(device, last) {
                 counters.add_all(&work);
+                // That others were cancelled when one stopped tells nothing.
+                if !matches!(done, Err(Stopped::TimedOut { .. })) {
+                    done = done.and(result);
+                }
             }
-            for target in self.targets() {
+            for target in self.targets().chain(self.resolve_targets()) {
                 target.bump_generation();
             }
             let elapsed = started.elapsed().as_nanos() as u64;
@@ -162,10 +242,16 @@ impl Pass {
         }
         self.draws.clear();
         self.bin_bytes = 0;
+        done
     }
 
-    /// Renders all macro-tiles, each by whichever worker is free; returns what every worker counted.
-    fn render_macro_tiles(&self, device: &Device, last: bool) -> Vec<Counters> {
+    /// Renders all macro-tiles, each by whichever worker is free; returns what every worker counted, and whether it
+    /// was stopped.
+    fn render_macro_tiles(
+        &self,
+        device: &Device,
+        last: bool,
+    ) -> Vec<(Counters, Result<(), Stopped>)> {
         let size = device.config().macro_tile_size;
         // The area begins at or after the framebuffer's corner.
         let range = |start: i32, length: u32| {
@@ -180,29 +266,39 @@ impl Pass {
             pass: self,
             device,
             last,
-            blenders: self.blenders(),
+            draws: self.tile_draws(device),
+            cancel: AtomicBool::new(false),
         };
         let next = AtomicU64::new(0);
         let work = || {
             let mut worker = Worker::new(self, size);
             loop {
                 let job = next.fetch_add(1, Ordering::Relaxed);
-                if job >= count {
-                    return worker.counters;
+                if job >= count || frame.cancel.load(Ordering::Relaxed) {
+                    return (worker.counters, Ok(()));
                 }
                 let (layer, place) = (job / (width * height), job % (width * height));
                 let at = [
                     columns.start + (place % width) as u32,
                     rows.start + (place / width) as u32,
                 ];
-                frame.render_macro_tile(&mut worker, layer as u32, at);
+                if let Err(stopped) = frame.render_macro_tile(&mut worker, layer as u32, at) {
+                    frame.cancel.store(true, Ordering::Relaxed);
+                    return (worker.counters, Err(stopped));
+                }
             }
         };
-        device.install(|| rayon::broadcast(|_| work()))
+        let done = device.install(|| rayon::broadcast(|_| work()));
+        for draw in &frame.draws {
+            if let Ready::Primitives(draw) = draw {
+                draw.finish();
+            }
+        }
+        done
     }
 
-    /// How each waiting draw blends into the first colour attachment, if it does.
-    fn blenders(&self) -> Vec<Option<Blender>> {
+    /// The waiting draws made ready for tiles.
+    fn tile_draws<'a>(&'a self, device: &Device) -> Vec<Ready<'a>> {
         const REPLACE: BlendState = BlendState {
             equations: None,
             write_mask: 0xF,
@@ -212,19 +308,65 @@ impl Pass {
             .first()
             .and_then(Option::as_ref)
             .map(Target::format);
-        let blender = |draw: &PassDraw| match draw {
-            PassDraw::Clear(_) => None,
+        let targets = Targets {
+            color: &self.color,
+            depth: self.depth.as_ref(),
+            stencil: self.stencil.as_ref(),
+        };
+        let ready = |draw: &'a PassDraw| match draw {
+            PassDraw::Clear(clear) => Ready::Clear(clear),
             PassDraw::Gaussians(draw) => {
                 // A draw's floating-point colours mean nothing to an integer attachment.
-                let format = format.filter(|format: &Format| !format.is_integer())?;
+                let Some(format) = format.filter(|format: &Format| !format.is_integer()) else {
+                    return Ready::Nothing;
+                };
                 let state = draw.state.blend.first().unwrap_or(&REPLACE);
                 let blender = Blender::new(state, draw.state.blend_constants, format);
-                (!blender.writes_nothing()).then_some(blender)
+                if blender.writes_nothing() {
+                    Ready::Nothing
+                } else {
+                    Ready::Gaussians(draw, blender)
+                }
             }
-            PassDraw::Primitives(_) => None,
+            PassDraw::Primitives(draw) if draw.primitives.is_empty() => Ready::Nothing,
+            PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TileDraw::new(
+                draw,
+                targets,
+                self.samples,
+                self.area,
+                device,
+            ))),
         };
-        self.draws.iter().map(blender).collect()
+        self.draws.iter().map(ready).collect()
     }
+}
+
+/// A draw made ready for tiles.
+enum Ready<'a> {
+    /// It changes nothing.
+    Nothing,
+    Clear(&'a ClearAttachments),
+    /// With how it blends into the first colour attachment.
+    Gaussians(&'a GaussianDraw, Blender),
+    Primitives(Box<TileDraw<'a>>),
+}
+
+/// Prepares what an attachment's aspect is resolved to.
+fn bind_resolve(
+    attachment: &Attachment,
+    (view, mode): &(ImageView, ResolveMode),
+    aspect: Aspect,
+    rendering: &Rendering,
+) -> Result<Resolve, AttachmentError> {
+    let target = Target::new(view, aspect, rendering.layer_count, StoreOp::Store)?;
+    let of = attachment.view.format.plane(aspect);
+    if of.map(Format::texel_size) != Some(target.format().texel_size()) {
+        return Err(AttachmentError::Format(view.format));
+    }
+    if target.samples() != 1 {
+        return Err(AttachmentError::Samples(target.samples()));
+    }
+    Ok((target, *mode))
 }
 
 /// Prepares an attachment's aspect.
@@ -244,25 +386,26 @@ fn bind(
 
 /// What a worker keeps from one macro-tile to the next.
 struct Worker {
-    color: Vec<Plane<[f32; 4]>>,
-    depth: Plane<f32>,
-    stencil: Plane<u8>,
+    buffers: Buffers,
     gaussians: GaussianTile,
+    scratch: Scratch,
     counters: Counters,
 }
 
 impl Worker {
     fn new(pass: &Pass, size: u32) -> Self {
-        let size_if = |present: bool| if present { size } else { 0 };
         Self {
-            color: pass
-                .color
-                .iter()
-                .map(|target| Plane::new(size_if(target.is_some())))
-                .collect(),
-            depth: Plane::new(size_if(pass.depth.is_some())),
-            stencil: Plane::new(size_if(pass.stencil.is_some())),
+            buffers: Buffers {
+                color: pass
+                    .color
+                    .iter()
+                    .map(|target| Plane::new(size, target.as_ref()))
+                    .collect(),
+                depth: Plane::new(size, pass.depth.as_ref()),
+                stencil: Plane::new(size, pass.stencil.as_ref()),
+            },
             gaussians: GaussianTile::default(),
+            scratch: Scratch::default(),
             counters: Counters::default(),
         }
     }
@@ -274,42 +417,75 @@ struct Frame<'a> {
     device: &'a Device,
     /// Whether the pass ends, so that only what is to be stored is kept.
     last: bool,
-    blenders: Vec<Option<Blender>>,
+    draws: Vec<Ready<'a>>,
+    /// Set when a worker was stopped.
+    cancel: AtomicBool,
 }
 
 impl Frame<'_> {
     /// Runs all draws in one macro-tile, then stores its tiles.
-    fn render_macro_tile(&self, worker: &mut Worker, layer: u32, at: [u32; 2]) {
+    fn render_macro_tile(
+        &self,
+        worker: &mut Worker,
+        layer: u32,
+        at: [u32; 2],
+    ) -> Result<(), Stopped> {
         let pass = self.pass;
         let size = self.device.config().macro_tile_size;
         let tiles = || Tile::of_macro_tile(size, at, pass.area);
-        for (draw, blender) in pass.draws.iter().zip(&self.blenders) {
+        for draw in &self.draws {
             match draw {
-                PassDraw::Clear(clear) => {
+                Ready::Nothing => {}
+                Ready::Clear(clear) => {
                     tiles().for_each(|tile| self.clear(worker, clear, layer, &tile));
                 }
-                // Only clears reach layers beyond the first: nothing else says which layer it is drawn to.
-                PassDraw::Gaussians(draw) => {
-                    if let Some(blender) = blender.as_ref().filter(|_| layer == 0) {
-                        tiles().for_each(|tile| self.gaussians(worker, draw, blender, &tile));
-                    }
+                // Nothing says which layer a Gaussian is drawn to.
+                Ready::Gaussians(draw, blender) if layer == 0 => {
+                    tiles().for_each(|tile| self.gaussians(worker, draw, blender, &tile));
                 }
-                PassDraw::Primitives(_) => {}
+                Ready::Gaussians(..) => {}
+                Ready::Primitives(draw) => draw.render(
+                    Place { layer, at, size },
+                    &mut worker.buffers,
+                    &mut worker.scratch,
+                    &mut worker.counters,
+                    &self.cancel,
+                )?,
             }
         }
-        let keep = |target: &Target| !self.last || target.store == StoreOp::Store;
         for tile in tiles() {
-            for (plane, target) in worker.color.iter_mut().zip(&pass.color) {
-                if let Some(target) = target {
-                    plane.finish(target, layer, &tile, keep(target));
-                }
+            self.finish(worker, layer, &tile);
+        }
+        Ok(())
+    }
+
+    /// Resolves and stores a tile.
+    fn finish(&self, worker: &mut Worker, layer: u32, tile: &Tile) {
+        let (pass, buffers) = (self.pass, &mut worker.buffers);
+        let colors = pass.color.iter().zip(&pass.resolve.color);
+        let planes = buffers.color.iter_mut().zip(colors);
+        let planes = planes
+            .map(|(plane, (target, resolve))| (plane, target.as_ref(), resolve.as_ref()))
+            .chain([
+                (
+                    &mut buffers.depth,
+                    pass.depth.as_ref(),
+                    pass.resolve.depth.as_ref(),
+                ),
+                (
+                    &mut buffers.stencil,
+                    pass.stencil.as_ref(),
+                    pass.resolve.stencil.as_ref(),
+                ),
+            ]);
+        for (plane, target, resolve) in planes {
+            let Some(target) = target else { continue };
+            if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
+                plane.touch(target, layer, tile);
+                plane.resolve(target, (resolve, *mode), layer, tile);
             }
-            if let Some(target) = &pass.depth {
-                worker.depth.finish(target, layer, &tile, keep(target));
-            }
-            if let Some(target) = &pass.stencil {
-                worker.stencil.finish(target, layer, &tile, keep(target));
-            }
+            let keep = !self.last || target.store == StoreOp::Store;
+            plane.finish(target, layer, tile, keep);
         }
     }
 
@@ -323,38 +499,42 @@ impl Frame<'_> {
             if !in_layers || tile.pixels.intersect(rect).is_empty() {
                 continue;
             }
+            let buffers = &mut worker.buffers;
             for clear in &clear.clears {
-                match *clear {
+                let (target, plane, aspect, value) = match *clear {
                     AttachmentClear::Color { index, value } => {
                         let target = pass.color.get(index).and_then(Option::as_ref);
-                        if let (Some(target), Some(plane)) = (target, worker.color.get_mut(index)) {
-                            let format = target.format();
-                            let texel = format.decode(&format.encode_clear(Aspect::Color, value));
-                            fill_rect(plane.touch(target, layer, tile), tile, rect, texel);
-                        }
+                        (target, buffers.color.get_mut(index), Aspect::Color, value)
                     }
                     AttachmentClear::Depth(depth) => {
-                        if let Some(target) = &pass.depth {
-                            let format = target.format();
-                            let [depth, ..] = format.decode(&format.encode([depth, 0.0, 0.0, 0.0]));
-                            let texels = worker.depth.touch(target, layer, tile);
-                            fill_rect(texels, tile, rect, depth);
-                        }
+                        let value = ClearValue::DepthStencil { depth, stencil: 0 };
+                        let plane = Some(&mut buffers.depth);
+                        (pass.depth.as_ref(), plane, Aspect::Depth, value)
                     }
                     AttachmentClear::Stencil(stencil) => {
-                        if let Some(target) = &pass.stencil {
-                            let texels = worker.stencil.touch(target, layer, tile);
-                            fill_rect(texels, tile, rect, stencil as u8);
-                        }
+                        let value = ClearValue::DepthStencil {
+                            depth: 0.0,
+                            stencil,
+                        };
+                        let plane = Some(&mut buffers.stencil);
+                        (pass.stencil.as_ref(), plane, Aspect::Stencil, value)
                     }
+                };
+                if let (Some(target), Some(plane)) = (target, plane) {
+                    let format = target.format();
+                    plane.touch(target, layer, tile);
+                    plane.fill_rect(format, tile, rect, &format.encode_clear(aspect, value));
                 }
             }
         }
     }
 
-    /// Renders what a Gaussian draw covers of one tile, and blends it into the first colour attachment.
+    /// Renders what a Gaussian draw covers of one tile, and blends it into the first colour attachment; all samples of
+    /// a pixel get the same, for alpha is taken at its centre.
+    // A depth test of Gaussians belongs here: stored depths go into `GaussianTile::render`, the median's come out.
     fn gaussians(&self, worker: &mut Worker, draw: &GaussianDraw, blender: &Blender, tile: &Tile) {
-        let (Some(Some(target)), Some(plane)) = (self.pass.color.first(), worker.color.first_mut())
+        let (Some(Some(target)), Some(plane)) =
+            (self.pass.color.first(), worker.buffers.color.first_mut())
         else {
             return;
         };
@@ -366,10 +546,10 @@ impl Frame<'_> {
         if !fragments.render(draw, self.device.level(), x, y, counters) {
             return;
         }
-        let texels = plane.touch(target, 0, tile);
-        for (y, columns) in tile.rows(draw.bounds) {
-            let row = &mut texels[y * TILE_SIZE as usize..][columns.clone()];
-            blender.blend_row(row, columns.map(|x| fragments.pixel(x, y)));
-        }
+        plane.touch(target, 0, tile);
+        plane.change_rows(target.format(), tile, draw.bounds, |row, y, first| {
+            let columns = first..first + row.len();
+            blender.blend_row(row, columns.map(|x| fragments.pixel(x, y)))
+        });
     }
 }

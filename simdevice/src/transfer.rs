@@ -1,18 +1,21 @@
-//! Copies, fills and clears outside of render passes.
+//! Copies, blits, resolves, fills and clears outside of render passes.
 //!
 //! Regions are expected to be valid; what reaches outside a buffer is left out row by row, what reaches outside an
 //! image is clipped, so that no packet can harm anything but its own result. Every function marks the memory that
 //! it writes as changed.
 
+mod blit;
+mod image_copy;
+mod resolve;
 #[cfg(test)]
 mod tests;
 
+use crate::format::MAX_TEXEL_SIZE;
 use crate::image::{Image, SubresourceLayout};
-use crate::packet::{
-    BufferImageRegion, BufferRange, ClearImage, CopyBuffer, CopyBufferImage, CopyImage,
-    ImageCopyRegion, SubresourceLayers,
-};
-use crate::{format::MAX_TEXEL_SIZE, image::ImageKind};
+use crate::packet::{BufferImageRegion, BufferRange, ClearImage, CopyBuffer, CopyBufferImage};
+pub use blit::blit_image;
+pub use image_copy::copy_image;
+pub use resolve::{resolve_image, resolve_row};
 
 /// The offset into the memory of bytes `offset..offset + size` of a range, if the range has them.
 fn within(range: &BufferRange, offset: u64, size: u64) -> Option<u64> {
@@ -167,112 +170,6 @@ fn copy_layer(
                 });
             if !matches!(copied, Some(Ok(()))) {
                 log::warn!("left out a row that lies outside the buffer: {region:?}");
-                return;
-            }
-        }
-    }
-}
-
-/// Executes [`Packet::CopyImage`](crate::Packet::CopyImage).
-pub fn copy_image(copy: &CopyImage) {
-    for region in &copy.regions {
-        copy_image_region(copy, region);
-    }
-    copy.target.memory.bump_generation();
-}
-
-/// One side of an image copy.
-struct Side<'a> {
-    image: &'a Image,
-    layers: &'a SubresourceLayers,
-    offset: [i32; 3],
-}
-
-impl Side<'_> {
-    /// The subresource and z of slice number `index`: 3D images have slices, the others layers.
-    fn slice(&self, index: u32) -> Option<(SubresourceLayout, i64)> {
-        let z = i64::from(self.offset[2]);
-        let (layer, z) = match self.image.desc.kind {
-            ImageKind::D3 => (self.layers.base_layer, z + i64::from(index)),
-            ImageKind::D1 | ImageKind::D2 => (self.layers.base_layer.checked_add(index)?, z),
-        };
-        let layout = self
-            .image
-            .subresource(self.layers.aspect, self.layers.mip_level, layer)?;
-        Some((layout, z))
-    }
-
-    /// How many slices or layers there are at most.
-    fn slices(&self) -> u32 {
-        self.image.desc.array_layers.max(self.image.desc.extent[2])
-    }
-}
-
-fn copy_image_region(copy: &CopyImage, region: &ImageCopyRegion) {
-    let source = Side {
-        image: &copy.source,
-        layers: &region.source,
-        offset: region.source_offset,
-    };
-    let target = Side {
-        image: &copy.target,
-        layers: &region.target,
-        offset: region.target_offset,
-    };
-    let slices = region.extent[2].max(region.source.layer_count);
-    // Offsets before the first slice are at most this many slices outside.
-    for index in 0..slices.min(source.slices().max(target.slices())) {
-        if let (Some(source_slice), Some(target_slice)) = (source.slice(index), target.slice(index))
-        {
-            copy_slice(copy, region, source_slice, target_slice);
-        }
-    }
-}
-
-/// Copies one slice of a region; each side is a subresource and a z in it.
-fn copy_slice(
-    copy: &CopyImage,
-    region: &ImageCopyRegion,
-    (source, source_z): (SubresourceLayout, i64),
-    (target, target_z): (SubresourceLayout, i64),
-) {
-    let (Ok(source_z), Ok(target_z)) = (u32::try_from(source_z), u32::try_from(target_z)) else {
-        return;
-    };
-    if source.format.texel_size() != target.format.texel_size() {
-        log::warn!("left out an image copy between texels of different sizes");
-        return;
-    }
-    let texel_size = source.format.texel_size() as u64;
-    // Clipped to the source, then what is left to the target.
-    let axes = [0, 1].map(|axis| {
-        let from = clip(
-            region.source_offset[axis],
-            region.extent[axis],
-            source.extent[axis],
-        );
-        let offset = i64::from(region.target_offset[axis]) + i64::from(from.skipped);
-        let to = clip(
-            i32::try_from(offset).unwrap_or(i32::MAX),
-            from.count,
-            target.extent[axis],
-        );
-        (from.first.saturating_add(to.skipped), to.first, to.count)
-    });
-    let [(from_x, to_x, width), (from_y, to_y, height)] = axes;
-    let size = u64::from(width) * texel_size;
-    for sample in 0..copy.source.desc.samples.min(copy.target.desc.samples) {
-        let (source, target) = (source.sample(sample), target.sample(sample));
-        for row in 0..height {
-            let from = copy
-                .source
-                .row(&source, [from_x, from_y + row, source_z], size);
-            let to = copy.target.row(&target, [to_x, to_y + row, target_z], size);
-            let copied = from.zip(to).map(|(from, to)| {
-                let memory = &copy.target.memory;
-                memory.copy_from(to, &copy.source.memory, from, size)
-            });
-            if !matches!(copied, Some(Ok(()))) {
                 return;
             }
         }

@@ -2,11 +2,11 @@
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_samples::scene::Scene;
 
-use crate::oracle::{OracleCamera, OracleState};
+use crate::oracle::{OracleCamera, OracleModel, OracleOrder, OracleState};
 use crate::scenes::SceneBuffers;
 
 impl From<&Scene> for SceneBuffers {
@@ -24,10 +24,17 @@ impl From<&Scene> for SceneBuffers {
 }
 
 impl OracleCamera {
-    /// The camera of a draw and its viewport's width and height, or `None` if the camera is no
-    /// pinhole.
+    /// The camera of a draw and its viewport's width and height, or `None` if the oracle lacks its
+    /// model.
     pub fn new(camera: &GaussianCameraGAURAST, [width, height]: [u32; 2]) -> Option<Self> {
-        (camera.model == GaussianCameraModelGAURAST::PINHOLE).then_some(Self {
+        let model = match camera.model {
+            GaussianCameraModelGAURAST::PINHOLE => OracleModel::Pinhole,
+            GaussianCameraModelGAURAST::ORTHOGRAPHIC => OracleModel::Orthographic,
+            GaussianCameraModelGAURAST::FISHEYE => OracleModel::Fisheye,
+            _ => return None,
+        };
+        Some(Self {
+            model,
             width,
             height,
             rotation: camera.rotation,
@@ -41,7 +48,13 @@ impl OracleCamera {
 
     /// The camera as a draw takes it.
     pub fn to_vulkan(&self) -> GaussianCameraGAURAST<'static> {
+        let model = match self.model {
+            OracleModel::Pinhole => GaussianCameraModelGAURAST::PINHOLE,
+            OracleModel::Orthographic => GaussianCameraModelGAURAST::ORTHOGRAPHIC,
+            OracleModel::Fisheye => GaussianCameraModelGAURAST::FISHEYE,
+        };
         GaussianCameraGAURAST::default()
+            .model(model)
             .rotation(self.rotation)
             .eye(self.eye)
             .focal_length(self.focal)
@@ -60,6 +73,11 @@ impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
             transmittance_floor: info.transmittance_floor,
             opacity_compensated: info.antialiasing
                 == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
+            order: match info.order {
+                GaussianOrderGAURAST::RADIAL_DISTANCE => OracleOrder::RadialDistance,
+                GaussianOrderGAURAST::PRIMITIVE => OracleOrder::Primitive,
+                _ => OracleOrder::ViewDepth,
+            },
         }
     }
 }
@@ -86,7 +104,7 @@ mod tests {
         assert!(OracleCamera::new(&camera, [8, 8]).is_some());
         let own = crate::scenes::camera(8, 8);
         assert_eq!(OracleCamera::new(&own.to_vulkan(), [8, 8]), Some(own));
-        let camera = camera.model(GaussianCameraModelGAURAST::ORTHOGRAPHIC);
+        let camera = camera.model(GaussianCameraModelGAURAST::EQUIRECTANGULAR);
         assert_eq!(OracleCamera::new(&camera, [8, 8]), None);
     }
 

@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::oracle::spherical_harmonics::coefficient_count;
-use crate::oracle::{OracleCamera, OracleScene};
+use crate::oracle::{OracleCamera, OracleModel, OracleScene};
 
 /// One Gaussian, with attributes as [`OracleScene`] has them.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +75,7 @@ impl SceneBuffers {
 pub fn camera(width: u32, height: u32) -> OracleCamera {
     let focal = 0.8 * width as f32;
     OracleCamera {
+        model: OracleModel::Pinhole,
         width,
         height,
         rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

@@ -40,8 +40,16 @@ pub(crate) const DEVICE: &[Extension] = &[
         ash::khr::dynamic_rendering::SPEC_VERSION,
     ),
     (
+        ash::ext::index_type_uint8::NAME,
+        ash::ext::index_type_uint8::SPEC_VERSION,
+    ),
+    (
         ash::khr::performance_query::NAME,
         ash::khr::performance_query::SPEC_VERSION,
+    ),
+    (
+        ash::ext::provoking_vertex::NAME,
+        ash::ext::provoking_vertex::SPEC_VERSION,
     ),
     (
         ash::khr::push_descriptor::NAME,
@@ -50,6 +58,10 @@ pub(crate) const DEVICE: &[Extension] = &[
     (
         ash::khr::synchronization2::NAME,
         ash::khr::synchronization2::SPEC_VERSION,
+    ),
+    (
+        ash::ext::vertex_attribute_divisor::NAME,
+        ash::ext::vertex_attribute_divisor::SPEC_VERSION,
     ),
 ];
 

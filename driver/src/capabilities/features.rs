@@ -11,12 +11,28 @@ use std::ffi::{CStr, c_void};
 /// this is the only place to state it.
 const SUPPORTED: &[&str] = &[
     // Core 1.0.
+    "alpha_to_one",
+    "depth_bias_clamp",
+    "depth_bounds",
+    "depth_clamp",
     "draw_indirect_first_instance",
+    "dual_src_blend",
+    "fill_mode_non_solid",
+    "fragment_stores_and_atomics",
     "full_draw_index_uint32",
     "image_cube_array",
     "independent_blend",
+    "inherited_queries",
+    "large_points",
+    "logic_op",
     "multi_draw_indirect",
+    "multi_viewport",
+    "occlusion_query_precise",
+    "pipeline_statistics_query",
     "robust_buffer_access",
+    "sample_rate_shading",
+    "shader_clip_distance",
+    "shader_cull_distance",
     "shader_float64",
     "shader_image_gather_extended",
     "shader_int16",
@@ -29,7 +45,10 @@ const SUPPORTED: &[&str] = &[
     "shader_storage_image_read_without_format",
     "shader_storage_image_write_without_format",
     "shader_uniform_buffer_array_dynamic_indexing",
+    "vertex_pipeline_stores_and_atomics",
+    "wide_lines",
     // Core 1.1.
+    "shader_draw_parameters",
     "storage_buffer16_bit_access",
     "storage_push_constant16",
     "uniform_and_storage_buffer16_bit_access",
@@ -46,6 +65,8 @@ const SUPPORTED: &[&str] = &[
     "shader_buffer_int64_atomics",
     "shader_float16",
     "shader_int8",
+    "shader_output_layer",
+    "shader_output_viewport_index",
     "shader_sampled_image_array_non_uniform_indexing",
     "shader_shared_int64_atomics",
     "shader_storage_buffer_array_non_uniform_indexing",
@@ -70,9 +91,16 @@ const SUPPORTED: &[&str] = &[
     "maintenance4",
     "private_data",
     "robust_image_access",
+    "shader_demote_to_helper_invocation",
+    "shader_terminate_invocation",
     "shader_zero_initialize_workgroup_memory",
     "subgroup_size_control",
     "synchronization2",
+    // VK_EXT_index_type_uint8, VK_EXT_provoking_vertex, VK_EXT_vertex_attribute_divisor.
+    "index_type_uint8",
+    "provoking_vertex_last",
+    "vertex_attribute_instance_rate_divisor",
+    "vertex_attribute_instance_rate_zero_divisor",
     // VK_KHR_performance_query.
     "performance_counter_query_pools",
     // VK_GAURAST_gaussian_primitive_topology.
@@ -83,6 +111,18 @@ const SUPPORTED: &[&str] = &[
 /// The extensions whose features can't be enabled without them. (Features of core need none.)
 const EXTENSIONS: &[(vk::StructureType, &CStr)] = &[
     (
+        vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::STRUCTURE_TYPE,
+        ash::ext::index_type_uint8::NAME,
+    ),
+    (
+        vk::PhysicalDeviceProvokingVertexFeaturesEXT::STRUCTURE_TYPE,
+        ash::ext::provoking_vertex::NAME,
+    ),
+    (
+        vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::STRUCTURE_TYPE,
+        ash::ext::vertex_attribute_divisor::NAME,
+    ),
+    (
         vk::PhysicalDevicePerformanceQueryFeaturesKHR::STRUCTURE_TYPE,
         ash::khr::performance_query::NAME,
     ),
@@ -92,7 +132,8 @@ const EXTENSIONS: &[(vk::StructureType, &CStr)] = &[
     ),
 ];
 
-fn is_supported(feature: &str) -> bool {
+/// Whether the feature, named as ash names its field, works.
+pub(crate) fn is_supported(feature: &str) -> bool {
     SUPPORTED.contains(&feature)
 }
 
@@ -259,6 +300,9 @@ chained! {
     vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>,
     vk::PhysicalDeviceDynamicRenderingFeatures<'_>,
     vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>,
+    vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>,
+    vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>,
+    vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>,
     PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
 }
 
@@ -425,6 +469,15 @@ features! {
     vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_> {
         performance_counter_query_pools, performance_counter_multiple_query_pools,
     }
+    vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_> {
+        index_type_uint8,
+    }
+    vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_> {
+        provoking_vertex_last, transform_feedback_preserves_provoking_vertex,
+    }
+    vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_> {
+        vertex_attribute_instance_rate_divisor, vertex_attribute_instance_rate_zero_divisor,
+    }
     PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         gaussian_primitive_topology, vertex_shader_projection, resolve_fragment_shader, radial_distance_order,
         primitive_order, per_pixel_order, rasterization_float16, opacity_compensation, orthographic_camera,
@@ -446,9 +499,7 @@ mod tests {
         "inline_uniform_block",
         "multiview",
         "pipeline_creation_cache_control",
-        "shader_demote_to_helper_invocation",
         "shader_integer_dot_product",
-        "shader_terminate_invocation",
     ];
 
     fn all_true<T: Default + Features>(count: usize) -> Vec<&'static str> {
@@ -461,11 +512,18 @@ mod tests {
 
     #[test]
     fn supported_features_are_those_of_the_structures() {
-        let mut names = all_true::<vk::PhysicalDeviceFeatures>(18);
-        names.extend(all_true::<vk::PhysicalDeviceVulkan11Features<'_>>(3));
-        names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(30));
-        names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(8));
+        let mut names = all_true::<vk::PhysicalDeviceFeatures>(36);
+        names.extend(all_true::<vk::PhysicalDeviceVulkan11Features<'_>>(4));
+        names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(32));
+        names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(10));
         names.extend(all_true::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(1));
+        names.extend(all_true::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(
+            1,
+        ));
+        names.extend(all_true::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(1));
+        names.extend(all_true::<
+            vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>,
+        >(2));
         names.extend(all_true::<
             PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
         >(2));
@@ -509,10 +567,10 @@ mod tests {
             "geometry_shader",
         );
         let mut core = vk::PhysicalDeviceFeatures2::default();
-        core.features.logic_op = vk::TRUE;
+        core.features.sparse_binding = vk::TRUE;
         refused(
             requested(&vk::DeviceCreateInfo::default().push_next(&mut core)),
-            "logic_op",
+            "sparse_binding",
         );
         let mut missing = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
             .gaussian_primitive_topology(true)

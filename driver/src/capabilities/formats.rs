@@ -1,5 +1,10 @@
 //! What each format can be used for. The formats themselves, and how texels are stored, are the device's.
 
+#[cfg(test)]
+mod required;
+#[cfg(test)]
+mod tests;
+
 use crate::capabilities::{limits, memory};
 use crate::error::Error;
 use ash::vk;
@@ -32,10 +37,20 @@ fn is_color(format: Format) -> bool {
     format.aspects() == [Aspect::Color]
 }
 
+/// Whether components are integers that are read as floating point: these are attributes of vertices only.
+fn is_scaled(format: Format) -> bool {
+    matches!(format.numeric(), Numeric::Uscaled | Numeric::Sscaled)
+}
+
 /// What images of the format, of either tiling, can do.
 fn image_features(format: Format) -> vk::FormatFeatureFlags {
+    if is_scaled(format) {
+        return vk::FormatFeatureFlags::empty();
+    }
     let mut features = vk::FormatFeatureFlags::TRANSFER_SRC
         | vk::FormatFeatureFlags::TRANSFER_DST
+        | vk::FormatFeatureFlags::BLIT_SRC
+        | vk::FormatFeatureFlags::BLIT_DST
         | vk::FormatFeatureFlags::SAMPLED_IMAGE;
     if !format.is_integer() && format.aspects() != [Aspect::Stencil] {
         features |= vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
@@ -49,16 +64,11 @@ fn image_features(format: Format) -> vk::FormatFeatureFlags {
     if is_atomic(format) {
         features |= vk::FormatFeatureFlags::STORAGE_IMAGE_ATOMIC;
     }
-    let is_rendered = match format.numeric() {
-        Numeric::Unorm | Numeric::Snorm | Numeric::Sfloat | Numeric::Ufloat | Numeric::Srgb => {
-            // Formats of three equal components make poor attachments: hardware has none.
-            format.texel_size().is_power_of_two()
+    if is_rendered(format) {
+        features |= vk::FormatFeatureFlags::COLOR_ATTACHMENT;
+        if !format.is_integer() {
+            features |= vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
         }
-        _ => false,
-    };
-    if is_rendered {
-        features |= vk::FormatFeatureFlags::COLOR_ATTACHMENT
-            | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
     }
     features
 }
@@ -75,25 +85,30 @@ fn is_atomic(format: Format) -> bool {
     format.is_integer() && format.texel_size() == 4 && format.components().len() == 1
 }
 
-/// What buffers of the format can do: any attribute that converts to floating point feeds a Gaussian. Integer
-/// attributes need vertex shaders, which don't run yet. Programs read texels of any format.
+/// Whether texels of a colour format are rendered to. Formats of three equal components make poor attachments:
+/// hardware has none.
+fn is_rendered(format: Format) -> bool {
+    format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two()
+}
+
+/// What buffers of the format can do: any colour is a vertex attribute, unless it takes more than its component to
+/// know one. Programs read texels of any format.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
-    let is_attribute = is_color(format)
-        && !format.is_integer()
-        && !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent)
-        && !format.has(Channel::X);
-    let mut features = vk::FormatFeatureFlags::empty();
-    if is_attribute {
+    if !is_color(format) {
+        return vk::FormatFeatureFlags::empty();
+    }
+    if is_scaled(format) {
+        return vk::FormatFeatureFlags::VERTEX_BUFFER;
+    }
+    let mut features = vk::FormatFeatureFlags::UNIFORM_TEXEL_BUFFER;
+    if !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent) {
         features |= vk::FormatFeatureFlags::VERTEX_BUFFER;
     }
-    if is_color(format) {
-        features |= vk::FormatFeatureFlags::UNIFORM_TEXEL_BUFFER;
-        if is_stored(format) {
-            features |= vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
-        }
-        if is_atomic(format) {
-            features |= vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER_ATOMIC;
-        }
+    if is_stored(format) {
+        features |= vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
+    }
+    if is_atomic(format) {
+        features |= vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER_ATOMIC;
     }
     features
 }
@@ -113,6 +128,26 @@ pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
         optimal_tiling_features: image_features(format),
         buffer_features: buffer_features(format),
     }
+}
+
+/// The 64-bit features that go with 32-bit ones: `VkFormatProperties3`.
+pub(crate) fn features2(
+    format: vk::Format,
+    features: vk::FormatFeatureFlags,
+) -> vk::FormatFeatureFlags2 {
+    // They begin with the 32-bit ones.
+    let mut wide = vk::FormatFeatureFlags2::from_raw(features.as_raw().into());
+    let stored =
+        vk::FormatFeatureFlags::STORAGE_IMAGE | vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
+    if features.intersects(stored) {
+        wide |= vk::FormatFeatureFlags2::STORAGE_READ_WITHOUT_FORMAT
+            | vk::FormatFeatureFlags2::STORAGE_WRITE_WITHOUT_FORMAT;
+    }
+    let has_depth = device_format(format).is_some_and(|format| format.has(Channel::D));
+    if has_depth && features.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE) {
+        wide |= vk::FormatFeatureFlags2::SAMPLED_IMAGE_DEPTH_COMPARISON;
+    }
+    wide
 }
 
 /// The flags that images may be created with.
@@ -148,6 +183,10 @@ const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
     (
         vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
         vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
+    ),
+    (
+        vk::ImageUsageFlags::INPUT_ATTACHMENT,
+        vk::FormatFeatureFlags::SAMPLED_IMAGE,
     ),
     // Its contents live in the tile buffers and never matter outside; it goes with an attachment usage.
     (
@@ -232,6 +271,14 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         }
     };
     let is_linear = tiling == vk::ImageTiling::LINEAR;
+    let is_attachment = features.intersects(
+        vk::FormatFeatureFlags::COLOR_ATTACHMENT | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
+    );
+    let has_samples = is_attachment
+        && !is_linear
+        && ty == vk::ImageType::TYPE_2D
+        && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE)
+        && !usage.contains(vk::ImageUsageFlags::STORAGE);
     if is_linear && ty != vk::ImageType::TYPE_2D {
         return refuse("linear images have two dimensions".to_owned());
     }
@@ -243,7 +290,11 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
             max_extent.width.ilog2() + 1
         },
         max_array_layers: if is_linear { 1 } else { layers },
-        sample_counts: vk::SampleCountFlags::TYPE_1,
+        sample_counts: if has_samples {
+            limits::SAMPLE_COUNTS
+        } else {
+            vk::SampleCountFlags::TYPE_1
+        },
         max_resource_size: memory::heap_size(),
     })
 }
@@ -253,105 +304,5 @@ fn extent(width: u32, height: u32, depth: u32) -> vk::Extent3D {
         width,
         height,
         depth,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_format_of_the_device_has_a_vulkan_name() {
-        let found: Vec<_> = (0..=vk::Format::D32_SFLOAT_S8_UINT.as_raw())
-            .filter_map(|raw| device_format(vk::Format::from_raw(raw)))
-            .collect();
-        assert_eq!(found, Format::ALL);
-        assert_eq!(
-            device_format(vk::Format::A2B10G10R10_UNORM_PACK32),
-            Some(Format::A2B10G10R10UnormPack32)
-        );
-        assert_eq!(device_format(vk::Format::UNDEFINED), None);
-        assert_eq!(device_format(vk::Format::from_raw(-1)), None);
-        assert_eq!(device_format(vk::Format::BC7_UNORM_BLOCK), None);
-    }
-
-    #[test]
-    fn formats_can_do_what_they_are_for() {
-        let float = properties(vk::Format::R32G32B32A32_SFLOAT);
-        assert!(
-            float
-                .optimal_tiling_features
-                .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND)
-        );
-        assert!(
-            float
-                .buffer_features
-                .contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
-        );
-        let depth = properties(vk::Format::D32_SFLOAT);
-        assert!(
-            depth
-                .optimal_tiling_features
-                .contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT)
-        );
-        assert!(depth.linear_tiling_features.is_empty());
-        let vertex = properties(vk::Format::R32G32B32_SFLOAT);
-        assert!(
-            vertex
-                .buffer_features
-                .contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
-        );
-        assert!(
-            !vertex
-                .optimal_tiling_features
-                .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT)
-        );
-    }
-
-    #[test]
-    fn images_that_cannot_be_are_refused() {
-        let query = ImageQuery {
-            format: vk::Format::R8G8B8A8_UNORM,
-            ty: vk::ImageType::TYPE_2D,
-            tiling: vk::ImageTiling::OPTIMAL,
-            usage: vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC,
-            flags: vk::ImageCreateFlags::empty(),
-        };
-        let properties = image_properties(query).unwrap();
-        assert_eq!(properties.max_extent.width, 16384);
-        assert_eq!(properties.max_mip_levels, 15);
-        let refused = [
-            ImageQuery {
-                format: vk::Format::UNDEFINED,
-                ..query
-            },
-            ImageQuery {
-                usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-                ..query
-            },
-            ImageQuery {
-                format: vk::Format::R8G8B8A8_SRGB,
-                usage: vk::ImageUsageFlags::STORAGE,
-                ..query
-            },
-            ImageQuery {
-                flags: vk::ImageCreateFlags::SPARSE_BINDING,
-                ..query
-            },
-            ImageQuery {
-                format: vk::Format::D32_SFLOAT,
-                ty: vk::ImageType::TYPE_3D,
-                usage: vk::ImageUsageFlags::TRANSFER_DST,
-                ..query
-            },
-        ];
-        for query in refused {
-            let error = image_properties(query).unwrap_err();
-            assert_eq!(
-                error.result(),
-                vk::Result::ERROR_FORMAT_NOT_SUPPORTED,
-                "{query:?}"
-            );
-        }
     }
 }

@@ -1,13 +1,13 @@
 //! The physical device's properties and limits.
 //!
-//! Limits are at least what Vulkan requires, except that there is no multisampling yet, so that every sample count is
-//! 1.
+//! Limits are at least what Vulkan requires.
 
 use crate::capabilities::extensions::{API_VERSION, fill_string};
 use crate::capabilities::memory;
 use crate::pnext;
 use ash::vk;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST;
+use simdevice::geometry;
 use std::ffi::{CStr, c_void};
 
 const DEVICE_NAME: &CStr = c"GauRast simulated device";
@@ -34,6 +34,17 @@ pub(crate) const MAX_IMAGE_DIMENSION_3D: u32 = 2048;
 
 /// The most array layers of an image or framebuffer.
 pub(crate) const MAX_LAYERS: u32 = 2048;
+
+/// The steps of points' and lines' sizes: those of coordinates.
+const SIZE_GRANULARITY: f32 = 1.0 / 256.0;
+
+/// The most clip and cull distances, together and each.
+const MAX_CLIP_CULL_DISTANCES: u32 = simdevice::packet::draw::MAX_CLIP_CULL_DISTANCES as u32;
+
+/// The samples that texels of attachments may have.
+pub(crate) const SAMPLE_COUNTS: vk::SampleCountFlags = vk::SampleCountFlags::from_raw(
+    vk::SampleCountFlags::TYPE_1.as_raw() | vk::SampleCountFlags::TYPE_4.as_raw(),
+);
 
 /// The most colour attachments.
 pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
@@ -110,7 +121,6 @@ pub(crate) fn properties() -> vk::PhysicalDeviceProperties {
 }
 
 fn limits() -> vk::PhysicalDeviceLimits {
-    let one_sample = vk::SampleCountFlags::TYPE_1;
     vk::PhysicalDeviceLimits {
         max_image_dimension1_d: MAX_IMAGE_DIMENSION,
         max_image_dimension2_d: MAX_IMAGE_DIMENSION,
@@ -159,7 +169,7 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_draw_indirect_count: u32::MAX,
         max_sampler_lod_bias: MAX_SAMPLER_LOD_BIAS,
         max_sampler_anisotropy: 1.0,
-        max_viewports: 1,
+        max_viewports: simdevice::packet::draw::MAX_VIEWPORTS as u32,
         max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],
         viewport_bounds_range: [
             -2.0 * MAX_IMAGE_DIMENSION as f32,
@@ -177,27 +187,38 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_framebuffer_width: MAX_IMAGE_DIMENSION,
         max_framebuffer_height: MAX_IMAGE_DIMENSION,
         max_framebuffer_layers: MAX_LAYERS,
-        framebuffer_color_sample_counts: one_sample,
-        framebuffer_depth_sample_counts: one_sample,
-        framebuffer_stencil_sample_counts: one_sample,
-        framebuffer_no_attachments_sample_counts: one_sample,
+        framebuffer_color_sample_counts: SAMPLE_COUNTS,
+        framebuffer_depth_sample_counts: SAMPLE_COUNTS,
+        framebuffer_stencil_sample_counts: SAMPLE_COUNTS,
+        framebuffer_no_attachments_sample_counts: SAMPLE_COUNTS,
         max_color_attachments: MAX_COLOR_ATTACHMENTS,
-        sampled_image_color_sample_counts: one_sample,
-        sampled_image_integer_sample_counts: one_sample,
-        sampled_image_depth_sample_counts: one_sample,
-        sampled_image_stencil_sample_counts: one_sample,
-        storage_image_sample_counts: one_sample,
+        sampled_image_color_sample_counts: SAMPLE_COUNTS,
+        sampled_image_integer_sample_counts: SAMPLE_COUNTS,
+        sampled_image_depth_sample_counts: SAMPLE_COUNTS,
+        sampled_image_stencil_sample_counts: SAMPLE_COUNTS,
+        storage_image_sample_counts: vk::SampleCountFlags::TYPE_1,
         max_sample_mask_words: 1,
         timestamp_compute_and_graphics: vk::TRUE,
         timestamp_period: 1.0,
         discrete_queue_priorities: 2,
-        point_size_range: [1.0, 1.0],
-        line_width_range: [1.0, 1.0],
+        point_size_range: [1.0, geometry::MAX_POINT_SIZE],
+        line_width_range: [1.0, geometry::MAX_LINE_WIDTH],
+        point_size_granularity: SIZE_GRANULARITY,
+        line_width_granularity: SIZE_GRANULARITY,
+        strict_lines: vk::TRUE,
         standard_sample_locations: vk::TRUE,
+        min_interpolation_offset: -0.5,
+        // The greatest offset is less than half a pixel by one step of its precision.
+        max_interpolation_offset: 0.5 - 1.0 / 16.0,
+        sub_pixel_interpolation_offset_bits: 4,
+        max_fragment_dual_src_attachments: 1,
+        max_clip_distances: MAX_CLIP_CULL_DISTANCES,
+        max_cull_distances: MAX_CLIP_CULL_DISTANCES,
+        max_combined_clip_and_cull_distances: MAX_CLIP_CULL_DISTANCES,
         optimal_buffer_copy_offset_alignment: 1,
         optimal_buffer_copy_row_pitch_alignment: 1,
         non_coherent_atom_size: 1,
-        // No tessellation, geometry shaders, clip distances, wide lines, sparse memory or interpolation offsets.
+        // No tessellation, geometry shaders or sparse memory.
         ..Default::default()
     }
 }
@@ -244,7 +265,16 @@ fn vulkan12() -> vk::PhysicalDeviceVulkan12Properties<'static> {
         shader_sampled_image_array_non_uniform_indexing_native: vk::TRUE,
         shader_storage_buffer_array_non_uniform_indexing_native: vk::TRUE,
         shader_storage_image_array_non_uniform_indexing_native: vk::TRUE,
-        framebuffer_integer_color_sample_counts: vk::SampleCountFlags::TYPE_1,
+        framebuffer_integer_color_sample_counts: SAMPLE_COUNTS,
+        supported_depth_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
+            | vk::ResolveModeFlags::AVERAGE
+            | vk::ResolveModeFlags::MIN
+            | vk::ResolveModeFlags::MAX,
+        supported_stencil_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
+            | vk::ResolveModeFlags::MIN
+            | vk::ResolveModeFlags::MAX,
+        independent_resolve_none: vk::TRUE,
+        independent_resolve: vk::TRUE,
         ..Default::default()
     };
     fill_string(&mut properties.driver_name, DRIVER_NAME);
@@ -326,6 +356,13 @@ properties! {
     parts {
     vk::PhysicalDevicePushDescriptorPropertiesKHR<'_> {
         max_push_descriptors: MAX_PUSH_DESCRIPTORS,
+    }
+    vk::PhysicalDeviceProvokingVertexPropertiesEXT<'_> {
+        provoking_vertex_mode_per_pipeline: vk::TRUE,
+        transform_feedback_preserves_triangle_fan_provoking_vertex: vk::FALSE,
+    }
+    vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT<'_> {
+        max_vertex_attrib_divisor: u32::MAX,
     }
     vk::PhysicalDevicePerformanceQueryPropertiesKHR<'_> {
         allow_command_buffer_query_copies: vk::FALSE,

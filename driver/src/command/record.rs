@@ -7,6 +7,7 @@ use crate::object::descriptor::set::Write;
 use crate::object::event::Event;
 use crate::object::pipeline::GraphicsPipeline;
 use crate::object::pipeline::compute::ComputePipeline;
+use crate::object::pipeline::setting::Setting;
 use crate::object::query_pool::QueryPool;
 use simdevice::Packet;
 use simdevice::packet::{BufferRange, Camera, Rect, Viewport};
@@ -29,22 +30,26 @@ pub(crate) enum Command {
     },
     /// `vkCmdBindIndexBuffer`.
     BindIndexBuffer(IndexBuffer),
-    /// `vkCmdSetViewport`.
+    /// `vkCmdSetViewport` and `vkCmdSetViewportWithCount`.
     SetViewports {
         /// The first viewport.
         first: u32,
         /// One for each viewport.
         viewports: Vec<Viewport>,
+        /// Whether there are no more than these.
+        with_count: bool,
     },
-    /// `vkCmdSetScissor`.
+    /// `vkCmdSetScissor` and `vkCmdSetScissorWithCount`.
     SetScissors {
         /// The first scissor.
         first: u32,
         /// One for each viewport.
         scissors: Vec<Rect>,
+        /// Whether there are no more than these.
+        with_count: bool,
     },
-    /// `vkCmdSetBlendConstants`.
-    SetBlendConstants([f32; 4]),
+    /// Any other `vkCmdSet...` of fixed-function state.
+    Set(Setting),
     /// `vkCmdSetGaussianCameraGAURAST`.
     SetCamera(Box<Camera>),
     /// `vkCmdDraw` and `vkCmdDrawIndexed`.
@@ -122,7 +127,7 @@ pub(crate) struct VertexBuffer {
 pub(crate) struct IndexBuffer {
     /// The bytes that indices are read from.
     pub(crate) range: BufferRange,
-    /// Bytes per index: 2 or 4 (1 with 8-bit indices).
+    /// Bytes per index: 1, 2 or 4.
     pub(crate) index_size: u32,
 }
 

@@ -289,6 +289,9 @@ impl Recorder {
 
     fn enter_subpass(&mut self, begun: Box<BegunPass>, subpass: usize) -> Result<(), Error> {
         let packet = begun.subpass(subpass)?;
+        for clear in begun.clears_before_reads(subpass)? {
+            self.packet(clear);
+        }
         let formats = color_formats(&packet);
         self.packet(packet);
         self.pass = Some(Pass::Begun {

@@ -2,8 +2,8 @@
 
 use super::record::{Command, CopyQueryResults, Draw, DrawIndirect};
 use super::state::{State, bind};
-use crate::lower::compute;
-use crate::lower::gaussian::{self, Undrawn};
+use crate::lower::draw::Undrawn;
+use crate::lower::{compute, gaussian, polygon};
 use crate::object::event::Event;
 use crate::object::pipeline::Primitive;
 use simdevice::Packet;
@@ -53,16 +53,38 @@ pub(crate) fn replay(commands: &[Command], executor: &mut dyn Executor) -> Resul
 fn step(command: &Command, state: &mut State, executor: &mut dyn Executor) -> Result<(), Lost> {
     match command {
         Command::Packet(packet) => executor.execute(packet)?,
-        Command::BindPipeline(pipeline) => state.pipeline = Some(pipeline.clone()),
+        Command::BindPipeline(pipeline) => {
+            state.pipeline = Some(pipeline.clone());
+            state.draw_state = None;
+        }
         Command::BindVertexBuffers { first, buffers } => {
             bind(&mut state.vertex_buffers, *first, buffers);
         }
         Command::BindIndexBuffer(buffer) => state.index_buffer = Some(buffer.clone()),
-        Command::SetViewports { first, viewports } => bind(&mut state.viewports, *first, viewports),
-        Command::SetScissors { first, scissors } => bind(&mut state.scissors, *first, scissors),
-        Command::SetBlendConstants(constants) => state.blend_constants = Some(*constants),
+        Command::SetViewports {
+            first,
+            viewports,
+            with_count,
+        } => {
+            bind(&mut state.viewports, *first, viewports);
+            state.viewport_count = with_count.then_some(viewports.len() as u32);
+            state.draw_state = None;
+        }
+        Command::SetScissors {
+            first,
+            scissors,
+            with_count,
+        } => {
+            bind(&mut state.scissors, *first, scissors);
+            state.scissor_count = with_count.then_some(scissors.len() as u32);
+            state.draw_state = None;
+        }
+        Command::Set(setting) => {
+            state.settings.set(*setting);
+            state.draw_state = None;
+        }
         Command::SetCamera(camera) => state.camera = Some(**camera),
-        Command::Draw(numbers) => draw(state, numbers, executor)?,
+        Command::Draw(numbers) => draw(state, numbers, 0, executor)?,
         Command::DrawIndirect(indirect) => draw_indirect(state, indirect, executor)?,
         Command::BindComputePipeline(pipeline) => state.compute_pipeline = Some(pipeline.clone()),
         Command::BindSets(bind) => state.sets_mut(bind.bind_point).bind(bind.first, &bind.sets),
@@ -103,23 +125,36 @@ fn step(command: &Command, state: &mut State, executor: &mut dyn Executor) -> Re
     Ok(())
 }
 
-fn draw(state: &State, numbers: &Draw, executor: &mut dyn Executor) -> Result<(), Lost> {
+fn draw(
+    state: &mut State,
+    numbers: &Draw,
+    draw_index: u32,
+    executor: &mut dyn Executor,
+) -> Result<(), Lost> {
     if numbers.count == 0 || numbers.instance_count == 0 {
         return Ok(());
     }
-    let packets = match &state.pipeline {
-        None => Err(Undrawn::Pipeline),
-        Some(pipeline) => match &pipeline.primitive {
-            Primitive::Gaussian(gaussian) => gaussian::draw(state, pipeline, gaussian, numbers),
-        },
-    };
-    match packets {
+    match packets(state, numbers, draw_index) {
         Ok(packets) => packets
             .iter()
             .try_for_each(|packet| executor.execute(packet)),
         Err(reason) => {
             executor.report(&format!("a draw draws nothing: {reason}"));
             Ok(())
+        }
+    }
+}
+
+/// The packets of a draw.
+fn packets(state: &mut State, numbers: &Draw, draw_index: u32) -> Result<Vec<Packet>, Undrawn> {
+    let pipeline = state.pipeline.clone().ok_or(Undrawn::Pipeline)?;
+    match &pipeline.primitive {
+        Primitive::Gaussian(gaussian) => {
+            gaussian::draw(state, &pipeline, gaussian, numbers).map(Vec::from)
+        }
+        Primitive::Polygons(polygons) => {
+            polygon::draw(state, &pipeline, polygons, numbers, draw_index)
+                .map(|packet| vec![packet])
         }
     }
 }
@@ -140,7 +175,7 @@ fn dispatch(
 }
 
 fn draw_indirect(
-    state: &State,
+    state: &mut State,
     indirect: &DrawIndirect,
     executor: &mut dyn Executor,
 ) -> Result<(), Lost> {
@@ -148,10 +183,10 @@ fn draw_indirect(
         None => indirect.draw_count,
         Some(count) => count.unwrap_or(0).min(indirect.draw_count),
     };
-    for index in 0..u64::from(draw_count) {
-        let offset = index * u64::from(indirect.stride);
+    for index in 0..draw_count {
+        let offset = u64::from(index) * u64::from(indirect.stride);
         match read_draw(&indirect.parameters, offset, indirect.indexed) {
-            Some(numbers) => draw(state, &numbers, executor)?,
+            Some(numbers) => draw(state, &numbers, index, executor)?,
             None => {
                 executor.report("an indirect draw's numbers lie outside their buffer");
                 break;

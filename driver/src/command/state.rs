@@ -2,8 +2,11 @@
 
 use super::bound::{BindPoint, BoundSets};
 use super::record::{IndexBuffer, VertexBuffer};
-use crate::object::pipeline::GraphicsPipeline;
 use crate::object::pipeline::compute::ComputePipeline;
+use crate::object::pipeline::setting::{Setting, Settings};
+use crate::object::pipeline::{GaussianPipeline, GraphicsPipeline};
+use ash::vk;
+use simdevice::packet::draw::DrawState;
 use simdevice::packet::{Camera, Rect, Viewport};
 use std::sync::Arc;
 
@@ -28,25 +31,40 @@ pub(crate) struct State {
     pub(crate) viewports: Vec<Option<Viewport>>,
     /// Dynamic scissors.
     pub(crate) scissors: Vec<Option<Rect>>,
-    /// Dynamic blend constants.
-    pub(crate) blend_constants: Option<[f32; 4]>,
+    /// How many viewports were set with their count.
+    pub(crate) viewport_count: Option<u32>,
+    /// How many scissors were set with their count.
+    pub(crate) scissor_count: Option<u32>,
+    /// All other dynamic state.
+    pub(crate) settings: Settings,
+    /// The fixed-function state that the last draw made of all this, unless something has changed since.
+    pub(crate) draw_state: Option<Arc<DrawState>>,
     /// The camera of Gaussian draws; kept when another pipeline is bound.
     pub(crate) camera: Option<Camera>,
 }
 
 impl State {
     /// The viewport in effect: the pipeline's, or the dynamic one.
-    pub(crate) fn viewport(&self, pipeline: &GraphicsPipeline) -> Option<Viewport> {
+    pub(crate) fn viewport(&self, pipeline: &GaussianPipeline) -> Option<Viewport> {
         pipeline
             .viewport
             .or_else(|| self.viewports.first().copied().flatten())
     }
 
     /// The scissor in effect: the pipeline's, or the dynamic one.
-    pub(crate) fn scissor(&self, pipeline: &GraphicsPipeline) -> Option<Rect> {
+    pub(crate) fn scissor(&self, pipeline: &GaussianPipeline) -> Option<Rect> {
         pipeline
             .scissor
             .or_else(|| self.scissors.first().copied().flatten())
+    }
+
+    /// The dynamic blend constants.
+    pub(crate) fn blend_constants(&self) -> Option<[f32; 4]> {
+        let mut set = self.settings.of(vk::DynamicState::BLEND_CONSTANTS);
+        set.find_map(|setting| match setting {
+            Setting::BlendConstants(constants) => Some(constants),
+            _ => None,
+        })
     }
 
     /// The descriptor sets of a bind point.

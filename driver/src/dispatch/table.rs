@@ -120,7 +120,7 @@ commands! {
         PFN_vkDestroyPipelineCache = pipeline::destroy_pipeline_cache;
         PFN_vkGetPipelineCacheData = pipeline::get_pipeline_cache_data;
         PFN_vkMergePipelineCaches = pipeline::merge_pipeline_caches;
-        PFN_vkCreateGraphicsPipelines = pipeline::create_graphics_pipelines;
+        PFN_vkCreateGraphicsPipelines = graphics_pipeline::create_graphics_pipelines;
         PFN_vkCreateComputePipelines = compute_pipeline::create_compute_pipelines;
         PFN_vkDestroyPipeline = pipeline::destroy_pipeline;
         PFN_vkCreatePipelineLayout = pipeline::create_pipeline_layout;
@@ -153,7 +153,7 @@ commands! {
         PFN_vkCmdSetScissor = command::cmd_set_scissor;
         PFN_vkCmdSetLineWidth = dynamic_state::cmd_set_line_width;
         PFN_vkCmdSetDepthBias = dynamic_state::cmd_set_depth_bias;
-        PFN_vkCmdSetBlendConstants = command::cmd_set_blend_constants;
+        PFN_vkCmdSetBlendConstants = dynamic_state::cmd_set_blend_constants;
         PFN_vkCmdSetDepthBounds = dynamic_state::cmd_set_depth_bounds;
         PFN_vkCmdSetStencilCompareMask = dynamic_state::cmd_set_stencil_compare_mask;
         PFN_vkCmdSetStencilWriteMask = dynamic_state::cmd_set_stencil_write_mask;
@@ -169,7 +169,7 @@ commands! {
         PFN_vkCmdDispatchIndirect = compute::cmd_dispatch_indirect;
         PFN_vkCmdCopyBuffer = transfer::cmd_copy_buffer;
         PFN_vkCmdCopyImage = transfer::cmd_copy_image;
-        PFN_vkCmdBlitImage = unsupported::cmd_blit_image;
+        PFN_vkCmdBlitImage = transfer::cmd_blit_image;
         PFN_vkCmdCopyBufferToImage = transfer::cmd_copy_buffer_to_image;
         PFN_vkCmdCopyImageToBuffer = transfer::cmd_copy_image_to_buffer;
         PFN_vkCmdUpdateBuffer = transfer::cmd_update_buffer;
@@ -177,7 +177,7 @@ commands! {
         PFN_vkCmdClearColorImage = transfer::cmd_clear_color_image;
         PFN_vkCmdClearDepthStencilImage = transfer::cmd_clear_depth_stencil_image;
         PFN_vkCmdClearAttachments = transfer::cmd_clear_attachments;
-        PFN_vkCmdResolveImage = unsupported::cmd_resolve_image;
+        PFN_vkCmdResolveImage = transfer::cmd_resolve_image;
         PFN_vkCmdSetEvent = command::cmd_set_event;
         PFN_vkCmdResetEvent = command::cmd_reset_event;
         PFN_vkCmdWaitEvents = command::cmd_wait_events;
@@ -262,8 +262,8 @@ commands! {
         PFN_vkCmdCopyImage2 = transfer::cmd_copy_image2;
         PFN_vkCmdCopyBufferToImage2 = transfer::cmd_copy_buffer_to_image2;
         PFN_vkCmdCopyImageToBuffer2 = transfer::cmd_copy_image_to_buffer2;
-        PFN_vkCmdBlitImage2 = unsupported::cmd_blit_image2;
-        PFN_vkCmdResolveImage2 = unsupported::cmd_resolve_image2;
+        PFN_vkCmdBlitImage2 = transfer::cmd_blit_image2;
+        PFN_vkCmdResolveImage2 = transfer::cmd_resolve_image2;
         PFN_vkCmdBeginRendering = rendering::cmd_begin_rendering;
         PFN_vkCmdEndRendering = rendering::cmd_end_rendering;
         PFN_vkCmdSetCullMode = dynamic_state::cmd_set_cull_mode;

@@ -104,6 +104,7 @@ crate::entry_points! {
     ) {
         record(command_buffer, |recorder| {
             let index_size = match index_type {
+                vk::IndexType::UINT8_KHR => 1,
                 vk::IndexType::UINT16 => 2,
                 vk::IndexType::UINT32 => 4,
                 other => {
@@ -122,7 +123,7 @@ crate::entry_points! {
         viewport_count: u32,
         viewports: *const vk::Viewport,
     ) {
-        set_viewports(command_buffer, first_viewport, viewport_count, viewports)
+        set_viewports(command_buffer, first_viewport, viewport_count, viewports, false)
     }
 
     fn cmd_set_viewport_with_count(
@@ -130,7 +131,7 @@ crate::entry_points! {
         viewport_count: u32,
         viewports: *const vk::Viewport,
     ) {
-        set_viewports(command_buffer, 0, viewport_count, viewports)
+        set_viewports(command_buffer, 0, viewport_count, viewports, true)
     }
 
     fn cmd_set_scissor(
@@ -139,7 +140,7 @@ crate::entry_points! {
         scissor_count: u32,
         scissors: *const vk::Rect2D,
     ) {
-        set_scissors(command_buffer, first_scissor, scissor_count, scissors)
+        set_scissors(command_buffer, first_scissor, scissor_count, scissors, false)
     }
 
     fn cmd_set_scissor_with_count(
@@ -147,18 +148,7 @@ crate::entry_points! {
         scissor_count: u32,
         scissors: *const vk::Rect2D,
     ) {
-        set_scissors(command_buffer, 0, scissor_count, scissors)
-    }
-
-    fn cmd_set_blend_constants(
-        command_buffer: vk::CommandBuffer,
-        blend_constants: *const [f32; 4],
-    ) {
-        record(command_buffer, |recorder| {
-            let constants = *pointer::input(blend_constants)?;
-            recorder.push(Command::SetBlendConstants(constants));
-            Ok(())
-        })
+        set_scissors(command_buffer, 0, scissor_count, scissors, true)
     }
 
     fn cmd_draw(
@@ -418,6 +408,7 @@ unsafe fn set_viewports(
     first: u32,
     count: u32,
     viewports: *const vk::Viewport,
+    with_count: bool,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     unsafe {
@@ -427,6 +418,7 @@ unsafe fn set_viewports(
             recorder.push(Command::SetViewports {
                 first,
                 viewports: viewports.iter().copied().map(pipeline::viewport).collect(),
+                with_count,
             });
             Ok(())
         })
@@ -442,6 +434,7 @@ unsafe fn set_scissors(
     first: u32,
     count: u32,
     scissors: *const vk::Rect2D,
+    with_count: bool,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     unsafe {
@@ -451,6 +444,7 @@ unsafe fn set_scissors(
             recorder.push(Command::SetScissors {
                 first,
                 scissors: scissors.iter().copied().map(rendering::rect).collect(),
+                with_count,
             });
             Ok(())
         })

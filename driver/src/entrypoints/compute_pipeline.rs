@@ -54,7 +54,7 @@ unsafe fn new_compute_pipeline(
 ///
 /// # Safety
 /// The stage and its chain are valid.
-unsafe fn stage<'a>(
+pub(super) unsafe fn stage<'a>(
     info: &'a vk::PipelineShaderStageCreateInfo<'a>,
 ) -> Result<StageInfo<'a>, Error> {
     // SAFETY: the caller's promise.

@@ -24,6 +24,7 @@ pub(crate) mod descriptor;
 pub(crate) mod descriptor_update;
 pub(crate) mod device;
 pub(crate) mod dynamic_state;
+pub(crate) mod graphics_pipeline;
 pub(crate) mod image;
 pub(crate) mod instance;
 pub(crate) mod memory;

@@ -61,10 +61,7 @@ entry_points! {
         properties.format_properties = found;
         pnext::for_each_output(properties.p_next, |mut structure| {
             if let Some(out) = structure.cast::<vk::FormatProperties3<'_>>() {
-                // The 64-bit flags begin with the 32-bit ones.
-                let widen = |flags: vk::FormatFeatureFlags| {
-                    vk::FormatFeatureFlags2::from_raw(flags.as_raw().into())
-                };
+                let widen = |features| formats::features2(format, features);
                 out.linear_tiling_features = widen(found.linear_tiling_features);
                 out.optimal_tiling_features = widen(found.optimal_tiling_features);
                 out.buffer_features = widen(found.buffer_features);

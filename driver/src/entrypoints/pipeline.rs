@@ -1,31 +1,16 @@
-//! Pipelines and what they are made of.
+//! What pipelines are made of, and what the creation of both kinds has in common.
 
 use crate::capabilities::limits;
 use crate::error::Error;
-use crate::object::device::Device;
+use crate::object::pipeline::PipelineCache;
 use crate::object::pipeline::layout::PipelineLayout;
-use crate::object::pipeline::{GraphicsPipeline, GraphicsPipelineInfo, Pipeline, PipelineCache};
 use crate::object::shader_module::ShaderModule;
 use crate::{handle, pnext, pointer};
 use ash::vk;
-use gaurast::vk::PipelineGaussianStateCreateInfoGAURAST;
 use std::ffi::c_void;
 use std::sync::Arc;
 
 crate::entry_points! {
-    fn create_graphics_pipelines(
-        device: vk::Device,
-        _pipeline_cache: vk::PipelineCache,
-        create_info_count: u32,
-        create_infos: *const vk::GraphicsPipelineCreateInfo<'_>,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-        pipelines: *mut vk::Pipeline,
-    ) -> vk::Result {
-        let device = handle::get(device)?;
-        let infos = pointer::slice(create_infos, create_info_count)?;
-        create_each(infos, pipelines, |info| new_graphics_pipeline(device, info))
-    }
-
     fn destroy_pipeline(
         _device: vk::Device,
         pipeline: vk::Pipeline,
@@ -165,24 +150,6 @@ pub(super) unsafe fn create_each<T>(
     first_error.map_or(Ok(()), Err)
 }
 
-/// Makes one pipeline.
-///
-/// # Safety
-/// The create info and its chain are valid.
-unsafe fn new_graphics_pipeline(
-    device: &Device,
-    info: &vk::GraphicsPipelineCreateInfo<'_>,
-) -> Result<vk::Pipeline, Error> {
-    // SAFETY: the caller's promise.
-    let gathered = unsafe {
-        withhold_feedback(info.p_next)?;
-        gather(info)?
-    };
-    let pipeline = GraphicsPipeline::new(&gathered, device.features())?;
-    let pipeline = Pipeline::Graphics(Arc::new(pipeline));
-    Ok(handle::create(Arc::new(pipeline)))
-}
-
 /// Says of creation feedback that there is none: it takes no time that anybody would want to know.
 ///
 /// # Safety
@@ -200,110 +167,5 @@ pub(super) unsafe fn withhold_feedback(chain: *const c_void) -> Result<(), Error
             pointer::output(place, none)?;
         }
         Ok(())
-    }
-}
-
-/// Follows a create info's pointers.
-///
-/// # Safety
-/// The create info and its chain are valid.
-unsafe fn gather<'a>(
-    info: &'a vk::GraphicsPipelineCreateInfo<'a>,
-) -> Result<GraphicsPipelineInfo<'a>, Error> {
-    let mut gathered = GraphicsPipelineInfo::default();
-    // SAFETY: the caller's promise.
-    unsafe {
-        gathered.stages = pointer::slice(info.p_stages, info.stage_count)?;
-        gathered.gaussian =
-            pnext::find::<PipelineGaussianStateCreateInfoGAURAST>(info.p_next).copied();
-        gathered.color_formats = color_formats(info)?;
-        if let Some(state) = pointer::optional(info.p_vertex_input_state) {
-            gathered.bindings = pointer::slice(
-                state.p_vertex_binding_descriptions,
-                state.vertex_binding_description_count,
-            )?;
-            gathered.attributes = pointer::slice(
-                state.p_vertex_attribute_descriptions,
-                state.vertex_attribute_description_count,
-            )?;
-        }
-        if let Some(state) = pointer::optional(info.p_input_assembly_state) {
-            gathered.topology = state.topology;
-            gathered.primitive_restart = state.primitive_restart_enable != vk::FALSE;
-        }
-        if let Some(state) = pointer::optional(info.p_viewport_state) {
-            gather_viewports(state, &mut gathered)?;
-        }
-        if let Some(state) = pointer::optional(info.p_rasterization_state) {
-            gathered.rasterization = *state;
-        }
-        if let Some(state) = pointer::optional(info.p_multisample_state) {
-            gathered.samples = state.rasterization_samples;
-            gathered.alpha_to = state.alpha_to_coverage_enable != vk::FALSE
-                || state.alpha_to_one_enable != vk::FALSE;
-        }
-        if let Some(state) = pointer::optional(info.p_depth_stencil_state) {
-            gathered.depth_stencil = *state;
-        }
-        if let Some(state) = pointer::optional(info.p_color_blend_state) {
-            gathered.logic_op = state.logic_op_enable != vk::FALSE;
-            gathered.blend = pointer::slice(state.p_attachments, state.attachment_count)?;
-            gathered.blend_constants = state.blend_constants;
-        }
-        if let Some(state) = pointer::optional(info.p_dynamic_state) {
-            gathered.dynamic = pointer::slice(state.p_dynamic_states, state.dynamic_state_count)?;
-        }
-    }
-    Ok(gathered)
-}
-
-/// Viewports and scissors; their pointers may be null, or anything, where they are dynamic.
-///
-/// # Safety
-/// The state is valid.
-unsafe fn gather_viewports<'a>(
-    state: &'a vk::PipelineViewportStateCreateInfo<'a>,
-    gathered: &mut GraphicsPipelineInfo<'a>,
-) -> Result<(), Error> {
-    gathered.viewport_count = state.viewport_count;
-    // SAFETY: the caller's promise; a null pointer is not followed.
-    unsafe {
-        if !state.p_viewports.is_null() {
-            gathered.viewports = pointer::slice(state.p_viewports, state.viewport_count)?;
-        }
-        if !state.p_scissors.is_null() {
-            gathered.scissors = pointer::slice(state.p_scissors, state.scissor_count)?;
-        }
-    }
-    Ok(())
-}
-
-/// The colour formats of the subpass, or of dynamic rendering, that a pipeline is for.
-///
-/// # Safety
-/// The create info and its chain are valid.
-unsafe fn color_formats(
-    info: &vk::GraphicsPipelineCreateInfo<'_>,
-) -> Result<Vec<vk::Format>, Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        if let Some(render_pass) = handle::get_optional(info.render_pass)? {
-            return render_pass
-                .color_formats(info.subpass as usize)
-                .ok_or_else(|| {
-                    Error::usage(
-                        "VUID-VkGraphicsPipelineCreateInfo-renderPass-06046",
-                        format!("the render pass has no subpass {}", info.subpass),
-                    )
-                });
-        }
-        let Some(rendering) = pnext::find::<vk::PipelineRenderingCreateInfo>(info.p_next) else {
-            return Ok(Vec::new());
-        };
-        let formats = pointer::slice(
-            rendering.p_color_attachment_formats,
-            rendering.color_attachment_count,
-        )?;
-        Ok(formats.to_vec())
     }
 }

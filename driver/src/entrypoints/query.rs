@@ -3,13 +3,13 @@
 use super::command::record;
 use crate::command::record::{Command, CopyQueryResults};
 use crate::error::Error;
-use crate::object::query_pool::QueryPool;
+use crate::object::query_pool::{Contents, QueryPool};
 use crate::object::signals::Signals;
 use crate::{handle, pnext, pointer};
 use ash::vk;
 use simdevice::Packet;
 use simdevice::counters::Counter;
-use simdevice::query::{QueryKind, QueryResult};
+use simdevice::query::QueryResult;
 use std::ffi::c_void;
 use std::sync::Arc;
 use std::time::Duration;
@@ -204,12 +204,10 @@ fn require_queries(pool: &QueryPool, first: u32, count: u32) -> Result<(), Error
 /// # Safety
 /// The create info's chain is valid.
 unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Error> {
-    match info.query_type {
-        vk::QueryType::TIMESTAMP => Ok(QueryPool::new(
-            QueryKind::Timestamp,
-            info.query_count,
-            Vec::new(),
-        )),
+    let contents = match info.query_type {
+        vk::QueryType::TIMESTAMP => Contents::Timestamp,
+        vk::QueryType::OCCLUSION => Contents::occlusion(),
+        vk::QueryType::PIPELINE_STATISTICS => Contents::statistics(info.pipeline_statistics),
         vk::QueryType::PERFORMANCE_QUERY_KHR => {
             // SAFETY: the caller's promise.
             let counters = unsafe {
@@ -230,16 +228,15 @@ unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Erro
                     format!("there is no performance counter {index}"),
                 ));
             }
-            Ok(QueryPool::new(
-                QueryKind::Performance,
-                info.query_count,
-                counters.to_vec(),
-            ))
+            Contents::Performance(counters.to_vec())
         }
-        other => Err(Error::FeatureNotPresent(format!(
-            "a query pool of type {other:?}"
-        ))),
-    }
+        other => {
+            return Err(Error::FeatureNotPresent(format!(
+                "a query pool of type {other:?}"
+            )));
+        }
+    };
+    Ok(QueryPool::new(contents, info.query_count))
 }
 
 /// Records a timestamp.

@@ -1,7 +1,10 @@
 //! Render passes and framebuffers.
 
 use crate::error::Error;
-use crate::object::render_pass::{AttachmentDescription, Framebuffer, RenderPass, Subpass};
+use crate::lower::rendering;
+use crate::object::render_pass::{
+    AttachmentDescription, DepthStencilResolve, Framebuffer, RenderPass, Subpass,
+};
 use crate::{handle, pnext, pointer};
 use ash::vk;
 use std::sync::Arc;
@@ -119,59 +122,84 @@ fn refuse_multiview(view_mask: u32) -> Result<(), Error> {
     ))
 }
 
-/// Resolving needs attachments of several samples, which there aren't.
-fn refuse_resolve(is_used: bool) -> Result<(), Error> {
-    if is_used {
-        return Err(Error::FeatureNotPresent(
-            "a resolve attachment (images have one sample)".into(),
-        ));
-    }
-    Ok(())
-}
-
 /// A subpass of `vkCreateRenderPass`.
 ///
 /// # Safety
 /// The description's pointers are valid.
 unsafe fn new_subpass(subpass: &vk::SubpassDescription<'_>) -> Result<Subpass, Error> {
     // SAFETY: the caller's promise.
-    let (color, depth_stencil) = unsafe {
+    let (color, resolve, input, depth_stencil) = unsafe {
         let count = subpass.color_attachment_count;
         let has_resolve = !subpass.p_resolve_attachments.is_null();
         let resolve_count = if has_resolve { count } else { 0 };
-        let resolve = pointer::slice(subpass.p_resolve_attachments, resolve_count)?;
-        refuse_resolve(resolve.iter().any(|r| used(r.attachment).is_some()))?;
         (
             pointer::slice(subpass.p_color_attachments, count)?,
+            pointer::slice(subpass.p_resolve_attachments, resolve_count)?,
+            pointer::slice(subpass.p_input_attachments, subpass.input_attachment_count)?,
             pointer::optional(subpass.p_depth_stencil_attachment),
         )
     };
+    let all = |references: &[vk::AttachmentReference]| {
+        references.iter().map(|r| used(r.attachment)).collect()
+    };
     Ok(Subpass {
-        color: color.iter().map(|r| used(r.attachment)).collect(),
+        color: all(color),
+        resolve: all(resolve),
         depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
+        depth_stencil_resolve: None,
+        input: all(input),
     })
 }
 
 /// A subpass of `vkCreateRenderPass2`.
 ///
 /// # Safety
-/// The description's pointers are valid.
+/// The description's pointers and chain are valid.
 unsafe fn new_subpass2(subpass: &vk::SubpassDescription2<'_>) -> Result<Subpass, Error> {
     refuse_multiview(subpass.view_mask)?;
     // SAFETY: the caller's promise.
-    let (color, depth_stencil) = unsafe {
+    let (color, resolve, input, depth_stencil, depth_stencil_resolve) = unsafe {
         let count = subpass.color_attachment_count;
         let has_resolve = !subpass.p_resolve_attachments.is_null();
         let resolve_count = if has_resolve { count } else { 0 };
-        let resolve = pointer::slice(subpass.p_resolve_attachments, resolve_count)?;
-        refuse_resolve(resolve.iter().any(|r| used(r.attachment).is_some()))?;
         (
             pointer::slice(subpass.p_color_attachments, count)?,
+            pointer::slice(subpass.p_resolve_attachments, resolve_count)?,
+            pointer::slice(subpass.p_input_attachments, subpass.input_attachment_count)?,
             pointer::optional(subpass.p_depth_stencil_attachment),
+            match pnext::find(subpass.p_next) {
+                Some(info) => new_depth_stencil_resolve(info)?,
+                None => None,
+            },
         )
     };
+    let all = |references: &[vk::AttachmentReference2<'_>]| {
+        references.iter().map(|r| used(r.attachment)).collect()
+    };
     Ok(Subpass {
-        color: color.iter().map(|r| used(r.attachment)).collect(),
+        color: all(color),
+        resolve: all(resolve),
         depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
+        depth_stencil_resolve,
+        input: all(input),
     })
+}
+
+/// How a subpass resolves depth and stencil, if it does.
+///
+/// # Safety
+/// The structure's pointers are valid.
+unsafe fn new_depth_stencil_resolve(
+    info: &vk::SubpassDescriptionDepthStencilResolve<'_>,
+) -> Result<Option<DepthStencilResolve>, Error> {
+    // SAFETY: the caller's promise.
+    let reference = unsafe { pointer::optional(info.p_depth_stencil_resolve_attachment) };
+    let Some(attachment) = reference.and_then(|r| used(r.attachment)) else {
+        return Ok(None);
+    };
+    Ok(Some(DepthStencilResolve {
+        attachment,
+        depth: rendering::resolve_mode(info.depth_resolve_mode)?,
+        stencil: rendering::resolve_mode(info.stencil_resolve_mode)?,
+    }))
 }

@@ -2,7 +2,7 @@
 
 use super::command::record;
 use crate::error::Error;
-use crate::lower::rendering::{BegunPass, DynamicAttachment, DynamicRendering, rect};
+use crate::lower::rendering::{self, BegunPass, DynamicAttachment, DynamicRendering, rect};
 use crate::{handle, pnext, pointer};
 use ash::vk;
 use simdevice::packet::Rect;
@@ -138,17 +138,20 @@ unsafe fn dynamic_rendering(info: &vk::RenderingInfo<'_>) -> Result<DynamicRende
 unsafe fn attachment(
     info: &vk::RenderingAttachmentInfo<'_>,
 ) -> Result<Option<DynamicAttachment>, Error> {
-    if info.resolve_mode != vk::ResolveModeFlags::NONE {
-        return Err(Error::FeatureNotPresent(
-            "a resolve attachment (images have one sample)".into(),
-        ));
-    }
-    // SAFETY: the caller's promise.
-    let view = unsafe { handle::get_optional(info.image_view)? };
+    let mode = rendering::resolve_mode(info.resolve_mode)?;
+    // SAFETY: the caller's promise; without a mode there may be anything in place of a view.
+    let (view, resolve_view) = unsafe {
+        let resolve_view = match mode {
+            Some(_) => handle::get_optional(info.resolve_image_view)?,
+            None => None,
+        };
+        (handle::get_optional(info.image_view)?, resolve_view)
+    };
     Ok(view.map(|view| DynamicAttachment {
         view: Arc::clone(view),
         load: info.load_op,
         store: info.store_op,
         clear_value: info.clear_value,
+        resolve: resolve_view.map(Arc::clone).zip(mode),
     }))
 }

@@ -1,4 +1,4 @@
-//! Commands that copy and clear.
+//! Commands that copy, blit, resolve and clear.
 
 use super::command::record;
 use crate::error::Error;
@@ -53,6 +53,52 @@ crate::entry_points! {
         let info = pointer::input(copy_image_info)?;
         let regions = || Ok(pointer::slice(info.p_regions, info.region_count)?.to_vec());
         copy_image(command_buffer, info.src_image, info.dst_image, regions)
+    }
+
+    fn cmd_blit_image(
+        command_buffer: vk::CommandBuffer,
+        src_image: vk::Image,
+        _src_image_layout: vk::ImageLayout,
+        dst_image: vk::Image,
+        _dst_image_layout: vk::ImageLayout,
+        region_count: u32,
+        regions: *const vk::ImageBlit,
+        filter: vk::Filter,
+    ) {
+        let regions = || Ok(pointer::slice(regions, region_count)?.iter().map(image_blit2).collect());
+        blit_image(command_buffer, src_image, dst_image, filter, regions)
+    }
+
+    fn cmd_blit_image2(
+        command_buffer: vk::CommandBuffer,
+        blit_image_info: *const vk::BlitImageInfo2<'_>,
+    ) {
+        let info = pointer::input(blit_image_info)?;
+        let regions = || Ok(pointer::slice(info.p_regions, info.region_count)?.to_vec());
+        blit_image(command_buffer, info.src_image, info.dst_image, info.filter, regions)
+    }
+
+    fn cmd_resolve_image(
+        command_buffer: vk::CommandBuffer,
+        src_image: vk::Image,
+        _src_image_layout: vk::ImageLayout,
+        dst_image: vk::Image,
+        _dst_image_layout: vk::ImageLayout,
+        region_count: u32,
+        regions: *const vk::ImageResolve,
+    ) {
+        let regions =
+            || Ok(pointer::slice(regions, region_count)?.iter().map(image_resolve2).collect());
+        resolve_image(command_buffer, src_image, dst_image, regions)
+    }
+
+    fn cmd_resolve_image2(
+        command_buffer: vk::CommandBuffer,
+        resolve_image_info: *const vk::ResolveImageInfo2<'_>,
+    ) {
+        let info = pointer::input(resolve_image_info)?;
+        let regions = || Ok(pointer::slice(info.p_regions, info.region_count)?.to_vec());
+        resolve_image(command_buffer, info.src_image, info.dst_image, regions)
     }
 
     fn cmd_copy_buffer_to_image(
@@ -255,6 +301,49 @@ unsafe fn copy_image<'a>(
     }
 }
 
+/// Records a blit.
+///
+/// # Safety
+/// The handles are live.
+unsafe fn blit_image<'a>(
+    command_buffer: vk::CommandBuffer,
+    source: vk::Image,
+    target: vk::Image,
+    filter: vk::Filter,
+    regions: impl FnOnce() -> Result<Vec<vk::ImageBlit2<'a>>, Error>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        record(command_buffer, |recorder| {
+            recorder.require_outside_pass()?;
+            let (source, target) = (handle::get(source)?, handle::get(target)?);
+            recorder.packet(transfer::blit_image(source, target, filter, &regions()?)?);
+            Ok(())
+        })
+    }
+}
+
+/// Records a resolve.
+///
+/// # Safety
+/// The handles are live.
+unsafe fn resolve_image<'a>(
+    command_buffer: vk::CommandBuffer,
+    source: vk::Image,
+    target: vk::Image,
+    regions: impl FnOnce() -> Result<Vec<vk::ImageResolve2<'a>>, Error>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        record(command_buffer, |recorder| {
+            recorder.require_outside_pass()?;
+            let (source, target) = (handle::get(source)?, handle::get(target)?);
+            recorder.packet(transfer::resolve_image(source, target, &regions()?)?);
+            Ok(())
+        })
+    }
+}
+
 /// Records a copy between a buffer and an image.
 ///
 /// # Safety
@@ -291,6 +380,23 @@ fn buffer_copy2(region: &vk::BufferCopy) -> vk::BufferCopy2<'static> {
 
 fn image_copy2(region: &vk::ImageCopy) -> vk::ImageCopy2<'static> {
     vk::ImageCopy2::default()
+        .src_subresource(region.src_subresource)
+        .src_offset(region.src_offset)
+        .dst_subresource(region.dst_subresource)
+        .dst_offset(region.dst_offset)
+        .extent(region.extent)
+}
+
+fn image_blit2(region: &vk::ImageBlit) -> vk::ImageBlit2<'static> {
+    vk::ImageBlit2::default()
+        .src_subresource(region.src_subresource)
+        .src_offsets(region.src_offsets)
+        .dst_subresource(region.dst_subresource)
+        .dst_offsets(region.dst_offsets)
+}
+
+fn image_resolve2(region: &vk::ImageResolve) -> vk::ImageResolve2<'static> {
+    vk::ImageResolve2::default()
         .src_subresource(region.src_subresource)
         .src_offset(region.src_offset)
         .dst_subresource(region.dst_subresource)

@@ -67,13 +67,9 @@ macro_rules! unsupported {
 
 unsupported! {
     fn queue_bind_sparse(queue: vk::Queue, bind_info_count: u32, bind_info: *const vk::BindSparseInfo<'_>, fence: vk::Fence) -> vk::Result;
-    fn cmd_blit_image(command_buffer: vk::CommandBuffer, src_image: vk::Image, src_image_layout: vk::ImageLayout, dst_image: vk::Image, dst_image_layout: vk::ImageLayout, region_count: u32, regions: *const vk::ImageBlit, filter: vk::Filter);
-    fn cmd_resolve_image(command_buffer: vk::CommandBuffer, src_image: vk::Image, src_image_layout: vk::ImageLayout, dst_image: vk::Image, dst_image_layout: vk::ImageLayout, region_count: u32, regions: *const vk::ImageResolve);
     fn create_sampler_ycbcr_conversion(device: vk::Device, create_info: *const vk::SamplerYcbcrConversionCreateInfo<'_>, allocator: *const vk::AllocationCallbacks<'_>, ycbcr_conversion: *mut vk::SamplerYcbcrConversion) -> vk::Result;
     fn destroy_sampler_ycbcr_conversion(device: vk::Device, ycbcr_conversion: vk::SamplerYcbcrConversion, allocator: *const vk::AllocationCallbacks<'_>);
     fn get_buffer_device_address(device: vk::Device, info: *const vk::BufferDeviceAddressInfo<'_>) -> vk::DeviceAddress;
     fn get_buffer_opaque_capture_address(device: vk::Device, info: *const vk::BufferDeviceAddressInfo<'_>) -> u64;
     fn get_device_memory_opaque_capture_address(device: vk::Device, info: *const vk::DeviceMemoryOpaqueCaptureAddressInfo<'_>) -> u64;
-    fn cmd_blit_image2(command_buffer: vk::CommandBuffer, blit_image_info: *const vk::BlitImageInfo2<'_>);
-    fn cmd_resolve_image2(command_buffer: vk::CommandBuffer, resolve_image_info: *const vk::ResolveImageInfo2<'_>);
 }

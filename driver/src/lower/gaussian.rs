@@ -1,40 +1,15 @@
 //! Lowers Gaussian draws: pipeline, bound buffers, viewport and camera to the three packets of a sorted set.
 
+use super::draw::{Undrawn, attribute_stream, indices};
 use crate::command::record::Draw;
 use crate::command::state::State;
 use crate::object::pipeline::{AttributeSource, GaussianPipeline, GraphicsPipeline};
+use ash::vk;
 use simdevice::Packet;
 use simdevice::packet::{
-    AttributeStream, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, IndexStream,
-    Viewport,
+    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, Viewport,
 };
 use std::sync::Arc;
-
-/// Why a draw draws nothing: state that it needs is undefined.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum Undrawn {
-    /// No pipeline.
-    #[error("no graphics pipeline is bound")]
-    Pipeline,
-    /// No camera.
-    #[error("no camera is set: vkCmdSetGaussianCameraGAURAST must be recorded before the draw")]
-    Camera,
-    /// No viewport.
-    #[error("the pipeline's viewport is dynamic and none is set")]
-    Viewport,
-    /// No scissor.
-    #[error("the pipeline's scissor is dynamic and none is set")]
-    Scissor,
-    /// No blend constants.
-    #[error("the pipeline's blend constants are dynamic and none are set")]
-    BlendConstants,
-    /// No vertex buffer.
-    #[error("no vertex buffer is bound at binding {0}")]
-    VertexBuffer(u32),
-    /// No index buffer.
-    #[error("no index buffer is bound")]
-    IndexBuffer,
-}
 
 /// The packets of one draw.
 ///
@@ -47,10 +22,10 @@ pub(crate) fn draw(
     draw: &Draw,
 ) -> Result<[Packet; 3], Undrawn> {
     let begin = GaussianBegin {
-        state: fixed_state(state, pipeline, gaussian)?,
+        state: fixed_state(state, gaussian)?,
         camera: state.camera.ok_or(Undrawn::Camera)?,
-        viewport: upright(state.viewport(pipeline).ok_or(Undrawn::Viewport)?),
-        scissor: state.scissor(pipeline).ok_or(Undrawn::Scissor)?,
+        viewport: upright(state.viewport(gaussian).ok_or(Undrawn::Viewport)?),
+        scissor: state.scissor(gaussian).ok_or(Undrawn::Scissor)?,
     };
     let append = GaussianAppend {
         attributes: attributes(state, pipeline, gaussian)?,
@@ -68,15 +43,13 @@ pub(crate) fn draw(
 }
 
 /// What the pipeline fixes, with the dynamic part filled in.
-fn fixed_state(
-    state: &State,
-    pipeline: &GraphicsPipeline,
-    gaussian: &GaussianPipeline,
-) -> Result<Arc<GaussianState>, Undrawn> {
-    if !pipeline.dynamic_blend_constants {
+fn fixed_state(state: &State, gaussian: &GaussianPipeline) -> Result<Arc<GaussianState>, Undrawn> {
+    if !gaussian.dynamic_blend_constants {
         return Ok(Arc::clone(&gaussian.state));
     }
-    let blend_constants = state.blend_constants.ok_or(Undrawn::BlendConstants)?;
+    let blend_constants = state
+        .blend_constants()
+        .ok_or(Undrawn::Dynamic(vk::DynamicState::BLEND_CONSTANTS))?;
     Ok(Arc::new(GaussianState {
         blend_constants,
         ..GaussianState::clone(&gaussian.state)
@@ -113,36 +86,6 @@ fn attributes(
             .map(stream)
             .collect::<Result<_, _>>()?,
     })
-}
-
-fn attribute_stream(
-    state: &State,
-    pipeline: &GraphicsPipeline,
-    source: &AttributeSource,
-) -> Result<AttributeStream, Undrawn> {
-    let bound = state
-        .vertex_buffer(source.binding)
-        .ok_or(Undrawn::VertexBuffer(source.binding))?;
-    let dynamic_stride = bound.stride.filter(|_| pipeline.dynamic_stride);
-    Ok(AttributeStream {
-        buffer: bound.range.clone(),
-        stride: dynamic_stride.unwrap_or(source.stride),
-        offset: source.offset,
-        format: source.format,
-        instance_divisor: source.instance_divisor,
-    })
-}
-
-fn indices(state: &State, draw: &Draw) -> Result<Option<IndexStream>, Undrawn> {
-    let Some(vertex_offset) = draw.vertex_offset else {
-        return Ok(None);
-    };
-    let bound = state.index_buffer.as_ref().ok_or(Undrawn::IndexBuffer)?;
-    Ok(Some(IndexStream {
-        buffer: bound.range.clone(),
-        index_size: bound.index_size,
-        vertex_offset,
-    }))
 }
 
 #[cfg(test)]

@@ -5,7 +5,9 @@ use crate::object::image::ImageView;
 use crate::object::render_pass::{AttachmentDescription, RenderPass};
 use ash::vk;
 use simdevice::format::{Channel, Numeric};
-use simdevice::packet::{Aspect, Attachment, ClearValue, LoadOp, Rect, Rendering, StoreOp};
+use simdevice::packet::{
+    Aspect, Attachment, ClearValue, LoadOp, Rect, Rendering, ResolveMode, StoreOp,
+};
 use simdevice::{Format, Packet};
 use std::sync::Arc;
 
@@ -94,6 +96,40 @@ fn store(op: vk::AttachmentStoreOp) -> Result<StoreOp, Error> {
     }
 }
 
+/// How samples become one, if they do.
+///
+/// # Errors
+/// [`Error::Usage`] for modes that Vulkan does not have.
+pub(crate) fn resolve_mode(mode: vk::ResolveModeFlags) -> Result<Option<ResolveMode>, Error> {
+    match mode {
+        vk::ResolveModeFlags::NONE => Ok(None),
+        vk::ResolveModeFlags::SAMPLE_ZERO => Ok(Some(ResolveMode::SampleZero)),
+        vk::ResolveModeFlags::AVERAGE => Ok(Some(ResolveMode::Average)),
+        vk::ResolveModeFlags::MIN => Ok(Some(ResolveMode::Min)),
+        vk::ResolveModeFlags::MAX => Ok(Some(ResolveMode::Max)),
+        other => Err(Error::usage(
+            "VUID-VkRenderingAttachmentInfo-resolveMode-parameter",
+            format!("{other:?} is not a VkResolveModeFlagBits"),
+        )),
+    }
+}
+
+/// Checks that an attachment's samples can be resolved to a view.
+fn check_resolve(attachment: &ImageView, view: &ImageView) -> Result<(), Error> {
+    let (from, to) = (&attachment.view, &view.view);
+    let samples = to.image.desc.samples;
+    if from.format == to.format && samples == 1 {
+        return Ok(());
+    }
+    Err(Error::usage(
+        "VUID-VkRenderingAttachmentInfo-imageView-06865",
+        format!(
+            "an attachment of format {:?} is resolved to one of format {:?} with {samples} samples",
+            from.format, to.format
+        ),
+    ))
+}
+
 /// A render pass that has begun, with what it renders to.
 #[derive(Clone)]
 pub(crate) struct BegunPass {
@@ -121,9 +157,15 @@ impl BegunPass {
                 format!("the render pass has no subpass {index}"),
             ));
         };
-        let color = subpass.color.iter().map(|used| {
+        let resolved = subpass
+            .resolve
+            .iter()
+            .copied()
+            .chain(std::iter::repeat(None));
+        let color = subpass.color.iter().zip(resolved).map(|(used, resolved)| {
             let ops = AttachmentDescription::main;
-            used.map(|number| self.attachment(index, number, Aspect::Color, ops))
+            let resolve = resolved.map(|number| (number, ResolveMode::Average));
+            used.map(|number| self.attachment(index, number, Aspect::Color, ops, resolve))
                 .transpose()
         });
         let depth_stencil = |aspect, ops| {
@@ -131,8 +173,15 @@ impl BegunPass {
             let number = subpass
                 .depth_stencil
                 .filter(|&number| self.format(number).is_some_and(has_aspect));
+            let resolve = subpass.depth_stencil_resolve.and_then(|resolve| {
+                let mode = match aspect {
+                    Aspect::Stencil => resolve.stencil,
+                    Aspect::Color | Aspect::Depth => resolve.depth,
+                };
+                mode.map(|mode| (resolve.attachment, mode))
+            });
             number
-                .map(|number| self.attachment(index, number, aspect, ops))
+                .map(|number| self.attachment(index, number, aspect, ops, resolve))
                 .transpose()
         };
         Ok(Packet::BeginRendering(Box::new(Rendering {
@@ -144,24 +193,78 @@ impl BegunPass {
         })))
     }
 
+    /// The packets that clear what a subpass reads before anything was rendered to it.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if a view is missing.
+    pub(crate) fn clears_before_reads(&self, index: usize) -> Result<Vec<Packet>, Error> {
+        let mut packets = Vec::new();
+        for number in self.render_pass.first_read(index) {
+            let Some(format) = self.format(number) else {
+                continue;
+            };
+            let cleared = |aspect, ops: fn(&AttachmentDescription) -> Ops| {
+                let (load, _) = ops(&self.render_pass.attachments[number]);
+                let is_cleared =
+                    format.aspects().contains(&aspect) && load == vk::AttachmentLoadOp::CLEAR;
+                is_cleared
+                    .then(|| self.attachment(index, number, aspect, ops, None))
+                    .transpose()
+            };
+            let color = cleared(Aspect::Color, AttachmentDescription::main)?;
+            let depth = cleared(Aspect::Depth, AttachmentDescription::main)?;
+            let stencil = cleared(Aspect::Stencil, AttachmentDescription::stencil)?;
+            let mut attachments = [color, depth, stencil];
+            if attachments.iter().all(Option::is_none) {
+                continue;
+            }
+            for attachment in attachments.iter_mut().flatten() {
+                attachment.store = StoreOp::Store;
+            }
+            let [color, depth, stencil] = attachments;
+            packets.push(Packet::BeginRendering(Box::new(Rendering {
+                area: self.area,
+                layer_count: self.layers,
+                color: vec![color],
+                depth,
+                stencil,
+            })));
+            packets.push(Packet::EndRendering);
+        }
+        Ok(packets)
+    }
+
     fn format(&self, number: usize) -> Option<Format> {
         self.views.get(number).map(|view| view.view.format)
     }
 
+    fn view(&self, number: usize) -> Result<&ImageView, Error> {
+        let view = self.views.get(number).map(Arc::as_ref);
+        view.ok_or_else(|| {
+            Error::usage(
+                "VUID-VkFramebufferCreateInfo-attachmentCount-00876",
+                format!("the framebuffer has no attachment {number}"),
+            )
+        })
+    }
+
+    /// An attachment and, if it is resolved, the attachment that it is resolved to and how.
     fn attachment(
         &self,
         subpass: usize,
         number: usize,
         aspect: Aspect,
         ops: fn(&AttachmentDescription) -> Ops,
+        resolve: Option<(usize, ResolveMode)>,
     ) -> Result<Attachment, Error> {
-        let Some(view) = self.views.get(number) else {
-            return Err(Error::usage(
-                "VUID-VkFramebufferCreateInfo-attachmentCount-00876",
-                format!("the framebuffer has no attachment {number}"),
-            ));
-        };
+        let view = self.view(number)?;
         check_attachment(view, aspect, self.layers)?;
+        let resolve = resolve.map(|(number, mode)| {
+            let to = self.view(number)?;
+            check_attachment(to, aspect, self.layers)?;
+            check_resolve(view, to)?;
+            Ok::<_, Error>((to.view.clone(), mode))
+        });
         let (load_op, store_op) = ops(&self.render_pass.attachments[number]);
         // A clear value that is missing is the application's error; zero is as good as any.
         let clear = || {
@@ -180,6 +283,7 @@ impl BegunPass {
             } else {
                 StoreOp::Store
             },
+            resolve: resolve.transpose()?,
         })
     }
 }
@@ -209,6 +313,8 @@ pub(crate) struct DynamicAttachment {
     pub(crate) store: vk::AttachmentStoreOp,
     /// What it is cleared to.
     pub(crate) clear_value: vk::ClearValue,
+    /// Where it is resolved to, and how.
+    pub(crate) resolve: Option<(Arc<ImageView>, ResolveMode)>,
 }
 
 /// Dynamic rendering.
@@ -260,6 +366,14 @@ impl DynamicRendering {
         aspect: Aspect,
     ) -> Result<Attachment, Error> {
         check_attachment(&attachment.view, aspect, self.layers)?;
+        // What is suspended is resolved where it ends.
+        let suspends = self.flags.contains(vk::RenderingFlags::SUSPENDING);
+        let resolve = attachment.resolve.as_ref().filter(|_| !suspends);
+        let resolve = resolve.map(|(view, mode)| {
+            check_attachment(view, aspect, self.layers)?;
+            check_resolve(&attachment.view, view)?;
+            Ok::<_, Error>((view.view.clone(), *mode))
+        });
         let format = attachment.view.view.format;
         Ok(Attachment {
             view: attachment.view.view.clone(),
@@ -270,11 +384,12 @@ impl DynamicRendering {
                     clear_value(format, attachment.clear_value)
                 })?
             },
-            store: if self.flags.contains(vk::RenderingFlags::SUSPENDING) {
+            store: if suspends {
                 StoreOp::Store
             } else {
                 store(attachment.store)?
             },
+            resolve: resolve.transpose()?,
         })
     }
 }

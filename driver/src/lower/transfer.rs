@@ -1,15 +1,18 @@
-//! Lowers copies and clears. Regions are converted as they are; the device refuses what lies outside an image.
+//! Lowers copies, blits, resolves and clears. Regions are converted as they are; the device refuses what lies outside an image.
 
 use super::rendering;
 use crate::error::Error;
 use crate::object::buffer::Buffer;
 use crate::object::image::{Image, count};
+use crate::object::sampler;
 use ash::vk;
-use simdevice::Packet;
+use simdevice::format::Numeric;
 use simdevice::packet::{
-    Aspect, BufferCopyRegion, BufferImageRegion, BufferRange, ClearImage, ClearValue, CopyBuffer,
-    CopyBufferImage, CopyImage, ImageCopyRegion, SubresourceLayers, SubresourceRange,
+    Aspect, BlitImage, BufferCopyRegion, BufferImageRegion, BufferRange, ClearImage, ClearValue,
+    CopyBuffer, CopyBufferImage, CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage,
+    ResolveMode, SubresourceLayers, SubresourceRange,
 };
+use simdevice::{Format, Packet};
 use std::sync::Arc;
 
 /// `vkCmdCopyBuffer`.
@@ -68,13 +71,100 @@ pub(crate) fn copy_buffer_image(
 /// `vkCmdCopyImage`.
 ///
 /// # Errors
-/// [`Error::Usage`] if an image is not bound or has no such subresource.
+/// [`Error::Usage`] if an image is not bound, has no such subresource, or differs from the other in its samples.
 pub(crate) fn copy_image(
     source: &Image,
     target: &Image,
     regions: &[vk::ImageCopy2],
 ) -> Result<Packet, Error> {
-    let region = |region: &vk::ImageCopy2| {
+    let (from, to) = (source.desc.samples, target.desc.samples);
+    if from != to {
+        return Err(Error::usage(
+            "VUID-vkCmdCopyImage-srcImage-00136",
+            format!("one image has {from} samples, the other {to}"),
+        ));
+    }
+    let mut lowered = Vec::with_capacity(regions.len());
+    for region in regions {
+        let pairs = layer_pairs(
+            (source, &region.src_subresource),
+            (target, &region.dst_subresource),
+        )?;
+        lowered.extend(pairs.into_iter().map(|(source, target)| ImageCopyRegion {
+            source,
+            source_offset: offset(region.src_offset),
+            target,
+            target_offset: offset(region.dst_offset),
+            extent: extent(region.extent),
+        }));
+    }
+    Ok(Packet::CopyImage(CopyImage {
+        source: Arc::clone(source.bound()?),
+        target: Arc::clone(target.bound()?),
+        regions: lowered,
+    }))
+}
+
+/// `vkCmdBlitImage`.
+///
+/// # Errors
+/// [`Error::Usage`] if an image is not bound, has no such subresource or several samples, or if the formats don't
+/// convert to each other; [`Error::FeatureNotPresent`] for filters of extensions.
+pub(crate) fn blit_image(
+    source: &Image,
+    target: &Image,
+    filter: vk::Filter,
+    regions: &[vk::ImageBlit2],
+) -> Result<Packet, Error> {
+    require_one_sample("VUID-vkCmdBlitImage-srcImage-00233", source)?;
+    require_one_sample("VUID-vkCmdBlitImage-dstImage-00234", target)?;
+    let (from, to) = (source.desc.format, target.desc.format);
+    if !converts(from, to) {
+        return Err(Error::usage(
+            "VUID-vkCmdBlitImage-srcImage-00229",
+            format!("texels of format {from:?} do not convert to {to:?}"),
+        ));
+    }
+    let mut lowered = Vec::with_capacity(regions.len());
+    for region in regions {
+        let pairs = layer_pairs(
+            (source, &region.src_subresource),
+            (target, &region.dst_subresource),
+        )?;
+        lowered.extend(pairs.into_iter().map(|(source, target)| ImageBlitRegion {
+            source,
+            source_corners: region.src_offsets.map(offset),
+            target,
+            target_corners: region.dst_offsets.map(offset),
+        }));
+    }
+    Ok(Packet::BlitImage(BlitImage {
+        source: Arc::clone(source.bound()?),
+        target: Arc::clone(target.bound()?),
+        filter: sampler::filter(filter)?,
+        regions: lowered,
+    }))
+}
+
+/// `vkCmdResolveImage`.
+///
+/// # Errors
+/// [`Error::Usage`] if an image is not bound or has no such subresource, if the target has several samples, or if
+/// the formats differ.
+pub(crate) fn resolve_image(
+    source: &Image,
+    target: &Image,
+    regions: &[vk::ImageResolve2],
+) -> Result<Packet, Error> {
+    require_one_sample("VUID-vkCmdResolveImage-dstImage-00259", target)?;
+    let (from, to) = (source.desc.format, target.desc.format);
+    if from != to || from.aspects() != [Aspect::Color] {
+        return Err(Error::usage(
+            "VUID-vkCmdResolveImage-srcImage-01386",
+            format!("texels of format {from:?} do not resolve to {to:?}"),
+        ));
+    }
+    let region = |region: &vk::ImageResolve2| {
         Ok(ImageCopyRegion {
             source: layers(source, &region.src_subresource)?,
             source_offset: offset(region.src_offset),
@@ -83,11 +173,34 @@ pub(crate) fn copy_image(
             extent: extent(region.extent),
         })
     };
-    Ok(Packet::CopyImage(CopyImage {
+    Ok(Packet::ResolveImage(ResolveImage {
         source: Arc::clone(source.bound()?),
         target: Arc::clone(target.bound()?),
+        mode: ResolveMode::Average,
         regions: regions.iter().map(region).collect::<Result<_, Error>>()?,
     }))
+}
+
+fn require_one_sample(vuid: &'static str, image: &Image) -> Result<(), Error> {
+    match image.desc.samples {
+        1 => Ok(()),
+        samples => Err(Error::usage(
+            vuid,
+            format!("the image has {samples} samples"),
+        )),
+    }
+}
+
+/// Whether a blit between the formats means something: signed integers, unsigned ones and everything else keep to
+/// themselves, and a depth and stencil format to itself.
+fn converts(from: Format, to: Format) -> bool {
+    let class = |format: Format| match format.numeric() {
+        Numeric::Uint => 0,
+        Numeric::Sint => 1,
+        _ => 2,
+    };
+    let are_colors = [from, to].map(|format| format.aspects() == [Aspect::Color]) == [true; 2];
+    from == to || are_colors && class(from) == class(to)
 }
 
 /// `vkCmdFillBuffer`; without a size the range ends at the last whole word.
@@ -204,27 +317,52 @@ fn subresource_range(
     }
 }
 
-/// The subresources of a copy; it names exactly one aspect.
+/// The subresources of a copy that names exactly one aspect.
 fn layers(image: &Image, layers: &vk::ImageSubresourceLayers) -> Result<SubresourceLayers, Error> {
-    let aspect = match *aspects(image, layers.aspect_mask)?.as_slice() {
-        [aspect] => aspect,
-        _ => return Err(no_subresource(layers)),
-    };
+    match *aspect_layers(image, layers)?.as_slice() {
+        [layers] => Ok(layers),
+        _ => Err(no_subresource(layers)),
+    }
+}
+
+/// The subresources on both sides of a copy, aspect by aspect.
+fn layer_pairs(
+    (source, from): (&Image, &vk::ImageSubresourceLayers),
+    (target, to): (&Image, &vk::ImageSubresourceLayers),
+) -> Result<Vec<(SubresourceLayers, SubresourceLayers)>, Error> {
+    let (sources, targets) = (aspect_layers(source, from)?, aspect_layers(target, to)?);
+    if sources.len() != targets.len() {
+        return Err(Error::usage(
+            "VUID-vkCmdCopyImage-srcImage-01551",
+            format!("a region goes from {from:?} to other aspects, {to:?}"),
+        ));
+    }
+    Ok(sources.into_iter().zip(targets).collect())
+}
+
+/// The subresources of a copy, aspect by aspect.
+fn aspect_layers(
+    image: &Image,
+    layers: &vk::ImageSubresourceLayers,
+) -> Result<Vec<SubresourceLayers>, Error> {
     let layer_count = count(
         layers.base_array_layer,
         layers.layer_count,
         vk::REMAINING_ARRAY_LAYERS,
         image.desc.array_layers,
     );
-    match layer_count {
-        Some(layer_count) if layers.mip_level < image.desc.mip_levels => Ok(SubresourceLayers {
+    let Some(layer_count) = layer_count.filter(|_| layers.mip_level < image.desc.mip_levels) else {
+        return Err(no_subresource(layers));
+    };
+    let aspects = aspects(image, layers.aspect_mask)?.into_iter();
+    Ok(aspects
+        .map(|aspect| SubresourceLayers {
             aspect,
             mip_level: layers.mip_level,
             base_layer: layers.base_array_layer,
             layer_count,
-        }),
-        _ => Err(no_subresource(layers)),
-    }
+        })
+        .collect())
 }
 
 /// The aspects of a mask, all of which the image has.

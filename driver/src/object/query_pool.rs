@@ -1,8 +1,9 @@
 //! Query pools.
 
 use crate::command::record::CopyQueryResults;
-use ash::vk::QueryResultFlags;
+use ash::vk::{QueryPipelineStatisticFlags as Statistic, QueryResultFlags};
 use simdevice::Packet;
+use simdevice::counters::Counter;
 use simdevice::packet::BufferRange;
 use simdevice::query::{self, QueryKind, QueryResult};
 use std::sync::Arc;
@@ -12,18 +13,92 @@ use std::sync::Arc;
 pub(crate) struct QueryPool {
     /// The device's half.
     pub(crate) queries: Arc<query::QueryPool>,
-    /// For a performance pool, the counters that results hold, in order.
-    counters: Vec<u32>,
+    /// What results hold.
+    contents: Contents,
+}
+
+/// What the results of a pool's queries hold.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Contents {
+    /// The host's time.
+    Timestamp,
+    /// Counters as `VkPerformanceCounterResultKHR`s, in order.
+    Performance(Vec<u32>),
+    /// Counters as words, in order: occlusion and pipeline statistics. `None` counts what this device never does.
+    Words(Vec<Option<Counter>>),
+}
+
+impl Contents {
+    /// Samples that passed all tests. They are always counted exactly.
+    pub(crate) fn occlusion() -> Self {
+        Self::Words(vec![Some(Counter::SamplesPassed)])
+    }
+
+    /// Pipeline statistics, from the lowest flag to the highest.
+    pub(crate) fn statistics(flags: Statistic) -> Self {
+        const ALL: [(Statistic, Option<Counter>); 11] = [
+            (
+                Statistic::INPUT_ASSEMBLY_VERTICES,
+                Some(Counter::InputVertices),
+            ),
+            (
+                Statistic::INPUT_ASSEMBLY_PRIMITIVES,
+                Some(Counter::InputPrimitives),
+            ),
+            (
+                Statistic::VERTEX_SHADER_INVOCATIONS,
+                Some(Counter::VertexInvocations),
+            ),
+            (Statistic::GEOMETRY_SHADER_INVOCATIONS, None),
+            (Statistic::GEOMETRY_SHADER_PRIMITIVES, None),
+            (
+                Statistic::CLIPPING_INVOCATIONS,
+                Some(Counter::ClippingInvocations),
+            ),
+            (
+                Statistic::CLIPPING_PRIMITIVES,
+                Some(Counter::ClippingPrimitives),
+            ),
+            (
+                Statistic::FRAGMENT_SHADER_INVOCATIONS,
+                Some(Counter::FragmentInvocations),
+            ),
+            (Statistic::TESSELLATION_CONTROL_SHADER_PATCHES, None),
+            (Statistic::TESSELLATION_EVALUATION_SHADER_INVOCATIONS, None),
+            (
+                Statistic::COMPUTE_SHADER_INVOCATIONS,
+                Some(Counter::ComputeInvocations),
+            ),
+        ];
+        let counted = ALL.iter().filter(|(flag, _)| flags.contains(*flag));
+        Self::Words(counted.map(|(_, counter)| *counter).collect())
+    }
+
+    fn kind(&self) -> QueryKind {
+        match self {
+            Self::Timestamp => QueryKind::Timestamp,
+            Self::Performance(_) | Self::Words(_) => QueryKind::Performance,
+        }
+    }
+
+    /// How many values a result has.
+    fn count(&self) -> usize {
+        match self {
+            Self::Timestamp => 1,
+            Self::Performance(counters) => counters.len(),
+            Self::Words(counters) => counters.len(),
+        }
+    }
 }
 
 crate::objects! { ash::vk::QueryPool => QueryPool; }
 
 impl QueryPool {
     /// A pool of `count` queries.
-    pub(crate) fn new(kind: QueryKind, count: u32, counters: Vec<u32>) -> Self {
+    pub(crate) fn new(contents: Contents, count: u32) -> Self {
         Self {
-            queries: Arc::new(query::QueryPool::new(kind, count)),
-            counters,
+            queries: Arc::new(query::QueryPool::new(contents.kind(), count)),
+            contents,
         }
     }
 
@@ -39,11 +114,9 @@ impl QueryPool {
         result: Option<&QueryResult>,
         flags: QueryResultFlags,
     ) -> Vec<(u64, Vec<u8>)> {
-        let (values, wide) = match self.queries.kind() {
-            // A VkPerformanceCounterResultKHR has eight bytes whatever the flags.
-            QueryKind::Performance => (self.counters.len(), true),
-            QueryKind::Timestamp => (1, flags.contains(QueryResultFlags::TYPE_64)),
-        };
+        // A VkPerformanceCounterResultKHR has eight bytes whatever the flags.
+        let wide = flags.contains(QueryResultFlags::TYPE_64)
+            || matches!(self.contents, Contents::Performance(_));
         let word = |value: u64| {
             if wide {
                 value.to_ne_bytes().to_vec()
@@ -52,27 +125,42 @@ impl QueryPool {
             }
         };
         let mut written = Vec::new();
-        if let Some(result) = result {
-            let values = self.values(result);
+        let values = match result {
+            Some(result) => Some(self.values(result)),
+            // So far nothing was counted: what is between is only known when the query ends.
+            None if flags.contains(QueryResultFlags::PARTIAL) => {
+                Some(vec![0; self.contents.count()])
+            }
+            None => None,
+        };
+        if let Some(values) = values {
             written.push((0, values.into_iter().flat_map(word).collect()));
         }
         if flags.contains(QueryResultFlags::WITH_AVAILABILITY) {
-            let place = values as u64 * if wide { 8 } else { 4 };
+            let place = self.contents.count() as u64 * if wide { 8 } else { 4 };
             written.push((place, word(result.is_some().into())));
         }
         written
     }
 
     fn values(&self, result: &QueryResult) -> Vec<u64> {
-        match result {
-            QueryResult::Performance(counters) => {
+        let counters = match result {
+            QueryResult::Timestamp(nanoseconds) => return vec![*nanoseconds],
+            QueryResult::Performance(counters) => counters,
+        };
+        match &self.contents {
+            Contents::Timestamp => vec![0],
+            Contents::Performance(indices) => {
                 let value = |&index: &u32| counters.values().get(index as usize).copied();
-                self.counters
+                indices
                     .iter()
                     .map(|index| value(index).unwrap_or(0))
                     .collect()
             }
-            QueryResult::Timestamp(nanoseconds) => vec![*nanoseconds],
+            Contents::Words(counted) => counted
+                .iter()
+                .map(|counter| counter.map_or(0, |counter| counters.get(counter)))
+                .collect(),
         }
     }
 }
@@ -103,7 +191,7 @@ pub(crate) fn copy_packets(copy: &CopyQueryResults) -> Vec<Packet> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use simdevice::counters::{Counter, Counters};
+    use simdevice::counters::Counters;
 
     #[test]
     fn counters_come_in_the_pools_order() {
@@ -114,7 +202,7 @@ mod tests {
             Counter::GaussiansDrawn as u32,
             Counter::GaussiansRead as u32,
         ];
-        let pool = QueryPool::new(QueryKind::Performance, 1, order);
+        let pool = QueryPool::new(Contents::Performance(order), 1);
         let result = QueryResult::Performance(Box::new(counters));
         let written = pool.written(Some(&result), QueryResultFlags::empty());
         let expected = [5u64.to_ne_bytes(), 7u64.to_ne_bytes()].concat();
@@ -123,7 +211,7 @@ mod tests {
 
     #[test]
     fn availability_follows_the_values() {
-        let pool = QueryPool::new(QueryKind::Timestamp, 3, Vec::new());
+        let pool = QueryPool::new(Contents::Timestamp, 3);
         let flags = QueryResultFlags::WITH_AVAILABILITY;
         let result = QueryResult::Timestamp((1 << 32) + 9);
         assert_eq!(
@@ -139,5 +227,23 @@ mod tests {
         );
         assert!(pool.written(None, QueryResultFlags::TYPE_64).is_empty());
         assert!(pool.has(1, 2) && !pool.has(2, 2) && !pool.has(u32::MAX, 2));
+    }
+
+    #[test]
+    fn statistics_are_words_in_the_order_of_their_flags() {
+        let mut counters = Counters::default();
+        counters.add(Counter::FragmentInvocations, 7);
+        counters.add(Counter::InputVertices, 3);
+        let flags = Statistic::FRAGMENT_SHADER_INVOCATIONS
+            | Statistic::GEOMETRY_SHADER_PRIMITIVES
+            | Statistic::INPUT_ASSEMBLY_VERTICES;
+        let pool = QueryPool::new(Contents::statistics(flags), 1);
+        let result = QueryResult::Performance(Box::new(counters));
+        let words = |words: [u32; 3]| words.map(u32::to_ne_bytes).concat();
+        let none = QueryResultFlags::empty();
+        assert_eq!(pool.written(Some(&result), none), [(0, words([3, 0, 7]))]);
+        assert!(pool.written(None, none).is_empty());
+        let partial = pool.written(None, QueryResultFlags::PARTIAL);
+        assert_eq!(partial, [(0, words([0; 3]))]);
     }
 }

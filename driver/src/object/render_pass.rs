@@ -3,6 +3,7 @@
 use super::image::ImageView;
 use crate::error::Error;
 use ash::vk;
+use simdevice::packet::ResolveMode;
 use std::sync::Arc;
 
 /// A render pass. Subpasses are rendered one after another; between them attachments are in memory.
@@ -34,14 +35,47 @@ pub(crate) struct AttachmentDescription {
 pub(crate) struct Subpass {
     /// Colour attachments by location.
     pub(crate) color: Vec<Option<usize>>,
+    /// What colour attachments are resolved to, by location; may be short.
+    pub(crate) resolve: Vec<Option<usize>>,
     /// The depth and stencil attachment.
     pub(crate) depth_stencil: Option<usize>,
+    /// What it is resolved to, and how.
+    pub(crate) depth_stencil_resolve: Option<DepthStencilResolve>,
+    /// Attachments that shaders read. Between subpasses they are in memory, so that they are images like any other.
+    pub(crate) input: Vec<Option<usize>>,
+}
+
+/// How a subpass resolves its depth and stencil attachment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DepthStencilResolve {
+    /// The attachment that it is resolved to.
+    pub(crate) attachment: usize,
+    /// How depth is resolved, if it is.
+    pub(crate) depth: Option<ResolveMode>,
+    /// How stencil is resolved, if it is.
+    pub(crate) stencil: Option<ResolveMode>,
 }
 
 impl Subpass {
-    /// Whether it renders to attachment number `index`.
+    /// The attachments that it uses.
+    fn attachments(&self) -> impl Iterator<Item = usize> {
+        let lists = [&self.color, &self.resolve, &self.input];
+        let resolved = self.depth_stencil_resolve.map(|resolve| resolve.attachment);
+        let listed = lists.into_iter().flatten().copied().flatten();
+        listed.chain(self.depth_stencil).chain(resolved)
+    }
+
+    /// Whether it uses attachment number `index`.
     fn uses(&self, index: usize) -> bool {
-        self.color.contains(&Some(index)) || self.depth_stencil == Some(index)
+        self.attachments().any(|used| used == index)
+    }
+
+    /// Whether it renders to attachment number `index`, or resolves to it.
+    fn writes(&self, index: usize) -> bool {
+        let resolved = self.depth_stencil_resolve.map(|resolve| resolve.attachment);
+        let lists = [&self.color, &self.resolve];
+        lists.iter().any(|list| list.contains(&Some(index)))
+            || [self.depth_stencil, resolved].contains(&Some(index))
     }
 }
 
@@ -59,11 +93,10 @@ impl RenderPass {
         attachments: Vec<AttachmentDescription>,
         subpasses: Vec<Subpass>,
     ) -> Result<Self, Error> {
-        let exists = |index: &usize| *index < attachments.len();
-        let valid = subpasses.iter().all(|subpass| {
-            let used = subpass.color.iter().flatten();
-            used.chain(&subpass.depth_stencil).all(exists)
-        });
+        let exists = |index: usize| index < attachments.len();
+        let valid = subpasses
+            .iter()
+            .all(|subpass| subpass.attachments().all(exists));
         if subpasses.is_empty() || !valid {
             return Err(Error::usage(
                 "VUID-VkRenderPassCreateInfo-attachment-00834",
@@ -84,6 +117,17 @@ impl RenderPass {
     /// Whether `subpass` is the last to use attachment number `index`.
     pub(crate) fn is_last_use(&self, subpass: usize, index: usize) -> bool {
         !self.subpasses[subpass + 1..].iter().any(|s| s.uses(index))
+    }
+
+    /// The attachments that `subpass` is the first to use, and only reads.
+    pub(crate) fn first_read(&self, subpass: usize) -> Vec<usize> {
+        let Some(used) = self.subpasses.get(subpass) else {
+            return Vec::new();
+        };
+        (0..self.attachments.len())
+            .filter(|&index| used.uses(index) && !used.writes(index))
+            .filter(|&index| self.is_first_use(subpass, index))
+            .collect()
     }
 
     /// The formats of a subpass's colour attachments; undefined where unused.
@@ -125,7 +169,7 @@ mod tests {
     fn subpass(color: &[Option<usize>]) -> Subpass {
         Subpass {
             color: color.to_vec(),
-            depth_stencil: None,
+            ..Subpass::default()
         }
     }
 
@@ -145,6 +189,39 @@ mod tests {
             [vk::Format::UNDEFINED, vk::Format::R8G8B8A8_UNORM]
         );
         assert!(pass.color_formats(3).is_none());
+    }
+
+    #[test]
+    fn input_and_resolve_attachments_are_used_too() {
+        let subpasses = vec![
+            Subpass {
+                resolve: vec![None, Some(2)],
+                ..subpass(&[Some(0)])
+            },
+            Subpass {
+                input: vec![Some(2), None, Some(3)],
+                ..subpass(&[Some(1)])
+            },
+            Subpass {
+                depth_stencil_resolve: Some(DepthStencilResolve {
+                    attachment: 0,
+                    depth: Some(ResolveMode::SampleZero),
+                    stencil: None,
+                }),
+                ..subpass(&[])
+            },
+        ];
+        let pass = RenderPass::new(vec![DESCRIPTION; 4], subpasses).unwrap();
+        assert!(pass.is_first_use(0, 2) && !pass.is_last_use(0, 2));
+        assert!(!pass.is_first_use(1, 2) && pass.is_last_use(1, 2));
+        assert!(!pass.is_last_use(0, 0) && pass.is_last_use(2, 0));
+        let read: Vec<_> = (0..4).map(|subpass| pass.first_read(subpass)).collect();
+        assert_eq!(read, [vec![], vec![3], vec![], vec![]]);
+        let outside = Subpass {
+            input: vec![Some(1)],
+            ..subpass(&[])
+        };
+        assert!(RenderPass::new(vec![DESCRIPTION], vec![outside]).is_err());
     }
 
     #[test]

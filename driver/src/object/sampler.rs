@@ -48,7 +48,11 @@ impl Sampler {
     }
 }
 
-fn filter(filter: vk::Filter) -> Result<Filter, Error> {
+/// A filter for the device.
+///
+/// # Errors
+/// [`Error::FeatureNotPresent`] for filters of extensions.
+pub(crate) fn filter(filter: vk::Filter) -> Result<Filter, Error> {
     match filter {
         vk::Filter::NEAREST => Ok(Filter::Nearest),
         vk::Filter::LINEAR => Ok(Filter::Linear),

@@ -177,13 +177,6 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
             },
             "DEPTH_TEST_ENABLE",
         ),
-        (
-            PipelineRequest {
-                topology: vk::PrimitiveTopology::TRIANGLE_LIST,
-                ..PipelineRequest::default()
-            },
-            "TRIANGLE_LIST",
-        ),
     ];
     for (request, word) in bad {
         assert_refused(&gpu, &request, vk::Result::ERROR_FEATURE_NOT_PRESENT, word);

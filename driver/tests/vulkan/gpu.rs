@@ -89,6 +89,9 @@ impl Gpu {
             gaurast::gaussian_primitive_topology::NAME,
             ash::khr::performance_query::NAME,
             ash::khr::push_descriptor::NAME,
+            ash::ext::index_type_uint8::NAME,
+            ash::ext::provoking_vertex::NAME,
+            ash::ext::vertex_attribute_divisor::NAME,
         ];
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
         let instance_extensions = [ash::ext::debug_utils::NAME.as_ptr()];
@@ -126,7 +129,15 @@ impl Gpu {
             let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
             let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
             let mut performance = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default();
+            let mut indices = vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::default();
+            let mut provoking = vk::PhysicalDeviceProvokingVertexFeaturesEXT::default();
+            let mut divisor = vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::default();
+            let mut vulkan11 = vk::PhysicalDeviceVulkan11Features::default();
             let mut features = vk::PhysicalDeviceFeatures2::default()
+                .push_next(&mut indices)
+                .push_next(&mut provoking)
+                .push_next(&mut divisor)
+                .push_next(&mut vulkan11)
                 .push_next(&mut gaussian)
                 .push_next(&mut vulkan12)
                 .push_next(&mut vulkan13)

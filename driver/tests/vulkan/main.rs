@@ -3,17 +3,23 @@
 //! `unsafe` here has one reason throughout: these are Vulkan calls, and each test follows Vulkan's valid usage or
 //! breaks it in the one way that it is about, which the driver must survive.
 
+mod canvas;
 mod command_buffers;
 mod compute;
 mod descriptors;
+mod dynamic_states;
 mod gaussian_draws;
 mod gaussian_pipelines;
 mod gpu;
+mod image_transfers;
 mod images_in_shaders;
 mod kernel;
 #[path = "../support/loader.rs"]
 mod loader;
 mod memory;
+mod polygon_draws;
+mod polygon_pipelines;
+mod polygons;
 mod queries;
 mod render_passes;
 mod scene;

@@ -126,8 +126,15 @@ impl PipelineRequest<'_> {
             .logic_op_enable(self.logic_op)
             .blend_constants(self.blend_constants);
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&self.dynamic);
-        let mut rendering =
-            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&self.formats);
+        // Without a depth attachment the depth test is ignored.
+        let depth_format = if self.depth_test {
+            vk::Format::D32_SFLOAT
+        } else {
+            vk::Format::UNDEFINED
+        };
+        let mut rendering = vk::PipelineRenderingCreateInfo::default()
+            .color_attachment_formats(&self.formats)
+            .depth_attachment_format(depth_format);
         let mut gaussian = self.gaussian.unwrap_or_default();
         // SAFETY: see the crate.
         unsafe {

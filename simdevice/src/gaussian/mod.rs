@@ -1,13 +1,16 @@
 //! Gaussian draws: from vertex attributes to a binned, depth-sorted set that the tile engine renders.
 //!
-//! Stages, each in a module: [`fetch`] (attributes to lanes), [`project`] (3D to the rasterizer's nine numbers),
+//! Stages, each in a module: [`fetch`] (attributes to lanes), [`project`] (3D to the rasterizer's nine numbers, with
+//! [`linearize`] for cameras that are no pinholes),
 //! [`footprint`] (which tiles), [`spherical_harmonics`] (colour), [`sort`] (depth order); then
 //! [`binning`](crate::binning) places them in tile lists.
 
 mod fetch;
 pub(crate) mod footprint;
 mod lanes;
+mod linearize;
 pub(crate) mod project;
+mod scratch;
 mod sort;
 pub mod spherical_harmonics;
 
@@ -20,8 +23,9 @@ use crate::packet::{GaussianAppend, GaussianBegin, GaussianState, Rect, Viewport
 use fearless_simd::dispatch;
 use fetch::{BATCH, Batch};
 use footprint::Visible;
-use project::{Projected, Projection, Scratch, Splat};
+use project::{Projected, Projection, Splat};
 use rayon::prelude::*;
+use scratch::Scratch;
 use std::sync::Arc;
 use std::time::Instant;
 

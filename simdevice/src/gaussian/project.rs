@@ -5,13 +5,17 @@
 //! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
-use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader, Fetcher};
+use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader};
 use super::footprint::{Ellipse, Span, Visible};
-use super::lanes::{Bits, Lanes, NO_LANES, log2};
+use super::lanes::{Bits, Lanes, log2};
+use super::linearize;
+use super::scratch::{Attributes, Scratch};
 use super::sort::ordered_bits;
 use super::spherical_harmonics;
 use crate::counters::{Counter, Counters};
-use crate::packet::{Camera, GaussianAttributes, GaussianState, Viewport};
+use crate::packet::{
+    Camera, CameraModel, GaussianAttributes, GaussianOrder, GaussianState, Viewport,
+};
 use fearless_simd::{Simd, prelude::*};
 
 /// A projected Gaussian: what the tile engine needs of it, in one cache line.
@@ -56,6 +60,8 @@ const LN_2: f64 = std::f64::consts::LN_2;
 /// What is the same for all Gaussians of a draw.
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
+    model: CameraModel,
+    order: GaussianOrder,
     rotation: [f64; 9],
     eye: [f64; 3],
     focal: [f64; 2],
@@ -72,127 +78,6 @@ pub(crate) struct Projection {
     log2_floor: f64,
     sh_degree: u32,
     visible: Visible,
-}
-
-/// What a batch's Gaussians are, and what becomes of them. Structures of arrays.
-pub(crate) struct Scratch {
-    fetcher: Fetcher,
-    attributes: Box<Attributes>,
-    /// The mean from the eye, in world axes.
-    offset: Box<[Lanes; 3]>,
-    /// The mean from the eye, in camera axes.
-    camera: Box<[Lanes; 3]>,
-    /// The lanes that were kept; what follows is dense in their order.
-    lanes: Vec<usize>,
-    dense: Box<Attributes>,
-    dense_camera: Box<[Lanes; 3]>,
-    dense_offset: Box<[Lanes; 3]>,
-    flat: Box<Flat>,
-}
-
-struct Attributes {
-    position: [Lanes; 3],
-    scale: [Lanes; 3],
-    rotation: [Lanes; 4],
-    opacity: Lanes,
-}
-
-/// Gaussians on the screen.
-struct Flat {
-    mean: [Lanes; 2],
-    determinant: Lanes,
-    log2_opacity: Lanes,
-    /// See [`Splat::factor`].
-    factor: [Lanes; 3],
-    /// See [`Ellipse`].
-    half: [Lanes; 2],
-    slope: Lanes,
-    narrowing: Lanes,
-    peak: Lanes,
-    /// The unit vector from the eye, in world axes.
-    direction: [Lanes; 3],
-}
-
-impl Default for Attributes {
-    fn default() -> Self {
-        Self {
-            position: [NO_LANES; 3],
-            scale: [NO_LANES; 3],
-            rotation: [NO_LANES; 4],
-            opacity: NO_LANES,
-        }
-    }
-}
-
-impl Default for Flat {
-    fn default() -> Self {
-        Self {
-            mean: [NO_LANES; 2],
-            determinant: NO_LANES,
-            log2_opacity: NO_LANES,
-            factor: [NO_LANES; 3],
-            half: [NO_LANES; 2],
-            slope: NO_LANES,
-            narrowing: NO_LANES,
-            peak: NO_LANES,
-            direction: [NO_LANES; 3],
-        }
-    }
-}
-
-impl Scratch {
-    /// Scratch for one worker.
-    pub(crate) fn new() -> Self {
-        Self {
-            fetcher: Fetcher::default(),
-            attributes: Box::default(),
-            offset: Box::new([NO_LANES; 3]),
-            camera: Box::new([NO_LANES; 3]),
-            lanes: Vec::with_capacity(BATCH),
-            dense: Box::default(),
-            dense_camera: Box::new([NO_LANES; 3]),
-            dense_offset: Box::new([NO_LANES; 3]),
-            flat: Box::default(),
-        }
-    }
-
-    fn fetch(&mut self, attributes: &GaussianAttributes, batch: &Batch) {
-        let to = &mut *self.attributes;
-        self.fetcher
-            .read(&attributes.position, batch, to.position.each_mut());
-        self.fetcher
-            .read(&attributes.scale, batch, to.scale.each_mut());
-        self.fetcher
-            .read(&attributes.rotation, batch, to.rotation.each_mut());
-        self.fetcher
-            .read(&attributes.opacity, batch, [&mut to.opacity]);
-    }
-
-    /// Packs the kept lanes densely.
-    #[inline(always)]
-    fn gather(&mut self, kept: &Bits) {
-        self.lanes.clear();
-        kept.for_each(|lane| self.lanes.push(lane));
-        let pack = |from: &Lanes, to: &mut Lanes| {
-            for (to, &lane) in to.iter_mut().zip(&self.lanes) {
-                *to = from[lane % BATCH];
-            }
-        };
-        let (from, to) = (&*self.attributes, &mut *self.dense);
-        for (from, to) in from.scale.iter().zip(&mut to.scale) {
-            pack(from, to);
-        }
-        for (from, to) in from.rotation.iter().zip(&mut to.rotation) {
-            pack(from, to);
-        }
-        pack(&from.opacity, &mut to.opacity);
-        for (from, to) in self.camera.iter().zip(&mut *self.dense_camera) {
-            pack(from, to);
-        }
-        for (from, to) in self.offset.iter().zip(&mut *self.dense_offset) {
-            pack(from, to);
-        }
-    }
 }
 
 impl Projected {
@@ -226,6 +111,8 @@ impl Projection {
         let size = [viewport.width, viewport.height].map(f64::from);
         let margin = [0, 1].map(|axis| 0.15 * size[axis] / focal[axis]);
         Self {
+            model: camera.model,
+            order: state.order,
             rotation: camera.rotation.map(f64::from),
             eye: camera.eye,
             focal,
@@ -335,6 +222,10 @@ impl Projection {
                 t.store_slice(&mut lanes[at..at + S::f64s::LEN]);
             }
 
+            if self.model != CameraModel::Pinhole {
+                inside.set(at, S::mask64s::splat(simd, true));
+                continue;
+            }
             // The projection of a sphere about the Gaussian bounds that of the Gaussian. Comparisons are such
             // that NaN counts as inside.
             let largest = sx.max(sy).max(sz);
@@ -355,7 +246,7 @@ impl Projection {
             inside.set(at, !outside);
         }
         let [mut beyond_near, mut before_far] = [Bits::default(); 2];
-        for (lane, &z) in scratch.camera[2][..len].iter().enumerate() {
+        for (lane, &z) in self.depths(len, scratch).iter().enumerate() {
             let z = z as f32;
             beyond_near.set_one(lane, self.near < z);
             before_far.set_one(lane, z < self.far);
@@ -376,6 +267,51 @@ impl Projection {
         kept
     }
 
+    /// The depth variable of each lane.
+    fn depths<'a>(&self, len: usize, scratch: &'a mut Scratch) -> &'a [f64] {
+        if self.model != CameraModel::Fisheye {
+            return &scratch.camera[2][..len];
+        }
+        let [x, y, z] = &*scratch.camera;
+        for (lane, distance) in scratch.distance[..len].iter_mut().enumerate() {
+            *distance = linearize::depth(self.model, [x[lane], y[lane], z[lane]]);
+        }
+        &scratch.distance[..len]
+    }
+
+    /// What a lane is sorted by.
+    fn key(&self, lane: usize, scratch: &Scratch) -> u32 {
+        let depth = match self.order {
+            GaussianOrder::ViewDepth if self.model == CameraModel::Fisheye => {
+                scratch.distance[lane]
+            }
+            GaussianOrder::ViewDepth => scratch.camera[2][lane],
+            GaussianOrder::RadialDistance => {
+                let [x, y, z] = &*scratch.offset;
+                (x[lane] * x[lane] + y[lane] * y[lane] + z[lane] * z[lane]).sqrt()
+            }
+            GaussianOrder::Primitive => 0.0,
+        };
+        ordered_bits(depth as f32)
+    }
+
+    /// Means and Jacobians of the kept Gaussians, for cameras that are no pinholes.
+    fn linearize(&self, scratch: &mut Scratch) {
+        let [x, y, z] = &*scratch.dense_camera;
+        let r = &self.rotation;
+        for at in 0..scratch.lanes.len().min(BATCH) {
+            let (place, rows) = linearize::linearize(self.model, [x[at], y[at], z[at]]);
+            for (axis, row) in rows.iter().enumerate() {
+                scratch.flat.mean[axis][at] = place[axis] * self.focal[axis] + self.center[axis];
+                let j = row.map(|element| element * self.focal[axis]);
+                for column in 0..3 {
+                    scratch.jacobian[axis][column][at] =
+                        j[0] * r[column] + j[1] * r[3 + column] + j[2] * r[6 + column];
+                }
+            }
+        }
+    }
+
     /// Bounds of the visible pixels' centres along an axis, with a pixel to spare.
     fn visible_range(&self, axis: usize) -> [f64; 2] {
         let Visible {
@@ -391,6 +327,10 @@ impl Projection {
     /// Computes mean, covariance and opacity on the screen of the kept Gaussians.
     #[inline(always)]
     fn flatten<S: Simd>(&self, simd: S, scratch: &mut Scratch) {
+        let is_pinhole = self.model == CameraModel::Pinhole;
+        if !is_pinhole {
+            self.linearize(scratch);
+        }
         let number = |value: f64| S::f64s::splat(simd, value);
         let load =
             |lanes: &Lanes, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
@@ -439,14 +379,21 @@ impl Projection {
             let depth = load(&scratch.dense_camera[2], at);
             let mut m = [[one; 3]; 2];
             for axis in 0..2 {
-                let slope = load(&scratch.dense_camera[axis], at) / depth;
-                let focal = number(self.focal[axis]);
-                store(slope * focal + self.center[axis], &mut flat.mean[axis]);
-                let clamped = slope.max(self.slope_min[axis]).min(self.slope_max[axis]);
-                let to_screen = focal / depth;
-                let kx = to_screen * (number(r[3 * axis]) - clamped * r[6]);
-                let ky = to_screen * (number(r[3 * axis + 1]) - clamped * r[7]);
-                let kz = to_screen * (number(r[3 * axis + 2]) - clamped * r[8]);
+                let [kx, ky, kz] = if is_pinhole {
+                    let slope = load(&scratch.dense_camera[axis], at) / depth;
+                    let focal = number(self.focal[axis]);
+                    store(slope * focal + self.center[axis], &mut flat.mean[axis]);
+                    let clamped = slope.max(self.slope_min[axis]).min(self.slope_max[axis]);
+                    let to_screen = focal / depth;
+                    [
+                        to_screen * (number(r[3 * axis]) - clamped * r[6]),
+                        to_screen * (number(r[3 * axis + 1]) - clamped * r[7]),
+                        to_screen * (number(r[3 * axis + 2]) - clamped * r[8]),
+                    ]
+                } else {
+                    let row = &scratch.jacobian[axis];
+                    [load(&row[0], at), load(&row[1], at), load(&row[2], at)]
+                };
                 for part in 0..3 {
                     let [cx, cy, cz] = columns[part];
                     m[axis][part] = scale[part] * (kx * cx + ky * cy + kz * cz);
@@ -543,8 +490,7 @@ impl Projection {
                 out.counters.add(Counter::SkippedNonFinite, 1);
                 continue;
             };
-            out.keys
-                .push(ordered_bits(scratch.camera[2][lane % BATCH] as f32));
+            out.keys.push(self.key(lane % BATCH, scratch));
             out.splats.push(Splat {
                 mean: ellipse.mean,
                 factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],

@@ -1,13 +1,51 @@
 //! Programs made ready for draws.
 
 use crate::device::Device;
-use crate::packet::draw::DrawPrograms;
+use crate::packet::draw::{
+    DrawPrograms, FragmentInput, Interpolation, MAX_CLIP_CULL_DISTANCES, VertexInput, VertexOutput,
+};
+use crate::raster::fragment::FragmentStage;
+use isa::exec::{Executable, Machine, Options};
+use isa::ir::{Rate, Type};
 use isa::validate::InvalidProgram;
+use std::ops::{Deref, DerefMut};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Vertices of a batch.
+pub(super) const LANES: usize = 128;
 
 /// A vertex and a fragment program ready for one device.
 #[derive(Debug)]
 pub struct DrawPipeline {
     pub(crate) programs: DrawPrograms,
+    pub(super) vertex: VertexProgram,
+    /// The fragment program.
+    pub(crate) fragment: Option<FragmentStage>,
+}
+
+/// The vertex program, and what its slots mean.
+#[derive(Debug)]
+pub(super) struct VertexProgram {
+    executable: Arc<Executable>,
+    pub inputs: Vec<(u32, Rate, VertexInput)>,
+    pub outputs: VertexOutputs,
+    /// Machines of earlier draws, to be used again.
+    idle: Mutex<Vec<Machine>>,
+}
+
+/// The slots of a vertex program's outputs; `None` was not written.
+#[derive(Debug, Default)]
+pub(super) struct VertexOutputs {
+    pub position: [Option<u32>; 4],
+    pub point_size: Option<u32>,
+    pub clip: [Option<u32>; MAX_CLIP_CULL_DISTANCES],
+    pub cull: [Option<u32>; MAX_CLIP_CULL_DISTANCES],
+    pub layer: Option<u32>,
+    pub viewport: Option<u32>,
+    /// By number; only those that the fragment stage may read exist.
+    pub varyings: Vec<Option<u32>>,
+    /// By number.
+    pub interpolation: Vec<Interpolation>,
 }
 
 impl DrawPipeline {
@@ -16,7 +54,142 @@ impl DrawPipeline {
     /// # Errors
     /// [`InvalidProgram`] if one of them cannot run on the device.
     pub fn new(device: &Device, programs: DrawPrograms) -> Result<Self, InvalidProgram> {
-        let _ = device;
-        Ok(Self { programs })
+        let vertex = VertexProgram::new(device, &programs)?;
+        let fragment = programs.fragment.as_ref();
+        let fragment = fragment
+            .map(|fragment| FragmentStage::new(device.level(), fragment))
+            .transpose()?;
+        Ok(Self {
+            programs,
+            vertex,
+            fragment,
+        })
+    }
+}
+
+impl VertexProgram {
+    fn new(device: &Device, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
+        let options = Options {
+            lanes: LANES,
+            subgroup_size: 64,
+            count_work: true,
+            level: device.level(),
+        };
+        let executable = Arc::new(Executable::new(programs.vertex.clone(), &options)?);
+        let meaning = |slot: u32| programs.vertex_inputs.get(slot as usize).copied().flatten();
+        let is_word = |reg: isa::ir::Reg| {
+            let register = programs.vertex.registers.get(reg.0 as usize);
+            register.is_some_and(|register| register.ty == Type::B32)
+        };
+        let inputs = executable
+            .inputs()
+            .iter()
+            .filter(|input| is_word(input.reg))
+            .filter_map(|input| Some((input.slot, input.rate, meaning(input.slot)?)))
+            .collect();
+        Ok(Self {
+            inputs,
+            outputs: VertexOutputs::new(programs),
+            executable,
+            idle: Mutex::default(),
+        })
+    }
+
+    /// A machine to run batches on.
+    pub(super) fn lease(&self) -> Lease<'_> {
+        let idle = self
+            .idle
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .pop();
+        let machine = idle.unwrap_or_else(|| Machine::new(Arc::clone(&self.executable)));
+        Lease {
+            program: self,
+            machine: Some(machine),
+        }
+    }
+}
+
+impl VertexOutputs {
+    fn new(programs: &DrawPrograms) -> Self {
+        let varyings = match programs.fragment {
+            Some(_) => programs.varyings as usize,
+            None => 0,
+        };
+        let mut this = Self {
+            varyings: vec![None; varyings],
+            interpolation: vec![Interpolation::Flat; varyings],
+            ..Self::default()
+        };
+        let fragment_inputs = programs.fragment.iter().flat_map(|stage| &stage.inputs);
+        for input in fragment_inputs.flatten() {
+            if let FragmentInput::Varying {
+                index,
+                interpolation,
+                ..
+            } = *input
+                && let Some(entry) = this.interpolation.get_mut(index as usize)
+            {
+                *entry = interpolation;
+            }
+        }
+        for output in programs.vertex.outputs.iter().map(|output| output.slot) {
+            let Some(meaning) = programs.vertex_outputs.get(output as usize) else {
+                continue;
+            };
+            let entry = match *meaning {
+                Some(VertexOutput::Position(component)) => this.position.get_mut(component),
+                Some(VertexOutput::PointSize) => Some(&mut this.point_size),
+                Some(VertexOutput::ClipDistance(index)) => this.clip.get_mut(index),
+                Some(VertexOutput::CullDistance(index)) => this.cull.get_mut(index),
+                Some(VertexOutput::Layer) => Some(&mut this.layer),
+                Some(VertexOutput::ViewportIndex) => Some(&mut this.viewport),
+                Some(VertexOutput::Varying(index)) => this.varyings.get_mut(index as usize),
+                None => None,
+            };
+            if let Some(entry) = entry {
+                *entry = Some(output);
+            }
+        }
+        this
+    }
+
+    /// Whether a vertex has more to it than position and varyings.
+    pub(super) fn has_extras(&self) -> bool {
+        let single = [self.point_size, self.layer, self.viewport];
+        let distances = self.clip.iter().chain(&self.cull);
+        single.iter().chain(distances).any(Option::is_some)
+    }
+}
+
+/// A machine that goes back to its pipeline when it is dropped.
+pub(super) struct Lease<'a> {
+    program: &'a VertexProgram,
+    /// Present until dropped.
+    machine: Option<Machine>,
+}
+
+impl Deref for Lease<'_> {
+    type Target = Machine;
+
+    fn deref(&self) -> &Machine {
+        self.machine.as_ref().expect("present until dropped")
+    }
+}
+
+impl DerefMut for Lease<'_> {
+    fn deref_mut(&mut self) -> &mut Machine {
+        self.machine.as_mut().expect("present until dropped")
+    }
+}
+
+impl Drop for Lease<'_> {
+    fn drop(&mut self) {
+        if let Some(machine) = self.machine.take() {
+            let idle = &self.program.idle;
+            idle.lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push(machine);
+        }
     }
 }

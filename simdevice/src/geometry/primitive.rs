@@ -1,7 +1,8 @@
 //! What the front end hands to the rasterizer.
 
-use super::DrawPipeline;
+use super::{Bins, DrawPipeline};
 use crate::bindings::Bindings;
+use crate::packet::Rect;
 use crate::packet::draw::{Draw, DrawState};
 use std::sync::Arc;
 
@@ -18,6 +19,11 @@ pub struct PrimitiveDraw {
     pub primitives: Vec<Primitive>,
     /// The varyings of their vertices.
     pub varyings: Varyings,
+    /// Which of them each macro-tile has to look at.
+    pub bins: Bins,
+    /// The pixels that they may touch, by viewport: those of the pass's area that lie in the scissor and in the
+    /// viewport. Primitives may reach farther.
+    pub regions: Vec<Rect>,
 }
 
 /// The varyings of vertices, those that clipping made included: 32-bit scalars, vertex by vertex.
@@ -77,12 +83,15 @@ impl PrimitiveDraw {
             bindings: draw.fragment_bindings.clone(),
             primitives: Vec::new(),
             varyings: Varyings::default(),
+            bins: Bins::default(),
+            regions: Vec::new(),
         }
     }
 
     /// Bytes of host memory that it holds while it waits.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let primitives = self.primitives.capacity() * size_of::<Primitive>();
-        (primitives + self.varyings.values.capacity() * size_of::<u32>()) as u64
+        let varyings = self.varyings.values.capacity() * size_of::<u32>();
+        (primitives + varyings + self.bins.memory_bytes()) as u64
     }
 }

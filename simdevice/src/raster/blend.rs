@@ -32,11 +32,7 @@ enum Mode {
 impl Blender {
     /// Prepares `state` for an attachment of `format`.
     pub fn new(state: &BlendState, constants: [f32; 4], format: Format) -> Self {
-        let range = match format.numeric() {
-            Numeric::Unorm | Numeric::Srgb => Some((0.0, 1.0)),
-            Numeric::Snorm => Some((-1.0, 1.0)),
-            _ => None,
-        };
+        let range = clamp_range(format);
         let mode = match state.equations {
             // Integers are never blended.
             _ if format.is_integer() => Mode::Replace,
@@ -61,6 +57,17 @@ impl Blender {
     /// What `source` makes of `destination`, before it is quantised to the format.
     #[inline]
     pub fn blend(&self, source: [f32; 4], destination: [f32; 4]) -> [f32; 4] {
+        self.blend_dual(source, [0.0; 4], destination)
+    }
+
+    /// As [`Blender::blend`], with the second source of dual-source blending.
+    #[inline]
+    pub fn blend_dual(
+        &self,
+        source: [f32; 4],
+        second: [f32; 4],
+        destination: [f32; 4],
+    ) -> [f32; 4] {
         let blended = match self.mode {
             Mode::Replace => source,
             Mode::Over => {
@@ -70,8 +77,9 @@ impl Blender {
             }
             Mode::General(color, alpha) => {
                 let (s, d) = (clamp(source, self.range), clamp(destination, self.range));
-                let [r, g, b, _] = evaluate(color, s, d, self.constants);
-                let [.., a] = evaluate(alpha, s, d, self.constants);
+                let second = clamp(second, self.range);
+                let [r, g, b, _] = evaluate(color, s, second, d, self.constants);
+                let [.., a] = evaluate(alpha, s, second, d, self.constants);
                 [r, g, b, a]
             }
         };
@@ -84,12 +92,13 @@ impl Blender {
         })
     }
 
-    /// Blends the fragments that exist, pixel by pixel, into a row of texels, and quantises them.
+    /// Blends the fragments that exist, pixel by pixel, into a row of texels, and quantises them. Returns whether
+    /// there were any.
     pub fn blend_row(
         &self,
         row: &mut [[f32; 4]],
         fragments: impl Iterator<Item = Option<[f32; 4]>>,
-    ) {
+    ) -> bool {
         let mut any = false;
         for (texel, fragment) in row.iter_mut().zip(fragments) {
             if let Some(source) = fragment {
@@ -101,6 +110,16 @@ impl Blender {
         if any {
             self.format.quantize_row(row);
         }
+        any
+    }
+}
+
+/// What colours are clamped to before they are blended in a format.
+pub(super) fn clamp_range(format: Format) -> Option<(f32, f32)> {
+    match format.numeric() {
+        Numeric::Unorm | Numeric::Srgb => Some((0.0, 1.0)),
+        Numeric::Snorm => Some((-1.0, 1.0)),
+        _ => None,
     }
 }
 
@@ -113,13 +132,19 @@ fn clamp(color: [f32; 4], range: Option<(f32, f32)>) -> [f32; 4] {
 }
 
 /// The blend equation.
-fn evaluate(equation: BlendEquation, s: [f32; 4], d: [f32; 4], constants: [f32; 4]) -> [f32; 4] {
+fn evaluate(
+    equation: BlendEquation,
+    s: [f32; 4],
+    second: [f32; 4],
+    d: [f32; 4],
+    constants: [f32; 4],
+) -> [f32; 4] {
     let term = |value: [f32; 4], by: BlendFactor| {
         // A factor of zero removes a term whatever its value, infinities and NaNs included.
         if by == BlendFactor::Zero {
             return [0.0; 4];
         }
-        let factors = factors(by, s, d, constants);
+        let factors = factors(by, s, second, d, constants);
         std::array::from_fn::<f32, 4, _>(|component| value[component] * factors[component])
     };
     let (source, destination) = match equation.op {
@@ -139,7 +164,13 @@ fn evaluate(equation: BlendEquation, s: [f32; 4], d: [f32; 4], constants: [f32; 
 }
 
 /// The factor of each component.
-fn factors(factor: BlendFactor, s: [f32; 4], d: [f32; 4], constants: [f32; 4]) -> [f32; 4] {
+fn factors(
+    factor: BlendFactor,
+    s: [f32; 4],
+    second: [f32; 4],
+    d: [f32; 4],
+    constants: [f32; 4],
+) -> [f32; 4] {
     let inverse = |of: [f32; 4]| of.map(|component| 1.0 - component);
     match factor {
         BlendFactor::Zero => [0.0; 4],
@@ -160,6 +191,10 @@ fn factors(factor: BlendFactor, s: [f32; 4], d: [f32; 4], constants: [f32; 4]) -
             let least = s[3].min(1.0 - d[3]);
             [least, least, least, 1.0]
         }
+        BlendFactor::Src1Color => second,
+        BlendFactor::OneMinusSrc1Color => inverse(second),
+        BlendFactor::Src1Alpha => [second[3]; 4],
+        BlendFactor::OneMinusSrc1Alpha => [1.0 - second[3]; 4],
     }
 }
 
@@ -167,7 +202,7 @@ fn factors(factor: BlendFactor, s: [f32; 4], d: [f32; 4], constants: [f32; 4]) -
 mod tests {
     use super::*;
 
-    const FACTORS: [BlendFactor; 15] = [
+    const FACTORS: [BlendFactor; 19] = [
         BlendFactor::Zero,
         BlendFactor::One,
         BlendFactor::SrcColor,
@@ -183,6 +218,10 @@ mod tests {
         BlendFactor::ConstantAlpha,
         BlendFactor::OneMinusConstantAlpha,
         BlendFactor::SrcAlphaSaturate,
+        BlendFactor::Src1Color,
+        BlendFactor::OneMinusSrc1Color,
+        BlendFactor::Src1Alpha,
+        BlendFactor::OneMinusSrc1Alpha,
     ];
     const OPS: [BlendOp; 5] = [
         BlendOp::Add,
@@ -194,7 +233,13 @@ mod tests {
     const CONSTANTS: [f32; 4] = [0.2, 1.5, -0.25, 0.75];
 
     /// The blend equation as tables of (factor, RGB, A) in binary64, straight from the specification.
-    fn model_factor(f: BlendFactor, s: [f64; 4], d: [f64; 4], c: [f64; 4]) -> [f64; 4] {
+    fn model_factor(
+        f: BlendFactor,
+        s: [f64; 4],
+        s1: [f64; 4],
+        d: [f64; 4],
+        c: [f64; 4],
+    ) -> [f64; 4] {
         let all = |x: f64| [x; 4];
         let inverse = |v: [f64; 4]| v.map(|x| 1.0 - x);
         match f {
@@ -216,12 +261,16 @@ mod tests {
                 let f = s[3].min(1.0 - d[3]);
                 [f, f, f, 1.0]
             }
+            BlendFactor::Src1Color => s1,
+            BlendFactor::OneMinusSrc1Color => inverse(s1),
+            BlendFactor::Src1Alpha => all(s1[3]),
+            BlendFactor::OneMinusSrc1Alpha => inverse(all(s1[3])),
         }
     }
 
-    fn model(e: BlendEquation, s: [f64; 4], d: [f64; 4], c: [f64; 4]) -> [f64; 4] {
-        let fs = model_factor(e.source, s, d, c);
-        let fd = model_factor(e.destination, s, d, c);
+    fn model(e: BlendEquation, s: [f64; 4], s1: [f64; 4], d: [f64; 4], c: [f64; 4]) -> [f64; 4] {
+        let fs = model_factor(e.source, s, s1, d, c);
+        let fd = model_factor(e.destination, s, s1, d, c);
         std::array::from_fn(|i| match e.op {
             BlendOp::Add => s[i] * fs[i] + d[i] * fd[i],
             BlendOp::Subtract => s[i] * fs[i] - d[i] * fd[i],
@@ -248,6 +297,7 @@ mod tests {
             })
         };
         let source = [0.3, 1.25, -0.5, 0.6];
+        let second = [0.7, -0.2, 1.1, 0.35];
         let destination = format.decode(&format.encode([0.9, 0.1, 0.45, 0.7]));
         let alpha = BlendEquation {
             source: BlendFactor::DstAlpha,
@@ -262,9 +312,11 @@ mod tests {
                         destination: d,
                         op,
                     };
-                    let blended = blender(color, alpha, format).blend(source, destination);
+                    let blended =
+                        blender(color, alpha, format).blend_dual(source, second, destination);
                     let (s, d, c) = (wide(source), wide(destination), wide(CONSTANTS));
-                    let (rgb, a) = (model(color, s, d, c), model(alpha, s, d, c));
+                    let s1 = wide(second);
+                    let (rgb, a) = (model(color, s, s1, d, c), model(alpha, s, s1, d, c));
                     let expected = [rgb[0], rgb[1], rgb[2], a[3]];
                     for (blended, expected) in blended.into_iter().zip(expected) {
                         let error = (f64::from(blended) - expected).abs();

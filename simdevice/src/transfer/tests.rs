@@ -1,7 +1,10 @@
 use super::*;
 use crate::Format;
-use crate::image::ImageDesc;
-use crate::packet::{Aspect, BufferCopyRegion, ClearValue, SubresourceRange};
+use crate::image::{ImageDesc, ImageKind};
+use crate::packet::{
+    Aspect, BufferCopyRegion, ClearValue, CopyImage, ImageCopyRegion, SubresourceLayers,
+    SubresourceRange,
+};
 use devmem::Allocation;
 use std::sync::Arc;
 

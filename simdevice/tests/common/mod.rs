@@ -67,6 +67,7 @@ pub fn attachment(view: &ImageView, load: LoadOp) -> Attachment {
         view: view.clone(),
         load,
         store: StoreOp::Store,
+        resolve: None,
     }
 }
 

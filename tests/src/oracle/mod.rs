@@ -93,9 +93,35 @@ impl OracleScene<'_> {
     }
 }
 
-/// A pinhole camera and the viewport that it fills, as `VkGaussianCameraGAURAST` holds them.
+/// How a camera projects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OracleModel {
+    /// Perspective.
+    #[default]
+    Pinhole,
+    /// Parallel.
+    Orthographic,
+    /// Equidistant fisheye.
+    Fisheye,
+}
+
+/// What Gaussians are sorted by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OracleOrder {
+    /// The depth variable.
+    #[default]
+    ViewDepth,
+    /// The distance from the eye.
+    RadialDistance,
+    /// The order of the draw.
+    Primitive,
+}
+
+/// A camera and the viewport that it fills, as `VkGaussianCameraGAURAST` holds them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OracleCamera {
+    /// How it projects.
+    pub model: OracleModel,
     /// Width of the viewport in pixels.
     pub width: u32,
     /// Height of the viewport in pixels.
@@ -104,7 +130,7 @@ pub struct OracleCamera {
     pub rotation: [f32; 9],
     /// Where the camera is in world space.
     pub eye: [f64; 3],
-    /// Focal lengths in pixels.
+    /// Focal lengths in pixels (per unit of length, or per radian).
     pub focal: [f32; 2],
     /// Principal point in pixels from the viewport's upper left corner.
     pub principal: [f32; 2],
@@ -127,6 +153,8 @@ pub struct OracleState {
     pub transmittance_floor: f32,
     /// Whether opacity makes up for the area that the low-pass filter adds.
     pub opacity_compensated: bool,
+    /// What Gaussians are sorted by.
+    pub order: OracleOrder,
 }
 
 impl Default for OracleState {
@@ -137,6 +165,7 @@ impl Default for OracleState {
             alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
             opacity_compensated: false,
+            order: OracleOrder::ViewDepth,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::error_model::ErrorModel;
 use super::spherical_harmonics;
-use super::{OracleCamera, OracleScene, OracleState, SkipReason};
+use super::{OracleCamera, OracleModel, OracleOrder, OracleScene, OracleState, SkipReason};
 
 /// A Gaussian as the pixels see it.
 #[derive(Clone, Copy, Debug)]
@@ -19,9 +19,9 @@ pub struct Splat {
     pub opacity: f64,
     /// Colour, at least 0.
     pub color: [f64; 3],
-    /// Depth key: `t.z` rounded to binary32.
+    /// What it is sorted by, rounded to binary32.
     pub key: f32,
-    /// Whether `t.z` is within its own error of the middle between two keys.
+    /// Whether that is within its own error of the middle between two keys.
     pub key_undecidable: bool,
     /// How far a binary32 implementation may err on this Gaussian.
     pub error: ErrorModel,
@@ -79,32 +79,28 @@ pub fn project(
     let position = scene.positions[index].map(f64::from);
     let offset = subtract(position, camera.eye);
     let t = transform(&rotation, offset);
-    let key = t[2] as f32;
-    // A key that is not a number passes neither.
-    let (beyond_near, before_far) = (camera.near < key, key < camera.far);
+    let depth = depth_variable(camera.model, t);
+    let z = depth as f32;
+    // A depth that is not a number passes neither.
+    let (beyond_near, before_far) = (camera.near < z, z < camera.far);
     if !beyond_near {
         return Err(SkipReason::Near);
     }
     if !before_far {
         return Err(SkipReason::Far);
     }
+    let sort_by = match state.order {
+        OracleOrder::ViewDepth => depth,
+        OracleOrder::RadialDistance => length(offset),
+        OracleOrder::Primitive => 0.0,
+    };
 
-    // Step 3. The mean and the Jacobian of the projection, whose point is kept near the viewport.
-    let [fx, fy] = camera.focal.map(f64::from);
-    let [cx, cy] = camera.principal.map(f64::from);
-    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
-    let (tan_x, tan_y) = (t[0] / t[2], t[1] / t[2]);
-    let mean = [fx * tan_x + cx, fy * tan_y + cy];
-    let u = tan_x
-        .max(-(cx / fx + 0.15 * width / fx))
-        .min((width - cx) / fx + 0.15 * width / fx);
-    let v = tan_y
-        .max(-(cy / fy + 0.15 * height / fy))
-        .min((height - cy) / fy + 0.15 * height / fy);
-    let jacobian = [
-        [fx / t[2], 0.0, -fx * u / t[2]],
-        [0.0, fy / t[2], -fy * v / t[2]],
-    ];
+    // Step 3. The mean and the Jacobian of the projection.
+    let (mean, jacobian) = match camera.model {
+        OracleModel::Pinhole => pinhole(camera, t),
+        OracleModel::Orthographic => orthographic(camera, t),
+        OracleModel::Fisheye => fisheye(camera, t),
+    };
     let scale = scene.scales[index].map(f64::from);
     let axes = rotation_matrix(scene.rotations[index].map(f64::from));
     let m = jacobian.map(|row| {
@@ -145,8 +141,9 @@ pub fn project(
         cholesky: Cholesky::new(covariance, determinant),
         opacity,
         color,
-        key,
-        key_undecidable: key_is_undecidable(&rotation, offset, t[2]),
+        key: sort_by as f32,
+        key_undecidable: state.order != OracleOrder::Primitive
+            && key_is_undecidable(&rotation, offset, sort_by),
         error: ErrorModel::new(spread, opacity, area_for_opacity),
     })
 }
@@ -203,13 +200,88 @@ fn rotation_matrix(quaternion: [f64; 4]) -> [f64; 9] {
     ]
 }
 
-/// Whether the binary64 error of `t.z` reaches across the middle between two binary32 values.
+/// Whether the binary64 error of what a Gaussian is sorted by reaches across the middle between two binary32 values.
 ///
-/// `t.z` is a sum of three products of differences: five roundings at most on each term.
-fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], t_z: f64) -> bool {
-    let magnitude: f64 = (0..3).map(|i| (rotation[6 + i] * offset[i]).abs()).sum();
-    let error = 2.5 * f64::EPSILON * magnitude;
-    (t_z - error) as f32 != (t_z + error) as f32
+/// Camera coordinates are sums of three products of differences: five roundings at most on each term. A length adds
+/// three more, and errs by no more than the vector.
+fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], sort_by: f64) -> bool {
+    let magnitude = |row: usize| -> f64 {
+        (0..3)
+            .map(|i| (rotation[3 * row + i] * offset[i]).abs())
+            .sum()
+    };
+    let error =
+        2.5 * f64::EPSILON * length([0, 1, 2].map(magnitude)) + 2.0 * f64::EPSILON * sort_by.abs();
+    (sort_by - error) as f32 != (sort_by + error) as f32
+}
+
+/// The depth variable of a point in camera axes.
+fn depth_variable(model: OracleModel, t: [f64; 3]) -> f64 {
+    match model {
+        OracleModel::Pinhole | OracleModel::Orthographic => t[2],
+        OracleModel::Fisheye => length(t),
+    }
+}
+
+/// The mean and the Jacobian of perspective, whose point is kept near the viewport.
+fn pinhole(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let [fx, fy] = camera.focal.map(f64::from);
+    let [cx, cy] = camera.principal.map(f64::from);
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let (tan_x, tan_y) = (t[0] / t[2], t[1] / t[2]);
+    let u = tan_x
+        .max(-(cx / fx + 0.15 * width / fx))
+        .min((width - cx) / fx + 0.15 * width / fx);
+    let v = tan_y
+        .max(-(cy / fy + 0.15 * height / fy))
+        .min((height - cy) / fy + 0.15 * height / fy);
+    let jacobian = [
+        [fx / t[2], 0.0, -fx * u / t[2]],
+        [0.0, fy / t[2], -fy * v / t[2]],
+    ];
+    ([fx * tan_x + cx, fy * tan_y + cy], jacobian)
+}
+
+/// The mean and the Jacobian of parallel projection.
+fn orthographic(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let [fx, fy] = camera.focal.map(f64::from);
+    let [cx, cy] = camera.principal.map(f64::from);
+    let jacobian = [[fx, 0.0, 0.0], [0.0, fy, 0.0]];
+    ([fx * t[0] + cx, fy * t[1] + cy], jacobian)
+}
+
+/// The mean and the Jacobian of the equidistant fisheye, by the chain rule from r = |t.xy| and a = atan2(r, t.z).
+fn fisheye(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let r = (t[0] * t[0] + t[1] * t[1]).sqrt();
+    let square = dot(t, t);
+    let angle = r.atan2(t[2]);
+    let focal = camera.focal.map(f64::from);
+    let principal = camera.principal.map(f64::from);
+    // On the axis the limits: nothing moves but across it, by 1 / t.z.
+    if r == 0.0 {
+        let scale = if t[2] > 0.0 { 1.0 / t[2] } else { f64::NAN };
+        return (
+            principal,
+            [[focal[0] * scale, 0.0, 0.0], [0.0, focal[1] * scale, 0.0]],
+        );
+    }
+    let row = |axis: usize| {
+        // The place is f (a / r) t[axis]; a / r has the gradient (a' r - a r') / r^2.
+        let gradient: [f64; 3] = std::array::from_fn(|k| {
+            let r_k = if k < 2 { t[k] / r } else { 0.0 };
+            let a_k = if k < 2 {
+                t[2] * t[k] / (r * square)
+            } else {
+                -r / square
+            };
+            let of_ratio = (a_k * r - angle * r_k) / (r * r);
+            let own = if k == axis { angle / r } else { 0.0 };
+            of_ratio * t[axis] + own
+        });
+        gradient.map(|g| focal[axis] * g)
+    };
+    let mean = [0, 1].map(|axis| focal[axis] * angle / r * t[axis] + principal[axis]);
+    (mean, [row(0), row(1)])
 }
 
 fn subtract(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

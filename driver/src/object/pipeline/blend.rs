@@ -1,16 +1,51 @@
 //! Blend state.
 
+use super::GraphicsPipelineInfo;
 use crate::error::Error;
 use ash::vk;
 use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
 
+/// The blend state of all colour attachments.
+///
+/// # Errors
+/// An [`Error`] if there are not as many as attachments, or for what the device lacks.
+pub(super) fn blend_states(info: &GraphicsPipelineInfo) -> Result<Vec<BlendState>, Error> {
+    if info.blend.len() != info.color_formats.len() {
+        return Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-renderPass-07609",
+            format!(
+                "the colour blend state's attachmentCount is {}, but the subpass has {} colour attachments",
+                info.blend.len(),
+                info.color_formats.len()
+            ),
+        ));
+    }
+    info.blend.iter().map(blend_state).collect()
+}
+
+/// Whether an attachment is blended with the second source of the fragment stage.
+pub(super) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState) -> bool {
+    use vk::BlendFactor as F;
+    let factors = [
+        state.src_color_blend_factor,
+        state.dst_color_blend_factor,
+        state.src_alpha_blend_factor,
+        state.dst_alpha_blend_factor,
+    ];
+    let is_second = |factor: F| {
+        matches!(
+            factor,
+            F::SRC1_COLOR | F::ONE_MINUS_SRC1_COLOR | F::SRC1_ALPHA | F::ONE_MINUS_SRC1_ALPHA
+        )
+    };
+    state.blend_enable != vk::FALSE && factors.into_iter().any(is_second)
+}
+
 /// One attachment's blend state for the device.
 ///
 /// # Errors
-/// An [`Error`] for factors and operations that Vulkan does not have, or that take a second source.
-pub(crate) fn blend_state(
-    state: &vk::PipelineColorBlendAttachmentState,
-) -> Result<BlendState, Error> {
+/// An [`Error`] for factors and operations that Vulkan does not have.
+fn blend_state(state: &vk::PipelineColorBlendAttachmentState) -> Result<BlendState, Error> {
     let equations = if state.blend_enable == vk::FALSE {
         None
     } else {
@@ -62,11 +97,10 @@ fn factor(factor: vk::BlendFactor) -> Result<BlendFactor, Error> {
         F::CONSTANT_ALPHA => BlendFactor::ConstantAlpha,
         F::ONE_MINUS_CONSTANT_ALPHA => BlendFactor::OneMinusConstantAlpha,
         F::SRC_ALPHA_SATURATE => BlendFactor::SrcAlphaSaturate,
-        F::SRC1_COLOR | F::ONE_MINUS_SRC1_COLOR | F::SRC1_ALPHA | F::ONE_MINUS_SRC1_ALPHA => {
-            return Err(Error::FeatureNotPresent(format!(
-                "blend factor {factor:?} (feature dualSrcBlend)"
-            )));
-        }
+        F::SRC1_COLOR => BlendFactor::Src1Color,
+        F::ONE_MINUS_SRC1_COLOR => BlendFactor::OneMinusSrc1Color,
+        F::SRC1_ALPHA => BlendFactor::Src1Alpha,
+        F::ONE_MINUS_SRC1_ALPHA => BlendFactor::OneMinusSrc1Alpha,
         other => {
             return Err(Error::usage(
                 "VUID-VkPipelineColorBlendAttachmentState-parameter",

@@ -1,9 +1,10 @@
 //! Pipelines of the Gaussian list topology.
 
 use super::vertex_input::attribute;
-use super::{GaussianPipeline, GraphicsPipelineInfo, blend};
+use super::{GaussianPipeline, GraphicsPipelineInfo, blend, viewport};
 use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
+use crate::lower::rendering;
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST,
@@ -11,7 +12,7 @@ use gaurast::vk::{
     GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
     PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
-use simdevice::packet::{BlendState, GaussianOrder, GaussianState};
+use simdevice::packet::{GaussianOrder, GaussianState};
 use std::sync::Arc;
 
 /// The greatest degree of spherical harmonics that a pipeline may ask for.
@@ -68,7 +69,34 @@ impl GaussianPipeline {
                 })
                 .collect::<Result<_, _>>()?,
             state: Arc::new(state(info, gaussian, features)?),
+            viewport: fixed(
+                "viewport",
+                info.is_dynamic(vk::DynamicState::VIEWPORT)
+                    || info.is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
+                info.viewports,
+            )?
+            .map(viewport),
+            scissor: fixed(
+                "scissor",
+                info.is_dynamic(vk::DynamicState::SCISSOR)
+                    || info.is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
+                info.scissors,
+            )?
+            .map(rendering::rect),
+            dynamic_blend_constants: info.is_dynamic(vk::DynamicState::BLEND_CONSTANTS),
         })
+    }
+}
+
+/// The state's first element, unless it is dynamic.
+fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, Error> {
+    match (dynamic, values.first()) {
+        (true, _) => Ok(None),
+        (false, Some(&value)) => Ok(Some(value)),
+        (false, None) => Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-04130",
+            format!("the pipeline has no {name}, and its {name} is not dynamic"),
+        )),
     }
 }
 
@@ -106,23 +134,9 @@ fn state(
         alpha_floor: gaussian.alpha_floor,
         alpha_ceiling: gaussian.alpha_ceiling,
         transmittance_floor: gaussian.transmittance_floor,
-        blend: blend_states(info)?,
+        blend: blend::blend_states(info)?,
         blend_constants: info.blend_constants,
     })
-}
-
-fn blend_states(info: &GraphicsPipelineInfo) -> Result<Vec<BlendState>, Error> {
-    if info.blend.len() != info.color_formats.len() {
-        return Err(Error::usage(
-            "VUID-VkGraphicsPipelineCreateInfo-renderPass-07609",
-            format!(
-                "the colour blend state's attachmentCount is {}, but the subpass has {} colour attachments",
-                info.blend.len(),
-                info.color_formats.len()
-            ),
-        ));
-    }
-    info.blend.iter().map(blend::blend_state).collect()
 }
 
 fn validate_stages(
@@ -142,19 +156,18 @@ fn validate_stages(
     let has_fragment_stage = info
         .stages
         .iter()
-        .any(|stage| stage.stage == vk::ShaderStageFlags::FRAGMENT);
+        .any(|(stage, _)| *stage == vk::ShaderStageFlags::FRAGMENT);
     if has_fragment_stage {
         return Err(unbuilt(
             "the pipeline has a fragment stage",
             "resolveFragmentShader",
         ));
     }
-    if let Some(stage) = info.stages.first() {
+    if let Some((stage, _)) = info.stages.first() {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
             format!(
-                "projectionMode is FIXED_FUNCTION, so the pipeline must not have a stage {:?}",
-                stage.stage
+                "projectionMode is FIXED_FUNCTION, so the pipeline must not have a stage {stage:?}"
             ),
         ));
     }
@@ -275,7 +288,7 @@ fn validate_values(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<
 
 /// Refuses what a Gaussian pipeline cannot do yet in the ordinary fixed-function state.
 fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
-    let depth_stencil = &info.depth_stencil;
+    let depth_stencil = info.depth_stencil.unwrap_or_default();
     if depth_stencil.depth_test_enable != vk::FALSE
         || depth_stencil.depth_bounds_test_enable != vk::FALSE
         || depth_stencil.stencil_test_enable != vk::FALSE
@@ -285,7 +298,9 @@ fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
             "gaussianDepthStencil",
         ));
     }
-    if info.samples != vk::SampleCountFlags::TYPE_1 && !info.samples.is_empty() {
+    let multisample = &info.multisample;
+    let samples = multisample.rasterization_samples;
+    if samples != vk::SampleCountFlags::TYPE_1 && !samples.is_empty() {
         return Err(unbuilt(
             "the pipeline has several samples per pixel",
             "gaussianMultisample",
@@ -296,7 +311,9 @@ fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
             "rasterizerDiscardEnable with Gaussians".into(),
         ));
     }
-    if info.alpha_to {
+    if multisample.alpha_to_coverage_enable != vk::FALSE
+        || multisample.alpha_to_one_enable != vk::FALSE
+    {
         return Err(Error::FeatureNotPresent(
             "alphaToCoverageEnable or alphaToOneEnable with Gaussians".into(),
         ));
@@ -306,15 +323,20 @@ fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
             "the dynamic state {state:?} with Gaussians"
         )));
     }
-    if info.logic_op {
+    if info.blend.iter().any(blend::reads_second_source) {
         return Err(Error::FeatureNotPresent(
-            "logicOpEnable (feature logicOp)".into(),
+            "a second source of blending (feature dualSrcBlend) with Gaussians".into(),
+        ));
+    }
+    if info.logic_op.is_some() {
+        return Err(Error::FeatureNotPresent(
+            "logicOpEnable with Gaussians".into(),
         ));
     }
     if info.viewport_count > 1 {
         return Err(Error::usage(
             "VUID-VkPipelineViewportStateCreateInfo-viewportCount-01216",
-            "viewportCount is greater than 1, but the feature multiViewport is not enabled",
+            "viewportCount is greater than 1, but Gaussians go to one viewport",
         ));
     }
     Ok(())

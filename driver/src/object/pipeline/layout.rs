@@ -107,10 +107,11 @@ impl PipelineLayout {
             return Ok(());
         }
         let messages: Vec<_> = mismatches.iter().map(ToString::to_string).collect();
-        Err(Error::usage(
-            "VUID-VkComputePipelineCreateInfo-layout-07988",
-            messages.join("; "),
-        ))
+        let vuid = match interface.stage {
+            Stage::Compute => "VUID-VkComputePipelineCreateInfo-layout-07988",
+            Stage::Vertex | Stage::Fragment => "VUID-VkGraphicsPipelineCreateInfo-layout-07988",
+        };
+        Err(Error::usage(vuid, messages.join("; ")))
     }
 }
 

@@ -5,18 +5,24 @@
 
 mod blend;
 pub(crate) mod compute;
+pub(crate) mod convert;
+pub(crate) mod fixed;
 mod gaussian;
 pub(crate) mod layout;
+mod link;
+pub(crate) mod polygon;
+pub(crate) mod setting;
 mod vertex_input;
 
-use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
-use crate::lower::rendering;
+use crate::object::device::Device;
 use ash::vk;
-use compute::ComputePipeline;
+use compute::{ComputePipeline, StageInfo};
 use gaurast::vk::{
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use layout::PipelineLayout;
+use polygon::PolygonPipeline;
 use simdevice::packet::{GaussianState, Rect, Viewport};
 use std::sync::Arc;
 pub(crate) use vertex_input::AttributeSource;
@@ -35,21 +41,17 @@ pub(crate) enum Pipeline {
 pub(crate) struct GraphicsPipeline {
     /// What it draws.
     pub(crate) primitive: Primitive,
-    /// The viewport, unless it is dynamic.
-    pub(crate) viewport: Option<Viewport>,
-    /// The scissor, unless it is dynamic.
-    pub(crate) scissor: Option<Rect>,
-    /// Whether the blend constants are dynamic.
-    pub(crate) dynamic_blend_constants: bool,
     /// Whether vertex strides come from `vkCmdBindVertexBuffers2`.
     pub(crate) dynamic_stride: bool,
 }
 
-/// What a pipeline draws. Triangles are not drawn yet, so there is one kind so far.
+/// What a pipeline draws.
 #[derive(Debug)]
 pub(crate) enum Primitive {
     /// Gaussians with fixed-function projection.
     Gaussian(Box<GaussianPipeline>),
+    /// Points, lines or triangles.
+    Polygons(Box<PolygonPipeline>),
 }
 
 /// The Gaussian part of a pipeline.
@@ -57,6 +59,12 @@ pub(crate) enum Primitive {
 pub(crate) struct GaussianPipeline {
     /// What the device needs to know.
     pub(crate) state: Arc<GaussianState>,
+    /// The viewport, unless it is dynamic.
+    pub(crate) viewport: Option<Viewport>,
+    /// The scissor, unless it is dynamic.
+    pub(crate) scissor: Option<Rect>,
+    /// Whether the blend constants are dynamic.
+    pub(crate) dynamic_blend_constants: bool,
     /// Where means are read from.
     pub(crate) position: AttributeSource,
     /// Where standard deviations are read from.
@@ -71,12 +79,16 @@ pub(crate) struct GaussianPipeline {
 
 /// A `VkGraphicsPipelineCreateInfo` with its pointers followed. State that the application may leave out is
 /// empty, `None` or the default.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct GraphicsPipelineInfo<'a> {
     /// The shader stages.
-    pub(crate) stages: &'a [vk::PipelineShaderStageCreateInfo<'a>],
+    pub(crate) stages: Vec<(vk::ShaderStageFlags, StageInfo<'a>)>,
+    /// The layout.
+    pub(crate) layout: Option<&'a Arc<PipelineLayout>>,
     /// Vertex bindings.
     pub(crate) bindings: &'a [vk::VertexInputBindingDescription],
+    /// How many instances an element lasts, of bindings that advance by instance and where that isn't one.
+    pub(crate) divisors: &'a [vk::VertexInputBindingDivisorDescriptionKHR],
     /// Vertex attributes.
     pub(crate) attributes: &'a [vk::VertexInputAttributeDescription],
     /// The topology.
@@ -87,16 +99,22 @@ pub(crate) struct GraphicsPipelineInfo<'a> {
     pub(crate) viewport_count: u32,
     /// Viewports, unless dynamic.
     pub(crate) viewports: &'a [vk::Viewport],
+    /// How many scissors.
+    pub(crate) scissor_count: u32,
     /// Scissors, unless dynamic.
     pub(crate) scissors: &'a [vk::Rect2D],
     /// Rasterization state.
     pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
-    /// Samples per pixel.
-    pub(crate) samples: vk::SampleCountFlags,
-    /// Depth and stencil state.
-    pub(crate) depth_stencil: vk::PipelineDepthStencilStateCreateInfo<'a>,
-    /// Whether the logic operation is enabled.
-    pub(crate) logic_op: bool,
+    /// Whether a primitive's last vertex, not its first, is the provoking one.
+    pub(crate) provoking_last: bool,
+    /// Multisample state.
+    pub(crate) multisample: vk::PipelineMultisampleStateCreateInfo<'a>,
+    /// The samples that may be covered.
+    pub(crate) sample_mask: u32,
+    /// Depth and stencil state, if the subpass has such an attachment.
+    pub(crate) depth_stencil: Option<vk::PipelineDepthStencilStateCreateInfo<'a>>,
+    /// The logic operation, if it is enabled.
+    pub(crate) logic_op: Option<vk::LogicOp>,
     /// Blend state by colour attachment.
     pub(crate) blend: &'a [vk::PipelineColorBlendAttachmentState],
     /// Blend constants.
@@ -105,66 +123,50 @@ pub(crate) struct GraphicsPipelineInfo<'a> {
     pub(crate) dynamic: &'a [vk::DynamicState],
     /// The colour formats of the subpass; undefined where the attachment is unused.
     pub(crate) color_formats: Vec<vk::Format>,
-    /// Whether alpha makes coverage, or becomes one.
-    pub(crate) alpha_to: bool,
     /// The extension's structure.
     pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
 }
 
 crate::objects! { vk::Pipeline => Pipeline; }
 
+impl GraphicsPipelineInfo<'_> {
+    /// Whether a state is dynamic.
+    pub(crate) fn is_dynamic(&self, state: vk::DynamicState) -> bool {
+        self.dynamic.contains(&state)
+    }
+
+    /// Whether nothing is ever rasterized, so that all state of rasterization is left out.
+    pub(crate) fn discards(&self) -> bool {
+        self.rasterization.rasterizer_discard_enable != vk::FALSE
+            && !self.is_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE)
+    }
+
+    /// The width of lines. Pipelines that draw none often leave it at zero.
+    fn line_width(&self) -> f32 {
+        let width = self.rasterization.line_width;
+        if width == 0.0 || self.is_dynamic(vk::DynamicState::LINE_WIDTH) {
+            return 1.0;
+        }
+        width
+    }
+}
+
 impl GraphicsPipeline {
     /// Creates a pipeline.
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
-    pub(crate) fn new(
-        info: &GraphicsPipelineInfo,
-        features: &EnabledFeatures,
-    ) -> Result<Self, Error> {
-        let is_dynamic = |state| info.dynamic.contains(&state);
-        let primitive = match info.topology {
-            PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST => {
-                let gaussian = GaussianPipeline::new(info, features)?;
-                Primitive::Gaussian(Box::new(gaussian))
-            }
-            topology => {
-                return Err(Error::FeatureNotPresent(format!(
-                    "a pipeline of topology {topology:?} (only the Gaussian list is drawn so far)"
-                )));
-            }
+    pub(crate) fn new(device: &Device, info: &GraphicsPipelineInfo) -> Result<Self, Error> {
+        let primitive = if info.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
+            let gaussian = GaussianPipeline::new(info, device.features())?;
+            Primitive::Gaussian(Box::new(gaussian))
+        } else {
+            Primitive::Polygons(Box::new(PolygonPipeline::new(device, info)?))
         };
         Ok(Self {
             primitive,
-            viewport: fixed(
-                "viewport",
-                is_dynamic(vk::DynamicState::VIEWPORT)
-                    || is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
-                info.viewports,
-            )?
-            .map(viewport),
-            scissor: fixed(
-                "scissor",
-                is_dynamic(vk::DynamicState::SCISSOR)
-                    || is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
-                info.scissors,
-            )?
-            .map(rendering::rect),
-            dynamic_blend_constants: is_dynamic(vk::DynamicState::BLEND_CONSTANTS),
-            dynamic_stride: is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE),
+            dynamic_stride: info.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE),
         })
-    }
-}
-
-/// The state's first element, unless it is dynamic.
-fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, Error> {
-    match (dynamic, values.first()) {
-        (true, _) => Ok(None),
-        (false, Some(&value)) => Ok(Some(value)),
-        (false, None) => Err(Error::usage(
-            "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-04130",
-            format!("the pipeline has no {name}, and its {name} is not dynamic"),
-        )),
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) struct AttributeSource {
     pub(crate) offset: u32,
     /// How it is stored.
     pub(crate) format: Format,
-    /// `Some(1)` if it advances by instance, `None` if by vertex.
+    /// After how many instances it advances (0: never), `None` if it advances by vertex.
     pub(crate) instance_divisor: Option<u32>,
 }
 
@@ -32,46 +32,59 @@ pub(crate) fn attribute(
     components: u32,
 ) -> Result<AttributeSource, Error> {
     let refuse = |what: String| {
-        Err(Error::usage(
+        Error::usage(
             "VUID-VkGaussianAttributeLocationsGAURAST-location",
             format!("{name} is location {location}, {what}"),
-        ))
+        )
     };
-    let Some(attribute) = info.attributes.iter().find(|a| a.location == location) else {
-        return refuse("which the vertex input state does not have".into());
-    };
-    let Some(binding) = info
-        .bindings
-        .iter()
-        .find(|b| b.binding == attribute.binding)
-    else {
-        return refuse(format!(
-            "whose binding {} the vertex input state does not have",
-            attribute.binding
-        ));
-    };
+    let source = source(info, location).map_err(refuse)?;
+    let format = source.format;
+    if format.is_integer() {
+        return Err(refuse(format!(
+            "whose format {format:?} does not convert to floating point"
+        )));
+    }
+    if (format.components().len() as u32) < components {
+        return Err(refuse(format!(
+            "whose format {format:?} has fewer than {components} components"
+        )));
+    }
+    Ok(source)
+}
+
+/// Finds the attribute at `location`.
+///
+/// # Errors
+/// What is missing or won't do, as the end of a sentence about the location.
+pub(super) fn source(
+    info: &GraphicsPipelineInfo,
+    location: u32,
+) -> Result<AttributeSource, String> {
+    let attribute = info.attributes.iter().find(|a| a.location == location);
+    let attribute = attribute.ok_or("which the vertex input state does not have")?;
+    let number = attribute.binding;
+    let binding = info.bindings.iter().find(|b| b.binding == number);
+    let binding = binding
+        .ok_or_else(|| format!("whose binding {number} the vertex input state does not have"))?;
     let features = formats::properties(attribute.format).buffer_features;
     let format = formats::device_format(attribute.format)
         .filter(|_| features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
-    let Some(format) = format else {
-        return refuse(format!(
+    let format = format.ok_or_else(|| {
+        format!(
             "whose format {:?} this device does not read as a vertex attribute",
             attribute.format
-        ));
-    };
-    if (format.components().len() as u32) < components {
-        return refuse(format!(
-            "whose format {:?} has fewer than {components} components",
-            attribute.format
-        ));
-    }
+        )
+    })?;
     let instance_divisor = match binding.input_rate {
         vk::VertexInputRate::VERTEX => None,
-        vk::VertexInputRate::INSTANCE => Some(1),
-        rate => return refuse(format!("whose binding has the unknown rate {rate:?}")),
+        vk::VertexInputRate::INSTANCE => {
+            let given = info.divisors.iter().find(|it| it.binding == number);
+            Some(given.map_or(1, |it| it.divisor))
+        }
+        rate => return Err(format!("whose binding has the unknown rate {rate:?}")),
     };
     Ok(AttributeSource {
-        binding: binding.binding,
+        binding: number,
         stride: binding.stride,
         offset: attribute.offset,
         format,

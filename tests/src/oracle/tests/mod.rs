@@ -6,12 +6,13 @@ mod meaning;
 mod skips;
 mod undecidable;
 
-use super::{OracleCamera, OracleState, Reference, render_literal};
+use super::{OracleCamera, OracleModel, OracleState, Reference, render_literal};
 use crate::scenes::{Gaussian, SceneBuffers};
 
 /// A 64 x 64 viewport whose principal point is the centre of pixel (32, 32), focal length 128.
 fn camera() -> OracleCamera {
     OracleCamera {
+        model: OracleModel::Pinhole,
         focal: [128.0; 2],
         principal: [32.5; 2],
         ..crate::scenes::camera(64, 64)

@@ -1,0 +1,142 @@
+use super::*;
+
+#[test]
+fn every_format_of_the_device_has_a_vulkan_name() {
+    let found: Vec<_> = (0..=vk::Format::D32_SFLOAT_S8_UINT.as_raw())
+        .filter_map(|raw| device_format(vk::Format::from_raw(raw)))
+        .collect();
+    assert_eq!(found, Format::ALL);
+    assert_eq!(
+        device_format(vk::Format::A2B10G10R10_UNORM_PACK32),
+        Some(Format::A2B10G10R10UnormPack32)
+    );
+    assert_eq!(device_format(vk::Format::UNDEFINED), None);
+    assert_eq!(device_format(vk::Format::from_raw(-1)), None);
+    assert_eq!(device_format(vk::Format::BC7_UNORM_BLOCK), None);
+}
+
+#[test]
+fn formats_can_do_what_they_are_for() {
+    let float = properties(vk::Format::R32G32B32A32_SFLOAT);
+    assert!(
+        float
+            .optimal_tiling_features
+            .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND)
+    );
+    assert!(
+        float
+            .buffer_features
+            .contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
+    );
+    let depth = properties(vk::Format::D32_SFLOAT);
+    assert!(
+        depth
+            .optimal_tiling_features
+            .contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT)
+    );
+    assert!(depth.linear_tiling_features.is_empty());
+    let vertex = properties(vk::Format::R32G32B32_SFLOAT);
+    assert!(
+        vertex
+            .buffer_features
+            .contains(vk::FormatFeatureFlags::VERTEX_BUFFER)
+    );
+    assert!(
+        !vertex
+            .optimal_tiling_features
+            .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT)
+    );
+}
+
+#[test]
+fn images_that_cannot_be_are_refused() {
+    let query = ImageQuery {
+        format: vk::Format::R8G8B8A8_UNORM,
+        ty: vk::ImageType::TYPE_2D,
+        tiling: vk::ImageTiling::OPTIMAL,
+        usage: vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC,
+        flags: vk::ImageCreateFlags::empty(),
+    };
+    let properties = image_properties(query).unwrap();
+    assert_eq!(properties.max_extent.width, 16384);
+    assert_eq!(properties.max_mip_levels, 15);
+    let refused = [
+        ImageQuery {
+            format: vk::Format::UNDEFINED,
+            ..query
+        },
+        ImageQuery {
+            usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+            ..query
+        },
+        ImageQuery {
+            format: vk::Format::R8G8B8A8_SRGB,
+            usage: vk::ImageUsageFlags::STORAGE,
+            ..query
+        },
+        ImageQuery {
+            flags: vk::ImageCreateFlags::SPARSE_BINDING,
+            ..query
+        },
+        ImageQuery {
+            format: vk::Format::D32_SFLOAT,
+            ty: vk::ImageType::TYPE_3D,
+            usage: vk::ImageUsageFlags::TRANSFER_DST,
+            ..query
+        },
+    ];
+    for query in refused {
+        let error = image_properties(query).unwrap_err();
+        assert_eq!(
+            error.result(),
+            vk::Result::ERROR_FORMAT_NOT_SUPPORTED,
+            "{query:?}"
+        );
+    }
+}
+
+#[test]
+fn attachments_of_two_dimensions_may_have_four_samples() {
+    let query = ImageQuery {
+        format: vk::Format::R8G8B8A8_UNORM,
+        ty: vk::ImageType::TYPE_2D,
+        tiling: vk::ImageTiling::OPTIMAL,
+        usage: vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED,
+        flags: vk::ImageCreateFlags::empty(),
+    };
+    let counts = |query| image_properties(query).unwrap().sample_counts;
+    let (one, four) = (vk::SampleCountFlags::TYPE_1, vk::SampleCountFlags::TYPE_4);
+    assert_eq!(counts(query), one | four);
+    let depth = ImageQuery {
+        format: vk::Format::D24_UNORM_S8_UINT,
+        usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+        ..query
+    };
+    assert_eq!(counts(depth), one | four);
+    let single = [
+        ImageQuery {
+            ty: vk::ImageType::TYPE_3D,
+            ..query
+        },
+        ImageQuery {
+            tiling: vk::ImageTiling::LINEAR,
+            ..query
+        },
+        ImageQuery {
+            flags: vk::ImageCreateFlags::CUBE_COMPATIBLE,
+            ..query
+        },
+        ImageQuery {
+            usage: query.usage | vk::ImageUsageFlags::STORAGE,
+            ..query
+        },
+        ImageQuery {
+            format: vk::Format::R32G32B32_SFLOAT,
+            usage: vk::ImageUsageFlags::SAMPLED,
+            ..query
+        },
+    ];
+    for query in single {
+        assert_eq!(counts(query), one, "{query:?}");
+    }
+}

@@ -1,0 +1,110 @@
+//! Cameras other than the pinhole: where a point appears, and how it moves in the picture as it moves in space.
+
+use crate::packet::CameraModel;
+
+/// A point's place in the picture relative to the principal point, and the two rows of the place's Jacobian, both
+/// for focal lengths of 1. `t` is in camera axes. What has no place is not a number.
+pub(super) fn linearize(model: CameraModel, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    match model {
+        CameraModel::Pinhole => pinhole(t),
+        CameraModel::Orthographic => ([t[0], t[1]], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        CameraModel::Fisheye => fisheye(t),
+    }
+}
+
+fn pinhole([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let (u, v) = (x / z, y / z);
+    ([u, v], [[1.0 / z, 0.0, -u / z], [0.0, 1.0 / z, -v / z]])
+}
+
+/// Equidistant: the distance from the principal point is the angle from the axis.
+fn fisheye([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let r = x.hypot(y);
+    if r == 0.0 {
+        // Straight behind, the picture of a point is a circle.
+        let scale = if z > 0.0 { 1.0 / z } else { f64::NAN };
+        return ([0.0; 2], [[scale, 0.0, 0.0], [0.0, scale, 0.0]]);
+    }
+    // Along the radius a point moves by z / |t|^2, across it by angle / r, and along the axis by -r / |t|^2.
+    let (cos, sin) = (x / r, y / r);
+    let length = r.hypot(z);
+    let (along, across, axial) = (z / length / length, r.atan2(z) / r, -(r / length / length));
+    let mixed = (along - across) * cos * sin;
+    (
+        [across * x, across * y],
+        [
+            [along * cos * cos + across * sin * sin, mixed, axial * cos],
+            [mixed, along * sin * sin + across * cos * cos, axial * sin],
+        ],
+    )
+}
+
+/// The depth variable: what near and far plane, fragment depth and the view-depth order go by.
+pub(super) fn depth(model: CameraModel, [x, y, z]: [f64; 3]) -> f64 {
+    match model {
+        CameraModel::Pinhole | CameraModel::Orthographic => z,
+        CameraModel::Fisheye => (x * x + y * y + z * z).sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Central differences.
+    fn jacobian(model: CameraModel, t: [f64; 3]) -> [[f64; 3]; 2] {
+        let step = 1e-5 * (t[0].abs() + t[1].abs() + t[2].abs());
+        let mut rows = [[0.0; 3]; 2];
+        for axis in 0..3 {
+            let moved = |by: f64| {
+                let mut t = t;
+                t[axis] += by;
+                linearize(model, t).0
+            };
+            let (ahead, behind) = (moved(step), moved(-step));
+            for (row, (a, b)) in rows.iter_mut().zip(ahead.into_iter().zip(behind)) {
+                row[axis] = (a - b) / (2.0 * step);
+            }
+        }
+        rows
+    }
+
+    proptest! {
+        #[test]
+        fn the_jacobian_is_the_derivative(x in -3.0..3.0f64, y in -3.0..3.0f64, z in 0.5..9.0f64, behind: bool) {
+            for model in [CameraModel::Pinhole, CameraModel::Orthographic, CameraModel::Fisheye] {
+                // A fisheye sees what is beside and behind it, but not what is straight behind.
+                let t = match model {
+                    CameraModel::Fisheye if behind => [x + x.signum(), y, -z],
+                    _ => [x, y, z],
+                };
+                let (_, rows) = linearize(model, t);
+                for (row, expected) in rows.iter().zip(jacobian(model, t)) {
+                    for (a, b) in row.iter().zip(expected) {
+                        prop_assert!((a - b).abs() < 1e-6, "{model:?} {t:?}: {rows:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn on_the_axis_a_fisheye_is_a_pinhole_and_behind_it_nothing() {
+        let (place, rows) = linearize(CameraModel::Fisheye, [0.0, 0.0, 4.0]);
+        assert_eq!(
+            (place, rows),
+            linearize(CameraModel::Pinhole, [0.0, 0.0, 4.0])
+        );
+        let (_, rows) = linearize(CameraModel::Fisheye, [1e-9, 0.0, 4.0]);
+        assert!((rows[1][1] - 0.25).abs() < 1e-12);
+        let (_, rows) = linearize(CameraModel::Fisheye, [0.0, 0.0, -4.0]);
+        assert!(rows[0][0].is_nan());
+    }
+
+    #[test]
+    fn a_fisheye_s_depth_is_the_distance() {
+        assert_eq!(depth(CameraModel::Fisheye, [2.0, 3.0, -6.0]), 7.0);
+        assert_eq!(depth(CameraModel::Orthographic, [2.0, 3.0, -6.0]), -6.0);
+    }
+}

@@ -1,0 +1,222 @@
+//! Binning: which primitives each macro-tile has to look at.
+
+use super::primitive::Primitive;
+use crate::packet::Rect;
+
+/// The macro-tiles that a pass's area touches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Grid {
+    /// The side of a macro-tile in pixels.
+    size: i32,
+    /// The column and row of the first.
+    first: [u32; 2],
+    columns: u32,
+    rows: u32,
+}
+
+impl Grid {
+    /// The macro-tiles of side `size` that share pixels with `area`.
+    pub(super) fn new(area: Rect, size: u32) -> Self {
+        let span = |start: i32, length: u32| {
+            // A pass's area begins at or after the framebuffer's corner.
+            let first = start.max(0) as u32 / size;
+            let end = (start.max(0) as u32).saturating_add(length).div_ceil(size);
+            (first, end.saturating_sub(first))
+        };
+        let (column, columns) = span(area.x, area.width);
+        let (row, rows) = span(area.y, area.height);
+        Self {
+            size: size as i32,
+            first: [column, row],
+            columns,
+            rows,
+        }
+    }
+
+    fn tile(&self, column: u32, row: u32, layer: u32) -> u32 {
+        let row = layer * self.rows + (row - self.first[1]);
+        row * self.columns + (column - self.first[0])
+    }
+}
+
+/// Pixels first to last in x, and in y, both inclusive and within the pass's area.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Pixels {
+    pub x: [i32; 2],
+    pub y: [i32; 2],
+}
+
+/// A macro-tile of a grid and a primitive that may touch it.
+pub(super) type Pair = (u32, u32);
+
+/// Adds the macro-tiles that a primitive, which covers nothing outside `pixels`, may touch.
+pub(super) fn bin(
+    grid: &Grid,
+    primitive: &Primitive,
+    number: u32,
+    pixels: Pixels,
+    pairs: &mut Vec<Pair>,
+) {
+    let tiles = |[first, last]: [i32; 2]| (first / grid.size) as u32..=(last / grid.size) as u32;
+    let (columns, rows) = (tiles(pixels.x), tiles(pixels.y));
+    let layer = primitive.layer.into();
+    if columns.start() == columns.end() || rows.start() == rows.end() {
+        for row in rows {
+            for column in columns.clone() {
+                pairs.push((grid.tile(column, row, layer), number));
+            }
+        }
+        return;
+    }
+    let outline = Outline::new(primitive);
+    for row in rows {
+        for column in columns.clone() {
+            if outline.touches(
+                [column, row].map(|tile| i64::from(tile) * i64::from(grid.size)),
+                grid.size,
+            ) {
+                pairs.push((grid.tile(column, row, layer), number));
+            }
+        }
+    }
+}
+
+/// The edges of a primitive: the value of each at x, y is `at + x * along[0] + y * along[1]`, positive inside.
+struct Outline {
+    edges: [(i64, [i64; 2]); 4],
+}
+
+impl Outline {
+    fn new(primitive: &Primitive) -> Self {
+        let [a, b, c] = primitive.corners.map(|corner| corner.map(i64::from));
+        let d = [a[0] + c[0] - b[0], a[1] + c[1] - b[1]];
+        let edge = |from: [i64; 2], to: [i64; 2]| {
+            let along = [from[1] - to[1], to[0] - from[0]];
+            (-(from[0] * along[0] + from[1] * along[1]), along)
+        };
+        let edges = match primitive.kind {
+            super::PrimitiveKind::Triangle => [edge(a, b), edge(b, c), edge(c, a), edge(c, a)],
+            _ => [edge(a, b), edge(b, c), edge(c, d), edge(d, a)],
+        };
+        Self { edges }
+    }
+
+    /// Whether it may share a point with the square of pixels from `corner` on.
+    fn touches(&self, corner: [i64; 2], size: i32) -> bool {
+        let (low, side) = (corner.map(|c| 256 * c), 256 * i64::from(size));
+        self.edges.iter().all(|&(at, along)| {
+            let greatest =
+                |axis: usize| along[axis] * (low[axis] + if along[axis] > 0 { side } else { 0 });
+            at + greatest(0) + greatest(1) >= 0
+        })
+    }
+}
+
+/// Lists of primitives by macro-tile and layer, each in order.
+#[derive(Debug, Default)]
+pub struct Bins {
+    grid: Grid,
+    layers: u32,
+    /// The macro-tile of the grid that the first list is of.
+    first: u32,
+    /// Where each list begins, and where the last one ends.
+    starts: Vec<u32>,
+    primitives: Vec<u32>,
+}
+
+impl Bins {
+    /// Sorts pairs by macro-tile; `pieces` are in order, each with the number that its primitives start from.
+    pub(super) fn new<'a>(
+        grid: Grid,
+        layers: u32,
+        pieces: impl Iterator<Item = (u32, &'a [Pair])> + Clone,
+    ) -> Self {
+        let tiles = pieces
+            .clone()
+            .flat_map(|(_, pairs)| pairs)
+            .map(|pair| pair.0);
+        let (mut first, mut last) = (u32::MAX, 0);
+        for tile in tiles.clone() {
+            first = first.min(tile);
+            last = last.max(tile);
+        }
+        if first > last {
+            return Self {
+                grid,
+                layers,
+                ..Self::default()
+            };
+        }
+        let mut starts = vec![0u32; (last - first) as usize + 2];
+        for tile in tiles {
+            starts[(tile - first) as usize + 1] += 1;
+        }
+        for place in 1..starts.len() {
+            starts[place] += starts[place - 1];
+        }
+        let mut next = starts.clone();
+        let mut primitives = vec![0; starts.last().map_or(0, |&total| total as usize)];
+        for (base, pairs) in pieces {
+            for &(tile, primitive) in pairs {
+                let next = &mut next[(tile - first) as usize];
+                primitives[*next as usize] = base + primitive;
+                *next += 1;
+            }
+        }
+        Self {
+            grid,
+            layers,
+            first,
+            starts,
+            primitives,
+        }
+    }
+
+    /// The primitives that may touch a macro-tile, given by column and row from the framebuffer's corner, in a layer:
+    /// indices into [`PrimitiveDraw::primitives`](super::PrimitiveDraw::primitives), ascending.
+    pub fn of(&self, macro_tile: [u32; 2], layer: u32) -> &[u32] {
+        let [column, row] = macro_tile;
+        let within =
+            |at: u32, first: u32, count: u32| at.checked_sub(first).is_some_and(|at| at < count);
+        let grid = &self.grid;
+        if !within(column, grid.first[0], grid.columns)
+            || !within(row, grid.first[1], grid.rows)
+            || layer >= self.layers
+        {
+            return &[];
+        }
+        let list = grid.tile(column, row, layer).checked_sub(self.first);
+        let bounds = list.and_then(|list| self.starts.get(list as usize..list as usize + 2));
+        match bounds {
+            Some(&[start, end]) => &self.primitives[start as usize..end as usize],
+            _ => &[],
+        }
+    }
+
+    /// Every primitive in every macro-tile of its layer, for tests that set up primitives by hand.
+    #[cfg(test)]
+    pub(crate) fn everywhere(primitives: &[Primitive], area: Rect, size: u32, layers: u32) -> Self {
+        let grid = Grid::new(area, size);
+        let mut pairs = Vec::new();
+        for (number, primitive) in primitives.iter().enumerate() {
+            for row in 0..grid.rows {
+                for column in 0..grid.columns {
+                    let at = [grid.first[0] + column, grid.first[1] + row];
+                    let tile = grid.tile(at[0], at[1], primitive.layer.into());
+                    pairs.push((tile, number as u32));
+                }
+            }
+        }
+        Self::new(grid, layers, std::iter::once((0, &pairs[..])))
+    }
+
+    /// How many pairs of a macro-tile and a primitive there are.
+    pub fn pairs(&self) -> u64 {
+        self.primitives.len() as u64
+    }
+
+    /// Bytes of host memory that the lists take.
+    pub(super) fn memory_bytes(&self) -> usize {
+        (self.starts.capacity() + self.primitives.capacity()) * size_of::<u32>()
+    }
+}

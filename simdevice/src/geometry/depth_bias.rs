@@ -1,0 +1,68 @@
+//! Depth bias of polygons (Vulkan 1.3, "Depth Bias").
+
+use super::viewport::Projected;
+use crate::format::{Channel, Format, Numeric};
+use crate::packet::draw::DepthBias;
+
+/// The least difference of depths that a depth attachment is sure to tell apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum DepthUnit {
+    /// The same everywhere.
+    Fixed(f32),
+    /// That of a binary32 number as large as the polygon's greatest depth.
+    Float,
+}
+
+impl DepthUnit {
+    /// That of a pass's depth attachment; without one it is as if it had 24 bits.
+    pub(super) fn of(format: Option<Format>) -> Self {
+        let depth = format.and_then(|format| {
+            let bits = format.components().iter();
+            let bits = bits.filter(|component| component.channel == Channel::D);
+            bits.map(|component| component.bits).next()
+        });
+        let is_float = format.is_some_and(|format| {
+            let numeric = format.numeric();
+            numeric == Numeric::Sfloat || format == Format::D32SfloatS8Uint
+        });
+        match depth {
+            Some(_) if is_float => Self::Float,
+            // Vulkan allows twice the distance of neighbouring values.
+            bits => Self::Fixed((2.0 / ((1u64 << bits.unwrap_or(24)) - 1) as f64) as f32),
+        }
+    }
+
+    fn at(self, greatest_depth: f32) -> f32 {
+        match self {
+            Self::Fixed(unit) => unit,
+            Self::Float => {
+                let exponent = greatest_depth.to_bits() & 0x7F80_0000;
+                f32::from_bits(exponent.saturating_sub(23 << 23))
+            }
+        }
+    }
+}
+
+/// What is added to the depth of a triangle.
+pub(super) fn bias(bias: &DepthBias, unit: DepthUnit, corners: [&Projected; 3]) -> f32 {
+    let [a, b, c] = corners;
+    let difference = |to: &Projected, from: &Projected| {
+        let [x, y] = [0, 1].map(|axis| to.window[axis] - from.window[axis]);
+        [x, y, to.depth - from.depth]
+    };
+    let (e, f) = (difference(a, b), difference(c, a));
+    let inverse = 1.0 / (e[0] * f[1] - e[1] * f[0]);
+    let along_x = ((e[1] * f[2] - e[2] * f[1]) * inverse).abs();
+    let along_y = ((e[2] * f[0] - e[0] * f[2]) * inverse).abs();
+    let slope = along_x.max(along_y);
+    let slope = if slope.is_finite() { slope } else { 0.0 };
+    let greatest = a.depth.max(b.depth).max(c.depth);
+    let offset = unit.at(greatest) * bias.constant + slope * bias.slope;
+    if bias.clamp > 0.0 {
+        offset.min(bias.clamp)
+    } else if bias.clamp < 0.0 {
+        offset.max(bias.clamp)
+    } else {
+        offset
+    }
+}

@@ -1,0 +1,333 @@
+//! Which vertices a draw names: consecutive ones or indices, runs between primitive restarts, and the distinct
+//! vertices of a chunk of primitives.
+
+use super::assemble::{places, primitive_count, uses_pivot};
+use crate::packet::IndexStream;
+use crate::packet::draw::{Draw, Topology};
+
+/// Vertices that no restart interrupts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Run {
+    /// The place of its first vertex among the draw's.
+    pub start: u32,
+    /// How many primitives come before it in the instance.
+    pub primitives_before: u32,
+    /// How many primitives it has.
+    pub primitives: u32,
+}
+
+/// Indices that are looked at for restarts at a time.
+const SCAN: u32 = 1 << 16;
+
+/// The runs of a draw that have primitives, and how many vertices all runs have.
+pub(super) fn runs(draw: &Draw) -> (Vec<Run>, u64) {
+    let topology = draw.state.topology;
+    let mut gathered = Runs {
+        topology,
+        runs: Vec::new(),
+        primitives: 0,
+        vertices: 0,
+    };
+    match &draw.indices {
+        Some(stream) if draw.state.primitive_restart => {
+            let restart = restart_index(stream);
+            let (mut start, mut indices) = (0, Vec::new());
+            // Indices outside the buffer read as zero, so that they restart nothing.
+            let known = known_indices(stream).saturating_sub(u64::from(draw.first));
+            let known = known.min(u64::from(draw.count)) as u32;
+            for block in (0..known).step_by(SCAN as usize) {
+                let len = SCAN.min(known - block);
+                read_indices(
+                    stream,
+                    u64::from(draw.first) + u64::from(block),
+                    len,
+                    &mut indices,
+                );
+                for (place, &index) in (block..).zip(&indices) {
+                    if index == restart {
+                        gathered.push(start, place);
+                        start = place + 1;
+                    }
+                }
+            }
+            gathered.push(start, draw.count);
+        }
+        _ => gathered.push(0, draw.count),
+    }
+    (gathered.runs, gathered.vertices)
+}
+
+struct Runs {
+    topology: Topology,
+    runs: Vec<Run>,
+    primitives: u32,
+    vertices: u64,
+}
+
+impl Runs {
+    fn push(&mut self, start: u32, end: u32) {
+        let vertices = end.saturating_sub(start);
+        let primitives = primitive_count(self.topology, vertices);
+        self.vertices += u64::from(vertices);
+        if primitives > 0 {
+            self.runs.push(Run {
+                start,
+                primitives_before: self.primitives,
+                primitives,
+            });
+            self.primitives += primitives;
+        }
+    }
+}
+
+/// The index that restarts a primitive: the greatest of its size.
+fn restart_index(stream: &IndexStream) -> u32 {
+    match stream.index_size {
+        1 => 0xFF,
+        2 => 0xFFFF,
+        _ => u32::MAX,
+    }
+}
+
+/// How many indices the buffer has.
+fn known_indices(stream: &IndexStream) -> u64 {
+    let memory = stream.buffer.memory.len();
+    let bytes = stream
+        .buffer
+        .size
+        .min(memory.saturating_sub(stream.buffer.offset));
+    bytes / u64::from(stream.index_size.max(1))
+}
+
+/// Reads `len` indices from number `first` on; those outside the buffer are zero.
+fn read_indices(stream: &IndexStream, first: u64, len: u32, out: &mut Vec<u32>) {
+    let size = u64::from(stream.index_size.max(1));
+    out.clear();
+    out.resize(len as usize, 0);
+    let known = known_indices(stream).saturating_sub(first).min(len.into()) as usize;
+    if known == 0 {
+        return;
+    }
+    // Both lie inside the buffer, so that neither overflows.
+    let start = stream.buffer.offset + first * size;
+    let out = &mut out[..known];
+    let memory = &stream.buffer.memory;
+    // What was known to lie inside cannot be refused.
+    match stream.index_size {
+        1 => {
+            let mut bytes = vec![0u8; known];
+            let _ = memory.read(start, &mut bytes);
+            out.iter_mut()
+                .zip(bytes)
+                .for_each(|(out, byte)| *out = byte.into());
+        }
+        2 => {
+            let mut halves = vec![0u16; known];
+            let _ = memory.read(start, &mut halves);
+            out.iter_mut()
+                .zip(halves)
+                .for_each(|(out, half)| *out = half.into());
+        }
+        _ => {
+            let _ = memory.read(start, out);
+        }
+    }
+}
+
+/// Primitives of one run and instance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    /// The run's primitives before this one belong to others.
+    pub first: u32,
+    /// The end of its primitives in the run.
+    pub end: u32,
+    /// How many primitives come before the run.
+    pub primitives_before: u32,
+    /// The place in the run of the first of `elements`.
+    base: u32,
+    /// Where its elements begin in [`Elements::slots`].
+    elements: usize,
+    /// The first of its slots.
+    first_vertex: usize,
+    /// The slot of the run's first vertex, where all primitives use it.
+    pivot: u32,
+}
+
+/// The distinct vertices of a chunk, each in a slot, and where primitives find them.
+#[derive(Debug, Default)]
+pub(super) struct Elements {
+    pub pieces: Vec<Piece>,
+    /// By slot: the vertex's number, which an offset may have made negative.
+    pub vertices: Vec<i64>,
+    /// By slot: the instance, counted from the draw's first.
+    pub instances: Vec<u32>,
+    /// The slot of each place of each piece, in order.
+    slots: Vec<u32>,
+    indices: Vec<u32>,
+    table: Vec<u32>,
+}
+
+impl Elements {
+    /// Forgets the previous chunk.
+    pub(super) fn clear(&mut self) {
+        self.pieces.clear();
+        self.vertices.clear();
+        self.instances.clear();
+        self.slots.clear();
+    }
+
+    /// How many primitives the chunk has.
+    pub(super) fn primitives(&self) -> u64 {
+        let pieces = self.pieces.iter();
+        pieces.map(|piece| u64::from(piece.end - piece.first)).sum()
+    }
+
+    /// Adds primitives `first..end` of a run.
+    pub(super) fn push(&mut self, draw: &Draw, run: &Run, instance: u32, first: u32, end: u32) {
+        let topology = draw.state.topology;
+        let range = places(topology, first, end);
+        let place = |place: u32| u64::from(draw.first) + u64::from(run.start) + u64::from(place);
+        let pivot = uses_pivot(topology);
+        let (elements, first_vertex) = (self.slots.len(), self.vertices.len());
+        // An instance that repeats the piece before it repeats its slots.
+        if let Some(&before) = self.pieces.last()
+            && (before.first, before.end) == (first, end)
+            && before.primitives_before == run.primitives_before
+        {
+            self.repeat(before, instance);
+            return;
+        }
+        match &draw.indices {
+            None => {
+                let next = self.vertices.len() as u32;
+                let len = range.end - range.start;
+                self.slots.extend(next..next + len);
+                let numbers = place(range.start)..place(range.start) + u64::from(len);
+                self.vertices.extend(numbers.map(|number| number as i64));
+                if pivot {
+                    self.slots.push(next + len);
+                    self.vertices.push(place(0) as i64);
+                }
+            }
+            Some(stream) => {
+                let mut indices = std::mem::take(&mut self.indices);
+                let len = range.end - range.start;
+                if pivot {
+                    let mut first = Vec::new();
+                    read_indices(stream, place(0), 1, &mut first);
+                    read_indices(stream, place(range.start), len, &mut indices);
+                    indices.extend(first);
+                } else {
+                    read_indices(stream, place(range.start), len, &mut indices);
+                }
+                self.place_indices(&indices, stream.vertex_offset.into());
+                self.indices = indices;
+            }
+        }
+        self.instances.resize(self.vertices.len(), instance);
+        self.pieces.push(Piece {
+            first,
+            end,
+            primitives_before: run.primitives_before,
+            base: range.start,
+            elements,
+            first_vertex,
+            pivot: if pivot {
+                self.slots.last().copied().unwrap_or(0)
+            } else {
+                0
+            },
+        });
+    }
+
+    /// Adds the primitives of `before`, the last piece, for another instance.
+    fn repeat(&mut self, before: Piece, instance: u32) {
+        let elements = self.slots.len();
+        // Its vertices are the last ones.
+        let first = before.first_vertex;
+        let shift = (self.vertices.len() - first) as u32;
+        self.slots.extend_from_within(before.elements..);
+        for slot in &mut self.slots[elements..] {
+            *slot += shift;
+        }
+        self.vertices.extend_from_within(first..);
+        self.instances.resize(self.vertices.len(), instance);
+        self.pieces.push(Piece {
+            elements,
+            first_vertex: first + shift as usize,
+            pivot: before.pivot + shift,
+            ..before
+        });
+    }
+
+    /// Gives each distinct index a slot, and appends the slot of every index.
+    fn place_indices(&mut self, indices: &[u32], offset: i64) {
+        let (mut least, mut greatest) = (u32::MAX, 0);
+        for &index in indices {
+            least = least.min(index);
+            greatest = greatest.max(index);
+        }
+        let range = u64::from(greatest.saturating_sub(least)) + 1;
+        if range <= 8 * indices.len() as u64 + 64 {
+            self.place_dense(indices, least, range as usize, offset);
+        } else {
+            self.place_sparse(indices, offset);
+        }
+    }
+
+    /// By a table of all indices in the range. Slots ascend with indices, so that memory is read in order.
+    fn place_dense(&mut self, indices: &[u32], least: u32, range: usize, offset: i64) {
+        self.table.clear();
+        self.table.resize(range, 0);
+        for &index in indices {
+            self.table[(index - least) as usize] = 1;
+        }
+        for (index, entry) in (least..=u32::MAX).zip(&mut self.table) {
+            if *entry != 0 {
+                *entry = self.vertices.len() as u32;
+                self.vertices.push(i64::from(index) + offset);
+            }
+        }
+        let table = &self.table;
+        let slots = indices.iter().map(|&index| table[(index - least) as usize]);
+        self.slots.extend(slots);
+    }
+
+    /// By a hash table with open addressing. Slots are in the order of first use.
+    fn place_sparse(&mut self, indices: &[u32], offset: i64) {
+        const FREE: u32 = u32::MAX;
+        let bits = (2 * indices.len())
+            .next_power_of_two()
+            .trailing_zeros()
+            .max(1);
+        self.table.clear();
+        self.table.resize(1 << bits, FREE);
+        let mask = (1usize << bits) - 1;
+        for &index in indices {
+            let number = i64::from(index) + offset;
+            let mut at = (index.wrapping_mul(0x9E37_79B9) >> (32 - bits)) as usize;
+            let slot = loop {
+                match self.table[at] {
+                    FREE => {
+                        let slot = self.vertices.len() as u32;
+                        self.table[at] = slot;
+                        self.vertices.push(number);
+                        break slot;
+                    }
+                    slot if self.vertices[slot as usize] == number => break slot,
+                    _ => at = (at + 1) & mask,
+                }
+            };
+            self.slots.push(slot);
+        }
+    }
+
+    /// The slot of the vertex at a place of a piece's run.
+    #[inline(always)]
+    pub(super) fn slot(&self, piece: &Piece, place: u32) -> u32 {
+        match place.checked_sub(piece.base) {
+            Some(place) => self.slots[piece.elements + place as usize],
+            None => piece.pivot,
+        }
+    }
+}

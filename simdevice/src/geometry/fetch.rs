@@ -1,0 +1,285 @@
+//! Vertex fetch: attributes of a batch of vertices, from device memory to the inputs of a machine.
+
+use super::pipeline::LANES;
+use crate::format::{Format, Numeric};
+use crate::packet::AttributeStream;
+use crate::packet::draw::{Draw, VertexInput};
+use isa::exec::{Chunk, Machine};
+
+/// A span of vertices is read whole where it has at most this many bytes for each vertex wanted.
+const SPAN_BYTES: u64 = 256;
+
+/// An attribute that the program reads.
+struct Attribute<'a> {
+    stream: &'a AttributeStream,
+    /// The inputs that take its components: slot and component.
+    inputs: Vec<(u32, usize)>,
+}
+
+/// The inputs of a draw's vertex program.
+pub(super) struct Fetcher<'a> {
+    draw: &'a Draw,
+    attributes: Vec<Attribute<'a>>,
+    /// Inputs that differ from vertex to vertex and are no attributes.
+    numbers: Vec<(u32, VertexInput)>,
+    bytes: Vec<u8>,
+    packed: Vec<u8>,
+}
+
+impl<'a> Fetcher<'a> {
+    /// Finds out what the draw's program reads, and sets what is the same for all its vertices.
+    pub(super) fn new(draw: &'a Draw, machine: &mut Machine) -> Self {
+        let mut attributes: Vec<Attribute<'a>> = Vec::new();
+        let mut numbers = Vec::new();
+        for &(slot, _, input) in &draw.pipeline.vertex.inputs {
+            match input {
+                VertexInput::Attribute { stream, component } => {
+                    let Some(stream) = draw.attributes.get(stream).filter(|_| component < 4) else {
+                        machine.fill_input(slot, 0);
+                        continue;
+                    };
+                    let known = attributes
+                        .iter_mut()
+                        .find(|attribute| std::ptr::eq(attribute.stream, stream));
+                    match known {
+                        Some(attribute) => attribute.inputs.push((slot, component)),
+                        None => attributes.push(Attribute {
+                            stream,
+                            inputs: vec![(slot, component)],
+                        }),
+                    }
+                }
+                VertexInput::VertexIndex
+                | VertexInput::InstanceIndex
+                | VertexInput::BaseVertex
+                | VertexInput::BaseInstance
+                | VertexInput::DrawIndex => numbers.push((slot, input)),
+            }
+        }
+        Self {
+            draw,
+            attributes,
+            numbers,
+            bytes: Vec::new(),
+            packed: Vec::new(),
+        }
+    }
+
+    /// Sets the inputs for a batch: vertices by number, and their instances counted from the first.
+    pub(super) fn fetch(&mut self, machine: &mut Machine, vertices: &[i64], instances: &[u32]) {
+        let one_instance = instances.windows(2).all(|pair| pair[0] == pair[1]);
+        self.set_numbers(machine, vertices, instances);
+        let mut elements = [0; LANES];
+        for attribute in &self.attributes {
+            let stream = attribute.stream;
+            let first = i64::from(self.draw.first_instance);
+            let count = match stream.instance_divisor {
+                None => {
+                    elements[..vertices.len()].copy_from_slice(vertices);
+                    vertices.len()
+                }
+                Some(divisor) => {
+                    let count = if one_instance || divisor == 0 {
+                        1
+                    } else {
+                        instances.len()
+                    };
+                    for (element, &instance) in elements.iter_mut().zip(&instances[..count]) {
+                        *element = first + i64::from(instance.checked_div(divisor).unwrap_or(0));
+                    }
+                    count
+                }
+            };
+            let source = Source::read(stream, &elements[..count], &mut self.bytes);
+            let broadcast = count < vertices.len();
+            let out = Out {
+                machine,
+                inputs: &attribute.inputs,
+                broadcast,
+            };
+            if is_words(stream.format) {
+                out.words(stream.format, &source, count);
+            } else {
+                source.pack(stream.format.texel_size(), count, &mut self.packed);
+                out.decoded(stream.format, &self.packed, count);
+            }
+        }
+    }
+
+    fn set_numbers(&self, machine: &mut Machine, vertices: &[i64], instances: &[u32]) {
+        let draw = self.draw;
+        let offset = match &draw.indices {
+            Some(stream) => stream.vertex_offset.cast_unsigned(),
+            None => draw.first,
+        };
+        for &(slot, input) in &self.numbers {
+            match input {
+                VertexInput::VertexIndex => {
+                    set_lanes(machine.input_mut(slot), vertices, |&number| number as u32);
+                }
+                VertexInput::InstanceIndex => set_lanes(machine.input_mut(slot), instances, |&i| {
+                    draw.first_instance.wrapping_add(i)
+                }),
+                VertexInput::BaseVertex => machine.fill_input(slot, offset),
+                VertexInput::BaseInstance => machine.fill_input(slot, draw.first_instance),
+                VertexInput::DrawIndex => machine.fill_input(slot, draw.draw_index),
+                VertexInput::Attribute { .. } => {}
+            }
+        }
+    }
+}
+
+/// Sets an input's lanes from values; a uniform input takes the first.
+fn set_lanes<T>(chunks: &mut [Chunk], values: &[T], bits: impl Fn(&T) -> u32) {
+    if let ([chunk], Some(first)) = (&mut *chunks, values.first()) {
+        *chunk = Chunk([bits(first); 16]);
+        return;
+    }
+    for (chunk, values) in chunks.iter_mut().zip(values.chunks(16)) {
+        for (lane, value) in chunk.0.iter_mut().zip(values) {
+            *lane = bits(value);
+        }
+    }
+}
+
+/// Whether components are whole words that need no conversion.
+fn is_words(format: Format) -> bool {
+    let words = matches!(
+        format.numeric(),
+        Numeric::Sfloat | Numeric::Uint | Numeric::Sint
+    );
+    words
+        && format
+            .components()
+            .iter()
+            .all(|component| component.bits == 32)
+}
+
+/// Elements in scratch memory.
+struct Source<'a> {
+    bytes: &'a [u8],
+    /// Where each element begins, in bytes.
+    starts: [u32; LANES],
+}
+
+impl<'a> Source<'a> {
+    /// Reads elements; those that don't lie inside the buffer are zero.
+    fn read(stream: &AttributeStream, elements: &[i64], scratch: &'a mut Vec<u8>) -> Self {
+        let size = stream.format.texel_size();
+        let mut starts = [0; LANES];
+        let least = elements.iter().copied().min().unwrap_or(0);
+        let greatest = elements.iter().copied().max().unwrap_or(0);
+        let stride = u64::from(stream.stride);
+        let span = (greatest.abs_diff(least))
+            .saturating_mul(stride)
+            .saturating_add(size as u64);
+        if span <= SPAN_BYTES * elements.len() as u64
+            && greatest.abs_diff(least) <= 4 * elements.len() as u64
+            && let Some(offset) = byte_offset(stream, least, span)
+        {
+            scratch.resize(span as usize, 0);
+            if stream.buffer.memory.read(offset, scratch).is_ok() {
+                for (start, &element) in starts.iter_mut().zip(elements) {
+                    *start = (element.abs_diff(least) * stride) as u32;
+                }
+                return Self {
+                    bytes: scratch,
+                    starts,
+                };
+            }
+        }
+        scratch.clear();
+        scratch.resize(size * elements.len(), 0);
+        for (lane, bytes) in scratch.chunks_exact_mut(size).enumerate() {
+            starts[lane] = (lane * size) as u32;
+            if let Some(offset) = byte_offset(stream, elements[lane], size as u64) {
+                // A refused read leaves zeros.
+                let _ = stream.buffer.memory.read(offset, bytes);
+            }
+        }
+        Self {
+            bytes: scratch,
+            starts,
+        }
+    }
+
+    /// Copies the elements to lie one after another.
+    fn pack(&self, size: usize, count: usize, packed: &mut Vec<u8>) {
+        packed.clear();
+        for &start in &self.starts[..count] {
+            packed.extend_from_slice(&self.bytes[start as usize..][..size]);
+        }
+    }
+}
+
+/// Where in memory `bytes` bytes from an element on lie, if they lie inside the buffer.
+fn byte_offset(stream: &AttributeStream, element: i64, bytes: u64) -> Option<u64> {
+    let start = u64::try_from(element)
+        .ok()?
+        .checked_mul(stream.stride.into())?
+        .checked_add(stream.offset.into())?;
+    let end = start.checked_add(bytes)?;
+    if end > stream.buffer.size {
+        return None;
+    }
+    stream.buffer.offset.checked_add(start)
+}
+
+/// The inputs that an attribute's components go to.
+struct Out<'a> {
+    machine: &'a mut Machine,
+    inputs: &'a [(u32, usize)],
+    /// One element is for all lanes.
+    broadcast: bool,
+}
+
+impl Out<'_> {
+    /// Components that are words.
+    fn words(self, format: Format, source: &Source, count: usize) {
+        let one = if format.is_integer() {
+            1
+        } else {
+            1f32.to_bits()
+        };
+        let components = format.components();
+        for &(slot, component) in self.inputs {
+            let chunks = self.machine.input_mut(slot);
+            // The order in memory need not be the order of components.
+            let wanted = [
+                crate::format::Channel::R,
+                crate::format::Channel::G,
+                crate::format::Channel::B,
+                crate::format::Channel::A,
+            ][component];
+            let Some(place) = components.iter().position(|c| c.channel == wanted) else {
+                chunks.fill(Chunk([if component == 3 { one } else { 0 }; 16]));
+                continue;
+            };
+            let word = |&start: &u32| {
+                let at = start as usize + 4 * place;
+                let bytes: [u8; 4] = source.bytes[at..at + 4].try_into().unwrap_or_default();
+                u32::from_le_bytes(bytes)
+            };
+            if self.broadcast {
+                chunks.fill(Chunk([word(&source.starts[0]); 16]));
+            } else {
+                set_lanes(chunks, &source.starts[..count], word);
+            }
+        }
+    }
+
+    /// Components that have to be decoded from packed elements.
+    fn decoded(self, format: Format, packed: &[u8], count: usize) {
+        let mut texels = [[0.0; 4]; LANES];
+        let texels = &mut texels[..count];
+        format.decode_row(packed, texels);
+        for &(slot, component) in self.inputs {
+            let chunks = self.machine.input_mut(slot);
+            if self.broadcast {
+                chunks.fill(Chunk([texels[0][component].to_bits(); 16]));
+            } else {
+                set_lanes(chunks, texels, |texel| texel[component].to_bits());
+            }
+        }
+    }
+}

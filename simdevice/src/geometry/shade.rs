@@ -1,0 +1,180 @@
+//! Vertex shading: runs the vertex program on the vertices of a chunk, and projects what it wrote.
+
+use super::elements::Elements;
+use super::fetch::Fetcher;
+use super::pipeline::{LANES, Lease, VertexOutputs};
+use super::viewport::{Projected, Transform, code};
+use crate::packet::draw::MAX_CLIP_CULL_DISTANCES;
+use isa::exec::{Chunk, LaneMask, Machine, Stopped, Watchdog};
+use isa::resources::Resources;
+
+/// A vertex after the vertex program and the first viewport's transform.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Vertex {
+    /// In clip space.
+    pub position: [f32; 4],
+    pub projected: Projected,
+    /// See [`code`].
+    pub code: u32,
+}
+
+/// What only some vertex programs write.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extras {
+    pub point_size: f32,
+    pub layer: u32,
+    pub viewport: u32,
+    pub clip: [f32; MAX_CLIP_CULL_DISTANCES],
+    pub cull: [f32; MAX_CLIP_CULL_DISTANCES],
+}
+
+/// What extras are where nothing is written.
+pub(super) const NO_EXTRAS: Extras = Extras {
+    point_size: 1.0,
+    layer: 0,
+    viewport: 0,
+    clip: [0.0; MAX_CLIP_CULL_DISTANCES],
+    cull: [0.0; MAX_CLIP_CULL_DISTANCES],
+};
+
+/// The shaded vertices of a chunk, by slot.
+#[derive(Debug, Default)]
+pub(super) struct Shaded {
+    pub vertices: Vec<Vertex>,
+    /// Empty if no vertex has any.
+    pub extras: Vec<Extras>,
+    /// Vertex by vertex.
+    pub varyings: Vec<u32>,
+}
+
+/// Where batches run.
+pub(super) struct Shader<'a> {
+    pub machine: Lease<'a>,
+    pub fetcher: Fetcher<'a>,
+    pub outputs: &'a VertexOutputs,
+    pub transform: Transform,
+    pub resources: &'a Resources<'a>,
+    pub watchdog: Watchdog<'a>,
+}
+
+impl Shader<'_> {
+    /// Shades all vertices of a chunk.
+    pub(super) fn shade(
+        &mut self,
+        elements: &Elements,
+        shaded: &mut Shaded,
+    ) -> Result<(), Stopped> {
+        shaded.vertices.clear();
+        shaded.extras.clear();
+        shaded.varyings.clear();
+        let batches = elements
+            .vertices
+            .chunks(LANES)
+            .zip(elements.instances.chunks(LANES));
+        for (vertices, instances) in batches {
+            self.fetcher.fetch(&mut self.machine, vertices, instances);
+            self.machine.run(
+                &LaneMask::first(vertices.len()),
+                &LaneMask::none(),
+                self.resources,
+                self.watchdog,
+            )?;
+            self.take(vertices.len(), shaded);
+        }
+        Ok(())
+    }
+
+    /// Appends a batch's outputs.
+    fn take(&self, count: usize, shaded: &mut Shaded) {
+        let outputs = self.outputs;
+        let first = shaded.vertices.len();
+        shaded.vertices.resize(first + count, Vertex::default());
+        let vertices = &mut shaded.vertices[first..];
+        for (component, &slot) in outputs.position.iter().enumerate() {
+            for_lanes(&self.machine, slot, vertices, |vertex, bits| {
+                vertex.position[component] = f32::from_bits(bits);
+            });
+        }
+        for vertex in &mut *vertices {
+            vertex.projected = self.transform.project(vertex.position);
+            vertex.code = self.transform.code(vertex.position, &vertex.projected);
+        }
+        if outputs.has_extras() {
+            self.take_extras(count, shaded);
+        }
+        let per_vertex = outputs.varyings.len();
+        if per_vertex > 0 {
+            let first = shaded.varyings.len();
+            shaded.varyings.resize(first + count * per_vertex, 0);
+            for (number, &slot) in outputs.varyings.iter().enumerate() {
+                let mut vertices = shaded.varyings[first..].chunks_exact_mut(per_vertex);
+                let chunks = slot.map_or(&[][..], |slot| self.machine.output_chunks(slot));
+                for chunk in chunks {
+                    for (&bits, vertex) in chunk.0.iter().zip(&mut vertices) {
+                        vertex[number] = bits;
+                    }
+                }
+            }
+        }
+    }
+
+    fn take_extras(&self, count: usize, shaded: &mut Shaded) {
+        let outputs = self.outputs;
+        let first = shaded.extras.len();
+        shaded.extras.resize(first + count, NO_EXTRAS);
+        let extras = &mut shaded.extras[first..];
+        let machine = &self.machine;
+        for_lanes(machine, outputs.point_size, extras, |extras, bits| {
+            extras.point_size = f32::from_bits(bits);
+        });
+        for_lanes(machine, outputs.layer, extras, |extras, bits| {
+            extras.layer = bits
+        });
+        for_lanes(machine, outputs.viewport, extras, |extras, bits| {
+            extras.viewport = bits
+        });
+        for index in 0..MAX_CLIP_CULL_DISTANCES {
+            for_lanes(machine, outputs.clip[index], extras, |extras, bits| {
+                extras.clip[index] = f32::from_bits(bits);
+            });
+            for_lanes(machine, outputs.cull[index], extras, |extras, bits| {
+                extras.cull[index] = f32::from_bits(bits);
+            });
+        }
+        for (vertex, extras) in shaded.vertices[first..].iter_mut().zip(extras) {
+            vertex.code |= distance_code(extras);
+        }
+    }
+}
+
+/// The part of a vertex's code that its distances make.
+fn distance_code(extras: &Extras) -> u32 {
+    let mut bits = 0;
+    for (index, distance) in extras.clip.iter().enumerate() {
+        if *distance < 0.0 {
+            bits |= code::USER << index;
+        }
+        if !distance.is_finite() {
+            bits |= code::INVALID;
+        }
+    }
+    for (index, distance) in extras.cull.iter().enumerate() {
+        if *distance < 0.0 {
+            bits |= code::CULL << index;
+        }
+    }
+    bits
+}
+
+/// Calls `set` with each of `items` and its lane of an output, if there is such an output.
+fn for_lanes<T>(machine: &Machine, slot: Option<u32>, items: &mut [T], set: impl Fn(&mut T, u32)) {
+    let Some(slot) = slot else {
+        return;
+    };
+    let chunks: &[Chunk] = machine.output_chunks(slot);
+    for (chunk, items) in chunks.iter().zip(items.chunks_mut(16)) {
+        for (&bits, item) in chunk.0.iter().zip(items) {
+            set(item, bits);
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Tests of the front end: each against a naive twin or a property that must hold.
+
+mod assembly;
+mod binning;
+mod clipping;
+mod culling;
+mod fetch;
+mod robustness;
+mod scene;
+mod shapes;
+mod snapping;

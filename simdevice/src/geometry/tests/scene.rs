@@ -1,0 +1,267 @@
+//! Draws that the tests share.
+
+use super::super::{DrawPipeline, FrontEnd, PrimitiveDraw, Surface};
+use crate::bindings::Bindings;
+use crate::counters::Counters;
+use crate::device::{Config, Device};
+use crate::format::Format;
+use crate::packet::draw::*;
+use crate::packet::{AttributeStream, BufferRange, IndexStream, Rect, Viewport};
+use devmem::Allocation;
+use isa::builder::Builder;
+use isa::ir::{Program, Rate, Type};
+use std::sync::Arc;
+
+/// The framebuffer: neither side is a multiple of a macro-tile's.
+pub const WIDTH: u32 = 200;
+/// See [`WIDTH`].
+pub const HEIGHT: u32 = 150;
+
+/// All pixels.
+pub const EVERYTHING: Rect = Rect {
+    x: 0,
+    y: 0,
+    width: WIDTH,
+    height: HEIGHT,
+};
+
+/// The varying that holds the vertex's index.
+pub const INDEX: usize = 0;
+/// The varying that holds the instance's index.
+pub const INSTANCE: usize = 1;
+/// The varying that holds the second attribute's first component, perspective-correct.
+pub const VALUE: usize = 2;
+/// The same, linear in the framebuffer.
+pub const LINEAR: usize = 3;
+
+/// A device with that many workers.
+pub fn device(threads: usize) -> Device {
+    let config = Config {
+        threads,
+        ..Config::default()
+    };
+    Device::new(&config).unwrap()
+}
+
+/// A program that copies its inputs, by slot, to outputs.
+pub fn copies(inputs: u32, copies: &[(u32, u32)]) -> Program {
+    let mut b = Builder::new();
+    let inputs: Vec<_> = (0..inputs)
+        .map(|slot| b.input(slot, Type::B32, Rate::Varying))
+        .collect();
+    for &(from, to) in copies {
+        let out = b.output(to, Type::B32);
+        b.assign(out, inputs[from as usize]);
+    }
+    b.finish().unwrap()
+}
+
+/// The four components of an attribute.
+pub fn attribute(stream: usize) -> impl Iterator<Item = Option<VertexInput>> {
+    (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }))
+}
+
+/// A fragment stage that reads varyings with these interpolations.
+pub fn fragment(interpolation: &[Interpolation]) -> FragmentPrograms {
+    let inputs = (0..).zip(interpolation).map(|(index, &interpolation)| {
+        Some(FragmentInput::Varying {
+            index,
+            interpolation,
+            sampling: Sampling::Center,
+        })
+    });
+    FragmentPrograms {
+        program: Program::default(),
+        inputs: inputs.collect(),
+        outputs: Vec::new(),
+        early_tests: false,
+        discards: false,
+        per_sample: false,
+        has_side_effects: false,
+    }
+}
+
+/// Positions come from attribute 0, varyings are as the constants above say. `extra` are what outputs take the
+/// components of attribute 2.
+pub fn programs(extra: &[VertexOutput]) -> DrawPrograms {
+    use Interpolation::*;
+    let mut pairs = vec![
+        (0, 0),
+        (1, 1),
+        (2, 2),
+        (3, 3),
+        (4, 4),
+        (5, 5),
+        (6, 6),
+        (6, 7),
+    ];
+    pairs.extend((0..extra.len() as u32).map(|index| (10 + index % 4, 8 + index)));
+    let mut inputs: Vec<_> = attribute(0).collect();
+    inputs.extend([
+        Some(VertexInput::VertexIndex),
+        Some(VertexInput::InstanceIndex),
+    ]);
+    inputs.extend(attribute(1));
+    inputs.extend(attribute(2));
+    let mut outputs: Vec<_> = (0..4).map(|c| Some(VertexOutput::Position(c))).collect();
+    outputs.extend((0..4).map(|number| Some(VertexOutput::Varying(number))));
+    outputs.extend(extra.iter().map(|&output| Some(output)));
+    DrawPrograms {
+        vertex: copies(14, &pairs),
+        vertex_inputs: inputs,
+        vertex_outputs: outputs,
+        varyings: 4,
+        fragment: Some(fragment(&[Flat, Flat, Perspective, Linear])),
+    }
+}
+
+/// State without any culling.
+pub fn state(topology: Topology) -> DrawState {
+    DrawState {
+        topology,
+        primitive_restart: false,
+        viewports: vec![Viewport {
+            x: 0.0,
+            y: 0.0,
+            width: WIDTH as f32,
+            height: HEIGHT as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        }],
+        scissors: vec![EVERYTHING],
+        depth_clamp: false,
+        rasterizer_discard: false,
+        polygon_mode: PolygonMode::Fill,
+        cull_front: false,
+        cull_back: false,
+        front_clockwise: true,
+        depth_bias: None,
+        line_width: 1.0,
+        provoking_last: false,
+        samples: 1,
+        sample_mask: u32::MAX,
+        sample_shading: false,
+        alpha_to_coverage: false,
+        alpha_to_one: false,
+        depth_stencil: DepthStencil {
+            depth: None,
+            bounds: None,
+            stencil: None,
+        },
+        logic_op: None,
+        blend: Vec::new(),
+        blend_constants: [0.0; 4],
+    }
+}
+
+/// A buffer of these elements.
+pub fn buffer<T: bytemuck::NoUninit>(elements: &[T]) -> BufferRange {
+    let size = size_of_val(elements) as u64;
+    let memory = Allocation::new_zeroed(size.max(4)).unwrap();
+    memory.write(0, elements).unwrap();
+    BufferRange {
+        memory,
+        offset: 0,
+        size,
+    }
+}
+
+/// A stream of tightly packed elements.
+pub fn stream<T: bytemuck::NoUninit>(elements: &[T], format: Format) -> AttributeStream {
+    AttributeStream {
+        buffer: buffer(elements),
+        stride: size_of::<T>() as u32,
+        offset: 0,
+        format,
+        instance_divisor: None,
+    }
+}
+
+/// An index buffer of 32-bit indices.
+pub fn indices(elements: &[u32]) -> IndexStream {
+    IndexStream {
+        buffer: buffer(elements),
+        index_size: 4,
+        vertex_offset: 0,
+    }
+}
+
+/// A draw of all of these positions, as [`programs`] has them.
+pub fn draw(device: &Device, topology: Topology, positions: &[[f32; 4]]) -> Draw {
+    draw_with(device, programs(&[]), state(topology), positions)
+}
+
+/// A draw of all of these positions.
+pub fn draw_with(
+    device: &Device,
+    programs: DrawPrograms,
+    state: DrawState,
+    positions: &[[f32; 4]],
+) -> Draw {
+    let values: Vec<f32> = (0..positions.len()).map(|vertex| vertex as f32).collect();
+    Draw {
+        pipeline: Arc::new(DrawPipeline::new(device, programs).unwrap()),
+        state: Arc::new(state),
+        attributes: vec![
+            stream(positions, Format::R32G32B32A32Sfloat),
+            stream(&values, Format::R32Sfloat),
+        ],
+        vertex_bindings: Bindings::default(),
+        fragment_bindings: Bindings::default(),
+        indices: None,
+        first: 0,
+        count: positions.len() as u32,
+        first_instance: 0,
+        instance_count: 1,
+        draw_index: 0,
+    }
+}
+
+/// What a draw becomes, in parts.
+pub fn parts(device: &Device, draw: &Draw) -> (Vec<PrimitiveDraw>, Counters) {
+    let surface = Surface {
+        area: EVERYTHING,
+        layers: 4,
+        depth: Some(Format::D32Sfloat),
+    };
+    let mut counters = Counters::default();
+    let mut front = FrontEnd::new(draw, surface, device, &mut counters);
+    let mut parts = Vec::new();
+    while let Some(part) = front.next_part(&mut counters).unwrap() {
+        parts.push(part);
+    }
+    (parts, counters)
+}
+
+/// What a draw becomes; it must be one part or nothing.
+pub fn run(device: &Device, draw: &Draw) -> PrimitiveDraw {
+    let (mut parts, _) = parts(device, draw);
+    assert!(parts.len() <= 1);
+    parts.pop().unwrap_or_else(|| PrimitiveDraw::empty(draw))
+}
+
+/// A varying of a vertex of the output, as a float.
+pub fn varying(draw: &PrimitiveDraw, vertex: u32, number: usize) -> f32 {
+    f32::from_bits(varying_bits(draw, vertex, number))
+}
+
+/// A varying of a vertex of the output.
+pub fn varying_bits(draw: &PrimitiveDraw, vertex: u32, number: usize) -> u32 {
+    draw.varyings.values[vertex as usize * draw.varyings.per_vertex + number]
+}
+
+/// Twice the signed area of a triangle.
+pub fn area(corners: [[i32; 2]; 3]) -> i64 {
+    let [a, b, c] = corners.map(|corner| corner.map(i64::from));
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// The clip-space position, w 1, of a point given in pixels.
+pub fn at_pixel(x: f32, y: f32, z: f32) -> [f32; 4] {
+    [
+        x / WIDTH as f32 * 2.0 - 1.0,
+        y / HEIGHT as f32 * 2.0 - 1.0,
+        z,
+        1.0,
+    ]
+}

@@ -1,0 +1,103 @@
+//! The viewport transform and snapping, digit by digit.
+
+use super::super::viewport::{Transform, pixels, snap, snap_away};
+use super::scene::*;
+use crate::packet::draw::Topology;
+use crate::packet::{Rect, Viewport};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+#[test]
+fn coordinates_round_to_the_nearest_sub_pixel() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let check = |x: f32| {
+        let scaled = (x - 0.5) * 256.0;
+        assert_eq!(snap(x), scaled.round_ties_even() as i32 + 128, "{x}");
+        assert_eq!(snap_away(x), scaled.round() as i32 + 128, "{x}");
+    };
+    for _ in 0..20_000 {
+        check(rng.random_range(-30_000.0..30_000.0));
+        check(rng.random_range(-3.0..3.0));
+    }
+    for step in -2000..2000 {
+        // Every other one is a tie.
+        check(step as f32 / 512.0);
+    }
+    for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30] {
+        assert!(snap(x).abs() < 1 << 25 && snap_away(x).abs() < 1 << 25);
+    }
+}
+
+#[test]
+fn the_viewport_maps_with_one_rounding_after_the_division() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    for _ in 0..5000 {
+        let viewport = Viewport {
+            x: rng.random_range(-50.0..50.0),
+            y: rng.random_range(-50.0..50.0),
+            width: rng.random_range(1.0..5000.0),
+            height: rng.random_range(-5000.0..5000.0),
+            min_depth: rng.random_range(0.0..1.0),
+            max_depth: rng.random_range(0.0..1.0),
+        };
+        let position: [f32; 4] = std::array::from_fn(|_| rng.random_range(0.1..3.0));
+        let projected = Transform::new(&viewport, false).project(position);
+        let inverse = 1.0 / position[3];
+        let half = [0.5 * viewport.width, 0.5 * viewport.height];
+        let x = (position[0] * inverse).mul_add(half[0], half[0] + viewport.x);
+        let y = (position[1] * inverse).mul_add(half[1], half[1] + viewport.y);
+        let depth = viewport.max_depth - viewport.min_depth;
+        let z = (position[2] * inverse).mul_add(depth, viewport.min_depth);
+        assert_eq!(projected.window, [x, y]);
+        assert_eq!((projected.depth, projected.inverse_w), (z, inverse));
+        assert_eq!(projected.snapped, [snap(x), snap(y)]);
+    }
+}
+
+#[test]
+fn corners_lie_where_positions_say() {
+    let device = device(1);
+    let pixel = |x, y| at_pixel(x, y, 0.25);
+    let positions = [pixel(10.0, 20.0), pixel(60.5, 20.25), pixel(10.0, 90.0)];
+    let drawn = run(&device, &draw(&device, Topology::TriangleList, &positions));
+    let [primitive] = &drawn.primitives[..] else {
+        panic!("one triangle");
+    };
+    for (corner, expected) in
+        primitive
+            .corners
+            .iter()
+            .zip([[2560, 5120], [15488, 5184], [2560, 23040]])
+    {
+        let off = [0, 1].map(|axis: usize| (corner[axis] - expected[axis]).abs());
+        assert!(off[0] <= 1 && off[1] <= 1, "{corner:?} {expected:?}");
+    }
+    assert_eq!(primitive.depth, [0.25; 3]);
+    assert_eq!(primitive.inverse_w, [1.0; 3]);
+}
+
+#[test]
+fn a_viewport_has_the_pixels_whose_centres_lie_in_it() {
+    let viewport = |x, width| Viewport {
+        x,
+        y: 7.0,
+        width,
+        height: -5.0,
+        min_depth: 0.0,
+        max_depth: 1.0,
+    };
+    for (x, width, first, count) in [
+        (0.0, 10.0, 0, 10),
+        (0.5, 10.0, 0, 10),
+        (0.51, 10.0, 1, 10),
+        (2.25, 0.5, 2, 1),
+    ] {
+        let expected = Rect {
+            x: first,
+            y: 2,
+            width: count,
+            height: 5,
+        };
+        assert_eq!(pixels(&viewport(x, width)), expected);
+    }
+}

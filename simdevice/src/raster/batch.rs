@@ -1,0 +1,525 @@
+//! Batches of fragments: 2x2 quads of any primitives of a draw within a macro-tile, and what the fragment program gets
+//! of them.
+
+use super::color::Quads;
+use super::fragment::{BATCH_LANES, Interface};
+use super::setup::Setup;
+use crate::geometry::{Primitive, PrimitiveKind, Varyings};
+use crate::packet::draw::{FragmentInput, Interpolation, Sampling};
+use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use isa::exec::{Chunk, LaneMask, Machine};
+
+/// Lanes of the largest batch.
+pub const LANES: usize = BATCH_LANES[1];
+/// Quads of it.
+pub const QUADS: usize = LANES / 4;
+
+/// A quad that is to be shaded.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Quad {
+    /// Its first pixel in the framebuffer.
+    pub x: u16,
+    pub y: u16,
+    /// Its primitive: an index into [`Batch::records`].
+    pub record: u16,
+    /// Its tile of the macro-tile.
+    pub tile: u8,
+    /// Its first pixel's place within the tile.
+    pub place: u8,
+    /// Bit `4 sample + lane` tells which samples are covered.
+    pub cover: u16,
+    /// The sample shaded, where each sample is shaded for itself.
+    pub sample: u8,
+}
+
+/// What quads need of their primitive.
+#[derive(Clone, Debug)]
+pub struct Record {
+    pub primitive: u32,
+    pub front: bool,
+    pub viewport: u8,
+    /// 1 / w at corners 1 and 2, as [`Setup::weights`].
+    weights: [f32; 2],
+    /// What [`BlockValues::inverse_w`] is to be multiplied by.
+    scale: f32,
+    /// Derivatives of the barycentrics by x and y in pixels.
+    slopes: [[f32; 2]; 2],
+    /// Derivatives of [`BlockValues::inverse_w`].
+    w_slopes: [f32; 2],
+    /// Derivatives of depth.
+    pub depth_slopes: [f32; 2],
+}
+
+/// Fragments to be shaded together.
+#[derive(Debug)]
+pub struct Batch {
+    pub quads: [Quad; QUADS],
+    pub count: usize,
+    pub records: Vec<Record>,
+    /// Of each record, each varying: its value at corner 0, and how much more it is at the others (the value alone if
+    /// it is flat).
+    attributes: Vec<[f32; 3]>,
+    /// The barycentrics of corners 1 and 2, lane by lane.
+    barycentrics: [[f32; LANES]; 2],
+    /// The same, perspective-correct.
+    perspective: [[f32; LANES]; 2],
+    pub depth: [f32; LANES],
+    inverse_w: [f32; LANES],
+    pub active: LaneMask,
+    pub helpers: LaneMask,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self {
+            quads: [Quad::default(); QUADS],
+            count: 0,
+            records: Vec::new(),
+            attributes: Vec::new(),
+            barycentrics: [[0.0; LANES]; 2],
+            perspective: [[0.0; LANES]; 2],
+            depth: [0.0; LANES],
+            inverse_w: [0.0; LANES],
+            active: LaneMask::none(),
+            helpers: LaneMask::none(),
+        }
+    }
+}
+
+/// Values that vary over the pixels of a block, at the centres.
+#[derive(Clone, Copy)]
+pub struct BlockValues<S: Simd> {
+    pub barycentrics: [f32x16<S>; 2],
+    pub depth: f32x16<S>,
+    /// 1 / w, in units of its value if that is the same everywhere.
+    pub inverse_w: f32x16<S>,
+}
+
+impl<S: Simd> BlockValues<S> {
+    /// As lanes, in the order of the fields.
+    #[inline(always)]
+    pub fn lanes(self) -> [[f32; 16]; 4] {
+        let [b1, b2] = self.barycentrics;
+        [
+            b1.into(),
+            b2.into(),
+            self.depth.into(),
+            self.inverse_w.into(),
+        ]
+    }
+}
+
+impl Batch {
+    /// Empties it.
+    pub fn clear(&mut self) {
+        self.count = 0;
+        self.records.clear();
+        self.attributes.clear();
+    }
+
+    /// Adds a primitive, of which quads may follow; returns its record.
+    pub fn add_primitive(
+        &mut self,
+        index: u32,
+        primitive: &Primitive,
+        setup: &Setup,
+        interface: &Interface,
+        varyings: &Varyings,
+    ) -> u16 {
+        self.records.push(Record {
+            primitive: index,
+            front: primitive.front,
+            viewport: primitive.viewport,
+            weights: setup.weights,
+            scale: setup.scale,
+            slopes: setup.slopes,
+            w_slopes: setup.w_slopes,
+            depth_slopes: setup.depth_slopes,
+        });
+        let value = |vertex: u32, varying: u32| {
+            let at = vertex as usize * varyings.per_vertex + varying as usize;
+            f32::from_bits(varyings.values.get(at).copied().unwrap_or(0))
+        };
+        for &(varying, interpolation) in &interface.varyings {
+            self.attributes.push(match interpolation {
+                Interpolation::Flat => [value(primitive.provoking, varying), 0.0, 0.0],
+                _ => {
+                    let [a, b, c] = primitive.vertices.map(|vertex| value(vertex, varying));
+                    [a, b - a, c - a]
+                }
+            });
+        }
+        (self.records.len() - 1) as u16
+    }
+
+    /// Adds a quad: `quad` of a block, whose values are given.
+    #[inline(always)]
+    pub fn add(&mut self, quad: Quad, number: usize, values: &[[f32; 16]; 4]) {
+        let at = 4 * self.count;
+        let lanes = 4 * number..4 * number + 4;
+        self.barycentrics[0][at..at + 4].copy_from_slice(&values[0][lanes.clone()]);
+        self.barycentrics[1][at..at + 4].copy_from_slice(&values[1][lanes.clone()]);
+        self.depth[at..at + 4].copy_from_slice(&values[2][lanes.clone()]);
+        self.inverse_w[at..at + 4].copy_from_slice(&values[3][lanes]);
+        self.quads[self.count] = quad;
+        self.count += 1;
+    }
+
+    /// Chunks of 16 lanes that have quads.
+    pub fn chunks(&self) -> usize {
+        self.count.div_ceil(4)
+    }
+
+    /// The quads of a chunk.
+    #[inline(always)]
+    pub fn chunk_quads(&self, chunk: usize) -> &[Quad; 4] {
+        let (chunks, _) = self.quads.as_chunks();
+        &chunks[chunk]
+    }
+
+    /// The record of all quads of a chunk, if it is the same.
+    #[inline(always)]
+    fn common_record(&self, chunk: usize) -> Option<u16> {
+        let [a, b, c, d] = self.chunk_quads(chunk);
+        (a.record == b.record && a.record == c.record && a.record == d.record).then_some(a.record)
+    }
+
+    /// A value of each lane's primitive.
+    #[inline(always)]
+    fn of_records<S: Simd>(
+        &self,
+        simd: S,
+        chunk: usize,
+        value: impl Fn(&Record) -> f32,
+    ) -> f32x16<S> {
+        if let Some(record) = self.common_record(chunk) {
+            return f32x16::splat(simd, value(&self.records[usize::from(record)]));
+        }
+        let mut lanes = [0.0; 16];
+        for (quad, lanes) in self.chunk_quads(chunk).iter().zip(lanes.as_chunks_mut().0) {
+            *lanes = [value(&self.records[usize::from(quad.record)]); 4];
+        }
+        f32x16::simd_from(simd, lanes)
+    }
+
+    /// A varying's value at corner 0 and differences to the other corners, of each lane's primitive.
+    #[inline(always)]
+    fn attribute<S: Simd>(
+        &self,
+        simd: S,
+        chunk: usize,
+        varying: usize,
+        per_record: usize,
+    ) -> [f32x16<S>; 3] {
+        if let Some(record) = self.common_record(chunk) {
+            let [a, b, c] = self.attributes[usize::from(record) * per_record + varying];
+            return [
+                f32x16::splat(simd, a),
+                f32x16::splat(simd, b),
+                f32x16::splat(simd, c),
+            ];
+        }
+        let mut lanes = [[0.0; 16]; 3];
+        for (number, quad) in self.chunk_quads(chunk).iter().enumerate() {
+            let values = self.attributes[usize::from(quad.record) * per_record + varying];
+            for (lanes, value) in lanes.iter_mut().zip(values) {
+                lanes[4 * number..4 * number + 4].copy_from_slice(&[value; 4]);
+            }
+        }
+        let [a, b, c] = lanes;
+        [
+            f32x16::simd_from(simd, a),
+            f32x16::simd_from(simd, b),
+            f32x16::simd_from(simd, c),
+        ]
+    }
+
+    /// Where a chunk's quads are in a plane of `samples` samples a pixel.
+    #[inline(always)]
+    pub fn places(&self, chunk: usize, sample: usize, samples: usize) -> Quads {
+        let mut first = [0; 4];
+        for (first, quad) in first.iter_mut().zip(self.chunk_quads(chunk)) {
+            let tile = usize::from(quad.tile) * samples + sample;
+            *first = tile * super::tile::AREA + usize::from(quad.place);
+        }
+        let [a, b, c, d] = first;
+        Quads {
+            first,
+            consecutive: b == a + 4 && c == a + 8 && d == a + 12,
+        }
+    }
+
+    /// Whether two quads of a chunk cover the same sample, so that their order matters.
+    pub fn overlaps(&self, chunk: usize) -> bool {
+        let quads = self.chunk_quads(chunk);
+        quads.iter().enumerate().any(|(index, a)| {
+            quads[index + 1..]
+                .iter()
+                .any(|b| (a.tile, a.place) == (b.tile, b.place) && a.cover & b.cover != 0)
+        })
+    }
+
+    /// Fills up the last chunk, and says which lanes are active and which only help with derivatives.
+    pub fn prepare(&mut self) {
+        let last = self.quads[self.count - 1];
+        for quad in &mut self.quads[self.count..4 * self.count.div_ceil(4)] {
+            *quad = Quad { cover: 0, ..last };
+        }
+        self.active = LaneMask::first(4 * self.count);
+        self.helpers = LaneMask::none();
+        for (number, quad) in self.quads[..self.count].iter().enumerate() {
+            let covered = covered_lanes(quad.cover);
+            if covered != 15 {
+                for lane in 0..4 {
+                    if covered >> lane & 1 == 0 {
+                        self.helpers.set(4 * number + lane, true);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Sets a program's inputs.
+    #[inline(always)]
+    pub fn set_inputs<S: Simd>(
+        &mut self,
+        simd: S,
+        interface: &Interface,
+        positions: &[[i32; 2]],
+        primitives: &[Primitive],
+        machine: &mut Machine,
+    ) {
+        if interface
+            .varyings
+            .iter()
+            .any(|(_, interpolation)| *interpolation == Interpolation::Perspective)
+        {
+            self.divide(simd);
+        }
+        for &(slot, kind) in &interface.inputs {
+            for (chunk, lanes) in machine.input_mut(slot).iter_mut().enumerate() {
+                if chunk >= self.chunks() {
+                    break;
+                }
+                *lanes = Chunk(self.input(simd, kind, chunk, interface, positions, primitives));
+            }
+        }
+    }
+
+    /// Finds perspective-correct barycentrics.
+    #[inline(always)]
+    fn divide<S: Simd>(&mut self, simd: S) {
+        for chunk in 0..self.chunks() {
+            let [p1, p2] = self.perspective_at(simd, chunk, self.linear_at(simd, chunk));
+            p1.store_slice(&mut self.perspective[0][16 * chunk..][..16]);
+            p2.store_slice(&mut self.perspective[1][16 * chunk..][..16]);
+        }
+    }
+
+    #[inline(always)]
+    fn linear_at<S: Simd>(&self, simd: S, chunk: usize) -> [f32x16<S>; 3] {
+        [
+            f32x16::from_slice(simd, &self.barycentrics[0][16 * chunk..][..16]),
+            f32x16::from_slice(simd, &self.barycentrics[1][16 * chunk..][..16]),
+            f32x16::from_slice(simd, &self.inverse_w[16 * chunk..][..16]),
+        ]
+    }
+
+    #[inline(always)]
+    fn perspective_at<S: Simd>(
+        &self,
+        simd: S,
+        chunk: usize,
+        [b1, b2, inverse_w]: [f32x16<S>; 3],
+    ) -> [f32x16<S>; 2] {
+        let w1 = self.of_records(simd, chunk, |record| record.weights[0]);
+        let w2 = self.of_records(simd, chunk, |record| record.weights[1]);
+        let inverse = f32x16::splat(simd, 1.0) / inverse_w;
+        [b1 * w1 * inverse, b2 * w2 * inverse]
+    }
+
+    /// The barycentrics at a sample covered of each lane, the centre if all are.
+    #[inline(always)]
+    fn centroid_at<S: Simd>(
+        &self,
+        simd: S,
+        chunk: usize,
+        positions: &[[i32; 2]],
+    ) -> [f32x16<S>; 3] {
+        let (mut x, mut y) = ([0.0; 16], [0.0; 16]);
+        for lane in 0..16 {
+            let cover = self.chunk_quads(chunk)[lane / 4].cover >> (lane % 4) & 0x1111;
+            if cover != 0 && cover != 0x1111 {
+                let [at_x, at_y] = positions[cover.trailing_zeros() as usize / 4];
+                (x[lane], y[lane]) = (offset(at_x), offset(at_y));
+            }
+        }
+        let (x, y) = (f32x16::simd_from(simd, x), f32x16::simd_from(simd, y));
+        let [b1, b2, inverse_w] = self.linear_at(simd, chunk);
+        let slope = |corner: usize, axis: usize| {
+            self.of_records(simd, chunk, |record| record.slopes[corner][axis])
+        };
+        [
+            b1 + slope(0, 0) * x + slope(0, 1) * y,
+            b2 + slope(1, 0) * x + slope(1, 1) * y,
+            inverse_w
+                + self.of_records(simd, chunk, |record| record.w_slopes[0]) * x
+                + self.of_records(simd, chunk, |record| record.w_slopes[1]) * y,
+        ]
+    }
+
+    /// The bits of an input for 16 lanes.
+    #[inline(always)]
+    fn input<S: Simd>(
+        &self,
+        simd: S,
+        kind: FragmentInput,
+        chunk: usize,
+        interface: &Interface,
+        positions: &[[i32; 2]],
+        primitives: &[Primitive],
+    ) -> [u32; 16] {
+        match kind {
+            FragmentInput::Varying {
+                index,
+                interpolation,
+                sampling,
+            } => {
+                let varying = interface
+                    .varyings
+                    .iter()
+                    .position(|&varying| varying == (index, interpolation))
+                    .unwrap_or(0);
+                let [a, da, db] = self.attribute(simd, chunk, varying, interface.varyings.len());
+                let centroid =
+                    sampling == Sampling::Centroid && positions.len() > 1 && !interface.per_sample;
+                let [b1, b2] = match interpolation {
+                    Interpolation::Flat => return a.to_bits().into(),
+                    Interpolation::Linear if centroid => {
+                        let [b1, b2, _] = self.centroid_at(simd, chunk, positions);
+                        [b1, b2]
+                    }
+                    Interpolation::Perspective if centroid => {
+                        let linear = self.centroid_at(simd, chunk, positions);
+                        self.perspective_at(simd, chunk, linear)
+                    }
+                    Interpolation::Linear => {
+                        let [b1, b2, _] = self.linear_at(simd, chunk);
+                        [b1, b2]
+                    }
+                    Interpolation::Perspective => [
+                        f32x16::from_slice(simd, &self.perspective[0][16 * chunk..][..16]),
+                        f32x16::from_slice(simd, &self.perspective[1][16 * chunk..][..16]),
+                    ],
+                };
+                db.mul_add(b2, da.mul_add(b1, a)).to_bits().into()
+            }
+            FragmentInput::FragCoord(2) => {
+                let depth = f32x16::from_slice(simd, &self.depth[16 * chunk..][..16]);
+                depth.to_bits().into()
+            }
+            FragmentInput::FragCoord(3) => {
+                let [.., inverse_w] = self.linear_at(simd, chunk);
+                let scale = self.of_records(simd, chunk, |record| record.scale);
+                (inverse_w * scale).to_bits().into()
+            }
+            FragmentInput::PointCoord(axis) => {
+                let [b1, b2, _] = self.linear_at(simd, chunk);
+                let value = if axis == 0 { b1 + b2 } else { b2 };
+                // Other primitives have none.
+                let is_point = self.of_records(simd, chunk, |record| {
+                    match primitives[record.primitive as usize].kind {
+                        PrimitiveKind::Point => 1.0,
+                        _ => 0.0,
+                    }
+                });
+                (value * is_point).to_bits().into()
+            }
+            _ => self.scalar_input(kind, chunk, positions, interface.per_sample, primitives),
+        }
+    }
+
+    /// As [`Batch::input`], for inputs that follow from the quad.
+    fn scalar_input(
+        &self,
+        kind: FragmentInput,
+        chunk: usize,
+        positions: &[[i32; 2]],
+        per_sample: bool,
+        primitives: &[Primitive],
+    ) -> [u32; 16] {
+        let quads = self.chunk_quads(chunk);
+        let mut lanes = [0; 16];
+        for (number, lane) in lanes.iter_mut().enumerate() {
+            let quad = &quads[number / 4];
+            let (column, row) = ((number & 1) as u16, (number >> 1 & 1) as u16);
+            let record = &self.records[usize::from(quad.record)];
+            let primitive = &primitives[record.primitive as usize];
+            let sample = usize::from(quad.sample);
+            // Samples shaded for themselves are where they are.
+            let within = if per_sample {
+                positions[sample].map(|at| at as f32 / 256.0)
+            } else {
+                [0.5; 2]
+            };
+            *lane = match kind {
+                FragmentInput::FragCoord(0) => (f32::from(quad.x + column) + within[0]).to_bits(),
+                FragmentInput::FragCoord(_) => (f32::from(quad.y + row) + within[1]).to_bits(),
+                FragmentInput::FrontFacing => {
+                    if primitive.front {
+                        u32::MAX
+                    } else {
+                        0
+                    }
+                }
+                FragmentInput::PrimitiveId => primitive.id,
+                FragmentInput::SampleId => sample as u32,
+                FragmentInput::SamplePosition(axis) => within[axis.min(1)].to_bits(),
+                FragmentInput::SampleMask => {
+                    let cover = quad.cover >> (number % 4);
+                    (0..4).map(|s| u32::from(cover >> (4 * s) & 1) << s).sum()
+                }
+                FragmentInput::Layer => primitive.layer.into(),
+                FragmentInput::ViewportIndex => primitive.viewport.into(),
+                FragmentInput::Varying { .. } | FragmentInput::PointCoord(_) => 0,
+            };
+        }
+        lanes
+    }
+}
+
+/// A sample's offset from the pixel's centre in pixels, along an axis.
+#[inline(always)]
+pub fn offset(position: i32) -> f32 {
+    (position - 128) as f32 / 256.0
+}
+
+/// The lanes of a quad of which some sample is covered.
+pub fn covered_lanes(cover: u16) -> u16 {
+    (cover | cover >> 4 | cover >> 8 | cover >> 12) & 15
+}
+
+/// Values of the block of a sample, from those at the centres.
+#[inline(always)]
+pub fn at_sample<S: Simd>(
+    values: &BlockValues<S>,
+    setup: &Setup,
+    position: [i32; 2],
+) -> BlockValues<S> {
+    let [x, y] = position.map(offset);
+    let move_by = |value: f32x16<S>, [dx, dy]: [f32; 2]| value + (dx * x + dy * y);
+    BlockValues {
+        barycentrics: [
+            move_by(values.barycentrics[0], setup.slopes[0]),
+            move_by(values.barycentrics[1], setup.slopes[1]),
+        ],
+        depth: move_by(values.depth, setup.depth_slopes),
+        inverse_w: move_by(values.inverse_w, setup.w_slopes),
+    }
+}
+
+/// Bits as lanes.
+#[inline(always)]
+pub fn as_floats<S: Simd>(simd: S, chunk: &Chunk) -> f32x16<S> {
+    f32x16::from_bits(u32x16::simd_from(simd, chunk.0))
+}

@@ -1,0 +1,518 @@
+//! What fragments make of a colour attachment, 16 at a time: blending or a logic operation, the write mask, and the
+//! attachment's format. [`super::blend::Blender`] says the same of one fragment.
+
+use super::blend::clamp_range;
+use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
+use crate::packet::draw::LogicOp;
+use crate::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
+
+/// Colours of 16 fragments, by component.
+pub type Colors<S> = [f32x16<S>; 4];
+
+/// A colour attachment as a draw writes it.
+#[derive(Clone, Debug)]
+pub struct ColorOutput {
+    format: Format,
+    codec: Codec,
+    equations: Option<(BlendEquation, BlendEquation)>,
+    constants: [f32; 4],
+    /// What sources and constants are clamped to before they are blended.
+    range: Option<(f32, f32)>,
+    logic: Option<LogicOp>,
+    /// The bits of a texel that are written, from its first byte on.
+    written: u128,
+}
+
+/// How texels are read and written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Codec {
+    /// Four bytes of 0 to 1, red first or (`bgra`) blue first.
+    Unorm8 { bgra: bool },
+    /// Four words as they are.
+    Words,
+    /// Red's word as it is.
+    Word,
+    /// By [`Format`]'s rows.
+    Other,
+}
+
+/// Where the quads of 16 lanes are in a plane: texels, from its beginning.
+#[derive(Clone, Copy, Debug)]
+pub struct Quads {
+    pub first: [usize; 4],
+    /// Whether they follow one another.
+    pub consecutive: bool,
+}
+
+impl Quads {
+    /// The texel of a lane.
+    #[inline(always)]
+    fn texel(&self, lane: usize) -> usize {
+        self.first[lane / 4] + lane % 4
+    }
+
+    /// The words of 16 lanes' texels of a word each.
+    #[inline(always)]
+    pub fn load(&self, words: &[u32]) -> [u32; 16] {
+        let mut out = [0; 16];
+        if self.consecutive {
+            out.copy_from_slice(&words[self.first[0]..][..16]);
+        } else {
+            for (quad, out) in self.first.iter().zip(out.chunks_exact_mut(4)) {
+                out.copy_from_slice(&words[*quad..][..4]);
+            }
+        }
+        out
+    }
+
+    /// Sets the texels of some lanes.
+    #[inline(always)]
+    pub fn store(&self, words: &mut [u32], lanes: u16, values: &[u32; 16]) {
+        if self.consecutive && lanes == u16::MAX {
+            words[self.first[0]..][..16].copy_from_slice(values);
+            return;
+        }
+        for (quad, first) in self.first.iter().enumerate() {
+            let values = &values[4 * quad..][..4];
+            match lanes >> (4 * quad) & 15 {
+                0 => {}
+                15 => words[*first..][..4].copy_from_slice(values),
+                some => {
+                    // Another quad of the vector may be at the same place with other lanes.
+                    let texels = &mut words[*first..][..4];
+                    for (lane, texel) in texels.iter_mut().enumerate() {
+                        if some >> lane & 1 == 1 {
+                            *texel = values[lane];
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl ColorOutput {
+    /// The output to an attachment of `format`; `None` if it never changes.
+    pub fn new(
+        state: &BlendState,
+        logic: Option<LogicOp>,
+        constants: [f32; 4],
+        format: Format,
+    ) -> Option<Self> {
+        let written = written_bits(format, state.write_mask);
+        let logic = logic.filter(|_| {
+            matches!(
+                format.numeric(),
+                Numeric::Unorm | Numeric::Snorm | Numeric::Uint | Numeric::Sint
+            )
+        });
+        let range = clamp_range(format);
+        let blends = logic.is_none() && !format.is_integer();
+        let codec = match format {
+            _ if logic.is_some() => Codec::Other,
+            Format::R8G8B8A8Unorm | Format::A8B8G8R8UnormPack32 => Codec::Unorm8 { bgra: false },
+            Format::B8G8R8A8Unorm => Codec::Unorm8 { bgra: true },
+            Format::R32G32B32A32Sfloat | Format::R32G32B32A32Uint | Format::R32G32B32A32Sint => {
+                Codec::Words
+            }
+            Format::R32Sfloat | Format::R32Uint | Format::R32Sint => Codec::Word,
+            _ => Codec::Other,
+        };
+        (written != 0).then_some(Self {
+            format,
+            codec,
+            equations: state.equations.filter(|_| blends),
+            constants: match range {
+                Some((low, high)) => constants.map(|constant| constant.clamp(low, high)),
+                None => constants,
+            },
+            range,
+            logic,
+            written,
+        })
+    }
+
+    /// Whether every texel is replaced as a whole, whatever it was.
+    pub fn overwrites(&self) -> bool {
+        self.equations.is_none()
+            && self.logic.is_none()
+            && self.written == written_bits(self.format, 0xF)
+    }
+
+    /// Whether the source's alpha matters only for blending, so that it must be there.
+    pub fn is_dual_source(&self) -> bool {
+        let dual = |factor| {
+            matches!(
+                factor,
+                BlendFactor::Src1Color
+                    | BlendFactor::OneMinusSrc1Color
+                    | BlendFactor::Src1Alpha
+                    | BlendFactor::OneMinusSrc1Alpha
+            )
+        };
+        self.equations.is_some_and(|(color, alpha)| {
+            [color, alpha]
+                .iter()
+                .any(|equation| dual(equation.source) || dual(equation.destination))
+        })
+    }
+
+    /// Blends fragments into the texels of a plane (`words`, its memory).
+    #[inline(always)]
+    pub fn write<S: Simd>(
+        &self,
+        simd: S,
+        source: &Colors<S>,
+        second: &Colors<S>,
+        lanes: u16,
+        quads: &Quads,
+        words: &mut [u32],
+    ) {
+        match self.codec {
+            Codec::Unorm8 { bgra } => {
+                let stored = u32x16::simd_from(simd, quads.load(words));
+                let blended = match self.equations {
+                    None => *source,
+                    Some(equations) => {
+                        let destination = unpack_unorm8(simd, stored, bgra);
+                        self.blend(simd, equations, source, second, &destination)
+                    }
+                };
+                let mut packed = pack_unorm8(simd, &blended, bgra);
+                let written = self.written as u32;
+                if written != u32::MAX {
+                    packed = (packed & written) | (stored & !written);
+                }
+                quads.store(words, lanes, &packed.into());
+            }
+            Codec::Word => {
+                let [red, ..] = match self.equations {
+                    None => *source,
+                    Some(equations) => {
+                        let stored = u32x16::simd_from(simd, quads.load(words));
+                        let mut destination = [f32x16::splat(simd, 0.0); 4];
+                        destination[0] = f32x16::from_bits(stored);
+                        destination[3] = f32x16::splat(simd, 1.0);
+                        self.blend(simd, equations, source, second, &destination)
+                    }
+                };
+                quads.store(words, lanes, &red.to_bits().into());
+            }
+            Codec::Words => self.write_words(simd, source, second, lanes, quads, words),
+            Codec::Other => self.write_other(simd, source, second, lanes, quads, words),
+        }
+    }
+
+    /// Texels of four words.
+    #[inline(always)]
+    fn write_words<S: Simd>(
+        &self,
+        simd: S,
+        source: &Colors<S>,
+        second: &Colors<S>,
+        lanes: u16,
+        quads: &Quads,
+        words: &mut [u32],
+    ) {
+        let blended = match self.equations {
+            None => *source,
+            Some(equations) => {
+                let mut stored = [[0f32; 16]; 4];
+                for lane in 0..16 {
+                    let texel = &words[4 * quads.texel(lane)..][..4];
+                    for (component, word) in stored.iter_mut().zip(texel) {
+                        component[lane] = f32::from_bits(*word);
+                    }
+                }
+                let [r, g, b, a] = stored;
+                let load = |component| f32x16::simd_from(simd, component);
+                let destination = [load(r), load(g), load(b), load(a)];
+                self.blend(simd, equations, source, second, &destination)
+            }
+        };
+        let [r, g, b, a] = blended;
+        let components: [[u32; 16]; 4] = [
+            r.to_bits().into(),
+            g.to_bits().into(),
+            b.to_bits().into(),
+            a.to_bits().into(),
+        ];
+        for lane in 0..16 {
+            if lanes >> lane & 1 == 1 {
+                let texel = &mut words[4 * quads.texel(lane)..][..4];
+                for (index, (word, component)) in texel.iter_mut().zip(&components).enumerate() {
+                    if self.written >> (32 * index) & 1 == 1 {
+                        *word = component[lane];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Texels of any format.
+    #[inline(always)]
+    fn write_other<S: Simd>(
+        &self,
+        simd: S,
+        source: &Colors<S>,
+        second: &Colors<S>,
+        lanes: u16,
+        quads: &Quads,
+        words: &mut [u32],
+    ) {
+        let size = self.format.texel_size();
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(words);
+        let blended = match self.equations {
+            None => *source,
+            Some(equations) => {
+                let destination = transpose(decode(self.format, bytes, quads));
+                let [r, g, b, a] = destination;
+                let load = |component| f32x16::simd_from(simd, component);
+                let destination = [load(r), load(g), load(b), load(a)];
+                self.blend(simd, equations, source, second, &destination)
+            }
+        };
+        let [r, g, b, a] = blended;
+        let texels = [r.into(), g.into(), b.into(), a.into()];
+        self.store_other(&texels, lanes, quads, bytes, size);
+    }
+
+    #[inline(never)]
+    fn store_other(
+        &self,
+        components: &[[f32; 16]; 4],
+        lanes: u16,
+        quads: &Quads,
+        bytes: &mut [u8],
+        size: usize,
+    ) {
+        let mut encoded = [0; 16 * MAX_TEXEL_SIZE];
+        let texels: [[f32; 4]; 16] =
+            std::array::from_fn(|lane| components.each_ref().map(|component| component[lane]));
+        self.format.encode_row(&texels, &mut encoded[..16 * size]);
+        for lane in 0..16 {
+            if lanes >> lane & 1 == 0 {
+                continue;
+            }
+            let stored = &mut bytes[quads.texel(lane) * size..][..size];
+            let (mut s, mut d) = ([0; MAX_TEXEL_SIZE], [0; MAX_TEXEL_SIZE]);
+            s[..size].copy_from_slice(&encoded[lane * size..][..size]);
+            d[..size].copy_from_slice(stored);
+            let (s, d) = (u128::from_le_bytes(s), u128::from_le_bytes(d));
+            let value = self.logic.map_or(s, |op| logic(op, s, d));
+            let value = value & self.written | d & !self.written;
+            stored.copy_from_slice(&value.to_le_bytes()[..size]);
+        }
+    }
+
+    /// The blend equations.
+    #[inline(always)]
+    fn blend<S: Simd>(
+        &self,
+        simd: S,
+        (color, alpha): (BlendEquation, BlendEquation),
+        source: &Colors<S>,
+        second: &Colors<S>,
+        destination: &Colors<S>,
+    ) -> Colors<S> {
+        let (mut source, mut second) = (*source, *second);
+        if let Some((low, high)) = self.range {
+            for component in source.iter_mut().chain(&mut second) {
+                *component = clamp(simd, *component, low, high);
+            }
+        }
+        let operands = Operands {
+            source,
+            second,
+            destination: *destination,
+            constants: self.constants,
+        };
+        [
+            operands.evaluate(simd, color, 0),
+            operands.evaluate(simd, color, 1),
+            operands.evaluate(simd, color, 2),
+            operands.evaluate(simd, alpha, 3),
+        ]
+    }
+}
+
+/// What blend equations are about.
+struct Operands<S: Simd> {
+    source: Colors<S>,
+    second: Colors<S>,
+    destination: Colors<S>,
+    constants: [f32; 4],
+}
+
+impl<S: Simd> Operands<S> {
+    /// One component's equation.
+    #[inline(always)]
+    fn evaluate(&self, simd: S, equation: BlendEquation, component: usize) -> f32x16<S> {
+        let (s, d) = (self.source[component], self.destination[component]);
+        match equation.op {
+            BlendOp::Min => s.min(d),
+            BlendOp::Max => s.max(d),
+            BlendOp::Add => {
+                self.term(simd, s, equation.source, component)
+                    + self.term(simd, d, equation.destination, component)
+            }
+            BlendOp::Subtract => {
+                self.term(simd, s, equation.source, component)
+                    - self.term(simd, d, equation.destination, component)
+            }
+            BlendOp::ReverseSubtract => {
+                self.term(simd, d, equation.destination, component)
+                    - self.term(simd, s, equation.source, component)
+            }
+        }
+    }
+
+    /// A value times its factor. A factor of zero removes it whatever it is, infinities and NaNs included.
+    #[inline(always)]
+    fn term(&self, simd: S, value: f32x16<S>, by: BlendFactor, component: usize) -> f32x16<S> {
+        match by {
+            BlendFactor::Zero => f32x16::splat(simd, 0.0),
+            BlendFactor::One => value,
+            _ => value * self.factor(simd, by, component),
+        }
+    }
+
+    #[inline(always)]
+    fn factor(&self, simd: S, factor: BlendFactor, component: usize) -> f32x16<S> {
+        let splat = |value: f32| f32x16::splat(simd, value);
+        let one = splat(1.0);
+        match factor {
+            BlendFactor::Zero => splat(0.0),
+            BlendFactor::One => one,
+            BlendFactor::SrcColor => self.source[component],
+            BlendFactor::OneMinusSrcColor => one - self.source[component],
+            BlendFactor::DstColor => self.destination[component],
+            BlendFactor::OneMinusDstColor => one - self.destination[component],
+            BlendFactor::SrcAlpha => self.source[3],
+            BlendFactor::OneMinusSrcAlpha => one - self.source[3],
+            BlendFactor::DstAlpha => self.destination[3],
+            BlendFactor::OneMinusDstAlpha => one - self.destination[3],
+            BlendFactor::ConstantColor => splat(self.constants[component]),
+            BlendFactor::OneMinusConstantColor => splat(1.0 - self.constants[component]),
+            BlendFactor::ConstantAlpha => splat(self.constants[3]),
+            BlendFactor::OneMinusConstantAlpha => splat(1.0 - self.constants[3]),
+            BlendFactor::SrcAlphaSaturate if component == 3 => one,
+            BlendFactor::SrcAlphaSaturate => self.source[3].min(one - self.destination[3]),
+            BlendFactor::Src1Color => self.second[component],
+            BlendFactor::OneMinusSrc1Color => one - self.second[component],
+            BlendFactor::Src1Alpha => self.second[3],
+            BlendFactor::OneMinusSrc1Alpha => one - self.second[3],
+        }
+    }
+}
+
+/// Clamps; NaN becomes the least.
+#[inline(always)]
+fn clamp<S: Simd>(simd: S, value: f32x16<S>, low: f32, high: f32) -> f32x16<S> {
+    let (low, high) = (f32x16::splat(simd, low), f32x16::splat(simd, high));
+    let above: mask32x16<S> = value.simd_gt(low);
+    let value = above.select(value, low);
+    let below: mask32x16<S> = value.simd_lt(high);
+    below.select(value, high)
+}
+
+/// 8-bit codes of 0 to 1, to nearest, in the low bits; above them are bits of no meaning.
+#[inline(always)]
+fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
+    // Leaves no bits for a fraction.
+    const NO_FRACTION: f32 = 8_388_608.0;
+    let value = clamp(simd, value, 0.0, 1.0);
+    // 255 v = 256 v - v: the first is exact, so the nearest integer to it is the result or one more.
+    let scaled = value * 256.0;
+    let rounded = scaled + NO_FRACTION;
+    let excess = (scaled - (rounded - NO_FRACTION) + 0.5) - value;
+    let more: mask32x16<S> = excess.simd_lt(0.0);
+    let one = more.select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
+    (rounded - one).to_bits()
+}
+
+#[inline(always)]
+fn pack_unorm8<S: Simd>(simd: S, [r, g, b, a]: &Colors<S>, bgra: bool) -> u32x16<S> {
+    let (first, third) = if bgra { (b, r) } else { (r, b) };
+    (unorm8(simd, *first) & 255)
+        | (unorm8(simd, *g) & 255) << 8
+        | (unorm8(simd, *third) & 255) << 16
+        | unorm8(simd, *a) << 24
+}
+
+#[inline(always)]
+fn unpack_unorm8<S: Simd>(simd: S, texels: u32x16<S>, bgra: bool) -> Colors<S> {
+    let all = f32x16::splat(simd, 255.0);
+    let first = (texels & 255).to_float::<f32x16<S>>() / all;
+    let second = (texels >> 8 & 255).to_float::<f32x16<S>>() / all;
+    let third = (texels >> 16 & 255).to_float::<f32x16<S>>() / all;
+    let fourth = (texels >> 24).to_float::<f32x16<S>>() / all;
+    if bgra {
+        [third, second, first, fourth]
+    } else {
+        [first, second, third, fourth]
+    }
+}
+
+/// The texels of 16 lanes.
+#[inline(never)]
+fn decode(format: Format, bytes: &[u8], quads: &Quads) -> [[f32; 4]; 16] {
+    let size = format.texel_size();
+    let mut stored = [0; 16 * MAX_TEXEL_SIZE];
+    for (lane, texel) in stored[..16 * size].chunks_exact_mut(size).enumerate() {
+        texel.copy_from_slice(&bytes[quads.texel(lane) * size..][..size]);
+    }
+    let mut out = [[0.0; 4]; 16];
+    format.decode_row(&stored[..16 * size], &mut out);
+    out
+}
+
+fn transpose(texels: [[f32; 4]; 16]) -> [[f32; 16]; 4] {
+    std::array::from_fn(|component| texels.map(|texel| texel[component]))
+}
+
+/// The bits of a texel that a write mask lets through.
+fn written_bits(format: Format, write_mask: u8) -> u128 {
+    let (mut bits, mut shift) = (0, 0);
+    for &Component {
+        channel,
+        bits: width,
+    } in format.components()
+    {
+        let written = channel
+            .register()
+            .is_some_and(|register| write_mask >> register & 1 == 1);
+        // The shared exponent belongs to all components, which can be written only together.
+        if written || channel.register().is_none() && write_mask & 7 == 7 {
+            bits |= (u128::MAX >> (128 - width)) << shift;
+        }
+        shift += width;
+    }
+    bits
+}
+
+/// A logic operation on all bits.
+fn logic(op: LogicOp, s: u128, d: u128) -> u128 {
+    match op {
+        LogicOp::Clear => 0,
+        LogicOp::And => s & d,
+        LogicOp::AndReverse => s & !d,
+        LogicOp::Copy => s,
+        LogicOp::AndInverted => !s & d,
+        LogicOp::NoOp => d,
+        LogicOp::Xor => s ^ d,
+        LogicOp::Or => s | d,
+        LogicOp::Nor => !(s | d),
+        LogicOp::Equivalent => !(s ^ d),
+        LogicOp::Invert => !d,
+        LogicOp::OrReverse => s | !d,
+        LogicOp::CopyInverted => !s,
+        LogicOp::OrInverted => !s | d,
+        LogicOp::Nand => !(s & d),
+        LogicOp::Set => u128::MAX,
+    }
+}
+
+#[cfg(test)]
+mod tests;

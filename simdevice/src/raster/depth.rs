@@ -1,0 +1,238 @@
+//! Depth and stencil tests (Vulkan 1.3, 27.10 to 27.14).
+//!
+//! Depths are compared as the numbers that the attachment's format holds: the code of a normalised format, the bits of a
+//! floating-point one, which are ordered as the numbers are because depth is clamped to 0 to 1.
+
+use crate::format::Format;
+use crate::packet::draw::{CompareOp, DepthStencil, StencilFace, StencilOp};
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
+
+/// How depths become numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthCode {
+    /// A normalised integer of this many bits.
+    Unorm(u32),
+    /// binary32.
+    Float,
+}
+
+impl DepthCode {
+    /// Of a depth format.
+    pub fn of(format: Format) -> Self {
+        match format {
+            Format::D16Unorm => Self::Unorm(16),
+            Format::X8D24UnormPack32 => Self::Unorm(24),
+            _ => Self::Float,
+        }
+    }
+
+    /// The numbers of depths, clamped to `range`; NaN becomes the least.
+    #[inline(always)]
+    pub fn encode<S: Simd>(self, simd: S, depth: f32x16<S>, range: (f32, f32)) -> u32x16<S> {
+        let (low, high) = (f32x16::splat(simd, range.0), f32x16::splat(simd, range.1));
+        let depth = depth.simd_gt(low).select(depth, low);
+        let depth = depth.simd_lt(high).select(depth, high);
+        match self {
+            // Negative zero becomes zero.
+            Self::Float => (depth + 0.0).to_bits(),
+            Self::Unorm(bits) => {
+                let scaled = depth * (1u32 << bits) as f32;
+                // (2^n - 1) d = 2^n d - d: the first is exact, so the nearest integer to it is the result or one more.
+                let nearest = scaled.round_ties_even();
+                let excess = (scaled - nearest + 0.5) - depth;
+                let one = excess
+                    .simd_lt(0.0)
+                    .select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
+                (nearest - one).to_int::<u32x16<S>>()
+            }
+        }
+    }
+
+    /// As [`DepthCode::encode`], of one depth.
+    pub fn encode_one(self, depth: f32) -> u32 {
+        let depth = if depth > 0.0 { depth.min(1.0) } else { 0.0 };
+        match self {
+            Self::Float => depth.to_bits(),
+            Self::Unorm(bits) => {
+                let max = f64::from((1u32 << bits) - 1);
+                (f64::from(depth) * max).round_ties_even() as u32
+            }
+        }
+    }
+}
+
+/// The depth and stencil tests of a draw.
+#[derive(Clone, Copy, Debug)]
+pub struct Tests {
+    pub code: DepthCode,
+    /// Comparison and whether depth is written.
+    pub depth: Option<(CompareOp, bool)>,
+    /// The least and greatest stored depth.
+    pub bounds: Option<[u32; 2]>,
+    /// Front and back.
+    pub stencil: Option<[StencilFace; 2]>,
+}
+
+impl Tests {
+    /// The tests that attachments of these formats leave of a state.
+    pub fn new(state: &DepthStencil, depth: Option<Format>, stencil: bool) -> Self {
+        let code = depth.map_or(DepthCode::Float, DepthCode::of);
+        Self {
+            code,
+            depth: state
+                .depth
+                .filter(|test| depth.is_some() && (test.write || test.compare != CompareOp::Always))
+                .map(|test| (test.compare, test.write)),
+            bounds: state
+                .bounds
+                .filter(|_| depth.is_some())
+                .map(|(least, greatest)| [least, greatest].map(|depth| code.encode_one(depth))),
+            stencil: state.stencil.filter(|_| stencil),
+        }
+    }
+
+    /// Whether there is anything to do.
+    pub fn any(&self) -> bool {
+        self.reads_depth() || self.stencil.is_some()
+    }
+
+    /// Whether the depth attachment is needed.
+    pub fn reads_depth(&self) -> bool {
+        self.depth.is_some() || self.bounds.is_some()
+    }
+
+    /// Whether an attachment may change.
+    pub fn writes(&self) -> bool {
+        self.depth.is_some_and(|(_, write)| write)
+            || self.stencil.is_some_and(|faces| {
+                faces.iter().any(|face| {
+                    face.write_mask != 0
+                        && [face.fail, face.pass, face.depth_fail] != [StencilOp::Keep; 3]
+                })
+            })
+    }
+
+    /// Tests 16 samples that have stored `depths` and `stencils`; returns the lanes of `lanes` that pass. What is to
+    /// be stored replaces `depths` and `stencils` in lanes of `lanes` only, unless `dry`.
+    #[inline(always)]
+    pub fn test<S: Simd>(
+        &self,
+        simd: S,
+        lanes: u16,
+        front: bool,
+        fragments: u32x16<S>,
+        depths: &mut [u32; 16],
+        stencils: &mut [u8; 16],
+    ) -> u16 {
+        let stored = u32x16::simd_from(simd, *depths);
+        let mut lanes = lanes;
+        if let Some([least, greatest]) = self.bounds {
+            let inside = stored.simd_ge(least) & stored.simd_le(greatest);
+            lanes &= inside.to_bitmask() as u16;
+        }
+        let stencil_passed = match &self.stencil {
+            Some(faces) => test_stencil(&faces[usize::from(!front)], lanes, stencils),
+            None => lanes,
+        };
+        let mut passed = stencil_passed;
+        if let Some((compare, write)) = self.depth {
+            let passes = compare_vectors(simd, compare, fragments, stored);
+            passed &= passes.to_bitmask() as u16;
+            if write {
+                let written = mask32x16::from_bitmask(simd, passed.into());
+                written.select(fragments, stored).store_slice(depths);
+            }
+        }
+        if let Some(faces) = &self.stencil {
+            let face = &faces[usize::from(!front)];
+            update_stencil(face, lanes, stencil_passed, passed, stencils);
+        }
+        passed
+    }
+}
+
+/// `fragment op stored`.
+#[inline(always)]
+fn compare_vectors<S: Simd>(
+    simd: S,
+    op: CompareOp,
+    fragment: u32x16<S>,
+    stored: u32x16<S>,
+) -> mask32x16<S> {
+    match op {
+        CompareOp::Never => mask32x16::splat(simd, false),
+        CompareOp::Less => fragment.simd_lt(stored),
+        CompareOp::Equal => fragment.simd_eq(stored),
+        CompareOp::LessOrEqual => fragment.simd_le(stored),
+        CompareOp::Greater => fragment.simd_gt(stored),
+        CompareOp::NotEqual => fragment.simd_ne(stored),
+        CompareOp::GreaterOrEqual => fragment.simd_ge(stored),
+        CompareOp::Always => mask32x16::splat(simd, true),
+    }
+}
+
+/// `reference op stored`.
+pub fn compare<T: PartialOrd>(op: CompareOp, reference: T, stored: T) -> bool {
+    match op {
+        CompareOp::Never => false,
+        CompareOp::Less => reference < stored,
+        CompareOp::Equal => reference == stored,
+        CompareOp::LessOrEqual => reference <= stored,
+        CompareOp::Greater => reference > stored,
+        CompareOp::NotEqual => reference != stored,
+        CompareOp::GreaterOrEqual => reference >= stored,
+        CompareOp::Always => true,
+    }
+}
+
+/// The lanes that pass the stencil test.
+fn test_stencil(face: &StencilFace, lanes: u16, stencils: &[u8; 16]) -> u16 {
+    let reference = face.reference & face.compare_mask;
+    let mut passed = 0;
+    for (lane, stencil) in stencils.iter().enumerate() {
+        let passes = compare(face.compare, reference, stencil & face.compare_mask);
+        passed |= u16::from(passes) << lane;
+    }
+    passed & lanes
+}
+
+/// Does what the tests' results ask for.
+fn update_stencil(
+    face: &StencilFace,
+    lanes: u16,
+    stencil_passed: u16,
+    passed: u16,
+    stencils: &mut [u8; 16],
+) {
+    for (lane, stencil) in stencils.iter_mut().enumerate() {
+        let is = |set: u16| set >> lane & 1 == 1;
+        let op = if !is(lanes) {
+            StencilOp::Keep
+        } else if is(passed) {
+            face.pass
+        } else if is(stencil_passed) {
+            face.depth_fail
+        } else {
+            face.fail
+        };
+        let value = apply(op, *stencil, face.reference);
+        *stencil = *stencil & !face.write_mask | value & face.write_mask;
+    }
+}
+
+/// What becomes of a stencil value.
+pub fn apply(op: StencilOp, stencil: u8, reference: u8) -> u8 {
+    match op {
+        StencilOp::Keep => stencil,
+        StencilOp::Zero => 0,
+        StencilOp::Replace => reference,
+        StencilOp::IncrementAndClamp => stencil.saturating_add(1),
+        StencilOp::DecrementAndClamp => stencil.saturating_sub(1),
+        StencilOp::Invert => !stencil,
+        StencilOp::IncrementAndWrap => stencil.wrapping_add(1),
+        StencilOp::DecrementAndWrap => stencil.wrapping_sub(1),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,148 @@
+//! Fragment programs made ready for draws.
+
+use crate::packet::draw::{
+    FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+};
+use fearless_simd::Level;
+use isa::exec::{Executable, Machine, Options};
+use isa::validate::InvalidProgram;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Lanes of the two sizes of batches: few fragments are shaded in the smaller.
+pub(super) const BATCH_LANES: [usize; 2] = [64, 256];
+
+/// Components of up to two sources of a colour attachment: the outputs' slots.
+pub(super) type ColorSlots = [[Option<u32>; 4]; 2];
+
+/// A fragment program ready for batches of quads.
+#[derive(Debug)]
+pub struct FragmentStage {
+    executables: [Arc<Executable>; 2],
+    pub(super) interface: Interface,
+    /// Machines of earlier draws, to be used again.
+    idle: Mutex<Vec<Machines>>,
+}
+
+/// What goes into the program and what comes out.
+#[derive(Debug, Default)]
+pub(super) struct Interface {
+    /// The inputs that it reads, by slot.
+    pub inputs: Vec<(u32, FragmentInput)>,
+    /// The varyings among them, each once, with their interpolation.
+    pub varyings: Vec<(u32, Interpolation)>,
+    /// By attachment.
+    pub colors: Vec<ColorSlots>,
+    pub depth: Option<u32>,
+    pub stencil_reference: Option<u32>,
+    pub sample_mask: Option<u32>,
+    pub early_tests: bool,
+    pub discards: bool,
+    pub per_sample: bool,
+    pub has_side_effects: bool,
+}
+
+/// The machines of one worker, made when they are first needed.
+#[derive(Debug, Default)]
+pub(super) struct Machines([Option<Machine>; 2]);
+
+impl FragmentStage {
+    /// Makes a program ready.
+    ///
+    /// # Errors
+    /// [`InvalidProgram`] if it cannot run on the device.
+    pub fn new(level: Level, programs: &FragmentPrograms) -> Result<Self, InvalidProgram> {
+        let executable = |lanes| {
+            let options = Options {
+                lanes,
+                subgroup_size: BATCH_LANES[0],
+                count_work: true,
+                level,
+            };
+            Executable::new(programs.program.clone(), &options).map(Arc::new)
+        };
+        let executables = [executable(BATCH_LANES[0])?, executable(BATCH_LANES[1])?];
+        let interface = Interface::new(programs, &executables[0]);
+        Ok(Self {
+            executables,
+            interface,
+            idle: Mutex::default(),
+        })
+    }
+
+    /// Machines for one worker.
+    pub(super) fn take_machines(&self) -> Machines {
+        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        idle.pop().unwrap_or_default()
+    }
+
+    /// Gives them back.
+    pub(super) fn put_back(&self, machines: Machines) {
+        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        idle.push(machines);
+    }
+
+    /// The machine for a size of batch.
+    pub(super) fn machine<'a>(&self, machines: &'a mut Machines, size: usize) -> &'a mut Machine {
+        machines.0[size].get_or_insert_with(|| Machine::new(Arc::clone(&self.executables[size])))
+    }
+}
+
+impl Interface {
+    fn new(programs: &FragmentPrograms, executable: &Executable) -> Self {
+        let mut interface = Self {
+            early_tests: programs.early_tests,
+            discards: programs.discards,
+            per_sample: programs.per_sample,
+            has_side_effects: programs.has_side_effects,
+            ..Self::default()
+        };
+        for input in executable.inputs() {
+            let Some(&Some(kind)) = programs.inputs.get(input.slot as usize) else {
+                continue;
+            };
+            interface.inputs.push((input.slot, kind));
+            match kind {
+                FragmentInput::Varying {
+                    index,
+                    interpolation,
+                    sampling,
+                } => {
+                    interface.per_sample |= sampling == Sampling::Sample;
+                    if !interface.varyings.contains(&(index, interpolation)) {
+                        interface.varyings.push((index, interpolation));
+                    }
+                }
+                FragmentInput::SampleId | FragmentInput::SamplePosition(_) => {
+                    interface.per_sample = true;
+                }
+                _ => {}
+            }
+        }
+        for output in executable.outputs() {
+            let Some(&Some(kind)) = programs.outputs.get(output.slot as usize) else {
+                continue;
+            };
+            match kind {
+                FragmentOutput::Color {
+                    attachment,
+                    component,
+                    index,
+                } => {
+                    if interface.colors.len() <= attachment {
+                        interface
+                            .colors
+                            .resize(attachment + 1, ColorSlots::default());
+                    }
+                    let sources = &mut interface.colors[attachment];
+                    if let Some(slot) = sources.get_mut(index).and_then(|s| s.get_mut(component)) {
+                        *slot = Some(output.slot);
+                    }
+                }
+                FragmentOutput::Depth => interface.depth = Some(output.slot),
+                FragmentOutput::StencilRef => interface.stencil_reference = Some(output.slot),
+                FragmentOutput::SampleMask => interface.sample_mask = Some(output.slot),
+            }
+        }
+        interface
+    }
+}

@@ -1,0 +1,235 @@
+//! What becomes of shaded fragments: coverage that the program takes away, late tests, and the colour attachments.
+
+use super::batch::{Batch, as_floats, offset};
+use super::color::{Colors, Quads};
+use super::depth::Tests;
+use super::fragment::{ColorSlots, Interface};
+use super::primitives::{Buffers, TileDraw, Timing};
+use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use isa::exec::{LaneMask, Machine};
+
+/// Tests depth and stencil of 16 samples; returns the lanes that pass.
+#[inline(always)]
+pub fn test<S: Simd>(
+    simd: S,
+    tests: &Tests,
+    lanes: u16,
+    front: bool,
+    code: u32x16<S>,
+    quads: &Quads,
+    buffers: &mut Buffers,
+) -> u16 {
+    let mut depths = [0; 16];
+    if tests.reads_depth() {
+        depths = quads.load(buffers.depth.words_mut());
+    }
+    let mut stencils = [0; 16];
+    if tests.stencil.is_some() {
+        let bytes = buffers.stencil.bytes_mut();
+        for (first, stencils) in quads.first.iter().zip(stencils.as_chunks_mut::<4>().0) {
+            stencils.copy_from_slice(&bytes[*first..][..4]);
+        }
+    }
+    let passed = tests.test(simd, lanes, front, code, &mut depths, &mut stencils);
+    if tests.depth.is_some_and(|(_, write)| write) {
+        quads.store(buffers.depth.words_mut(), passed, &depths);
+    }
+    if tests.stencil.is_some() {
+        let bytes = buffers.stencil.bytes_mut();
+        for lane in super::coverage::bits(lanes.into()) {
+            bytes[quads.first[lane / 4] + lane % 4] = stencils[lane];
+        }
+    }
+    passed
+}
+
+/// Takes a batch's results to the attachments, in order; returns how many samples passed if they are counted here.
+#[inline(always)]
+pub fn write<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    interface: &Interface,
+    batch: &Batch,
+    machine: &Machine,
+    killed: &LaneMask,
+    buffers: &mut Buffers,
+) -> u64 {
+    let late = draw.timing == Timing::Late && draw.tests.any();
+    let mut passed = 0;
+    for chunk in 0..batch.chunks() {
+        let killed = killed.words().get(chunk / 4).copied().unwrap_or(0) >> (16 * (chunk % 4));
+        let alive = !(killed as u16);
+        // Quads that cover the same sample take turns; so do those that may face differently in a stencil test.
+        let in_turn = batch.overlaps(chunk) || late && draw.tests.stencil.is_some();
+        let turns: &[u16] = if in_turn {
+            &[0xF, 0xF0, 0xF00, 0xF000]
+        } else {
+            &[0xFFFF]
+        };
+        for &turn in turns {
+            let mut samples = sample_lanes(batch, chunk, alive & turn);
+            remove(simd, draw, interface, machine, chunk, &mut samples);
+            for (sample, lanes) in samples.iter_mut().enumerate().take(draw.positions.len()) {
+                if *lanes == 0 {
+                    continue;
+                }
+                let quads = batch.places(chunk, sample, draw.positions.len());
+                if late {
+                    let code = late_depth(simd, draw, interface, batch, machine, chunk, sample);
+                    let number = turn.trailing_zeros() as usize / 4;
+                    let quad = &batch.chunk_quads(chunk)[number];
+                    let front = batch.records[usize::from(quad.record)].front;
+                    *lanes = test(simd, &draw.tests, *lanes, front, code, &quads, buffers);
+                }
+                passed += u64::from(lanes.count_ones());
+                write_colors(
+                    simd, draw, interface, machine, chunk, *lanes, &quads, buffers,
+                );
+            }
+        }
+    }
+    if draw.count_late { passed } else { 0 }
+}
+
+/// The lanes of a chunk covered, by sample.
+#[inline(always)]
+fn sample_lanes(batch: &Batch, chunk: usize, among: u16) -> [u16; 4] {
+    let mut samples = [0; 4];
+    for (number, quad) in batch.chunk_quads(chunk).iter().enumerate() {
+        for (sample, lanes) in samples.iter_mut().enumerate() {
+            *lanes |= (quad.cover >> (4 * sample) & 15) << (4 * number);
+        }
+    }
+    samples.map(|lanes| lanes & among)
+}
+
+/// Takes away the samples that alpha and the program's sample mask do not cover.
+#[inline(always)]
+fn remove<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    interface: &Interface,
+    machine: &Machine,
+    chunk: usize,
+    samples: &mut [u16; 4],
+) {
+    if let Some(masks) = interface
+        .sample_mask
+        .and_then(|slot| machine.output_chunks(slot).get(chunk))
+    {
+        for (lane, mask) in masks.0.iter().enumerate() {
+            for (sample, lanes) in samples.iter_mut().enumerate() {
+                if mask >> sample & 1 == 0 {
+                    *lanes &= !(1 << lane);
+                }
+            }
+        }
+    }
+    if draw.draw.state.alpha_to_coverage {
+        let alpha = interface.colors.first().and_then(|[first, _]| first[3]);
+        if let Some(alpha) = alpha.and_then(|slot| machine.output_chunks(slot).get(chunk)) {
+            let alpha = as_floats(simd, alpha);
+            if draw.positions.len() == 1 {
+                samples[0] &= alpha.simd_ge(0.5).to_bitmask() as u16;
+            } else {
+                for (sample, lanes) in samples.iter_mut().enumerate() {
+                    *lanes &= alpha.simd_gt(sample as f32 / 4.0).to_bitmask() as u16;
+                }
+            }
+        }
+    }
+}
+
+/// The depths of a chunk's samples as the attachment holds them.
+#[inline(always)]
+fn late_depth<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    interface: &Interface,
+    batch: &Batch,
+    machine: &Machine,
+    chunk: usize,
+    sample: usize,
+) -> u32x16<S> {
+    let written = interface
+        .depth
+        .and_then(|slot| machine.output_chunks(slot).get(chunk));
+    let depth = match written {
+        Some(depth) => as_floats(simd, depth),
+        None => {
+            let mut depth = f32x16::from_slice(simd, &batch.depth[16 * chunk..][..16]);
+            // Samples shaded for themselves have their own depth already.
+            if draw.positions.len() > 1 && !draw.per_sample {
+                let [x, y] = draw.positions[sample].map(offset);
+                let mut offsets = [0.0; 16];
+                for (lane, offset) in offsets.iter_mut().enumerate() {
+                    let quad = &batch.chunk_quads(chunk)[lane / 4];
+                    let [dx, dy] = batch.records[usize::from(quad.record)].depth_slopes;
+                    *offset = dx * x + dy * y;
+                }
+                depth += f32x16::simd_from(simd, offsets);
+            }
+            depth
+        }
+    };
+    let mut codes = [0; 16];
+    for (number, quad) in batch.chunk_quads(chunk).iter().enumerate() {
+        let viewport = usize::from(batch.records[usize::from(quad.record)].viewport);
+        let range = draw.ranges.get(viewport).copied().unwrap_or((0.0, 1.0));
+        let all: [u32; 16] = draw.tests.code.encode(simd, depth, range).into();
+        codes[4 * number..4 * number + 4].copy_from_slice(&all[4 * number..4 * number + 4]);
+    }
+    u32x16::simd_from(simd, codes)
+}
+
+/// Writes 16 fragments to one sample of the colour attachments.
+#[inline(always)]
+fn write_colors<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    interface: &Interface,
+    machine: &Machine,
+    chunk: usize,
+    lanes: u16,
+    quads: &Quads,
+    buffers: &mut Buffers,
+) {
+    if lanes == 0 {
+        return;
+    }
+    for (index, output) in draw.colors.iter().enumerate() {
+        let (Some(output), Some(slots)) = (output, interface.colors.get(index)) else {
+            continue;
+        };
+        let mut source = load(simd, slots, 0, machine, chunk);
+        let mut second = if output.is_dual_source() {
+            load(simd, slots, 1, machine, chunk)
+        } else {
+            [f32x16::splat(simd, 0.0); 4]
+        };
+        if draw.draw.state.alpha_to_one {
+            source[3] = f32x16::splat(simd, 1.0);
+            second[3] = f32x16::splat(simd, 1.0);
+        }
+        let words = buffers.color[index].words_mut();
+        output.write(simd, &source, &second, lanes, quads, words);
+    }
+}
+
+/// A source of 16 fragments; components that are not written are 0.
+#[inline(always)]
+fn load<S: Simd>(
+    simd: S,
+    slots: &ColorSlots,
+    index: usize,
+    machine: &Machine,
+    chunk: usize,
+) -> Colors<S> {
+    let mut color = [f32x16::splat(simd, 0.0); 4];
+    for (component, slot) in color.iter_mut().zip(slots[index]) {
+        if let Some(chunk) = slot.and_then(|slot| machine.output_chunks(slot).get(chunk)) {
+            *component = as_floats(simd, chunk);
+        }
+    }
+    color
+}

@@ -1,0 +1,281 @@
+//! Tile buffer A: a macro-tile's piece of an attachment.
+//!
+//! A tile (16x16 pixels) of an attachment is loaded or cleared when a draw first touches it, and stored if it was;
+//! what no draw touches is never loaded, and cleared only in memory. Texels are held as the bytes that they are in
+//! memory, so that a store and a load in the middle of a pass change nothing; depths as the number that their format
+//! holds (see [`super::depth`]). Tiles rather than macro-tiles are loaded and stored, so that the size of a macro-tile
+//! changes nothing either.
+
+use super::tile::{AREA, SIDE, Target, Tile, place};
+use crate::format::{Format, MAX_TEXEL_SIZE};
+use crate::packet::{Rect, ResolveMode};
+use crate::transfer::resolve_row;
+
+/// The most samples of a pixel.
+const MAX_SAMPLES: usize = 4;
+
+/// One attachment's texels of a macro-tile: by tile, then sample, then pixel (see [`place`]).
+#[derive(Debug, Default)]
+pub struct Plane {
+    /// Bytes, kept in words so that texels of words are aligned.
+    words: Vec<u32>,
+    /// Bytes of a texel here.
+    stride: usize,
+    samples: usize,
+    /// Bit `index` tells that the tile was loaded or cleared here.
+    touched: u64,
+}
+
+/// A texel in the tile buffer and in memory.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    /// The same bytes.
+    Same,
+    /// A 16-bit depth, here in a word.
+    Depth16,
+    /// A 24-bit depth in a word whose upper bits are unused.
+    Depth24,
+}
+
+impl Kind {
+    fn of(format: Format) -> Self {
+        match format {
+            Format::D16Unorm => Self::Depth16,
+            Format::X8D24UnormPack32 => Self::Depth24,
+            _ => Self::Same,
+        }
+    }
+}
+
+/// Bytes of a texel of `format` in a tile buffer.
+fn stride(format: Format) -> usize {
+    match Kind::of(format) {
+        Kind::Same => format.texel_size(),
+        Kind::Depth16 | Kind::Depth24 => 4,
+    }
+}
+
+/// A texel's bytes in memory as those in a tile buffer; `bytes` begins with the former.
+fn unpack(format: Format, bytes: &[u8]) -> [u8; MAX_TEXEL_SIZE] {
+    let mut texel = [0; MAX_TEXEL_SIZE];
+    let size = match Kind::of(format) {
+        Kind::Same => format.texel_size(),
+        Kind::Depth16 => 2,
+        Kind::Depth24 => 3,
+    };
+    texel[..size].copy_from_slice(&bytes[..size]);
+    texel
+}
+
+impl Plane {
+    /// A plane for macro-tiles of `size` pixels of a target.
+    pub fn new(size: u32, target: Option<&Target>) -> Self {
+        let Some(target) = target else {
+            return Self::default();
+        };
+        let (stride, samples) = (stride(target.format()), target.samples() as usize);
+        let bytes = (size * size) as usize * samples * stride;
+        Self {
+            words: vec![0; bytes.div_ceil(4)],
+            stride,
+            samples,
+            touched: 0,
+        }
+    }
+
+    /// Whether a tile was loaded or cleared.
+    #[inline]
+    pub fn is_touched(&self, tile: usize) -> bool {
+        self.touched >> tile & 1 == 1
+    }
+
+    /// Bytes of a texel.
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// The first texel of a sample of a tile.
+    #[inline(always)]
+    pub fn start(&self, tile: usize, sample: usize) -> usize {
+        (tile * self.samples + sample) * AREA
+    }
+
+    /// All texels' bytes.
+    #[inline(always)]
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        bytemuck::cast_slice_mut(&mut self.words)
+    }
+
+    /// All texels' words.
+    #[inline(always)]
+    pub fn words_mut(&mut self) -> &mut [u32] {
+        &mut self.words
+    }
+
+    /// The bytes of one sample of a tile.
+    pub fn sample_mut(&mut self, tile: usize, sample: usize) -> &mut [u8] {
+        let (start, stride) = (self.start(tile, sample), self.stride);
+        &mut self.bytes_mut()[start * stride..][..AREA * stride]
+    }
+
+    /// Loads or clears a tile if this is the first touch.
+    #[inline]
+    pub fn touch(&mut self, target: &Target, layer: u32, tile: &Tile) {
+        if !self.is_touched(tile.index) {
+            self.bring(target, layer, tile);
+        }
+    }
+
+    /// Marks a tile as touched whose texels are all overwritten before anybody reads them.
+    pub fn touch_unread(&mut self, tile: usize) {
+        self.touched |= 1 << tile;
+    }
+
+    #[cold]
+    fn bring(&mut self, target: &Target, layer: u32, tile: &Tile) {
+        self.touched |= 1 << tile.index;
+        let (format, stride) = (target.format(), self.stride);
+        for sample in 0..self.samples {
+            let texels = self.sample_mut(tile.index, sample);
+            if let Some(clear) = &target.clear {
+                fill(texels, &unpack(format, clear)[..stride]);
+                continue;
+            }
+            let size = format.texel_size();
+            let mut bytes = [0; SIDE * MAX_TEXEL_SIZE];
+            for (y, columns) in tile.rows(tile.pixels) {
+                let bytes = &mut bytes[..columns.len() * size];
+                let at = tile.pixel(columns.start, y);
+                target.read(layer, sample as u32, at, bytes);
+                for (x, texel) in columns.zip(bytes.chunks_exact(size)) {
+                    let at = place(x, y) * stride;
+                    texels[at..at + stride].copy_from_slice(&unpack(format, texel)[..stride]);
+                }
+            }
+        }
+    }
+
+    /// Stores a tile that was touched; clears in memory one that was not, if the pass is to clear it.
+    /// Afterwards no tile of that index is touched.
+    pub fn finish(&mut self, target: &Target, layer: u32, tile: &Tile, keep: bool) {
+        let touched = self.is_touched(tile.index);
+        self.touched &= !(1 << tile.index);
+        if !keep || !touched && target.clear.is_none() {
+            return;
+        }
+        let (size, stride) = (target.format().texel_size(), self.stride);
+        let mut row = [0; SIDE * MAX_TEXEL_SIZE];
+        if let Some(clear) = target.clear.as_ref().filter(|_| !touched) {
+            fill(&mut row[..SIDE * size], &clear[..size]);
+        }
+        for sample in 0..self.samples {
+            let texels = self.sample_mut(tile.index, sample);
+            for (y, columns) in tile.rows(tile.pixels) {
+                let at = tile.pixel(columns.start, y);
+                let bytes = &mut row[..columns.len() * size];
+                if touched {
+                    for (x, out) in columns.zip(bytes.chunks_exact_mut(size)) {
+                        // A depth's bytes are its lower ones.
+                        out.copy_from_slice(&texels[place(x, y) * stride..][..size]);
+                    }
+                }
+                target.write(layer, sample as u32, at, bytes);
+            }
+        }
+    }
+
+    /// Resolves a tile that was touched: one sample for each of its pixels is written to `resolve`.
+    pub fn resolve(
+        &mut self,
+        target: &Target,
+        (resolve, mode): (&Target, ResolveMode),
+        layer: u32,
+        tile: &Tile,
+    ) {
+        let (format, samples, stride) = (target.format(), self.samples, self.stride);
+        let (size, resolved_size) = (format.texel_size(), resolve.format().texel_size());
+        let has_mean = mode != ResolveMode::Average || !format.is_integer();
+        let copied = mode == ResolveMode::SampleZero || !has_mean || samples == 1;
+        for (y, columns) in tile.rows(tile.pixels) {
+            let count = columns.len();
+            let mut decoded = [[[0f32; 4]; SIDE]; MAX_SAMPLES];
+            let mut row = [0; SIDE * MAX_TEXEL_SIZE];
+            let used = if copied { 1 } else { samples };
+            for (sample, decoded) in decoded.iter_mut().enumerate().take(used) {
+                let texels = self.sample_mut(tile.index, sample);
+                let bytes = &mut row[..count * size];
+                for (x, out) in columns.clone().zip(bytes.chunks_exact_mut(size)) {
+                    out.copy_from_slice(&texels[place(x, y) * stride..][..size]);
+                }
+                if !copied {
+                    format.decode_row(bytes, &mut decoded[..count]);
+                }
+            }
+            let bytes = &mut row[..count * resolved_size];
+            if !copied {
+                let mut resolved = [[0f32; 4]; SIDE];
+                let rows = decoded[..used].iter().map(|row| &row[..count]);
+                resolve_row(format, mode, rows, &mut resolved[..count]);
+                resolve.format().encode_row(&resolved[..count], bytes);
+            }
+            resolve.write(layer, 0, tile.pixel(columns.start, y), bytes);
+        }
+    }
+
+    /// Sets all samples of the pixels of a tile that lie in `rect` to a texel, given by its bytes in memory.
+    pub fn fill_rect(&mut self, format: Format, tile: &Tile, rect: Rect, texel: &[u8]) {
+        let stride = self.stride;
+        let texel = unpack(format, texel);
+        for sample in 0..self.samples {
+            let texels = self.sample_mut(tile.index, sample);
+            for (y, columns) in tile.rows(rect) {
+                for x in columns {
+                    texels[place(x, y) * stride..][..stride].copy_from_slice(&texel[..stride]);
+                }
+            }
+        }
+    }
+
+    /// Hands rows of decoded texels within `rect` to `change`, and takes back what it returns true for.
+    /// `change` gets the row, its y and the first x, both from the tile's corner.
+    pub fn change_rows(
+        &mut self,
+        format: Format,
+        tile: &Tile,
+        rect: Rect,
+        mut change: impl FnMut(&mut [[f32; 4]], usize, usize) -> bool,
+    ) {
+        let size = self.stride;
+        for sample in 0..self.samples {
+            let texels = self.sample_mut(tile.index, sample);
+            for (y, columns) in tile.rows(rect) {
+                let mut bytes = [0; SIDE * MAX_TEXEL_SIZE];
+                let mut row = [[0.0; 4]; SIDE];
+                let (bytes, row) = (
+                    &mut bytes[..columns.len() * size],
+                    &mut row[..columns.len()],
+                );
+                for (x, out) in columns.clone().zip(bytes.chunks_exact_mut(size)) {
+                    out.copy_from_slice(&texels[place(x, y) * size..][..size]);
+                }
+                format.decode_row(bytes, row);
+                if change(row, y, columns.start) {
+                    format.encode_row(row, bytes);
+                    for (x, texel) in columns.zip(bytes.chunks_exact(size)) {
+                        texels[place(x, y) * size..][..size].copy_from_slice(texel);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Repeats `texel` over `bytes`.
+fn fill(bytes: &mut [u8], texel: &[u8]) {
+    for chunk in bytes.chunks_exact_mut(texel.len()) {
+        chunk.copy_from_slice(texel);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,626 @@
+//! Triangle mode of the tile engine: the primitives of a draw, one after another, through coverage, early tests and
+//! shading.
+
+use super::batch::{Batch, BlockValues, QUADS, Quad, at_sample};
+use super::color::{ColorOutput, Quads};
+use super::coverage::{Coverage, bits};
+use super::depth::Tests;
+use super::fragment::{FragmentStage, Machines};
+use super::output;
+use super::setup::{CENTER, SAMPLES_4, Setup};
+use super::tile::{AREA, SIDE, Target, Tile};
+use super::{Plane, TILE_SIZE};
+use crate::bindings::Prepared;
+use crate::counters::{Counter, Counters};
+use crate::device::Device;
+use crate::geometry::{Primitive, PrimitiveDraw};
+use crate::packet::draw::FragmentInput;
+use crate::packet::{BlendState, Rect};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use isa::exec::{Stopped, Watchdog};
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// The attachments of a pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Targets<'a> {
+    pub color: &'a [Option<Target>],
+    pub depth: Option<&'a Target>,
+    pub stencil: Option<&'a Target>,
+}
+
+/// The tile buffers of a worker.
+#[derive(Debug)]
+pub struct Buffers {
+    pub color: Vec<Plane>,
+    pub depth: Plane,
+    pub stencil: Plane,
+}
+
+/// What a worker needs besides.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    batch: Box<Batch>,
+}
+
+/// When depth and stencil are tested.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Timing {
+    /// Before shading.
+    Early,
+    /// After it.
+    Late,
+}
+
+/// A draw made ready for tiles, which all workers share.
+pub struct TileDraw<'a> {
+    pub(super) draw: &'a PrimitiveDraw,
+    /// The program, if it must run.
+    pub(super) stage: Option<&'a FragmentStage>,
+    pub(super) bindings: Prepared<'a>,
+    pub(super) targets: Targets<'a>,
+    pub(super) colors: Vec<Option<ColorOutput>>,
+    pub(super) tests: Tests,
+    pub(super) timing: Timing,
+    /// Samples are counted after shading, which may discard some.
+    pub(super) count_late: bool,
+    /// Every sample is shaded for itself.
+    pub(super) per_sample: bool,
+    pub(super) positions: &'static [[i32; 2]],
+    /// The pixels that the pass may touch.
+    area: Rect,
+    /// Of each viewport: the pixels drawn to, and the range that depth is clamped to.
+    clips: Vec<Rect>,
+    pub(super) ranges: Vec<(f32, f32)>,
+    /// Whether fragments need 1 / w.
+    needs_w: bool,
+    /// Whether fragments need barycentrics.
+    needs_barycentrics: bool,
+    /// Whether fragments need depth after the early tests.
+    needs_depth: bool,
+    pub(super) level: Level,
+    limit: Duration,
+}
+
+/// The macro-tile that a worker renders.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    pub layer: u32,
+    /// Column and row of the macro-tile.
+    pub at: [u32; 2],
+    /// Its side in pixels.
+    pub size: u32,
+}
+
+impl<'a> TileDraw<'a> {
+    /// Makes a draw ready. `samples` are the attachments' samples, if there are attachments.
+    pub fn new(
+        draw: &'a PrimitiveDraw,
+        targets: Targets<'a>,
+        samples: Option<u32>,
+        area: Rect,
+        device: &Device,
+    ) -> Self {
+        const REPLACE: BlendState = BlendState {
+            equations: None,
+            write_mask: 0xF,
+        };
+        let state = &*draw.state;
+        let multisampled = samples.unwrap_or(state.samples) > 1;
+        let mut stage = draw.pipeline.fragment.as_ref();
+        let tests = Tests::new(
+            &state.depth_stencil,
+            targets.depth.map(Target::format),
+            targets.stencil.is_some(),
+        );
+        let color = |(index, target): (usize, &Option<Target>)| {
+            let written = stage?.interface.colors.get(index)?;
+            written.iter().flatten().flatten().next()?;
+            let blend = state.blend.get(index).unwrap_or(&REPLACE);
+            let format = target.as_ref()?.format();
+            ColorOutput::new(blend, state.logic_op, state.blend_constants, format)
+        };
+        let colors: Vec<_> = targets.color.iter().enumerate().map(color).collect();
+        let (mut timing, mut count_late) = (Timing::Early, false);
+        if let Some(interface) = stage.map(|stage| &stage.interface) {
+            let removes =
+                interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
+            let changes = interface.depth.is_some() || interface.stencil_reference.is_some();
+            let late = !interface.early_tests
+                && (changes
+                    || interface.has_side_effects && tests.any()
+                    || removes && tests.writes());
+            if late {
+                timing = Timing::Late;
+            }
+            count_late = late || removes && !interface.early_tests;
+            let needed = interface.has_side_effects
+                || late
+                || count_late
+                || colors.iter().any(Option::is_some);
+            if !needed {
+                stage = None;
+            }
+        }
+        let interface = stage.map(|stage| &stage.interface);
+        let per_sample = multisampled
+            && (state.sample_shading || interface.is_some_and(|interface| interface.per_sample));
+        let reads = |wanted: fn(FragmentInput) -> bool| {
+            interface
+                .is_some_and(|interface| interface.inputs.iter().any(|&(_, input)| wanted(input)))
+        };
+        let viewports = state.viewports.iter();
+        Self {
+            draw,
+            stage,
+            bindings: draw.bindings.prepare(device.level()),
+            targets,
+            colors,
+            tests,
+            timing,
+            count_late,
+            per_sample,
+            positions: if multisampled { &SAMPLES_4 } else { &CENTER },
+            area,
+            clips: state.scissors.iter().map(|s| s.intersect(area)).collect(),
+            ranges: viewports
+                .map(|viewport| {
+                    let (a, b) = (viewport.min_depth, viewport.max_depth);
+                    if state.depth_clamp {
+                        (a.min(b).clamp(0.0, 1.0), a.max(b).clamp(0.0, 1.0))
+                    } else {
+                        (0.0, 1.0)
+                    }
+                })
+                .collect(),
+            needs_w: reads(|input| {
+                matches!(
+                    input,
+                    FragmentInput::Varying { .. } | FragmentInput::FragCoord(3)
+                )
+            }),
+            needs_barycentrics: reads(|input| {
+                matches!(
+                    input,
+                    FragmentInput::Varying { .. } | FragmentInput::PointCoord(_)
+                )
+            }),
+            needs_depth: timing == Timing::Late
+                || reads(|input| matches!(input, FragmentInput::FragCoord(2))),
+            level: device.level(),
+            limit: device.config().shader_timeout,
+        }
+    }
+
+    /// Marks what its program may have written to as changed.
+    pub fn finish(&self) {
+        if self.stage.is_some() {
+            self.draw.bindings.bump_generations();
+        }
+    }
+
+    /// Renders what it covers of a macro-tile.
+    ///
+    /// # Errors
+    /// [`Stopped`] if its program ran for too long, or `cancel` was set.
+    pub fn render(
+        &self,
+        place: Place,
+        buffers: &mut Buffers,
+        scratch: &mut Scratch,
+        counters: &mut Counters,
+        cancel: &AtomicBool,
+    ) -> Result<(), Stopped> {
+        let mut machines = self
+            .stage
+            .map(FragmentStage::take_machines)
+            .unwrap_or_default();
+        let mut renderer = Renderer {
+            draw: self,
+            place,
+            buffers,
+            batch: &mut scratch.batch,
+            machines: &mut machines,
+            counters,
+            cancel,
+            samples_passed: 0,
+        };
+        renderer.batch.clear();
+        let level = self.level;
+        let done = if self.positions.len() == 1 {
+            dispatch!(level, simd => renderer.run::<_, 1>(simd))
+        } else {
+            dispatch!(level, simd => renderer.run::<_, 4>(simd))
+        };
+        let done = done.and_then(|()| renderer.flush());
+        let passed = renderer.samples_passed;
+        counters.add(Counter::SamplesPassed, passed);
+        if let Some(stage) = self.stage {
+            stage.put_back(machines);
+        }
+        done
+    }
+}
+
+/// A draw in a macro-tile.
+pub(super) struct Renderer<'a, 'd> {
+    pub draw: &'a TileDraw<'d>,
+    pub place: Place,
+    pub buffers: &'a mut Buffers,
+    pub batch: &'a mut Batch,
+    pub machines: &'a mut Machines,
+    pub counters: &'a mut Counters,
+    pub cancel: &'a AtomicBool,
+    pub samples_passed: u64,
+}
+
+/// A primitive while it is rasterized.
+struct Current<'p> {
+    index: u32,
+    primitive: &'p Primitive,
+    setup: Setup,
+    /// Its record in the batch, once it has one.
+    record: Option<u16>,
+    range: (f32, f32),
+}
+
+impl<'d> Renderer<'_, 'd> {
+    /// All primitives.
+    #[inline(always)]
+    fn run<S: Simd, const N: usize>(&mut self, simd: S) -> Result<(), Stopped> {
+        let size = self.place.size;
+        let whole = Rect {
+            x: (self.place.at[0] * size) as i32,
+            y: (self.place.at[1] * size) as i32,
+            width: size,
+            height: size,
+        };
+        let mut coverage = Coverage::<N>::default();
+        let draw = self.draw;
+        let mut clip = (u8::MAX, Rect { width: 0, ..whole });
+        for &index in draw.draw.bins.of(self.place.at, self.place.layer) {
+            let Some(primitive) = draw.draw.primitives.get(index as usize) else {
+                continue;
+            };
+            if clip.0 != primitive.viewport {
+                let Some(pixels) = draw.clips.get(usize::from(primitive.viewport)) else {
+                    continue;
+                };
+                clip = (primitive.viewport, pixels.intersect(whole));
+            }
+            let Some(setup) = Setup::new(simd, primitive, draw.positions, clip.1) else {
+                continue;
+            };
+            let range = draw.ranges.get(usize::from(primitive.viewport));
+            let mut current = Current {
+                index,
+                primitive,
+                setup,
+                record: None,
+                range: range.copied().unwrap_or((0.0, 1.0)),
+            };
+            self.primitive(simd, &mut current, &mut coverage, [whole.x, whole.y])?;
+        }
+        Ok(())
+    }
+
+    /// One primitive, tile by tile.
+    #[inline(always)]
+    fn primitive<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        current: &mut Current<'d>,
+        coverage: &mut Coverage<N>,
+        corner: [i32; 2],
+    ) -> Result<(), Stopped> {
+        let bounds = current.setup.bounds;
+        let first = [
+            (bounds.x - corner[0]) / SIDE as i32,
+            (bounds.y - corner[1]) / SIDE as i32,
+        ];
+        let last = [
+            (bounds.x + bounds.width as i32 - 1 - corner[0]) / SIDE as i32,
+            (bounds.y + bounds.height as i32 - 1 - corner[1]) / SIDE as i32,
+        ];
+        let side = self.place.size / TILE_SIZE;
+        for row in first[1]..=last[1] {
+            for column in first[0]..=last[0] {
+                let x = corner[0] + column * SIDE as i32;
+                let y = corner[1] + row * SIDE as i32;
+                if coverage.find(simd, &current.setup, x, y) {
+                    let tile = (row as u32 * side + column as u32) as usize;
+                    self.tile(simd, current, coverage, tile, [x, y])?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What a primitive covers of a tile at pixel `at`, block by block.
+    #[inline(always)]
+    fn tile<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        current: &mut Current<'d>,
+        coverage: &Coverage<N>,
+        tile: usize,
+        at: [i32; 2],
+    ) -> Result<(), Stopped> {
+        let draw = self.draw;
+        let early = draw.timing == Timing::Early && draw.tests.any();
+        if draw.tests.any() {
+            self.touch_tests(tile);
+        }
+        let state = &draw.draw.state;
+        for block in bits(coverage.blocks) {
+            let mut lanes = coverage.lanes[block];
+            if state.sample_mask & ((1 << N) - 1) != (1 << N) - 1 {
+                for (sample, lanes) in lanes.iter_mut().enumerate() {
+                    if state.sample_mask >> sample & 1 == 0 {
+                        *lanes = 0;
+                    }
+                }
+            }
+            let x = at[0] + (block % 4 * 4) as i32;
+            let y = at[1] + (block / 4 * 4) as i32;
+            let setup = &current.setup;
+            let [b1, b2] = setup.barycentrics(x, y);
+            let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
+            let mut values = BlockValues {
+                barycentrics: [f32x16::splat(simd, 0.0); 2],
+                depth: f32x16::splat(simd, 0.0),
+                inverse_w: f32x16::splat(simd, 1.0),
+            };
+            if early || draw.needs_depth {
+                values.depth = add(setup.depth([b1, b2]), setup.lane_depth);
+            }
+            if early {
+                self.test(simd, current, &values, &mut lanes, tile, block);
+            }
+            if !draw.count_late {
+                for lanes in lanes {
+                    self.samples_passed += u64::from(lanes.count_ones());
+                }
+            }
+            let mut any = 0;
+            for lanes in lanes {
+                any |= lanes;
+            }
+            if any == 0 || draw.stage.is_none() {
+                continue;
+            }
+            let setup = &current.setup;
+            if draw.needs_barycentrics {
+                values.barycentrics = [
+                    add(b1 as f32, setup.lane_barycentrics[0]),
+                    add(b2 as f32, setup.lane_barycentrics[1]),
+                ];
+            }
+            if draw.needs_w {
+                values.inverse_w = add(setup.inverse_w([b1, b2]), setup.lane_w);
+            }
+            self.touch_colors(tile);
+            let quad = Quad {
+                x: x as u16,
+                y: y as u16,
+                tile: tile as u8,
+                place: (block * 16) as u8,
+                ..Quad::default()
+            };
+            if draw.per_sample {
+                for sample in 0..N {
+                    if lanes[sample] != 0 {
+                        let mut only = [0; N];
+                        only[sample] = lanes[sample];
+                        let quad = Quad {
+                            sample: sample as u8,
+                            ..quad
+                        };
+                        let values = at_sample(&values, setup_of(current), draw.positions[sample]);
+                        self.append(current, quad, &only, &values.lanes())?;
+                    }
+                }
+            } else {
+                self.append(current, quad, &lanes, &values.lanes())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the quads of a block that have samples to the batch, which is shaded when it is full. `quad` is the
+    /// block's first.
+    #[inline(always)]
+    fn append<const N: usize>(
+        &mut self,
+        current: &mut Current<'d>,
+        quad: Quad,
+        lanes: &[u16; N],
+        values: &[[f32; 16]; 4],
+    ) -> Result<(), Stopped> {
+        for number in 0..4 {
+            let mut cover = 0;
+            for (sample, lanes) in lanes.iter().enumerate() {
+                cover |= (lanes >> (4 * number) & 15) << (4 * sample);
+            }
+            if cover == 0 {
+                continue;
+            }
+            if self.batch.count == QUADS {
+                self.flush()?;
+                current.record = None;
+            }
+            let record = match current.record {
+                Some(record) => record,
+                None => self.record(current),
+            };
+            let quad = Quad {
+                x: quad.x + (number as u16 & 1) * 2,
+                y: quad.y + (number as u16 & 2),
+                place: quad.place + 4 * number as u8,
+                record,
+                cover,
+                ..quad
+            };
+            self.batch.add(quad, number, values);
+        }
+        Ok(())
+    }
+
+    fn record(&mut self, current: &mut Current<'d>) -> u16 {
+        let (draw, stage) = (self.draw.draw, self.draw.stage);
+        let Some(stage) = stage else { return 0 };
+        let record = self.batch.add_primitive(
+            current.index,
+            current.primitive,
+            &current.setup,
+            &stage.interface,
+            &draw.varyings,
+        );
+        current.record = Some(record);
+        record
+    }
+
+    /// The early tests of a block.
+    #[inline(always)]
+    fn test<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        current: &Current<'d>,
+        values: &BlockValues<S>,
+        lanes: &mut [u16; N],
+        tile: usize,
+        block: usize,
+    ) {
+        let draw = self.draw;
+        for (sample, lanes) in lanes.iter_mut().enumerate() {
+            if *lanes == 0 {
+                continue;
+            }
+            let depth = if N == 1 {
+                values.depth
+            } else {
+                at_sample(values, &current.setup, draw.positions[sample]).depth
+            };
+            let code = draw.tests.code.encode(simd, depth, current.range);
+            let first = (tile * N + sample) * AREA + 16 * block;
+            let quads = Quads {
+                first: [first, first + 4, first + 8, first + 12],
+                consecutive: true,
+            };
+            *lanes = output::test(
+                simd,
+                &draw.tests,
+                *lanes,
+                current.primitive.front,
+                code,
+                &quads,
+                self.buffers,
+            );
+        }
+    }
+
+    /// Makes sure that depth and stencil of a tile are there.
+    fn touch_tests(&mut self, tile: usize) {
+        let (targets, layer) = (self.draw.targets, self.place.layer);
+        if let Some(target) = targets
+            .depth
+            .filter(|_| !self.buffers.depth.is_touched(tile))
+        {
+            let tile = self.tile_of(tile);
+            self.buffers.depth.touch(target, layer, &tile);
+        }
+        if let Some(target) = targets
+            .stencil
+            .filter(|_| !self.buffers.stencil.is_touched(tile))
+        {
+            let tile = self.tile_of(tile);
+            self.buffers.stencil.touch(target, layer, &tile);
+        }
+    }
+
+    /// Makes sure that a tile of the colours written is there.
+    fn touch_colors(&mut self, tile: usize) {
+        for (index, output) in self.draw.colors.iter().enumerate() {
+            if output.is_none() || self.buffers.color[index].is_touched(tile) {
+                continue;
+            }
+            if let Some(target) = &self.draw.targets.color[index] {
+                let tile = self.tile_of(tile);
+                self.buffers.color[index].touch(target, self.place.layer, &tile);
+            }
+        }
+    }
+
+    /// A tile of the macro-tile.
+    #[cold]
+    fn tile_of(&self, index: usize) -> Tile {
+        let side = self.place.size / TILE_SIZE;
+        let [column, row] = self.place.at;
+        let at = [
+            column * side + index as u32 % side,
+            row * side + index as u32 / side,
+        ];
+        let whole = Rect {
+            x: (at[0] * TILE_SIZE) as i32,
+            y: (at[1] * TILE_SIZE) as i32,
+            width: TILE_SIZE,
+            height: TILE_SIZE,
+        };
+        Tile {
+            index,
+            at,
+            pixels: whole.intersect(self.draw.area),
+        }
+    }
+
+    /// Shades what the batch has.
+    #[inline(never)]
+    pub fn flush(&mut self) -> Result<(), Stopped> {
+        let Some(stage) = self.draw.stage.filter(|_| self.batch.count > 0) else {
+            return Ok(());
+        };
+        let size = usize::from(4 * self.batch.count > super::fragment::BATCH_LANES[0]);
+        let (level, draw) = (self.draw.level, self.draw);
+        let machine = stage.machine(self.machines, size);
+        let batch = &mut *self.batch;
+        batch.prepare();
+        let primitives = &draw.draw.primitives[..];
+        dispatch!(level, simd => batch.set_inputs(
+            simd, &stage.interface, draw.positions, primitives, machine
+        ));
+        let watchdog = Watchdog {
+            limit: draw.limit,
+            cancel: Some(self.cancel),
+        };
+        machine.run(
+            &batch.active,
+            &batch.helpers,
+            &draw.bindings.resources(),
+            watchdog,
+        )?;
+        self.counters.add_work(&machine.take_work());
+        let lanes = (4 * batch.count - batch.helpers.count()) as u64;
+        self.counters.add(Counter::FragmentInvocations, lanes);
+        let killed = if stage.interface.discards {
+            machine.killed()
+        } else {
+            isa::exec::LaneMask::none()
+        };
+        let buffers = &mut *self.buffers;
+        let passed = dispatch!(level, simd => {
+            output::write(simd, draw, &stage.interface, batch, machine, &killed, buffers)
+        });
+        self.samples_passed += passed;
+        self.batch.clear();
+        Ok(())
+    }
+}
+
+/// The set-up of a primitive.
+#[inline(always)]
+fn setup_of<'a>(current: &'a Current<'_>) -> &'a Setup {
+    &current.setup
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,383 @@
+//! Whole passes against a naive twin: each sample for itself, each primitive in order.
+
+mod twin;
+
+use super::*;
+use crate::bindings::Bindings;
+use crate::device::{Config, FlushPolicy};
+use crate::format::Format;
+use crate::geometry::{Bins, DrawPipeline, PrimitiveKind, Varyings};
+use crate::image::{Image, ImageDesc, ImageKind, ImageView};
+use crate::packet::draw::*;
+use crate::packet::*;
+use crate::pass::{Pass, PassDraw};
+use devmem::Allocation;
+use isa::builder::Builder;
+use isa::ir::{Program, Rate, Statement, Type};
+use isa::level::SimdLevel;
+use isa::op::Op;
+use rand::seq::IndexedRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
+
+/// The framebuffer: no side is a multiple of a tile's.
+const WIDTH: u32 = 90;
+const HEIGHT: u32 = 70;
+const EVERYTHING: Rect = Rect {
+    x: 0,
+    y: 0,
+    width: WIDTH,
+    height: HEIGHT,
+};
+
+fn image(format: Format, samples: u32, layers: u32) -> ImageView {
+    let desc = ImageDesc {
+        kind: ImageKind::D2,
+        format,
+        extent: [WIDTH, HEIGHT, 1],
+        mip_levels: 1,
+        array_layers: layers,
+        samples,
+    };
+    let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
+    ImageView {
+        image: Arc::new(Image::new(desc, memory, 0).unwrap()),
+        format,
+        base_mip_level: 0,
+        level_count: 1,
+        base_layer: 0,
+        layer_count: layers,
+    }
+}
+
+/// The bytes of a texel.
+fn texel(view: &ImageView, aspect: Aspect, layer: u32, sample: u32, [x, y]: [u32; 2]) -> Vec<u8> {
+    let layout = view.image.subresource(aspect, 0, layer).unwrap();
+    let layout = layout.sample(sample);
+    let mut out = vec![0; layout.format.texel_size()];
+    view.image.read_row(&layout, [x, y, 0], &mut out).unwrap();
+    out
+}
+
+fn attachment(view: &ImageView, value: ClearValue) -> Attachment {
+    Attachment {
+        view: view.clone(),
+        load: LoadOp::Clear(value),
+        store: StoreOp::Store,
+        resolve: None,
+    }
+}
+
+fn state(samples: u32) -> DrawState {
+    DrawState {
+        topology: Topology::TriangleList,
+        primitive_restart: false,
+        viewports: vec![Viewport {
+            x: 0.0,
+            y: 0.0,
+            width: WIDTH as f32,
+            height: HEIGHT as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        }],
+        scissors: vec![EVERYTHING],
+        depth_clamp: false,
+        rasterizer_discard: false,
+        polygon_mode: PolygonMode::Fill,
+        cull_front: false,
+        cull_back: false,
+        front_clockwise: false,
+        depth_bias: None,
+        line_width: 1.0,
+        provoking_last: false,
+        samples,
+        sample_mask: u32::MAX,
+        sample_shading: false,
+        alpha_to_coverage: false,
+        alpha_to_one: false,
+        depth_stencil: DepthStencil {
+            depth: None,
+            bounds: None,
+            stencil: None,
+        },
+        logic_op: None,
+        blend: Vec::new(),
+        blend_constants: [0.25, 0.5, 0.75, 1.0],
+    }
+}
+
+/// A fragment stage whose inputs and outputs are as given, slot by slot: each output is an input. Lanes are killed
+/// where the input after the last output is above one half, if `discards`.
+fn fragments(
+    inputs: Vec<FragmentInput>,
+    outputs: Vec<FragmentOutput>,
+    discards: bool,
+) -> FragmentPrograms {
+    let mut b = Builder::new();
+    let registers: Vec<_> = (0..inputs.len())
+        .map(|slot| b.input(slot as u32, Type::B32, Rate::Varying))
+        .collect();
+    if discards {
+        let half = b.f32(0.5);
+        let more = b.compute(Op::FLt, &[half, registers[outputs.len()]]);
+        b.begin_if(more);
+        b.statement(Statement::Kill);
+        b.end();
+    }
+    for (slot, input) in registers.iter().enumerate().take(outputs.len()) {
+        let output = b.output(slot as u32, Type::B32);
+        b.assign(output, *input);
+    }
+    FragmentPrograms {
+        program: b.finish().unwrap(),
+        inputs: inputs.into_iter().map(Some).collect(),
+        outputs: outputs.into_iter().map(Some).collect(),
+        early_tests: false,
+        discards,
+        per_sample: false,
+        has_side_effects: false,
+    }
+}
+
+/// Varyings 0 to `count`.
+fn varyings(count: u32, interpolation: Interpolation, sampling: Sampling) -> Vec<FragmentInput> {
+    (0..count)
+        .map(|index| FragmentInput::Varying {
+            index,
+            interpolation,
+            sampling,
+        })
+        .collect()
+}
+
+/// The components of a colour attachment.
+fn color(attachment: usize, index: usize) -> Vec<FragmentOutput> {
+    (0..4)
+        .map(|component| FragmentOutput::Color {
+            attachment,
+            component,
+            index,
+        })
+        .collect()
+}
+
+fn vertex_program() -> Program {
+    Builder::new().finish().unwrap()
+}
+
+/// A draw by hand: three vertices to each primitive, each with `per_vertex` varyings.
+fn draw(
+    device: &Device,
+    fragment: Option<FragmentPrograms>,
+    state: DrawState,
+    primitives: Vec<Primitive>,
+    values: Vec<u32>,
+    per_vertex: usize,
+) -> PrimitiveDraw {
+    let programs = DrawPrograms {
+        vertex: vertex_program(),
+        vertex_inputs: Vec::new(),
+        vertex_outputs: Vec::new(),
+        varyings: per_vertex as u32,
+        fragment,
+    };
+    let area = Rect {
+        x: 0,
+        y: 0,
+        width: WIDTH,
+        height: HEIGHT,
+    };
+    let layers = primitives.iter().map(|p| u32::from(p.layer) + 1).max();
+    PrimitiveDraw {
+        pipeline: Arc::new(DrawPipeline::new(device, programs).unwrap()),
+        state: Arc::new(state),
+        bindings: Bindings::default(),
+        bins: Bins::everywhere(
+            &primitives,
+            area,
+            device.config().macro_tile_size,
+            layers.unwrap_or(1),
+        ),
+        regions: Vec::new(),
+        primitives,
+        varyings: Varyings { values, per_vertex },
+    }
+}
+
+/// A triangle of random corners around the framebuffer, at a constant depth.
+fn triangle(rng: &mut ChaCha8Rng, index: u32) -> Primitive {
+    let spread = *[600, 4000, 30_000].choose(rng).unwrap();
+    let (w, h) = (WIDTH as i32 * 256, HEIGHT as i32 * 256);
+    loop {
+        let middle = [rng.random_range(0..w), rng.random_range(0..h)];
+        let corners: [[i32; 2]; 3] = std::array::from_fn(|_| {
+            middle.map(|middle: i32| middle + rng.random_range(-spread..=spread))
+        });
+        let [a, b, c] = corners.map(|corner| corner.map(i64::from));
+        if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) <= 0 {
+            continue;
+        }
+        // Few depths, so that they are often equal.
+        let depth = rng.random_range(0..8) as f32 / 7.0;
+        return Primitive {
+            corners,
+            depth: [depth; 3],
+            inverse_w: [1.0; 3],
+            vertices: [3 * index, 3 * index + 1, 3 * index + 2],
+            provoking: 3 * index,
+            id: index,
+            kind: PrimitiveKind::Triangle,
+            front: rng.random(),
+            viewport: 0,
+            layer: 0,
+        };
+    }
+}
+
+/// Runs draws as one pass; returns what was counted.
+fn run(
+    config: &Config,
+    rendering: &Rendering,
+    draws: impl Fn(&Device) -> Vec<PrimitiveDraw>,
+) -> Counters {
+    let device = Device::new(config).unwrap();
+    let mut counters = Counters::default();
+    let mut pass = Pass::begin(rendering).unwrap();
+    for draw in draws(&device) {
+        pass.push(PassDraw::Primitives(draw), &device, &mut counters)
+            .unwrap();
+    }
+    pass.end(&device, &mut counters).unwrap();
+    counters
+}
+
+/// Ways to go about a pass that must not matter.
+fn configs() -> Vec<Config> {
+    let base = Config {
+        threads: 1,
+        ..Config::default()
+    };
+    let mut configs = vec![
+        Config {
+            macro_tile_size: 16,
+            threads: 3,
+            ..base.clone()
+        },
+        Config {
+            macro_tile_size: 128,
+            flush: FlushPolicy::EveryDraw,
+            ..base.clone()
+        },
+    ];
+    configs.extend(SimdLevel::supported().into_iter().map(|(_, simd)| Config {
+        simd,
+        ..base.clone()
+    }));
+    configs
+}
+
+#[test]
+fn interpolation_agrees_with_binary64() {
+    for samples in [1, 4] {
+        for (_, simd) in SimdLevel::supported() {
+            interpolate(samples, simd);
+        }
+    }
+}
+
+/// One large triangle in perspective: every varying, depth and 1 / w against binary64.
+fn interpolate(samples: u32, simd: SimdLevel) {
+    let config = Config {
+        threads: 1,
+        simd,
+        ..Config::default()
+    };
+    let corners = [[-3000, 700], [26_000, -900], [9000, 20_000]];
+    let (depth, inverse_w) = ([0.1, 0.9, 0.4], [2.0, 0.01, 0.5]);
+    let values: [[f32; 2]; 3] = [[1.0, -4.0], [0.0, 3.0], [0.5, 100.0]];
+    let mut inputs = varyings(1, Interpolation::Perspective, Sampling::Center);
+    inputs.push(FragmentInput::Varying {
+        index: 1,
+        interpolation: Interpolation::Linear,
+        sampling: Sampling::Center,
+    });
+    inputs.extend([FragmentInput::FragCoord(2), FragmentInput::FragCoord(3)]);
+    let target = image(Format::R32G32B32A32Sfloat, samples, 1);
+    let rendering = Rendering {
+        area: EVERYTHING,
+        layer_count: 1,
+        color: vec![Some(attachment(&target, ClearValue::Float([-9.0; 4])))],
+        depth: None,
+        stencil: None,
+    };
+    let counters = run(&config, &rendering, |device| {
+        let primitive = Primitive {
+            corners,
+            depth,
+            inverse_w,
+            vertices: [0, 1, 2],
+            provoking: 0,
+            id: 0,
+            kind: PrimitiveKind::Triangle,
+            front: true,
+            viewport: 0,
+            layer: 0,
+        };
+        let bits = values.as_flattened().iter().map(|v| v.to_bits()).collect();
+        let stage = fragments(inputs.clone(), color(0, 0), false);
+        vec![draw(
+            device,
+            Some(stage),
+            state(samples),
+            vec![primitive],
+            bits,
+            2,
+        )]
+    });
+    let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    let mut covered = 0;
+    for y in 0..HEIGHT {
+        for x in 0..WIDTH {
+            let bytes = texel(&target, Aspect::Color, 0, 0, [x, y]);
+            let found = Format::R32G32B32A32Sfloat.decode(&bytes);
+            if found[0] == -9.0 {
+                continue;
+            }
+            covered += 1;
+            let p = [f64::from(x) * 256.0 + 128.0, f64::from(y) * 256.0 + 128.0];
+            let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
+                (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+            };
+            let weights = [
+                side(b, c, p) / area,
+                side(c, a, p) / area,
+                side(a, b, p) / area,
+            ];
+            let sum = |of: [f64; 3]| (0..3).map(|i| weights[i] * of[i]).sum::<f64>();
+            let w = sum(inverse_w.map(f64::from));
+            let perspective = (0..3)
+                .map(|i| weights[i] * f64::from(inverse_w[i]) * f64::from(values[i][0]))
+                .sum::<f64>()
+                / w;
+            let linear = sum(values.map(|v| f64::from(v[1])));
+            let expected = [perspective, linear, sum(depth.map(f64::from)), w];
+            let tolerance = [1e-6, 2e-5, 1.2e-7, 4e-7 * w.abs().max(0.1)];
+            for i in 0..4 {
+                let error = (f64::from(found[i]) - expected[i]).abs();
+                assert!(
+                    error <= tolerance[i],
+                    "{x} {y} {i}: {} {}",
+                    found[i],
+                    expected[i]
+                );
+            }
+        }
+    }
+    assert!(covered > 2000);
+    if samples == 1 {
+        assert_eq!(counters.get(Counter::FragmentInvocations), covered);
+        assert_eq!(counters.get(Counter::SamplesPassed), covered);
+    }
+}

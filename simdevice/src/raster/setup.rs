@@ -1,0 +1,230 @@
+//! A primitive made ready for tiles: its edges as exact integers, and what varies over it as planes.
+
+use super::coverage::{LANE_X, LANE_Y};
+use crate::geometry::{Primitive, PrimitiveKind};
+use crate::packet::Rect;
+use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
+
+/// Primitives reach at most this far from the framebuffer's corner, in 1/256 pixels, so that edge functions fit 64 bits;
+/// others are not drawn.
+pub const MAX_COORDINATE: i32 = 1 << 29;
+
+/// Sub-pixel positions of a pixel.
+const ONE: i64 = 256;
+
+/// Vulkan's standard sample positions of 4 samples, in 1/256 pixels.
+pub const SAMPLES_4: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];
+
+/// The only sample of a pixel is at its centre.
+pub const CENTER: [[i32; 2]; 1] = [[128, 128]];
+
+/// An edge: a sample of pixel (x, y) is inside if `a x + b y + c[sample] >= 0`. Dividing the edge function of 1/256
+/// pixels by 256 and rounding down changes no sign, since `a x + b y` is an integer.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Edge {
+    pub a: i64,
+    pub b: i64,
+    pub c: [i64; 4],
+    /// `a x + b y` of the lanes of a block, if they fit.
+    pub lanes: [i32; 16],
+}
+
+/// What does not depend on tiles.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    edges: [Edge; 4],
+    edge_count: usize,
+    /// The pixels that may have samples in it.
+    pub bounds: Rect,
+    origin: [i64; 2],
+    /// How the barycentrics' numerators of corners 1 and 2 grow with x and y, per 1/256 pixel.
+    numerators: [[i64; 2]; 2],
+    inverse_area: f64,
+    /// What the barycentrics add at each lane of a block.
+    pub lane_barycentrics: [[f32; 16]; 2],
+    /// The barycentrics' derivatives by x and y in pixels.
+    pub slopes: [[f32; 2]; 2],
+    depth: [f64; 3],
+    /// What depth adds at each lane of a block.
+    pub lane_depth: [f32; 16],
+    /// Depth's derivatives.
+    pub depth_slopes: [f32; 2],
+    inverse_w: [f64; 3],
+    /// What 1 / w adds at each lane of a block.
+    pub lane_w: [f32; 16],
+    /// The derivatives of 1 / w.
+    pub w_slopes: [f32; 2],
+    /// 1 / w at corners 1 and 2, in units of `scale`.
+    pub weights: [f32; 2],
+    /// What 1 / w is in units of: its value if it is the same at all corners, so that nothing is lost.
+    pub scale: f32,
+}
+
+/// Pixels that may have samples between two coordinates of 1/256 pixels, as `first..end`.
+fn pixels(low: i32, high: i32, samples: usize) -> (i32, i32) {
+    if samples == 1 {
+        ((low + 127) >> 8, ((high - 128) >> 8) + 1)
+    } else {
+        (low >> 8, (high >> 8) + 1)
+    }
+}
+
+impl Setup {
+    /// Makes a primitive ready, or returns `None` if none of its samples lies in `clip`.
+    #[inline(always)]
+    pub fn new<S: Simd>(
+        simd: S,
+        primitive: &Primitive,
+        positions: &[[i32; 2]],
+        clip: Rect,
+    ) -> Option<Self> {
+        let [p0, p1, p2] = primitive.corners;
+        let parallelogram = primitive.kind != PrimitiveKind::Triangle;
+        let mut corners = [p0, p1, p2, p2];
+        let edge_count = if parallelogram { 4 } else { 3 };
+        if parallelogram {
+            corners[3] = std::array::from_fn(|axis| {
+                p0[axis].saturating_add(p2[axis]).saturating_sub(p1[axis])
+            });
+        }
+        let extent = |axis: usize| {
+            let [a, b, c, d] = corners.map(|corner| corner[axis]);
+            (a.min(b).min(c).min(d), a.max(b).max(c).max(d))
+        };
+        let ((left, right), (top, bottom)) = (extent(0), extent(1));
+        if left.min(top) < -MAX_COORDINATE || right.max(bottom) > MAX_COORDINATE {
+            return None;
+        }
+        let (columns, rows) = (
+            pixels(left, right, positions.len()),
+            pixels(top, bottom, positions.len()),
+        );
+        let span = |(first, end): (i32, i32)| (end - first).max(0) as u32;
+        let bounds = clip.intersect(Rect {
+            x: columns.0,
+            y: rows.0,
+            width: span(columns),
+            height: span(rows),
+        });
+        if bounds.is_empty() {
+            return None;
+        }
+        let wide = |p: [i32; 2]| p.map(i64::from);
+        let (w0, w1, w2) = (wide(p0), wide(p1), wide(p2));
+        let area = (w1[0] - w0[0]) * (w2[1] - w0[1]) - (w1[1] - w0[1]) * (w2[0] - w0[0]);
+        if area <= 0 {
+            return None;
+        }
+        let mut edges = [Edge::default(); 4];
+        for (index, edge) in edges.iter_mut().enumerate().take(edge_count) {
+            let next = if index + 1 == edge_count {
+                0
+            } else {
+                index + 1
+            };
+            *edge = Edge::new(simd, wide(corners[index]), wide(corners[next]), positions);
+        }
+        let numerators = [
+            [w2[1] - w0[1], w0[0] - w2[0]],
+            [w0[1] - w1[1], w1[0] - w0[0]],
+        ];
+        let inverse_area = 1.0 / area as f64;
+        let slopes = numerators.map(|n| n.map(|n| (n * ONE) as f64 * inverse_area));
+        let depth = primitive.depth.map(f64::from);
+        let (d1, d2) = (depth[1] - depth[0], depth[2] - depth[0]);
+        let depth_slopes: [f32; 2] =
+            std::array::from_fn(|axis| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32);
+        let [iw0, iw1, iw2] = primitive.inverse_w;
+        let affine = iw0 == iw1 && iw0 == iw2;
+        let scale = if affine { iw0 } else { 1.0 };
+        let weights = if affine { [1.0; 3] } else { [iw0, iw1, iw2] };
+        let inverse_w = weights.map(f64::from);
+        let (d1, d2) = (inverse_w[1] - inverse_w[0], inverse_w[2] - inverse_w[0]);
+        let w_slopes: [f32; 2] =
+            std::array::from_fn(|axis| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32);
+        let slopes = slopes.map(|slope| slope.map(|slope| slope as f32));
+        let lanes = |[dx, dy]: [f32; 2]| lane_offsets(simd, dx, dy);
+        Some(Self {
+            edges,
+            edge_count,
+            bounds,
+            origin: w0,
+            numerators,
+            inverse_area,
+            lane_barycentrics: [lanes(slopes[0]), lanes(slopes[1])],
+            slopes,
+            depth,
+            lane_depth: lanes(depth_slopes),
+            depth_slopes,
+            inverse_w,
+            lane_w: lanes(w_slopes),
+            w_slopes,
+            weights: [weights[1], weights[2]],
+            scale,
+        })
+    }
+
+    /// Its edges.
+    #[inline(always)]
+    pub fn edges(&self) -> &[Edge] {
+        &self.edges[..self.edge_count]
+    }
+
+    /// The barycentrics of corners 1 and 2 at the centre of pixel (x, y).
+    #[inline(always)]
+    pub fn barycentrics(&self, x: i32, y: i32) -> [f64; 2] {
+        let dx = i64::from(x) * ONE + ONE / 2 - self.origin[0];
+        let dy = i64::from(y) * ONE + ONE / 2 - self.origin[1];
+        let [[a1, b1], [a2, b2]] = self.numerators;
+        [
+            (a1 * dx + b1 * dy) as f64 * self.inverse_area,
+            (a2 * dx + b2 * dy) as f64 * self.inverse_area,
+        ]
+    }
+
+    /// Depth where the barycentrics are these.
+    #[inline(always)]
+    pub fn depth(&self, [b1, b2]: [f64; 2]) -> f32 {
+        let [z0, z1, z2] = self.depth;
+        (z0 + b1 * (z1 - z0) + b2 * (z2 - z0)) as f32
+    }
+
+    /// 1 / w in units of [`Setup::scale`] where the barycentrics are these.
+    #[inline(always)]
+    pub fn inverse_w(&self, [b1, b2]: [f64; 2]) -> f32 {
+        let [w0, w1, w2] = self.inverse_w;
+        (w0 + b1 * (w1 - w0) + b2 * (w2 - w0)) as f32
+    }
+}
+
+/// `dx x + dy y` of the lanes of a block.
+#[inline(always)]
+fn lane_offsets<S: Simd>(simd: S, dx: f32, dy: f32) -> [f32; 16] {
+    let x = f32x16::simd_from(simd, LANE_X.map(|x| x as f32));
+    let y = f32x16::simd_from(simd, LANE_Y.map(|y| y as f32));
+    (x * dx + y * dy).into()
+}
+
+impl Edge {
+    /// The edge from `p` to `q`, both in 1/256 pixels; the polygon is to the right of it (clockwise, y down).
+    #[inline(always)]
+    fn new<S: Simd>(simd: S, p: [i64; 2], q: [i64; 2], positions: &[[i32; 2]]) -> Self {
+        let [dx, dy] = [q[0] - p[0], q[1] - p[1]];
+        let (a, b) = (-dy, dx);
+        // Samples on an edge belong to the polygon if it is a left or a top edge.
+        let inclusive = dy < 0 || dy == 0 && dx > 0;
+        let constant = -(a * p[0] + b * p[1]) - i64::from(!inclusive);
+        let mut c = [0; 4];
+        for (c, &[x, y]) in c.iter_mut().zip(positions) {
+            *c = (constant + a * i64::from(x) + b * i64::from(y)) >> 8;
+        }
+        let x = i32x16::simd_from(simd, LANE_X) * a as i32;
+        let y = i32x16::simd_from(simd, LANE_Y) * b as i32;
+        Self {
+            a,
+            b,
+            c,
+            lanes: (x + y).into(),
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Blits: copies that scale, mirror, filter and convert.
+//!
+//! Vulkan 1.3, "Image Copies With Scaling". Where a texel's centre lies in the source is worked out exactly, in
+//! integers, along each axis by itself. Beyond the source's edges its texels at the edge go on.
+
+#[cfg(test)]
+mod tests;
+
+use crate::format::Format;
+use crate::image::{Image, SubresourceLayout};
+use crate::packet::{Aspect, BlitImage, ImageBlitRegion};
+use crate::texture::Filter;
+use std::ops::Range;
+
+/// Executes [`Packet::BlitImage`](crate::Packet::BlitImage).
+pub fn blit_image(blit: &BlitImage) {
+    for region in &blit.regions {
+        let (source, target) = (&region.source, &region.target);
+        let layers = |image: &Image, base: u32| image.desc.array_layers.saturating_sub(base);
+        let count = source.layer_count.min(target.layer_count);
+        let count = count
+            .min(layers(&blit.source, source.base_layer))
+            .min(layers(&blit.target, target.base_layer));
+        for layer in 0..count {
+            let from =
+                blit.source
+                    .subresource(source.aspect, source.mip_level, source.base_layer + layer);
+            let to =
+                blit.target
+                    .subresource(target.aspect, target.mip_level, target.base_layer + layer);
+            if let (Some(from), Some(to)) = (from, to) {
+                blit_layer(blit, region, from, to);
+            }
+        }
+    }
+    blit.target.memory.bump_generation();
+}
+
+/// What one texel of the target reads along an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Tap {
+    /// Indices in the source; nearest filtering reads the first.
+    index: [u32; 2],
+    /// The second's weight.
+    weight: f32,
+}
+
+/// The texels of the target along an axis, and what each reads.
+#[derive(Debug)]
+struct Axis {
+    target: Range<u32>,
+    taps: Vec<Tap>,
+}
+
+impl Axis {
+    /// Maps the corners `to` of the target to the corners `from` of the source; the sizes are the images'.
+    fn new(
+        filter: Filter,
+        from: [i32; 2],
+        source_size: u32,
+        to: [i32; 2],
+        target_size: u32,
+    ) -> Self {
+        let clamped = |corner: i32| corner.max(0).cast_unsigned().min(target_size);
+        let target = clamped(to[0].min(to[1]))..clamped(to[0].max(to[1]));
+        let [from, to] = [from, to].map(|corners| corners.map(i128::from));
+        let (source_length, target_length) = (from[1] - from[0], to[1] - to[0]);
+        let tap = |i: u32| {
+            // The centre's place in the source is `numerator / denominator` texels from its beginning.
+            let mut denominator = 2 * target_length;
+            let mut numerator =
+                (2 * (i128::from(i) - to[0]) + 1) * source_length + from[0] * denominator;
+            if filter == Filter::Linear {
+                // Texels' centres are half a texel inside.
+                numerator -= target_length;
+            }
+            if denominator < 0 {
+                (numerator, denominator) = (-numerator, -denominator);
+            }
+            let whole = numerator.div_euclid(denominator);
+            let rest = numerator.rem_euclid(denominator);
+            let index = [whole, whole + 1]
+                .map(|index| index.clamp(0, i128::from(source_size.saturating_sub(1))) as u32);
+            let weight = match filter {
+                Filter::Nearest => 0.0,
+                Filter::Linear => (rest as f64 / denominator as f64) as f32,
+            };
+            Tap { index, weight }
+        };
+        // An empty box has no texels, so that nothing is divided by zero.
+        let taps = target.clone().map(tap).collect();
+        Self { target, taps }
+    }
+
+    /// The texels of the source that are read, as a range.
+    fn source(&self) -> Range<u32> {
+        let indices = || self.taps.iter().flat_map(|tap| tap.index);
+        let first = indices().min().unwrap_or(0);
+        first..indices().max().map_or(first, |last| last + 1)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.taps.is_empty()
+    }
+}
+
+fn blit_layer(
+    blit: &BlitImage,
+    region: &ImageBlitRegion,
+    from: SubresourceLayout,
+    to: SubresourceLayout,
+) {
+    let is_color = region.source.aspect == Aspect::Color;
+    let filter = if is_color && !from.format.is_integer() {
+        blit.filter
+    } else {
+        Filter::Nearest
+    };
+    let [x, y, z] = [0, 1, 2].map(|axis| {
+        let corners = |corners: &[[i32; 3]; 2]| corners.map(|corner| corner[axis]);
+        Axis::new(
+            filter,
+            corners(&region.source_corners),
+            from.extent[axis],
+            corners(&region.target_corners),
+            to.extent[axis],
+        )
+    });
+    if x.is_empty() || y.is_empty() || z.is_empty() {
+        return;
+    }
+    let mut rows = Rows::new(&blit.source, from, &x);
+    let same = from.format == to.format && filter == Filter::Nearest;
+    let mut bytes = vec![0; x.taps.len() * to.format.texel_size()];
+    let mut texels = vec![[0.0; 4]; x.taps.len()];
+    for (target_z, tap_z) in z.target.clone().zip(&z.taps) {
+        for (target_y, tap_y) in y.target.clone().zip(&y.taps) {
+            let row = if same {
+                // Bits that mean nothing are kept, and so are those that mean more than registers hold.
+                rows.copy(&x, tap_y.index[0], tap_z.index[0], &mut bytes)
+            } else {
+                let row = rows.filter(&x, tap_y, tap_z, &mut texels);
+                to.format.encode_row(&texels, &mut bytes);
+                row
+            };
+            let at = [x.target.start, target_y, target_z];
+            let written = row.and_then(|()| blit.target.write_row(&to.sample(0), at, &bytes));
+            if written.is_none() {
+                return;
+            }
+        }
+    }
+}
+
+/// Rows of the source, those last read decoded.
+struct Rows<'a> {
+    image: &'a Image,
+    layout: SubresourceLayout,
+    /// The columns that are read.
+    columns: Range<u32>,
+    bytes: Vec<u8>,
+    /// Decoded rows and their y and z: as many as one row of the target needs, the last used first.
+    decoded: Vec<([u32; 2], Vec<[f32; 4]>)>,
+}
+
+/// Two rows of two slices.
+const KEPT_ROWS: usize = 4;
+
+impl<'a> Rows<'a> {
+    fn new(image: &'a Image, layout: SubresourceLayout, x: &Axis) -> Self {
+        let columns = x.source();
+        let bytes = vec![0; columns.len() * layout.format.texel_size()];
+        Self {
+            image,
+            layout: layout.sample(0),
+            columns,
+            bytes,
+            decoded: Vec::new(),
+        }
+    }
+
+    fn format(&self) -> Format {
+        self.layout.format
+    }
+
+    fn read(&mut self, y: u32, z: u32) -> Option<()> {
+        let at = [self.columns.start, y, z];
+        self.image.read_row(&self.layout, at, &mut self.bytes)
+    }
+
+    /// The bytes of a row's nearest texels.
+    fn copy(&mut self, x: &Axis, y: u32, z: u32, out: &mut [u8]) -> Option<()> {
+        self.read(y, z)?;
+        let size = self.format().texel_size();
+        for (tap, out) in x.taps.iter().zip(out.chunks_exact_mut(size)) {
+            let column = (tap.index[0] - self.columns.start) as usize;
+            out.copy_from_slice(&self.bytes[column * size..][..size]);
+        }
+        Some(())
+    }
+
+    /// Decodes a row, unless it is there.
+    fn decode(&mut self, place: [u32; 2]) -> Option<&[[f32; 4]]> {
+        let known = self.decoded.iter().position(|(known, _)| *known == place);
+        let (_, row) = match known {
+            Some(index) => self.decoded.remove(index),
+            None => {
+                self.read(place[0], place[1])?;
+                let mut row = if self.decoded.len() < KEPT_ROWS {
+                    vec![[0.0; 4]; self.columns.len()]
+                } else {
+                    self.decoded.pop()?.1
+                };
+                self.format().decode_row(&self.bytes, &mut row);
+                (place, row)
+            }
+        };
+        self.decoded.insert(0, (place, row));
+        self.decoded.first().map(|(_, row)| row.as_slice())
+    }
+
+    /// The weighted means of a row of the target.
+    fn filter(&mut self, x: &Axis, y: &Tap, z: &Tap, out: &mut [[f32; 4]]) -> Option<()> {
+        // What has no weight is not read: it might be infinite.
+        let taps = |tap: &Tap| {
+            let second = (tap.weight > 0.0).then_some((tap.index[1], tap.weight));
+            [Some((tap.index[0], 1.0 - tap.weight)), second]
+        };
+        out.fill([0.0; 4]);
+        let mut is_first = true;
+        let first_column = self.columns.start;
+        for (z, z_weight) in taps(z).into_iter().flatten() {
+            for (y, y_weight) in taps(y).into_iter().flatten() {
+                let weight = z_weight * y_weight;
+                let row = self.decode([y, z])?;
+                for (tap, out) in x.taps.iter().zip(&mut *out) {
+                    let [a, b] = tap.index.map(|index| row[(index - first_column) as usize]);
+                    let texel = if tap.weight > 0.0 {
+                        mix(a, b, tap.weight)
+                    } else {
+                        a
+                    };
+                    if is_first && weight == 1.0 {
+                        // Integers go through untouched.
+                        *out = texel;
+                    } else {
+                        for (out, component) in out.iter_mut().zip(texel) {
+                            *out += weight * component;
+                        }
+                    }
+                }
+                is_first = false;
+            }
+        }
+        Some(())
+    }
+}
+
+fn mix(a: [f32; 4], b: [f32; 4], weight: f32) -> [f32; 4] {
+    std::array::from_fn(|component| a[component] + weight * (b[component] - a[component]))
+}

@@ -1,0 +1,136 @@
+//! Copies between images of texels of the same size.
+
+use super::clip;
+use crate::image::{Image, ImageKind, SubresourceLayout};
+use crate::packet::{CopyImage, ImageCopyRegion, SubresourceLayers};
+
+/// Executes [`Packet::CopyImage`](crate::Packet::CopyImage).
+pub fn copy_image(copy: &CopyImage) {
+    for region in &copy.regions {
+        for_each_slice(&copy.source, &copy.target, region, |pair| {
+            copy_slice(copy, pair);
+        });
+    }
+    copy.target.memory.bump_generation();
+}
+
+/// The part of a slice or layer that a region names and both images have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SlicePair {
+    /// Where texels come from: a subresource and the first texel in it.
+    pub source: (SubresourceLayout, [u32; 3]),
+    /// Where they go.
+    pub target: (SubresourceLayout, [u32; 3]),
+    /// Texels in x and y.
+    pub extent: [u32; 2],
+}
+
+/// One side of a region.
+struct Side<'a> {
+    image: &'a Image,
+    layers: &'a SubresourceLayers,
+    offset: [i32; 3],
+}
+
+impl Side<'_> {
+    /// The subresource and z of slice number `index`: 3D images have slices, the others layers.
+    fn slice(&self, index: u32) -> Option<(SubresourceLayout, u32)> {
+        let z = i64::from(self.offset[2]);
+        let (layer, z) = match self.image.desc.kind {
+            ImageKind::D3 => (self.layers.base_layer, z + i64::from(index)),
+            ImageKind::D1 | ImageKind::D2 => (self.layers.base_layer.checked_add(index)?, z),
+        };
+        let layout = self
+            .image
+            .subresource(self.layers.aspect, self.layers.mip_level, layer)?;
+        let z = u32::try_from(z).ok().filter(|&z| z < layout.extent[2])?;
+        Some((layout, z))
+    }
+
+    /// How many slices or layers there are at most.
+    fn slices(&self) -> u32 {
+        self.image.desc.array_layers.max(self.image.desc.extent[2])
+    }
+}
+
+/// Calls `f` for every slice or layer of a region that both images have.
+pub(super) fn for_each_slice(
+    source: &Image,
+    target: &Image,
+    region: &ImageCopyRegion,
+    mut f: impl FnMut(&SlicePair),
+) {
+    let source = Side {
+        image: source,
+        layers: &region.source,
+        offset: region.source_offset,
+    };
+    let target = Side {
+        image: target,
+        layers: &region.target,
+        offset: region.target_offset,
+    };
+    let slices = region.extent[2].max(region.source.layer_count);
+    // Offsets before the first slice are at most this many slices outside.
+    for index in 0..slices.min(source.slices().max(target.slices())) {
+        if let (Some(from), Some(to)) = (source.slice(index), target.slice(index)) {
+            f(&overlap(region, from, to));
+        }
+    }
+}
+
+/// What a region is in x and y, clipped to the source, then what is left to the target.
+fn overlap(
+    region: &ImageCopyRegion,
+    (source, source_z): (SubresourceLayout, u32),
+    (target, target_z): (SubresourceLayout, u32),
+) -> SlicePair {
+    let [(from_x, to_x, width), (from_y, to_y, height)] = [0, 1].map(|axis| {
+        let from = clip(
+            region.source_offset[axis],
+            region.extent[axis],
+            source.extent[axis],
+        );
+        let offset = i64::from(region.target_offset[axis]) + i64::from(from.skipped);
+        let to = clip(
+            i32::try_from(offset).unwrap_or(i32::MAX),
+            from.count,
+            target.extent[axis],
+        );
+        (from.first.saturating_add(to.skipped), to.first, to.count)
+    });
+    SlicePair {
+        source: (source, [from_x, from_y, source_z]),
+        target: (target, [to_x, to_y, target_z]),
+        extent: [width, height],
+    }
+}
+
+/// `at`, `row` rows below.
+pub(super) fn below([x, y, z]: [u32; 3], row: u32) -> [u32; 3] {
+    [x, y + row, z]
+}
+
+fn copy_slice(copy: &CopyImage, pair: &SlicePair) {
+    let ((source, from), (target, to)) = (&pair.source, &pair.target);
+    if source.format.texel_size() != target.format.texel_size() {
+        log::warn!("left out an image copy between texels of different sizes");
+        return;
+    }
+    let [width, height] = pair.extent;
+    let size = u64::from(width) * source.format.texel_size() as u64;
+    for sample in 0..copy.source.desc.samples.min(copy.target.desc.samples) {
+        let (source, target) = (source.sample(sample), target.sample(sample));
+        for row in 0..height {
+            let from = copy.source.row(&source, below(*from, row), size);
+            let to = copy.target.row(&target, below(*to, row), size);
+            let copied = from.zip(to).map(|(from, to)| {
+                let memory = &copy.target.memory;
+                memory.copy_from(to, &copy.source.memory, from, size)
+            });
+            if !matches!(copied, Some(Ok(()))) {
+                return;
+            }
+        }
+    }
+}
