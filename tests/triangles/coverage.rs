@@ -284,7 +284,8 @@ clipped! {
     clipped_at_all_planes: 215, all_planes;
 }
 
-/// A grid over the whole target whose inner corners are moved, cut along random diagonals.
+/// A grid over the whole target whose inner corners are moved, by too little to make a cell concave,
+/// cut along random diagonals.
 fn moved_grid(seed: u64, cells: usize) -> Vec<Triangle> {
     let mut rng = shapes::rng(seed);
     let step = 2.0 / cells as f32;
@@ -300,7 +301,7 @@ fn moved_grid(seed: u64, cells: usize) -> Vec<Triangle> {
             let mut along = |index: usize| match index {
                 0 => -1.0,
                 _ if index == cells => 1.0,
-                _ => index as f32 * step - 1.0 + rng.random_range(-0.4..0.4f32) * step,
+                _ => index as f32 * step - 1.0 + rng.random_range(-0.2..0.2f32) * step,
             };
             [along(column) * w, along(row) * w, 0.5 * w, w]
         })

@@ -2,4 +2,5 @@
 
 mod coverage;
 mod devices;
+mod doors;
 mod sweep;

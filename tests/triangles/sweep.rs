@@ -2,8 +2,9 @@
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 
-use gaurast_tests::compare::{Difference, differences, write_differences};
+use gaurast_tests::compare::{Difference, differences, for_people, write_differences};
 use gaurast_tests::for_each_scene;
 use gaurast_tests::triangles::{Expected, Gpu, Output, Scene, scenes};
 
@@ -37,7 +38,9 @@ fn check(name: &str) {
         }
     };
     assert!(theirs.shows_something(), "the scene is blank on lavapipe");
-    let verdict = judge(name, try_draw(scene, own()), &theirs);
+    let ours = try_draw(scene, own());
+    show(name, &ours, &theirs);
+    let verdict = judge(name, ours, &theirs);
     match (verdict, Expected::read().unsupported(name)) {
         (Ok(()), None) => {}
         (Err(reason), Some(listed)) => eprintln!("not supported yet: {listed} ({reason})"),
@@ -45,6 +48,20 @@ fn check(name: &str) {
             panic!("it is drawn right: take it off the list of what is not supported ({listed})")
         }
         (Err(reason), None) => panic!("{reason}"),
+    }
+}
+
+/// Writes what both drew to the folder that `GAURAST_TRIANGLE_PICTURES` names, if it does.
+fn show(name: &str, ours: &Result<Output, String>, theirs: &Output) {
+    let Some(folder) = std::env::var_os("GAURAST_TRIANGLE_PICTURES") else {
+        return;
+    };
+    for (who, output) in [("own", ours.as_ref().ok()), ("lavapipe", Some(theirs))] {
+        for picture in output.iter().flat_map(|output| &output.pictures) {
+            let file = format!("{name}-{}-{who}.png", picture.name.replace(' ', "_"));
+            let path = Path::new(&folder).join(file);
+            for_people(picture).save(&path).expect("a picture is written");
+        }
     }
 }
 

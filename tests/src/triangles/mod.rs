@@ -12,6 +12,7 @@ mod commands;
 pub mod edges;
 mod expected;
 mod gpu;
+pub mod models;
 mod output;
 mod pipeline;
 mod resource;

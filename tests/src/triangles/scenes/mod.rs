@@ -5,6 +5,7 @@ use super::{Gpu, Output};
 mod blending;
 mod commands;
 mod depth_stencil;
+mod models;
 mod multisample;
 mod passes;
 mod raster;
@@ -61,6 +62,8 @@ macro_rules! for_each_scene {
                 dynamic_culling, dynamic_depth_test, dynamic_depth_bias, dynamic_blend_constants, dynamic_topology_and_restart, dynamic_stencil, dynamic_vertex_strides, secondary_command_buffers, clears_within_a_pass, load_and_store, several_pipelines;
             passes:
                 render_pass_object, input_attachments, resolve_attachments;
+            models:
+                african_head, african_head_of_four_samples, duck, bunny;
         }
     };
 }
