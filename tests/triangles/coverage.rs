@@ -107,11 +107,15 @@ fn unclipped(seed: u64, count: usize) -> Vec<Triangle> {
 }
 
 fn assert_equal(ours: &Gpu, theirs: &Gpu, triangles: &[Triangle], samples: u32) {
-    let [ours, theirs] = [ours, theirs].map(|gpu| Checksums::new(gpu, triangles, [SIZE; 2], samples));
+    let [ours, theirs] =
+        [ours, theirs].map(|gpu| Checksums::new(gpu, triangles, [SIZE; 2], samples));
     let count = triangles.len() as u32;
     let (our_sums, their_sums) = (ours.draw(0..count), theirs.draw(0..count));
     let covered = their_sums[0].iter().filter(|sums| sums[0] > 0.0).count();
-    assert!(covered > (SIZE * SIZE / 4) as usize, "only {covered} pixels are covered");
+    assert!(
+        covered > (SIZE * SIZE / 4) as usize,
+        "only {covered} pixels are covered"
+    );
     if our_sums == their_sums {
         return;
     }
@@ -158,7 +162,9 @@ const SMALL: u32 = 256;
 /// Triangles that some planes cut, in units of 1/64.
 fn clipped(seed: u64, count: usize, plane: fn(&mut ChaCha8Rng) -> Position) -> Vec<[Position; 3]> {
     let mut rng = shapes::rng(seed);
-    (0..count).map(|_| [0; 3].map(|_| plane(&mut rng))).collect()
+    (0..count)
+        .map(|_| [0; 3].map(|_| plane(&mut rng)))
+        .collect()
 }
 
 /// A position with `w` in sixteenths to four, `x` and `y` within the sides unless `wide`.
@@ -213,7 +219,11 @@ fn is_explained(
 ) -> bool {
     let near: Vec<_> = (0..)
         .zip(triangles)
-        .filter(|(_, triangle)| lines(triangle).iter().any(|&line| is_near(line, SMALL, place)))
+        .filter(|(_, triangle)| {
+            lines(triangle)
+                .iter()
+                .any(|&line| is_near(line, SMALL, place))
+        })
         .map(|(index, _)| numbers(index))
         .collect();
     let difference = [0, 1, 2, 3].map(|channel| ours[channel] - theirs[channel]);
@@ -237,10 +247,16 @@ fn check_clipped(name: &str, seed: u64, plane: fn(&mut ChaCha8Rng) -> Position) 
     };
     for samples in [1, 4] {
         let positions = clipped(seed, 1000, plane);
-        let triangles: Vec<_> = positions.iter().map(|corners| corners.map(to_clip)).collect();
+        let triangles: Vec<_> = positions
+            .iter()
+            .map(|corners| corners.map(to_clip))
+            .collect();
         let draw = |gpu| Checksums::new(gpu, &triangles, [SMALL; 2], samples).draw(0..1000);
         let (ours, theirs) = (draw(own()), draw(lavapipe));
-        assert!(theirs[0].iter().any(|sums| sums[0] > 0.0), "nothing is drawn");
+        assert!(
+            theirs[0].iter().any(|sums| sums[0] > 0.0),
+            "nothing is drawn"
+        );
         let (mut different, mut unexplained) = (0, Vec::new());
         for (sample, (ours, theirs)) in ours.iter().zip(&theirs).enumerate() {
             let offset = places(samples)[sample];
@@ -249,7 +265,10 @@ fn check_clipped(name: &str, seed: u64, plane: fn(&mut ChaCha8Rng) -> Position) 
                     continue;
                 }
                 different += 1;
-                let place = [16 * (pixel % SMALL) + offset[0], 16 * (pixel / SMALL) + offset[1]];
+                let place = [
+                    16 * (pixel % SMALL) + offset[0],
+                    16 * (pixel / SMALL) + offset[1],
+                ];
                 if !is_explained(&positions, place, *ours, *theirs) {
                     unexplained.push((sample, pixel % SMALL, pixel / SMALL));
                 }
@@ -325,7 +344,12 @@ fn moved_grid(seed: u64, cells: usize) -> Vec<Triangle> {
 /// Slivers from one point to the whole border.
 fn star(seed: u64, per_side: usize) -> Vec<Triangle> {
     let mut rng = shapes::rng(seed);
-    let center = [rng.random_range(-0.3..0.3), rng.random_range(-0.3..0.3), 0.5, 1.0];
+    let center = [
+        rng.random_range(-0.3..0.3),
+        rng.random_range(-0.3..0.3),
+        0.5,
+        1.0,
+    ];
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let mut border = Vec::new();
     for side in 0..4 {
@@ -346,8 +370,9 @@ fn assert_watertight(gpu: &Gpu, name: &str, triangles: &[Triangle]) {
     for samples in [1, 4] {
         let count = triangles.len() as u32;
         // The sums tell which triangle it is: if just one, they are its numbers.
-        let known: std::collections::HashSet<_> =
-            (0..count).map(|index| numbers(index).map(f32::to_bits)).collect();
+        let known: std::collections::HashSet<_> = (0..count)
+            .map(|index| numbers(index).map(f32::to_bits))
+            .collect();
         assert_eq!(known.len(), triangles.len(), "the numbers clash");
         let sums = Checksums::new(gpu, triangles, [SMALL; 2], samples).draw(0..count);
         for (sample, sums) in sums.iter().enumerate() {

@@ -60,7 +60,9 @@ fn show(name: &str, ours: &Result<Output, String>, theirs: &Output) {
         for picture in output.iter().flat_map(|output| &output.pictures) {
             let file = format!("{name}-{}-{who}.png", picture.name.replace(' ', "_"));
             let path = Path::new(&folder).join(file);
-            for_people(picture).save(&path).expect("a picture is written");
+            for_people(picture)
+                .save(&path)
+                .expect("a picture is written");
         }
     }
 }
@@ -76,9 +78,9 @@ fn judge(name: &str, ours: Result<Output, String>, theirs: &Output) -> Result<()
             exception.covers(&difference.picture) && difference.texels <= exception.texels
         })
     };
-    let stale = expected.exceptions(name).find(|exception| {
-        !(found.iter()).any(|difference| exception.covers(&difference.picture))
-    });
+    let stale = expected
+        .exceptions(name)
+        .find(|exception| !(found.iter()).any(|difference| exception.covers(&difference.picture)));
     if let Some(exception) = stale {
         return Err(format!("nothing differs any more: {exception:?}"));
     }

@@ -94,11 +94,7 @@ mod tests {
     fn cuts_are_where_depth_meets_the_planes() {
         // Depth goes from -1/2 at the left to 3/2 at the right.
         let at = |x: i64, y: i64, z: i64| [x, y, z, UNITS];
-        let triangle = [
-            at(-64, -64, -32),
-            at(64, -64, 96),
-            at(-64, 64, -32),
-        ];
+        let triangle = [at(-64, -64, -32), at(64, -64, 96), at(-64, 64, -32)];
         let [.., near, far] = lines(&triangle);
         let column = |x: u32| [16 * x, 300];
         assert!(is_near(near, 64, column(16)) && !is_near(near, 64, column(17)));

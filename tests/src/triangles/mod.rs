@@ -20,6 +20,7 @@ pub mod scenes;
 pub mod shader;
 pub mod shapes;
 mod target;
+pub mod workloads;
 
 pub use commands::{Commands, Pass};
 pub use expected::{Exception, Expected};

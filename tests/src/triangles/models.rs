@@ -197,7 +197,10 @@ fn read_obj(path: &Path) -> Result<(Vec<Corner>, Vec<u32>), Missing> {
             position: triple(&mesh.positions, index),
             normal: triple(&mesh.normals, index),
             // OBJ counts from the bottom.
-            uv: [mesh.texcoords[2 * index], 1.0 - mesh.texcoords[2 * index + 1]],
+            uv: [
+                mesh.texcoords[2 * index],
+                1.0 - mesh.texcoords[2 * index + 1],
+            ],
         }));
         indices.extend(mesh.indices.iter().map(|index| first + index));
     }
@@ -337,15 +340,34 @@ impl Ready {
 fn uniforms(model: &Model, [width, height]: [u32; 2], direction: Vec3) -> Uniforms {
     let (middle, radius) = model.bounds();
     let eye = middle + 2.6 * radius * direction.normalize();
-    let view = Mat4::look_at_rh(eye, middle, Vec3::Y);
     let aspect = width as f32 / height as f32;
-    let mut projection = Mat4::perspective_rh(0.8, aspect, 0.5 * radius, 6.0 * radius);
-    projection.y_axis.y *= -1.0;
+    let to_clip = perspective(aspect, 0.5 * radius, 6.0 * radius) * look_at(eye, middle);
     Uniforms {
-        to_clip: projection * view,
+        to_clip,
         eye: eye.extend(1.0),
         light: Vec3::new(0.4, 0.6, 0.7).normalize().extend(0.0),
     }
+}
+
+/// From the world to a camera at `eye` that looks at `middle`: x to the right, y down, z forward.
+fn look_at(eye: Vec3, middle: Vec3) -> Mat4 {
+    let forward = (middle - eye).normalize();
+    let right = forward.cross(Vec3::Y).normalize();
+    let down = forward.cross(right);
+    let row = |axis: Vec3| axis.extend(-axis.dot(eye));
+    Mat4::from_cols(row(right), row(down), row(forward), Vec4::W).transpose()
+}
+
+/// From that camera to clip coordinates.
+fn perspective(aspect: f32, near: f32, far: f32) -> Mat4 {
+    let focal = 2.4;
+    let depth = far / (far - near);
+    Mat4::from_cols(
+        Vec4::X * (focal / aspect),
+        Vec4::Y * focal,
+        Vec4::new(0.0, 0.0, depth, 1.0),
+        Vec4::new(0.0, 0.0, -near * depth, 0.0),
+    )
 }
 
 impl ReadyPart {

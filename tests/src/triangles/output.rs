@@ -24,7 +24,10 @@ impl Output {
         self.pictures.iter().any(|picture| {
             let texel = texel_size(picture.format) as usize;
             let first = &picture.bytes[..texel];
-            picture.bytes.chunks_exact(texel).any(|other| other != first)
+            picture
+                .bytes
+                .chunks_exact(texel)
+                .any(|other| other != first)
         })
     }
 }

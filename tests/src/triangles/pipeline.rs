@@ -259,9 +259,8 @@ impl Pipeline {
         }
         let device = self.gpu.device();
         // SAFETY: see `triangles`.
-        let created = unsafe {
-            device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None)
-        };
+        let created =
+            unsafe { device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
         created
             .map(|pipelines| pipelines[0])
             .map_err(|(_, result)| result)

@@ -256,11 +256,7 @@ impl Image {
     }
 
     /// A copy of one level.
-    pub(super) fn region(
-        &self,
-        aspect: vk::ImageAspectFlags,
-        level: u32,
-    ) -> vk::BufferImageCopy {
+    pub(super) fn region(&self, aspect: vk::ImageAspectFlags, level: u32) -> vk::BufferImageCopy {
         let [width, height, depth] = self.options.size.map(|size| (size >> level).max(1));
         let layers = vk::ImageSubresourceLayers {
             aspect_mask: aspect,

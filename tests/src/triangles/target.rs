@@ -292,5 +292,9 @@ pub fn fetch_sample(gpu: &Gpu, image: &Image, sample: u32) -> Picture {
             commands.draw(0..4);
         });
     });
-    picture(String::new(), &target.colors[0], vk::ImageAspectFlags::COLOR)
+    picture(
+        String::new(),
+        &target.colors[0],
+        vk::ImageAspectFlags::COLOR,
+    )
 }

@@ -41,7 +41,9 @@ const OPERATIONS: [Op; 5] = [
 fn layers() -> Vec<Vertex> {
     let mut vertices = shapes::soup(60, 20);
     for vertex in &mut vertices {
-        vertex.color = vertex.color.map(|channel| (255.0 * channel).round() / 255.0);
+        vertex.color = vertex
+            .color
+            .map(|channel| (255.0 * channel).round() / 255.0);
     }
     for triangle in vertices.chunks_exact_mut(3) {
         let color = triangle[0].color;
@@ -88,7 +90,12 @@ pub fn blend_operations(gpu: &Gpu) -> Drawn {
 /// Several layers of 8 bits, each rounded.
 pub fn blended_bytes(gpu: &Gpu) -> Drawn {
     let state = blend(Factor::SRC_ALPHA, Factor::ONE_MINUS_SRC_ALPHA, Op::ADD);
-    Ok(blended(gpu, vk::Format::R8G8B8A8_UNORM, state, &layers()[..9]))
+    Ok(blended(
+        gpu,
+        vk::Format::R8G8B8A8_UNORM,
+        state,
+        &layers()[..9],
+    ))
 }
 
 pub fn added_bytes(gpu: &Gpu) -> Drawn {
@@ -98,7 +105,12 @@ pub fn added_bytes(gpu: &Gpu) -> Drawn {
 
 pub fn blended_srgb(gpu: &Gpu) -> Drawn {
     let state = blend(Factor::SRC_ALPHA, Factor::ONE_MINUS_SRC_ALPHA, Op::ADD);
-    Ok(blended(gpu, vk::Format::R8G8B8A8_SRGB, state, &layers()[..6]))
+    Ok(blended(
+        gpu,
+        vk::Format::R8G8B8A8_SRGB,
+        state,
+        &layers()[..6],
+    ))
 }
 
 /// Colour and alpha have their own factors and operations.
@@ -120,7 +132,11 @@ pub fn dual_source_blending(gpu: &Gpu) -> Drawn {
              layout(location = 0, index = 1) out vec4 factor;
              void main() { color = v_color; factor = v_color.gbra; }",
         ),
-        blend: vec![blend(Factor::SRC1_COLOR, Factor::ONE_MINUS_SRC1_COLOR, Op::ADD)],
+        blend: vec![blend(
+            Factor::SRC1_COLOR,
+            Factor::ONE_MINUS_SRC1_COLOR,
+            Op::ADD,
+        )],
         ..PipelineOptions::default()
     };
     let target = TargetOptions::of(vk::Format::R16G16B16A16_SFLOAT);

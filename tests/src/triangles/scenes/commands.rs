@@ -39,16 +39,22 @@ pub fn dynamic_culling(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::default();
-    dynamic(gpu, &target, &options, &shapes::soup(120, 40), |commands, half| {
-        let fronts = [vk::FrontFace::CLOCKWISE, vk::FrontFace::COUNTER_CLOCKWISE];
-        let modes = [vk::CullModeFlags::BACK, vk::CullModeFlags::BACK];
-        // SAFETY: see `triangles`.
-        unsafe {
-            let device = commands.device();
-            device.cmd_set_cull_mode(commands.raw, modes[half]);
-            device.cmd_set_front_face(commands.raw, fronts[half]);
-        }
-    })
+    dynamic(
+        gpu,
+        &target,
+        &options,
+        &shapes::soup(120, 40),
+        |commands, half| {
+            let fronts = [vk::FrontFace::CLOCKWISE, vk::FrontFace::COUNTER_CLOCKWISE];
+            let modes = [vk::CullModeFlags::BACK, vk::CullModeFlags::BACK];
+            // SAFETY: see `triangles`.
+            unsafe {
+                let device = commands.device();
+                device.cmd_set_cull_mode(commands.raw, modes[half]);
+                device.cmd_set_front_face(commands.raw, fronts[half]);
+            }
+        },
+    )
 }
 
 pub fn dynamic_depth_test(gpu: &Gpu) -> Drawn {
@@ -61,16 +67,22 @@ pub fn dynamic_depth_test(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::with_depth(D32);
-    dynamic(gpu, &target, &options, &shapes::soup(121, 40), |commands, half| {
-        let ops = [vk::CompareOp::LESS, vk::CompareOp::GREATER];
-        // SAFETY: see `triangles`.
-        unsafe {
-            let device = commands.device();
-            device.cmd_set_depth_test_enable(commands.raw, true);
-            device.cmd_set_depth_write_enable(commands.raw, half == 0);
-            device.cmd_set_depth_compare_op(commands.raw, ops[half]);
-        }
-    })
+    dynamic(
+        gpu,
+        &target,
+        &options,
+        &shapes::soup(121, 40),
+        |commands, half| {
+            let ops = [vk::CompareOp::LESS, vk::CompareOp::GREATER];
+            // SAFETY: see `triangles`.
+            unsafe {
+                let device = commands.device();
+                device.cmd_set_depth_test_enable(commands.raw, true);
+                device.cmd_set_depth_write_enable(commands.raw, half == 0);
+                device.cmd_set_depth_compare_op(commands.raw, ops[half]);
+            }
+        },
+    )
 }
 
 pub fn dynamic_depth_bias(gpu: &Gpu) -> Drawn {
@@ -83,14 +95,20 @@ pub fn dynamic_depth_bias(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::with_depth(D32);
-    dynamic(gpu, &target, &options, &shapes::flat_soup(122, 40), |commands, half| {
-        // SAFETY: see `triangles`.
-        unsafe {
-            let device = commands.device();
-            device.cmd_set_depth_bias(commands.raw, 0.0, 0.0, 2.0);
-            device.cmd_set_depth_bias_enable(commands.raw, half == 0);
-        }
-    })
+    dynamic(
+        gpu,
+        &target,
+        &options,
+        &shapes::flat_soup(122, 40),
+        |commands, half| {
+            // SAFETY: see `triangles`.
+            unsafe {
+                let device = commands.device();
+                device.cmd_set_depth_bias(commands.raw, 0.0, 0.0, 2.0);
+                device.cmd_set_depth_bias_enable(commands.raw, half == 0);
+            }
+        },
+    )
 }
 
 pub fn dynamic_blend_constants(gpu: &Gpu) -> Drawn {
@@ -102,14 +120,20 @@ pub fn dynamic_blend_constants(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::of(vk::Format::R16G16B16A16_SFLOAT);
-    dynamic(gpu, &target, &options, &shapes::soup(123, 40), |commands, half| {
-        let constants = [[0.1, 0.5, 0.9, 0.3], [0.7, 0.2, 0.4, 1.0]];
-        // SAFETY: see `triangles`.
-        unsafe {
-            let device = commands.device();
-            device.cmd_set_blend_constants(commands.raw, &constants[half]);
-        }
-    })
+    dynamic(
+        gpu,
+        &target,
+        &options,
+        &shapes::soup(123, 40),
+        |commands, half| {
+            let constants = [[0.1, 0.5, 0.9, 0.3], [0.7, 0.2, 0.4, 1.0]];
+            // SAFETY: see `triangles`.
+            unsafe {
+                let device = commands.device();
+                device.cmd_set_blend_constants(commands.raw, &constants[half]);
+            }
+        },
+    )
 }
 
 pub fn dynamic_topology_and_restart(gpu: &Gpu) -> Drawn {
@@ -121,18 +145,24 @@ pub fn dynamic_topology_and_restart(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::default();
-    dynamic(gpu, &target, &options, &shapes::zigzag(124, 24), |commands, half| {
-        let topologies = [
-            vk::PrimitiveTopology::TRIANGLE_STRIP,
-            vk::PrimitiveTopology::TRIANGLE_FAN,
-        ];
-        // SAFETY: see `triangles`.
-        unsafe {
-            let device = commands.device();
-            device.cmd_set_primitive_topology(commands.raw, topologies[half]);
-            device.cmd_set_primitive_restart_enable(commands.raw, false);
-        }
-    })
+    dynamic(
+        gpu,
+        &target,
+        &options,
+        &shapes::zigzag(124, 24),
+        |commands, half| {
+            let topologies = [
+                vk::PrimitiveTopology::TRIANGLE_STRIP,
+                vk::PrimitiveTopology::TRIANGLE_FAN,
+            ];
+            // SAFETY: see `triangles`.
+            unsafe {
+                let device = commands.device();
+                device.cmd_set_primitive_topology(commands.raw, topologies[half]);
+                device.cmd_set_primitive_restart_enable(commands.raw, false);
+            }
+        },
+    )
 }
 
 pub fn dynamic_stencil(gpu: &Gpu) -> Drawn {
@@ -147,21 +177,27 @@ pub fn dynamic_stencil(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::with_depth(vk::Format::D32_SFLOAT_S8_UINT);
-    dynamic(gpu, &target, &options, &shapes::soup(125, 40), |commands, half| {
-        let faces = vk::StencilFaceFlags::FRONT_AND_BACK;
-        let compare = [vk::CompareOp::ALWAYS, vk::CompareOp::EQUAL][half];
-        let pass = [vk::StencilOp::REPLACE, vk::StencilOp::INVERT][half];
-        let keep = vk::StencilOp::KEEP;
-        // SAFETY: see `triangles`.
-        unsafe {
-            let device = commands.device();
-            device.cmd_set_stencil_test_enable(commands.raw, true);
-            device.cmd_set_stencil_op(commands.raw, faces, keep, pass, keep, compare);
-            device.cmd_set_stencil_compare_mask(commands.raw, faces, 0x0f);
-            device.cmd_set_stencil_write_mask(commands.raw, faces, 0x3f);
-            device.cmd_set_stencil_reference(commands.raw, faces, 0x15);
-        }
-    })
+    dynamic(
+        gpu,
+        &target,
+        &options,
+        &shapes::soup(125, 40),
+        |commands, half| {
+            let faces = vk::StencilFaceFlags::FRONT_AND_BACK;
+            let compare = [vk::CompareOp::ALWAYS, vk::CompareOp::EQUAL][half];
+            let pass = [vk::StencilOp::REPLACE, vk::StencilOp::INVERT][half];
+            let keep = vk::StencilOp::KEEP;
+            // SAFETY: see `triangles`.
+            unsafe {
+                let device = commands.device();
+                device.cmd_set_stencil_test_enable(commands.raw, true);
+                device.cmd_set_stencil_op(commands.raw, faces, keep, pass, keep, compare);
+                device.cmd_set_stencil_compare_mask(commands.raw, faces, 0x0f);
+                device.cmd_set_stencil_write_mask(commands.raw, faces, 0x3f);
+                device.cmd_set_stencil_reference(commands.raw, faces, 0x15);
+            }
+        },
+    )
 }
 
 pub fn dynamic_vertex_strides(gpu: &Gpu) -> Drawn {

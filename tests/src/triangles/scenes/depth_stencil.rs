@@ -40,7 +40,9 @@ pub fn depth_comparisons(gpu: &Gpu) -> Drawn {
         vertex.color = [1.0; 4];
     }
     let name = |op: &Compare| format!("{op:?}");
-    Ok(cases(COMPARISONS, name, |&op| tested(gpu, D32, op, &vertices)))
+    Ok(cases(COMPARISONS, name, |&op| {
+        tested(gpu, D32, op, &vertices)
+    }))
 }
 
 fn depth_format(gpu: &Gpu, format: vk::Format) -> Drawn {

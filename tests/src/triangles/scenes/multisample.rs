@@ -116,7 +116,12 @@ pub fn centroid_qualifier(gpu: &Gpu) -> Drawn {
     let mut vertices = shapes::flat_soup(77, 30);
     // Zero along one edge and never below it, so that only an extrapolation can be negative.
     for (index, vertex) in vertices.iter_mut().enumerate() {
-        vertex.color = [f32::from(index % 3 == 0), 1.0, f32::from(index % 3 == 1), 1.0];
+        vertex.color = [
+            f32::from(index % 3 == 0),
+            1.0,
+            f32::from(index % 3 == 1),
+            1.0,
+        ];
     }
     Ok(simple(gpu, &four(), &options, &vertices))
 }

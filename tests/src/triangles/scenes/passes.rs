@@ -47,7 +47,13 @@ impl Object {
     }
 
     /// Records a pass that clears its attachments to `clears`.
-    fn pass(&self, commands: &Commands, target: &Target, clears: &[vk::ClearValue], draws: impl FnOnce()) {
+    fn pass(
+        &self,
+        commands: &Commands,
+        target: &Target,
+        clears: &[vk::ClearValue],
+        draws: impl FnOnce(),
+    ) {
         let [width, height] = target.options.size;
         let info = vk::RenderPassBeginInfo::default()
             .render_pass(self.render_pass)
@@ -119,7 +125,10 @@ fn clears() -> [vk::ClearValue; 3] {
 pub fn render_pass_object(gpu: &Gpu) -> Drawn {
     let format = vk::Format::D32_SFLOAT;
     let target = Target::new(gpu, &TargetOptions::with_depth(format));
-    let attachments = [attachment(target.options.colors[0], 1), attachment(format, 1)];
+    let attachments = [
+        attachment(target.options.colors[0], 1),
+        attachment(format, 1),
+    ];
     let colors = [reference(0, COLOR)];
     let depth = reference(1, DEPTH);
     let subpasses = [vk::SubpassDescription::default()
@@ -167,10 +176,7 @@ pub fn input_attachments(gpu: &Gpu) -> Drawn {
     let first_colors = [reference(0, COLOR)];
     let depth = reference(1, DEPTH);
     let second_colors = [reference(2, COLOR)];
-    let inputs = [
-        reference(0, READ),
-        reference(1, READ),
-    ];
+    let inputs = [reference(0, READ), reference(1, READ)];
     let subpasses = [
         vk::SubpassDescription::default()
             .color_attachments(&first_colors)
@@ -196,7 +202,10 @@ pub fn input_attachments(gpu: &Gpu) -> Drawn {
         target.colors[1].attachment,
     ];
     let object = Object::new(gpu, &info, &views, options.size);
-    let resources = [Resource::Input(target.colors[0].view), Resource::Input(depth_image.view)];
+    let resources = [
+        Resource::Input(target.colors[0].view),
+        Resource::Input(depth_image.view),
+    ];
     let bindings = Bindings::new(gpu, &resources);
     // Each subpass has one colour attachment.
     let one = Target::new(gpu, &TargetOptions::with_depth(format));

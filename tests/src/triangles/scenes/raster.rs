@@ -4,9 +4,7 @@ use ash::vk;
 
 use super::Drawn;
 use super::simple::{cases, need, simple, with};
-use crate::triangles::{
-    FRAGMENT, Gpu, PipelineOptions, TargetOptions, depth_test, shapes,
-};
+use crate::triangles::{FRAGMENT, Gpu, PipelineOptions, TargetOptions, depth_test, shapes};
 
 /// Culling of each face, for each winding of front faces.
 pub fn culling(gpu: &Gpu) -> Drawn {
@@ -27,7 +25,12 @@ pub fn culling(gpu: &Gpu) -> Drawn {
             raster: raster.cull_mode(mode).front_face(front),
             ..PipelineOptions::default()
         };
-        simple(gpu, &TargetOptions::default(), &options, &shapes::soup(20, 40))
+        simple(
+            gpu,
+            &TargetOptions::default(),
+            &options,
+            &shapes::soup(20, 40),
+        )
     }))
 }
 
@@ -84,10 +87,16 @@ pub fn negative_viewport_height(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let vertices = shapes::soup(24, 30);
-    Ok(with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
-        commands.viewport([0.0, 128.0, 128.0, -128.0], [0.0, 1.0]);
-        commands.draw(0..90);
-    }))
+    Ok(with(
+        gpu,
+        &TargetOptions::default(),
+        &options,
+        &vertices,
+        |commands| {
+            commands.viewport([0.0, 128.0, 128.0, -128.0], [0.0, 1.0]);
+            commands.draw(0..90);
+        },
+    ))
 }
 
 pub fn viewport_and_depth_range(gpu: &Gpu) -> Drawn {
@@ -96,37 +105,55 @@ pub fn viewport_and_depth_range(gpu: &Gpu) -> Drawn {
         ..PipelineOptions::default()
     };
     let target = TargetOptions::with_depth(vk::Format::D32_SFLOAT);
-    Ok(with(gpu, &target, &options, &shapes::soup(25, 30), |commands| {
-        commands.viewport([3.25, 7.5, 61.0, 90.75], [0.25, 0.5]);
-        commands.draw(0..45);
-        commands.viewport([60.0, 10.0, 64.0, 100.0], [0.9, 0.1]);
-        commands.draw(45..90);
-    }))
+    Ok(with(
+        gpu,
+        &target,
+        &options,
+        &shapes::soup(25, 30),
+        |commands| {
+            commands.viewport([3.25, 7.5, 61.0, 90.75], [0.25, 0.5]);
+            commands.draw(0..45);
+            commands.viewport([60.0, 10.0, 64.0, 100.0], [0.9, 0.1]);
+            commands.draw(45..90);
+        },
+    ))
 }
 
 pub fn scissors(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions::default();
     let vertices = shapes::soup(26, 30);
-    Ok(with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
-        commands.scissor([5, 9], [50, 21]);
-        commands.draw(0..30);
-        commands.scissor([64, 64], [0, 10]);
-        commands.draw(0..90);
-        commands.scissor([71, 33], [1000, 1]);
-        commands.draw(0..90);
-        commands.scissor([63, 63], [3, 60]);
-        commands.draw(30..90);
-    }))
+    Ok(with(
+        gpu,
+        &TargetOptions::default(),
+        &options,
+        &vertices,
+        |commands| {
+            commands.scissor([5, 9], [50, 21]);
+            commands.draw(0..30);
+            commands.scissor([64, 64], [0, 10]);
+            commands.draw(0..90);
+            commands.scissor([71, 33], [1000, 1]);
+            commands.draw(0..90);
+            commands.scissor([63, 63], [3, 60]);
+            commands.draw(30..90);
+        },
+    ))
 }
 
 /// A viewport that goes far beyond the target on all sides.
 pub fn viewport_beyond_the_target(gpu: &Gpu) -> Drawn {
     let options = PipelineOptions::default();
     let vertices = shapes::flat_soup(27, 30);
-    Ok(with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
-        commands.viewport([-100.0, -64.0, 328.0, 256.0], [0.0, 1.0]);
-        commands.draw(0..90);
-    }))
+    Ok(with(
+        gpu,
+        &TargetOptions::default(),
+        &options,
+        &vertices,
+        |commands| {
+            commands.viewport([-100.0, -64.0, 328.0, 256.0], [0.0, 1.0]);
+            commands.draw(0..90);
+        },
+    ))
 }
 
 /// Distances that cut triangles, or remove those that are wholly on the wrong side.

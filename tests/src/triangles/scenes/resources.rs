@@ -10,7 +10,13 @@ use crate::triangles::{
 };
 
 /// Colours in a vertex format of their own, from a second binding.
-fn colored(gpu: &Gpu, format: vk::Format, stride: u32, bytes: &[u8], fragment_scale: f32) -> Output {
+fn colored(
+    gpu: &Gpu,
+    format: vk::Format,
+    stride: u32,
+    bytes: &[u8],
+    fragment_scale: f32,
+) -> Output {
     let prefix = match format!("{format:?}") {
         name if name.contains("UINT") => "u",
         name if name.contains("SINT") => "i",
@@ -78,7 +84,10 @@ pub fn vertex_formats(gpu: &Gpu) -> Drawn {
 
 pub fn float_vertex_formats(gpu: &Gpu) -> Drawn {
     use vk::Format as F;
-    let floats: Vec<f32> = noise(240).iter().map(|&byte| f32::from(byte) / 120.0).collect();
+    let floats: Vec<f32> = noise(240)
+        .iter()
+        .map(|&byte| f32::from(byte) / 120.0)
+        .collect();
     let formats = [
         (F::R32_SFLOAT, 4),
         (F::R32G32_SFLOAT, 8),
@@ -110,7 +119,10 @@ pub fn vertex_offsets_and_strides(gpu: &Gpu) -> Drawn {
         let target = Target::new(gpu, &TargetOptions::default());
         let pipeline = Pipeline::new(gpu, &target, &options);
         let positions = Buffer::of(gpu, &shapes::soup(102, 20));
-        let floats: Vec<f32> = noise(600).iter().map(|&byte| f32::from(byte) / 120.0).collect();
+        let floats: Vec<f32> = noise(600)
+            .iter()
+            .map(|&byte| f32::from(byte) / 120.0)
+            .collect();
         let colors = Buffer::of(gpu, &floats);
         target.draw(gpu, &Pass::default(), |commands| {
             commands.bind(&pipeline);
@@ -122,7 +134,13 @@ pub fn vertex_offsets_and_strides(gpu: &Gpu) -> Drawn {
 }
 
 /// Scales positions and mixes colours with what comes from a binding or push constants.
-fn fed(gpu: &Gpu, declaration: &str, resource: Option<Resource>, offsets: &[&[u32]], push: &[f32]) -> Output {
+fn fed(
+    gpu: &Gpu,
+    declaration: &str,
+    resource: Option<Resource>,
+    offsets: &[&[u32]],
+    push: &[f32],
+) -> Output {
     let vertex = format!(
         "{declaration}
          layout(location = 0) in vec4 position;
@@ -220,7 +238,10 @@ pub fn push_constants_between_draws(gpu: &Gpu) -> Drawn {
     };
     let target = Target::new(gpu, &TargetOptions::default());
     let pipeline = Pipeline::new(gpu, &target, &options);
-    let vertices = Buffer::of(gpu, &shapes::rectangle([-1.0, -1.0, 1.0, 1.0], 0.5, [0.0; 4]));
+    let vertices = Buffer::of(
+        gpu,
+        &shapes::rectangle([-1.0, -1.0, 1.0, 1.0], 0.5, [0.0; 4]),
+    );
     Ok(target.draw(gpu, &Pass::default(), |commands| {
         commands.bind(&pipeline);
         commands.vertices(&vertices);

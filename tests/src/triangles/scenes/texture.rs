@@ -84,11 +84,23 @@ fn sampled(
 
 pub fn nearest_filter(gpu: &Gpu) -> Drawn {
     let sampler = vk::SamplerCreateInfo::default();
-    Ok(sampled(gpu, &flat(gpu, 1), &sampler, "sampler2D", "texture(image, uv)"))
+    Ok(sampled(
+        gpu,
+        &flat(gpu, 1),
+        &sampler,
+        "sampler2D",
+        "texture(image, uv)",
+    ))
 }
 
 pub fn linear_filter(gpu: &Gpu) -> Drawn {
-    Ok(sampled(gpu, &flat(gpu, 1), &linear(), "sampler2D", "texture(image, uv)"))
+    Ok(sampled(
+        gpu,
+        &flat(gpu, 1),
+        &linear(),
+        "sampler2D",
+        "texture(image, uv)",
+    ))
 }
 
 /// Levels chosen by the shader, so that no derivative is involved.
@@ -192,28 +204,58 @@ pub fn unnormalized_coordinates(gpu: &Gpu) -> Drawn {
         .address_mode_v(mode)
         .unnormalized_coordinates(true);
     let expression = "textureLod(image, vec2(32.0, 16.0) * uv, 0.0)";
-    Ok(sampled(gpu, &flat(gpu, 1), &sampler, "sampler2D", expression))
+    Ok(sampled(
+        gpu,
+        &flat(gpu, 1),
+        &sampler,
+        "sampler2D",
+        expression,
+    ))
 }
 
 pub fn texel_fetch(gpu: &Gpu) -> Drawn {
     let expression = "texelFetch(image, (ivec2(gl_FragCoord.xy) / 8) & 7, 1)";
     let sampler = vk::SamplerCreateInfo::default().max_lod(9.0);
-    Ok(sampled(gpu, &flat(gpu, 3), &sampler, "sampler2D", expression))
+    Ok(sampled(
+        gpu,
+        &flat(gpu, 3),
+        &sampler,
+        "sampler2D",
+        expression,
+    ))
 }
 
 pub fn texture_gather(gpu: &Gpu) -> Drawn {
     let expression = "textureGather(image, uv, 1)";
-    Ok(sampled(gpu, &flat(gpu, 1), &linear(), "sampler2D", expression))
+    Ok(sampled(
+        gpu,
+        &flat(gpu, 1),
+        &linear(),
+        "sampler2D",
+        expression,
+    ))
 }
 
 pub fn texel_offsets(gpu: &Gpu) -> Drawn {
     let expression = "textureLodOffset(image, uv, 0.0, ivec2(3, -2))";
-    Ok(sampled(gpu, &flat(gpu, 1), &linear(), "sampler2D", expression))
+    Ok(sampled(
+        gpu,
+        &flat(gpu, 1),
+        &linear(),
+        "sampler2D",
+        expression,
+    ))
 }
 
 pub fn one_dimension(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::TYPE_1D, [32, 1, 1], 1, 1);
-    Ok(sampled(gpu, &image, &linear(), "sampler1D", "texture(image, uv.x)"))
+    Ok(sampled(
+        gpu,
+        &image,
+        &linear(),
+        "sampler1D",
+        "texture(image, uv.x)",
+    ))
 }
 
 pub fn three_dimensions(gpu: &Gpu) -> Drawn {
@@ -226,14 +268,21 @@ pub fn array_layers(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::TYPE_2D_ARRAY, [16, 16, 1], 5, 1);
     // Away from where the layer changes.
     let expression = "texture(image, vec3(uv, floor(gl_FragCoord.x / 20.0) - 0.9))";
-    Ok(sampled(gpu, &image, &linear(), "sampler2DArray", expression))
+    Ok(sampled(
+        gpu,
+        &image,
+        &linear(),
+        "sampler2DArray",
+        expression,
+    ))
 }
 
 pub fn cube_faces(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::CUBE, [8, 8, 1], 6, 1);
     // Nearest, since how faces join is an implementation's choice in part.
     let sampler = vk::SamplerCreateInfo::default();
-    let expression = "textureLod(image, vec3(3.0 * uv.x - 1.3, 2.0 * uv.y - 0.9, sin(9.0 * uv.x)), 0.0)";
+    let expression =
+        "textureLod(image, vec3(3.0 * uv.x - 1.3, 2.0 * uv.y - 0.9, sin(9.0 * uv.x)), 0.0)";
     Ok(sampled(gpu, &image, &sampler, "samplerCube", expression))
 }
 
@@ -248,7 +297,13 @@ pub fn cube_arrays(gpu: &Gpu) -> Drawn {
     let image = image(gpu, vk::ImageViewType::CUBE_ARRAY, [8, 8, 1], 12, 1);
     let sampler = vk::SamplerCreateInfo::default();
     let expression = "textureLod(image, vec4(uv - 0.5, 0.6, step(64.0, gl_FragCoord.x)), 0.0)";
-    Ok(sampled(gpu, &image, &sampler, "samplerCubeArray", expression))
+    Ok(sampled(
+        gpu,
+        &image,
+        &sampler,
+        "samplerCubeArray",
+        expression,
+    ))
 }
 
 pub fn anisotropic_filter(gpu: &Gpu) -> Drawn {

@@ -3,8 +3,8 @@
 use ash::vk;
 use ash::vk::PrimitiveTopology as Topology;
 
-use super::simple::{cases, need, simple, with};
 use super::Drawn;
+use super::simple::{cases, need, simple, with};
 use crate::triangles::{
     Buffer, Gpu, Output, PipelineOptions, TargetOptions, Vertex, attribute, binding, shapes,
 };
@@ -60,7 +60,12 @@ pub fn provoking_vertices(gpu: &Gpu) -> Drawn {
             fragment: Some(FRAGMENT),
             ..of(topology)
         };
-        simple(gpu, &TargetOptions::default(), &options, &shapes::zigzag(4, 12))
+        simple(
+            gpu,
+            &TargetOptions::default(),
+            &options,
+            &shapes::zigzag(4, 12),
+        )
     }))
 }
 
@@ -135,10 +140,16 @@ pub fn indices_of_every_type(gpu: &Gpu) -> Drawn {
             _ => Buffer::of(gpu, &words),
         };
         let options = PipelineOptions::default();
-        with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
-            commands.indices(&indices, 0, index_type);
-            commands.draw_indexed(0..45, 0);
-        })
+        with(
+            gpu,
+            &TargetOptions::default(),
+            &options,
+            &vertices,
+            |commands| {
+                commands.indices(&indices, 0, index_type);
+                commands.draw_indexed(0..45, 0);
+            },
+        )
     }))
 }
 
@@ -174,10 +185,16 @@ pub fn primitive_restart(gpu: &Gpu) -> Drawn {
             restart: true,
             ..of(topology)
         };
-        with(gpu, &TargetOptions::default(), &options, &vertices, |commands| {
-            commands.indices(&indices, 0, vk::IndexType::UINT16);
-            commands.draw_indexed(0..order.len() as u32, 0);
-        })
+        with(
+            gpu,
+            &TargetOptions::default(),
+            &options,
+            &vertices,
+            |commands| {
+                commands.indices(&indices, 0, vk::IndexType::UINT16);
+                commands.draw_indexed(0..order.len() as u32, 0);
+            },
+        )
     }))
 }
 
@@ -202,10 +219,16 @@ fn numbered() -> PipelineOptions<'static> {
 
 pub fn instances_by_number(gpu: &Gpu) -> Drawn {
     let target = TargetOptions::default();
-    Ok(with(gpu, &target, &numbered(), &shapes::whole(0.0, [0.0; 4]), |commands| {
-        commands.draw_instances(0..3, 0..20);
-        commands.draw_instances(3..6, 30..50);
-    }))
+    Ok(with(
+        gpu,
+        &target,
+        &numbered(),
+        &shapes::whole(0.0, [0.0; 4]),
+        |commands| {
+            commands.draw_instances(0..3, 0..20);
+            commands.draw_instances(3..6, 30..50);
+        },
+    ))
 }
 
 /// Vertices of a rectangle, moved and coloured by instance.
