@@ -273,7 +273,7 @@ pub fn resolve_attachments(gpu: &Gpu) -> Drawn {
     let pipeline = Pipeline::new(gpu, &target, &options);
     let vertices = Buffer::of(gpu, &shapes::flat_soup(142, 40));
     gpu.run(|commands| {
-        object.pass(commands, &target, &clears()[..1], || {
+        object.pass(commands, &target, &[clears()[0]; 2], || {
             commands.bind(&pipeline);
             commands.vertices(&vertices);
             commands.draw(0..120);
