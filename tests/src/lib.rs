@@ -1,5 +1,6 @@
 //! What the project's tests share: the reference renderer, generated scenes, image comparison,
-//! devices to draw on, compute kernels, and the place of test data.
+//! devices to draw on, compute kernels, scenes of triangles, and the
+//! place of test data.
 
 pub mod compare;
 pub mod contexts;
@@ -8,3 +9,4 @@ pub mod data;
 pub mod kernels;
 pub mod oracle;
 pub mod scenes;
+pub mod triangles;
