@@ -29,6 +29,7 @@ const SUPPORTED: &[&str] = &[
     "shader_storage_image_read_without_format",
     "shader_storage_image_write_without_format",
     "shader_uniform_buffer_array_dynamic_indexing",
+    "texture_compression_bc",
     // Core 1.1.
     "storage_buffer16_bit_access",
     "storage_push_constant16",
