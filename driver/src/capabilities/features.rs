@@ -462,7 +462,7 @@ mod tests {
 
     #[test]
     fn supported_features_are_those_of_the_structures() {
-        let mut names = all_true::<vk::PhysicalDeviceFeatures>(18);
+        let mut names = all_true::<vk::PhysicalDeviceFeatures>(19);
         names.extend(all_true::<vk::PhysicalDeviceVulkan11Features<'_>>(3));
         names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(30));
         names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(8));

@@ -184,6 +184,16 @@ impl Device {
         properties.optimal_tiling_features
     }
 
+    /// What buffers can do.
+    pub fn buffer_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+        // SAFETY: see the crate.
+        let properties = unsafe {
+            self.instance
+                .get_physical_device_format_properties(self.physical_device, format)
+        };
+        properties.buffer_features
+    }
+
     /// Records commands, submits them and waits.
     pub fn run(&self, record: impl FnOnce(&ash::Device, vk::CommandBuffer)) {
         let info = vk::CommandBufferAllocateInfo::default()
@@ -226,6 +236,7 @@ impl Device {
             vk::BufferUsageFlags::TRANSFER_SRC
                 | vk::BufferUsageFlags::TRANSFER_DST
                 | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER
                 | vk::BufferUsageFlags::STORAGE_BUFFER,
         );
         // SAFETY: see the crate.
