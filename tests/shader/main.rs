@@ -1,3 +1,4 @@
 //! Shader cores as a Vulkan application sees them.
 
+mod instructions;
 mod kernels;

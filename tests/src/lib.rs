@@ -1,5 +1,5 @@
 //! What the project's tests share: the reference renderer, generated scenes, image comparison,
-//! devices to draw on, compute kernels, and the place of test data.
+//! devices to draw on, compute kernels, programs made up at random, and the place of test data.
 
 pub mod compare;
 pub mod contexts;
@@ -7,4 +7,5 @@ pub mod convert;
 pub mod data;
 pub mod kernels;
 pub mod oracle;
+pub mod programs;
 pub mod scenes;
