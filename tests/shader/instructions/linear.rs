@@ -125,11 +125,7 @@ fn products(kind: Kind) -> Vec<Row> {
 }
 
 fn length(p: Format, v: &[Interval]) -> Maybe {
-    match v {
-        // One component's length is its size, which is at least as accurate.
-        [one] if one.low == one.high => Some(exactly(one.low.abs())),
-        _ => p.sqrt(p.dot(v, v)?),
-    }
+    p.sqrt(p.dot(v, v)?)
 }
 
 fn difference(p: Format, a: &[f64], b: &[f64]) -> Option<Vec<Interval>> {

@@ -330,7 +330,11 @@ impl Format {
         let formula = formula?;
         let error = (truth - formula.low).abs().max((truth - formula.high).abs());
         (truth.is_finite() && !error.is_nan()).then_some(())?;
-        Some(exactly(truth).widened(error, error))
+        // The formula's own ends again, since the widened ones are rounded here.
+        Some(Interval {
+            low: formula.low.min(truth - error),
+            high: formula.high.max(truth + error),
+        })
     }
 
     /// Whether a result lies within an interval: in place of what is larger than the largest number, an infinity or the
