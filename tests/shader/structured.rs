@@ -14,7 +14,7 @@ const PROGRAMS: u64 = 20;
 /// Seeds on this driver.
 const SEEDS: u64 = 4000;
 /// Seeds on lavapipe, whose compiler takes its time.
-const SAMPLE: u64 = 100;
+const SAMPLE: u64 = 2000;
 
 /// Invocations' inputs: small numbers, so that conditions hold and fail, and any.
 fn inputs() -> Vec<[u32; 2]> {

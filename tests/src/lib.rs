@@ -5,6 +5,7 @@ pub mod compare;
 pub mod contexts;
 pub mod convert;
 pub mod data;
+pub mod fuzzing;
 pub mod kernels;
 pub mod oracle;
 pub mod programs;
