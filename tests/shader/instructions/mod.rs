@@ -157,6 +157,63 @@ fn check_all(context: &Context, list: &str) {
     );
 }
 
+/// Opcodes of the groups of instructions that are tried here.
+const OPCODES: &[std::ops::RangeInclusive<u32>] = &[
+    // Composites, conversions, arithmetic.
+    77..=84,
+    109..=116,
+    124..=124,
+    126..=152,
+    // Truth values, relations, bits.
+    154..=157,
+    164..=191,
+    194..=205,
+    // Atomics, groups.
+    227..=242,
+    333..=366,
+];
+
+/// Those among them that no row is named after: they are in all rows, or need what Vulkan doesn't have.
+const IN_ALL_ROWS: &[Op] = &[
+    Op::CompositeExtract,
+    Op::AtomicCompareExchangeWeak,
+];
+
+#[test]
+fn every_instruction_has_a_row() {
+    let mut rows = all();
+    rows.extend(subgroup::rows(&Context::gaurast().unwrap()));
+    let names: Vec<&str> = rows.iter().map(|row| row.name.as_str()).collect();
+    let is_named = |name: &str| {
+        let is_word = |row: &str| row.split([' ', ',']).any(|word| word == name);
+        names.iter().any(|row| is_word(row))
+    };
+    let core = OPCODES.iter().cloned().flatten().filter_map(Op::from_u32);
+    let core = core.filter(|op| !IN_ALL_ROWS.contains(op));
+    let missing: Vec<String> = core
+        .map(What::Core)
+        .chain((1..=81).filter_map(G::from_u32).map(What::Glsl))
+        .map(What::name)
+        .filter(|name| !is_named(name))
+        .collect();
+    // The first is reserved, the others are for fragments alone.
+    let none = [
+        "GlslIMix",
+        "GlslInterpolateAtCentroid",
+        "GlslInterpolateAtSample",
+        "GlslInterpolateAtOffset",
+    ];
+    assert_eq!(missing, none);
+}
+
+#[test]
+fn the_reserved_function_is_refused() {
+    let ty = Ty::scalar(gaurast_tests::programs::types::Kind::I32);
+    let row = whole(What::Glsl(G::IMix), &[ty, ty, ty], ty, |_| vec![Expect::Any]);
+    let refused = check(&Context::gaurast().unwrap(), &[row]);
+    assert!(refused.is_err(), "GLSL.std.450 has no IMix");
+}
+
 #[test]
 fn instructions_are_as_precise_as_vulkan_asks() {
     check_all(&Context::gaurast().unwrap(), "");

@@ -31,10 +31,10 @@ fn number(random: &mut ChaCha8Rng, bound: u32) -> u32 {
     }
 }
 
-/// A module like the first, with one to four changes; some of them take instructions from the second.
+/// A module like the first, with one to three changes; some of them take instructions from the second.
 pub fn mutate(random: &mut ChaCha8Rng, original: &[u32], other: &[u32]) -> Vec<u32> {
     let mut words = original.to_vec();
-    for _ in 0..random.random_range(1..=4) {
+    for _ in 0..*[1, 1, 2, 3].choose(random).expect("some") {
         change(random, &mut words, other);
     }
     words
@@ -46,7 +46,7 @@ fn change(random: &mut ChaCha8Rng, words: &mut Vec<u32>, other: &[u32]) {
         return;
     };
     let bound = words.get(3).copied().unwrap_or(0).min(1 << 20);
-    match random.random_range(0..16) {
+    match random.random_range(0..20) {
         // A byte anywhere.
         0 | 1 => {
             let at = random.random_range(0..words.len());
@@ -61,26 +61,26 @@ fn change(random: &mut ChaCha8Rng, words: &mut Vec<u32>, other: &[u32]) {
             let [a, b] = [(); 2].map(|()| start + random.random_range(1..count));
             words.swap(a, b);
         }
-        // An operand comes from an instruction of the same opcode.
-        7 | 8 if count > 1 => {
+        // An operand comes from an instruction of the same opcode, which has the right type more often than not.
+        15..=18 if count > 1 => {
+            let at = random.random_range(1..count);
             let same: Vec<_> = all
                 .iter()
-                .filter(|it| words[it.0] == words[start])
+                .filter(|it| words[it.0] == words[start] && at < it.1)
                 .copied()
                 .collect();
-            let at = random.random_range(1..count);
             if let Some((from, _)) = same.choose(random) {
                 words[start + at] = words[from + at];
             }
         }
         // Another opcode: any, one next to it, or that of an instruction of the same size.
-        9 => words[start] = words[start] & 0xffff_0000 | random.random_range(0..460),
-        10 => {
+        7 => words[start] = words[start] & 0xffff_0000 | random.random_range(0..460),
+        8 | 9 => {
             let opcode = words[start] as u16;
             let near = opcode.wrapping_add(1).wrapping_sub(random.random_range(0..3));
             words[start] = words[start] & 0xffff_0000 | u32::from(near);
         }
-        11 => {
+        10 | 11 => {
             let same: Vec<_> = all.iter().filter(|it| it.1 == count).copied().collect();
             if let Some((from, _)) = same.choose(random) {
                 words[start] = words[*from];
