@@ -36,11 +36,17 @@ fn seeds() -> Vec<(String, Vec<u32>, Layout)> {
     names.sort();
     let kept = names.into_iter().map(|path| {
         let words = bytemuck::pod_collect_to_vec(&std::fs::read(&path).unwrap());
-        (path.file_name().unwrap().to_string_lossy().into_owned(), words)
+        (
+            path.file_name().unwrap().to_string_lossy().into_owned(),
+            words,
+        )
     });
     let made = (0..8).map(|seed| {
         let program = structured::generate(seed, &[[seed as u32, 3]]);
-        (format!("structured {seed}"), structured::assemble(&[program]))
+        (
+            format!("structured {seed}"),
+            structured::assemble(&[program]),
+        )
     });
     kept.chain(made)
         .filter_map(|(name, words)| Layout::of(&words).map(|layout| (name, words, layout)))
@@ -57,7 +63,10 @@ fn mutated_modules_never_panic_and_never_write_elsewhere() {
     }));
     let seeds = seeds();
     assert!(seeds.len() > 20, "there should be shaders to begin with");
-    let (runs, first) = (number("GAURAST_FUZZ_RUNS", RUNS), number("GAURAST_FUZZ_FIRST", 0));
+    let (runs, first) = (
+        number("GAURAST_FUZZ_RUNS", RUNS),
+        number("GAURAST_FUZZ_FIRST", 0),
+    );
     let mut harness = Harness::new();
     let mut counts = [0u64; 3];
     for run in first..first + runs {

@@ -78,16 +78,15 @@ fn differences(
 }
 
 /// Runs as many seeds; those that are wrong must be those that the list names, each with a reason.
-fn check(
-    context: &Context,
-    seeds: u64,
-    list: &str,
-    rewrite: impl Fn(Vec<u32>) -> Vec<u32> + Copy,
-) {
+fn check(context: &Context, seeds: u64, list: &str, rewrite: impl Fn(Vec<u32>) -> Vec<u32> + Copy) {
     let listed: Vec<u64> = list
         .lines()
         .filter(|line| !line.starts_with('#'))
-        .map(|line| line.split_once(": ").expect("a seed, a colon and a reason").0)
+        .map(|line| {
+            line.split_once(": ")
+                .expect("a seed, a colon and a reason")
+                .0
+        })
         .map(|seed| seed.parse().expect("a number"))
         .collect();
     let wrong: Vec<(u64, String)> = (0..seeds)

@@ -19,10 +19,18 @@ const UPDATES: &[(Op, Update)] = &[
     (Op::AtomicExchange, |_, _, value| value),
     (Op::AtomicIAdd, |_, old, value| old.wrapping_add(value)),
     (Op::AtomicISub, |_, old, value| old.wrapping_sub(value)),
-    (Op::AtomicSMin, |kind, old, value| pick(kind, true, true, [old, value])),
-    (Op::AtomicUMin, |kind, old, value| pick(kind, false, true, [old, value])),
-    (Op::AtomicSMax, |kind, old, value| pick(kind, true, false, [old, value])),
-    (Op::AtomicUMax, |kind, old, value| pick(kind, false, false, [old, value])),
+    (Op::AtomicSMin, |kind, old, value| {
+        pick(kind, true, true, [old, value])
+    }),
+    (Op::AtomicUMin, |kind, old, value| {
+        pick(kind, false, true, [old, value])
+    }),
+    (Op::AtomicSMax, |kind, old, value| {
+        pick(kind, true, false, [old, value])
+    }),
+    (Op::AtomicUMax, |kind, old, value| {
+        pick(kind, false, false, [old, value])
+    }),
     (Op::AtomicAnd, |_, old, value| old & value),
     (Op::AtomicOr, |_, old, value| old | value),
     (Op::AtomicXor, |_, old, value| old ^ value),

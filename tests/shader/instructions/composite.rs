@@ -23,7 +23,15 @@ fn moves(
 
 pub fn rows() -> Vec<Row> {
     let mut rows = Vec::new();
-    for kind in [Kind::Bool, Kind::U8, Kind::I16, Kind::F16, Kind::F32, Kind::U64, Kind::F64] {
+    for kind in [
+        Kind::Bool,
+        Kind::U8,
+        Kind::I16,
+        Kind::F16,
+        Kind::F32,
+        Kind::U64,
+        Kind::F64,
+    ] {
         rows.extend(vectors(kind));
     }
     for kind in Kind::FLOATS {
@@ -166,7 +174,9 @@ fn array(kind: Kind, class: StorageClass) -> Row {
             let pointer = body.asm.pointer(class, ty);
             for element in 0..5 {
                 let element = body.asm.u32(element);
-                let place = body.asm.emit(Op::AccessChain, pointer, &[variable, element]);
+                let place = body
+                    .asm
+                    .emit(Op::AccessChain, pointer, &[variable, element]);
                 body.asm.act(Op::Store, &[place, v[0]]);
             }
             let written = body

@@ -19,7 +19,9 @@ pub fn rows() -> Vec<Row> {
         }
     }
     for from in Kind::INTEGERS {
-        let wider = Kind::INTEGERS.into_iter().filter(|to| to.bits() != from.bits());
+        let wider = Kind::INTEGERS
+            .into_iter()
+            .filter(|to| to.bits() != from.bits());
         for to in wider {
             rows.extend(between_integers(from, to));
         }
@@ -58,8 +60,11 @@ fn between(float: Kind, integer: Kind) -> Vec<Row> {
             Expect::Any
         }
     };
-    let most = 2f64.powi(i32::try_from(integer.bits()).expect("few")).min(65504.0);
-    let mut within = each(Core(to), &[floats], integers, to_integer).of(0, Domain::Floats(-most, most));
+    let most = 2f64
+        .powi(i32::try_from(integer.bits()).expect("few"))
+        .min(65504.0);
+    let mut within =
+        each(Core(to), &[floats], integers, to_integer).of(0, Domain::Floats(-most, most));
     within.name += " in range";
     vec![
         each(Core(to), &[floats], integers, to_integer),
@@ -76,7 +81,8 @@ fn between_floats(from: Kind, to: Kind) -> Vec<Row> {
     let mut rows = vec![each(Core(Op::FConvert), &[source], target, model)];
     if from.bits() > to.bits() {
         // Numbers close to the middle between two of the narrower ones: where rounding twice goes wrong.
-        let mut row = each(Core(Op::FConvert), &[source], target, model).of(0, Domain::NearTies(to));
+        let mut row =
+            each(Core(Op::FConvert), &[source], target, model).of(0, Domain::NearTies(to));
         row.name += " near ties";
         rows.push(row);
     }
@@ -128,7 +134,9 @@ fn quantized() -> Row {
 /// A signaling NaN made quiet, which most operations may do.
 fn quiet(kind: Kind, bits: u64) -> u64 {
     match kind {
-        kind if kind.is_float() && kind.float(bits).is_nan() => bits | kind.round(f64::NAN) & !kind.round(f64::INFINITY),
+        kind if kind.is_float() && kind.float(bits).is_nan() => {
+            bits | kind.round(f64::NAN) & !kind.round(f64::INFINITY)
+        }
         _ => bits,
     }
 }
@@ -160,10 +168,9 @@ fn bit_casts() -> Vec<Row> {
             let (source, target) = (Ty::vector(from, count), Ty::vector(to, results));
             let mut row = whole(Core(Op::Bitcast), &[source], target, move |v| {
                 let cast = |components: &[u64]| -> Vec<u64> {
-                    let whole = components
-                        .iter()
-                        .rev()
-                        .fold(0u128, |whole, part| whole << from.bits() | u128::from(*part));
+                    let whole = components.iter().rev().fold(0u128, |whole, part| {
+                        whole << from.bits() | u128::from(*part)
+                    });
                     (0..results)
                         .map(|index| (whole >> (index * to.bits())) as u64 & to.mask())
                         .collect()

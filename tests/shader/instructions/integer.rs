@@ -44,7 +44,9 @@ fn remainder(a: i128, b: i128) -> Option<i128> {
     (a >= 0 && b > 0).then(|| a % b)
 }
 
-const COMPARISONS: &[(Op, Sees, fn(i128, i128) -> bool)] = &[
+type Relation = fn(i128, i128) -> bool;
+
+const COMPARISONS: &[(Op, Sees, Relation)] = &[
     (Op::IEqual, Sees::Typed, |a, b| a == b),
     (Op::INotEqual, Sees::Typed, |a, b| a != b),
     (Op::UGreaterThan, Sees::Unsigned, |a, b| a > b),
@@ -107,15 +109,10 @@ pub fn rows() -> Vec<Row> {
             let Some(seen) = seen(kind, *sees) else {
                 continue;
             };
-            rows.push(each(
-                Core(*op),
-                &[ty, ty],
-                ty.of(Kind::Bool),
-                move |v| {
-                    let truth = model(seen.integer(v[0]), seen.integer(v[1]));
-                    Expect::Is(u64::from(truth))
-                },
-            ));
+            rows.push(each(Core(*op), &[ty, ty], ty.of(Kind::Bool), move |v| {
+                let truth = model(seen.integer(v[0]), seen.integer(v[1]));
+                Expect::Is(u64::from(truth))
+            }));
         }
         for (op, sees, model) in GLSL {
             if seen(kind, *sees).is_some_and(|seen| seen == kind) {
@@ -127,7 +124,12 @@ pub fn rows() -> Vec<Row> {
         rows.extend(one_operand(kind, ty));
         rows.extend(shifts(kind, ty));
     }
-    rows.extend(Kind::INTEGERS.into_iter().filter(|kind| kind.bits() == 32).flat_map(bits));
+    rows.extend(
+        Kind::INTEGERS
+            .into_iter()
+            .filter(|kind| kind.bits() == 32)
+            .flat_map(bits),
+    );
     rows.extend(extended());
     rows.extend(logic());
     rows
@@ -153,7 +155,11 @@ fn one_operand(kind: Kind, ty: Ty) -> Vec<Row> {
             }),
         ]);
     }
-    let clamp = if kind.is_signed() { G::SClamp } else { G::UClamp };
+    let clamp = if kind.is_signed() {
+        G::SClamp
+    } else {
+        G::UClamp
+    };
     rows.push(each(Glsl(clamp), &[ty, ty, ty], ty, move |v| {
         let [x, low, high] = [0, 1, 2].map(|index| kind.integer(v[index]));
         outcome(kind, (low <= high).then(|| x.clamp(low, high)))
@@ -163,7 +169,8 @@ fn one_operand(kind: Kind, ty: Ty) -> Vec<Row> {
 
 fn shifts(kind: Kind, ty: Ty) -> Vec<Row> {
     let amounts = Domain::Integers(0, i128::from(kind.bits()) - 1);
-    let models: [(Op, fn(Kind, u64, u64) -> i128); 3] = [
+    type Shift = fn(Kind, u64, u64) -> i128;
+    let models: [(Op, Shift); 3] = [
         (Op::ShiftLeftLogical, |kind, a, by| kind.integer(a) << by),
         (Op::ShiftRightLogical, |kind, a, by| {
             kind.with_sign(false).integer(a) >> by
@@ -220,17 +227,29 @@ fn bits(kind: Kind) -> Vec<Row> {
                 value => u64::from(value.trailing_zeros()),
             })
         }),
-        each(Glsl(G::FindUMsb), &[ty], ty, move |v| Expect::Is(find(v[0]))),
+        each(Glsl(G::FindUMsb), &[ty], ty, move |v| {
+            Expect::Is(find(v[0]))
+        }),
         each(Glsl(G::FindSMsb), &[ty], ty, move |v| {
             let negative = v[0] >> 31 == 1;
             Expect::Is(find(if negative { !v[0] } else { v[0] }))
         }),
-        whole(Core(Op::BitFieldSExtract), &[ty, count, count], ty, extract(true))
-            .of(1, any)
-            .of(2, any),
-        whole(Core(Op::BitFieldUExtract), &[ty, count, count], ty, extract(false))
-            .of(1, any)
-            .of(2, any),
+        whole(
+            Core(Op::BitFieldSExtract),
+            &[ty, count, count],
+            ty,
+            extract(true),
+        )
+        .of(1, any)
+        .of(2, any),
+        whole(
+            Core(Op::BitFieldUExtract),
+            &[ty, count, count],
+            ty,
+            extract(false),
+        )
+        .of(1, any)
+        .of(2, any),
         whole(Core(Op::BitFieldInsert), &[ty, ty, count, count], ty, |v| {
             let (at, width) = (v[2][0], v[3][0]);
             let mask = ((1 << width) - 1) << at;
@@ -249,10 +268,10 @@ fn bits(kind: Kind) -> Vec<Row> {
 fn extended() -> Vec<Row> {
     type Both = fn(i128, i128) -> [i128; 2];
     let all: [(Op, Kind, Both); 4] = [
-        (Op::IAddCarry, Kind::U32, |a, b| [a + b, a + b >> 32]),
+        (Op::IAddCarry, Kind::U32, |a, b| [a + b, (a + b) >> 32]),
         (Op::ISubBorrow, Kind::U32, |a, b| [a - b, i128::from(a < b)]),
-        (Op::UMulExtended, Kind::U32, |a, b| [a * b, a * b >> 32]),
-        (Op::SMulExtended, Kind::I32, |a, b| [a * b, a * b >> 32]),
+        (Op::UMulExtended, Kind::U32, |a, b| [a * b, (a * b) >> 32]),
+        (Op::SMulExtended, Kind::I32, |a, b| [a * b, (a * b) >> 32]),
     ];
     all.into_iter()
         .map(|(op, kind, model)| {
@@ -270,8 +289,7 @@ fn extended() -> Vec<Row> {
                         .to_vec()
                 },
                 move |v| {
-                    let value =
-                        |k: usize| model(kind.integer(v[0][k]), kind.integer(v[1][k]));
+                    let value = |k: usize| model(kind.integer(v[0][k]), kind.integer(v[1][k]));
                     let place = |half: usize, k: usize| Expect::Is(kind.wrap(value(k)[half]));
                     vec![place(0, 0), place(0, 1), place(1, 0), place(1, 1)]
                 },
@@ -283,7 +301,8 @@ fn extended() -> Vec<Row> {
 fn logic() -> Vec<Row> {
     let ty = Ty::vector(Kind::Bool, 4);
     let one = Ty::scalar(Kind::Bool);
-    let two: [(Op, fn(u64, u64) -> u64); 4] = [
+    type Both = fn(u64, u64) -> u64;
+    let two: [(Op, Both); 4] = [
         (Op::LogicalOr, |a, b| a | b),
         (Op::LogicalAnd, |a, b| a & b),
         (Op::LogicalEqual, |a, b| 1 - (a ^ b)),
@@ -292,7 +311,9 @@ fn logic() -> Vec<Row> {
     let mut rows: Vec<Row> = two
         .into_iter()
         .map(|(op, model)| {
-            each(Core(op), &[ty, ty], ty, move |v| Expect::Is(model(v[0], v[1])))
+            each(Core(op), &[ty, ty], ty, move |v| {
+                Expect::Is(model(v[0], v[1]))
+            })
         })
         .collect();
     rows.extend([
@@ -304,7 +325,14 @@ fn logic() -> Vec<Row> {
             vec![Expect::Is(u64::from(!v[0].contains(&0)))]
         }),
     ]);
-    for kind in [Kind::Bool, Kind::I16, Kind::U64, Kind::F16, Kind::F32, Kind::F64] {
+    for kind in [
+        Kind::Bool,
+        Kind::I16,
+        Kind::U64,
+        Kind::F16,
+        Kind::F32,
+        Kind::F64,
+    ] {
         let value = Ty::vector(kind, 3);
         rows.push(each(
             Core(Op::Select),

@@ -181,27 +181,32 @@ fn geometry(kind: Kind) -> Vec<Row> {
                 })
                 .collect()
         }),
-        whole(Glsl(G::FaceForward), &[vector, vector, vector], vector, move |v| {
-            let (i, reference) = (numbers(kind, &v[1]), numbers(kind, &v[2]));
-            let along = p.dot(&exact(&reference), &exact(&i));
-            let facing = |along: Interval| match along {
-                along if along.high < 0.0 => Some(false),
-                along if along.low >= 0.0 => Some(true),
-                _ => None,
-            };
-            let turned = along.and_then(facing);
-            v[0].iter()
-                .map(|bits| {
-                    let away = kind.round(-kind.float(*bits));
-                    match turned {
-                        Some(true) => Expect::Is(away),
-                        Some(false) => Expect::Is(*bits),
-                        None if kind.float(*bits).is_nan() => Expect::Any,
-                        None => Expect::OneOf(vec![*bits, away]),
-                    }
-                })
-                .collect()
-        }),
+        whole(
+            Glsl(G::FaceForward),
+            &[vector, vector, vector],
+            vector,
+            move |v| {
+                let (i, reference) = (numbers(kind, &v[1]), numbers(kind, &v[2]));
+                let along = p.dot(&exact(&reference), &exact(&i));
+                let facing = |along: Interval| match along {
+                    along if along.high < 0.0 => Some(false),
+                    along if along.low >= 0.0 => Some(true),
+                    _ => None,
+                };
+                let turned = along.and_then(facing);
+                v[0].iter()
+                    .map(|bits| {
+                        let away = kind.round(-kind.float(*bits));
+                        match turned {
+                            Some(true) => Expect::Is(away),
+                            Some(false) => Expect::Is(*bits),
+                            None if kind.float(*bits).is_nan() => Expect::Any,
+                            None => Expect::OneOf(vec![*bits, away]),
+                        }
+                    })
+                    .collect()
+            },
+        ),
         whole(Glsl(G::Reflect), &pair, vector, move |v| {
             let (i, n) = both(v);
             let along = p.dot(&exact(&n), &exact(&i));

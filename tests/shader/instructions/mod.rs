@@ -8,6 +8,7 @@ mod float;
 mod function;
 mod integer;
 mod linear;
+mod reduction;
 mod subgroup;
 
 use gaurast_tests::kernels::Context;
@@ -174,10 +175,7 @@ const OPCODES: &[std::ops::RangeInclusive<u32>] = &[
 ];
 
 /// Those among them that no row is named after: they are in all rows, or need what Vulkan doesn't have.
-const IN_ALL_ROWS: &[Op] = &[
-    Op::CompositeExtract,
-    Op::AtomicCompareExchangeWeak,
-];
+const IN_ALL_ROWS: &[Op] = &[Op::CompositeExtract, Op::AtomicCompareExchangeWeak];
 
 #[test]
 fn every_instruction_has_a_row() {
@@ -209,7 +207,9 @@ fn every_instruction_has_a_row() {
 #[test]
 fn the_reserved_function_is_refused() {
     let ty = Ty::scalar(gaurast_tests::programs::types::Kind::I32);
-    let row = whole(What::Glsl(G::IMix), &[ty, ty, ty], ty, |_| vec![Expect::Any]);
+    let row = whole(What::Glsl(G::IMix), &[ty, ty, ty], ty, |_| {
+        vec![Expect::Any]
+    });
     let refused = check(&Context::gaurast().unwrap(), &[row]);
     assert!(refused.is_err(), "GLSL.std.450 has no IMix");
 }

@@ -173,7 +173,10 @@ impl Open {
     fn check_guards(&self) {
         let mut bytes = vec![0; BYTES];
         // SAFETY: the mapping has as many bytes, and nothing is pending.
-        unsafe { self.mapped.copy_to_nonoverlapping(bytes.as_mut_ptr(), BYTES) };
+        unsafe {
+            self.mapped
+                .copy_to_nonoverlapping(bytes.as_mut_ptr(), BYTES);
+        };
         for (index, guard) in bytes.chunks(RANGE as usize).step_by(2).enumerate() {
             let written = guard.iter().position(|byte| *byte != GUARD);
             assert_eq!(written, None, "guard {index} was written to");
@@ -326,14 +329,7 @@ impl Open {
             device.begin_command_buffer(commands[0], &info)?;
             device.cmd_bind_pipeline(commands[0], point, pipeline);
             if !sets.is_empty() {
-                device.cmd_bind_descriptor_sets(
-                    commands[0],
-                    point,
-                    pipeline_layout,
-                    0,
-                    &sets,
-                    &[],
-                );
+                device.cmd_bind_descriptor_sets(commands[0], point, pipeline_layout, 0, &sets, &[]);
             }
             let push: [u8; PUSH_BYTES] =
                 std::array::from_fn(|index| if index % 4 == 0 { index as u8 % 9 } else { 0 });

@@ -226,10 +226,7 @@ impl Assembler {
         }
         let glsl = [vec![self.glsl], string("GLSL.std.450")].concat();
         instruction(&mut words, Op::ExtInstImport, &glsl);
-        let model = [
-            AddressingModel::Logical as u32,
-            MemoryModel::GLSL450 as u32,
-        ];
+        let model = [AddressingModel::Logical as u32, MemoryModel::GLSL450 as u32];
         instruction(&mut words, Op::MemoryModel, &model);
         let mut entry = vec![ExecutionModel::GLCompute as u32, self.main];
         entry.extend(string("main"));

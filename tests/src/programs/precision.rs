@@ -328,7 +328,9 @@ impl Format {
     /// The interval around the true result that a formula's permits.
     pub fn inherited(self, truth: f64, formula: Maybe) -> Maybe {
         let formula = formula?;
-        let error = (truth - formula.low).abs().max((truth - formula.high).abs());
+        let error = (truth - formula.low)
+            .abs()
+            .max((truth - formula.high).abs());
         (truth.is_finite() && !error.is_nan()).then_some(())?;
         // The formula's own ends again, since the widened ones are rounded here.
         Some(Interval {

@@ -116,9 +116,9 @@ impl Body {
         if self.scratch[at] == 0 {
             let kind = if wide { Kind::U64 } else { Kind::U32 };
             let element = self.ty(Ty::scalar(kind));
-            self.scratch[at] =
-                self.asm
-                    .storage_buffer(2 + at as u32, element, kind.bits() / 8);
+            self.scratch[at] = self
+                .asm
+                .storage_buffer(2 + at as u32, element, kind.bits() / 8);
         }
         self.scratch[at]
     }
@@ -290,7 +290,12 @@ fn compare(context: &Context, row: &Row, lanes: &[Lane], found: &[u32]) -> Optio
         let failure = failure.get_or_insert_with(|| Failure {
             row: row.name.clone(),
             lanes: 0,
-            example: describe(row, &lanes[lane], &found, &row.expected(lanes, lane, subgroup)),
+            example: describe(
+                row,
+                &lanes[lane],
+                &found,
+                &row.expected(lanes, lane, subgroup),
+            ),
         });
         failure.lanes += 1;
     }
@@ -327,7 +332,10 @@ fn describe(row: &Row, lane: &Lane, found: &[(Kind, u64)], expected: &[Expect]) 
             all.join(" ")
         })
         .collect();
-    let found: Vec<String> = found.iter().map(|(kind, bits)| text(*kind, *bits)).collect();
+    let found: Vec<String> = found
+        .iter()
+        .map(|(kind, bits)| text(*kind, *bits))
+        .collect();
     let one = |(expected, ty): (&Expect, Kind)| match expected {
         Expect::Is(bits) => text(ty, *bits),
         Expect::OneOf(all) => {
@@ -336,10 +344,7 @@ fn describe(row: &Row, lane: &Lane, found: &[(Kind, u64)], expected: &[Expect]) 
         }
         other => format!("{other:?}"),
     };
-    let kinds = row
-        .results
-        .iter()
-        .flat_map(|ty| vec![ty.kind; ty.count()]);
+    let kinds = row.results.iter().flat_map(|ty| vec![ty.kind; ty.count()]);
     let expected: Vec<String> = expected.iter().zip(kinds).map(one).collect();
     format!(
         "of ({}) came [{}] instead of [{}]",
@@ -356,7 +361,10 @@ fn assemble(rows: &[Row], preserve_denormals: bool) -> (Vec<u32>, u32) {
     asm.capability(Capability::SignedZeroInfNanPreserve);
     asm.capability(Capability::RoundingModeRTE);
     let word = Ty::scalar(Kind::U32).declare(&mut asm);
-    let (input, output) = (asm.storage_buffer(0, word, 4), asm.storage_buffer(1, word, 4));
+    let (input, output) = (
+        asm.storage_buffer(0, word, 4),
+        asm.storage_buffer(1, word, 4),
+    );
     let triple = Ty::vector(Kind::U32, 3).declare(&mut asm);
     let id = asm.built_in(BuiltIn::GlobalInvocationId, triple);
     let id = asm.emit(Op::Load, triple, &[id]);
@@ -385,9 +393,12 @@ fn assemble(rows: &[Row], preserve_denormals: bool) -> (Vec<u32>, u32) {
             memory.store(&mut body, *ty, value);
         }
     }
-    let types = rows
-        .iter()
-        .flat_map(|row| row.operands.iter().map(|it| it.0).chain(row.results.clone()));
+    let types = rows.iter().flat_map(|row| {
+        row.operands
+            .iter()
+            .map(|it| it.0)
+            .chain(row.results.clone())
+    });
     let mut widths: Vec<u32> = types
         .filter(|ty| ty.kind.is_float())
         .map(|ty| ty.kind.bits())

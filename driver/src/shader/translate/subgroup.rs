@@ -245,7 +245,11 @@ impl Translator<'_> {
                     _ => *reg,
                 };
                 let reg = self.builder.subgroup(operation, Some(reg), None);
-                let reg = if signed { self.clamped(scalar, op, reg) } else { reg };
+                let reg = if signed {
+                    self.clamped(scalar, op, reg)
+                } else {
+                    reg
+                };
                 self.normalize(scalar, reg)
             })
             .collect();
@@ -256,7 +260,11 @@ impl Translator<'_> {
 impl Translator<'_> {
     /// The least or greatest of no narrow integers: what 32 bits have for it, brought to the type's range.
     fn clamped(&mut self, scalar: Scalar, op: Ir, reg: Reg) -> Reg {
-        let Scalar::Int { width: width @ (8 | 16), .. } = scalar else {
+        let Scalar::Int {
+            width: width @ (8 | 16),
+            ..
+        } = scalar
+        else {
             return reg;
         };
         let most = (1 << (width - 1)) - 1;

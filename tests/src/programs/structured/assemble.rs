@@ -147,7 +147,11 @@ fn write_function(
     }
     let id = asm.id();
     let (u32, local) = (types.u32, types.local);
-    let parameters = [(parameters[0], u32), (parameters[1], u32), (borrowed, local)];
+    let parameters = [
+        (parameters[0], u32),
+        (parameters[1], u32),
+        (borrowed, local),
+    ];
     asm.function(id, u32, &parameters);
     id
 }

@@ -45,7 +45,9 @@ impl Invocation<'_> {
         let function: &Function = &program.functions[function];
         let mut frame = Frame {
             parameters,
-            variables: std::array::from_fn(|index| parameters[index % 2].wrapping_add(index as u32)),
+            variables: std::array::from_fn(|index| {
+                parameters[index % 2].wrapping_add(index as u32)
+            }),
             array: std::array::from_fn(|index| index as u32),
             counters: vec![0; function.loops],
             borrowed: lent,
@@ -89,7 +91,11 @@ impl Invocation<'_> {
                 frame.variables[*to] = result;
             }
             Statement::If(condition, then, otherwise) => {
-                let chosen = if frame.holds(condition) { then } else { otherwise };
+                let chosen = if frame.holds(condition) {
+                    then
+                } else {
+                    otherwise
+                };
                 return self.list(frame, chosen);
             }
             Statement::Loop(it) => return self.repeat(frame, it),
@@ -166,7 +172,11 @@ impl Frame {
                 }
             }
             Expression::Choose(condition, then, otherwise) => {
-                self.value(if self.holds(condition) { then } else { otherwise })
+                self.value(if self.holds(condition) {
+                    then
+                } else {
+                    otherwise
+                })
             }
         }
     }

@@ -165,7 +165,6 @@ pub struct Case {
     pub falls_through: bool,
 }
 
-
 /// What a value becomes that is mixed into a hash.
 fn mixed(hash: u32, value: u32) -> u32 {
     (hash ^ value).wrapping_mul(0x0100_0193)
