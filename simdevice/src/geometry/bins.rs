@@ -8,6 +8,8 @@ use crate::packet::Rect;
 pub(super) struct Grid {
     /// The side of a macro-tile in pixels.
     size: i32,
+    /// 2^32 / size, rounded up: multiplication by it divides any pixel's coordinate.
+    reciprocal: u64,
     /// The column and row of the first.
     first: [u32; 2],
     columns: u32,
@@ -27,6 +29,7 @@ impl Grid {
         let (row, rows) = span(area.y, area.height);
         Self {
             size: size as i32,
+            reciprocal: (1u64 << 32).div_ceil(size.into()),
             first: [column, row],
             columns,
             rows,
@@ -57,7 +60,8 @@ pub(super) fn bin(
     pixels: Pixels,
     pairs: &mut Vec<Pair>,
 ) {
-    let tiles = |[first, last]: [i32; 2]| (first / grid.size) as u32..=(last / grid.size) as u32;
+    let tile = |pixel: i32| ((pixel.max(0) as u64 * grid.reciprocal) >> 32) as u32;
+    let tiles = |[first, last]: [i32; 2]| tile(first)..=tile(last);
     let (columns, rows) = (tiles(pixels.x), tiles(pixels.y));
     let layer = primitive.layer.into();
     if columns.start() == columns.end() || rows.start() == rows.end() {

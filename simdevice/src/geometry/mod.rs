@@ -12,6 +12,7 @@ mod bins;
 mod clip;
 mod depth_bias;
 mod elements;
+mod emit;
 mod fetch;
 mod pipeline;
 mod primitive;
@@ -22,9 +23,9 @@ mod tests;
 mod viewport;
 
 pub use bins::Bins;
+pub use emit::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
 pub use pipeline::DrawPipeline;
 pub use primitive::{Primitive, PrimitiveDraw, PrimitiveKind, Varyings};
-pub use setup::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
 
 use crate::bindings::Prepared;
 use crate::counters::{Counter, Counters};

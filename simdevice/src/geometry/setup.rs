@@ -1,21 +1,16 @@
 //! Set-up: assembled primitives are clipped, culled and become what the rasterizer takes.
 
 use super::assemble::{corner_count, corners};
-use super::bins::{Grid, Pair, Pixels, bin};
+use super::bins::{Grid, Pair};
 use super::clip::{ClipVertex, Clipper};
 use super::depth_bias::{self, DepthUnit};
 use super::elements::Elements;
 use super::pipeline::VertexOutputs;
-use super::primitive::{Primitive, PrimitiveKind};
+use super::primitive::Primitive;
 use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
-use super::viewport::{ONE, Projected, Transform, code, snap_away, snap_length};
+use super::viewport::{Projected, Transform, code};
 use crate::packet::Rect;
-use crate::packet::draw::{DrawState, Interpolation, PolygonMode};
-
-/// The greatest side of a point, in pixels.
-pub const MAX_POINT_SIZE: f32 = 255.0;
-/// The greatest width of a line, in pixels.
-pub const MAX_LINE_WIDTH: f32 = 255.0;
+use crate::packet::draw::{DrawState, PolygonMode};
 
 /// What a chunk of primitives became. Vertices and primitives are numbered from 0.
 #[derive(Debug, Default)]
@@ -46,38 +41,38 @@ pub(super) struct Setup<'a> {
 
 /// A chunk being set up.
 pub(super) struct Job<'a> {
-    setup: &'a Setup<'a>,
-    shaded: &'a Shaded,
+    pub(super) setup: &'a Setup<'a>,
+    pub(super) shaded: &'a Shaded,
     /// By slot: the vertex's number in the output, or [`NONE`].
-    numbers: &'a mut Vec<u32>,
-    out: Output,
+    pub(super) numbers: &'a mut Vec<u32>,
+    pub(super) out: Output,
 }
 
 /// A vertex that has no number yet.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// The primitive being set up.
 #[derive(Clone, Copy)]
-struct Current {
-    id: u32,
+pub(super) struct Current {
+    pub id: u32,
     /// Slots of its corners.
-    slots: [u32; 3],
+    pub slots: [u32; 3],
     /// The provoking vertex's slot.
-    provoking: u32,
-    viewport: u8,
-    layer: u16,
-    front: bool,
+    pub provoking: u32,
+    pub viewport: u8,
+    pub layer: u16,
+    pub front: bool,
 }
 
 /// A vertex of a primitive after clipping.
 #[derive(Clone, Copy)]
-struct Place {
-    projected: Projected,
-    origin: Origin,
+pub(super) struct Place {
+    pub projected: Projected,
+    pub origin: Origin,
 }
 
 #[derive(Clone, Copy)]
-enum Origin {
+pub(super) enum Origin {
     /// A shaded vertex, by slot.
     Slot(u32),
     /// A mixture of the primitive's corners, already in the output.
@@ -124,7 +119,7 @@ impl<'a> Job<'a> {
         self.out
     }
 
-    fn extras(&self, slot: u32) -> &Extras {
+    pub(super) fn extras(&self, slot: u32) -> &Extras {
         self.shaded.extras.get(slot as usize).unwrap_or(&NO_EXTRAS)
     }
 
@@ -142,7 +137,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn transform(&self, current: &Current) -> &'a Transform {
+    pub(super) fn transform(&self, current: &Current) -> &'a Transform {
         &self.setup.transforms[usize::from(current.viewport)]
     }
 
@@ -317,7 +312,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn bias(&self, corners: [&Place; 3]) -> f32 {
+    pub(super) fn bias(&self, corners: [&Place; 3]) -> f32 {
         match &self.setup.state.depth_bias {
             Some(bias) => {
                 let corners = corners.map(|place| &place.projected);
@@ -326,239 +321,16 @@ impl<'a> Job<'a> {
             None => 0.0,
         }
     }
-
-    #[inline(always)]
-    fn push_triangle(&mut self, current: &Current, places: [&Place; 3], area: i64) {
-        let [a, b, c] = places;
-        let places = if area > 0 { [a, b, c] } else { [a, c, b] };
-        let corners = places.map(|place| place.projected.snapped);
-        let Some(pixels) = self.pixels(current, &corners) else {
-            return;
-        };
-        if self.setup.state.samples == 1 && covers_nothing(&corners, pixels) {
-            return;
-        }
-        let bias = self.bias(places);
-        self.push(
-            current,
-            PrimitiveKind::Triangle,
-            corners,
-            places,
-            pixels,
-            bias,
-        );
-    }
-
-    fn push_line(&mut self, current: &Current, from: &Place, to: &Place, bias: f32) {
-        let (a, b) = (from.projected.window, to.projected.window);
-        let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
-        let length = (dx * dx + dy * dy).sqrt();
-        if length.is_nan() || length <= 0.0 {
-            return;
-        }
-        let scale = 0.5 * self.setup.state.line_width.clamp(0.0, MAX_LINE_WIDTH) / length;
-        let side = [snap_length(-dy * scale), snap_length(dx * scale)];
-        let (a, b) = (a.map(snap_away), b.map(snap_away));
-        let corners = [
-            [a[0] - side[0], a[1] - side[1]],
-            [a[0] + side[0], a[1] + side[1]],
-            [b[0] + side[0], b[1] + side[1]],
-        ];
-        if cross(corners) <= 0 {
-            return;
-        }
-        let last = [b[0] - side[0], b[1] - side[1]];
-        let [c0, c1, c2] = corners;
-        if let Some(pixels) = self.pixels(current, &[c0, c1, c2, last]) {
-            let places = [from, from, to];
-            self.push(current, PrimitiveKind::Line, corners, places, pixels, bias);
-        }
-    }
-
-    fn push_point(&mut self, current: &Current, place: &Place, size: f32, bias: f32) {
-        let size = if size.is_nan() {
-            1.0
-        } else {
-            size.clamp(0.0, MAX_POINT_SIZE)
-        };
-        let side = snap_length(size).max(ONE);
-        let [x, y] = place.projected.window.map(|at| snap_away(at) - side / 2);
-        let corners = [[x, y], [x + side, y], [x + side, y + side]];
-        if let Some(pixels) = self.pixels(current, &corners) {
-            self.push(
-                current,
-                PrimitiveKind::Point,
-                corners,
-                [place; 3],
-                pixels,
-                bias,
-            );
-        }
-    }
-
-    /// The pixels that may have a sample within the bounds of these corners, where they may be drawn to.
-    #[inline(always)]
-    fn pixels(&self, current: &Current, corners: &[[i32; 2]]) -> Option<Pixels> {
-        // Where samples lie within a pixel: the least and the greatest coordinate.
-        let (low, high) = if self.setup.state.samples == 1 {
-            (128, 128)
-        } else {
-            (32, 224)
-        };
-        let region = &self.setup.regions[usize::from(current.viewport)];
-        let along = |axis: usize, start: i32, length: u32| {
-            let (mut least, mut greatest) = (i32::MAX, i32::MIN);
-            for corner in corners {
-                least = least.min(corner[axis]);
-                greatest = greatest.max(corner[axis]);
-            }
-            // Right and bottom edges cover nothing.
-            let first = (least - high + ONE - 1) >> 8;
-            let last = (greatest - 1 - low) >> 8;
-            let end = i64::from(start) + i64::from(length) - 1;
-            let last = i64::from(last).min(end);
-            [first.max(start), last as i32]
-        };
-        let pixels = Pixels {
-            x: along(0, region.x, region.width),
-            y: along(1, region.y, region.height),
-        };
-        (pixels.x[0] <= pixels.x[1] && pixels.y[0] <= pixels.y[1]).then_some(pixels)
-    }
-
-    #[inline(always)]
-    fn push(
-        &mut self,
-        current: &Current,
-        kind: PrimitiveKind,
-        corners: [[i32; 2]; 3],
-        places: [&Place; 3],
-        pixels: Pixels,
-        bias: f32,
-    ) {
-        let vertices = places.map(|place| self.number(place.origin));
-        let provoking = self.number(Origin::Slot(current.provoking));
-        let primitive = Primitive {
-            corners,
-            depth: places.map(|place| place.projected.depth + bias),
-            inverse_w: places.map(|place| place.projected.inverse_w),
-            vertices,
-            provoking,
-            id: current.id,
-            kind,
-            front: current.front,
-            viewport: current.viewport,
-            layer: current.layer,
-        };
-        let number = self.out.primitives.len() as u32;
-        bin(
-            &self.setup.grid,
-            &primitive,
-            number,
-            pixels,
-            &mut self.out.pairs,
-        );
-        self.out.primitives.push(primitive);
-    }
-
-    /// The number of a vertex in the output, which it enters when it is first asked for.
-    #[inline(always)]
-    fn number(&mut self, origin: Origin) -> u32 {
-        let slot = match origin {
-            Origin::Slot(slot) => slot as usize,
-            Origin::New { number } => return number,
-        };
-        if self.numbers[slot] == NONE {
-            self.numbers[slot] = self.out.vertices;
-            self.out.vertices += 1;
-            let per_vertex = self.setup.outputs.varyings.len();
-            let varyings = &self.shaded.varyings[slot * per_vertex..][..per_vertex];
-            self.out.varyings.extend_from_slice(varyings);
-        }
-        self.numbers[slot]
-    }
-
-    /// Makes a vertex that clipping found, and puts its varyings into the output.
-    fn new_place(&mut self, current: &Current, vertex: &ClipVertex) -> Place {
-        let number = self.out.vertices;
-        self.out.vertices += 1;
-        let weights = vertex.weights;
-        // Weights in the framebuffer are those in clip space times w, made to add up to 1 again.
-        let mut linear = weights;
-        for (weight, slot) in linear.iter_mut().zip(current.slots) {
-            *weight *= f64::from(self.shaded.vertices[slot as usize].position[3]);
-        }
-        let sum: f64 = linear.iter().sum();
-        let linear = linear.map(|weight| weight / sum);
-        let interpolation = &self.setup.outputs.interpolation;
-        let per_vertex = interpolation.len();
-        let of =
-            |slot: u32, varying: usize| self.shaded.varyings[slot as usize * per_vertex + varying];
-        for (varying, interpolation) in interpolation.iter().enumerate() {
-            let mix = |weights: [f64; 3]| {
-                let part = |corner: usize| {
-                    // A corner that has no part in it must not spoil it by being infinite.
-                    if weights[corner] == 0.0 {
-                        return 0.0;
-                    }
-                    let value = f32::from_bits(of(current.slots[corner], varying));
-                    weights[corner] * f64::from(value)
-                };
-                ((part(0) + part(1) + part(2)) as f32).to_bits()
-            };
-            let value = match interpolation {
-                Interpolation::Perspective => mix(weights),
-                Interpolation::Linear => mix(linear),
-                Interpolation::Flat => of(current.provoking, varying),
-            };
-            self.out.varyings.push(value);
-        }
-        Place {
-            projected: self.transform(current).project(narrow(vertex)),
-            origin: Origin::New { number },
-        }
-    }
 }
 
 /// A position as vertices have it.
-fn narrow(vertex: &ClipVertex) -> [f32; 4] {
+pub(super) fn narrow(vertex: &ClipVertex) -> [f32; 4] {
     vertex.position.map(|coordinate| coordinate as f32)
 }
 
 /// Twice the signed area of a triangle.
 #[inline(always)]
-fn cross([a, b, c]: [[i32; 2]; 3]) -> i64 {
+pub(super) fn cross([a, b, c]: [[i32; 2]; 3]) -> i64 {
     let along = |to: [i32; 2], axis: usize| i64::from(to[axis]) - i64::from(a[axis]);
     along(b, 0) * along(c, 1) - along(b, 1) * along(c, 0)
-}
-
-/// Whether a triangle, whose bounds hold at most four pixel centres, covers none of them. Larger ones aren't looked
-/// at.
-#[inline(always)]
-fn covers_nothing(corners: &[[i32; 2]; 3], pixels: Pixels) -> bool {
-    let span = |[first, last]: [i32; 2]| last - first;
-    if span(pixels.x) > 1 || span(pixels.y) > 1 {
-        return false;
-    }
-    let inside = |x: i32, y: i32| {
-        let [x, y] = [x, y].map(|pixel| i64::from(pixel) * 256 + 128);
-        let mut inside = true;
-        for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-            let ([ax, ay], [bx, by]) = (corners[from].map(i64::from), corners[to].map(i64::from));
-            let (dx, dy) = (bx - ax, by - ay);
-            let value = dx * (y - ay) - dy * (x - ax);
-            // Points on an edge belong to it if it is a left or a top one.
-            let owns = dy < 0 || (dy == 0 && dx > 0);
-            inside &= value > 0 || (value == 0 && owns);
-        }
-        inside
-    };
-    for y in pixels.y[0]..=pixels.y[1] {
-        for x in pixels.x[0]..=pixels.x[1] {
-            if inside(x, y) {
-                return false;
-            }
-        }
-    }
-    true
 }
