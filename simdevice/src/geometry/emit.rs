@@ -3,7 +3,7 @@
 use super::bins::{Pixels, bin};
 use super::clip::ClipVertex;
 use super::primitive::{Primitive, PrimitiveKind};
-use super::setup::{Current, Job, NONE, Origin, Place, cross, narrow};
+use super::setup::{Current, Job, NONE, Origin, Place, cross};
 use super::viewport::{ONE, snap_away, snap_length};
 use crate::packet::draw::Interpolation;
 
@@ -24,7 +24,7 @@ struct Shape {
 
 impl Job<'_> {
     #[inline(always)]
-    pub(super) fn push_triangle(&mut self, current: &Current, places: [&Place; 3], area: i64) {
+    pub(super) fn push_triangle(&mut self, current: &Current, places: [Place; 3], area: i64) {
         let [a, b, c] = places;
         let places = if area > 0 { [a, b, c] } else { [a, c, b] };
         let corners = places.map(|place| place.projected.snapped);
@@ -44,7 +44,7 @@ impl Job<'_> {
         self.push(current, &shape, places);
     }
 
-    pub(super) fn push_line(&mut self, current: &Current, from: &Place, to: &Place, bias: f32) {
+    pub(super) fn push_line(&mut self, current: &Current, from: Place, to: Place, bias: f32) {
         let (a, b) = (from.projected.window, to.projected.window);
         let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
         let length = (dx * dx + dy * dy).sqrt();
@@ -76,7 +76,7 @@ impl Job<'_> {
         }
     }
 
-    pub(super) fn push_point(&mut self, current: &Current, place: &Place, size: f32, bias: f32) {
+    pub(super) fn push_point(&mut self, current: &Current, place: Place, size: f32, bias: f32) {
         let size = if size.is_nan() {
             1.0
         } else {
@@ -127,7 +127,7 @@ impl Job<'_> {
     }
 
     #[inline(always)]
-    fn push(&mut self, current: &Current, shape: &Shape, places: [&Place; 3]) {
+    fn push(&mut self, current: &Current, shape: &Shape, places: [Place; 3]) {
         let vertices = places.map(|place| self.number(place.origin));
         let provoking = self.number(Origin::Slot(current.provoking));
         let primitive = Primitive {
@@ -171,7 +171,7 @@ impl Job<'_> {
     }
 
     /// Makes a vertex that clipping found, and puts its varyings into the output.
-    pub(super) fn new_place(&mut self, current: &Current, vertex: &ClipVertex) -> Place {
+    pub(super) fn new_vertex(&mut self, current: &Current, vertex: &ClipVertex) -> Origin {
         let number = self.out.vertices;
         self.out.vertices += 1;
         let weights = vertex.weights;
@@ -205,26 +205,23 @@ impl Job<'_> {
             };
             self.out.varyings.push(value);
         }
-        Place {
-            projected: self.transform(current).project(narrow(vertex)),
-            origin: Origin::New { number },
-        }
+        Origin::New { number }
     }
 }
 
 /// The depth at a triangle's corners, on the plane through its vertices where they were before snapping. That is
 /// what depth is in between; taking it at the corners would move the plane by up to half a sub-pixel.
 #[inline(always)]
-fn depth_at_corners(places: [&Place; 3]) -> [f32; 3] {
+fn depth_at_corners(places: [Place; 3]) -> [f32; 3] {
     let depth = places.map(|place| place.projected.depth);
     if depth[0] == depth[1] && depth[0] == depth[2] {
         return depth;
     }
-    let origin = &places[0].projected;
-    let along = |place: &Place, axis: usize| {
+    let origin = places[0].projected;
+    let along = |place: Place, axis: usize| {
         f64::from(place.projected.window[axis]) - f64::from(origin.window[axis])
     };
-    let rise = |place: &Place| f64::from(place.projected.depth) - f64::from(origin.depth);
+    let rise = |place: Place| f64::from(place.projected.depth) - f64::from(origin.depth);
     let (e, f) = (places[1], places[2]);
     let (ex, ey, fx, fy) = (along(e, 0), along(e, 1), along(f, 0), along(f, 1));
     let inverse = 1.0 / (ex * fy - ey * fx);
@@ -235,7 +232,7 @@ fn depth_at_corners(places: [&Place; 3]) -> [f32; 3] {
     // Needles have slopes without meaning: they must not leave the range of their vertices by more than half of it.
     let range = rise(e).max(rise(f)).max(0.0) - rise(e).min(rise(f)).min(0.0);
     places.map(|place| {
-        let projected = &place.projected;
+        let projected = place.projected;
         let off = |axis: usize| {
             f64::from(projected.snapped[axis]) / f64::from(ONE) - f64::from(projected.window[axis])
         };

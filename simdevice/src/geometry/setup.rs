@@ -2,7 +2,7 @@
 
 use super::assemble::{corner_count, corners};
 use super::bins::{Grid, Pair};
-use super::clip::{ClipVertex, Clipper};
+use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
 use super::depth_bias::{self, DepthUnit};
 use super::elements::Elements;
 use super::pipeline::VertexOutputs;
@@ -11,10 +11,17 @@ use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
 use super::viewport::{Projected, Transform, code};
 use crate::packet::Rect;
 use crate::packet::draw::{DrawState, PolygonMode};
+use isa::exec::Work;
 
 /// What a chunk of primitives became. Vertices and primitives are numbered from 0.
 #[derive(Debug, Default)]
 pub(super) struct Output {
+    /// The chunk's number.
+    pub chunk: u64,
+    /// What the shader cores did.
+    pub work: Work,
+    /// Vertices shaded.
+    pub shaded: u64,
     pub primitives: Vec<Primitive>,
     pub varyings: Vec<u32>,
     pub pairs: Vec<Pair>,
@@ -24,6 +31,16 @@ pub(super) struct Output {
     pub assembled: u64,
     /// Primitives that clipping left.
     pub clipped: u64,
+}
+
+impl Output {
+    /// Forgets an earlier chunk, but keeps its memory.
+    pub(super) fn clear(&mut self) {
+        self.primitives.clear();
+        self.varyings.clear();
+        self.pairs.clear();
+        (self.vertices, self.assembled, self.clipped) = (0, 0, 0);
+    }
 }
 
 /// What set-up needs to know of a draw.
@@ -45,7 +62,7 @@ pub(super) struct Job<'a> {
     pub(super) shaded: &'a Shaded,
     /// By slot: the vertex's number in the output, or [`NONE`].
     pub(super) numbers: &'a mut Vec<u32>,
-    pub(super) out: Output,
+    pub(super) out: &'a mut Output,
 }
 
 /// A vertex that has no number yet.
@@ -66,8 +83,8 @@ pub(super) struct Current {
 
 /// A vertex of a primitive after clipping.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
-    pub projected: Projected,
+pub(super) struct Place<'p> {
+    pub projected: &'p Projected,
     pub origin: Origin,
 }
 
@@ -80,19 +97,25 @@ pub(super) enum Origin {
 }
 
 impl<'a> Job<'a> {
-    pub(super) fn new(setup: &'a Setup<'a>, shaded: &'a Shaded, numbers: &'a mut Vec<u32>) -> Self {
+    /// `out` must be clear.
+    pub(super) fn new(
+        setup: &'a Setup<'a>,
+        shaded: &'a Shaded,
+        numbers: &'a mut Vec<u32>,
+        out: &'a mut Output,
+    ) -> Self {
         numbers.clear();
         numbers.resize(shaded.vertices.len(), NONE);
         Self {
             setup,
             shaded,
             numbers,
-            out: Output::default(),
+            out,
         }
     }
 
     /// Sets up all primitives of a chunk.
-    pub(super) fn run(mut self, elements: &Elements) -> Output {
+    pub(super) fn run(mut self, elements: &Elements) {
         let state = self.setup.state;
         let count = corner_count(state.topology);
         for piece in &elements.pieces {
@@ -109,14 +132,13 @@ impl<'a> Job<'a> {
                 };
                 self.choose_target(&mut current);
                 match count {
-                    1 => self.point(&current),
-                    2 => self.line(&current),
-                    _ => self.triangle(&mut current),
+                    1 => self.with_vertices(&mut current, Self::point),
+                    2 => self.with_vertices(&mut current, Self::line),
+                    _ => self.with_vertices(&mut current, Self::triangle),
                 }
             }
             self.out.assembled += u64::from(piece.end - piece.first);
         }
-        self.out
     }
 
     pub(super) fn extras(&self, slot: u32) -> &Extras {
@@ -141,58 +163,75 @@ impl<'a> Job<'a> {
         &self.setup.transforms[usize::from(current.viewport)]
     }
 
-    /// A shaded vertex as the primitive's viewport has it.
-    #[inline(always)]
-    fn vertex(&self, current: &Current, slot: u32) -> Vertex {
+    /// A shaded vertex as the primitive's viewport, which is not the first, has it.
+    fn projected_again(&self, current: &Current, slot: u32) -> Vertex {
         let mut vertex = self.shaded.vertices[slot as usize];
-        if current.viewport != 0 {
-            let transform = self.transform(current);
-            vertex.projected = transform.project(vertex.position);
-            let kept = vertex.code & (code::INVALID | code::ANY_USER | code::ANY_CULL);
-            vertex.code = kept | transform.code(vertex.position, &vertex.projected);
-        }
+        let transform = self.transform(current);
+        vertex.projected = transform.project(vertex.position);
+        let kept = vertex.code & (code::INVALID | code::ANY_USER | code::ANY_CULL);
+        vertex.code = kept | transform.code(vertex.position, &vertex.projected);
         vertex
     }
 
-    fn point(&mut self, current: &Current) {
-        let slot = current.slots[0];
-        let vertex = self.vertex(current, slot);
+    /// Calls `then` with the primitive's vertices as its viewport has them. They are not copied: this is where set-up
+    /// spends its time.
+    #[inline(always)]
+    fn with_vertices<const N: usize>(
+        &mut self,
+        current: &mut Current,
+        then: impl FnOnce(&mut Self, &mut Current, [&Vertex; N]),
+    ) {
+        let shaded = self.shaded;
+        if current.viewport == 0 {
+            let vertices =
+                std::array::from_fn(|corner| &shaded.vertices[current.slots[corner] as usize]);
+            then(self, current, vertices);
+        } else {
+            let vertices: [Vertex; N] =
+                std::array::from_fn(|corner| self.projected_again(current, current.slots[corner]));
+            then(self, current, vertices.each_ref());
+        }
+    }
+
+    fn point(&mut self, current: &mut Current, [vertex]: [&Vertex; 1]) {
         if vertex.code & (code::CLIP | code::ANY_SIDE | code::ANY_CULL) != 0 {
             return;
         }
         self.out.clipped += 1;
+        let slot = current.slots[0];
         let place = Place {
-            projected: vertex.projected,
+            projected: &vertex.projected,
             origin: Origin::Slot(slot),
         };
-        self.push_point(current, &place, self.extras(slot).point_size, 0.0);
+        self.push_point(current, place, self.extras(slot).point_size, 0.0);
     }
 
-    fn line(&mut self, current: &Current) {
-        let slots = [current.slots[0], current.slots[1]];
-        let ends = slots.map(|slot| self.vertex(current, slot));
+    fn line(&mut self, current: &mut Current, ends: [&Vertex; 2]) {
         let (all, any) = (ends[0].code & ends[1].code, ends[0].code | ends[1].code);
         // A wide line may reach into the view volume from beyond its side.
         if all & code::OUTSIDE & !code::ANY_SIDE != 0 || any & code::INVALID != 0 {
             return;
         }
-        let mut places = [0, 1].map(|end: usize| Place {
-            projected: ends[end].projected,
-            origin: Origin::Slot(slots[end]),
-        });
+        let mut projected = ends.map(|end| end.projected);
+        let mut origins = [0, 1].map(|end: usize| Origin::Slot(current.slots[end]));
         if any & code::CLIP != 0 {
             let clipper = self.clipper(current);
-            let Some(clipped) = clipper.line([ends[0].position, ends[1].position]) else {
+            let Some(clipped) = clipper.line(ends.map(|end| end.position)) else {
                 return;
             };
-            for (place, vertex) in places.iter_mut().zip(&clipped) {
+            for (end, vertex) in clipped.iter().enumerate() {
                 if vertex.corner().is_none() {
-                    *place = self.new_place(current, vertex);
+                    projected[end] = self.transform(current).project(narrow(vertex));
+                    origins[end] = self.new_vertex(current, vertex);
                 }
             }
         }
         self.out.clipped += 1;
-        self.push_line(current, &places[0], &places[1], 0.0);
+        let [from, to] = [0, 1].map(|end: usize| Place {
+            projected: &projected[end],
+            origin: origins[end],
+        });
+        self.push_line(current, from, to, 0.0);
     }
 
     fn clipper(&self, current: &Current) -> Clipper<'a> {
@@ -205,76 +244,78 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn triangle(&mut self, current: &mut Current) {
-        let vertices = current.slots.map(|slot| self.vertex(current, slot));
-        let [a, b, c] = [vertices[0].code, vertices[1].code, vertices[2].code];
+    #[inline(always)]
+    fn triangle(&mut self, current: &mut Current, vertices: [&Vertex; 3]) {
+        let [a, b, c] = vertices.map(|vertex| vertex.code);
         let (all, any) = (a & b & c, a | b | c);
         if all & code::OUTSIDE != 0 || any & code::INVALID != 0 {
             return;
         }
         if any & code::CLIP != 0 {
-            self.clipped_triangle(current, &vertices);
+            self.clipped_triangle(current, vertices);
             return;
         }
         self.out.clipped += 1;
-        let projected = [0, 1, 2].map(|corner: usize| &vertices[corner].projected);
-        let area = cross(projected.map(|projected| projected.snapped));
+        let area = cross(vertices.map(|vertex| vertex.projected.snapped));
         if !self.faces(current, area) {
             return;
         }
-        let state = self.setup.state;
-        if state.polygon_mode == PolygonMode::Fill && area == 0 {
-            return;
-        }
-        let places = [0, 1, 2].map(|corner: usize| Place {
-            projected: vertices[corner].projected,
+        let place = |corner: usize| Place {
+            projected: &vertices[corner].projected,
             origin: Origin::Slot(current.slots[corner]),
-        });
-        match state.polygon_mode {
-            PolygonMode::Fill => {
-                self.push_triangle(current, [&places[0], &places[1], &places[2]], area)
-            }
-            _ => self.outline(current, &places, &[true; 3]),
+        };
+        let places = [place(0), place(1), place(2)];
+        if self.setup.state.polygon_mode != PolygonMode::Fill {
+            self.outline(current, &places, |_| true);
+        } else if area != 0 {
+            self.push_triangle(current, places, area);
         }
     }
 
-    fn clipped_triangle(&mut self, current: &mut Current, vertices: &[Vertex; 3]) {
+    #[cold]
+    fn clipped_triangle(&mut self, current: &mut Current, vertices: [&Vertex; 3]) {
         let clipper = self.clipper(current);
-        let polygon = clipper.triangle([0, 1, 2].map(|corner: usize| vertices[corner].position));
+        let polygon = clipper.triangle(vertices.map(|vertex| vertex.position));
         let clipped = polygon.vertices();
         if clipped.len() < 3 {
             return;
         }
         self.out.clipped += clipped.len() as u64 - 2;
-        // Whether it is seen is decided before anything is made for it.
         let transform = self.transform(current);
-        let snapped = |vertex: &ClipVertex| match vertex.corner() {
-            Some(corner) => vertices[corner].projected.snapped,
-            None => transform.project(narrow(vertex)).snapped,
-        };
-        let fan = |place: usize| [0, place, place + 1].map(|place| snapped(&clipped[place]));
-        let area: i64 = (1..clipped.len() - 1).map(|place| cross(fan(place))).sum();
+        let mut projected = [Projected::default(); MOST_VERTICES];
+        for (projected, vertex) in projected.iter_mut().zip(clipped) {
+            *projected = match vertex.corner() {
+                Some(corner) => vertices[corner].projected,
+                None => transform.project(narrow(vertex)),
+            };
+        }
+        // Whether it is seen is decided before anything is made for it.
+        let fan = |place: usize| cross([0, place, place + 1].map(|i: usize| projected[i].snapped));
+        let area: i64 = (1..clipped.len() - 1).map(fan).sum();
         let fills = self.setup.state.polygon_mode == PolygonMode::Fill;
         if !self.faces(current, area) || (fills && area == 0) {
             return;
         }
-        let mut places = Vec::with_capacity(clipped.len());
-        for vertex in clipped {
-            places.push(match vertex.corner() {
-                Some(corner) => Place {
-                    projected: vertices[corner].projected,
-                    origin: Origin::Slot(current.slots[corner]),
+        let mut places = [Place {
+            projected: &projected[0],
+            origin: Origin::Slot(current.slots[0]),
+        }; MOST_VERTICES];
+        for (number, vertex) in clipped.iter().enumerate() {
+            places[number] = Place {
+                projected: &projected[number],
+                origin: match vertex.corner() {
+                    Some(corner) => Origin::Slot(current.slots[corner]),
+                    None => self.new_vertex(current, vertex),
                 },
-                None => self.new_place(current, vertex),
-            });
+            };
         }
+        let places = &places[..clipped.len()];
         if !fills {
-            let edges: Vec<bool> = clipped.iter().map(|vertex| vertex.edge).collect();
-            self.outline(current, &places, &edges);
+            self.outline(current, places, |place| clipped[place].edge);
             return;
         }
         for pair in places[1..].windows(2) {
-            let corners = [&places[0], &pair[0], &pair[1]];
+            let corners = [places[0], pair[0], pair[1]];
             let part = cross(corners.map(|place| place.projected.snapped));
             // What snapping has turned over lies within its neighbours.
             if part.signum() == area.signum() {
@@ -295,27 +336,27 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Draws a polygon's edges or vertices.
-    fn outline(&mut self, current: &Current, places: &[Place], edges: &[bool]) {
-        let bias = self.bias([&places[0], &places[1], &places[2]]);
+    /// Draws a polygon's edges, or their first vertices, where they belong to its outline.
+    fn outline(&mut self, current: &Current, places: &[Place], edge: impl Fn(usize) -> bool) {
+        let bias = self.bias([places[0], places[1], places[2]]);
         let next = |place: usize| (place + 1) % places.len();
-        for place in (0..places.len()).filter(|&place| edges[place]) {
+        for place in (0..places.len()).filter(|&place| edge(place)) {
             if self.setup.state.polygon_mode == PolygonMode::Line {
-                self.push_line(current, &places[place], &places[next(place)], bias);
+                self.push_line(current, places[place], places[next(place)], bias);
             } else {
                 let size = match places[place].origin {
                     Origin::Slot(slot) => self.extras(slot).point_size,
                     Origin::New { .. } => self.extras(current.provoking).point_size,
                 };
-                self.push_point(current, &places[place], size, bias);
+                self.push_point(current, places[place], size, bias);
             }
         }
     }
 
-    pub(super) fn bias(&self, corners: [&Place; 3]) -> f32 {
+    pub(super) fn bias(&self, corners: [Place; 3]) -> f32 {
         match &self.setup.state.depth_bias {
             Some(bias) => {
-                let corners = corners.map(|place| &place.projected);
+                let corners = corners.map(|place| place.projected);
                 depth_bias::bias(bias, self.setup.depth_unit, corners)
             }
             None => 0.0,
