@@ -205,7 +205,7 @@ impl Bins {
                 }
             }
         }
-        Self::new(grid, layers, std::iter::once((0, &pairs[..])))
+        Self::new(&grid, layers, &pairs)
     }
 
     /// How many pairs of a macro-tile and a primitive there are.

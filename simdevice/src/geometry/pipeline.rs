@@ -17,7 +17,6 @@ pub(super) const LANES: usize = 128;
 /// A vertex and a fragment program ready for one device.
 #[derive(Debug)]
 pub struct DrawPipeline {
-    pub(crate) programs: DrawPrograms,
     pub(super) vertex: VertexProgram,
     /// The fragment program.
     pub(crate) fragment: Option<FragmentStage>,
@@ -53,17 +52,13 @@ impl DrawPipeline {
     ///
     /// # Errors
     /// [`InvalidProgram`] if one of them cannot run on the device.
-    pub fn new(device: &Device, programs: DrawPrograms) -> Result<Self, InvalidProgram> {
-        let vertex = VertexProgram::new(device, &programs)?;
+    pub fn new(device: &Device, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
+        let vertex = VertexProgram::new(device, programs)?;
         let fragment = programs.fragment.as_ref();
         let fragment = fragment
             .map(|fragment| FragmentStage::new(device.level(), fragment))
             .transpose()?;
-        Ok(Self {
-            programs,
-            vertex,
-            fragment,
-        })
+        Ok(Self { vertex, fragment })
     }
 }
 
