@@ -57,6 +57,8 @@ pub mod builder;
 mod display;
 mod escape;
 pub mod exec;
+mod hoist;
+mod homes;
 pub mod ir;
 pub mod level;
 pub mod op;

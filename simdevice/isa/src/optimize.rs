@@ -5,12 +5,14 @@ use std::collections::HashMap;
 use fearless_simd::Level;
 
 use super::exec::evaluate;
+use super::hoist::hoist;
 use super::ir::{Block, Constant, Program, Reg, Register, Role, Statement, Type};
 use super::op::Op;
 
 /// Optimizes a valid program; it stays valid and means the same.
 pub fn optimize(program: &mut Program, level: Level) {
     fold(program, level);
+    hoist(program);
     remove_dead(program);
     let Program {
         registers, body, ..

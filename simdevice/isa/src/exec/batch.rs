@@ -20,6 +20,8 @@ pub struct Batch<'a> {
     pub masks: Masks<'a>,
     /// Workgroup memory.
     pub shared: &'a [AtomicU32],
+    /// Whether all lanes that the batch began with are active, of those in the chunks that the file spans.
+    pub whole: bool,
     /// Private memory: a row of chunks for each word.
     pub private: &'a [Cell<Chunk>],
 }
@@ -29,6 +31,14 @@ impl Batch<'_> {
     #[inline(always)]
     pub fn slot(&self, reg: Reg) -> Slot {
         self.executable.slots[reg.0 as usize]
+    }
+
+    /// Finds out which chunks have active lanes, after the masks have changed.
+    #[inline(always)]
+    pub fn look_at_masks(&mut self) {
+        let (span, whole) = self.masks.span();
+        self.file = self.file.with_span(span);
+        self.whole = whole;
     }
 
     /// `dst = src` in the active lanes; in all, if `dst` is uniform.
@@ -47,7 +57,7 @@ impl Batch<'_> {
         }
         // A uniform source has one chunk (or pair) for all.
         let step = usize::from(src.len() == dst.len());
-        for chunk in 0..dst.len() / per_16 {
+        for chunk in self.file.span() {
             let active = self.masks.chunk(MaskId::ACTIVE, chunk);
             for part in 0..per_16 {
                 let to = &dst[chunk * per_16 + part];
@@ -68,8 +78,21 @@ impl Batch<'_> {
     #[inline(always)]
     pub fn copy(&self, dst: Slot, src: Slot, ty: Type) {
         match ty {
-            Type::B64 => copy_chunks(self.file.wide(dst), self.file.wide(src), 2),
-            Type::B32 | Type::Bool => copy_chunks(self.file.narrow(dst), self.file.narrow(src), 1),
+            Type::B64 => self.copy_chunks(dst, self.file.wide(dst), self.file.wide(src), 2),
+            Type::B32 | Type::Bool => {
+                self.copy_chunks(dst, self.file.narrow(dst), self.file.narrow(src), 1);
+            }
+        }
+    }
+
+    /// Copies the chunks to compute of a register; a uniform source has only the first `per_16`.
+    #[inline(always)]
+    fn copy_chunks(&self, slot: Slot, dst: &[Cell<Chunk>], src: &[Cell<Chunk>], per_16: usize) {
+        let step = usize::from(src.len() == dst.len());
+        for chunk in self.file.rounds(slot) {
+            for part in 0..per_16 {
+                dst[chunk * per_16 + part].set(src[chunk * per_16 * step + part].get());
+            }
         }
     }
 
@@ -135,16 +158,6 @@ impl Batch<'_> {
             // The rest is arithmetic or control flow, which has steps of its own.
             _ => {}
         }
-    }
-}
-
-/// Copies all chunks of a register; a uniform source has only the first `per_16`.
-#[inline(always)]
-fn copy_chunks(dst: &[Cell<Chunk>], src: &[Cell<Chunk>], per_16: usize) {
-    for (dst, src) in dst.chunks(per_16).zip(src.chunks(per_16).cycle()) {
-        dst.iter()
-            .zip(src)
-            .for_each(|(dst, src)| dst.set(src.get()));
     }
 }
 
