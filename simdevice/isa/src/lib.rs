@@ -64,6 +64,7 @@ pub mod level;
 pub mod op;
 mod optimize;
 pub mod resources;
+mod select;
 mod uniformity;
 pub mod validate;
 mod visit;

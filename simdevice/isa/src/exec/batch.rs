@@ -45,6 +45,9 @@ impl Batch<'_> {
     #[inline(always)]
     pub fn assign<S: Simd>(&self, simd: S, dst: Slot, src: Slot, ty: Type) {
         let uniform = !dst.is_varying();
+        if self.whole && !uniform {
+            return self.copy(dst, src, ty);
+        }
         let (dst, src, per_16) = match ty {
             Type::B64 => (self.file.wide(dst), self.file.wide(src), 2),
             Type::B32 | Type::Bool => (self.file.narrow(dst), self.file.narrow(src), 1),
@@ -97,7 +100,7 @@ impl Batch<'_> {
     }
 
     /// Runs a statement that reaches across lanes or out of the registers.
-    pub fn other(&self, statement: &Statement) {
+    pub fn other<S: Simd>(&self, simd: S, statement: &Statement) {
         match statement {
             Statement::LaneIndex { dst } => {
                 for chunk in 0..self.file.width() {
@@ -116,12 +119,12 @@ impl Batch<'_> {
                 dst,
                 address,
                 format,
-            } => self.load(dst, address, *format),
+            } => self.load(simd, dst, address, *format),
             Statement::Store {
                 src,
                 address,
                 format,
-            } => self.store(src, address, *format),
+            } => self.store(simd, src, address, *format),
             Statement::Atomic {
                 op,
                 dst,
@@ -130,7 +133,7 @@ impl Batch<'_> {
                 value,
                 comparator,
             } => {
-                self.atomic(*op, *dst, address, *format, *value, *comparator);
+                self.atomic(simd, *op, *dst, address, *format, *value, *comparator);
             }
             Statement::BufferSize { dst, buffer } => self.buffer_size(*dst, buffer),
             Statement::Sample(sample) => self.sample(sample),
@@ -163,7 +166,7 @@ impl Batch<'_> {
 
 /// A mask vector from bits.
 #[inline(always)]
-fn bits_to_mask<S: Simd>(simd: S, bits: u16) -> fearless_simd::mask32x16<S> {
+pub fn bits_to_mask<S: Simd>(simd: S, bits: u16) -> fearless_simd::mask32x16<S> {
     simd.from_bitmask_mask32x16(u64::from(bits))
 }
 

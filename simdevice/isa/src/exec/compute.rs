@@ -14,7 +14,7 @@ type I<S> = i32x16<S>;
 type F<S> = f32x16<S>;
 
 /// `dst = op(src...)` in the lanes that a file spans.
-pub type Kernel<S> = fn(S, File<'_>, Slot, &[Slot; 4]);
+pub type Kernel<S> = fn(S, &File<'_>, Slot, &[Slot; 4]);
 
 // The shapes of operation: what the operands are read as, and what the result is.
 macro_rules! word {
@@ -24,7 +24,7 @@ macro_rules! word {
                 #[inline(always)]
                 move || $shape(
                     simd,
-                    file,
+                    *file,
                     dst,
                     src,
                     #[inline(always)]
@@ -70,7 +70,7 @@ macro_rules! lanes {
         |simd, file, dst, src| {
             simd.vectorize(
                 #[inline(always)]
-                move || $map(file, dst, src, $f),
+                move || $map(*file, dst, src, $f),
             )
         }
     };
@@ -185,7 +185,7 @@ fn by_lane<S: Simd>(op: Op) -> Kernel<S> {
         Op::BitfieldInsert => |simd, file, dst, src| {
             simd.vectorize(
                 #[inline(always)]
-                move || integer::bitfield_insert(file, dst, src),
+                move || integer::bitfield_insert(*file, dst, src),
             )
         },
         Op::BitfieldSExtract => lanes!(map3, integer::signed_bitfield),

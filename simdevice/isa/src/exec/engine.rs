@@ -68,7 +68,7 @@ impl<S: Simd> Engine for Kernels<S> {
     }
 
     fn compute(&self, file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4]) {
-        self.by_op[usize::from(op as u8)](self.simd, file, dst, src);
+        self.by_op[usize::from(op as u8)](self.simd, &file, dst, src);
     }
 }
 
@@ -90,20 +90,20 @@ fn run_steps<S: Simd>(
         next += 1;
         match step {
             Step::Compute { op, dst, src } => {
-                kernels.by_op[usize::from(*op as u8)](simd, batch.file, *dst, src);
+                kernels.by_op[usize::from(*op as u8)](simd, &batch.file, *dst, src);
             }
             Step::ComputeAssign { op, dst, via, src } => {
                 let kernel = kernels.by_op[usize::from(*op as u8)];
                 if batch.whole {
-                    kernel(simd, batch.file, *dst, src);
+                    kernel(simd, &batch.file, *dst, src);
                 } else {
-                    kernel(simd, batch.file, *via, src);
+                    kernel(simd, &batch.file, *via, src);
                     batch.assign(simd, *dst, *via, op.signature().result);
                 }
             }
             Step::Assign { dst, src, ty } => batch.assign(simd, *dst, *src, *ty),
             Step::Copy { dst, src, ty } => batch.copy(*dst, *src, *ty),
-            Step::Other(statement) => batch.other(statement),
+            Step::Other(statement) => batch.other(simd, statement),
             Step::Count(run) => {
                 let (executions, active) = &mut runs[*run as usize];
                 *executions += 1;

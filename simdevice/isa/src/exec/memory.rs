@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
+use fearless_simd::Simd;
+
 use super::super::ir::{Address, AtomicOp, Binding, CHUNK_LANES, Format, Reg, Space};
 use super::super::resources::{load_word, range_words};
 use super::batch::Batch;
@@ -218,13 +220,13 @@ impl<'a> Batch<'a> {
         }
     }
 
-    pub fn load(&self, dst: &[Reg], address: &Address, format: Format) {
+    pub fn load<S: Simd>(&self, simd: S, dst: &[Reg], address: &Address, format: Format) {
         let view = self.common_view(&address.space);
         // Registers of one load are uniform together.
         let uniform = dst.iter().any(|reg| !self.slot(*reg).is_varying());
         match view {
             Some(view) if uniform => self.load_uniform_from(view, dst, address, format),
-            Some(view) if format == Format::B32 => self.load_words(view, dst, address),
+            Some(view) if format == Format::B32 => self.load_words(simd, view, dst, address),
             None if address.space == Space::Private => self.load_private(dst, address, format),
             _ if uniform => self.load_uniform(dst, address, format),
             _ => self
@@ -284,9 +286,9 @@ impl<'a> Batch<'a> {
         }
     }
 
-    pub fn store(&self, src: &[Reg], address: &Address, format: Format) {
+    pub fn store<S: Simd>(&self, simd: S, src: &[Reg], address: &Address, format: Format) {
         match self.common_view(&address.space) {
-            Some(view) if format == Format::B32 => self.store_words(view, src, address),
+            Some(view) if format == Format::B32 => self.store_words(simd, view, src, address),
             None if address.space == Space::Private => self.store_private(src, address, format),
             _ => self
                 .file
@@ -313,8 +315,9 @@ impl<'a> Batch<'a> {
         }
     }
 
-    pub fn atomic(
+    pub fn atomic<S: Simd>(
         &self,
+        simd: S,
         op: AtomicOp,
         dst: Option<Reg>,
         address: &Address,
@@ -333,7 +336,7 @@ impl<'a> Batch<'a> {
                 let at_once = (format == Format::B32).then(|| {
                     let [values, comparators] =
                         [values, comparators].map(|lanes| each_lane(lanes, |lane| lane as u32));
-                    self.atomic_words(op, address, chunk, &values, &comparators)
+                    self.atomic_words(simd, op, address, chunk, &values, &comparators)
                 });
                 old = match at_once.flatten() {
                     Some(old) => each_lane(old, u64::from),

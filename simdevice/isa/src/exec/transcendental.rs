@@ -32,7 +32,7 @@ pub fn kernel<S: Simd>(op: Op) -> Kernel<S> {
                     move || {
                         vector1(
                             simd,
-                            file,
+                            *file,
                             dst,
                             src,
                             #[inline(always)]
@@ -51,7 +51,7 @@ pub fn kernel<S: Simd>(op: Op) -> Kernel<S> {
                     move || {
                         vector2(
                             simd,
-                            file,
+                            *file,
                             dst,
                             src,
                             #[inline(always)]

@@ -2,9 +2,11 @@
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
+use fearless_simd::{Simd, prelude::*, u32x16};
+
 use super::super::ir::{Address, AtomicOp, CHUNK_LANES, Format, Reg, Space};
-use super::batch::Batch;
-use super::file::Slot;
+use super::batch::{Batch, bits_to_mask};
+use super::file::{Slot, load};
 use super::mask::{MaskId, lanes_of};
 use super::memory::{View, combine};
 
@@ -17,55 +19,54 @@ struct Window<'a> {
     words: &'a [AtomicU32],
 }
 
-/// Where 16 lanes access, in words from a window's start; all elements are within.
-struct Starts {
-    words: [u32; CHUNK_LANES],
-}
-
 impl<'a> Window<'a> {
-    /// None if the offset isn't aligned.
+    /// Empty if the offset isn't aligned.
     #[inline(always)]
-    fn new(view: View<'a>, offset: u32) -> Option<Self> {
+    fn new(view: View<'a>, offset: u32) -> Self {
         let end = view.words.len().min(view.bytes as usize / 4);
         let start = (offset as usize / 4).min(end);
-        offset.is_multiple_of(4).then(|| Self {
-            words: &view.words[start..end],
-        })
+        if offset.is_multiple_of(4) {
+            Self {
+                words: &view.words[start..end],
+            }
+        } else {
+            Self { words: &[] }
+        }
     }
 
-    /// The lanes' places, if all `count` elements of each of `lanes` are within and aligned. The other lanes get some
-    /// place that is within, too.
+    /// Where lanes begin, in words from the window's start, if all `count` elements of each of `lanes` are within and
+    /// aligned. The other lanes get some place that is within, too.
     #[inline(always)]
-    fn starts(self, mut bases: [u32; CHUNK_LANES], lanes: u16, count: usize) -> Option<Starts> {
+    fn starts<S: Simd>(
+        self,
+        simd: S,
+        mut bases: u32x16<S>,
+        lanes: u16,
+        count: usize,
+    ) -> Option<u32x16<S>> {
         if lanes != u16::MAX {
             let first = bases[lanes.trailing_zeros() as usize % CHUNK_LANES];
-            for (lane, base) in bases.iter_mut().enumerate() {
-                if lanes >> lane & 1 == 0 {
-                    *base = first;
-                }
-            }
+            let first = u32x16::splat(simd, first);
+            bases = bits_to_mask(simd, lanes).select(bases, first);
         }
         let last = u32::try_from(self.words.len().checked_sub(count)?).unwrap_or(u32::MAX);
-        let mut outside = 0;
-        for base in &mut bases {
-            outside |= (*base & 3) | u32::from(*base / 4 > last);
-            *base /= 4;
-        }
-        (outside == 0).then_some(Starts { words: bases })
+        let words = bases >> 2;
+        let within = words.simd_le(u32x16::splat(simd, last));
+        let aligned = (bases & 3).simd_eq(u32x16::splat(simd, 0));
+        (within & aligned).all_true().then_some(words)
     }
 }
 
-impl Starts {
-    /// Whether the lanes' elements follow one another, `stride` words apart.
-    #[inline(always)]
-    fn are_apart(&self, stride: u32) -> bool {
-        let first = self.words[0];
-        let mut differs = 0;
-        for (lane, word) in self.words.iter().enumerate() {
-            differs |= word ^ first.wrapping_add(lane as u32 * stride);
-        }
-        differs == 0
+/// Whether lanes follow one another, `STRIDE` words apart.
+#[inline(always)]
+fn are_apart<S: Simd, const STRIDE: usize>(starts: u32x16<S>) -> bool {
+    let mut steps = [0; CHUNK_LANES];
+    for lane in 0..CHUNK_LANES {
+        steps[lane] = (lane * STRIDE) as u32;
     }
+    let steps = u32x16::simd_from(starts.simd, steps);
+    let wanted = u32x16::splat(starts.simd, starts[0]) + steps;
+    starts.simd_eq(wanted).all_true()
 }
 
 /// `COUNT` elements from a word on.
@@ -79,10 +80,11 @@ fn element<const COUNT: usize>(words: &[AtomicU32], at: u32) -> &[AtomicU32; COU
 
 impl<'a> Batch<'a> {
     #[inline(always)]
-    fn bases(&self, address: &Address, chunk: usize) -> [u32; CHUNK_LANES] {
-        match address.base {
-            Some(base) => self.file.lanes(self.slot(base), chunk),
-            None => [0; CHUNK_LANES],
+    fn bases<S: Simd>(&self, simd: S, address: &Address, chunk: usize) -> u32x16<S> {
+        match address.base.map(|base| self.slot(base)) {
+            Some(base) if base.is_varying() => load(simd, &self.file.narrow(base)[chunk]),
+            Some(base) => load(simd, &self.file.narrow(base)[0]),
+            None => u32x16::splat(simd, 0),
         }
     }
 
@@ -96,7 +98,13 @@ impl<'a> Batch<'a> {
     }
 
     /// Loads into varying registers.
-    pub(super) fn load_words(&self, view: View<'a>, dst: &[Reg], address: &Address) {
+    pub(super) fn load_words<S: Simd>(
+        &self,
+        simd: S,
+        view: View<'a>,
+        dst: &[Reg],
+        address: &Address,
+    ) {
         for (part, dst) in dst.chunks(TOGETHER).enumerate() {
             let address = Address {
                 // What overflows is beyond the end of any memory.
@@ -104,61 +112,69 @@ impl<'a> Batch<'a> {
                 ..*address
             };
             match dst {
-                [a] => self.load_elements([*a], view, dst, &address),
-                [a, b] => self.load_elements([*a, *b], view, dst, &address),
-                [a, b, c] => self.load_elements([*a, *b, *c], view, dst, &address),
-                [a, b, c, d, ..] => self.load_elements([*a, *b, *c, *d], view, dst, &address),
+                [a] => self.load_elements(simd, [*a], view, dst, &address),
+                [a, b] => self.load_elements(simd, [*a, *b], view, dst, &address),
+                [a, b, c] => self.load_elements(simd, [*a, *b, *c], view, dst, &address),
+                [a, b, c, d, ..] => self.load_elements(simd, [*a, *b, *c, *d], view, dst, &address),
                 [] => {}
             }
         }
     }
 
-    fn load_elements<const COUNT: usize>(
+    #[inline(never)]
+    fn load_elements<S: Simd, const COUNT: usize>(
         &self,
+        simd: S,
         regs: [Reg; COUNT],
         view: View<'a>,
         dst: &[Reg],
         address: &Address,
     ) {
-        let slots = self.slots(regs);
-        let window = Window::new(view, address.offset);
-        for chunk in self.file.span() {
-            let lanes = self.masks.chunk(MaskId::ACTIVE, chunk);
-            if lanes == 0 {
-                continue;
-            }
-            let bases = self.bases(address, chunk);
-            match window.and_then(|window| Some((window, window.starts(bases, lanes, COUNT)?))) {
-                Some((window, starts)) => self.gather_words(slots, chunk, window, &starts),
-                None => self.load_chunk(dst, address, Format::B32, chunk),
-            }
-        }
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let slots = self.slots(regs);
+                let window = Window::new(view, address.offset);
+                for chunk in self.file.span() {
+                    let lanes = self.masks.chunk(MaskId::ACTIVE, chunk);
+                    if lanes == 0 {
+                        continue;
+                    }
+                    let bases = self.bases(simd, address, chunk);
+                    match window.starts(simd, bases, lanes, COUNT) {
+                        Some(starts) => self.gather_words(slots, chunk, window, starts),
+                        None => self.load_chunk(dst, address, Format::B32, chunk),
+                    }
+                }
+            },
+        );
     }
 
     #[inline(always)]
-    fn gather_words<const COUNT: usize>(
+    fn gather_words<S: Simd, const COUNT: usize>(
         &self,
         slots: [Slot; COUNT],
         chunk: usize,
         window: Window<'_>,
-        starts: &Starts,
+        starts: u32x16<S>,
     ) {
         let mut values = [[0; CHUNK_LANES]; COUNT];
-        if starts.are_apart(0) {
-            let element = element::<COUNT>(window.words, starts.words[0]);
+        if are_apart::<S, 0>(starts) {
+            let element = element::<COUNT>(window.words, starts[0]);
             for index in 0..COUNT {
                 values[index] = [element[index].load(Relaxed); CHUNK_LANES];
             }
-        } else if starts.are_apart(COUNT as u32) {
-            let run = &window.words[starts.words[0] as usize..][..CHUNK_LANES * COUNT];
+        } else if are_apart::<S, COUNT>(starts) {
+            let run = &window.words[starts[0] as usize..][..CHUNK_LANES * COUNT];
             for lane in 0..CHUNK_LANES {
                 for index in 0..COUNT {
                     values[index][lane] = run[lane * COUNT + index].load(Relaxed);
                 }
             }
         } else {
-            for (lane, start) in starts.words.iter().enumerate() {
-                let element = element::<COUNT>(window.words, *start);
+            let starts: [u32; CHUNK_LANES] = starts.into();
+            for lane in 0..CHUNK_LANES {
+                let element = element::<COUNT>(window.words, starts[lane]);
                 for index in 0..COUNT {
                     values[index][lane] = element[index].load(Relaxed);
                 }
@@ -170,59 +186,75 @@ impl<'a> Batch<'a> {
     }
 
     /// Stores words.
-    pub(super) fn store_words(&self, view: View<'a>, src: &[Reg], address: &Address) {
+    pub(super) fn store_words<S: Simd>(
+        &self,
+        simd: S,
+        view: View<'a>,
+        src: &[Reg],
+        address: &Address,
+    ) {
         for (part, src) in src.chunks(TOGETHER).enumerate() {
             let address = Address {
                 offset: address.offset.saturating_add((4 * TOGETHER * part) as u32),
                 ..*address
             };
             match src {
-                [a] => self.store_elements([*a], view, src, &address),
-                [a, b] => self.store_elements([*a, *b], view, src, &address),
-                [a, b, c] => self.store_elements([*a, *b, *c], view, src, &address),
-                [a, b, c, d, ..] => self.store_elements([*a, *b, *c, *d], view, src, &address),
+                [a] => self.store_elements(simd, [*a], view, src, &address),
+                [a, b] => self.store_elements(simd, [*a, *b], view, src, &address),
+                [a, b, c] => self.store_elements(simd, [*a, *b, *c], view, src, &address),
+                [a, b, c, d, ..] => {
+                    self.store_elements(simd, [*a, *b, *c, *d], view, src, &address)
+                }
                 [] => {}
             }
         }
     }
 
-    fn store_elements<const COUNT: usize>(
+    #[inline(never)]
+    fn store_elements<S: Simd, const COUNT: usize>(
         &self,
+        simd: S,
         regs: [Reg; COUNT],
         view: View<'a>,
         src: &[Reg],
         address: &Address,
     ) {
-        let slots = self.slots(regs);
-        let window = Window::new(view, address.offset);
-        for chunk in self.file.span() {
-            let lanes = self.masks.writing(chunk);
-            if lanes == 0 {
-                continue;
-            }
-            let bases = self.bases(address, chunk);
-            match window.and_then(|window| Some((window, window.starts(bases, lanes, COUNT)?))) {
-                Some((window, starts)) => self.scatter_words(slots, chunk, lanes, window, &starts),
-                None => self.store_chunk(src, address, Format::B32, chunk),
-            }
-        }
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let slots = self.slots(regs);
+                let window = Window::new(view, address.offset);
+                for chunk in self.file.span() {
+                    let lanes = self.masks.writing(chunk);
+                    if lanes == 0 {
+                        continue;
+                    }
+                    let bases = self.bases(simd, address, chunk);
+                    match window.starts(simd, bases, lanes, COUNT) {
+                        Some(starts) => self.scatter_words(slots, chunk, lanes, window, starts),
+                        None => self.store_chunk(src, address, Format::B32, chunk),
+                    }
+                }
+            },
+        );
     }
 
     #[inline(always)]
-    fn scatter_words<const COUNT: usize>(
+    fn scatter_words<S: Simd, const COUNT: usize>(
         &self,
         slots: [Slot; COUNT],
         chunk: usize,
         lanes: u16,
         window: Window<'_>,
-        starts: &Starts,
+        starts: u32x16<S>,
     ) {
         let mut values = [[0; CHUNK_LANES]; COUNT];
         for index in 0..COUNT {
             values[index] = self.file.lanes::<u32>(slots[index], chunk);
         }
+        let starts: [u32; CHUNK_LANES] = starts.into();
         let put = |lane: usize| {
-            let element = element::<COUNT>(window.words, starts.words[lane]);
+            let element = element::<COUNT>(window.words, starts[lane]);
             for index in 0..COUNT {
                 element[index].store(values[index][lane], Relaxed);
             }
@@ -239,8 +271,9 @@ impl<'a> Batch<'a> {
     }
 
     /// A read-modify-write of 32 bits, in 16 lanes in order. Gives the old values, or None if a lane is out of range.
-    pub(super) fn atomic_words(
+    pub(super) fn atomic_words<S: Simd>(
         &self,
+        simd: S,
         op: AtomicOp,
         address: &Address,
         chunk: usize,
@@ -248,12 +281,12 @@ impl<'a> Batch<'a> {
         comparators: &[u32; CHUNK_LANES],
     ) -> Option<[u32; CHUNK_LANES]> {
         let lanes = self.masks.writing(chunk);
-        let window = Window::new(self.common_view(&address.space)?, address.offset)?;
-        let starts = window.starts(self.bases(address, chunk), lanes, 1)?;
+        let window = Window::new(self.common_view(&address.space)?, address.offset);
+        let starts = window.starts(simd, self.bases(simd, address, chunk), lanes, 1)?;
         let access = Access {
             lanes,
             window,
-            starts,
+            starts: starts.into(),
             values,
             comparators,
         };
@@ -290,7 +323,7 @@ impl<'a> Batch<'a> {
 struct Access<'a> {
     lanes: u16,
     window: Window<'a>,
-    starts: Starts,
+    starts: [u32; CHUNK_LANES],
     values: &'a [u32; CHUNK_LANES],
     comparators: &'a [u32; CHUNK_LANES],
 }
@@ -301,7 +334,7 @@ impl Access<'_> {
     fn each(&self, change: impl Fn(&AtomicU32, u32, u32) -> u32) -> [u32; CHUNK_LANES] {
         let mut old = [0; CHUNK_LANES];
         for lane in lanes_of(self.lanes) {
-            let word = &self.window.words[self.starts.words[lane] as usize];
+            let word = &self.window.words[self.starts[lane] as usize];
             old[lane] = change(word, self.values[lane], self.comparators[lane]);
         }
         old
