@@ -186,7 +186,7 @@ fn by_lane<S: Simd>(op: Op) -> Kernel<S> {
             simd.vectorize(
                 #[inline(always)]
                 move || integer::bitfield_insert(*file, dst, src),
-            )
+            );
         },
         Op::BitfieldSExtract => lanes!(map3, integer::signed_bitfield),
         Op::BitfieldUExtract => lanes!(map3, integer::unsigned_bitfield),

@@ -315,6 +315,7 @@ impl<'a> Batch<'a> {
         }
     }
 
+    #[allow(clippy::too_many_arguments, reason = "the statement has as many")]
     pub fn atomic<S: Simd>(
         &self,
         simd: S,

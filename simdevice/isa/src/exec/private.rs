@@ -8,6 +8,12 @@ use super::mask::{MaskId, lanes_of};
 /// A word that doesn't exist.
 const NOWHERE: usize = usize::MAX;
 
+/// The rows that 16 lanes access.
+enum Rows {
+    Same(usize),
+    Each([usize; CHUNK_LANES]),
+}
+
 impl Batch<'_> {
     /// The row of private memory that a byte address means; [`NOWHERE`] if there is none.
     #[inline(always)]
@@ -19,23 +25,18 @@ impl Batch<'_> {
         }
     }
 
-    /// The rows that 16 lanes access, and whether they are the same.
+    /// The rows that 16 lanes access.
     #[inline(always)]
-    fn private_rows(
-        &self,
-        address: &Address,
-        step: u64,
-        chunk: usize,
-    ) -> Result<usize, [usize; CHUNK_LANES]> {
+    fn private_rows(&self, address: &Address, step: u64, chunk: usize) -> Rows {
         let step = u64::from(address.offset) + step;
         match address.base.map(|base| self.slot(base)) {
-            None => Ok(self.private_row(step)),
+            None => Rows::Same(self.private_row(step)),
             Some(base) if !base.is_varying() => {
-                Ok(self.private_row(u64::from(self.file.first::<u32>(base)) + step))
+                Rows::Same(self.private_row(u64::from(self.file.first::<u32>(base)) + step))
             }
             Some(base) => {
                 let bases = self.file.lanes::<u32>(base, chunk);
-                Err(each_lane(bases, |base| {
+                Rows::Each(each_lane(bases, |base| {
                     self.private_row(u64::from(base) + step)
                 }))
             }
@@ -47,9 +48,9 @@ impl Batch<'_> {
     fn private_words(&self, address: &Address, step: u64, chunk: usize) -> [u32; CHUNK_LANES] {
         let word = |row: usize| self.private.get(row.wrapping_add(chunk));
         match self.private_rows(address, step, chunk) {
-            Ok(NOWHERE) => [0; CHUNK_LANES],
-            Ok(row) => word(row).map_or([0; CHUNK_LANES], |chunk| chunk.get().0),
-            Err(rows) => {
+            Rows::Same(NOWHERE) => [0; CHUNK_LANES],
+            Rows::Same(row) => word(row).map_or([0; CHUNK_LANES], |chunk| chunk.get().0),
+            Rows::Each(rows) => {
                 let mut values = [0; CHUNK_LANES];
                 for (lane, row) in rows.into_iter().enumerate() {
                     if row != NOWHERE {
@@ -87,8 +88,8 @@ impl Batch<'_> {
     /// Where the second word of a 64-bit element exists.
     fn second_exists(&self, address: &Address, step: u64, chunk: usize) -> [bool; CHUNK_LANES] {
         match self.private_rows(address, step + 4, chunk) {
-            Ok(row) => [row != NOWHERE; CHUNK_LANES],
-            Err(rows) => rows.map(|row| row != NOWHERE),
+            Rows::Same(row) => [row != NOWHERE; CHUNK_LANES],
+            Rows::Each(rows) => rows.map(|row| row != NOWHERE),
         }
     }
 
@@ -126,8 +127,8 @@ impl Batch<'_> {
     ) {
         let word = |row: usize| self.private.get(row.wrapping_add(chunk));
         match self.private_rows(address, step, chunk) {
-            Ok(NOWHERE) => {}
-            Ok(row) => {
+            Rows::Same(NOWHERE) => {}
+            Rows::Same(row) => {
                 if let Some(cell) = word(row) {
                     let mut chunk = cell.get();
                     for (lane, value) in values.into_iter().enumerate() {
@@ -138,7 +139,7 @@ impl Batch<'_> {
                     cell.set(chunk);
                 }
             }
-            Err(rows) => {
+            Rows::Each(rows) => {
                 for lane in lanes_of(lanes).filter(|lane| rows[*lane] != NOWHERE) {
                     if let Some(cell) = word(rows[lane]) {
                         let mut chunk = cell.get();

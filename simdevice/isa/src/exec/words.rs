@@ -60,10 +60,15 @@ impl<'a> Window<'a> {
 /// Whether lanes follow one another, `STRIDE` words apart.
 #[inline(always)]
 fn are_apart<S: Simd, const STRIDE: usize>(starts: u32x16<S>) -> bool {
-    let mut steps = [0; CHUNK_LANES];
-    for lane in 0..CHUNK_LANES {
-        steps[lane] = (lane * STRIDE) as u32;
-    }
+    let steps = const {
+        let mut steps = [0; CHUNK_LANES];
+        let mut lane = 0;
+        while lane < CHUNK_LANES {
+            steps[lane] = (lane * STRIDE) as u32;
+            lane += 1;
+        }
+        steps
+    };
     let steps = u32x16::simd_from(starts.simd, steps);
     let wanted = u32x16::splat(starts.simd, starts[0]) + steps;
     starts.simd_eq(wanted).all_true()
@@ -203,7 +208,7 @@ impl<'a> Batch<'a> {
                 [a, b] => self.store_elements(simd, [*a, *b], view, src, &address),
                 [a, b, c] => self.store_elements(simd, [*a, *b, *c], view, src, &address),
                 [a, b, c, d, ..] => {
-                    self.store_elements(simd, [*a, *b, *c, *d], view, src, &address)
+                    self.store_elements(simd, [*a, *b, *c, *d], view, src, &address);
                 }
                 [] => {}
             }
