@@ -5,12 +5,17 @@ use std::collections::HashMap;
 use fearless_simd::Level;
 
 use super::exec::evaluate;
+use super::hoist::hoist;
 use super::ir::{Block, Constant, Program, Reg, Register, Role, Statement, Type};
 use super::op::Op;
+use super::select::select;
 
 /// Optimizes a valid program; it stays valid and means the same.
 pub fn optimize(program: &mut Program, level: Level) {
     fold(program, level);
+    remove_dead(program);
+    select(program);
+    hoist(program);
     remove_dead(program);
     let Program {
         registers, body, ..

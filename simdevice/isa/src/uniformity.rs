@@ -1,16 +1,23 @@
 //! Which registers hold the same value in all lanes. Such a register is kept, and computed, once a batch.
 
+use super::homes::{Homes, homes};
 use super::ir::{Block, Label, Program, Rate, Reg, Space, Statement};
 
 /// For each register, whether it may differ between lanes of a batch.
 ///
 /// A value is uniform if it is computed from uniform values. A variable is uniform if all that is assigned to it is, and
-/// no assignment can be masked for a lane that comes back later: none lies in a branch on a varying condition, or in a
-/// construct that some lanes leave before others. (Lanes that return don't come back.)
-pub fn varying_registers(program: &Program) -> Vec<bool> {
+/// no assignment can be masked for a lane that reads it later: none lies in a branch on a varying condition within the
+/// variable's home (see [`Homes`]), or in a construct there that some lanes leave before others and outside which it is
+/// read. (Lanes that return don't come back.)
+///
+/// `private_is_uniform` says that private memory holds the same in all lanes.
+pub fn varying_registers(program: &Program, private_is_uniform: bool) -> Vec<bool> {
     let mut search = Search {
         varying: vec![false; program.registers.len()],
-        divergent: Vec::new(),
+        private_is_uniform,
+        homes: homes(program),
+        left: Vec::new(),
+        continued: Vec::new(),
         open: Vec::new(),
         changed: true,
     };
@@ -34,14 +41,33 @@ pub fn varying_registers(program: &Program) -> Vec<bool> {
 enum Around {
     /// A branch on a varying condition.
     Varying,
-    /// One that lanes may leave by name.
+    /// A branch on a uniform condition.
+    Uniform,
+    /// A switch or scope, which lanes may leave by name.
     Labelled(Label),
+    /// A loop's body.
+    Body(Label),
+    /// What a loop does before the next round.
+    Continuing(Label),
+}
+
+impl Around {
+    fn label(&self) -> Option<Label> {
+        match self {
+            Self::Labelled(label) | Self::Body(label) | Self::Continuing(label) => Some(*label),
+            Self::Varying | Self::Uniform => None,
+        }
+    }
 }
 
 struct Search {
     varying: Vec<bool>,
-    /// Constructs that some lanes leave before others.
-    divergent: Vec<Label>,
+    private_is_uniform: bool,
+    homes: Homes,
+    /// Constructs that some lanes break out of before others.
+    left: Vec<Label>,
+    /// Loops in whose body some lanes continue before others.
+    continued: Vec<Label>,
     open: Vec<Around>,
     changed: bool,
 }
@@ -57,14 +83,33 @@ impl Search {
 
     /// Whether lanes may be inactive here for reasons that lie within the innermost `depth` constructs.
     fn masked_within(&self, depth: usize) -> bool {
-        self.open
-            .iter()
-            .rev()
-            .take(depth)
-            .any(|around| match around {
-                Around::Varying => true,
-                Around::Labelled(label) => self.divergent.contains(label),
-            })
+        let mut within = self.open.iter().rev().take(depth);
+        within.any(|around| self.masks(around, |label| self.left.contains(&label)))
+    }
+
+    /// Whether a construct masks what is in it. `left` says whether it counts that lanes break out of one.
+    fn masks(&self, around: &Around, left: impl Fn(Label) -> bool) -> bool {
+        match around {
+            Around::Varying => true,
+            Around::Uniform => false,
+            Around::Labelled(label) | Around::Continuing(label) => left(*label),
+            Around::Body(label) => left(*label) || self.continued.contains(label),
+        }
+    }
+
+    /// Whether an assignment here may be masked for a lane that reads the variable later.
+    fn assigned_by_some(&self, variable: Reg) -> bool {
+        let home = self.homes.depth(variable).min(self.open.len());
+        // Within a loop, lanes come back to what they left.
+        let mut repeated = false;
+        self.open[home..].iter().any(|around| {
+            let masked = self.masks(around, |label| {
+                let read_later = repeated || self.homes.is_read_outside(variable, label);
+                self.left.contains(&label) && read_later
+            });
+            repeated |= matches!(around, Around::Body(_) | Around::Continuing(_));
+            masked
+        })
     }
 
     fn block(&mut self, block: &Block) {
@@ -77,26 +122,17 @@ impl Search {
         self.open.pop();
     }
 
-    /// A break or continue to `label`: if only some lanes take it, the construct is divergent.
-    fn leave(&mut self, label: Label) {
-        let depth = self
-            .open
-            .iter()
-            .rev()
-            .position(|around| matches!(around, Around::Labelled(open) if *open == label));
-        if let Some(depth) = depth
-            && self.masked_within(depth)
-            && !self.divergent.contains(&label)
-        {
-            self.divergent.push(label);
-            self.changed = true;
-        }
+    /// Whether only some of the lanes in the construct get here, where they leave it.
+    fn diverges(&self, label: Label) -> bool {
+        let mut around = self.open.iter().rev();
+        let depth = around.position(|around| around.label() == Some(label));
+        depth.is_some_and(|depth| self.masked_within(depth))
     }
 
     fn statement(&mut self, statement: &Statement) {
         match statement {
             Statement::Assign { dst, src } => {
-                if self.is_varying(*src) || self.masked_within(usize::MAX) {
+                if self.is_varying(*src) || self.assigned_by_some(*dst) {
                     self.mark(*dst);
                 }
             }
@@ -106,11 +142,8 @@ impl Search {
                 otherwise,
             } => {
                 for block in [then, otherwise] {
-                    if self.is_varying(*condition) {
-                        self.within(Around::Varying, block);
-                    } else {
-                        self.block(block);
-                    }
+                    let around = self.branch(*condition);
+                    self.within(around, block);
                 }
             }
             Statement::Switch {
@@ -120,11 +153,8 @@ impl Search {
             } => {
                 self.open.push(Around::Labelled(*label));
                 for case in cases {
-                    if self.is_varying(*selector) {
-                        self.within(Around::Varying, &case.body);
-                    } else {
-                        self.block(&case.body);
-                    }
+                    let around = self.branch(*selector);
+                    self.within(around, &case.body);
                 }
                 self.open.pop();
             }
@@ -133,13 +163,24 @@ impl Search {
                 body,
                 continuing,
             } => {
-                self.within(Around::Labelled(*label), body);
-                self.within(Around::Labelled(*label), continuing);
+                self.within(Around::Body(*label), body);
+                self.within(Around::Continuing(*label), continuing);
             }
             Statement::Scope { label, body } => self.within(Around::Labelled(*label), body),
-            Statement::Break(label) | Statement::Continue(label) => self.leave(*label),
+            Statement::Break(label) => {
+                if self.diverges(*label) && !self.left.contains(label) {
+                    self.left.push(*label);
+                    self.changed = true;
+                }
+            }
+            Statement::Continue(label) => {
+                if self.diverges(*label) && !self.continued.contains(label) {
+                    self.continued.push(*label);
+                    self.changed = true;
+                }
+            }
             other => {
-                let differs = differs_by_itself(other)
+                let differs = self.differs_by_itself(other)
                     || other.uses().into_iter().any(|reg| self.is_varying(reg));
                 if differs {
                     other
@@ -150,15 +191,25 @@ impl Search {
             }
         }
     }
-}
 
-/// Whether a statement's results may differ between lanes though its operands don't.
-fn differs_by_itself(statement: &Statement) -> bool {
-    match statement {
-        Statement::Load { address, .. } => address.space == Space::Private,
-        Statement::Compute { .. } | Statement::BufferSize { .. } | Statement::ImageQuery { .. } => {
-            false
+    fn branch(&self, condition: Reg) -> Around {
+        if self.is_varying(condition) {
+            Around::Varying
+        } else {
+            Around::Uniform
         }
-        _ => true,
+    }
+
+    /// Whether a statement's results may differ between lanes though its operands don't.
+    fn differs_by_itself(&self, statement: &Statement) -> bool {
+        match statement {
+            Statement::Load { address, .. } => {
+                address.space == Space::Private && !self.private_is_uniform
+            }
+            Statement::Compute { .. }
+            | Statement::BufferSize { .. }
+            | Statement::ImageQuery { .. } => false,
+            _ => true,
+        }
     }
 }

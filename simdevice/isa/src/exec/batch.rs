@@ -20,6 +20,8 @@ pub struct Batch<'a> {
     pub masks: Masks<'a>,
     /// Workgroup memory.
     pub shared: &'a [AtomicU32],
+    /// Whether all lanes that the batch began with are active, of those in the chunks that the file spans.
+    pub whole: bool,
     /// Private memory: a row of chunks for each word.
     pub private: &'a [Cell<Chunk>],
 }
@@ -31,10 +33,21 @@ impl Batch<'_> {
         self.executable.slots[reg.0 as usize]
     }
 
+    /// Finds out which chunks have active lanes, after the masks have changed.
+    #[inline(always)]
+    pub fn look_at_masks(&mut self) {
+        let (span, whole) = self.masks.span();
+        self.file = self.file.with_span(span);
+        self.whole = whole;
+    }
+
     /// `dst = src` in the active lanes; in all, if `dst` is uniform.
     #[inline(always)]
     pub fn assign<S: Simd>(&self, simd: S, dst: Slot, src: Slot, ty: Type) {
         let uniform = !dst.is_varying();
+        if self.whole && !uniform {
+            return self.copy(dst, src, ty);
+        }
         let (dst, src, per_16) = match ty {
             Type::B64 => (self.file.wide(dst), self.file.wide(src), 2),
             Type::B32 | Type::Bool => (self.file.narrow(dst), self.file.narrow(src), 1),
@@ -47,7 +60,7 @@ impl Batch<'_> {
         }
         // A uniform source has one chunk (or pair) for all.
         let step = usize::from(src.len() == dst.len());
-        for chunk in 0..dst.len() / per_16 {
+        for chunk in self.file.span() {
             let active = self.masks.chunk(MaskId::ACTIVE, chunk);
             for part in 0..per_16 {
                 let to = &dst[chunk * per_16 + part];
@@ -68,13 +81,26 @@ impl Batch<'_> {
     #[inline(always)]
     pub fn copy(&self, dst: Slot, src: Slot, ty: Type) {
         match ty {
-            Type::B64 => copy_chunks(self.file.wide(dst), self.file.wide(src), 2),
-            Type::B32 | Type::Bool => copy_chunks(self.file.narrow(dst), self.file.narrow(src), 1),
+            Type::B64 => self.copy_chunks(dst, self.file.wide(dst), self.file.wide(src), 2),
+            Type::B32 | Type::Bool => {
+                self.copy_chunks(dst, self.file.narrow(dst), self.file.narrow(src), 1);
+            }
+        }
+    }
+
+    /// Copies the chunks to compute of a register; a uniform source has only the first `per_16`.
+    #[inline(always)]
+    fn copy_chunks(&self, slot: Slot, dst: &[Cell<Chunk>], src: &[Cell<Chunk>], per_16: usize) {
+        let step = usize::from(src.len() == dst.len());
+        for chunk in self.file.rounds(slot) {
+            for part in 0..per_16 {
+                dst[chunk * per_16 + part].set(src[chunk * per_16 * step + part].get());
+            }
         }
     }
 
     /// Runs a statement that reaches across lanes or out of the registers.
-    pub fn other(&self, statement: &Statement) {
+    pub fn other<S: Simd>(&self, simd: S, statement: &Statement) {
         match statement {
             Statement::LaneIndex { dst } => {
                 for chunk in 0..self.file.width() {
@@ -93,12 +119,12 @@ impl Batch<'_> {
                 dst,
                 address,
                 format,
-            } => self.load(dst, address, *format),
+            } => self.load(simd, dst, address, *format),
             Statement::Store {
                 src,
                 address,
                 format,
-            } => self.store(src, address, *format),
+            } => self.store(simd, src, address, *format),
             Statement::Atomic {
                 op,
                 dst,
@@ -107,7 +133,7 @@ impl Batch<'_> {
                 value,
                 comparator,
             } => {
-                self.atomic(*op, *dst, address, *format, *value, *comparator);
+                self.atomic(simd, *op, *dst, address, *format, *value, *comparator);
             }
             Statement::BufferSize { dst, buffer } => self.buffer_size(*dst, buffer),
             Statement::Sample(sample) => self.sample(sample),
@@ -138,19 +164,9 @@ impl Batch<'_> {
     }
 }
 
-/// Copies all chunks of a register; a uniform source has only the first `per_16`.
-#[inline(always)]
-fn copy_chunks(dst: &[Cell<Chunk>], src: &[Cell<Chunk>], per_16: usize) {
-    for (dst, src) in dst.chunks(per_16).zip(src.chunks(per_16).cycle()) {
-        dst.iter()
-            .zip(src)
-            .for_each(|(dst, src)| dst.set(src.get()));
-    }
-}
-
 /// A mask vector from bits.
 #[inline(always)]
-fn bits_to_mask<S: Simd>(simd: S, bits: u16) -> fearless_simd::mask32x16<S> {
+pub fn bits_to_mask<S: Simd>(simd: S, bits: u16) -> fearless_simd::mask32x16<S> {
     simd.from_bitmask_mask32x16(u64::from(bits))
 }
 

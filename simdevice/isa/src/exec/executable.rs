@@ -1,18 +1,22 @@
 //! A program made ready to run.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicU32;
+
 use fearless_simd::Level;
 
 use super::super::ir::{
-    CHUNK_LANES, Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Reg, Type,
+    CHUNK_LANES, Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Type,
 };
 use super::super::optimize::optimize;
 use super::super::uniformity::varying_registers;
 use super::super::validate::{InvalidProgram, validate};
 use super::allocate::allocate;
+use super::engine::{Engine, engine};
 use super::file::Slot;
 use super::lower::{Lowered, lower};
-use super::mask::MaskId;
 use super::step::{RunCost, Step};
+use super::table::take_table;
 
 /// The most chunks that a register file may have: 256 MiB.
 const MAX_CHUNKS: usize = 1 << 22;
@@ -59,7 +63,9 @@ pub struct Executable {
     pub(super) subgroup_size: usize,
     pub(super) shared_bytes: u32,
     pub(super) private_bytes: u32,
-    pub(super) level: Level,
+    /// What private memory holds, if that is the same in all lanes at all times.
+    pub(super) table: Option<Vec<AtomicU32>>,
+    pub(super) engine: Arc<dyn Engine>,
 }
 
 impl Executable {
@@ -83,8 +89,10 @@ impl Executable {
         }
         validate(&program)?;
         optimize(&mut program, level);
+        let table = take_table(&mut program);
         let width = lanes / CHUNK_LANES;
-        let allocation = allocate(&program, &varying_registers(&program), width);
+        let varying = varying_registers(&program, table.is_some());
+        let allocation = allocate(&program, &varying, width);
         if allocation.chunks > MAX_CHUNKS {
             return structure("too many registers are live at once");
         }
@@ -105,55 +113,24 @@ impl Executable {
             outputs: program.outputs,
             shared_bytes: program.shared_bytes,
             private_bytes: program.private_bytes,
+            table: table.map(|words| words.into_iter().map(AtomicU32::new).collect()),
             lanes,
             subgroup_size,
-            level,
+            engine: engine(level),
         })
-    }
-
-    /// An executable of one chunk without steps, with room for one operation's registers.
-    pub(super) fn empty(level: Level) -> Self {
-        Self {
-            steps: Vec::new(),
-            slots: Vec::new(),
-            types: Vec::new(),
-            constants: Vec::new(),
-            inputs: Vec::new(),
-            outputs: Vec::new(),
-            runs: Vec::new(),
-            masks: usize::from(MaskId::FIRST_FREE),
-            chunks: 10,
-            lanes: CHUNK_LANES,
-            subgroup_size: 4,
-            shared_bytes: 0,
-            private_bytes: 0,
-            level,
-        }
-    }
-
-    /// Adds a register at a place.
-    fn add_register(&mut self, slot: Slot, ty: Type) -> Reg {
-        self.slots.push(slot);
-        self.types.push(ty);
-        Reg(self.slots.len() as u32 - 1)
-    }
-
-    /// Adds a constant at a place.
-    pub(super) fn add_constant(&mut self, slot: Slot, ty: Type, bits: u64) {
-        let reg = self.add_register(slot, ty);
-        self.constants.push(Constant { reg, bits });
-    }
-
-    /// Adds an output at a place; returns its slot number.
-    pub(super) fn add_output(&mut self, slot: Slot, ty: Type) -> u32 {
-        let (reg, number) = (self.add_register(slot, ty), self.outputs.len() as u32);
-        self.outputs.push(Output { slot: number, reg });
-        number
     }
 
     /// Lanes of a batch.
     pub fn lanes(&self) -> usize {
         self.lanes
+    }
+
+    /// Words of private memory that each lane has for itself.
+    pub(super) fn private_words(&self) -> usize {
+        match self.table {
+            Some(_) => 0,
+            None => self.private_bytes as usize / 4,
+        }
     }
 
     /// Bytes of registers of a batch.

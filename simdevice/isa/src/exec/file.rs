@@ -1,6 +1,7 @@
 //! The register file: chunks of 16 lanes, and views of them as vectors and as typed lanes.
 
 use std::cell::Cell;
+use std::ops::Range;
 
 use fearless_simd::{Simd, i32x16, mask32x16, prelude::*, u32x16};
 
@@ -48,11 +49,57 @@ pub struct File<'a> {
     chunks: &'a [Cell<Chunk>],
     /// Chunks of a varying 32-bit register: lanes / 16.
     width: usize,
+    /// The chunks that instructions compute.
+    span: Span,
+}
+
+/// Chunks from the first to the last that has active lanes. The others are skipped: nobody looks at what an instruction
+/// gives in lanes that are not active, except within their own chunk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    pub first: usize,
+    pub count: usize,
 }
 
 impl<'a> File<'a> {
     pub fn new(chunks: &'a [Cell<Chunk>], width: usize) -> Self {
-        Self { chunks, width }
+        let span = Span {
+            first: 0,
+            count: width,
+        };
+        Self {
+            chunks,
+            width,
+            span,
+        }
+    }
+
+    /// The same registers, of which other chunks shall be computed.
+    #[inline(always)]
+    pub fn with_span(self, span: Span) -> Self {
+        Self { span, ..self }
+    }
+
+    /// The chunks to compute.
+    #[inline(always)]
+    pub fn span(self) -> Range<usize> {
+        self.span.first..self.span.first + self.span.count
+    }
+
+    /// The chunks of a 32-bit register that are to be computed: the span's, or the only one.
+    #[inline(always)]
+    fn spanned(self, slot: Slot) -> &'a [Cell<Chunk>] {
+        if slot.is_varying() {
+            &self.chunks[slot.start() + self.span.first..][..self.span.count]
+        } else {
+            &self.chunks[slot.start()..][..1]
+        }
+    }
+
+    /// The chunks to be computed of a register: the span, or the first if it is uniform.
+    #[inline(always)]
+    pub fn rounds(self, dst: Slot) -> Range<usize> {
+        if dst.is_varying() { self.span() } else { 0..1 }
     }
 
     /// Chunks of a varying 32-bit register.
@@ -100,13 +147,26 @@ impl<'a> File<'a> {
 }
 
 /// A type that a register's lanes may be read as.
-pub trait Lane: Copy {
+pub trait Lane: Copy + Default {
     /// The chunks of a register of this type's width.
     fn chunks<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Chunk>];
     /// Lanes 16 `index`..
     fn load(chunks: &[Cell<Chunk>], index: usize) -> [Self; CHUNK_LANES];
     /// Sets lanes 16 `index`..
     fn store(chunks: &[Cell<Chunk>], index: usize, value: [Self; CHUNK_LANES]);
+}
+
+/// `f` of each lane. (The standard library's `map` is not always inlined.)
+#[inline(always)]
+pub fn each_lane<A: Copy, B: Copy + Default>(
+    lanes: [A; CHUNK_LANES],
+    f: impl Fn(A) -> B,
+) -> [B; CHUNK_LANES] {
+    let mut results = [B::default(); CHUNK_LANES];
+    for lane in 0..CHUNK_LANES {
+        results[lane] = f(lanes[lane]);
+    }
+    results
 }
 
 macro_rules! narrow_lane {
@@ -119,12 +179,12 @@ macro_rules! narrow_lane {
 
             #[inline(always)]
             fn load(chunks: &[Cell<Chunk>], index: usize) -> [Self; CHUNK_LANES] {
-                chunks[index].get().0.map($from)
+                each_lane(chunks[index].get().0, $from)
             }
 
             #[inline(always)]
             fn store(chunks: &[Cell<Chunk>], index: usize, value: [Self; CHUNK_LANES]) {
-                chunks[index].set(Chunk(value.map($to)));
+                chunks[index].set(Chunk(each_lane(value, $to)));
             }
         }
     };
@@ -154,12 +214,12 @@ macro_rules! wide_lane {
                     bytemuck::cast(chunks[2 * index].get().0),
                     bytemuck::cast(chunks[2 * index + 1].get().0),
                 ];
-                bytemuck::cast::<_, [u64; CHUNK_LANES]>(halves).map($from)
+                each_lane(bytemuck::cast::<_, [u64; CHUNK_LANES]>(halves), $from)
             }
 
             #[inline(always)]
             fn store(chunks: &[Cell<Chunk>], index: usize, value: [Self; CHUNK_LANES]) {
-                let words: [[u32; CHUNK_LANES]; 2] = bytemuck::cast(value.map($to));
+                let words: [[u32; CHUNK_LANES]; 2] = bytemuck::cast(each_lane(value, $to));
                 chunks[2 * index].set(Chunk(words[0]));
                 chunks[2 * index + 1].set(Chunk(words[1]));
             }
@@ -172,17 +232,11 @@ wide_lane!(i64, |bits: u64| bits.cast_signed(), |value: i64| value
     .cast_unsigned());
 wide_lane!(f64, f64::from_bits, f64::to_bits);
 
-/// How many times a lane-by-lane kernel runs for a destination: once if it is uniform.
-#[inline(always)]
-fn rounds(file: File<'_>, dst: Slot) -> usize {
-    if dst.is_varying() { file.width } else { 1 }
-}
-
 /// Lane by lane, one operand.
 #[inline(always)]
 pub fn map1<A: Lane, R: Lane>(file: File<'_>, dst: Slot, src: &[Slot; 4], f: impl Fn(A) -> R) {
-    for index in 0..rounds(file, dst) {
-        file.set(dst, index, file.lanes(src[0], index).map(&f));
+    for index in file.rounds(dst) {
+        file.set(dst, index, each_lane(file.lanes(src[0], index), &f));
     }
 }
 
@@ -194,9 +248,13 @@ pub fn map2<A: Lane, B: Lane, R: Lane>(
     src: &[Slot; 4],
     f: impl Fn(A, B) -> R,
 ) {
-    for index in 0..rounds(file, dst) {
+    for index in file.rounds(dst) {
         let (a, b) = (file.lanes(src[0], index), file.lanes(src[1], index));
-        file.set(dst, index, std::array::from_fn(|lane| f(a[lane], b[lane])));
+        let mut results = [R::default(); CHUNK_LANES];
+        for lane in 0..CHUNK_LANES {
+            results[lane] = f(a[lane], b[lane]);
+        }
+        file.set(dst, index, results);
     }
 }
 
@@ -208,14 +266,14 @@ pub fn map3<A: Lane, B: Lane, C: Lane, R: Lane>(
     src: &[Slot; 4],
     f: impl Fn(A, B, C) -> R,
 ) {
-    for index in 0..rounds(file, dst) {
+    for index in file.rounds(dst) {
         let (a, b) = (file.lanes(src[0], index), file.lanes(src[1], index));
         let c = file.lanes(src[2], index);
-        file.set(
-            dst,
-            index,
-            std::array::from_fn(|lane| f(a[lane], b[lane], c[lane])),
-        );
+        let mut results = [R::default(); CHUNK_LANES];
+        for lane in 0..CHUNK_LANES {
+            results[lane] = f(a[lane], b[lane], c[lane]);
+        }
+        file.set(dst, index, results);
     }
 }
 
@@ -247,19 +305,14 @@ pub fn from_mask<S: Simd>(mask: mask32x16<S>) -> u32x16<S> {
         .bitcast::<u32x16<S>>()
 }
 
-/// The chunk of an operand for one round: its own if it is `VARYING`, else the only one.
-#[inline(always)]
-fn operand<const VARYING: bool>(chunks: &[Cell<Chunk>], index: usize) -> &Cell<Chunk> {
-    if VARYING { &chunks[index] } else { &chunks[0] }
-}
+// The loops below are over indices, because the standard library's adapters are not always inlined into functions of
+// another SIMD level.
 
-/// As many chunks as there are rounds, so that indices below that need no check.
+/// `value` to all chunks.
 #[inline(always)]
-fn cut<const VARYING: bool>(chunks: &[Cell<Chunk>], rounds: usize) -> &[Cell<Chunk>] {
-    if VARYING {
-        &chunks[..rounds]
-    } else {
-        &chunks[..1]
+fn fill<S: Simd>(dst: &[Cell<Chunk>], value: u32x16<S>) {
+    for chunk in dst {
+        store(chunk, value);
     }
 }
 
@@ -272,14 +325,14 @@ pub fn vector1<S: Simd>(
     src: &[Slot; 4],
     f: impl Fn(u32x16<S>) -> u32x16<S>,
 ) {
-    let (dst, a) = (file.narrow(dst), file.narrow(src[0]));
-    if a.len() == dst.len() {
-        for (dst, a) in dst.iter().zip(a) {
-            store(dst, f(load(simd, a)));
+    let (dst, a) = (file.spanned(dst), file.spanned(src[0]));
+    let n = dst.len();
+    if a.len() == n {
+        for i in 0..n {
+            store(&dst[i], f(load(simd, &a[i])));
         }
     } else {
-        let value = f(load(simd, &a[0]));
-        dst.iter().for_each(|dst| store(dst, value));
+        fill(dst, f(load(simd, &a[0])));
     }
 }
 
@@ -292,34 +345,29 @@ pub fn vector2<S: Simd>(
     src: &[Slot; 4],
     f: impl Fn(u32x16<S>, u32x16<S>) -> u32x16<S>,
 ) {
-    let (dst, a, b) = (file.narrow(dst), file.narrow(src[0]), file.narrow(src[1]));
-    match (a.len() == dst.len(), b.len() == dst.len()) {
-        (true, true) => rounds2::<S, true, true>(simd, dst, a, b, f),
-        (true, false) => rounds2::<S, true, false>(simd, dst, a, b, f),
-        (false, true) => rounds2::<S, false, true>(simd, dst, a, b, f),
-        (false, false) => {
-            let value = f(load(simd, &a[0]), load(simd, &b[0]));
-            dst.iter().for_each(|dst| store(dst, value));
+    let dst = file.spanned(dst);
+    let (a, b) = (file.spanned(src[0]), file.spanned(src[1]));
+    let n = dst.len();
+    if a.len() == n && b.len() == n {
+        for i in 0..n {
+            store(&dst[i], f(load(simd, &a[i]), load(simd, &b[i])));
         }
+    } else if a.len() == n {
+        let b = load(simd, &b[0]);
+        for i in 0..n {
+            store(&dst[i], f(load(simd, &a[i]), b));
+        }
+    } else if b.len() == n {
+        let a = load(simd, &a[0]);
+        for i in 0..n {
+            store(&dst[i], f(a, load(simd, &b[i])));
+        }
+    } else {
+        fill(dst, f(load(simd, &a[0]), load(simd, &b[0])));
     }
 }
 
-#[inline(always)]
-fn rounds2<S: Simd, const A: bool, const B: bool>(
-    simd: S,
-    dst: &[Cell<Chunk>],
-    a: &[Cell<Chunk>],
-    b: &[Cell<Chunk>],
-    f: impl Fn(u32x16<S>, u32x16<S>) -> u32x16<S>,
-) {
-    let (a, b) = (cut::<A>(a, dst.len()), cut::<B>(b, dst.len()));
-    for (index, dst) in dst.iter().enumerate() {
-        let (a, b) = (operand::<A>(a, index), operand::<B>(b, index));
-        store(dst, f(load(simd, a), load(simd, b)));
-    }
-}
-
-/// Vector by vector, three operands.
+/// Vector by vector, three operands. Only the commonest case has a loop without checks.
 #[inline(always)]
 pub fn vector3<S: Simd>(
     simd: S,
@@ -328,39 +376,22 @@ pub fn vector3<S: Simd>(
     src: &[Slot; 4],
     f: impl Fn(u32x16<S>, u32x16<S>, u32x16<S>) -> u32x16<S>,
 ) {
-    let (dst, a, b) = (file.narrow(dst), file.narrow(src[0]), file.narrow(src[1]));
-    let c = file.narrow(src[2]);
+    let dst = file.spanned(dst);
+    let (a, b) = (file.spanned(src[0]), file.spanned(src[1]));
+    let c = file.spanned(src[2]);
     let n = dst.len();
-    match (a.len() == n, b.len() == n, c.len() == n) {
-        (true, true, true) => rounds3::<S, true, true, true>(simd, dst, a, b, c, f),
-        (false, true, true) => rounds3::<S, false, true, true>(simd, dst, a, b, c, f),
-        (true, false, true) => rounds3::<S, true, false, true>(simd, dst, a, b, c, f),
-        (true, true, false) => rounds3::<S, true, true, false>(simd, dst, a, b, c, f),
-        (true, false, false) => rounds3::<S, true, false, false>(simd, dst, a, b, c, f),
-        (false, true, false) => rounds3::<S, false, true, false>(simd, dst, a, b, c, f),
-        (false, false, true) => rounds3::<S, false, false, true>(simd, dst, a, b, c, f),
-        (false, false, false) => rounds3::<S, false, false, false>(simd, dst, a, b, c, f),
+    if a.len() == n && b.len() == n && c.len() == n {
+        for i in 0..n {
+            let (a, b) = (load(simd, &a[i]), load(simd, &b[i]));
+            store(&dst[i], f(a, b, load(simd, &c[i])));
+        }
+        return;
     }
-}
-
-#[inline(always)]
-fn rounds3<S: Simd, const A: bool, const B: bool, const C: bool>(
-    simd: S,
-    dst: &[Cell<Chunk>],
-    a: &[Cell<Chunk>],
-    b: &[Cell<Chunk>],
-    c: &[Cell<Chunk>],
-    f: impl Fn(u32x16<S>, u32x16<S>, u32x16<S>) -> u32x16<S>,
-) {
-    let rounds = dst.len();
-    let (a, b, c) = (
-        cut::<A>(a, rounds),
-        cut::<B>(b, rounds),
-        cut::<C>(c, rounds),
-    );
-    for (index, dst) in dst.iter().enumerate() {
-        let (a, b) = (operand::<A>(a, index), operand::<B>(b, index));
-        let c = operand::<C>(c, index);
-        store(dst, f(load(simd, a), load(simd, b), load(simd, c)));
+    // A uniform operand has one chunk for all rounds.
+    let step = |operand: &[Cell<Chunk>]| if operand.len() == n { usize::MAX } else { 0 };
+    let (at_a, at_b, at_c) = (step(a), step(b), step(c));
+    for i in 0..n {
+        let (a, b) = (load(simd, &a[i & at_a]), load(simd, &b[i & at_b]));
+        store(&dst[i], f(a, b, load(simd, &c[i & at_c])));
     }
 }

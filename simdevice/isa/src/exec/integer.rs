@@ -83,14 +83,21 @@ pub fn signed_bitfield(value: u32, offset: u32, count: u32) -> i32 {
 
 /// Replaces bits of a base.
 #[inline(always)]
+fn insert_bits(base: u32, insert: u32, offset: u32, count: u32) -> u32 {
+    let mask = ones(count).checked_shl(offset).unwrap_or(0);
+    base & !mask | insert.checked_shl(offset).unwrap_or(0) & mask
+}
+
+/// Replaces bits of bases.
+#[inline(always)]
 pub fn bitfield_insert(file: File<'_>, dst: Slot, src: &[Slot; 4]) {
-    let rounds = if dst.is_varying() { file.width() } else { 1 };
-    for index in 0..rounds {
-        let [base, insert, offset, count] = src.map(|slot| file.lanes::<u32>(slot, index));
-        let result: [u32; 16] = std::array::from_fn(|lane| {
-            let mask = ones(count[lane]).checked_shl(offset[lane]).unwrap_or(0);
-            base[lane] & !mask | insert[lane].checked_shl(offset[lane]).unwrap_or(0) & mask
-        });
+    for index in file.rounds(dst) {
+        let (base, insert) = (file.lanes(src[0], index), file.lanes(src[1], index));
+        let (offset, count) = (file.lanes(src[2], index), file.lanes(src[3], index));
+        let mut result = [0; 16];
+        for lane in 0..16 {
+            result[lane] = insert_bits(base[lane], insert[lane], offset[lane], count[lane]);
+        }
         file.set(dst, index, result);
     }
 }

@@ -4,18 +4,14 @@ use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use fearless_simd::{Simd, dispatch};
-
 use super::super::ir::{Reg, Type};
 use super::super::resources::Resources;
 use super::batch::Batch;
-use super::compute::compute;
 use super::counters::Work;
 use super::executable::Executable;
-use super::file::{Chunk, File, Slot};
+use super::file::{Chunk, File};
 use super::mask::{LaneMask, MaskId, Masks};
 use super::set_all;
-use super::step::Step;
 use super::watchdog::{Stopped, Watch, Watchdog};
 
 /// Runs batches of one executable, one after another. Each worker has its own.
@@ -41,7 +37,7 @@ impl Machine {
             shared: (0..executable.shared_bytes.div_ceil(4))
                 .map(|_| AtomicU32::new(0))
                 .collect(),
-            private: vec![Chunk::default(); executable.private_bytes as usize / 4 * width],
+            private: vec![Chunk::default(); executable.private_words() * width],
             work: Work::default(),
             runs: vec![(0, 0); executable.runs.len()],
             executable,
@@ -196,13 +192,14 @@ impl Machine {
             masks,
             shared: &self.shared,
             private: Cell::from_mut(&mut self.private[..]).as_slice_of_cells(),
+            whole: false,
         };
         if !masks.any(MaskId::ACTIVE) {
             return Ok(());
         }
-        let runs = &mut self.runs[..];
-        let mut watch = Watch::new(watchdog);
-        dispatch!(executable.level, simd => run_steps(simd, &batch, runs, &mut watch))
+        executable
+            .engine
+            .run(&batch, &mut self.runs, &mut Watch::new(watchdog))
     }
 
     /// Sets masks, outputs and workgroup memory as they are when a batch begins.
@@ -222,188 +219,5 @@ impl Machine {
             self.registers[range].fill(Chunk::default());
         }
         self.shared.iter().for_each(|word| word.store(0, Relaxed));
-    }
-}
-
-/// The loop over the steps.
-#[inline(always)]
-fn run_steps<S: Simd>(
-    simd: S,
-    batch: &Batch<'_>,
-    runs: &mut [(u64, u64)],
-    watch: &mut Watch<'_>,
-) -> Result<(), Stopped> {
-    let (file, masks) = (batch.file, batch.masks);
-    let steps = &batch.executable.steps[..];
-    let mut next = 0;
-    while let Some(step) = steps.get(next) {
-        next += 1;
-        // There is one copy of the kernels, so both kinds of computation meet here.
-        let computation = match step {
-            Step::Compute { op, dst, src } => Some((*op, *dst, src, None)),
-            Step::ComputeAssign { op, dst, src, .. } if masks.is_whole() => {
-                Some((*op, *dst, src, None))
-            }
-            Step::ComputeAssign { op, dst, via, src } => Some((*op, *via, src, Some(*dst))),
-            _ => None,
-        };
-        if let Some((op, target, src, assigned)) = computation {
-            compute(simd, file, op, target, src);
-            if let Some(dst) = assigned {
-                batch.assign(simd, dst, target, op.signature().result);
-            }
-            continue;
-        }
-        let jump = match step {
-            Step::Assign { dst, src, ty } => {
-                batch.assign(simd, *dst, *src, *ty);
-                None
-            }
-            Step::Copy { dst, src, ty } => {
-                batch.copy(*dst, *src, *ty);
-                None
-            }
-            Step::Other(statement) => {
-                batch.other(statement);
-                None
-            }
-            Step::Count(run) => {
-                let (executions, active) = &mut runs[*run as usize];
-                *executions += 1;
-                *active += masks.count(MaskId::ACTIVE);
-                None
-            }
-            Step::Repeat(head) => {
-                if masks.any(MaskId::ACTIVE) {
-                    watch.tick()?;
-                    Some(*head)
-                } else {
-                    None
-                }
-            }
-            Step::End => break,
-            control => branch(simd, file, masks, control),
-        };
-        if let Some(target) = jump {
-            next = target as usize;
-        }
-    }
-    Ok(())
-}
-
-/// Updates the masks; returns where to go if not on.
-#[inline(always)]
-fn branch<S: Simd>(simd: S, file: File<'_>, masks: Masks<'_>, step: &Step) -> Option<u32> {
-    let unless_any = |target: u32| (!masks.any(MaskId::ACTIVE)).then_some(target);
-    match step {
-        Step::Jump(target) => Some(*target),
-        Step::Unless { condition, target } => (!file.first::<bool>(*condition)).then_some(*target),
-        Step::If {
-            condition,
-            other,
-            target,
-        } => {
-            let other = masks.get(*other);
-            masks.split(simd, file, *condition, |active, taken, word| {
-                other[word].set(active.get() & !taken);
-                active.set(taken);
-            });
-            unless_any(*target)
-        }
-        Step::Else { other, target } => {
-            masks.swap(MaskId::ACTIVE, *other);
-            unless_any(*target)
-        }
-        Step::Clear(mask) => {
-            masks.clear(*mask);
-            None
-        }
-        Step::Join { mask, target } => {
-            masks.join(MaskId::ACTIVE, *mask);
-            unless_any(*target)
-        }
-        Step::Leave { into, target } => {
-            masks.join(*into, MaskId::ACTIVE);
-            masks.clear(MaskId::ACTIVE);
-            Some(*target)
-        }
-        Step::LeaveIf {
-            condition,
-            when,
-            into,
-            target,
-        } => {
-            let into = masks.get(*into);
-            masks.split(simd, file, *condition, |active, taken, word| {
-                let leaving = if *when { taken } else { active.get() & !taken };
-                into[word].set(into[word].get() | leaving);
-                active.set(active.get() & !leaving);
-            });
-            unless_any(*target)
-        }
-        Step::Switch {
-            selector,
-            values,
-            entered,
-            unmatched,
-        } => {
-            masks.copy(*entered, MaskId::ACTIVE);
-            masks.copy(*unmatched, MaskId::ACTIVE);
-            select_lanes(file, masks, *selector, values, *entered, |word, bits| {
-                let unmatched = &masks.get(*unmatched)[word];
-                unmatched.set(unmatched.get() & !bits);
-            });
-            masks.clear(MaskId::ACTIVE);
-            None
-        }
-        Step::Case {
-            selector,
-            values,
-            entered,
-            unmatched,
-            target,
-        } => {
-            select_lanes(file, masks, *selector, values, *entered, |word, bits| {
-                let active = &masks.get(MaskId::ACTIVE)[word];
-                active.set(active.get() | bits);
-            });
-            if let Some(unmatched) = unmatched {
-                masks.join(MaskId::ACTIVE, *unmatched);
-            }
-            unless_any(*target)
-        }
-        Step::Kill(target) => {
-            masks.join(MaskId::KILLED, MaskId::ACTIVE);
-            masks.clear(MaskId::ACTIVE);
-            Some(*target)
-        }
-        Step::Demote => {
-            masks.join(MaskId::KILLED, MaskId::ACTIVE);
-            masks.join(MaskId::HELPER, MaskId::ACTIVE);
-            None
-        }
-        // The loop over the steps has taken the others.
-        _ => None,
-    }
-}
-
-/// Calls `found(word, lanes)` for the lanes of a mask whose selector is one of `values`.
-fn select_lanes(
-    file: File<'_>,
-    masks: Masks<'_>,
-    selector: Slot,
-    values: &[u32],
-    among: MaskId,
-    found: impl Fn(usize, u64),
-) {
-    for (word, lanes) in masks.get(among).iter().enumerate() {
-        let mut bits = 0;
-        for chunk in 4 * word..(4 * word + 4).min(file.width()) {
-            let selectors = file.lanes::<u32>(selector, chunk);
-            for (lane, selector) in selectors.iter().enumerate() {
-                bits |= u64::from(values.contains(selector)) << (16 * (chunk % 4) + lane);
-            }
-        }
-        found(word, bits & lanes.get());
     }
 }

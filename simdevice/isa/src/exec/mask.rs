@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use fearless_simd::{Simd, prelude::*};
 
-use super::file::{File, Slot, load, to_mask};
+use super::file::{File, Slot, Span, load, to_mask};
 
 /// A set of lanes that the caller gives or gets.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -104,51 +104,85 @@ impl<'a> Masks<'a> {
 
     #[inline(always)]
     pub fn any(self, mask: MaskId) -> bool {
-        self.get(mask).iter().any(|word| word.get() != 0)
+        let mut any = 0;
+        for word in self.get(mask) {
+            any |= word.get();
+        }
+        any != 0
     }
 
-    /// Whether all lanes are active that ever were.
+    /// The chunks from the first to the last that has active lanes, and whether in them all lanes are active that were
+    /// when the batch began.
     #[inline(always)]
-    pub fn is_whole(self) -> bool {
-        let entry = self.get(MaskId::ENTRY).iter();
-        entry
-            .zip(self.get(MaskId::ACTIVE))
-            .all(|(entry, active)| entry == active)
+    pub fn span(self) -> (Span, bool) {
+        let (active, entry) = (self.get(MaskId::ACTIVE), self.get(MaskId::ENTRY));
+        let (mut first_word, mut end) = (0, self.width);
+        while first_word < end && active[first_word].get() == 0 {
+            first_word += 1;
+        }
+        if first_word == end {
+            return (Span { first: 0, count: 0 }, true);
+        }
+        while active[end - 1].get() == 0 {
+            end -= 1;
+        }
+        let last_word = end - 1;
+        let first = 4 * first_word + active[first_word].get().trailing_zeros() as usize / 16;
+        let last = 4 * last_word + 3 - active[last_word].get().leading_zeros() as usize / 16;
+        let mut missing = 0;
+        for word in first_word..end {
+            let mut within = u64::MAX;
+            if word == first_word {
+                within &= u64::MAX << (16 * (first % 4));
+            }
+            if word == last_word {
+                within &= u64::MAX >> (48 - 16 * (last % 4));
+            }
+            missing |= entry[word].get() & !active[word].get() & within;
+        }
+        let count = last + 1 - first;
+        (Span { first, count }, missing == 0)
     }
 
     #[inline(always)]
     pub fn count(self, mask: MaskId) -> u64 {
-        self.get(mask)
-            .iter()
-            .map(|word| u64::from(word.get().count_ones()))
-            .sum()
+        let mut count = 0;
+        for word in self.get(mask) {
+            count += u64::from(word.get().count_ones());
+        }
+        count
     }
 
     #[inline(always)]
     pub fn clear(self, mask: MaskId) {
-        self.get(mask).iter().for_each(|word| word.set(0));
+        for word in self.get(mask) {
+            word.set(0);
+        }
     }
 
     /// `into |= from`.
     #[inline(always)]
     pub fn join(self, into: MaskId, from: MaskId) {
-        for (into, from) in self.get(into).iter().zip(self.get(from)) {
-            into.set(into.get() | from.get());
+        let (into, from) = (self.get(into), self.get(from));
+        for word in 0..self.width {
+            into[word].set(into[word].get() | from[word].get());
         }
     }
 
     /// `into = from`.
     #[inline(always)]
     pub fn copy(self, into: MaskId, from: MaskId) {
-        for (into, from) in self.get(into).iter().zip(self.get(from)) {
-            into.set(from.get());
+        let (into, from) = (self.get(into), self.get(from));
+        for word in 0..self.width {
+            into[word].set(from[word].get());
         }
     }
 
     #[inline(always)]
     pub fn swap(self, a: MaskId, b: MaskId) {
-        for (a, b) in self.get(a).iter().zip(self.get(b)) {
-            a.swap(b);
+        let (a, b) = (self.get(a), self.get(b));
+        for word in 0..self.width {
+            a[word].swap(&b[word]);
         }
     }
 
@@ -173,19 +207,28 @@ impl<'a> Masks<'a> {
         condition: Slot,
         mut split: impl FnMut(&Cell<u64>, u64, usize),
     ) {
-        let chunks = file.narrow(condition);
-        for (word, active) in self.get(MaskId::ACTIVE).iter().enumerate() {
-            let mut bits = 0;
-            let end = chunks.len().min(4 * word + 4);
-            for (index, chunk) in chunks[(4 * word).min(end)..end].iter().enumerate() {
-                bits |= (to_mask(load(simd, chunk)).to_bitmask() & 0xffff) << (16 * index);
+        let active = self.get(MaskId::ACTIVE);
+        if !condition.is_varying() {
+            let bits = if file.first::<bool>(condition) {
+                u64::MAX
+            } else {
+                0
+            };
+            for (word, active) in active.iter().enumerate() {
+                split(active, active.get() & bits, word);
             }
-            if !condition.is_varying() {
-                bits = if file.first::<bool>(condition) {
-                    u64::MAX
-                } else {
-                    0
-                };
+            return;
+        }
+        let chunks = file.narrow(condition);
+        for (word, active) in active.iter().enumerate() {
+            if active.get() == 0 {
+                split(active, 0, word);
+                continue;
+            }
+            let mut bits = 0;
+            for index in 0..(chunks.len() - 4 * word).min(4) {
+                let lanes = to_mask(load(simd, &chunks[4 * word + index])).to_bitmask() & 0xffff;
+                bits |= lanes << (16 * index);
             }
             split(active, active.get() & bits, word);
         }

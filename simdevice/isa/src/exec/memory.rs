@@ -2,18 +2,20 @@
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
+use fearless_simd::Simd;
+
 use super::super::ir::{Address, AtomicOp, Binding, CHUNK_LANES, Format, Reg, Space};
 use super::super::resources::{load_word, range_words};
 use super::batch::Batch;
-use super::file::Slot;
+use super::file::{Slot, each_lane};
 use super::mask::{MaskId, lanes_of};
 use devmem::BufferRange;
 
 /// Memory that an access goes to: words, and how many bytes of them count.
 #[derive(Clone, Copy)]
-struct View<'a> {
-    words: &'a [AtomicU32],
-    bytes: u32,
+pub(super) struct View<'a> {
+    pub(super) words: &'a [AtomicU32],
+    pub(super) bytes: u32,
     /// The range that it is, for atomics of 64 bits; workgroup memory has none, and only one thread.
     range: Option<&'a BufferRange>,
 }
@@ -145,16 +147,7 @@ impl<'a> Batch<'a> {
                     }
                 }
             },
-            Space::PushConstants => Ok(View {
-                words: self.resources.push_constants,
-                bytes: u32::MAX,
-                range: None,
-            }),
-            _ => Ok(View {
-                words: self.shared,
-                bytes: self.executable.shared_bytes,
-                range: None,
-            }),
+            space => Ok(self.common_view(space).unwrap_or(View::EMPTY)),
         };
         Places { view, addresses }
     }
@@ -185,50 +178,99 @@ impl<'a> Batch<'a> {
         if format == Format::B64 {
             self.file.set(dst, chunk, values);
         } else {
-            self.file.set(dst, chunk, values.map(|value| value as u32));
+            self.file
+                .set(dst, chunk, each_lane(values, |value| value as u32));
         }
     }
 
     /// One lane-chunk of a register to store.
-    fn take(&self, src: Slot, format: Format, chunk: usize) -> [u64; CHUNK_LANES] {
+    pub(super) fn take(&self, src: Slot, format: Format, chunk: usize) -> [u64; CHUNK_LANES] {
         if format == Format::B64 {
             self.file.lanes(src, chunk)
         } else {
-            self.file.lanes::<u32>(src, chunk).map(u64::from)
+            each_lane(self.file.lanes::<u32>(src, chunk), u64::from)
         }
     }
 
-    pub fn load(&self, dst: &[Reg], address: &Address, format: Format) {
-        if address.space == Space::Private {
-            return self.load_private(dst, address, format);
+    /// The memory that all lanes access, if it's one memory of words.
+    #[inline(always)]
+    pub(super) fn common_view(&self, space: &Space) -> Option<View<'a>> {
+        match space {
+            Space::Buffer(binding) => match binding.index.map(|index| self.slot(index)) {
+                None => Some(self.buffer(binding, 0)),
+                Some(index) if index.is_varying() => None,
+                Some(index) => Some(self.buffer(binding, self.file.first(index))),
+            },
+            Space::PushConstants => Some(View {
+                words: self.resources.push_constants,
+                bytes: u32::MAX,
+                range: None,
+            }),
+            Space::Shared => Some(View {
+                words: self.shared,
+                bytes: self.executable.shared_bytes,
+                range: None,
+            }),
+            Space::Private => self.executable.table.as_deref().map(|words| View {
+                words,
+                bytes: self.executable.private_bytes,
+                range: None,
+            }),
+            Space::Global => None,
         }
+    }
+
+    pub fn load<S: Simd>(&self, simd: S, dst: &[Reg], address: &Address, format: Format) {
+        let view = self.common_view(&address.space);
         // Registers of one load are uniform together.
-        if dst.iter().any(|reg| !self.slot(*reg).is_varying()) {
-            return self.load_uniform(dst, address, format);
+        let uniform = dst.iter().any(|reg| !self.slot(*reg).is_varying());
+        match view {
+            Some(view) if uniform => self.load_uniform_from(view, dst, address, format),
+            Some(view) if format == Format::B32 => self.load_words(simd, view, dst, address),
+            None if address.space == Space::Private => self.load_private(dst, address, format),
+            _ if uniform => self.load_uniform(dst, address, format),
+            _ => self
+                .file
+                .span()
+                .for_each(|chunk| self.load_chunk(dst, address, format, chunk)),
         }
-        for chunk in 0..self.file.width() {
-            let lanes = self.masks.chunk(MaskId::ACTIVE, chunk);
-            if lanes == 0 {
-                continue;
+    }
+
+    /// Loads 16 lanes, one by one.
+    pub(super) fn load_chunk(&self, dst: &[Reg], address: &Address, format: Format, chunk: usize) {
+        let lanes = self.masks.chunk(MaskId::ACTIVE, chunk);
+        if lanes == 0 {
+            return;
+        }
+        let places = self.places(address, chunk, lanes);
+        for (element, reg) in dst.iter().enumerate() {
+            let step = element as u64 * u64::from(format.bytes());
+            let mut values = [0; CHUNK_LANES];
+            for lane in lanes_of(lanes) {
+                values[lane] = places
+                    .view(lane)
+                    .load(places.addresses[lane] + step, format)
+                    .unwrap_or(0);
             }
-            let places = self.places(address, chunk, lanes);
-            if lanes == u16::MAX
-                && format == Format::B32
-                && self.load_consecutive(dst, chunk, &places)
-            {
-                continue;
+            self.put(self.slot(*reg), format, chunk, values);
+        }
+    }
+
+    /// Loads what is the same in all lanes.
+    fn load_uniform_from(&self, view: View<'_>, dst: &[Reg], address: &Address, format: Format) {
+        let base = address
+            .base
+            .map_or(0, |base| self.file.first::<u32>(self.slot(base)));
+        let mut at = u64::from(base) + u64::from(address.offset);
+        for reg in dst {
+            let value = view.load(at, format).unwrap_or(0);
+            if format == Format::B64 {
+                self.file.set(self.slot(*reg), 0, [value; CHUNK_LANES]);
+            } else {
+                self.file
+                    .set(self.slot(*reg), 0, [value as u32; CHUNK_LANES]);
             }
-            for (element, reg) in dst.iter().enumerate() {
-                let step = element as u64 * u64::from(format.bytes());
-                let mut values = [0; CHUNK_LANES];
-                for lane in lanes_of(lanes) {
-                    values[lane] = places
-                        .view(lane)
-                        .load(places.addresses[lane] + step, format)
-                        .unwrap_or(0);
-                }
-                self.put(self.slot(*reg), format, chunk, values);
-            }
+            at += u64::from(format.bytes());
         }
     }
 
@@ -244,54 +286,39 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Loads 16 lanes whose elements follow one another in memory, all within it. False if they don't.
-    fn load_consecutive(&self, dst: &[Reg], chunk: usize, places: &Places<'_>) -> bool {
-        let Ok(view) = places.view else { return false };
-        let count = dst.len();
-        let first = places.addresses[0];
-        let stride = 4 * count as u64;
-        let mut follows = first.is_multiple_of(4);
-        for (lane, address) in places.addresses.iter().enumerate() {
-            follows &= *address == first + lane as u64 * stride;
+    pub fn store<S: Simd>(&self, simd: S, src: &[Reg], address: &Address, format: Format) {
+        match self.common_view(&address.space) {
+            Some(view) if format == Format::B32 => self.store_words(simd, view, src, address),
+            None if address.space == Space::Private => self.store_private(src, address, format),
+            _ => self
+                .file
+                .span()
+                .for_each(|chunk| self.store_chunk(src, address, format, chunk)),
         }
-        if !follows || first + stride * CHUNK_LANES as u64 > u64::from(view.bytes) {
-            return false;
-        }
-        let start = (first / 4) as usize;
-        let Some(words) = view.words.get(start..start + count * CHUNK_LANES) else {
-            return false;
-        };
-        for (element, reg) in dst.iter().enumerate() {
-            let values = std::array::from_fn(|lane| words[lane * count + element].load(Relaxed));
-            self.file.set::<u32>(self.slot(*reg), chunk, values);
-        }
-        true
     }
 
-    pub fn store(&self, src: &[Reg], address: &Address, format: Format) {
-        if address.space == Space::Private {
-            return self.store_private(src, address, format);
+    /// Stores 16 lanes, one by one.
+    pub(super) fn store_chunk(&self, src: &[Reg], address: &Address, format: Format, chunk: usize) {
+        let lanes = self.masks.writing(chunk);
+        if lanes == 0 {
+            return;
         }
-        for chunk in 0..self.file.width() {
-            let lanes = self.masks.writing(chunk);
-            if lanes == 0 {
-                continue;
-            }
-            let places = self.places(address, chunk, lanes);
-            for (element, reg) in src.iter().enumerate() {
-                let step = element as u64 * u64::from(format.bytes());
-                let values = self.take(self.slot(*reg), format, chunk);
-                for lane in lanes_of(lanes) {
-                    places
-                        .view(lane)
-                        .store(places.addresses[lane] + step, format, values[lane]);
-                }
+        let places = self.places(address, chunk, lanes);
+        for (element, reg) in src.iter().enumerate() {
+            let step = element as u64 * u64::from(format.bytes());
+            let values = self.take(self.slot(*reg), format, chunk);
+            for lane in lanes_of(lanes) {
+                places
+                    .view(lane)
+                    .store(places.addresses[lane] + step, format, values[lane]);
             }
         }
     }
 
-    pub fn atomic(
+    #[allow(clippy::too_many_arguments, reason = "the statement has as many")]
+    pub fn atomic<S: Simd>(
         &self,
+        simd: S,
         op: AtomicOp,
         dst: Option<Reg>,
         address: &Address,
@@ -299,21 +326,27 @@ impl<'a> Batch<'a> {
         value: Reg,
         comparator: Option<Reg>,
     ) {
-        for chunk in 0..self.file.width() {
+        for chunk in self.file.span() {
             let lanes = self.masks.writing(chunk);
             let mut old = [0; CHUNK_LANES];
             if lanes != 0 {
-                let places = self.places(address, chunk, lanes);
                 let values = self.take(self.slot(value), format, chunk);
                 let comparators = comparator.map_or([0; CHUNK_LANES], |reg| {
                     self.take(self.slot(reg), format, chunk)
                 });
-                for lane in lanes_of(lanes) {
-                    let (view, at) = (places.view(lane), places.addresses[lane]);
-                    let change =
-                        |old: u64| combine(op, format, old, values[lane], comparators[lane]);
-                    old[lane] = update(view, at, format, change).unwrap_or(0);
-                }
+                let at_once = (format == Format::B32).then(|| {
+                    let [values, comparators] =
+                        [values, comparators].map(|lanes| each_lane(lanes, |lane| lane as u32));
+                    self.atomic_words(simd, op, address, chunk, &values, &comparators)
+                });
+                old = match at_once.flatten() {
+                    Some(old) => each_lane(old, u64::from),
+                    None => {
+                        let change =
+                            |lane, old| combine(op, format, old, values[lane], comparators[lane]);
+                        self.atomic_chunk(address, format, chunk, lanes, change)
+                    }
+                };
             }
             if let Some(dst) = dst {
                 self.put(self.slot(dst), format, chunk, old);
@@ -321,14 +354,27 @@ impl<'a> Batch<'a> {
         }
     }
 
+    /// Atomic operations of 16 lanes, one by one. Gives the old values.
+    fn atomic_chunk(
+        &self,
+        address: &Address,
+        format: Format,
+        chunk: usize,
+        lanes: u16,
+        change: impl Fn(usize, u64) -> u64,
+    ) -> [u64; CHUNK_LANES] {
+        let mut old = [0; CHUNK_LANES];
+        let places = self.places(address, chunk, lanes);
+        for lane in lanes_of(lanes) {
+            let (view, at) = (places.view(lane), places.addresses[lane]);
+            old[lane] = update(view, at, format, |old| change(lane, old)).unwrap_or(0);
+        }
+        old
+    }
+
     pub fn buffer_size(&self, dst: Reg, buffer: &Binding) {
         let slot = self.slot(dst);
-        let rounds = if slot.is_varying() {
-            self.file.width()
-        } else {
-            1
-        };
-        for chunk in 0..rounds {
+        for chunk in self.file.rounds(slot) {
             let sizes = match buffer.index {
                 None => [self.buffer(buffer, 0).bytes; CHUNK_LANES],
                 Some(index) => self
@@ -337,92 +383,6 @@ impl<'a> Batch<'a> {
                     .map(|index| self.buffer(buffer, index).bytes),
             };
             self.file.set(slot, chunk, sizes);
-        }
-    }
-
-    /// The word of private memory that each of 16 lanes accesses, if it exists.
-    fn private_words(
-        &self,
-        address: &Address,
-        element: usize,
-        format: Format,
-        chunk: usize,
-    ) -> [u64; CHUNK_LANES] {
-        let step = u64::from(address.offset) + element as u64 * u64::from(format.bytes());
-        let bases = address.base.map_or([0; CHUNK_LANES], |base| {
-            self.file.lanes::<u32>(self.slot(base), chunk)
-        });
-        bases.map(|base| {
-            let address = u64::from(base) + step;
-            if address.is_multiple_of(4) {
-                address / 4
-            } else {
-                u64::MAX / 2
-            }
-        })
-    }
-
-    fn private_word(&self, word: u64, chunk: usize, lane: usize) -> Option<u32> {
-        let row = usize::try_from(word).ok()?.checked_mul(self.file.width())?;
-        self.private
-            .get(row.checked_add(chunk)?)
-            .map(|chunk| chunk.get().0[lane])
-    }
-
-    fn set_private_word(&self, word: u64, chunk: usize, lane: usize, value: u32) {
-        let row = usize::try_from(word)
-            .ok()
-            .and_then(|word| word.checked_mul(self.file.width()));
-        if let Some(cell) = row.and_then(|row| self.private.get(row.checked_add(chunk)?)) {
-            let mut lanes = cell.get();
-            lanes.0[lane] = value;
-            cell.set(lanes);
-        }
-    }
-
-    fn load_private(&self, dst: &[Reg], address: &Address, format: Format) {
-        for chunk in 0..self.file.width() {
-            for (element, reg) in dst.iter().enumerate() {
-                let words = self.private_words(address, element, format, chunk);
-                let low: [u32; CHUNK_LANES] = std::array::from_fn(|lane| {
-                    self.private_word(words[lane], chunk, lane).unwrap_or(0)
-                });
-                if format == Format::B64 {
-                    let values: [u64; CHUNK_LANES] = std::array::from_fn(|lane| {
-                        self.private_word(words[lane] + 1, chunk, lane)
-                            .map_or(0, |high| u64::from(low[lane]) | u64::from(high) << 32)
-                    });
-                    self.file.set(self.slot(*reg), chunk, values);
-                } else {
-                    self.file.set(self.slot(*reg), chunk, low);
-                }
-            }
-        }
-    }
-
-    fn store_private(&self, src: &[Reg], address: &Address, format: Format) {
-        for chunk in 0..self.file.width() {
-            let lanes = self.masks.chunk(MaskId::ACTIVE, chunk);
-            for (element, reg) in src.iter().enumerate() {
-                let words = self.private_words(address, element, format, chunk);
-                let values = self.take(self.slot(*reg), format, chunk);
-                for lane in lanes_of(lanes) {
-                    if format == Format::B64
-                        && self.private_word(words[lane] + 1, chunk, lane).is_none()
-                    {
-                        continue;
-                    }
-                    self.set_private_word(words[lane], chunk, lane, values[lane] as u32);
-                    if format == Format::B64 {
-                        self.set_private_word(
-                            words[lane] + 1,
-                            chunk,
-                            lane,
-                            (values[lane] >> 32) as u32,
-                        );
-                    }
-                }
-            }
         }
     }
 }

@@ -33,6 +33,7 @@ mod batch;
 mod compute;
 mod counters;
 mod cross_lane;
+mod engine;
 mod executable;
 mod file;
 mod image;
@@ -42,10 +43,13 @@ mod lower;
 mod machine;
 mod mask;
 mod memory;
+mod private;
 mod step;
+mod table;
 mod transcendental;
 mod watchdog;
 mod wide;
+mod words;
 
 pub use counters::Work;
 pub use executable::{Executable, Options};
@@ -54,48 +58,32 @@ pub use machine::Machine;
 pub use mask::LaneMask;
 pub use watchdog::{Stopped, Watchdog};
 
-use std::sync::Arc;
+use std::cell::Cell;
 
 use fearless_simd::Level;
 
 use super::ir::Type;
 use super::op::Op;
-use super::resources::Resources;
+use engine::engine;
 use file::{File, Slot};
 pub use memory::combine;
-use step::Step;
 
 /// What an operation gives for constants, by the same kernels that programs run.
 pub(super) fn evaluate(level: Level, op: Op, operands: &[u64]) -> u64 {
     let signature = op.signature();
     let place = |index: usize| Slot::uniform(2 * index);
+    let chunks: [Cell<Chunk>; 10] = Default::default();
+    let file = File::new(&chunks, 1);
     let mut src = [Slot::ZERO; 4];
-    let mut executable = Executable::empty(level);
     for (index, (bits, ty)) in operands.iter().zip(signature.operands).enumerate() {
         src[index] = place(index + 1);
-        executable.add_constant(src[index], *ty, *bits);
+        set_all(file, src[index], *ty, *bits);
     }
-    let result = executable.add_output(place(0), signature.result);
-    executable.steps = vec![
-        Step::Compute {
-            op,
-            dst: place(0),
-            src,
-        },
-        Step::End,
-    ];
-    let mut machine = Machine::new(Arc::new(executable));
-    let done = machine.run(
-        &LaneMask::first(1),
-        &LaneMask::none(),
-        &Resources::default(),
-        Watchdog::default(),
-    );
-    debug_assert!(done.is_ok(), "one step always ends");
+    engine(level).compute(file, op, place(0), &src);
     match signature.result {
-        Type::Bool => u64::from(machine.output(result, 0) != 0),
-        Type::B32 => u64::from(machine.output(result, 0)),
-        Type::B64 => machine.output64(result, 0),
+        Type::Bool => u64::from(file.first::<bool>(place(0))),
+        Type::B32 => u64::from(file.first::<u32>(place(0))),
+        Type::B64 => file.first(place(0)),
     }
 }
 

@@ -9,7 +9,8 @@ use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI, SQRT_2};
 
 use super::super::op::Op;
-use super::file::{File, Slot, vector1, vector2};
+use super::compute::Kernel;
+use super::file::{vector1, vector2};
 
 type F<S> = f32x16<S>;
 type I<S> = i32x16<S>;
@@ -21,31 +22,44 @@ pub fn is_one(op: Op) -> bool {
     (Op::FExp as u8..=Op::FAtanh as u8).contains(&(op as u8))
 }
 
-/// `dst = op(src...)`, all lanes.
-#[inline(always)]
-pub fn run<S: Simd>(simd: S, file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4]) {
+/// The kernel of one of these functions.
+pub fn kernel<S: Simd>(op: Op) -> Kernel<S> {
     macro_rules! unary {
         ($function:ident) => {
-            vector1(
-                simd,
-                file,
-                dst,
-                src,
-                #[inline(always)]
-                |a: U<S>| $function::<S>(a.bitcast()).bitcast(),
-            )
+            |simd, file, dst, src| {
+                simd.vectorize(
+                    #[inline(always)]
+                    move || {
+                        vector1(
+                            simd,
+                            *file,
+                            dst,
+                            src,
+                            #[inline(always)]
+                            |a: U<S>| $function::<S>(a.bitcast()).bitcast(),
+                        )
+                    },
+                )
+            }
         };
     }
     macro_rules! binary {
         ($function:ident) => {
-            vector2(
-                simd,
-                file,
-                dst,
-                src,
-                #[inline(always)]
-                |a: U<S>, b: U<S>| $function::<S>(a.bitcast(), b.bitcast()).bitcast(),
-            )
+            |simd, file, dst, src| {
+                simd.vectorize(
+                    #[inline(always)]
+                    move || {
+                        vector2(
+                            simd,
+                            *file,
+                            dst,
+                            src,
+                            #[inline(always)]
+                            |a: U<S>, b: U<S>| $function::<S>(a.bitcast(), b.bitcast()).bitcast(),
+                        )
+                    },
+                )
+            }
         };
     }
     match op {
@@ -67,7 +81,10 @@ pub fn run<S: Simd>(simd: S, file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4])
         Op::FAsinh => unary!(asinh),
         Op::FAcosh => unary!(acosh),
         Op::FAtanh => unary!(atanh),
-        _ => debug_assert!(false, "{} isn't a transcendental function", op.name()),
+        _ => {
+            debug_assert!(false, "{} isn't a transcendental function", op.name());
+            |_, _, _, _| {}
+        }
     }
 }
 

@@ -2,50 +2,47 @@
 
 use std::cmp::Ordering;
 
+use fearless_simd::Simd;
+
 use super::super::op::Op;
-use super::file::{File, Slot, map1, map2, map3};
+use super::compute::{Kernel, lanes};
+use super::file::{map1, map2, map3};
 use super::integer::floor_mod64;
 
-/// `dst = op(src...)`, all lanes.
-#[inline(always)]
-pub fn run(file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4]) {
+/// The kernel of a 64-bit operation or conversion.
+pub fn kernel<S: Simd>(op: Op) -> Kernel<S> {
     match op {
-        Op::Select64 => map3(
-            file,
-            dst,
-            src,
-            |c: bool, a: u64, b: u64| if c { a } else { b },
-        ),
+        Op::Select64 => lanes!(map3, |c: bool, a: u64, b: u64| if c { a } else { b },),
 
-        Op::FToF64 => map1(file, dst, src, |a: f32| f64::from(a)),
-        Op::F64ToF => map1(file, dst, src, |a: f64| a as f32),
-        Op::F64ToS => map1(file, dst, src, |a: f64| a as i32),
-        Op::F64ToU => map1(file, dst, src, |a: f64| a as u32),
-        Op::SToF64 => map1(file, dst, src, |a: i32| f64::from(a)),
-        Op::UToF64 => map1(file, dst, src, |a: u32| f64::from(a)),
-        Op::F64ToS64 => map1(file, dst, src, |a: f64| a as i64),
-        Op::F64ToU64 => map1(file, dst, src, |a: f64| a as u64),
-        Op::S64ToF64 => map1(file, dst, src, |a: i64| a as f64),
-        Op::U64ToF64 => map1(file, dst, src, |a: u64| a as f64),
-        Op::FToS64 => map1(file, dst, src, |a: f32| a as i64),
-        Op::FToU64 => map1(file, dst, src, |a: f32| a as u64),
-        Op::S64ToF => map1(file, dst, src, |a: i64| a as f32),
-        Op::U64ToF => map1(file, dst, src, |a: u64| a as f32),
-        Op::SToS64 => map1(file, dst, src, |a: i32| i64::from(a)),
-        Op::UToU64 => map1(file, dst, src, |a: u32| u64::from(a)),
-        Op::Low32 => map1(file, dst, src, |a: u64| a as u32),
-        Op::High32 => map1(file, dst, src, |a: u64| (a >> 32) as u32),
-        Op::Join64 => map2(file, dst, src, |low: u32, high: u32| {
+        Op::FToF64 => lanes!(map1, |a: f32| f64::from(a)),
+        Op::F64ToF => lanes!(map1, |a: f64| a as f32),
+        Op::F64ToS => lanes!(map1, |a: f64| a as i32),
+        Op::F64ToU => lanes!(map1, |a: f64| a as u32),
+        Op::SToF64 => lanes!(map1, |a: i32| f64::from(a)),
+        Op::UToF64 => lanes!(map1, |a: u32| f64::from(a)),
+        Op::F64ToS64 => lanes!(map1, |a: f64| a as i64),
+        Op::F64ToU64 => lanes!(map1, |a: f64| a as u64),
+        Op::S64ToF64 => lanes!(map1, |a: i64| a as f64),
+        Op::U64ToF64 => lanes!(map1, |a: u64| a as f64),
+        Op::FToS64 => lanes!(map1, |a: f32| a as i64),
+        Op::FToU64 => lanes!(map1, |a: f32| a as u64),
+        Op::S64ToF => lanes!(map1, |a: i64| a as f32),
+        Op::U64ToF => lanes!(map1, |a: u64| a as f32),
+        Op::SToS64 => lanes!(map1, |a: i32| i64::from(a)),
+        Op::UToU64 => lanes!(map1, |a: u32| u64::from(a)),
+        Op::Low32 => lanes!(map1, |a: u64| a as u32),
+        Op::High32 => lanes!(map1, |a: u64| (a >> 32) as u32),
+        Op::Join64 => lanes!(map2, |low: u32, high: u32| {
             u64::from(low) | u64::from(high) << 32
         }),
 
-        Op::FAdd64 => map2(file, dst, src, |a: f64, b: f64| a + b),
-        Op::FSub64 => map2(file, dst, src, |a: f64, b: f64| a - b),
-        Op::FMul64 => map2(file, dst, src, |a: f64, b: f64| a * b),
-        Op::FDiv64 => map2(file, dst, src, |a: f64, b: f64| a / b),
-        Op::FFma64 => map3(file, dst, src, |a: f64, b: f64, c: f64| a.mul_add(b, c)),
-        Op::FRem64 => map2(file, dst, src, |a: f64, b: f64| a % b),
-        Op::FMod64 => map2(file, dst, src, |a: f64, b: f64| {
+        Op::FAdd64 => lanes!(map2, |a: f64, b: f64| a + b),
+        Op::FSub64 => lanes!(map2, |a: f64, b: f64| a - b),
+        Op::FMul64 => lanes!(map2, |a: f64, b: f64| a * b),
+        Op::FDiv64 => lanes!(map2, |a: f64, b: f64| a / b),
+        Op::FFma64 => lanes!(map3, |a: f64, b: f64, c: f64| a.mul_add(b, c)),
+        Op::FRem64 => lanes!(map2, |a: f64, b: f64| a % b),
+        Op::FMod64 => lanes!(map2, |a: f64, b: f64| {
             let r = a % b;
             if r != 0.0 && (r < 0.0) != (b < 0.0) {
                 r + b
@@ -53,76 +50,75 @@ pub fn run(file: File<'_>, op: Op, dst: Slot, src: &[Slot; 4]) {
                 r
             }
         }),
-        Op::FNeg64 => map1(file, dst, src, |a: f64| -a),
-        Op::FAbs64 => map1(file, dst, src, f64::abs),
-        Op::FSign64 => map1(file, dst, src, |a: f64| {
+        Op::FNeg64 => lanes!(map1, |a: f64| -a),
+        Op::FAbs64 => lanes!(map1, f64::abs),
+        Op::FSign64 => lanes!(map1, |a: f64| {
             f64::from(i8::from(a > 0.0) - i8::from(a < 0.0))
         }),
-        Op::FFloor64 => map1(file, dst, src, f64::floor),
-        Op::FCeil64 => map1(file, dst, src, f64::ceil),
-        Op::FTrunc64 => map1(file, dst, src, f64::trunc),
-        Op::FRoundEven64 => map1(file, dst, src, f64::round_ties_even),
-        Op::FFract64 => map1(file, dst, src, |a: f64| a - a.floor()),
-        Op::FMin64 => map2(file, dst, src, f64::min),
-        Op::FMax64 => map2(file, dst, src, f64::max),
-        Op::FSqrt64 => map1(file, dst, src, f64::sqrt),
-        Op::FEq64 => map2(file, dst, src, |a: f64, b: f64| a == b),
-        Op::FNe64 => map2(file, dst, src, |a: f64, b: f64| a != b),
-        Op::FLt64 => map2(file, dst, src, |a: f64, b: f64| a < b),
-        Op::FLe64 => map2(file, dst, src, |a: f64, b: f64| a <= b),
-        Op::FLtGt64 => map2(file, dst, src, |a: f64, b: f64| {
+        Op::FFloor64 => lanes!(map1, f64::floor),
+        Op::FCeil64 => lanes!(map1, f64::ceil),
+        Op::FTrunc64 => lanes!(map1, f64::trunc),
+        Op::FRoundEven64 => lanes!(map1, f64::round_ties_even),
+        Op::FFract64 => lanes!(map1, |a: f64| a - a.floor()),
+        Op::FMin64 => lanes!(map2, f64::min),
+        Op::FMax64 => lanes!(map2, f64::max),
+        Op::FSqrt64 => lanes!(map1, f64::sqrt),
+        Op::FEq64 => lanes!(map2, |a: f64, b: f64| a == b),
+        Op::FNe64 => lanes!(map2, |a: f64, b: f64| a != b),
+        Op::FLt64 => lanes!(map2, |a: f64, b: f64| a < b),
+        Op::FLe64 => lanes!(map2, |a: f64, b: f64| a <= b),
+        Op::FLtGt64 => lanes!(map2, |a: f64, b: f64| {
             a.partial_cmp(&b).is_some_and(Ordering::is_ne)
         }),
-        Op::FIsNan64 => map1(file, dst, src, f64::is_nan),
-        Op::FIsInf64 => map1(file, dst, src, f64::is_infinite),
-        Op::FLdexp64 => map2(file, dst, src, ldexp),
-        Op::FFrexpSignificand64 => map1(file, dst, src, |a: f64| frexp(a).0),
-        Op::FFrexpExponent64 => map1(file, dst, src, |a: f64| frexp(a).1),
+        Op::FIsNan64 => lanes!(map1, f64::is_nan),
+        Op::FIsInf64 => lanes!(map1, f64::is_infinite),
+        Op::FLdexp64 => lanes!(map2, ldexp),
+        Op::FFrexpSignificand64 => lanes!(map1, |a: f64| frexp(a).0),
+        Op::FFrexpExponent64 => lanes!(map1, |a: f64| frexp(a).1),
 
-        Op::IAdd64 => map2(file, dst, src, u64::wrapping_add),
-        Op::ISub64 => map2(file, dst, src, u64::wrapping_sub),
-        Op::IMul64 => map2(file, dst, src, u64::wrapping_mul),
-        Op::INeg64 => map1(file, dst, src, u64::wrapping_neg),
-        Op::SAbs64 => map1(file, dst, src, i64::wrapping_abs),
-        Op::SSign64 => map1(file, dst, src, i64::signum),
-        Op::UDiv64 => map2(file, dst, src, |a: u64, b: u64| {
+        Op::IAdd64 => lanes!(map2, u64::wrapping_add),
+        Op::ISub64 => lanes!(map2, u64::wrapping_sub),
+        Op::IMul64 => lanes!(map2, u64::wrapping_mul),
+        Op::INeg64 => lanes!(map1, u64::wrapping_neg),
+        Op::SAbs64 => lanes!(map1, i64::wrapping_abs),
+        Op::SSign64 => lanes!(map1, i64::signum),
+        Op::UDiv64 => lanes!(map2, |a: u64, b: u64| {
             a.checked_div(b).unwrap_or(u64::MAX)
         }),
-        Op::URem64 => map2(file, dst, src, |a: u64, b: u64| {
-            a.checked_rem(b).unwrap_or(a)
-        }),
-        Op::SDiv64 => map2(
-            file,
-            dst,
-            src,
-            |a: i64, b: i64| if b == 0 { -1 } else { a.wrapping_div(b) },
-        ),
-        Op::SRem64 => map2(
-            file,
-            dst,
-            src,
-            |a: i64, b: i64| if b == 0 { a } else { a.wrapping_rem(b) },
-        ),
-        Op::SMod64 => map2(file, dst, src, floor_mod64),
-        Op::And64 => map2(file, dst, src, |a: u64, b: u64| a & b),
-        Op::Or64 => map2(file, dst, src, |a: u64, b: u64| a | b),
-        Op::Xor64 => map2(file, dst, src, |a: u64, b: u64| a ^ b),
-        Op::Not64 => map1(file, dst, src, |a: u64| !a),
-        Op::Shl64 => map2(file, dst, src, u64::wrapping_shl),
-        Op::UShr64 => map2(file, dst, src, u64::wrapping_shr),
-        Op::SShr64 => map2(file, dst, src, i64::wrapping_shr),
-        Op::IEq64 => map2(file, dst, src, |a: u64, b: u64| a == b),
-        Op::INe64 => map2(file, dst, src, |a: u64, b: u64| a != b),
-        Op::SLt64 => map2(file, dst, src, |a: i64, b: i64| a < b),
-        Op::SLe64 => map2(file, dst, src, |a: i64, b: i64| a <= b),
-        Op::ULt64 => map2(file, dst, src, |a: u64, b: u64| a < b),
-        Op::ULe64 => map2(file, dst, src, |a: u64, b: u64| a <= b),
-        Op::SMin64 => map2(file, dst, src, |a: i64, b: i64| a.min(b)),
-        Op::SMax64 => map2(file, dst, src, |a: i64, b: i64| a.max(b)),
-        Op::UMin64 => map2(file, dst, src, |a: u64, b: u64| a.min(b)),
-        Op::UMax64 => map2(file, dst, src, |a: u64, b: u64| a.max(b)),
+        Op::URem64 => lanes!(map2, |a: u64, b: u64| { a.checked_rem(b).unwrap_or(a) }),
+        Op::SDiv64 => lanes!(map2, |a: i64, b: i64| if b == 0 {
+            -1
+        } else {
+            a.wrapping_div(b)
+        },),
+        Op::SRem64 => lanes!(map2, |a: i64, b: i64| if b == 0 {
+            a
+        } else {
+            a.wrapping_rem(b)
+        },),
+        Op::SMod64 => lanes!(map2, floor_mod64),
+        Op::And64 => lanes!(map2, |a: u64, b: u64| a & b),
+        Op::Or64 => lanes!(map2, |a: u64, b: u64| a | b),
+        Op::Xor64 => lanes!(map2, |a: u64, b: u64| a ^ b),
+        Op::Not64 => lanes!(map1, |a: u64| !a),
+        Op::Shl64 => lanes!(map2, u64::wrapping_shl),
+        Op::UShr64 => lanes!(map2, u64::wrapping_shr),
+        Op::SShr64 => lanes!(map2, i64::wrapping_shr),
+        Op::IEq64 => lanes!(map2, |a: u64, b: u64| a == b),
+        Op::INe64 => lanes!(map2, |a: u64, b: u64| a != b),
+        Op::SLt64 => lanes!(map2, |a: i64, b: i64| a < b),
+        Op::SLe64 => lanes!(map2, |a: i64, b: i64| a <= b),
+        Op::ULt64 => lanes!(map2, |a: u64, b: u64| a < b),
+        Op::ULe64 => lanes!(map2, |a: u64, b: u64| a <= b),
+        Op::SMin64 => lanes!(map2, |a: i64, b: i64| a.min(b)),
+        Op::SMax64 => lanes!(map2, |a: i64, b: i64| a.max(b)),
+        Op::UMin64 => lanes!(map2, |a: u64, b: u64| a.min(b)),
+        Op::UMax64 => lanes!(map2, |a: u64, b: u64| a.max(b)),
         // Every other operation is 32-bit, and `compute` has taken it.
-        _ => debug_assert!(false, "{} isn't a 64-bit operation", op.name()),
+        _ => {
+            debug_assert!(false, "{} isn't a 64-bit operation", op.name());
+            |_, _, _, _| {}
+        }
     }
 }
 

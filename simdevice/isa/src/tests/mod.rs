@@ -1,5 +1,6 @@
 //! Tests of the shader cores against a scalar interpreter and exact models, at every SIMD level.
 
+mod fast_paths;
 mod memory;
 mod operations;
 mod random;
