@@ -251,7 +251,7 @@ fn measure(name: &str, device: &Arc<Device>, draw: &Draw) {
             best = time;
             let rate = |counter| counters.get(counter) as f64 * 1e3 / time as f64;
             line = format!(
-                "{:.2} ms ({:.2} ms joining): {:.1} M vertices/s, {:.1} M triangles/s, {} drawn",
+                "{:.2} ms ({:.2} ms binning): {:.1} M vertices/s, {:.1} M triangles/s, {} drawn",
                 time as f64 / 1e6,
                 counters.get(Counter::BinningTime) as f64 / 1e6,
                 rate(Counter::VertexInvocations),
