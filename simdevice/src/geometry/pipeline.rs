@@ -17,7 +17,6 @@ pub(super) const LANES: usize = 128;
 /// A vertex and a fragment program ready for one device.
 #[derive(Debug)]
 pub struct DrawPipeline {
-    pub(crate) programs: DrawPrograms,
     pub(super) vertex: VertexProgram,
     /// The fragment program.
     pub(crate) fragment: Option<FragmentStage>,
@@ -59,11 +58,7 @@ impl DrawPipeline {
         let fragment = fragment
             .map(|fragment| FragmentStage::new(device.level(), fragment))
             .transpose()?;
-        Ok(Self {
-            programs,
-            vertex,
-            fragment,
-        })
+        Ok(Self { vertex, fragment })
     }
 }
 

@@ -257,7 +257,7 @@ fn a_program_that_does_not_end_is_stopped() {
     let mut counters = Counters::default();
     let primitives = vec![over(LARGE, 0)];
     let draw = draw(&device, Some(endless), state(1), primitives, Vec::new(), 0);
-    pass.push(PassDraw::Primitives(draw), &device, &mut counters)
+    pass.push(PassDraw::Primitives(Box::new(draw)), &device, &mut counters)
         .unwrap();
     assert!(matches!(
         pass.end(&device, &mut counters),
