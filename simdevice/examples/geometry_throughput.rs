@@ -172,7 +172,7 @@ fn main() {
     };
     let device = Arc::new(Device::new(&config).expect("a device"));
     println!("{} workers", device.threads());
-    let pipeline = Arc::new(DrawPipeline::new(&device, programs()).expect("valid programs"));
+    let pipeline = Arc::new(DrawPipeline::new(&device, &programs()).expect("valid programs"));
     let identity: Vec<u8> = (0..16)
         .flat_map(|at| f32::to_le_bytes(if at % 5 == 0 { 1.0 } else { 0.0 }))
         .collect();

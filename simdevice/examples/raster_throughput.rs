@@ -277,7 +277,7 @@ fn main() {
 
 /// Draws a scene a few times, and prints the best time of the tile engine.
 fn measure(device: &Arc<Device>, scene: &Scene) {
-    let pipeline = DrawPipeline::new(device, programs(scene.rounds)).expect("valid programs");
+    let pipeline = DrawPipeline::new(device, &programs(scene.rounds)).expect("valid programs");
     let vertices = buffer(&scene.vertices);
     let stream = |offset| AttributeStream {
         buffer: vertices.clone(),

@@ -157,7 +157,7 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_vertex_output_components: 64,
         max_fragment_input_components: 64,
         max_fragment_output_attachments: MAX_COLOR_ATTACHMENTS,
-        max_fragment_combined_output_resources: MAX_COLOR_ATTACHMENTS,
+        max_fragment_combined_output_resources: DESCRIPTORS,
         max_compute_shared_memory_size: MAX_SHARED_BYTES,
         max_compute_work_group_count: [u32::MAX; 3],
         max_compute_work_group_invocations: MAX_WORKGROUP_INVOCATIONS,

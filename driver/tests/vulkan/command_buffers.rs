@@ -99,17 +99,22 @@ fn commands_outside_of_recordings_are_refused() {
 }
 
 #[test]
-fn commands_that_are_not_there_yet_fail_the_recording() {
+fn commands_that_are_refused_fail_the_recording() {
     let gpu = Gpu::new();
+    let buffer = gpu.buffer(4, MAPPABLE);
     let recorded = gpu.record(|device, commands| {
         // SAFETY: see the crate.
         unsafe {
-            let (image, layout) = (vk::Image::null(), vk::ImageLayout::GENERAL);
-            device.cmd_resolve_image(commands, image, layout, image, layout, &[]);
+            device.cmd_bind_index_buffer(commands, buffer.buffer, 0, vk::IndexType::NONE_KHR);
         }
     });
     assert_eq!(recorded.unwrap_err(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
-    assert!(gpu.take_messages().concat().contains("vkCmdResolveImage"));
+    let told = gpu.take_messages().concat();
+    assert!(
+        told.contains("vkCmdBindIndexBuffer") && told.contains("NONE"),
+        "{told}"
+    );
+    gpu.free_buffer(buffer);
 }
 
 #[test]

@@ -365,19 +365,21 @@ fn constants(on: bool) -> [f32; 4] {
 
 /// Draws a case's vertices: one by one, with a restart in the middle.
 fn draw(canvas: &Canvas, case: &Case, request: &Request, set: Option<bool>) -> Vec<[f32; 4]> {
-    let count = case.vertices.len() as u16;
-    let mut order: Vec<u16> = (0..count).collect();
+    // The index that restarts is a vertex like any other where nothing restarts.
+    let mut vertices = case.vertices.clone();
+    vertices.resize(256, vertex(0.9, 0.0, [1.0; 4]));
+    let mut order: Vec<u8> = (0..case.vertices.len() as u8).collect();
     if case.state == S::PRIMITIVE_RESTART_ENABLE {
-        order.insert(3, u16::MAX);
+        order.insert(3, u8::MAX);
     }
     let indices = canvas.gpu.buffer_of(&order);
-    let pixels = canvas.draw(request, &case.vertices, |device, commands, _| {
+    let pixels = canvas.draw(request, &vertices, |device, commands, _| {
         if let Some(on) = set {
             (case.dynamic)(device, commands, on);
         }
         // SAFETY: see the crate.
         unsafe {
-            device.cmd_bind_index_buffer(commands, indices.buffer, 0, vk::IndexType::UINT16);
+            device.cmd_bind_index_buffer(commands, indices.buffer, 0, vk::IndexType::UINT8_KHR);
             device.cmd_draw_indexed(commands, order.len() as u32, 1, 0, 0, 0);
         }
     });

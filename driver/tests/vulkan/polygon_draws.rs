@@ -628,3 +628,132 @@ fn several_samples_make_smooth_edges() {
     gpu.free_image(samples);
     made.destroy(gpu);
 }
+
+#[test]
+fn polygons_may_be_drawn_as_lines_or_points() {
+    let canvas = Canvas::new();
+    let drawn = |mode| {
+        let mut request = Request::default();
+        request.raster.polygon_mode = mode;
+        let vertices = [
+            vertex(-0.5, -0.5, RED),
+            vertex(0.5, -0.5, RED),
+            vertex(-0.5, 0.5, RED),
+        ];
+        count(&canvas.draw_vertices(&request, &vertices), RED)
+    };
+    let fill = drawn(vk::PolygonMode::FILL);
+    let line = drawn(vk::PolygonMode::LINE);
+    // Three points of four by four pixels.
+    assert_eq!(drawn(vk::PolygonMode::POINT), 3 * 16);
+    assert!(fill > 300 && (60..120).contains(&line), "{fill} {line}");
+}
+
+#[test]
+fn depth_is_clipped_or_clamped() {
+    let canvas = Canvas::with_depth();
+    let mut request = Request {
+        depth_format: DEPTH_FORMAT,
+        depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(true)
+            .depth_compare_op(vk::CompareOp::GREATER),
+        ..Request::default()
+    };
+    let deep = everything(RED).map(|[x, y, ..]| deep_vertex([x, y, 1.5], RED));
+    assert_eq!(count(&canvas.draw_vertices(&request, &deep), CLEAR), PIXELS);
+    request.raster = request.raster.depth_clamp_enable(true);
+    assert_eq!(count(&canvas.draw_vertices(&request, &deep), RED), PIXELS);
+}
+
+#[test]
+fn shaders_clip_and_cull() {
+    let canvas = Canvas::new();
+    let mut request = Request::default();
+    request.shaders[0] = vertex_shader(spirv!("clipped.vert"));
+    let pixels = canvas.draw_vertices(&request, &everything(RED));
+    assert_eq!(count(&pixels, RED), PIXELS / 2);
+    assert_eq!(at(&pixels, (WIDTH / 2 - 1, 9)), CLEAR);
+    assert_eq!(at(&pixels, (WIDTH / 2, 9)), RED);
+    // One vertex inside keeps the primitive.
+    let mut vertices = everything(BLUE);
+    assert_eq!(
+        count(&canvas.draw_vertices(&request, &vertices), CLEAR),
+        PIXELS
+    );
+    vertices[1] = vertex(3.0, -1.0, RED);
+    assert_eq!(
+        count(&canvas.draw_vertices(&request, &vertices), CLEAR),
+        PIXELS / 2
+    );
+}
+
+#[test]
+fn demoted_invocations_write_nothing_and_help() {
+    let canvas = Canvas::new();
+    let request = Request::default().with_fragment(spirv!("demoted.frag"));
+    let pixels = canvas.draw_vertices(&request, &everything(BLUE));
+    let expected = [1.0, 0.0, 1.0, 0.25];
+    assert_eq!(count(&pixels, expected), PIXELS / 2);
+    assert_eq!(at(&pixels, (6, 5)), expected);
+    assert_eq!(at(&pixels, (7, 5)), CLEAR);
+}
+
+/// Draws everything on four samples and resolves them.
+fn resolved(canvas: &Canvas, request: &Request, color: [f32; 4]) -> [f32; 4] {
+    let gpu = &canvas.gpu;
+    let samples = sampled_image(gpu, vk::SampleCountFlags::TYPE_4);
+    let made = request.create(gpu).unwrap();
+    let vertices = gpu.buffer_of(everything(color).as_flattened());
+    gpu.run(|device, commands| {
+        canvas.record_resolving_pass(device, commands, samples, || {
+            // SAFETY: see the crate.
+            unsafe {
+                device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, made.pipeline);
+                device.cmd_bind_vertex_buffers(commands, 0, &[vertices.buffer], &[0]);
+                device.cmd_draw(commands, 3, 1, 0, 0);
+            }
+        });
+    });
+    gpu.free_buffer(vertices);
+    gpu.free_image(samples);
+    made.destroy(gpu);
+    let pixels = canvas.pixels();
+    assert_eq!(count(&pixels, pixels[0]), PIXELS);
+    pixels[0]
+}
+
+#[test]
+fn samples_are_shaded_masked_and_covered() {
+    let canvas = Canvas::new();
+    let four = vk::PipelineMultisampleStateCreateInfo::default()
+        .rasterization_samples(vk::SampleCountFlags::TYPE_4);
+    let request = Request {
+        multisample: four,
+        ..Request::default()
+    };
+    assert_close(resolved(&canvas, &request, RED), RED);
+    let each = request.clone().with_fragment(spirv!("per_sample.frag"));
+    assert_close(resolved(&canvas, &each, RED), [15.0 / 4.0, 0.0, 0.0, 1.0]);
+    let mask = [0b0101u32];
+    let masked = Request {
+        multisample: vk::PipelineMultisampleStateCreateInfo {
+            p_sample_mask: mask.as_ptr(),
+            ..four
+        },
+        ..each
+    };
+    let clear = CLEAR[0] * 0.5;
+    assert_close(
+        resolved(&canvas, &masked, RED),
+        [5.0 / 4.0 + clear, clear, clear, 0.5],
+    );
+    // Alpha of one half covers two samples, and becomes one there.
+    let covering = Request {
+        multisample: four
+            .alpha_to_coverage_enable(true)
+            .alpha_to_one_enable(true),
+        ..Request::default()
+    };
+    let expected = [clear, 0.5 + clear, clear, 0.5];
+    assert_close(resolved(&canvas, &covering, GREEN), expected);
+}

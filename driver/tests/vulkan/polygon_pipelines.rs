@@ -148,11 +148,13 @@ fn attributes_are_of_the_kinds_that_the_shader_reads() {
     let mut unread = Request::default();
     unread.attributes[1].format = vk::Format::BC7_UNORM_BLOCK;
     assert_refused(&gpu, &unread, USAGE, "BC7_UNORM_BLOCK");
-    let cells = Request {
+    let mut cells = Request {
         shaders: vec![vertex_shader(spirv!("numbered.vert"))],
         ..Request::default()
     };
     assert_refused(&gpu, &cells, USAGE, "Float");
+    cells.attributes[0].format = vk::Format::R8G8_UINT;
+    assert_made(&gpu, &cells);
 }
 
 #[test]

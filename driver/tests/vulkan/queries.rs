@@ -102,13 +102,13 @@ fn timestamps_ascend_and_are_copied_with_their_availability() {
 #[test]
 fn what_cannot_be_measured_is_refused() {
     let gpu = Gpu::new();
-    let occlusion = vk::QueryPoolCreateInfo::default()
-        .query_type(vk::QueryType::OCCLUSION)
+    let feedback = vk::QueryPoolCreateInfo::default()
+        .query_type(vk::QueryType::TRANSFORM_FEEDBACK_STREAM_EXT)
         .query_count(1);
-    let unchained = occlusion.query_type(vk::QueryType::PERFORMANCE_QUERY_KHR);
+    let unchained = feedback.query_type(vk::QueryType::PERFORMANCE_QUERY_KHR);
     let mut unknown = vk::QueryPoolPerformanceCreateInfoKHR::default().counter_indices(&[9999]);
     let unknown = unchained.push_next(&mut unknown);
-    for info in [occlusion, unchained, unknown] {
+    for info in [feedback, unchained, unknown] {
         // SAFETY: see the crate.
         unsafe { assert!(gpu.device.create_query_pool(&info, None).is_err()) };
     }

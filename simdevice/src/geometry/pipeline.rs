@@ -52,8 +52,8 @@ impl DrawPipeline {
     ///
     /// # Errors
     /// [`InvalidProgram`] if one of them cannot run on the device.
-    pub fn new(device: &Device, programs: DrawPrograms) -> Result<Self, InvalidProgram> {
-        let vertex = VertexProgram::new(device, &programs)?;
+    pub fn new(device: &Device, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
+        let vertex = VertexProgram::new(device, programs)?;
         let fragment = programs.fragment.as_ref();
         let fragment = fragment
             .map(|fragment| FragmentStage::new(device.level(), fragment))

@@ -240,11 +240,14 @@ impl FixedState {
         self.depth_bounds_test = bounds_test;
         self.depth_bounds = (state.min_depth_bounds, state.max_depth_bounds);
         // What isn't used may hold anything.
-        if self.depth_test && !info.is_dynamic(vk::DynamicState::DEPTH_COMPARE_OP) {
+        let may_test = |enabled, state| enabled || info.is_dynamic(state);
+        let tests_depth = may_test(self.depth_test, vk::DynamicState::DEPTH_TEST_ENABLE);
+        if tests_depth && !info.is_dynamic(vk::DynamicState::DEPTH_COMPARE_OP) {
             self.depth_compare = convert::compare_op(state.depth_compare_op)?;
         }
         self.stencil_test = state.stencil_test_enable != vk::FALSE;
-        let static_ops = self.stencil_test && !info.is_dynamic(vk::DynamicState::STENCIL_OP);
+        let tests_stencil = may_test(self.stencil_test, vk::DynamicState::STENCIL_TEST_ENABLE);
+        let static_ops = tests_stencil && !info.is_dynamic(vk::DynamicState::STENCIL_OP);
         for (face, given) in [state.front, state.back].into_iter().enumerate() {
             if static_ops {
                 let ops = setting::stencil_ops(

@@ -89,7 +89,7 @@ impl PolygonPipeline {
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link(vertex, fragment, stream, effects)?;
-        let programs = DrawPipeline::new(device.simulated(), programs)
+        let programs = DrawPipeline::new(device.simulated(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         let is_static =
             dynamic.is_empty() && viewports == Origin::Static && scissors == Origin::Static;

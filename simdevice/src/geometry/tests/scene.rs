@@ -200,7 +200,7 @@ pub fn draw_with(
 ) -> Draw {
     let values: Vec<f32> = (0..positions.len()).map(|vertex| vertex as f32).collect();
     Draw {
-        pipeline: Arc::new(DrawPipeline::new(device, programs).unwrap()),
+        pipeline: Arc::new(DrawPipeline::new(device, &programs).unwrap()),
         state: Arc::new(state),
         attributes: vec![
             stream(positions, Format::R32G32B32A32Sfloat),

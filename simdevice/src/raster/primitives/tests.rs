@@ -196,7 +196,7 @@ fn draw(
     let state = Arc::new(state);
     let scissors = state.scissors.clone().into_iter();
     PrimitiveDraw {
-        pipeline: Arc::new(DrawPipeline::new(device, programs).unwrap()),
+        pipeline: Arc::new(DrawPipeline::new(device, &programs).unwrap()),
         state,
         bindings: Bindings::default(),
         bins: Bins::everywhere(
