@@ -144,7 +144,7 @@ impl CommandProcessor {
                 let device = Arc::clone(&self.device);
                 let mut front = FrontEnd::new(draw, surface, &device, &mut self.counters);
                 while let Some(part) = front.next_part(&mut self.counters)? {
-                    self.draw(PassDraw::Primitives(part))?;
+                    self.draw(PassDraw::Primitives(Box::new(part)))?;
                 }
                 Ok(())
             }

@@ -30,7 +30,7 @@ pub enum PassDraw {
     /// A sorted and binned set of Gaussians.
     Gaussians(GaussianDraw),
     /// Points, lines or triangles.
-    Primitives(PrimitiveDraw),
+    Primitives(Box<PrimitiveDraw>),
 }
 
 impl PassDraw {
@@ -225,10 +225,11 @@ impl Pass {
             let started = Instant::now();
             for (work, result) in self.render_macro_tiles(device, last) {
                 counters.add_all(&work);
-                // That others were cancelled when one stopped tells nothing.
-                if !matches!(done, Err(Stopped::TimedOut { .. })) {
-                    done = done.and(result);
-                }
+                done = match (done, result) {
+                    // That others were cancelled when one stopped tells nothing.
+                    (Err(Stopped::Cancelled), Err(stopped)) | (Err(stopped), _) => Err(stopped),
+                    (Ok(()), result) => result,
+                };
             }
             for target in self.targets().chain(self.resolve_targets()) {
                 target.bump_generation();

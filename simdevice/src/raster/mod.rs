@@ -9,6 +9,7 @@ pub mod fragment;
 pub mod gaussian;
 mod output;
 mod plane;
+mod prepared;
 pub(crate) mod primitives;
 mod setup;
 mod target;

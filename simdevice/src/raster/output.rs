@@ -4,7 +4,8 @@ use super::batch::{Batch, as_floats, offset};
 use super::color::{Colors, Quads};
 use super::depth::Tests;
 use super::fragment::Interface;
-use super::primitives::{Buffers, TileDraw, Timing};
+use super::prepared::{TileDraw, Timing};
+use super::primitives::Buffers;
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::exec::{Chunk, LaneMask, Machine};
 

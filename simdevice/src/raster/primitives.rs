@@ -2,32 +2,22 @@
 //! shading.
 
 use super::batch::{Batch, BlockValues, QUADS, Quad, at_sample};
-use super::color::{ColorOutput, Quads};
+use super::color::Quads;
 use super::coverage::{Coverage, bits};
 use super::depth::Tests;
 use super::fragment::{FragmentStage, Machines};
 use super::output;
-use super::setup::{CENTER, SAMPLES_4, Setup};
-use super::tile::{AREA, SIDE, Target, Tile};
+use super::prepared::Timing;
+pub use super::prepared::{Targets, TileDraw};
+use super::setup::Setup;
+use super::tile::{AREA, SIDE, Tile};
 use super::{Plane, TILE_SIZE};
-use crate::bindings::Prepared;
 use crate::counters::{Counter, Counters};
-use crate::device::Device;
-use crate::geometry::{Primitive, PrimitiveDraw};
-use crate::packet::draw::FragmentInput;
-use crate::packet::{BlendState, Rect};
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use crate::geometry::Primitive;
+use crate::packet::Rect;
+use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
-
-/// The attachments of a pass.
-#[derive(Clone, Copy, Debug)]
-pub struct Targets<'a> {
-    pub color: &'a [Option<Target>],
-    pub depth: Option<&'a Target>,
-    pub stencil: Option<&'a Target>,
-}
 
 /// The tile buffers of a worker.
 #[derive(Debug)]
@@ -43,48 +33,6 @@ pub struct Scratch {
     batch: Box<Batch>,
 }
 
-/// When depth and stencil are tested.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Timing {
-    /// Before shading.
-    Early,
-    /// After it.
-    Late,
-}
-
-/// A draw made ready for tiles, which all workers share.
-pub struct TileDraw<'a> {
-    pub(super) draw: &'a PrimitiveDraw,
-    /// The program, if it must run.
-    pub(super) stage: Option<&'a FragmentStage>,
-    pub(super) bindings: Prepared<'a>,
-    pub(super) targets: Targets<'a>,
-    pub(super) colors: Vec<Option<ColorOutput>>,
-    pub(super) tests: Tests,
-    pub(super) timing: Timing,
-    /// What can be tested early of late tests.
-    filter: Option<Tests>,
-    /// Whether all that is covered is written.
-    keeps_all: bool,
-    /// Samples are counted after shading, which may discard some.
-    pub(super) count_late: bool,
-    /// Every sample is shaded for itself.
-    pub(super) per_sample: bool,
-    pub(super) positions: &'static [[i32; 2]],
-    /// The pixels that the pass may touch.
-    area: Rect,
-    /// Of each viewport: the range that depth is clamped to.
-    pub(super) ranges: Vec<(f32, f32)>,
-    /// Whether fragments need 1 / w.
-    needs_w: bool,
-    /// Whether fragments need barycentrics.
-    needs_barycentrics: bool,
-    /// Whether fragments need depth after the early tests.
-    needs_depth: bool,
-    pub(super) level: Level,
-    limit: Duration,
-}
-
 /// From how many blocks of a tile on it pays to ask whether a primitive is hidden in all of it.
 const HIDDEN_BLOCKS: u32 = 6;
 
@@ -98,120 +46,7 @@ pub struct Place {
     pub size: u32,
 }
 
-impl<'a> TileDraw<'a> {
-    /// Makes a draw ready. `samples` are the attachments' samples, if there are attachments.
-    pub fn new(
-        draw: &'a PrimitiveDraw,
-        targets: Targets<'a>,
-        samples: Option<u32>,
-        area: Rect,
-        device: &Device,
-    ) -> Self {
-        const REPLACE: BlendState = BlendState {
-            equations: None,
-            write_mask: 0xF,
-        };
-        let state = &*draw.state;
-        let multisampled = samples.unwrap_or(state.samples) > 1;
-        let mut stage = draw.pipeline.fragment.as_ref();
-        let tests = Tests::new(
-            &state.depth_stencil,
-            targets.depth.map(Target::format),
-            targets.stencil.is_some(),
-        );
-        let color = |(index, target): (usize, &Option<Target>)| {
-            let written = stage?.interface.colors.get(index)?;
-            written.iter().flatten().flatten().next()?;
-            let blend = state.blend.get(index).unwrap_or(&REPLACE);
-            let format = target.as_ref()?.format();
-            ColorOutput::new(blend, state.logic_op, state.blend_constants, format)
-        };
-        let colors: Vec<_> = targets.color.iter().enumerate().map(color).collect();
-        let (mut timing, mut count_late) = (Timing::Early, false);
-        let (mut filter, mut keeps_all) = (None, !tests.any());
-        if let Some(interface) = stage.map(|stage| &stage.interface) {
-            let removes =
-                interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
-            let changes = interface.depth.is_some() || interface.stencil_reference.is_some();
-            let late = !interface.early_tests
-                && (changes
-                    || interface.has_side_effects && tests.any()
-                    || removes && tests.writes());
-            if late {
-                timing = Timing::Late;
-                filter = tests
-                    .filter()
-                    .filter(|_| !changes && !interface.has_side_effects);
-            }
-            keeps_all &= !removes;
-            count_late = late || removes && !interface.early_tests;
-            let needed = interface.has_side_effects
-                || late
-                || count_late
-                || colors.iter().any(Option::is_some);
-            if !needed {
-                stage = None;
-            }
-        }
-        let interface = stage.map(|stage| &stage.interface);
-        let per_sample = multisampled
-            && (state.sample_shading || interface.is_some_and(|interface| interface.per_sample));
-        let reads = |wanted: fn(FragmentInput) -> bool| {
-            interface.is_some_and(|interface| {
-                interface.inputs.iter().any(|&(_, input, _)| wanted(input))
-            })
-        };
-        let viewports = state.viewports.iter();
-        Self {
-            draw,
-            stage,
-            bindings: draw.bindings.prepare(device.level()),
-            targets,
-            colors,
-            tests,
-            timing,
-            filter,
-            keeps_all,
-            count_late,
-            per_sample,
-            positions: if multisampled { &SAMPLES_4 } else { &CENTER },
-            area,
-            ranges: viewports
-                .map(|viewport| {
-                    let (a, b) = (viewport.min_depth, viewport.max_depth);
-                    if state.depth_clamp {
-                        (a.min(b).clamp(0.0, 1.0), a.max(b).clamp(0.0, 1.0))
-                    } else {
-                        (0.0, 1.0)
-                    }
-                })
-                .collect(),
-            needs_w: reads(|input| {
-                matches!(
-                    input,
-                    FragmentInput::Varying { .. } | FragmentInput::FragCoord(3)
-                )
-            }),
-            needs_barycentrics: reads(|input| {
-                matches!(
-                    input,
-                    FragmentInput::Varying { .. } | FragmentInput::PointCoord(_)
-                )
-            }),
-            needs_depth: timing == Timing::Late
-                || reads(|input| matches!(input, FragmentInput::FragCoord(2))),
-            level: device.level(),
-            limit: device.config().shader_timeout,
-        }
-    }
-
-    /// Marks what its program may have written to as changed.
-    pub fn finish(&self) {
-        if self.stage.is_some() {
-            self.draw.bindings.bump_generations();
-        }
-    }
-
+impl TileDraw<'_> {
     /// Renders what it covers of a macro-tile.
     ///
     /// # Errors
@@ -409,7 +244,7 @@ impl<'d> Renderer<'_, 'd> {
                 values.depth = add(setup.depth([b1, b2]), setup.lane_depth);
             }
             if let Some(tests) = early {
-                self.test(simd, tests, current, &values, &mut lanes, tile, block);
+                self.test(simd, tests, current, &values, &mut lanes, (tile, block));
             }
             if !draw.count_late {
                 for lanes in lanes {
@@ -541,8 +376,7 @@ impl<'d> Renderer<'_, 'd> {
         current: &Current<'d>,
         values: &BlockValues<S>,
         lanes: &mut [u16; N],
-        tile: usize,
-        block: usize,
+        (tile, block): (usize, usize),
     ) {
         let draw = self.draw;
         for (sample, lanes) in lanes.iter_mut().enumerate() {
@@ -587,7 +421,7 @@ impl<'d> Renderer<'_, 'd> {
         }
         let bounds = current.setup.depth_bounds(at[0], at[1]);
         let (low, high) = current.range;
-        let code = |depth: f32| tests.code.encode_one(depth.clamp(low, high));
+        let code = |depth: f32| tests.code.encode_one(depth.max(low).min(high));
         let stored = self.buffers.depth.range(simd, tile);
         let hidden = tests.hides(bounds.map(code), stored);
         self.counters.add(Counter::TilesHidden, hidden.into());

@@ -78,9 +78,9 @@ fn fast<const N: usize>(
             for lane in 0..16 {
                 let px = x + BLOCK_X[block] + LANE_X[lane];
                 let py = y + BLOCK_Y[block] + LANE_Y[lane];
-                for sample in 0..N {
-                    out[(py * SIZE + px) as usize][sample] =
-                        coverage.lanes[block][sample] >> lane & 1 == 1;
+                let samples = &mut out[(py * SIZE + px) as usize];
+                for (sample, lanes) in samples.iter_mut().zip(coverage.lanes[block]) {
+                    *sample = lanes >> lane & 1 == 1;
                 }
             }
         }

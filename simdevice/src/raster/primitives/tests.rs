@@ -5,13 +5,16 @@ mod twin;
 
 use super::*;
 use crate::bindings::Bindings;
+use crate::device::Device;
 use crate::device::{Config, FlushPolicy};
 use crate::format::Format;
+use crate::geometry::PrimitiveDraw;
 use crate::geometry::{Bins, DrawPipeline, PrimitiveKind, Varyings};
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::draw::*;
 use crate::packet::*;
 use crate::pass::{Pass, PassDraw};
+use crate::raster::setup::{CENTER, SAMPLES_4};
 use devmem::Allocation;
 use isa::builder::Builder;
 use isa::ir::{Program, Rate, Statement, Type};
@@ -248,7 +251,7 @@ fn run(
     let mut counters = Counters::default();
     let mut pass = Pass::begin(rendering).unwrap();
     for draw in draws(&device) {
-        pass.push(PassDraw::Primitives(draw), &device, &mut counters)
+        pass.push(PassDraw::Primitives(Box::new(draw)), &device, &mut counters)
             .unwrap();
     }
     pass.end(&device, &mut counters).unwrap();

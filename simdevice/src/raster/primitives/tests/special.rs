@@ -89,7 +89,7 @@ fn each_sample_is_shaded_for_itself() {
 fn centroids_lie_within_the_primitive() {
     let target = image(WIDE, 4, 1);
     // Half a pixel wide: most centres are outside.
-    let corners = [[1000, 10], [1130, 10], [1000, 15_000]];
+    let corners = [[1000, 10], [1190, 10], [1000, 15_000]];
     let varying = |sampling| FragmentInput::Varying {
         index: 0,
         interpolation: Interpolation::Perspective,
@@ -133,7 +133,7 @@ fn centroids_lie_within_the_primitive() {
             assert_eq!(found[3].to_bits(), 7);
         }
     }
-    assert!(covered > 50 && outside > 5, "{covered} {outside}");
+    assert!(covered > 40 && outside > 5, "{covered} {outside}");
 }
 
 #[test]
@@ -257,7 +257,7 @@ fn a_program_that_does_not_end_is_stopped() {
     let mut counters = Counters::default();
     let primitives = vec![over(LARGE, 0)];
     let draw = draw(&device, Some(endless), state(1), primitives, Vec::new(), 0);
-    pass.push(PassDraw::Primitives(draw), &device, &mut counters)
+    pass.push(PassDraw::Primitives(Box::new(draw)), &device, &mut counters)
         .unwrap();
     assert!(matches!(
         pass.end(&device, &mut counters),

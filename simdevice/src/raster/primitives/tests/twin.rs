@@ -322,13 +322,14 @@ fn fragment(
     picture: &mut Picture,
 ) {
     let alpha = f32::from_bits(values[3]);
-    let kept = !(draw.discards && f32::from_bits(values[8]) > 0.5)
-        && !(draw.state.alpha_to_coverage
-            && if scene.samples == 1 {
-                alpha < 0.5
-            } else {
-                alpha <= sample as f32 / 4.0
-            });
+    let is_killed = draw.discards && f32::from_bits(values[8]) > 0.5;
+    let least = if scene.samples == 1 {
+        0.5
+    } else {
+        f32::from_bits((sample as f32 / 4.0).to_bits() + 1)
+    };
+    let is_covered = !draw.state.alpha_to_coverage || alpha >= least;
+    let kept = !is_killed && is_covered;
     if !kept && !draw.early_tests {
         return;
     }

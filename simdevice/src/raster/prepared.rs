@@ -1,0 +1,180 @@
+//! A draw's state made ready for tiles, once for all workers: what its fragments need, when they are tested, and where
+//! they go.
+
+use super::color::ColorOutput;
+use super::depth::Tests;
+use super::fragment::FragmentStage;
+use super::setup::{CENTER, SAMPLES_4};
+use super::tile::Target;
+use crate::bindings::Prepared;
+use crate::device::Device;
+use crate::geometry::PrimitiveDraw;
+use crate::packet::draw::FragmentInput;
+use crate::packet::{BlendState, Rect};
+use fearless_simd::Level;
+use std::time::Duration;
+
+/// The attachments of a pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Targets<'a> {
+    pub color: &'a [Option<Target>],
+    pub depth: Option<&'a Target>,
+    pub stencil: Option<&'a Target>,
+}
+
+/// When depth and stencil are tested.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Timing {
+    /// Before shading.
+    Early,
+    /// After it.
+    Late,
+}
+
+/// A draw made ready for tiles, which all workers share.
+pub struct TileDraw<'a> {
+    pub(super) draw: &'a PrimitiveDraw,
+    /// The program, if it must run.
+    pub(super) stage: Option<&'a FragmentStage>,
+    pub(super) bindings: Prepared<'a>,
+    pub(super) targets: Targets<'a>,
+    pub(super) colors: Vec<Option<ColorOutput>>,
+    pub(super) tests: Tests,
+    pub(super) timing: Timing,
+    /// What can be tested early of late tests.
+    pub(super) filter: Option<Tests>,
+    /// Whether all that is covered is written.
+    pub(super) keeps_all: bool,
+    /// Samples are counted after shading, which may discard some.
+    pub(super) count_late: bool,
+    /// Every sample is shaded for itself.
+    pub(super) per_sample: bool,
+    pub(super) positions: &'static [[i32; 2]],
+    /// The pixels that the pass may touch.
+    pub(super) area: Rect,
+    /// Of each viewport: the range that depth is clamped to.
+    pub(super) ranges: Vec<(f32, f32)>,
+    /// Whether fragments need 1 / w.
+    pub(super) needs_w: bool,
+    /// Whether fragments need barycentrics.
+    pub(super) needs_barycentrics: bool,
+    /// Whether fragments need depth after the early tests.
+    pub(super) needs_depth: bool,
+    pub(super) level: Level,
+    pub(super) limit: Duration,
+}
+
+impl<'a> TileDraw<'a> {
+    /// Makes a draw ready. `samples` are the attachments' samples, if there are attachments.
+    pub fn new(
+        draw: &'a PrimitiveDraw,
+        targets: Targets<'a>,
+        samples: Option<u32>,
+        area: Rect,
+        device: &Device,
+    ) -> Self {
+        const REPLACE: BlendState = BlendState {
+            equations: None,
+            write_mask: 0xF,
+        };
+        let state = &*draw.state;
+        let multisampled = samples.unwrap_or(state.samples) > 1;
+        let mut stage = draw.pipeline.fragment.as_ref();
+        let tests = Tests::new(
+            &state.depth_stencil,
+            targets.depth.map(Target::format),
+            targets.stencil.is_some(),
+        );
+        let color = |(index, target): (usize, &Option<Target>)| {
+            let written = stage?.interface.colors.get(index)?;
+            written.iter().flatten().flatten().next()?;
+            let blend = state.blend.get(index).unwrap_or(&REPLACE);
+            let format = target.as_ref()?.format();
+            ColorOutput::new(blend, state.logic_op, state.blend_constants, format)
+        };
+        let colors: Vec<_> = targets.color.iter().enumerate().map(color).collect();
+        let (mut timing, mut count_late) = (Timing::Early, false);
+        let (mut filter, mut keeps_all) = (None, !tests.any());
+        if let Some(interface) = stage.map(|stage| &stage.interface) {
+            let removes =
+                interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
+            let changes = interface.depth.is_some() || interface.stencil_reference.is_some();
+            let late = !interface.early_tests
+                && (changes
+                    || interface.has_side_effects && tests.any()
+                    || removes && tests.writes());
+            if late {
+                timing = Timing::Late;
+                filter = tests
+                    .filter()
+                    .filter(|_| !changes && !interface.has_side_effects);
+            }
+            keeps_all &= !removes;
+            count_late = late || removes && !interface.early_tests;
+            let needed = interface.has_side_effects
+                || late
+                || count_late
+                || colors.iter().any(Option::is_some);
+            if !needed {
+                stage = None;
+            }
+        }
+        let interface = stage.map(|stage| &stage.interface);
+        let per_sample = multisampled
+            && (state.sample_shading || interface.is_some_and(|interface| interface.per_sample));
+        let reads = |wanted: fn(FragmentInput) -> bool| {
+            interface.is_some_and(|interface| {
+                interface.inputs.iter().any(|&(_, input, _)| wanted(input))
+            })
+        };
+        let viewports = state.viewports.iter();
+        Self {
+            draw,
+            stage,
+            bindings: draw.bindings.prepare(device.level()),
+            targets,
+            colors,
+            tests,
+            timing,
+            filter,
+            keeps_all,
+            count_late,
+            per_sample,
+            positions: if multisampled { &SAMPLES_4 } else { &CENTER },
+            area,
+            ranges: viewports
+                .map(|viewport| {
+                    let (a, b) = (viewport.min_depth, viewport.max_depth);
+                    if state.depth_clamp {
+                        (a.min(b).clamp(0.0, 1.0), a.max(b).clamp(0.0, 1.0))
+                    } else {
+                        (0.0, 1.0)
+                    }
+                })
+                .collect(),
+            needs_w: reads(|input| {
+                matches!(
+                    input,
+                    FragmentInput::Varying { .. } | FragmentInput::FragCoord(3)
+                )
+            }),
+            needs_barycentrics: reads(|input| {
+                matches!(
+                    input,
+                    FragmentInput::Varying { .. } | FragmentInput::PointCoord(_)
+                )
+            }),
+            needs_depth: timing == Timing::Late
+                || reads(|input| matches!(input, FragmentInput::FragCoord(2))),
+            level: device.level(),
+            limit: device.config().shader_timeout,
+        }
+    }
+
+    /// Marks what its program may have written to as changed.
+    pub fn finish(&self) {
+        if self.stage.is_some() {
+            self.draw.bindings.bump_generations();
+        }
+    }
+}
