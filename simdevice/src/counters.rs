@@ -76,6 +76,7 @@ counters! {
     BlockEvaluations: "raster", "block evaluations", Count, "Pairs of a 4x4 block and a Gaussian whose alpha was evaluated";
     PixelContributions: "raster", "pixel contributions", Count, "Pairs of a pixel and a Gaussian that contributed to it";
     FragmentInvocations: "raster", "fragment invocations", Count, "Invocations of fragment programs, those that only help with derivatives apart";
+    TilesHidden: "raster", "tiles hidden", Count, "Pairs of a tile and a primitive that was skipped there because all of the tile's depths hide it";
     SamplesPassed: "raster", "samples passed", Count, "Samples of primitives that passed all tests";
     ComputeInvocations: "shader cores", "compute invocations", Count, "Invocations of compute programs";
     ShaderBatches: "shader cores", "batches", Count, "Batches of shader invocations run";

@@ -125,7 +125,7 @@ pub enum ClearValue {
 }
 
 /// A rectangle of framebuffer pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rect {
     /// The left edge in pixels.
     pub x: i32,

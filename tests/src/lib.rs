@@ -1,10 +1,14 @@
 //! What the project's tests share: the reference renderer, generated scenes, image comparison,
-//! devices to draw on, compute kernels, and the place of test data.
+//! devices to draw on, compute kernels, programs made up at random, scenes of triangles, and the
+//! place of test data.
 
 pub mod compare;
 pub mod contexts;
 pub mod convert;
 pub mod data;
+pub mod fuzzing;
 pub mod kernels;
 pub mod oracle;
+pub mod programs;
 pub mod scenes;
+pub mod triangles;

@@ -8,6 +8,8 @@ use crate::packet::Rect;
 pub(super) struct Grid {
     /// The side of a macro-tile in pixels.
     size: i32,
+    /// 2^32 / size, rounded up: multiplication by it divides any pixel's coordinate.
+    reciprocal: u64,
     /// The column and row of the first.
     first: [u32; 2],
     columns: u32,
@@ -27,6 +29,7 @@ impl Grid {
         let (row, rows) = span(area.y, area.height);
         Self {
             size: size as i32,
+            reciprocal: (1u64 << 32).div_ceil(size.into()),
             first: [column, row],
             columns,
             rows,
@@ -34,8 +37,8 @@ impl Grid {
     }
 
     fn tile(&self, column: u32, row: u32, layer: u32) -> u32 {
-        let row = layer * self.rows + (row - self.first[1]);
-        row * self.columns + (column - self.first[0])
+        let place = [column - self.first[0], row - self.first[1], layer];
+        tile_number(self.columns, self.rows, place)
     }
 }
 
@@ -57,7 +60,8 @@ pub(super) fn bin(
     pixels: Pixels,
     pairs: &mut Vec<Pair>,
 ) {
-    let tiles = |[first, last]: [i32; 2]| (first / grid.size) as u32..=(last / grid.size) as u32;
+    let tile = |pixel: i32| ((pixel.max(0) as u64 * grid.reciprocal) >> 32) as u32;
+    let tiles = |[first, last]: [i32; 2]| tile(first)..=tile(last);
     let (columns, rows) = (tiles(pixels.x), tiles(pixels.y));
     let layer = primitive.layer.into();
     if columns.start() == columns.end() || rows.start() == rows.end() {
@@ -115,37 +119,37 @@ impl Outline {
 /// Lists of primitives by macro-tile and layer, each in order.
 #[derive(Debug, Default)]
 pub struct Bins {
-    grid: Grid,
+    /// The first column and row.
+    origin: [u32; 2],
+    columns: u32,
+    rows: u32,
     layers: u32,
-    /// The macro-tile of the grid that the first list is of.
+    /// The macro-tile, numbered by layer, row and column, that the first list is of.
     first: u32,
     /// Where each list begins, and where the last one ends.
-    starts: Vec<u32>,
-    primitives: Vec<u32>,
+    starts: Box<[u32]>,
+    primitives: Box<[u32]>,
 }
 
 impl Bins {
-    /// Sorts pairs by macro-tile; `pieces` are in order, each with the number that its primitives start from.
-    pub(super) fn new<'a>(
-        grid: Grid,
-        layers: u32,
-        pieces: impl Iterator<Item = (u32, &'a [Pair])> + Clone,
-    ) -> Self {
-        let tiles = pieces
-            .clone()
-            .flat_map(|(_, pairs)| pairs)
-            .map(|pair| pair.0);
+    /// Sorts pairs by macro-tile; those of one keep their order.
+    pub(super) fn new(grid: &Grid, layers: u32, pairs: &[Pair]) -> Self {
+        let tiles = pairs.iter().map(|pair| pair.0);
         let (mut first, mut last) = (u32::MAX, 0);
         for tile in tiles.clone() {
             first = first.min(tile);
             last = last.max(tile);
         }
-        if first > last {
-            return Self {
-                grid,
-                layers,
-                ..Self::default()
-            };
+        let mut bins = Self {
+            origin: grid.first,
+            columns: grid.columns,
+            rows: grid.rows,
+            layers,
+            first,
+            ..Self::default()
+        };
+        if pairs.is_empty() {
+            return bins;
         }
         let mut starts = vec![0u32; (last - first) as usize + 2];
         for tile in tiles {
@@ -155,37 +159,31 @@ impl Bins {
             starts[place] += starts[place - 1];
         }
         let mut next = starts.clone();
-        let mut primitives = vec![0; starts.last().map_or(0, |&total| total as usize)];
-        for (base, pairs) in pieces {
-            for &(tile, primitive) in pairs {
-                let next = &mut next[(tile - first) as usize];
-                primitives[*next as usize] = base + primitive;
-                *next += 1;
-            }
+        let mut primitives = vec![0; pairs.len()];
+        for &(tile, primitive) in pairs {
+            let next = &mut next[(tile - first) as usize];
+            primitives[*next as usize] = primitive;
+            *next += 1;
         }
-        Self {
-            grid,
-            layers,
-            first,
-            starts,
-            primitives,
-        }
+        (bins.starts, bins.primitives) = (starts.into(), primitives.into());
+        bins
     }
 
     /// The primitives that may touch a macro-tile, given by column and row from the framebuffer's corner, in a layer:
     /// indices into [`PrimitiveDraw::primitives`](super::PrimitiveDraw::primitives), ascending.
     pub fn of(&self, macro_tile: [u32; 2], layer: u32) -> &[u32] {
-        let [column, row] = macro_tile;
-        let within =
-            |at: u32, first: u32, count: u32| at.checked_sub(first).is_some_and(|at| at < count);
-        let grid = &self.grid;
-        if !within(column, grid.first[0], grid.columns)
-            || !within(row, grid.first[1], grid.rows)
-            || layer >= self.layers
-        {
+        let within = |axis: usize, count: u32| {
+            let at = macro_tile[axis].checked_sub(self.origin[axis]);
+            at.filter(|&at| at < count)
+        };
+        let (Some(column), Some(row)) = (within(0, self.columns), within(1, self.rows)) else {
+            return &[];
+        };
+        if layer >= self.layers {
             return &[];
         }
-        let list = grid.tile(column, row, layer).checked_sub(self.first);
+        let tile = tile_number(self.columns, self.rows, [column, row, layer]);
+        let list = tile.checked_sub(self.first);
         let bounds = list.and_then(|list| self.starts.get(list as usize..list as usize + 2));
         match bounds {
             Some(&[start, end]) => &self.primitives[start as usize..end as usize],
@@ -217,6 +215,11 @@ impl Bins {
 
     /// Bytes of host memory that the lists take.
     pub(super) fn memory_bytes(&self) -> usize {
-        (self.starts.capacity() + self.primitives.capacity()) * size_of::<u32>()
+        size_of_val(&*self.starts) + size_of_val(&*self.primitives)
     }
+}
+
+/// The number of a macro-tile, by column, row and layer, of so many columns and rows.
+fn tile_number(columns: u32, rows: u32, [column, row, layer]: [u32; 3]) -> u32 {
+    (layer * rows + row) * columns + column
 }

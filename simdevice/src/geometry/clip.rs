@@ -15,8 +15,8 @@ pub(super) struct ClipVertex {
     pub edge: bool,
 }
 
-/// Three corners, and one more for each plane.
-const MOST_VERTICES: usize = 3 + PLANES + MAX_CLIP_CULL_DISTANCES;
+/// The most vertices of a polygon: three corners, and one more for each plane.
+pub(super) const MOST_VERTICES: usize = 3 + PLANES + MAX_CLIP_CULL_DISTANCES;
 
 /// near, far, w, and four of the guard band.
 const PLANES: usize = 7;

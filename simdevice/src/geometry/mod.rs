@@ -12,6 +12,7 @@ mod bins;
 mod clip;
 mod depth_bias;
 mod elements;
+mod emit;
 mod fetch;
 mod pipeline;
 mod primitive;
@@ -22,9 +23,9 @@ mod tests;
 mod viewport;
 
 pub use bins::Bins;
+pub use emit::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
 pub use pipeline::DrawPipeline;
 pub use primitive::{Primitive, PrimitiveDraw, PrimitiveKind, Varyings};
-pub use setup::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
 
 use crate::bindings::Prepared;
 use crate::counters::{Counter, Counters};
@@ -32,17 +33,17 @@ use crate::device::Device;
 use crate::format::Format;
 use crate::packet::Rect;
 use crate::packet::draw::{Draw, VertexInput};
-use bins::Grid;
+use bins::{Grid, Pair};
 use depth_bias::DepthUnit;
 use elements::{Elements, Run, runs};
 use fetch::Fetcher;
-use isa::exec::{Stopped, Watchdog, Work};
+use isa::exec::{Stopped, Watchdog};
 use isa::ir::Rate;
 use isa::resources::Resources;
 use rayon::prelude::*;
 use setup::{Job, Output, Setup};
 use shade::{Shaded, Shader};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::time::Instant;
 use viewport::Transform;
 
@@ -51,6 +52,9 @@ const CHUNK: u64 = 2048;
 
 /// Chunks of a part: what is set up before any of it is rendered.
 const PART: u64 = 512;
+
+/// Chunks of a wave for each worker: what is set up before it is joined, and its memory used again.
+const WAVE: u64 = 4;
 
 /// What is drawn to.
 #[derive(Clone, Copy, Debug)]
@@ -146,15 +150,19 @@ impl<'a> FrontEnd<'a> {
         let started = Instant::now();
         let range = self.next..self.chunks.min(self.next + PART);
         self.next = range.end;
-        let done = self.process(range);
+        let done = self.process(range, counters);
         self.draw.vertex_bindings.bump_generations();
-        let part = done.map(|chunks| self.join(chunks, counters));
+        let part = done.map(|joined| self.finish(joined, counters));
         counters.add(Counter::GeometryTime, started.elapsed().as_nanos() as u64);
         part.map(Some)
     }
 
-    /// Takes chunks through all stages, in parallel.
-    fn process(&self, range: std::ops::Range<u64>) -> Result<Vec<(Output, Work, u64)>, Stopped> {
+    /// Takes chunks through all stages, in waves: workers fill outputs, which are then joined in order and used again.
+    fn process(
+        &self,
+        range: std::ops::Range<u64>,
+        counters: &mut Counters,
+    ) -> Result<Joined, Stopped> {
         let setup = Setup {
             state: &self.draw.state,
             outputs: &self.draw.pipeline.vertex.outputs,
@@ -166,53 +174,60 @@ impl<'a> FrontEnd<'a> {
         };
         let resources = self.prepared.resources();
         let cancel = AtomicBool::new(false);
-        let worker = || Worker::new(self, &setup, &resources, &cancel);
-        if range.end - range.start == 1 || self.device.threads() == 1 {
-            let mut worker = worker();
-            return range.map(|chunk| worker.run(chunk)).collect();
-        }
-        let results: Vec<_> = self.device.install(|| {
-            let chunks = (range.start as usize..range.end as usize).into_par_iter();
-            chunks
-                .map_init(worker, |worker, chunk| worker.run(chunk as u64))
-                .collect()
-        });
-        // That others were cancelled tells nothing.
-        let mut done = Vec::with_capacity(results.len());
-        let mut stopped = None;
-        for result in results {
-            match result {
-                Ok(result) => done.push(result),
-                Err(Stopped::Cancelled) => stopped = stopped.or(Some(Stopped::Cancelled)),
-                Err(reason) => stopped = Some(reason),
+        let count = (range.end - range.start).min(self.device.threads() as u64);
+        let mut workers: Vec<_> = (0..count)
+            .map(|_| Worker::new(self, &setup, &resources, &cancel))
+            .collect();
+        let mut joined = Joined::default();
+        let mut start = range.start;
+        while start < range.end {
+            let end = range.end.min(start + count * WAVE);
+            let next = AtomicU64::new(start);
+            match &mut workers[..] {
+                [worker] => worker.run(&next, end),
+                workers => self.device.install(|| {
+                    workers
+                        .par_iter_mut()
+                        .for_each(|worker| worker.run(&next, end));
+                }),
             }
+            let failures = workers
+                .iter_mut()
+                .filter_map(|worker| worker.stopped.take());
+            // That others were cancelled tells nothing.
+            if let Some(stopped) = failures.min_by_key(|stopped| *stopped == Stopped::Cancelled) {
+                return Err(stopped);
+            }
+            let mut done: Vec<_> = workers.iter_mut().flat_map(Worker::done).collect();
+            done.sort_unstable_by_key(|output| output.chunk);
+            for output in done {
+                joined.append(output, counters);
+            }
+            start = end;
         }
-        stopped.map_or(Ok(done), Err)
+        Ok(joined)
     }
 
     fn grid(&self) -> Grid {
         Grid::new(self.surface.area, self.device.config().macro_tile_size)
     }
 
-    /// Puts chunks together in order.
-    fn join(&self, chunks: Vec<(Output, Work, u64)>, counters: &mut Counters) -> PrimitiveDraw {
+    /// Sorts what was joined by macro-tile.
+    fn finish(&self, joined: Joined, counters: &mut Counters) -> PrimitiveDraw {
         let started = Instant::now();
-        for (output, work, invocations) in &chunks {
-            counters.add_work(work);
-            counters.add(Counter::VertexInvocations, *invocations);
-            counters.add(Counter::InputPrimitives, output.assembled);
-            counters.add(Counter::ClippingInvocations, output.assembled);
-            counters.add(Counter::ClippingPrimitives, output.clipped);
-            counters.add(Counter::PrimitivesDrawn, output.primitives.len() as u64);
-        }
-        let outputs = chunks.into_iter().map(|chunk| chunk.0).collect();
-        let mut draw = PrimitiveDraw::empty(self.draw);
-        draw.regions = self.regions.clone();
-        draw.varyings.per_vertex = self.draw.pipeline.vertex.outputs.varyings.len();
-        join_outputs(&mut draw, outputs, self.grid(), self.surface.layers);
-        counters.add(Counter::BinnedPairs, draw.bins.pairs());
+        let bins = Bins::new(&self.grid(), self.surface.layers, &joined.pairs);
+        counters.add(Counter::BinnedPairs, bins.pairs());
         counters.add(Counter::BinningTime, started.elapsed().as_nanos() as u64);
-        draw
+        PrimitiveDraw {
+            primitives: joined.primitives,
+            varyings: Varyings {
+                values: joined.varyings,
+                per_vertex: self.draw.pipeline.vertex.outputs.varyings.len(),
+            },
+            bins,
+            regions: self.regions.clone(),
+            ..PrimitiveDraw::empty(self.draw)
+        }
     }
 
     /// Calls `each` with the runs, instances and primitives (first and end) of a chunk, in order.
@@ -268,6 +283,11 @@ struct Worker<'a> {
     elements: Elements,
     shaded: Shaded,
     numbers: Vec<u32>,
+    /// The first `used` are of this wave.
+    outputs: Vec<Output>,
+    used: usize,
+    /// Why it could not go on.
+    stopped: Option<Stopped>,
 }
 
 impl<'a> Worker<'a> {
@@ -297,11 +317,34 @@ impl<'a> Worker<'a> {
             elements: Elements::default(),
             shaded: Shaded::default(),
             numbers: Vec::new(),
+            outputs: Vec::new(),
+            used: 0,
+            stopped: None,
         }
     }
 
-    /// Takes a chunk through all stages. Returns what it became, the shader cores' work and the vertices shaded.
-    fn run(&mut self, chunk: u64) -> Result<(Output, Work, u64), Stopped> {
+    /// Takes chunks up to `end` that nobody else took.
+    fn run(&mut self, next: &AtomicU64, end: u64) {
+        self.used = 0;
+        loop {
+            let chunk = next.fetch_add(1, Relaxed);
+            if chunk >= end {
+                return;
+            }
+            if self.used == self.outputs.len() {
+                self.outputs.push(Output::default());
+            }
+            if let Err(stopped) = self.run_chunk(chunk) {
+                self.cancel.store(true, Relaxed);
+                self.stopped = Some(stopped);
+                return;
+            }
+            self.used += 1;
+        }
+    }
+
+    /// Takes a chunk through all stages.
+    fn run_chunk(&mut self, chunk: u64) -> Result<(), Stopped> {
         if self.cancel.load(Relaxed) {
             return Err(Stopped::Cancelled);
         }
@@ -310,45 +353,55 @@ impl<'a> Worker<'a> {
         front.pieces(chunk, |run, instance, first, end| {
             elements.push(front.draw, run, instance, first, end);
         });
-        let shaded = self.shader.shade(elements, &mut self.shaded);
-        let work = self.shader.machine.take_work();
-        shaded.inspect_err(|_| self.cancel.store(true, Relaxed))?;
-        let mut output = Output::default();
-        if self.front.draw.state.rasterizer_discard || self.setup.transforms.is_empty() {
-            output.assembled = self.elements.primitives();
+        let ran = self.shader.shade(elements, &mut self.shaded);
+        let output = &mut self.outputs[self.used];
+        output.clear();
+        output.chunk = chunk;
+        output.work = self.shader.machine.take_work();
+        output.shaded = elements.vertices.len() as u64;
+        ran?;
+        if front.draw.state.rasterizer_discard || self.setup.transforms.is_empty() {
+            output.assembled = elements.primitives();
         } else {
-            output = Job::new(self.setup, &self.shaded, &mut self.numbers).run(&self.elements);
+            Job::new(self.setup, &self.shaded, &mut self.numbers, output).run(elements);
         }
-        Ok((output, work, self.elements.vertices.len() as u64))
+        Ok(())
+    }
+
+    /// What it made of its chunks of this wave.
+    fn done(&mut self) -> &mut [Output] {
+        &mut self.outputs[..self.used]
     }
 }
 
-/// Joins chunks' outputs in order, with vertices and primitives numbered through.
-fn join_outputs(draw: &mut PrimitiveDraw, mut outputs: Vec<Output>, grid: Grid, layers: u32) {
-    let mut bases = Vec::with_capacity(outputs.len());
-    let (mut vertices, mut primitives) = (0u32, 0u32);
-    for output in &outputs {
-        bases.push((vertices, primitives));
-        vertices += output.vertices;
-        primitives += output.primitives.len() as u32;
-    }
-    let pieces = outputs.iter().zip(&bases);
-    let pieces = pieces.map(|(output, &(_, base))| (base, output.pairs.as_slice()));
-    draw.bins = Bins::new(grid, layers, pieces);
-    if let [output] = &mut outputs[..] {
-        draw.primitives = std::mem::take(&mut output.primitives);
-        draw.varyings.values = std::mem::take(&mut output.varyings);
-        return;
-    }
-    draw.primitives.reserve_exact(primitives as usize);
-    let words = outputs.iter().map(|output| output.varyings.len()).sum();
-    draw.varyings.values.reserve_exact(words);
-    for (mut output, (base, _)) in outputs.into_iter().zip(bases) {
-        for primitive in &mut output.primitives {
-            primitive.vertices = primitive.vertices.map(|vertex| vertex + base);
-            primitive.provoking += base;
-        }
-        draw.primitives.append(&mut output.primitives);
-        draw.varyings.values.append(&mut output.varyings);
+/// Chunks' outputs in order, with vertices and primitives numbered through.
+#[derive(Debug, Default)]
+struct Joined {
+    primitives: Vec<Primitive>,
+    varyings: Vec<u32>,
+    pairs: Vec<Pair>,
+    vertices: u32,
+}
+
+impl Joined {
+    fn append(&mut self, output: &Output, counters: &mut Counters) {
+        counters.add_work(&output.work);
+        counters.add(Counter::VertexInvocations, output.shaded);
+        counters.add(Counter::InputPrimitives, output.assembled);
+        counters.add(Counter::ClippingInvocations, output.assembled);
+        counters.add(Counter::ClippingPrimitives, output.clipped);
+        counters.add(Counter::PrimitivesDrawn, output.primitives.len() as u64);
+        let (vertices, primitives) = (self.vertices, self.primitives.len() as u32);
+        let renumbered = output.primitives.iter().map(|primitive| Primitive {
+            vertices: primitive.vertices.map(|vertex| vertex + vertices),
+            provoking: primitive.provoking + vertices,
+            ..primitive.clone()
+        });
+        self.primitives.extend(renumbered);
+        self.varyings.extend_from_slice(&output.varyings);
+        let pairs = output.pairs.iter();
+        self.pairs
+            .extend(pairs.map(|&(tile, primitive)| (tile, primitives + primitive)));
+        self.vertices += output.vertices;
     }
 }

@@ -90,8 +90,8 @@ impl PrimitiveDraw {
 
     /// Bytes of host memory that it holds while it waits.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let primitives = self.primitives.capacity() * size_of::<Primitive>();
-        let varyings = self.varyings.values.capacity() * size_of::<u32>();
+        let primitives = size_of_val(&*self.primitives);
+        let varyings = size_of_val(&*self.varyings.values);
         (primitives + varyings + self.bins.memory_bytes()) as u64
     }
 }

@@ -1,25 +1,27 @@
 //! Set-up: assembled primitives are clipped, culled and become what the rasterizer takes.
 
 use super::assemble::{corner_count, corners};
-use super::bins::{Grid, Pair, Pixels, bin};
-use super::clip::{ClipVertex, Clipper};
+use super::bins::{Grid, Pair};
+use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
 use super::depth_bias::{self, DepthUnit};
 use super::elements::Elements;
 use super::pipeline::VertexOutputs;
-use super::primitive::{Primitive, PrimitiveKind};
+use super::primitive::Primitive;
 use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
-use super::viewport::{ONE, Projected, Transform, code, snap_away, snap_length};
+use super::viewport::{Projected, Transform, code};
 use crate::packet::Rect;
-use crate::packet::draw::{DrawState, Interpolation, PolygonMode};
-
-/// The greatest side of a point, in pixels.
-pub const MAX_POINT_SIZE: f32 = 255.0;
-/// The greatest width of a line, in pixels.
-pub const MAX_LINE_WIDTH: f32 = 255.0;
+use crate::packet::draw::{DrawState, PolygonMode};
+use isa::exec::Work;
 
 /// What a chunk of primitives became. Vertices and primitives are numbered from 0.
 #[derive(Debug, Default)]
 pub(super) struct Output {
+    /// The chunk's number.
+    pub chunk: u64,
+    /// What the shader cores did.
+    pub work: Work,
+    /// Vertices shaded.
+    pub shaded: u64,
     pub primitives: Vec<Primitive>,
     pub varyings: Vec<u32>,
     pub pairs: Vec<Pair>,
@@ -29,6 +31,16 @@ pub(super) struct Output {
     pub assembled: u64,
     /// Primitives that clipping left.
     pub clipped: u64,
+}
+
+impl Output {
+    /// Forgets an earlier chunk, but keeps its memory.
+    pub(super) fn clear(&mut self) {
+        self.primitives.clear();
+        self.varyings.clear();
+        self.pairs.clear();
+        (self.vertices, self.assembled, self.clipped) = (0, 0, 0);
+    }
 }
 
 /// What set-up needs to know of a draw.
@@ -46,38 +58,38 @@ pub(super) struct Setup<'a> {
 
 /// A chunk being set up.
 pub(super) struct Job<'a> {
-    setup: &'a Setup<'a>,
-    shaded: &'a Shaded,
+    pub(super) setup: &'a Setup<'a>,
+    pub(super) shaded: &'a Shaded,
     /// By slot: the vertex's number in the output, or [`NONE`].
-    numbers: &'a mut Vec<u32>,
-    out: Output,
+    pub(super) numbers: &'a mut Vec<u32>,
+    pub(super) out: &'a mut Output,
 }
 
 /// A vertex that has no number yet.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// The primitive being set up.
 #[derive(Clone, Copy)]
-struct Current {
-    id: u32,
+pub(super) struct Current {
+    pub id: u32,
     /// Slots of its corners.
-    slots: [u32; 3],
+    pub slots: [u32; 3],
     /// The provoking vertex's slot.
-    provoking: u32,
-    viewport: u8,
-    layer: u16,
-    front: bool,
+    pub provoking: u32,
+    pub viewport: u8,
+    pub layer: u16,
+    pub front: bool,
 }
 
 /// A vertex of a primitive after clipping.
 #[derive(Clone, Copy)]
-struct Place {
-    projected: Projected,
-    origin: Origin,
+pub(super) struct Place<'p> {
+    pub projected: &'p Projected,
+    pub origin: Origin,
 }
 
 #[derive(Clone, Copy)]
-enum Origin {
+pub(super) enum Origin {
     /// A shaded vertex, by slot.
     Slot(u32),
     /// A mixture of the primitive's corners, already in the output.
@@ -85,19 +97,25 @@ enum Origin {
 }
 
 impl<'a> Job<'a> {
-    pub(super) fn new(setup: &'a Setup<'a>, shaded: &'a Shaded, numbers: &'a mut Vec<u32>) -> Self {
+    /// `out` must be clear.
+    pub(super) fn new(
+        setup: &'a Setup<'a>,
+        shaded: &'a Shaded,
+        numbers: &'a mut Vec<u32>,
+        out: &'a mut Output,
+    ) -> Self {
         numbers.clear();
         numbers.resize(shaded.vertices.len(), NONE);
         Self {
             setup,
             shaded,
             numbers,
-            out: Output::default(),
+            out,
         }
     }
 
     /// Sets up all primitives of a chunk.
-    pub(super) fn run(mut self, elements: &Elements) -> Output {
+    pub(super) fn run(mut self, elements: &Elements) {
         let state = self.setup.state;
         let count = corner_count(state.topology);
         for piece in &elements.pieces {
@@ -114,17 +132,16 @@ impl<'a> Job<'a> {
                 };
                 self.choose_target(&mut current);
                 match count {
-                    1 => self.point(&current),
-                    2 => self.line(&current),
-                    _ => self.triangle(&mut current),
+                    1 => self.with_vertices(&mut current, Self::point),
+                    2 => self.with_vertices(&mut current, Self::line),
+                    _ => self.with_vertices(&mut current, Self::triangle),
                 }
             }
             self.out.assembled += u64::from(piece.end - piece.first);
         }
-        self.out
     }
 
-    fn extras(&self, slot: u32) -> &Extras {
+    pub(super) fn extras(&self, slot: u32) -> &Extras {
         self.shaded.extras.get(slot as usize).unwrap_or(&NO_EXTRAS)
     }
 
@@ -142,62 +159,79 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn transform(&self, current: &Current) -> &'a Transform {
+    pub(super) fn transform(&self, current: &Current) -> &'a Transform {
         &self.setup.transforms[usize::from(current.viewport)]
     }
 
-    /// A shaded vertex as the primitive's viewport has it.
-    #[inline(always)]
-    fn vertex(&self, current: &Current, slot: u32) -> Vertex {
+    /// A shaded vertex as the primitive's viewport, which is not the first, has it.
+    fn projected_again(&self, current: &Current, slot: u32) -> Vertex {
         let mut vertex = self.shaded.vertices[slot as usize];
-        if current.viewport != 0 {
-            let transform = self.transform(current);
-            vertex.projected = transform.project(vertex.position);
-            let kept = vertex.code & (code::INVALID | code::ANY_USER | code::ANY_CULL);
-            vertex.code = kept | transform.code(vertex.position, &vertex.projected);
-        }
+        let transform = self.transform(current);
+        vertex.projected = transform.project(vertex.position);
+        let kept = vertex.code & (code::INVALID | code::ANY_USER | code::ANY_CULL);
+        vertex.code = kept | transform.code(vertex.position, &vertex.projected);
         vertex
     }
 
-    fn point(&mut self, current: &Current) {
-        let slot = current.slots[0];
-        let vertex = self.vertex(current, slot);
+    /// Calls `then` with the primitive's vertices as its viewport has them. They are not copied: this is where set-up
+    /// spends its time.
+    #[inline(always)]
+    fn with_vertices<const N: usize>(
+        &mut self,
+        current: &mut Current,
+        then: impl FnOnce(&mut Self, &mut Current, [&Vertex; N]),
+    ) {
+        let shaded = self.shaded;
+        if current.viewport == 0 {
+            let vertices =
+                std::array::from_fn(|corner| &shaded.vertices[current.slots[corner] as usize]);
+            then(self, current, vertices);
+        } else {
+            let vertices: [Vertex; N] =
+                std::array::from_fn(|corner| self.projected_again(current, current.slots[corner]));
+            then(self, current, vertices.each_ref());
+        }
+    }
+
+    fn point(&mut self, current: &mut Current, [vertex]: [&Vertex; 1]) {
         if vertex.code & (code::CLIP | code::ANY_SIDE | code::ANY_CULL) != 0 {
             return;
         }
         self.out.clipped += 1;
+        let slot = current.slots[0];
         let place = Place {
-            projected: vertex.projected,
+            projected: &vertex.projected,
             origin: Origin::Slot(slot),
         };
-        self.push_point(current, &place, self.extras(slot).point_size, 0.0);
+        self.push_point(current, place, self.extras(slot).point_size, 0.0);
     }
 
-    fn line(&mut self, current: &Current) {
-        let slots = [current.slots[0], current.slots[1]];
-        let ends = slots.map(|slot| self.vertex(current, slot));
+    fn line(&mut self, current: &mut Current, ends: [&Vertex; 2]) {
         let (all, any) = (ends[0].code & ends[1].code, ends[0].code | ends[1].code);
         // A wide line may reach into the view volume from beyond its side.
         if all & code::OUTSIDE & !code::ANY_SIDE != 0 || any & code::INVALID != 0 {
             return;
         }
-        let mut places = [0, 1].map(|end: usize| Place {
-            projected: ends[end].projected,
-            origin: Origin::Slot(slots[end]),
-        });
+        let mut projected = ends.map(|end| end.projected);
+        let mut origins = [0, 1].map(|end: usize| Origin::Slot(current.slots[end]));
         if any & code::CLIP != 0 {
             let clipper = self.clipper(current);
-            let Some(clipped) = clipper.line([ends[0].position, ends[1].position]) else {
+            let Some(clipped) = clipper.line(ends.map(|end| end.position)) else {
                 return;
             };
-            for (place, vertex) in places.iter_mut().zip(&clipped) {
+            for (end, vertex) in clipped.iter().enumerate() {
                 if vertex.corner().is_none() {
-                    *place = self.new_place(current, vertex);
+                    projected[end] = self.transform(current).project(narrow(vertex));
+                    origins[end] = self.new_vertex(current, vertex);
                 }
             }
         }
         self.out.clipped += 1;
-        self.push_line(current, &places[0], &places[1], 0.0);
+        let [from, to] = [0, 1].map(|end: usize| Place {
+            projected: &projected[end],
+            origin: origins[end],
+        });
+        self.push_line(current, from, to, 0.0);
     }
 
     fn clipper(&self, current: &Current) -> Clipper<'a> {
@@ -210,76 +244,78 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn triangle(&mut self, current: &mut Current) {
-        let vertices = current.slots.map(|slot| self.vertex(current, slot));
-        let [a, b, c] = [vertices[0].code, vertices[1].code, vertices[2].code];
+    #[inline(always)]
+    fn triangle(&mut self, current: &mut Current, vertices: [&Vertex; 3]) {
+        let [a, b, c] = vertices.map(|vertex| vertex.code);
         let (all, any) = (a & b & c, a | b | c);
         if all & code::OUTSIDE != 0 || any & code::INVALID != 0 {
             return;
         }
         if any & code::CLIP != 0 {
-            self.clipped_triangle(current, &vertices);
+            self.clipped_triangle(current, vertices);
             return;
         }
         self.out.clipped += 1;
-        let projected = [0, 1, 2].map(|corner: usize| &vertices[corner].projected);
-        let area = cross(projected.map(|projected| projected.snapped));
+        let area = cross(vertices.map(|vertex| vertex.projected.snapped));
         if !self.faces(current, area) {
             return;
         }
-        let state = self.setup.state;
-        if state.polygon_mode == PolygonMode::Fill && area == 0 {
-            return;
-        }
-        let places = [0, 1, 2].map(|corner: usize| Place {
-            projected: vertices[corner].projected,
+        let place = |corner: usize| Place {
+            projected: &vertices[corner].projected,
             origin: Origin::Slot(current.slots[corner]),
-        });
-        match state.polygon_mode {
-            PolygonMode::Fill => {
-                self.push_triangle(current, [&places[0], &places[1], &places[2]], area)
-            }
-            _ => self.outline(current, &places, &[true; 3]),
+        };
+        let places = [place(0), place(1), place(2)];
+        if self.setup.state.polygon_mode != PolygonMode::Fill {
+            self.outline(current, &places, |_| true);
+        } else if area != 0 {
+            self.push_triangle(current, places, area);
         }
     }
 
-    fn clipped_triangle(&mut self, current: &mut Current, vertices: &[Vertex; 3]) {
+    #[cold]
+    fn clipped_triangle(&mut self, current: &mut Current, vertices: [&Vertex; 3]) {
         let clipper = self.clipper(current);
-        let polygon = clipper.triangle([0, 1, 2].map(|corner: usize| vertices[corner].position));
+        let polygon = clipper.triangle(vertices.map(|vertex| vertex.position));
         let clipped = polygon.vertices();
         if clipped.len() < 3 {
             return;
         }
         self.out.clipped += clipped.len() as u64 - 2;
-        // Whether it is seen is decided before anything is made for it.
         let transform = self.transform(current);
-        let snapped = |vertex: &ClipVertex| match vertex.corner() {
-            Some(corner) => vertices[corner].projected.snapped,
-            None => transform.project(narrow(vertex)).snapped,
-        };
-        let fan = |place: usize| [0, place, place + 1].map(|place| snapped(&clipped[place]));
-        let area: i64 = (1..clipped.len() - 1).map(|place| cross(fan(place))).sum();
+        let mut projected = [Projected::default(); MOST_VERTICES];
+        for (projected, vertex) in projected.iter_mut().zip(clipped) {
+            *projected = match vertex.corner() {
+                Some(corner) => vertices[corner].projected,
+                None => transform.project(narrow(vertex)),
+            };
+        }
+        // Whether it is seen is decided before anything is made for it.
+        let fan = |place: usize| cross([0, place, place + 1].map(|i: usize| projected[i].snapped));
+        let area: i64 = (1..clipped.len() - 1).map(fan).sum();
         let fills = self.setup.state.polygon_mode == PolygonMode::Fill;
         if !self.faces(current, area) || (fills && area == 0) {
             return;
         }
-        let mut places = Vec::with_capacity(clipped.len());
-        for vertex in clipped {
-            places.push(match vertex.corner() {
-                Some(corner) => Place {
-                    projected: vertices[corner].projected,
-                    origin: Origin::Slot(current.slots[corner]),
+        let mut places = [Place {
+            projected: &projected[0],
+            origin: Origin::Slot(current.slots[0]),
+        }; MOST_VERTICES];
+        for (number, vertex) in clipped.iter().enumerate() {
+            places[number] = Place {
+                projected: &projected[number],
+                origin: match vertex.corner() {
+                    Some(corner) => Origin::Slot(current.slots[corner]),
+                    None => self.new_vertex(current, vertex),
                 },
-                None => self.new_place(current, vertex),
-            });
+            };
         }
+        let places = &places[..clipped.len()];
         if !fills {
-            let edges: Vec<bool> = clipped.iter().map(|vertex| vertex.edge).collect();
-            self.outline(current, &places, &edges);
+            self.outline(current, places, |place| clipped[place].edge);
             return;
         }
         for pair in places[1..].windows(2) {
-            let corners = [&places[0], &pair[0], &pair[1]];
+            let corners = [places[0], pair[0], pair[1]];
             let part = cross(corners.map(|place| place.projected.snapped));
             // What snapping has turned over lies within its neighbours.
             if part.signum() == area.signum() {
@@ -300,265 +336,42 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Draws a polygon's edges or vertices.
-    fn outline(&mut self, current: &Current, places: &[Place], edges: &[bool]) {
-        let bias = self.bias([&places[0], &places[1], &places[2]]);
+    /// Draws a polygon's edges, or their first vertices, where they belong to its outline.
+    fn outline(&mut self, current: &Current, places: &[Place], edge: impl Fn(usize) -> bool) {
+        let bias = self.bias([places[0], places[1], places[2]]);
         let next = |place: usize| (place + 1) % places.len();
-        for place in (0..places.len()).filter(|&place| edges[place]) {
+        for place in (0..places.len()).filter(|&place| edge(place)) {
             if self.setup.state.polygon_mode == PolygonMode::Line {
-                self.push_line(current, &places[place], &places[next(place)], bias);
+                self.push_line(current, places[place], places[next(place)], bias);
             } else {
                 let size = match places[place].origin {
                     Origin::Slot(slot) => self.extras(slot).point_size,
                     Origin::New { .. } => self.extras(current.provoking).point_size,
                 };
-                self.push_point(current, &places[place], size, bias);
+                self.push_point(current, places[place], size, bias);
             }
         }
     }
 
-    fn bias(&self, corners: [&Place; 3]) -> f32 {
+    pub(super) fn bias(&self, corners: [Place; 3]) -> f32 {
         match &self.setup.state.depth_bias {
             Some(bias) => {
-                let corners = corners.map(|place| &place.projected);
+                let corners = corners.map(|place| place.projected);
                 depth_bias::bias(bias, self.setup.depth_unit, corners)
             }
             None => 0.0,
         }
     }
-
-    #[inline(always)]
-    fn push_triangle(&mut self, current: &Current, places: [&Place; 3], area: i64) {
-        let [a, b, c] = places;
-        let places = if area > 0 { [a, b, c] } else { [a, c, b] };
-        let corners = places.map(|place| place.projected.snapped);
-        let Some(pixels) = self.pixels(current, &corners) else {
-            return;
-        };
-        if self.setup.state.samples == 1 && covers_nothing(&corners, pixels) {
-            return;
-        }
-        let bias = self.bias(places);
-        self.push(
-            current,
-            PrimitiveKind::Triangle,
-            corners,
-            places,
-            pixels,
-            bias,
-        );
-    }
-
-    fn push_line(&mut self, current: &Current, from: &Place, to: &Place, bias: f32) {
-        let (a, b) = (from.projected.window, to.projected.window);
-        let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
-        let length = (dx * dx + dy * dy).sqrt();
-        if length.is_nan() || length <= 0.0 {
-            return;
-        }
-        let scale = 0.5 * self.setup.state.line_width.clamp(0.0, MAX_LINE_WIDTH) / length;
-        let side = [snap_length(-dy * scale), snap_length(dx * scale)];
-        let (a, b) = (a.map(snap_away), b.map(snap_away));
-        let corners = [
-            [a[0] - side[0], a[1] - side[1]],
-            [a[0] + side[0], a[1] + side[1]],
-            [b[0] + side[0], b[1] + side[1]],
-        ];
-        if cross(corners) <= 0 {
-            return;
-        }
-        let last = [b[0] - side[0], b[1] - side[1]];
-        let [c0, c1, c2] = corners;
-        if let Some(pixels) = self.pixels(current, &[c0, c1, c2, last]) {
-            let places = [from, from, to];
-            self.push(current, PrimitiveKind::Line, corners, places, pixels, bias);
-        }
-    }
-
-    fn push_point(&mut self, current: &Current, place: &Place, size: f32, bias: f32) {
-        let size = if size.is_nan() {
-            1.0
-        } else {
-            size.clamp(0.0, MAX_POINT_SIZE)
-        };
-        let side = snap_length(size).max(ONE);
-        let [x, y] = place.projected.window.map(|at| snap_away(at) - side / 2);
-        let corners = [[x, y], [x + side, y], [x + side, y + side]];
-        if let Some(pixels) = self.pixels(current, &corners) {
-            self.push(
-                current,
-                PrimitiveKind::Point,
-                corners,
-                [place; 3],
-                pixels,
-                bias,
-            );
-        }
-    }
-
-    /// The pixels that may have a sample within the bounds of these corners, where they may be drawn to.
-    #[inline(always)]
-    fn pixels(&self, current: &Current, corners: &[[i32; 2]]) -> Option<Pixels> {
-        // Where samples lie within a pixel: the least and the greatest coordinate.
-        let (low, high) = if self.setup.state.samples == 1 {
-            (128, 128)
-        } else {
-            (32, 224)
-        };
-        let region = &self.setup.regions[usize::from(current.viewport)];
-        let along = |axis: usize, start: i32, length: u32| {
-            let (mut least, mut greatest) = (i32::MAX, i32::MIN);
-            for corner in corners {
-                least = least.min(corner[axis]);
-                greatest = greatest.max(corner[axis]);
-            }
-            // Right and bottom edges cover nothing.
-            let first = (least - high + ONE - 1) >> 8;
-            let last = (greatest - 1 - low) >> 8;
-            let end = i64::from(start) + i64::from(length) - 1;
-            let last = i64::from(last).min(end);
-            [first.max(start), last as i32]
-        };
-        let pixels = Pixels {
-            x: along(0, region.x, region.width),
-            y: along(1, region.y, region.height),
-        };
-        (pixels.x[0] <= pixels.x[1] && pixels.y[0] <= pixels.y[1]).then_some(pixels)
-    }
-
-    #[inline(always)]
-    fn push(
-        &mut self,
-        current: &Current,
-        kind: PrimitiveKind,
-        corners: [[i32; 2]; 3],
-        places: [&Place; 3],
-        pixels: Pixels,
-        bias: f32,
-    ) {
-        let vertices = places.map(|place| self.number(place.origin));
-        let provoking = self.number(Origin::Slot(current.provoking));
-        let primitive = Primitive {
-            corners,
-            depth: places.map(|place| place.projected.depth + bias),
-            inverse_w: places.map(|place| place.projected.inverse_w),
-            vertices,
-            provoking,
-            id: current.id,
-            kind,
-            front: current.front,
-            viewport: current.viewport,
-            layer: current.layer,
-        };
-        let number = self.out.primitives.len() as u32;
-        bin(
-            &self.setup.grid,
-            &primitive,
-            number,
-            pixels,
-            &mut self.out.pairs,
-        );
-        self.out.primitives.push(primitive);
-    }
-
-    /// The number of a vertex in the output, which it enters when it is first asked for.
-    #[inline(always)]
-    fn number(&mut self, origin: Origin) -> u32 {
-        let slot = match origin {
-            Origin::Slot(slot) => slot as usize,
-            Origin::New { number } => return number,
-        };
-        if self.numbers[slot] == NONE {
-            self.numbers[slot] = self.out.vertices;
-            self.out.vertices += 1;
-            let per_vertex = self.setup.outputs.varyings.len();
-            let varyings = &self.shaded.varyings[slot * per_vertex..][..per_vertex];
-            self.out.varyings.extend_from_slice(varyings);
-        }
-        self.numbers[slot]
-    }
-
-    /// Makes a vertex that clipping found, and puts its varyings into the output.
-    fn new_place(&mut self, current: &Current, vertex: &ClipVertex) -> Place {
-        let number = self.out.vertices;
-        self.out.vertices += 1;
-        let weights = vertex.weights;
-        // Weights in the framebuffer are those in clip space times w, made to add up to 1 again.
-        let mut linear = weights;
-        for (weight, slot) in linear.iter_mut().zip(current.slots) {
-            *weight *= f64::from(self.shaded.vertices[slot as usize].position[3]);
-        }
-        let sum: f64 = linear.iter().sum();
-        let linear = linear.map(|weight| weight / sum);
-        let interpolation = &self.setup.outputs.interpolation;
-        let per_vertex = interpolation.len();
-        let of =
-            |slot: u32, varying: usize| self.shaded.varyings[slot as usize * per_vertex + varying];
-        for (varying, interpolation) in interpolation.iter().enumerate() {
-            let mix = |weights: [f64; 3]| {
-                let part = |corner: usize| {
-                    // A corner that has no part in it must not spoil it by being infinite.
-                    if weights[corner] == 0.0 {
-                        return 0.0;
-                    }
-                    let value = f32::from_bits(of(current.slots[corner], varying));
-                    weights[corner] * f64::from(value)
-                };
-                ((part(0) + part(1) + part(2)) as f32).to_bits()
-            };
-            let value = match interpolation {
-                Interpolation::Perspective => mix(weights),
-                Interpolation::Linear => mix(linear),
-                Interpolation::Flat => of(current.provoking, varying),
-            };
-            self.out.varyings.push(value);
-        }
-        Place {
-            projected: self.transform(current).project(narrow(vertex)),
-            origin: Origin::New { number },
-        }
-    }
 }
 
 /// A position as vertices have it.
-fn narrow(vertex: &ClipVertex) -> [f32; 4] {
+pub(super) fn narrow(vertex: &ClipVertex) -> [f32; 4] {
     vertex.position.map(|coordinate| coordinate as f32)
 }
 
 /// Twice the signed area of a triangle.
 #[inline(always)]
-fn cross([a, b, c]: [[i32; 2]; 3]) -> i64 {
+pub(super) fn cross([a, b, c]: [[i32; 2]; 3]) -> i64 {
     let along = |to: [i32; 2], axis: usize| i64::from(to[axis]) - i64::from(a[axis]);
     along(b, 0) * along(c, 1) - along(b, 1) * along(c, 0)
-}
-
-/// Whether a triangle, whose bounds hold at most four pixel centres, covers none of them. Larger ones aren't looked
-/// at.
-#[inline(always)]
-fn covers_nothing(corners: &[[i32; 2]; 3], pixels: Pixels) -> bool {
-    let span = |[first, last]: [i32; 2]| last - first;
-    if span(pixels.x) > 1 || span(pixels.y) > 1 {
-        return false;
-    }
-    let inside = |x: i32, y: i32| {
-        let [x, y] = [x, y].map(|pixel| i64::from(pixel) * 256 + 128);
-        let mut inside = true;
-        for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-            let ([ax, ay], [bx, by]) = (corners[from].map(i64::from), corners[to].map(i64::from));
-            let (dx, dy) = (bx - ax, by - ay);
-            let value = dx * (y - ay) - dy * (x - ax);
-            // Points on an edge belong to it if it is a left or a top one.
-            let owns = dy < 0 || (dy == 0 && dx > 0);
-            inside &= value > 0 || (value == 0 && owns);
-        }
-        inside
-    };
-    for y in pixels.y[0]..=pixels.y[1] {
-        for x in pixels.x[0]..=pixels.x[1] {
-            if inside(x, y) {
-                return false;
-            }
-        }
-    }
-    true
 }

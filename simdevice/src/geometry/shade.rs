@@ -128,10 +128,10 @@ impl Shader<'_> {
             extras.point_size = f32::from_bits(bits);
         });
         for_lanes(machine, outputs.layer, extras, |extras, bits| {
-            extras.layer = bits
+            extras.layer = bits;
         });
         for_lanes(machine, outputs.viewport, extras, |extras, bits| {
-            extras.viewport = bits
+            extras.viewport = bits;
         });
         for index in 0..MAX_CLIP_CULL_DISTANCES {
             for_lanes(machine, outputs.clip[index], extras, |extras, bits| {

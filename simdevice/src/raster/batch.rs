@@ -65,6 +65,8 @@ pub struct Batch {
     perspective: [[f32; LANES]; 2],
     pub depth: [f32; LANES],
     inverse_w: [f32; LANES],
+    /// The record of all quads of each chunk, if it is the same.
+    common: [Option<u16>; LANES / 16],
     pub active: LaneMask,
     pub helpers: LaneMask,
 }
@@ -80,6 +82,7 @@ impl Default for Batch {
             perspective: [[0.0; LANES]; 2],
             depth: [0.0; LANES],
             inverse_w: [0.0; LANES],
+            common: [None; LANES / 16],
             active: LaneMask::none(),
             helpers: LaneMask::none(),
         }
@@ -165,6 +168,18 @@ impl Batch {
         self.count += 1;
     }
 
+    /// Adds all four quads of a block, for which there is room.
+    #[inline(always)]
+    pub fn add_block(&mut self, quads: [Quad; 4], values: &[[f32; 16]; 4]) {
+        let at = 4 * self.count;
+        self.barycentrics[0][at..at + 16].copy_from_slice(&values[0]);
+        self.barycentrics[1][at..at + 16].copy_from_slice(&values[1]);
+        self.depth[at..at + 16].copy_from_slice(&values[2]);
+        self.inverse_w[at..at + 16].copy_from_slice(&values[3]);
+        self.quads[self.count..self.count + 4].copy_from_slice(&quads);
+        self.count += 4;
+    }
+
     /// Chunks of 16 lanes that have quads.
     pub fn chunks(&self) -> usize {
         self.count.div_ceil(4)
@@ -177,13 +192,6 @@ impl Batch {
         &chunks[chunk]
     }
 
-    /// The record of all quads of a chunk, if it is the same.
-    #[inline(always)]
-    fn common_record(&self, chunk: usize) -> Option<u16> {
-        let [a, b, c, d] = self.chunk_quads(chunk);
-        (a.record == b.record && a.record == c.record && a.record == d.record).then_some(a.record)
-    }
-
     /// A value of each lane's primitive.
     #[inline(always)]
     fn of_records<S: Simd>(
@@ -192,7 +200,7 @@ impl Batch {
         chunk: usize,
         value: impl Fn(&Record) -> f32,
     ) -> f32x16<S> {
-        if let Some(record) = self.common_record(chunk) {
+        if let Some(record) = self.common[chunk] {
             return f32x16::splat(simd, value(&self.records[usize::from(record)]));
         }
         let mut lanes = [0.0; 16];
@@ -211,7 +219,7 @@ impl Batch {
         varying: usize,
         per_record: usize,
     ) -> [f32x16<S>; 3] {
-        if let Some(record) = self.common_record(chunk) {
+        if let Some(record) = self.common[chunk] {
             let [a, b, c] = self.attributes[usize::from(record) * per_record + varying];
             return [
                 f32x16::splat(simd, a),
@@ -250,7 +258,13 @@ impl Batch {
     }
 
     /// Whether two quads of a chunk cover the same sample, so that their order matters.
+    #[inline(always)]
     pub fn overlaps(&self, chunk: usize) -> bool {
+        // A primitive has each sample once.
+        self.common[chunk].is_none() && self.overlap(chunk)
+    }
+
+    fn overlap(&self, chunk: usize) -> bool {
         let quads = self.chunk_quads(chunk);
         quads.iter().enumerate().any(|(index, a)| {
             quads[index + 1..]
@@ -264,6 +278,11 @@ impl Batch {
         let last = self.quads[self.count - 1];
         for quad in &mut self.quads[self.count..4 * self.count.div_ceil(4)] {
             *quad = Quad { cover: 0, ..last };
+        }
+        for (quads, common) in self.quads.as_chunks().0.iter().zip(&mut self.common) {
+            let [a, b, c, d]: &[Quad; 4] = quads;
+            let same = a.record == b.record && a.record == c.record && a.record == d.record;
+            *common = same.then_some(a.record);
         }
         self.active = LaneMask::first(4 * self.count);
         self.helpers = LaneMask::none();
@@ -296,12 +315,13 @@ impl Batch {
         {
             self.divide(simd);
         }
-        for &(slot, kind) in &interface.inputs {
+        for &(slot, kind, place) in &interface.inputs {
             for (chunk, lanes) in machine.input_mut(slot).iter_mut().enumerate() {
                 if chunk >= self.chunks() {
                     break;
                 }
-                *lanes = Chunk(self.input(simd, kind, chunk, interface, positions, primitives));
+                *lanes =
+                    Chunk(self.input(simd, (kind, place), chunk, interface, positions, primitives));
             }
         }
     }
@@ -373,7 +393,7 @@ impl Batch {
     fn input<S: Simd>(
         &self,
         simd: S,
-        kind: FragmentInput,
+        (kind, place): (FragmentInput, usize),
         chunk: usize,
         interface: &Interface,
         positions: &[[i32; 2]],
@@ -381,16 +401,11 @@ impl Batch {
     ) -> [u32; 16] {
         match kind {
             FragmentInput::Varying {
-                index,
                 interpolation,
                 sampling,
+                ..
             } => {
-                let varying = interface
-                    .varyings
-                    .iter()
-                    .position(|&varying| varying == (index, interpolation))
-                    .unwrap_or(0);
-                let [a, da, db] = self.attribute(simd, chunk, varying, interface.varyings.len());
+                let [a, da, db] = self.attribute(simd, chunk, place, interface.varyings.len());
                 let centroid =
                     sampling == Sampling::Centroid && positions.len() > 1 && !interface.per_sample;
                 let [b1, b2] = match interpolation {

@@ -2,6 +2,7 @@
 //! attachment's format. [`super::blend::Blender`] says the same of one fragment.
 
 use super::blend::clamp_range;
+use super::tile::AREA;
 use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
 use crate::packet::draw::LogicOp;
 use crate::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
@@ -50,6 +51,19 @@ impl Quads {
     #[inline(always)]
     fn texel(&self, lane: usize) -> usize {
         self.first[lane / 4] + lane % 4
+    }
+
+    /// The tiles that they are in, of a plane of `samples` samples a pixel.
+    #[inline(always)]
+    pub fn tiles(&self, samples: usize) -> [usize; 4] {
+        let size = samples * AREA;
+        let [a, b, c, d] = self.first;
+        if self.consecutive {
+            let (first, last) = (a / size, d / size);
+            [first, first, last, last]
+        } else {
+            [a / size, b / size, c / size, d / size]
+        }
     }
 
     /// The words of 16 lanes' texels of a word each.
@@ -101,6 +115,8 @@ impl ColorOutput {
         format: Format,
     ) -> Option<Self> {
         let written = written_bits(format, state.write_mask);
+        // An enabled logic operation disables blending even where it does nothing itself.
+        let blends = logic.is_none() && !format.is_integer();
         let logic = logic.filter(|_| {
             matches!(
                 format.numeric(),
@@ -108,7 +124,6 @@ impl ColorOutput {
             )
         });
         let range = clamp_range(format);
-        let blends = logic.is_none() && !format.is_integer();
         let codec = match format {
             _ if logic.is_some() => Codec::Other,
             Format::R8G8B8A8Unorm | Format::A8B8G8R8UnormPack32 => Codec::Unorm8 { bgra: false },
@@ -140,7 +155,7 @@ impl ColorOutput {
             && self.written == written_bits(self.format, 0xF)
     }
 
-    /// Whether the source's alpha matters only for blending, so that it must be there.
+    /// Whether blending takes the second source.
     pub fn is_dual_source(&self) -> bool {
         let dual = |factor| {
             matches!(

@@ -137,6 +137,16 @@ impl<const N: usize> Coverage<N> {
         self.blocks != 0
     }
 
+    /// Whether every sample of the tile is covered.
+    pub fn is_whole(&self) -> bool {
+        self.blocks == 0xFFFF
+            && self
+                .lanes
+                .as_flattened()
+                .iter()
+                .all(|&lanes| lanes == u16::MAX)
+    }
+
     /// Removes lanes outside of columns and rows.
     #[inline(always)]
     fn cut(&mut self, [left, right]: [i32; 2], [top, bottom]: [i32; 2]) {

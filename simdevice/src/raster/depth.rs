@@ -112,6 +112,36 @@ impl Tests {
             })
     }
 
+    /// Those that fragments of a draw which may still be discarded, or not, can fail for good before they are shaded:
+    /// what is stored only ever comes nearer.
+    pub fn filter(&self) -> Option<Self> {
+        let (compare, _) = self.depth?;
+        let monotonic = matches!(
+            compare,
+            CompareOp::Less
+                | CompareOp::LessOrEqual
+                | CompareOp::Greater
+                | CompareOp::GreaterOrEqual
+        );
+        (monotonic && self.stencil.is_none()).then_some(Self {
+            depth: Some((compare, false)),
+            bounds: None,
+            ..*self
+        })
+    }
+
+    /// Whether no depth from `fragments` passes against any from `stored`, each the least and the greatest.
+    #[inline(always)]
+    pub fn hides(&self, fragments: [u32; 2], stored: [u32; 2]) -> bool {
+        match self.depth {
+            Some((CompareOp::Less, _)) => fragments[0] >= stored[1],
+            Some((CompareOp::LessOrEqual, _)) => fragments[0] > stored[1],
+            Some((CompareOp::Greater, _)) => fragments[1] <= stored[0],
+            Some((CompareOp::GreaterOrEqual, _)) => fragments[1] < stored[0],
+            _ => false,
+        }
+    }
+
     /// Tests 16 samples that have stored `depths` and `stencils`; returns the lanes of `lanes` that pass. What is to
     /// be stored replaces `depths` and `stencils` in lanes of `lanes` only, unless `dry`.
     #[inline(always)]

@@ -1,5 +1,6 @@
 //! Fragment programs made ready for draws.
 
+use crate::counters::Counters;
 use crate::packet::draw::{
     FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
 };
@@ -26,8 +27,8 @@ pub struct FragmentStage {
 /// What goes into the program and what comes out.
 #[derive(Debug, Default)]
 pub(super) struct Interface {
-    /// The inputs that it reads, by slot.
-    pub inputs: Vec<(u32, FragmentInput)>,
+    /// The inputs that it reads: slot, meaning, and of varyings the place in `varyings`.
+    pub inputs: Vec<(u32, FragmentInput, usize)>,
     /// The varyings among them, each once, with their interpolation.
     pub varyings: Vec<(u32, Interpolation)>,
     /// By attachment.
@@ -75,8 +76,11 @@ impl FragmentStage {
         idle.pop().unwrap_or_default()
     }
 
-    /// Gives them back.
-    pub(super) fn put_back(&self, machines: Machines) {
+    /// Gives them back, and counts what they did.
+    pub(super) fn put_back(&self, mut machines: Machines, counters: &mut Counters) {
+        for machine in machines.0.iter_mut().flatten() {
+            counters.add_work(&machine.take_work());
+        }
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         idle.push(machines);
     }
@@ -100,7 +104,7 @@ impl Interface {
             let Some(&Some(kind)) = programs.inputs.get(input.slot as usize) else {
                 continue;
             };
-            interface.inputs.push((input.slot, kind));
+            let mut place = 0;
             match kind {
                 FragmentInput::Varying {
                     index,
@@ -108,8 +112,14 @@ impl Interface {
                     sampling,
                 } => {
                     interface.per_sample |= sampling == Sampling::Sample;
-                    if !interface.varyings.contains(&(index, interpolation)) {
-                        interface.varyings.push((index, interpolation));
+                    let varying = (index, interpolation);
+                    let known = interface
+                        .varyings
+                        .iter()
+                        .position(|&other| other == varying);
+                    place = known.unwrap_or(interface.varyings.len());
+                    if known.is_none() {
+                        interface.varyings.push(varying);
                     }
                 }
                 FragmentInput::SampleId | FragmentInput::SamplePosition(_) => {
@@ -117,6 +127,7 @@ impl Interface {
                 }
                 _ => {}
             }
+            interface.inputs.push((input.slot, kind, place));
         }
         for output in executable.outputs() {
             let Some(&Some(kind)) = programs.outputs.get(output.slot as usize) else {

@@ -3,10 +3,10 @@
 use super::batch::{Batch, as_floats, offset};
 use super::color::{Colors, Quads};
 use super::depth::Tests;
-use super::fragment::{ColorSlots, Interface};
+use super::fragment::Interface;
 use super::primitives::{Buffers, TileDraw, Timing};
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
-use isa::exec::{LaneMask, Machine};
+use isa::exec::{Chunk, LaneMask, Machine};
 
 /// Tests depth and stencil of 16 samples; returns the lanes that pass.
 #[inline(always)]
@@ -33,6 +33,9 @@ pub fn test<S: Simd>(
     let passed = tests.test(simd, lanes, front, code, &mut depths, &mut stencils);
     if tests.depth.is_some_and(|(_, write)| write) {
         quads.store(buffers.depth.words_mut(), passed, &depths);
+        for tile in quads.tiles(buffers.depth.samples()) {
+            buffers.depth.changed(tile);
+        }
     }
     if tests.stencil.is_some() {
         let bytes = buffers.stencil.bytes_mut();
@@ -42,6 +45,9 @@ pub fn test<S: Simd>(
     }
     passed
 }
+
+/// The components of both sources of an attachment, by chunk; those that are not written are empty.
+type Sources<'a> = [[&'a [Chunk]; 4]; 2];
 
 /// Takes a batch's results to the attachments, in order; returns how many samples passed if they are counted here.
 #[inline(always)]
@@ -55,6 +61,11 @@ pub fn write<S: Simd>(
     buffers: &mut Buffers,
 ) -> u64 {
     let late = draw.timing == Timing::Late && draw.tests.any();
+    let sources: Vec<Sources<'_>> = interface
+        .colors
+        .iter()
+        .map(|slots| slots.map(|slots| slots.map(|slot| lanes_of(machine, slot))))
+        .collect();
     let mut passed = 0;
     for chunk in 0..batch.chunks() {
         let killed = killed.words().get(chunk / 4).copied().unwrap_or(0) >> (16 * (chunk % 4));
@@ -82,9 +93,7 @@ pub fn write<S: Simd>(
                     *lanes = test(simd, &draw.tests, *lanes, front, code, &quads, buffers);
                 }
                 passed += u64::from(lanes.count_ones());
-                write_colors(
-                    simd, draw, interface, machine, chunk, *lanes, &quads, buffers,
-                );
+                write_colors(simd, draw, &sources, chunk, *lanes, &quads, buffers);
             }
         }
     }
@@ -187,8 +196,7 @@ fn late_depth<S: Simd>(
 fn write_colors<S: Simd>(
     simd: S,
     draw: &TileDraw<'_>,
-    interface: &Interface,
-    machine: &Machine,
+    sources: &[Sources<'_>],
     chunk: usize,
     lanes: u16,
     quads: &Quads,
@@ -198,12 +206,12 @@ fn write_colors<S: Simd>(
         return;
     }
     for (index, output) in draw.colors.iter().enumerate() {
-        let (Some(output), Some(slots)) = (output, interface.colors.get(index)) else {
+        let (Some(output), Some(sources)) = (output, sources.get(index)) else {
             continue;
         };
-        let mut source = load(simd, slots, 0, machine, chunk);
+        let mut source = load(simd, &sources[0], chunk);
         let mut second = if output.is_dual_source() {
-            load(simd, slots, 1, machine, chunk)
+            load(simd, &sources[1], chunk)
         } else {
             [f32x16::splat(simd, 0.0); 4]
         };
@@ -218,18 +226,17 @@ fn write_colors<S: Simd>(
 
 /// A source of 16 fragments; components that are not written are 0.
 #[inline(always)]
-fn load<S: Simd>(
-    simd: S,
-    slots: &ColorSlots,
-    index: usize,
-    machine: &Machine,
-    chunk: usize,
-) -> Colors<S> {
+fn load<S: Simd>(simd: S, source: &[&[Chunk]; 4], chunk: usize) -> Colors<S> {
     let mut color = [f32x16::splat(simd, 0.0); 4];
-    for (component, slot) in color.iter_mut().zip(slots[index]) {
-        if let Some(chunk) = slot.and_then(|slot| machine.output_chunks(slot).get(chunk)) {
-            *component = as_floats(simd, chunk);
+    for (component, lanes) in color.iter_mut().zip(source) {
+        if let Some(lanes) = lanes.get(chunk) {
+            *component = as_floats(simd, lanes);
         }
     }
     color
+}
+
+/// What a program wrote to a slot, if there is one.
+fn lanes_of(machine: &Machine, slot: Option<u32>) -> &[Chunk] {
+    slot.map_or(&[], |slot| machine.output_chunks(slot))
 }

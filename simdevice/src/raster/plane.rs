@@ -6,10 +6,12 @@
 //! holds (see [`super::depth`]). Tiles rather than macro-tiles are loaded and stored, so that the size of a macro-tile
 //! changes nothing either.
 
+use super::TILE_SIZE;
 use super::tile::{AREA, SIDE, Target, Tile, place};
 use crate::format::{Format, MAX_TEXEL_SIZE};
 use crate::packet::{Rect, ResolveMode};
 use crate::transfer::resolve_row;
+use fearless_simd::{Simd, prelude::*, u32x16};
 
 /// The most samples of a pixel.
 const MAX_SAMPLES: usize = 4;
@@ -24,6 +26,10 @@ pub struct Plane {
     samples: usize,
     /// Bit `index` tells that the tile was loaded or cleared here.
     touched: u64,
+    /// Bit `index` tells that the tile's entry of `ranges` is true.
+    ranged: u64,
+    /// The least and the greatest word of each tile.
+    ranges: Vec<[u32; 2]>,
 }
 
 /// A texel in the tile buffer and in memory.
@@ -80,6 +86,8 @@ impl Plane {
             stride,
             samples,
             touched: 0,
+            ranged: 0,
+            ranges: vec![[0; 2]; (size / TILE_SIZE).pow(2) as usize],
         }
     }
 
@@ -89,9 +97,10 @@ impl Plane {
         self.touched >> tile & 1 == 1
     }
 
-    /// Bytes of a texel.
-    pub fn stride(&self) -> usize {
-        self.stride
+    /// Samples of a pixel.
+    #[inline(always)]
+    pub fn samples(&self) -> usize {
+        self.samples
     }
 
     /// The first texel of a sample of a tile.
@@ -112,8 +121,33 @@ impl Plane {
         &mut self.words
     }
 
+    /// Bounds of the words of all samples of a tile.
+    #[inline(always)]
+    pub fn range<S: Simd>(&mut self, simd: S, tile: usize) -> [u32; 2] {
+        if self.ranged >> tile & 1 == 0 {
+            let count = self.samples * AREA;
+            let words = &self.words[tile * count..][..count];
+            let (mut least, mut greatest) = (u32x16::splat(simd, u32::MAX), u32x16::splat(simd, 0));
+            for chunk in words.as_chunks::<16>().0 {
+                let chunk = u32x16::simd_from(simd, *chunk);
+                least = least.min(chunk);
+                greatest = greatest.max(chunk);
+            }
+            self.ranges[tile] = [least.reduce_min(), greatest.reduce_max()];
+            self.ranged |= 1 << tile;
+        }
+        self.ranges[tile]
+    }
+
+    /// Tells that words of a tile have changed.
+    #[inline(always)]
+    pub fn changed(&mut self, tile: usize) {
+        self.ranged &= !(1 << tile);
+    }
+
     /// The bytes of one sample of a tile.
     pub fn sample_mut(&mut self, tile: usize, sample: usize) -> &mut [u8] {
+        self.changed(tile);
         let (start, stride) = (self.start(tile, sample), self.stride);
         &mut self.bytes_mut()[start * stride..][..AREA * stride]
     }
@@ -147,6 +181,10 @@ impl Plane {
                 let bytes = &mut bytes[..columns.len() * size];
                 let at = tile.pixel(columns.start, y);
                 target.read(layer, sample as u32, at, bytes);
+                if stride == size && matches!(Kind::of(format), Kind::Same) {
+                    set_row(texels, size, y, columns.start, bytes);
+                    continue;
+                }
                 for (x, texel) in columns.zip(bytes.chunks_exact(size)) {
                     let at = place(x, y) * stride;
                     texels[at..at + stride].copy_from_slice(&unpack(format, texel)[..stride]);
@@ -160,6 +198,7 @@ impl Plane {
     pub fn finish(&mut self, target: &Target, layer: u32, tile: &Tile, keep: bool) {
         let touched = self.is_touched(tile.index);
         self.touched &= !(1 << tile.index);
+        self.changed(tile.index);
         if !keep || !touched && target.clear.is_none() {
             return;
         }
@@ -173,7 +212,9 @@ impl Plane {
             for (y, columns) in tile.rows(tile.pixels) {
                 let at = tile.pixel(columns.start, y);
                 let bytes = &mut row[..columns.len() * size];
-                if touched {
+                if touched && stride == size {
+                    get_row(texels, size, y, columns.start, bytes);
+                } else if touched {
                     for (x, out) in columns.zip(bytes.chunks_exact_mut(size)) {
                         // A depth's bytes are its lower ones.
                         out.copy_from_slice(&texels[place(x, y) * stride..][..size]);
@@ -255,15 +296,11 @@ impl Plane {
                     &mut bytes[..columns.len() * size],
                     &mut row[..columns.len()],
                 );
-                for (x, out) in columns.clone().zip(bytes.chunks_exact_mut(size)) {
-                    out.copy_from_slice(&texels[place(x, y) * size..][..size]);
-                }
+                get_row(texels, size, y, columns.start, bytes);
                 format.decode_row(bytes, row);
                 if change(row, y, columns.start) {
                     format.encode_row(row, bytes);
-                    for (x, texel) in columns.zip(bytes.chunks_exact(size)) {
-                        texels[place(x, y) * size..][..size].copy_from_slice(texel);
-                    }
+                    set_row(texels, size, y, columns.start, bytes);
                 }
             }
         }
@@ -272,8 +309,67 @@ impl Plane {
 
 /// Repeats `texel` over `bytes`.
 fn fill(bytes: &mut [u8], texel: &[u8]) {
-    for chunk in bytes.chunks_exact_mut(texel.len()) {
-        chunk.copy_from_slice(texel);
+    match texel.len() {
+        1 => fill_each::<1>(bytes, texel),
+        2 => fill_each::<2>(bytes, texel),
+        4 => fill_each::<4>(bytes, texel),
+        8 => fill_each::<8>(bytes, texel),
+        16 => fill_each::<16>(bytes, texel),
+        size => bytes
+            .chunks_exact_mut(size)
+            .for_each(|chunk| chunk.copy_from_slice(texel)),
+    }
+}
+
+fn fill_each<const N: usize>(bytes: &mut [u8], texel: &[u8]) {
+    if let (texels, Ok(texel)) = (bytes.as_chunks_mut::<N>().0, texel.try_into()) {
+        texels.fill(texel);
+    }
+}
+
+/// Copies a row of a tile's sample, from column `first` on, to `row`.
+fn get_row(texels: &[u8], size: usize, y: usize, first: usize, row: &mut [u8]) {
+    match size {
+        1 => get_each::<1>(texels, y, first, row),
+        2 => get_each::<2>(texels, y, first, row),
+        4 => get_each::<4>(texels, y, first, row),
+        8 => get_each::<8>(texels, y, first, row),
+        16 => get_each::<16>(texels, y, first, row),
+        size => {
+            for (x, texel) in row.chunks_exact_mut(size).enumerate() {
+                texel.copy_from_slice(&texels[place(first + x, y) * size..][..size]);
+            }
+        }
+    }
+}
+
+fn get_each<const N: usize>(texels: &[u8], y: usize, first: usize, row: &mut [u8]) {
+    let (tiles, _) = texels.as_chunks::<N>().0.as_chunks::<AREA>();
+    for (x, texel) in row.as_chunks_mut::<N>().0.iter_mut().enumerate() {
+        *texel = tiles[0][place(first + x, y)];
+    }
+}
+
+/// The inverse of [`get_row`].
+fn set_row(texels: &mut [u8], size: usize, y: usize, first: usize, row: &[u8]) {
+    match size {
+        1 => set_each::<1>(texels, y, first, row),
+        2 => set_each::<2>(texels, y, first, row),
+        4 => set_each::<4>(texels, y, first, row),
+        8 => set_each::<8>(texels, y, first, row),
+        16 => set_each::<16>(texels, y, first, row),
+        size => {
+            for (x, texel) in row.chunks_exact(size).enumerate() {
+                texels[place(first + x, y) * size..][..size].copy_from_slice(texel);
+            }
+        }
+    }
+}
+
+fn set_each<const N: usize>(texels: &mut [u8], y: usize, first: usize, row: &[u8]) {
+    let (tiles, _) = texels.as_chunks_mut::<N>().0.as_chunks_mut::<AREA>();
+    for (x, texel) in row.as_chunks::<N>().0.iter().enumerate() {
+        tiles[0][place(first + x, y)] = *texel;
     }
 }
 

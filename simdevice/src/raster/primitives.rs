@@ -62,6 +62,10 @@ pub struct TileDraw<'a> {
     pub(super) colors: Vec<Option<ColorOutput>>,
     pub(super) tests: Tests,
     pub(super) timing: Timing,
+    /// What can be tested early of late tests.
+    filter: Option<Tests>,
+    /// Whether all that is covered is written.
+    keeps_all: bool,
     /// Samples are counted after shading, which may discard some.
     pub(super) count_late: bool,
     /// Every sample is shaded for itself.
@@ -69,8 +73,7 @@ pub struct TileDraw<'a> {
     pub(super) positions: &'static [[i32; 2]],
     /// The pixels that the pass may touch.
     area: Rect,
-    /// Of each viewport: the pixels drawn to, and the range that depth is clamped to.
-    clips: Vec<Rect>,
+    /// Of each viewport: the range that depth is clamped to.
     pub(super) ranges: Vec<(f32, f32)>,
     /// Whether fragments need 1 / w.
     needs_w: bool,
@@ -81,6 +84,9 @@ pub struct TileDraw<'a> {
     pub(super) level: Level,
     limit: Duration,
 }
+
+/// From how many blocks of a tile on it pays to ask whether a primitive is hidden in all of it.
+const HIDDEN_BLOCKS: u32 = 6;
 
 /// The macro-tile that a worker renders.
 #[derive(Clone, Copy, Debug)]
@@ -122,6 +128,7 @@ impl<'a> TileDraw<'a> {
         };
         let colors: Vec<_> = targets.color.iter().enumerate().map(color).collect();
         let (mut timing, mut count_late) = (Timing::Early, false);
+        let (mut filter, mut keeps_all) = (None, !tests.any());
         if let Some(interface) = stage.map(|stage| &stage.interface) {
             let removes =
                 interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
@@ -132,7 +139,11 @@ impl<'a> TileDraw<'a> {
                     || removes && tests.writes());
             if late {
                 timing = Timing::Late;
+                filter = tests
+                    .filter()
+                    .filter(|_| !changes && !interface.has_side_effects);
             }
+            keeps_all &= !removes;
             count_late = late || removes && !interface.early_tests;
             let needed = interface.has_side_effects
                 || late
@@ -146,8 +157,9 @@ impl<'a> TileDraw<'a> {
         let per_sample = multisampled
             && (state.sample_shading || interface.is_some_and(|interface| interface.per_sample));
         let reads = |wanted: fn(FragmentInput) -> bool| {
-            interface
-                .is_some_and(|interface| interface.inputs.iter().any(|&(_, input)| wanted(input)))
+            interface.is_some_and(|interface| {
+                interface.inputs.iter().any(|&(_, input, _)| wanted(input))
+            })
         };
         let viewports = state.viewports.iter();
         Self {
@@ -158,11 +170,12 @@ impl<'a> TileDraw<'a> {
             colors,
             tests,
             timing,
+            filter,
+            keeps_all,
             count_late,
             per_sample,
             positions: if multisampled { &SAMPLES_4 } else { &CENTER },
             area,
-            clips: state.scissors.iter().map(|s| s.intersect(area)).collect(),
             ranges: viewports
                 .map(|viewport| {
                     let (a, b) = (viewport.min_depth, viewport.max_depth);
@@ -211,6 +224,9 @@ impl<'a> TileDraw<'a> {
         counters: &mut Counters,
         cancel: &AtomicBool,
     ) -> Result<(), Stopped> {
+        if self.draw.bins.of(place.at, place.layer).is_empty() {
+            return Ok(());
+        }
         let mut machines = self
             .stage
             .map(FragmentStage::take_machines)
@@ -236,7 +252,7 @@ impl<'a> TileDraw<'a> {
         let passed = renderer.samples_passed;
         counters.add(Counter::SamplesPassed, passed);
         if let Some(stage) = self.stage {
-            stage.put_back(machines);
+            stage.put_back(machines, counters);
         }
         done
     }
@@ -277,28 +293,36 @@ impl<'d> Renderer<'_, 'd> {
         };
         let mut coverage = Coverage::<N>::default();
         let draw = self.draw;
+        let Some(primitive) = draw.draw.primitives.first() else {
+            return Ok(());
+        };
+        let mut current = Current {
+            index: 0,
+            primitive,
+            setup: Setup::default(),
+            record: None,
+            range: (0.0, 1.0),
+        };
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
         for &index in draw.draw.bins.of(self.place.at, self.place.layer) {
             let Some(primitive) = draw.draw.primitives.get(index as usize) else {
                 continue;
             };
             if clip.0 != primitive.viewport {
-                let Some(pixels) = draw.clips.get(usize::from(primitive.viewport)) else {
+                let Some(pixels) = draw.draw.regions.get(usize::from(primitive.viewport)) else {
                     continue;
                 };
                 clip = (primitive.viewport, pixels.intersect(whole));
             }
-            let Some(setup) = Setup::new(simd, primitive, draw.positions, clip.1) else {
+            let setup = &mut current.setup;
+            if !setup.prepare(simd, primitive, draw.positions, clip.1) {
                 continue;
-            };
+            }
+            current.index = index;
+            current.primitive = primitive;
+            current.record = None;
             let range = draw.ranges.get(usize::from(primitive.viewport));
-            let mut current = Current {
-                index,
-                primitive,
-                setup,
-                record: None,
-                range: range.copied().unwrap_or((0.0, 1.0)),
-            };
+            current.range = range.copied().unwrap_or((0.0, 1.0));
             self.primitive(simd, &mut current, &mut coverage, [whole.x, whole.y])?;
         }
         Ok(())
@@ -347,9 +371,19 @@ impl<'d> Renderer<'_, 'd> {
         at: [i32; 2],
     ) -> Result<(), Stopped> {
         let draw = self.draw;
-        let early = draw.timing == Timing::Early && draw.tests.any();
+        let early = match draw.timing {
+            Timing::Early => Some(&draw.tests).filter(|tests| tests.any()),
+            Timing::Late => draw.filter.as_ref(),
+        };
         if draw.tests.any() {
             self.touch_tests(tile);
+        }
+        if let Some(tests) = early
+            && coverage.blocks.count_ones() >= HIDDEN_BLOCKS
+            && tests.stencil.is_none()
+            && self.is_hidden(simd, tests, current, tile, at)
+        {
+            return Ok(());
         }
         let state = &draw.draw.state;
         for block in bits(coverage.blocks) {
@@ -371,11 +405,11 @@ impl<'d> Renderer<'_, 'd> {
                 depth: f32x16::splat(simd, 0.0),
                 inverse_w: f32x16::splat(simd, 1.0),
             };
-            if early || draw.needs_depth {
+            if early.is_some() || draw.needs_depth {
                 values.depth = add(setup.depth([b1, b2]), setup.lane_depth);
             }
-            if early {
-                self.test(simd, current, &values, &mut lanes, tile, block);
+            if let Some(tests) = early {
+                self.test(simd, tests, current, &values, &mut lanes, tile, block);
             }
             if !draw.count_late {
                 for lanes in lanes {
@@ -399,7 +433,7 @@ impl<'d> Renderer<'_, 'd> {
             if draw.needs_w {
                 values.inverse_w = add(setup.inverse_w([b1, b2]), setup.lane_w);
             }
-            self.touch_colors(tile);
+            self.touch_colors(tile, coverage);
             let quad = Quad {
                 x: x as u16,
                 y: y as u16,
@@ -437,6 +471,24 @@ impl<'d> Renderer<'_, 'd> {
         lanes: &[u16; N],
         values: &[[f32; 16]; 4],
     ) -> Result<(), Stopped> {
+        if N == 1 && lanes[0] == u16::MAX && self.batch.count + 4 <= QUADS {
+            let record = match current.record {
+                Some(record) => record,
+                None => self.record(current),
+            };
+            let mut quads = [Quad {
+                record,
+                cover: 15,
+                ..quad
+            }; 4];
+            for (number, quad) in quads.iter_mut().enumerate() {
+                quad.x += (number as u16 & 1) * 2;
+                quad.y += number as u16 & 2;
+                quad.place += 4 * number as u8;
+            }
+            self.batch.add_block(quads, values);
+            return Ok(());
+        }
         for number in 0..4 {
             let mut cover = 0;
             for (sample, lanes) in lanes.iter().enumerate() {
@@ -485,6 +537,7 @@ impl<'d> Renderer<'_, 'd> {
     fn test<S: Simd, const N: usize>(
         &mut self,
         simd: S,
+        tests: &Tests,
         current: &Current<'d>,
         values: &BlockValues<S>,
         lanes: &mut [u16; N],
@@ -501,7 +554,7 @@ impl<'d> Renderer<'_, 'd> {
             } else {
                 at_sample(values, &current.setup, draw.positions[sample]).depth
             };
-            let code = draw.tests.code.encode(simd, depth, current.range);
+            let code = tests.code.encode(simd, depth, current.range);
             let first = (tile * N + sample) * AREA + 16 * block;
             let quads = Quads {
                 first: [first, first + 4, first + 8, first + 12],
@@ -509,7 +562,7 @@ impl<'d> Renderer<'_, 'd> {
             };
             *lanes = output::test(
                 simd,
-                &draw.tests,
+                tests,
                 *lanes,
                 current.primitive.front,
                 code,
@@ -517,6 +570,28 @@ impl<'d> Renderer<'_, 'd> {
                 self.buffers,
             );
         }
+    }
+
+    /// Whether a primitive fails the depth test in all of a tile.
+    #[inline(always)]
+    fn is_hidden<S: Simd>(
+        &mut self,
+        simd: S,
+        tests: &Tests,
+        current: &Current<'d>,
+        tile: usize,
+        at: [i32; 2],
+    ) -> bool {
+        if tests.depth.is_none() {
+            return false;
+        }
+        let bounds = current.setup.depth_bounds(at[0], at[1]);
+        let (low, high) = current.range;
+        let code = |depth: f32| tests.code.encode_one(depth.clamp(low, high));
+        let stored = self.buffers.depth.range(simd, tile);
+        let hidden = tests.hides(bounds.map(code), stored);
+        self.counters.add(Counter::TilesHidden, hidden.into());
+        hidden
     }
 
     /// Makes sure that depth and stencil of a tile are there.
@@ -539,12 +614,22 @@ impl<'d> Renderer<'_, 'd> {
     }
 
     /// Makes sure that a tile of the colours written is there.
-    fn touch_colors(&mut self, tile: usize) {
+    #[inline(always)]
+    fn touch_colors<const N: usize>(&mut self, tile: usize, coverage: &Coverage<N>) {
         for (index, output) in self.draw.colors.iter().enumerate() {
-            if output.is_none() || self.buffers.color[index].is_touched(tile) {
+            let Some(output) = output else { continue };
+            if self.buffers.color[index].is_touched(tile) {
                 continue;
             }
-            if let Some(target) = &self.draw.targets.color[index] {
+            // What is overwritten as a whole need not be loaded or cleared.
+            let state = &self.draw.draw.state;
+            if self.draw.keeps_all
+                && output.overwrites()
+                && coverage.is_whole()
+                && state.sample_mask & 15 == 15
+            {
+                self.buffers.color[index].touch_unread(tile);
+            } else if let Some(target) = &self.draw.targets.color[index] {
                 let tile = self.tile_of(tile);
                 self.buffers.color[index].touch(target, self.place.layer, &tile);
             }
@@ -598,7 +683,6 @@ impl<'d> Renderer<'_, 'd> {
             &draw.bindings.resources(),
             watchdog,
         )?;
-        self.counters.add_work(&machine.take_work());
         let lanes = (4 * batch.count - batch.helpers.count()) as u64;
         self.counters.add(Counter::FragmentInvocations, lanes);
         let killed = if stage.interface.discards {

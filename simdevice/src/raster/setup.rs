@@ -30,7 +30,7 @@ pub struct Edge {
 }
 
 /// What does not depend on tiles.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Setup {
     edges: [Edge; 4],
     edge_count: usize,
@@ -70,14 +70,15 @@ fn pixels(low: i32, high: i32, samples: usize) -> (i32, i32) {
 }
 
 impl Setup {
-    /// Makes a primitive ready, or returns `None` if none of its samples lies in `clip`.
+    /// Becomes that of a primitive; returns false, and is undefined, if none of its samples lies in `clip`.
     #[inline(always)]
-    pub fn new<S: Simd>(
+    pub fn prepare<S: Simd>(
+        &mut self,
         simd: S,
         primitive: &Primitive,
         positions: &[[i32; 2]],
         clip: Rect,
-    ) -> Option<Self> {
+    ) -> bool {
         let [p0, p1, p2] = primitive.corners;
         let parallelogram = primitive.kind != PrimitiveKind::Triangle;
         let mut corners = [p0, p1, p2, p2];
@@ -93,7 +94,7 @@ impl Setup {
         };
         let ((left, right), (top, bottom)) = (extent(0), extent(1));
         if left.min(top) < -MAX_COORDINATE || right.max(bottom) > MAX_COORDINATE {
-            return None;
+            return false;
         }
         let (columns, rows) = (
             pixels(left, right, positions.len()),
@@ -107,16 +108,15 @@ impl Setup {
             height: span(rows),
         });
         if bounds.is_empty() {
-            return None;
+            return false;
         }
         let wide = |p: [i32; 2]| p.map(i64::from);
         let (w0, w1, w2) = (wide(p0), wide(p1), wide(p2));
         let area = (w1[0] - w0[0]) * (w2[1] - w0[1]) - (w1[1] - w0[1]) * (w2[0] - w0[0]);
         if area <= 0 {
-            return None;
+            return false;
         }
-        let mut edges = [Edge::default(); 4];
-        for (index, edge) in edges.iter_mut().enumerate().take(edge_count) {
+        for (index, edge) in self.edges.iter_mut().enumerate().take(edge_count) {
             let next = if index + 1 == edge_count {
                 0
             } else {
@@ -144,24 +144,22 @@ impl Setup {
             std::array::from_fn(|axis| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32);
         let slopes = slopes.map(|slope| slope.map(|slope| slope as f32));
         let lanes = |[dx, dy]: [f32; 2]| lane_offsets(simd, dx, dy);
-        Some(Self {
-            edges,
-            edge_count,
-            bounds,
-            origin: w0,
-            numerators,
-            inverse_area,
-            lane_barycentrics: [lanes(slopes[0]), lanes(slopes[1])],
-            slopes,
-            depth,
-            lane_depth: lanes(depth_slopes),
-            depth_slopes,
-            inverse_w,
-            lane_w: lanes(w_slopes),
-            w_slopes,
-            weights: [weights[1], weights[2]],
-            scale,
-        })
+        self.edge_count = edge_count;
+        self.bounds = bounds;
+        self.origin = w0;
+        self.numerators = numerators;
+        self.inverse_area = inverse_area;
+        self.lane_barycentrics = [lanes(slopes[0]), lanes(slopes[1])];
+        self.slopes = slopes;
+        self.depth = depth;
+        self.lane_depth = lanes(depth_slopes);
+        self.depth_slopes = depth_slopes;
+        self.inverse_w = inverse_w;
+        self.lane_w = lanes(w_slopes);
+        self.w_slopes = w_slopes;
+        self.weights = [weights[1], weights[2]];
+        self.scale = scale;
+        true
     }
 
     /// Its edges.
@@ -187,6 +185,18 @@ impl Setup {
     pub fn depth(&self, [b1, b2]: [f64; 2]) -> f32 {
         let [z0, z1, z2] = self.depth;
         (z0 + b1 * (z1 - z0) + b2 * (z2 - z0)) as f32
+    }
+
+    /// Bounds of depth at its samples within the tile at pixel (x, y), rounding included.
+    #[inline(always)]
+    pub fn depth_bounds(&self, x: i32, y: i32) -> [f32; 2] {
+        let half = super::tile::SIDE as i32 / 2;
+        let middle = self.depth(self.barycentrics(x + half, y + half));
+        let [dx, dy] = self.depth_slopes.map(f32::abs);
+        // From the middle of the pixel beside the tile's middle, samples are at most 8.5 pixels away.
+        let reach = 8.6 * (dx + dy);
+        let margin = 1e-5 * (middle.abs() + reach) + f32::MIN_POSITIVE;
+        [middle - reach - margin, middle + reach + margin]
     }
 
     /// 1 / w in units of [`Setup::scale`] where the barycentrics are these.

@@ -6,13 +6,17 @@
 //! - *How different do two pictures look?* [`Statistics`] says so for people and benchmark tables:
 //!   greatest difference, 99.9th percentile, PSNR and FLIP.
 //!
+//! Triangles have no oracle: [`differences`] holds what two devices drew against each other.
+//!
 //! Images are slices of premultiplied red, green, blue and alpha, row by row from the top.
 
+mod devices;
 pub mod flip;
 mod picture;
 mod statistics;
 mod verdict;
 
+pub use devices::{Difference, difference, differences, for_people, write_differences};
 pub use picture::{PictureError, write_difference};
 pub use statistics::Statistics;
 pub use verdict::{Limits, Verdict, assert_contract, verdict};

@@ -7,6 +7,12 @@ use ash::vk;
 pub struct Context {
     /// The driver's name and version.
     pub name: String,
+    /// Invocations of a subgroup.
+    pub subgroup_size: u32,
+    /// What its subgroups can do.
+    pub subgroup_operations: vk::SubgroupFeatureFlags,
+    /// Whether shaders can ask for denormals of every float type to be kept.
+    pub preserves_denormals: bool,
     instance: ash::Instance,
     device: ash::Device,
     queue: vk::Queue,
@@ -91,7 +97,22 @@ impl Context {
                 .position(|ty| ty.property_flags.contains(wanted))
                 .ok_or_else(|| refused("map memory")(vk::Result::ERROR_UNKNOWN))?;
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
-            let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+            let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+            let mut floats = vk::PhysicalDeviceFloatControlsProperties::default();
+            let mut properties = vk::PhysicalDeviceProperties2::default()
+                .push_next(&mut subgroup)
+                .push_next(&mut floats);
+            instance.get_physical_device_properties2(physical_device, &mut properties);
+            // All features that there are, so that a shader may have any capability.
+            let mut core_1_1 = vk::PhysicalDeviceVulkan11Features::default();
+            let mut core_1_2 = vk::PhysicalDeviceVulkan12Features::default();
+            let mut features = vk::PhysicalDeviceFeatures2::default()
+                .push_next(&mut core_1_1)
+                .push_next(&mut core_1_2);
+            instance.get_physical_device_features2(physical_device, &mut features);
+            let info = vk::DeviceCreateInfo::default()
+                .queue_create_infos(&queues)
+                .push_next(&mut features);
             let device = instance
                 .create_device(physical_device, &info, None)
                 .map_err(refused("create a device"))?;
@@ -101,6 +122,12 @@ impl Context {
                 .map_err(refused("create a command pool"))?;
             Ok(Some(Self {
                 name: format!("{name} {version}"),
+                subgroup_size: subgroup.subgroup_size,
+                subgroup_operations: subgroup.supported_operations,
+                preserves_denormals: floats.shader_denorm_preserve_float16
+                    & floats.shader_denorm_preserve_float32
+                    & floats.shader_denorm_preserve_float64
+                    == vk::TRUE,
                 queue: device.get_device_queue(0, 0),
                 commands,
                 memory_type: memory_type as u32,
@@ -264,7 +291,7 @@ impl Prepared<'_> {
         let specialization = vk::SpecializationInfo::default()
             .map_entries(&entries)
             .data(bytemuck::cast_slice(&values));
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(kernel.spirv);
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&kernel.spirv);
         // SAFETY: the create infos are valid.
         unsafe {
             self.set_layout = device

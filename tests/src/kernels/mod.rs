@@ -8,13 +8,14 @@ use ash::vk;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// A dispatch of a kernel, and what it must leave behind.
 pub struct Kernel {
     /// Its name.
     pub name: &'static str,
     /// Its SPIR-V, as bytes.
-    pub spirv: &'static [u8],
+    pub spirv: Cow<'static, [u8]>,
     /// Values of specialization constants, by id.
     pub specialization: Vec<(u32, u32)>,
     /// What the buffers of bindings 0.. hold before.
@@ -107,12 +108,12 @@ impl Size {
 
 macro_rules! spirv {
     ($name:literal) => {
-        include_bytes!(concat!(
+        Cow::Borrowed(include_bytes!(concat!(
             env!("CARGO_MANIFEST_DIR"),
             "/../driver/tests/shaders/",
             $name,
             ".comp.spv"
-        ))
+        )))
     };
 }
 

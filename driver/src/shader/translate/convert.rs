@@ -84,16 +84,32 @@ impl Translator<'_> {
             }
             Op::FConvert => match wide {
                 (false, true) => self.op(Ir::FToF64, &[reg]),
-                (true, false) => {
-                    let narrow = self.op(Ir::F64ToF, &[reg]);
-                    self.normalize(to, narrow)
+                (true, false) if to == (Scalar::Float { width: 16 }) => {
+                    let odd = self.round_to_odd(reg);
+                    self.normalize(to, odd)
                 }
+                (true, false) => self.op(Ir::F64ToF, &[reg]),
                 (false, false) => self.normalize(to, reg),
                 (true, true) => reg,
             },
             Op::QuantizeToF16 => self.quantize(reg),
             other => return unsupported(format!("Op{other:?}")),
         })
+    }
+
+    /// A double as a single from which rounding further to a half gives what rounding the double at once would: rounded
+    /// towards zero, and made odd if that was inexact.
+    fn round_to_odd(&mut self, reg: Reg) -> Reg {
+        let near = self.op(Ir::F64ToF, &[reg]);
+        let back = self.op(Ir::FToF64, &[near]);
+        let inexact = self.op(Ir::FNe64, &[back, reg]);
+        let (found, exact) = (self.op(Ir::FAbs64, &[back]), self.op(Ir::FAbs64, &[reg]));
+        let outwards = self.op(Ir::FLt64, &[exact, found]);
+        let one = self.u32(1);
+        let below = self.op(Ir::ISub, &[near, one]);
+        let inwards = self.select(outwards, below, near);
+        let odd = self.op(Ir::Or, &[inwards, one]);
+        self.select(inexact, odd, near)
     }
 
     /// `OpQuantizeToF16`: to what a half can hold, with denormals flushed to zero of the same sign.

@@ -151,11 +151,24 @@ impl Translator<'_> {
         self.op(Ir::INe, &[bit, zero])
     }
 
+    /// A ballot's words without the bits above the subgroup's.
+    fn ballot_of_subgroup(&mut self, it: &Instruction, index: usize) -> Outcome<[Reg; 4]> {
+        let mut words = self.ballot_operand(it, index)?;
+        for (first, word) in (0..).step_by(32).zip(&mut words) {
+            let bits = self.options.subgroup_size.saturating_sub(first).min(32);
+            if bits < 32 {
+                let mask = self.u32((1 << bits) - 1);
+                *word = self.op(Ir::And, &[*word, mask]);
+            }
+        }
+        Ok(words)
+    }
+
     fn ballot_count(&mut self, it: &Instruction) -> Outcome<()> {
         let Some(Operand::GroupOperation(group)) = it.operands.get(1) else {
             return malformed("there is no group operation");
         };
-        let words = self.ballot_operand(it, 2)?;
+        let words = self.ballot_of_subgroup(it, 2)?;
         let mut sum = self.u32(0);
         for (index, word) in (0..).zip(words) {
             let mask = match group {
@@ -179,7 +192,7 @@ impl Translator<'_> {
 
     fn ballot_find(&mut self, it: &Instruction) -> Outcome<()> {
         let lowest = it.class.opcode == Op::GroupNonUniformBallotFindLSB;
-        let words = self.ballot_operand(it, 1)?;
+        let words = self.ballot_of_subgroup(it, 1)?;
         let zero = self.u32(0);
         let mut found = self.u32(u32::MAX);
         let order: [u32; 4] = if lowest { [3, 2, 1, 0] } else { [0, 1, 2, 3] };
@@ -232,10 +245,31 @@ impl Translator<'_> {
                     _ => *reg,
                 };
                 let reg = self.builder.subgroup(operation, Some(reg), None);
+                let reg = if signed {
+                    self.clamped(scalar, op, reg)
+                } else {
+                    reg
+                };
                 self.normalize(scalar, reg)
             })
             .collect();
         self.define(it, reduced)
+    }
+}
+
+impl Translator<'_> {
+    /// The least or greatest of no narrow integers: what 32 bits have for it, brought to the type's range.
+    fn clamped(&mut self, scalar: Scalar, op: Ir, reg: Reg) -> Reg {
+        let Scalar::Int {
+            width: width @ (8 | 16),
+            ..
+        } = scalar
+        else {
+            return reg;
+        };
+        let most = (1 << (width - 1)) - 1;
+        let limit = self.u32(if op == Ir::SMin { most } else { !most });
+        self.op(op, &[reg, limit])
     }
 }
 

@@ -104,8 +104,8 @@ fn primitives(draw: &super::super::PrimitiveDraw) -> Vec<(u32, u32, Vec<u32>, u3
 fn expected(topology: Topology, runs: &[Vec<u32>], last: bool) -> Vec<(u32, u32, Vec<u32>, u32)> {
     let mut out = Vec::new();
     for instance in [5, 6] {
-        let mut id = 0;
-        for (vertices, provoking) in runs.iter().flat_map(|run| naive(topology, run)) {
+        let primitives = runs.iter().flat_map(|run| naive(topology, run));
+        for (id, (vertices, provoking)) in (0..).zip(primitives) {
             let mut distinct = vertices.clone();
             distinct.sort_unstable();
             distinct.dedup();
@@ -113,7 +113,6 @@ fn expected(topology: Topology, runs: &[Vec<u32>], last: bool) -> Vec<(u32, u32,
                 let provoking = provoking[usize::from(last)];
                 out.push((id, instance, canonical(vertices), provoking));
             }
-            id += 1;
         }
     }
     out

@@ -101,3 +101,49 @@ fn a_viewport_has_the_pixels_whose_centres_lie_in_it() {
         assert_eq!(pixels(&viewport(x, width)), expected);
     }
 }
+
+#[test]
+fn snapping_does_not_move_the_plane_of_depth() {
+    let device = device(1);
+    let mut rng = ChaCha8Rng::seed_from_u64(15);
+    let positions: Vec<[f32; 4]> = (0..3 * 200)
+        .map(|_| {
+            let [x, y] = [0, 1].map(|_| rng.random_range(5.0..145.0));
+            at_pixel(x, y, rng.random_range(0.0..1.0))
+        })
+        .collect();
+    let drawn = run(&device, &draw(&device, Topology::TriangleList, &positions));
+    let transform = Transform::new(&state(Topology::TriangleList).viewports[0], false);
+    // The depth at a place, of a plane given at three others.
+    let plane = |corners: [[f64; 2]; 3], depth: [f64; 3], at: [f64; 2]| {
+        let area = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        };
+        let [a, b, c] = corners;
+        let weights = [area(at, b, c), area(a, at, c), area(a, b, at)];
+        let sum: f64 = weights
+            .iter()
+            .zip(depth)
+            .map(|(weight, depth)| weight * depth)
+            .sum();
+        sum / area(a, b, c)
+    };
+    let mut checked = 0;
+    for primitive in &drawn.primitives {
+        if area(primitive.corners) < 400 * 65_536 {
+            continue;
+        }
+        let first = 3 * primitive.id as usize;
+        let exact = [0, 1, 2].map(|corner: usize| transform.project(positions[first + corner]));
+        let window = exact.map(|vertex| vertex.window.map(f64::from));
+        let center = [0, 1].map(|axis: usize| window.iter().map(|at| at[axis]).sum::<f64>() / 3.0);
+        let expected = plane(window, exact.map(|vertex| f64::from(vertex.depth)), center);
+        let corners = primitive
+            .corners
+            .map(|corner| corner.map(|c| f64::from(c) / 256.0));
+        let found = plane(corners, primitive.depth.map(f64::from), center);
+        assert!((found - expected).abs() < 2e-7, "{found} {expected}");
+        checked += 1;
+    }
+    assert!(checked > 100);
+}

@@ -1,1 +1,59 @@
 use super::*;
+use fearless_simd::dispatch;
+use isa::level::SimdLevel;
+
+/// Every float around every code, its middle and its neighbours' middle.
+#[test]
+fn bytes_are_the_nearest_and_read_back_as_their_format_says() {
+    let mut values = vec![f32::NAN, f32::INFINITY, -1.0, -0.0, 2.0, f32::MIN_POSITIVE];
+    for half in 0..=510 {
+        let at = (f64::from(half) / 510.0) as f32;
+        values
+            .extend((-4..=4).map(|step| f32::from_bits(at.to_bits().saturating_add_signed(step))));
+    }
+    while !values.len().is_multiple_of(16) {
+        values.push(0.3);
+    }
+    let format = Format::R8G8B8A8Unorm;
+    for (_, level) in SimdLevel::supported() {
+        let level = level.resolve().unwrap();
+        for chunk in values.as_chunks::<16>().0 {
+            let (packed, unpacked): ([u32; 16], [f32; 16]) = dispatch!(level, simd => {
+                let value = f32x16::simd_from(simd, *chunk);
+                let packed = pack_unorm8(simd, &[value; 4], false);
+                let [.., blue, _] = unpack_unorm8(simd, packed, true);
+                (packed.into(), blue.into())
+            });
+            for (lane, value) in chunk.iter().enumerate() {
+                let bytes = packed[lane].to_le_bytes();
+                assert_eq!(bytes, format.encode([*value; 4])[..4], "{value}");
+                assert_eq!(unpacked[lane], format.decode(&bytes)[0], "{value}");
+            }
+        }
+    }
+}
+
+#[test]
+fn stores_touch_only_their_lanes() {
+    let values = std::array::from_fn(|lane| 100 + lane as u32);
+    let quads = Quads {
+        first: [8, 0, 8, 4],
+        consecutive: false,
+    };
+    let mut words = [7; 16];
+    // Quads 0 and 2 share a place, each with lanes of its own.
+    quads.store(&mut words, 0b1111_0110_0000_1001, &values);
+    assert_eq!(
+        words,
+        [
+            7, 7, 7, 7, 112, 113, 114, 115, 100, 109, 110, 103, 7, 7, 7, 7
+        ]
+    );
+    let block = Quads {
+        first: [0, 4, 8, 12],
+        consecutive: true,
+    };
+    block.store(&mut words, u16::MAX, &values);
+    assert_eq!(words, values);
+    assert_eq!(block.load(&words), values);
+}

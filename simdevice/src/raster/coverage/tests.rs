@@ -64,10 +64,10 @@ fn fast<const N: usize>(
     clip: Rect,
 ) -> Vec<[bool; N]> {
     let mut out = vec![[false; N]; (SIZE * SIZE) as usize];
-    let setup = dispatch!(level, simd => Setup::new(simd, primitive, positions, clip));
-    let Some(setup) = setup else {
+    let mut setup = Setup::default();
+    if !dispatch!(level, simd => setup.prepare(simd, primitive, positions, clip)) {
         return out;
-    };
+    }
     let mut coverage = Coverage::<N>::default();
     for tile in 0..(SIZE / 16) * (SIZE / 16) {
         let (x, y) = (tile % (SIZE / 16) * 16, tile / (SIZE / 16) * 16);

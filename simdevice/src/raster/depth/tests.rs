@@ -1,1 +1,71 @@
 use super::*;
+use fearless_simd::dispatch;
+use isa::level::SimdLevel;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// What a format's encoder makes of a depth.
+fn expected(format: Format, depth: f32) -> u32 {
+    let [a, b, c, d, ..] = format.encode([depth, 0.0, 0.0, 0.0]);
+    match format {
+        Format::D16Unorm => u32::from_le_bytes([a, b, 0, 0]),
+        Format::X8D24UnormPack32 => u32::from_le_bytes([a, b, c, 0]),
+        _ => u32::from_le_bytes([a, b, c, d]),
+    }
+}
+
+#[test]
+fn depths_become_the_nearest_numbers_of_their_format() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut depths: Vec<f32> = (0..40_000)
+        .map(|round| match round % 4 {
+            0 => rng.random_range(0.0..1.0),
+            1 => rng.random_range(0.0f32..1.0).powi(9),
+            // Beside the middle of two codes.
+            2 => ((f64::from(rng.random_range(0..1u32 << 16)) + 0.5) / 65_535.0) as f32,
+            _ => ((f64::from(rng.random_range(0..1u32 << 24)) + 0.5) / 16_777_215.0) as f32,
+        })
+        .collect();
+    depths.extend([
+        0.0,
+        1.0,
+        0.5,
+        f32::from_bits(1),
+        0.999_999_94,
+        2.0,
+        -1.0,
+        -0.0,
+    ]);
+    for (_, level) in SimdLevel::supported() {
+        let level = level.resolve().unwrap();
+        for format in [
+            Format::D16Unorm,
+            Format::X8D24UnormPack32,
+            Format::D32Sfloat,
+        ] {
+            let code = DepthCode::of(format);
+            for chunk in depths.as_chunks::<16>().0 {
+                let codes: [u32; 16] = dispatch!(level, simd => {
+                    code.encode(simd, f32x16::simd_from(simd, *chunk), (0.0, 1.0)).into()
+                });
+                for (depth, found) in chunk.iter().zip(codes) {
+                    let inside = if *depth > 0.0 { depth.min(1.0) } else { 0.0 };
+                    assert_eq!(found, expected(format, inside), "{format:?} {depth}");
+                    assert_eq!(found, code.encode_one(*depth), "{format:?} {depth}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn depth_is_clamped_to_the_viewports_range() {
+    let level = SimdLevel::Best.resolve().unwrap();
+    let depths = std::array::from_fn(|lane| lane as f32 / 10.0 - 0.2);
+    let codes: [u32; 16] = dispatch!(level, simd => {
+        DepthCode::Float.encode(simd, f32x16::simd_from(simd, depths), (0.25, 0.5)).into()
+    });
+    for (depth, code) in depths.into_iter().zip(codes) {
+        assert_eq!(f32::from_bits(code), depth.clamp(0.25, 0.5));
+    }
+}

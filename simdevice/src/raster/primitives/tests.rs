@@ -1,5 +1,6 @@
 //! Whole passes against a naive twin: each sample for itself, each primitive in order.
 
+mod special;
 mod twin;
 
 use super::*;
@@ -189,9 +190,11 @@ fn draw(
         height: HEIGHT,
     };
     let layers = primitives.iter().map(|p| u32::from(p.layer) + 1).max();
+    let state = Arc::new(state);
+    let scissors = state.scissors.clone().into_iter();
     PrimitiveDraw {
         pipeline: Arc::new(DrawPipeline::new(device, programs).unwrap()),
-        state: Arc::new(state),
+        state,
         bindings: Bindings::default(),
         bins: Bins::everywhere(
             &primitives,
@@ -199,7 +202,7 @@ fn draw(
             device.config().macro_tile_size,
             layers.unwrap_or(1),
         ),
-        regions: Vec::new(),
+        regions: scissors.map(|scissor| scissor.intersect(area)).collect(),
         primitives,
         varyings: Varyings { values, per_vertex },
     }

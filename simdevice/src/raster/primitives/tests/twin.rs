@@ -94,13 +94,15 @@ struct Scene {
     draws: Vec<SceneDraw>,
 }
 
-/// A draw of it. Each primitive has nine varyings at its provoking vertex: two colours, and what kills it above 0.5.
+/// A draw of it. Each primitive has ten varyings at its provoking vertex: two colours, what kills it above 0.5, and a
+/// depth.
 struct SceneDraw {
     state: DrawState,
     primitives: Vec<Primitive>,
-    values: Vec<[u32; 9]>,
+    values: Vec<[u32; 10]>,
     discards: bool,
     early_tests: bool,
+    writes_depth: bool,
 }
 
 const CLEAR: [u32; 4] = [0x3F40_0000, 0x3E80_0000, 0x3F00_0000, 0x3F19_999A];
@@ -185,8 +187,9 @@ fn scene(rng: &mut ChaCha8Rng) -> Scene {
         };
         let values = (0..count)
             .map(|_| {
-                let mut values = [0; 9].map(|_| value(rng));
+                let mut values = [0; 10].map(|_| value(rng));
                 values[8] = rng.random::<f32>().to_bits();
+                values[9] = (rng.random_range(-1..9) as f32 / 7.0).to_bits();
                 values
             })
             .collect();
@@ -196,6 +199,7 @@ fn scene(rng: &mut ChaCha8Rng) -> Scene {
             values,
             discards: rng.random_bool(0.3),
             early_tests: rng.random_bool(0.3),
+            writes_depth: rng.random_bool(0.25),
         }
     });
     let draws = draws.collect();
@@ -311,7 +315,7 @@ fn fragment(
     draw: &SceneDraw,
     blender: &Blender,
     primitive: &Primitive,
-    values: &[u32; 9],
+    values: &[u32; 10],
     at: usize,
     sample: u32,
     has_stencil: bool,
@@ -347,9 +351,12 @@ fn fragment(
             stencil & face.compare_mask,
         )
     });
-    let code = scene
-        .depth
-        .map(|format| depth_code(format, primitive.depth[0]));
+    let depth = if draw.writes_depth && !draw.early_tests {
+        f32::from_bits(values[9]).clamp(0.0, 1.0)
+    } else {
+        primitive.depth[0]
+    };
+    let code = scene.depth.map(|format| depth_code(format, depth));
     let depth_passes = match (code, tests.depth) {
         (Some(code), Some(test)) => compare(test.compare, code, picture.depth[at]),
         _ => true,
@@ -376,7 +383,13 @@ fn fragment(
 }
 
 /// The colour of one sample.
-fn blend(scene: &Scene, draw: &SceneDraw, blender: &Blender, values: &[u32; 9], stored: &mut [u8]) {
+fn blend(
+    scene: &Scene,
+    draw: &SceneDraw,
+    blender: &Blender,
+    values: &[u32; 10],
+    stored: &mut [u8],
+) {
     let mut source: [f32; 4] = std::array::from_fn(|c| f32::from_bits(values[c]));
     let mut second: [f32; 4] = std::array::from_fn(|c| f32::from_bits(values[4 + c]));
     if draw.state.alpha_to_one {
@@ -401,6 +414,15 @@ fn blend(scene: &Scene, draw: &SceneDraw, blender: &Blender, values: &[u32; 9], 
                 .zip(new)
                 .map(|(&d, s)| logic_byte(op, s, d))
                 .collect();
+            // -1 has two codes, of which this may give either.
+            if format == Format::R8G8B8A8Snorm {
+                for (byte, new) in bytes.into_iter().enumerate() {
+                    if draw.state.blend[0].write_mask >> byte & 1 == 1 {
+                        stored[byte] = new;
+                    }
+                }
+                return;
+            }
             format.decode(&bytes)
         }
         // Other formats take the source as it is.
@@ -415,8 +437,12 @@ fn blend(scene: &Scene, draw: &SceneDraw, blender: &Blender, values: &[u32; 9], 
             destination[component]
         }
     });
-    let size = stored.len();
-    stored.copy_from_slice(&format.encode(masked)[..size]);
+    for (byte, new) in format.encode(masked)[..stored.len()].iter().enumerate() {
+        // -1 has two codes, of which a component that is not written keeps its own.
+        if format != Format::R8G8B8A8Snorm || mask >> byte & 1 == 1 {
+            stored[byte] = *new;
+        }
+    }
 }
 
 /// A logic operation by its truth table: bit `2 s + d` of the entry.
@@ -452,18 +478,22 @@ fn render(scene: &Scene, config: &Config) -> Picture {
     };
     let counters = run(config, &rendering, |device| {
         let draws = scene.draws.iter().map(|scene_draw| {
-            let inputs = varyings(9, Interpolation::Flat, Sampling::Center);
-            let outputs = [color(0, 0), color(0, 1)].concat();
+            let mut inputs = varyings(10, Interpolation::Flat, Sampling::Center);
+            let mut outputs = [color(0, 0), color(0, 1)].concat();
+            if scene_draw.writes_depth {
+                inputs.swap(8, 9);
+                outputs.push(FragmentOutput::Depth);
+            }
             let mut stage = fragments(inputs, outputs, scene_draw.discards);
             stage.early_tests = scene_draw.early_tests;
             // Only provoking vertices matter.
             let values = scene_draw.values.iter().flat_map(|values| {
-                let mut all = [[0x7FC0_1234; 9]; 3];
+                let mut all = [[0x7FC0_1234; 10]; 3];
                 all[0] = *values;
                 all.into_iter().flatten()
             });
             let (state, primitives) = (scene_draw.state.clone(), scene_draw.primitives.clone());
-            draw(device, Some(stage), state, primitives, values.collect(), 9)
+            draw(device, Some(stage), state, primitives, values.collect(), 10)
         });
         draws.collect()
     });

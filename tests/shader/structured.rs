@@ -1,0 +1,142 @@
+//! Programs of random control flow give what a scalar interpreter says, on this driver and on lavapipe.
+
+use gaurast_tests::kernels::{Context, Kernel};
+use gaurast_tests::programs::structured::{INVOCATIONS, Program, assemble, generate, run};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::process::Command;
+
+/// Programs of a shader.
+const PROGRAMS: u64 = 20;
+/// Seeds on this driver.
+const SEEDS: u64 = 4000;
+/// Seeds on lavapipe, whose compiler takes its time.
+const SAMPLE: u64 = 100;
+
+/// Invocations' inputs: small numbers, so that conditions hold and fail, and any.
+fn inputs() -> Vec<[u32; 2]> {
+    let mut random = ChaCha8Rng::seed_from_u64(71);
+    (0..INVOCATIONS)
+        .map(|lane| match lane % 3 {
+            0 => [random.random_range(0..8), random.random_range(0..8)],
+            1 => [random.random_range(0..8), random.random()],
+            _ => random.random(),
+        })
+        .collect()
+}
+
+fn kernel(spirv: &[u32], inputs: &[[u32; 2]], programs: usize) -> Kernel {
+    Kernel {
+        name: "structured",
+        spirv: Cow::Owned(bytemuck::pod_collect_to_vec(spirv)),
+        specialization: Vec::new(),
+        buffers: vec![
+            inputs.as_flattened().to_vec(),
+            vec![0xdead_beef; 2 * INVOCATIONS * programs],
+        ],
+        uniform: None,
+        push: Vec::new(),
+        groups: [1, 1, 1],
+        expected: Vec::new(),
+    }
+}
+
+/// Runs the programs of seeds and compares; returns the seeds that are wrong and how.
+fn differences(
+    context: &Context,
+    seeds: std::ops::Range<u64>,
+    rewrite: impl Fn(Vec<u32>) -> Vec<u32>,
+) -> Vec<(u64, String)> {
+    let inputs = inputs();
+    let programs: Vec<Program> = seeds
+        .clone()
+        .into_par_iter()
+        .map(|seed| generate(seed, &inputs))
+        .collect();
+    let spirv = rewrite(assemble(&programs));
+    let kernel = kernel(&spirv, &inputs, programs.len());
+    let place = || format!("seeds {seeds:?} on {}", context.name);
+    let prepared = context
+        .prepare(&kernel)
+        .unwrap_or_else(|error| panic!("{}: {error}", place()));
+    prepared
+        .run()
+        .unwrap_or_else(|error| panic!("{}: {error}", place()));
+    let found = prepared.read(1).unwrap();
+    let mut wrong = Vec::new();
+    for ((seed, program), found) in seeds.zip(&programs).zip(found.chunks(2 * INVOCATIONS)) {
+        let differs = |(inputs, found): (&[u32; 2], &[u32])| {
+            let expected = run(program, *inputs, u32::MAX).expect("it ends");
+            let text = || format!("seed {seed} of {inputs:?}: {found:?} instead of {expected:?}");
+            (found != expected).then(|| (seed, text()))
+        };
+        wrong.extend(inputs.iter().zip(found.chunks(2)).find_map(differs));
+    }
+    wrong
+}
+
+/// Runs as many seeds; those that are wrong must be those that the list names, each with a reason.
+fn check(context: &Context, seeds: u64, list: &str, rewrite: impl Fn(Vec<u32>) -> Vec<u32> + Copy) {
+    let listed: Vec<u64> = list
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| {
+            line.split_once(": ")
+                .expect("a seed, a colon and a reason")
+                .0
+        })
+        .map(|seed| seed.parse().expect("a number"))
+        .collect();
+    let wrong: Vec<(u64, String)> = (0..seeds)
+        .step_by(PROGRAMS as usize)
+        .flat_map(|first| differences(context, first..(first + PROGRAMS).min(seeds), rewrite))
+        .collect();
+    eprintln!("{}: {seeds} programs, {} wrong", context.name, wrong.len());
+    let found: Vec<u64> = wrong.iter().map(|wrong| wrong.0).collect();
+    assert_eq!(found, listed, "{}: {wrong:#?}", context.name);
+}
+
+/// Runs a program of the system on a module; returns what it prints.
+fn system(program: &str, arguments: &[&str], words: &[u32]) -> Vec<u8> {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), bytemuck::cast_slice(words)).unwrap();
+    let mut command = Command::new(program);
+    let output = command.args(arguments).arg(file.path()).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{program}: {message}");
+    output.stdout
+}
+
+#[test]
+fn random_programs_give_what_the_interpreter_says() {
+    check(&Context::gaurast().unwrap(), SEEDS, "", |words| words);
+}
+
+#[test]
+fn optimized_programs_give_the_same() {
+    let exists = |program| Command::new(program).arg("--version").output().is_ok();
+    if !exists("spirv-opt") || !exists("spirv-val") {
+        eprintln!("skipped: there is no spirv-opt or no spirv-val");
+        return;
+    }
+    let context = Context::gaurast().unwrap();
+    check(&context, SEEDS / 10, "", |words| {
+        system("spirv-val", &["--target-env", "vulkan1.2"], &words);
+        bytemuck::pod_collect_to_vec(&system("spirv-opt", &["-O", "-o", "-"], &words))
+    });
+}
+
+#[test]
+fn random_programs_give_the_same_on_lavapipe() {
+    match Context::lavapipe().unwrap() {
+        Some(lavapipe) => check(
+            &lavapipe,
+            SAMPLE,
+            include_str!("../expected_failures/lavapipe_structured.txt"),
+            |words| words,
+        ),
+        None => eprintln!("skipped: the Vulkan loader does not know lavapipe"),
+    }
+}

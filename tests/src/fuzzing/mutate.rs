@@ -1,0 +1,114 @@
+//! Modules changed at random: bytes, and whole instructions.
+
+use rand::Rng;
+use rand::seq::IndexedRandom;
+use rand_chacha::ChaCha8Rng;
+
+/// The words before the first instruction.
+const HEADER: usize = 5;
+
+/// Where the instructions of a module begin, and how many words each has.
+fn instructions(words: &[u32]) -> Vec<(usize, usize)> {
+    let mut all = Vec::new();
+    let mut at = HEADER;
+    while at < words.len() && words[at] >> 16 > 0 {
+        let count = ((words[at] >> 16) as usize).min(words.len() - at);
+        all.push((at, count));
+        at += count;
+    }
+    all
+}
+
+/// A number with which something may go wrong, or any.
+fn number(random: &mut ChaCha8Rng, bound: u32) -> u32 {
+    match random.random_range(0..5) {
+        0 => random.random(),
+        1 => random.random_range(0..16),
+        2 => *[
+            0,
+            u32::MAX,
+            1 << 31,
+            i32::MAX.cast_unsigned(),
+            0x7f80_0000,
+            0xffff,
+        ]
+        .choose(random)
+        .expect("some"),
+        _ => random.random_range(0..bound.max(1)),
+    }
+}
+
+/// A module like the first, with one to three changes; some of them take instructions from the second.
+pub fn mutate(random: &mut ChaCha8Rng, original: &[u32], other: &[u32]) -> Vec<u32> {
+    let mut words = original.to_vec();
+    for _ in 0..*[1, 1, 2, 3].choose(random).expect("some") {
+        change(random, &mut words, other);
+    }
+    words
+}
+
+fn change(random: &mut ChaCha8Rng, words: &mut Vec<u32>, other: &[u32]) {
+    let all = instructions(words);
+    let Some((start, count)) = all.choose(random).copied() else {
+        return;
+    };
+    let bound = words.get(3).copied().unwrap_or(0).min(1 << 20);
+    match random.random_range(0..20) {
+        // A byte anywhere.
+        0 | 1 => {
+            let at = random.random_range(0..words.len());
+            words[at] ^= random.random_range(1..256) << (8 * random.random_range(0..4));
+        }
+        // An operand becomes another id, a small number or any.
+        2..=5 if count > 1 => {
+            words[start + random.random_range(1..count)] = number(random, bound);
+        }
+        // Two operands change places.
+        6 if count > 2 => {
+            let [a, b] = [(); 2].map(|()| start + random.random_range(1..count));
+            words.swap(a, b);
+        }
+        // An operand comes from an instruction of the same opcode, which has the right type more often than not.
+        15..=18 if count > 1 => {
+            let at = random.random_range(1..count);
+            let same: Vec<_> = all
+                .iter()
+                .filter(|it| words[it.0] == words[start] && at < it.1)
+                .copied()
+                .collect();
+            if let Some((from, _)) = same.choose(random) {
+                words[start + at] = words[from + at];
+            }
+        }
+        // Another opcode: any, one next to it, or that of an instruction of the same size.
+        7 => words[start] = words[start] & 0xffff_0000 | random.random_range(0..460),
+        8 | 9 => {
+            let opcode = words[start] as u16;
+            let near = opcode
+                .wrapping_add(1)
+                .wrapping_sub(random.random_range(0..3));
+            words[start] = words[start] & 0xffff_0000 | u32::from(near);
+        }
+        10 | 11 => {
+            let same: Vec<_> = all.iter().filter(|it| it.1 == count).copied().collect();
+            if let Some((from, _)) = same.choose(random) {
+                words[start] = words[*from];
+            }
+        }
+        // An instruction vanishes, is doubled, or moves.
+        12 => drop(words.drain(start..start + count)),
+        13 => {
+            let copy = words[start..start + count].to_vec();
+            let to = all.choose(random).map_or(start, |it| it.0);
+            words.splice(to..to, copy);
+        }
+        14 => {
+            let theirs = instructions(other);
+            if let Some((from, count)) = theirs.choose(random).copied() {
+                words.splice(start..start, other[from..from + count].iter().copied());
+            }
+        }
+        // The end is cut off.
+        _ => words.truncate(words.len() - random.random_range(0..words.len().min(8))),
+    }
+}

@@ -1,0 +1,73 @@
+//! What most scenes are: a target, a pipeline and vertices, drawn once.
+
+use ash::vk;
+
+use super::Missing;
+use crate::triangles::{
+    Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
+};
+
+/// Fails with the name of a feature unless it is there.
+pub fn need(name: &str, has: vk::Bool32) -> Result<(), Missing> {
+    if has == vk::TRUE {
+        Ok(())
+    } else {
+        Err(Missing(name.to_owned()))
+    }
+}
+
+/// Fails unless images of `format` can be used so.
+pub fn need_format(
+    gpu: &Gpu,
+    format: vk::Format,
+    features: vk::FormatFeatureFlags,
+) -> Result<(), Missing> {
+    if gpu.format_features(format).contains(features) {
+        Ok(())
+    } else {
+        Err(Missing(format!("{features:?} of {format:?}")))
+    }
+}
+
+/// Draws `vertices` once.
+pub fn simple(
+    gpu: &Gpu,
+    target: &TargetOptions,
+    options: &PipelineOptions<'_>,
+    vertices: &[Vertex],
+) -> Output {
+    with(gpu, target, options, vertices, |commands| {
+        commands.draw(0..vertices.len() as u32);
+    })
+}
+
+/// Binds `vertices` and lets `draws` draw them.
+pub fn with(
+    gpu: &Gpu,
+    target: &TargetOptions,
+    options: &PipelineOptions<'_>,
+    vertices: &[Vertex],
+    draws: impl FnOnce(&Commands),
+) -> Output {
+    let target = Target::new(gpu, target);
+    let pipeline = Pipeline::new(gpu, &target, options);
+    let buffer = Buffer::of(gpu, vertices);
+    target.draw(gpu, &Pass::default(), |commands| {
+        commands.bind(&pipeline);
+        commands.vertices(&buffer);
+        draws(commands);
+    })
+}
+
+/// One output of several cases, each named.
+pub fn cases<T>(
+    cases: impl IntoIterator<Item = T>,
+    name: impl Fn(&T) -> String,
+    draw: impl Fn(&T) -> Output,
+) -> Output {
+    let mut output = Output::default();
+    for case in cases {
+        output.add(&name(&case), draw(&case));
+    }
+    output
+}

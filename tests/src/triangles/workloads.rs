@@ -1,0 +1,260 @@
+//! Work to measure: scenes that are prepared once and submitted again and again.
+
+use ash::vk;
+use glam::Vec3;
+use rand::Rng;
+
+use super::models::{Model, Ready};
+use super::{
+    Bindings, Buffer, Gpu, Image, ImageOptions, Missing, Pass, Pipeline, PipelineOptions, Recorded,
+    Resource, Sampler, Target, TargetOptions, Vertex, blend, depth_test, shapes,
+};
+
+/// The names of all workloads.
+pub const NAMES: [&str; 9] = [
+    "fill",
+    "small triangles",
+    "trilinear texture",
+    "layers front to back",
+    "layers back to front",
+    "vertices",
+    "blended layers",
+    "four samples",
+    "african head 1080p",
+];
+
+const SIZE: [u32; 2] = [1920, 1080];
+
+/// Commands with all that they use.
+pub struct Workload {
+    // Before what it uses.
+    commands: Recorded,
+    _target: Target,
+    _things: Box<dyn std::any::Any>,
+}
+
+impl Workload {
+    /// Prepares the workload of a name.
+    ///
+    /// # Errors
+    /// [`Missing`] if it needs a file that is not there.
+    ///
+    /// # Panics
+    /// If the device cannot do it, or there is no such name.
+    pub fn new(gpu: &Gpu, name: &str) -> Result<Self, Missing> {
+        let plain = TargetOptions {
+            size: SIZE,
+            ..TargetOptions::default()
+        };
+        let deep = TargetOptions {
+            size: SIZE,
+            ..TargetOptions::with_depth(vk::Format::D32_SFLOAT)
+        };
+        let tested = PipelineOptions {
+            depth_stencil: depth_test(vk::CompareOp::LESS),
+            ..PipelineOptions::default()
+        };
+        let (from, to) = (
+            vk::BlendFactor::SRC_ALPHA,
+            vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+        );
+        let blended = PipelineOptions {
+            blend: vec![blend(from, to, vk::BlendOp::ADD)],
+            ..PipelineOptions::default()
+        };
+        let default = PipelineOptions::default();
+        let workload = match name {
+            "fill" => Self::of(gpu, &plain, &default, &one_big()),
+            "small triangles" => Self::of(gpu, &deep, &tested, &small(1_000_000)),
+            "trilinear texture" => Self::textured(gpu, &plain),
+            "layers front to back" => Self::of(gpu, &deep, &tested, &layers(32, false)),
+            "layers back to front" => Self::of(gpu, &deep, &tested, &layers(32, true)),
+            "vertices" => Self::vertices(gpu, &plain),
+            "blended layers" => Self::of(gpu, &plain, &blended, &layers(8, true)),
+            "four samples" => {
+                let target = TargetOptions { samples: 4, ..deep };
+                Self::of(gpu, &target, &tested, &small(100_000))
+            }
+            "african head 1080p" => Self::model(gpu, &deep)?,
+            _ => panic!("no workload is called {name}"),
+        };
+        Ok(workload)
+    }
+
+    /// Does the work and waits for its end.
+    pub fn run(&self) {
+        self.commands.submit();
+    }
+
+    fn of(
+        gpu: &Gpu,
+        target: &TargetOptions,
+        options: &PipelineOptions<'_>,
+        vertices: &[Vertex],
+    ) -> Self {
+        let target = Target::new(gpu, target);
+        let pipeline = Pipeline::new(gpu, &target, options);
+        let buffer = Buffer::of(gpu, vertices);
+        let commands = gpu.record(|commands| {
+            commands.pass(&target, &Pass::default(), || {
+                commands.bind(&pipeline);
+                commands.vertices(&buffer);
+                commands.draw(0..vertices.len() as u32);
+            });
+        });
+        Self {
+            commands,
+            _target: target,
+            _things: Box::new((pipeline, buffer)),
+        }
+    }
+
+    /// A million vertices, shared by twice as many triangles that are too small to be seen.
+    fn vertices(gpu: &Gpu, target: &TargetOptions) -> Self {
+        const SIDE: u32 = 1000;
+        let target = Target::new(gpu, target);
+        let pipeline = Pipeline::new(gpu, &target, &PipelineOptions::default());
+        let mut vertices = Vec::new();
+        for row in 0..SIDE {
+            for column in 0..SIDE {
+                let [x, y] = [column, row].map(|i| i as f32 / SIDE as f32 * 0.2 - 0.1);
+                vertices.push(Vertex {
+                    position: [x, y, 0.5, 1.0],
+                    color: [x, y, 1.0, 1.0],
+                });
+            }
+        }
+        let mut indices = Vec::new();
+        for row in 0..SIDE - 1 {
+            for column in 0..SIDE - 1 {
+                let at = row * SIDE + column;
+                indices.extend([at, at + 1, at + SIDE, at + SIDE, at + 1, at + SIDE + 1]);
+            }
+        }
+        let buffer = Buffer::of(gpu, &vertices);
+        let index_buffer = Buffer::of(gpu, &indices);
+        let commands = gpu.record(|commands| {
+            commands.pass(&target, &Pass::default(), || {
+                commands.bind(&pipeline);
+                commands.vertices(&buffer);
+                commands.indices(&index_buffer, 0, vk::IndexType::UINT32);
+                commands.draw_indexed(0..indices.len() as u32, 0);
+            });
+        });
+        Self {
+            commands,
+            _target: target,
+            _things: Box::new((pipeline, buffer, index_buffer)),
+        }
+    }
+
+    /// The whole target, sampled with all of a texture's levels in use.
+    fn textured(gpu: &Gpu, target: &TargetOptions) -> Self {
+        const SIDE: u32 = 1024;
+        let target = Target::new(gpu, target);
+        let mut rng = shapes::rng(301);
+        let levels: Vec<Vec<[u8; 4]>> = (0..=SIDE.ilog2())
+            .map(|level| (0..(SIDE >> level).pow(2)).map(|_| rng.random()).collect())
+            .collect();
+        let format = vk::Format::R8G8B8A8_UNORM;
+        let options = ImageOptions::new(format, [SIDE; 2], vk::ImageUsageFlags::empty());
+        let image = Image::textured(gpu, &options, &levels);
+        let sampler = vk::SamplerCreateInfo::default()
+            .mag_filter(vk::Filter::LINEAR)
+            .min_filter(vk::Filter::LINEAR)
+            .mipmap_mode(vk::SamplerMipmapMode::LINEAR)
+            .max_lod(vk::LOD_CLAMP_NONE);
+        let sampler = Sampler::new(gpu, &sampler);
+        let bindings = Bindings::new(gpu, &[Resource::Texture(image.view, sampler.raw)]);
+        let options = PipelineOptions {
+            fragment: Some(
+                "layout(set = 0, binding = 0) uniform sampler2D image;
+                 layout(location = 0) in vec4 v_color;
+                 layout(location = 0) out vec4 color;
+                 void main() { color = texture(image, v_color.xy); }",
+            ),
+            bindings: Some(&bindings),
+            ..PipelineOptions::default()
+        };
+        let pipeline = Pipeline::new(gpu, &target, &options);
+        // Perspective, so that the texture is enlarged on one side and shrunk on the other.
+        let corners = [
+            [-1.0, -1.0, 1.0],
+            [1.0, -1.0, 1.0],
+            [-1.0, 1.0, 8.0],
+            [1.0, 1.0, 8.0],
+        ];
+        let corners = corners.map(|[x, y, w]| Vertex {
+            position: [x * w, y * w, 0.5 * w, w],
+            color: [x * w, w, 0.0, 0.0],
+        });
+        let buffer = Buffer::of(gpu, &[0, 1, 2, 2, 1, 3].map(|index: usize| corners[index]));
+        let commands = gpu.record(|commands| {
+            commands.pass(&target, &Pass::default(), || {
+                commands.bind(&pipeline);
+                commands.bind_set(&bindings, &[]);
+                commands.vertices(&buffer);
+                commands.draw(0..6);
+            });
+        });
+        Self {
+            commands,
+            _target: target,
+            _things: Box::new((pipeline, buffer, bindings, image, sampler)),
+        }
+    }
+
+    fn model(gpu: &Gpu, target: &TargetOptions) -> Result<Self, Missing> {
+        let target = Target::new(gpu, target);
+        let model = Model::african_head()?;
+        let ready = Ready::new(gpu, &target, &model, Vec3::new(0.5, 0.1, 1.0));
+        let commands = gpu.record(|commands| {
+            commands.pass(&target, &Pass::default(), || ready.draw(commands));
+        });
+        Ok(Self {
+            commands,
+            _target: target,
+            _things: Box::new(ready),
+        })
+    }
+}
+
+/// One triangle of half the target.
+fn one_big() -> Vec<Vertex> {
+    [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]]
+        .map(|[x, y]| Vertex {
+            position: [x, y, 0.5, 1.0],
+            color: [x, y, 0.5, 1.0],
+        })
+        .to_vec()
+}
+
+/// Triangles of about four pixels.
+fn small(count: usize) -> Vec<Vertex> {
+    let mut rng = shapes::rng(302);
+    let pixel = [0, 1].map(|axis| 2.0 / SIZE[axis] as f32);
+    let mut vertices = Vec::with_capacity(3 * count);
+    for _ in 0..count {
+        let center = [0; 2].map(|_| rng.random_range(-0.99..0.99f32));
+        let z = rng.random_range(0.0..1.0);
+        for corner in [[-1.4, -1.4], [1.4, -1.4], [-1.4, 1.4f32]] {
+            let [x, y] = [0, 1].map(|axis| center[axis] + corner[axis] * pixel[axis]);
+            vertices.push(Vertex {
+                position: [x, y, z, 1.0],
+                color: [x, y, z, 1.0],
+            });
+        }
+    }
+    vertices
+}
+
+/// The whole target, `count` times.
+fn layers(count: u8, back_to_front: bool) -> Vec<Vertex> {
+    (0..count)
+        .flat_map(|layer| {
+            let t = (f32::from(layer) + 0.5) / f32::from(count);
+            let z = if back_to_front { 1.0 - t } else { t };
+            shapes::whole(z, [t, 1.0 - t, 0.5, 0.4])
+        })
+        .collect()
+}

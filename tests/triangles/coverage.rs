@@ -1,0 +1,410 @@
+//! Which samples triangles cover: a million of all kinds, clipped ones, and meshes.
+
+use gaurast_tests::triangles::checksum::{Checksums, first_difference, numbers};
+use gaurast_tests::triangles::edges::{Position, is_near, lines, to_clip};
+use gaurast_tests::triangles::{Gpu, shapes};
+use rand::Rng;
+use rand::seq::IndexedRandom;
+use rand_chacha::ChaCha8Rng;
+
+use crate::devices::{lavapipe, own};
+
+type Triangle = [[f32; 4]; 3];
+
+/// Pixels of the square target.
+const SIZE: u32 = 512;
+
+/// Where the samples of a pixel are, in sixteenths of it: one sample, or four.
+fn places(samples: u32) -> &'static [[u32; 2]] {
+    match samples {
+        1 => &[[8, 8]],
+        _ => &[[6, 2], [14, 6], [2, 10], [10, 14]],
+    }
+}
+
+/// A kind of triangle: three points in pixels.
+type Kind = fn(&mut ChaCha8Rng) -> [[f32; 2]; 3];
+
+fn around(rng: &mut ChaCha8Rng, radius: f32) -> [[f32; 2]; 3] {
+    let margin = radius..SIZE as f32 - radius;
+    let center = [0; 2].map(|_| rng.random_range(margin.clone()));
+    [0; 3].map(|_| center.map(|c| c + rng.random_range(-radius..radius)))
+}
+
+fn sub_pixel(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
+    around(rng, 0.5)
+}
+
+fn small(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
+    around(rng, 4.0)
+}
+
+fn sliver(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
+    let [a, b, _] = around(rng, 40.0);
+    let share: f32 = rng.random();
+    let between = [0, 1].map(|axis| {
+        let width = rng.random_range(-0.2..0.2f32);
+        (a[axis] + share * (b[axis] - a[axis]) + width).clamp(0.0, SIZE as f32)
+    });
+    [a, b, between]
+}
+
+fn huge(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
+    [0; 3].map(|_| [0; 2].map(|_| rng.random_range(0.0..SIZE as f32)))
+}
+
+/// Vertices and edges on samples, between pixels, and on the borders.
+fn aligned(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
+    around(rng, 12.0).map(|point| point.map(|c| (8.0 * c).round() / 8.0))
+}
+
+/// No area: two corners the same, or three in a line.
+fn degenerate(rng: &mut ChaCha8Rng) -> [[f32; 2]; 3] {
+    let [a, b, _] = aligned(rng);
+    if rng.random() {
+        [a, b, b]
+    } else {
+        [a, b, [0, 1].map(|axis| 0.5 * (a[axis] + b[axis]))]
+    }
+}
+
+/// From pixels to clip coordinates, with or without perspective.
+fn to_triangle(rng: &mut ChaCha8Rng, points: [[f32; 2]; 3]) -> Triangle {
+    let perspective: bool = rng.random();
+    points.map(|[x, y]| {
+        let half = SIZE as f32 / 2.0;
+        let z = rng.random_range(0.01..0.99f32);
+        let w = if perspective {
+            rng.random_range(0.5..4.0f32)
+        } else {
+            1.0
+        };
+        // What rounding might put outside is moved back.
+        let clip = |pixel: f32| ((pixel - half) / half * w).clamp(-w, w);
+        [clip(x), clip(y), z * w, w]
+    })
+}
+
+/// Triangles within the view volume, and how many of each kind there are per thousand.
+fn unclipped(seed: u64, count: usize) -> Vec<Triangle> {
+    const KINDS: [(Kind, u32); 6] = [
+        (sub_pixel, 4000),
+        (small, 3500),
+        (sliver, 1200),
+        (aligned, 1000),
+        (degenerate, 297),
+        (huge, 3),
+    ];
+    let mut rng = shapes::rng(seed);
+    (0..count)
+        .map(|_| {
+            let kinds = KINDS.choose_weighted(&mut rng, |(_, weight)| *weight);
+            let (kind, _) = kinds.expect("weights are positive");
+            let points = kind(&mut rng);
+            to_triangle(&mut rng, points)
+        })
+        .collect()
+}
+
+fn assert_equal(ours: &Gpu, theirs: &Gpu, triangles: &[Triangle], samples: u32) {
+    let [ours, theirs] =
+        [ours, theirs].map(|gpu| Checksums::new(gpu, triangles, [SIZE; 2], samples));
+    let count = triangles.len() as u32;
+    let (our_sums, their_sums) = (ours.draw(0..count), theirs.draw(0..count));
+    let covered = their_sums[0].iter().filter(|sums| sums[0] > 0.0).count();
+    assert!(
+        covered > (SIZE * SIZE / 4) as usize,
+        "only {covered} pixels are covered"
+    );
+    if our_sums == their_sums {
+        return;
+    }
+    let pairs = our_sums.iter().flatten().zip(their_sums.iter().flatten());
+    let different = pairs.filter(|(ours, theirs)| ours != theirs).count();
+    let first = first_difference(&ours, &theirs, count);
+    let first = first.map(|(triangle, sample, pixel)| {
+        let (x, y) = (pixel as u32 % SIZE, pixel as u32 / SIZE);
+        let corners = triangles[triangle as usize];
+        let half = SIZE as f32 / 2.0;
+        let pixels = corners.map(|[x, y, _, w]| [half * (x / w) + half, half * (y / w) + half]);
+        format!(
+            "first triangle {triangle}: {corners:?}, in pixels {pixels:?}, \
+             at sample {sample} of pixel ({x}, {y})"
+        )
+    });
+    panic!("{different} samples differ; {}", first.unwrap_or_default());
+}
+
+fn million(samples: u32) {
+    let Some(lavapipe) = lavapipe() else {
+        return;
+    };
+    // In parts, since that keeps memory and the search for a culprit small.
+    for part in 0..4 {
+        let triangles = unclipped(200 + part, 250_000);
+        assert_equal(own(), lavapipe, &triangles, samples);
+    }
+}
+
+#[test]
+fn a_million_triangles_cover_the_same_pixels() {
+    million(1);
+}
+
+#[test]
+fn a_million_triangles_cover_the_same_samples() {
+    million(4);
+}
+
+/// Pixels of the square target for clipped triangles.
+const SMALL: u32 = 256;
+
+/// Triangles that some planes cut, in units of 1/64.
+fn clipped(seed: u64, count: usize, plane: fn(&mut ChaCha8Rng) -> Position) -> Vec<[Position; 3]> {
+    let mut rng = shapes::rng(seed);
+    (0..count)
+        .map(|_| [0; 3].map(|_| plane(&mut rng)))
+        .collect()
+}
+
+/// A position with `w` in sixteenths to four, `x` and `y` within the sides unless `wide`.
+fn position(rng: &mut ChaCha8Rng, wide: [bool; 2]) -> Position {
+    let w = rng.random_range(32..256);
+    let [x, y] = wide.map(|wide| {
+        let reach = if wide { 3 * w } else { w };
+        rng.random_range(-reach..=reach)
+    });
+    [x, y, rng.random_range(0..=w), w]
+}
+
+fn left_and_right(rng: &mut ChaCha8Rng) -> Position {
+    position(rng, [true, false])
+}
+
+fn top_and_bottom(rng: &mut ChaCha8Rng) -> Position {
+    position(rng, [false, true])
+}
+
+fn far_plane(rng: &mut ChaCha8Rng) -> Position {
+    let [x, y, _, w] = position(rng, [false, false]);
+    [x, y, rng.random_range(0..2 * w), w]
+}
+
+fn near_plane(rng: &mut ChaCha8Rng) -> Position {
+    let [x, y, _, w] = position(rng, [false, false]);
+    [x, y, rng.random_range(-w..w), w]
+}
+
+/// Some corners are behind the eye, as a perspective projection would put them.
+fn behind_the_eye(rng: &mut ChaCha8Rng) -> Position {
+    let w = rng.random_range(-128..256);
+    let [x, y] = [0; 2].map(|_| rng.random_range(-256..=256));
+    // The near plane is at w = 1/2.
+    [x, y, w - 32, w]
+}
+
+fn all_planes(rng: &mut ChaCha8Rng) -> Position {
+    let w = rng.random_range(-64..256i64);
+    let [x, y] = [0; 2].map(|_| rng.random_range(-512..=512));
+    [x, y, w - 32 + rng.random_range(-8..=8), w]
+}
+
+/// Whether the triangles whose edges pass the sample explain how the sums differ: some of them are
+/// there on one device only.
+fn is_explained(
+    triangles: &[[Position; 3]],
+    place: [u32; 2],
+    ours: [f32; 4],
+    theirs: [f32; 4],
+) -> bool {
+    let near: Vec<_> = (0..)
+        .zip(triangles)
+        .filter(|(_, triangle)| {
+            lines(triangle)
+                .iter()
+                .any(|&line| is_near(line, SMALL, place))
+        })
+        .map(|(index, _)| numbers(index))
+        .collect();
+    let difference = [0, 1, 2, 3].map(|channel| ours[channel] - theirs[channel]);
+    is_sum(&near, difference)
+}
+
+/// Whether some of `numbers`, each added or subtracted, make `sum`.
+fn is_sum(numbers: &[[f32; 4]], sum: [f32; 4]) -> bool {
+    let Some((first, rest)) = numbers.split_first() else {
+        return sum == [0.0; 4];
+    };
+    [0.0, 1.0, -1.0].into_iter().any(|sign| {
+        let left = [0, 1, 2, 3].map(|channel| sum[channel] - sign * first[channel]);
+        is_sum(rest, left)
+    })
+}
+
+fn check_clipped(name: &str, seed: u64, plane: fn(&mut ChaCha8Rng) -> Position) {
+    let Some(lavapipe) = lavapipe() else {
+        return;
+    };
+    for samples in [1, 4] {
+        let positions = clipped(seed, 1000, plane);
+        let triangles: Vec<_> = positions
+            .iter()
+            .map(|corners| corners.map(to_clip))
+            .collect();
+        let draw = |gpu| Checksums::new(gpu, &triangles, [SMALL; 2], samples).draw(0..1000);
+        let (ours, theirs) = (draw(own()), draw(lavapipe));
+        assert!(
+            theirs[0].iter().any(|sums| sums[0] > 0.0),
+            "nothing is drawn"
+        );
+        let (mut different, mut unexplained) = (0, Vec::new());
+        for (sample, (ours, theirs)) in ours.iter().zip(&theirs).enumerate() {
+            let offset = places(samples)[sample];
+            for (pixel, (ours, theirs)) in (0..).zip(ours.iter().zip(theirs)) {
+                if ours == theirs {
+                    continue;
+                }
+                different += 1;
+                let place = [
+                    16 * (pixel % SMALL) + offset[0],
+                    16 * (pixel / SMALL) + offset[1],
+                ];
+                if !is_explained(&positions, place, *ours, *theirs) {
+                    unexplained.push((sample, pixel % SMALL, pixel / SMALL));
+                }
+            }
+        }
+        eprintln!("{name}, {samples} samples: {different} samples differ");
+        assert!(
+            unexplained.is_empty(),
+            "{samples} samples: {} of {different} differing samples are not within 1/256 of a pixel \
+             from an edge, such as sample, x and y {:?}",
+            unexplained.len(),
+            unexplained[0]
+        );
+    }
+}
+
+macro_rules! clipped {
+    ($($name:ident: $seed:literal, $plane:ident;)+) => {
+        $(#[test]
+        fn $name() {
+            check_clipped(stringify!($name), $seed, $plane);
+        })+
+    };
+}
+
+clipped! {
+    clipped_at_the_left_and_right: 210, left_and_right;
+    clipped_at_the_top_and_bottom: 211, top_and_bottom;
+    clipped_at_the_near_plane: 212, near_plane;
+    clipped_at_the_far_plane: 213, far_plane;
+    clipped_behind_the_eye: 214, behind_the_eye;
+    clipped_at_all_planes: 215, all_planes;
+}
+
+/// A grid over the whole target whose inner corners are moved, by too little to make a cell concave,
+/// cut along random diagonals.
+fn moved_grid(seed: u64, cells: usize) -> Vec<Triangle> {
+    let mut rng = shapes::rng(seed);
+    let step = 2.0 / cells as f32;
+    let corners: Vec<[f32; 4]> = (0..=cells)
+        .flat_map(|row| (0..=cells).map(move |column| (row, column)))
+        .map(|(row, column)| {
+            let inner = |index: usize| index > 0 && index < cells;
+            let w = if inner(row) && inner(column) {
+                rng.random_range(0.5..3.0f32)
+            } else {
+                1.0
+            };
+            let mut along = |index: usize| match index {
+                0 => -1.0,
+                _ if index == cells => 1.0,
+                _ => index as f32 * step - 1.0 + rng.random_range(-0.2..0.2f32) * step,
+            };
+            [along(column) * w, along(row) * w, 0.5 * w, w]
+        })
+        .collect();
+    let mut triangles = Vec::new();
+    for row in 0..cells {
+        for column in 0..cells {
+            let at = |dx: usize, dy: usize| corners[(row + dy) * (cells + 1) + column + dx];
+            if rng.random() {
+                triangles.push([at(0, 0), at(1, 0), at(0, 1)]);
+                triangles.push([at(0, 1), at(1, 0), at(1, 1)]);
+            } else {
+                triangles.push([at(0, 0), at(1, 0), at(1, 1)]);
+                triangles.push([at(0, 0), at(1, 1), at(0, 1)]);
+            }
+        }
+    }
+    triangles
+}
+
+/// Slivers from one point to the whole border.
+fn star(seed: u64, per_side: usize) -> Vec<Triangle> {
+    let mut rng = shapes::rng(seed);
+    let center = [
+        rng.random_range(-0.3..0.3),
+        rng.random_range(-0.3..0.3),
+        0.5,
+        1.0,
+    ];
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let mut border = Vec::new();
+    for side in 0..4 {
+        let (from, to): ([f32; 2], [f32; 2]) = (corners[side], corners[(side + 1) % 4]);
+        for step in 0..per_side {
+            let t = step as f32 / per_side as f32;
+            let [x, y] = [0, 1].map(|axis| from[axis] + t * (to[axis] - from[axis]));
+            border.push([x, y, 0.5, 1.0]);
+        }
+    }
+    (0..border.len())
+        .map(|index| [center, border[index], border[(index + 1) % border.len()]])
+        .collect()
+}
+
+/// Every sample is covered by one triangle of the mesh.
+fn assert_watertight(gpu: &Gpu, name: &str, triangles: &[Triangle]) {
+    for samples in [1, 4] {
+        let count = triangles.len() as u32;
+        // The sums tell which triangle it is: if just one, they are its numbers.
+        let known: std::collections::HashSet<_> = (0..count)
+            .map(|index| numbers(index).map(f32::to_bits))
+            .collect();
+        assert_eq!(known.len(), triangles.len(), "the numbers clash");
+        let sums = Checksums::new(gpu, triangles, [SMALL; 2], samples).draw(0..count);
+        for (sample, sums) in sums.iter().enumerate() {
+            let wrong = |sums: &[f32; 4]| !known.contains(&sums.map(f32::to_bits));
+            let count = sums.iter().filter(|sums| wrong(sums)).count();
+            let first = sums.iter().position(wrong).map(|pixel| {
+                let pixel = pixel as u32;
+                (pixel % SMALL, pixel / SMALL)
+            });
+            assert_eq!(
+                count,
+                0,
+                "{name} on {}: sample {sample} of {samples} is not covered once, first at {first:?}",
+                gpu.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn meshes_are_watertight() {
+    let Some(lavapipe) = lavapipe() else {
+        return;
+    };
+    let meshes = [
+        ("coarse grid", moved_grid(220, 7)),
+        ("fine grid", moved_grid(221, 100)),
+        ("finer than pixels", moved_grid(222, 400)),
+        ("star", star(223, 300)),
+    ];
+    for (name, triangles) in &meshes {
+        assert_watertight(lavapipe, name, triangles);
+        assert_watertight(own(), name, triangles);
+    }
+}

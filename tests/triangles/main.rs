@@ -1,0 +1,6 @@
+//! Triangles, held against lavapipe's.
+
+mod coverage;
+mod devices;
+mod doors;
+mod sweep;
