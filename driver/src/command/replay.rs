@@ -67,7 +67,9 @@ fn step(command: &Command, state: &mut State, executor: &mut dyn Executor) -> Re
             with_count,
         } => {
             bind(&mut state.viewports, *first, viewports);
-            state.viewport_count = with_count.then_some(viewports.len() as u32);
+            if *with_count {
+                state.viewport_count = Some(viewports.len() as u32);
+            }
             state.draw_state = None;
         }
         Command::SetScissors {
@@ -76,7 +78,9 @@ fn step(command: &Command, state: &mut State, executor: &mut dyn Executor) -> Re
             with_count,
         } => {
             bind(&mut state.scissors, *first, scissors);
-            state.scissor_count = with_count.then_some(scissors.len() as u32);
+            if *with_count {
+                state.scissor_count = Some(scissors.len() as u32);
+            }
             state.draw_state = None;
         }
         Command::Set(setting) => {

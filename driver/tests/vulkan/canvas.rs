@@ -14,6 +14,13 @@ pub const CLEAR: [f32; 4] = [0.25, 0.25, 0.25, 0.0];
 /// What passes clear depth to; stencil is cleared to 0.
 pub const CLEAR_DEPTH: f32 = 0.5;
 
+pub const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
+pub const GREEN: [f32; 4] = [0.0, 1.0, 0.0, 0.5];
+pub const BLUE: [f32; 4] = [0.0, 0.0, 1.0, 0.25];
+
+/// How many pixels a canvas has.
+pub const PIXELS: usize = (WIDTH * HEIGHT) as usize;
+
 /// A triangle that covers everything.
 pub fn everything(color: [f32; 4]) -> [Vertex; 3] {
     [

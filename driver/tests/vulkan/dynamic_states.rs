@@ -1,13 +1,11 @@
 //! Every dynamic state does what the same static state does, and has an effect.
 
-use crate::canvas::{Canvas, DEPTH_FORMAT};
+use crate::canvas::{Canvas, DEPTH_FORMAT, GREEN, RED};
 use crate::polygons::{Request, Vertex, deep_vertex, vertex};
 use crate::scene::{HEIGHT, WIDTH, replace};
 use ash::vk;
 use vk::DynamicState as S;
 
-const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
-const GREEN: [f32; 4] = [0.0, 1.0, 0.0, 0.5];
 const BOTH: vk::StencilFaceFlags = vk::StencilFaceFlags::FRONT_AND_BACK;
 
 /// Two settings of a state, false and true: as a pipeline has them and as a command buffer sets them.

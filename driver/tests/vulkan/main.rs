@@ -17,8 +17,10 @@ mod kernel;
 #[path = "../support/loader.rs"]
 mod loader;
 mod memory;
+mod polygon_attachments;
 mod polygon_draws;
 mod polygon_pipelines;
+mod polygon_resources;
 mod polygons;
 mod queries;
 mod render_passes;

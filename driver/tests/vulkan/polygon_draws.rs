@@ -1,19 +1,13 @@
 //! Points, lines and triangles as they are drawn.
 
 use crate::canvas::{
-    CLEAR, Canvas, DEPTH_FORMAT, count, everything, layered_image, read_layer, sampled_image,
-    write_image,
+    BLUE, CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, count, everything, layered_image,
+    read_layer,
 };
-use crate::polygons::{Request, deep_vertex, fragment_shader, vertex, vertex_shader};
-use crate::scene::{FORMAT, HEIGHT, WIDTH, assert_close, at, replace};
+use crate::polygons::{Request, deep_vertex, vertex, vertex_shader};
+use crate::scene::{HEIGHT, WIDTH, assert_close, at};
 use crate::spirv;
 use ash::vk;
-
-const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
-const GREEN: [f32; 4] = [0.0, 1.0, 0.0, 0.5];
-const BLUE: [f32; 4] = [0.0, 0.0, 1.0, 0.25];
-
-const PIXELS: usize = (WIDTH * HEIGHT) as usize;
 
 #[test]
 fn a_triangle_covers_what_it_covers() {
@@ -53,29 +47,6 @@ fn colours_are_interpolated() {
         let expected = [s / WIDTH as f32, t / HEIGHT as f32, 0.5, 1.0];
         assert_close(at(&pixels, (x, y)), expected);
     }
-}
-
-#[test]
-fn push_constants_move_vertices() {
-    let canvas = Canvas::new();
-    let vertices = everything(RED);
-    let pixels = canvas.draw(&Request::default(), &vertices, |device, commands, made| {
-        let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
-        let offset = [1.0f32, 0.0, 0.0, 0.0];
-        // SAFETY: see the crate.
-        unsafe {
-            device.cmd_push_constants(
-                commands,
-                made.layout,
-                stages,
-                0,
-                bytemuck::cast_slice(&offset),
-            );
-            device.cmd_draw(commands, 3, 1, 0, 0);
-        }
-    });
-    assert_eq!(at(&pixels, (WIDTH / 2 - 1, 20)), CLEAR);
-    assert_eq!(at(&pixels, (WIDTH / 2, 20)), RED);
 }
 
 #[test]
@@ -213,86 +184,6 @@ fn indirect_draws_are_numbered() {
 }
 
 #[test]
-fn two_attachments_are_written_and_masked() {
-    let canvas = Canvas::new();
-    let gpu = &canvas.gpu;
-    let other = gpu.image(FORMAT, WIDTH, HEIGHT);
-    let mut request = Request::default().with_fragment(spirv!("two_targets.frag"));
-    request.formats = vec![FORMAT; 2];
-    request.blend = vec![
-        replace(),
-        replace().color_write_mask(vk::ColorComponentFlags::G),
-    ];
-    let made = request.create(gpu).unwrap();
-    let vertices = gpu.buffer_of(everything(RED).as_flattened());
-    canvas.pass(&[canvas.image, other], |device, commands| {
-        // SAFETY: see the crate.
-        unsafe {
-            device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, made.pipeline);
-            device.cmd_bind_vertex_buffers(commands, 0, &[vertices.buffer], &[0]);
-            device.cmd_draw(commands, 3, 1, 0, 0);
-        }
-    });
-    assert_eq!(count(&canvas.pixels(), RED), PIXELS);
-    let masked = [CLEAR[0], 1.0, CLEAR[2], CLEAR[3]];
-    assert_eq!(count(&gpu.read_image(other, 16), masked), PIXELS);
-    gpu.free_image(other);
-    gpu.free_buffer(vertices);
-    made.destroy(gpu);
-}
-
-#[test]
-fn two_sources_are_blended() {
-    let canvas = Canvas::new();
-    let mut request = Request::default().with_fragment(spirv!("two_sources.frag"));
-    request.blend = vec![
-        replace()
-            .blend_enable(true)
-            .src_color_blend_factor(vk::BlendFactor::SRC1_COLOR)
-            .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC1_COLOR)
-            .src_alpha_blend_factor(vk::BlendFactor::SRC1_ALPHA)
-            .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC1_ALPHA),
-    ];
-    let pixels = canvas.draw_vertices(&request, &everything([1.0, 1.0, 1.0, 0.5]));
-    let blend = |factor: f32| factor + 0.25 * (1.0 - factor);
-    assert_close(
-        at(&pixels, (5, 5)),
-        [blend(0.5), blend(0.25), blend(0.125), 0.5],
-    );
-}
-
-#[test]
-fn a_logic_operation_works_on_bits() {
-    let canvas = Canvas::of(vk::Format::R8G8B8A8_UNORM);
-    let request = Request {
-        logic_op: Some(vk::LogicOp::XOR),
-        formats: vec![vk::Format::R8G8B8A8_UNORM],
-        ..Request::default()
-    };
-    let made = request.create(&canvas.gpu).unwrap();
-    let color = [15.0 / 255.0, 1.0, 0.0, 51.0 / 255.0];
-    let vertices = canvas.gpu.buffer_of(everything(color).as_flattened());
-    canvas.pass(&[canvas.image], |device, commands| {
-        // SAFETY: see the crate.
-        unsafe {
-            device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, made.pipeline);
-            device.cmd_bind_vertex_buffers(commands, 0, &[vertices.buffer], &[0]);
-            device.cmd_draw(commands, 3, 1, 0, 0);
-        }
-    });
-    let clear = 64u8;
-    let expected = [clear ^ 15, clear ^ 255, clear, 51];
-    let texels: Vec<[u8; 4]> = canvas.gpu.read_image(canvas.image, 4);
-    assert!(
-        texels.iter().all(|texel| *texel == expected),
-        "{:?}",
-        texels[0]
-    );
-    canvas.gpu.free_buffer(vertices);
-    made.destroy(&canvas.gpu);
-}
-
-#[test]
 fn the_provoking_vertex_is_chosen() {
     let canvas = Canvas::new();
     let mut vertices = everything(RED);
@@ -379,170 +270,6 @@ fn primitives_go_to_their_viewport_and_layer() {
 }
 
 #[test]
-fn textures_uniforms_and_specialization_constants_reach_the_fragment_stage() {
-    let canvas = Canvas::new();
-    let gpu = &canvas.gpu;
-    let texture = gpu.image(vk::Format::R8G8B8A8_UNORM, 2, 1);
-    let texels = gpu.buffer_of(&[[255u8, 0, 0, 255], [0, 255, 51, 255]]);
-    let tint = gpu.buffer_of(&[0.5f32, 0.25, 1.0, 1.0]);
-    let sampler = canvas.nearest_sampler();
-    let set = canvas.tint_set(texture, sampler, tint);
-    write_image(gpu, texture, texels);
-    let mut request = Request::default().with_fragment(spirv!("tinted.frag"));
-    request.shaders[1].constants = vec![(3, 2.0)];
-    request.set_layouts = vec![set.layout];
-    let vertices = [
-        vertex(-1.0, -1.0, [0.0; 4]),
-        vertex(3.0, -1.0, [2.0, 0.0, 0.0, 0.0]),
-        vertex(-1.0, 3.0, [0.0, 2.0, 0.0, 0.0]),
-    ];
-    let pixels = canvas.draw(&request, &vertices, |device, commands, made| {
-        let bind_point = vk::PipelineBindPoint::GRAPHICS;
-        // SAFETY: see the crate.
-        unsafe {
-            device.cmd_bind_descriptor_sets(commands, bind_point, made.layout, 0, &[set.set], &[]);
-            device.cmd_draw(commands, 3, 1, 0, 0);
-        }
-    });
-    assert_close(at(&pixels, (3, 3)), [1.0, 0.0, 0.0, 2.0]);
-    assert_close(at(&pixels, (60, 3)), [0.0, 0.5, 0.4, 2.0]);
-    set.destroy(gpu);
-    // SAFETY: see the crate.
-    unsafe { gpu.device.destroy_sampler(sampler, None) };
-    gpu.free_image(texture);
-    gpu.free_buffer(texels);
-    gpu.free_buffer(tint);
-    let told = gpu.take_messages().concat();
-    assert!(told.contains("location 7"), "{told}");
-}
-
-#[test]
-fn both_stages_store() {
-    let canvas = Canvas::new();
-    let gpu = &canvas.gpu;
-    let counts = gpu.buffer_of(&[0u32; 5]);
-    let set = canvas.storage_set(counts);
-    let request = Request {
-        shaders: vec![
-            vertex_shader(spirv!("stores.vert")),
-            fragment_shader(spirv!("stores.frag")),
-        ],
-        set_layouts: vec![set.layout],
-        ..Request::default()
-    };
-    let pixels = canvas.draw(&request, &everything(RED), |device, commands, made| {
-        let bind_point = vk::PipelineBindPoint::GRAPHICS;
-        // SAFETY: see the crate.
-        unsafe {
-            device.cmd_bind_descriptor_sets(commands, bind_point, made.layout, 0, &[set.set], &[]);
-            device.cmd_draw(commands, 3, 1, 0, 0);
-        }
-    });
-    assert_eq!(count(&pixels, RED), PIXELS - 8 * HEIGHT as usize);
-    assert_eq!(at(&pixels, (7, 9)), CLEAR);
-    let counted: Vec<u32> = gpu.read(counts);
-    assert_eq!(counted, [3, PIXELS as u32, 7, 8, 9]);
-    set.destroy(gpu);
-    gpu.free_buffer(counts);
-}
-
-#[test]
-fn queries_count_samples_and_invocations() {
-    let canvas = Canvas::new();
-    let gpu = &canvas.gpu;
-    let device = &gpu.device;
-    let statistics = vk::QueryPipelineStatisticFlags::INPUT_ASSEMBLY_VERTICES
-        | vk::QueryPipelineStatisticFlags::INPUT_ASSEMBLY_PRIMITIVES
-        | vk::QueryPipelineStatisticFlags::VERTEX_SHADER_INVOCATIONS
-        | vk::QueryPipelineStatisticFlags::CLIPPING_INVOCATIONS
-        | vk::QueryPipelineStatisticFlags::FRAGMENT_SHADER_INVOCATIONS
-        | vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS;
-    let pool = |info: vk::QueryPoolCreateInfo| {
-        // SAFETY: see the crate.
-        unsafe {
-            device
-                .create_query_pool(&info.query_count(1), None)
-                .unwrap()
-        }
-    };
-    let occlusion = pool(vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::OCCLUSION));
-    let counted = pool(
-        vk::QueryPoolCreateInfo::default()
-            .query_type(vk::QueryType::PIPELINE_STATISTICS)
-            .pipeline_statistics(statistics),
-    );
-    // SAFETY: see the crate.
-    unsafe {
-        device.reset_query_pool(occlusion, 0, 1);
-        device.reset_query_pool(counted, 0, 1);
-    }
-    let mut vertices = everything(RED).to_vec();
-    // Behind the eye.
-    vertices.extend(everything(GREEN).map(|[x, y, z, _, r, g, b, a]| [x, y, z, -1.0, r, g, b, a]));
-    canvas.draw(&Request::default(), &vertices, |device, commands, _| {
-        // SAFETY: see the crate.
-        unsafe {
-            device.cmd_begin_query(commands, occlusion, 0, vk::QueryControlFlags::PRECISE);
-            device.cmd_begin_query(commands, counted, 0, vk::QueryControlFlags::empty());
-            device.cmd_draw(commands, 6, 1, 0, 0);
-            device.cmd_end_query(commands, counted, 0);
-            device.cmd_end_query(commands, occlusion, 0);
-            device.cmd_draw(commands, 3, 1, 0, 0);
-        }
-    });
-    let (mut samples, mut statistics) = ([0u32; 1], [[0u64; 6]; 1]);
-    let flags = vk::QueryResultFlags::WAIT;
-    // SAFETY: see the crate.
-    unsafe {
-        device
-            .get_query_pool_results(occlusion, 0, &mut samples, flags)
-            .unwrap();
-        let flags = flags | vk::QueryResultFlags::TYPE_64;
-        device
-            .get_query_pool_results(counted, 0, &mut statistics, flags)
-            .unwrap();
-        device.destroy_query_pool(occlusion, None);
-        device.destroy_query_pool(counted, None);
-    }
-    assert_eq!(samples, [PIXELS as u32]);
-    assert_eq!(statistics, [[6, 2, 6, 2, PIXELS as u64, 0]]);
-}
-
-#[test]
-fn a_secondary_command_buffer_draws_in_its_primarys_pass() {
-    let canvas = Canvas::new();
-    let gpu = &canvas.gpu;
-    let made = Request::default().create(gpu).unwrap();
-    let vertices = gpu.buffer_of(everything(BLUE).as_flattened());
-    let secondary = gpu.command_buffer_of(vk::CommandBufferLevel::SECONDARY);
-    let formats = [FORMAT];
-    let mut rendering = vk::CommandBufferInheritanceRenderingInfo::default()
-        .color_attachment_formats(&formats)
-        .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-    let inheritance = vk::CommandBufferInheritanceInfo::default().push_next(&mut rendering);
-    let begin = vk::CommandBufferBeginInfo::default()
-        .flags(vk::CommandBufferUsageFlags::RENDER_PASS_CONTINUE)
-        .inheritance_info(&inheritance);
-    let device = &gpu.device;
-    // SAFETY: see the crate.
-    unsafe {
-        device.begin_command_buffer(secondary, &begin).unwrap();
-        crate::scene::set_viewport(device, secondary, canvas.image);
-        device.cmd_bind_pipeline(secondary, vk::PipelineBindPoint::GRAPHICS, made.pipeline);
-        device.cmd_bind_vertex_buffers(secondary, 0, &[vertices.buffer], &[0]);
-        device.cmd_draw(secondary, 3, 1, 0, 0);
-        device.end_command_buffer(secondary).unwrap();
-    }
-    canvas.pass(&[canvas.image], |device, commands| {
-        // SAFETY: see the crate.
-        unsafe { device.cmd_execute_commands(commands, &[secondary]) };
-    });
-    assert_eq!(count(&canvas.pixels(), BLUE), PIXELS);
-    gpu.free_buffer(vertices);
-    made.destroy(gpu);
-}
-
-#[test]
 fn a_draw_without_what_its_pipeline_needs_draws_nothing_and_says_so() {
     let canvas = Canvas::new();
     let request = Request::default().with_dynamic(vk::DynamicState::CULL_MODE);
@@ -560,73 +287,6 @@ fn a_draw_without_what_its_pipeline_needs_draws_nothing_and_says_so() {
     assert_eq!(count(&pixels, CLEAR), PIXELS);
     let told = canvas.gpu.take_messages().concat();
     assert!(told.contains("binding 3"), "{told}");
-}
-
-#[test]
-fn depth_decides_what_is_seen() {
-    let canvas = Canvas::with_depth();
-    let request = Request {
-        depth_format: DEPTH_FORMAT,
-        depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(true)
-            .depth_write_enable(true)
-            .depth_compare_op(vk::CompareOp::LESS),
-        ..Request::default()
-    };
-    let near = everything(RED).map(|[x, y, ..]| deep_vertex([x, y, 0.25], RED));
-    let far = [
-        deep_vertex([-1.0, -1.0, 0.4], GREEN),
-        deep_vertex([3.0, -1.0, 0.4], GREEN),
-        deep_vertex([-1.0, 3.0, 0.0], GREEN),
-    ];
-    let pixels = canvas.draw_vertices(&request, &[near, far].concat());
-    // The second triangle's depth falls to 0.2 at the lower edge.
-    assert_eq!(at(&pixels, (30, 2)), RED);
-    assert_eq!(at(&pixels, (30, 46)), GREEN);
-}
-
-#[test]
-fn several_samples_make_smooth_edges() {
-    let canvas = Canvas::new();
-    let gpu = &canvas.gpu;
-    let samples = sampled_image(gpu, vk::SampleCountFlags::TYPE_4);
-    let request = Request {
-        multisample: vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_4),
-        ..Request::default()
-    };
-    let made = request.create(gpu).unwrap();
-    let vertices = [
-        vertex(-1.0, -1.0, RED),
-        vertex(1.0, -1.0, RED),
-        vertex(-1.0, 1.0, RED),
-    ];
-    let vertices = gpu.buffer_of(vertices.as_flattened());
-    gpu.run(|device, commands| {
-        canvas.record_resolving_pass(device, commands, samples, || {
-            // SAFETY: see the crate.
-            unsafe {
-                device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, made.pipeline);
-                device.cmd_bind_vertex_buffers(commands, 0, &[vertices.buffer], &[0]);
-                device.cmd_draw(commands, 3, 1, 0, 0);
-            }
-        });
-    });
-    let pixels = canvas.pixels();
-    let (inside, outside) = (count(&pixels, RED), count(&pixels, CLEAR));
-    assert_eq!(at(&pixels, (0, 0)), RED);
-    let edge = PIXELS - inside - outside;
-    assert!(
-        (HEIGHT as usize..3 * WIDTH as usize).contains(&edge),
-        "{edge}"
-    );
-    for pixel in &pixels {
-        let covered = (pixel[0] - CLEAR[0]) / (RED[0] - CLEAR[0]) * 4.0;
-        assert!((covered - covered.round()).abs() < 1e-5, "{pixel:?}");
-    }
-    gpu.free_buffer(vertices);
-    gpu.free_image(samples);
-    made.destroy(gpu);
 }
 
 #[test]
@@ -685,75 +345,4 @@ fn shaders_clip_and_cull() {
         count(&canvas.draw_vertices(&request, &vertices), CLEAR),
         PIXELS / 2
     );
-}
-
-#[test]
-fn demoted_invocations_write_nothing_and_help() {
-    let canvas = Canvas::new();
-    let request = Request::default().with_fragment(spirv!("demoted.frag"));
-    let pixels = canvas.draw_vertices(&request, &everything(BLUE));
-    let expected = [1.0, 0.0, 1.0, 0.25];
-    assert_eq!(count(&pixels, expected), PIXELS / 2);
-    assert_eq!(at(&pixels, (6, 5)), expected);
-    assert_eq!(at(&pixels, (7, 5)), CLEAR);
-}
-
-/// Draws everything on four samples and resolves them.
-fn resolved(canvas: &Canvas, request: &Request, color: [f32; 4]) -> [f32; 4] {
-    let gpu = &canvas.gpu;
-    let samples = sampled_image(gpu, vk::SampleCountFlags::TYPE_4);
-    let made = request.create(gpu).unwrap();
-    let vertices = gpu.buffer_of(everything(color).as_flattened());
-    gpu.run(|device, commands| {
-        canvas.record_resolving_pass(device, commands, samples, || {
-            // SAFETY: see the crate.
-            unsafe {
-                device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, made.pipeline);
-                device.cmd_bind_vertex_buffers(commands, 0, &[vertices.buffer], &[0]);
-                device.cmd_draw(commands, 3, 1, 0, 0);
-            }
-        });
-    });
-    gpu.free_buffer(vertices);
-    gpu.free_image(samples);
-    made.destroy(gpu);
-    let pixels = canvas.pixels();
-    assert_eq!(count(&pixels, pixels[0]), PIXELS);
-    pixels[0]
-}
-
-#[test]
-fn samples_are_shaded_masked_and_covered() {
-    let canvas = Canvas::new();
-    let four = vk::PipelineMultisampleStateCreateInfo::default()
-        .rasterization_samples(vk::SampleCountFlags::TYPE_4);
-    let request = Request {
-        multisample: four,
-        ..Request::default()
-    };
-    assert_close(resolved(&canvas, &request, RED), RED);
-    let each = request.clone().with_fragment(spirv!("per_sample.frag"));
-    assert_close(resolved(&canvas, &each, RED), [15.0 / 4.0, 0.0, 0.0, 1.0]);
-    let mask = [0b0101u32];
-    let masked = Request {
-        multisample: vk::PipelineMultisampleStateCreateInfo {
-            p_sample_mask: mask.as_ptr(),
-            ..four
-        },
-        ..each
-    };
-    let clear = CLEAR[0] * 0.5;
-    assert_close(
-        resolved(&canvas, &masked, RED),
-        [5.0 / 4.0 + clear, clear, clear, 0.5],
-    );
-    // Alpha of one half covers two samples, and becomes one there.
-    let covering = Request {
-        multisample: four
-            .alpha_to_coverage_enable(true)
-            .alpha_to_one_enable(true),
-        ..Request::default()
-    };
-    let expected = [clear, 0.5 + clear, clear, 0.5];
-    assert_close(resolved(&canvas, &covering, GREEN), expected);
 }
