@@ -119,3 +119,54 @@ fn perspective_is_exact_at_samples() {
         assert!(error <= 2e-6, "{place:?}: {error:e}");
     }
 }
+
+/// Along a line a value changes with the projection onto it, whatever the sample's distance from it.
+#[test]
+fn lines_are_exact_at_samples() {
+    if !shader::can_compile() {
+        eprintln!("skipped: there is no glslangValidator here");
+        return;
+    }
+    let gpu = own();
+    let options = TargetOptions {
+        samples: 4,
+        resolve: false,
+        ..TargetOptions::of(vk::Format::R32_SFLOAT)
+    };
+    let target = Target::new(gpu, &options);
+    let options = PipelineOptions {
+        topology: vk::PrimitiveTopology::LINE_LIST,
+        fragment: Some(
+            "layout(location = 0) sample in vec4 v_color;
+             layout(location = 0) out vec4 color;
+             void main() { color = v_color; }",
+        ),
+        ..PipelineOptions::default()
+    };
+    let pipeline = Pipeline::new(gpu, &target, &options);
+    // From (10, 20) to (110, 60), in pixels of 128.
+    let ends = [[10.0f32, 20.0, 1.0], [110.0, 60.0, 2.0]].map(|[x, y, value]| Vertex {
+        position: [x / 64.0 - 1.0, y / 64.0 - 1.0, 0.5, 1.0],
+        color: [value; 4],
+    });
+    let buffer = Buffer::of(gpu, &ends);
+    gpu.run(|commands| {
+        commands.pass(&target, &Pass::zeros(), || {
+            commands.bind(&pipeline);
+            commands.vertices(&buffer);
+            commands.draw(0..2);
+        });
+    });
+    let mut covered = 0;
+    for (sample, [dx, dy]) in (0..).zip(PLACES) {
+        let values: Vec<f32> = fetch_sample(gpu, &target.colors[0], sample).texels();
+        for (index, value) in (0u32..).zip(values).filter(|(_, value)| *value != 0.0) {
+            let (x, y) = (f64::from(index % 128) + dx, f64::from(index / 128) + dy);
+            let along = ((x - 10.0) * 100.0 + (y - 20.0) * 40.0) / 11_600.0;
+            let error = (f64::from(value) - 1.0 - along).abs();
+            assert!(error <= 2e-6, "({x}, {y}): {error:e}");
+            covered += 1;
+        }
+    }
+    assert!(covered > 200, "only {covered} samples are covered");
+}
