@@ -14,6 +14,14 @@ const PIXELS: [[f64; 2]; 3] = [[4.0, 9.0], [124.0, 17.0], [33.0, 120.0]];
 const W: [f64; 3] = [1.0, 4.0, 0.5];
 const VALUES: [f64; 3] = [0.0, 1.0, 0.25];
 
+/// Where the four samples of a pixel are.
+const PLACES: [[f64; 2]; 4] = [
+    [0.375, 0.125],
+    [0.875, 0.375],
+    [0.125, 0.625],
+    [0.625, 0.875],
+];
+
 /// The value at a point in pixels, in binary64, and whether the point is inside by `margin` of a
 /// barycentric coordinate.
 fn exact(x: f64, y: f64, margin: f64) -> (f64, bool) {
@@ -108,13 +116,7 @@ fn perspective_is_exact_at_samples() {
         eprintln!("skipped: there is no glslangValidator here");
         return;
     }
-    let places = [
-        [0.375, 0.125],
-        [0.875, 0.375],
-        [0.125, 0.625],
-        [0.625, 0.875],
-    ];
-    for (values, place) in draw(own(), 4, "sample").iter().zip(places) {
+    for (values, place) in draw(own(), 4, "sample").iter().zip(PLACES) {
         let error = greatest_error(values, place);
         assert!(error <= 2e-6, "{place:?}: {error:e}");
     }
