@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn a_256th_of_a_pixel_is_the_limit() {
         // The line X = a / b in units, a little off the middle of 64 pixels, at x = 512 sixteenths.
-        let off = |numerator, denominator| [denominator, 0, -numerator];
+        let off = |numerator: i128, denominator: i128| [denominator, 0, -numerator];
         // 1/256 pixel is 1/8192 of half the target's size.
         assert!(is_near(off(1, 8192), 64, [512, 3]));
         assert!(!is_near(off(1001, 8_192_000), 64, [512, 3]));
