@@ -3,4 +3,5 @@
 mod coverage;
 mod devices;
 mod doors;
+mod interpolation;
 mod sweep;

@@ -63,14 +63,15 @@ pub fn resolved_floats(gpu: &Gpu) -> Drawn {
     Ok(simple(gpu, &target, &options, &shapes::flat_soup(73, 30)))
 }
 
-/// Every sample is shaded at its own place.
+/// Every sample is shaded at its own place. (Without perspective, which lavapipe divides by the `w`
+/// of the pixel's centre; `interpolation` in the tests holds perspective against exact values.)
 pub fn sample_shading(gpu: &Gpu) -> Drawn {
     need("sampleRateShading", gpu.features().sample_rate_shading)?;
     let options = PipelineOptions {
         sample_shading: Some(1.0),
         ..PipelineOptions::default()
     };
-    Ok(simple(gpu, &four(), &options, &shapes::soup(74, 30)))
+    Ok(simple(gpu, &four(), &options, &shapes::flat_soup(74, 30)))
 }
 
 /// The shader asks for its sample, which makes it run for each.
@@ -86,7 +87,7 @@ pub fn sample_numbers(gpu: &Gpu) -> Drawn {
         ),
         ..PipelineOptions::default()
     };
-    Ok(simple(gpu, &four(), &options, &shapes::soup(75, 30)))
+    Ok(simple(gpu, &four(), &options, &shapes::flat_soup(75, 30)))
 }
 
 pub fn sample_qualifier(gpu: &Gpu) -> Drawn {
@@ -99,7 +100,7 @@ pub fn sample_qualifier(gpu: &Gpu) -> Drawn {
         ),
         ..PipelineOptions::default()
     };
-    Ok(simple(gpu, &four(), &options, &shapes::soup(76, 30)))
+    Ok(simple(gpu, &four(), &options, &shapes::flat_soup(76, 30)))
 }
 
 /// Which sample of those covered stands for the centroid is the device's choice, so that only

@@ -130,8 +130,25 @@ pub fn implicit_levels(gpu: &Gpu) -> Drawn {
     }))
 }
 
+/// Waves, whose levels differ little, so that neither does the picture if the level does by what
+/// devices may.
 pub fn trilinear_filter(gpu: &Gpu) -> Drawn {
-    let image = image(gpu, vk::ImageViewType::TYPE_2D, [64, 64, 1], 1, 7);
+    let levels: Vec<Vec<[u8; 4]>> = (0..7)
+        .map(|level| {
+            let side = 64u16 >> level;
+            let texel = |index: u16| {
+                let turn = |i: u16| std::f32::consts::TAU * (f32::from(i) + 0.5) / f32::from(side);
+                let (x, y) = (turn(index % side), turn(index / side));
+                // A level's mean of a wave is less high.
+                let height = 100.0 * (1.0 - f32::from(1u16 << level) / 64.0);
+                let waves = [x.sin(), y.cos(), (x + y).sin(), (x - y).cos()];
+                waves.map(|wave| (128.0 + height * wave).round() as u8)
+            };
+            (0..side * side).map(texel).collect()
+        })
+        .collect();
+    let options = ImageOptions::new(RGBA8, [64, 64], vk::ImageUsageFlags::empty());
+    let image = Image::textured(gpu, &options, &levels);
     let sampler = linear().mipmap_mode(vk::SamplerMipmapMode::LINEAR);
     let expression = "texture(image, 3.0 * uv)";
     Ok(sampled(gpu, &image, &sampler, "sampler2D", expression))
@@ -295,7 +312,7 @@ pub fn seamless_cube(gpu: &Gpu) -> Drawn {
 pub fn cube_arrays(gpu: &Gpu) -> Drawn {
     need("imageCubeArray", gpu.features().image_cube_array)?;
     let image = image(gpu, vk::ImageViewType::CUBE_ARRAY, [8, 8, 1], 12, 1);
-    let sampler = vk::SamplerCreateInfo::default();
+    let sampler = linear();
     let expression = "textureLod(image, vec4(uv - 0.5, 0.6, step(64.0, gl_FragCoord.x)), 0.0)";
     Ok(sampled(
         gpu,

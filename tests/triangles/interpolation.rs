@@ -1,0 +1,174 @@
+//! Values between vertices, held against exact ones: what lavapipe does not do exactly enough to be
+//! the measure.
+
+use ash::vk;
+use gaurast_tests::triangles::{
+    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, fetch_sample,
+    shader,
+};
+
+use crate::devices::own;
+
+/// Corners at whole pixels of 128, so that no rounding moves them, with strong perspective.
+const PIXELS: [[f64; 2]; 3] = [[4.0, 9.0], [124.0, 17.0], [33.0, 120.0]];
+const W: [f64; 3] = [1.0, 4.0, 0.5];
+const VALUES: [f64; 3] = [0.0, 1.0, 0.25];
+
+/// Where the four samples of a pixel are.
+const PLACES: [[f64; 2]; 4] = [
+    [0.375, 0.125],
+    [0.875, 0.375],
+    [0.125, 0.625],
+    [0.625, 0.875],
+];
+
+/// The value at a point in pixels, in binary64, and whether the point is inside by `margin` of a
+/// barycentric coordinate.
+fn exact(x: f64, y: f64, margin: f64) -> (f64, bool) {
+    let area = |a: [f64; 2], b: [f64; 2]| (a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x);
+    let [a, b, c] = PIXELS;
+    let areas = [area(b, c), area(c, a), area(a, b)];
+    let sum: f64 = areas.iter().sum();
+    let shares = areas.map(|area| area / sum);
+    let over_w = |values: [f64; 3]| -> f64 {
+        (0..3)
+            .map(|index| shares[index] * values[index] / W[index])
+            .sum()
+    };
+    let value = over_w(VALUES) / over_w([1.0; 3]);
+    (value, shares.iter().all(|&share| share > margin))
+}
+
+fn vertices() -> Vec<Vertex> {
+    let corner = |index: usize| {
+        let [x, y] = PIXELS[index].map(|pixel| (pixel / 64.0 - 1.0) * W[index]);
+        Vertex {
+            position: [x, y, 0.5 * W[index], W[index]].map(|c| c as f32),
+            color: [VALUES[index] as f32; 4],
+        }
+    };
+    (0..3).map(corner).collect()
+}
+
+/// The greatest error of any pixel inside, for one sample at a place in the pixel.
+fn greatest_error(values: &[f32], [dx, dy]: [f64; 2]) -> f64 {
+    let mut greatest = 0.0f64;
+    let mut inside = 0;
+    for (index, &value) in (0u32..).zip(values) {
+        let (x, y) = (f64::from(index % 128) + dx, f64::from(index / 128) + dy);
+        if let (exact, true) = exact(x, y, 0.01) {
+            greatest = greatest.max((f64::from(value) - exact).abs());
+            inside += 1;
+        }
+    }
+    assert!(inside > 3000, "only {inside} pixels are inside");
+    greatest
+}
+
+fn draw(gpu: &Gpu, samples: u32, qualifier: &str) -> Vec<Vec<f32>> {
+    let options = TargetOptions {
+        samples,
+        resolve: false,
+        ..TargetOptions::of(vk::Format::R32_SFLOAT)
+    };
+    let target = Target::new(gpu, &options);
+    let fragment = format!(
+        "layout(location = 0) {qualifier} in vec4 v_color;
+         layout(location = 0) out vec4 color;
+         void main() {{ color = v_color; }}"
+    );
+    let options = PipelineOptions {
+        fragment: Some(&fragment),
+        ..PipelineOptions::default()
+    };
+    let pipeline = Pipeline::new(gpu, &target, &options);
+    let buffer = Buffer::of(gpu, &vertices());
+    gpu.run(|commands| {
+        commands.pass(&target, &Pass::zeros(), || {
+            commands.bind(&pipeline);
+            commands.vertices(&buffer);
+            commands.draw(0..3);
+        });
+    });
+    let image = &target.colors[0];
+    if samples == 1 {
+        let bytes = image.read(vk::ImageAspectFlags::COLOR, 4);
+        return vec![bytemuck::pod_collect_to_vec(&bytes)];
+    }
+    (0..samples)
+        .map(|sample| fetch_sample(gpu, image, sample).texels())
+        .collect()
+}
+
+#[test]
+fn perspective_is_exact_at_pixel_centres() {
+    if !shader::can_compile() {
+        eprintln!("skipped: there is no glslangValidator here");
+        return;
+    }
+    let error = greatest_error(&draw(own(), 1, "")[0], [0.5; 2]);
+    assert!(error <= 2e-6, "{error:e}");
+}
+
+#[test]
+fn perspective_is_exact_at_samples() {
+    if !shader::can_compile() {
+        eprintln!("skipped: there is no glslangValidator here");
+        return;
+    }
+    for (values, place) in draw(own(), 4, "sample").iter().zip(PLACES) {
+        let error = greatest_error(values, place);
+        assert!(error <= 2e-6, "{place:?}: {error:e}");
+    }
+}
+
+/// Along a line a value changes with the projection onto it, whatever the sample's distance from it.
+#[test]
+fn lines_are_exact_at_samples() {
+    if !shader::can_compile() {
+        eprintln!("skipped: there is no glslangValidator here");
+        return;
+    }
+    let gpu = own();
+    let options = TargetOptions {
+        samples: 4,
+        resolve: false,
+        ..TargetOptions::of(vk::Format::R32_SFLOAT)
+    };
+    let target = Target::new(gpu, &options);
+    let options = PipelineOptions {
+        topology: vk::PrimitiveTopology::LINE_LIST,
+        fragment: Some(
+            "layout(location = 0) sample in vec4 v_color;
+             layout(location = 0) out vec4 color;
+             void main() { color = v_color; }",
+        ),
+        ..PipelineOptions::default()
+    };
+    let pipeline = Pipeline::new(gpu, &target, &options);
+    // From (10, 20) to (110, 60), in pixels of 128.
+    let ends = [[10.0f32, 20.0, 1.0], [110.0, 60.0, 2.0]].map(|[x, y, value]| Vertex {
+        position: [x / 64.0 - 1.0, y / 64.0 - 1.0, 0.5, 1.0],
+        color: [value; 4],
+    });
+    let buffer = Buffer::of(gpu, &ends);
+    gpu.run(|commands| {
+        commands.pass(&target, &Pass::zeros(), || {
+            commands.bind(&pipeline);
+            commands.vertices(&buffer);
+            commands.draw(0..2);
+        });
+    });
+    let mut covered = 0;
+    for (sample, [dx, dy]) in (0..).zip(PLACES) {
+        let values: Vec<f32> = fetch_sample(gpu, &target.colors[0], sample).texels();
+        for (index, value) in (0u32..).zip(values).filter(|(_, value)| *value != 0.0) {
+            let (x, y) = (f64::from(index % 128) + dx, f64::from(index / 128) + dy);
+            let along = ((x - 10.0) * 100.0 + (y - 20.0) * 40.0) / 11_600.0;
+            let error = (f64::from(value) - 1.0 - along).abs();
+            assert!(error <= 2e-6, "({x}, {y}): {error:e}");
+            covered += 1;
+        }
+    }
+    assert!(covered > 200, "only {covered} samples are covered");
+}
