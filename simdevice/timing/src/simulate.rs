@@ -1,0 +1,268 @@
+//! One frame on one piece of hardware: every model of this crate put together.
+
+use crate::config::Config;
+use crate::energy::{self, Energy};
+use crate::fast;
+use crate::raster::RasterReport;
+use crate::schedule::{self, Policy, Span, Stages};
+use crate::shader_cores::{self, Roofline};
+use crate::work::{FrameWork, Mode, Saturation};
+use serde::Serialize;
+
+/// What a frame took, and what it would have taken without the rasterizer.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Simulation {
+    /// The rasterizer's cycles; zero if there is none.
+    pub raster: RasterReport,
+    /// The share of evaluations that changed a pixel.
+    pub blended: f64,
+    /// Stage 1.
+    pub preprocess: Roofline,
+    /// Stage 2.
+    pub sort: Roofline,
+    /// Milliseconds of the stages.
+    pub stages: Stages,
+    /// GB/s that stages 1 and 2 take from the rasterizer while both run.
+    pub contention_gb_s: f64,
+    /// Frames per second as configured.
+    pub fps: f64,
+    /// Frames per second if frames overlap.
+    pub fps_collaborative: f64,
+    /// Frames per second if they don't.
+    pub fps_serial: f64,
+    /// Stage 3 on the shader cores, in ms.
+    pub baseline_raster_ms: f64,
+    /// Frames per second without a rasterizer.
+    pub baseline_fps: f64,
+    /// Stage 3 against the baseline's.
+    pub raster_speedup: f64,
+    /// Frames per second against the baseline's.
+    pub speedup: f64,
+    /// Millijoules of a frame.
+    pub energy: Energy,
+    /// Millijoules of a frame without a rasterizer.
+    pub baseline_mj: f64,
+}
+
+/// Evaluations that stage 3 makes on shader cores: the original code ends a tile's list when all its pixels are
+/// finished, and bins by the square around the 3-sigma circle.
+pub fn baseline_evaluations(frame: &FrameWork) -> f64 {
+    let of_draw = |draw: &crate::work::DrawWork| {
+        let pairs = draw.pairs();
+        let boxed = if pairs == 0 || draw.boxed_pairs == 0 {
+            1.0
+        } else {
+            (draw.boxed_pairs as f64 / pairs as f64).max(1.0)
+        };
+        draw.evaluations(Saturation::Tile) as f64 * boxed
+    };
+    frame.draws.iter().map(of_draw).sum()
+}
+
+/// Simulates a frame.
+pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
+    let [one, two] = frame.shader();
+    let preprocess = shader_cores::roofline(&one, &config.shader, &config.memory);
+    let sort = shader_cores::roofline(&two, &config.shader, &config.memory);
+    let before = preprocess.milliseconds() + sort.milliseconds();
+    let has_rasterizer = config.rasterizer.modules > 0;
+    let overlaps = config.schedule.collaborative && has_rasterizer;
+    let contention_gb_s = if overlaps && before > 0.0 {
+        (one.bytes + two.bytes) / before * 1e-6
+    } else {
+        0.0
+    };
+    let baseline_raster_ms = shader_cores::stage_3_ms(baseline_evaluations(frame), config);
+    let raster = if has_rasterizer {
+        fast::rasterize(frame, config, contention_gb_s)
+    } else {
+        RasterReport::default()
+    };
+    let raster_ms = if has_rasterizer {
+        raster.milliseconds(config.rasterizer.clock_ghz)
+    } else {
+        baseline_raster_ms
+    };
+    let stages = Stages {
+        preprocess: preprocess.milliseconds(),
+        sort: sort.milliseconds(),
+        raster: raster_ms,
+    };
+    let policy = policy(config);
+    let fps = |collaborative| {
+        schedule::fps(
+            stages,
+            Policy {
+                collaborative,
+                ..policy
+            },
+        )
+    };
+    let (fps_collaborative, fps_serial) = (fps(true), fps(false));
+    let baseline_ms = before + baseline_raster_ms;
+    let blended = blended(frame, config);
+    let mut energy = if has_rasterizer {
+        energy::rasterizer(&raster, blended, config)
+    } else {
+        Energy::default()
+    };
+    let on_shader_cores = if has_rasterizer { before } else { baseline_ms };
+    energy.shader_cores = energy::shader_cores_mj(on_shader_cores, config);
+    let fps = if policy.collaborative {
+        fps_collaborative
+    } else {
+        fps_serial
+    };
+    Simulation {
+        blended,
+        preprocess,
+        sort,
+        stages,
+        contention_gb_s,
+        fps,
+        fps_collaborative,
+        fps_serial,
+        baseline_raster_ms,
+        baseline_fps: 1e3 / baseline_ms,
+        raster_speedup: baseline_raster_ms / raster_ms,
+        speedup: fps * baseline_ms * 1e-3,
+        energy,
+        baseline_mj: energy::shader_cores_mj(baseline_ms, config),
+        raster,
+    }
+}
+
+/// How the configuration lets frames overlap.
+pub fn policy(config: &Config) -> Policy {
+    Policy {
+        collaborative: config.schedule.collaborative,
+        frames_in_flight: config.schedule.frames_in_flight as usize,
+        has_rasterizer: config.rasterizer.modules > 0,
+    }
+}
+
+/// Frames one after the other on the timeline.
+pub fn timeline(frames: &[Simulation], config: &Config) -> Vec<Span> {
+    let stages: Vec<_> = frames.iter().map(|frame| frame.stages).collect();
+    schedule::timeline(&stages, policy(config))
+}
+
+/// The share of evaluations that changed a pixel.
+fn blended(frame: &FrameWork, config: &Config) -> f64 {
+    let gaussians = frame
+        .draws
+        .iter()
+        .filter(|draw| draw.mode == Mode::Gaussian);
+    let (mut changed, mut evaluated) = (0, 0);
+    for draw in gaussians {
+        changed += draw
+            .tiles
+            .iter()
+            .map(|tile| tile.contributions)
+            .sum::<u64>();
+        evaluated += draw.evaluations(config.rasterizer.saturation);
+    }
+    if evaluated == 0 {
+        0.0
+    } else {
+        (changed as f64 / evaluated as f64).min(1.0)
+    }
+}
+
+/// A frame of Gaussians spread evenly over the tiles of an image, none of which finishes.
+pub fn even_frame(size: [u32; 2], pairs: u64, contributions: f64) -> FrameWork {
+    let [columns, rows] = size.map(|side| side.div_ceil(crate::work::TILE_SIDE));
+    let tiles = u64::from(columns) * u64::from(rows);
+    let tile = |index: u64| {
+        let listed = (pairs * (index + 1) / tiles - pairs * index / tiles) as u32;
+        let at = [
+            (index % u64::from(columns)) as u32,
+            (index / u64::from(columns)) as u32,
+        ];
+        let mut work = crate::work::TileWork::open(at, listed);
+        work.contributions = (work.contributions as f64 * contributions) as u64;
+        work
+    };
+    let draw = crate::work::DrawWork {
+        tiles: (0..tiles).map(tile).collect(),
+        ..crate::work::DrawWork::default()
+    };
+    FrameWork {
+        size,
+        draws: vec![draw],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::work::ShaderWork;
+
+    fn frame() -> FrameWork {
+        let mut frame = even_frame([640, 480], 1_000_000, 0.25);
+        let draw = &mut frame.draws[0];
+        draw.preprocess = ShaderWork {
+            float: 3e9,
+            bytes: 2e8,
+            ..ShaderWork::default()
+        };
+        draw.sort = ShaderWork {
+            integer: 5e8,
+            bytes: 4e8,
+            ..ShaderWork::default()
+        };
+        frame
+    }
+
+    #[test]
+    fn more_modules_are_faster_until_something_else_limits() {
+        let mut last = f64::INFINITY;
+        for modules in [1, 2, 4, 8, 15, 30, 60] {
+            let setting = format!("modules={modules}");
+            let config = Config::preset("paper-15x16", &[setting]).unwrap();
+            let raster = simulate(&frame(), &config).stages.raster;
+            assert!(raster <= last * 1.001, "{modules}: {raster} {last}");
+            last = raster;
+        }
+        // A million pairs of 40 bytes cannot take less time than their bytes.
+        assert!(last > 1e6 * 40.0 / (68.3e6 * 0.9));
+    }
+
+    #[test]
+    fn the_baseline_has_no_rasterizer() {
+        let config = Config::preset("orin-nx-10w", &[]).unwrap();
+        let simulation = simulate(&frame(), &config);
+        assert!(
+            (simulation.speedup - 1.0).abs() < 1e-9
+                && (simulation.raster_speedup - 1.0).abs() < 1e-9
+        );
+        assert!((simulation.energy.total() - simulation.baseline_mj).abs() < 1e-9);
+        let paper = simulate(&frame(), &Config::preset("paper-15x16", &[]).unwrap());
+        assert!((paper.baseline_fps - simulation.fps).abs() < 1e-9);
+        assert!(paper.fps_collaborative > paper.fps_serial && paper.fps_serial > simulation.fps);
+    }
+
+    #[test]
+    fn finer_saturation_never_costs_cycles() {
+        // Half of each tile finishes early.
+        let mut frame = frame();
+        for tile in &mut frame.draws[0].tiles {
+            let n = tile.listed;
+            let run = |primitives, rows, blocks| crate::work::Run {
+                primitives,
+                rows,
+                blocks,
+                reached: primitives * u32::from(blocks) / 2,
+            };
+            tile.runs = vec![run(n / 3, 16, 16), run(n / 3, 12, 8)];
+        }
+        let mut last = f64::INFINITY;
+        for saturation in ["none", "tile", "row", "block", "reached"] {
+            let config =
+                Config::preset("single-module", &[format!("saturation={saturation}")]).unwrap();
+            let cycles = simulate(&frame, &config).raster.cycles;
+            assert!(cycles < last, "{saturation}: {cycles} {last}");
+            last = cycles;
+        }
+    }
+}
