@@ -17,6 +17,7 @@ pub mod raster;
 pub mod schedule;
 pub mod shader_cores;
 pub mod simulate;
+pub mod stages;
 pub mod stepped;
 pub mod work;
 
