@@ -7,8 +7,8 @@ use crate::packet::Rect;
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
-pub use timing::work::{DrawWork, FrameWork, Mode, Run, TRACE_VERSION, TileWork, Trace};
 use timing::stages::{self, GaussianCounts};
+pub use timing::work::{DrawWork, FrameWork, Mode, Run, TRACE_VERSION, TileWork, Trace};
 
 /// Render passes that are kept; older ones make room for newer ones.
 const MAX_FRAMES: usize = 64;
@@ -87,7 +87,11 @@ impl Recorder {
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        let sink = self.sink.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let sink = self
+            .sink
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
         if let Some(sink) = sink {
             sink(self.trace());
         }
@@ -103,8 +107,13 @@ impl DrawRecord {
 
     /// The draw with its tiles row by row, whichever worker was first.
     fn finished(&self) -> DrawWork {
-        let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        work.tiles.sort_unstable_by_key(|tile| [tile.at[1], tile.at[0]]);
+        let mut work = self
+            .0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone();
+        work.tiles
+            .sort_unstable_by_key(|tile| [tile.at[1], tile.at[0]]);
         work
     }
 }
@@ -151,7 +160,11 @@ pub(crate) fn gaussian_draw(
         mode: Mode::Gaussian,
         primitives: read,
         drawn,
-        boxed_pairs: splats.iter().flatten().map(|splat| boxed_tiles(splat, bounds)).sum(),
+        boxed_pairs: splats
+            .iter()
+            .flatten()
+            .map(|splat| boxed_tiles(splat, bounds))
+            .sum(),
         preprocess,
         sort,
         tiles: Vec::new(),
@@ -174,7 +187,9 @@ fn boxed_tiles(splat: &Splat, bounds: Rect) -> u64 {
         let (start, end) = (f64::from(start), f64::from(start) + f64::from(length));
         let (first, last) = ((start / size).floor(), (end / size).ceil());
         let low = ((mean - radius) / size).floor().clamp(first, last);
-        let high = ((mean + radius + size - 1.0) / size).floor().clamp(first, last);
+        let high = ((mean + radius + size - 1.0) / size)
+            .floor()
+            .clamp(first, last);
         (high - low) as u64
     };
     let [x, y] = splat.mean;
@@ -219,18 +234,30 @@ mod tests {
         recorder.begin_frame(BOUNDS);
         let draw = recorder.begin_draw(DrawWork::default());
         for at in [[1, 1], [0, 1], [3, 0]] {
-            draw.add(TileWork { at, ..TileWork::default() });
+            draw.add(TileWork {
+                at,
+                ..TileWork::default()
+            });
         }
         drop(recorder);
         let trace = receive.recv().unwrap();
         assert_eq!((trace.version, trace.frames.len()), (TRACE_VERSION, 1));
-        let order: Vec<_> = trace.frames[0].draws[0].tiles.iter().map(|tile| tile.at).collect();
+        let order: Vec<_> = trace.frames[0].draws[0]
+            .tiles
+            .iter()
+            .map(|tile| tile.at)
+            .collect();
         assert_eq!(order, [[3, 0], [0, 1], [1, 1]]);
     }
 
     #[test]
     fn runs_grow_until_something_finishes() {
-        let run = |rows, blocks| Run { primitives: 32, rows, blocks, reached: 5 };
+        let run = |rows, blocks| Run {
+            primitives: 32,
+            rows,
+            blocks,
+            reached: 5,
+        };
         let mut runs = Vec::new();
         for next in [run(16, 16), run(16, 16), run(12, 9), run(12, 8)] {
             push_run(&mut runs, next);

@@ -203,7 +203,15 @@ impl GaussianTile {
             work.items += items as u64;
             if let Some(runs) = &mut runs {
                 let (primitives, reached) = (chunk.len() as u32, items as u32);
-                trace::push_run(runs, Run { primitives, rows, blocks, reached });
+                trace::push_run(
+                    runs,
+                    Run {
+                        primitives,
+                        rows,
+                        blocks,
+                        reached,
+                    },
+                );
             }
             work.contributions += self.evaluate(simd, items, thresholds);
         }
@@ -243,7 +251,11 @@ impl GaussianTile {
             height: TILE_SIZE,
         };
         let inside = bounds.intersect(tile);
-        let finished = self.transmittance.iter().flatten().filter(|t| t.is_sign_negative());
+        let finished = self
+            .transmittance
+            .iter()
+            .flatten()
+            .filter(|t| t.is_sign_negative());
         let outside = TILE_SIZE * TILE_SIZE - inside.width * inside.height;
         (finished.count() as u32).saturating_sub(outside)
     }

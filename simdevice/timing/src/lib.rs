@@ -19,6 +19,7 @@ pub mod shader_cores;
 pub mod simulate;
 pub mod stages;
 pub mod stepped;
+pub mod what_if;
 pub mod work;
 
 pub use config::{Config, ConfigError};

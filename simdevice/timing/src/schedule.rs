@@ -123,29 +123,75 @@ pub fn fps(stages: Stages, policy: Policy) -> f64 {
     MEASURED as f64 / last * 1e3
 }
 
-/// The timeline as Chrome's trace event JSON, which Perfetto opens too: a row per engine, colours by frame.
-pub fn chrome_trace(spans: &[Span], tasks: &[(String, serde_json::Value)]) -> serde_json::Value {
-    use serde_json::json;
+/// A timeline in Chrome's trace event format, which Perfetto opens too: a row per engine. To be written as JSON.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct ChromeTrace<T> {
+    trace_events: Vec<Event>,
+    display_time_unit: &'static str,
+    /// Whatever else a reader should know.
+    other_data: T,
+}
+
+/// An event; times in microseconds.
+#[derive(Clone, Debug, Serialize)]
+struct Event {
+    name: String,
+    /// "M": a name of a process or thread; "X": a span.
+    ph: &'static str,
+    pid: u32,
+    tid: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cat: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ts: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dur: Option<f64>,
+    args: Arguments,
+}
+
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Arguments {
+    Name(&'static str),
+    Frame(usize),
+}
+
+/// The timeline, with `other_data` beside it.
+pub fn chrome_trace<T: Serialize>(spans: &[Span], other_data: T) -> ChromeTrace<T> {
     let track = |engine: Engine| match engine {
         Engine::ShaderCores => 1,
         Engine::Rasterizer => 2,
     };
-    let mut events =
-        vec![json!({"name": "process_name", "ph": "M", "pid": 1, "args": {"name": "GauRast"}})];
+    let named = |kind: &str, tid, name| Event {
+        name: kind.to_owned(),
+        ph: "M",
+        pid: 1,
+        tid,
+        cat: None,
+        ts: None,
+        dur: None,
+        args: Arguments::Name(name),
+    };
+    let mut trace_events = vec![named("process_name", 0, "GauRast")];
     for engine in [Engine::ShaderCores, Engine::Rasterizer] {
-        events.push(json!({
-            "name": "thread_name", "ph": "M", "pid": 1, "tid": track(engine), "args": {"name": engine.name()},
-        }));
+        trace_events.push(named("thread_name", track(engine), engine.name()));
     }
-    for span in spans {
-        events.push(json!({
-            "name": format!("{} {}", span.stage, span.frame), "cat": span.stage, "ph": "X", "pid": 1,
-            "tid": track(span.engine), "ts": span.begin_ms * 1e3, "dur": (span.end_ms - span.begin_ms) * 1e3,
-            "args": {"frame": span.frame},
-        }));
+    trace_events.extend(spans.iter().map(|span| Event {
+        name: format!("{} {}", span.stage, span.frame),
+        ph: "X",
+        pid: 1,
+        tid: track(span.engine),
+        cat: Some(span.stage),
+        ts: Some(span.begin_ms * 1e3),
+        dur: Some((span.end_ms - span.begin_ms) * 1e3),
+        args: Arguments::Frame(span.frame),
+    }));
+    ChromeTrace {
+        trace_events,
+        display_time_unit: "ms",
+        other_data,
     }
-    let extra: serde_json::Map<_, _> = tasks.iter().cloned().collect();
-    json!({"traceEvents": events, "displayTimeUnit": "ms", "otherData": extra})
 }
 
 #[cfg(test)]
@@ -223,7 +269,7 @@ mod tests {
     #[test]
     fn the_trace_has_an_event_per_span() {
         let spans = timeline(&[STAGES; 3], POLICY);
-        let trace = chrome_trace(&spans, &[]);
+        let trace = serde_json::to_value(chrome_trace(&spans, [1])).unwrap();
         let events = trace["traceEvents"].as_array().unwrap();
         let complete: Vec<_> = events.iter().filter(|event| event["ph"] == "X").collect();
         assert_eq!(complete.len(), spans.len());

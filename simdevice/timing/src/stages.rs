@@ -91,11 +91,17 @@ pub fn gaussian(counts: &GaussianCounts) -> [ShaderWork; 2] {
     let preprocess = CULL
         .times(counts.read as f64)
         .plus(&PROJECT.times(counts.projected as f64))
-        .plus(&DIRECTION.plus(&COEFFICIENT.times(coefficients)).times(counts.drawn as f64));
+        .plus(
+            &DIRECTION
+                .plus(&COEFFICIENT.times(coefficients))
+                .times(counts.drawn as f64),
+        );
     // 32 bits of depth below the tile's number.
     let bits = 32 + u64::BITS - counts.tiles.saturating_sub(1).leading_zeros();
     let passes = f64::from(bits.div_ceil(DIGIT_BITS));
-    let sort = EMIT.plus(&SORT_PASS.times(passes)).times(counts.pairs as f64);
+    let sort = EMIT
+        .plus(&SORT_PASS.times(passes))
+        .times(counts.pairs as f64);
     [preprocess, sort]
 }
 
@@ -105,12 +111,22 @@ mod tests {
 
     #[test]
     fn work_grows_with_what_there_is() {
-        let counts = GaussianCounts { read: 10, projected: 8, drawn: 5, degree: 3, pairs: 20, tiles: 3600 };
+        let counts = GaussianCounts {
+            read: 10,
+            projected: 8,
+            drawn: 5,
+            degree: 3,
+            pairs: 20,
+            tiles: 3600,
+        };
         let [one, two] = gaussian(&counts);
         assert!((one.bytes - (10.0 * 12.0 + 8.0 * 80.0 + 5.0 * 192.0)).abs() < 1e-9);
         // 12 bits of tile number: 44 bits, 6 passes.
         assert!((two.bytes - 20.0 * (20.0 + 6.0 * 24.0)).abs() < 1e-9);
-        let [flat, _] = gaussian(&GaussianCounts { degree: 0, ..counts });
+        let [flat, _] = gaussian(&GaussianCounts {
+            degree: 0,
+            ..counts
+        });
         assert!(flat.float < one.float);
     }
 }

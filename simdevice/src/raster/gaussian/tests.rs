@@ -318,7 +318,18 @@ fn a_saturated_tile_fetches_no_more() {
 fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
     use crate::trace::{DrawWork, Recorder};
     let quiet = Device::new(&Config::default()).unwrap();
-    for (seed, bounds) in [(40, WHOLE), (41, Rect { x: 5, y: 3, width: 70, height: 50 })] {
+    for (seed, bounds) in [
+        (40, WHOLE),
+        (
+            41,
+            Rect {
+                x: 5,
+                y: 3,
+                width: 70,
+                height: 50,
+            },
+        ),
+    ] {
         let recorder = Arc::new(Recorder::default());
         let recording = Device::new(&Config {
             recorder: Some(Arc::clone(&recorder)),
@@ -347,12 +358,21 @@ fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
         let trace = recorder.trace();
         let work: &DrawWork = &trace.frames[0].draws[0];
         assert_eq!(work.pairs(), pairs);
-        assert_eq!(work.needed_pairs(), counted.get(Counter::TilePairsEvaluated));
+        assert_eq!(
+            work.needed_pairs(),
+            counted.get(Counter::TilePairsEvaluated)
+        );
         let sum = |of: fn(&TileWork) -> u64| work.tiles.iter().map(of).sum::<u64>();
         let reached = sum(|tile| tile.runs.iter().map(|run| u64::from(run.reached)).sum());
         assert_eq!(reached, counted.get(Counter::BlockEvaluations));
-        assert_eq!(sum(|tile| tile.contributions), counted.get(Counter::PixelContributions));
-        assert!(sum(|tile| u64::from(tile.terminated)) > 0, "some pixels saturate");
+        assert_eq!(
+            sum(|tile| tile.contributions),
+            counted.get(Counter::PixelContributions)
+        );
+        assert!(
+            sum(|tile| u64::from(tile.terminated)) > 0,
+            "some pixels saturate"
+        );
         // What finishes stays finished, and a row or block has pixels as long as the tile has.
         for tile in &work.tiles {
             for pair in tile.runs.windows(2) {
