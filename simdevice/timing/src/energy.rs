@@ -95,37 +95,41 @@ fn busy_cycle_pj(mode: Mode, config: &Config) -> f64 {
 /// The utilization of the calibration frames: the paper's scenes keep the PEs busy all but the edges of tiles.
 pub const CALIBRATION_UTILIZATION: f64 = 0.95;
 
-/// pJ of the rasterizer's technology per pJ of the table.
-pub fn scale(config: &Config) -> f64 {
-    let energy = &config.energy;
-    if energy.scale > 0.0 {
-        return energy.scale;
-    }
-    // Where nothing is known of a module's power, the units scale as the paper's fp32 ones do; a module's of any width
-    // is 16 PEs here, which is what was measured.
-    let reference = Config::preset(crate::config::DEFAULT_PRESET, &[]);
-    let Ok(reference) = reference else {
-        return 1.0;
+/// PEs of the module whose power the paper gives.
+const MEASURED_PES: u32 = 16;
+
+/// The hardware whose power is known: this one with modules of the paper's width or, where nothing is known of its power,
+/// the paper's own.
+fn measured(config: &Config) -> Config {
+    let known = config.energy.module_power_w > 0.0;
+    let mut measured = match (known, Config::preset(crate::config::DEFAULT_PRESET, &[])) {
+        (false, Ok(paper)) => paper,
+        _ => config.clone(),
     };
-    let energy = &reference.energy;
-    let dynamic_w = energy.module_power_w * (1.0 - energy.static_share);
-    let picojoules = dynamic_w / reference.rasterizer.clock_ghz * 1e3;
-    picojoules / (busy_cycle_pj(Mode::Gaussian, &reference) * CALIBRATION_UTILIZATION)
+    measured.rasterizer.pes_per_module = MEASURED_PES;
+    measured
 }
 
-/// Static power of a module in W.
+/// pJ of the rasterizer's technology per pJ of the table.
+pub fn scale(config: &Config) -> f64 {
+    if config.energy.scale > 0.0 {
+        return config.energy.scale;
+    }
+    let measured = measured(config);
+    let dynamic_w = measured.energy.module_power_w * (1.0 - measured.energy.static_share);
+    let picojoules = dynamic_w / measured.rasterizer.clock_ghz * 1e3;
+    picojoules / (busy_cycle_pj(Mode::Gaussian, &measured) * CALIBRATION_UTILIZATION)
+}
+
+/// Static power of a module in W. It grows with the PEs, and narrower units leak less, as they are smaller.
 pub fn static_w(config: &Config) -> f64 {
-    let energy = &config.energy;
-    let reference = Config::preset(crate::config::DEFAULT_PRESET, &[]);
-    let whole = match (energy.module_power_w > 0.0, reference) {
-        (false, Ok(reference)) => {
-            // Narrower units leak less, as they are smaller.
-            reference.energy.module_power_w * busy_cycle_pj(Mode::Gaussian, config)
-                / busy_cycle_pj(Mode::Gaussian, &reference)
-        }
-        _ => energy.module_power_w,
-    };
-    whole * energy.static_share * f64::from(config.rasterizer.pes_per_module) / 16.0
+    let measured = measured(config);
+    let mut alike = config.clone();
+    alike.rasterizer.pes_per_module = MEASURED_PES;
+    let of = |config| busy_cycle_pj(Mode::Gaussian, config);
+    let size = of(&alike) / of(&measured) * f64::from(config.rasterizer.pes_per_module)
+        / f64::from(MEASURED_PES);
+    measured.energy.module_power_w * measured.energy.static_share * size
 }
 
 /// What stage 3 of a frame spent on the rasterizer. `blended` is the share of evaluations that were blended.
@@ -191,6 +195,17 @@ mod tests {
             "{watts} {}",
             report.utilization()
         );
+    }
+
+    #[test]
+    fn power_is_what_the_configuration_says() {
+        let config = Config::preset("single-module", &["module_power_w=0.64".to_owned()]).unwrap();
+        let report = report(&config);
+        let energy = rasterizer(&report, config.energy.blended_share, &config);
+        let watts = energy.modules() / report.milliseconds(config.rasterizer.clock_ghz);
+        assert!((watts / 0.64 - 1.0).abs() < 0.06, "{watts}");
+        let wide = Config::preset("single-module", &["pes_per_module=32".to_owned()]).unwrap();
+        assert!((static_w(&wide) / 0.34 - 2.0).abs() < 1e-9);
     }
 
     #[test]

@@ -59,37 +59,82 @@ pub fn baseline_evaluations(frame: &FrameWork) -> f64 {
     frame.draws.iter().map(of_draw).sum()
 }
 
+/// Stages 1 and 2, of which a frame in flight's rasterizer takes bytes away.
+fn before_raster(frame: &FrameWork, config: &Config, rasters_bytes: f64) -> [Roofline; 2] {
+    let stages = frame.shader();
+    let bytes: f64 = stages.iter().map(|stage| stage.bytes).sum();
+    stages.map(|mut stage| {
+        if bytes > 0.0 {
+            stage.bytes += rasters_bytes * stage.bytes / bytes;
+        }
+        shader_cores::roofline(&stage, &config.shader, &config.memory)
+    })
+}
+
+/// Milliseconds of stages 1 and 2.
+fn milliseconds(before: &[Roofline; 2]) -> f64 {
+    before.iter().map(Roofline::milliseconds).sum()
+}
+
+/// Frames one at a time, and frames that overlap.
+struct Both {
+    before: [Roofline; 2],
+    raster: RasterReport,
+    raster_ms: f64,
+    contention_gb_s: f64,
+}
+
+impl Both {
+    fn stages(&self) -> Stages {
+        let [preprocess, sort] = self.before.map(|stage| stage.milliseconds());
+        Stages {
+            preprocess,
+            sort,
+            raster: self.raster_ms,
+        }
+    }
+}
+
+/// The stages where nothing else runs.
+fn serial(frame: &FrameWork, config: &Config, baseline_raster_ms: f64) -> Both {
+    let has_rasterizer = config.rasterizer.modules > 0;
+    let mut raster = RasterReport::default();
+    let mut raster_ms = baseline_raster_ms;
+    if has_rasterizer {
+        raster = fast::rasterize(frame, config, 0.0);
+        raster_ms = raster.milliseconds(config.rasterizer.clock_ghz);
+    }
+    Both {
+        before: before_raster(frame, config, 0.0),
+        raster,
+        raster_ms,
+        contention_gb_s: 0.0,
+    }
+}
+
+/// The stages where a frame's stages 1 and 2 run beside another's stage 3: both move their bytes through one memory.
+fn collaborative(frame: &FrameWork, config: &Config, alone: &Both) -> Both {
+    let moved = alone.raster.bytes_in + alone.raster.bytes_out;
+    let before = before_raster(frame, config, moved);
+    let bytes: f64 = frame.shader().iter().map(|stage| stage.bytes).sum();
+    let time = milliseconds(&before);
+    let contention_gb_s = if time > 0.0 { bytes / time * 1e-6 } else { 0.0 };
+    let raster = fast::rasterize(frame, config, contention_gb_s);
+    Both {
+        before,
+        raster_ms: raster.milliseconds(config.rasterizer.clock_ghz),
+        raster,
+        contention_gb_s,
+    }
+}
+
 /// Simulates a frame.
 pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
-    let [one, two] = frame.shader();
-    let preprocess = shader_cores::roofline(&one, &config.shader, &config.memory);
-    let sort = shader_cores::roofline(&two, &config.shader, &config.memory);
-    let before = preprocess.milliseconds() + sort.milliseconds();
-    let has_rasterizer = config.rasterizer.modules > 0;
-    let overlaps = config.schedule.collaborative && has_rasterizer;
-    let contention_gb_s = if overlaps && before > 0.0 {
-        (one.bytes + two.bytes) / before * 1e-6
-    } else {
-        0.0
-    };
-    let baseline_raster_ms = shader_cores::stage_3_ms(baseline_evaluations(frame), config);
-    let raster = if has_rasterizer {
-        fast::rasterize(frame, config, contention_gb_s)
-    } else {
-        RasterReport::default()
-    };
-    let raster_ms = if has_rasterizer {
-        raster.milliseconds(config.rasterizer.clock_ghz)
-    } else {
-        baseline_raster_ms
-    };
-    let stages = Stages {
-        preprocess: preprocess.milliseconds(),
-        sort: sort.milliseconds(),
-        raster: raster_ms,
-    };
     let policy = policy(config);
-    let fps = |collaborative| {
+    let baseline_raster_ms = shader_cores::stage_3_ms(baseline_evaluations(frame), config);
+    let alone = serial(frame, config, baseline_raster_ms);
+    let baseline_ms = milliseconds(&alone.before) + baseline_raster_ms;
+    let fps = |stages, collaborative| {
         schedule::fps(
             stages,
             Policy {
@@ -98,37 +143,50 @@ pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
             },
         )
     };
-    let (fps_collaborative, fps_serial) = (fps(true), fps(false));
-    let baseline_ms = before + baseline_raster_ms;
-    let blended = blended(frame, config);
-    let mut energy = if has_rasterizer {
-        energy::rasterizer(&raster, blended, config)
+    let fps_serial = fps(alone.stages(), false);
+    let on_shader_cores = if policy.has_rasterizer {
+        milliseconds(&alone.before)
     } else {
-        Energy::default()
+        baseline_ms
     };
-    let on_shader_cores = if has_rasterizer { before } else { baseline_ms };
+    let mut fps_collaborative = fps_serial;
+    let mut chosen = alone;
+    if policy.has_rasterizer {
+        let together = collaborative(frame, config, &chosen);
+        fps_collaborative = fps(together.stages(), true);
+        if policy.collaborative {
+            chosen = together;
+        }
+    }
+    let blended = blended(frame, config);
+    let mut energy = Energy::default();
+    if policy.has_rasterizer {
+        energy = energy::rasterizer(&chosen.raster, blended, config);
+    }
     energy.shader_cores = energy::shader_cores_mj(on_shader_cores, config);
     let fps = if policy.collaborative {
         fps_collaborative
     } else {
         fps_serial
     };
+    let stages = chosen.stages();
+    let [preprocess, sort] = chosen.before;
     Simulation {
         blended,
         preprocess,
         sort,
         stages,
-        contention_gb_s,
+        contention_gb_s: chosen.contention_gb_s,
         fps,
         fps_collaborative,
         fps_serial,
         baseline_raster_ms,
         baseline_fps: 1e3 / baseline_ms,
-        raster_speedup: baseline_raster_ms / raster_ms,
+        raster_speedup: baseline_raster_ms / stages.raster,
         speedup: fps * baseline_ms * 1e-3,
         energy,
         baseline_mj: energy::shader_cores_mj(baseline_ms, config),
-        raster,
+        raster: chosen.raster,
     }
 }
 
@@ -240,6 +298,33 @@ mod tests {
         let paper = simulate(&frame(), &Config::preset("paper-15x16", &[]).unwrap());
         assert!((paper.baseline_fps - simulation.fps).abs() < 1e-9);
         assert!(paper.fps_collaborative > paper.fps_serial && paper.fps_serial > simulation.fps);
+    }
+
+    #[test]
+    fn overlapping_frames_share_memory() {
+        // Stages 1 and 2 limited by memory alone: a frame takes as long as all its bytes.
+        let mut frame = frame();
+        let [draw] = frame.draws.as_mut_slice() else {
+            panic!("one draw")
+        };
+        draw.preprocess = ShaderWork {
+            bytes: 2e8,
+            ..ShaderWork::default()
+        };
+        draw.sort = ShaderWork {
+            bytes: 4e8,
+            ..ShaderWork::default()
+        };
+        let config = Config::preset("paper-15x16", &[]).unwrap();
+        let simulation = simulate(&frame, &config);
+        let bytes = 6e8 + simulation.raster.bytes_in + simulation.raster.bytes_out;
+        let least_ms = bytes / (68.3e6 * 0.9);
+        assert!(
+            (1e3 / simulation.fps / least_ms - 1.0).abs() < 0.01,
+            "{} {least_ms}",
+            simulation.fps
+        );
+        assert!(simulation.stages.raster > 0.0 && simulation.contention_gb_s < 68.3 * 0.9);
     }
 
     #[test]

@@ -132,7 +132,8 @@ fn model() -> Result<Vec<Section>, ConfigError> {
         Section {
             title: "What the model makes of the pairs",
             text: "The implied pairs, spread evenly over the tiles, through the modules' cycles: what tiles, fetches and \
-                   write-backs add to an ideal machine. That the time comes back is no evidence for the pairs."
+                   write-backs add to an ideal machine. That the time comes back is no evidence for the pairs. Even lists are the \
+                   worst case for write-backs: where modules end tiles at the same time, their pixels crowd out fetches."
                 .to_owned(),
             rows,
         },
