@@ -328,6 +328,8 @@ fn a_scene_is_simulated_from_the_work_that_was_done() {
     );
     let sweep = simulate(&["--sweep", "modules=1..4", "--format", "csv"]);
     assert_eq!(sweep.lines().count(), 5, "{sweep}");
+    let compared = simulate(&["--stepped"]);
+    assert!(compared.contains("+0.000 %"), "{compared}");
     assert!(simulate(&["--what-if"]).contains("blocks saturate"));
     assert!(simulate(&[]).contains("stage 3, raster"));
     // Only the timeline was asked for.

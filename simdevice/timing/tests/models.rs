@@ -71,14 +71,14 @@ fn tile(random: &mut ChaCha8Rng, at: [u32; 2], mode: Mode, largest: f64) -> Tile
 fn trace(random: &mut ChaCha8Rng, kind: Kind) -> FrameWork {
     let tiles = match kind {
         Kind::OneTile => 1,
-        _ => random.random_range(1..=40),
+        _ => random.random_range(1..=24),
     };
     let draws = match kind {
         Kind::ModeSwitching => random.random_range(2..=4),
         Kind::OneTile => 1,
         _ => random.random_range(1..=2),
     };
-    let largest = random.random_range(2.0..250.0);
+    let largest = random.random_range(2.0..160.0);
     let draws = (0..draws).map(|index| {
         let mode = match kind {
             Kind::ModeSwitching if index % 2 == 1 => Mode::Triangle,

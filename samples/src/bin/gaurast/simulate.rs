@@ -14,7 +14,7 @@ use timing::schedule;
 use timing::simulate::{self, Simulation};
 use timing::what_if::{WhatIf, what_ifs};
 use timing::work::{TRACE_VERSION, Trace};
-use timing::{FrameWork, paper};
+use timing::{FrameWork, fast, paper, stepped};
 
 use crate::args::Size;
 use crate::simulate_report as report;
@@ -93,8 +93,12 @@ pub struct SimulateArguments {
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..))]
     pub frames: u16,
 
+    /// Steps the rasterizer clock by clock, too, and tells how far the fast model is off
+    #[arg(long, conflicts_with_all = ["sweep", "what_if"])]
+    pub stepped: bool,
+
     /// Prints the paper's numbers beside the model's, and nothing else
-    #[arg(long, conflicts_with_all = ["scene", "sweep", "what_if", "trace"])]
+    #[arg(long, conflicts_with_all = ["scene", "sweep", "what_if", "trace", "stepped"])]
     pub paper: bool,
 
     /// How results are printed
@@ -144,6 +148,9 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
         let variants = what_ifs(frame, &config);
         return print(&what_if_text(arguments.format, &variants)?);
     }
+    if arguments.stepped {
+        return print(&report::compared(&models(&trace, &config)));
+    }
     let results: Vec<_> = machines
         .iter()
         .map(|(name, config)| (name.clone(), simulate::simulate(frame, config)))
@@ -158,6 +165,15 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
         (Format::Json, many) => serde_json::to_string_pretty(many)? + "\n",
         (Format::Csv, many) => report::csv(many),
     })
+}
+
+/// Each frame's cycles by the fast model and by the stepped one.
+fn models(trace: &Trace, config: &Config) -> Vec<[f64; 2]> {
+    let cycles = |frame: &FrameWork| {
+        let fast = fast::rasterize(frame, config, 0.0).cycles;
+        [fast, stepped::rasterize(frame, config, 0.0).cycles]
+    };
+    trace.frames.iter().map(cycles).collect()
 }
 
 fn what_if_text(format: Format, variants: &[WhatIf]) -> Result<String, Error> {

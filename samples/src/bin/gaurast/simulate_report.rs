@@ -191,6 +191,27 @@ pub fn many(results: &[(String, Simulation)]) -> String {
     format!("{table}\n")
 }
 
+/// The fast model beside the stepped one, a row for each frame.
+pub fn compared(frames: &[[f64; 2]]) -> String {
+    let mut table = new_table();
+    table.set_header(["frame", "fast cycles", "stepped cycles", "difference"]);
+    for (number, [fast, stepped]) in frames.iter().enumerate() {
+        let difference = if *stepped == 0.0 {
+            0.0
+        } else {
+            (fast / stepped - 1.0) * 100.0
+        };
+        let values = [
+            format!("{fast:.0}"),
+            format!("{stepped:.0}"),
+            format!("{difference:+.3} %"),
+        ];
+        table.add_row(std::iter::once(number.to_string()).chain(values));
+    }
+    right(&mut table, 1..4);
+    format!("{table}\n")
+}
+
 /// A field of a line, quoted where that is needed.
 fn field(text: &str) -> String {
     if text.contains([',', '"', '\n']) {
