@@ -50,7 +50,6 @@ fn raster() -> Section {
             RASTER_SPEEDUP[1] * SOC_W / watts
         )),
     ];
-    debug_assert!(RASTER_ENERGY[1] > 0.0);
     Section {
         title: "Headlines of the raster stage",
         text: "From the published times and powers.".to_owned(),
