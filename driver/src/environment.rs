@@ -5,16 +5,22 @@
 //! - `GAURAST_THREADS`: how many worker threads a device has; 0 (the default) means one per processor.
 //! - `GAURAST_TIMEOUT_MS`: how many milliseconds one batch of shader invocations may take before the device is lost; a
 //!   loop without end is stopped so. A batch is a workgroup, or some 64 vertices or fragments.
+//! - `GAURAST_TRACE`: a file that the work of a device's last 64 render passes is written to, as JSON, when the device is
+//!   gone; `gaurast simulate` reads it. It costs a little time and changes no image.
 //! - `GAURAST_DUMP`: what is printed to standard error for people, by name: ir (the device's programs, as pipelines are
 //!   created).
 
 use crate::error::Error;
 use simdevice::device::{Config, SimdLevel};
+use simdevice::trace::{Recorder, Trace};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 const SIMD: &str = "GAURAST_SIMD";
 const THREADS: &str = "GAURAST_THREADS";
 const TIMEOUT: &str = "GAURAST_TIMEOUT_MS";
+const TRACE: &str = "GAURAST_TRACE";
 const DUMP: &str = "GAURAST_DUMP";
 
 /// Opens a simulated device as the environment says.
@@ -22,12 +28,27 @@ const DUMP: &str = "GAURAST_DUMP";
 /// # Errors
 /// [`Error::InitializationFailed`] for a value that means nothing or that this machine can't satisfy.
 pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
-    let config = config(
+    let mut config = config(
         variable(SIMD)?.as_deref(),
         variable(THREADS)?.as_deref(),
         variable(TIMEOUT)?.as_deref(),
     )?;
+    if let Some(file) = variable(TRACE)?.filter(|file| !file.is_empty()) {
+        let file = PathBuf::from(file);
+        let recorder = Recorder::new(move |trace| write_trace(&file, &trace));
+        config.recorder = Some(Arc::new(recorder));
+    }
     simdevice::Device::new(&config).map_err(|error| Error::InitializationFailed(error.to_string()))
+}
+
+/// Writes a trace; whoever asked for it is told if that fails.
+fn write_trace(file: &Path, trace: &Trace) {
+    let written = serde_json::to_vec(trace)
+        .map_err(std::io::Error::from)
+        .and_then(|json| std::fs::write(file, json));
+    if let Err(error) = written {
+        log::error!("{TRACE}={}: {error}", file.display());
+    }
 }
 
 /// What is printed for people.

@@ -291,3 +291,86 @@ fn without_arguments_it_draws_the_garden() {
             == 1
     );
 }
+
+#[test]
+fn a_scene_is_simulated_from_the_work_that_was_done() {
+    let folder = folder();
+    // Three in a row, so that the camera which suits the scene is some way off.
+    let last = ONE.lines().last().expect("a Gaussian");
+    let others = last.replacen("0 0 3", "2 0 3", 1) + "\n" + &last.replacen("0 0 3", "-2 1 3", 1);
+    let three = ONE.replace("vertex 1", "vertex 3") + &others + "\n";
+    write(&folder, "three.ply", &three);
+    let simulate = |arguments: &[&str]| {
+        let arguments = [&["simulate", "three.ply", "--size", "65x49"], arguments].concat();
+        let output = gaurast(&folder, &arguments);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            output.status.success() && stderr.is_empty(),
+            "{arguments:?}: {stderr}"
+        );
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let json: serde_json::Value =
+        serde_json::from_str(&simulate(&["--format", "json", "--trace", "t.json"])).expect("JSON");
+    let raster = &json[0][1]["raster"];
+    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+    // Every list holds at most three Gaussians, and there are 5 x 4 tiles.
+    let pairs = number(&raster["pairs"]);
+    assert!((3.0..=60.0).contains(&pairs), "{pairs}");
+    assert_eq!(number(&raster["gaussian_evaluations"]), pairs * 256.0);
+    assert!(number(&json[0][1]["blended"]) > 0.0);
+    let timeline = std::fs::read(folder.path().join("t.json")).expect("a timeline");
+    let timeline: serde_json::Value = serde_json::from_slice(&timeline).expect("JSON");
+    let events = timeline["traceEvents"].as_array().expect("events");
+    assert_eq!(
+        events.iter().filter(|event| event["ph"] == "X").count(),
+        6 * 3
+    );
+    let sweep = simulate(&["--sweep", "modules=1..4", "--format", "csv"]);
+    assert_eq!(sweep.lines().count(), 5, "{sweep}");
+    let compared = simulate(&["--stepped"]);
+    assert!(compared.contains("+0.000 %"), "{compared}");
+    assert!(simulate(&["--what-if"]).contains("blocks saturate"));
+    assert!(simulate(&[]).contains("stage 3, raster"));
+    // Only the timeline was asked for.
+    let files = std::fs::read_dir(folder.path()).expect("readable").count();
+    assert_eq!(files, 2);
+}
+
+#[test]
+fn what_cannot_be_simulated_is_said() {
+    let folder = folder();
+    write(&folder, "bad.json", "{}");
+    let fails = |arguments: &[&str], message: &str| {
+        fails(&folder, &[&["simulate"], arguments].concat(), message);
+    };
+    fails(
+        &["--preset", "abacus"],
+        "gaurast: there is no preset abacus",
+    );
+    fails(&["--set", "moduls=3"], "gaurast: there is no field moduls");
+    fails(
+        &["--sweep", "modules=3..1"],
+        "gaurast: --sweep modules=3..1",
+    );
+    fails(&["bad.json"], "gaurast: bad.json: not a trace of work");
+    fails(&["missing.ply"], "gaurast: drawing the scene: missing.ply");
+    fails(&["missing.json"], "gaurast: missing.json");
+}
+
+#[test]
+fn the_papers_numbers_are_printed() {
+    let folder = folder();
+    let output = gaurast(&folder, &["simulate", "--paper"]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    for part in [
+        "bicycle",
+        "GSCore",
+        "predicted",
+        "solved",
+        "calibrated",
+        "0.64 W",
+    ] {
+        assert!(text.contains(part), "{part}");
+    }
+}

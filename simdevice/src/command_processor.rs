@@ -103,7 +103,11 @@ impl CommandProcessor {
                 if self.pass.is_some() {
                     return Err(ExecutionError::InsidePass);
                 }
-                self.pass = Some(Pass::begin(rendering)?);
+                let pass = Pass::begin(rendering)?;
+                if let Some(recorder) = &self.device.config().recorder {
+                    recorder.begin_frame(pass.area());
+                }
+                self.pass = Some(pass);
                 Ok(())
             }
             Packet::ClearAttachments(clear) => self.draw(PassDraw::Clear(clear.clone())),

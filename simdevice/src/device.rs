@@ -1,9 +1,11 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::trace::Recorder;
 use crate::workers::Workers;
 use fearless_simd::Level;
 pub use isa::level::SimdLevel;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// What can be chosen when a device is created.
@@ -22,6 +24,8 @@ pub struct Config {
     pub flush: FlushPolicy,
     /// The longest time that one batch of shader invocations may take.
     pub shader_timeout: Duration,
+    /// Gathers what draws do in tiles, if anybody wants to know. It never changes an image.
+    pub recorder: Option<Arc<Recorder>>,
 }
 
 /// When a pass's bins are rendered. It never changes an image.
@@ -42,6 +46,7 @@ impl Default for Config {
             bin_budget_bytes: 256 << 20,
             flush: FlushPolicy::WhenFull,
             shader_timeout: Duration::from_secs(5),
+            recorder: None,
         }
     }
 }

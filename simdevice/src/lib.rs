@@ -23,6 +23,7 @@ pub mod pass;
 pub mod query;
 pub mod raster;
 pub mod texture;
+pub mod trace;
 pub mod transfer;
 mod workers;
 
@@ -33,3 +34,4 @@ pub use format::Format;
 pub use image::{Image, ImageView};
 pub use isa;
 pub use packet::Packet;
+pub use timing;

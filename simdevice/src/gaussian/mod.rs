@@ -20,6 +20,7 @@ use crate::binning::TileLists;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::packet::{GaussianAppend, GaussianBegin, GaussianState, Rect, Viewport};
+use crate::trace::{self, DrawRecord};
 use fearless_simd::dispatch;
 use fetch::{BATCH, Batch};
 use footprint::Visible;
@@ -63,6 +64,8 @@ pub struct GaussianDraw {
     /// By batch; [`locate`] finds a primitive's.
     pub(crate) splats: Vec<Vec<Splat>>,
     pub(crate) tiles: TileLists,
+    /// Where the work of its tiles goes, if anybody wants to know.
+    pub(crate) record: Option<Arc<DrawRecord>>,
 }
 
 /// The pixels whose centres lie in the viewport.
@@ -114,9 +117,11 @@ impl GaussianSet {
     ) -> Result<GaussianDraw, TooManyGaussians> {
         let started = Instant::now();
         let batches = self.project(device)?;
+        let mut work = Counters::default();
         for batch in &batches {
-            counters.add_all(&batch.counters);
+            work.add_all(&batch.counters);
         }
+        counters.add_all(&work);
         let projected = Instant::now();
         let order = sorted(&batches);
         let sorted = Instant::now();
@@ -127,11 +132,19 @@ impl GaussianSet {
         counters.add(Counter::PreprocessTime, nanoseconds(started, projected));
         counters.add(Counter::SortTime, nanoseconds(projected, sorted));
         counters.add(Counter::BinningTime, nanoseconds(sorted, Instant::now()));
+        let splats: Vec<_> = batches.into_iter().map(|batch| batch.splats).collect();
+        let record = device.config().recorder.as_ref().map(|recorder| {
+            let degree = self.begin.state.sh_degree;
+            let (pairs, bounds) = (tiles.pairs(), self.bounds);
+            let draw = trace::gaussian_draw(&work, &splats, pairs, degree, bounds);
+            recorder.begin_draw(draw)
+        });
         Ok(GaussianDraw {
             state: self.begin.state,
             bounds: self.bounds,
-            splats: batches.into_iter().map(|batch| batch.splats).collect(),
+            splats,
             tiles,
+            record,
         })
     }
 

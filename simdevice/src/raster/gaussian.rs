@@ -14,6 +14,7 @@ use crate::counters::{Counter, Counters};
 use crate::gaussian::project::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::packet::{GaussianState, Rect};
+use crate::trace::{self, Run, TileWork};
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 
 const TILE: usize = TILE_SIZE as usize;
@@ -112,8 +113,18 @@ impl GaussianTile {
         let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
         self.clear(corner, draw.bounds);
         let thresholds = Thresholds::new(&draw.state);
-        let work =
-            dispatch!(level, simd => self.composite(simd, &draw.splats, list, corner, thresholds));
+        let mut runs = draw.record.as_ref().map(|_| Vec::new());
+        let work = dispatch!(level, simd =>
+            self.composite(simd, &draw.splats, list, corner, thresholds, runs.as_mut()));
+        if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
+            record.add(TileWork {
+                at: [tile_x, tile_y],
+                listed: list.len() as u32,
+                runs,
+                contributions: work.contributions,
+                terminated: self.finished_pixels(corner, draw.bounds),
+            });
+        }
         counters.add(Counter::TilePairsEvaluated, work.pairs);
         counters.add(Counter::BlockEvaluations, work.items);
         counters.add(Counter::PixelContributions, work.contributions);
@@ -165,6 +176,7 @@ impl GaussianTile {
         list: &[u32],
         corner: [u32; 2],
         thresholds: Thresholds,
+        mut runs: Option<&mut Vec<Run>>,
     ) -> Work {
         let mut work = Work::default();
         for chunk in list.chunks(CHUNK) {
@@ -172,6 +184,8 @@ impl GaussianTile {
             if open == 0 {
                 break;
             }
+            let blocks = open.count_ones() as u8;
+            let rows = if runs.is_some() { self.open_rows() } else { 0 };
             let open = mask32x16::from_bitmask(simd, open);
             let mut items = 0;
             for (number, &primitive) in chunk.iter().enumerate() {
@@ -187,6 +201,18 @@ impl GaussianTile {
             }
             work.pairs += chunk.len() as u64;
             work.items += items as u64;
+            if let Some(runs) = &mut runs {
+                let (primitives, reached) = (chunk.len() as u32, items as u32);
+                trace::push_run(
+                    runs,
+                    Run {
+                        primitives,
+                        rows,
+                        blocks,
+                        reached,
+                    },
+                );
+            }
             work.contributions += self.evaluate(simd, items, thresholds);
         }
         work
@@ -203,6 +229,35 @@ impl GaussianTile {
             open |= u64::from(any) << block;
         }
         open
+    }
+
+    /// How many rows have a pixel that is not finished.
+    fn open_rows(&self) -> u8 {
+        let open = |&y: &usize| {
+            (0..TILE).any(|x| {
+                let (block, lane) = block_and_lane(x, y);
+                self.transmittance[block][lane].is_sign_positive()
+            })
+        };
+        (0..TILE).filter(open).count() as u8
+    }
+
+    /// How many pixels of `bounds` are finished.
+    fn finished_pixels(&self, corner: [u32; 2], bounds: Rect) -> u32 {
+        let tile = Rect {
+            x: corner[0] as i32,
+            y: corner[1] as i32,
+            width: TILE_SIZE,
+            height: TILE_SIZE,
+        };
+        let inside = bounds.intersect(tile);
+        let finished = self
+            .transmittance
+            .iter()
+            .flatten()
+            .filter(|t| t.is_sign_negative());
+        let outside = TILE_SIZE * TILE_SIZE - inside.width * inside.height;
+        (finished.count() as u32).saturating_sub(outside)
     }
 
     /// Phase 2: composites the first `count` items; returns how many pixels accepted one.

@@ -6,6 +6,8 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand};
 use gaurast_samples::scene::{self, MAX_SH_DEGREE};
 
+use crate::simulate::SimulateArguments;
+
 /// The greatest width and height of a picture.
 const MAX_SIDE: u32 = 16_384;
 
@@ -24,6 +26,8 @@ pub struct Arguments {
 pub enum Command {
     /// Draws a scene and writes the picture.
     Render(Box<RenderArguments>),
+    /// Tells what the simulated hardware would have spent on a scene: time, energy, area
+    Simulate(Box<SimulateArguments>),
 }
 
 impl Default for Command {

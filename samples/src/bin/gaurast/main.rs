@@ -4,6 +4,8 @@ mod args;
 mod progress;
 mod render;
 mod report;
+mod simulate;
+mod simulate_report;
 
 use std::process::ExitCode;
 
@@ -15,7 +17,10 @@ fn main() -> ExitCode {
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
     let arguments = Arguments::parse();
     let result = match arguments.command.unwrap_or_default() {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(arguments) => render::run(&arguments).map_err(|error| error.to_string()),
+        Command::Simulate(arguments) => {
+            simulate::run(&arguments).map_err(|error| error.to_string())
+        }
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -313,3 +313,73 @@ fn a_saturated_tile_fetches_no_more() {
     });
     assert_eq!(all, list);
 }
+
+#[test]
+fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
+    use crate::trace::{DrawWork, Recorder};
+    let quiet = Device::new(&Config::default()).unwrap();
+    for (seed, bounds) in [
+        (40, WHOLE),
+        (
+            41,
+            Rect {
+                x: 5,
+                y: 3,
+                width: 70,
+                height: 50,
+            },
+        ),
+    ] {
+        let recorder = Arc::new(Recorder::default());
+        let recording = Device::new(&Config {
+            recorder: Some(Arc::clone(&recorder)),
+            ..Config::default()
+        })
+        .unwrap();
+        recorder.begin_frame(bounds);
+        let pictures = [&quiet, &recording].map(|device| {
+            let draw = draw(seed, 3000, defaults(), device, bounds);
+            assert_eq!(draw.record.is_some(), device.config().recorder.is_some());
+            let mut tile = Box::new(GaussianTile::default());
+            let mut counters = Counters::default();
+            let mut pixels = Vec::new();
+            for (y, x) in (0..8).flat_map(|y| (0..8).map(move |x| (y, x))) {
+                if !draw.tiles.list(x, y).is_empty() {
+                    tile.render(&draw, device.level(), x, y, &mut counters);
+                    let all = (0..TILE * TILE).map(|at| tile.pixel(at % TILE, at / TILE));
+                    pixels.extend(all.map(|pixel| pixel.map(|rgba| rgba.map(f32::to_bits))));
+                }
+            }
+            (pixels, counters, draw.tiles.pairs())
+        });
+        let [(without, counters, _), (with, counted, pairs)] = pictures;
+        assert!(without == with && !with.is_empty());
+        assert_eq!(counters, counted);
+        let trace = recorder.trace();
+        let work: &DrawWork = &trace.frames[0].draws[0];
+        assert_eq!(work.pairs(), pairs);
+        assert_eq!(
+            work.needed_pairs(),
+            counted.get(Counter::TilePairsEvaluated)
+        );
+        let sum = |of: fn(&TileWork) -> u64| work.tiles.iter().map(of).sum::<u64>();
+        let reached = sum(|tile| tile.runs.iter().map(|run| u64::from(run.reached)).sum());
+        assert_eq!(reached, counted.get(Counter::BlockEvaluations));
+        assert_eq!(
+            sum(|tile| tile.contributions),
+            counted.get(Counter::PixelContributions)
+        );
+        assert!(
+            sum(|tile| u64::from(tile.terminated)) > 0,
+            "some pixels saturate"
+        );
+        // What finishes stays finished, and a row or block has pixels as long as the tile has.
+        for tile in &work.tiles {
+            for pair in tile.runs.windows(2) {
+                assert!(pair[1].rows <= pair[0].rows && pair[1].blocks <= pair[0].blocks);
+            }
+            assert!(tile.runs.iter().all(|run| run.rows > 0 && run.blocks > 0));
+        }
+        assert!(work.boxed_pairs > 0 && work.preprocess.bytes > 0.0 && work.sort.bytes > 0.0);
+    }
+}

@@ -1,0 +1,544 @@
+//! Everything that can be chosen of the hardware, in one typed TOML file, and the presets. Where each number comes
+//! from is written beside it in `presets/paper-15x16.toml`; a preset may inherit from another.
+
+use crate::work::{Mode, Saturation, TILE_PIXELS};
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+/// The hardware.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// The rasterizer modules.
+    pub rasterizer: Rasterizer,
+    /// Main memory, which all share.
+    pub memory: Memory,
+    /// The shader cores.
+    pub shader: Shader,
+    /// Stage 3 on the shader cores, where there is no rasterizer for it.
+    pub baseline: Baseline,
+    /// The chip around them.
+    pub soc: Soc,
+    /// How frames follow each other.
+    pub schedule: ScheduleConfig,
+    /// Energy.
+    pub energy: EnergyConfig,
+    /// Area.
+    pub area: AreaConfig,
+}
+
+/// The rasterizer modules.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rasterizer {
+    /// How many; 0: stage 3 runs on the shader cores.
+    pub modules: u32,
+    /// Processing elements of one.
+    pub pes_per_module: u32,
+    /// Clock in GHz.
+    pub clock_ghz: f64,
+    /// Cycles from one pixel to the next in a PE, in Gaussian mode.
+    pub gaussian_interval: u32,
+    /// The same in triangle mode.
+    pub triangle_interval: u32,
+    /// Cycles from operands to the blended pixel.
+    pub gaussian_latency: u32,
+    /// Cycles from operands to weights and depth.
+    pub triangle_latency: u32,
+    /// Cycles from a pixel's transmittance (or depth) to its next one: a primitive cannot take fewer.
+    pub carried_latency: u32,
+    /// Whether opacity is folded into the exponent; if not, a Gaussian takes a multiplication more than there are
+    /// multipliers, and its interval is one cycle longer.
+    pub opacity_folded: bool,
+    /// What finished pixels are spared.
+    pub saturation: Saturation,
+    /// Primitives that half of the ping-pong tile buffer holds.
+    pub batch: u32,
+    /// Numbers that a primitive brings in.
+    pub numbers_in: u32,
+    /// Numbers that a pixel takes out.
+    pub numbers_out: u32,
+    /// Bytes of a number.
+    pub number_bytes: u32,
+    /// Bytes of an entry of a tile's list.
+    pub index_bytes: u32,
+    /// Width of a module's memory port.
+    pub port_bytes_per_cycle: f64,
+    /// Cycles of the controller at a tile's beginning.
+    pub tile_overhead: u32,
+    /// Cycles to reconfigure once the pipeline has drained.
+    pub mode_switch: u32,
+}
+
+impl Rasterizer {
+    /// All PEs.
+    pub fn pes(&self) -> u32 {
+        self.modules * self.pes_per_module
+    }
+
+    /// Cycles from one pixel to the next in a PE.
+    pub fn interval(&self, mode: Mode) -> u32 {
+        match mode {
+            Mode::Triangle => self.triangle_interval,
+            Mode::Gaussian => self.gaussian_interval + u32::from(!self.opacity_folded),
+        }
+    }
+
+    /// Cycles from operands to results.
+    pub fn latency(&self, mode: Mode) -> u32 {
+        match mode {
+            Mode::Triangle => self.triangle_latency,
+            Mode::Gaussian => self.gaussian_latency,
+        }
+    }
+
+    /// Cycles that a primitive occupies a module's PEs, evaluated in `groups` groups of 16 pixels.
+    pub fn primitive_cycles(&self, mode: Mode, groups: u64) -> u64 {
+        let pixels = groups * 16;
+        let busy = pixels.div_ceil(u64::from(self.pes_per_module)) * u64::from(self.interval(mode));
+        // Where no pixel is evaluated, the controller still looks at the primitive.
+        let carried = if groups == 0 {
+            1
+        } else {
+            u64::from(self.carried_latency)
+        };
+        busy.max(carried).max(1)
+    }
+
+    /// Bytes that a primitive of a tile's list brings in.
+    pub fn primitive_bytes(&self) -> u32 {
+        self.numbers_in * self.number_bytes + self.index_bytes
+    }
+
+    /// Bytes that a tile takes out.
+    pub fn tile_bytes(&self) -> u32 {
+        TILE_PIXELS * self.numbers_out * self.number_bytes
+    }
+}
+
+/// Main memory.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Memory {
+    /// Peak, in GB/s.
+    pub bandwidth_gb_s: f64,
+    /// What of the peak streams reach.
+    pub efficiency: f64,
+    /// Until the first byte of a request, in ns.
+    pub latency_ns: f64,
+}
+
+/// The shader cores: per SM and cycle, lanes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(
+    missing_docs,
+    reason = "named after the fields of ShaderWork that they execute"
+)]
+pub struct Shader {
+    pub sms: u32,
+    pub clock_ghz: f64,
+    pub float_per_cycle: f64,
+    pub integer_per_cycle: f64,
+    pub special_per_cycle: f64,
+    pub wide_per_cycle: f64,
+    pub memory_per_cycle: f64,
+    /// Of the issue slots, those used.
+    pub efficiency: f64,
+}
+
+impl Shader {
+    /// Peak 32-bit floating-point rate in TFLOPS, a fused multiply-add counted as two.
+    pub fn tflops(&self) -> f64 {
+        f64::from(self.sms) * self.float_per_cycle * 2.0 * self.clock_ghz * 1e-3
+    }
+}
+
+/// Stage 3 on shader cores.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Baseline {
+    /// 32-bit operations per pixel and primitive.
+    pub operations_per_evaluation: f64,
+    /// Of the issue slots, those used.
+    pub efficiency: f64,
+}
+
+/// The chip.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Soc {
+    /// Power in W while the shader cores work.
+    pub power_w: f64,
+    /// Area in mm2.
+    pub area_mm2: f64,
+    /// How much smaller a circuit of the rasterizer's technology is in the chip's.
+    pub node_scaling: f64,
+}
+
+/// How frames follow each other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScheduleConfig {
+    /// Whether the next frame's stages 1 and 2 run while a frame is rasterized.
+    pub collaborative: bool,
+    /// Frames begun and not ended, at most.
+    pub frames_in_flight: u32,
+}
+
+/// Energy: picojoules of the reference technology, except where said.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "the operation or byte is in the name")]
+pub struct EnergyConfig {
+    /// What a module draws at the calibration frames' mean activity, in W; 0: nothing is known of it.
+    pub module_power_w: f64,
+    /// Of that, the static part.
+    pub static_share: f64,
+    /// Rasterizer pJ per pJ of this table; 0: calibrated.
+    pub scale: f64,
+    pub add_pj: f64,
+    pub mul_pj: f64,
+    pub div_pj: f64,
+    pub exp_pj: f64,
+    pub buffer_pj_per_byte: f64,
+    pub dram_pj_per_byte: f64,
+    /// Evaluations of the calibration frames that are blended.
+    pub blended_share: f64,
+    pub shader_pj_per_operation: f64,
+}
+
+/// Area: square micrometres of the reference technology.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "the unit is in the name")]
+pub struct AreaConfig {
+    pub technology_nm: f64,
+    pub reference_nm: f64,
+    pub add_um2: f64,
+    pub mul_um2: f64,
+    pub div_um2: f64,
+    /// 0: solved from `enhanced_ratio`.
+    pub exp_um2: f64,
+    pub half_add_um2: f64,
+    pub half_mul_um2: f64,
+    /// Area added by Gaussians over that of the units that were there.
+    pub enhanced_ratio: f64,
+}
+
+/// Why a configuration could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// No preset has this name.
+    #[error("there is no preset {0}; there are {list}", list = preset_names().join(", "))]
+    UnknownPreset(String),
+    /// The file is not TOML, or a field is missing, unknown or of the wrong kind.
+    #[error("{0}")]
+    Toml(String),
+    /// A setting is not `name=value`.
+    #[error("{0} is not NAME=VALUE")]
+    Setting(String),
+    /// No field has this name.
+    #[error("there is no field {0}")]
+    UnknownField(String),
+    /// Several sections have a field of this name.
+    #[error("there are several fields {name}: {}", among.join(", "))]
+    Ambiguous {
+        /// What was asked for.
+        name: String,
+        /// Their full names.
+        among: Vec<String>,
+    },
+    /// A number is out of its range.
+    #[error("{0}")]
+    Range(&'static str),
+    /// Presets inherit from each other in a circle, or too deeply.
+    #[error("{0} inherits from too many")]
+    Inheritance(String),
+}
+
+const PRESETS: &[(&str, &str)] = &[
+    ("paper-15x16", include_str!("../presets/paper-15x16.toml")),
+    ("paper-300", include_str!("../presets/paper-300.toml")),
+    (
+        "single-module",
+        include_str!("../presets/single-module.toml"),
+    ),
+    ("fp16", include_str!("../presets/fp16.toml")),
+    ("orin-nx-10w", include_str!("../presets/orin-nx-10w.toml")),
+    ("orin-nx-maxn", include_str!("../presets/orin-nx-maxn.toml")),
+    ("m2-pro", include_str!("../presets/m2-pro.toml")),
+];
+
+/// The preset that is used where none is named.
+pub const DEFAULT_PRESET: &str = "paper-15x16";
+
+/// The names of the presets.
+pub fn preset_names() -> Vec<&'static str> {
+    PRESETS.iter().map(|(name, _)| *name).collect()
+}
+
+/// Levels of inheritance.
+const MAX_DEPTH: usize = 8;
+
+fn parse(text: &str) -> Result<Table, ConfigError> {
+    text.parse()
+        .map_err(|error: toml::de::Error| ConfigError::Toml(error.to_string()))
+}
+
+fn preset_table(name: &str, depth: usize) -> Result<Table, ConfigError> {
+    let (_, text) = PRESETS
+        .iter()
+        .find(|(known, _)| *known == name)
+        .ok_or_else(|| ConfigError::UnknownPreset(name.to_owned()))?;
+    resolve(parse(text)?, depth)
+}
+
+/// The table with what it inherits.
+fn resolve(mut table: Table, depth: usize) -> Result<Table, ConfigError> {
+    let Some(parent) = table.remove("inherits") else {
+        return Ok(table);
+    };
+    let Value::String(parent) = parent else {
+        return Err(ConfigError::Toml(
+            "inherits is not the name of a preset".to_owned(),
+        ));
+    };
+    if depth >= MAX_DEPTH {
+        return Err(ConfigError::Inheritance(parent));
+    }
+    let mut whole = preset_table(&parent, depth + 1)?;
+    for (section, fields) in table {
+        match (whole.get_mut(&section), fields) {
+            (Some(Value::Table(known)), Value::Table(fields)) => known.extend(fields),
+            (_, fields) => {
+                whole.insert(section, fields);
+            }
+        }
+    }
+    Ok(whole)
+}
+
+impl Config {
+    /// A preset with settings on top, each `section.field=value`, or `field=value` where one section alone has it.
+    ///
+    /// # Errors
+    /// [`ConfigError`] for unknown names and impossible values.
+    pub fn preset(name: &str, settings: &[String]) -> Result<Self, ConfigError> {
+        Self::from_table(preset_table(name, 0)?, settings)
+    }
+
+    /// A configuration from a file's text, which may inherit from a preset, with settings on top.
+    ///
+    /// # Errors
+    /// As for [`Self::preset`].
+    pub fn parse(text: &str, settings: &[String]) -> Result<Self, ConfigError> {
+        Self::from_table(resolve(parse(text)?, 0)?, settings)
+    }
+
+    /// The configuration with settings on top.
+    ///
+    /// # Errors
+    /// As for [`Self::preset`].
+    pub fn with(&self, settings: &[String]) -> Result<Self, ConfigError> {
+        let table = Table::try_from(self).map_err(|error| ConfigError::Toml(error.to_string()))?;
+        Self::from_table(table, settings)
+    }
+
+    fn from_table(mut table: Table, settings: &[String]) -> Result<Self, ConfigError> {
+        for setting in settings {
+            let (name, value) = setting
+                .split_once('=')
+                .ok_or_else(|| ConfigError::Setting(setting.clone()))?;
+            set(&mut table, name.trim(), value.trim())?;
+        }
+        let config: Self = Value::Table(table)
+            .try_into()
+            .map_err(|error: toml::de::Error| ConfigError::Toml(error.to_string()))?;
+        config.check()?;
+        Ok(config)
+    }
+
+    fn check(&self) -> Result<(), ConfigError> {
+        let raster = &self.rasterizer;
+        let counts = [
+            raster.pes_per_module,
+            raster.gaussian_interval,
+            raster.triangle_interval,
+            raster.batch,
+            raster.number_bytes,
+            self.shader.sms,
+            self.schedule.frames_in_flight,
+        ];
+        if counts.contains(&0) {
+            return Err(ConfigError::Range(
+                "PEs, intervals, batch, bytes, SMs and frames in flight are at least 1",
+            ));
+        }
+        if raster.modules > 4096 || raster.batch > 1 << 16 || raster.pes_per_module > 1 << 16 {
+            return Err(ConfigError::Range(
+                "at most 4096 modules, and batches and PEs of 65536",
+            ));
+        }
+        let positive = [
+            raster.clock_ghz,
+            raster.port_bytes_per_cycle,
+            self.memory.bandwidth_gb_s,
+            self.memory.efficiency,
+            self.shader.clock_ghz,
+            self.shader.float_per_cycle,
+            self.shader.integer_per_cycle,
+            self.shader.special_per_cycle,
+            self.shader.wide_per_cycle,
+            self.shader.memory_per_cycle,
+            self.shader.efficiency,
+            self.baseline.efficiency,
+            self.baseline.operations_per_evaluation,
+        ];
+        let large = 1e12;
+        if positive.iter().any(|value| !(1e-6..large).contains(value)) {
+            return Err(ConfigError::Range(
+                "clocks, rates, widths and efficiencies are positive",
+            ));
+        }
+        if !(0.0..1e9).contains(&self.memory.latency_ns) {
+            return Err(ConfigError::Range("a latency is not negative"));
+        }
+        if !(0.0..1.0).contains(&self.energy.static_share) {
+            return Err(ConfigError::Range("the static share is from 0 to below 1"));
+        }
+        Ok(())
+    }
+}
+
+/// Sets a field by its full name, or by its own where that is unique.
+fn set(table: &mut Table, name: &str, text: &str) -> Result<(), ConfigError> {
+    let unknown = || ConfigError::UnknownField(name.to_owned());
+    let full = match name.split_once('.') {
+        Some(_) => name.to_owned(),
+        None => {
+            let among: Vec<_> = table
+                .iter()
+                .filter(|(_, fields)| fields.get(name).is_some())
+                .map(|(section, _)| format!("{section}.{name}"))
+                .collect();
+            match among.as_slice() {
+                [] => return Err(unknown()),
+                [one] => one.clone(),
+                _ => {
+                    let name = name.to_owned();
+                    return Err(ConfigError::Ambiguous { name, among });
+                }
+            }
+        }
+    };
+    let (section, field) = full.split_once('.').ok_or_else(unknown)?;
+    let value = table
+        .get_mut(section)
+        .and_then(|fields| fields.get_mut(field))
+        .ok_or_else(unknown)?;
+    let wrong = || ConfigError::Setting(format!("{name}={text}"));
+    *value = match value {
+        Value::Integer(_) => Value::Integer(text.parse().map_err(|_| wrong())?),
+        Value::Float(_) => Value::Float(text.parse().map_err(|_| wrong())?),
+        Value::Boolean(_) => Value::Boolean(text.parse().map_err(|_| wrong())?),
+        _ => Value::String(text.to_owned()),
+    };
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_can_be_read() {
+        for name in preset_names() {
+            Config::preset(name, &[]).unwrap_or_else(|error| panic!("{name}: {error}"));
+        }
+        let paper = Config::preset("paper-15x16", &[]).unwrap();
+        assert_eq!(paper.rasterizer.pes(), 240);
+        let larger = Config::preset("paper-300", &[]).unwrap();
+        assert_eq!(larger.rasterizer.pes(), 300);
+        assert_eq!(larger.memory, paper.memory);
+    }
+
+    #[test]
+    fn every_number_of_the_presets_says_where_it_comes_from() {
+        for (name, text) in PRESETS {
+            let fields = text
+                .lines()
+                .filter(|line| line.contains(" = ") && !line.starts_with("inherits"));
+            for line in fields.filter(|line| line.contains(char::is_numeric)) {
+                let explained = line.contains('#') || line.trim() == "modules = 0";
+                assert!(explained, "{name}: {line}");
+            }
+        }
+    }
+
+    #[test]
+    fn settings_by_full_and_by_unique_names() {
+        let settings = ["modules=30", "memory.efficiency=0.5", "saturation=block"];
+        let config = Config::preset("paper-15x16", &settings.map(str::to_owned)).unwrap();
+        assert_eq!(config.rasterizer.modules, 30);
+        assert!((config.memory.efficiency - 0.5).abs() < 1e-12);
+        assert_eq!(config.rasterizer.saturation, Saturation::Block);
+        let error = |setting: &str| Config::preset("fp16", &[setting.to_owned()]).unwrap_err();
+        assert!(
+            matches!(error("clock_ghz=1"), ConfigError::Ambiguous { among, .. } if among.len() == 2)
+        );
+        assert!(matches!(error("moduls=1"), ConfigError::UnknownField(_)));
+        assert!(matches!(error("modules"), ConfigError::Setting(_)));
+        assert!(matches!(error("modules=-1"), ConfigError::Toml(_)));
+        assert!(matches!(error("batch=0"), ConfigError::Range(_)));
+        assert!(matches!(error("bandwidth_gb_s=nan"), ConfigError::Range(_)));
+        assert!(matches!(
+            Config::preset("paper", &[]).unwrap_err(),
+            ConfigError::UnknownPreset(_)
+        ));
+    }
+
+    #[test]
+    fn a_file_may_inherit_and_unknown_fields_are_refused() {
+        let config = Config::parse("inherits = 'fp16'\n[rasterizer]\nmodules = 3", &[]).unwrap();
+        assert_eq!(
+            (config.rasterizer.modules, config.rasterizer.number_bytes),
+            (3, 2)
+        );
+        let typo = Config::parse("inherits = 'fp16'\n[rasterizer]\nmodulse = 3", &[]);
+        assert!(matches!(typo, Err(ConfigError::Toml(_))));
+        let again = config.with(&["modules=4".to_owned()]).unwrap();
+        assert_eq!(again.rasterizer.modules, 4);
+    }
+
+    #[test]
+    fn a_gaussian_takes_16_cycles_of_a_tile() {
+        let raster = Config::preset("paper-15x16", &[]).unwrap().rasterizer;
+        assert_eq!(raster.primitive_cycles(Mode::Gaussian, 16), 16);
+        assert_eq!(raster.primitive_cycles(Mode::Triangle, 16), 16);
+        assert_eq!(
+            raster.primitive_cycles(Mode::Gaussian, 2),
+            6,
+            "the carried latency"
+        );
+        assert_eq!(raster.primitive_cycles(Mode::Gaussian, 0), 1);
+        let wide = Rasterizer {
+            pes_per_module: 20,
+            ..raster.clone()
+        };
+        assert_eq!(
+            wide.primitive_cycles(Mode::Gaussian, 16),
+            13,
+            "256 pixels on 20 PEs"
+        );
+        let unfolded = Rasterizer {
+            opacity_folded: false,
+            ..raster
+        };
+        assert_eq!(
+            unfolded.primitive_cycles(Mode::Gaussian, 16),
+            32,
+            "11 multiplications on 10 units"
+        );
+    }
+}

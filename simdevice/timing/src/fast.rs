@@ -1,0 +1,413 @@
+//! The fast model: closed form from event to event.
+//!
+//! With two halves of a tile buffer, a module proceeds in steps: while one batch is evaluated, the next is fetched, and
+//! the longer of the two is the step's length. Where memory is not contended, a stretch of `n` equal steps takes
+//! `n max(c, b / h)` cycles, for `c` cycles of evaluation and `b` bytes a step at `h` bytes per cycle, and nothing in it
+//! is simulated. Where the modules' ports together are wider than main memory, steps are taken one by one, and time
+//! leaps to whatever ends first: an evaluation, a fetch or a write, each of them at a share that is constant in between.
+
+use crate::config::{Config, Rasterizer};
+use crate::plan::{self, Part, Rates, Task};
+use crate::raster::RasterReport;
+use crate::work::{FrameWork, Mode, Segment};
+use std::collections::VecDeque;
+
+/// Rasterizes a frame while others move `others_gb_s` to and from main memory.
+pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> RasterReport {
+    let tasks = plan::tasks(frame, config.rasterizer.saturation);
+    let rates = Rates::new(config, others_gb_s);
+    let mut report = RasterReport::default();
+    let mut queue = tasks.iter();
+    let raster = &config.rasterizer;
+    let contended = rates.port * f64::from(raster.modules) > rates.memory;
+    let mut modules: Vec<_> = (0..raster.modules)
+        .map(|_| Module::new(rates, contended))
+        .collect();
+    for module in &mut modules {
+        module.proceed(&mut queue, raster, &mut report);
+    }
+    let mut now = 0.0;
+    loop {
+        let asking = modules.iter().filter(|module| module.asks()).count();
+        let share = rates.port.min(rates.memory / asking.max(1) as f64);
+        let next = modules
+            .iter()
+            .map(|module| module.next_event(share))
+            .fold(f64::INFINITY, f64::min);
+        if !next.is_finite() {
+            break;
+        }
+        now += next;
+        for module in &mut modules {
+            module.advance(next, share);
+            // Steps of no length follow at once.
+            while module.is_done() {
+                module.proceed(&mut queue, raster, &mut report);
+            }
+            // A tile may end while the next batch is still on its way.
+            if module.step.is_some_and(|step| step.cycles <= 0.0) {
+                let write = module.end_tile(raster, &mut report);
+                module.port.extend(write);
+            }
+        }
+    }
+    report.cycles = now;
+    // Steps wait for memory for as long as they last beyond their evaluation.
+    let evaluation = report.modules.total();
+    let lasted: f64 = modules.iter().map(|module| module.lasted).sum();
+    report.modules.memory = (lasted - evaluation).max(0.0);
+    report.modules.idle = now * modules.len() as f64 - report.modules.total();
+    report
+}
+
+/// What is left of a module's step, its port apart.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    /// Cycles of evaluation.
+    cycles: f64,
+    /// Whether evaluation begins a tile, for whose pixels there must be room.
+    first_of_tile: bool,
+}
+
+/// What a port moves, in order.
+#[derive(Clone, Copy, Debug)]
+struct Request {
+    /// Cycles until the first byte, from when the port gets to it.
+    latency: f64,
+    bytes: f64,
+    /// Pixels, which no step waits for.
+    write: bool,
+}
+
+/// Bytes that count as none, after rounding.
+const SLACK: f64 = 1e-6;
+
+/// Batches that cost alike.
+#[derive(Clone, Copy, Debug)]
+struct Batches {
+    mode: Mode,
+    count: f64,
+    cycles: f64,
+    bytes: f64,
+    /// Fetched in vain; what is fetched next could not be foreseen.
+    wasted: bool,
+    first_of_tile: bool,
+    last_of_tile: bool,
+}
+
+#[derive(Debug)]
+struct Module {
+    rates: Rates,
+    contended: bool,
+    claimed: VecDeque<Batches>,
+    current: Option<Batches>,
+    started: bool,
+    mode: Option<Mode>,
+    step: Option<Step>,
+    port: VecDeque<Request>,
+    /// Cycles in steps.
+    lasted: f64,
+    /// The step evaluates a tile's last batch, in this mode.
+    tile_ended: Option<Mode>,
+}
+
+impl Module {
+    fn new(rates: Rates, contended: bool) -> Self {
+        Self {
+            rates,
+            contended,
+            claimed: VecDeque::new(),
+            current: None,
+            started: false,
+            mode: None,
+            step: None,
+            port: VecDeque::new(),
+            lasted: 0.0,
+            tile_ended: None,
+        }
+    }
+
+    /// Whether the port moves bytes.
+    fn asks(&self) -> bool {
+        self.port
+            .front()
+            .is_some_and(|request| request.latency <= 0.0)
+    }
+
+    /// Whether evaluation waits for pixels to be written: two halves hold pixels.
+    fn is_blocked(&self, step: &Step) -> bool {
+        // What has been evaluated has had its room.
+        step.first_of_tile
+            && step.cycles > 0.0
+            && self.port.iter().filter(|request| request.write).count() > 1
+    }
+
+    /// Whether the step has ended, and everything with it that it waits for.
+    fn is_done(&self) -> bool {
+        self.step
+            .is_some_and(|step| step.cycles <= 0.0 && self.port.iter().all(|request| request.write))
+    }
+
+    /// Cycles until something ends.
+    fn next_event(&self, share: f64) -> f64 {
+        let mut next = f64::INFINITY;
+        if let Some(step) = &self.step
+            && step.cycles > 0.0
+            && !self.is_blocked(step)
+        {
+            next = step.cycles;
+        }
+        match self.port.front() {
+            Some(request) if request.latency > 0.0 => next.min(request.latency),
+            // A port moves one request in a cycle: what is left of the cycle is lost.
+            Some(request) => next.min(((request.bytes - SLACK) / share).ceil().max(1.0)),
+            None => next,
+        }
+    }
+
+    /// Lets `cycles` pass.
+    fn advance(&mut self, cycles: f64, share: f64) {
+        let blocked = self.step.is_some_and(|step| self.is_blocked(&step));
+        if let Some(step) = &mut self.step {
+            self.lasted += cycles;
+            if !blocked {
+                step.cycles -= cycles;
+            }
+        }
+        if let Some(request) = self.port.front_mut() {
+            if request.latency > 0.0 {
+                request.latency -= cycles;
+                return;
+            }
+            request.bytes -= cycles * share;
+            if request.bytes <= SLACK {
+                self.port.pop_front();
+            }
+        }
+    }
+
+    /// Goes on to the next step, or to a stretch of equal ones, if there is any.
+    fn proceed<'a>(
+        &mut self,
+        queue: &mut impl Iterator<Item = &'a Task>,
+        raster: &Rasterizer,
+        report: &mut RasterReport,
+    ) {
+        self.step = None;
+        let write = self.end_tile(raster, report);
+        if let Some(current) = &mut self.current
+            && current.count > 1.0
+        {
+            let Batches {
+                count,
+                cycles,
+                bytes,
+                ..
+            } = *current;
+            let first_of_tile = false;
+            if self.contended || write.is_some() || !self.port.is_empty() {
+                current.count -= 1.0;
+                self.port.push_back(Request {
+                    latency: 0.0,
+                    bytes,
+                    write: false,
+                });
+                self.port.extend(write);
+                self.step = Some(Step {
+                    cycles,
+                    first_of_tile,
+                });
+                return;
+            }
+            // A stretch, in closed form.
+            current.count = 1.0;
+            let each = cycles.max(((bytes - SLACK) / self.rates.port).ceil());
+            let cycles = (count - 1.0) * each;
+            self.step = Some(Step {
+                cycles,
+                first_of_tile,
+            });
+            return;
+        }
+        if self.claimed.is_empty()
+            && let Some(task) = queue.next()
+        {
+            self.claimed = self.batches(task, raster, report);
+        }
+        let next = self.claimed.pop_front();
+        let before = std::mem::replace(&mut self.current, next);
+        if let Some(next) = next {
+            let cold = before.map_or(!self.started, |batch| batch.wasted);
+            let latency = if cold {
+                f64::from(self.rates.latency)
+            } else {
+                0.0
+            };
+            self.port.push_back(Request {
+                latency,
+                bytes: next.bytes,
+                write: false,
+            });
+        }
+        self.started = true;
+        self.port.extend(write);
+        self.tile_ended = before
+            .filter(|batch| batch.last_of_tile)
+            .map(|batch| batch.mode);
+        if before.is_some() || next.is_some() {
+            self.step = Some(Step {
+                cycles: before.map_or(0.0, |batch| batch.cycles),
+                first_of_tile: before.is_some_and(|batch| batch.first_of_tile),
+            });
+        }
+    }
+
+    /// The write of a tile whose last batch has just been evaluated.
+    fn end_tile(&mut self, raster: &Rasterizer, report: &mut RasterReport) -> Option<Request> {
+        let mode = self.tile_ended.take()?;
+        let bytes = f64::from(raster.tile_bytes());
+        report.bytes_out += bytes;
+        // The last pixels must leave the pipeline first.
+        let latency = f64::from(raster.latency(mode));
+        Some(Request {
+            latency,
+            bytes,
+            write: true,
+        })
+    }
+
+    /// A tile's batches, equal ones together.
+    fn batches(
+        &mut self,
+        task: &Task,
+        raster: &Rasterizer,
+        report: &mut RasterReport,
+    ) -> VecDeque<Batches> {
+        let mut out = VecDeque::new();
+        for part in &task.parts {
+            let mut begin = f64::from(raster.tile_overhead);
+            report.modules.controller += begin;
+            if let Some(before) = self.mode.filter(|&mode| mode != part.mode) {
+                let switch = f64::from(raster.latency(before) + raster.mode_switch);
+                report.modules.mode_switch += switch;
+                report.switches += 1.0;
+                begin += switch;
+            }
+            self.mode = Some(part.mode);
+            part_batches(part, raster, begin, report, &mut out);
+        }
+        if let Some(first) = out.front_mut() {
+            first.first_of_tile = true;
+        }
+        if let Some(last) = out.iter_mut().rfind(|batches| !batches.wasted) {
+            last.last_of_tile = true;
+        }
+        out
+    }
+}
+
+/// Cycles of the primitives `from..to` of a segment. The segment's groups are spread evenly.
+fn cycles_of(segment: &Segment, [from, to]: [u32; 2], mode: Mode, raster: &Rasterizer) -> [f64; 3] {
+    let n = u64::from(segment.primitives);
+    let low = segment.groups / n;
+    let before = |k: u32| u64::from(k) * segment.groups / n;
+    let count = u64::from(to - from);
+    let high = before(to) - before(from) - count * low;
+    let [mut busy, mut dependency, mut controller] = [0.0; 3];
+    for (groups, count) in [(low, count - high), (low + 1, high)] {
+        let each = raster.primitive_cycles(mode, groups);
+        let interval = u64::from(raster.interval(mode));
+        let active = (groups * 16).div_ceil(u64::from(raster.pes_per_module)) * interval;
+        let waiting = if groups == 0 {
+            &mut controller
+        } else {
+            &mut dependency
+        };
+        *waiting += ((each - active) * count) as f64;
+        busy += (active * count) as f64;
+    }
+    [busy, dependency, controller]
+}
+
+/// The batches of one draw in a tile, the first of which takes `begin` cycles more.
+fn part_batches(
+    part: &Part,
+    raster: &Rasterizer,
+    begin: f64,
+    report: &mut RasterReport,
+    out: &mut VecDeque<Batches>,
+) {
+    let size = raster.batch;
+    let bytes_each = f64::from(raster.primitive_bytes());
+    let mut listed = part.needed + part.left_over;
+    report.pairs += f64::from(part.needed);
+    let mut fetched = 0.0;
+    let mut push = |count: u32, cycles: f64| {
+        let primitives = listed.min(size * count);
+        listed -= primitives;
+        let bytes = f64::from(primitives) * bytes_each;
+        fetched += bytes;
+        out.push_back(Batches {
+            mode: part.mode,
+            count: f64::from(count),
+            cycles,
+            bytes: bytes / f64::from(count),
+            wasted: false,
+            first_of_tile: false,
+            last_of_tile: false,
+        });
+    };
+    let mut cycles = begin;
+    let mut filled = 0;
+    // A draw's first batch stands alone: it takes longer, and may have to wait for pixels to be written.
+    let mut alone = true;
+    for segment in &part.segments {
+        let mut spend = |range: [u32; 2]| {
+            let [busy, dependency, controller] = cycles_of(segment, range, part.mode, raster);
+            report.modules.busy += busy;
+            report.modules.dependency += dependency;
+            report.modules.controller += controller;
+            busy + dependency + controller
+        };
+        let even = segment.groups.is_multiple_of(u64::from(segment.primitives));
+        let mut at = 0;
+        while at < segment.primitives {
+            let left = segment.primitives - at;
+            let whole = left / size;
+            // The last batch of a list may be fetched in part only.
+            if filled == 0 && !alone && whole >= 1 && even {
+                let total = spend([at, at + whole * size]);
+                push(whole, total / f64::from(whole));
+                at += whole * size;
+                continue;
+            }
+            let taken = left.min(size - filled);
+            cycles += spend([at, at + taken]);
+            filled += taken;
+            at += taken;
+            if filled == size {
+                push(1, cycles);
+                (cycles, filled, alone) = (0.0, 0, false);
+            }
+        }
+        report.add_evaluations(part.mode, (segment.groups * 16) as f64);
+    }
+    if filled > 0 {
+        push(1, cycles);
+    }
+    report.bytes_in += fetched;
+    if listed > 0 {
+        let bytes = f64::from(listed.min(size)) * bytes_each;
+        report.bytes_in += bytes;
+        report.bytes_wasted += bytes;
+        out.push_back(Batches {
+            mode: part.mode,
+            count: 1.0,
+            cycles: 0.0,
+            bytes,
+            wasted: true,
+            first_of_tile: false,
+            last_of_tile: false,
+        });
+    }
+}

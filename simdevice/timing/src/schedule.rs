@@ -1,0 +1,282 @@
+//! Two engines, the shader cores and the rasterizer, and frames that pass through them: stages 1 and 2 on the one, stage
+//! 3 on the other. Collaborative scheduling lets the next frame's stages 1 and 2 run while a frame is rasterized;
+//! without it a frame ends before the next one begins. Without a rasterizer all three stages run on the shader cores.
+
+use serde::Serialize;
+
+/// Milliseconds of a frame's stages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Stages {
+    /// Stage 1.
+    pub preprocess: f64,
+    /// Stage 2.
+    pub sort: f64,
+    /// Stage 3.
+    pub raster: f64,
+}
+
+/// Who works.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Engine {
+    /// The shader cores.
+    ShaderCores,
+    /// The rasterizer.
+    Rasterizer,
+}
+
+impl Engine {
+    /// How people call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ShaderCores => "shader cores",
+            Self::Rasterizer => "rasterizer",
+        }
+    }
+}
+
+/// A piece of work on the timeline.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Span {
+    /// Who works.
+    pub engine: Engine,
+    /// The frame, from 0.
+    pub frame: usize,
+    /// Which stage.
+    pub stage: &'static str,
+    /// When it begins, in ms.
+    pub begin_ms: f64,
+    /// When it ends, in ms.
+    pub end_ms: f64,
+}
+
+/// How frames may overlap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Policy {
+    /// Whether stages 1 and 2 of a frame may run beside stage 3 of an earlier one.
+    pub collaborative: bool,
+    /// Frames begun and not ended, at most.
+    pub frames_in_flight: usize,
+    /// Whether there is a rasterizer for stage 3.
+    pub has_rasterizer: bool,
+}
+
+/// Lays frames out in time, each as early as the engines and the frames before it allow.
+pub fn timeline(frames: &[Stages], policy: Policy) -> Vec<Span> {
+    let mut spans: Vec<Span> = Vec::new();
+    let (mut shader_free, mut raster_free) = (0.0f64, 0.0f64);
+    let mut ends: Vec<f64> = Vec::new();
+    let in_flight = if policy.collaborative {
+        policy.frames_in_flight.max(1)
+    } else {
+        1
+    };
+    for (frame, stages) in frames.iter().enumerate() {
+        let before = frame
+            .checked_sub(in_flight)
+            .and_then(|index| ends.get(index));
+        let mut now = shader_free.max(before.copied().unwrap_or(0.0));
+        let mut span = |engine, stage, begin_ms: f64, length: f64| {
+            let end_ms = begin_ms + length;
+            spans.push(Span {
+                engine,
+                frame,
+                stage,
+                begin_ms,
+                end_ms,
+            });
+            end_ms
+        };
+        now = span(Engine::ShaderCores, "preprocess", now, stages.preprocess);
+        now = span(Engine::ShaderCores, "sort", now, stages.sort);
+        shader_free = now;
+        let end = if policy.has_rasterizer {
+            raster_free = span(
+                Engine::Rasterizer,
+                "raster",
+                now.max(raster_free),
+                stages.raster,
+            );
+            raster_free
+        } else {
+            shader_free = span(Engine::ShaderCores, "raster", now, stages.raster);
+            shader_free
+        };
+        ends.push(end);
+    }
+    spans
+}
+
+/// Frames per second that the same frame, over and over, settles at.
+pub fn fps(stages: Stages, policy: Policy) -> f64 {
+    const WARM_UP: usize = 8;
+    const MEASURED: usize = 64;
+    let spans = timeline(&[stages; WARM_UP + MEASURED], policy);
+    let end_of = |frame: usize| {
+        let ends = spans
+            .iter()
+            .filter(|span| span.frame == frame)
+            .map(|span| span.end_ms);
+        ends.fold(0.0, f64::max)
+    };
+    let last = end_of(WARM_UP + MEASURED - 1) - end_of(WARM_UP - 1);
+    MEASURED as f64 / last * 1e3
+}
+
+/// A timeline in Chrome's trace event format, which Perfetto opens too: a row per engine. To be written as JSON.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct ChromeTrace<T> {
+    trace_events: Vec<Event>,
+    display_time_unit: &'static str,
+    /// Whatever else a reader should know.
+    other_data: T,
+}
+
+/// An event; times in microseconds.
+#[derive(Clone, Debug, Serialize)]
+struct Event {
+    name: String,
+    /// "M": a name of a process or thread; "X": a span.
+    ph: &'static str,
+    pid: u32,
+    tid: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cat: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ts: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dur: Option<f64>,
+    args: Arguments,
+}
+
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Arguments {
+    Name(&'static str),
+    Frame(usize),
+}
+
+/// The timeline, with `other_data` beside it.
+pub fn chrome_trace<T: Serialize>(spans: &[Span], other_data: T) -> ChromeTrace<T> {
+    let track = |engine: Engine| match engine {
+        Engine::ShaderCores => 1,
+        Engine::Rasterizer => 2,
+    };
+    let named = |kind: &str, tid, name| Event {
+        name: kind.to_owned(),
+        ph: "M",
+        pid: 1,
+        tid,
+        cat: None,
+        ts: None,
+        dur: None,
+        args: Arguments::Name(name),
+    };
+    let mut trace_events = vec![named("process_name", 0, "GauRast")];
+    for engine in [Engine::ShaderCores, Engine::Rasterizer] {
+        trace_events.push(named("thread_name", track(engine), engine.name()));
+    }
+    trace_events.extend(spans.iter().map(|span| Event {
+        name: format!("{} {}", span.stage, span.frame),
+        ph: "X",
+        pid: 1,
+        tid: track(span.engine),
+        cat: Some(span.stage),
+        ts: Some(span.begin_ms * 1e3),
+        dur: Some((span.end_ms - span.begin_ms) * 1e3),
+        args: Arguments::Frame(span.frame),
+    }));
+    ChromeTrace {
+        trace_events,
+        display_time_unit: "ms",
+        other_data,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STAGES: Stages = Stages {
+        preprocess: 20.0,
+        sort: 10.0,
+        raster: 12.0,
+    };
+    const POLICY: Policy = Policy {
+        collaborative: true,
+        frames_in_flight: 2,
+        has_rasterizer: true,
+    };
+
+    #[test]
+    fn the_slower_engine_sets_the_pace_if_they_collaborate() {
+        assert!((fps(STAGES, POLICY) - 1e3 / 30.0).abs() < 1e-9);
+        let raster = Stages {
+            raster: 50.0,
+            ..STAGES
+        };
+        assert!((fps(raster, POLICY) - 1e3 / 50.0).abs() < 1e-9);
+        let serial = Policy {
+            collaborative: false,
+            ..POLICY
+        };
+        assert!((fps(STAGES, serial) - 1e3 / 42.0).abs() < 1e-9);
+        let one = Policy {
+            frames_in_flight: 1,
+            ..POLICY
+        };
+        assert!((fps(STAGES, one) - 1e3 / 42.0).abs() < 1e-9);
+        let none = Policy {
+            has_rasterizer: false,
+            ..POLICY
+        };
+        assert!((fps(STAGES, none) - 1e3 / 42.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_engine_does_one_thing_at_a_time_and_stages_follow_each_other() {
+        let frames: Vec<_> = (0..9)
+            .map(|k| Stages {
+                preprocess: f64::from(k * 7 % 5),
+                sort: 1.0,
+                raster: f64::from(k * 3 % 4),
+            })
+            .collect();
+        let spans = timeline(&frames, POLICY);
+        assert_eq!(spans.len(), 27);
+        for (i, a) in spans.iter().enumerate() {
+            assert!(a.end_ms >= a.begin_ms);
+            for b in &spans[..i] {
+                let apart = b.end_ms <= a.begin_ms || a.end_ms <= b.begin_ms;
+                assert!(apart || a.engine != b.engine, "{a:?} {b:?}");
+                assert!(a.frame != b.frame || b.end_ms <= a.begin_ms);
+            }
+        }
+        // Two frames in flight: a third begins when the first has ended.
+        let end = |frame| {
+            spans
+                .iter()
+                .filter(|s| s.frame == frame)
+                .map(|s| s.end_ms)
+                .fold(0.0, f64::max)
+        };
+        for span in &spans {
+            assert!(span.frame < 2 || span.begin_ms >= end(span.frame - 2));
+        }
+    }
+
+    #[test]
+    fn the_trace_has_an_event_per_span() {
+        let spans = timeline(&[STAGES; 3], POLICY);
+        let trace = serde_json::to_value(chrome_trace(&spans, [1])).unwrap();
+        let events = trace["traceEvents"].as_array().unwrap();
+        let complete: Vec<_> = events.iter().filter(|event| event["ph"] == "X").collect();
+        assert_eq!(complete.len(), spans.len());
+        let total: f64 = complete
+            .iter()
+            .map(|event| event["dur"].as_f64().unwrap())
+            .sum();
+        assert!((total - 3.0 * 42.0 * 1e3).abs() < 1e-6);
+    }
+}

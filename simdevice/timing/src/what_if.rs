@@ -1,0 +1,108 @@
+//! What skipping would bring as hardware: the same frame on the same machine, with each skip of the device alone and
+//! together.
+
+use crate::config::Config;
+use crate::simulate::{Simulation, simulate};
+use crate::work::{FrameWork, Saturation};
+use serde::Serialize;
+
+/// A variant of the hardware or of the work that reaches it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WhatIf {
+    /// What is different.
+    pub name: &'static str,
+    /// What comes of it.
+    pub simulation: Simulation,
+}
+
+/// The variants, the least skipping first.
+pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
+    let with = |name, frame: &FrameWork, saturation| {
+        let mut config = config.clone();
+        config.rasterizer.saturation = saturation;
+        WhatIf {
+            name,
+            simulation: simulate(frame, &config),
+        }
+    };
+    let boxed = boxed(frame);
+    vec![
+        with(
+            "3-sigma squares, no saturation (estimated)",
+            &boxed,
+            Saturation::None,
+        ),
+        with(
+            "3-sigma squares, tiles saturate (estimated)",
+            &boxed,
+            Saturation::Tile,
+        ),
+        with("exact tile tests, no saturation", frame, Saturation::None),
+        with("exact tile tests, tiles saturate", frame, Saturation::Tile),
+        with("exact tile tests, rows saturate", frame, Saturation::Row),
+        with(
+            "exact tile tests, blocks saturate",
+            frame,
+            Saturation::Block,
+        ),
+        with(
+            "exact tile and block tests, blocks saturate",
+            frame,
+            Saturation::Reached,
+        ),
+    ]
+}
+
+/// The frame with as many pairs as 3-sigma squares give. Which tiles they are in is not known: every list is lengthened
+/// alike, so what comes of it is an estimate.
+fn boxed(frame: &FrameWork) -> FrameWork {
+    let mut frame = frame.clone();
+    for draw in &mut frame.draws {
+        let pairs = draw.pairs();
+        if pairs == 0 || draw.boxed_pairs <= pairs {
+            continue;
+        }
+        let factor = draw.boxed_pairs as f64 / pairs as f64;
+        let longer = |count: u32| (f64::from(count) * factor).round() as u32;
+        draw.sort = draw.sort.times(factor);
+        draw.boxed_pairs = 0;
+        for tile in &mut draw.tiles {
+            for run in &mut tile.runs {
+                run.primitives = longer(run.primitives);
+            }
+            tile.listed = longer(tile.listed).max(tile.needed());
+        }
+    }
+    frame
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::even_frame;
+    use crate::work::Run;
+
+    #[test]
+    fn each_skip_saves_cycles() {
+        let mut frame = even_frame([640, 480], 800_000, 0.2);
+        let draw = &mut frame.draws[0];
+        draw.boxed_pairs = 2 * draw.pairs();
+        for tile in &mut draw.tiles {
+            let n = tile.listed;
+            let run = |primitives, rows, blocks| Run {
+                primitives,
+                rows,
+                blocks,
+                reached: primitives * u32::from(blocks) / 2,
+            };
+            tile.runs = vec![run(n / 4, 16, 16), run(n / 4, 13, 9), run(n / 4, 8, 7)];
+        }
+        let config = Config::preset("single-module", &[]).unwrap();
+        let cycles: Vec<_> = what_ifs(&frame, &config)
+            .iter()
+            .map(|what_if| what_if.simulation.raster.cycles)
+            .collect();
+        assert!(cycles[0] > 1.9 * cycles[2]);
+        assert!(cycles[2..].is_sorted_by(|a, b| a > b), "{cycles:?}");
+    }
+}

@@ -1,0 +1,338 @@
+//! The trace of work: what a device did for a frame, in the units that cost hardware something. It tells nothing of
+//! time; every model in this crate reads it and none changes it.
+
+use serde::{Deserialize, Serialize};
+
+/// Pixels along a side of the tiles that a trace tells of, and parallel rows (or 4x4 blocks) of one.
+pub const TILE_SIDE: u32 = 16;
+/// Pixels of such a tile.
+pub const TILE_PIXELS: u32 = TILE_SIDE * TILE_SIDE;
+/// Groups of 16 pixels (rows, or 4x4 blocks) of such a tile.
+pub const TILE_GROUPS: u32 = 16;
+/// The version of [`Trace`]'s layout.
+pub const TRACE_VERSION: u32 = 1;
+
+/// What a program did, as a list of frames.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Trace {
+    /// [`TRACE_VERSION`].
+    pub version: u32,
+    /// Frames, oldest first: render passes that drew something.
+    pub frames: Vec<FrameWork>,
+}
+
+/// The work of one frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameWork {
+    /// Width and height of what is rendered to, in pixels.
+    pub size: [u32; 2],
+    /// Draws in submission order.
+    pub draws: Vec<DrawWork>,
+}
+
+/// What the rasterizer is configured for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// Triangles: coverage, weights and depth.
+    Triangle,
+    /// Gaussians: front-to-back accumulation.
+    #[default]
+    Gaussian,
+}
+
+/// The work of one draw.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DrawWork {
+    /// The rasterizer's mode.
+    pub mode: Mode,
+    /// Primitives that the draw named.
+    pub primitives: u64,
+    /// Primitives that reached at least one tile.
+    pub drawn: u64,
+    /// Pairs of a tile and a Gaussian that the square around its 3-sigma circle gives (what the original 3DGS code
+    /// bins); 0 where that is unknown.
+    pub boxed_pairs: u64,
+    /// Stage 1, preprocessing: projection, spherical harmonics or vertex shaders; and for triangles the fragment
+    /// shaders.
+    pub preprocess: ShaderWork,
+    /// Stage 2: making tile lists in depth order.
+    pub sort: ShaderWork,
+    /// Tiles whose list is not empty, in the order in which they are dispatched.
+    pub tiles: Vec<TileWork>,
+}
+
+/// What shader cores execute and move: counts of operations of single lanes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ShaderWork {
+    /// 32-bit floating-point additions, multiplications and fused ones, comparisons and selections.
+    pub float: f64,
+    /// 32-bit integer operations.
+    pub integer: f64,
+    /// Divisions, roots, exponentials.
+    pub special: f64,
+    /// 64-bit operations.
+    pub wide: f64,
+    /// Loads and stores.
+    pub memory: f64,
+    /// Bytes moved to and from main memory.
+    pub bytes: f64,
+}
+
+impl ShaderWork {
+    /// Both together.
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            float: self.float + other.float,
+            integer: self.integer + other.integer,
+            special: self.special + other.special,
+            wide: self.wide + other.wide,
+            memory: self.memory + other.memory,
+            bytes: self.bytes + other.bytes,
+        }
+    }
+
+    /// The work, `factor` times.
+    pub fn times(&self, factor: f64) -> Self {
+        Self {
+            float: self.float * factor,
+            integer: self.integer * factor,
+            special: self.special * factor,
+            wide: self.wide * factor,
+            memory: self.memory * factor,
+            bytes: self.bytes * factor,
+        }
+    }
+
+    /// All operations.
+    pub fn operations(&self) -> f64 {
+        self.float + self.integer + self.special + self.wide + self.memory
+    }
+}
+
+/// The work of one draw in one 16x16 tile.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TileWork {
+    /// Column and row in tiles.
+    pub at: [u32; 2],
+    /// Primitives in the tile's list.
+    pub listed: u32,
+    /// The list from its front, cut where the number of unfinished pixels changes. What no run covers was not
+    /// fetched, because the tile was finished.
+    pub runs: Vec<Run>,
+    /// Pairs of a pixel and a primitive that changed the pixel.
+    pub contributions: u64,
+    /// Pixels that were finished before the list's end.
+    pub terminated: u32,
+}
+
+/// Consecutive primitives of a tile's list between two changes of what is finished.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Primitives.
+    pub primitives: u32,
+    /// Rows of 16 pixels with an unfinished pixel, 0 to 16.
+    pub rows: u8,
+    /// Blocks of 4x4 pixels with an unfinished pixel, 0 to 16.
+    pub blocks: u8,
+    /// Pairs of a primitive and an unfinished 4x4 block that it reaches, summed over the primitives.
+    pub reached: u32,
+}
+
+/// Which pixels are spared a primitive once they are finished.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Saturation {
+    /// None: every primitive of the list is evaluated at every pixel.
+    None,
+    /// The tile's list ends once all its pixels are finished.
+    #[default]
+    Tile,
+    /// Rows of 16 pixels, too.
+    Row,
+    /// Blocks of 4x4 pixels, too.
+    Block,
+    /// Blocks of 4x4 pixels, and a primitive is evaluated only in blocks that it reaches.
+    Reached,
+}
+
+impl Saturation {
+    /// Every granularity, the coarsest first.
+    pub const ALL: [Self; 5] = [
+        Self::None,
+        Self::Tile,
+        Self::Row,
+        Self::Block,
+        Self::Reached,
+    ];
+}
+
+impl TileWork {
+    /// A tile of which all pixels stay unfinished and that every primitive covers.
+    pub fn open(at: [u32; 2], listed: u32) -> Self {
+        Self {
+            at,
+            listed,
+            runs: vec![Run {
+                primitives: listed,
+                rows: 16,
+                blocks: 16,
+                reached: listed * TILE_GROUPS,
+            }],
+            contributions: u64::from(listed) * u64::from(TILE_PIXELS),
+            terminated: 0,
+        }
+    }
+
+    /// Primitives that the tile's unfinished pixels needed.
+    pub fn needed(&self) -> u32 {
+        self.runs.iter().map(|run| run.primitives).sum()
+    }
+
+    /// The list as hardware that saturates like this sees it: how many primitives, and how many groups of 16 pixels
+    /// they are evaluated in together. In order.
+    pub fn segments(&self, saturation: Saturation) -> impl Iterator<Item = Segment> {
+        let all = matches!(saturation, Saturation::None);
+        let rest = if all {
+            self.listed.saturating_sub(self.needed())
+        } else {
+            0
+        };
+        let groups = move |run: &Run| {
+            let n = u64::from(run.primitives);
+            match saturation {
+                Saturation::None | Saturation::Tile => n * u64::from(TILE_GROUPS),
+                Saturation::Row => n * u64::from(run.rows),
+                Saturation::Block => n * u64::from(run.blocks),
+                Saturation::Reached => u64::from(run.reached),
+            }
+        };
+        let runs = self.runs.iter().map(move |run| Segment {
+            primitives: run.primitives,
+            groups: groups(run),
+        });
+        let rest = Segment {
+            primitives: rest,
+            groups: u64::from(rest) * u64::from(TILE_GROUPS),
+        };
+        runs.chain([rest]).filter(|segment| segment.primitives > 0)
+    }
+
+    /// Pairs of a pixel and a primitive that hardware which saturates like this evaluates.
+    pub fn evaluations(&self, saturation: Saturation) -> u64 {
+        self.segments(saturation)
+            .map(|segment| segment.groups * u64::from(TILE_PIXELS / TILE_GROUPS))
+            .sum()
+    }
+}
+
+/// Consecutive primitives that cost alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segment {
+    /// Primitives.
+    pub primitives: u32,
+    /// Groups of 16 pixels that they are evaluated in, summed over the primitives.
+    pub groups: u64,
+}
+
+impl DrawWork {
+    /// Pairs of a tile and a primitive in the lists.
+    pub fn pairs(&self) -> u64 {
+        self.tiles.iter().map(|tile| u64::from(tile.listed)).sum()
+    }
+
+    /// Pairs of a tile and a primitive that unfinished pixels needed.
+    pub fn needed_pairs(&self) -> u64 {
+        self.tiles.iter().map(|tile| u64::from(tile.needed())).sum()
+    }
+
+    /// Pairs of a pixel and a primitive that are evaluated.
+    pub fn evaluations(&self, saturation: Saturation) -> u64 {
+        self.tiles
+            .iter()
+            .map(|tile| tile.evaluations(saturation))
+            .sum()
+    }
+}
+
+impl FrameWork {
+    /// Pairs of a tile and a primitive in the lists.
+    pub fn pairs(&self) -> u64 {
+        self.draws.iter().map(DrawWork::pairs).sum()
+    }
+
+    /// Stages 1 and 2 of all draws.
+    pub fn shader(&self) -> [ShaderWork; 2] {
+        self.draws
+            .iter()
+            .fold(Default::default(), |[one, two], draw| {
+                [one.plus(&draw.preprocess), two.plus(&draw.sort)]
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tile() -> TileWork {
+        let run = |primitives, rows, blocks, reached| Run {
+            primitives,
+            rows,
+            blocks,
+            reached,
+        };
+        TileWork {
+            at: [0, 0],
+            listed: 10,
+            runs: vec![run(3, 16, 16, 20), run(4, 9, 7, 8)],
+            contributions: 100,
+            terminated: 256,
+        }
+    }
+
+    #[test]
+    fn finer_saturation_evaluates_less() {
+        let evaluations = Saturation::ALL.map(|saturation| tile().evaluations(saturation));
+        assert_eq!(
+            evaluations,
+            [10 * 256, 7 * 256, (48 + 36) * 16, (48 + 28) * 16, 28 * 16]
+        );
+    }
+
+    #[test]
+    fn what_was_not_needed_is_a_segment_without_saturation() {
+        let segments: Vec<_> = tile().segments(Saturation::None).collect();
+        assert_eq!(segments.len(), 3);
+        assert_eq!(
+            segments[2],
+            Segment {
+                primitives: 3,
+                groups: 48
+            }
+        );
+        assert_eq!(tile().segments(Saturation::Row).count(), 2);
+    }
+
+    #[test]
+    fn traces_survive_json() {
+        let trace = Trace {
+            version: TRACE_VERSION,
+            frames: vec![FrameWork {
+                size: [16, 16],
+                draws: vec![DrawWork {
+                    tiles: vec![tile()],
+                    ..DrawWork::default()
+                }],
+            }],
+        };
+        let text = serde_json::to_string(&trace).unwrap();
+        assert_eq!(serde_json::from_str::<Trace>(&text).unwrap(), trace);
+    }
+}
