@@ -3,9 +3,11 @@
 //! One table defines them; sizes, aspects and conversions derive from it. Texels are decoded to and encoded from
 //! four 32-bit registers in the order R, G, B, A. Registers of integer formats hold the integer's bits, as shader
 //! registers do; depth and stencil are held in the first register. Components that a format lacks read as
-//! (0, 0, 0, 1). The uncompressed formats of Vulkan 1.0 with components of up to 32 bits are here; which of them
+//! (0, 0, 0, 1). The formats of Vulkan 1.0 with components of up to 32 bits are here, and those of compressed blocks of
+//! texels (see [`Format::decompressed`]), whose blocks are read and written whole, as if each were a texel; which of them
 //! can be used for what is advertised elsewhere.
 
+mod block;
 mod convert;
 #[cfg(test)]
 mod tests;
@@ -231,6 +233,22 @@ formats! {
     D16UnormS8Uint: DepthStencil, D 16 S 8;
     D24UnormS8Uint: DepthStencil, D 24 S 8;
     D32SfloatS8Uint: DepthStencil, D 32 S 8;
+    Bc1RgbUnormBlock: Unorm, X 32 X 32;
+    Bc1RgbSrgbBlock: Srgb, X 32 X 32;
+    Bc1RgbaUnormBlock: Unorm, X 32 X 32;
+    Bc1RgbaSrgbBlock: Srgb, X 32 X 32;
+    Bc2UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Bc2SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Bc3UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Bc3SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
+    Bc4UnormBlock: Unorm, X 32 X 32;
+    Bc4SnormBlock: Snorm, X 32 X 32;
+    Bc5UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Bc5SnormBlock: Snorm, X 32 X 32 X 32 X 32;
+    Bc6hUfloatBlock: Ufloat, X 32 X 32 X 32 X 32;
+    Bc6hSfloatBlock: Sfloat, X 32 X 32 X 32 X 32;
+    Bc7UnormBlock: Unorm, X 32 X 32 X 32 X 32;
+    Bc7SrgbBlock: Srgb, X 32 X 32 X 32 X 32;
 }
 
 /// A texel has at most this many bytes.
@@ -240,7 +258,7 @@ pub const MAX_TEXEL_SIZE: usize = 16;
 const ABSENT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
 impl Format {
-    /// Bytes per texel. Formats of both depth and stencil have no texel of both: see [`Format::plane`].
+    /// Bytes per texel, or per block of a compressed format. Formats of both depth and stencil have no texel of both: see [`Format::plane`].
     pub const fn texel_size(self) -> usize {
         let components = self.components();
         let (mut bits, mut index) = (0, 0);

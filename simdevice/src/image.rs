@@ -3,9 +3,14 @@
 //! Every aspect is a plane of its own: all of its layers, each holding its mip levels from the largest down. A
 //! level holds its samples one after another, a sample its slices, a slice its rows; rows begin at multiples of
 //! [`ROW_ALIGNMENT`]. So a row of one sample is always consecutive, whatever the image.
+//!
+//! A compressed image's blocks of texels take the place of texels: layouts and copies count them.
+
+mod decompress;
 
 use crate::format::Format;
 use crate::packet::Aspect;
+use decompress::Decompressed;
 use devmem::{Allocation, OutOfBounds};
 use std::sync::Arc;
 
@@ -48,7 +53,7 @@ pub struct ImageDesc {
 pub struct SubresourceLayout {
     /// How its texels are stored.
     pub format: Format,
-    /// Its texels in x, y and z.
+    /// Its texels, or blocks of texels, in x, y and z.
     pub extent: [u32; 3],
     /// Bytes from the image's beginning to its own.
     pub offset: u64,
@@ -128,7 +133,9 @@ impl ImageDesc {
     /// A mip level's layout, but for its place.
     fn level_layout(&self, aspect: Aspect, level: u32) -> Option<SubresourceLayout> {
         let format = self.format.plane(aspect)?;
-        let extent = self.mip_extent(level);
+        let side = format.block_side();
+        let [width, height, depth] = self.mip_extent(level);
+        let extent = [width.div_ceil(side), height.div_ceil(side), depth];
         let [width, height, depth] = extent.map(u64::from);
         let row_pitch = (width * format.texel_size() as u64).next_multiple_of(ROW_ALIGNMENT);
         let depth_pitch = row_pitch.checked_mul(height)?;
@@ -186,6 +193,8 @@ pub struct Image {
     pub memory: Arc<Allocation>,
     /// The byte at which it begins there.
     pub offset: u64,
+    /// A compressed image's texels, once they were wanted.
+    decompressed: Arc<Decompressed>,
 }
 
 impl Image {
@@ -209,6 +218,7 @@ impl Image {
             desc,
             memory,
             offset,
+            decompressed: Arc::default(),
         })
     }
 

@@ -45,6 +45,7 @@ const SUPPORTED: &[&str] = &[
     "shader_storage_image_read_without_format",
     "shader_storage_image_write_without_format",
     "shader_uniform_buffer_array_dynamic_indexing",
+    "texture_compression_bc",
     "vertex_pipeline_stores_and_atomics",
     "wide_lines",
     // Core 1.1.
@@ -516,7 +517,7 @@ mod tests {
 
     #[test]
     fn supported_features_are_those_of_the_structures() {
-        let mut names = all_true::<vk::PhysicalDeviceFeatures>(36);
+        let mut names = all_true::<vk::PhysicalDeviceFeatures>(37);
         names.extend(all_true::<vk::PhysicalDeviceVulkan11Features<'_>>(4));
         names.extend(all_true::<vk::PhysicalDeviceVulkan12Features<'_>>(32));
         names.extend(all_true::<vk::PhysicalDeviceVulkan13Features<'_>>(10));

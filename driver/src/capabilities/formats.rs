@@ -17,7 +17,7 @@ use std::sync::LazyLock;
 pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
     /// By the values of Vulkan's core formats, which are consecutive.
     static FORMATS: LazyLock<Vec<Option<Format>>> = LazyLock::new(|| {
-        (0..=vk::Format::D32_SFLOAT_S8_UINT.as_raw())
+        (0..=vk::Format::BC7_SRGB_BLOCK.as_raw())
             .map(|raw| named(&format!("{:?}", vk::Format::from_raw(raw))))
             .collect()
     });
@@ -42,10 +42,22 @@ fn is_scaled(format: Format) -> bool {
     matches!(format.numeric(), Numeric::Uscaled | Numeric::Sscaled)
 }
 
+/// Whether texels are stored in compressed blocks.
+fn is_compressed(format: Format) -> bool {
+    format.decompressed().is_some()
+}
+
 /// What images of the format, of either tiling, can do.
 fn image_features(format: Format) -> vk::FormatFeatureFlags {
     if is_scaled(format) {
         return vk::FormatFeatureFlags::empty();
+    }
+    if is_compressed(format) {
+        return vk::FormatFeatureFlags::TRANSFER_SRC
+            | vk::FormatFeatureFlags::TRANSFER_DST
+            | vk::FormatFeatureFlags::BLIT_SRC
+            | vk::FormatFeatureFlags::SAMPLED_IMAGE
+            | vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
     }
     let mut features = vk::FormatFeatureFlags::TRANSFER_SRC
         | vk::FormatFeatureFlags::TRANSFER_DST
@@ -94,7 +106,7 @@ fn is_rendered(format: Format) -> bool {
 /// What buffers of the format can do: any colour is a vertex attribute, unless it takes more than its component to
 /// know one. Programs read texels of any format.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
-    if !is_color(format) {
+    if !is_color(format) || is_compressed(format) {
         return vk::FormatFeatureFlags::empty();
     }
     if is_scaled(format) {
@@ -118,7 +130,7 @@ pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
     let Some(format) = device_format(format) else {
         return vk::FormatProperties::default();
     };
-    let linear = if is_color(format) {
+    let linear = if is_color(format) && !is_compressed(format) {
         image_features(format)
     } else {
         vk::FormatFeatureFlags::empty()
@@ -155,7 +167,8 @@ const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
     vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw()
         | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
         | vk::ImageCreateFlags::ALIAS.as_raw()
-        | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw(),
+        | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw()
+        | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw(),
 );
 
 /// The features that usages need; other usages are not supported.
@@ -251,8 +264,9 @@ pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatPrope
         return refuse(format!("image flags {flags:?} are not supported"));
     }
     let is_depth_stencil = features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT);
+    let is_compressed = device_format(format).is_some_and(is_compressed);
     let (max_extent, layers) = match ty {
-        vk::ImageType::TYPE_1D => (
+        vk::ImageType::TYPE_1D if !is_compressed => (
             extent(limits::MAX_IMAGE_DIMENSION, 1, 1),
             limits::MAX_LAYERS,
         ),

@@ -126,14 +126,9 @@ crate::entry_points! {
         let Some(format) = formats::device_format(info.format) else {
             return Err(unsupported_format(info.format));
         };
-        if image.desc.kind == ImageKind::D3 && info.view_type != vk::ImageViewType::TYPE_3D {
-            return Err(Error::FeatureNotPresent(format!(
-                "a view of type {:?} of a 3D image",
-                info.view_type
-            )));
-        }
         let object = ImageView::new(
             image,
+            info.view_type,
             info.format,
             format,
             info.components,

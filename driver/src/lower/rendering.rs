@@ -1,5 +1,8 @@
 //! Lowers render passes and dynamic rendering: attachments, load and store operations, clear values.
 
+#[cfg(test)]
+mod tests;
+
 use crate::error::Error;
 use crate::object::image::ImageView;
 use crate::object::render_pass::{AttachmentDescription, RenderPass};

@@ -51,14 +51,15 @@ pub(crate) fn copy_buffer_image(
     image: &Image,
     regions: &[vk::BufferImageCopy2],
 ) -> Result<CopyBufferImage, Error> {
+    let side = image.desc.format.block_side();
     let region = |region: &vk::BufferImageCopy2| {
         Ok(BufferImageRegion {
             buffer_offset: region.buffer_offset,
-            buffer_row_length: region.buffer_row_length,
-            buffer_image_height: region.buffer_image_height,
+            buffer_row_length: region.buffer_row_length.div_ceil(side),
+            buffer_image_height: region.buffer_image_height.div_ceil(side),
             subresource: layers(image, &region.image_subresource)?,
-            image_offset: offset(region.image_offset),
-            image_extent: extent(region.image_extent),
+            image_offset: block_offset(image, region.image_offset),
+            image_extent: block_extent(image, region.image_extent),
         })
     };
     Ok(CopyBufferImage {
@@ -84,6 +85,7 @@ pub(crate) fn copy_image(
             format!("one image has {from} samples, the other {to}"),
         ));
     }
+    let (source_image, target_image) = (source, target);
     let mut lowered = Vec::with_capacity(regions.len());
     for region in regions {
         let pairs = layer_pairs(
@@ -92,10 +94,10 @@ pub(crate) fn copy_image(
         )?;
         lowered.extend(pairs.into_iter().map(|(source, target)| ImageCopyRegion {
             source,
-            source_offset: offset(region.src_offset),
+            source_offset: block_offset(source_image, region.src_offset),
             target,
-            target_offset: offset(region.dst_offset),
-            extent: extent(region.extent),
+            target_offset: block_offset(target_image, region.dst_offset),
+            extent: block_extent(source_image, region.extent),
         }));
     }
     Ok(Packet::CopyImage(CopyImage {
@@ -119,7 +121,8 @@ pub(crate) fn blit_image(
     require_one_sample("VUID-vkCmdBlitImage-srcImage-00233", source)?;
     require_one_sample("VUID-vkCmdBlitImage-dstImage-00234", target)?;
     let (from, to) = (source.desc.format, target.desc.format);
-    if !converts(from, to) {
+    let to_compressed = to.decompressed().is_some();
+    if to_compressed || !converts(from.decompressed().unwrap_or(from), to) {
         return Err(Error::usage(
             "VUID-vkCmdBlitImage-srcImage-00229",
             format!("texels of format {from:?} do not convert to {to:?}"),
@@ -400,4 +403,21 @@ fn offset(offset: vk::Offset3D) -> [i32; 3] {
 
 fn extent(extent: vk::Extent3D) -> [u32; 3] {
     [extent.width, extent.height, extent.depth]
+}
+
+/// An offset in texels, in the blocks that an image is stored in.
+fn block_offset(image: &Image, offset: vk::Offset3D) -> [i32; 3] {
+    // Valid usage has them multiples of a block's side.
+    let side = image.desc.format.block_side().cast_signed();
+    [offset.x / side, offset.y / side, offset.z]
+}
+
+/// An extent in texels, in the blocks that an image is stored in.
+fn block_extent(image: &Image, extent: vk::Extent3D) -> [u32; 3] {
+    let side = image.desc.format.block_side();
+    [
+        extent.width.div_ceil(side),
+        extent.height.div_ceil(side),
+        extent.depth,
+    ]
 }

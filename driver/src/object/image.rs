@@ -4,7 +4,7 @@ use super::buffer;
 use crate::error::Error;
 use ash::vk;
 use simdevice::Allocation;
-use simdevice::image::{self, ImageDesc};
+use simdevice::image::{self, ImageDesc, ImageKind};
 use simdevice::packet::Aspect;
 use simdevice::texture::{ComponentSwizzle, IDENTITY, Swizzle};
 use std::sync::{Arc, OnceLock};
@@ -98,12 +98,14 @@ pub(crate) struct ImageView {
 }
 
 impl ImageView {
-    /// A view of `range` of a bound image, read as `format`.
+    /// A view of `range` of a bound image, read as `format`. A view of a 3D image as an array of 2D ones has its slices
+    /// for layers; it is rendered to, and nothing else.
     ///
     /// # Errors
     /// [`Error::Usage`] if the image is not bound or does not have the range, or the formats are not compatible.
     pub(crate) fn new(
         image: &Image,
+        view_type: vk::ImageViewType,
         view_format: vk::Format,
         format: simdevice::Format,
         components: vk::ComponentMapping,
@@ -124,11 +126,16 @@ impl ImageView {
             desc.mip_levels,
         );
         let base_layer = range.base_array_layer;
+        let are_slices = desc.kind == ImageKind::D3 && view_type != vk::ImageViewType::TYPE_3D;
         let layer_count = count(
             base_layer,
             range.layer_count,
             vk::REMAINING_ARRAY_LAYERS,
-            desc.array_layers,
+            if are_slices {
+                desc.mip_extent(base_mip_level)[2]
+            } else {
+                desc.array_layers
+            },
         );
         let (Some(level_count), Some(layer_count)) = (level_count, layer_count) else {
             return Err(Error::usage(

@@ -253,6 +253,12 @@ fn formats_are_converted() {
             if from_class != to_class {
                 continue;
             }
+            // lavapipe decodes sRGB by a polynomial that is off by 1e-3: enough for 8 bits. (Ours is checked against the
+            // transfer function where formats are.)
+            let is_srgb = device_format(from).numeric() == Numeric::Srgb;
+            if is_srgb && device_format(to).components()[0].bits > 8 {
+                continue;
+            }
             let filters: &[_] = if from_class == 2 {
                 &FILTERS
             } else {

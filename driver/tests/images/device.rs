@@ -62,11 +62,16 @@ impl Shape {
         self.extent.map(|size| (size >> level).max(1))
     }
 
-    /// Texels of all levels and layers.
+    /// Texels, or blocks of texels, of a level of all layers.
+    pub fn level_texels(&self, level: u32) -> usize {
+        let side = device_format(self.format).block_side();
+        let [width, height, depth] = self.level_extent(level);
+        (width.div_ceil(side) * height.div_ceil(side) * depth * self.layers) as usize
+    }
+
+    /// Texels, or blocks of texels, of all levels and layers.
     pub fn texels(&self) -> usize {
-        (0..self.levels)
-            .map(|level| self.level_extent(level).iter().product::<u32>() * self.layers)
-            .sum::<u32>() as usize
+        (0..self.levels).map(|level| self.level_texels(level)).sum()
     }
 
     /// The format of an aspect's texels in buffers.
@@ -179,6 +184,16 @@ impl Device {
         properties.optimal_tiling_features
     }
 
+    /// What buffers can do.
+    pub fn buffer_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+        // SAFETY: see the crate.
+        let properties = unsafe {
+            self.instance
+                .get_physical_device_format_properties(self.physical_device, format)
+        };
+        properties.buffer_features
+    }
+
     /// Records commands, submits them and waits.
     pub fn run(&self, record: impl FnOnce(&ash::Device, vk::CommandBuffer)) {
         let info = vk::CommandBufferAllocateInfo::default()
@@ -221,6 +236,7 @@ impl Device {
             vk::BufferUsageFlags::TRANSFER_SRC
                 | vk::BufferUsageFlags::TRANSFER_DST
                 | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER
                 | vk::BufferUsageFlags::STORAGE_BUFFER,
         );
         // SAFETY: see the crate.
@@ -353,9 +369,9 @@ impl Device {
                         height,
                         depth,
                     });
-                let texels = width * height * depth * image.shape.layers;
+                let texels = image.shape.level_texels(level) as u64;
                 // Offsets are multiples of texels and of four.
-                offset = (offset + u64::from(texels) * texel_size).next_multiple_of(48);
+                offset = (offset + texels * texel_size).next_multiple_of(48);
                 region
             })
             .collect()
@@ -388,12 +404,7 @@ impl Device {
     }
 
     fn region_bytes(image: &Image, aspect: Aspect, region: &vk::BufferImageCopy) -> usize {
-        let vk::Extent3D {
-            width,
-            height,
-            depth,
-        } = region.image_extent;
-        let texels = (width * height * depth * image.shape.layers) as usize;
+        let texels = image.shape.level_texels(region.image_subresource.mip_level);
         texels * image.shape.plane(aspect).texel_size()
     }
 

@@ -1,9 +1,12 @@
-//! Images side by side with lavapipe: what blits and samples give there, they give here.
+//! Images side by side with lavapipe: what blits, samples and stores give there, they give here. The shaders' SPIR-V is
+//! checked in beside them: `glslangValidator -V --target-env vulkan1.3`.
 //!
 //! `unsafe` here has one reason throughout: these are Vulkan calls, and each test follows Vulkan's valid usage. Objects
 //! that a device outlives are its drop's.
 
 mod blits;
+mod compute;
 mod device;
 mod sampling;
+mod storing;
 mod texels;

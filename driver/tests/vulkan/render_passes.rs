@@ -232,3 +232,112 @@ fn passes_load_what_is_there_within_their_area() {
     assert_eq!(gpu.read_image::<[u8; 4]>(image, 4), expected);
     gpu.free_image(image);
 }
+
+#[test]
+fn what_a_subpass_only_reads_is_cleared_for_it() {
+    let gpu = Gpu::new();
+    let images = [gpu.image(FORMAT, 4, 2), gpu.image(FORMAT, 4, 2)];
+    let attachments = [attachment(vk::AttachmentLoadOp::CLEAR); 2];
+    let (written, read) = ([reference(0)], [reference(1)]);
+    let subpasses = [vk::SubpassDescription::default()
+        .color_attachments(&written)
+        .input_attachments(&read)];
+    let info = vk::RenderPassCreateInfo::default()
+        .attachments(&attachments)
+        .subpasses(&subpasses);
+    // SAFETY: see the crate.
+    unsafe {
+        let pass = gpu.device.create_render_pass(&info, None).unwrap();
+        let framebuffer = framebuffer(&gpu, pass, &images);
+        let values = [clear_value([0.0, 1.0, 0.0, 1.0]), clear_value([1.0; 4])];
+        gpu.run(|device, commands| {
+            let begin = vk::RenderPassBeginInfo::default()
+                .render_pass(pass)
+                .framebuffer(framebuffer)
+                .render_area(area(images[0]))
+                .clear_values(&values);
+            device.cmd_begin_render_pass(commands, &begin, vk::SubpassContents::INLINE);
+            device.cmd_end_render_pass(commands);
+        });
+        gpu.device.destroy_framebuffer(framebuffer, None);
+        gpu.device.destroy_render_pass(pass, None);
+    }
+    for (image, expected) in images.into_iter().zip([GREEN, WHITE]) {
+        assert_eq!(gpu.read_image::<[u8; 4]>(image, 4), [expected; 8]);
+        gpu.free_image(image);
+    }
+}
+
+#[test]
+fn slices_of_solid_images_are_rendered_to() {
+    let gpu = Gpu::new();
+    let out = gpu.image(FORMAT, 4, 2);
+    let info = vk::ImageCreateInfo::default()
+        .flags(vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE)
+        .image_type(vk::ImageType::TYPE_3D)
+        .format(FORMAT)
+        .extent(vk::Extent3D {
+            width: 4,
+            height: 2,
+            depth: 3,
+        })
+        .mip_levels(1)
+        .array_layers(1)
+        .samples(vk::SampleCountFlags::TYPE_1)
+        .usage(vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC);
+    let general = vk::ImageLayout::GENERAL;
+    // SAFETY: see the crate.
+    unsafe {
+        let device = &gpu.device;
+        let solid = device.create_image(&info, None).unwrap();
+        let requirements = device.get_image_memory_requirements(solid);
+        let memory = gpu.allocate(requirements.size, crate::gpu::DEVICE_ONLY);
+        device.bind_image_memory(solid, memory, 0).unwrap();
+        let slices = |first, count| {
+            let info = vk::ImageViewCreateInfo::default()
+                .image(solid)
+                .view_type(vk::ImageViewType::TYPE_2D_ARRAY)
+                .format(FORMAT)
+                .subresource_range(vk::ImageSubresourceRange {
+                    base_array_layer: first,
+                    layer_count: count,
+                    ..crate::gpu::COLOR
+                });
+            device.create_image_view(&info, None)
+        };
+        assert!(slices(2, 2).is_err(), "there are three slices");
+        let view = slices(1, 2).unwrap();
+        gpu.run(|device, commands| {
+            let attachments = [vk::RenderingAttachmentInfo::default()
+                .image_view(view)
+                .image_layout(general)
+                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .store_op(vk::AttachmentStoreOp::STORE)
+                .clear_value(clear_value([0.0, 1.0, 0.0, 1.0]))];
+            let info = vk::RenderingInfo::default()
+                .render_area(area(out))
+                .layer_count(2)
+                .color_attachments(&attachments);
+            device.cmd_begin_rendering(commands, &info);
+            device.cmd_end_rendering(commands);
+        });
+        for (slice, expected) in [[0; 4], GREEN, GREEN].into_iter().enumerate() {
+            gpu.run(|device, commands| {
+                let copy = vk::ImageCopy::default()
+                    .src_subresource(crate::gpu::COLOR_LAYERS)
+                    .src_offset(vk::Offset3D {
+                        z: slice as i32,
+                        ..Default::default()
+                    })
+                    .dst_subresource(crate::gpu::COLOR_LAYERS)
+                    .extent(out.extent.into());
+                device.cmd_copy_image(commands, solid, general, out.image, general, &[copy]);
+            });
+            assert_eq!(gpu.read_image::<[u8; 4]>(out, 4), [expected; 8], "{slice}");
+        }
+        device.destroy_image_view(view, None);
+        device.destroy_image(solid, None);
+        device.free_memory(memory, None);
+    }
+    gpu.free_image(out);
+}

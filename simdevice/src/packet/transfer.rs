@@ -1,4 +1,5 @@
-//! What packets of copies, blits, resolves and clears say.
+//! What packets of copies, blits, resolves and clears say. Where an image is compressed, copies count its blocks of
+//! texels in place of texels; blits count texels always.
 
 use super::{Aspect, BufferRange, ClearValue, ResolveMode};
 use crate::image::Image;

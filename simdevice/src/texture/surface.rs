@@ -65,6 +65,7 @@ impl Surface {
     }
 
     fn image(view: &ImageView, aspect: Aspect) -> Option<Self> {
+        let view = &view.decompressed()?;
         let image = &view.image;
         let format = view.format.plane(aspect)?;
         let levels: Vec<Level> = (0..view.level_count.min(image.desc.mip_levels))

@@ -14,6 +14,12 @@ use std::ops::Range;
 
 /// Executes [`Packet::BlitImage`](crate::Packet::BlitImage).
 pub fn blit_image(blit: &BlitImage) {
+    if let Some(source) = blit.source.decompressed() {
+        return blit_image(&BlitImage {
+            source,
+            ..blit.clone()
+        });
+    }
     for region in &blit.regions {
         let (source, target) = (&region.source, &region.target);
         let layers = |image: &Image, base: u32| image.desc.array_layers.saturating_sub(base);

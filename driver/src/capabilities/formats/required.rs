@@ -1,7 +1,7 @@
 //! The tables "Required Format Support" of Vulkan 1.0, and what an implementation chooses among them.
 
 use super::properties;
-use ash::vk::{self, Format as F, FormatFeatureFlags as Feature};
+use ash::vk::{Format as F, FormatFeatureFlags as Feature};
 
 /// What each letter stands for in the image column.
 const IMAGE: &[(char, Feature)] = &[
@@ -105,6 +105,18 @@ fn every_format_can_do_what_vulkan_requires() {
         assert!(lacking.is_empty(), "{format:?} lacks {lacking:?}");
         let lacking = features(buffer, BUFFER) & !found.buffer_features;
         assert!(lacking.is_empty(), "buffers of {format:?} lack {lacking:?}");
+    }
+}
+
+/// One of the families of compressed formats is required, whole: this is it.
+#[test]
+fn blocks_are_sampled_filtered_and_blitted() {
+    let required = features("sbl", IMAGE) | Feature::TRANSFER_SRC | Feature::TRANSFER_DST;
+    let blocks = F::BC1_RGB_UNORM_BLOCK.as_raw()..=F::BC7_SRGB_BLOCK.as_raw();
+    assert_eq!(blocks.clone().count(), 16);
+    for format in blocks.map(F::from_raw) {
+        let lacking = required & !properties(format).optimal_tiling_features;
+        assert!(lacking.is_empty(), "{format:?} lacks {lacking:?}");
     }
 }
 

@@ -1,0 +1,177 @@
+//! Compressed formats: blocks of 4x4 texels (BC1 to BC7, also known as DXT, RGTC and BPTC).
+
+use super::Format;
+use half::f16;
+
+/// Texels along a block's side.
+const SIDE: usize = 4;
+
+/// Texels of a block.
+const TEXELS: usize = SIDE * SIDE;
+
+/// A block's texels, row by row, in a format without compression.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Block {
+    bytes: [u8; TEXELS * 8],
+    texel_size: usize,
+}
+
+impl Block {
+    fn of<T: bytemuck::NoUninit>(texels: &[T]) -> Self {
+        let bytes: &[u8] = bytemuck::cast_slice(texels);
+        let mut block = Self {
+            bytes: [0; TEXELS * 8],
+            texel_size: bytes.len() / TEXELS,
+        };
+        block.bytes[..bytes.len()].copy_from_slice(bytes);
+        block
+    }
+
+    /// The bytes of a row of four texels.
+    pub(crate) fn row(&self, row: usize) -> &[u8] {
+        let pitch = SIDE * self.texel_size;
+        &self.bytes[row * pitch..][..pitch]
+    }
+}
+
+impl Format {
+    /// Texels along the side of what is stored as a unit: 4, or 1 for formats without compression.
+    pub const fn block_side(self) -> u32 {
+        if self.decompressed().is_some() {
+            SIDE as u32
+        } else {
+            1
+        }
+    }
+
+    /// The format that holds a compressed format's texels one by one, without loss.
+    pub const fn decompressed(self) -> Option<Self> {
+        Some(match self {
+            Self::Bc1RgbUnormBlock
+            | Self::Bc1RgbaUnormBlock
+            | Self::Bc2UnormBlock
+            | Self::Bc3UnormBlock
+            | Self::Bc7UnormBlock => Self::R8G8B8A8Unorm,
+            Self::Bc1RgbSrgbBlock
+            | Self::Bc1RgbaSrgbBlock
+            | Self::Bc2SrgbBlock
+            | Self::Bc3SrgbBlock
+            | Self::Bc7SrgbBlock => Self::R8G8B8A8Srgb,
+            Self::Bc4UnormBlock | Self::Bc4SnormBlock => Self::R32Sfloat,
+            Self::Bc5UnormBlock | Self::Bc5SnormBlock => Self::R32G32Sfloat,
+            Self::Bc6hUfloatBlock | Self::Bc6hSfloatBlock => Self::R16G16B16A16Sfloat,
+            _ => return None,
+        })
+    }
+
+    /// The texels of a block, in the format of [`Format::decompressed`]; `None` if this format is not compressed.
+    pub(crate) fn decode_block(self, block: &[u8; 16]) -> Option<Block> {
+        let mut rgba = [0u8; 4 * TEXELS];
+        let pitch = 4 * SIDE;
+        match self {
+            Self::Bc1RgbUnormBlock | Self::Bc1RgbSrgbBlock => {
+                bcdec_rs::bc1(block, &mut rgba, pitch);
+                // What would be transparent with alpha is opaque without.
+                for texel in rgba.as_chunks_mut::<4>().0 {
+                    texel[3] = u8::MAX;
+                }
+            }
+            Self::Bc1RgbaUnormBlock | Self::Bc1RgbaSrgbBlock => {
+                bcdec_rs::bc1(block, &mut rgba, pitch);
+            }
+            Self::Bc2UnormBlock | Self::Bc2SrgbBlock => bcdec_rs::bc2(block, &mut rgba, pitch),
+            Self::Bc3UnormBlock | Self::Bc3SrgbBlock => bcdec_rs::bc3(block, &mut rgba, pitch),
+            Self::Bc7UnormBlock | Self::Bc7SrgbBlock => bcdec_rs::bc7(block, &mut rgba, pitch),
+            Self::Bc4UnormBlock | Self::Bc4SnormBlock => {
+                let mut red = [0f32; TEXELS];
+                bcdec_rs::bc4_float(block, &mut red, SIDE, self == Self::Bc4SnormBlock);
+                return Some(Block::of(&red));
+            }
+            Self::Bc5UnormBlock | Self::Bc5SnormBlock => {
+                let mut both = [0f32; 2 * TEXELS];
+                bcdec_rs::bc5_float(block, &mut both, 2 * SIDE, self == Self::Bc5SnormBlock);
+                return Some(Block::of(&both));
+            }
+            Self::Bc6hUfloatBlock | Self::Bc6hSfloatBlock => {
+                let mut rgb = [0u16; 3 * TEXELS];
+                bcdec_rs::bc6h_half(block, &mut rgb, 3 * SIDE, self == Self::Bc6hSfloatBlock);
+                let mut halves = [f16::ONE.to_bits(); 4 * TEXELS];
+                let texels = halves.as_chunks_mut::<4>().0.iter_mut();
+                for (texel, rgb) in texels.zip(rgb.as_chunks::<3>().0) {
+                    texel[..3].copy_from_slice(rgb);
+                }
+                return Some(Block::of(&halves));
+            }
+            _ => return None,
+        }
+        Some(Block::of(&rgba))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The registers of each texel of a block.
+    fn texels(format: Format, block: &[u8]) -> Vec<[f32; 4]> {
+        let mut whole = [0; 16];
+        whole[..block.len()].copy_from_slice(block);
+        let decoded = format.decode_block(&whole).unwrap();
+        let plain = format.decompressed().unwrap();
+        let rows = (0..4).flat_map(|row| decoded.row(row).chunks_exact(plain.texel_size()));
+        rows.map(|texel| plain.decode(texel)).collect()
+    }
+
+    #[test]
+    fn only_compressed_formats_have_blocks() {
+        for &format in Format::ALL {
+            let name = format!("{format:?}");
+            assert_eq!(format.block_side() == 4, name.ends_with("Block"), "{name}");
+            let block = format.decode_block(&[0x5A; 16]);
+            assert_eq!(block.is_some(), name.ends_with("Block"), "{name}");
+            if format.block_side() == 4 {
+                let large = ["Bc1", "Bc4"].iter().all(|small| !name.starts_with(small));
+                assert_eq!(format.texel_size(), if large { 16 } else { 8 }, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn colours_lie_between_two_ends() {
+        // Red first and greater, then blue; the codes of the first row are 0, 1, 2, 3.
+        let block = [0x00, 0xF8, 0x1F, 0x00, 0b11_10_01_00, 0, 0, 0];
+        let row = &texels(Format::Bc1RgbUnormBlock, &block)[..4];
+        let byte = |code: u8| f32::from(code) / 255.0;
+        assert_eq!(row[0], [1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(row[1], [0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(row[2], [byte(170), 0.0, byte(85), 1.0]);
+        assert_eq!(row[3], [byte(85), 0.0, byte(170), 1.0]);
+        // The other way about, code 3 is black, and transparent if there is alpha.
+        let block = [0x1F, 0x00, 0x00, 0xF8, 0b11_10_01_00, 0, 0, 0];
+        let opaque = &texels(Format::Bc1RgbUnormBlock, &block)[..4];
+        let clear = &texels(Format::Bc1RgbaUnormBlock, &block)[..4];
+        assert_eq!(opaque[3], [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(clear[3], [0.0; 4]);
+        assert_eq!(opaque[..3], clear[..3]);
+    }
+
+    #[test]
+    fn single_components_lie_between_two_ends_exactly() {
+        // Ends 255 and 0; codes 0 to 7, in 3 bits each.
+        let codes: u64 = (0..8u64).fold(0, |all, code| all | code << (3 * code));
+        let mut block = (codes << 16 | 0x00FF).to_le_bytes();
+        let sevenths = texels(Format::Bc4UnormBlock, &block);
+        let expected = [7, 0, 6, 5, 4, 3, 2, 1].map(|n| n as f32 / 7.0);
+        for (texel, expected) in sevenths.iter().zip(expected) {
+            assert!((texel[0] - expected).abs() < 1e-6, "{texel:?} {expected}");
+            assert_eq!(texel[1..], [0.0, 0.0, 1.0]);
+        }
+        // As signed ones: -1 and 1, so that there are five steps, then the extremes.
+        block[..2].copy_from_slice(&[0x81, 0x7F]);
+        let fifths = texels(Format::Bc4SnormBlock, &block);
+        let expected = [-1.0, 1.0, -0.6, -0.2, 0.2, 0.6, -1.0, 1.0];
+        for (texel, expected) in fifths.iter().zip(expected) {
+            assert!((texel[0] - expected).abs() < 1e-6, "{texel:?} {expected}");
+        }
+    }
+}
