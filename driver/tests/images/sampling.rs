@@ -459,13 +459,21 @@ fn formats() {
         let mut count = 0;
         for format in (1..=vk::Format::BC7_SRGB_BLOCK.as_raw()).map(vk::Format::from_raw) {
             let both = [ours, theirs].map(|device| device.features(format).contains(sampled));
-            if both != [true; 2] || device_format(format).aspects() != [Aspect::Color] {
+            // lavapipe interpolates BC1 to BC5 in integers of 8 bits and truncates, so that it is off by a code and more.
+            // (Ours are checked against the exact values where blocks are decoded.)
+            let name = format!("{format:?}");
+            let truncated = ["BC1", "BC2", "BC3", "BC4", "BC5"];
+            let is_truncated = truncated.iter().any(|it| name.starts_with(it));
+            if both != [true; 2]
+                || is_truncated
+                || device_format(format).aspects() != [Aspect::Color]
+            {
                 continue;
             }
             count += 1;
             let mut comparison = Comparison::new(ours, theirs, format, DEPTH);
             // Numbers of very different sizes have no mean worth comparing.
-            let is_huge = format!("{format:?}").starts_with("BC6H");
+            let is_huge = name.starts_with("BC6H");
             let filter = FILTERS[if is_huge { 0 } else { 4 }];
             comparison.check(Kind::Two, Way::Lod, &sampler(filter, 0));
             comparison.check(Kind::Three, Way::Lod, &sampler(FILTERS[0], 1));

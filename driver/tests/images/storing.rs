@@ -189,7 +189,13 @@ fn every_format_is_stored_and_fetched() {
                 }
                 let fetched = a.fetched.iter().zip(&b.fetched);
                 let apart = fetched.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-                if can[2] && apart > 1e-6 {
+                // lavapipe decodes sRGB by a polynomial that is off by 1e-3.
+                let limit = if plain.numeric() == Numeric::Srgb {
+                    1.0 / 255.0
+                } else {
+                    1e-6
+                };
+                if can[2] && apart > limit {
                     findings.push(format!("{format:?} fetched: {apart} apart"));
                 }
                 for (count, can) in counts.iter_mut().zip(can) {

@@ -156,6 +156,43 @@ mod tests {
     }
 
     #[test]
+    fn colours_are_those_of_exact_arithmetic_but_for_a_code() {
+        let mut state = 1u64;
+        for _ in 0..2000 {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            let block = (state ^ state >> 29).to_le_bytes();
+            let ends = [0, 2].map(|at| u16::from_le_bytes([block[at], block[at + 1]]));
+            let exact = ends.map(|end| {
+                [(end >> 11, 31.0), (end >> 5 & 63, 63.0), (end & 31, 31.0)]
+                    .map(|(code, max)| f64::from(code) / max)
+            });
+            let weight = |code: usize| match (ends[0] > ends[1], code) {
+                (_, 0) => 0.0,
+                (_, 1) => 1.0,
+                (true, code) => f64::from(code as u32 - 1) / 3.0,
+                (false, _) => 0.5,
+            };
+            let decoded = texels(Format::Bc1RgbUnormBlock, &block);
+            for (index, texel) in decoded.iter().enumerate() {
+                let code = usize::from(block[4 + index / 4] >> (2 * (index % 4)) & 3);
+                let is_black = ends[0] <= ends[1] && code == 3;
+                for channel in 0..3 {
+                    let [a, b] = exact.map(|end| end[channel]);
+                    let expected = if is_black {
+                        0.0
+                    } else {
+                        a + weight(code) * (b - a)
+                    };
+                    let error = (f64::from(texel[channel]) - expected).abs() * 255.0;
+                    assert!(error < 1.0, "{block:?} {index}: {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn single_components_lie_between_two_ends_exactly() {
         // Ends 255 and 0; codes 0 to 7, in 3 bits each.
         let codes: u64 = (0..8u64).fold(0, |all, code| all | code << (3 * code));
