@@ -481,7 +481,8 @@ fn formats() {
             let found = comparison.findings.iter();
             findings.extend(found.map(|finding| format!("{format:?}: {finding}")));
         }
-        assert!(count > 45, "{count} formats");
+        // Vulkan requires 21 of them, and BC6H and BC7 are 4.
+        assert!(count >= 25, "{count} formats");
         assert!(findings.is_empty(), "{}", findings.join("\n"));
     });
 }

@@ -251,7 +251,7 @@ impl Canvas {
     }
 
     /// A set of descriptors, one a binding.
-    fn set(&self, kinds: &[vk::DescriptorType], stages: vk::ShaderStageFlags) -> Set {
+    pub fn set(&self, kinds: &[vk::DescriptorType], stages: vk::ShaderStageFlags) -> Set {
         let bindings: Vec<_> = (0..)
             .zip(kinds)
             .map(|(binding, &kind)| {
@@ -351,7 +351,8 @@ pub fn sampled_image(gpu: &Gpu, samples: vk::SampleCountFlags) -> Image {
     )
 }
 
-fn attachment_image(
+/// An image as large as a canvas, with a view of it.
+pub fn attachment_image(
     gpu: &Gpu,
     info: vk::ImageCreateInfo,
     view_type: vk::ImageViewType,

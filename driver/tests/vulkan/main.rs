@@ -25,6 +25,7 @@ mod polygons;
 mod queries;
 mod render_passes;
 mod scene;
+mod subpasses;
 mod synchronization;
 mod transfers;
 mod validation;

@@ -65,6 +65,8 @@ pub struct Request {
     pub formats: Vec<vk::Format>,
     pub depth_format: vk::Format,
     pub has_layout: bool,
+    /// The subpass that it is for, in place of dynamic rendering.
+    pub subpass: Option<(vk::RenderPass, u32)>,
 }
 
 impl Default for Request {
@@ -103,6 +105,7 @@ impl Default for Request {
             formats: vec![FORMAT],
             depth_format: vk::Format::UNDEFINED,
             has_layout: true,
+            subpass: None,
         }
     }
 }
@@ -259,8 +262,11 @@ impl Request {
                 layout
             } else {
                 vk::PipelineLayout::null()
-            })
-            .push_next(&mut rendering);
+            });
+        let info = match self.subpass {
+            Some((render_pass, subpass)) => info.render_pass(render_pass).subpass(subpass),
+            None => info.push_next(&mut rendering),
+        };
         let cache = vk::PipelineCache::null();
         // SAFETY: see the crate.
         let created = unsafe { gpu.device.create_graphics_pipelines(cache, &[info], None) };
