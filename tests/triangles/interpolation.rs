@@ -166,7 +166,8 @@ fn lines_are_exact_at_samples() {
             let (x, y) = (f64::from(index % 128) + dx, f64::from(index / 128) + dy);
             let along = ((x - 10.0) * 100.0 + (y - 20.0) * 40.0) / 11_600.0;
             let error = (f64::from(value) - 1.0 - along).abs();
-            assert!(error <= 2e-6, "({x}, {y}): {error:e}");
+            // A 256th of a pixel, to which the ends are rounded, along a line of 107.7.
+            assert!(error <= 3.6e-5, "({x}, {y}): {error:e}");
             covered += 1;
         }
     }
