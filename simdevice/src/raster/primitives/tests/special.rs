@@ -89,7 +89,7 @@ fn each_sample_is_shaded_for_itself() {
 fn centroids_lie_within_the_primitive() {
     let target = image(WIDE, 4, 1);
     // Half a pixel wide: most centres are outside.
-    let corners = [[1000, 10], [1190, 10], [1000, 15_000]];
+    let corners = [[1000, 10], [1130, 10], [1000, 15_000]];
     let varying = |sampling| FragmentInput::Varying {
         index: 0,
         interpolation: Interpolation::Perspective,
@@ -133,7 +133,7 @@ fn centroids_lie_within_the_primitive() {
             assert_eq!(found[3].to_bits(), 7);
         }
     }
-    assert!(covered > 40 && outside > 5, "{covered} {outside}");
+    assert!(covered > 30 && outside > 5, "{covered} {outside}");
 }
 
 #[test]
