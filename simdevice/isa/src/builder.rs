@@ -17,7 +17,7 @@ use super::validate::{self, InvalidProgram};
 /// them. Misuse (closing what isn't open, operands of a wrong type) is reported by [`Builder::finish`], not by a panic.
 ///
 /// ```
-/// use simdevice::isa::{builder::Builder, ir::{Rate, Type}, op::Op};
+/// use isa::{builder::Builder, ir::{Rate, Type}, op::Op};
 ///
 /// // out = x < 1 ? x : x * x, the long way round.
 /// let mut b = Builder::new();

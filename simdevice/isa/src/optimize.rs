@@ -53,10 +53,21 @@ fn sink(block: &mut Block, registers: &[Register]) {
             registers[operand.0 as usize].role == Role::Value
                 || !between.iter().any(|other| touches(other, operand))
         });
-        if movable && !between.iter().any(|other| reads(other, src)) {
+        // Lanes that leave in between may need the result where they come back.
+        let all_stay = between.iter().all(keeps_lanes);
+        if movable && all_stay && !between.iter().any(|other| reads(other, src)) {
             block[from..at].rotate_left(1);
         }
     }
+}
+
+/// Whether every lane that runs a statement runs the next one, too.
+fn keeps_lanes(statement: &Statement) -> bool {
+    let leaves = matches!(
+        statement,
+        Statement::Break(_) | Statement::Continue(_) | Statement::Return | Statement::Kill
+    );
+    !leaves && statement.blocks().into_iter().flatten().all(keeps_lanes)
 }
 
 /// Whether a statement, or one within, assigns to a register.

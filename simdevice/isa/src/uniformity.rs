@@ -168,7 +168,9 @@ impl Search {
             }
             Statement::Scope { label, body } => self.within(Around::Labelled(*label), body),
             Statement::Break(label) => {
-                if self.diverges(*label) && !self.left.contains(label) {
+                // Lanes that continued aren't here, so those that are leave before them.
+                let diverges = self.diverges(*label) || self.continued.contains(label);
+                if diverges && !self.left.contains(label) {
                     self.left.push(*label);
                     self.changed = true;
                 }

@@ -7,7 +7,7 @@
 //! ```
 //! use std::sync::Arc;
 //! use fearless_simd::Level;
-//! use simdevice::isa::{
+//! use isa::{
 //!     builder::Builder, exec::{Executable, LaneMask, Machine, Options, Watchdog}, ir::{Rate, Type}, op::Op,
 //!     resources::Resources,
 //! };
