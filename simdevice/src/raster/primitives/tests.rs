@@ -228,6 +228,7 @@ fn triangle(rng: &mut ChaCha8Rng, index: u32) -> Primitive {
         let depth = rng.random_range(0..8) as f32 / 7.0;
         return Primitive {
             corners,
+            offsets: rng.random(),
             depth: [depth; 3],
             inverse_w: [1.0; 3],
             vertices: [3 * index, 3 * index + 1, 3 * index + 2],
@@ -300,6 +301,7 @@ fn interpolate(samples: u32, simd: SimdLevel) {
         ..Config::default()
     };
     let corners = [[-3000, 700], [26_000, -900], [9000, 20_000]];
+    let offsets = [[-32_768, 20_000], [31_000, 32_767], [-9000, -32_768]];
     let (depth, inverse_w) = ([0.1, 0.9, 0.4], [2.0, 0.01, 0.5]);
     let values: [[f32; 2]; 3] = [[1.0, -4.0], [0.0, 3.0], [0.5, 100.0]];
     let mut inputs = varyings(1, Interpolation::Perspective, Sampling::Center);
@@ -320,6 +322,7 @@ fn interpolate(samples: u32, simd: SimdLevel) {
     let counters = run(&config, &rendering, |device| {
         let primitive = Primitive {
             corners,
+            offsets,
             depth,
             inverse_w,
             vertices: [0, 1, 2],
@@ -341,7 +344,12 @@ fn interpolate(samples: u32, simd: SimdLevel) {
             2,
         )]
     });
-    let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+    let [a, b, c] = [0, 1, 2].map(|corner: usize| {
+        let along = |axis: usize| {
+            f64::from(corners[corner][axis]) + f64::from(offsets[corner][axis]) / 65_536.0
+        };
+        [along(0), along(1)]
+    });
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     let mut covered = 0;
     for y in 0..HEIGHT {

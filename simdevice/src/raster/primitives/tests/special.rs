@@ -16,6 +16,7 @@ fn single() -> Config {
 fn over(corners: [[i32; 2]; 3], layer: u16) -> Primitive {
     Primitive {
         corners,
+        offsets: [[0; 2]; 3],
         depth: [0.5; 3],
         inverse_w: [1.0; 3],
         vertices: [0, 1, 2],
