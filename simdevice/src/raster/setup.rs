@@ -179,8 +179,8 @@ impl Setup {
             [w2[1] - w0[1], w0[0] - w2[0]],
             [w0[1] - w1[1], w1[0] - w0[0]],
         ];
-        let moved = Moved::new(numerators, area, primitive.offsets)
-            .unwrap_or_else(|| Moved::nowhere(area));
+        let moved =
+            Moved::new(numerators, area, primitive.offsets).unwrap_or_else(|| Moved::nowhere(area));
         let inverse_area = 1.0 / moved.area;
         let sums: [[f64; 2]; 2] = std::array::from_fn(|corner| {
             let ([a, b], [c, d]) = (numerators[corner], moved.numerators[corner]);
