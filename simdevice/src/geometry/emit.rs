@@ -4,7 +4,7 @@ use super::bins::{Pixels, bin};
 use super::clip::ClipVertex;
 use super::primitive::{Primitive, PrimitiveKind};
 use super::setup::{Current, Job, NONE, Origin, Place, cross};
-use super::viewport::{ONE, snap_away, snap_length};
+use super::viewport::{ONE, Projected, snap_away, snap_length};
 use crate::packet::draw::Interpolation;
 
 /// The greatest side of a point, in pixels.
@@ -12,11 +12,18 @@ pub const MAX_POINT_SIZE: f32 = 255.0;
 /// The greatest width of a line, in pixels.
 pub const MAX_LINE_WIDTH: f32 = 255.0;
 
+/// Offsets of what snapping has not moved.
+const UNMOVED: [[i16; 2]; 3] = [[0; 2]; 3];
+/// The units of [`Primitive::offsets`] in a pixel.
+const OFFSET_UNITS: f64 = 16_777_216.0;
+
 /// A primitive's outline.
 struct Shape {
     kind: PrimitiveKind,
     corners: [[i32; 2]; 3],
-    /// At the corners.
+    /// As [`Primitive::offsets`].
+    offsets: [[i16; 2]; 3],
+    /// At the vertices.
     depth: [f32; 3],
     /// What it may cover.
     pixels: Pixels,
@@ -38,7 +45,8 @@ impl Job<'_> {
         let shape = Shape {
             kind: PrimitiveKind::Triangle,
             corners,
-            depth: depth_at_corners(places).map(|depth| depth + bias),
+            offsets: offsets(places),
+            depth: places.map(|place| place.projected.depth + bias),
             pixels,
         };
         self.push(current, &shape, places);
@@ -69,6 +77,7 @@ impl Job<'_> {
             let shape = Shape {
                 kind: PrimitiveKind::Line,
                 corners,
+                offsets: UNMOVED,
                 depth: places.map(|place| place.projected.depth + bias),
                 pixels,
             };
@@ -89,6 +98,7 @@ impl Job<'_> {
             let shape = Shape {
                 kind: PrimitiveKind::Point,
                 corners,
+                offsets: UNMOVED,
                 depth: [place.projected.depth + bias; 3],
                 pixels,
             };
@@ -132,6 +142,7 @@ impl Job<'_> {
         let provoking = self.number(Origin::Slot(current.provoking));
         let primitive = Primitive {
             corners: shape.corners,
+            offsets: shape.offsets,
             depth: shape.depth,
             inverse_w: places.map(|place| place.projected.inverse_w),
             vertices,
@@ -209,40 +220,20 @@ impl Job<'_> {
     }
 }
 
-/// The depth at a triangle's corners, on the plane through its vertices where they were before snapping. That is
-/// what depth is in between; taking it at the corners would move the plane by up to half a sub-pixel.
+/// Where a triangle's vertices were before snapping, from its corners.
 #[inline(always)]
-fn depth_at_corners(places: [Place; 3]) -> [f32; 3] {
-    let depth = places.map(|place| place.projected.depth);
-    if depth[0] == depth[1] && depth[0] == depth[2] {
-        return depth;
-    }
-    let origin = places[0].projected;
-    let along = |place: Place, axis: usize| {
-        f64::from(place.projected.window[axis]) - f64::from(origin.window[axis])
-    };
-    let rise = |place: Place| f64::from(place.projected.depth) - f64::from(origin.depth);
-    let (e, f) = (places[1], places[2]);
-    let (ex, ey, fx, fy) = (along(e, 0), along(e, 1), along(f, 0), along(f, 1));
-    let inverse = 1.0 / (ex * fy - ey * fx);
-    let slope = [
-        (rise(e) * fy - rise(f) * ey) * inverse,
-        (rise(f) * ex - rise(e) * fx) * inverse,
-    ];
-    // Needles have slopes without meaning: they must not leave the range of their vertices by more than half of it.
-    let range = rise(e).max(rise(f)).max(0.0) - rise(e).min(rise(f)).min(0.0);
-    places.map(|place| {
-        let projected = place.projected;
-        let off = |axis: usize| {
-            f64::from(projected.snapped[axis]) / f64::from(ONE) - f64::from(projected.window[axis])
-        };
-        let shift = slope[0] * off(0) + slope[1] * off(1);
-        if shift.abs() <= 0.5 * range {
-            (f64::from(projected.depth) + shift) as f32
-        } else {
-            projected.depth
+fn offsets(places: [Place; 3]) -> [[i16; 2]; 3] {
+    let mut offsets = UNMOVED;
+    for (offset, place) in offsets.iter_mut().zip(places) {
+        let Projected {
+            window, snapped, ..
+        } = place.projected;
+        for axis in 0..2 {
+            let off = f64::from(window[axis]) - f64::from(snapped[axis]) / f64::from(ONE);
+            offset[axis] = (off * OFFSET_UNITS) as i16;
         }
-    })
+    }
+    offsets
 }
 
 /// Whether a triangle, whose bounds hold at most four pixel centres, covers none of them. Larger ones aren't looked

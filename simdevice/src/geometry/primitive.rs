@@ -48,15 +48,18 @@ pub enum PrimitiveKind {
 
 /// A convex polygon to be rasterized: a triangle, or the parallelogram whose fourth corner is c0 + c2 - c1. Whatever
 /// varies over it is affine in the framebuffer (after division by w where it is perspective-correct), and given at
-/// corners 0 to 2.
+/// corners 0 to 2, or where those were before snapping.
 #[derive(Clone, Debug)]
 pub struct Primitive {
     /// Framebuffer positions in 1/256 pixels, x and y down; ordered so that the signed area
     /// (c1 - c0) x (c2 - c0) is positive, whichever way the primitive faces.
     pub corners: [[i32; 2]; 3],
-    /// Depth at the corners, viewport-mapped, with depth bias, not clamped.
+    /// Where the vertices were before snapping, from the corners, in 2^-24 pixels. Whatever varies has its values
+    /// there.
+    pub offsets: [[i16; 2]; 3],
+    /// Depth at the vertices, viewport-mapped, with depth bias, not clamped.
     pub depth: [f32; 3],
-    /// 1 / w at the corners.
+    /// 1 / w at the vertices.
     pub inverse_w: [f32; 3],
     /// The vertices at the corners, in [`PrimitiveDraw::varyings`].
     pub vertices: [u32; 3],

@@ -32,6 +32,15 @@ pub struct Quad {
     pub sample: u8,
 }
 
+/// The samples of a draw's pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct Samples {
+    /// Where they are, in 1/256 pixels.
+    pub positions: &'static [[i32; 2]],
+    /// Whether each is shaded for itself, with its own values.
+    pub each_shaded: bool,
+}
+
 /// What quads need of their primitive.
 #[derive(Clone, Debug)]
 pub struct Record {
@@ -304,7 +313,7 @@ impl Batch {
         &mut self,
         simd: S,
         interface: &Interface,
-        positions: &[[i32; 2]],
+        samples: Samples,
         primitives: &[Primitive],
         machine: &mut Machine,
     ) {
@@ -321,7 +330,7 @@ impl Batch {
                     break;
                 }
                 *lanes =
-                    Chunk(self.input(simd, (kind, place), chunk, interface, positions, primitives));
+                    Chunk(self.input(simd, (kind, place), chunk, interface, samples, primitives));
             }
         }
     }
@@ -396,7 +405,7 @@ impl Batch {
         (kind, place): (FragmentInput, usize),
         chunk: usize,
         interface: &Interface,
-        positions: &[[i32; 2]],
+        samples: Samples,
         primitives: &[Primitive],
     ) -> [u32; 16] {
         match kind {
@@ -406,8 +415,9 @@ impl Batch {
                 ..
             } => {
                 let [a, da, db] = self.attribute(simd, chunk, place, interface.varyings.len());
+                let Samples { positions, .. } = samples;
                 let centroid =
-                    sampling == Sampling::Centroid && positions.len() > 1 && !interface.per_sample;
+                    sampling == Sampling::Centroid && positions.len() > 1 && !samples.each_shaded;
                 let [b1, b2] = match interpolation {
                     Interpolation::Flat => return a.to_bits().into(),
                     Interpolation::Linear if centroid => {
@@ -450,7 +460,7 @@ impl Batch {
                 });
                 (value * is_point).to_bits().into()
             }
-            _ => self.scalar_input(kind, chunk, positions, interface.per_sample, primitives),
+            _ => self.scalar_input(kind, chunk, samples, primitives),
         }
     }
 
@@ -459,8 +469,7 @@ impl Batch {
         &self,
         kind: FragmentInput,
         chunk: usize,
-        positions: &[[i32; 2]],
-        per_sample: bool,
+        samples: Samples,
         primitives: &[Primitive],
     ) -> [u32; 16] {
         let quads = self.chunk_quads(chunk);
@@ -472,8 +481,8 @@ impl Batch {
             let primitive = &primitives[record.primitive as usize];
             let sample = usize::from(quad.sample);
             // Samples shaded for themselves are where they are.
-            let within = if per_sample {
-                positions[sample].map(|at| at as f32 / 256.0)
+            let within = if samples.each_shaded {
+                samples.positions[sample].map(|at| at as f32 / 256.0)
             } else {
                 [0.5; 2]
             };

@@ -1,7 +1,7 @@
 //! Triangle mode of the tile engine: the primitives of a draw, one after another, through coverage, early tests and
 //! shading.
 
-use super::batch::{Batch, BlockValues, QUADS, Quad, at_sample};
+use super::batch::{Batch, BlockValues, QUADS, Quad, Samples, at_sample};
 use super::color::Quads;
 use super::coverage::{Coverage, bits};
 use super::depth::Tests;
@@ -504,8 +504,12 @@ impl<'d> Renderer<'_, 'd> {
         let batch = &mut *self.batch;
         batch.prepare();
         let primitives = &draw.draw.primitives[..];
+        let samples = Samples {
+            positions: draw.positions,
+            each_shaded: draw.per_sample,
+        };
         dispatch!(level, simd => batch.set_inputs(
-            simd, &stage.interface, draw.positions, primitives, machine
+            simd, &stage.interface, samples, primitives, machine
         ));
         let watchdog = Watchdog {
             limit: draw.limit,

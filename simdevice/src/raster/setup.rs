@@ -12,6 +12,9 @@ pub const MAX_COORDINATE: i32 = 1 << 29;
 /// Sub-pixel positions of a pixel.
 const ONE: i64 = 256;
 
+/// Units of [`Primitive::offsets`] in 1/256 pixel.
+const OFFSETS_IN_SUB_PIXEL: f64 = 65_536.0;
+
 /// Vulkan's standard sample positions of 4 samples, in 1/256 pixels.
 pub const SAMPLES_4: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];
 
@@ -37,8 +40,10 @@ pub struct Setup {
     /// The pixels that may have samples in it.
     pub bounds: Rect,
     origin: [i64; 2],
-    /// How the barycentrics' numerators of corners 1 and 2 grow with x and y, per 1/256 pixel.
+    /// How the barycentrics' numerators of corners 1 and 2 grow with x and y, per 1/256 pixel, were the vertices at the
+    /// corners.
     numerators: [[i64; 2]; 2],
+    moved: Moved,
     inverse_area: f64,
     /// What the barycentrics add at each lane of a block.
     pub lane_barycentrics: [[f32; 16]; 2],
@@ -58,6 +63,52 @@ pub struct Setup {
     pub weights: [f32; 2],
     /// What 1 / w is in units of: its value if it is the same at all corners, so that nothing is lost.
     pub scale: f32,
+}
+
+/// What barycentrics owe to the vertices not being at the corners, but where they were before snapping.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moved {
+    /// To be added to [`Setup::numerators`].
+    numerators: [[f64; 2]; 2],
+    /// The barycentrics' numerators at corner 0.
+    at_origin: [f64; 2],
+    /// Twice the area of the triangle of the vertices.
+    area: f64,
+}
+
+impl Moved {
+    /// Of vertices that are at the corners, which enclose half of `area`.
+    fn nowhere(area: i64) -> Self {
+        Self {
+            area: area as f64,
+            ..Self::default()
+        }
+    }
+
+    /// `None` for needles that snapping has turned over or made much wider, whose samples may lie far outside of what
+    /// they were.
+    #[inline(always)]
+    fn new(numerators: [[i64; 2]; 2], area: i64, offsets: [[i16; 2]; 3]) -> Option<Self> {
+        let [o0, o1, o2] =
+            offsets.map(|offset| offset.map(|offset| f64::from(offset) / OFFSETS_IN_SUB_PIXEL));
+        let by = [
+            [o2[1] - o0[1], o0[0] - o2[0]],
+            [o0[1] - o1[1], o1[0] - o0[0]],
+        ];
+        let [[a1, b1], [a2, b2]] = numerators.map(|n| n.map(|n| n as f64));
+        let [[c1, d1], [c2, d2]] = by;
+        // The large part is exact.
+        let larger = a1 * d2 + c1 * (b2 + d2) - b1 * c2 - d1 * (a2 + c2);
+        let snapped = area as f64;
+        (snapped + larger >= 0.25 * snapped).then(|| Self {
+            numerators: by,
+            at_origin: [
+                -(a1 + c1) * o0[0] - (b1 + d1) * o0[1],
+                -(a2 + c2) * o0[0] - (b2 + d2) * o0[1],
+            ],
+            area: snapped + larger,
+        })
+    }
 }
 
 /// Pixels that may have samples between two coordinates of 1/256 pixels, as `first..end`.
@@ -128,8 +179,14 @@ impl Setup {
             [w2[1] - w0[1], w0[0] - w2[0]],
             [w0[1] - w1[1], w1[0] - w0[0]],
         ];
-        let inverse_area = 1.0 / area as f64;
-        let slopes = numerators.map(|n| n.map(|n| (n * ONE) as f64 * inverse_area));
+        let moved =
+            Moved::new(numerators, area, primitive.offsets).unwrap_or_else(|| Moved::nowhere(area));
+        let inverse_area = 1.0 / moved.area;
+        let sums: [[f64; 2]; 2] = std::array::from_fn(|corner| {
+            let ([a, b], [c, d]) = (numerators[corner], moved.numerators[corner]);
+            [a as f64 + c, b as f64 + d]
+        });
+        let slopes = sums.map(|n| n.map(|n| n * ONE as f64 * inverse_area));
         let depth = primitive.depth.map(f64::from);
         let (d1, d2) = (depth[1] - depth[0], depth[2] - depth[0]);
         let depth_slopes: [f32; 2] =
@@ -148,6 +205,7 @@ impl Setup {
         self.bounds = bounds;
         self.origin = w0;
         self.numerators = numerators;
+        self.moved = moved;
         self.inverse_area = inverse_area;
         self.lane_barycentrics = [lanes(slopes[0]), lanes(slopes[1])];
         self.slopes = slopes;
@@ -173,11 +231,13 @@ impl Setup {
     pub fn barycentrics(&self, x: i32, y: i32) -> [f64; 2] {
         let dx = i64::from(x) * ONE + ONE / 2 - self.origin[0];
         let dy = i64::from(y) * ONE + ONE / 2 - self.origin[1];
-        let [[a1, b1], [a2, b2]] = self.numerators;
-        [
-            (a1 * dx + b1 * dy) as f64 * self.inverse_area,
-            (a2 * dx + b2 * dy) as f64 * self.inverse_area,
-        ]
+        // The large part is exact.
+        let numerator = |corner: usize| {
+            let ([a, b], [c, d]) = (self.numerators[corner], self.moved.numerators[corner]);
+            let small = c * dx as f64 + d * dy as f64 + self.moved.at_origin[corner];
+            ((a * dx + b * dy) as f64 + small) * self.inverse_area
+        };
+        [numerator(0), numerator(1)]
     }
 
     /// Depth where the barycentrics are these.

@@ -138,10 +138,13 @@ fn snapping_does_not_move_the_plane_of_depth() {
         let window = exact.map(|vertex| vertex.window.map(f64::from));
         let center = [0, 1].map(|axis: usize| window.iter().map(|at| at[axis]).sum::<f64>() / 3.0);
         let expected = plane(window, exact.map(|vertex| f64::from(vertex.depth)), center);
-        let corners = primitive
-            .corners
-            .map(|corner| corner.map(|c| f64::from(c) / 256.0));
-        let found = plane(corners, primitive.depth.map(f64::from), center);
+        let vertices = [0, 1, 2].map(|corner: usize| {
+            [0, 1].map(|axis: usize| {
+                let offset = f64::from(primitive.offsets[corner][axis]) / 65_536.0;
+                (f64::from(primitive.corners[corner][axis]) + offset) / 256.0
+            })
+        });
+        let found = plane(vertices, primitive.depth.map(f64::from), center);
         assert!((found - expected).abs() < 2e-7, "{found} {expected}");
         checked += 1;
     }

@@ -12,6 +12,7 @@ const SIZE: i32 = 64;
 fn primitive(corners: [[i32; 2]; 3], kind: PrimitiveKind) -> Primitive {
     Primitive {
         corners,
+        offsets: [[0; 2]; 3],
         depth: [0.0; 3],
         inverse_w: [1.0; 3],
         vertices: [0, 1, 2],

@@ -228,6 +228,7 @@ fn triangle(rng: &mut ChaCha8Rng, index: u32) -> Primitive {
         let depth = rng.random_range(0..8) as f32 / 7.0;
         return Primitive {
             corners,
+            offsets: rng.random(),
             depth: [depth; 3],
             inverse_w: [1.0; 3],
             vertices: [3 * index, 3 * index + 1, 3 * index + 2],
@@ -285,21 +286,23 @@ fn configs() -> Vec<Config> {
 
 #[test]
 fn interpolation_agrees_with_binary64() {
-    for samples in [1, 4] {
+    for (samples, each_shaded) in [(1, false), (4, false), (4, true)] {
         for (_, simd) in SimdLevel::supported() {
-            interpolate(samples, simd);
+            interpolate(samples, each_shaded, simd);
         }
     }
 }
 
-/// One large triangle in perspective: every varying, depth and 1 / w against binary64.
-fn interpolate(samples: u32, simd: SimdLevel) {
+/// One large triangle in perspective: every varying, depth and 1 / w against binary64, at the pixels' centres or at the
+/// samples.
+fn interpolate(samples: u32, each_shaded: bool, simd: SimdLevel) {
     let config = Config {
         threads: 1,
         simd,
         ..Config::default()
     };
     let corners = [[-3000, 700], [26_000, -900], [9000, 20_000]];
+    let offsets = [[-32_768, 20_000], [31_000, 32_767], [-9000, -32_768]];
     let (depth, inverse_w) = ([0.1, 0.9, 0.4], [2.0, 0.01, 0.5]);
     let values: [[f32; 2]; 3] = [[1.0, -4.0], [0.0, 3.0], [0.5, 100.0]];
     let mut inputs = varyings(1, Interpolation::Perspective, Sampling::Center);
@@ -320,6 +323,7 @@ fn interpolate(samples: u32, simd: SimdLevel) {
     let counters = run(&config, &rendering, |device| {
         let primitive = Primitive {
             corners,
+            offsets,
             depth,
             inverse_w,
             vertices: [0, 1, 2],
@@ -335,24 +339,37 @@ fn interpolate(samples: u32, simd: SimdLevel) {
         vec![draw(
             device,
             Some(stage),
-            state(samples),
+            DrawState {
+                sample_shading: each_shaded,
+                ..state(samples)
+            },
             vec![primitive],
             bits,
             2,
         )]
     });
-    let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+    let [a, b, c] = [0, 1, 2].map(|corner: usize| {
+        let along = |axis: usize| {
+            f64::from(corners[corner][axis]) + f64::from(offsets[corner][axis]) / 65_536.0
+        };
+        [along(0), along(1)]
+    });
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     let mut covered = 0;
-    for y in 0..HEIGHT {
+    let places: &[_] = if each_shaded { &SAMPLES_4 } else { &CENTER };
+    for (sample, y) in (0..places.len()).flat_map(|sample| (0..HEIGHT).map(move |y| (sample, y))) {
         for x in 0..WIDTH {
-            let bytes = texel(&target, Aspect::Color, 0, 0, [x, y]);
+            let bytes = texel(&target, Aspect::Color, 0, sample as u32, [x, y]);
             let found = Format::R32G32B32A32Sfloat.decode(&bytes);
             if found[0] == -9.0 {
                 continue;
             }
             covered += 1;
-            let p = [f64::from(x) * 256.0 + 128.0, f64::from(y) * 256.0 + 128.0];
+            let [within_x, within_y] = places[sample].map(f64::from);
+            let p = [
+                f64::from(x) * 256.0 + within_x,
+                f64::from(y) * 256.0 + within_y,
+            ];
             let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
                 (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
             };
@@ -382,8 +399,60 @@ fn interpolate(samples: u32, simd: SimdLevel) {
         }
     }
     assert!(covered > 2000);
-    if samples == 1 {
+    if places.len() == samples as usize {
         assert_eq!(counters.get(Counter::FragmentInvocations), covered);
         assert_eq!(counters.get(Counter::SamplesPassed), covered);
+    }
+}
+
+#[test]
+fn where_each_sample_is_shaded_fragments_are_at_their_sample() {
+    for (_, simd) in SimdLevel::supported() {
+        let config = Config {
+            threads: 1,
+            simd,
+            ..Config::default()
+        };
+        let target = image(Format::R32G32B32A32Sfloat, 4, 1);
+        let rendering = Rendering {
+            area: EVERYTHING,
+            layer_count: 1,
+            color: vec![Some(attachment(&target, ClearValue::Float([-9.0; 4])))],
+            depth: None,
+            stencil: None,
+        };
+        run(&config, &rendering, |device| {
+            let mut rng = ChaCha8Rng::seed_from_u64(4);
+            let everywhere = Primitive {
+                corners: [[-1000, -1000], [100_000, -1000], [-1000, 100_000]],
+                ..triangle(&mut rng, 0)
+            };
+            let inputs = vec![FragmentInput::FragCoord(0), FragmentInput::FragCoord(1)];
+            let mut outputs = color(0, 0);
+            outputs.truncate(2);
+            let state = DrawState {
+                sample_shading: true,
+                ..state(4)
+            };
+            let stage = fragments(inputs, outputs, false);
+            vec![draw(
+                device,
+                Some(stage),
+                state,
+                vec![everywhere],
+                Vec::new(),
+                0,
+            )]
+        });
+        for (sample, place) in (0..).zip(SAMPLES_4) {
+            for at in 0..WIDTH * HEIGHT {
+                let pixel = [at % WIDTH, at / WIDTH];
+                let bytes = texel(&target, Aspect::Color, 0, sample, pixel);
+                let found = Format::R32G32B32A32Sfloat.decode(&bytes);
+                let expected =
+                    [0, 1].map(|axis: usize| pixel[axis] as f32 + place[axis] as f32 / 256.0);
+                assert_eq!(found[..2], expected);
+            }
+        }
     }
 }

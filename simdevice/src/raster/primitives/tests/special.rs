@@ -16,6 +16,7 @@ fn single() -> Config {
 fn over(corners: [[i32; 2]; 3], layer: u16) -> Primitive {
     Primitive {
         corners,
+        offsets: [[0; 2]; 3],
         depth: [0.5; 3],
         inverse_w: [1.0; 3],
         vertices: [0, 1, 2],
@@ -88,8 +89,8 @@ fn each_sample_is_shaded_for_itself() {
 #[test]
 fn centroids_lie_within_the_primitive() {
     let target = image(WIDE, 4, 1);
-    // Half a pixel wide: most centres are outside.
-    let corners = [[1000, 10], [1130, 10], [1000, 15_000]];
+    // Half a pixel wide, between the edge of pixels and their centres: those lie outside, where the varying is above 1.
+    let corners = [[1020, 10], [1150, 10], [1020, 15_000]];
     let varying = |sampling| FragmentInput::Varying {
         index: 0,
         interpolation: Interpolation::Perspective,
