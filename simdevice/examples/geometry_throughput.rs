@@ -75,48 +75,13 @@ fn programs() -> DrawPrograms {
 
 fn state(cull_back: bool) -> DrawState {
     DrawState {
-        topology: Topology::TriangleList,
-        primitive_restart: false,
-        viewports: vec![Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: WIDTH as f32,
-            height: HEIGHT as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        }],
-        scissors: vec![Rect {
-            x: 0,
-            y: 0,
-            width: WIDTH,
-            height: HEIGHT,
-        }],
-        depth_clamp: false,
-        rasterizer_discard: false,
-        polygon_mode: PolygonMode::Fill,
-        cull_front: false,
         cull_back,
-        front_clockwise: true,
-        depth_bias: None,
-        line_width: 1.0,
-        provoking_last: false,
-        samples: 1,
-        sample_mask: u32::MAX,
-        sample_shading: false,
-        alpha_to_coverage: false,
-        alpha_to_one: false,
-        depth_stencil: DepthStencil {
-            depth: None,
-            bounds: None,
-            stencil: None,
-        },
-        logic_op: None,
         // No fragment work: what is measured comes before it.
         blend: vec![BlendState {
             equations: None,
             write_mask: 0,
         }],
-        blend_constants: [0.0; 4],
+        ..DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT])
     }
 }
 

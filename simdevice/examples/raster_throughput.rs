@@ -1,4 +1,4 @@
-//! How fast triangle mode is: fill, tiny triangles, texturing, overdraw and multisampling at 1920x1080.
+//! How fast triangle mode is: fill, tiny triangles, arithmetic, overdraw and multisampling at 1920x1080.
 //!
 //! `cargo run --release -p simdevice --example raster_throughput [workers [words of a scene's name]]`
 
@@ -99,36 +99,7 @@ fn state(scene: &Scene) -> DrawState {
         op: BlendOp::Add,
     };
     DrawState {
-        topology: Topology::TriangleList,
-        primitive_restart: false,
-        viewports: vec![Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: WIDTH as f32,
-            height: HEIGHT as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        }],
-        scissors: vec![Rect {
-            x: 0,
-            y: 0,
-            width: WIDTH,
-            height: HEIGHT,
-        }],
-        depth_clamp: false,
-        rasterizer_discard: false,
-        polygon_mode: PolygonMode::Fill,
-        cull_front: false,
-        cull_back: false,
-        front_clockwise: true,
-        depth_bias: None,
-        line_width: 1.0,
-        provoking_last: false,
         samples: scene.samples,
-        sample_mask: u32::MAX,
-        sample_shading: false,
-        alpha_to_coverage: false,
-        alpha_to_one: false,
         depth_stencil: DepthStencil {
             depth: scene.depth.then_some(DepthTest {
                 compare: CompareOp::LessOrEqual,
@@ -137,12 +108,11 @@ fn state(scene: &Scene) -> DrawState {
             bounds: None,
             stencil: None,
         },
-        logic_op: None,
         blend: vec![BlendState {
             equations: scene.blend.then_some((over, over)),
             write_mask: 0xF,
         }],
-        blend_constants: [0.0; 4],
+        ..DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT])
     }
 }
 

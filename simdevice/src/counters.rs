@@ -77,7 +77,7 @@ counters! {
     PixelContributions: "raster", "pixel contributions", Count, "Pairs of a pixel and a Gaussian that contributed to it";
     FragmentInvocations: "raster", "fragment invocations", Count, "Invocations of fragment programs, those that only help with derivatives apart";
     TilesHidden: "raster", "tiles hidden", Count, "Pairs of a tile and a primitive that was skipped there because all of the tile's depths hide it";
-    SamplesPassed: "raster", "samples passed", Count, "Samples of primitives that passed all tests";
+    SamplesPassed: "raster", "samples passed", Count, "Samples that passed all tests, those of Gaussian draws' fragments included";
     ComputeInvocations: "shader cores", "compute invocations", Count, "Invocations of compute programs";
     ShaderBatches: "shader cores", "batches", Count, "Batches of shader invocations run";
     ShaderFloat: "shader cores", "float instructions", Count, "32-bit float instructions, each counted once for a batch";

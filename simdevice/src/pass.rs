@@ -317,17 +317,13 @@ impl Pass {
         let ready = |draw: &'a PassDraw| match draw {
             PassDraw::Clear(clear) => Ready::Clear(clear),
             PassDraw::Gaussians(draw) => {
-                // A draw's floating-point colours mean nothing to an integer attachment.
-                let Some(format) = format.filter(|format: &Format| !format.is_integer()) else {
-                    return Ready::Nothing;
-                };
                 let state = draw.state.blend.first().unwrap_or(&REPLACE);
-                let blender = Blender::new(state, draw.state.blend_constants, format);
-                if blender.writes_nothing() {
-                    Ready::Nothing
-                } else {
-                    Ready::Gaussians(draw, blender)
-                }
+                // A draw's floating-point colours mean nothing to an integer attachment.
+                let blender = format
+                    .filter(|format: &Format| !format.is_integer())
+                    .map(|format| Blender::new(state, draw.state.blend_constants, format))
+                    .filter(|blender| !blender.writes_nothing());
+                Ready::Gaussians(draw, blender)
             }
             PassDraw::Primitives(draw) if draw.primitives.is_empty() => Ready::Nothing,
             PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TileDraw::new(
@@ -347,8 +343,8 @@ enum Ready<'a> {
     /// It changes nothing.
     Nothing,
     Clear(&'a ClearAttachments),
-    /// With how it blends into the first colour attachment.
-    Gaussians(&'a GaussianDraw, Blender),
+    /// With how it blends into the first colour attachment; one that does not still counts its samples.
+    Gaussians(&'a GaussianDraw, Option<Blender>),
     Primitives(Box<TileDraw<'a>>),
 }
 
@@ -442,7 +438,7 @@ impl Frame<'_> {
                 }
                 // Nothing says which layer a Gaussian is drawn to.
                 Ready::Gaussians(draw, blender) if layer == 0 => {
-                    tiles().for_each(|tile| self.gaussians(worker, draw, blender, &tile));
+                    tiles().for_each(|tile| self.gaussians(worker, draw, blender.as_ref(), &tile));
                 }
                 Ready::Gaussians(..) => {}
                 Ready::Primitives(draw) => draw.render(
@@ -533,12 +529,13 @@ impl Frame<'_> {
     /// Renders what a Gaussian draw covers of one tile, and blends it into the first colour attachment; all samples of
     /// a pixel get the same, for alpha is taken at its centre.
     // A depth test of Gaussians belongs here: stored depths go into `GaussianTile::render`, the median's come out.
-    fn gaussians(&self, worker: &mut Worker, draw: &GaussianDraw, blender: &Blender, tile: &Tile) {
-        let (Some(Some(target)), Some(plane)) =
-            (self.pass.color.first(), worker.buffers.color.first_mut())
-        else {
-            return;
-        };
+    fn gaussians(
+        &self,
+        worker: &mut Worker,
+        draw: &GaussianDraw,
+        blender: Option<&Blender>,
+        tile: &Tile,
+    ) {
         if !draw.touches(tile.pixels) {
             return;
         }
@@ -547,6 +544,14 @@ impl Frame<'_> {
         if !fragments.render(draw, self.device.level(), x, y, counters) {
             return;
         }
+        let samples = u64::from(self.pass.samples.unwrap_or(1));
+        counters.add(Counter::SamplesPassed, fragments.covered_pixels() * samples);
+        let target = self.pass.color.first().and_then(Option::as_ref);
+        let (Some(blender), Some(target), Some(plane)) =
+            (blender, target, worker.buffers.color.first_mut())
+        else {
+            return;
+        };
         plane.touch(target, 0, tile);
         plane.change_rows(target.format(), tile, draw.bounds, |row, y, first| {
             let columns = first..first + row.len();

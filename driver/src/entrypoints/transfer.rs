@@ -2,8 +2,9 @@
 
 use super::command::record;
 use crate::error::Error;
+use crate::handle::{self, Handle};
 use crate::lower::{rendering, transfer};
-use crate::{handle, pointer};
+use crate::pointer;
 use ash::vk;
 use simdevice::Packet;
 use simdevice::packet::{AttachmentClear, ClearAttachments};
@@ -20,8 +21,10 @@ crate::entry_points! {
         region_count: u32,
         regions: *const vk::BufferCopy,
     ) {
-        let regions = || Ok(pointer::slice(regions, region_count)?.iter().map(buffer_copy2).collect());
-        copy_buffer(command_buffer, src_buffer, dst_buffer, regions)
+        let regions = || converted(regions, region_count, buffer_copy2);
+        between(command_buffer, src_buffer, dst_buffer, |source, target| {
+            transfer::copy_buffer(source, target, &regions()?)
+        })
     }
 
     fn cmd_copy_buffer2(
@@ -29,8 +32,10 @@ crate::entry_points! {
         copy_buffer_info: *const vk::CopyBufferInfo2<'_>,
     ) {
         let info = pointer::input(copy_buffer_info)?;
-        let regions = || Ok(pointer::slice(info.p_regions, info.region_count)?.to_vec());
-        copy_buffer(command_buffer, info.src_buffer, info.dst_buffer, regions)
+        let regions = || pointer::slice(info.p_regions, info.region_count);
+        between(command_buffer, info.src_buffer, info.dst_buffer, |source, target| {
+            transfer::copy_buffer(source, target, regions()?)
+        })
     }
 
     fn cmd_copy_image(
@@ -42,8 +47,10 @@ crate::entry_points! {
         region_count: u32,
         regions: *const vk::ImageCopy,
     ) {
-        let regions = || Ok(pointer::slice(regions, region_count)?.iter().map(image_copy2).collect());
-        copy_image(command_buffer, src_image, dst_image, regions)
+        let regions = || converted(regions, region_count, image_copy2);
+        between(command_buffer, src_image, dst_image, |source, target| {
+            transfer::copy_image(source, target, &regions()?)
+        })
     }
 
     fn cmd_copy_image2(
@@ -51,8 +58,10 @@ crate::entry_points! {
         copy_image_info: *const vk::CopyImageInfo2<'_>,
     ) {
         let info = pointer::input(copy_image_info)?;
-        let regions = || Ok(pointer::slice(info.p_regions, info.region_count)?.to_vec());
-        copy_image(command_buffer, info.src_image, info.dst_image, regions)
+        let regions = || pointer::slice(info.p_regions, info.region_count);
+        between(command_buffer, info.src_image, info.dst_image, |source, target| {
+            transfer::copy_image(source, target, regions()?)
+        })
     }
 
     fn cmd_blit_image(
@@ -65,8 +74,10 @@ crate::entry_points! {
         regions: *const vk::ImageBlit,
         filter: vk::Filter,
     ) {
-        let regions = || Ok(pointer::slice(regions, region_count)?.iter().map(image_blit2).collect());
-        blit_image(command_buffer, src_image, dst_image, filter, regions)
+        let regions = || converted(regions, region_count, image_blit2);
+        between(command_buffer, src_image, dst_image, |source, target| {
+            transfer::blit_image(source, target, filter, &regions()?)
+        })
     }
 
     fn cmd_blit_image2(
@@ -74,8 +85,10 @@ crate::entry_points! {
         blit_image_info: *const vk::BlitImageInfo2<'_>,
     ) {
         let info = pointer::input(blit_image_info)?;
-        let regions = || Ok(pointer::slice(info.p_regions, info.region_count)?.to_vec());
-        blit_image(command_buffer, info.src_image, info.dst_image, info.filter, regions)
+        let regions = || pointer::slice(info.p_regions, info.region_count);
+        between(command_buffer, info.src_image, info.dst_image, |source, target| {
+            transfer::blit_image(source, target, info.filter, regions()?)
+        })
     }
 
     fn cmd_resolve_image(
@@ -87,9 +100,10 @@ crate::entry_points! {
         region_count: u32,
         regions: *const vk::ImageResolve,
     ) {
-        let regions =
-            || Ok(pointer::slice(regions, region_count)?.iter().map(image_resolve2).collect());
-        resolve_image(command_buffer, src_image, dst_image, regions)
+        let regions = || converted(regions, region_count, image_resolve2);
+        between(command_buffer, src_image, dst_image, |source, target| {
+            transfer::resolve_image(source, target, &regions()?)
+        })
     }
 
     fn cmd_resolve_image2(
@@ -97,8 +111,10 @@ crate::entry_points! {
         resolve_image_info: *const vk::ResolveImageInfo2<'_>,
     ) {
         let info = pointer::input(resolve_image_info)?;
-        let regions = || Ok(pointer::slice(info.p_regions, info.region_count)?.to_vec());
-        resolve_image(command_buffer, info.src_image, info.dst_image, regions)
+        let regions = || pointer::slice(info.p_regions, info.region_count);
+        between(command_buffer, info.src_image, info.dst_image, |source, target| {
+            transfer::resolve_image(source, target, regions()?)
+        })
     }
 
     fn cmd_copy_buffer_to_image(
@@ -109,9 +125,11 @@ crate::entry_points! {
         region_count: u32,
         regions: *const vk::BufferImageCopy,
     ) {
-        let regions =
-            || Ok(pointer::slice(regions, region_count)?.iter().map(buffer_image_copy2).collect());
-        copy_buffer_image(command_buffer, src_buffer, dst_image, true, regions)
+        let regions = || converted(regions, region_count, buffer_image_copy2);
+        between(command_buffer, src_buffer, dst_image, |buffer, image| {
+            let copy = transfer::copy_buffer_image(buffer, image, &regions()?)?;
+            Ok(Packet::CopyBufferToImage(copy))
+        })
     }
 
     fn cmd_copy_buffer_to_image2(
@@ -119,8 +137,11 @@ crate::entry_points! {
         copy_buffer_to_image_info: *const vk::CopyBufferToImageInfo2<'_>,
     ) {
         let info = pointer::input(copy_buffer_to_image_info)?;
-        let regions = || Ok(pointer::slice(info.p_regions, info.region_count)?.to_vec());
-        copy_buffer_image(command_buffer, info.src_buffer, info.dst_image, true, regions)
+        let regions = || pointer::slice(info.p_regions, info.region_count);
+        between(command_buffer, info.src_buffer, info.dst_image, |buffer, image| {
+            let copy = transfer::copy_buffer_image(buffer, image, regions()?)?;
+            Ok(Packet::CopyBufferToImage(copy))
+        })
     }
 
     fn cmd_copy_image_to_buffer(
@@ -131,9 +152,11 @@ crate::entry_points! {
         region_count: u32,
         regions: *const vk::BufferImageCopy,
     ) {
-        let regions =
-            || Ok(pointer::slice(regions, region_count)?.iter().map(buffer_image_copy2).collect());
-        copy_buffer_image(command_buffer, dst_buffer, src_image, false, regions)
+        let regions = || converted(regions, region_count, buffer_image_copy2);
+        between(command_buffer, src_image, dst_buffer, |image, buffer| {
+            let copy = transfer::copy_buffer_image(buffer, image, &regions()?)?;
+            Ok(Packet::CopyImageToBuffer(copy))
+        })
     }
 
     fn cmd_copy_image_to_buffer2(
@@ -141,8 +164,11 @@ crate::entry_points! {
         copy_image_to_buffer_info: *const vk::CopyImageToBufferInfo2<'_>,
     ) {
         let info = pointer::input(copy_image_to_buffer_info)?;
-        let regions = || Ok(pointer::slice(info.p_regions, info.region_count)?.to_vec());
-        copy_buffer_image(command_buffer, info.dst_buffer, info.src_image, false, regions)
+        let regions = || pointer::slice(info.p_regions, info.region_count);
+        between(command_buffer, info.src_image, info.dst_buffer, |image, buffer| {
+            let copy = transfer::copy_buffer_image(buffer, image, regions()?)?;
+            Ok(Packet::CopyImageToBuffer(copy))
+        })
     }
 
     fn cmd_fill_buffer(
@@ -259,116 +285,39 @@ crate::entry_points! {
     }
 }
 
-/// Records a copy between buffers; `regions` is called while recording, so that its error is the recording's.
+/// Records what `lower` makes of two objects; it is called while recording, so that its error is the recording's.
 ///
 /// # Safety
 /// The handles are live.
-unsafe fn copy_buffer<'a>(
+unsafe fn between<S: Handle, T: Handle>(
     command_buffer: vk::CommandBuffer,
-    source: vk::Buffer,
-    target: vk::Buffer,
-    regions: impl FnOnce() -> Result<Vec<vk::BufferCopy2<'a>>, Error>,
+    source: S,
+    target: T,
+    lower: impl FnOnce(&S::Object, &T::Object) -> Result<Packet, Error>,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     unsafe {
         record(command_buffer, |recorder| {
             recorder.require_outside_pass()?;
             let (source, target) = (handle::get(source)?, handle::get(target)?);
-            recorder.packet(transfer::copy_buffer(source, target, &regions()?)?);
+            recorder.packet(lower(source, target)?);
             Ok(())
         })
     }
 }
 
-/// Records a copy between images.
+/// Regions in the form of `vkCmd*2`.
 ///
 /// # Safety
-/// The handles are live.
-unsafe fn copy_image<'a>(
-    command_buffer: vk::CommandBuffer,
-    source: vk::Image,
-    target: vk::Image,
-    regions: impl FnOnce() -> Result<Vec<vk::ImageCopy2<'a>>, Error>,
-) -> Result<(), Error> {
+/// `regions` points at `count` of them.
+unsafe fn converted<T, U>(
+    regions: *const T,
+    count: u32,
+    convert: fn(&T) -> U,
+) -> Result<Vec<U>, Error> {
     // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            recorder.require_outside_pass()?;
-            let (source, target) = (handle::get(source)?, handle::get(target)?);
-            recorder.packet(transfer::copy_image(source, target, &regions()?)?);
-            Ok(())
-        })
-    }
-}
-
-/// Records a blit.
-///
-/// # Safety
-/// The handles are live.
-unsafe fn blit_image<'a>(
-    command_buffer: vk::CommandBuffer,
-    source: vk::Image,
-    target: vk::Image,
-    filter: vk::Filter,
-    regions: impl FnOnce() -> Result<Vec<vk::ImageBlit2<'a>>, Error>,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            recorder.require_outside_pass()?;
-            let (source, target) = (handle::get(source)?, handle::get(target)?);
-            recorder.packet(transfer::blit_image(source, target, filter, &regions()?)?);
-            Ok(())
-        })
-    }
-}
-
-/// Records a resolve.
-///
-/// # Safety
-/// The handles are live.
-unsafe fn resolve_image<'a>(
-    command_buffer: vk::CommandBuffer,
-    source: vk::Image,
-    target: vk::Image,
-    regions: impl FnOnce() -> Result<Vec<vk::ImageResolve2<'a>>, Error>,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            recorder.require_outside_pass()?;
-            let (source, target) = (handle::get(source)?, handle::get(target)?);
-            recorder.packet(transfer::resolve_image(source, target, &regions()?)?);
-            Ok(())
-        })
-    }
-}
-
-/// Records a copy between a buffer and an image.
-///
-/// # Safety
-/// The handles are live.
-unsafe fn copy_buffer_image<'a>(
-    command_buffer: vk::CommandBuffer,
-    buffer: vk::Buffer,
-    image: vk::Image,
-    to_image: bool,
-    regions: impl FnOnce() -> Result<Vec<vk::BufferImageCopy2<'a>>, Error>,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            recorder.require_outside_pass()?;
-            let (buffer, image) = (handle::get(buffer)?, handle::get(image)?);
-            let copy = transfer::copy_buffer_image(buffer, image, &regions()?)?;
-            recorder.packet(if to_image {
-                Packet::CopyBufferToImage(copy)
-            } else {
-                Packet::CopyImageToBuffer(copy)
-            });
-            Ok(())
-        })
-    }
+    let regions = unsafe { pointer::slice(regions, count)? };
+    Ok(regions.iter().map(convert).collect())
 }
 
 fn buffer_copy2(region: &vk::BufferCopy) -> vk::BufferCopy2<'static> {

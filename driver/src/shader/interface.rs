@@ -72,7 +72,6 @@ pub enum BuiltIn {
     SamplePosition,
     SampleMask,
     FragDepth,
-    FragStencilRef,
     WorkgroupId,
     NumWorkgroups,
 }

@@ -105,10 +105,16 @@ fn bounds_test(request: &mut Request) {
         .max_depth_bounds(1.0);
 }
 
-#[allow(
-    clippy::undocumented_unsafe_blocks,
-    reason = "what the crate says of calls is true of each of these"
-)]
+/// Records a command that sets state; the arguments may depend on whether the state is on.
+macro_rules! sets {
+    ($on:pat => $command:ident($($argument:expr),* $(,)?)) => {
+        |device, commands, $on| {
+            // SAFETY: see the crate.
+            unsafe { device.$command(commands, $($argument),*) }
+        }
+    };
+}
+
 fn cases() -> Vec<Case> {
     let flat = || two_triangles([0.3, 0.3]);
     let steps = || two_triangles([0.2, 0.4]);
@@ -117,67 +123,43 @@ fn cases() -> Vec<Case> {
             state: S::CULL_MODE,
             vertices: flat(),
             base: |_| {},
-            fixed: |request, on| {
-                let mode = if on {
-                    vk::CullModeFlags::BACK
-                } else {
-                    vk::CullModeFlags::NONE
-                };
-                request.raster.cull_mode = mode;
-            },
-            dynamic: |device, commands, on| {
-                let mode = if on {
-                    vk::CullModeFlags::BACK
-                } else {
-                    vk::CullModeFlags::NONE
-                };
-                unsafe { device.cmd_set_cull_mode(commands, mode) };
-            },
+            fixed: |request, on| request.raster.cull_mode = culled(on),
+            dynamic: sets!(on => cmd_set_cull_mode(culled(on))),
         },
         Case {
             state: S::FRONT_FACE,
             vertices: flat(),
             base: cull_back,
             fixed: |request, on| request.raster.front_face = face(on),
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_front_face(commands, face(on));
-            },
+            dynamic: sets!(on => cmd_set_front_face(face(on))),
         },
         Case {
             state: S::PRIMITIVE_TOPOLOGY,
             vertices: flat(),
             base: |_| {},
             fixed: |request, on| request.topology = topology(on),
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_primitive_topology(commands, topology(on));
-            },
+            dynamic: sets!(on => cmd_set_primitive_topology(topology(on))),
         },
         Case {
             state: S::PRIMITIVE_RESTART_ENABLE,
             vertices: flat(),
             base: strip,
             fixed: |request, on| request.restart = on,
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_primitive_restart_enable(commands, on);
-            },
+            dynamic: sets!(on => cmd_set_primitive_restart_enable(on)),
         },
         Case {
             state: S::RASTERIZER_DISCARD_ENABLE,
             vertices: flat(),
             base: |_| {},
             fixed: |request, on| request.raster = request.raster.rasterizer_discard_enable(on),
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_rasterizer_discard_enable(commands, on);
-            },
+            dynamic: sets!(on => cmd_set_rasterizer_discard_enable(on)),
         },
         Case {
             state: S::LINE_WIDTH,
             vertices: flat()[..4].to_vec(),
             base: lines,
             fixed: |request, on| request.raster.line_width = if on { 5.0 } else { 1.0 },
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_line_width(commands, if on { 5.0 } else { 1.0 });
-            },
+            dynamic: sets!(on => cmd_set_line_width(if on { 5.0 } else { 1.0 })),
         },
         Case {
             state: S::DEPTH_TEST_ENABLE,
@@ -186,9 +168,7 @@ fn cases() -> Vec<Case> {
             fixed: |request, on| {
                 request.depth_stencil = request.depth_stencil.depth_test_enable(on);
             },
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_depth_test_enable(commands, on);
-            },
+            dynamic: sets!(on => cmd_set_depth_test_enable(on)),
         },
         Case {
             state: S::DEPTH_WRITE_ENABLE,
@@ -197,9 +177,7 @@ fn cases() -> Vec<Case> {
             fixed: |request, on| {
                 request.depth_stencil = request.depth_stencil.depth_write_enable(on);
             },
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_depth_write_enable(commands, on);
-            },
+            dynamic: sets!(on => cmd_set_depth_write_enable(on)),
         },
         Case {
             state: S::DEPTH_COMPARE_OP,
@@ -208,9 +186,7 @@ fn cases() -> Vec<Case> {
             fixed: |request, on| {
                 request.depth_stencil = request.depth_stencil.depth_compare_op(compare(on));
             },
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_depth_compare_op(commands, compare(on));
-            },
+            dynamic: sets!(on => cmd_set_depth_compare_op(compare(on))),
         },
         Case {
             state: S::DEPTH_BOUNDS,
@@ -219,9 +195,7 @@ fn cases() -> Vec<Case> {
             fixed: |request, on| {
                 request.depth_stencil.min_depth_bounds = if on { 0.6 } else { 0.0 };
             },
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_depth_bounds(commands, if on { 0.6 } else { 0.0 }, 1.0);
-            },
+            dynamic: sets!(on => cmd_set_depth_bounds(if on { 0.6 } else { 0.0 }, 1.0)),
         },
         Case {
             state: S::DEPTH_BOUNDS_TEST_ENABLE,
@@ -233,9 +207,7 @@ fn cases() -> Vec<Case> {
             fixed: |request, on| {
                 request.depth_stencil = request.depth_stencil.depth_bounds_test_enable(on);
             },
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_depth_bounds_test_enable(commands, on);
-            },
+            dynamic: sets!(on => cmd_set_depth_bounds_test_enable(on)),
         },
         Case {
             state: S::DEPTH_BIAS,
@@ -244,9 +216,7 @@ fn cases() -> Vec<Case> {
             fixed: |request, on| {
                 request.raster.depth_bias_constant_factor = if on { BIAS } else { 0.0 };
             },
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_depth_bias(commands, if on { BIAS } else { 0.0 }, 0.0, 0.0);
-            },
+            dynamic: sets!(on => cmd_set_depth_bias(if on { BIAS } else { 0.0 }, 0.0, 0.0)),
         },
         Case {
             state: S::DEPTH_BIAS_ENABLE,
@@ -256,9 +226,7 @@ fn cases() -> Vec<Case> {
                 request.raster.depth_bias_constant_factor = BIAS;
             },
             fixed: |request, on| request.raster = request.raster.depth_bias_enable(on),
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_depth_bias_enable(commands, on);
-            },
+            dynamic: sets!(on => cmd_set_depth_bias_enable(on)),
         },
         Case {
             state: S::STENCIL_TEST_ENABLE,
@@ -267,58 +235,58 @@ fn cases() -> Vec<Case> {
             fixed: |request, on| {
                 request.depth_stencil = request.depth_stencil.stencil_test_enable(on);
             },
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_stencil_test_enable(commands, on);
-            },
+            dynamic: sets!(on => cmd_set_stencil_test_enable(on)),
         },
         Case {
             state: S::STENCIL_OP,
             vertices: flat(),
             base: stencil_test,
             fixed: |request, on| set_faces(request, |face| face.pass_op = pass_op(on)),
-            dynamic: |device, commands, on| unsafe {
-                let keep = vk::StencilOp::KEEP;
-                let equal = vk::CompareOp::EQUAL;
-                device.cmd_set_stencil_op(commands, BOTH, keep, pass_op(on), keep, equal);
-            },
+            dynamic: sets!(on => cmd_set_stencil_op(
+                BOTH,
+                vk::StencilOp::KEEP,
+                pass_op(on),
+                vk::StencilOp::KEEP,
+                vk::CompareOp::EQUAL,
+            )),
         },
         Case {
             state: S::STENCIL_COMPARE_MASK,
             vertices: flat(),
             base: stencil_test,
             fixed: |request, on| set_faces(request, |face| face.compare_mask = mask(on)),
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_stencil_compare_mask(commands, BOTH, mask(on));
-            },
+            dynamic: sets!(on => cmd_set_stencil_compare_mask(BOTH, mask(on))),
         },
         Case {
             state: S::STENCIL_WRITE_MASK,
             vertices: flat(),
             base: stencil_test,
             fixed: |request, on| set_faces(request, |face| face.write_mask = mask(on)),
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_stencil_write_mask(commands, BOTH, mask(on));
-            },
+            dynamic: sets!(on => cmd_set_stencil_write_mask(BOTH, mask(on))),
         },
         Case {
             state: S::STENCIL_REFERENCE,
             vertices: flat(),
             base: stencil_test,
             fixed: |request, on| set_faces(request, |face| face.reference = on.into()),
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_stencil_reference(commands, BOTH, on.into());
-            },
+            dynamic: sets!(on => cmd_set_stencil_reference(BOTH, on.into())),
         },
         Case {
             state: S::BLEND_CONSTANTS,
             vertices: flat(),
             base: constant_blend,
             fixed: |request, on| request.blend_constants = constants(on),
-            dynamic: |device, commands, on| unsafe {
-                device.cmd_set_blend_constants(commands, &constants(on));
-            },
+            dynamic: sets!(on => cmd_set_blend_constants(&constants(on))),
         },
     ]
+}
+
+fn culled(on: bool) -> vk::CullModeFlags {
+    if on {
+        vk::CullModeFlags::BACK
+    } else {
+        vk::CullModeFlags::NONE
+    }
 }
 
 fn face(on: bool) -> vk::FrontFace {

@@ -66,6 +66,49 @@ fn counters_are_read_in_the_order_that_the_pool_chose() {
 }
 
 #[test]
+fn occlusion_queries_count_the_fragments_of_gaussian_draws() {
+    let splats = [
+        splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3]),
+        splat([0.1, 0.0, 6.0], 0.1, 0.8, [0.5; 3]),
+    ];
+    let masked = PipelineRequest {
+        blend: vec![crate::scene::replace().color_write_mask(vk::ColorComponentFlags::empty())],
+        ..PipelineRequest::default()
+    };
+    // What is written nowhere counts all the same.
+    let [shown, hidden] = [PipelineRequest::default(), masked].map(|request| {
+        let scene = Scene::new(&splats, &request);
+        let device = &scene.gpu.device;
+        let info = vk::QueryPoolCreateInfo::default()
+            .query_type(vk::QueryType::OCCLUSION)
+            .query_count(1);
+        let mut samples = [0u32];
+        // SAFETY: see the crate.
+        unsafe {
+            let pool = device.create_query_pool(&info, None).unwrap();
+            device.reset_query_pool(pool, 0, 1);
+            scene.gpu.run(|device, commands| {
+                device.cmd_begin_query(commands, pool, 0, vk::QueryControlFlags::PRECISE);
+                crate::scene::pass(device, commands, scene.image, [0.0; 4], || {
+                    scene.bind(device, commands);
+                    device.cmd_draw(commands, 2, 1, 0, 0);
+                });
+                device.cmd_end_query(commands, pool, 0);
+            });
+            device
+                .get_query_pool_results(pool, 0, &mut samples, vk::QueryResultFlags::WAIT)
+                .unwrap();
+            device.destroy_query_pool(pool, None);
+        }
+        let pixels = scene.pixels();
+        let drawn = pixels.iter().filter(|pixel| pixel[3] > 0.0).count();
+        (samples[0] as usize, drawn)
+    });
+    assert!(shown.0 > 20 && shown.0 == shown.1, "{shown:?}");
+    assert_eq!(hidden, (shown.0, 0));
+}
+
+#[test]
 fn timestamps_ascend_and_are_copied_with_their_availability() {
     let gpu = Gpu::new();
     let device = &gpu.device;

@@ -51,6 +51,21 @@ fn reference(attachment: u32) -> vk::AttachmentReference {
     }
 }
 
+/// A render pass of two subpasses, the second of which reads what the first wrote.
+fn render_pass(
+    gpu: &Gpu,
+    attachments: &[vk::AttachmentDescription],
+    subpasses: &[vk::SubpassDescription],
+) -> vk::RenderPass {
+    let dependencies = [dependency()];
+    let info = vk::RenderPassCreateInfo::default()
+        .attachments(attachments)
+        .subpasses(subpasses)
+        .dependencies(&dependencies);
+    // SAFETY: see the crate.
+    unsafe { gpu.device.create_render_pass(&info, None).unwrap() }
+}
+
 /// What the second subpass reads, the first has written.
 fn dependency() -> vk::SubpassDependency {
     vk::SubpassDependency::default()
@@ -177,13 +192,7 @@ fn a_subpass_reads_what_an_earlier_one_left() {
             .color_attachments(&last)
             .input_attachments(&read),
     ];
-    let dependencies = [dependency()];
-    let info = vk::RenderPassCreateInfo::default()
-        .attachments(&attachments)
-        .subpasses(&subpasses)
-        .dependencies(&dependencies);
-    // SAFETY: see the crate.
-    let pass = unsafe { gpu.device.create_render_pass(&info, None).unwrap() };
+    let pass = render_pass(gpu, &attachments, &subpasses);
     let set = inputs(&canvas, &images[..2]);
     let writes_depth = Request {
         depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default()
@@ -260,13 +269,7 @@ fn samples_are_resolved_and_read_one_by_one() {
             .color_attachments(&last)
             .input_attachments(&many),
     ];
-    let dependencies = [dependency()];
-    let info = vk::RenderPassCreateInfo::default()
-        .attachments(&attachments)
-        .subpasses(&subpasses)
-        .dependencies(&dependencies);
-    // SAFETY: see the crate.
-    let pass = unsafe { gpu.device.create_render_pass(&info, None).unwrap() };
+    let pass = render_pass(gpu, &attachments, &subpasses);
     let set = inputs(&canvas, &images[..1]);
     let multisampled = Request {
         multisample: vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(four),

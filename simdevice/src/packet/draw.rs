@@ -183,8 +183,6 @@ pub enum FragmentOutput {
     },
     /// The depth.
     Depth,
-    /// The stencil reference.
-    StencilRef,
     /// Samples to keep.
     SampleMask,
 }
@@ -361,4 +359,51 @@ pub struct DrawState {
     pub blend: Vec<BlendState>,
     /// The constants of the constant blend factors.
     pub blend_constants: [f32; 4],
+}
+
+impl DrawState {
+    /// Filled primitives over a framebuffer of that many pixels, one sample each: nothing is culled, tested, biased or
+    /// blended, and front faces are clockwise. Attachments have no state yet.
+    pub fn new(topology: Topology, [width, height]: [u32; 2]) -> Self {
+        Self {
+            topology,
+            primitive_restart: false,
+            viewports: vec![Viewport {
+                x: 0.0,
+                y: 0.0,
+                width: width as f32,
+                height: height as f32,
+                min_depth: 0.0,
+                max_depth: 1.0,
+            }],
+            scissors: vec![Rect {
+                x: 0,
+                y: 0,
+                width,
+                height,
+            }],
+            depth_clamp: false,
+            rasterizer_discard: false,
+            polygon_mode: PolygonMode::Fill,
+            cull_front: false,
+            cull_back: false,
+            front_clockwise: true,
+            depth_bias: None,
+            line_width: 1.0,
+            provoking_last: false,
+            samples: 1,
+            sample_mask: u32::MAX,
+            sample_shading: false,
+            alpha_to_coverage: false,
+            alpha_to_one: false,
+            depth_stencil: DepthStencil {
+                depth: None,
+                bounds: None,
+                stencil: None,
+            },
+            logic_op: None,
+            blend: Vec::new(),
+            blend_constants: [0.0; 4],
+        }
+    }
 }

@@ -34,7 +34,6 @@ pub(super) struct Interface {
     /// By attachment.
     pub colors: Vec<ColorSlots>,
     pub depth: Option<u32>,
-    pub stencil_reference: Option<u32>,
     pub sample_mask: Option<u32>,
     pub early_tests: bool,
     pub discards: bool,
@@ -150,7 +149,6 @@ impl Interface {
                     }
                 }
                 FragmentOutput::Depth => interface.depth = Some(output.slot),
-                FragmentOutput::StencilRef => interface.stencil_reference = Some(output.slot),
                 FragmentOutput::SampleMask => interface.sample_mask = Some(output.slot),
             }
         }

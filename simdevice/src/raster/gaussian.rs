@@ -131,6 +131,14 @@ impl GaussianTile {
         self.covered.iter().any(|&lanes| lanes != 0)
     }
 
+    /// How many pixels of the tile were covered.
+    pub fn covered_pixels(&self) -> u64 {
+        self.covered
+            .iter()
+            .map(|lanes| u64::from(lanes.count_ones()))
+            .sum()
+    }
+
     /// The premultiplied colour and coverage (C, 1 - T) of a pixel of the tile, if it was covered.
     pub fn pixel(&self, x: usize, y: usize) -> Option<[f32; 4]> {
         let (block, lane) = block_and_lane(x, y);

@@ -98,7 +98,7 @@ impl<'a> TileDraw<'a> {
         if let Some(interface) = stage.map(|stage| &stage.interface) {
             let removes =
                 interface.discards || interface.sample_mask.is_some() || state.alpha_to_coverage;
-            let changes = interface.depth.is_some() || interface.stencil_reference.is_some();
+            let changes = interface.depth.is_some();
             let late = !interface.early_tests
                 && (changes
                     || interface.has_side_effects && tests.any()

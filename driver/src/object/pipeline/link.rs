@@ -298,7 +298,6 @@ fn fragment_output(output: &Output, effects: Effects<'_>) -> Option<FragmentOutp
             component,
         } => match built_in {
             BuiltIn::FragDepth => Some(FragmentOutput::Depth),
-            BuiltIn::FragStencilRef => Some(FragmentOutput::StencilRef),
             BuiltIn::SampleMask if component == 0 => Some(FragmentOutput::SampleMask),
             _ => None,
         },

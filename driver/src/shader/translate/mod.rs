@@ -544,7 +544,6 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::SubgroupVoteKHR
             | C::DrawParameters
             | C::DeviceGroup
-            | C::MultiView
             | C::StorageBuffer16BitAccess
             | C::UniformAndStorageBuffer16BitAccess
             | C::StoragePushConstant16
@@ -555,7 +554,6 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::SignedZeroInfNanPreserve
             | C::DenormPreserve
             | C::RoundingModeRTE
-            | C::StencilExportEXT
             | C::ShaderNonUniform
             | C::RuntimeDescriptorArray
             | C::InputAttachmentArrayDynamicIndexing

@@ -71,7 +71,6 @@ fn output_target(origin: Origin) -> Outcome<OutputTarget> {
                 Spirv::ViewportIndex => BuiltIn::ViewportIndex,
                 Spirv::FragDepth => BuiltIn::FragDepth,
                 Spirv::SampleMask => BuiltIn::SampleMask,
-                Spirv::FragStencilRefEXT => BuiltIn::FragStencilRef,
                 other => return unsupported(format!("output built-in {other:?}")),
             },
             component,

@@ -6,7 +6,7 @@ use crate::counters::Counters;
 use crate::device::{Config, Device};
 use crate::format::Format;
 use crate::packet::draw::*;
-use crate::packet::{AttributeStream, BufferRange, IndexStream, Rect, Viewport};
+use crate::packet::{AttributeStream, BufferRange, IndexStream, Rect};
 use devmem::Allocation;
 use isa::builder::Builder;
 use isa::ir::{Program, Rate, Type};
@@ -117,41 +117,7 @@ pub fn programs(extra: &[VertexOutput]) -> DrawPrograms {
 
 /// State without any culling.
 pub fn state(topology: Topology) -> DrawState {
-    DrawState {
-        topology,
-        primitive_restart: false,
-        viewports: vec![Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: WIDTH as f32,
-            height: HEIGHT as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        }],
-        scissors: vec![EVERYTHING],
-        depth_clamp: false,
-        rasterizer_discard: false,
-        polygon_mode: PolygonMode::Fill,
-        cull_front: false,
-        cull_back: false,
-        front_clockwise: true,
-        depth_bias: None,
-        line_width: 1.0,
-        provoking_last: false,
-        samples: 1,
-        sample_mask: u32::MAX,
-        sample_shading: false,
-        alpha_to_coverage: false,
-        alpha_to_one: false,
-        depth_stencil: DepthStencil {
-            depth: None,
-            bounds: None,
-            stencil: None,
-        },
-        logic_op: None,
-        blend: Vec::new(),
-        blend_constants: [0.0; 4],
-    }
+    DrawState::new(topology, [WIDTH, HEIGHT])
 }
 
 /// A buffer of these elements.

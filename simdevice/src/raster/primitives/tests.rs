@@ -75,39 +75,10 @@ fn attachment(view: &ImageView, value: ClearValue) -> Attachment {
 
 fn state(samples: u32) -> DrawState {
     DrawState {
-        topology: Topology::TriangleList,
-        primitive_restart: false,
-        viewports: vec![Viewport {
-            x: 0.0,
-            y: 0.0,
-            width: WIDTH as f32,
-            height: HEIGHT as f32,
-            min_depth: 0.0,
-            max_depth: 1.0,
-        }],
-        scissors: vec![EVERYTHING],
-        depth_clamp: false,
-        rasterizer_discard: false,
-        polygon_mode: PolygonMode::Fill,
-        cull_front: false,
-        cull_back: false,
         front_clockwise: false,
-        depth_bias: None,
-        line_width: 1.0,
-        provoking_last: false,
         samples,
-        sample_mask: u32::MAX,
-        sample_shading: false,
-        alpha_to_coverage: false,
-        alpha_to_one: false,
-        depth_stencil: DepthStencil {
-            depth: None,
-            bounds: None,
-            stencil: None,
-        },
-        logic_op: None,
-        blend: Vec::new(),
         blend_constants: [0.25, 0.5, 0.75, 1.0],
+        ..DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT])
     }
 }
 
