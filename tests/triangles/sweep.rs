@@ -81,8 +81,9 @@ fn judge(name: &str, ours: Result<Output, String>, theirs: &Output) -> Result<()
     let stale = expected
         .exceptions(name)
         .find(|exception| !(found.iter()).any(|difference| exception.covers(&difference.picture)));
+    // What lavapipe rounds depends on its processor, too.
     if let Some(exception) = stale {
-        return Err(format!("nothing differs any more: {exception:?}"));
+        eprintln!("nothing differs here: {exception:?}");
     }
     let inexcusable: Vec<_> = (found.into_iter())
         .filter(|difference| !is_excused(difference))

@@ -1,7 +1,7 @@
 //! What is expected to differ, and what this driver cannot do yet: two checked-in lists.
 //!
-//! Both are exact in both directions: a scene that is listed and has nothing to hide fails too, so
-//! that the lists never say more than is true.
+//! A scene that is listed as missing and is drawn right fails, so that the list says no more than is
+//! true; an exception that nothing needs is told.
 
 use std::path::Path;
 
