@@ -3,11 +3,13 @@
 
 use ash::vk;
 use gaurast_tests::triangles::{
-    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, fetch_sample,
-    shader,
+    Buffer, Gpu, Image, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
+    fetch_sample, shader, shapes,
 };
 
-use crate::devices::own;
+use rand::Rng;
+
+use crate::devices::{lavapipe, own};
 
 /// Corners at whole pixels of 128, so that no rounding moves them, with strong perspective.
 const PIXELS: [[f64; 2]; 3] = [[4.0, 9.0], [124.0, 17.0], [33.0, 120.0]];
@@ -172,4 +174,121 @@ fn lines_are_exact_at_samples() {
         }
     }
     assert!(covered > 200, "only {covered} samples are covered");
+}
+
+/// A triangle of pixels, depths and a number, of corners that no rounding moves.
+struct Sliver {
+    pixels: [[f64; 2]; 3],
+    depths: [f32; 3],
+}
+
+impl Sliver {
+    /// Corners on the grid of 256ths within 120 pixels, the third one almost on the others' line.
+    fn random(rng: &mut impl Rng) -> Self {
+        let grid = |value: f64| (256.0 * value).round() / 256.0;
+        let [a, b] = [0; 2].map(|_| [0; 2].map(|_| grid(rng.random_range(4.0..124.0))));
+        let (along, beside) = (rng.random_range(0.0..1.0), rng.random_range(-1.5..1.5));
+        let length = (b[0] - a[0]).hypot(b[1] - a[1]).max(1.0);
+        let normal = [(a[1] - b[1]) / length, (b[0] - a[0]) / length];
+        let third = |axis: usize| {
+            let on_line = a[axis] + along * (b[axis] - a[axis]);
+            grid((on_line + beside * normal[axis]).clamp(4.0, 124.0))
+        };
+        Self {
+            pixels: [a, b, [third(0), third(1)]],
+            depths: [0; 3].map(|_| rng.random_range(0.05..0.95)),
+        }
+    }
+
+    /// The depth of its plane, in binary64.
+    fn depth(&self, x: f64, y: f64) -> f64 {
+        let area = |a: [f64; 2], b: [f64; 2]| (a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x);
+        let [a, b, c] = self.pixels;
+        let areas = [area(b, c), area(c, a), area(a, b)];
+        let weighted = (0..3).map(|index| areas[index] * f64::from(self.depths[index]));
+        weighted.sum::<f64>() / areas.iter().sum::<f64>()
+    }
+
+    /// Its corners, with its number as a colour.
+    fn vertices(&self, number: usize) -> [Vertex; 3] {
+        [0, 1, 2].map(|index| {
+            let [x, y] = self.pixels[index].map(|pixel| (pixel / 64.0 - 1.0) as f32);
+            Vertex {
+                position: [x, y, self.depths[index], 1.0],
+                color: [number as f32; 4],
+            }
+        })
+    }
+}
+
+/// The greatest error of a depth among slivers that a device drew, and how many pixels there were.
+fn greatest_error_of_slivers(gpu: &Gpu, slivers: &[Sliver]) -> (f64, usize) {
+    let options = TargetOptions {
+        depth: Some(vk::Format::D32_SFLOAT),
+        ..TargetOptions::of(vk::Format::R32_SFLOAT)
+    };
+    let target = Target::new(gpu, &options);
+    let pipeline = PipelineOptions {
+        vertex: "layout(location = 0) in vec4 position;
+                 layout(location = 1) in vec4 color;
+                 layout(location = 0) flat out float number;
+                 void main() { gl_Position = position; number = color.x; }",
+        fragment: Some(
+            "layout(location = 0) flat in float number;
+             layout(location = 0) out vec4 color;
+             void main() { color = vec4(number); }",
+        ),
+        depth_stencil: depth_test(vk::CompareOp::ALWAYS),
+        ..PipelineOptions::default()
+    };
+    let pipeline = Pipeline::new(gpu, &target, &pipeline);
+    let numbered = (1..).zip(slivers);
+    let vertices: Vec<_> = numbered
+        .flat_map(|(n, sliver)| sliver.vertices(n))
+        .collect();
+    let buffer = Buffer::of(gpu, &vertices);
+    gpu.run(|commands| {
+        commands.pass(&target, &Pass::zeros(), || {
+            commands.bind(&pipeline);
+            commands.vertices(&buffer);
+            commands.draw(0..vertices.len() as u32);
+        });
+    });
+    let read = |image: &Image, aspect| -> Vec<f32> {
+        bytemuck::pod_collect_to_vec(&image.read(aspect, 4))
+    };
+    let numbers = read(&target.colors[0], vk::ImageAspectFlags::COLOR);
+    let depth = target.depth.as_ref().expect("a depth attachment");
+    let depths = read(depth, vk::ImageAspectFlags::DEPTH);
+    let mut greatest = 0.0f64;
+    let mut pixels = 0;
+    for (index, (&number, &depth)) in numbers.iter().zip(&depths).enumerate() {
+        let Some(sliver) = (number as usize).checked_sub(1).map(|n| &slivers[n]) else {
+            continue;
+        };
+        let exact = sliver.depth((index % 128) as f64 + 0.5, (index / 128) as f64 + 0.5);
+        greatest = greatest.max((f64::from(depth) - exact).abs());
+        pixels += 1;
+    }
+    (greatest, pixels)
+}
+
+/// The steeper a plane, the more of its depth is lost where it is evaluated carelessly: it is here
+/// that pictures differ from lavapipe's.
+#[test]
+fn depths_of_slivers_are_exact() {
+    if !shader::can_compile() {
+        eprintln!("skipped: there is no glslangValidator here");
+        return;
+    }
+    let mut rng = shapes::rng(11);
+    let slivers: Vec<_> = (0..3000).map(|_| Sliver::random(&mut rng)).collect();
+    let (error, pixels) = greatest_error_of_slivers(own(), &slivers);
+    println!("own: {error:e} over {pixels} pixels");
+    if let Some(lavapipe) = lavapipe() {
+        let (error, pixels) = greatest_error_of_slivers(lavapipe, &slivers);
+        println!("lavapipe: {error:e} over {pixels} pixels");
+    }
+    assert!(pixels > 3000, "only {pixels} pixels are covered");
+    assert!(error <= 4e-6, "{error:e}");
 }

@@ -5,8 +5,10 @@
 
 use std::path::Path;
 
+use crate::compare::Difference;
+
 /// A difference that the specification permits.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Exception {
     /// The scene.
     pub scene: String,
@@ -14,6 +16,8 @@ pub struct Exception {
     pub picture: String,
     /// The most texels that may differ.
     pub texels: usize,
+    /// How far they may differ, in limits of the format.
+    pub limits: f64,
     /// The clause that permits it.
     pub clause: String,
 }
@@ -43,13 +47,14 @@ impl Expected {
 
     fn parse(exceptions: &str, unsupported: &str) -> Self {
         let exceptions = lines(exceptions).map(|fields| match fields[..] {
-            [scene, picture, texels, clause] if !clause.is_empty() => Exception {
+            [scene, picture, texels, limits, clause] if !clause.is_empty() => Exception {
                 scene: scene.to_owned(),
                 picture: picture.to_owned(),
                 texels: texels.parse().expect("a number of texels"),
+                limits: limits.parse().expect("a number of limits"),
                 clause: clause.to_owned(),
             },
-            _ => panic!("scene | picture | texels | clause, not {fields:?}"),
+            _ => panic!("scene | picture | texels | limits | clause, not {fields:?}"),
         });
         let unsupported = lines(unsupported).map(|fields| match fields[..] {
             [scene, reason] if !reason.is_empty() => (scene.to_owned(), reason.to_owned()),
@@ -85,6 +90,13 @@ impl Exception {
     pub fn covers(&self, picture: &str) -> bool {
         self.picture == "*" || self.picture == picture
     }
+
+    /// Whether a difference of its picture is no greater than it says.
+    pub fn excuses(&self, difference: &Difference) -> bool {
+        self.covers(&difference.picture)
+            && difference.texels <= self.texels
+            && difference.worst <= self.limits
+    }
 }
 
 /// Lines of fields between bars; those that begin with `#` are comments.
@@ -102,12 +114,21 @@ mod tests {
     #[test]
     fn lines_become_exceptions_and_reasons() {
         let expected = Expected::parse(
-            "# scene | picture | texels | clause\nlines | color 0 | 3 | 28.6.1: may\n\n",
+            "# scene | picture | texels | limits | clause\nlines | color 0 | 3 | 1.5 | 28.6.1: may\n\n",
             "points | no points\n",
         );
         let exception = expected.exceptions("lines").next().unwrap();
         assert!(exception.covers("color 0") && !exception.covers("depth"));
         assert_eq!((exception.texels, &*exception.clause), (3, "28.6.1: may"));
+        let difference = |texels, worst| Difference {
+            picture: "color 0".to_owned(),
+            texels,
+            worst,
+            place: [0; 2],
+            components: Default::default(),
+        };
+        assert!(exception.excuses(&difference(3, 1.5)));
+        assert!(!exception.excuses(&difference(4, 1.5)) && !exception.excuses(&difference(3, 1.6)));
         assert_eq!(expected.exceptions("points").count(), 0);
         assert_eq!(expected.unsupported("points"), Some("no points"));
         assert_eq!(expected.unsupported("lines"), None);
@@ -115,8 +136,8 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "scene | picture | texels | clause")]
+    #[should_panic(expected = "scene | picture | texels | limits | clause")]
     fn an_exception_needs_a_clause() {
-        Expected::parse("lines | color 0 | 3\n", "");
+        Expected::parse("lines | color 0 | 3 | 1.5\n", "");
     }
 }
