@@ -53,6 +53,14 @@ pub(crate) enum Error {
     /// A feature that isn't supported.
     #[error("{0} is not supported")]
     FeatureNotPresent(String),
+    /// A mode of the extension whose feature is not enabled, or does not exist here.
+    #[error("{message} ({vuid})")]
+    FeatureNotEnabled {
+        /// The rule's id.
+        vuid: &'static str,
+        /// What wants which feature.
+        message: String,
+    },
     /// A format, or a use of it, that isn't supported.
     #[error("{0}")]
     FormatNotSupported(String),
@@ -84,9 +92,9 @@ impl Error {
             Self::InvalidHandle { .. } | Self::NullPointer { .. } | Self::Panic(_) => {
                 vk::Result::ERROR_UNKNOWN
             }
-            Self::Unsupported { .. } | Self::FeatureNotPresent(_) => {
-                vk::Result::ERROR_FEATURE_NOT_PRESENT
-            }
+            Self::Unsupported { .. }
+            | Self::FeatureNotPresent(_)
+            | Self::FeatureNotEnabled { .. } => vk::Result::ERROR_FEATURE_NOT_PRESENT,
             Self::OutOfDeviceMemory(_) => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
             Self::OutOfPoolMemory(_) => vk::Result::ERROR_OUT_OF_POOL_MEMORY,
             Self::InvalidShader(_) => vk::Result::ERROR_INVALID_SHADER_NV,
@@ -103,7 +111,7 @@ impl Error {
     /// The message id that debug messengers show.
     pub(crate) fn message_id(&self) -> &'static str {
         match self {
-            Self::Usage { vuid, .. } => vuid,
+            Self::Usage { vuid, .. } | Self::FeatureNotEnabled { vuid, .. } => vuid,
             Self::InvalidHandle { .. } => "GAURAST-invalid-handle",
             Self::NullPointer { .. } => "GAURAST-null-pointer",
             Self::Unsupported { .. } => "GAURAST-unsupported-command",
@@ -117,7 +125,10 @@ impl Error {
     pub(crate) fn is_usage(&self) -> bool {
         matches!(
             self,
-            Self::Usage { .. } | Self::InvalidHandle { .. } | Self::NullPointer { .. }
+            Self::Usage { .. }
+                | Self::FeatureNotEnabled { .. }
+                | Self::InvalidHandle { .. }
+                | Self::NullPointer { .. }
         )
     }
 }

@@ -107,10 +107,12 @@ const SUPPORTED: &[&str] = &[
     // VK_GAURAST_gaussian_primitive_topology.
     "gaussian_primitive_topology",
     "fisheye_camera",
+    "merged_draws",
     "opacity_compensation",
     "orthographic_camera",
     "primitive_order",
     "radial_distance_order",
+    "uniform_buffer_camera",
 ];
 
 /// The extensions whose features can't be enabled without them. (Features of core need none.)

@@ -1,9 +1,11 @@
 //! What descriptors a bind point has while commands are replayed.
 
 use crate::error::Error;
+use crate::object::descriptor::Descriptor;
 use crate::object::descriptor::layout::DescriptorSetLayout;
 use crate::object::descriptor::set::{DescriptorSet, Write};
 use ash::vk;
+use simdevice::packet::BufferRange;
 use std::sync::Arc;
 
 /// A bind point.
@@ -36,6 +38,21 @@ pub(crate) struct BoundSet {
     pub(crate) set: Arc<DescriptorSet>,
     /// As many as the set's layout wants.
     pub(crate) dynamic_offsets: Vec<u32>,
+}
+
+impl BoundSet {
+    /// The bytes of the uniform or storage buffer that the first descriptor of a binding holds.
+    pub(crate) fn buffer(&self, binding: u32) -> Option<BufferRange> {
+        let binding = self.set.layout().binding(binding)?;
+        let held = self.set.lock();
+        let Descriptor::Buffer(buffer) = held.get(binding.first)? else {
+            return None;
+        };
+        let offset = binding
+            .first_dynamic
+            .and_then(|index| self.dynamic_offsets.get(index));
+        Some(buffer.range(offset.copied().unwrap_or(0)))
+    }
 }
 
 /// The sets of a bind point, by number.

@@ -45,7 +45,26 @@ pub(crate) struct Lost(pub String);
 pub(crate) fn replay(commands: &[Command], executor: &mut dyn Executor) -> Result<(), Lost> {
     let mut state = State::default();
     for command in commands {
+        end_set(command, &mut state, executor)?;
         step(command, &mut state, executor)?;
+    }
+    close_set(&mut state, executor)
+}
+
+/// Ends the sorted set that draws are merged into, unless the command may come between them.
+fn end_set(command: &Command, state: &mut State, executor: &mut dyn Executor) -> Result<(), Lost> {
+    match command {
+        Command::Draw(_)
+        | Command::DrawIndirect(_)
+        | Command::BindVertexBuffers { .. }
+        | Command::BindIndexBuffer(_) => Ok(()),
+        _ => close_set(state, executor),
+    }
+}
+
+fn close_set(state: &mut State, executor: &mut dyn Executor) -> Result<(), Lost> {
+    if std::mem::take(&mut state.set_is_open) {
+        executor.execute(&Packet::GaussianResolve)?;
     }
     Ok(())
 }
@@ -154,7 +173,17 @@ fn packets(state: &mut State, numbers: &Draw, draw_index: u32) -> Result<Vec<Pac
     let pipeline = state.pipeline.clone().ok_or(Undrawn::Pipeline)?;
     match &pipeline.primitive {
         Primitive::Gaussian(gaussian) => {
-            gaussian::draw(state, &pipeline, gaussian, numbers).map(Vec::from)
+            let append = gaussian::append(state, &pipeline, gaussian, numbers)?;
+            if state.set_is_open {
+                return Ok(vec![append]);
+            }
+            let begin = gaussian::begin(state, gaussian)?;
+            state.set_is_open = gaussian.merges_draws;
+            let mut packets = vec![begin, append];
+            if !gaussian.merges_draws {
+                packets.push(Packet::GaussianResolve);
+            }
+            Ok(packets)
         }
         Primitive::Polygons(polygons) => {
             polygon::draw(state, &pipeline, polygons, numbers, draw_index)

@@ -41,6 +41,8 @@ pub(crate) struct State {
     pub(crate) draw_state: Option<Arc<DrawState>>,
     /// The camera of Gaussian draws; kept when another pipeline is bound.
     pub(crate) camera: Option<Camera>,
+    /// Whether draws are being merged into a sorted set that has begun.
+    pub(crate) set_is_open: bool,
 }
 
 impl State {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// A set that is not bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("descriptor set {0}, which the pipeline uses, is not bound")]
-pub(crate) struct Unbound(u32);
+pub(crate) struct Unbound(pub(super) u32);
 
 /// What programs that use `descriptors` are bound to. What a set doesn't hold reads as zero.
 ///

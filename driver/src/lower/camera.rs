@@ -1,8 +1,35 @@
 //! The camera of Gaussian draws.
 
+use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
-use gaurast::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST};
-use simdevice::packet::{Camera, CameraModel};
+use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
+use simdevice::packet::{BufferRange, Camera, CameraModel};
+
+/// The camera models whose features are enabled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct CameraModels {
+    orthographic: bool,
+    fisheye: bool,
+}
+
+impl CameraModels {
+    /// Those of a device.
+    pub(crate) fn of(features: &EnabledFeatures) -> Self {
+        Self {
+            orthographic: features.has("orthographic_camera"),
+            fisheye: features.has("fisheye_camera"),
+        }
+    }
+
+    /// Whether a camera of this model may be used.
+    pub(crate) fn have(self, model: CameraModel) -> bool {
+        match model {
+            CameraModel::Pinhole => true,
+            CameraModel::Orthographic => self.orthographic,
+            CameraModel::Fisheye => self.fisheye,
+        }
+    }
+}
 
 /// A camera for the device.
 ///
@@ -38,6 +65,41 @@ pub(crate) fn camera(camera: &GaussianCameraGAURAST) -> Result<Camera, Error> {
         far_plane: camera.far_plane,
         depth_coefficients: camera.depth_coefficients,
     })
+}
+
+/// Bytes of a `VkGaussianCameraDataGAURAST`.
+const DATA_BYTES: usize = size_of::<GaussianCameraDataGAURAST>();
+
+/// Reads a `VkGaussianCameraDataGAURAST` from the start of a uniform buffer.
+///
+/// # Errors
+/// As [`camera`]; [`Error::Usage`] if the buffer is too short.
+pub(crate) fn read(range: &BufferRange) -> Result<Camera, Error> {
+    let mut words = [0u32; DATA_BYTES / 4];
+    let inside = range.size >= DATA_BYTES as u64;
+    if !inside || range.memory.read(range.offset, &mut words).is_err() {
+        return Err(Error::usage(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
+            format!("it has {} bytes, and a camera {DATA_BYTES}", range.size),
+        ));
+    }
+    let float = |word: usize| f32::from_bits(words[word]);
+    let double =
+        |word: usize| f64::from_bits(u64::from(words[word]) | u64::from(words[word + 1]) << 32);
+    let pair = |word: usize| [float(word), float(word + 1)];
+    // Rows of the rotation take four words each, of which the last means nothing.
+    let rotation = std::array::from_fn(|element| float(8 + element / 3 * 4 + element % 3));
+    camera(
+        &GaussianCameraGAURAST::default()
+            .model(GaussianCameraModelGAURAST::from_raw(words[6].cast_signed()))
+            .rotation(rotation)
+            .eye([double(0), double(2), double(4)])
+            .focal_length(pair(20))
+            .principal_point(pair(22))
+            .depth_coefficients(pair(24))
+            .near_plane(float(26))
+            .far_plane(float(27)),
+    )
 }
 
 fn validate(camera: &GaussianCameraGAURAST, model: CameraModel) -> Result<(), Error> {
@@ -89,6 +151,7 @@ fn validate(camera: &GaussianCameraGAURAST, model: CameraModel) -> Result<(), Er
 #[cfg(test)]
 mod tests {
     use super::*;
+    use simdevice::Allocation;
 
     fn good() -> GaussianCameraGAURAST<'static> {
         GaussianCameraGAURAST::default()
@@ -113,6 +176,53 @@ mod tests {
         assert!(camera(&behind).is_err());
         let parallel = behind.model(GaussianCameraModelGAURAST::ORTHOGRAPHIC);
         assert_eq!(camera(&parallel).unwrap().model, CameraModel::Orthographic);
+    }
+
+    #[test]
+    fn a_uniform_buffer_holds_what_a_command_sets() {
+        let set = good()
+            .model(GaussianCameraModelGAURAST::FISHEYE)
+            .eye([1e6 + 0.125, -2.5, 1e-9])
+            .rotation(std::array::from_fn(|element| element as f32 - 3.5))
+            .depth_coefficients([0.25, -0.75])
+            .near_plane(0.5)
+            .far_plane(70.0);
+        let data = GaussianCameraDataGAURAST::from(&set);
+        let mut bytes = Vec::new();
+        bytes.extend(data.eye.iter().flat_map(|value| value.to_le_bytes()));
+        bytes.extend(data.model.as_raw().to_le_bytes());
+        bytes.extend([0xFF; 4]);
+        let rows = data.rotation.as_flattened().iter().enumerate();
+        // What means nothing is not looked at.
+        bytes.extend(rows.flat_map(|(index, value)| match index % 4 {
+            3 => f32::NAN.to_le_bytes(),
+            _ => value.to_le_bytes(),
+        }));
+        let rest = [
+            data.focal_length,
+            data.principal_point,
+            data.depth_coefficients,
+        ];
+        bytes.extend(
+            rest.as_flattened()
+                .iter()
+                .flat_map(|value| value.to_le_bytes()),
+        );
+        bytes.extend(
+            [data.near_plane, data.far_plane]
+                .map(f32::to_le_bytes)
+                .concat(),
+        );
+        assert_eq!(bytes.len(), DATA_BYTES);
+        let memory = Allocation::new_zeroed(4096).unwrap();
+        memory.write(64, &bytes).unwrap();
+        let range = |size| BufferRange {
+            memory: memory.clone(),
+            offset: 64,
+            size,
+        };
+        assert_eq!(read(&range(112)).unwrap(), camera(&set).unwrap());
+        assert!(read(&range(111)).is_err());
     }
 
     #[test]

@@ -5,10 +5,10 @@ use crate::command::record::Draw;
 use crate::command::state::State;
 use crate::object::pipeline::{AttributeSource, GraphicsPipeline};
 use ash::vk;
-use simdevice::packet::{AttributeStream, IndexStream};
+use simdevice::packet::{AttributeStream, CameraModel, IndexStream};
 
 /// Why a draw draws nothing: state that it needs is undefined.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Undrawn {
     /// No pipeline.
     #[error("no graphics pipeline is bound")]
@@ -16,6 +16,24 @@ pub(crate) enum Undrawn {
     /// No camera.
     #[error("no camera is set: vkCmdSetGaussianCameraGAURAST must be recorded before the draw")]
     Camera,
+    /// A camera of a model that is not enabled.
+    #[error(
+        "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-parameter)"
+    )]
+    CameraModel(CameraModel),
+    /// No uniform buffer where the camera should be.
+    #[error(
+        "no uniform buffer is bound at set {set}, binding {binding}, where the camera should be"
+    )]
+    CameraBuffer {
+        /// The descriptor set.
+        set: u32,
+        /// The binding.
+        binding: u32,
+    },
+    /// A uniform buffer that holds no camera.
+    #[error("the camera's uniform buffer: {0}")]
+    CameraData(String),
     /// No viewport.
     #[error("the pipeline's viewport is dynamic and none is set")]
     Viewport,

@@ -1,45 +1,71 @@
-//! Lowers Gaussian draws: pipeline, bound buffers, viewport and camera to the three packets of a sorted set.
+//! Lowers Gaussian draws: pipeline, bound buffers, viewport and camera to the packets of a sorted set.
 
+use super::bindings::Unbound;
+use super::camera;
 use super::draw::{Undrawn, attribute_stream, indices};
 use crate::command::record::Draw;
 use crate::command::state::State;
-use crate::object::pipeline::{AttributeSource, GaussianPipeline, GraphicsPipeline};
+use crate::object::pipeline::{AttributeSource, CameraSource, GaussianPipeline, GraphicsPipeline};
 use ash::vk;
 use simdevice::Packet;
 use simdevice::packet::{
-    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, Viewport,
+    Camera, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, Viewport,
 };
 use std::sync::Arc;
 
-/// The packets of one draw.
+/// What begins a sorted set.
 ///
 /// # Errors
-/// [`Undrawn`] where bound state that the draw needs is missing.
-pub(crate) fn draw(
+/// [`Undrawn`] where bound state that the set needs is missing.
+pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Packet, Undrawn> {
+    Ok(Packet::GaussianBegin(Box::new(GaussianBegin {
+        state: fixed_state(state, gaussian)?,
+        camera: enabled_camera(state, gaussian)?,
+        viewport: upright(state.viewport(gaussian).ok_or(Undrawn::Viewport)?),
+        scissor: state.scissor(gaussian).ok_or(Undrawn::Scissor)?,
+    })))
+}
+
+/// What adds a draw to a sorted set.
+///
+/// # Errors
+/// [`Undrawn`] where a buffer that the draw needs is not bound.
+pub(crate) fn append(
     state: &State,
     pipeline: &GraphicsPipeline,
     gaussian: &GaussianPipeline,
     draw: &Draw,
-) -> Result<[Packet; 3], Undrawn> {
-    let begin = GaussianBegin {
-        state: fixed_state(state, gaussian)?,
-        camera: state.camera.ok_or(Undrawn::Camera)?,
-        viewport: upright(state.viewport(gaussian).ok_or(Undrawn::Viewport)?),
-        scissor: state.scissor(gaussian).ok_or(Undrawn::Scissor)?,
-    };
-    let append = GaussianAppend {
+) -> Result<Packet, Undrawn> {
+    Ok(Packet::GaussianAppend(Box::new(GaussianAppend {
         attributes: attributes(state, pipeline, gaussian)?,
         indices: indices(state, draw)?,
         first: draw.first,
         count: draw.count,
         first_instance: draw.first_instance,
         instance_count: draw.instance_count,
+    })))
+}
+
+/// The camera that a draw sees with, if its model's feature is enabled.
+fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, Undrawn> {
+    let camera = camera(state, gaussian.camera)?;
+    if !gaussian.camera_models.have(camera.model) {
+        return Err(Undrawn::CameraModel(camera.model));
+    }
+    Ok(camera)
+}
+
+/// The camera that a draw is given.
+fn camera(state: &State, source: CameraSource) -> Result<Camera, Undrawn> {
+    let (set, binding) = match source {
+        CameraSource::Command => return state.camera.ok_or(Undrawn::Camera),
+        CameraSource::UniformBuffer { set, binding } => (set, binding),
     };
-    Ok([
-        Packet::GaussianBegin(Box::new(begin)),
-        Packet::GaussianAppend(Box::new(append)),
-        Packet::GaussianResolve,
-    ])
+    let bound = state.graphics_sets.get(set).ok_or(Unbound(set))?;
+    let range = bound
+        .buffer(binding)
+        .ok_or(Undrawn::CameraBuffer { set, binding })?;
+    camera::read(&range).map_err(|error| Undrawn::CameraData(error.to_string()))
 }
 
 /// What the pipeline fixes, with the dynamic part filled in.

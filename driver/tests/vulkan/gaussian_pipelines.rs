@@ -4,9 +4,8 @@ use crate::gpu::Gpu;
 use crate::scene::{PipelineRequest, over, replace};
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST, GaussianGeometryGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
+    GaussianAntialiasingGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
 
@@ -121,14 +120,6 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
         (
             with_state(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)),
             "unscentedProjection",
-        ),
-        (
-            with_state(|s| s.camera_source(GaussianCameraSourceGAURAST::UNIFORM_BUFFER)),
-            "uniformBufferCamera",
-        ),
-        (
-            with_state(|s| s.flags(PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS)),
-            "mergedDraws",
         ),
         (
             with_state(|s| s.attribute_locations(s.attribute_locations.model_opacity(3))),

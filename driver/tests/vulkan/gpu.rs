@@ -83,8 +83,32 @@ impl Gpu {
         Self::of(vulkan_gaurast::entry(), &[])
     }
 
+    /// Opens the device with all that it supports but the optional modes of the extension.
+    pub fn without_modes() -> Self {
+        let no_modes =
+            gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
+                .gaussian_primitive_topology(true);
+        Self::with(vulkan_gaurast::entry(), &[], Some(no_modes))
+    }
+
+    /// Opens the device with all that it supports but the Gaussian topology.
+    pub fn without_the_topology() -> Self {
+        let nothing =
+            gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default();
+        Self::with(vulkan_gaurast::entry(), &[], Some(nothing))
+    }
+
     /// Opens the device through some door, with layers.
     pub fn of(entry: ash::Entry, layers: &[&CStr]) -> Self {
+        Self::with(entry, layers, None)
+    }
+
+    /// Opens the device through some door, with layers and with these of the extension's features, or all.
+    fn with(
+        entry: ash::Entry,
+        layers: &[&CStr],
+        modes: Option<gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'static>>,
+    ) -> Self {
         let extensions = [
             gaurast::gaussian_primitive_topology::NAME,
             ash::khr::performance_query::NAME,
@@ -138,15 +162,18 @@ impl Gpu {
                 .push_next(&mut provoking)
                 .push_next(&mut divisor)
                 .push_next(&mut vulkan11)
-                .push_next(&mut gaussian)
                 .push_next(&mut vulkan12)
                 .push_next(&mut vulkan13)
                 .push_next(&mut performance);
             instance.get_physical_device_features2(physical_device, &mut features);
+            let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut gaussian);
+            instance.get_physical_device_features2(physical_device, &mut all);
+            let mut gaussian = modes.unwrap_or(gaussian);
             let device_info = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queue_info)
                 .enabled_extension_names(&names)
-                .push_next(&mut features);
+                .push_next(&mut features)
+                .push_next(&mut gaussian);
             let device = instance
                 .create_device(physical_device, &device_info, None)
                 .unwrap();

@@ -57,6 +57,9 @@ pub struct PipelineRequest<'a> {
     pub dynamic: Vec<vk::DynamicState>,
     pub formats: Vec<vk::Format>,
     pub render_pass: vk::RenderPass,
+    /// Without sets or push constants if it is null.
+    pub layout: vk::PipelineLayout,
+    pub primitive_restart: bool,
     pub gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'static>>,
 }
 
@@ -98,6 +101,8 @@ impl Default for PipelineRequest<'_> {
             dynamic: vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR],
             formats: vec![FORMAT],
             render_pass: vk::RenderPass::null(),
+            layout: vk::PipelineLayout::null(),
+            primitive_restart: false,
             gaussian: Some(
                 PipelineGaussianStateCreateInfoGAURAST::default().attribute_locations(locations),
             ),
@@ -106,13 +111,14 @@ impl Default for PipelineRequest<'_> {
 }
 
 impl PipelineRequest<'_> {
-    /// Creates it; its layout is destroyed at once, as Vulkan allows.
+    /// Creates it. A layout of its own is destroyed at once, as Vulkan allows.
     pub fn create(&self, gpu: &Gpu) -> Result<vk::Pipeline, vk::Result> {
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&self.bindings)
             .vertex_attribute_descriptions(&self.attributes);
-        let input_assembly =
-            vk::PipelineInputAssemblyStateCreateInfo::default().topology(self.topology);
+        let input_assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
+            .topology(self.topology)
+            .primitive_restart_enable(self.primitive_restart);
         let viewport = vk::PipelineViewportStateCreateInfo::default()
             .viewport_count(1)
             .scissor_count(1);
@@ -139,10 +145,14 @@ impl PipelineRequest<'_> {
         // SAFETY: see the crate.
         unsafe {
             let layout_info = vk::PipelineLayoutCreateInfo::default();
-            let layout = gpu
+            let empty = gpu
                 .device
                 .create_pipeline_layout(&layout_info, None)
                 .unwrap();
+            let layout = match self.layout {
+                layout if layout == vk::PipelineLayout::null() => empty,
+                layout => layout,
+            };
             let mut info = vk::GraphicsPipelineCreateInfo::default()
                 .stages(&self.stages)
                 .vertex_input_state(&vertex_input)
@@ -162,7 +172,7 @@ impl PipelineRequest<'_> {
             let created =
                 gpu.device
                     .create_graphics_pipelines(vk::PipelineCache::null(), &[info], None);
-            gpu.device.destroy_pipeline_layout(layout, None);
+            gpu.device.destroy_pipeline_layout(empty, None);
             match created {
                 Ok(pipelines) => Ok(pipelines[0]),
                 Err((pipelines, error)) => {

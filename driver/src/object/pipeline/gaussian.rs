@@ -1,10 +1,12 @@
 //! Pipelines of the Gaussian list topology.
 
 use super::vertex_input::attribute;
-use super::{GaussianPipeline, GraphicsPipelineInfo, blend, viewport};
+use super::{CameraSource, GaussianPipeline, GraphicsPipelineInfo, blend, viewport};
 use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
+use crate::lower::camera::CameraModels;
 use crate::lower::rendering;
+use crate::object::descriptor::layout::Binding;
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST,
@@ -26,10 +28,7 @@ impl GaussianPipeline {
         info: &GraphicsPipelineInfo,
         features: &EnabledFeatures,
     ) -> Result<Self, Error> {
-        require(
-            "gaussianPrimitiveTopology",
-            features.has("gaussian_primitive_topology"),
-        )?;
+        require(features, TOPOLOGY, "the topology is the Gaussian list")?;
         let Some(gaussian) = &info.gaussian else {
             return Err(Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-topology-GAURAST",
@@ -41,7 +40,7 @@ impl GaussianPipeline {
             ));
         };
         validate_stages(info, gaussian)?;
-        validate_modes(gaussian)?;
+        validate_modes(gaussian, features)?;
         validate_values(gaussian)?;
         validate_fixed_state(info)?;
 
@@ -51,7 +50,7 @@ impl GaussianPipeline {
             ("modelOpacity", locations.model_opacity),
         ] {
             if location != GAUSSIAN_LOCATION_UNUSED_GAURAST {
-                return Err(unbuilt(&format!("{name} is used"), "gaussianInstancing"));
+                require(features, INSTANCING, &format!("{name} is used"))?;
             }
         }
         let degree = gaussian.spherical_harmonics_degree;
@@ -84,6 +83,11 @@ impl GaussianPipeline {
             )?
             .map(rendering::rect),
             dynamic_blend_constants: info.is_dynamic(vk::DynamicState::BLEND_CONSTANTS),
+            camera: camera_source(info, gaussian, features)?,
+            camera_models: CameraModels::of(features),
+            merges_draws: gaussian
+                .flags
+                .contains(PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS),
         })
     }
 }
@@ -108,7 +112,11 @@ fn state(
     let opacity_compensated = match gaussian.antialiasing {
         GaussianAntialiasingGAURAST::DILATE => false,
         GaussianAntialiasingGAURAST::OPACITY_COMPENSATED => {
-            require("opacityCompensation", features.has("opacity_compensation"))?;
+            require(
+                features,
+                OPACITY_COMPENSATION,
+                "antialiasing is OPACITY_COMPENSATED",
+            )?;
             true
         }
         other => return Err(unknown("antialiasing", &other)),
@@ -116,15 +124,15 @@ fn state(
     let order = match gaussian.order {
         GaussianOrderGAURAST::VIEW_DEPTH => GaussianOrder::ViewDepth,
         GaussianOrderGAURAST::RADIAL_DISTANCE => {
-            require("radialDistanceOrder", features.has("radial_distance_order"))?;
+            require(features, RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
             GaussianOrder::RadialDistance
         }
         GaussianOrderGAURAST::PRIMITIVE => {
-            require("primitiveOrder", features.has("primitive_order"))?;
+            require(features, PRIMITIVE_ORDER, "order is PRIMITIVE")?;
             GaussianOrder::Primitive
         }
         GaussianOrderGAURAST::PER_PIXEL => {
-            return Err(unbuilt("order is PER_PIXEL", "perPixelOrder"));
+            return Err(not_enabled(PER_PIXEL_ORDER, "order is PER_PIXEL"));
         }
         other => return Err(unknown("order", &other)),
     };
@@ -148,9 +156,9 @@ fn validate_stages(
     match gaussian.projection_mode {
         GaussianProjectionModeGAURAST::FIXED_FUNCTION => {}
         GaussianProjectionModeGAURAST::VERTEX_SHADER => {
-            return Err(unbuilt(
+            return Err(not_enabled(
+                VERTEX_SHADER_PROJECTION,
                 "projectionMode is VERTEX_SHADER",
-                "vertexShaderProjection",
             ));
         }
         other => return Err(unknown("projectionMode", &other)),
@@ -160,9 +168,9 @@ fn validate_stages(
         .iter()
         .any(|(stage, _)| *stage == vk::ShaderStageFlags::FRAGMENT);
     if has_fragment_stage {
-        return Err(unbuilt(
+        return Err(not_enabled(
+            RESOLVE_FRAGMENT_SHADER,
             "the pipeline has a fragment stage",
-            "resolveFragmentShader",
         ));
     }
     if let Some((stage, _)) = info.stages.first() {
@@ -182,48 +190,86 @@ fn validate_stages(
     Ok(())
 }
 
-fn validate_modes(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
+fn validate_modes(
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+    features: &EnabledFeatures,
+) -> Result<(), Error> {
     match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_3D => {}
         GaussianGeometryGAURAST::GAUSSIAN_2D => {
-            return Err(unbuilt("geometry is GAUSSIAN_2D", "gaussian2D"));
+            return Err(not_enabled(GAUSSIAN_2D, "geometry is GAUSSIAN_2D"));
         }
         other => return Err(unknown("geometry", &other)),
     }
     match gaussian.linearization {
         GaussianLinearizationGAURAST::JACOBIAN => {}
         GaussianLinearizationGAURAST::UNSCENTED => {
-            return Err(unbuilt("linearization is UNSCENTED", "unscentedProjection"));
+            return Err(not_enabled(
+                UNSCENTED_PROJECTION,
+                "linearization is UNSCENTED",
+            ));
         }
         other => return Err(unknown("linearization", &other)),
     }
     match gaussian.precision {
         GaussianPrecisionGAURAST::FLOAT32 => {}
         GaussianPrecisionGAURAST::FLOAT16 => {
-            return Err(unbuilt("precision is FLOAT16", "rasterizationFloat16"));
+            return Err(not_enabled(RASTERIZATION_FLOAT16, "precision is FLOAT16"));
         }
         other => return Err(unknown("precision", &other)),
     }
-    match gaussian.camera_source {
-        GaussianCameraSourceGAURAST::COMMAND => {}
-        GaussianCameraSourceGAURAST::UNIFORM_BUFFER => {
-            return Err(unbuilt(
-                "cameraSource is UNIFORM_BUFFER",
-                "uniformBufferCamera",
-            ));
-        }
-        other => return Err(unknown("cameraSource", &other)),
+    let merge_draws = PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS;
+    if gaussian.flags.contains(merge_draws) {
+        require(features, MERGED_DRAWS, "flags has MERGE_DRAWS")?;
     }
-    if gaussian
-        .flags
-        .contains(PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS)
-    {
-        return Err(unbuilt("flags has MERGE_DRAWS", "mergedDraws"));
-    }
-    if !gaussian.flags.is_empty() {
+    if !merge_draws.contains(gaussian.flags) {
         return Err(unknown("flags", &gaussian.flags));
     }
     Ok(())
+}
+
+/// Where draws take their camera from.
+fn camera_source(
+    info: &GraphicsPipelineInfo,
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+    features: &EnabledFeatures,
+) -> Result<CameraSource, Error> {
+    match gaussian.camera_source {
+        GaussianCameraSourceGAURAST::COMMAND => return Ok(CameraSource::Command),
+        GaussianCameraSourceGAURAST::UNIFORM_BUFFER => {}
+        other => return Err(unknown("cameraSource", &other)),
+    }
+    require(
+        features,
+        UNIFORM_BUFFER_CAMERA,
+        "cameraSource is UNIFORM_BUFFER",
+    )?;
+    let (set, binding) = (gaussian.camera_set, gaussian.camera_binding);
+    let is_there = info.layout.is_some_and(|layout| {
+        let found = layout.set_layout(set).ok();
+        found
+            .and_then(|set| set.binding(binding))
+            .is_some_and(holds_camera)
+    });
+    if !is_there {
+        return Err(Error::usage(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
+            format!(
+                "{STRUCTURE}: the pipeline layout has no uniform buffer visible to the vertex stage at set {set}, \
+                 binding {binding}, where cameraSet and cameraBinding want one"
+            ),
+        ));
+    }
+    Ok(CameraSource::UniformBuffer { set, binding })
+}
+
+/// Whether a binding is a uniform buffer that the vertex stage sees.
+fn holds_camera(binding: &Binding) -> bool {
+    let is_uniform = matches!(
+        binding.kind,
+        vk::DescriptorType::UNIFORM_BUFFER | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
+    );
+    is_uniform && binding.count > 0 && binding.stages.contains(vk::ShaderStageFlags::VERTEX)
 }
 
 /// A member's name and the id of the rule on its value.
@@ -295,17 +341,17 @@ fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
         || depth_stencil.depth_bounds_test_enable != vk::FALSE
         || depth_stencil.stencil_test_enable != vk::FALSE
     {
-        return Err(unbuilt(
+        return Err(not_enabled(
+            DEPTH_STENCIL,
             "the pipeline has a depth, depth bounds or stencil test",
-            "gaussianDepthStencil",
         ));
     }
     let multisample = &info.multisample;
     let samples = multisample.rasterization_samples;
     if samples != vk::SampleCountFlags::TYPE_1 && !samples.is_empty() {
-        return Err(unbuilt(
+        return Err(not_enabled(
+            MULTISAMPLE,
             "the pipeline has several samples per pixel",
-            "gaussianMultisample",
         ));
     }
     if info.rasterization.rasterizer_discard_enable != vk::FALSE {
@@ -371,18 +417,54 @@ fn may_be_dynamic(state: vk::DynamicState) -> bool {
     )
 }
 
-fn require(feature: &str, enabled: bool) -> Result<(), Error> {
-    if enabled {
-        return Ok(());
-    }
-    Err(Error::FeatureNotPresent(format!(
-        "{STRUCTURE}: what needs the feature {feature}, which is not enabled on the device,"
-    )))
+/// A feature bit of the extension: its name here, its name there, and the id of the rule that asks for it.
+type Feature = (&'static str, &'static str, &'static str);
+
+macro_rules! feature {
+    ($field:literal, $name:literal) => {
+        (
+            $field,
+            $name,
+            concat!(
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-",
+                $name,
+                "-feature"
+            ),
+        )
+    };
 }
 
-/// A mode that the extension has and this device doesn't.
-fn unbuilt(what: &str, feature: &str) -> Error {
-    Error::FeatureNotPresent(format!("{STRUCTURE}: {what} (feature {feature}), which"))
+const TOPOLOGY: Feature = feature!("gaussian_primitive_topology", "gaussianPrimitiveTopology");
+const VERTEX_SHADER_PROJECTION: Feature =
+    feature!("vertex_shader_projection", "vertexShaderProjection");
+const RESOLVE_FRAGMENT_SHADER: Feature =
+    feature!("resolve_fragment_shader", "resolveFragmentShader");
+const RADIAL_DISTANCE_ORDER: Feature = feature!("radial_distance_order", "radialDistanceOrder");
+const PRIMITIVE_ORDER: Feature = feature!("primitive_order", "primitiveOrder");
+const PER_PIXEL_ORDER: Feature = feature!("per_pixel_order", "perPixelOrder");
+const RASTERIZATION_FLOAT16: Feature = feature!("rasterization_float16", "rasterizationFloat16");
+const OPACITY_COMPENSATION: Feature = feature!("opacity_compensation", "opacityCompensation");
+const UNSCENTED_PROJECTION: Feature = feature!("unscented_projection", "unscentedProjection");
+const GAUSSIAN_2D: Feature = feature!("gaussian_2d", "gaussian2D");
+const UNIFORM_BUFFER_CAMERA: Feature = feature!("uniform_buffer_camera", "uniformBufferCamera");
+const MERGED_DRAWS: Feature = feature!("merged_draws", "mergedDraws");
+const INSTANCING: Feature = feature!("gaussian_instancing", "gaussianInstancing");
+const DEPTH_STENCIL: Feature = feature!("gaussian_depth_stencil", "gaussianDepthStencil");
+const MULTISAMPLE: Feature = feature!("gaussian_multisample", "gaussianMultisample");
+
+/// Refuses `what` unless its feature is enabled, which one that the device lacks never is.
+fn require(features: &EnabledFeatures, feature: Feature, what: &str) -> Result<(), Error> {
+    if features.has(feature.0) {
+        return Ok(());
+    }
+    Err(not_enabled(feature, what))
+}
+
+fn not_enabled((_, name, vuid): Feature, what: &str) -> Error {
+    Error::FeatureNotEnabled {
+        vuid,
+        message: format!("{STRUCTURE}: {what}, but the feature {name} is not enabled"),
+    }
 }
 
 fn unknown(field: &str, value: &dyn std::fmt::Debug) -> Error {

@@ -15,6 +15,7 @@ pub(crate) mod setting;
 mod vertex_input;
 
 use crate::error::Error;
+use crate::lower::camera::CameraModels;
 use crate::object::device::Device;
 use ash::vk;
 use compute::{ComputePipeline, StageInfo};
@@ -65,6 +66,12 @@ pub(crate) struct GaussianPipeline {
     pub(crate) scissor: Option<Rect>,
     /// Whether the blend constants are dynamic.
     pub(crate) dynamic_blend_constants: bool,
+    /// Where draws take their camera from.
+    pub(crate) camera: CameraSource,
+    /// The models that the camera may have.
+    pub(crate) camera_models: CameraModels,
+    /// Whether consecutive draws are sorted together.
+    pub(crate) merges_draws: bool,
     /// Where means are read from.
     pub(crate) position: AttributeSource,
     /// Where standard deviations are read from.
@@ -75,6 +82,20 @@ pub(crate) struct GaussianPipeline {
     pub(crate) opacity: AttributeSource,
     /// Where the spherical harmonics' coefficients are read from.
     pub(crate) spherical_harmonics: Vec<AttributeSource>,
+}
+
+/// Where Gaussian draws take their camera from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum CameraSource {
+    /// `vkCmdSetGaussianCameraGAURAST`.
+    Command,
+    /// A uniform buffer, read when the draw executes.
+    UniformBuffer {
+        /// The descriptor set.
+        set: u32,
+        /// The binding, whose first descriptor it is.
+        binding: u32,
+    },
 }
 
 /// A `VkGraphicsPipelineCreateInfo` with its pointers followed. State that the application may leave out is

@@ -1,0 +1,306 @@
+//! The extension's valid usage: each statement of the specification is broken once, and its id is heard.
+
+use crate::gpu::Gpu;
+use crate::scene::{PipelineRequest, Scene, camera, splat};
+use ash::vk;
+use gaurast::vk::{
+    GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
+    GaussianCameraSourceGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use std::collections::BTreeSet;
+
+const SPECIFICATION: &str =
+    include_str!("../../../api/spec/VK_GAURAST_gaussian_primitive_topology.adoc");
+
+/// The ids of the specification's statements.
+fn stated() -> BTreeSet<&'static str> {
+    let is_of_id = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    let candidates = SPECIFICATION.split(|c: char| !is_of_id(c));
+    candidates.filter(|id| id.starts_with("VUID-")).collect()
+}
+
+type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
+
+fn with(change: impl FnOnce(State) -> State) -> PipelineRequest<'static> {
+    let request = PipelineRequest::default();
+    PipelineRequest {
+        gaussian: request.gaussian.map(change),
+        ..request
+    }
+}
+
+/// Pipelines that break one statement each.
+fn pipelines() -> Vec<(&'static str, PipelineRequest<'static>)> {
+    let missing = |index: usize| {
+        let mut request = PipelineRequest::default();
+        request.attributes.truncate(index);
+        request
+    };
+    let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
+    vec![
+        (
+            "VUID-VkGraphicsPipelineCreateInfo-topology-GAURAST",
+            PipelineRequest {
+                gaussian: None,
+                ..PipelineRequest::default()
+            },
+        ),
+        (
+            "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-GAURAST",
+            PipelineRequest {
+                primitive_restart: true,
+                ..PipelineRequest::default()
+            },
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-parameter",
+            with(|s| s.order(GaussianOrderGAURAST::from_raw(77))),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-value",
+            with(|s| s.spherical_harmonics_degree(9)),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-value",
+            with(|s| s.low_pass_variance(f32::NAN)),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-value",
+            with(|s| s.alpha_floor(-1.0)),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
+            with(|s| s.alpha_ceiling(0.0)),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-value",
+            with(|s| s.transmittance_floor(1.0)),
+        ),
+        (
+            "VUID-VkGaussianAttributeLocationsGAURAST-location",
+            missing(2),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
+            with(|s| s.camera_source(buffer)),
+        ),
+    ]
+}
+
+/// Pipelines that use a mode each, on a device on which none is enabled.
+fn modes() -> Vec<(&'static str, PipelineRequest<'static>)> {
+    let buffer = GaussianCameraSourceGAURAST::UNIFORM_BUFFER;
+    let merge = PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS;
+    let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
+    vec![
+        (
+            "vertexShaderProjection",
+            with(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)),
+        ),
+        (
+            "radialDistanceOrder",
+            with(|s| s.order(GaussianOrderGAURAST::RADIAL_DISTANCE)),
+        ),
+        (
+            "primitiveOrder",
+            with(|s| s.order(GaussianOrderGAURAST::PRIMITIVE)),
+        ),
+        (
+            "perPixelOrder",
+            with(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
+        ),
+        (
+            "rasterizationFloat16",
+            with(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16)),
+        ),
+        ("opacityCompensation", with(|s| s.antialiasing(compensated))),
+        (
+            "unscentedProjection",
+            with(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)),
+        ),
+        (
+            "gaussian2D",
+            with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
+        ),
+        ("uniformBufferCamera", with(|s| s.camera_source(buffer))),
+        ("mergedDraws", with(|s| s.flags(merge))),
+        (
+            "gaussianInstancing",
+            with(|s| s.attribute_locations(s.attribute_locations.first_model_matrix(9))),
+        ),
+        (
+            "gaussianDepthStencil",
+            PipelineRequest {
+                depth_test: true,
+                ..PipelineRequest::default()
+            },
+        ),
+        (
+            "gaussianMultisample",
+            PipelineRequest {
+                samples: vk::SampleCountFlags::TYPE_4,
+                ..PipelineRequest::default()
+            },
+        ),
+    ]
+}
+
+/// Cameras that break one statement each.
+fn cameras() -> Vec<(&'static str, GaussianCameraGAURAST<'static>)> {
+    let nan = f32::NAN;
+    vec![
+        (
+            "VUID-VkGaussianCameraGAURAST-model-parameter",
+            camera().model(GaussianCameraModelGAURAST::from_raw(77)),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-rotation-value",
+            camera().rotation([nan; 9]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-eye-value",
+            camera().eye([f64::INFINITY; 3]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-principalPoint-value",
+            camera().principal_point([nan, 0.0]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-depthCoefficients-value",
+            camera().depth_coefficients([0.0, nan]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-focalLength-value",
+            camera().focal_length([0.0, 1.0]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-nearPlane-value",
+            camera().near_plane(0.0),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-farPlane-value",
+            camera().far_plane(0.1),
+        ),
+    ]
+}
+
+/// Creates the pipeline, which must fail, and gives what was heard.
+fn refused(gpu: &Gpu, request: &PipelineRequest, result: vk::Result, what: &str) -> String {
+    let error = request.create(gpu).expect_err(what);
+    assert_eq!(error, result, "{what}");
+    gpu.take_messages().concat()
+}
+
+#[test]
+fn every_statement_is_reported_by_its_id() {
+    let mut tested = BTreeSet::new();
+    let mut heard = |id: &'static str, messages: String| {
+        assert!(messages.contains(&format!("({id})")), "{id}: {messages:?}");
+        tested.insert(id);
+    };
+    let gpu = Gpu::new();
+    let invalid = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+    for (id, request) in pipelines() {
+        heard(id, refused(&gpu, &request, invalid, id));
+    }
+    heard(
+        "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
+        with_a_vertex_stage(&gpu),
+    );
+    for (id, camera) in cameras() {
+        let recorded = gpu.record(|_, commands| {
+            // SAFETY: see the crate.
+            unsafe { gpu.gaussian.cmd_set_gaussian_camera(commands, &camera) };
+        });
+        assert_eq!(recorded.unwrap_err(), invalid, "{id}");
+        heard(id, gpu.take_messages().concat());
+    }
+    let bare = Gpu::without_modes();
+    let absent = vk::Result::ERROR_FEATURE_NOT_PRESENT;
+    let stated = stated();
+    let of_feature = |feature: &str| {
+        let id = format!("VUID-VkPipelineGaussianStateCreateInfoGAURAST-{feature}-feature");
+        let found = stated.iter().find(|stated| **stated == id);
+        *found.unwrap_or_else(|| panic!("{id} is not stated"))
+    };
+    for (feature, request) in modes() {
+        heard(
+            of_feature(feature),
+            refused(&bare, &request, absent, feature),
+        );
+    }
+    heard(
+        of_feature("resolveFragmentShader"),
+        with_a_fragment_stage(&bare),
+    );
+    heard(
+        of_feature("gaussianPrimitiveTopology"),
+        without_the_topology(),
+    );
+    let untested: Vec<_> = stated.difference(&tested).collect();
+    assert!(untested.is_empty(), "no test breaks {untested:?}");
+}
+
+/// What is heard when a pipeline has a stage.
+fn with_a_stage(gpu: &Gpu, stage: vk::ShaderStageFlags, result: vk::Result) -> String {
+    let code = [0x0723_0203, 0x0001_0000, 0, 1, 0];
+    let info = vk::ShaderModuleCreateInfo::default().code(&code);
+    // SAFETY: see the crate.
+    let module = unsafe { gpu.device.create_shader_module(&info, None).unwrap() };
+    let stage = vk::PipelineShaderStageCreateInfo::default()
+        .stage(stage)
+        .module(module)
+        .name(c"main");
+    let request = PipelineRequest {
+        stages: vec![stage],
+        ..PipelineRequest::default()
+    };
+    let messages = refused(gpu, &request, result, "a stage");
+    // SAFETY: see the crate.
+    unsafe { gpu.device.destroy_shader_module(module, None) };
+    messages
+}
+
+fn with_a_vertex_stage(gpu: &Gpu) -> String {
+    let result = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+    with_a_stage(gpu, vk::ShaderStageFlags::VERTEX, result)
+}
+
+fn with_a_fragment_stage(gpu: &Gpu) -> String {
+    let result = vk::Result::ERROR_FEATURE_NOT_PRESENT;
+    with_a_stage(gpu, vk::ShaderStageFlags::FRAGMENT, result)
+}
+
+fn without_the_topology() -> String {
+    let gpu = Gpu::without_the_topology();
+    let result = vk::Result::ERROR_FEATURE_NOT_PRESENT;
+    refused(&gpu, &PipelineRequest::default(), result, "the topology")
+}
+
+#[test]
+fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so() {
+    let scene = Scene::on(
+        Gpu::without_modes(),
+        &[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])],
+        &PipelineRequest::default(),
+    );
+    for model in [
+        GaussianCameraModelGAURAST::ORTHOGRAPHIC,
+        GaussianCameraModelGAURAST::FISHEYE,
+    ] {
+        let pixels = scene.draw([0.25; 4], |device, commands| {
+            // SAFETY: see the crate.
+            unsafe {
+                let gaussian = &scene.gpu.gaussian;
+                gaussian.cmd_set_gaussian_camera(commands, &camera().model(model));
+                device.cmd_draw(commands, 1, 1, 0, 0);
+            }
+        });
+        assert!(pixels.iter().all(|pixel| *pixel == [0.25; 4]));
+        let messages = scene.gpu.take_messages().concat();
+        let id = "VUID-VkGaussianCameraGAURAST-model-parameter";
+        assert!(messages.contains(id), "{messages:?}");
+    }
+}
