@@ -2,4 +2,5 @@
 
 mod accuracy;
 mod determinism;
+mod popping;
 mod reference;
