@@ -1,0 +1,6 @@
+//! Numerical stress: scenes made to break a renderer, each held against the binary64 oracle, and
+//! properties that every picture has.
+
+mod properties;
+mod scenes;
+mod verdicts;

@@ -1,0 +1,195 @@
+//! Properties that pictures have whatever is drawn, on scenes made up at random.
+
+use gaurast::vk::GaussianCameraGAURAST;
+use gaurast_tests::contexts::{
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over,
+};
+use gaurast_tests::scenes::{Gaussian, SceneBuffers};
+use proptest::prelude::*;
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const SIZE: [u32; 2] = [75, 53];
+type Camera = GaussianCameraGAURAST<'static>;
+
+fn camera() -> Camera {
+    Camera::default()
+        .focal_length([60.0; 2])
+        .principal_point([0.5 * SIZE[0] as f32, 0.5 * SIZE[1] as f32])
+}
+
+/// Gaussians whose coordinates are multiples of 2^-10 below 16, so that moving them by as much as
+/// 2^12 loses nothing, and whose depths differ.
+fn scene(seed: u64, count: usize) -> Vec<Gaussian> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut depths: Vec<i32> = (2 * 1024..9 * 1024).collect();
+    depths.shuffle(&mut rng);
+    let one = |depth: i32| {
+        let z = depth as f32 / 1024.0;
+        let mut coordinate = || (rng.random_range(-0.6..0.6) * z * 1024.0f32).round() / 1024.0;
+        let position = [coordinate(), coordinate(), z];
+        Gaussian {
+            position,
+            scale: [0; 3].map(|_| 10f32.powf(rng.random_range(-3.0..0.5))),
+            rotation: [0; 4].map(|_| rng.random_range(-1.0..1.0)),
+            opacity: rng.random_range(0.0..1.2),
+            sh: vec![[0; 3].map(|_| rng.random_range(-1.7..1.7))],
+        }
+    };
+    depths.into_iter().take(count).map(one).collect()
+}
+
+fn buffers(gaussians: &[Gaussian]) -> SceneBuffers {
+    SceneBuffers::new(0, gaussians.iter().cloned())
+}
+
+/// Draws sets of Gaussians one after the other, each over what was drawn before.
+fn draw(
+    context: &Context,
+    sets: &[&[Gaussian]],
+    options: &PipelineOptions,
+    camera: &Camera,
+) -> Vec<[f32; 4]> {
+    let pipeline = Pipeline::new(context, options);
+    let on_device: Vec<_> = sets
+        .iter()
+        .map(|set| DeviceScene::new(context, &buffers(set)))
+        .collect();
+    let target = Target::new(context, options.format, SIZE);
+    context.run(|commands| {
+        commands.pass(&target, &Pass::clear([0.0; 4]), || {
+            for set in &on_device {
+                commands.bind(&pipeline, set, camera);
+                commands.draw([set.count, 1, 0, 0]);
+            }
+        });
+    });
+    target.read()
+}
+
+fn one(context: &Context, gaussians: &[Gaussian], camera: &Camera) -> Vec<[f32; 4]> {
+    draw(context, &[gaussians], &PipelineOptions::new(0), camera)
+}
+
+/// The greatest difference of a channel.
+fn distance(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
+    let pairs = a.as_flattened().iter().zip(b.as_flattened());
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+/// Few but whole pictures; the seed of a failure is printed.
+fn cases() -> ProptestConfig {
+    ProptestConfig {
+        cases: 24,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
+}
+
+proptest! {
+    #![proptest_config(cases())]
+
+    /// The order of the draw matters for ties only.
+    #[test]
+    fn order_does_not_matter(seed: u64, count in 1..150usize) {
+        let context = Context::embedded(&Settings::default());
+        let mut gaussians = scene(seed, count);
+        let sorted = one(&context, &gaussians, &camera());
+        gaussians.shuffle(&mut ChaCha8Rng::seed_from_u64(!seed));
+        prop_assert!(sorted == one(&context, &gaussians, &camera()));
+    }
+
+    /// Where scene and camera are together does not matter, to the last bit where no coordinate is rounded.
+    #[test]
+    fn place_does_not_matter(seed: u64, count in 1..150usize, offset in prop::array::uniform3(-4096..4096i32)) {
+        let context = Context::embedded(&Settings::default());
+        let mut gaussians = scene(seed, count);
+        let here = one(&context, &gaussians, &camera());
+        let offset = offset.map(|o| o as f32);
+        for gaussian in &mut gaussians {
+            for (p, o) in gaussian.position.iter_mut().zip(offset) {
+                *p += o;
+            }
+        }
+        let there = one(&context, &gaussians, &camera().eye(offset.map(f64::from)));
+        prop_assert!(here == there);
+    }
+
+    /// A mirrored scene gives the mirrored picture, to rounding.
+    #[test]
+    fn mirrors_agree(seed: u64, count in 1..60usize) {
+        let context = Context::embedded(&Settings::default());
+        let mut gaussians = scene(seed, count);
+        // Floors would flip whole contributions where rounding differs.
+        let mut options = PipelineOptions::new(0);
+        options.state = options.state.alpha_floor(0.0).transmittance_floor(0.0);
+        let straight = draw(&context, &[&gaussians], &options, &camera());
+        for gaussian in &mut gaussians {
+            gaussian.position[0] *= -1.0;
+            // Mirroring x reverses rotations about y and z.
+            gaussian.rotation[2] *= -1.0;
+            gaussian.rotation[3] *= -1.0;
+        }
+        let mut mirrored = draw(&context, &[&gaussians], &options, &camera());
+        mirrored.chunks_mut(SIZE[0] as usize).for_each(<[_]>::reverse);
+        let distance = distance(&straight, &mirrored);
+        prop_assert!(distance <= 1e-5, "{distance:e}");
+    }
+
+    /// A draw cut in two by depth, the near part blended over the far one, is the whole draw, where
+    /// no transmittance ends a pixel.
+    #[test]
+    fn a_draw_may_be_cut_by_depth(seed: u64, count in 2..150usize, share in 0.0..1.0f64) {
+        let context = Context::embedded(&Settings::default());
+        let mut gaussians = scene(seed, count);
+        gaussians.sort_by(|a, b| a.position[2].total_cmp(&b.position[2]));
+        let mut options = PipelineOptions::new(0);
+        options.state = options.state.transmittance_floor(0.0);
+        options.blend = over();
+        let whole = draw(&context, &[&gaussians], &options, &camera());
+        let (near, far) = gaussians.split_at((share * count as f64) as usize);
+        let parts = draw(&context, &[far, near], &options, &camera());
+        let distance = distance(&whole, &parts);
+        prop_assert!(distance <= 1e-5, "{distance:e}");
+    }
+
+    /// With a floor, each part begins with a transmittance of 1, so the far part may show by as much
+    /// as the floor over the least that a layer can let through.
+    #[test]
+    fn a_cut_shows_no_more_than_the_floor(seed: u64, count in 2..150usize, share in 0.0..1.0f64) {
+        let context = Context::embedded(&Settings::default());
+        let mut gaussians = scene(seed, count);
+        gaussians.sort_by(|a, b| a.position[2].total_cmp(&b.position[2]));
+        let mut options = PipelineOptions::new(0);
+        options.blend = over();
+        let whole = draw(&context, &[&gaussians], &options, &camera());
+        let (near, far) = gaussians.split_at((share * count as f64) as usize);
+        let parts = draw(&context, &[far, near], &options, &camera());
+        // 1e-4 / (1 - 0.99), times 1 in alpha and less in colours: 0.5 + 1.7 / (2 sqrt(pi)) at most.
+        let bound = 1e-2 + 1e-5;
+        let distance = distance(&whole, &parts);
+        prop_assert!(distance <= bound, "{distance:e}");
+    }
+
+    /// Colours are finite and not negative, alpha lies in [0, 1].
+    #[test]
+    fn pictures_are_sane(seed: u64, count in 1..60usize) {
+        let context = Context::embedded(&Settings::default());
+        let scene = gaurast_tests::scenes::awkward(seed, count, 1);
+        let options = PipelineOptions::new(1);
+        let pipeline = Pipeline::new(&context, &options);
+        let on_device = DeviceScene::new(&context, &scene);
+        let target = Target::new(&context, options.format, SIZE);
+        context.run(|commands| {
+            commands.pass(&target, &Pass::clear([0.0; 4]), || {
+                commands.bind(&pipeline, &on_device, &camera());
+                commands.draw([on_device.count, 1, 0, 0]);
+            });
+        });
+        for pixel in target.read::<[f32; 4]>() {
+            prop_assert!(pixel.iter().all(|c| c.is_finite() && *c >= 0.0), "{pixel:?}");
+            prop_assert!(pixel[3] <= 1.0, "{pixel:?}");
+        }
+    }
+}
