@@ -2,4 +2,5 @@
 
 mod accuracy;
 mod determinism;
+mod given_scenes;
 mod reference;
