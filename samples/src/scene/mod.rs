@@ -6,6 +6,7 @@
 //! SPZ files, which are right-up-back, are turned half around x.
 
 mod benchmark;
+mod captured;
 mod error;
 mod format;
 mod generate;
