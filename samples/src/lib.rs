@@ -5,3 +5,4 @@ pub mod camera;
 pub mod output;
 pub mod renderer;
 pub mod scene;
+pub mod usage;

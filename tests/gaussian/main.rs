@@ -2,5 +2,6 @@
 
 mod accuracy;
 mod determinism;
+mod given_scenes;
 mod popping;
 mod reference;

@@ -4,11 +4,10 @@
 
 pub mod compare;
 pub mod contexts;
-pub mod convert;
 pub mod data;
 pub mod fuzzing;
 pub mod kernels;
-pub mod oracle;
 pub mod programs;
-pub mod scenes;
 pub mod triangles;
+
+pub use gaurast_oracle::{oracle, scenes};

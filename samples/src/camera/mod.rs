@@ -5,6 +5,7 @@ mod frame;
 
 use gaurast::vk::GaussianCameraGAURAST;
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use file::{CameraFileError, View, load};
@@ -13,7 +14,7 @@ pub use file::{CameraFileError, View, load};
 pub const DEFAULT_FOV: f64 = 50.0;
 
 /// A pinhole camera with its picture's size.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Camera {
     /// World to camera, row by row: the directions right, down and forward in the world.
     pub rotation: [[f64; 3]; 3],
@@ -115,6 +116,35 @@ impl Camera {
         }
     }
 
+    /// The camera turned by `angle` radians about an axis through `pivot`.
+    #[must_use]
+    pub fn turned(&self, pivot: [f64; 3], axis: [f64; 3], angle: f64) -> Self {
+        let pivot = DVec3::from_array(pivot);
+        let turn = DMat3::from_axis_angle(DVec3::from_array(axis).normalize(), angle);
+        let eye = pivot + turn * (DVec3::from_array(self.eye) - pivot);
+        Self {
+            rotation: self
+                .rotation
+                .map(|row| (turn * DVec3::from_array(row)).to_array()),
+            eye: eye.to_array(),
+            ..*self
+        }
+    }
+
+    /// `count` cameras evenly around the origin at a distance of 4, somewhat above it, that look
+    /// at it: a path for scenes that come without one.
+    pub fn orbit(count: usize, size: [u32; 2]) -> Vec<Self> {
+        let eye = DVec3::new(0.0, -0.35, -1.0).normalize() * 4.0;
+        let forward = -eye.normalize();
+        let right = DVec3::X;
+        let rotation = [right, forward.cross(right), forward].map(<[f64; 3]>::from);
+        let first = Self::new(rotation, eye.to_array(), DEFAULT_FOV, size);
+        (0..count)
+            .map(|i| i as f64 / count as f64 * std::f64::consts::TAU)
+            .map(|angle| first.turned([0.0; 3], [0.0, 1.0, 0.0], angle))
+            .collect()
+    }
+
     /// Where `point` of the world appears, in pixels, if it is in front of the camera.
     pub fn project(&self, point: [f64; 3]) -> Option<[f64; 2]> {
         let rotation = DMat3::from_cols_array_2d(&self.rotation).transpose();
@@ -188,6 +218,21 @@ mod tests {
         let point = [0.1, -0.2, 1.0];
         let [x, y] = camera.project(point).expect("in front");
         close(resized.project(point), [2.0 * x, 3.0 * y]);
+    }
+
+    #[test]
+    fn an_orbit_looks_at_the_middle_from_all_sides() {
+        let cameras = Camera::orbit(7, [64, 48]);
+        assert_eq!(cameras.len(), 7);
+        for camera in &cameras {
+            close(camera.project([0.; 3]), [32., 24.]);
+            // Up is up.
+            let [_, y] = camera.project([0., -0.5, 0.]).expect("in front");
+            assert!(y < 24.0);
+            let rows = DMat3::from_cols_array_2d(&camera.rotation);
+            assert!((rows.determinant() - 1.0).abs() < 1e-9);
+        }
+        assert!(cameras[0] != cameras[1]);
     }
 
     #[test]

@@ -38,11 +38,19 @@ impl Drop for Instance {
     }
 }
 
-/// A logical device that draws Gaussians, its queue, and what is known about it.
+/// What a device is wanted for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Purpose<'a> {
+    /// The Gaussian primitive topology.
+    Gaussians,
+    /// Triangles alone, on the first device whose name holds this text.
+    Triangles(&'a str),
+}
+
+/// A logical device, its queue, and what is known about it.
 pub(super) struct Device {
     raw: ash::Device,
     queue: vk::Queue,
-    gaussian: gaussian_primitive_topology::Device,
     /// Absent if the device doesn't count.
     performance: Option<ash::khr::performance_query::Device>,
     physical: PhysicalDevice,
@@ -63,29 +71,34 @@ struct PhysicalDevice {
 }
 
 impl Device {
-    /// The first device of `entry` that draws Gaussians.
-    pub(super) fn new(entry: ash::Entry) -> Result<Self, RenderError> {
+    /// The first device of `entry` that serves the purpose.
+    pub(super) fn new(entry: ash::Entry, purpose: Purpose<'_>) -> Result<Self, RenderError> {
         let instance = Instance::new(entry)?;
-        let physical = PhysicalDevice::choose(&instance.raw)?;
+        let physical = PhysicalDevice::choose(&instance.raw, purpose)?;
 
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(physical.queue_family)
             .queue_priorities(&priorities)];
-        let mut extensions = vec![gaussian_primitive_topology::NAME.as_ptr()];
+        let mut extensions = Vec::new();
         let mut gaussian = GaussianFeatures::default().gaussian_primitive_topology(true);
         let mut rendering =
             vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
         let mut counting = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()
             .performance_counter_query_pools(true);
+        if matches!(purpose, Purpose::Gaussians) {
+            extensions.push(gaussian_primitive_topology::NAME.as_ptr());
+        }
         if physical.counts {
             extensions.push(ash::khr::performance_query::NAME.as_ptr());
         }
         let mut create_info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
-            .push_next(&mut gaussian)
             .push_next(&mut rendering);
+        if matches!(purpose, Purpose::Gaussians) {
+            create_info = create_info.push_next(&mut gaussian);
+        }
         if physical.counts {
             create_info = create_info.push_next(&mut counting);
         }
@@ -99,7 +112,6 @@ impl Device {
         Ok(Self {
             // SAFETY: the queue was asked for at creation.
             queue: unsafe { raw.get_device_queue(physical.queue_family, 0) },
-            gaussian: gaussian_primitive_topology::Device::new(&instance.raw, &raw),
             performance: physical
                 .counts
                 .then(|| ash::khr::performance_query::Device::new(&instance.raw, &raw)),
@@ -121,8 +133,10 @@ impl Device {
         self.physical.queue_family
     }
 
-    pub(super) fn gaussian(&self) -> &gaussian_primitive_topology::Device {
-        &self.gaussian
+    /// The functions of the Gaussian primitive topology, for a device that was made to draw
+    /// Gaussians.
+    pub(super) fn gaussian_functions(&self) -> gaussian_primitive_topology::Device {
+        gaussian_primitive_topology::Device::new(&self.instance.raw, &self.raw)
     }
 
     /// The functions of performance queries, if the device counts.
@@ -244,8 +258,8 @@ impl Drop for Device {
 }
 
 impl PhysicalDevice {
-    /// The first physical device with the extension and a graphics queue.
-    fn choose(instance: &ash::Instance) -> Result<Self, RenderError> {
+    /// The first physical device that serves the purpose and has a graphics queue.
+    fn choose(instance: &ash::Instance, purpose: Purpose<'_>) -> Result<Self, RenderError> {
         // SAFETY: the instance is alive.
         let handles = unsafe { instance.enumerate_physical_devices() }
             .during("vkEnumeratePhysicalDevices")?;
@@ -258,7 +272,7 @@ impl PhysicalDevice {
                 .unwrap_or_default()
                 .to_string_lossy()
                 .into_owned();
-            if let Some(physical) = Self::suitable(instance, handle, &properties, &name)? {
+            if let Some(physical) = Self::suitable(instance, handle, &properties, &name, purpose)? {
                 return Ok(physical);
             }
             found.push(name);
@@ -268,7 +282,13 @@ impl PhysicalDevice {
         } else {
             found.join(", ")
         };
-        Err(RenderError::NoDevice { found })
+        Err(match purpose {
+            Purpose::Gaussians => RenderError::NoDevice { found },
+            Purpose::Triangles(name) => RenderError::NoSuchDevice {
+                name: name.to_owned(),
+                found,
+            },
+        })
     }
 
     fn suitable(
@@ -276,6 +296,7 @@ impl PhysicalDevice {
         handle: vk::PhysicalDevice,
         properties: &vk::PhysicalDeviceProperties,
         name: &str,
+        purpose: Purpose<'_>,
     ) -> Result<Option<Self>, RenderError> {
         // SAFETY: the handle is the instance's.
         let extensions = unsafe { instance.enumerate_device_extension_properties(handle) }
@@ -285,7 +306,11 @@ impl PhysicalDevice {
                 .iter()
                 .any(|extension| extension.extension_name_as_c_str() == Ok(name))
         };
-        if !has(gaussian_primitive_topology::NAME) || properties.api_version < vk::API_VERSION_1_3 {
+        let serves = match purpose {
+            Purpose::Gaussians => has(gaussian_primitive_topology::NAME),
+            Purpose::Triangles(text) => name.contains(text),
+        };
+        if !serves || properties.api_version < vk::API_VERSION_1_3 {
             return Ok(None);
         }
         // SAFETY: the handle is the instance's.
@@ -296,11 +321,16 @@ impl PhysicalDevice {
         let Some(queue_family) = graphics else {
             return Ok(None);
         };
+        // A device without the extension leaves its limits as they are: zero.
         let mut gaussian = GaussianProperties::default();
-        let mut chain = vk::PhysicalDeviceProperties2::default().push_next(&mut gaussian);
+        let mut chain = vk::PhysicalDeviceProperties2::default();
+        if has(gaussian_primitive_topology::NAME) {
+            chain = chain.push_next(&mut gaussian);
+        }
         // SAFETY: the chain holds structures of extensions that the device has.
         unsafe { instance.get_physical_device_properties2(handle, &mut chain) };
-        let counts = has(ash::khr::performance_query::NAME) && {
+        let draws_gaussians = matches!(purpose, Purpose::Gaussians);
+        let counts = draws_gaussians && has(ash::khr::performance_query::NAME) && {
             let mut counting = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default();
             let mut chain = vk::PhysicalDeviceFeatures2::default().push_next(&mut counting);
             // SAFETY: as above.

@@ -17,6 +17,7 @@
 
 mod device;
 mod pipeline;
+pub mod quads;
 mod query;
 mod resource;
 
@@ -28,12 +29,15 @@ use thiserror::Error;
 
 use crate::camera::Camera;
 use crate::output::Picture;
-use crate::scene::{Scene, Shape};
-use device::Device;
+use crate::scene::{MAX_SH_DEGREE, Scene, Shape};
+use crate::usage::processor_time;
+use device::{Device, Purpose};
+use gaurast::gaussian_primitive_topology;
 use pipeline::{BINDINGS, GaussianPipeline};
 pub use query::Counter;
 use query::CounterQuery;
 use resource::{Buffer, CommandBuffers, Image, Memory};
+use serde::{Deserialize, Serialize};
 
 /// Bytes that go to the device at once.
 const STAGING: u64 = 64 << 20;
@@ -58,6 +62,20 @@ pub enum RenderError {
         /// The devices there are.
         found: String,
     },
+    /// No device has the name that is wanted.
+    #[error("no Vulkan device has \"{name}\" in its name and Vulkan 1.3 (there is {found})")]
+    NoSuchDevice {
+        /// The part of a name.
+        name: String,
+        /// The devices there are.
+        found: String,
+    },
+    /// The Vulkan loader is not there.
+    #[error("there is no Vulkan loader: {0}")]
+    NoLoader(String),
+    /// Threads could not be started.
+    #[error("cannot start threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// No memory type will do.
     #[error("the device has no {0} memory for a resource")]
     NoMemory(&'static str),
@@ -97,12 +115,37 @@ pub struct Renderer {
     query: Option<CounterQuery>,
     target: Option<Target>,
     commands: CommandBuffers<2>,
+    gaussian: gaussian_primitive_topology::Device,
     device: Arc<Device>,
+}
+
+/// What a draw may save on: the pipeline's state as far as pictures are the better for it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Draw colours with spherical harmonics of at most this degree.
+    pub sh_degree: u32,
+    /// A Gaussian counts where its alpha is at least this.
+    pub alpha_floor: f32,
+    /// A pixel is finished before its transmittance would fall below this.
+    pub transmittance_floor: f32,
+}
+
+impl Default for Settings {
+    /// 3DGS's, with all colour there is.
+    fn default() -> Self {
+        Self {
+            sh_degree: MAX_SH_DEGREE,
+            alpha_floor: 1.0 / 255.0,
+            transmittance_floor: 1e-4,
+        }
+    }
 }
 
 /// A scene in device memory, with its pipeline.
 pub struct DeviceScene {
     count: u32,
+    strides: [u32; BINDINGS],
+    stored_degree: u32,
     pipeline: GaussianPipeline,
     /// One for each of [`BINDINGS`].
     buffers: [Buffer; BINDINGS],
@@ -115,6 +158,8 @@ pub struct Frame {
     pub picture: Picture,
     /// From the submission to its end, the copy to the host included.
     pub time: Duration,
+    /// What all threads of the process spent meanwhile, if the system tells.
+    pub processor_time: Option<Duration>,
     /// The device's counters of the draw, in its order; none if it has none.
     pub counters: Vec<Counter>,
 }
@@ -131,11 +176,12 @@ impl Renderer {
     /// # Errors
     /// If there is none, or Vulkan fails.
     pub fn new(entry: ash::Entry) -> Result<Self, RenderError> {
-        let device = Arc::new(Device::new(entry)?);
+        let device = Arc::new(Device::new(entry, Purpose::Gaussians)?);
         Ok(Self {
             query: CounterQuery::new(&device)?,
             target: None,
             commands: CommandBuffers::new(&device)?,
+            gaussian: device.gaussian_functions(),
             device,
         })
     }
@@ -155,15 +201,15 @@ impl Renderer {
         scene: &Scene,
         sh_degree: Option<u32>,
     ) -> Result<DeviceScene, RenderError> {
+        let settings = Settings {
+            sh_degree: sh_degree.unwrap_or(MAX_SH_DEGREE),
+            ..Settings::default()
+        };
         let max = self.device.max_gaussians().min(u32::MAX.into());
         let count = scene.len() as u64;
         if count > max {
             return Err(RenderError::TooMany { count, max });
         }
-        let drawn_degree = scene
-            .sh_degree()
-            .min(sh_degree.unwrap_or(u32::MAX))
-            .min(self.device.max_sh_degree());
         let strides = [
             size_of::<[f32; 3]>(),
             size_of::<Shape>(),
@@ -172,13 +218,37 @@ impl Renderer {
         .map(|stride| stride as u32);
         Ok(DeviceScene {
             count: count as u32,
-            pipeline: GaussianPipeline::new(&self.device, strides, drawn_degree, COLOR_FORMAT)?,
+            strides,
+            stored_degree: scene.sh_degree(),
+            pipeline: self.pipeline(strides, scene.sh_degree(), settings)?,
             buffers: [
                 self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
                 self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
                 self.upload_bytes(bytemuck::cast_slice(scene.sh()))?,
             ],
         })
+    }
+
+    /// Draws `scene` by other settings from now on.
+    ///
+    /// # Errors
+    /// If Vulkan fails.
+    pub fn set(&self, scene: &mut DeviceScene, settings: Settings) -> Result<(), RenderError> {
+        scene.pipeline = self.pipeline(scene.strides, scene.stored_degree, settings)?;
+        Ok(())
+    }
+
+    fn pipeline(
+        &self,
+        strides: [u32; BINDINGS],
+        stored_degree: u32,
+        mut settings: Settings,
+    ) -> Result<GaussianPipeline, RenderError> {
+        settings.sh_degree = settings
+            .sh_degree
+            .min(stored_degree)
+            .min(self.device.max_sh_degree());
+        GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT)
     }
 
     /// A device-local vertex buffer of `bytes`, by way of a staging buffer.
@@ -236,10 +306,7 @@ impl Renderer {
     /// If the size is not within the device's limits, or Vulkan fails.
     pub fn render(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<Frame, RenderError> {
         let (width, height) = (camera.width, camera.height);
-        let max = self.device.max_size();
-        if !(1..=max).contains(&width) || !(1..=max).contains(&height) {
-            return Err(RenderError::Size { width, height, max });
-        }
+        check_size(&self.device, width, height)?;
         let target = match self.target.take() {
             Some(target) if target.image.extent() == vk::Extent2D { width, height } => target,
             _ => Target::new(&self.device, width, height)?,
@@ -257,16 +324,25 @@ impl Renderer {
             if let Some(query) = &self.query {
                 query.begin(commands);
             }
-            record_draw(&self.device, commands, &target.image, scene, camera);
+            let gaussian = &self.gaussian;
+            record_draw(
+                &self.device,
+                gaussian,
+                commands,
+                &target.image,
+                scene,
+                camera,
+            );
             if let Some(query) = &self.query {
                 query.end(commands);
             }
         })?;
         self.commands
             .record(1, |_, commands| record_copy(&self.device, commands, target))?;
-        let start = Instant::now();
+        let (start, processor) = (Instant::now(), processor_time());
         self.commands.submit_and_wait(&[0, 1])?;
         let time = start.elapsed();
+        let processor_time = processor.and_then(|start| Some(processor_time()? - start));
 
         let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
         target.readback.read(&mut pixels)?;
@@ -278,9 +354,19 @@ impl Renderer {
                 pixels,
             },
             time,
+            processor_time,
             counters: counters.unwrap_or_default(),
         })
     }
+}
+
+/// Whether the device can draw a picture of this size.
+fn check_size(device: &Device, width: u32, height: u32) -> Result<(), RenderError> {
+    let max = device.max_size();
+    if !(1..=max).contains(&width) || !(1..=max).contains(&height) {
+        return Err(RenderError::Size { width, height, max });
+    }
+    Ok(())
 }
 
 impl Target {
@@ -306,6 +392,7 @@ impl Target {
 /// Clears `image` to nothing and draws `scene` into it.
 fn record_draw(
     device: &Device,
+    gaussian: &gaussian_primitive_topology::Device,
     commands: vk::CommandBuffer,
     image: &Image,
     scene: &DeviceScene,
@@ -356,9 +443,7 @@ fn record_draw(
         raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
         raw.cmd_set_viewport(commands, 0, &[viewport]);
         raw.cmd_set_scissor(commands, 0, &[area]);
-        device
-            .gaussian()
-            .cmd_set_gaussian_camera(commands, &camera.to_vulkan());
+        gaussian.cmd_set_gaussian_camera(commands, &camera.to_vulkan());
         raw.cmd_draw(commands, scene.count, 1, 0, 0);
         raw.cmd_end_rendering(commands);
     }

@@ -9,7 +9,7 @@ use gaurast::vk::{
 };
 
 use super::device::Device;
-use super::{During, RenderError};
+use super::{During, RenderError, Settings};
 use crate::scene::Shape;
 
 /// Vertex buffers: positions, shapes, spherical harmonics.
@@ -27,12 +27,12 @@ pub(super) struct GaussianPipeline {
 }
 
 impl GaussianPipeline {
-    /// A pipeline for vertex buffers of `strides`, that draws with spherical harmonics of degree
-    /// `sh_degree` into an attachment of `format`.
+    /// A pipeline for vertex buffers of `strides`, that draws by `settings` (with a degree that is
+    /// stored) into an attachment of `format`.
     pub(super) fn new(
         device: &Arc<Device>,
         strides: [u32; BINDINGS],
-        sh_degree: u32,
+        settings: Settings,
         format: vk::Format,
     ) -> Result<Self, RenderError> {
         let raw = device.raw();
@@ -50,7 +50,7 @@ impl GaussianPipeline {
                 .binding(binding)
                 .stride(strides[binding as usize])
         });
-        let attributes = attributes(sh_degree);
+        let attributes = attributes(settings.sh_degree);
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&bindings)
             .vertex_attribute_descriptions(&attributes);
@@ -72,7 +72,9 @@ impl GaussianPipeline {
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
         let mut gaussian = PipelineGaussianStateCreateInfoGAURAST::default()
-            .spherical_harmonics_degree(sh_degree)
+            .spherical_harmonics_degree(settings.sh_degree)
+            .alpha_floor(settings.alpha_floor)
+            .transmittance_floor(settings.transmittance_floor)
             .attribute_locations(
                 GaussianAttributeLocationsGAURAST::default()
                     .position(0)

@@ -1,5 +1,6 @@
 //! Buffers, images and command buffers that destroy themselves.
 
+use std::mem::MaybeUninit;
 use std::sync::Arc;
 
 use ash::vk;
@@ -121,6 +122,29 @@ impl Buffer {
             // SAFETY: `mapped` points to `size` bytes, which nothing else accesses meanwhile.
             unsafe { mapped.copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len()) }
         })
+    }
+
+    /// Lets `fill` write the first `count` elements of the buffer, which must be in host memory and
+    /// unused by the device.
+    pub(super) fn fill<T: Pod>(
+        &self,
+        count: usize,
+        fill: impl FnOnce(&mut [MaybeUninit<T>]),
+    ) -> Result<(), RenderError> {
+        assert!(
+            (count * size_of::<T>()) as u64 <= self.size,
+            "the buffer holds the elements"
+        );
+        self.mapped(|mapped| {
+            assert!(mapped.cast::<T>().is_aligned(), "memory is mapped at 64");
+            // SAFETY: `mapped` points to `size` bytes, aligned for `T`, which nothing else
+            // accesses meanwhile and which need not be initialised.
+            fill(unsafe { std::slice::from_raw_parts_mut(mapped.cast(), count) });
+        })
+    }
+
+    pub(super) fn size(&self) -> u64 {
+        self.size
     }
 
     fn mapped(&self, access: impl FnOnce(*mut u8)) -> Result<(), RenderError> {

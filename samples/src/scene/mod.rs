@@ -6,6 +6,7 @@
 //! SPZ files, which are right-up-back, are turned half around x.
 
 mod benchmark;
+mod captured;
 mod error;
 mod format;
 mod generate;
@@ -23,6 +24,7 @@ use bytemuck::{Pod, Zeroable};
 pub use error::{Place, Reason, SceneError};
 use format::Input;
 pub use format::known_extensions;
+use gaurast_oracle::scenes::SceneBuffers;
 pub use generate::DEFAULT_COUNT;
 
 /// The value of the constant spherical harmonic, 1 / (2 sqrt(pi)).
@@ -176,6 +178,21 @@ impl Scene {
     fn sh_of_mut(&mut self, index: usize) -> &mut [[f32; 3]] {
         let stride = self.sh_stride();
         &mut self.sh[index * stride..][..stride]
+    }
+}
+
+impl From<&Scene> for SceneBuffers {
+    /// The scene as the oracle takes it.
+    fn from(scene: &Scene) -> Self {
+        let shapes = scene.shapes();
+        Self {
+            positions: scene.positions().to_vec(),
+            scales: shapes.iter().map(|shape| shape.scale).collect(),
+            rotations: shapes.iter().map(|shape| shape.rotation).collect(),
+            opacities: shapes.iter().map(|shape| shape.opacity).collect(),
+            sh: scene.sh().to_vec(),
+            degree: scene.sh_degree(),
+        }
     }
 }
 

@@ -1,22 +1,7 @@
-//! Holding an image against a reference.
-//!
-//! Two questions, kept apart:
-//! - *Does it keep the accuracy contract?* [`verdict`] answers yes or no, from the oracle's
-//!   [`Reference`](crate::oracle::Reference); [`assert_contract`] makes a test of it.
-//! - *How different do two pictures look?* [`Statistics`] says so for people and benchmark tables:
-//!   greatest difference, 99.9th percentile, PSNR and FLIP.
-//!
-//! Triangles have no oracle: [`differences`] holds what two devices drew against each other.
-//!
-//! Images are slices of premultiplied red, green, blue and alpha, row by row from the top.
+//! Holding an image against a reference ([`gaurast_oracle::compare`]), or against another device's: triangles have no
+//! oracle, so that [`differences`] holds what two devices drew against each other.
 
 mod devices;
-pub mod flip;
-mod picture;
-mod statistics;
-mod verdict;
 
 pub use devices::{Difference, difference, differences, for_people, write_differences};
-pub use picture::{PictureError, write_difference};
-pub use statistics::Statistics;
-pub use verdict::{Limits, Verdict, assert_contract, verdict};
+pub use gaurast_oracle::compare::*;

@@ -119,6 +119,7 @@ mod tests {
                 pixels: vec![[0.0; 4]; 2],
             },
             time: Duration::from_millis(5),
+            processor_time: None,
             counters: vec![counter(Unit::GENERIC, 4321.0)],
         };
         let text = table(&Scene::default(), Duration::ZERO, &frame).to_string();

@@ -140,7 +140,7 @@ pub fn assert_contract(
     let verdict = verdict(image, reference, limits);
     if !verdict.holds() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../target/differences")
+            .join("../../target/differences")
             .join(format!("{name}.png"));
         let picture = match write_difference(&path, image, reference, limits.distance) {
             Ok(()) => format!("see {}", path.display()),

@@ -1,0 +1,39 @@
+//! Gaussians without the Gaussian topology: blended quads, sorted on the processor, as any Vulkan device can draw them.
+//!
+//! `quad_splats [DEVICE [SCENE]]` writes quad_splats.png by the loader's first device whose name holds DEVICE (such as
+//! llvmpipe), or by this driver without one. `gaurast render` draws the same picture as it is meant.
+
+use gaurast_samples::camera::Camera;
+use gaurast_samples::output;
+use gaurast_samples::renderer::quads::QuadRenderer;
+use gaurast_samples::scene::{DEFAULT_COUNT, Scene};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let mut renderer = match arguments.next() {
+        Some(device) => QuadRenderer::through_the_loader(&device, 0)?,
+        None => QuadRenderer::new(vulkan_gaurast::entry(), "", 0)?,
+    };
+    println!("{}", renderer.device_name());
+    let size = [1280, 720];
+    let (scene, camera) = match arguments.next() {
+        Some(path) => {
+            let scene = Scene::load(path.as_ref())?;
+            let camera = Camera::framing(&scene, 50.0, size);
+            (scene, camera)
+        }
+        None => (
+            Scene::generate(1, DEFAULT_COUNT),
+            Camera::of_generated(None, size)?,
+        ),
+    };
+    for frame in ["first", "second"] {
+        let frame_drawn = renderer.render(&scene, &camera, 3, 1.0 / 255.0)?;
+        println!("{frame} frame: {:?}", frame_drawn.time);
+        for step in &frame_drawn.counters {
+            println!("{:>10}: {:8.2} ms", step.name, step.value * 1e-6);
+        }
+        output::write("quad_splats.png".as_ref(), &frame_drawn.picture, None)?;
+    }
+    Ok(())
+}
