@@ -1,5 +1,6 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
+use crate::gaussian::cache::ChunkCache;
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
 use crate::skips::Skips;
 use crate::trace::Recorder;
@@ -21,6 +22,9 @@ pub struct Config {
     pub macro_tile_size: u32,
     /// A pass is flushed early when its bins exceed this many bytes.
     pub bin_budget_bytes: u64,
+    /// How many bytes of host memory may hold Gaussians in an order that is faster to read (see
+    /// [`Skip::Chunks`](crate::skips::Skip::Chunks)): 48 for each.
+    pub chunk_budget_bytes: u64,
     /// When a pass is flushed.
     pub flush: FlushPolicy,
     /// The longest time that one batch of shader invocations may take.
@@ -47,6 +51,7 @@ impl Default for Config {
             simd: SimdLevel::Best,
             macro_tile_size: 64,
             bin_budget_bytes: 256 << 20,
+            chunk_budget_bytes: 512 << 20,
             flush: FlushPolicy::WhenFull,
             shader_timeout: Duration::from_secs(5),
             skips: Skips::default(),
@@ -75,6 +80,7 @@ pub struct Device {
     workers: Workers,
     level: Level,
     config: Config,
+    chunks: ChunkCache,
 }
 
 impl Device {
@@ -97,12 +103,18 @@ impl Device {
             workers,
             level,
             config: config.clone(),
+            chunks: ChunkCache::default(),
         })
     }
 
     /// What was chosen when it was created.
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    /// The chunks of Gaussians that were drawn more than once.
+    pub(crate) fn chunks(&self) -> &ChunkCache {
+        &self.chunks
     }
 
     /// The SIMD level of every kernel.

@@ -34,6 +34,7 @@ macro_rules! skips {
 }
 
 skips! {
+    Chunks: "chunks", OutsideByChunks, "Gaussians that are drawn again are in chunks, of which those outside the picture are not read.";
     Bounds: "bounds", OutsideByBounds, "A Gaussian whose bounding sphere is off the screen is not projected further.";
     Ellipse: "ellipse", TilesBesideEllipse, "A Gaussian is listed only in tiles that its ellipse reaches, not in all of its box.";
     Harmonics: "harmonics", HarmonicsUnread, "Spherical harmonics are read only for Gaussians that reach a tile.";
@@ -137,7 +138,7 @@ mod tests {
                 .parse::<Skips>()
                 .unwrap_err()
                 .to_string(),
-            "everything is neither all nor none nor a skip, which are bounds, ellipse, harmonics, blocks, saturated, \
+            "everything is neither all nor none nor a skip, which are chunks, bounds, ellipse, harmonics, blocks, saturated, \
              empty-tiles"
         );
     }

@@ -1,4 +1,6 @@
 //! Skips: each saves work, and none changes a bit.
+//!
+//! Every scene is drawn twice to a target, since some of what is saved is prepared by the first time.
 
 mod common;
 
@@ -6,10 +8,10 @@ use common::*;
 use simdevice::counters::{Counter, Counters};
 use simdevice::packet::*;
 use simdevice::skips::{Skip, Skips};
-use simdevice::{CommandProcessor, Config, Device, Format, Packet};
+use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 
-/// Few Gaussians, many, and several draws with a clear between them; how the attachment begins.
+/// Few Gaussians, many, many that only the device can write, of which all are equally deep in one scene, and several draws with a clear between them; how the attachment begins.
 fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
     let clear_part = clear(
         vec![AttachmentClear::Color {
@@ -29,9 +31,18 @@ fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
         vec![clear_part],
         gaussians(4, 300, OVER),
     ];
+    let mut ties = gaussians_in(false, 6, 3000, OVER);
+    if let Packet::GaussianBegin(begin) = &mut ties[0] {
+        begin.state = Arc::new(GaussianState {
+            order: GaussianOrder::Primitive,
+            ..(*begin.state).clone()
+        });
+    }
     vec![
         ("few", gaussians(1, 12, OVER), LoadOp::Load),
         ("many", gaussians(2, 5000, OVER), over_black),
+        ("chunks", gaussians_in(false, 5, 6000, OVER), over_black),
+        ("ties", ties, LoadOp::Load),
         ("several", several.concat(), LoadOp::Load),
         ("nothing", Vec::new(), over_black),
     ]
@@ -42,9 +53,13 @@ fn draw(skips: Skips, packets: &[Packet], load: LoadOp) -> (Vec<u8>, Counters) {
     let config = Config { skips, ..single() };
     let target = image(Format::R32G32B32A32Sfloat, 1, 0x3E);
     let mut processor = CommandProcessor::new(Arc::new(Device::new(&config).unwrap()));
-    let begin = Packet::BeginRendering(Box::new(rendering(attachment(&target, load))));
-    for packet in [begin].iter().chain(packets).chain([&Packet::EndRendering]) {
-        processor.execute(packet).unwrap();
+    let begin = [Packet::BeginRendering(Box::new(rendering(attachment(
+        &target, load,
+    ))))];
+    for _ in 0..2 {
+        for packet in begin.iter().chain(packets).chain([&Packet::EndRendering]) {
+            processor.execute(packet).unwrap();
+        }
     }
     (bytes(&target), processor.counters().clone())
 }
@@ -84,4 +99,79 @@ fn without_skips_everything_is_worked_on() {
             "{scene}"
         );
     }
+}
+
+/// What a device counts in each of four passes that draw the same, between which `change` is called with the pass's number
+/// and the device's memory; all images are those of a device without chunks.
+fn draw_again(config: &Config, change: impl Fn(usize, &Allocation)) -> Vec<Counters> {
+    let packets = gaussians_in(false, 7, 4000, OVER);
+    let Packet::GaussianAppend(append) = &packets[1] else {
+        panic!("a set begins, is filled and is resolved");
+    };
+    let memory = &append.attributes.position.buffer.memory;
+    let target = image(Format::R32G32B32A32Sfloat, 1, 0);
+    let clear = LoadOp::Clear(ClearValue::Float([0.0; 4]));
+    let begin = [Packet::BeginRendering(Box::new(rendering(attachment(
+        &target, clear,
+    ))))];
+    let mut processor = CommandProcessor::new(Arc::new(Device::new(config).unwrap()));
+    let passes = (0..4).map(|pass| {
+        let before = processor.counters().clone();
+        for packet in begin.iter().chain(&packets).chain([&Packet::EndRendering]) {
+            processor.execute(packet).unwrap();
+        }
+        let plain = Config {
+            skips: Skips::ALL.without(Skip::Chunks),
+            ..single()
+        };
+        let drawn = bytes(&target);
+        let mut other = CommandProcessor::new(Arc::new(Device::new(&plain).unwrap()));
+        for packet in begin.iter().chain(&packets).chain([&Packet::EndRendering]) {
+            other.execute(packet).unwrap();
+        }
+        assert!(bytes(&target) == drawn, "pass {pass}");
+        change(pass, memory);
+        processor.counters().since(&before)
+    });
+    passes.collect()
+}
+
+fn chunks_built(passes: &[Counters]) -> Vec<u64> {
+    let built = passes.iter().map(|pass| pass.get(Counter::ChunksBuilt));
+    built.collect()
+}
+
+#[test]
+fn chunks_are_made_once() {
+    let passes = draw_again(&single(), |_, _| {});
+    assert_eq!(chunks_built(&passes), [0, 16, 0, 0]);
+    let left_out = |pass: &Counters| pass.get(Counter::OutsideByChunks);
+    assert_eq!(left_out(&passes[0]), 0);
+    assert!(left_out(&passes[3]) > 0);
+    for pass in &passes {
+        assert_eq!(pass.get(Counter::GaussiansRead), 4000);
+        let drawn = pass.get(Counter::GaussiansDrawn);
+        assert_eq!(drawn, passes[0].get(Counter::GaussiansDrawn));
+    }
+}
+
+#[test]
+fn chunks_are_made_anew_when_the_memory_was_written() {
+    let far = [0.0f32, 0.0, 1e3];
+    let passes = draw_again(&single(), |pass, memory| {
+        if pass == 1 {
+            memory.write(0, &far).unwrap();
+            memory.bump_generation();
+        }
+    });
+    assert_eq!(chunks_built(&passes), [0, 16, 0, 16]);
+}
+
+#[test]
+fn chunks_stay_within_their_budget() {
+    let config = Config {
+        chunk_budget_bytes: 100_000,
+        ..single()
+    };
+    assert_eq!(chunks_built(&draw_again(&config, |_, _| {})), [0; 4]);
 }
