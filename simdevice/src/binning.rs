@@ -1,27 +1,20 @@
 //! Binning: depth-sorted primitives to lists per tile.
 //!
 //! Sorting comes first, and placement is stable, so that every list is in depth order without a sort of its
-//! own. Workers take runs of the sorted sequence and bucket what they reach by rows of tiles; then each row is
-//! counted and placed by one worker, whose counters and lists stay in its cache.
+//! own. What each primitive reaches is brought into the sorted order; then each worker takes a band of rows of tiles,
+//! walks the whole sequence, counts, and places. A band's counters stay in the first-level cache.
 
-use crate::gaussian::footprint::{Span, TILE_SIZE};
+use crate::gaussian::footprint::{Reach, TILE_SIZE};
 use crate::gaussian::locate;
 use crate::gaussian::project::Projected;
 use crate::packet::Rect;
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// A primitive's tiles in one row.
-#[derive(Clone, Copy, Debug)]
-struct RowEntry {
-    primitive: u32,
-    first: u16,
-    end: u16,
-}
-
-/// The lists of one row of tiles.
+/// The lists of some rows of tiles.
 #[derive(Debug, Default)]
-struct Row {
-    /// Where tile `x`'s list begins, for each tile of the row and one past.
+struct Band {
+    /// Where each tile's list begins, row by row, and one past the last.
     starts: Vec<u32>,
     primitives: Vec<u32>,
 }
@@ -29,10 +22,20 @@ struct Row {
 /// Lists of primitives by tile, each in the order of the sorted sequence.
 #[derive(Debug)]
 pub(crate) struct TileLists {
-    /// The row of tiles that `rows[0]` is.
+    /// The first row of tiles.
     first_row: u32,
-    rows: Vec<Row>,
+    /// Tiles of a row.
+    columns: u32,
+    /// Rows of a band; the last may have fewer.
+    band_rows: u32,
+    bands: Vec<Band>,
 }
+
+/// A primitive and what it reaches.
+type Reaching = (u32, Reach);
+
+/// Primitives that a worker brings into order at a time.
+const RUN: usize = 4096;
 
 impl TileLists {
     /// Places the survivors named by `order`, in that order, in the lists of the tiles they reach.
@@ -45,62 +48,64 @@ impl TileLists {
         if bounds.is_empty() || order.is_empty() {
             return Self {
                 first_row: 0,
-                rows: Vec::new(),
+                columns: 0,
+                band_rows: 1,
+                bands: Vec::new(),
             };
         }
         // Visible pixels have coordinates from zero on: the render area lies inside its attachments.
         let tile = |pixel: i64| (pixel.max(0) / i64::from(TILE_SIZE)) as u32;
         let first_row = tile(bounds.y.into());
-        let last_row = tile(i64::from(bounds.y) + i64::from(bounds.height) - 1);
+        let rows = tile(i64::from(bounds.y) + i64::from(bounds.height) - 1) - first_row + 1;
         let columns = tile(i64::from(bounds.x) + i64::from(bounds.width) - 1) + 1;
-        let row_count = (last_row - first_row + 1) as usize;
+        let band_rows = rows.div_ceil(threads.max(1) as u32);
 
-        // Several runs for each worker, so that one that is late does not keep the others waiting.
-        let run = order.len().div_ceil(4 * threads.max(1)).max(1024);
-        let runs: Vec<Vec<Vec<RowEntry>>> = order
-            .par_chunks(run)
-            .map(|names| {
-                let mut rows = vec![Vec::with_capacity(2 * run / row_count); row_count];
-                for &(_, primitive) in names {
-                    let (batch, place) = locate(primitive);
-                    for &Span { row, first, end } in batches[batch].spans_of(place) {
-                        let row = (u32::from(row) - first_row) as usize;
-                        rows[row].push(RowEntry {
-                            primitive,
-                            first,
-                            end,
-                        });
-                    }
-                }
-                rows
+        let sorted: Vec<Reaching> = order
+            .par_iter()
+            .with_min_len(RUN)
+            .map(|&(_, primitive)| {
+                let (batch, place) = locate(primitive);
+                (primitive, batches[batch].reaches[place])
             })
             .collect();
-        let rows = (0..row_count)
+        let bands = (0..rows)
             .into_par_iter()
-            .map(|row| Row::place(columns, || runs.iter().flat_map(move |run| &run[row])))
+            .step_by(band_rows as usize)
+            .map(|row| {
+                let row = first_row + row;
+                let end = (row + band_rows).min(first_row + rows);
+                Band::place(batches, &sorted, row..end, columns)
+            })
             .collect();
-        Self { first_row, rows }
+        Self {
+            first_row,
+            columns,
+            band_rows,
+            bands,
+        }
     }
 
     /// The primitives of a tile.
     pub(crate) fn list(&self, tile_x: u32, tile_y: u32) -> &[u32] {
-        let row = tile_y
-            .checked_sub(self.first_row)
-            .and_then(|row| self.rows.get(row as usize));
-        row.and_then(|row| {
-            let start = *row.starts.get(tile_x as usize)?;
-            let end = *row.starts.get(tile_x as usize + 1)?;
-            row.primitives.get(start as usize..end as usize)
-        })
-        .unwrap_or_default()
+        let of = || {
+            let row = tile_y.checked_sub(self.first_row)?;
+            let band = self.bands.get((row / self.band_rows) as usize)?;
+            let tile = row % self.band_rows * self.columns + tile_x;
+            let start = *band.starts.get(tile as usize)?;
+            let end = *band.starts.get(tile as usize + 1)?;
+            band.primitives.get(start as usize..end as usize)
+        };
+        if tile_x < self.columns {
+            of().unwrap_or_default()
+        } else {
+            &[]
+        }
     }
 
     /// How many pairs of tile and primitive there are.
     pub(crate) fn pairs(&self) -> u64 {
-        self.rows
-            .iter()
-            .map(|row| row.primitives.len() as u64)
-            .sum()
+        let pairs = |band: &Band| band.primitives.len() as u64;
+        self.bands.iter().map(pairs).sum()
     }
 
     /// Whether a tile that shares pixels with `rect` has a primitive.
@@ -117,49 +122,82 @@ impl TileLists {
 
     /// Bytes of host memory that the lists take.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let bytes = |row: &Row| size_of_val(&*row.starts) + size_of_val(&*row.primitives);
-        self.rows.iter().map(|row| bytes(row) as u64).sum()
+        let bytes = |band: &Band| size_of_val(&*band.starts) + size_of_val(&*band.primitives);
+        self.bands.iter().map(|band| bytes(band) as u64).sum()
     }
 }
 
-impl Row {
-    /// Counts, then places what `entries` gives, in its order.
-    fn place<'a, I: Iterator<Item = &'a RowEntry>>(columns: u32, entries: impl Fn() -> I) -> Self {
-        let mut starts = vec![0u32; columns as usize + 1];
-        for entry in entries() {
-            for count in &mut starts[usize::from(entry.first)..usize::from(entry.end)] {
+impl Band {
+    /// Counts, then places what `sorted` reaches of the rows, in its order.
+    fn place(batches: &[Projected], sorted: &[Reaching], rows: Range<u32>, columns: u32) -> Self {
+        let tiles = (rows.end - rows.start) as usize * columns as usize;
+        let mut starts = vec![0u32; tiles + 1];
+        each_span(batches, sorted, &rows, columns, |_, tiles| {
+            for count in &mut starts[tiles] {
                 *count += 1;
             }
-        }
+        });
         let mut total = 0;
         for start in &mut starts {
             total += std::mem::replace(start, total);
         }
         let mut next = starts.clone();
         let mut primitives = vec![0; total as usize];
-        for entry in entries() {
-            for next in &mut next[usize::from(entry.first)..usize::from(entry.end)] {
-                primitives[*next as usize] = entry.primitive;
+        each_span(batches, sorted, &rows, columns, |primitive, tiles| {
+            for next in &mut next[tiles] {
+                primitives[*next as usize] = primitive;
                 *next += 1;
             }
-        }
+        });
         Self { starts, primitives }
+    }
+}
+
+/// Calls `visit` with each primitive and the tiles that it reaches in a row of a band, numbered from the band's corner.
+#[inline(always)]
+fn each_span(
+    batches: &[Projected],
+    sorted: &[Reaching],
+    rows: &Range<u32>,
+    columns: u32,
+    mut visit: impl FnMut(u32, Range<usize>),
+) {
+    for (primitive, reach) in sorted {
+        if !reach.is_within(rows.start, rows.end) {
+            continue;
+        }
+        let others = &batches[locate(*primitive).0].spans;
+        for (row, span) in reach.spans(others) {
+            if rows.contains(&row) {
+                let corner = ((row - rows.start) * columns) as usize;
+                let first = corner + usize::from(span.first);
+                visit(
+                    *primitive,
+                    first..first + usize::from(span.end - span.first),
+                );
+            }
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gaussian::footprint::Span;
 
     #[test]
     fn lists_keep_the_sorted_order() {
         let mut batch = Projected::default();
-        for tiles in [&[(1, 0, 2)][..], &[(1, 1, 2), (2, 0, 3)], &[(1, 0, 1)]] {
-            let tiles = tiles.iter();
-            batch
-                .spans
-                .extend(tiles.map(|&(row, first, end)| Span { row, first, end }));
-            batch.span_ends.push(batch.spans.len() as u32);
+        for (row, spans) in [
+            (1, &[(0, 2)][..]),
+            (1, &[(1, 2), (0, 3), (0, 0), (0, 0), (0, 0)]),
+            (1, &[(0, 1)]),
+        ] {
+            let mut reach = Reach::new(row, spans.len() as u16, &mut batch.spans);
+            for (number, &(first, end)) in (0..).zip(spans) {
+                reach.set(&mut batch.spans, number, Span { first, end });
+            }
+            batch.reaches.push(reach);
         }
         let order = [(5, 2), (6, 0), (7, 1)];
         let bounds = Rect {

@@ -55,6 +55,7 @@ macro_rules! counters {
 
 counters! {
     GaussiansRead: "gaussians", "gaussians read", Count, "Gaussians that draws named";
+    ChunksBuilt: "gaussians", "chunks built", Count, "Chunks of up to 256 Gaussians that were made of memory that is drawn again";
     GaussiansDrawn: "gaussians", "gaussians drawn", Count, "Gaussians that reached at least one tile";
     SkippedNonFinite: "gaussians skipped", "non-finite", Count, "Gaussians with a non-finite attribute";
     SkippedZeroRotation: "gaussians skipped", "zero quaternion", Count, "Gaussians whose quaternion is all zero";
@@ -64,6 +65,13 @@ counters! {
     SkippedFar: "gaussians skipped", "beyond far plane", Count, "Gaussians not before the far plane";
     SkippedDegenerate: "gaussians skipped", "degenerate covariance", Count, "Gaussians whose screen-space covariance is not positive and finite";
     SkippedOffScreen: "gaussians skipped", "off screen", Count, "Gaussians that reach no pixel of the scissored viewport at the alpha floor";
+    OutsideByChunks: "skips", "outside by chunks", Count, "Gaussians that were not read because the bounds of their chunk are outside the picture";
+    OutsideByBounds: "skips", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
+    TilesBesideEllipse: "skips", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
+    HarmonicsUnread: "skips", "harmonics unread", Count, "Gaussians whose spherical harmonics were not read";
+    BlocksBesideEllipse: "skips", "blocks beside ellipse", Count, "Pairs of an unfinished 4x4 block and a Gaussian of its tile that does not reach the block";
+    BlocksSaturated: "skips", "blocks saturated", Count, "Pairs of a finished 4x4 block and a Gaussian of its tile";
+    TilesUntouched: "skips", "tiles untouched", Count, "Tiles of attachments that were not loaded, because nothing was drawn to them";
     InputVertices: "geometry", "input vertices", Count, "Vertices or indices of draws of points, lines and triangles";
     InputPrimitives: "geometry", "input primitives", Count, "Points, lines and triangles that were assembled";
     VertexInvocations: "geometry", "vertex invocations", Count, "Vertices shaded";
@@ -95,6 +103,7 @@ counters! {
     ShaderLanes: "shader cores", "lanes", Count, "Lanes that could have been active, summed alike; active lanes by it is the lane occupancy";
     GeometryTime: "time", "geometry", Nanoseconds, "All of points, lines and triangles before tiles: vertices, set-up, binning";
     PreprocessTime: "time", "preprocess", Nanoseconds, "Reading, culling, projecting and colouring Gaussians";
+    ChunkTime: "time", "chunks", Nanoseconds, "Putting Gaussians that are drawn again into chunks; not part of preprocess";
     SortTime: "time", "sort", Nanoseconds, "Sorting by depth";
     BinningTime: "time", "binning", Nanoseconds, "Placing Gaussians and primitives in the lists of their tiles";
     ShaderTime: "time", "dispatches", Nanoseconds, "Running the workgroups of compute programs";

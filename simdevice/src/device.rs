@@ -1,6 +1,8 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
+use crate::gaussian::cache::ChunkCache;
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::skips::Skips;
 use crate::trace::Recorder;
 use crate::workers::Workers;
 use fearless_simd::Level;
@@ -20,10 +22,15 @@ pub struct Config {
     pub macro_tile_size: u32,
     /// A pass is flushed early when its bins exceed this many bytes.
     pub bin_budget_bytes: u64,
+    /// How many bytes of host memory may hold Gaussians in an order that is faster to read (see
+    /// [`Skip::Chunks`](crate::skips::Skip::Chunks)): 48 for each.
+    pub chunk_budget_bytes: u64,
     /// When a pass is flushed.
     pub flush: FlushPolicy,
     /// The longest time that one batch of shader invocations may take.
     pub shader_timeout: Duration,
+    /// The work that is left out where it changes no pixel.
+    pub skips: Skips,
     /// Gathers what draws do in tiles, if anybody wants to know. It never changes an image.
     pub recorder: Option<Arc<Recorder>>,
 }
@@ -44,8 +51,10 @@ impl Default for Config {
             simd: SimdLevel::Best,
             macro_tile_size: 64,
             bin_budget_bytes: 256 << 20,
+            chunk_budget_bytes: 512 << 20,
             flush: FlushPolicy::WhenFull,
             shader_timeout: Duration::from_secs(5),
+            skips: Skips::default(),
             recorder: None,
         }
     }
@@ -71,6 +80,7 @@ pub struct Device {
     workers: Workers,
     level: Level,
     config: Config,
+    chunks: ChunkCache,
 }
 
 impl Device {
@@ -93,12 +103,18 @@ impl Device {
             workers,
             level,
             config: config.clone(),
+            chunks: ChunkCache::default(),
         })
     }
 
     /// What was chosen when it was created.
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    /// The chunks of Gaussians that were drawn more than once.
+    pub(crate) fn chunks(&self) -> &ChunkCache {
+        &self.chunks
     }
 
     /// The SIMD level of every kernel.

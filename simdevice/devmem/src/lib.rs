@@ -11,8 +11,10 @@ mod atomic;
 
 use bytemuck::{AnyBitPattern, NoUninit};
 use memmap2::{MmapOptions, MmapRaw};
-use std::sync::Arc;
+use std::any::Any;
+use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The alignment of every allocation in bytes, and the granularity at which the host backs it with pages.
 pub const PAGE_SIZE: u64 = 4096;
@@ -50,6 +52,27 @@ pub struct Allocation {
     /// Bumped by every packet that writes; anything derived from the contents is keyed by it.
     generation: AtomicU64,
     host_visible: bool,
+    derived: Derived,
+}
+
+/// Something that was derived from an allocation's contents.
+pub type DerivedData = Arc<dyn Any + Send + Sync>;
+
+/// What was derived from the contents, for as long as they stay as they are.
+#[derive(Default)]
+struct Derived(Mutex<Vec<DerivedData>>);
+
+impl Derived {
+    fn lock(&self) -> MutexGuard<'_, Vec<DerivedData>> {
+        // A list of pointers is whole whatever panicked.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for Derived {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} things", self.lock().len())
+    }
 }
 
 impl Allocation {
@@ -81,6 +104,7 @@ impl Allocation {
             len,
             generation: AtomicU64::new(0),
             host_visible,
+            derived: Derived::default(),
         }))
     }
 
@@ -103,6 +127,19 @@ impl Allocation {
     /// Marks the contents as changed, so that what was derived from them is derived anew.
     pub fn bump_generation(&self) {
         self.generation.fetch_add(1, Ordering::AcqRel);
+        // Freed without the lock: it may take a while.
+        drop(std::mem::take(&mut *self.derived.lock()));
+    }
+
+    /// Keeps something that was derived from the contents until they change or the memory is freed. It says itself which
+    /// generation it belongs to: the contents may have changed since they were read.
+    pub fn keep_derived(&self, data: DerivedData) {
+        self.derived.lock().push(data);
+    }
+
+    /// Forgets what was given to [`Allocation::keep_derived`].
+    pub fn drop_derived(&self, data: &DerivedData) {
+        self.derived.lock().retain(|kept| !Arc::ptr_eq(kept, data));
     }
 
     /// The address of byte 0, for the application that maps this memory; valid while the allocation lives.
@@ -233,6 +270,21 @@ mod tests {
         assert!(Allocation::new_zeroed(0).is_err());
         assert!(Allocation::new_zeroed(u64::MAX).is_err());
         assert!(Allocation::new_zeroed(1 << 62).is_err());
+    }
+
+    #[test]
+    fn what_is_derived_goes_with_the_contents() {
+        let memory = Allocation::new(16, false).unwrap();
+        let [a, b] = [Arc::new(1), Arc::new(2)];
+        memory.keep_derived(a.clone());
+        memory.keep_derived(b.clone());
+        memory.drop_derived(&(a.clone() as DerivedData));
+        assert_eq!([Arc::strong_count(&a), Arc::strong_count(&b)], [1, 2]);
+        memory.bump_generation();
+        assert_eq!(Arc::strong_count(&b), 1, "what changed has nothing derived");
+        memory.keep_derived(b.clone());
+        drop(memory);
+        assert_eq!(Arc::strong_count(&b), 1, "freed with the memory");
     }
 
     #[test]

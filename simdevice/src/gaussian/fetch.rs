@@ -1,8 +1,9 @@
-//! Vertex fetch for Gaussians: attribute streams to structures of arrays. Values are binary32, held as binary64.
+//! Vertex fetch for Gaussians: attribute streams to structures of arrays.
 
-use super::lanes::Lanes;
+use super::lanes::F32_LANES;
+use super::scratch::Attributes;
 use crate::format::Format;
-use crate::packet::{AttributeStream, GaussianAppend, IndexStream};
+use crate::packet::{AttributeStream, GaussianAppend, GaussianAttributes, IndexStream};
 
 /// Gaussians per batch: what preprocessing holds in its caches at a time.
 pub(super) const BATCH: usize = 256;
@@ -11,22 +12,24 @@ pub(super) const BATCH: usize = 256;
 const WHOLE_SPAN_STRIDE: u32 = 64;
 
 /// The vertices of one batch of one instance.
-pub(super) struct Batch {
+pub(super) struct Batch<'a> {
     /// The vertices, as many as the batch has.
-    vertices: Vertices,
+    vertices: Vertices<'a>,
     pub(super) instance: u32,
     pub(super) first_instance: u32,
     pub(super) len: usize,
 }
 
-enum Vertices {
+enum Vertices<'a> {
     /// Consecutive from this one on.
     From(u64),
     /// Picked by an index buffer.
     Listed(Vec<u64>),
+    /// The first one of a draw and, from there, each of a chunk.
+    Chunk(u64, &'a [u32]),
 }
 
-impl Batch {
+impl<'a> Batch<'a> {
     /// Vertices `start..start + len` of `append`'s count, for `instance`.
     pub(super) fn new(append: &GaussianAppend, instance: u32, start: u32, len: usize) -> Self {
         let first = u64::from(append.first) + u64::from(start);
@@ -42,6 +45,16 @@ impl Batch {
         }
     }
 
+    /// The vertices of `append`'s count whose numbers are `numbers`, for `instance`.
+    pub(super) fn of_chunk(append: &GaussianAppend, instance: u32, numbers: &'a [u32]) -> Self {
+        Self {
+            vertices: Vertices::Chunk(append.first.into(), numbers),
+            instance,
+            first_instance: append.first_instance,
+            len: numbers.len(),
+        }
+    }
+
     /// The element of `stream` that lane `lane` reads.
     fn element(&self, stream: &AttributeStream, lane: usize) -> u64 {
         match stream.instance_divisor {
@@ -53,6 +66,7 @@ impl Batch {
             None => match &self.vertices {
                 Vertices::From(first) => first + lane as u64,
                 Vertices::Listed(list) => list[lane],
+                Vertices::Chunk(first, numbers) => first + u64::from(numbers[lane]),
             },
         }
     }
@@ -119,16 +133,17 @@ impl Fetcher {
     pub(super) fn read<const COMPONENTS: usize>(
         &mut self,
         stream: &AttributeStream,
-        batch: &Batch,
-        mut out: [&mut Lanes; COMPONENTS],
+        batch: &Batch<'_>,
+        mut out: [&mut [f32; F32_LANES]; COMPONENTS],
     ) {
         let (size, floats) = layout(stream.format);
         let step = self.read_bytes(stream, batch, size);
         let elements = self.bytes.chunks(step).take(batch.len).enumerate();
         if floats && size >= 4 * COMPONENTS {
             for (lane, bytes) in elements {
-                for (component, out) in out.iter_mut().enumerate() {
-                    out[lane] = float_at(bytes, component).into();
+                let words = bytes.as_chunks::<4>().0;
+                for (out, &word) in out.iter_mut().zip(words) {
+                    out[lane] = f32::from_le_bytes(word);
                 }
             }
             return;
@@ -136,13 +151,26 @@ impl Fetcher {
         for (lane, bytes) in elements {
             let value = stream.format.decode(&bytes[..size]);
             for (component, out) in out.iter_mut().enumerate() {
-                out[lane] = value[component].into();
+                out[lane] = value[component];
             }
         }
     }
 
+    /// Reads what a batch's Gaussians are, but for their colours.
+    pub(super) fn read_all(
+        &mut self,
+        streams: &GaussianAttributes,
+        batch: &Batch<'_>,
+        out: &mut Attributes,
+    ) {
+        self.read(&streams.position, batch, out.position.each_mut());
+        self.read(&streams.scale, batch, out.scale.each_mut());
+        self.read(&streams.rotation, batch, out.rotation.each_mut());
+        self.read(&streams.opacity, batch, [&mut out.opacity]);
+    }
+
     /// Fills the scratch with one element every returned number of bytes.
-    fn read_bytes(&mut self, stream: &AttributeStream, batch: &Batch, size: usize) -> usize {
+    fn read_bytes(&mut self, stream: &AttributeStream, batch: &Batch<'_>, size: usize) -> usize {
         let stride = stream.stride as usize;
         let at = |lane| {
             batch
@@ -156,24 +184,27 @@ impl Fetcher {
             && batch.len > 0
         {
             let span = stride * (batch.len - 1) + size;
-            self.bytes.resize(span, 0);
+            self.grow(span);
             let start = at(0);
             if start.saturating_add(span as u64) <= stream.buffer.size {
-                read_clipped(&stream.buffer, start, &mut self.bytes);
+                read_clipped(&stream.buffer, start, &mut self.bytes[..span]);
                 return stride;
             }
         }
-        self.bytes.resize(size * batch.len, 0);
-        for (lane, element) in self.bytes.chunks_exact_mut(size).enumerate() {
+        self.grow(size * batch.len);
+        let elements = self.bytes.chunks_exact_mut(size).take(batch.len);
+        for (lane, element) in elements.enumerate() {
             read_clipped(&stream.buffer, at(lane), element);
         }
         size
     }
-}
 
-fn float_at(bytes: &[u8], component: usize) -> f32 {
-    let word = &bytes[4 * component..4 * component + 4];
-    f32::from_le_bytes([word[0], word[1], word[2], word[3]])
+    /// Makes room for `bytes`.
+    fn grow(&mut self, bytes: usize) {
+        if self.bytes.len() < bytes {
+            self.bytes.resize(bytes, 0);
+        }
+    }
 }
 
 /// The coefficients of all degrees up to 4.
@@ -209,7 +240,7 @@ impl<'a> CoefficientReader<'a> {
     }
 
     /// Reads the coefficients of `lane`: red, green, blue of each in turn.
-    pub(super) fn read(&self, batch: &Batch, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
+    pub(super) fn read(&self, batch: &Batch<'_>, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
         let at = |stream: &AttributeStream| {
             batch
                 .element(stream, lane)

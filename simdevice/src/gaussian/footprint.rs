@@ -7,14 +7,87 @@ use crate::packet::Rect;
 pub const TILE_SIZE: u32 = 16;
 
 /// A run of tiles in one row of tiles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Span {
-    /// The row of tiles.
-    pub row: u16,
     /// The first tile.
     pub first: u16,
     /// One past the last tile.
     pub end: u16,
+}
+
+/// Rows of tiles that a [`Reach`] holds itself.
+const HELD_ROWS: usize = 3;
+
+/// The tiles that a Gaussian reaches: a span for each of some rows of tiles that follow one another. Small, since most
+/// reach few tiles, and all of them are read in the order of their depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Reach {
+    /// The first row.
+    row: u16,
+    /// How many rows.
+    rows: u16,
+    /// The rows' spans, if they fit; otherwise they lie among those of the batch, at the first one's index (low half,
+    /// high half).
+    held: [Span; HELD_ROWS],
+}
+
+impl Reach {
+    /// Empty spans of `rows` rows of tiles from `row` on; `others` makes room for what does not fit.
+    #[inline(always)]
+    pub(crate) fn new(row: u16, rows: u16, others: &mut Vec<Span>) -> Self {
+        let mut reach = Self {
+            row,
+            rows,
+            held: [Span::default(); HELD_ROWS],
+        };
+        if usize::from(rows) > HELD_ROWS {
+            let at = others.len() as u32;
+            reach.held[0] = Span {
+                first: at as u16,
+                end: (at >> 16) as u16,
+            };
+            others.resize(others.len() + usize::from(rows), Span::default());
+        }
+        reach
+    }
+
+    /// Where the spans that do not fit begin.
+    #[inline(always)]
+    fn start(&self) -> usize {
+        let Span { first, end } = self.held[0];
+        usize::from(first) | usize::from(end) << 16
+    }
+
+    /// Sets the span of row `number` of its rows.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, others: &mut [Span], number: u16, span: Span) {
+        let at = usize::from(number);
+        if usize::from(self.rows) > HELD_ROWS {
+            others[self.start() + at] = span;
+        } else {
+            self.held[at % HELD_ROWS] = span;
+        }
+    }
+
+    /// Its rows, each with its span, which may be empty.
+    #[inline(always)]
+    pub(crate) fn spans<'a>(&'a self, others: &'a [Span]) -> impl Iterator<Item = (u32, Span)> {
+        let rows = usize::from(self.rows);
+        let spans = if rows <= HELD_ROWS {
+            &self.held[..rows]
+        } else {
+            let start = self.start();
+            &others[start..start + rows]
+        };
+        (u32::from(self.row)..).zip(spans.iter().copied())
+    }
+
+    /// Whether it has rows in `first..end`.
+    #[inline(always)]
+    pub(crate) fn is_within(&self, first: u32, end: u32) -> bool {
+        let row = u32::from(self.row);
+        row < end && first < row + u32::from(self.rows)
+    }
 }
 
 /// The pixels that a draw may touch: half-open, in framebuffer coordinates.
@@ -62,49 +135,74 @@ fn centres(low: f64, high: f64, first: i64, end: i64) -> Option<(i64, i64)> {
 }
 
 impl Ellipse {
-    /// Appends the spans of tiles that hold a visible pixel centre's column and row inside the ellipse.
+    /// The tiles that hold a visible pixel centre's column and row inside the ellipse, if there are any. Spans that do
+    /// not fit go to `others`.
     ///
     /// The ellipse is convex, so that in each row of tiles the reached ones follow one another, and the
-    /// columns that it spans within the row's pixel centres tell them exactly.
+    /// columns that it spans within the row's pixel centres tell them exactly. The tiles of its box that it does not
+    /// reach are added to `beside`; without it, the whole box is listed.
     #[inline(always)]
-    pub(crate) fn append_spans(&self, visible: &Visible, spans: &mut Vec<Span>) {
+    pub(crate) fn reach(
+        &self,
+        visible: &Visible,
+        others: &mut Vec<Span>,
+        beside: Option<&mut u64>,
+    ) -> Option<Reach> {
         let tile = i64::from(TILE_SIZE);
         let [x, y] = self.mean;
         let [half_x, half_y] = self.half;
         let columns = centres(x - half_x, x + half_x, visible.left, visible.right);
         let rows = centres(y - half_y, y + half_y, visible.top, visible.bottom);
         let (Some((left, right)), Some((top, bottom))) = (columns, rows) else {
-            return;
+            return None;
         };
-        let push = |spans: &mut Vec<Span>, row: i64, left: i64, right: i64| {
-            spans.push(Span {
-                row: row as u16,
-                first: (left / tile) as u16,
-                end: (right / tile + 1) as u16,
-            });
+        // Visible pixels are few enough for 16 bits of tiles.
+        let span = |left: i64, right: i64| Span {
+            first: (left / tile) as u16,
+            end: (right / tile + 1) as u16,
         };
+        let (row, rows) = ((top / tile) as u16, (bottom / tile - top / tile + 1) as u16);
         let clipped = left == visible.left
             || right == visible.right - 1
             || top == visible.top
             || bottom == visible.bottom - 1;
-        if left / tile == right / tile && top / tile == bottom / tile && !clipped {
-            push(spans, top / tile, left, right);
-            return;
-        }
-        // Both sides are monotonic above and below their furthest points, at -peak and peak.
-        let side = |dy: f64, sign: f64| {
-            let rest = (half_y * half_y - dy * dy).max(0.0);
-            self.slope * dy + sign * (self.narrowing * rest).sqrt()
+        let boxed = span(left, right);
+        let one = boxed.end - boxed.first == 1 && rows == 1 && !clipped;
+        let mut reach = Reach::new(row, rows, others);
+        let Some(beside) = beside.filter(|_| !one) else {
+            for number in 0..rows {
+                reach.set(others, number, boxed);
+            }
+            return Some(reach);
         };
-        for row in top / tile..=bottom / tile {
-            let above = top.max(row * tile) as f64 + 0.5 - y;
-            let below = bottom.min(row * tile + tile - 1) as f64 + 0.5 - y;
-            let low = side((-self.peak).max(above).min(below), -1.0);
-            let high = side(self.peak.max(above).min(below), 1.0);
+        let mut reached = 0;
+        for number in 0..rows {
+            let top = top.max(i64::from(row + number) * tile);
+            let bottom = bottom.min(i64::from(row + number) * tile + tile - 1);
+            let [low, high] = self.sides(top as f64 + 0.5 - y, bottom as f64 + 0.5 - y);
             if let Some((left, right)) = centres(x + low, x + high, visible.left, visible.right) {
-                push(spans, row, left, right);
+                let span = span(left, right);
+                reached += u64::from(span.end - span.first);
+                reach.set(others, number, span);
             }
         }
+        let all = u64::from(rows) * u64::from(boxed.end - boxed.first);
+        *beside += all.saturating_sub(reached);
+        (reached > 0).then_some(reach)
+    }
+
+    /// How far it reaches to the left and to the right between two heights, all relative to its centre.
+    #[inline(always)]
+    fn sides(&self, above: f64, below: f64) -> [f64; 2] {
+        // Both sides are monotonic above and below their furthest points, at -peak and peak.
+        let left = (-self.peak).max(above).min(below);
+        let right = self.peak.max(above).min(below);
+        let square = self.half[1] * self.half[1];
+        let width = [
+            (self.narrowing * (square - left * left).max(0.0)).sqrt(),
+            (self.narrowing * (square - right * right).max(0.0)).sqrt(),
+        ];
+        [self.slope * left - width[0], self.slope * right + width[1]]
     }
 }
 
@@ -161,10 +259,16 @@ mod tests {
             }
         }
 
-        fn spans(&self) -> Vec<Span> {
-            let mut spans = Vec::new();
-            self.ellipse().append_spans(&VISIBLE, &mut spans);
+        /// Row, first tile and one past the last tile of each row.
+        fn spans(&self) -> Vec<(u32, u16, u16)> {
+            // Not the first of its batch.
+            let mut others = vec![Span::default(); 70_000];
+            let reach = self.ellipse().reach(&VISIBLE, &mut others, Some(&mut 0));
+            let spans = reach.iter().flat_map(|reach| reach.spans(&others));
             spans
+                .filter(|(_, span)| span.first < span.end)
+                .map(|(row, span)| (row, span.first, span.end))
+                .collect()
         }
 
         /// The tiles that hold a visible pixel centre inside the ellipse.
@@ -187,12 +291,7 @@ mod tests {
     #[test]
     fn a_small_one_reaches_its_own_tile() {
         let round = Gaussian::new([40.2, 20.7], [0.6, 0.6], 0.0, 9.0);
-        let tile = Span {
-            row: 1,
-            first: 2,
-            end: 3,
-        };
-        assert_eq!(round.spans(), [tile]);
+        assert_eq!(round.spans(), [(1, 2, 3)]);
     }
 
     #[test]
@@ -219,7 +318,7 @@ mod tests {
             let listed: BTreeSet<_> = gaussian
                 .spans()
                 .iter()
-                .flat_map(|s| (s.first..s.end).map(|tile| (s.row, tile)))
+                .flat_map(|&(row, first, end)| (first..end).map(move |tile| (row as u16, tile)))
                 .collect();
             for tile in gaussian.reached() {
                 prop_assert!(listed.contains(&tile), "{tile:?} of {gaussian:?}");

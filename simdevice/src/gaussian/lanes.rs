@@ -12,6 +12,9 @@ pub(super) type Lanes = [f64; BATCH + 8];
 /// Lanes before anything is known of them.
 pub(super) const NO_LANES: Lanes = [0.0; BATCH + 8];
 
+/// Lanes of what is read: attributes as they are, which their readers walk one after the other.
+pub(super) const F32_LANES: usize = BATCH;
+
 const WORDS: usize = BATCH / 64;
 
 /// A set of lanes of a batch.

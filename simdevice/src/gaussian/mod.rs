@@ -5,8 +5,11 @@
 //! [`footprint`] (which tiles), [`spherical_harmonics`] (colour), [`sort`] (depth order); then
 //! [`binning`](crate::binning) places them in tile lists.
 
+pub(crate) mod cache;
+mod chunks;
 mod fetch;
 pub(crate) mod footprint;
+mod frustum;
 mod lanes;
 mod linearize;
 pub(crate) mod project;
@@ -20,13 +23,16 @@ use crate::binning::TileLists;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::packet::{GaussianAppend, GaussianBegin, GaussianState, Rect, Viewport};
+use crate::skips::{Skip, Skips};
 use crate::trace::{self, DrawRecord};
+use chunks::{Chunk, Chunks};
 use fearless_simd::dispatch;
-use fetch::{BATCH, Batch};
+use fetch::{BATCH, Batch, Fetcher};
 use footprint::Visible;
-use project::{Projected, Projection, Splat};
+use frustum::{Frustum, Outside};
+use project::{Projected, Projection, Source, Splat};
 use rayon::prelude::*;
-use scratch::Scratch;
+use scratch::{Attributes, Scratch};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -64,6 +70,8 @@ pub struct GaussianDraw {
     /// By batch; [`locate`] finds a primitive's.
     pub(crate) splats: Vec<Vec<Splat>>,
     pub(crate) tiles: TileLists,
+    /// What is left out in its tiles.
+    pub(crate) skips: Skips,
     /// Where the work of its tiles goes, if anybody wants to know.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
@@ -115,9 +123,10 @@ impl GaussianSet {
         device: &Device,
         counters: &mut Counters,
     ) -> Result<GaussianDraw, TooManyGaussians> {
+        let chunks = self.find_chunks(device, counters);
         let started = Instant::now();
-        let batches = self.project(device)?;
         let mut work = Counters::default();
+        let batches = self.project(device, &chunks, &mut work)?;
         for batch in &batches {
             work.add_all(&batch.counters);
         }
@@ -144,80 +153,235 @@ impl GaussianSet {
             bounds: self.bounds,
             splats,
             tiles,
+            skips: device.config().skips,
             record,
         })
     }
 
-    /// Projects every batch, in the order of draw, instance and position in the draw.
-    fn project(&self, device: &Device) -> Result<Vec<Projected>, TooManyGaussians> {
-        let per_instance = |append: &GaussianAppend| append.count.div_ceil(BATCH as u32);
-        let starts: Vec<u64> = self
-            .appends
-            .iter()
-            .scan(0u64, |next, append| {
-                let start = *next;
-                let batches = u64::from(per_instance(append)) * u64::from(append.instance_count);
-                *next = next.saturating_add(batches);
-                Some(start)
-            })
-            .collect();
-        let batches = self
-            .appends
-            .last()
-            .zip(starts.last())
-            .map_or(0, |(append, &start)| {
-                start + u64::from(per_instance(append)) * u64::from(append.instance_count)
-            });
+    /// The chunks of each append that has some.
+    fn find_chunks(&self, device: &Device, counters: &mut Counters) -> Vec<Option<Arc<Chunks>>> {
+        let config = device.config();
+        let mut found = vec![None; self.appends.len()];
+        if !config.skips.has(Skip::Chunks) {
+            return found;
+        }
+        for (append, found) in self.appends.iter().zip(&mut found) {
+            let build = || {
+                let started = Instant::now();
+                let chunks = device.install(|| Chunks::build(append));
+                counters.add(Counter::ChunksBuilt, chunks.chunks.len() as u64);
+                counters.add(Counter::ChunkTime, started.elapsed().as_nanos() as u64);
+                chunks
+            };
+            let cache = device.chunks();
+            *found = cache.get(append, config.chunk_budget_bytes, build);
+        }
+        found
+    }
+
+    /// What is to be projected, in the order of draw, instance and, but for chunks, position in the draw. What is left
+    /// out already is counted.
+    fn jobs<'a>(
+        &'a self,
+        chunks: &'a [Option<Arc<Chunks>>],
+        projection: &Projection,
+        counters: &mut Counters,
+    ) -> Result<Vec<Job<'a>>, TooManyGaussians> {
+        let batches = |append: &GaussianAppend| {
+            let per_instance = append.count.div_ceil(BATCH as u32);
+            u64::from(per_instance) * u64::from(append.instance_count)
+        };
+        let batches = self.appends.iter().map(batches);
+        let batches = batches.fold(0, u64::saturating_add);
         if batches > MAX_BATCHES {
             return Err(TooManyGaussians { batches });
         }
+        let mut jobs = Vec::new();
+        // There are no more Gaussians than places in batches, so that this stays within 32 bits but at the very end.
+        let mut sequence = 0u32;
+        for (append, chunks) in self.appends.iter().zip(chunks) {
+            let opacity = chunks.as_ref().map_or(1.0, |chunks| chunks.opacity);
+            let frustum = Arc::new(Frustum::new(projection, opacity));
+            for instance in 0..append.instance_count {
+                let job = Job {
+                    append,
+                    instance: append.first_instance.saturating_add(instance),
+                    sequence,
+                    part: Part::From(0),
+                    frustum: Arc::clone(&frustum),
+                };
+                match chunks {
+                    None => jobs.extend((0..append.count).step_by(BATCH).map(|start| Job {
+                        part: Part::From(start),
+                        ..job.clone()
+                    })),
+                    Some(chunks) => jobs.extend(
+                        chunks
+                            .chunks
+                            .iter()
+                            .filter(|chunk| !self.is_left_out(chunk, &frustum, counters))
+                            .map(|chunk| Job {
+                                part: Part::Chunk(chunk),
+                                ..job.clone()
+                            }),
+                    ),
+                }
+                sequence = sequence.wrapping_add(append.count);
+            }
+        }
+        Ok(jobs)
+    }
+
+    /// Whether a whole chunk is outside; its Gaussians are counted then.
+    fn is_left_out(&self, chunk: &Chunk, frustum: &Frustum, counters: &mut Counters) -> bool {
+        let Some(reason) = frustum.excludes(&chunk.bounds) else {
+            return false;
+        };
+        let reason = match reason {
+            Outside::Faint => Counter::SkippedFaint,
+            Outside::Near => Counter::SkippedNear,
+            Outside::Far => Counter::SkippedFar,
+            Outside::Beside => Counter::SkippedOffScreen,
+        };
+        for counter in [reason, Counter::GaussiansRead, Counter::OutsideByChunks] {
+            counters.add(counter, chunk.numbers.len() as u64);
+        }
+        true
+    }
+
+    /// Projects everything. What is left out with its chunk is counted in `counters`.
+    fn project(
+        &self,
+        device: &Device,
+        chunks: &[Option<Arc<Chunks>>],
+        counters: &mut Counters,
+    ) -> Result<Vec<Projected>, TooManyGaussians> {
         let begin = &self.begin;
+        let skips = device.config().skips;
         let projection = Projection::new(
             &begin.state,
             &begin.camera,
             &begin.viewport,
             Visible::from(self.bounds),
+            skips,
         );
+        let jobs = self.jobs(chunks, &projection, counters)?;
+        if skips.has(Skip::Harmonics) {
+            let unread = counters.get(Counter::OutsideByChunks);
+            counters.add(Counter::HarmonicsUnread, unread);
+        }
         let level = device.level();
-        let one = |scratch: &mut Scratch, number: usize| {
-            let number = number as u64;
-            let which = starts.partition_point(|&start| start <= number) - 1;
-            let append = &self.appends[which];
-            let within = number - starts[which];
-            let instance = (within / u64::from(per_instance(append))) as u32;
-            let start = (within % u64::from(per_instance(append))) as u32 * BATCH as u32;
-            let len = (append.count - start).min(BATCH as u32) as usize;
-            let instance = append.first_instance.saturating_add(instance);
-            let batch = Batch::new(append, instance, start, len);
+        let one = |worker: &mut Worker, job: &Job<'_>| {
             let mut out = Projected::default();
-            dispatch!(level, simd => projection.run(simd, &append.attributes, &batch, scratch, &mut out));
+            let Worker {
+                fetcher,
+                attributes,
+                scratch,
+            } = worker;
+            let source = job.read(fetcher, attributes);
+            // A frustum is for opacities that it was told of.
+            let wider;
+            let mut frustum = &*job.frustum;
+            if let Part::From(_) = job.part {
+                let opacities = &source.attributes.opacity[..source.batch.len];
+                let opacity = opacities.iter().copied().fold(1.0, f32::max);
+                if opacity > 1.0 {
+                    wider = Frustum::new(&projection, opacity);
+                    frustum = &wider;
+                }
+            }
+            let source = Source {
+                frustum: skips.has(Skip::Bounds).then_some(frustum),
+                ..source
+            };
+            let sequence = |lane: usize| match &job.part {
+                Part::From(start) => job.sequence + start + lane as u32,
+                Part::Chunk(chunk) => job.sequence + chunk.numbers[lane],
+            };
+            dispatch!(level, simd => projection.run(simd, &source, scratch, sequence, &mut out));
             out
         };
         Ok(device.install(|| {
-            (0..batches as usize)
-                .into_par_iter()
+            jobs.par_iter()
                 .with_min_len(BATCHES_PER_TASK)
-                .map_init(Scratch::new, one)
+                .map_init(Worker::new, one)
                 .collect()
         }))
     }
 }
 
-/// The survivors in depth order, as batch number times `BATCH` plus place in the batch.
+/// A batch to project.
+#[derive(Clone)]
+struct Job<'a> {
+    append: &'a GaussianAppend,
+    instance: u32,
+    /// Which Gaussian of the set the instance's first is.
+    sequence: u32,
+    part: Part<'a>,
+    frustum: Arc<Frustum>,
+}
+
+#[derive(Clone, Copy)]
+enum Part<'a> {
+    /// The vertices from this one on.
+    From(u32),
+    Chunk(&'a Chunk),
+}
+
+impl<'a> Job<'a> {
+    /// Reads the batch, if it lies in no chunk.
+    fn read<'b>(&'b self, fetcher: &mut Fetcher, attributes: &'b mut Attributes) -> Source<'b> {
+        let streams = &self.append.attributes;
+        match self.part {
+            Part::From(start) => {
+                let len = (self.append.count - start).min(BATCH as u32) as usize;
+                let batch = Batch::new(self.append, self.instance, start, len);
+                fetcher.read_all(streams, &batch, attributes);
+                Source {
+                    streams,
+                    batch,
+                    attributes,
+                    is_sound: false,
+                    frustum: None,
+                }
+            }
+            Part::Chunk(chunk) => Source {
+                streams,
+                batch: Batch::of_chunk(self.append, self.instance, &chunk.numbers),
+                attributes: &chunk.attributes,
+                is_sound: chunk.is_sound,
+                frustum: None,
+            },
+        }
+    }
+}
+
+/// What a worker keeps from one batch to the next.
+struct Worker {
+    fetcher: Fetcher,
+    attributes: Box<Attributes>,
+    scratch: Scratch,
+}
+
+/// The survivors in depth order, as key and batch number times `BATCH` plus place in the batch.
 fn sorted(batches: &[Projected]) -> Vec<(u32, u32)> {
     let count = batches.iter().map(|batch| batch.keys.len()).sum();
     let mut order = Vec::with_capacity(count);
     for (number, batch) in batches.iter().enumerate() {
-        let base = (number * BATCH) as u32;
-        order.extend(
-            batch
-                .keys
-                .iter()
-                .zip(base..)
-                .map(|(&key, name)| (key, name)),
-        );
+        let keys = batch.keys.iter().map(|&[key, _]| key);
+        order.extend(keys.zip((number * BATCH) as u32..));
     }
     sort::sort_by_key(&mut order);
+    // Equal keys are in the order of batches, which chunks have changed.
+    let sequence = |&(_, name): &(u32, u32)| {
+        let (batch, place) = locate(name);
+        batches[batch].keys[place][1]
+    };
+    for ties in order.chunk_by_mut(|a, b| a.0 == b.0) {
+        if ties.len() > 1 && !ties.is_sorted_by_key(sequence) {
+            ties.sort_unstable_by_key(sequence);
+        }
+    }
     order
 }
 
@@ -238,5 +402,15 @@ impl GaussianDraw {
     pub fn touches(&self, rect: Rect) -> bool {
         let shared = self.bounds.intersect(rect);
         !shared.is_empty() && self.tiles.any_in(shared)
+    }
+}
+
+impl Worker {
+    fn new() -> Self {
+        Self {
+            fetcher: Fetcher::default(),
+            attributes: Box::default(),
+            scratch: Scratch::new(),
+        }
     }
 }

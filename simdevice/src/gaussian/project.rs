@@ -6,8 +6,9 @@
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
 use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader};
-use super::footprint::{Ellipse, Span, Visible};
-use super::lanes::{Bits, Lanes, log2};
+use super::footprint::{Ellipse, Reach, Span, Visible};
+use super::frustum::Frustum;
+use super::lanes::{Bits, F32_LANES, Lanes, log2};
 use super::linearize;
 use super::scratch::{Attributes, Scratch};
 use super::sort::ordered_bits;
@@ -16,6 +17,7 @@ use crate::counters::{Counter, Counters};
 use crate::packet::{
     Camera, CameraModel, GaussianAttributes, GaussianOrder, GaussianState, Viewport,
 };
+use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, prelude::*};
 
 /// A projected Gaussian: what the tile engine needs of it, in one cache line.
@@ -35,17 +37,20 @@ pub(crate) struct Splat {
     pub color: [f32; 3],
 }
 
+/// Gaussians whose spherical harmonics are read together.
+const GROUP: usize = 16;
+
 /// What came of a batch.
 #[derive(Debug, Default)]
 pub(crate) struct Projected {
     /// What is drawn, in the order of the draw.
     pub splats: Vec<Splat>,
-    /// The depth key of each.
-    pub keys: Vec<u32>,
-    /// The tiles of all of them, one after the other.
+    /// The depth key of each, and its place in the set, which decides between equal keys.
+    pub keys: Vec<[u32; 2]>,
+    /// The tiles of each.
+    pub reaches: Vec<Reach>,
+    /// The tiles of those that reach many.
     pub spans: Vec<Span>,
-    /// Where the tiles of each end in `spans`.
-    pub span_ends: Vec<u32>,
     /// What was skipped and why.
     pub counters: Counters,
 }
@@ -60,42 +65,45 @@ const LN_2: f64 = std::f64::consts::LN_2;
 /// What is the same for all Gaussians of a draw.
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
-    model: CameraModel,
-    order: GaussianOrder,
-    rotation: [f64; 9],
-    eye: [f64; 3],
-    focal: [f64; 2],
+    pub(super) model: CameraModel,
+    pub(super) order: GaussianOrder,
+    pub(super) rotation: [f64; 9],
+    pub(super) eye: [f64; 3],
+    pub(super) focal: [f64; 2],
     /// The principal point in framebuffer pixels.
-    center: [f64; 2],
+    pub(super) center: [f64; 2],
     /// Bounds of `t.x / t.z` and `t.y / t.z` in the Jacobian.
-    slope_min: [f64; 2],
-    slope_max: [f64; 2],
-    near: f32,
-    far: f32,
-    low_pass: f64,
-    compensated: bool,
-    alpha_floor: f64,
-    log2_floor: f64,
-    sh_degree: u32,
-    visible: Visible,
+    pub(super) slope_min: [f64; 2],
+    pub(super) slope_max: [f64; 2],
+    pub(super) near: f32,
+    pub(super) far: f32,
+    pub(super) low_pass: f64,
+    pub(super) compensated: bool,
+    pub(super) alpha_floor: f64,
+    pub(super) log2_floor: f64,
+    pub(super) sh_degree: u32,
+    pub(super) visible: Visible,
+    pub(super) skips: Skips,
 }
 
 impl Projected {
-    /// The tiles of a splat of the batch.
-    #[inline(always)]
-    pub(crate) fn spans_of(&self, place: usize) -> &[Span] {
-        let start = place
-            .checked_sub(1)
-            .map_or(0, |before| self.span_ends[before]);
-        &self.spans[start as usize..self.span_ends[place] as usize]
-    }
-
     fn reserve(&mut self, count: usize) {
         self.splats.reserve_exact(count);
         self.keys.reserve_exact(count);
-        self.span_ends.reserve_exact(count);
-        self.spans.reserve(2 * count);
+        self.reaches.reserve_exact(count);
     }
+}
+
+/// A batch of Gaussians that were read.
+pub(super) struct Source<'a> {
+    /// Where their colours are.
+    pub(super) streams: &'a GaussianAttributes,
+    pub(super) batch: Batch<'a>,
+    pub(super) attributes: &'a Attributes,
+    /// None is skipped for what its attributes are.
+    pub(super) is_sound: bool,
+    /// What bounds those that can be seen; `None` tells nothing of them.
+    pub(super) frustum: Option<&'a Frustum>,
 }
 
 impl Projection {
@@ -105,6 +113,7 @@ impl Projection {
         camera: &Camera,
         viewport: &Viewport,
         visible: Visible,
+        skips: Skips,
     ) -> Self {
         let focal = camera.focal_length.map(f64::from);
         let principal = camera.principal_point.map(f64::from);
@@ -131,176 +140,113 @@ impl Projection {
             log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
             sh_degree: state.sh_degree,
             visible,
+            skips,
         }
     }
 
-    /// Projects a batch.
+    /// Projects a batch. `sequence` tells of each of its Gaussians which of the set it is.
     #[inline(always)]
     pub(super) fn run<S: Simd>(
         &self,
         simd: S,
-        attributes: &GaussianAttributes,
-        batch: &Batch,
+        source: &Source<'_>,
         scratch: &mut Scratch,
+        sequence: impl Fn(usize) -> u32,
         out: &mut Projected,
     ) {
-        scratch.fetch(attributes, batch);
-        out.counters.add(Counter::GaussiansRead, batch.len as u64);
-        let kept = self.cull(simd, batch.len, scratch, &mut out.counters);
-        scratch.gather(&kept);
+        let counters = &mut out.counters;
+        counters.add(Counter::GaussiansRead, source.batch.len as u64);
+        let kept = self.cull(simd, source, counters);
+        scratch.gather(source.attributes, &kept);
         self.flatten(simd, scratch);
-        self.emit(simd, attributes, batch, scratch, out);
+        self.emit(simd, source, scratch, sequence, out);
     }
 
-    /// Finds the camera-space mean of each lane, and counts the first reason to skip it, if there is one.
-    /// Returns which lanes have none.
+    /// Finds which lanes have finite spherical harmonics, of all that the batch holds.
     #[inline(always)]
-    fn cull<S: Simd>(
-        &self,
-        simd: S,
-        len: usize,
-        scratch: &mut Scratch,
-        counters: &mut Counters,
-    ) -> Bits {
-        let number = |value: f64| S::f64s::splat(simd, value);
-        let load =
-            |lanes: &Lanes, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
-        let Attributes {
-            position,
-            scale,
-            rotation,
-            opacity,
-        } = &*scratch.attributes;
-        let zero = number(0.0);
-        let largest_opacity = opacity[..len].iter().fold(1.0f64, |a, &b| a.max(b));
-        // A hundredth more than the ellipse needs, so that rounding loses nothing.
-        let extent = number(2.02 * LN_2 * (largest_opacity.log2() - self.log2_floor));
-        let low_pass = number(self.low_pass);
-        let r = self.rotation;
-        let [
-            mut finite,
-            mut rotated,
-            mut positive,
-            mut bright,
-            mut inside,
-        ] = [Bits::default(); 5];
-        for at in (0..len).step_by(S::f64s::LEN) {
-            let [px, py, pz] = [0, 1, 2].map(
-                #[inline(always)]
-                |axis| load(&position[axis], at),
-            );
-            let [sx, sy, sz] = [
-                load(&scale[0], at),
-                load(&scale[1], at),
-                load(&scale[2], at),
-            ];
-            let [qw, qx] = [load(&rotation[0], at), load(&rotation[1], at)];
-            let [qy, qz] = [load(&rotation[2], at), load(&rotation[3], at)];
-            let o = load(opacity, at);
-            // Multiplied by zero, what is not finite becomes NaN, and stays it.
-            let nothing = (px + py + pz) * zero
-                + (sx * zero + sy * zero + sz * zero)
-                + (qw * zero + qx * zero + qy * zero + qz * zero)
-                + o * zero;
-            finite.set(at, nothing.simd_eq(zero));
-            rotated.set(
-                at,
-                (qw.abs() + qx.abs() + qy.abs() + qz.abs()).simd_gt(zero),
-            );
-            positive.set(at, sx.min(sy).min(sz).simd_ge(zero));
-            bright.set(at, o.simd_ge(self.alpha_floor));
-
-            let d = [px - self.eye[0], py - self.eye[1], pz - self.eye[2]];
-            for (lanes, d) in scratch.offset.iter_mut().zip(d) {
-                d.store_slice(&mut lanes[at..at + S::f64s::LEN]);
-            }
-            let [dx, dy, dz] = d;
-            let tx = dx * r[0] + dy * r[1] + dz * r[2];
-            let ty = dx * r[3] + dy * r[4] + dz * r[5];
-            let tz = dx * r[6] + dy * r[7] + dz * r[8];
-            for (lanes, t) in scratch.camera.iter_mut().zip([tx, ty, tz]) {
-                t.store_slice(&mut lanes[at..at + S::f64s::LEN]);
-            }
-
-            if self.model != CameraModel::Pinhole {
-                inside.set(at, S::mask64s::splat(simd, true));
-                continue;
-            }
-            // The projection of a sphere about the Gaussian bounds that of the Gaussian. Comparisons are such
-            // that NaN counts as inside.
-            let largest = sx.max(sy).max(sz);
-            let mut outside = S::mask64s::splat(simd, false);
-            for (axis, t) in [tx, ty].into_iter().enumerate() {
-                let slope = t / tz;
-                let clamped = slope.max(self.slope_min[axis]).min(self.slope_max[axis]);
-                let kx = number(r[3 * axis]) - clamped * r[6];
-                let ky = number(r[3 * axis + 1]) - clamped * r[7];
-                let kz = number(r[3 * axis + 2]) - clamped * r[8];
-                let scale = largest * self.focal[axis] / tz;
-                let variance = scale * scale * (kx * kx + ky * ky + kz * kz) + low_pass;
-                let reach = (extent * variance).sqrt();
-                let center = slope * self.focal[axis] + self.center[axis];
-                let [first, end] = self.visible_range(axis);
-                outside = outside | (center + reach).simd_lt(first) | (center - reach).simd_gt(end);
-            }
-            inside.set(at, !outside);
+    fn find_colored<S: Simd>(&self, simd: S, source: &Source<'_>) -> Bits {
+        let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
+        let mut coefficients = [0.0; COEFFICIENT_FLOATS];
+        let mut colored = Bits::default();
+        for lane in 0..source.batch.len {
+            reader.read(&source.batch, lane, &mut coefficients);
+            let anywhere = [0.0, 0.0, 1.0];
+            let color = spherical_harmonics::color(simd, self.sh_degree, anywhere, &coefficients);
+            colored.set_one(lane, color.is_some());
         }
-        let [mut beyond_near, mut before_far] = [Bits::default(); 2];
-        for (lane, &z) in self.depths(len, scratch).iter().enumerate() {
-            let z = z as f32;
-            beyond_near.set_one(lane, self.near < z);
-            before_far.set_one(lane, z < self.far);
-        }
+        colored
+    }
+
+    /// Finds which lanes nothing is known against yet, and counts the first reason to skip the others.
+    #[inline(always)]
+    fn cull<S: Simd>(&self, simd: S, source: &Source<'_>, counters: &mut Counters) -> Bits {
+        let len = source.batch.len;
         let mut kept = Bits::first(len);
-        for (passed, counter) in [
-            (finite, Counter::SkippedNonFinite),
-            (rotated, Counter::SkippedZeroRotation),
-            (positive, Counter::SkippedNegativeScale),
-            (bright, Counter::SkippedFaint),
-            (beyond_near, Counter::SkippedNear),
-            (before_far, Counter::SkippedFar),
-            (inside, Counter::SkippedOffScreen),
-        ] {
-            counters.add(counter, kept.without(&passed).count());
-            kept = kept.and(&passed);
+        let mut keep = |passed: &Bits, counter: Counter| {
+            let skipped = kept.without(passed).count();
+            counters.add(counter, skipped);
+            kept = kept.and(passed);
+            skipped
+        };
+        if !self.skips.has(Skip::Harmonics) {
+            let colored = self.find_colored(simd, source);
+            keep(&colored, Counter::SkippedNonFinite);
+        }
+        if !source.is_sound {
+            let [finite, rotated, positive] = find_sound(simd, source.attributes, len);
+            keep(&finite, Counter::SkippedNonFinite);
+            keep(&rotated, Counter::SkippedZeroRotation);
+            keep(&positive, Counter::SkippedNegativeScale);
+        }
+        let bright = self.find_bright(simd, source.attributes, len);
+        keep(&bright, Counter::SkippedFaint);
+        if let Some(frustum) = source.frustum {
+            let outside = frustum.lanes_outside(simd, source.attributes, len);
+            let all = Bits::first(len);
+            keep(&all.without(&outside.near), Counter::SkippedNear);
+            keep(&all.without(&outside.far), Counter::SkippedFar);
+            let beside = all.without(&outside.beside);
+            let skipped = keep(&beside, Counter::SkippedOffScreen);
+            counters.add(Counter::OutsideByBounds, skipped);
         }
         kept
     }
 
-    /// The depth variable of each lane.
-    fn depths<'a>(&self, len: usize, scratch: &'a mut Scratch) -> &'a [f64] {
-        if self.model != CameraModel::Fisheye {
-            return &scratch.camera[2][..len];
+    /// Which lanes' opacities reach the alpha floor.
+    #[inline(always)]
+    fn find_bright<S: Simd>(&self, simd: S, attributes: &Attributes, len: usize) -> Bits {
+        let mut bright = Bits::default();
+        // The floor is binary32 in the first place.
+        let floor = S::f32s::splat(simd, self.alpha_floor as f32);
+        for at in (0..len).step_by(S::f32s::LEN) {
+            let o = S::f32s::from_slice(simd, &attributes.opacity[at..at + S::f32s::LEN]);
+            bright.set(at, o.simd_ge(floor));
         }
-        let [x, y, z] = &*scratch.camera;
-        for (lane, distance) in scratch.distance[..len].iter_mut().enumerate() {
-            *distance = linearize::depth(self.model, [x[lane], y[lane], z[lane]]);
-        }
-        &scratch.distance[..len]
+        bright
     }
 
-    /// What a lane is sorted by.
-    fn key(&self, lane: usize, scratch: &Scratch) -> u32 {
+    /// What a kept lane is sorted by.
+    #[inline(always)]
+    fn key(&self, at: usize, sequence: u32, scratch: &Scratch) -> u32 {
         let depth = match self.order {
-            GaussianOrder::ViewDepth if self.model == CameraModel::Fisheye => {
-                scratch.distance[lane]
-            }
-            GaussianOrder::ViewDepth => scratch.camera[2][lane],
+            GaussianOrder::ViewDepth => scratch.depth[at],
             GaussianOrder::RadialDistance => {
                 let [x, y, z] = &*scratch.offset;
-                (x[lane] * x[lane] + y[lane] * y[lane] + z[lane] * z[lane]).sqrt()
+                (x[at] * x[at] + y[at] * y[at] + z[at] * z[at]).sqrt()
             }
-            GaussianOrder::Primitive => 0.0,
+            GaussianOrder::Primitive => return sequence,
         };
         ordered_bits(depth as f32)
     }
 
-    /// Means and Jacobians of the kept Gaussians, for cameras that are no pinholes.
+    /// Depths, means and Jacobians of the kept Gaussians, for cameras that are no pinholes.
     fn linearize(&self, scratch: &mut Scratch) {
-        let [x, y, z] = &*scratch.dense_camera;
+        let [x, y, z] = &*scratch.camera;
         let r = &self.rotation;
         for at in 0..scratch.lanes.len().min(BATCH) {
-            let (place, rows) = linearize::linearize(self.model, [x[at], y[at], z[at]]);
+            let t = [x[at], y[at], z[at]];
+            scratch.depth[at] = linearize::depth(self.model, t);
+            let (place, rows) = linearize::linearize(self.model, t);
             for (axis, row) in rows.iter().enumerate() {
                 scratch.flat.mean[axis][at] = place[axis] * self.focal[axis] + self.center[axis];
                 let j = row.map(|element| element * self.focal[axis]);
@@ -312,8 +258,34 @@ impl Projection {
         }
     }
 
+    /// Finds the place of the kept Gaussians in camera space.
+    #[inline(always)]
+    fn place<S: Simd>(&self, simd: S, scratch: &mut Scratch) {
+        let r = self.rotation;
+        for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
+            let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+            let store = |value: S::f64s, lanes: &mut Lanes| {
+                value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
+            };
+            let [px, py, pz] = &*scratch.position;
+            let dx = load(px) - self.eye[0];
+            let dy = load(py) - self.eye[1];
+            let dz = load(pz) - self.eye[2];
+            let [x, y, z] = &mut *scratch.offset;
+            store(dx, x);
+            store(dy, y);
+            store(dz, z);
+            let tz = dx * r[6] + dy * r[7] + dz * r[8];
+            let [x, y, z] = &mut *scratch.camera;
+            store(dx * r[0] + dy * r[1] + dz * r[2], x);
+            store(dx * r[3] + dy * r[4] + dz * r[5], y);
+            store(tz, z);
+            store(tz, &mut scratch.depth);
+        }
+    }
+
     /// Bounds of the visible pixels' centres along an axis, with a pixel to spare.
-    fn visible_range(&self, axis: usize) -> [f64; 2] {
+    pub(super) fn visible_range(&self, axis: usize) -> [f64; 2] {
         let Visible {
             left,
             top,
@@ -327,6 +299,7 @@ impl Projection {
     /// Computes mean, covariance and opacity on the screen of the kept Gaussians.
     #[inline(always)]
     fn flatten<S: Simd>(&self, simd: S, scratch: &mut Scratch) {
+        self.place(simd, scratch);
         let is_pinhole = self.model == CameraModel::Pinhole;
         if !is_pinhole {
             self.linearize(scratch);
@@ -334,12 +307,7 @@ impl Projection {
         let number = |value: f64| S::f64s::splat(simd, value);
         let load =
             |lanes: &Lanes, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
-        let Attributes {
-            scale,
-            rotation,
-            opacity,
-            ..
-        } = &*scratch.dense;
+        let (scale, rotation, opacity) = (&*scratch.scale, &*scratch.rotation, &*scratch.opacity);
         let flat = &mut *scratch.flat;
         let r = self.rotation;
         let (one, two, low_pass) = (number(1.0), number(2.0), number(self.low_pass));
@@ -376,11 +344,11 @@ impl Projection {
                 load(&scale[1], at),
                 load(&scale[2], at),
             ];
-            let depth = load(&scratch.dense_camera[2], at);
+            let depth = load(&scratch.camera[2], at);
             let mut m = [[one; 3]; 2];
             for axis in 0..2 {
                 let [kx, ky, kz] = if is_pinhole {
-                    let slope = load(&scratch.dense_camera[axis], at) / depth;
+                    let slope = load(&scratch.camera[axis], at) / depth;
                     let focal = number(self.focal[axis]);
                     store(slope * focal + self.center[axis], &mut flat.mean[axis]);
                     let clamped = slope.max(self.slope_min[axis]).min(self.slope_max[axis]);
@@ -432,7 +400,7 @@ impl Projection {
             store(determinant / (c * c), &mut flat.narrowing);
             store(b * half_x / a, &mut flat.peak);
 
-            let d = &scratch.dense_offset;
+            let d = &scratch.offset;
             let [dx, dy, dz] = [load(&d[0], at), load(&d[1], at), load(&d[2], at)];
             let largest = dx.abs().max(dy.abs()).max(dz.abs());
             let [dx, dy, dz] = [dx / largest, dy / largest, dz / largest];
@@ -443,28 +411,34 @@ impl Projection {
         }
     }
 
-    /// Finds the tiles and the colour of the kept Gaussians and appends what reaches a tile to `out`.
+    /// Why a kept Gaussian is skipped after all, by what does not depend on tiles and colours.
     #[inline(always)]
-    fn emit<S: Simd>(
-        &self,
-        simd: S,
-        attributes: &GaussianAttributes,
-        batch: &Batch,
-        scratch: &Scratch,
-        out: &mut Projected,
-    ) {
-        let reader = CoefficientReader::new(&attributes.spherical_harmonics);
-        let mut coefficients = [0.0; COEFFICIENT_FLOATS];
-        let flat = &*scratch.flat;
-        out.reserve(scratch.lanes.len());
-        for (at, &lane) in scratch.lanes.iter().enumerate() {
-            let at = at % BATCH;
-            let determinant = flat.determinant[at];
-            if !(determinant > 0.0 && determinant.is_finite()) {
-                out.counters.add(Counter::SkippedDegenerate, 1);
+    fn why_skipped(&self, at: usize, scratch: &Scratch) -> Option<Counter> {
+        let z = scratch.depth[at] as f32;
+        let determinant = scratch.flat.determinant[at];
+        // What is not a number is nowhere.
+        if !(self.near < z) {
+            Some(Counter::SkippedNear)
+        } else if !(z < self.far) {
+            Some(Counter::SkippedFar)
+        } else if !(determinant > 0.0 && determinant.is_finite()) {
+            Some(Counter::SkippedDegenerate)
+        } else {
+            None
+        }
+    }
+
+    /// Finds the kept Gaussians that reach a tile.
+    #[inline(always)]
+    fn find_tiles(&self, scratch: &mut Scratch, out: &mut Projected) {
+        let mut beside = self.skips.has(Skip::Ellipse).then_some(0);
+        scratch.reached.clear();
+        for at in 0..scratch.lanes.len().min(BATCH) {
+            if let Some(reason) = self.why_skipped(at, scratch) {
+                out.counters.add(reason, 1);
                 continue;
             }
-            let first_span = out.spans.len();
+            let flat = &*scratch.flat;
             let ellipse = Ellipse {
                 mean: [flat.mean[0][at], flat.mean[1][at]],
                 half: [flat.half[0][at], flat.half[1][at]],
@@ -472,34 +446,97 @@ impl Projection {
                 narrowing: flat.narrowing[at],
                 peak: flat.peak[at],
             };
+            let mut reach = None;
             // The square root of a negative extent is not a number.
             if ellipse.half[1] >= 0.0 {
-                ellipse.append_spans(&self.visible, &mut out.spans);
+                reach = ellipse.reach(&self.visible, &mut out.spans, beside.as_mut());
             }
-            if out.spans.len() == first_span {
-                out.counters.add(Counter::SkippedOffScreen, 1);
-                continue;
+            match reach {
+                Some(reach) => scratch.reached.push((at, reach)),
+                None => out.counters.add(Counter::SkippedOffScreen, 1),
             }
-            reader.read(batch, lane, &mut coefficients);
-            let d = &flat.direction;
-            let direction = [d[0][at] as f32, d[1][at] as f32, d[2][at] as f32];
-            let degree = self.sh_degree;
-            let Some(color) = spherical_harmonics::color(simd, degree, direction, &coefficients)
-            else {
-                out.spans.truncate(first_span);
-                out.counters.add(Counter::SkippedNonFinite, 1);
-                continue;
-            };
-            out.keys.push(self.key(lane % BATCH, scratch));
-            out.splats.push(Splat {
-                mean: ellipse.mean,
-                factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
-                log2_opacity: flat.log2_opacity[at] as f32,
-                color,
-            });
-            out.span_ends.push(out.spans.len() as u32);
         }
-        out.counters
-            .add(Counter::GaussiansDrawn, out.splats.len() as u64);
+        let beside = beside.unwrap_or_default();
+        out.counters.add(Counter::TilesBesideEllipse, beside);
     }
+
+    /// Finds the tiles and the colour of the kept Gaussians and appends what reaches a tile to `out`.
+    #[inline(always)]
+    fn emit<S: Simd>(
+        &self,
+        simd: S,
+        source: &Source<'_>,
+        scratch: &mut Scratch,
+        sequence: impl Fn(usize) -> u32,
+        out: &mut Projected,
+    ) {
+        out.reserve(scratch.lanes.len());
+        self.find_tiles(scratch, out);
+        let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
+        let mut coefficients = [[0.0; COEFFICIENT_FLOATS]; GROUP];
+        for group in scratch.reached.chunks(GROUP) {
+            // Reading several at a time overlaps the waits for memory.
+            for (&(at, _), coefficients) in group.iter().zip(&mut coefficients) {
+                reader.read(&source.batch, scratch.lanes[at], coefficients);
+            }
+            for (&(at, reach), coefficients) in group.iter().zip(&coefficients) {
+                let at = at % BATCH;
+                let flat = &*scratch.flat;
+                let d = &flat.direction;
+                let direction = [d[0][at] as f32, d[1][at] as f32, d[2][at] as f32];
+                let degree = self.sh_degree;
+                let Some(color) = spherical_harmonics::color(simd, degree, direction, coefficients)
+                else {
+                    out.counters.add(Counter::SkippedNonFinite, 1);
+                    continue;
+                };
+                let sequence = sequence(scratch.lanes[at]);
+                out.keys.push([self.key(at, sequence, scratch), sequence]);
+                out.splats.push(Splat {
+                    mean: [flat.mean[0][at], flat.mean[1][at]],
+                    factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
+                    log2_opacity: flat.log2_opacity[at] as f32,
+                    color,
+                });
+                out.reaches.push(reach);
+            }
+        }
+        let counters = &mut out.counters;
+        counters.add(Counter::GaussiansDrawn, out.splats.len() as u64);
+        if self.skips.has(Skip::Harmonics) {
+            let unread = source.batch.len - scratch.reached.len();
+            counters.add(Counter::HarmonicsUnread, unread as u64);
+        }
+    }
+}
+
+/// Which lanes are finite, which have a rotation, and which have no negative scale.
+#[inline(always)]
+fn find_sound<S: Simd>(simd: S, attributes: &Attributes, len: usize) -> [Bits; 3] {
+    let mut sound = [Bits::default(); 3];
+    let zero = S::f32s::splat(simd, 0.0);
+    for at in (0..len).step_by(S::f32s::LEN) {
+        let load =
+            |lanes: &[f32; F32_LANES]| S::f32s::from_slice(simd, &lanes[at..at + S::f32s::LEN]);
+        // Multiplied by zero, what is not finite becomes NaN, and stays it.
+        let mut nothing = load(&attributes.opacity) * zero;
+        let mut least = zero;
+        for lanes in &attributes.scale {
+            least = least.min(load(lanes));
+        }
+        let mut largest = zero;
+        for lanes in &attributes.rotation {
+            let part = load(lanes);
+            nothing = nothing + part * zero;
+            largest = largest.max(part.abs());
+        }
+        for lanes in attributes.position.iter().chain(&attributes.scale) {
+            nothing = nothing + load(lanes) * zero;
+        }
+        let [finite, rotated, positive] = &mut sound;
+        finite.set(at, nothing.simd_eq(zero));
+        rotated.set(at, largest.simd_gt(zero));
+        positive.set(at, least.simd_ge(zero));
+    }
+    sound
 }

@@ -1,35 +1,37 @@
 //! What a worker needs to project a batch of Gaussians.
 
-use super::fetch::{BATCH, Batch, Fetcher};
-use super::lanes::{Bits, Lanes, NO_LANES};
-use crate::packet::GaussianAttributes;
+use super::fetch::BATCH;
+use super::footprint::Reach;
+use super::lanes::{Bits, F32_LANES, Lanes, NO_LANES};
 
-/// What a batch's Gaussians are, and what becomes of them. Structures of arrays.
+/// Vertex attributes by lane, as they are read.
+#[derive(Clone, Debug)]
+pub(super) struct Attributes {
+    pub(super) position: [[f32; F32_LANES]; 3],
+    pub(super) scale: [[f32; F32_LANES]; 3],
+    pub(super) rotation: [[f32; F32_LANES]; 4],
+    pub(super) opacity: [f32; F32_LANES],
+}
+
+/// What becomes of a batch's Gaussians: of those that were kept, densely, in structures of arrays.
 pub(crate) struct Scratch {
-    pub(super) fetcher: Fetcher,
-    pub(super) attributes: Box<Attributes>,
+    /// The lanes that were kept; what follows is in their order.
+    pub(super) lanes: Vec<usize>,
+    pub(super) position: Box<[Lanes; 3]>,
+    pub(super) scale: Box<[Lanes; 3]>,
+    pub(super) rotation: Box<[Lanes; 4]>,
+    pub(super) opacity: Box<Lanes>,
     /// The mean from the eye, in world axes.
     pub(super) offset: Box<[Lanes; 3]>,
     /// The mean from the eye, in camera axes.
     pub(super) camera: Box<[Lanes; 3]>,
-    /// The depth variable, where that is not the camera axis.
-    pub(super) distance: Box<Lanes>,
-    /// The lanes that were kept; what follows is dense in their order.
-    pub(super) lanes: Vec<usize>,
-    pub(super) dense: Box<Attributes>,
-    pub(super) dense_camera: Box<[Lanes; 3]>,
-    pub(super) dense_offset: Box<[Lanes; 3]>,
+    /// The depth variable.
+    pub(super) depth: Box<Lanes>,
     /// The Jacobian's rows in world axes, of cameras that are no pinholes.
     pub(super) jacobian: Box<[[Lanes; 3]; 2]>,
     pub(super) flat: Box<Flat>,
-}
-
-/// Vertex attributes by lane.
-pub(super) struct Attributes {
-    pub(super) position: [Lanes; 3],
-    pub(super) scale: [Lanes; 3],
-    pub(super) rotation: [Lanes; 4],
-    pub(super) opacity: Lanes,
+    /// Which of them reach tiles, and which tiles.
+    pub(super) reached: Vec<(usize, Reach)>,
 }
 
 /// Gaussians on the screen.
@@ -51,10 +53,10 @@ pub(super) struct Flat {
 impl Default for Attributes {
     fn default() -> Self {
         Self {
-            position: [NO_LANES; 3],
-            scale: [NO_LANES; 3],
-            rotation: [NO_LANES; 4],
-            opacity: NO_LANES,
+            position: [[0.0; F32_LANES]; 3],
+            scale: [[0.0; F32_LANES]; 3],
+            rotation: [[0.0; F32_LANES]; 4],
+            opacity: [0.0; F32_LANES],
         }
     }
 }
@@ -79,55 +81,47 @@ impl Scratch {
     /// Scratch for one worker.
     pub(crate) fn new() -> Self {
         Self {
-            fetcher: Fetcher::default(),
-            attributes: Box::default(),
+            lanes: Vec::with_capacity(BATCH),
+            position: Box::new([NO_LANES; 3]),
+            scale: Box::new([NO_LANES; 3]),
+            rotation: Box::new([NO_LANES; 4]),
+            opacity: Box::new(NO_LANES),
             offset: Box::new([NO_LANES; 3]),
             camera: Box::new([NO_LANES; 3]),
-            distance: Box::new(NO_LANES),
-            lanes: Vec::with_capacity(BATCH),
-            dense: Box::default(),
-            dense_camera: Box::new([NO_LANES; 3]),
-            dense_offset: Box::new([NO_LANES; 3]),
+            depth: Box::new(NO_LANES),
             jacobian: Box::new([[NO_LANES; 3]; 2]),
             flat: Box::default(),
+            reached: Vec::with_capacity(BATCH),
         }
     }
 
-    pub(super) fn fetch(&mut self, attributes: &GaussianAttributes, batch: &Batch) {
-        let to = &mut *self.attributes;
-        self.fetcher
-            .read(&attributes.position, batch, to.position.each_mut());
-        self.fetcher
-            .read(&attributes.scale, batch, to.scale.each_mut());
-        self.fetcher
-            .read(&attributes.rotation, batch, to.rotation.each_mut());
-        self.fetcher
-            .read(&attributes.opacity, batch, [&mut to.opacity]);
-    }
-
-    /// Packs the kept lanes densely.
+    /// Packs the kept lanes densely, as binary64.
     #[inline(always)]
-    pub(super) fn gather(&mut self, kept: &Bits) {
+    pub(super) fn gather(&mut self, attributes: &Attributes, kept: &Bits) {
         self.lanes.clear();
         kept.for_each(|lane| self.lanes.push(lane));
-        let pack = |from: &Lanes, to: &mut Lanes| {
-            for (to, &lane) in to.iter_mut().zip(&self.lanes) {
-                *to = from[lane % BATCH];
+        let lanes = &*self.lanes;
+        let whole = lanes.len() == BATCH;
+        let pack = |from: &[f32; F32_LANES], to: &mut Lanes| {
+            if whole {
+                for (to, &from) in to.iter_mut().zip(from) {
+                    *to = from.into();
+                }
+                return;
+            }
+            for (to, &lane) in to.iter_mut().zip(lanes) {
+                *to = from[lane % BATCH].into();
             }
         };
-        let (from, to) = (&*self.attributes, &mut *self.dense);
-        for (from, to) in from.scale.iter().zip(&mut to.scale) {
+        for (from, to) in attributes.position.iter().zip(&mut *self.position) {
             pack(from, to);
         }
-        for (from, to) in from.rotation.iter().zip(&mut to.rotation) {
+        for (from, to) in attributes.scale.iter().zip(&mut *self.scale) {
             pack(from, to);
         }
-        pack(&from.opacity, &mut to.opacity);
-        for (from, to) in self.camera.iter().zip(&mut *self.dense_camera) {
+        for (from, to) in attributes.rotation.iter().zip(&mut *self.rotation) {
             pack(from, to);
         }
-        for (from, to) in self.offset.iter().zip(&mut *self.dense_offset) {
-            pack(from, to);
-        }
+        pack(&attributes.opacity, &mut self.opacity);
     }
 }

@@ -71,31 +71,38 @@ pub(super) fn color<S: Simd>(
     let basis = basis(degree, direction);
     // A vector holds a coefficient's three components and the next one's first, which is not used. Two sums
     // halve the wait for one another; the largest terms, the constant one and 0.5, are added last.
-    let load = |k: usize| f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
-    let term = |k: usize, sum| load(k).mul_add(f32x4::splat(simd, basis[k]), sum);
     let (mut even, mut odd) = (f32x4::splat(simd, 0.0), f32x4::splat(simd, 0.0));
-    for k in (2..count).step_by(2) {
-        even = term(k, even);
-    }
     for k in (1..count).step_by(2) {
-        odd = term(k, odd);
+        odd = term(simd, coefficients, &basis, k, odd);
     }
-    let sum = term(0, even + odd) + 0.5;
+    for k in (2..count).step_by(2) {
+        even = term(simd, coefficients, &basis, k, even);
+    }
+    let sum = term(simd, coefficients, &basis, 0, even + odd) + 0.5;
     // Multiplied by zero, what is not finite becomes NaN.
-    let nothing = coefficients[..3 * count]
-        .chunks(16)
-        .map(|part| match f32x16_of(simd, part) {
-            Some(part) => (part * 0.0).reduce_sum(),
-            None => part.iter().map(|c| c * 0.0).sum(),
-        })
-        .fold(0.0f32, |sum, part| sum + part);
-    (nothing == 0.0).then(|| [sum[0].max(0.0), sum[1].max(0.0), sum[2].max(0.0)])
+    let (whole, rest) = coefficients[..3 * count].as_chunks::<16>();
+    let mut nothing = f32x16::splat(simd, 0.0);
+    for part in whole {
+        nothing += f32x16::simd_from(simd, *part) * 0.0;
+    }
+    let mut finite = nothing.simd_eq(0.0).to_bitmask() == 0xFFFF;
+    for coefficient in rest {
+        finite &= coefficient.is_finite();
+    }
+    finite.then_some([sum[0].max(0.0), sum[1].max(0.0), sum[2].max(0.0)])
 }
 
-/// A vector of a whole part.
+/// `sum` and coefficient `k` times its basis function.
 #[inline(always)]
-fn f32x16_of<S: Simd>(simd: S, part: &[f32]) -> Option<f32x16<S>> {
-    (part.len() == 16).then(|| f32x16::from_slice(simd, part))
+fn term<S: Simd>(
+    simd: S,
+    coefficients: &[f32; COEFFICIENT_FLOATS],
+    basis: &[f32; MAX_COEFFICIENTS],
+    k: usize,
+    sum: f32x4<S>,
+) -> f32x4<S> {
+    let coefficient = f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
+    coefficient.mul_add(f32x4::splat(simd, basis[k]), sum)
 }
 
 #[cfg(test)]

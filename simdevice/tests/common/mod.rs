@@ -82,8 +82,13 @@ pub fn rendering(color: Attachment) -> Rendering {
     }
 }
 
-/// `count` random Gaussians as the packets of one draw.
+/// `count` random Gaussians as the packets of one draw, in memory that the host may map.
 pub fn gaussians(seed: u64, count: u32, blend: BlendState) -> Vec<Packet> {
+    gaussians_in(true, seed, count, blend)
+}
+
+/// As [`gaussians`], in memory that is `host_visible` or not.
+pub fn gaussians_in(host_visible: bool, seed: u64, count: u32, blend: BlendState) -> Vec<Packet> {
     const FLOATS: usize = 14;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut floats = Vec::new();
@@ -99,7 +104,7 @@ pub fn gaussians(seed: u64, count: u32, blend: BlendState) -> Vec<Packet> {
         floats.extend([0; 3].map(|_| rng.random_range(-1.0..2.0f32)));
     }
     let size = 4 * floats.len() as u64;
-    let memory = Allocation::new_zeroed(size.max(4)).unwrap();
+    let memory = Allocation::new(size.max(4), host_visible).unwrap();
     memory.write(0, &floats).unwrap();
     let stream = |offset: u32, format| AttributeStream {
         buffer: BufferRange {

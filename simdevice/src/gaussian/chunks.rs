@@ -1,0 +1,207 @@
+//! Chunks: the Gaussians of a buffer that is drawn again and again, in an order in which neighbours in space are
+//! neighbours in memory. Bounds tell of a whole chunk that no picture needs it; what is left is read in one go.
+//!
+//! They are derived from memory that only the device can write, and never change an image.
+
+use super::fetch::{BATCH, Batch, Fetcher};
+use super::scratch::Attributes;
+use super::sort;
+use crate::packet::GaussianAppend;
+use rayon::prelude::*;
+
+/// Bounds of the Gaussians of a chunk that can be drawn at all.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    /// The least coordinates of the means.
+    pub(super) low: [f32; 3],
+    /// The greatest.
+    pub(super) high: [f32; 3],
+    /// The greatest scale.
+    pub(super) scale: f32,
+    /// The greatest opacity.
+    pub(super) opacity: f32,
+}
+
+/// Some Gaussians that are near one another.
+#[derive(Debug)]
+pub(super) struct Chunk {
+    /// The vertices' numbers in the draw.
+    pub(super) numbers: Vec<u32>,
+    pub(super) attributes: Attributes,
+    pub(super) bounds: Bounds,
+    /// No Gaussian of it is skipped for what its attributes are.
+    pub(super) is_sound: bool,
+}
+
+/// All Gaussians of a draw without indices, but for their colours.
+#[derive(Debug)]
+pub(super) struct Chunks {
+    pub(super) chunks: Vec<Chunk>,
+    /// The greatest opacity.
+    pub(super) opacity: f32,
+}
+
+/// Bits of an axis in a Morton code.
+const AXIS_BITS: u32 = 10;
+
+/// Bytes of host memory that chunks of `count` Gaussians take.
+pub(super) fn memory_bytes(count: u32) -> u64 {
+    u64::from(count).div_ceil(BATCH as u64) * (size_of::<Chunk>() + 4 * BATCH) as u64
+}
+
+impl Chunks {
+    /// The chunks of what `append` draws, which has neither indices nor attributes by instance.
+    pub(super) fn build(append: &GaussianAppend) -> Self {
+        let order = morton_order(append);
+        let chunks: Vec<_> = order
+            .par_chunks(BATCH)
+            .map_init(Fetcher::default, |fetcher, numbers| {
+                Chunk::read(append, fetcher, numbers)
+            })
+            .collect();
+        let opacities = chunks.iter().map(|chunk| chunk.bounds.opacity);
+        Self {
+            opacity: opacities.fold(0.0, f32::max),
+            chunks,
+        }
+    }
+}
+
+impl Chunk {
+    fn read(append: &GaussianAppend, fetcher: &mut Fetcher, numbers: &[u32]) -> Self {
+        let batch = Batch::of_chunk(append, append.first_instance, numbers);
+        let mut attributes = Attributes::default();
+        fetcher.read_all(&append.attributes, &batch, &mut attributes);
+        let mut bounds = Bounds {
+            low: [f32::INFINITY; 3],
+            high: [f32::NEG_INFINITY; 3],
+            scale: 0.0,
+            opacity: 0.0,
+        };
+        let mut is_sound = true;
+        for lane in 0..numbers.len() {
+            let at = |lanes: &[f32; BATCH]| lanes[lane];
+            let position = attributes.position.each_ref().map(at);
+            let scale = attributes.scale.each_ref().map(at);
+            let rotation = attributes.rotation.each_ref().map(at);
+            let opacity = attributes.opacity[lane];
+            let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
+            let sound = finite(&position)
+                && finite(&scale)
+                && finite(&rotation)
+                && opacity.is_finite()
+                && rotation.iter().any(|&part| part != 0.0)
+                && scale.iter().all(|&scale| scale >= 0.0);
+            if !sound {
+                is_sound = false;
+                continue;
+            }
+            for (axis, position) in position.into_iter().enumerate() {
+                bounds.low[axis] = bounds.low[axis].min(position);
+                bounds.high[axis] = bounds.high[axis].max(position);
+            }
+            bounds.scale = scale.into_iter().fold(bounds.scale, f32::max);
+            bounds.opacity = bounds.opacity.max(opacity);
+        }
+        Self {
+            numbers: numbers.to_vec(),
+            attributes,
+            bounds,
+            is_sound,
+        }
+    }
+}
+
+/// The numbers of the draw's vertices in an order in which neighbours are mostly near one another.
+fn morton_order(append: &GaussianAppend) -> Vec<u32> {
+    let starts: Vec<u32> = (0..append.count).step_by(BATCH).collect();
+    let positions: Vec<[f32; 3]> = starts
+        .into_par_iter()
+        .map_init(
+            || (Fetcher::default(), Attributes::default()),
+            |(fetcher, attributes), start| {
+                let len = (append.count - start).min(BATCH as u32) as usize;
+                let batch = Batch::new(append, append.first_instance, start, len);
+                let streams = &append.attributes;
+                fetcher.read(&streams.position, &batch, attributes.position.each_mut());
+                let [x, y, z] = &attributes.position;
+                (0..len).map(|at| [x[at], y[at], z[at]]).collect::<Vec<_>>()
+            },
+        )
+        .flatten_iter()
+        .collect();
+    let (low, per_cell) = grid(&positions);
+    let code = |position: &[f32; 3]| {
+        [0, 1, 2]
+            .into_iter()
+            .map(|axis| {
+                // What is not a number becomes zero.
+                let cell = (f64::from(position[axis]) - low[axis]) / per_cell;
+                spread(cell.clamp(0.0, f64::from((1u32 << AXIS_BITS) - 1)) as u32) << axis
+            })
+            .sum()
+    };
+    let mut order: Vec<(u32, u32)> = positions.iter().map(code).zip(0..).collect();
+    sort::sort_by_key(&mut order);
+    order.into_iter().map(|(_, number)| number).collect()
+}
+
+/// The corner and the cells' side of a grid that holds most positions, whatever lies far off.
+fn grid(positions: &[[f32; 3]]) -> ([f64; 3], f64) {
+    let finite = || {
+        let all = positions.iter();
+        all.filter(|position| position.iter().all(|value| value.is_finite()))
+    };
+    let count = finite().count().max(1) as f64;
+    let [mut mean, mut variance] = [[0.0; 3]; 2];
+    for position in finite() {
+        for axis in 0..3 {
+            mean[axis] += f64::from(position[axis]) / count;
+        }
+    }
+    for position in finite() {
+        for axis in 0..3 {
+            variance[axis] += (f64::from(position[axis]) - mean[axis]).powi(2) / count;
+        }
+    }
+    let deviation = variance.into_iter().fold(0.0, f64::max).sqrt();
+    let half = (3.0 * deviation).clamp(f64::MIN_POSITIVE * 1e9, f64::MAX / 4.0);
+    (
+        mean.map(|mean| mean - half),
+        2.0 * half / f64::from(1u32 << AXIS_BITS),
+    )
+}
+
+/// Puts two zeros between the bits of a number of [`AXIS_BITS`].
+fn spread(value: u32) -> u32 {
+    let value = (value | value << 16) & 0x030_000FF;
+    let value = (value | value << 8) & 0x0300_F00F;
+    let value = (value | value << 4) & 0x030C_30C3;
+    (value | value << 2) & 0x0924_9249
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_are_spread() {
+        for value in 0..1 << AXIS_BITS {
+            let expected: u32 = (0..AXIS_BITS)
+                .map(|bit| (value >> bit & 1) << (3 * bit))
+                .sum();
+            assert_eq!(spread(value), expected, "{value:#b}");
+        }
+    }
+
+    #[test]
+    fn a_few_far_off_do_not_spoil_the_grid() {
+        let mut positions = vec![[0.0, 0.0, 0.0]; 500];
+        positions.extend(vec![[1.0, 0.0, 0.0]; 500]);
+        positions.push([f32::NAN, 0.0, 0.0]);
+        positions.push([5.0, 0.0, f32::INFINITY]);
+        let (low, per_cell) = grid(&positions);
+        assert!((low[0] - (0.5 - 1.5)).abs() < 1e-9, "{low:?}");
+        assert!((per_cell - 3.0 / 1024.0).abs() < 1e-9, "{per_cell}");
+    }
+}

@@ -1,0 +1,209 @@
+//! What of space a picture can show. Planes bound it, and tell in a few operations of Gaussians, alone or in a chunk,
+//! that they are off the screen. The answer is conservative: what is not surely outside is inside.
+
+use super::chunks::Bounds;
+use super::lanes::{Bits, F32_LANES};
+use super::project::Projection;
+use super::scratch::Attributes;
+use crate::packet::CameraModel;
+use fearless_simd::{Simd, prelude::*};
+
+/// How much wider than exact bounds are, so that rounding loses nothing.
+const MARGIN: f64 = 1e-5;
+
+/// Bounds of binary32's error relative to the sum of the magnitudes of what is summed.
+const ERROR: f64 = 1.0 / 1_048_576.0;
+
+/// A Gaussian at `d` from the eye whose largest scale is `s` is outside where
+/// `normal . d + per_scale s + offset < 0`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Plane {
+    normal: [f64; 3],
+    per_scale: f64,
+    offset: f64,
+}
+
+/// The planes of a camera.
+#[derive(Clone, Debug)]
+pub(super) struct Frustum {
+    eye: [f64; 3],
+    /// The camera's axis and the least and greatest depths along it, if depths are measured along it.
+    depth: Option<([f64; 3], f32, f32)>,
+    /// Left, right, top and bottom; none where a camera's sides are not planes.
+    sides: Vec<Plane>,
+    alpha_floor: f64,
+}
+
+/// Why Gaussians are not in a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outside {
+    /// Opacities are below the floor.
+    Faint,
+    /// Not beyond the near plane.
+    Near,
+    /// Not before the far plane.
+    Far,
+    /// Beside the picture.
+    Beside,
+}
+
+/// Lanes that are not in a picture, by the first reason that is found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct OutsideLanes {
+    pub(super) near: Bits,
+    pub(super) far: Bits,
+    pub(super) beside: Bits,
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    dot(v, v).sqrt()
+}
+
+fn magnitude(v: [f64; 3]) -> f64 {
+    v[0].abs() + v[1].abs() + v[2].abs()
+}
+
+impl Plane {
+    /// The side of the picture along `axis` that `sign` (1: the lower coordinates) names, for Gaussians whose ellipses
+    /// reach `sigmas` standard deviations.
+    fn side(projection: &Projection, axis: usize, sign: f64, sigmas: f64) -> Self {
+        let row = |axis: usize| [0, 1, 2].map(|i| projection.rotation[3 * axis + i]);
+        let (across, forward) = (row(axis), row(2));
+        let focal = projection.focal[axis];
+        let [first, end] = projection.visible_range(axis);
+        let edge = if sign > 0.0 { first } else { end };
+        // The low-pass variance and the scale add in quadrature: their deviations' sum is no less.
+        let center = sign * (projection.center[axis] - edge) + sigmas * projection.low_pass.sqrt();
+        let (normal, steepest, offset) = if projection.model == CameraModel::Orthographic {
+            (across.map(|a| sign * focal * a), length(across), center)
+        } else {
+            // Where sign (f x/z + c - edge) + reach < 0, times z, which is positive where it matters.
+            let normal = [0, 1, 2].map(|i| sign * focal * across[i] + center * forward[i]);
+            let ends = [projection.slope_min[axis], projection.slope_max[axis]];
+            let steepness = |slope: f64| length([0, 1, 2].map(|i| across[i] - slope * forward[i]));
+            (normal, steepness(ends[0]).max(steepness(ends[1])), 0.0)
+        };
+        Self {
+            normal,
+            per_scale: sigmas * focal.abs() * steepest * (1.0 + MARGIN),
+            offset: offset + offset.abs() * MARGIN,
+        }
+    }
+}
+
+impl Frustum {
+    /// The frustum of Gaussians whose opacities are at most `opacity`.
+    pub(super) fn new(projection: &Projection, opacity: f32) -> Self {
+        let room = f64::from(opacity.max(1.0)).log2() - projection.log2_floor;
+        // Wider than the ellipse that the tile engine's margins ask for.
+        let sigmas = (2.0 * std::f64::consts::LN_2 * (1.01 * room + 2e-3)).sqrt();
+        let side = |axis, sign| Plane::side(projection, axis, sign, sigmas);
+        let r = &projection.rotation;
+        let depth = ([r[6], r[7], r[8]], projection.near, projection.far);
+        let (depth, sides) = match projection.model {
+            CameraModel::Fisheye => (None, Vec::new()),
+            _ => (
+                Some(depth),
+                vec![side(0, 1.0), side(0, -1.0), side(1, 1.0), side(1, -1.0)],
+            ),
+        };
+        Self {
+            eye: projection.eye,
+            depth,
+            sides,
+            alpha_floor: projection.alpha_floor,
+        }
+    }
+
+    /// Why a whole chunk is outside, if it is.
+    pub(super) fn excludes(&self, bounds: &Bounds) -> Option<Outside> {
+        if f64::from(bounds.opacity) < self.alpha_floor {
+            return Some(Outside::Faint);
+        }
+        let [mut middle, mut half] = [[0.0; 3]; 2];
+        for axis in 0..3 {
+            let [low, high] = [bounds.low[axis], bounds.high[axis]].map(f64::from);
+            middle[axis] = 0.5 * (low + high) - self.eye[axis];
+            half[axis] = 0.5 * (high - low);
+        }
+        // How far a linear function rises from the middle of the box to a corner, with room for rounding.
+        let size = magnitude(middle) + magnitude(half) + magnitude(self.eye);
+        let rise = |normal: [f64; 3]| {
+            let rise = dot(normal.map(f64::abs), half);
+            rise + 1e-12 * magnitude(normal) * size
+        };
+        if let Some((forward, near, far)) = self.depth {
+            let (depth, rise) = (dot(forward, middle), rise(forward));
+            if depth + rise <= f64::from(near) {
+                return Some(Outside::Near);
+            }
+            if depth - rise >= f64::from(far) {
+                return Some(Outside::Far);
+            }
+        }
+        let scale = f64::from(bounds.scale);
+        let beside = self.sides.iter().any(|side| {
+            let greatest = dot(side.normal, middle) + rise(side.normal);
+            greatest + side.per_scale * scale + side.offset < 0.0
+        });
+        beside.then_some(Outside::Beside)
+    }
+
+    /// Which lanes are outside, found in binary32: those whose error leaves it open are not.
+    #[inline(always)]
+    pub(super) fn lanes_outside<S: Simd>(
+        &self,
+        simd: S,
+        attributes: &Attributes,
+        len: usize,
+    ) -> OutsideLanes {
+        let number = |value: f64| S::f32s::splat(simd, value as f32);
+        let mut outside = OutsideLanes::default();
+        let Some((forward, near, far)) = self.depth else {
+            return outside;
+        };
+        // The eye in two parts, so that little is lost far from the origin.
+        let eye = self.eye.map(number);
+        let rest = self.eye.map(|eye| eye - f64::from(eye as f32));
+        let far_off = number(magnitude(rest));
+        let rest = rest.map(number);
+        let error =
+            |normal: [f64; 3]| number(ERROR * normal.map(f64::abs).into_iter().sum::<f64>());
+        let depth = (forward.map(number), error(forward));
+        let (near, far) = (number(near.into()), number(far.into()));
+        let mut planes = [([number(0.0); 3], number(0.0), number(0.0), number(0.0)); 4];
+        for (plane, side) in planes.iter_mut().zip(&self.sides) {
+            let normal = side.normal.map(number);
+            let (per_scale, offset) = (number(side.per_scale), number(side.offset));
+            *plane = (normal, per_scale, offset, error(side.normal));
+        }
+        let planes = &planes[..self.sides.len().min(4)];
+        for at in (0..len).step_by(S::f32s::LEN) {
+            let load =
+                |lanes: &[f32; F32_LANES]| S::f32s::from_slice(simd, &lanes[at..at + S::f32s::LEN]);
+            let [x, y, z] = &attributes.position;
+            let (x, y, z) = (load(x) - eye[0], load(y) - eye[1], load(z) - eye[2]);
+            let size = x.abs() + y.abs() + z.abs() + far_off;
+            let (x, y, z) = (x - rest[0], y - rest[1], z - rest[2]);
+            let ([nx, ny, nz], error) = depth;
+            let t = x.mul_add(nx, y.mul_add(ny, z * nz));
+            let slack = size * error;
+            outside.near.set(at, (t + slack).simd_le(near));
+            outside.far.set(at, (t - slack).simd_ge(far));
+            let [sx, sy, sz] = &attributes.scale;
+            let scale = load(sx).max(load(sy)).max(load(sz));
+            let mut beside = S::mask32s::splat(simd, false);
+            for &([nx, ny, nz], per_scale, offset, error) in planes {
+                let slack = size.mul_add(error, scale.mul_add(per_scale, offset));
+                let value = x.mul_add(nx, y.mul_add(ny, z.mul_add(nz, slack)));
+                beside = beside | value.simd_lt(0.0);
+            }
+            outside.beside.set(at, beside);
+        }
+        outside
+    }
+}

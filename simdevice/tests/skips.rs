@@ -1,0 +1,177 @@
+//! Skips: each saves work, and none changes a bit.
+//!
+//! Every scene is drawn twice to a target, since some of what is saved is prepared by the first time.
+
+mod common;
+
+use common::*;
+use simdevice::counters::{Counter, Counters};
+use simdevice::packet::*;
+use simdevice::skips::{Skip, Skips};
+use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
+use std::sync::Arc;
+
+/// Few Gaussians, many, many that only the device can write, of which all are equally deep in one scene, and several draws with a clear between them; how the attachment begins.
+fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
+    let clear_part = clear(
+        vec![AttachmentClear::Color {
+            index: 0,
+            value: ClearValue::Float([0.4, 0.1, 0.9, 0.5]),
+        }],
+        &[Rect {
+            x: 30,
+            y: 20,
+            width: 40,
+            height: 40,
+        }],
+    );
+    let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
+    let several = [
+        gaussians(3, 20, OVER),
+        vec![clear_part],
+        gaussians(4, 300, OVER),
+    ];
+    let mut ties = gaussians_in(false, 6, 3000, OVER);
+    if let Packet::GaussianBegin(begin) = &mut ties[0] {
+        begin.state = Arc::new(GaussianState {
+            order: GaussianOrder::Primitive,
+            ..(*begin.state).clone()
+        });
+    }
+    vec![
+        ("few", gaussians(1, 12, OVER), LoadOp::Load),
+        ("many", gaussians(2, 5000, OVER), over_black),
+        ("chunks", gaussians_in(false, 5, 6000, OVER), over_black),
+        ("ties", ties, LoadOp::Load),
+        ("several", several.concat(), LoadOp::Load),
+        ("nothing", Vec::new(), over_black),
+    ]
+}
+
+/// Draws a scene on a device of its own.
+fn draw(skips: Skips, packets: &[Packet], load: LoadOp) -> (Vec<u8>, Counters) {
+    let config = Config { skips, ..single() };
+    let target = image(Format::R32G32B32A32Sfloat, 1, 0x3E);
+    let mut processor = CommandProcessor::new(Arc::new(Device::new(&config).unwrap()));
+    let begin = [Packet::BeginRendering(Box::new(rendering(attachment(
+        &target, load,
+    ))))];
+    for _ in 0..2 {
+        for packet in begin.iter().chain(packets).chain([&Packet::EndRendering]) {
+            processor.execute(packet).unwrap();
+        }
+    }
+    (bytes(&target), processor.counters().clone())
+}
+
+#[test]
+fn every_skip_saves_work_and_changes_no_bit() {
+    let mut saved = Counters::default();
+    for (scene, packets, load) in scenes() {
+        let (image, counters) = draw(Skips::ALL, &packets, load);
+        saved.add_all(&counters);
+        let (other, without) = draw(Skips::NONE, &packets, load);
+        assert!(other == image, "{scene}: without any skip");
+        for &skip in Skip::ALL {
+            assert_eq!(without.get(skip.counter()), 0, "{scene}: {skip:?}");
+            for skips in [Skips::ALL.without(skip), Skips::NONE.with(skip)] {
+                let (other, counters) = draw(skips, &packets, load);
+                assert!(other == image, "{scene}: {skips:?}");
+                let count = counters.get(skip.counter());
+                assert!(count == 0 || skips.has(skip), "{scene}: {skip:?}");
+            }
+        }
+    }
+    for &skip in Skip::ALL {
+        assert!(saved.get(skip.counter()) > 0, "{skip:?} saved nothing");
+    }
+}
+
+#[test]
+fn without_skips_everything_is_worked_on() {
+    for (scene, packets, load) in scenes() {
+        let (_, counters) = draw(Skips::NONE, &packets, load);
+        let pairs = counters.get(Counter::TilePairs);
+        assert_eq!(counters.get(Counter::TilePairsEvaluated), pairs, "{scene}");
+        assert_eq!(
+            counters.get(Counter::BlockEvaluations),
+            16 * pairs,
+            "{scene}"
+        );
+    }
+}
+
+/// What a device counts in each of four passes that draw the same, between which `change` is called with the pass's number
+/// and the device's memory; all images are those of a device without chunks.
+fn draw_again(config: &Config, change: impl Fn(usize, &Allocation)) -> Vec<Counters> {
+    let packets = gaussians_in(false, 7, 4000, OVER);
+    let Packet::GaussianAppend(append) = &packets[1] else {
+        panic!("a set begins, is filled and is resolved");
+    };
+    let memory = &append.attributes.position.buffer.memory;
+    let target = image(Format::R32G32B32A32Sfloat, 1, 0);
+    let clear = LoadOp::Clear(ClearValue::Float([0.0; 4]));
+    let begin = [Packet::BeginRendering(Box::new(rendering(attachment(
+        &target, clear,
+    ))))];
+    let mut processor = CommandProcessor::new(Arc::new(Device::new(config).unwrap()));
+    let passes = (0..4).map(|pass| {
+        let before = processor.counters().clone();
+        for packet in begin.iter().chain(&packets).chain([&Packet::EndRendering]) {
+            processor.execute(packet).unwrap();
+        }
+        let plain = Config {
+            skips: Skips::ALL.without(Skip::Chunks),
+            ..single()
+        };
+        let drawn = bytes(&target);
+        let mut other = CommandProcessor::new(Arc::new(Device::new(&plain).unwrap()));
+        for packet in begin.iter().chain(&packets).chain([&Packet::EndRendering]) {
+            other.execute(packet).unwrap();
+        }
+        assert!(bytes(&target) == drawn, "pass {pass}");
+        change(pass, memory);
+        processor.counters().since(&before)
+    });
+    passes.collect()
+}
+
+fn chunks_built(passes: &[Counters]) -> Vec<u64> {
+    let built = passes.iter().map(|pass| pass.get(Counter::ChunksBuilt));
+    built.collect()
+}
+
+#[test]
+fn chunks_are_made_once() {
+    let passes = draw_again(&single(), |_, _| {});
+    assert_eq!(chunks_built(&passes), [0, 16, 0, 0]);
+    let left_out = |pass: &Counters| pass.get(Counter::OutsideByChunks);
+    assert_eq!(left_out(&passes[0]), 0);
+    assert!(left_out(&passes[3]) > 0);
+    for pass in &passes {
+        assert_eq!(pass.get(Counter::GaussiansRead), 4000);
+        let drawn = pass.get(Counter::GaussiansDrawn);
+        assert_eq!(drawn, passes[0].get(Counter::GaussiansDrawn));
+    }
+}
+
+#[test]
+fn chunks_are_made_anew_when_the_memory_was_written() {
+    let far = [0.0f32, 0.0, 1e3];
+    let passes = draw_again(&single(), |pass, memory| {
+        if pass == 1 {
+            memory.write(0, &far).unwrap();
+            memory.bump_generation();
+        }
+    });
+    assert_eq!(chunks_built(&passes), [0, 16, 0, 16]);
+}
+
+#[test]
+fn chunks_stay_within_their_budget() {
+    let config = Config {
+        chunk_budget_bytes: 100_000,
+        ..single()
+    };
+    assert_eq!(chunks_built(&draw_again(&config, |_, _| {})), [0; 4]);
+}
