@@ -129,14 +129,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let begin = GaussianBegin {
         state: Arc::new(GaussianState {
             sh_degree: 3,
-            order: GaussianOrder::ViewDepth,
-            opacity_compensated: false,
-            low_pass_variance: 0.3,
-            alpha_floor: 1.0 / 255.0,
-            alpha_ceiling: 0.99,
-            transmittance_floor: 1e-4,
-            blend: Vec::new(),
-            blend_constants: [0.0; 4],
+            ..GaussianState::default()
         }),
         camera: Camera {
             model: CameraModel::Pinhole,
@@ -163,7 +156,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut last = Counters::default();
     for _ in 0..9 {
         let mut counters = Counters::default();
-        let mut set = GaussianSet::begin(&begin, area);
+        let mut set = GaussianSet::begin(&begin, area, None);
         set.append(&append);
         let draw = set.resolve(&device, &mut counters)?;
         let started = Instant::now();

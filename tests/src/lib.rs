@@ -7,6 +7,7 @@ pub mod contexts;
 pub mod convert;
 pub mod data;
 pub mod fuzzing;
+pub mod hybrid;
 pub mod kernels;
 pub mod oracle;
 pub mod programs;

@@ -5,6 +5,7 @@
 //! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
+use super::depth::CenterDepth;
 use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader};
 use super::footprint::{Ellipse, Span, Visible};
 use super::lanes::{Bits, Lanes, log2};
@@ -33,6 +34,8 @@ pub(crate) struct Splat {
     pub log2_opacity: f32,
     /// Red, green, blue.
     pub color: [f32; 3],
+    /// The centre's depth as the depth attachment holds it, if the draw tests or writes depth.
+    pub depth: u32,
 }
 
 /// What came of a batch.
@@ -78,6 +81,8 @@ pub(crate) struct Projection {
     log2_floor: f64,
     sh_degree: u32,
     visible: Visible,
+    /// How centres become depths, if the draw needs to know.
+    depth: Option<CenterDepth>,
 }
 
 impl Projected {
@@ -105,6 +110,7 @@ impl Projection {
         camera: &Camera,
         viewport: &Viewport,
         visible: Visible,
+        depth: Option<CenterDepth>,
     ) -> Self {
         let focal = camera.focal_length.map(f64::from);
         let principal = camera.principal_point.map(f64::from);
@@ -131,6 +137,7 @@ impl Projection {
             log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
             sh_degree: state.sh_degree,
             visible,
+            depth,
         }
     }
 
@@ -277,6 +284,17 @@ impl Projection {
             *distance = linearize::depth(self.model, [x[lane], y[lane], z[lane]]);
         }
         &scratch.distance[..len]
+    }
+
+    /// A lane's depth as the attachment holds it.
+    fn center_depth(&self, lane: usize, scratch: &Scratch) -> u32 {
+        self.depth.map_or(0, |depth| {
+            let z = match self.model {
+                CameraModel::Fisheye => scratch.distance[lane],
+                CameraModel::Pinhole | CameraModel::Orthographic => scratch.camera[2][lane],
+            };
+            depth.code(z as f32)
+        })
     }
 
     /// What a lane is sorted by.
@@ -496,6 +514,7 @@ impl Projection {
                 factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
                 log2_opacity: flat.log2_opacity[at] as f32,
                 color,
+                depth: self.center_depth(lane % BATCH, scratch),
             });
             out.span_ends.push(out.spans.len() as u32);
         }
