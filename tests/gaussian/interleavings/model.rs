@@ -56,9 +56,9 @@ impl Pixel {
     /// A premultiplied colour over what it may hold.
     fn over(&mut self, color: [f64; 4]) {
         let rest = 1.0 - color[3];
-        for channel in 0..4 {
-            self.least[channel] = color[channel] + rest * self.least[channel];
-            self.greatest[channel] = color[channel] + rest * self.greatest[channel];
+        for (channel, color) in color.into_iter().enumerate() {
+            self.least[channel] = color + rest * self.least[channel];
+            self.greatest[channel] = color + rest * self.greatest[channel];
         }
     }
 }
