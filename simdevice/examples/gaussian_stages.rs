@@ -1,4 +1,7 @@
-//! Times the stages of a Gaussian draw on a synthetic scene: `gaussian_stages [COUNT] [LEVEL] [THREADS]`.
+//! Times the stages of a Gaussian draw on a synthetic scene: `gaussian_stages [COUNT] [LEVEL] [THREADS] [DEPTH]`.
+//!
+//! DEPTH is `none`; `test`, against a depth buffer that nothing is behind; `write`, the same and the median is stored; or
+//! `behind`, against one that half of the scene is behind.
 //!
 //! The scene: 35 % on a sphere shell, 35 % on a plane, 30 % in a box; log-normal scales (median 0.012, sigma
 //! 0.6), flattened; random rotations; opacity logit N(0.5, 2); degree 3. 1280x720, focal length 1000 px.
@@ -7,10 +10,12 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::counters::{Counter, Counters};
 use simdevice::device::SimdLevel;
-use simdevice::gaussian::{GaussianSet, TILE_SIZE};
+use simdevice::gaussian::GaussianSet;
+use simdevice::image::{ImageDesc, ImageKind};
+use simdevice::packet::draw::{CompareOp, DepthStencil, DepthTest};
 use simdevice::packet::*;
-use simdevice::raster::gaussian::GaussianTile;
-use simdevice::{Allocation, Config, Device, Format};
+use simdevice::pass::{Pass, PassDraw};
+use simdevice::{Allocation, Config, Device, Format, Image, ImageView};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::Instant;
@@ -65,12 +70,65 @@ fn gaussian(rng: &mut ChaCha8Rng) -> [f32; FLOATS] {
     out
 }
 
+/// What is done about depth.
+struct Depth {
+    test: Option<DepthTest>,
+    stored: f32,
+}
+
+impl Depth {
+    fn new(name: &str) -> Result<Self, String> {
+        let test = |write| {
+            Some(DepthTest {
+                compare: CompareOp::Less,
+                write,
+            })
+        };
+        // The camera is 6 before the scene's middle, and depths are 1 - 0.2 / z.
+        let (test, stored) = match name {
+            "none" => (None, 1.0),
+            "test" => (test(false), 1.0),
+            "write" => (test(true), 1.0),
+            "behind" => (test(false), 1.0 - 0.2 / 6.0),
+            other => return Err(format!("no DEPTH is called {other}")),
+        };
+        Ok(Self { test, stored })
+    }
+}
+
+fn attachment(format: Format, clear: ClearValue) -> Result<Attachment, Box<dyn std::error::Error>> {
+    let desc = ImageDesc {
+        kind: ImageKind::D2,
+        format,
+        extent: [WIDTH, HEIGHT, 1],
+        mip_levels: 1,
+        array_layers: 1,
+        samples: 1,
+    };
+    let memory = Allocation::new(desc.memory_size().ok_or("too large")?, false)?;
+    let view = ImageView {
+        image: Arc::new(Image::new(desc, memory, 0)?),
+        format,
+        base_mip_level: 0,
+        level_count: 1,
+        base_layer: 0,
+        layer_count: 1,
+    };
+    Ok(Attachment {
+        view,
+        load: LoadOp::Clear(clear),
+        store: StoreOp::Store,
+        resolve: None,
+    })
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let count: u32 = arguments.next().map_or(Ok(300_000), |text| text.parse())?;
     let simd = arguments.next().unwrap_or_else(|| "best".into());
     let simd = SimdLevel::from_name(&simd).ok_or("an unknown SIMD level")?;
     let threads = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let depth = Depth::new(arguments.next().as_deref().unwrap_or("none"))?;
     let device = Device::new(&Config {
         threads,
         simd,
@@ -129,14 +187,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let begin = GaussianBegin {
         state: Arc::new(GaussianState {
             sh_degree: 3,
-            order: GaussianOrder::ViewDepth,
-            opacity_compensated: false,
-            low_pass_variance: 0.3,
-            alpha_floor: 1.0 / 255.0,
-            alpha_ceiling: 0.99,
-            transmittance_floor: 1e-4,
-            blend: Vec::new(),
-            blend_constants: [0.0; 4],
+            depth_stencil: DepthStencil {
+                depth: depth.test,
+                ..DepthStencil::default()
+            },
+            ..GaussianState::default()
         }),
         camera: Camera {
             model: CameraModel::Pinhole,
@@ -146,7 +201,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             principal_point: [WIDTH as f32 / 2.0, HEIGHT as f32 / 2.0],
             near_plane: 0.2,
             far_plane: f32::INFINITY,
-            depth_coefficients: [0.0; 2],
+            depth_coefficients: [1.0, -0.2],
         },
         viewport: Viewport {
             x: 0.0,
@@ -158,24 +213,34 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         },
         scissor: area,
     };
-    let mut tile = Box::new(GaussianTile::default());
+    let rendering = Rendering {
+        area,
+        layer_count: 1,
+        color: vec![Some(attachment(
+            Format::R8G8B8A8Unorm,
+            ClearValue::Float([0.0; 4]),
+        )?)],
+        depth: Some(attachment(
+            Format::D32Sfloat,
+            ClearValue::DepthStencil {
+                depth: depth.stored,
+                stencil: 0,
+            },
+        )?),
+        stencil: None,
+    };
     let mut times: Vec<[f64; 4]> = Vec::new();
     let mut last = Counters::default();
     for _ in 0..9 {
         let mut counters = Counters::default();
-        let mut set = GaussianSet::begin(&begin, area);
+        let mut set = GaussianSet::begin(&begin, area, Some(Format::D32Sfloat));
         set.append(&append);
         let draw = set.resolve(&device, &mut counters)?;
         let started = Instant::now();
-        let mut checksum = 0.0;
-        for y in 0..HEIGHT.div_ceil(TILE_SIZE) {
-            for x in 0..WIDTH.div_ceil(TILE_SIZE) {
-                tile.render(&draw, device.level(), x, y, &mut counters);
-                checksum += tile.pixel(3, 4).map_or(0.0, |color| color[1]);
-            }
-        }
+        let mut pass = Pass::begin(&rendering)?;
+        pass.push(PassDraw::Gaussians(draw), &device, &mut counters)?;
+        pass.end(&device, &mut counters)?;
         let raster = started.elapsed().as_secs_f64() * 1e3;
-        std::hint::black_box(checksum);
         let ms = |counter| counters.get(counter) as f64 / 1e6;
         times.push([
             ms(Counter::PreprocessTime),
@@ -185,7 +250,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ]);
         last = counters;
     }
-    for (stage, name) in ["preprocess", "sort", "binning", "raster (1 thread)"]
+    for (stage, name) in ["preprocess", "sort", "binning", "raster"]
         .iter()
         .enumerate()
     {

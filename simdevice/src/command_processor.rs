@@ -114,7 +114,7 @@ impl CommandProcessor {
             Packet::GaussianBegin(begin) => {
                 let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
                 self.outside_gaussian_set()?;
-                self.gaussians = Some(GaussianSet::begin(begin, pass.area()));
+                self.gaussians = Some(GaussianSet::begin(begin, pass.area(), pass.depth_format()));
                 Ok(())
             }
             Packet::GaussianAppend(append) => {

@@ -85,6 +85,8 @@ counters! {
     PixelContributions: "raster", "pixel contributions", Count, "Pairs of a pixel and a Gaussian that contributed to it";
     FragmentInvocations: "raster", "fragment invocations", Count, "Invocations of fragment programs, those that only help with derivatives apart";
     TilesHidden: "raster", "tiles hidden", Count, "Pairs of a tile and a primitive that was skipped there because all of the tile's depths hide it";
+    GaussianTilesHidden: "raster", "gaussian tiles hidden", Count, "Pairs of a tile and a Gaussian that was skipped there because its depth fails against all of the tile's";
+    GaussianBlocksHidden: "raster", "gaussian blocks hidden", Count, "Pairs of a 4x4 block and a Gaussian that was skipped there because its depth fails against all of the block's";
     SamplesPassed: "raster", "samples passed", Count, "Samples that passed all tests, those of Gaussian draws' fragments included";
     ComputeInvocations: "shader cores", "compute invocations", Count, "Invocations of compute programs";
     ShaderBatches: "shader cores", "batches", Count, "Batches of shader invocations run";

@@ -42,6 +42,8 @@ pub enum FlushPolicy {
     WhenFull,
     /// After every draw, too.
     EveryDraw,
+    /// After some draws, too, which follow from the number and how many draws the pass had.
+    SomeDraws(u64),
 }
 
 impl Default for Config {

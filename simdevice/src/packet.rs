@@ -1,5 +1,6 @@
 //! Packets: what the driver asks of the device. Plain data; everything a packet needs it holds by [`Arc`].
 
+mod display;
 pub mod draw;
 mod transfer;
 
@@ -324,10 +325,36 @@ pub struct GaussianState {
     pub alpha_ceiling: f32,
     /// A pixel is finished before its transmittance would fall below this.
     pub transmittance_floor: f32,
-    /// Blending and write masks, one per colour attachment.
+    /// The samples that may be covered.
+    pub sample_mask: u32,
+    /// Depth and stencil. Gaussians face the front.
+    pub depth_stencil: draw::DepthStencil,
+    /// The logic operation, if enabled; it then replaces blending.
+    pub logic_op: Option<draw::LogicOp>,
+    /// Blending and write masks, one per colour attachment. Only the first attachment is written.
     pub blend: Vec<BlendState>,
     /// The constants of the constant blend factors.
     pub blend_constants: [f32; 4],
+}
+
+impl Default for GaussianState {
+    /// The defaults of 3DGS, degree 0; nothing is tested, and the fragment replaces what the attachment holds.
+    fn default() -> Self {
+        Self {
+            sh_degree: 0,
+            order: GaussianOrder::ViewDepth,
+            opacity_compensated: false,
+            low_pass_variance: 0.3,
+            alpha_floor: 1.0 / 255.0,
+            alpha_ceiling: 0.99,
+            transmittance_floor: 1e-4,
+            sample_mask: u32::MAX,
+            depth_stencil: draw::DepthStencil::default(),
+            logic_op: None,
+            blend: Vec::new(),
+            blend_constants: [0.0; 4],
+        }
+    }
 }
 
 /// A factor of the blend equation.

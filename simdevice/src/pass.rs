@@ -10,12 +10,12 @@ use crate::gaussian::GaussianDraw;
 use crate::geometry::PrimitiveDraw;
 use crate::image::ImageView;
 use crate::packet::{
-    Aspect, Attachment, AttachmentClear, BlendState, ClearAttachments, ClearValue, LoadOp, Rect,
-    Rendering, ResolveMode, StoreOp,
+    Aspect, Attachment, AttachmentClear, ClearAttachments, ClearValue, LoadOp, Rect, Rendering,
+    ResolveMode, StoreOp,
 };
 use crate::raster::Plane;
-use crate::raster::blend::Blender;
 use crate::raster::gaussian::GaussianTile;
+use crate::raster::gaussian::tile_draw::GaussianTileDraw;
 use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
 use crate::raster::tile::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target, Tile};
 use crate::skips::Skip;
@@ -69,7 +69,17 @@ pub struct Pass {
     /// Samples per pixel of the attachments, if there are any.
     samples: Option<u32>,
     draws: Vec<PassDraw>,
+    /// How many draws there were, those included that do not wait any more.
+    pushed: u64,
     bin_bytes: u64,
+}
+
+/// Whether [`FlushPolicy::SomeDraws`] flushes after a draw: one in three, without a pattern.
+fn flushes(seed: u64, draw: u64) -> bool {
+    // Multiplication by an odd constant mixes upwards.
+    let mixed =
+        (seed ^ draw.wrapping_mul(0x9E37_79B9_7F4A_7C15)).wrapping_mul(0xD134_2543_DE82_EF95);
+    (mixed >> 32).is_multiple_of(3)
 }
 
 impl Pass {
@@ -112,6 +122,7 @@ impl Pass {
             },
             samples: None,
             draws: Vec::new(),
+            pushed: 0,
             bin_bytes: 0,
         };
         // The smallest attachment bounds the others; without any the area is all there is.
@@ -170,10 +181,12 @@ impl Pass {
     ) -> Result<(), Stopped> {
         self.bin_bytes = self.bin_bytes.saturating_add(draw.memory_bytes());
         self.draws.push(draw);
+        self.pushed += 1;
         let config = device.config();
         let full = match config.flush {
             FlushPolicy::WhenFull => self.bin_bytes > config.bin_budget_bytes,
             FlushPolicy::EveryDraw => true,
+            FlushPolicy::SomeDraws(seed) => flushes(seed, self.pushed),
         };
         if full {
             self.flush(device, counters)?;
@@ -301,15 +314,6 @@ impl Pass {
 
     /// The waiting draws made ready for tiles.
     fn tile_draws<'a>(&'a self, device: &Device) -> Vec<Ready<'a>> {
-        const REPLACE: BlendState = BlendState {
-            equations: None,
-            write_mask: 0xF,
-        };
-        let format = self
-            .color
-            .first()
-            .and_then(Option::as_ref)
-            .map(Target::format);
         let targets = Targets {
             color: &self.color,
             depth: self.depth.as_ref(),
@@ -317,15 +321,12 @@ impl Pass {
         };
         let ready = |draw: &'a PassDraw| match draw {
             PassDraw::Clear(clear) => Ready::Clear(clear),
-            PassDraw::Gaussians(draw) => {
-                let state = draw.state.blend.first().unwrap_or(&REPLACE);
-                // A draw's floating-point colours mean nothing to an integer attachment.
-                let blender = format
-                    .filter(|format: &Format| !format.is_integer())
-                    .map(|format| Blender::new(state, draw.state.blend_constants, format))
-                    .filter(|blender| !blender.writes_nothing());
-                Ready::Gaussians(draw, blender)
-            }
+            PassDraw::Gaussians(draw) => Ready::Gaussians(Box::new(GaussianTileDraw::new(
+                draw,
+                targets,
+                self.samples,
+                device.level(),
+            ))),
             PassDraw::Primitives(draw) if draw.primitives.is_empty() => Ready::Nothing,
             PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TileDraw::new(
                 draw,
@@ -344,8 +345,7 @@ enum Ready<'a> {
     /// It changes nothing.
     Nothing,
     Clear(&'a ClearAttachments),
-    /// With how it blends into the first colour attachment; one that does not still counts its samples.
-    Gaussians(&'a GaussianDraw, Option<Blender>),
+    Gaussians(Box<GaussianTileDraw<'a>>),
     Primitives(Box<TileDraw<'a>>),
 }
 
@@ -385,7 +385,7 @@ fn bind(
 /// What a worker keeps from one macro-tile to the next.
 struct Worker {
     buffers: Buffers,
-    gaussians: GaussianTile,
+    gaussians: Box<GaussianTile>,
     scratch: Scratch,
     counters: Counters,
 }
@@ -402,7 +402,7 @@ impl Worker {
                 depth: Plane::new(size, pass.depth.as_ref()),
                 stencil: Plane::new(size, pass.stencil.as_ref()),
             },
-            gaussians: GaussianTile::default(),
+            gaussians: Box::default(),
             scratch: Scratch::default(),
             counters: Counters::default(),
         }
@@ -438,10 +438,13 @@ impl Frame<'_> {
                     tiles().for_each(|tile| self.clear(worker, clear, layer, &tile));
                 }
                 // Nothing says which layer a Gaussian is drawn to.
-                Ready::Gaussians(draw, blender) if layer == 0 => {
-                    tiles().for_each(|tile| self.gaussians(worker, draw, blender.as_ref(), &tile));
+                Ready::Gaussians(draw) if layer == 0 => {
+                    let (buffers, fragments) = (&mut worker.buffers, &mut worker.gaussians);
+                    for tile in tiles() {
+                        draw.render(&tile, buffers, fragments, &mut worker.counters);
+                    }
                 }
-                Ready::Gaussians(..) => {}
+                Ready::Gaussians(_) => {}
                 Ready::Primitives(draw) => draw.render(
                     Place { layer, at, size },
                     &mut worker.buffers,
@@ -547,38 +550,5 @@ impl Frame<'_> {
                 }
             }
         }
-    }
-
-    /// Renders what a Gaussian draw covers of one tile, and blends it into the first colour attachment; all samples of
-    /// a pixel get the same, for alpha is taken at its centre.
-    // A depth test of Gaussians belongs here: stored depths go into `GaussianTile::render`, the median's come out.
-    fn gaussians(
-        &self,
-        worker: &mut Worker,
-        draw: &GaussianDraw,
-        blender: Option<&Blender>,
-        tile: &Tile,
-    ) {
-        if !draw.touches(tile.pixels) {
-            return;
-        }
-        let [x, y] = tile.at;
-        let (fragments, counters) = (&mut worker.gaussians, &mut worker.counters);
-        if !fragments.render(draw, self.device.level(), x, y, counters) {
-            return;
-        }
-        let samples = u64::from(self.pass.samples.unwrap_or(1));
-        counters.add(Counter::SamplesPassed, fragments.covered_pixels() * samples);
-        let target = self.pass.color.first().and_then(Option::as_ref);
-        let (Some(blender), Some(target), Some(plane)) =
-            (blender, target, worker.buffers.color.first_mut())
-        else {
-            return;
-        };
-        plane.touch(target, 0, tile);
-        plane.change_rows(target.format(), tile, draw.bounds, |row, y, first| {
-            let columns = first..first + row.len();
-            blender.blend_row(row, columns.map(|x| fragments.pixel(x, y)))
-        });
     }
 }

@@ -1,7 +1,10 @@
 //! Gaussian draws, from an application's calls to pixels.
 
 mod accuracy;
+mod depth_stencil;
 mod determinism;
 mod given_scenes;
+mod hybrid_scenes;
+mod interleavings;
 mod popping;
 mod reference;

@@ -6,6 +6,7 @@ pub mod compare;
 pub mod contexts;
 pub mod data;
 pub mod fuzzing;
+pub mod hybrid;
 pub mod kernels;
 pub mod programs;
 pub mod triangles;

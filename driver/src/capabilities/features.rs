@@ -107,6 +107,8 @@ const SUPPORTED: &[&str] = &[
     // VK_GAURAST_gaussian_primitive_topology.
     "gaussian_primitive_topology",
     "fisheye_camera",
+    "gaussian_depth_stencil",
+    "gaussian_multisample",
     "merged_draws",
     "opacity_compensation",
     "orthographic_camera",
@@ -533,7 +535,7 @@ mod tests {
         >(2));
         names.extend(all_true::<
             PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-        >(6));
+        >(8));
         let names: HashSet<_> = names.into_iter().collect();
         assert_eq!(names, SUPPORTED.iter().copied().collect());
     }

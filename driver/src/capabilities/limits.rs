@@ -308,7 +308,7 @@ fn gaussian() -> PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'stati
         rasterizer_module_count: RASTERIZER_MODULES,
         processing_element_count: PROCESSING_ELEMENTS,
         max_spherical_harmonics_degree: 3,
-        gaussian_sample_counts: vk::SampleCountFlags::TYPE_1,
+        gaussian_sample_counts: SAMPLE_COUNTS,
         max_gaussians_per_draw: MAX_GAUSSIANS,
         max_gaussians_per_set: MAX_GAUSSIANS,
         ..Default::default()

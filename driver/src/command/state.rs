@@ -3,9 +3,8 @@
 use super::bound::{BindPoint, BoundSets};
 use super::record::{IndexBuffer, VertexBuffer};
 use crate::object::pipeline::compute::ComputePipeline;
-use crate::object::pipeline::setting::{Setting, Settings};
+use crate::object::pipeline::setting::Settings;
 use crate::object::pipeline::{GaussianPipeline, GraphicsPipeline};
-use ash::vk;
 use simdevice::packet::draw::DrawState;
 use simdevice::packet::{Camera, Rect, Viewport};
 use std::sync::Arc;
@@ -58,15 +57,6 @@ impl State {
         pipeline
             .scissor
             .or_else(|| self.scissors.first().copied().flatten())
-    }
-
-    /// The dynamic blend constants.
-    pub(crate) fn blend_constants(&self) -> Option<[f32; 4]> {
-        let mut set = self.settings.of(vk::DynamicState::BLEND_CONSTANTS);
-        set.find_map(|setting| match setting {
-            Setting::BlendConstants(constants) => Some(constants),
-            _ => None,
-        })
     }
 
     /// The descriptor sets of a bind point.

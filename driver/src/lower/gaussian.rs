@@ -6,7 +6,6 @@ use super::draw::{Undrawn, attribute_stream, indices};
 use crate::command::record::Draw;
 use crate::command::state::State;
 use crate::object::pipeline::{AttributeSource, CameraSource, GaussianPipeline, GraphicsPipeline};
-use ash::vk;
 use simdevice::Packet;
 use simdevice::packet::{
     Camera, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, Viewport,
@@ -70,14 +69,17 @@ fn camera(state: &State, source: CameraSource) -> Result<Camera, Undrawn> {
 
 /// What the pipeline fixes, with the dynamic part filled in.
 fn fixed_state(state: &State, gaussian: &GaussianPipeline) -> Result<Arc<GaussianState>, Undrawn> {
-    if !gaussian.dynamic_blend_constants {
+    if gaussian.dynamic.is_empty() {
         return Ok(Arc::clone(&gaussian.state));
     }
-    let blend_constants = state
-        .blend_constants()
-        .ok_or(Undrawn::Dynamic(vk::DynamicState::BLEND_CONSTANTS))?;
+    let mut fixed = gaussian.fixed.clone();
+    fixed
+        .set_dynamic(&gaussian.dynamic, &state.settings)
+        .map_err(Undrawn::Dynamic)?;
+    let lowered = fixed.lower();
     Ok(Arc::new(GaussianState {
-        blend_constants,
+        depth_stencil: lowered.depth_stencil,
+        blend_constants: lowered.blend_constants,
         ..GaussianState::clone(&gaussian.state)
     }))
 }

@@ -141,13 +141,6 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
         ),
         (
             PipelineRequest {
-                logic_op: true,
-                ..PipelineRequest::default()
-            },
-            "logicOp",
-        ),
-        (
-            PipelineRequest {
                 blend: vec![over().src_color_blend_factor(vk::BlendFactor::SRC1_COLOR)],
                 ..PipelineRequest::default()
             },
@@ -158,7 +151,14 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
                 dynamic: vec![vk::DynamicState::DEPTH_TEST_ENABLE],
                 ..PipelineRequest::default()
             },
-            "DEPTH_TEST_ENABLE",
+            "gaussianDepthStencil",
+        ),
+        (
+            PipelineRequest {
+                dynamic: vec![vk::DynamicState::RASTERIZER_DISCARD_ENABLE],
+                ..PipelineRequest::default()
+            },
+            "RASTERIZER_DISCARD_ENABLE",
         ),
     ];
     for (request, word) in bad {
@@ -166,6 +166,11 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
     }
     let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
     create(&gpu, &with_state(|s| s.antialiasing(compensated))).unwrap();
+    let logic = PipelineRequest {
+        logic_op: true,
+        ..PipelineRequest::default()
+    };
+    create(&gpu, &logic).unwrap();
 }
 
 #[test]

@@ -2,11 +2,12 @@
 //!
 //! Stages, each in a module: [`fetch`] (attributes to lanes), [`project`] (3D to the rasterizer's nine numbers, with
 //! [`linearize`] for cameras that are no pinholes),
-//! [`footprint`] (which tiles), [`spherical_harmonics`] (colour), [`sort`] (depth order); then
+//! [`depth`] (what the depth test compares), [`footprint`] (which tiles), [`spherical_harmonics`] (colour), [`sort`] (depth order); then
 //! [`binning`](crate::binning) places them in tile lists.
 
 pub(crate) mod cache;
 mod chunks;
+pub(crate) mod depth;
 mod fetch;
 pub(crate) mod footprint;
 mod frustum;
@@ -22,10 +23,12 @@ pub use footprint::TILE_SIZE;
 use crate::binning::TileLists;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
-use crate::packet::{GaussianAppend, GaussianBegin, GaussianState, Rect, Viewport};
+use crate::format::Format;
+use crate::packet::{GaussianAppend, GaussianBegin, GaussianOrder, GaussianState, Rect, Viewport};
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, DrawRecord};
 use chunks::{Chunk, Chunks};
+use depth::{CenterDepth, Trend};
 use fearless_simd::dispatch;
 use fetch::{BATCH, Batch, Fetcher};
 use footprint::Visible;
@@ -47,6 +50,7 @@ const BATCHES_PER_TASK: usize = 16;
 pub struct GaussianSet {
     begin: GaussianBegin,
     bounds: Rect,
+    depth: Option<CenterDepth>,
     appends: Vec<GaussianAppend>,
 }
 
@@ -72,6 +76,8 @@ pub struct GaussianDraw {
     pub(crate) tiles: TileLists,
     /// What is left out in its tiles.
     pub(crate) skips: Skips,
+    /// How the depths of a tile's list follow one another.
+    pub(crate) depth_trend: Trend,
     /// Where the work of its tiles goes, if anybody wants to know.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
@@ -95,14 +101,18 @@ fn viewport_pixels(viewport: &Viewport) -> Rect {
 }
 
 impl GaussianSet {
-    /// Starts a set that may touch the pixels of `area` which lie in its scissor and its viewport.
-    pub fn begin(begin: &GaussianBegin, area: Rect) -> Self {
+    /// Starts a set that may touch the pixels of `area` which lie in its scissor and its viewport. `depth` is the
+    /// depth attachment's format, if there is one.
+    pub fn begin(begin: &GaussianBegin, area: Rect, depth: Option<Format>) -> Self {
         let visible = area
             .intersect(begin.scissor)
             .intersect(viewport_pixels(&begin.viewport));
         Self {
             begin: begin.clone(),
             bounds: visible,
+            depth: depth
+                .filter(|_| begin.state.depth_stencil.depth.is_some())
+                .map(|format| CenterDepth::new(&begin.camera, &begin.viewport, format)),
             appends: Vec::new(),
         }
     }
@@ -149,6 +159,10 @@ impl GaussianSet {
             recorder.begin_draw(draw)
         });
         Ok(GaussianDraw {
+            depth_trend: match (self.depth, self.begin.state.order) {
+                (Some(depth), GaussianOrder::ViewDepth) => depth.trend(),
+                _ => Trend::None,
+            },
             state: self.begin.state,
             bounds: self.bounds,
             splats,
@@ -263,6 +277,7 @@ impl GaussianSet {
             &begin.camera,
             &begin.viewport,
             Visible::from(self.bounds),
+            self.depth,
             skips,
         );
         let jobs = self.jobs(chunks, &projection, counters)?;

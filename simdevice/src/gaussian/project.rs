@@ -5,6 +5,7 @@
 //! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
+use super::depth::CenterDepth;
 use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader};
 use super::footprint::{Ellipse, Reach, Span, Visible};
 use super::frustum::Frustum;
@@ -35,6 +36,8 @@ pub(crate) struct Splat {
     pub log2_opacity: f32,
     /// Red, green, blue.
     pub color: [f32; 3],
+    /// The centre's depth as the depth attachment holds it, if the draw tests or writes depth.
+    pub depth: u32,
 }
 
 /// Gaussians whose spherical harmonics are read together.
@@ -84,6 +87,8 @@ pub(crate) struct Projection {
     pub(super) sh_degree: u32,
     pub(super) visible: Visible,
     pub(super) skips: Skips,
+    /// How centres become depths, if the draw needs to know.
+    depth: Option<CenterDepth>,
 }
 
 impl Projected {
@@ -113,6 +118,7 @@ impl Projection {
         camera: &Camera,
         viewport: &Viewport,
         visible: Visible,
+        depth: Option<CenterDepth>,
         skips: Skips,
     ) -> Self {
         let focal = camera.focal_length.map(f64::from);
@@ -140,6 +146,7 @@ impl Projection {
             log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
             sh_degree: state.sh_degree,
             visible,
+            depth,
             skips,
         }
     }
@@ -223,6 +230,13 @@ impl Projection {
             bright.set(at, o.simd_ge(floor));
         }
         bright
+    }
+
+    /// A kept lane's depth as the attachment holds it.
+    #[inline(always)]
+    fn center_depth(&self, at: usize, scratch: &Scratch) -> u32 {
+        self.depth
+            .map_or(0, |depth| depth.code(scratch.depth[at] as f32))
     }
 
     /// What a kept lane is sorted by.
@@ -497,6 +511,7 @@ impl Projection {
                     factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
                     log2_opacity: flat.log2_opacity[at] as f32,
                     color,
+                    depth: self.center_depth(at, scratch),
                 });
                 out.reaches.push(reach);
             }

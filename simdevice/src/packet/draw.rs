@@ -259,8 +259,8 @@ pub struct StencilFace {
     pub reference: u8,
 }
 
-/// Depth and stencil state.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Depth and stencil state. By default nothing is tested.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DepthStencil {
     /// The depth test; `None` passes always and writes nothing.
     pub depth: Option<DepthTest>,

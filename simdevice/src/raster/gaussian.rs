@@ -9,14 +9,23 @@
 //! binary64 and rounded once, and from there pixels are at most 1.5 away in x and y. Needles that cross many tiles
 //! and dust smaller than a pixel lose nothing alike; no position is ever rounded to binary32, and no value depends
 //! on where tiles begin.
+//!
+//! A draw that tests depth leaves out, pixel by pixel, the Gaussians whose centre fails against what was stored before
+//! the draw ([`passing`]). What the tests of a whole draw do to a tile's samples is said in [`tile_draw`].
 
+mod passing;
+pub(crate) mod tile_draw;
+
+use super::tile::place;
 use crate::counters::{Counter, Counters};
+use crate::gaussian::depth::Trend;
 use crate::gaussian::project::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::packet::{GaussianState, Rect};
-use crate::skips::Skip;
+use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
+use passing::Passing;
 
 const TILE: usize = TILE_SIZE as usize;
 /// Pixels of a block, which are the lanes of a vector.
@@ -30,20 +39,47 @@ const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
 /// Gaussians of a chunk: as many as phase 1 and phase 2 pass through the first-level cache.
 const CHUNK: usize = 32;
 
-/// A tile's accumulated colour and transmittance: the part of tile buffer B that Gaussian mode uses.
-///
-/// Arrays are indexed by block, then by pixel of the block, both row by row.
+/// Layers of a tile: one for each sample, and one to find what is reached at all.
+const LAYERS: usize = super::MAX_SAMPLES as usize + 1;
+
+/// The part of tile buffer B that Gaussian mode uses.
 #[derive(Debug)]
-#[repr(align(64))]
 pub struct GaussianTile {
+    layers: [Layer; LAYERS],
+    passing: Passing,
+    chunk: [Record; CHUNK],
+    items: [u32; CHUNK * BLOCKS + LANES],
+}
+
+/// Accumulated colour and transmittance of a tile's pixels, or of one sample of each.
+///
+/// Arrays are indexed by block, row by row, then by pixel of the block in the order of [`place`].
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Layer {
     color: [[[f32; LANES]; BLOCKS]; 3],
     /// Transmittance; negative where the pixel is finished or is not to be touched.
     transmittance: [[f32; LANES]; BLOCKS],
     /// Bit `lane` of entry `block` tells that some Gaussian contributed.
     covered: [u32; BLOCKS],
-    chunk: [Record; CHUNK],
-    items: [u32; CHUNK * BLOCKS + LANES],
+    /// The median depth as the attachment holds it, where covered, if the draw writes depth.
+    median: [[u32; LANES]; BLOCKS],
 }
+
+/// Lanes by block.
+type Lanes = [u32; BLOCKS];
+
+/// Every lane of a block.
+const ALL_LANES: u32 = (1 << LANES) - 1;
+
+/// What the kernel does about depth; a constant, so that what isn't done costs nothing.
+type DepthMode = u8;
+/// Nothing.
+const NO_DEPTH: DepthMode = 0;
+/// It leaves out what fails the test.
+const TEST_DEPTH: DepthMode = 1;
+/// It also finds the median.
+const FIND_MEDIAN: DepthMode = 2;
 
 /// What the two phases need of a Gaussian in this tile.
 #[derive(Clone, Copy, Debug, Default)]
@@ -56,6 +92,8 @@ struct Record {
     factor: [f32; 3],
     log2_opacity: f32,
     color: [f32; 3],
+    /// As [`Splat::depth`].
+    depth: u32,
 }
 
 /// The constants of a draw.
@@ -81,9 +119,8 @@ impl Thresholds {
 impl Default for GaussianTile {
     fn default() -> Self {
         Self {
-            color: [[[0.0; LANES]; BLOCKS]; 3],
-            transmittance: [[1.0; LANES]; BLOCKS],
-            covered: [0; BLOCKS],
+            layers: [Layer::EMPTY; LAYERS],
+            passing: Passing::default(),
             chunk: [Record::default(); CHUNK],
             items: [0; CHUNK * BLOCKS + LANES],
         }
@@ -92,154 +129,45 @@ impl Default for GaussianTile {
 
 /// The block of a pixel of a tile, and the lane in it.
 fn block_and_lane(x: usize, y: usize) -> (usize, usize) {
-    (
-        y / BLOCK * (TILE / BLOCK) + x / BLOCK,
-        y % BLOCK * BLOCK + x % BLOCK,
-    )
+    let place = place(x, y);
+    (place / LANES % BLOCKS, place % LANES)
 }
 
-impl GaussianTile {
-    /// Composites `draw`'s Gaussians in the tile at (`tile_x`, `tile_y`), in tiles from the framebuffer's
-    /// corner. Returns whether any pixel was covered.
-    pub fn render(
-        &mut self,
-        draw: &GaussianDraw,
-        level: Level,
-        tile_x: u32,
-        tile_y: u32,
-        counters: &mut Counters,
-    ) -> bool {
-        let list = draw.tiles.list(tile_x, tile_y);
-        if list.is_empty() {
-            return false;
-        }
-        let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
-        self.clear(corner, draw.bounds);
-        let thresholds = Thresholds::new(&draw.state);
-        let mut runs = draw.record.as_ref().map(|_| Vec::new());
-        let work = dispatch!(level, simd =>
-            self.composite(simd, draw, list, corner, thresholds, runs.as_mut()));
-        if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
-            record.add(TileWork {
-                at: [tile_x, tile_y],
-                listed: list.len() as u32,
-                runs,
-                contributions: work.contributions,
-                terminated: self.finished_pixels(corner, draw.bounds),
-            });
-        }
-        counters.add(Counter::TilePairsEvaluated, work.pairs);
-        counters.add(Counter::BlockEvaluations, work.items);
-        counters.add(Counter::BlocksBesideEllipse, work.open - work.items);
-        let blocks = (list.len() * BLOCKS) as u64;
-        counters.add(Counter::BlocksSaturated, blocks - work.open);
-        counters.add(Counter::PixelContributions, work.contributions);
-        self.covered.iter().any(|&lanes| lanes != 0)
-    }
+impl Layer {
+    const EMPTY: Self = Self {
+        color: [[[0.0; LANES]; BLOCKS]; 3],
+        transmittance: [[1.0; LANES]; BLOCKS],
+        covered: [0; BLOCKS],
+        median: [[0; LANES]; BLOCKS],
+    };
 
-    /// How many pixels of the tile were covered.
-    pub fn covered_pixels(&self) -> u64 {
-        self.covered
-            .iter()
-            .map(|lanes| u64::from(lanes.count_ones()))
-            .sum()
-    }
-
-    /// The premultiplied colour and coverage (C, 1 - T) of a pixel of the tile, if it was covered.
-    pub fn pixel(&self, x: usize, y: usize) -> Option<[f32; 4]> {
-        let (block, lane) = block_and_lane(x, y);
-        let covered = self.covered[block] >> lane & 1 == 1;
-        covered.then(|| {
-            let [r, g, b] = [0, 1, 2].map(|channel| self.color[channel][block][lane]);
-            [r, g, b, 1.0 - self.transmittance[block][lane].abs()]
-        })
-    }
-
-    /// Makes the pixels of `bounds` fresh, and the others finished.
-    fn clear(&mut self, corner: [u32; 2], bounds: Rect) {
+    /// Makes the pixels in `lanes` fresh, and the others finished.
+    fn clear(&mut self, lanes: &Lanes) {
         self.color = [[[0.0; LANES]; BLOCKS]; 3];
         self.covered = [0; BLOCKS];
-        let [left, top] = corner.map(i64::from);
-        let size = i64::from(TILE_SIZE);
-        let tile = Rect {
-            x: left as i32,
-            y: top as i32,
-            width: TILE_SIZE,
-            height: TILE_SIZE,
-        };
-        let inside = bounds.intersect(tile);
-        if i64::from(inside.width) == size && i64::from(inside.height) == size {
-            self.transmittance = [[1.0; LANES]; BLOCKS];
-            return;
-        }
-        self.transmittance = [[-1.0; LANES]; BLOCKS];
-        let first = [i64::from(inside.x) - left, i64::from(inside.y) - top].map(|at| at as usize);
-        for y in first[1]..first[1] + inside.height as usize {
-            for x in first[0]..first[0] + inside.width as usize {
-                let (block, lane) = block_and_lane(x, y);
-                self.transmittance[block][lane] = 1.0;
+        for (block, &lanes) in self.transmittance.iter_mut().zip(lanes) {
+            if lanes == ALL_LANES {
+                *block = [1.0; LANES];
+                continue;
+            }
+            for (lane, t) in block.iter_mut().enumerate() {
+                *t = if lanes >> lane & 1 == 1 { 1.0 } else { -1.0 };
             }
         }
     }
 
+    /// The premultiplied colour and coverage (C, 1 - T) of a block's lanes.
     #[inline(always)]
-    fn composite<S: Simd>(
-        &mut self,
-        simd: S,
-        draw: &GaussianDraw,
-        list: &[u32],
-        corner: [u32; 2],
-        thresholds: Thresholds,
-        mut runs: Option<&mut Vec<Run>>,
-    ) -> Work {
-        let mut work = Work::default();
-        let (bounded, end_early) = (
-            draw.skips.has(Skip::Blocks),
-            draw.skips.has(Skip::Saturated),
-        );
-        for chunk in list.chunks(CHUNK) {
-            let open = if end_early {
-                self.open_blocks()
-            } else {
-                ALL_BLOCKS
-            };
-            if open == 0 {
-                break;
-            }
-            let blocks = open.count_ones() as u8;
-            let rows = if runs.is_some() { self.open_rows() } else { 0 };
-            let open = mask32x16::from_bitmask(simd, open);
-            let mut items = 0;
-            for (number, &primitive) in chunk.iter().enumerate() {
-                let (batch, place) = locate(primitive);
-                let splat = &draw.splats[batch][place];
-                let record = &mut self.chunk[number % CHUNK];
-                let reached = record.place(simd, splat, corner, thresholds.log2_floor);
-                let Some(room) = self.items.get_mut(items..items + LANES) else {
-                    // There is room for all blocks of all records, and for a vector more.
-                    break;
-                };
-                let reached = if bounded { reached & open } else { open };
-                items += append_items(simd, number, reached, room);
-            }
-            work.pairs += chunk.len() as u64;
-            work.items += items as u64;
-            work.open += chunk.len() as u64 * u64::from(blocks);
-            if let Some(runs) = &mut runs {
-                let (primitives, reached) = (chunk.len() as u32, items as u32);
-                trace::push_run(
-                    runs,
-                    Run {
-                        primitives,
-                        rows,
-                        blocks,
-                        reached,
-                    },
-                );
-            }
-            work.contributions += self.evaluate(simd, items, thresholds);
-        }
-        work
+    fn fragments<S: Simd>(&self, simd: S, block: usize) -> [f32x16<S>; 4] {
+        let [r, g, b] = &self.color;
+        let load = |lanes: &[f32; LANES]| f32x16::from_slice(simd, lanes);
+        let rest = load(&self.transmittance[block]).abs();
+        [
+            load(&r[block]),
+            load(&g[block]),
+            load(&b[block]),
+            f32x16::splat(simd, 1.0) - rest,
+        ]
     }
 
     /// Bit `block` tells that a pixel of the block is not finished.
@@ -266,27 +194,251 @@ impl GaussianTile {
         (0..TILE).filter(open).count() as u8
     }
 
-    /// How many pixels of `bounds` are finished.
-    fn finished_pixels(&self, corner: [u32; 2], bounds: Rect) -> u32 {
-        let tile = Rect {
-            x: corner[0] as i32,
-            y: corner[1] as i32,
-            width: TILE_SIZE,
-            height: TILE_SIZE,
-        };
-        let inside = bounds.intersect(tile);
-        let finished = self
-            .transmittance
-            .iter()
-            .flatten()
-            .filter(|t| t.is_sign_negative());
-        let outside = TILE_SIZE * TILE_SIZE - inside.width * inside.height;
-        (finished.count() as u32).saturating_sub(outside)
+    /// Pixels that are finished or were not to be touched.
+    fn finished(&self) -> Lanes {
+        let mut finished = [0; BLOCKS];
+        for (finished, lanes) in finished.iter_mut().zip(&self.transmittance) {
+            for (lane, t) in lanes.iter().enumerate() {
+                *finished |= u32::from(t.is_sign_negative()) << lane;
+            }
+        }
+        finished
+    }
+}
+
+/// How many pixels `lanes` has.
+fn count(lanes: &Lanes) -> u32 {
+    lanes.iter().map(|lanes| lanes.count_ones()).sum()
+}
+
+/// The pixels of `bounds` in the tile at `corner`.
+fn lanes_within(bounds: Rect, corner: [u32; 2]) -> Lanes {
+    let tile = Rect {
+        x: corner[0] as i32,
+        y: corner[1] as i32,
+        width: TILE_SIZE,
+        height: TILE_SIZE,
+    };
+    let inside = bounds.intersect(tile);
+    if [inside.width, inside.height] == [TILE_SIZE; 2] {
+        return [ALL_LANES; BLOCKS];
+    }
+    let mut lanes = [0; BLOCKS];
+    if inside.is_empty() {
+        return lanes;
+    }
+    let first = [inside.x as u32 - corner[0], inside.y as u32 - corner[1]];
+    for y in first[1]..first[1] + inside.height {
+        for x in first[0]..first[0] + inside.width {
+            let (block, lane) = block_and_lane(x as usize, y as usize);
+            lanes[block] |= 1 << lane;
+        }
+    }
+    lanes
+}
+
+impl GaussianTile {
+    /// Composites `draw`'s Gaussians in the tile at (`tile_x`, `tile_y`), in tiles from the framebuffer's
+    /// corner, without tests. Returns whether any pixel was covered.
+    pub fn render(
+        &mut self,
+        draw: &GaussianDraw,
+        level: Level,
+        tile_x: u32,
+        tile_y: u32,
+        counters: &mut Counters,
+    ) -> bool {
+        let at = [tile_x, tile_y];
+        let lanes = lanes_within(draw.bounds, at.map(|tile| tile * TILE_SIZE));
+        self.run::<NO_DEPTH>(draw, level, at, 0, &lanes, counters);
+        self.layers[0].covered != [0; BLOCKS]
     }
 
-    /// Phase 2: composites the first `count` items; returns how many pixels accepted one.
+    /// Composites `draw`'s Gaussians in `lanes` of a tile, into a layer.
+    fn run<const DEPTH: DepthMode>(
+        &mut self,
+        draw: &GaussianDraw,
+        level: Level,
+        [tile_x, tile_y]: [u32; 2],
+        layer: usize,
+        lanes: &Lanes,
+        counters: &mut Counters,
+    ) {
+        let list = draw.tiles.list(tile_x, tile_y);
+        let to = &mut self.layers[layer];
+        to.clear(lanes);
+        if list.is_empty() {
+            return;
+        }
+        let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
+        let task = Task {
+            splats: &draw.splats,
+            list,
+            skips: draw.skips,
+            trend: draw.depth_trend,
+            corner,
+            thresholds: Thresholds::new(&draw.state),
+        };
+        let mut runs = draw.record.as_ref().map(|_| Vec::new());
+        let work = dispatch!(level, simd =>
+            self.composite::<_, DEPTH>(simd, &task, layer, runs.as_mut()));
+        if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
+            let outside = TILE_SIZE * TILE_SIZE - count(lanes);
+            record.add(TileWork {
+                at: [tile_x, tile_y],
+                listed: list.len() as u32,
+                runs,
+                contributions: work.contributions,
+                terminated: count(&self.layers[layer].finished()).saturating_sub(outside),
+            });
+        }
+        counters.add(Counter::TilePairsEvaluated, work.pairs);
+        counters.add(Counter::GaussianTilesHidden, work.tiles_hidden);
+        counters.add(Counter::GaussianBlocksHidden, work.blocks_hidden);
+        counters.add(Counter::BlockEvaluations, work.items);
+        counters.add(
+            Counter::BlocksBesideEllipse,
+            work.open - work.items - work.blocks_hidden,
+        );
+        let blocks = (list.len() as u64 - work.tiles_hidden) * BLOCKS as u64;
+        counters.add(Counter::BlocksSaturated, blocks - work.open);
+        counters.add(Counter::PixelContributions, work.contributions);
+    }
+
+    /// Which of `lanes` some Gaussian of `draw` reaches with an alpha of the floor or more, whatever its depth.
+    fn reached(
+        &mut self,
+        draw: &GaussianDraw,
+        level: Level,
+        [tile_x, tile_y]: [u32; 2],
+        lanes: &Lanes,
+    ) -> Lanes {
+        const LAYER: usize = LAYERS - 1;
+        self.layers[LAYER].clear(lanes);
+        let task = Task {
+            splats: &draw.splats,
+            list: draw.tiles.list(tile_x, tile_y),
+            skips: Skips::ALL,
+            trend: Trend::None,
+            corner: [tile_x, tile_y].map(|tile| tile * TILE_SIZE),
+            // The first Gaussian that reaches a pixel finishes it.
+            thresholds: Thresholds {
+                transmittance_floor: f32::INFINITY,
+                ..Thresholds::new(&draw.state)
+            },
+        };
+        dispatch!(level, simd => self.composite::<_, NO_DEPTH>(simd, &task, LAYER, None));
+        let finished = self.layers[LAYER].finished();
+        std::array::from_fn(|block| finished[block] & lanes[block])
+    }
+
+    /// How many pixels of the tile were covered.
+    pub fn covered_pixels(&self) -> u64 {
+        count(&self.layers[0].covered).into()
+    }
+
+    /// The premultiplied colour and coverage (C, 1 - T) of a pixel of the tile, if it was covered.
+    pub fn pixel(&self, x: usize, y: usize) -> Option<[f32; 4]> {
+        self.sample(0, x, y)
+    }
+
+    /// As [`GaussianTile::pixel`], of a layer.
+    fn sample(&self, layer: usize, x: usize, y: usize) -> Option<[f32; 4]> {
+        let layer = &self.layers[layer];
+        let (block, lane) = block_and_lane(x, y);
+        let covered = layer.covered[block] >> lane & 1 == 1;
+        covered.then(|| {
+            let [r, g, b] = [0, 1, 2].map(|channel| layer.color[channel][block][lane]);
+            [r, g, b, 1.0 - layer.transmittance[block][lane].abs()]
+        })
+    }
+
     #[inline(always)]
-    fn evaluate<S: Simd>(&mut self, simd: S, count: usize, thresholds: Thresholds) -> u64 {
+    fn composite<S: Simd, const DEPTH: DepthMode>(
+        &mut self,
+        simd: S,
+        task: &Task<'_>,
+        layer: usize,
+        mut runs: Option<&mut Vec<Run>>,
+    ) -> Work {
+        let mut work = Work::default();
+        let layer = &mut self.layers[layer];
+        let bounded = task.skips.has(Skip::Blocks);
+        let end_early = task.skips.has(Skip::Saturated);
+        for (number, chunk) in task.list.chunks(CHUNK).enumerate() {
+            let open = if end_early {
+                layer.open_blocks()
+            } else {
+                ALL_BLOCKS
+            };
+            if open == 0 {
+                break;
+            }
+            if DEPTH != NO_DEPTH && self.passing.hides_from(task.depth(chunk[0]), task.trend) {
+                work.tiles_hidden += (task.list.len() - number * CHUNK) as u64;
+                break;
+            }
+            let blocks = open.count_ones() as u8;
+            let rows = if runs.is_some() { layer.open_rows() } else { 0 };
+            let open = mask32x16::from_bitmask(simd, open);
+            let mut items = 0;
+            for (number, &primitive) in chunk.iter().enumerate() {
+                let (batch, place) = locate(primitive);
+                let splat = &task.splats[batch][place];
+                if DEPTH != NO_DEPTH && self.passing.hides(splat.depth) {
+                    work.tiles_hidden += 1;
+                    continue;
+                }
+                let record = &mut self.chunk[number % CHUNK];
+                let reached = record.place(simd, splat, task.corner, task.thresholds.log2_floor);
+                let mut reached = if bounded { reached & open } else { open };
+                work.open += u64::from(blocks);
+                if DEPTH != NO_DEPTH {
+                    record.depth = splat.depth;
+                    let shown = self.passing.blocks(simd, splat.depth);
+                    let hidden = (reached & !shown).to_bitmask();
+                    work.blocks_hidden += u64::from(hidden.count_ones());
+                    reached &= shown;
+                }
+                let Some(room) = self.items.get_mut(items..items + LANES) else {
+                    // There is room for all blocks of all records, and for a vector more.
+                    break;
+                };
+                items += append_items(simd, number, reached, room);
+            }
+            work.pairs += chunk.len() as u64;
+            work.items += items as u64;
+            if let Some(runs) = &mut runs {
+                let (primitives, reached) = (chunk.len() as u32, items as u32);
+                trace::push_run(
+                    runs,
+                    Run {
+                        primitives,
+                        rows,
+                        blocks,
+                        reached,
+                    },
+                );
+            }
+            let (items, chunk) = (&self.items[..items], &self.chunk);
+            work.contributions +=
+                layer.evaluate::<_, DEPTH>(simd, items, chunk, &self.passing, task.thresholds);
+        }
+        work
+    }
+}
+
+impl Layer {
+    /// Phase 2: composites `items`; returns how many pixels accepted one.
+    #[inline(always)]
+    fn evaluate<S: Simd, const DEPTH: DepthMode>(
+        &mut self,
+        simd: S,
+        items: &[u32],
+        chunk: &[Record; CHUNK],
+        passing: &Passing,
+        thresholds: Thresholds,
+    ) -> u64 {
         let across = f32x16::simd_from(simd, LANE_X);
         let down = f32x16::simd_from(simd, LANE_Y);
         let floor = f32x16::splat(simd, thresholds.alpha_floor);
@@ -294,9 +446,9 @@ impl GaussianTile {
         let finish = f32x16::splat(simd, thresholds.transmittance_floor);
         let zero = f32x16::splat(simd, 0.0);
         let mut contributions = 0;
-        for &item in &self.items[..count] {
+        for &item in items {
             let block = item as usize % BLOCKS;
-            let g = &self.chunk[item as usize / BLOCKS % CHUNK];
+            let g = &chunk[item as usize / BLOCKS % CHUNK];
             let [a, b, c] = g.factor;
             let u = across.mul_add(f32x16::splat(simd, a), f32x16::splat(simd, g.u[block]));
             let v = down.mul_add(f32x16::splat(simd, c), f32x16::splat(simd, g.v[block]));
@@ -307,9 +459,18 @@ impl GaussianTile {
             let t = f32x16::from_slice(simd, &self.transmittance[block]);
             let weight = t * alpha;
             let rest = t - weight;
-            let reached = alpha.simd_ge(floor) & t.simd_ge(zero);
+            let mut reached = alpha.simd_ge(floor) & t.simd_ge(zero);
+            if DEPTH != NO_DEPTH {
+                reached &= passing.pixels(simd, block, g.depth);
+            }
             let accepted = reached & rest.simd_ge(finish);
             let finished = reached & rest.simd_lt(finish);
+            if DEPTH == FIND_MEDIAN {
+                let median = u32x16::from_slice(simd, &self.median[block]);
+                let first_half = accepted & t.simd_ge(0.5);
+                let median = first_half.select(u32x16::splat(simd, g.depth), median);
+                median.store_slice(&mut self.median[block]);
+            }
             let t = accepted.select(rest, finished.select(zero - t, t));
             t.store_slice(&mut self.transmittance[block]);
             let weight = accepted.select(weight, zero);
@@ -326,6 +487,25 @@ impl GaussianTile {
     }
 }
 
+/// What a tile's Gaussians are.
+struct Task<'a> {
+    splats: &'a [Vec<Splat>],
+    list: &'a [u32],
+    /// What is left out.
+    skips: Skips,
+    trend: Trend,
+    corner: [u32; 2],
+    thresholds: Thresholds,
+}
+
+impl Task<'_> {
+    /// A primitive's depth.
+    fn depth(&self, primitive: u32) -> u32 {
+        let (batch, place) = locate(primitive);
+        self.splats[batch][place].depth
+    }
+}
+
 /// What compositing a tile took.
 #[derive(Clone, Copy, Debug, Default)]
 struct Work {
@@ -334,6 +514,8 @@ struct Work {
     /// Blocks that were not finished, summed over the pairs.
     open: u64,
     contributions: u64,
+    tiles_hidden: u64,
+    blocks_hidden: u64,
 }
 
 /// Half of the distance between a block's first and last pixel centres.
@@ -347,14 +529,14 @@ const BLOCK_Y: [f64; BLOCKS] = middles(false);
 
 const BLOCK_NUMBERS: [u32; BLOCKS] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// The column or row of each cell of a 4x4 grid, from the grid's middle.
+/// The column or row of each lane's pixel, from the block's middle.
 const fn grid(column: bool) -> [f32; LANES] {
     let mut out = [0.0; LANES];
-    let mut cell = 0;
-    while cell < LANES {
-        let at = if column { cell % BLOCK } else { cell / BLOCK };
-        out[cell] = at as f32 - HALF;
-        cell += 1;
+    let mut pixel = 0;
+    while pixel < LANES {
+        let (x, y) = (pixel % BLOCK, pixel / BLOCK);
+        out[place(x, y) % LANES] = (if column { x } else { y }) as f32 - HALF;
+        pixel += 1;
     }
     out
 }

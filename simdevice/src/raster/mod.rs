@@ -16,6 +16,7 @@ mod target;
 pub mod tile;
 
 pub use crate::gaussian::TILE_SIZE;
+pub(crate) use depth::DepthCode;
 pub(crate) use plane::Plane;
 
 /// The greatest side of a macro-tile in pixels.

@@ -117,6 +117,12 @@ impl Plane {
 
     /// All texels' words.
     #[inline(always)]
+    pub fn words(&self) -> &[u32] {
+        &self.words
+    }
+
+    /// As [`Plane::words`], to be changed.
+    #[inline(always)]
     pub fn words_mut(&mut self) -> &mut [u32] {
         &mut self.words
     }
@@ -272,35 +278,6 @@ impl Plane {
             for (y, columns) in tile.rows(rect) {
                 for x in columns {
                     texels[place(x, y) * stride..][..stride].copy_from_slice(&texel[..stride]);
-                }
-            }
-        }
-    }
-
-    /// Hands rows of decoded texels within `rect` to `change`, and takes back what it returns true for.
-    /// `change` gets the row, its y and the first x, both from the tile's corner.
-    pub fn change_rows(
-        &mut self,
-        format: Format,
-        tile: &Tile,
-        rect: Rect,
-        mut change: impl FnMut(&mut [[f32; 4]], usize, usize) -> bool,
-    ) {
-        let size = self.stride;
-        for sample in 0..self.samples {
-            let texels = self.sample_mut(tile.index, sample);
-            for (y, columns) in tile.rows(rect) {
-                let mut bytes = [0; SIDE * MAX_TEXEL_SIZE];
-                let mut row = [[0.0; 4]; SIDE];
-                let (bytes, row) = (
-                    &mut bytes[..columns.len() * size],
-                    &mut row[..columns.len()],
-                );
-                get_row(texels, size, y, columns.start, bytes);
-                format.decode_row(bytes, row);
-                if change(row, y, columns.start) {
-                    format.encode_row(row, bytes);
-                    set_row(texels, size, y, columns.start, bytes);
                 }
             }
         }

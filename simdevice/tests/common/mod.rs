@@ -142,15 +142,9 @@ pub fn gaussians_in(host_visible: bool, seed: u64, count: u32, blend: BlendState
 pub fn begin(blend: BlendState) -> GaussianBegin {
     GaussianBegin {
         state: Arc::new(GaussianState {
-            sh_degree: 0,
-            order: GaussianOrder::ViewDepth,
-            opacity_compensated: false,
-            low_pass_variance: 0.3,
-            alpha_floor: 1.0 / 255.0,
-            alpha_ceiling: 0.99,
-            transmittance_floor: 1e-4,
             blend: vec![blend],
             blend_constants: [0.5, 0.25, 0.75, 0.5],
+            ..GaussianState::default()
         }),
         camera: Camera {
             model: CameraModel::Pinhole,

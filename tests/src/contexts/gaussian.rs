@@ -121,12 +121,7 @@ impl Pipeline {
         let formats = [options.format];
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
-        let locations = GaussianAttributeLocationsGAURAST::default()
-            .position(0)
-            .scale(1)
-            .rotation(2)
-            .opacity(3)
-            .first_spherical_harmonics(4);
+        let locations = attribute_locations();
         let mut state = options
             .state
             .spherical_harmonics_degree(options.drawn_degree)
@@ -164,10 +159,28 @@ impl Pipeline {
 }
 
 fn bindings(options: &PipelineOptions) -> [vk::VertexInputBindingDescription; BINDINGS as usize] {
-    let triples = (options.stored_degree + 1).pow(2);
+    scene_bindings(options.stored_degree, options.looks_by_instance)
+}
+
+/// Where those attributes are.
+pub(crate) fn attribute_locations() -> GaussianAttributeLocationsGAURAST {
+    GaussianAttributeLocationsGAURAST::default()
+        .position(0)
+        .scale(1)
+        .rotation(2)
+        .opacity(3)
+        .first_spherical_harmonics(4)
+}
+
+/// A scene's bindings: positions, scales, rotations, opacities, coefficients.
+pub(crate) fn scene_bindings(
+    degree: u32,
+    looks_by_instance: bool,
+) -> [vk::VertexInputBindingDescription; BINDINGS as usize] {
+    let triples = (degree + 1).pow(2);
     let strides = [12, 12, 16, 4, 12 * triples];
     std::array::from_fn(|binding| {
-        let by_instance = options.looks_by_instance && binding >= 3;
+        let by_instance = looks_by_instance && binding >= 3;
         vk::VertexInputBindingDescription {
             binding: binding as u32,
             stride: strides[binding],
@@ -180,7 +193,8 @@ fn bindings(options: &PipelineOptions) -> [vk::VertexInputBindingDescription; BI
     })
 }
 
-fn attributes(degree: u32) -> Vec<vk::VertexInputAttributeDescription> {
+/// The attributes in those bindings, up to a degree.
+pub(crate) fn attributes(degree: u32) -> Vec<vk::VertexInputAttributeDescription> {
     let attribute = |location: u32, binding, format, offset| vk::VertexInputAttributeDescription {
         location,
         binding,

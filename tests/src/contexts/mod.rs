@@ -6,7 +6,7 @@
 //! Vulkan's valid usage; a draw beyond its buffers would be a mistake in the test, which the driver
 //! answers with zeros, not with foreign memory.
 
-mod gaussian;
+pub(crate) mod gaussian;
 mod pass;
 mod resource;
 mod settings;

@@ -182,6 +182,15 @@ impl Commands {
         unsafe { self.device().cmd_set_scissor(self.raw, 0, &[scissor]) };
     }
 
+    /// Sets the stencil reference of both faces.
+    pub fn stencil_reference(&self, reference: u32) {
+        let faces = vk::StencilFaceFlags::FRONT_AND_BACK;
+        unsafe {
+            self.device()
+                .cmd_set_stencil_reference(self.raw, faces, reference);
+        }
+    }
+
     /// Binds a graphics pipeline.
     pub fn bind(&self, pipeline: &Pipeline) {
         self.layout.set(pipeline.layout);

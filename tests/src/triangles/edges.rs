@@ -47,6 +47,24 @@ pub fn lines(triangle: &[Position; 3]) -> [Line; 5] {
     [edges[0], edges[1], edges[2], near, far]
 }
 
+/// Whether a triangle with w = 1 covers the sample at `x` and `y`, in sixteenths of a pixel, of a square of `size`
+/// pixels: inside, or on an edge that is a left or a top one.
+pub fn covers(triangle: &[Position; 3], size: u32, [x, y]: [u32; 2]) -> bool {
+    let points = triangle.map(|[x, y, _, w]| [x, y, w].map(i128::from));
+    let [a, b, c, ..] = lines(triangle);
+    let turn = dot(points[0], a).signum();
+    let denominator = 16 * i128::from(size);
+    let along = |sixteenths: u32| 2 * i128::from(sixteenths) - denominator;
+    let sample = [along(x), along(y), denominator];
+    turn != 0
+        && [a, b, c].iter().all(|&line| {
+            // Grows towards the inside; y points down.
+            let line = line.map(|part| turn * part);
+            let inside = dot(line, sample);
+            inside > 0 || inside == 0 && (line[0] > 0 || line[0] == 0 && line[1] > 0)
+        })
+}
+
 /// Whether the sample at `x` and `y`, in sixteenths of a pixel, of a square of `size` pixels lies
 /// within 1/256 of a pixel from a line.
 pub fn is_near(line: Line, size: u32, [x, y]: [u32; 2]) -> bool {
@@ -78,6 +96,25 @@ mod tests {
         assert!(!near([265, 400]));
         assert!(!near([263, 400]));
         assert!(near([400, 264]));
+    }
+
+    #[test]
+    fn shared_edges_belong_to_one_triangle() {
+        // Corners at pixel centres of 64 pixels, so that edges run through samples.
+        let at = |x: i64, y: i64| [2 * x - 63, 2 * y - 63, 0, UNITS];
+        let [a, b, c, d] = [at(8, 8), at(24, 8), at(24, 24), at(8, 24)];
+        for triangles in [[[a, b, c], [a, c, d]], [[a, c, b], [d, a, c]]] {
+            let count = |x: u32, y: u32| {
+                let sample = [16 * x + 8, 16 * y + 8];
+                let of = |triangle: &&[Position; 3]| covers(triangle, 64, sample);
+                triangles.iter().filter(of).count()
+            };
+            for (x, y) in (0..64).flat_map(|y| (0..64).map(move |x| (x, y))) {
+                // Left and top edges are inside, right and bottom ones are not.
+                let inside = (8..24).contains(&x) && (8..24).contains(&y);
+                assert_eq!(count(x, y), usize::from(inside), "{x} {y}");
+            }
+        }
     }
 
     #[test]

@@ -3,6 +3,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
+use gaurast::gaussian_primitive_topology;
+use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as GaussianFeatures;
 
 use super::Commands;
 use crate::contexts::{Settings, with_settings};
@@ -21,6 +23,7 @@ struct Shared {
     memory: vk::PhysicalDeviceMemoryProperties,
     features: vk::PhysicalDeviceFeatures,
     limits: vk::PhysicalDeviceLimits,
+    gaussian: Option<gaussian_primitive_topology::Device>,
     /// Last: it may own the library that all others call.
     _entry: ash::Entry,
 }
@@ -107,6 +110,8 @@ impl Gpu {
                 limits: instance
                     .get_physical_device_properties(physical_device)
                     .limits,
+                gaussian: has_gaussians(&instance, physical_device)
+                    .then(|| gaussian_primitive_topology::Device::new(&instance, &device)),
                 device,
                 physical_device,
                 instance,
@@ -133,6 +138,11 @@ impl Gpu {
     /// The device's limits.
     pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
         &self.0.limits
+    }
+
+    /// The functions of Gaussian draws, if the device has them.
+    pub fn gaussian(&self) -> Option<&gaussian_primitive_topology::Device> {
+        self.0.gaussian.as_ref()
     }
 
     /// What images of `format` with optimal tiling can be used for.
@@ -223,7 +233,18 @@ fn find(
     Ok(None)
 }
 
-/// Creates a device with every core feature that it has except robust access, which costs time.
+/// Whether a device draws Gaussians.
+fn has_gaussians(instance: &ash::Instance, physical_device: vk::PhysicalDevice) -> bool {
+    // SAFETY: the physical device is the instance's.
+    let extensions = unsafe { instance.enumerate_device_extension_properties(physical_device) };
+    let is_it = |extension: &vk::ExtensionProperties| {
+        extension.extension_name_as_c_str() == Ok(gaussian_primitive_topology::NAME)
+    };
+    extensions.is_ok_and(|extensions| extensions.iter().any(is_it))
+}
+
+/// Creates a device with every core feature that it has except robust access, which costs time; and with all features
+/// of Gaussian draws, if it draws Gaussians.
 fn create_device(
     instance: &ash::Instance,
     physical_device: vk::PhysicalDevice,
@@ -232,10 +253,15 @@ fn create_device(
     let mut vulkan_1_1 = vk::PhysicalDeviceVulkan11Features::default();
     let mut vulkan_1_2 = vk::PhysicalDeviceVulkan12Features::default();
     let mut vulkan_1_3 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut gaussian = GaussianFeatures::default();
+    let has_gaussians = has_gaussians(instance, physical_device);
     let mut features = vk::PhysicalDeviceFeatures2::default()
         .push_next(&mut vulkan_1_1)
         .push_next(&mut vulkan_1_2)
         .push_next(&mut vulkan_1_3);
+    if has_gaussians {
+        features = features.push_next(&mut gaussian);
+    }
     // SAFETY: the physical device is the instance's, and the create info is valid.
     unsafe {
         instance.get_physical_device_features2(physical_device, &mut features);
@@ -245,13 +271,20 @@ fn create_device(
         vulkan_1_1.p_next = std::ptr::null_mut();
         vulkan_1_2.p_next = std::ptr::null_mut();
         vulkan_1_3.p_next = std::ptr::null_mut();
+        gaussian.p_next = std::ptr::null_mut();
         vulkan_1_3.robust_image_access = vk::FALSE;
-        let info = vk::DeviceCreateInfo::default()
+        let names = [gaussian_primitive_topology::NAME.as_ptr()];
+        let mut info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_features(&core)
             .push_next(&mut vulkan_1_1)
             .push_next(&mut vulkan_1_2)
             .push_next(&mut vulkan_1_3);
+        if has_gaussians {
+            info = info
+                .enabled_extension_names(&names)
+                .push_next(&mut gaussian);
+        }
         instance
             .create_device(physical_device, &info, None)
             .map_err(refused("create a device"))

@@ -47,7 +47,7 @@ impl FixedState {
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(super) fn new(info: &GraphicsPipelineInfo) -> Result<Self, Error> {
-        let mut state = Self::of(info)?;
+        let mut state = Self::of(info, convert::topology(info.topology)?)?;
         if !info.discards() {
             state.set_viewports(info)?;
             state.set_samples(info)?;
@@ -57,8 +57,23 @@ impl FixedState {
         Ok(state)
     }
 
+    /// As [`FixedState::new`], of Gaussians: what becomes of their fragments.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn of_gaussians(info: &GraphicsPipelineInfo) -> Result<Self, Error> {
+        // Nothing comes of the topology.
+        let mut state = Self::of(info, Topology::TriangleStrip)?;
+        if !info.multisample.rasterization_samples.is_empty() {
+            state.set_samples(info)?;
+        }
+        state.set_depth_stencil(info)?;
+        state.set_blend(info)?;
+        Ok(state)
+    }
+
     /// Vertex assembly and rasterization; the rest such that it does nothing.
-    fn of(info: &GraphicsPipelineInfo) -> Result<Self, Error> {
+    fn of(info: &GraphicsPipelineInfo, topology: Topology) -> Result<Self, Error> {
         let raster = &info.rasterization;
         let polygon_mode = convert::polygon_mode(raster.polygon_mode)?;
         let needs = [
@@ -80,7 +95,6 @@ impl FixedState {
             (info.line_width() != 1.0, "wide_lines", "a line width but 1"),
         ];
         require_all(&needs)?;
-        let topology = convert::topology(info.topology)?;
         let is_list = matches!(
             topology,
             Topology::PointList | Topology::LineList | Topology::TriangleList

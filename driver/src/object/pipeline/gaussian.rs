@@ -1,5 +1,6 @@
 //! Pipelines of the Gaussian list topology.
 
+use super::fixed::FixedState;
 use super::vertex_input::attribute;
 use super::{CameraSource, GaussianPipeline, GraphicsPipelineInfo, blend, viewport};
 use crate::capabilities::features::EnabledFeatures;
@@ -14,6 +15,7 @@ use gaurast::vk::{
     GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
     PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use simdevice::packet::draw::DrawState;
 use simdevice::packet::{GaussianOrder, GaussianState};
 use std::sync::Arc;
 
@@ -42,7 +44,8 @@ impl GaussianPipeline {
         validate_stages(info, gaussian)?;
         validate_modes(gaussian, features)?;
         validate_values(gaussian)?;
-        validate_fixed_state(info)?;
+        validate_fixed_state(info, features)?;
+        let fragments = FixedState::of_gaussians(info)?;
 
         let locations = &gaussian.attribute_locations;
         for (name, location) in [
@@ -67,7 +70,9 @@ impl GaussianPipeline {
                     attribute(info, &name, first.saturating_add(k), 3)
                 })
                 .collect::<Result<_, _>>()?,
-            state: Arc::new(state(info, gaussian, features)?),
+            state: Arc::new(state(gaussian, features, fragments.lower())?),
+            dynamic: info.dynamic.iter().copied().filter(is_taken).collect(),
+            fixed: fragments,
             viewport: fixed(
                 "viewport",
                 info.is_dynamic(vk::DynamicState::VIEWPORT)
@@ -82,7 +87,6 @@ impl GaussianPipeline {
                 info.scissors,
             )?
             .map(rendering::rect),
-            dynamic_blend_constants: info.is_dynamic(vk::DynamicState::BLEND_CONSTANTS),
             camera: camera_source(info, gaussian, features)?,
             camera_models: CameraModels::of(features),
             merges_draws: gaussian
@@ -105,9 +109,9 @@ fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, 
 }
 
 fn state(
-    info: &GraphicsPipelineInfo,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
     features: &EnabledFeatures,
+    fragments: DrawState,
 ) -> Result<GaussianState, Error> {
     let opacity_compensated = match gaussian.antialiasing {
         GaussianAntialiasingGAURAST::DILATE => false,
@@ -144,8 +148,11 @@ fn state(
         alpha_floor: gaussian.alpha_floor,
         alpha_ceiling: gaussian.alpha_ceiling,
         transmittance_floor: gaussian.transmittance_floor,
-        blend: blend::blend_states(info)?,
-        blend_constants: info.blend_constants,
+        sample_mask: fragments.sample_mask,
+        depth_stencil: fragments.depth_stencil,
+        logic_op: fragments.logic_op,
+        blend: fragments.blend,
+        blend_constants: fragments.blend_constants,
     })
 }
 
@@ -335,24 +342,38 @@ fn validate_values(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<
 }
 
 /// Refuses what a Gaussian pipeline cannot do yet in the ordinary fixed-function state.
-fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
+fn validate_fixed_state(
+    info: &GraphicsPipelineInfo,
+    features: &EnabledFeatures,
+) -> Result<(), Error> {
+    use vk::DynamicState as S;
     let depth_stencil = info.depth_stencil.unwrap_or_default();
-    if depth_stencil.depth_test_enable != vk::FALSE
-        || depth_stencil.depth_bounds_test_enable != vk::FALSE
-        || depth_stencil.stencil_test_enable != vk::FALSE
+    let tests = [
+        (depth_stencil.depth_test_enable, S::DEPTH_TEST_ENABLE),
+        (
+            depth_stencil.depth_bounds_test_enable,
+            S::DEPTH_BOUNDS_TEST_ENABLE,
+        ),
+        (depth_stencil.stencil_test_enable, S::STENCIL_TEST_ENABLE),
+    ];
+    if tests
+        .iter()
+        .any(|&(enable, state)| enable != vk::FALSE || info.is_dynamic(state))
     {
-        return Err(not_enabled(
+        require(
+            features,
             DEPTH_STENCIL,
             "the pipeline has a depth, depth bounds or stencil test",
-        ));
+        )?;
     }
     let multisample = &info.multisample;
     let samples = multisample.rasterization_samples;
     if samples != vk::SampleCountFlags::TYPE_1 && !samples.is_empty() {
-        return Err(not_enabled(
+        require(
+            features,
             MULTISAMPLE,
             "the pipeline has several samples per pixel",
-        ));
+        )?;
     }
     if info.rasterization.rasterizer_discard_enable != vk::FALSE {
         return Err(Error::FeatureNotPresent(
@@ -376,11 +397,6 @@ fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
             "a second source of blending (feature dualSrcBlend) with Gaussians".into(),
         ));
     }
-    if info.logic_op.is_some() {
-        return Err(Error::FeatureNotPresent(
-            "logicOpEnable with Gaussians".into(),
-        ));
-    }
     if info.viewport_count > 1 {
         return Err(Error::usage(
             "VUID-VkPipelineViewportStateCreateInfo-viewportCount-01216",
@@ -393,27 +409,39 @@ fn validate_fixed_state(info: &GraphicsPipelineInfo) -> Result<(), Error> {
 /// Whether a Gaussian pipeline takes the state from the command buffer, or has no use for it.
 fn may_be_dynamic(state: vk::DynamicState) -> bool {
     use vk::DynamicState as S;
+    is_taken(&state)
+        || matches!(
+            state,
+            S::VIEWPORT
+                | S::SCISSOR
+                | S::VIEWPORT_WITH_COUNT
+                | S::SCISSOR_WITH_COUNT
+                | S::VERTEX_INPUT_BINDING_STRIDE
+                | S::LINE_WIDTH
+                | S::DEPTH_BIAS
+                | S::DEPTH_BIAS_ENABLE
+                | S::CULL_MODE
+                | S::FRONT_FACE
+                | S::PRIMITIVE_TOPOLOGY
+        )
+}
+
+/// Whether the state says what becomes of a Gaussian draw's fragments.
+fn is_taken(state: &vk::DynamicState) -> bool {
+    use vk::DynamicState as S;
     matches!(
-        state,
-        S::VIEWPORT
-            | S::SCISSOR
-            | S::VIEWPORT_WITH_COUNT
-            | S::SCISSOR_WITH_COUNT
-            | S::BLEND_CONSTANTS
-            | S::VERTEX_INPUT_BINDING_STRIDE
-            | S::LINE_WIDTH
-            | S::DEPTH_BIAS
-            | S::DEPTH_BIAS_ENABLE
+        *state,
+        S::BLEND_CONSTANTS
             | S::DEPTH_BOUNDS
+            | S::DEPTH_BOUNDS_TEST_ENABLE
+            | S::DEPTH_TEST_ENABLE
             | S::DEPTH_WRITE_ENABLE
             | S::DEPTH_COMPARE_OP
+            | S::STENCIL_TEST_ENABLE
             | S::STENCIL_COMPARE_MASK
             | S::STENCIL_WRITE_MASK
             | S::STENCIL_REFERENCE
             | S::STENCIL_OP
-            | S::CULL_MODE
-            | S::FRONT_FACE
-            | S::PRIMITIVE_TOPOLOGY
     )
 }
 

@@ -19,6 +19,7 @@ use crate::lower::camera::CameraModels;
 use crate::object::device::Device;
 use ash::vk;
 use compute::{ComputePipeline, StageInfo};
+use fixed::FixedState;
 use gaurast::vk::{
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
@@ -58,14 +59,16 @@ pub(crate) enum Primitive {
 /// The Gaussian part of a pipeline.
 #[derive(Debug)]
 pub(crate) struct GaussianPipeline {
-    /// What the device needs to know.
+    /// What the device needs to know; what is dynamic of it is filled in for each draw.
     pub(crate) state: Arc<GaussianState>,
+    /// What becomes of fragments, as far as it is static.
+    pub(crate) fixed: FixedState,
+    /// What the command buffer sets of that.
+    pub(crate) dynamic: Vec<vk::DynamicState>,
     /// The viewport, unless it is dynamic.
     pub(crate) viewport: Option<Viewport>,
     /// The scissor, unless it is dynamic.
     pub(crate) scissor: Option<Rect>,
-    /// Whether the blend constants are dynamic.
-    pub(crate) dynamic_blend_constants: bool,
     /// Where draws take their camera from.
     pub(crate) camera: CameraSource,
     /// The models that the camera may have.

@@ -1,3 +1,5 @@
+mod whole_draws;
+
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;
@@ -57,6 +59,18 @@ fn draw(
     device: &Device,
     bounds: Rect,
 ) -> GaussianDraw {
+    draw_with_depth(seed, count, state, device, bounds, None)
+}
+
+/// As [`draw`], for a depth attachment of a format, with these depth coefficients.
+fn draw_with_depth(
+    seed: u64,
+    count: u32,
+    state: GaussianState,
+    device: &Device,
+    bounds: Rect,
+    depth: Option<(Format, [f32; 2])>,
+) -> GaussianDraw {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut floats = Vec::new();
     for _ in 0..count {
@@ -115,7 +129,7 @@ fn draw(
             principal_point: [48.5, 30.0],
             near_plane: 0.2,
             far_plane: f32::INFINITY,
-            depth_coefficients: [0.0; 2],
+            depth_coefficients: depth.map_or([0.0; 2], |(_, coefficients)| coefficients),
         },
         viewport: Viewport {
             x: 0.0,
@@ -127,23 +141,13 @@ fn draw(
         },
         scissor: bounds,
     };
-    let mut set = GaussianSet::begin(&begin, bounds);
+    let mut set = GaussianSet::begin(&begin, bounds, depth.map(|(format, _)| format));
     set.append(&append);
     set.resolve(device, &mut Counters::default()).unwrap()
 }
 
 fn defaults() -> GaussianState {
-    GaussianState {
-        sh_degree: 0,
-        order: GaussianOrder::ViewDepth,
-        opacity_compensated: false,
-        low_pass_variance: 0.3,
-        alpha_floor: 1.0 / 255.0,
-        alpha_ceiling: 0.99,
-        transmittance_floor: 1e-4,
-        blend: Vec::new(),
-        blend_constants: [0.0; 4],
-    }
+    GaussianState::default()
 }
 
 /// The tile kernel's naive twin: one pixel at a time through the whole list, no blocks, no saturation.
@@ -154,6 +158,27 @@ fn naive_pixel(
     y: usize,
     fused: bool,
 ) -> Option<[f32; 4]> {
+    naive_sample(draw, tile, [x, y], fused, |_| true).fragment
+}
+
+/// What a twin's sample is.
+#[derive(Default)]
+struct Naive {
+    /// Some Gaussian's alpha reached the floor, whatever its depth.
+    reached: bool,
+    fragment: Option<[f32; 4]>,
+    median: u32,
+}
+
+/// As [`naive_pixel`], of the Gaussians whose depth passes.
+fn naive_sample(
+    draw: &GaussianDraw,
+    tile: [u32; 2],
+    [x, y]: [usize; 2],
+    fused: bool,
+    passes: impl Fn(u32) -> bool,
+) -> Naive {
+    let mut out = Naive::default();
     let mul_add = |a: f32, b: f32, c: f32| if fused { a.mul_add(b, c) } else { a * b + c };
     let power = |x: f32| {
         let x = x.clamp(-126.0, 1.0);
@@ -185,9 +210,16 @@ fn naive_pixel(
         if alpha < state.alpha_floor {
             continue;
         }
+        out.reached = true;
+        if !passes(g.depth) {
+            continue;
+        }
         let weight = t * alpha;
         if t - weight < state.transmittance_floor {
             break;
+        }
+        if t >= 0.5 {
+            out.median = g.depth;
         }
         for (c, color) in c.iter_mut().zip(g.color) {
             *c = mul_add(weight, color, *c);
@@ -195,7 +227,8 @@ fn naive_pixel(
         t -= weight;
         covered = true;
     }
-    covered.then_some([c[0], c[1], c[2], 1.0 - t])
+    out.fragment = covered.then_some([c[0], c[1], c[2], 1.0 - t]);
+    out
 }
 
 /// Every pixel of every tile equals the naive twin's, bit for bit, at every level.

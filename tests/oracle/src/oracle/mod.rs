@@ -10,6 +10,7 @@
 //! | 3, 4 | mean, covariance, determinant, opacity compensation | [`project`] |
 //! | 5 | colour from spherical harmonics | [`spherical_harmonics`] |
 //! | 6, 7 | alpha at a pixel centre, compositing front to back | [`pixel`] |
+//! | then | depth and stencil, sample by sample | [`sample_tests`] |
 //!
 //! The inputs are attributes and camera *after* conversion to binary32 (the eye: binary64), which
 //! is what the device is given too; every one of them converts exactly to `f64`, and nothing is
@@ -23,6 +24,9 @@
 //! right. It calls the pixel *undecidable* and follows both, up to [`MAX_DECISIONS`] times along
 //! one path. A pixel then has several outcomes, the first of which is what binary64 says;
 //! [`crate::compare`] holds an image against all of them.
+//!
+//! A third one, `T >= 1/2`, says which Gaussian is a pixel's median; nothing else follows from it, so a pixel
+//! simply has every median that it may have.
 //!
 //! Three more decisions exist and are not followed both ways:
 //! - the depth key is `t.z` rounded to binary32. Where the binary64 value lies within its own
@@ -38,6 +42,7 @@ pub mod error_model;
 pub mod pixel;
 pub mod project;
 mod render;
+pub mod sample_tests;
 pub mod spherical_harmonics;
 
 #[cfg(test)]
@@ -45,6 +50,9 @@ mod tests;
 
 pub use pixel::MAX_DECISIONS;
 pub use render::{Reference, render_bounded, render_literal};
+pub use sample_tests::{
+    OracleDepthFormat, OracleStencil, OracleTests, Stored, TestedReference, render_tested,
+};
 
 /// The Gaussians of a draw, in primitive order (by draw, instance, position in the draw).
 ///

@@ -48,11 +48,57 @@ impl Splat {
     }
 }
 
+/// Depth variables, one of which is a pixel's median.
+#[derive(Clone, Copy, Debug, Default)]
+struct Medians {
+    z: [f32; MAX_MEDIANS],
+    count: usize,
+    /// Whether there would be more.
+    exhausted: bool,
+}
+
+/// How many Gaussians may be the one at which T falls below one half, before the reference gives up.
+const MAX_MEDIANS: usize = 4;
+
+impl Medians {
+    /// A Gaussian contributes where `before` is left; it is the median unless less than one half is.
+    fn add(&mut self, z: f32, before: Transmittance) {
+        if before.value + before.error < 0.5 {
+            return;
+        }
+        if before.value - before.error >= 0.5 {
+            self.count = 0;
+        }
+        match self.z.get_mut(self.count) {
+            Some(slot) => {
+                *slot = z;
+                self.count += 1;
+            }
+            None => self.exhausted = true,
+        }
+    }
+}
+
+/// What became of a pixel in one of its ways.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// (C, 1 - T).
+    pub rgba: [f64; 4],
+    /// Whether a Gaussian contributed.
+    pub covered: bool,
+    /// Depth variables that the median may have, if covered.
+    pub medians: Vec<f32>,
+    /// Whether those are not all.
+    pub medians_exhausted: bool,
+}
+
 /// One way in which a pixel may come about.
 #[derive(Clone, Copy, Debug)]
 struct Path {
     color: [f64; 3],
     transmittance: Transmittance,
+    covered: bool,
+    medians: Medians,
     finished: bool,
     /// Undecidable decisions behind it, each of which was followed both ways.
     decisions: u32,
@@ -62,9 +108,24 @@ impl Path {
     const START: Self = Self {
         color: [0.0; 3],
         transmittance: Transmittance::ONE,
+        covered: false,
+        medians: Medians {
+            z: [0.0; MAX_MEDIANS],
+            count: 0,
+            exhausted: false,
+        },
         finished: false,
         decisions: 0,
     };
+
+    fn outcome(&self) -> Outcome {
+        Outcome {
+            rgba: self.rgba(),
+            covered: self.covered,
+            medians: self.medians.z[..self.medians.count].to_vec(),
+            medians_exhausted: self.medians.exhausted,
+        }
+    }
 
     fn rgba(&self) -> [f64; 4] {
         let [r, g, b] = self.color;
@@ -103,6 +164,7 @@ impl Pixel {
         }
         let mut step = Step {
             color: splat.color,
+            z: splat.z,
             alpha,
             state,
             forks: Vec::new(),
@@ -126,6 +188,13 @@ impl Pixel {
         self.alternatives.iter().map(Path::rgba).collect()
     }
 
+    /// Every way, what binary64 says first.
+    pub fn outcomes(&self) -> impl Iterator<Item = Outcome> {
+        std::iter::once(&self.nominal)
+            .chain(&self.alternatives)
+            .map(Path::outcome)
+    }
+
     /// Whether some path met more undecidable decisions than are followed.
     pub fn is_exhausted(&self) -> bool {
         self.exhausted
@@ -135,6 +204,7 @@ impl Pixel {
 /// One Gaussian being added to all paths of a pixel.
 struct Step<'a> {
     color: [f64; 3],
+    z: f32,
     alpha: Alpha,
     state: &'a OracleState,
     /// Paths that part from others at this Gaussian, which is already added to them.
@@ -195,6 +265,8 @@ impl Step<'_> {
         for (sum, color) in path.color.iter_mut().zip(self.color) {
             *sum += weight * color;
         }
+        path.covered = true;
+        path.medians.add(self.z, path.transmittance);
         path.transmittance = behind;
     }
 

@@ -21,7 +21,9 @@ pub struct Splat {
     pub color: [f64; 3],
     /// What it is sorted by, rounded to binary32.
     pub key: f32,
-    /// Whether that is within its own error of the middle between two keys.
+    /// The depth variable, rounded to binary32.
+    pub z: f32,
+    /// Whether the key is within its own error of the middle between two keys.
     pub key_undecidable: bool,
     /// How far a binary32 implementation may err on this Gaussian.
     pub error: ErrorModel,
@@ -142,6 +144,7 @@ pub fn project(
         opacity,
         color,
         key: sort_by as f32,
+        z,
         key_undecidable: state.order != OracleOrder::Primitive
             && key_is_undecidable(&rotation, offset, sort_by),
         error: ErrorModel::new(spread, opacity, area_for_opacity),

@@ -50,6 +50,27 @@ impl Reference {
         })
     }
 
+    /// Every outcome over (by `ONE`, `ONE_MINUS_SRC_ALPHA`) what is behind its pixel.
+    #[must_use]
+    pub fn over(&self, behind: &[[f64; 4]]) -> Self {
+        let blend = |index: usize, rgba: &[f64; 4]| {
+            std::array::from_fn(|c| rgba[c] + (1.0 - rgba[3]) * behind[index][c])
+        };
+        let alternatives = self.alternatives.iter();
+        Self {
+            nominal: (self.nominal.iter().enumerate())
+                .map(|(index, rgba)| blend(index, rgba))
+                .collect(),
+            alternatives: alternatives
+                .map(|(&index, outcomes)| {
+                    let outcomes = outcomes.iter().map(|rgba| blend(index, rgba));
+                    (index, outcomes.collect())
+                })
+                .collect(),
+            ..self.clone()
+        }
+    }
+
     /// The binary64 image rounded to binary32.
     pub fn to_f32(&self) -> Vec<[f32; 4]> {
         self.nominal
@@ -75,7 +96,8 @@ pub fn render_literal(
         }
         row
     });
-    collect(camera, &projected, rows.collect())
+    let rows: Vec<Vec<Pixel>> = rows.collect();
+    collect(camera, &projected, || rows.iter().flatten())
 }
 
 /// Draws every Gaussian where its alpha can reach the floor, rows in parallel.
@@ -117,17 +139,18 @@ pub fn render_bounded(
             row
         })
         .collect();
-    collect(camera, &projected, rows)
+    let rows: Vec<Vec<Pixel>> = rows;
+    collect(camera, &projected, || rows.iter().flatten())
 }
 
 /// The Gaussians that are drawn, nearest first, and a tally of the others.
-struct Projected {
-    splats: Vec<Splat>,
+pub(super) struct Projected {
+    pub(super) splats: Vec<Splat>,
     skips: SkipCounts,
 }
 
 impl Projected {
-    fn new(scene: &OracleScene, camera: &OracleCamera, state: &OracleState) -> Self {
+    pub(super) fn new(scene: &OracleScene, camera: &OracleCamera, state: &OracleState) -> Self {
         let mut skips = SkipCounts::default();
         let mut splats = Vec::with_capacity(scene.len());
         for index in 0..scene.len() {
@@ -142,8 +165,11 @@ impl Projected {
     }
 }
 
-fn collect(camera: &OracleCamera, projected: &Projected, rows: Vec<Vec<Pixel>>) -> Reference {
-    let pixels = || rows.iter().flatten();
+pub(super) fn collect<'a, I: Iterator<Item = &'a Pixel>>(
+    camera: &OracleCamera,
+    projected: &Projected,
+    pixels: impl Fn() -> I,
+) -> Reference {
     Reference {
         width: camera.width,
         height: camera.height,
@@ -164,7 +190,7 @@ fn collect(camera: &OracleCamera, projected: &Projected, rows: Vec<Vec<Pixel>>) 
 }
 
 /// The ellipse outside which a Gaussian's alpha is decidably below the floor.
-struct Bound {
+pub(super) struct Bound {
     mean: [f64; 2],
     covariance: [f64; 3],
     determinant: f64,
@@ -173,7 +199,7 @@ struct Bound {
 }
 
 impl Bound {
-    fn new(splat: &Splat, state: &OracleState) -> Self {
+    pub(super) fn new(splat: &Splat, state: &OracleState) -> Self {
         // Undecidable or better needs opacity exp(-q / 2) (1 + error) >= floor, hence
         // q <= level + 2 ln(1 + error). The error is at most 1, which bounds q, which bounds it.
         let level = 2.0 * (splat.opacity / f64::from(state.alpha_floor)).ln();
@@ -195,7 +221,7 @@ impl Bound {
     }
 
     /// Rows of pixels that the ellipse and its margin reach.
-    fn rows(&self, height: u32) -> Range<u32> {
+    pub(super) fn rows(&self, height: u32) -> Range<u32> {
         if self.q < 0.0 {
             return 0..0;
         }
@@ -203,7 +229,7 @@ impl Bound {
     }
 
     /// Pixels of row `y` that the ellipse and its margin reach.
-    fn columns(&self, y: u32, width: u32) -> Range<u32> {
+    pub(super) fn columns(&self, y: u32, width: u32) -> Range<u32> {
         let [_, xy, yy] = self.covariance;
         let dy = f64::from(y) + 0.5 - self.mean[1];
         let centre = self.mean[0] + xy / yy * dy;

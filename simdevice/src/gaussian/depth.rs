@@ -1,0 +1,183 @@
+//! The depth of a Gaussian's centre, as the depth attachment holds it.
+
+use crate::format::Format;
+use crate::packet::{Camera, CameraModel, Viewport};
+use crate::raster::DepthCode;
+
+/// How depths follow one another where depth variables ascend.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Trend {
+    /// No later one is less.
+    Rising,
+    /// No later one is greater.
+    Falling,
+    /// Anyhow.
+    None,
+}
+
+/// How the depth variable of a draw's centres becomes a depth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CenterDepth {
+    /// Whether the depth is linear in the depth variable, not in its inverse.
+    is_linear: bool,
+    coefficients: [f64; 2],
+    /// The viewport's depths of 0 and 1.
+    range: [f64; 2],
+    code: DepthCode,
+}
+
+impl CenterDepth {
+    /// Of a camera and a viewport, for an attachment of `format`.
+    pub(crate) fn new(camera: &Camera, viewport: &Viewport, format: Format) -> Self {
+        Self {
+            is_linear: camera.model == CameraModel::Orthographic,
+            coefficients: camera.depth_coefficients.map(f64::from),
+            range: [viewport.min_depth, viewport.max_depth].map(f64::from),
+            code: DepthCode::of(format),
+        }
+    }
+
+    /// The depth of a centre whose depth variable is `z`: computed in binary64, clamped to 0 to 1, mapped to the
+    /// viewport's range and rounded once, to the format's nearest.
+    #[inline]
+    pub(crate) fn code(&self, z: f32) -> u32 {
+        let z = f64::from(z);
+        let [c0, c1] = self.coefficients;
+        let depth = clamp(c0 + if self.is_linear { c1 * z } else { c1 / z });
+        let [near, far] = self.range;
+        let depth = clamp(near + depth * (far - near));
+        match self.code {
+            DepthCode::Float => (depth as f32).to_bits(),
+            DepthCode::Unorm(bits) => {
+                let greatest = f64::from((1u32 << bits) - 1);
+                (depth * greatest).round_ties_even() as u32
+            }
+        }
+    }
+
+    /// How [`CenterDepth::code`] changes as z grows; every operation in it is monotonic, its rounding included. Only
+    /// a linear depth may have z of either sign.
+    pub(crate) fn trend(&self) -> Trend {
+        let [near, far] = self.range;
+        let slope = self.coefficients[1] * (far - near);
+        let slope = if self.is_linear { slope } else { -slope };
+        if slope < 0.0 {
+            Trend::Falling
+        } else {
+            Trend::Rising
+        }
+    }
+}
+
+/// Clamps to 0 to 1; what is no number becomes 0, and so does negative zero.
+fn clamp(depth: f64) -> f64 {
+    if depth > 0.0 { depth.min(1.0) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn depth(
+        model: CameraModel,
+        coefficients: [f32; 2],
+        range: [f32; 2],
+        format: Format,
+    ) -> CenterDepth {
+        let camera = Camera {
+            model,
+            rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            eye: [0.0; 3],
+            focal_length: [1.0; 2],
+            principal_point: [0.0; 2],
+            near_plane: 0.5,
+            far_plane: 100.0,
+            depth_coefficients: coefficients,
+        };
+        let viewport = Viewport {
+            x: 0.0,
+            y: 0.0,
+            width: 8.0,
+            height: 8.0,
+            min_depth: range[0],
+            max_depth: range[1],
+        };
+        CenterDepth::new(&camera, &viewport, format)
+    }
+
+    #[test]
+    fn depths_are_the_projection_matrix_s() {
+        // Near 1, far 4: depth (4 / 3) (1 - 1 / z).
+        let of = |format| {
+            depth(
+                CameraModel::Pinhole,
+                [4.0 / 3.0, -4.0 / 3.0],
+                [0.0, 1.0],
+                format,
+            )
+        };
+        let float = of(Format::D32Sfloat);
+        assert_eq!(float.code(1.0), 0);
+        assert_eq!(float.code(0.5), 0, "nearer than the near plane");
+        assert_eq!(float.code(9.0), 1.0f32.to_bits(), "beyond the far plane");
+        let (two, expected) = (f32::from_bits(float.code(2.0)), 2.0 / 3.0);
+        assert!((two - expected).abs() < 1e-6, "{two}");
+        assert_eq!(of(Format::D16Unorm).code(2.0), 43690);
+        assert_eq!(of(Format::X8D24UnormPack32).code(4.0), (1 << 24) - 1);
+    }
+
+    #[test]
+    fn the_viewport_maps_depths_and_trends_are_true() {
+        let cases = [
+            (
+                CameraModel::Pinhole,
+                [1.0, -1.0],
+                [0.25, 0.75],
+                Trend::Rising,
+            ),
+            (CameraModel::Pinhole, [0.0, 1.0], [0.0, 1.0], Trend::Falling),
+            (CameraModel::Fisheye, [0.0, 1.0], [1.0, 0.5], Trend::Rising),
+            (
+                CameraModel::Orthographic,
+                [0.5, 0.01],
+                [0.0, 1.0],
+                Trend::Rising,
+            ),
+            (
+                CameraModel::Orthographic,
+                [0.5, 0.01],
+                [1.0, 0.0],
+                Trend::Falling,
+            ),
+        ];
+        for (model, coefficients, range, trend) in cases {
+            for format in [
+                Format::D16Unorm,
+                Format::X8D24UnormPack32,
+                Format::D32Sfloat,
+            ] {
+                let depth = depth(model, coefficients, range, format);
+                assert_eq!(depth.trend(), trend);
+                let first = if model == CameraModel::Orthographic {
+                    -40
+                } else {
+                    1
+                };
+                let codes: Vec<u32> = (first..200).map(|z| depth.code(0.3 * z as f32)).collect();
+                let ordered = match trend {
+                    Trend::Falling => codes.is_sorted_by(|a, b| a >= b),
+                    _ => codes.is_sorted(),
+                };
+                assert!(
+                    ordered && codes[0] != codes[codes.len() - 1],
+                    "{model:?} {format:?}"
+                );
+                let [low, high] = [range[0].min(range[1]), range[0].max(range[1])];
+                if format == Format::D32Sfloat {
+                    let inside = |&code: &u32| (low..=high).contains(&f32::from_bits(code));
+                    assert!(codes.iter().all(inside));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,461 @@
+//! Whole draws with random tests against a twin that takes each sample for itself.
+
+use super::*;
+use crate::image::{Image, ImageDesc, ImageKind, ImageView};
+use crate::packet::draw::*;
+use crate::pass::{Pass, PassDraw};
+use crate::raster::blend::Blender;
+use crate::raster::depth::{apply, compare};
+use rand::seq::IndexedRandom;
+
+const DEPTHS: [Format; 5] = [
+    Format::D16Unorm,
+    Format::X8D24UnormPack32,
+    Format::D32Sfloat,
+    Format::D24UnormS8Uint,
+    Format::D32SfloatS8Uint,
+];
+const COLORS: [Format; 4] = [
+    Format::R32G32B32A32Sfloat,
+    Format::R8G8B8A8Unorm,
+    Format::B8G8R8A8Srgb,
+    Format::R16G16B16A16Sfloat,
+];
+const COMPARES: [CompareOp; 8] = [
+    CompareOp::Never,
+    CompareOp::Less,
+    CompareOp::Equal,
+    CompareOp::LessOrEqual,
+    CompareOp::Greater,
+    CompareOp::NotEqual,
+    CompareOp::GreaterOrEqual,
+    CompareOp::Always,
+];
+const STENCIL_OPS: [StencilOp; 8] = [
+    StencilOp::Keep,
+    StencilOp::Zero,
+    StencilOp::Replace,
+    StencilOp::IncrementAndClamp,
+    StencilOp::DecrementAndClamp,
+    StencilOp::Invert,
+    StencilOp::IncrementAndWrap,
+    StencilOp::DecrementAndWrap,
+];
+
+/// Depth coefficients that take 1 to 6 to 0 to 1, and to 1 to 0.
+const FORWARD: [f32; 2] = [1.2, -1.2];
+const REVERSE: [f32; 2] = [-0.2, 1.2];
+
+fn one_of<T: Copy>(rng: &mut ChaCha8Rng, of: &[T]) -> T {
+    *of.choose(rng).unwrap()
+}
+
+/// What is drawn, and what the attachments hold before: by sample of each pixel.
+struct Scene {
+    seed: u64,
+    state: GaussianState,
+    samples: u32,
+    bounds: Rect,
+    color: Format,
+    depth: Format,
+    coefficients: [f32; 2],
+    before: Picture,
+}
+
+/// What attachments hold, by sample of each pixel.
+#[derive(Clone, Debug, PartialEq)]
+struct Picture {
+    color: Vec<[f32; 4]>,
+    depth: Vec<u32>,
+    stencil: Vec<u8>,
+    passed: u64,
+}
+
+fn random_state(rng: &mut ChaCha8Rng) -> GaussianState {
+    let face = |rng: &mut ChaCha8Rng| StencilFace {
+        fail: one_of(rng, &STENCIL_OPS),
+        pass: one_of(rng, &STENCIL_OPS),
+        depth_fail: one_of(rng, &STENCIL_OPS),
+        compare: one_of(rng, &COMPARES),
+        compare_mask: one_of(rng, &[1, 3, 0xFF]),
+        write_mask: one_of(rng, &[0, 0x0F, 0xFF]),
+        reference: rng.random_range(0..4),
+    };
+    let over = BlendEquation {
+        source: BlendFactor::One,
+        destination: BlendFactor::OneMinusSrcAlpha,
+        op: BlendOp::Add,
+    };
+    GaussianState {
+        order: one_of(
+            rng,
+            &[
+                GaussianOrder::ViewDepth,
+                GaussianOrder::ViewDepth,
+                GaussianOrder::RadialDistance,
+                GaussianOrder::Primitive,
+            ],
+        ),
+        transmittance_floor: one_of(rng, &[1e-4, 0.3]),
+        sample_mask: one_of(rng, &[u32::MAX, u32::MAX, 0b1011]),
+        depth_stencil: DepthStencil {
+            depth: rng.random_bool(0.9).then(|| DepthTest {
+                compare: one_of(rng, &COMPARES),
+                write: rng.random(),
+            }),
+            bounds: rng.random_bool(0.2).then_some((0.25, 0.9)),
+            stencil: rng.random_bool(0.5).then(|| [face(rng), face(rng)]),
+        },
+        blend: vec![BlendState {
+            equations: rng.random_bool(0.7).then_some((over, over)),
+            write_mask: one_of(rng, &[0xF, 0xF, 0b0101]),
+        }],
+        ..defaults()
+    }
+}
+
+fn random_scene(seed: u64) -> Scene {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let samples = one_of(&mut rng, &[1, 4]);
+    let (color, depth) = (one_of(&mut rng, &COLORS), one_of(&mut rng, &DEPTHS));
+    let coefficients = one_of(&mut rng, &[FORWARD, REVERSE]);
+    let state = random_state(&mut rng);
+    let bounds = one_of(
+        &mut rng,
+        &[
+            WHOLE,
+            Rect {
+                x: 5,
+                y: 3,
+                width: 70,
+                height: 51,
+            },
+        ],
+    );
+    // Depths that Gaussians have, so that equal ones occur.
+    let device = Device::new(&Config::default()).unwrap();
+    let like = Some((depth.plane(Aspect::Depth).unwrap(), coefficients));
+    let tested = GaussianState {
+        depth_stencil: DepthStencil {
+            depth: Some(DepthTest {
+                compare: CompareOp::Always,
+                write: true,
+            }),
+            ..DepthStencil::default()
+        },
+        ..state.clone()
+    };
+    let draw = draw_with_depth(seed, 300, tested, &device, WHOLE, like);
+    let depths: Vec<u32> = draw.splats.iter().flatten().map(|g| g.depth).collect();
+    let count = (96 * 64 * samples) as usize;
+    let mut before = Picture {
+        color: Vec::with_capacity(count),
+        depth: Vec::with_capacity(count),
+        stencil: Vec::with_capacity(count),
+        passed: 0,
+    };
+    let has_stencil = depth.plane(Aspect::Stencil).is_some();
+    for at in 0..count {
+        let (pixel, sample) = (at as u32 / samples, at as u32 % samples);
+        // Large areas of one depth, some of which differ by sample.
+        let [x, y] = [pixel % 96, pixel / 96];
+        let area = x / 24 + y / 20 * 4;
+        let part = if area % 3 == 0 && x + y < 90 {
+            sample
+        } else {
+            0
+        };
+        before
+            .depth
+            .push(depths[(area * 31 + part * 7) as usize % depths.len()]);
+        let stencil = ((x / 7 + y / 5 + part) % 4) as u8;
+        before.stencil.push(if has_stencil { stencil } else { 0 });
+        let texel = [0.125, 0.5, 0.25, 1.0].map(|c| c + 0.001 * (x % 9) as f32);
+        let bytes = color.encode(texel);
+        before.color.push(color.decode(&bytes));
+    }
+    Scene {
+        seed,
+        state,
+        samples,
+        bounds,
+        color,
+        depth,
+        coefficients,
+        before,
+    }
+}
+
+impl Scene {
+    fn draw(&self, device: &Device) -> GaussianDraw {
+        let depth = Some((self.depth.plane(Aspect::Depth).unwrap(), self.coefficients));
+        draw_with_depth(
+            self.seed,
+            300,
+            self.state.clone(),
+            device,
+            self.bounds,
+            depth,
+        )
+    }
+
+    /// Each sample for itself.
+    fn naive(&self, draw: &GaussianDraw, fused: bool) -> Picture {
+        let mut picture = self.before.clone();
+        let state = &self.state;
+        let blender = Blender::new(&state.blend[0], state.blend_constants, self.color);
+        let tests = &state.depth_stencil;
+        let has_stencil = self.depth.plane(Aspect::Stencil).is_some();
+        for at in 0..picture.depth.len() {
+            let (pixel, sample) = (at as u32 / self.samples, at as u32 % self.samples);
+            let [x, y] = [pixel % 96, pixel / 96];
+            let here = Rect {
+                x: x as i32,
+                y: y as i32,
+                width: 1,
+                height: 1,
+            };
+            if self.bounds.intersect(here).is_empty() || state.sample_mask >> sample & 1 == 0 {
+                continue;
+            }
+            let stored = picture.depth[at];
+            let depth = match self.depth.plane(Aspect::Depth).unwrap() {
+                Format::D16Unorm => f64::from(stored) / 65535.0,
+                Format::X8D24UnormPack32 => f64::from(stored) / 16_777_215.0,
+                _ => f32::from_bits(stored).into(),
+            };
+            if tests
+                .bounds
+                .is_some_and(|(least, greatest)| depth < least.into() || depth > greatest.into())
+            {
+                continue;
+            }
+            let face = tests
+                .stencil
+                .map(|[front, _]| front)
+                .filter(|_| has_stencil);
+            let stencil_passes = face.is_none_or(|face| {
+                let masked = picture.stencil[at] & face.compare_mask;
+                compare(face.compare, face.reference & face.compare_mask, masked)
+            });
+            let tile = [x / 16, y / 16];
+            let inside = [x % 16, y % 16].map(|at| at as usize);
+            let found = naive_sample(draw, tile, inside, fused, |depth| {
+                stencil_passes
+                    && tests
+                        .depth
+                        .is_none_or(|test| compare(test.compare, depth, stored))
+            });
+            if let Some(face) = face.filter(|_| found.reached) {
+                let op = match (stencil_passes, found.fragment.is_some()) {
+                    (false, _) => face.fail,
+                    (true, false) => face.depth_fail,
+                    (true, true) => face.pass,
+                };
+                let old = picture.stencil[at];
+                let new = apply(op, old, face.reference);
+                picture.stencil[at] = old & !face.write_mask | new & face.write_mask;
+            }
+            let Some(fragment) = found.fragment else {
+                continue;
+            };
+            picture.passed += 1;
+            if tests.depth.is_some_and(|test| test.write) {
+                picture.depth[at] = found.median;
+            }
+            let blended = blender.blend(fragment, picture.color[at]);
+            picture.color[at] = self.color.decode(&self.color.encode(blended));
+        }
+        picture
+    }
+
+    fn image(&self, format: Format) -> ImageView {
+        let desc = ImageDesc {
+            kind: ImageKind::D2,
+            format,
+            extent: [96, 64, 1],
+            mip_levels: 1,
+            array_layers: 1,
+            samples: self.samples,
+        };
+        let memory = Allocation::new_zeroed(desc.memory_size().unwrap()).unwrap();
+        ImageView {
+            image: Arc::new(Image::new(desc, memory, 0).unwrap()),
+            format,
+            base_mip_level: 0,
+            level_count: 1,
+            base_layer: 0,
+            layer_count: 1,
+        }
+    }
+
+    /// Calls `with` for each sample's texel of an aspect: its index, where it is, and its size.
+    fn each(
+        &self,
+        view: &ImageView,
+        aspect: Aspect,
+        mut with: impl FnMut(usize, &crate::image::SubresourceLayout, [u32; 3], usize),
+    ) {
+        let Some(layout) = view.image.subresource(aspect, 0, 0) else {
+            return;
+        };
+        for at in 0..self.before.depth.len() {
+            let (pixel, sample) = (at as u32 / self.samples, at as u32 % self.samples);
+            let layout = layout.sample(sample);
+            let size = layout.format.texel_size();
+            with(at, &layout, [pixel % 96, pixel / 96, 0], size);
+        }
+    }
+
+    /// Draws it on a device.
+    fn render(&self, device: &Device) -> Picture {
+        let (color, depth) = (self.image(self.color), self.image(self.depth));
+        let before = &self.before;
+        let write = |view: &ImageView, aspect, texel: &dyn Fn(usize) -> Vec<u8>| {
+            self.each(view, aspect, |at, layout, place, size| {
+                let bytes = &texel(at)[..size];
+                view.image.write_row(layout, place, bytes).unwrap();
+            });
+        };
+        write(&color, Aspect::Color, &|at| {
+            self.color.encode(before.color[at]).to_vec()
+        });
+        write(&depth, Aspect::Depth, &|at| {
+            before.depth[at].to_le_bytes().to_vec()
+        });
+        write(&depth, Aspect::Stencil, &|at| vec![before.stencil[at]]);
+        let attachment = |view: &ImageView| Attachment {
+            view: view.clone(),
+            load: LoadOp::Load,
+            store: StoreOp::Store,
+            resolve: None,
+        };
+        let has_stencil = self.depth.plane(Aspect::Stencil).is_some();
+        let mut pass = Pass::begin(&Rendering {
+            area: WHOLE,
+            layer_count: 1,
+            color: vec![Some(attachment(&color))],
+            depth: Some(attachment(&depth)),
+            stencil: has_stencil.then(|| attachment(&depth)),
+        })
+        .unwrap();
+        let mut counters = Counters::default();
+        let draw = PassDraw::Gaussians(self.draw(device));
+        pass.push(draw, device, &mut counters).unwrap();
+        pass.end(device, &mut counters).unwrap();
+        let read = |view: &ImageView, aspect| {
+            let mut texels = Vec::new();
+            self.each(view, aspect, |_, layout, place, size| {
+                let mut bytes = vec![0; size];
+                view.image.read_row(layout, place, &mut bytes).unwrap();
+                bytes.resize(16, 0);
+                texels.push(bytes);
+            });
+            texels
+        };
+        let word = |bytes: Vec<u8>| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+        let colors = read(&color, Aspect::Color).into_iter();
+        let stencils = read(&depth, Aspect::Stencil).into_iter();
+        Picture {
+            color: colors.map(|bytes| self.color.decode(&bytes)).collect(),
+            depth: read(&depth, Aspect::Depth).into_iter().map(word).collect(),
+            stencil: if has_stencil {
+                stencils.map(|bytes| bytes[0]).collect()
+            } else {
+                before.stencil.clone()
+            },
+            passed: counters.get(Counter::SamplesPassed),
+        }
+    }
+}
+
+#[test]
+fn random_tests_agree_with_the_twin_at_every_level() {
+    let mut changed = 0;
+    for seed in 0..60 {
+        let scene = random_scene(seed);
+        for (name, simd) in SimdLevel::supported() {
+            let device = Device::new(&Config {
+                threads: 2,
+                simd,
+                ..Config::default()
+            })
+            .unwrap();
+            let fused = matches!(simd, SimdLevel::Avx2 | SimdLevel::Avx512);
+            let expected = scene.naive(&scene.draw(&device), fused);
+            let found = scene.render(&device);
+            for at in 0..expected.depth.len() {
+                let of = |p: &Picture| (p.color[at], p.depth[at], p.stencil[at]);
+                assert_eq!(
+                    of(&found),
+                    of(&expected),
+                    "{name}, seed {seed}, {:?}, {:?}, {} samples, sample {at} of {:?}, {:?}",
+                    scene.color,
+                    scene.depth,
+                    scene.samples,
+                    of(&scene.before),
+                    scene.state,
+                );
+            }
+            assert_eq!(found.passed, expected.passed, "{name}, seed {seed}");
+            changed += u32::from(expected.passed > 0);
+        }
+    }
+    assert!(changed > 60, "hardly anything was drawn");
+}
+
+/// The draw's counters, and the counters when nothing can be hidden, for a stored depth that is the same everywhere.
+fn hidden(coefficients: [f32; 2], compare: CompareOp, stored: f32) -> Counters {
+    let device = Device::new(&Config::default()).unwrap();
+    let state = GaussianState {
+        depth_stencil: DepthStencil {
+            depth: Some(DepthTest {
+                compare,
+                write: false,
+            }),
+            ..DepthStencil::default()
+        },
+        ..defaults()
+    };
+    let draw = draw_with_depth(
+        3,
+        2000,
+        state,
+        &device,
+        WHOLE,
+        Some((Format::D32Sfloat, coefficients)),
+    );
+    let mut tile = Box::new(GaussianTile::default());
+    let mut counters = Counters::default();
+    let lanes = [ALL_LANES; BLOCKS];
+    tile.passing.set(compare, &[stored.to_bits(); 256], &lanes);
+    tile.run::<TEST_DEPTH>(&draw, device.level(), [2, 2], 0, &lanes, &mut counters);
+    let pairs = counters.get(Counter::TilePairsEvaluated);
+    assert!(pairs <= draw.tiles.list(2, 2).len() as u64);
+    counters
+}
+
+#[test]
+fn what_is_behind_a_whole_tile_is_not_even_fetched() {
+    let (forward, reverse) = (
+        hidden(FORWARD, CompareOp::Less, 0.3),
+        hidden(REVERSE, CompareOp::Greater, 0.7),
+    );
+    let everything = hidden(FORWARD, CompareOp::Always, 0.3);
+    for counters in [forward, reverse] {
+        assert!(counters.get(Counter::GaussianTilesHidden) > 0);
+        let read = |counters: &Counters| {
+            (
+                counters.get(Counter::TilePairsEvaluated),
+                counters.get(Counter::BlockEvaluations),
+            )
+        };
+        let (pairs, blocks) = read(&counters);
+        let (all_pairs, all_blocks) = read(&everything);
+        assert!(pairs <= all_pairs && blocks < all_blocks);
+        assert!(pairs > 0 && blocks > 0, "what is in front is drawn");
+    }
+    let nothing = hidden(FORWARD, CompareOp::Less, 0.0);
+    assert_eq!(nothing.get(Counter::BlockEvaluations), 0);
+    assert_eq!(everything.get(Counter::GaussianTilesHidden), 0);
+}

@@ -1,0 +1,339 @@
+//! A Gaussian draw in a tile: depth bounds and stencil first, then the kernel with its depth test, then the blended
+//! colour, the median depth and the stencil, each once.
+//!
+//! Alpha is that of the pixel's centre, so samples of a pixel differ only in what their tests let pass. The kernel runs
+//! once for all samples that agree in all of a block, and again only in the blocks of a tile where some differ.
+
+use super::{
+    BLOCKS, DepthMode, FIND_MEDIAN, GaussianTile, LANES, Lanes, NO_DEPTH, TEST_DEPTH, TILE_SIZE,
+    count, lanes_within,
+};
+use crate::counters::{Counter, Counters};
+use crate::gaussian::GaussianDraw;
+use crate::packet::BlendState;
+use crate::packet::draw::{StencilFace, StencilOp};
+use crate::raster::MAX_SAMPLES;
+use crate::raster::color::{ColorOutput, Quads};
+use crate::raster::depth::{Tests, apply, compare};
+use crate::raster::primitives::{Buffers, Targets};
+use crate::raster::tile::{AREA, Target, Tile};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+
+const SAMPLES: usize = MAX_SAMPLES as usize;
+
+/// A Gaussian draw made ready for tiles, which all workers share.
+#[derive(Debug)]
+pub struct GaussianTileDraw<'a> {
+    draw: &'a GaussianDraw,
+    targets: Targets<'a>,
+    /// The first colour attachment, unless the draw leaves it as it is.
+    color: Option<ColorOutput>,
+    tests: Tests,
+    /// Samples of a pixel.
+    samples: usize,
+    level: Level,
+}
+
+/// What becomes of a tile's samples: lanes by sample and block.
+#[derive(Debug, Default)]
+struct Samples {
+    /// Those that the draw may touch, and whose stored depth lies within bounds.
+    candidates: [Lanes; SAMPLES],
+    /// Those of them that pass the stencil test.
+    tested: [Lanes; SAMPLES],
+    /// The layer that a sample's block is composited in.
+    layers: [[usize; BLOCKS]; SAMPLES],
+}
+
+impl<'a> GaussianTileDraw<'a> {
+    /// Makes a draw ready. `samples` are the attachments' samples, if there are attachments.
+    pub fn new(
+        draw: &'a GaussianDraw,
+        targets: Targets<'a>,
+        samples: Option<u32>,
+        level: Level,
+    ) -> Self {
+        const REPLACE: BlendState = BlendState {
+            equations: None,
+            write_mask: 0xF,
+        };
+        let state = &*draw.state;
+        let format = targets.color.first().and_then(Option::as_ref);
+        let color = format
+            .map(Target::format)
+            // A draw's floating-point colours mean nothing to an integer attachment.
+            .filter(|format| !format.is_integer())
+            .and_then(|format| {
+                let blend = state.blend.first().unwrap_or(&REPLACE);
+                ColorOutput::new(blend, state.logic_op, state.blend_constants, format)
+            });
+        let depth = targets.depth.map(Target::format);
+        Self {
+            draw,
+            targets,
+            color,
+            tests: Tests::new(&state.depth_stencil, depth, targets.stencil.is_some()),
+            samples: samples.map_or(1, |samples| samples as usize).min(SAMPLES),
+            level,
+        }
+    }
+
+    /// Renders what it covers of a tile.
+    pub fn render(
+        &self,
+        tile: &Tile,
+        buffers: &mut Buffers,
+        fragments: &mut GaussianTile,
+        counters: &mut Counters,
+    ) {
+        if !self.draw.touches(tile.pixels) {
+            return;
+        }
+        if let Some(target) = self.targets.depth.filter(|_| self.tests.reads_depth()) {
+            buffers.depth.touch(target, 0, tile);
+        }
+        if let Some(target) = self
+            .targets
+            .stencil
+            .filter(|_| self.tests.stencil.is_some())
+        {
+            buffers.stencil.touch(target, 0, tile);
+        }
+        let mut samples = self.test_first(tile, buffers);
+        match self.tests.depth {
+            None => self.composite::<NO_DEPTH>(tile, &mut samples, buffers, fragments, counters),
+            Some((_, false)) => {
+                self.composite::<TEST_DEPTH>(tile, &mut samples, buffers, fragments, counters);
+            }
+            Some((_, true)) => {
+                self.composite::<FIND_MEDIAN>(tile, &mut samples, buffers, fragments, counters);
+            }
+        }
+        let covered: [Lanes; SAMPLES] = std::array::from_fn(|sample| {
+            std::array::from_fn(|block| {
+                let layer = &fragments.layers[samples.layers[sample][block]];
+                layer.covered[block] & samples.tested[sample][block]
+            })
+        });
+        let passed: u32 = covered.iter().take(self.samples).map(count).sum();
+        counters.add(Counter::SamplesPassed, passed.into());
+        if passed > 0 {
+            self.write_color(tile, &samples, &covered, buffers, fragments);
+            if self.tests.depth.is_some_and(|(_, write)| write) {
+                self.write_depth(tile, &samples, &covered, buffers, fragments);
+            }
+        }
+        if let Some([face, _]) = &self.tests.stencil {
+            self.write_stencil(face, tile, &samples, &covered, buffers, fragments);
+        }
+    }
+
+    /// Finds the samples that depth bounds and stencil let pass.
+    fn test_first(&self, tile: &Tile, buffers: &mut Buffers) -> Samples {
+        let corner = tile.at.map(|at| at * TILE_SIZE);
+        let touched = lanes_within(self.draw.bounds.intersect(tile.pixels), corner);
+        let mut samples = Samples::default();
+        for sample in 0..self.samples {
+            if self.draw.state.sample_mask >> sample & 1 == 0 {
+                continue;
+            }
+            let mut lanes = touched;
+            if let Some([least, greatest]) = self.tests.bounds {
+                let start = buffers.depth.start(tile.index, sample);
+                let stored = &buffers.depth.words_mut()[start..][..AREA];
+                keep(&mut lanes, stored, |depth| {
+                    (least..=greatest).contains(&depth)
+                });
+            }
+            samples.candidates[sample] = lanes;
+            if let Some([face, _]) = &self.tests.stencil {
+                let start = buffers.stencil.start(tile.index, sample);
+                let stored = &buffers.stencil.bytes_mut()[start..][..AREA];
+                let reference = face.reference & face.compare_mask;
+                keep(&mut lanes, stored, |stencil| {
+                    compare(face.compare, reference, stencil & face.compare_mask)
+                });
+            }
+            samples.tested[sample] = lanes;
+        }
+        samples
+    }
+
+    /// Runs the kernel for every sample, in the blocks where no earlier one had the same tests.
+    fn composite<const DEPTH: DepthMode>(
+        &self,
+        tile: &Tile,
+        samples: &mut Samples,
+        buffers: &mut Buffers,
+        fragments: &mut GaussianTile,
+        counters: &mut Counters,
+    ) {
+        for sample in 0..self.samples {
+            let mut lanes = samples.tested[sample];
+            for (block, lanes) in lanes.iter_mut().enumerate() {
+                let same = |earlier: &usize| {
+                    let tested = &samples.tested;
+                    tested[*earlier][block] == tested[sample][block]
+                        && (DEPTH == NO_DEPTH
+                            || self.depths(tile, buffers, *earlier, block)
+                                == self.depths(tile, buffers, sample, block))
+                };
+                let layer = (0..sample).find(same).unwrap_or(sample);
+                samples.layers[sample][block] = samples.layers[layer][block];
+                if layer == sample {
+                    samples.layers[sample][block] = sample;
+                } else {
+                    *lanes = 0;
+                }
+            }
+            if lanes == [0; BLOCKS] && sample > 0 {
+                continue;
+            }
+            if let Some((op, _)) = self.tests.depth {
+                let start = buffers.depth.start(tile.index, sample);
+                let stored = &buffers.depth.words_mut()[start..][..AREA];
+                fragments.passing.set(op, stored, &lanes);
+            }
+            fragments.run::<DEPTH>(self.draw, self.level, tile.at, sample, &lanes, counters);
+        }
+    }
+
+    /// A sample's stored depths in a block.
+    fn depths(&self, tile: &Tile, buffers: &Buffers, sample: usize, block: usize) -> [u32; LANES] {
+        let start = buffers.depth.start(tile.index, sample) + block * LANES;
+        let mut depths = [0; LANES];
+        depths.copy_from_slice(&buffers.depth.words()[start..][..LANES]);
+        depths
+    }
+
+    /// Blends the covered samples' colours.
+    fn write_color(
+        &self,
+        tile: &Tile,
+        samples: &Samples,
+        covered: &[Lanes; SAMPLES],
+        buffers: &mut Buffers,
+        fragments: &GaussianTile,
+    ) {
+        let target = self.targets.color.first().and_then(Option::as_ref);
+        let (Some(output), Some(target), Some(plane)) =
+            (&self.color, target, buffers.color.first_mut())
+        else {
+            return;
+        };
+        plane.touch(target, 0, tile);
+        for (sample, lanes) in covered.iter().enumerate().take(self.samples) {
+            let start = plane.start(tile.index, sample);
+            let layers = &samples.layers[sample];
+            let words = plane.words_mut();
+            dispatch!(self.level, simd =>
+                blend(simd, output, fragments, layers, lanes, start, words));
+        }
+        plane.changed(tile.index);
+    }
+
+    /// Stores the covered samples' median depths.
+    fn write_depth(
+        &self,
+        tile: &Tile,
+        samples: &Samples,
+        covered: &[Lanes; SAMPLES],
+        buffers: &mut Buffers,
+        fragments: &GaussianTile,
+    ) {
+        for (sample, covered) in covered.iter().enumerate().take(self.samples) {
+            let start = buffers.depth.start(tile.index, sample);
+            let stored = &mut buffers.depth.words_mut()[start..][..AREA];
+            for (block, stored) in stored.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+                let layer = &fragments.layers[samples.layers[sample][block]];
+                for (lane, stored) in stored.iter_mut().enumerate() {
+                    if covered[block] >> lane & 1 == 1 {
+                        *stored = layer.median[block][lane];
+                    }
+                }
+            }
+        }
+        buffers.depth.changed(tile.index);
+    }
+
+    /// Does what the tests' results ask for.
+    fn write_stencil(
+        &self,
+        face: &StencilFace,
+        tile: &Tile,
+        samples: &Samples,
+        covered: &[Lanes; SAMPLES],
+        buffers: &mut Buffers,
+        fragments: &mut GaussianTile,
+    ) {
+        if face.write_mask == 0 {
+            return;
+        }
+        // A sample that fails has a fragment where some Gaussian reaches it.
+        let mut reached = [0; BLOCKS];
+        if [face.fail, face.depth_fail] != [StencilOp::Keep; 2] {
+            for (block, reached) in reached.iter_mut().enumerate() {
+                for (candidates, covered) in samples.candidates.iter().zip(covered) {
+                    *reached |= candidates[block] & !covered[block];
+                }
+            }
+            reached = fragments.reached(self.draw, self.level, tile.at, &reached);
+        }
+        for (sample, covered) in covered.iter().enumerate().take(self.samples) {
+            let start = buffers.stencil.start(tile.index, sample);
+            let stored = &mut buffers.stencil.bytes_mut()[start..][..AREA];
+            for (at, stored) in stored.iter_mut().enumerate() {
+                let (block, lane) = (at / LANES, at % LANES);
+                let is = |lanes: u32| lanes >> lane & 1 == 1;
+                let op = if is(covered[block]) {
+                    face.pass
+                } else if !is(samples.candidates[sample][block] & reached[block]) {
+                    continue;
+                } else if is(samples.tested[sample][block]) {
+                    face.depth_fail
+                } else {
+                    face.fail
+                };
+                let value = apply(op, *stored, face.reference);
+                *stored = *stored & !face.write_mask | value & face.write_mask;
+            }
+        }
+    }
+}
+
+/// Takes away the lanes whose stored value, in the order of blocks, does not pass.
+fn keep<T: Copy>(lanes: &mut Lanes, stored: &[T], passes: impl Fn(T) -> bool) {
+    for (lanes, stored) in lanes.iter_mut().zip(stored.as_chunks::<LANES>().0) {
+        for (lane, &stored) in stored.iter().enumerate() {
+            if !passes(stored) {
+                *lanes &= !(1 << lane);
+            }
+        }
+    }
+}
+
+/// Blends one sample of a tile, whose first texel is `start`.
+#[inline(always)]
+fn blend<S: Simd>(
+    simd: S,
+    output: &ColorOutput,
+    fragments: &GaussianTile,
+    layers: &[usize; BLOCKS],
+    covered: &Lanes,
+    start: usize,
+    words: &mut [u32],
+) {
+    let no_second = [f32x16::splat(simd, 0.0); 4];
+    for (block, &lanes) in covered.iter().enumerate() {
+        if lanes == 0 {
+            continue;
+        }
+        let source = fragments.layers[layers[block]].fragments(simd, block);
+        let first = start + block * LANES;
+        let quads = Quads {
+            first: [first, first + 4, first + 8, first + 12],
+            consecutive: true,
+        };
+        output.write(simd, &source, &no_second, lanes as u16, &quads, words);
+    }
+}

@@ -1,0 +1,393 @@
+//! Depth and stencil tests and multisampling of Gaussian draws, against the binary64 oracle.
+//!
+//! Triangles are drawn first; what they leave in the attachments is read back and given to the oracle, whose picture of
+//! the Gaussians is then laid over it.
+
+use ash::vk;
+use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST};
+use gaurast_tests::compare::{Limits, assert_contract};
+use gaurast_tests::contexts::Settings;
+use gaurast_tests::hybrid::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Held, depth_format, held,
+};
+use gaurast_tests::oracle::{
+    OracleCamera, OracleStencil, OracleTests, TestedReference, render_tested,
+};
+use gaurast_tests::scenes::{self, SceneBuffers};
+use gaurast_tests::triangles::{
+    Buffer, Commands, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex,
+    depth_test,
+};
+
+/// Odd, so that tiles are cut.
+const SIZE: [u32; 2] = [107, 83];
+
+/// The near and the far plane of the depth buffer.
+const PLANES: [f32; 2] = [1.0, 16.0];
+
+const COMPARES: [vk::CompareOp; 8] = [
+    vk::CompareOp::NEVER,
+    vk::CompareOp::LESS,
+    vk::CompareOp::EQUAL,
+    vk::CompareOp::LESS_OR_EQUAL,
+    vk::CompareOp::GREATER,
+    vk::CompareOp::NOT_EQUAL,
+    vk::CompareOp::GREATER_OR_EQUAL,
+    vk::CompareOp::ALWAYS,
+];
+
+const FORMATS: [vk::Format; 5] = [
+    vk::Format::D16_UNORM,
+    vk::Format::X8_D24_UNORM_PACK32,
+    vk::Format::D32_SFLOAT,
+    vk::Format::D24_UNORM_S8_UINT,
+    vk::Format::D32_SFLOAT_S8_UINT,
+];
+
+/// Depth coefficients that take the near plane to 0 and the far plane to 1, or the reverse.
+fn coefficients(reverse: bool) -> [f32; 2] {
+    let [near, far] = PLANES;
+    if reverse {
+        [-near / (far - near), near * far / (far - near)]
+    } else {
+        [far / (far - near), -near * far / (far - near)]
+    }
+}
+
+fn camera(reverse: bool) -> GaussianCameraGAURAST<'static> {
+    scenes::camera(SIZE[0], SIZE[1])
+        .to_vulkan()
+        .depth_coefficients(coefficients(reverse))
+}
+
+/// A cloud in which many Gaussians are at the same depths.
+fn layered_cloud(seed: u64, count: usize) -> SceneBuffers {
+    let mut scene = scenes::cloud(seed, count, 1);
+    for position in &mut scene.positions {
+        let z = (2.0 * position[2]).round() / 2.0;
+        *position = [
+            position[0] * z / position[2],
+            position[1] * z / position[2],
+            z,
+        ];
+    }
+    for scale in &mut scene.scales {
+        *scale = scale.map(|s| 4.0 * s);
+    }
+    scene
+}
+
+/// A target of floats.
+fn target(depth: vk::Format, samples: u32) -> TargetOptions {
+    TargetOptions {
+        size: SIZE,
+        colors: vec![vk::Format::R32G32B32A32_SFLOAT],
+        depth: Some(depth),
+        samples,
+        resolve: false,
+    }
+}
+
+/// Triangles all over the target at depths at which there are Gaussians, one of them slanted.
+fn triangles(reverse: bool) -> Vec<Vertex> {
+    let [c0, c1] = coefficients(reverse).map(f64::from);
+    let depth = |z: f64| (c0 + c1 / z) as f32;
+    let corner = |[x, y]: [f32; 2], z: f64, shade: f32| Vertex {
+        position: [x, y, depth(z), 1.0],
+        color: [shade, 0.5 * shade, 1.0 - shade, 1.0],
+    };
+    let flat =
+        |points: [[f32; 2]; 3], z: f64, shade: f32| points.map(|point| corner(point, z, shade));
+    let mut all = Vec::new();
+    all.extend(flat([[-1.1, -0.9], [0.1, -0.8], [-0.7, 0.7]], 4.0, 0.2));
+    all.extend(flat([[-0.2, -0.95], [0.9, -0.9], [0.3, 0.2]], 6.5, 0.5));
+    all.extend(flat([[-0.9, 0.95], [0.2, 0.9], [-0.3, 0.1]], 2.5, 0.8));
+    all.extend([
+        corner([0.0, 0.9], 2.2, 0.9),
+        corner([0.95, 0.8], 7.0, 0.1),
+        corner([0.7, -0.2], 11.0, 0.4),
+    ]);
+    all
+}
+
+/// What is drawn and tested.
+struct Case {
+    name: String,
+    target: TargetOptions,
+    reverse: bool,
+    /// The viewport's depths of 0 and 1.
+    range: [f32; 2],
+    options: GaussianOptions,
+}
+
+impl Case {
+    fn new(name: String, depth: vk::Format, samples: u32) -> Self {
+        Self {
+            name,
+            target: target(depth, samples),
+            reverse: false,
+            range: [0.0, 1.0],
+            options: GaussianOptions::default(),
+        }
+    }
+
+    fn tests(&self) -> OracleTests {
+        let state = &self.options.depth_stencil;
+        OracleTests {
+            depth_coefficients: coefficients(self.reverse),
+            depth_range: self.range,
+            format: depth_format(&self.target),
+            depth: (state.depth_test_enable != vk::FALSE).then_some((
+                state.depth_compare_op,
+                state.depth_write_enable != vk::FALSE,
+            )),
+            bounds: (state.depth_bounds_test_enable != vk::FALSE)
+                .then_some([state.min_depth_bounds, state.max_depth_bounds]),
+            stencil: (state.stencil_test_enable != vk::FALSE)
+                .then_some(OracleStencil { state: state.front }),
+        }
+    }
+
+    /// The triangles, then the Gaussians if there is a scene.
+    fn draw(&self, gpu: &Gpu, scene: Option<&SceneBuffers>) -> Output {
+        let target = Target::new(gpu, &self.target);
+        let corners = triangles(self.reverse);
+        let vertices = Buffer::of(gpu, &corners);
+        // Each triangle leaves its number as its stencil.
+        let stencil = vk::StencilOpState {
+            pass_op: vk::StencilOp::REPLACE,
+            compare_op: vk::CompareOp::ALWAYS,
+            compare_mask: 255,
+            write_mask: 255,
+            ..vk::StencilOpState::default()
+        };
+        let pipeline = Pipeline::new(
+            gpu,
+            &target,
+            &PipelineOptions {
+                depth_stencil: depth_test(vk::CompareOp::ALWAYS)
+                    .stencil_test_enable(true)
+                    .front(stencil)
+                    .back(stencil),
+                dynamic: vec![vk::DynamicState::STENCIL_REFERENCE],
+                ..PipelineOptions::default()
+            },
+        );
+        let gaussians = scene.map(|scene| {
+            let pipeline = GaussianPipeline::new(gpu, &target, scene.degree, &self.options);
+            (pipeline, GaussianScene::new(gpu, scene))
+        });
+        let pass = Pass {
+            depth: vk::ClearDepthStencilValue {
+                depth: if self.reverse { 0.0 } else { 1.0 },
+                stencil: 7,
+            },
+            ..Pass::default()
+        };
+        target.draw(gpu, &pass, |commands: &Commands| {
+            commands.bind(&pipeline);
+            commands.vertices(&vertices);
+            for triangle in 0..corners.len() as u32 / 3 {
+                commands.stencil_reference(triangle);
+                commands.draw(3 * triangle..3 * triangle + 3);
+            }
+            if let Some((pipeline, scene)) = &gaussians {
+                let size = SIZE.map(|side| side as f32);
+                commands.viewport([0.0, 0.0, size[0], size[1]], self.range);
+                scene.draw(commands, pipeline, &camera(self.reverse));
+            }
+        })
+    }
+
+    /// Draws it and holds it against the oracle; returns the greatest distance from the envelope, and how many samples
+    /// have a fragment.
+    fn judge(&self, gpu: &Gpu, scene: &SceneBuffers) -> (f64, usize) {
+        let before = held(&self.target, &self.draw(gpu, None));
+        let after = held(&self.target, &self.draw(gpu, Some(scene)));
+        let oracle = OracleCamera::new(&camera(self.reverse), SIZE).expect("a pinhole");
+        let state = (&self.options.state).into();
+        let (mut worst, mut fragments) = (0.0f64, 0);
+        for (sample, (before, after)) in before.iter().zip(&after).enumerate() {
+            let name = format!("{}, sample {sample}", self.name);
+            if self.options.sample_mask >> sample & 1 == 0 {
+                assert!(
+                    before.color == after.color,
+                    "{name}: a masked sample changed"
+                );
+                assert_eq!(before.stored, after.stored, "{name}");
+                continue;
+            }
+            let tests = self.tests();
+            let reference =
+                render_tested(&scene.as_oracle(), &oracle, &state, &tests, &before.stored);
+            worst = worst.max(judge_sample(&name, &reference, before, after));
+            fragments += reference.fragments[0];
+        }
+        (worst, fragments)
+    }
+}
+
+/// Holds what a sample of each pixel stores against the oracle.
+fn judge_sample(name: &str, reference: &TestedReference, before: &Held, after: &Held) -> f64 {
+    let behind: Vec<_> = before.color.iter().map(|c| c.map(f64::from)).collect();
+    let composite = reference.color.over(&behind);
+    let verdict = assert_contract(name, &after.color, &composite, Limits::ENVELOPE_ONLY);
+    let mut unknown = 0;
+    for (at, &depth) in after.stored.depth.iter().enumerate() {
+        match &reference.depth[at] {
+            Some(allowed) => assert!(
+                allowed.contains(&depth),
+                "{name}: pixel {at} stores depth {depth:#x}, not one of {allowed:x?}"
+            ),
+            None => unknown += 1,
+        }
+    }
+    assert!(
+        unknown * 1000 < reference.depth.len(),
+        "{name}: {unknown} depths unknown"
+    );
+    for (at, stencil) in after.stored.stencil.iter().enumerate() {
+        let allowed = &reference.stencil[at];
+        assert!(
+            allowed.contains(stencil),
+            "{name}: pixel {at} stores {stencil}, not {allowed:?}"
+        );
+    }
+    verdict.max_distance
+}
+
+fn gpu() -> Gpu {
+    Gpu::embedded(&Settings::default()).expect("a device")
+}
+
+#[test]
+fn every_comparison_works_in_every_format_both_ways() {
+    let (gpu, scene) = (gpu(), layered_cloud(1, 1500));
+    let (mut worst, mut drawn) = (0.0f64, 0);
+    for format in FORMATS {
+        for (op, reverse) in COMPARES
+            .into_iter()
+            .flat_map(|op| [(op, false), (op, true)])
+        {
+            let mut case = Case::new(format!("{op:?} {format:?} reverse {reverse}"), format, 1);
+            case.reverse = reverse;
+            case.options.depth_stencil = depth_test(op);
+            let (distance, fragments) = case.judge(&gpu, &scene);
+            worst = worst.max(distance);
+            drawn += usize::from(fragments > 0);
+            assert_eq!(fragments == 0, op == vk::CompareOp::NEVER, "{}", case.name);
+        }
+    }
+    eprintln!("{worst:.2e} from the envelope at most");
+    assert_eq!(drawn, FORMATS.len() * 14);
+}
+
+#[test]
+fn samples_are_tested_one_by_one() {
+    let (gpu, scene) = (gpu(), layered_cloud(2, 1500));
+    let mut worst = 0.0f64;
+    for (format, op, write, mask) in [
+        (vk::Format::D32_SFLOAT, vk::CompareOp::LESS, true, u32::MAX),
+        (vk::Format::D32_SFLOAT, vk::CompareOp::LESS, false, 0b1010),
+        (
+            vk::Format::D16_UNORM,
+            vk::CompareOp::GREATER,
+            true,
+            u32::MAX,
+        ),
+        (vk::Format::D16_UNORM, vk::CompareOp::EQUAL, true, u32::MAX),
+        (
+            vk::Format::D24_UNORM_S8_UINT,
+            vk::CompareOp::NOT_EQUAL,
+            true,
+            0b0111,
+        ),
+        (
+            vk::Format::X8_D24_UNORM_PACK32,
+            vk::CompareOp::LESS_OR_EQUAL,
+            true,
+            u32::MAX,
+        ),
+    ] {
+        let name = format!("4 samples {op:?} {format:?} mask {mask:x}");
+        let mut case = Case::new(name, format, 4);
+        case.options.depth_stencil = depth_test(op).depth_write_enable(write);
+        case.options.sample_mask = mask;
+        worst = worst.max(case.judge(&gpu, &scene).0);
+    }
+    // Without tests all samples get the same.
+    let case = Case::new("4 samples untested".to_owned(), vk::Format::D32_SFLOAT, 4);
+    worst = worst.max(case.judge(&gpu, &scene).0);
+    eprintln!("{worst:.2e} from the envelope at most");
+}
+
+#[test]
+fn depth_ranges_bounds_and_orders_apply() {
+    let (gpu, scene) = (gpu(), layered_cloud(3, 1500));
+    let less = depth_test(vk::CompareOp::LESS);
+    let mut case = Case::new("a range".to_owned(), vk::Format::D32_SFLOAT, 1);
+    case.range = [0.25, 0.875];
+    case.options.depth_stencil = less;
+    case.judge(&gpu, &scene);
+    case.name = "a reversed range".to_owned();
+    case.range = [1.0, 0.5];
+    case.judge(&gpu, &scene);
+    let mut case = Case::new("bounds".to_owned(), vk::Format::D32_SFLOAT, 1);
+    let bounds = less
+        .depth_bounds_test_enable(true)
+        .min_depth_bounds(0.2)
+        .max_depth_bounds(0.81);
+    case.options.depth_stencil = bounds;
+    case.judge(&gpu, &scene);
+    case.name = "bounds alone".to_owned();
+    case.options.depth_stencil = bounds.depth_test_enable(false);
+    case.judge(&gpu, &scene);
+    for order in [
+        GaussianOrderGAURAST::RADIAL_DISTANCE,
+        GaussianOrderGAURAST::PRIMITIVE,
+    ] {
+        let mut case = Case::new(format!("{order:?}"), vk::Format::D32_SFLOAT, 1);
+        case.options.depth_stencil = less;
+        case.options.state = case.options.state.order(order);
+        case.judge(&gpu, &scene);
+    }
+}
+
+#[test]
+fn stencil_is_tested_first_and_written_last() {
+    use vk::StencilOp as Op;
+    let (gpu, scene) = (gpu(), layered_cloud(4, 1500));
+    let all = [
+        Op::KEEP,
+        Op::ZERO,
+        Op::REPLACE,
+        Op::INCREMENT_AND_CLAMP,
+        Op::DECREMENT_AND_CLAMP,
+        Op::INVERT,
+        Op::INCREMENT_AND_WRAP,
+        Op::DECREMENT_AND_WRAP,
+    ];
+    for (index, compare) in COMPARES.into_iter().enumerate() {
+        let face = vk::StencilOpState {
+            fail_op: all[(index + 1) % 8],
+            pass_op: all[(index + 3) % 8],
+            depth_fail_op: all[(index + 6) % 8],
+            compare_op: compare,
+            compare_mask: 3,
+            write_mask: [255, 0x0E][index % 2],
+            reference: 1,
+        };
+        let format = [
+            vk::Format::D24_UNORM_S8_UINT,
+            vk::Format::D32_SFLOAT_S8_UINT,
+        ][index % 2];
+        let mut case = Case::new(format!("stencil {compare:?}"), format, 1);
+        case.options.depth_stencil = depth_test(vk::CompareOp::LESS)
+            .stencil_test_enable(true)
+            .front(face);
+        case.judge(&gpu, &scene);
+        case.name = format!("stencil {compare:?} without depth");
+        case.options.depth_stencil = case.options.depth_stencil.depth_test_enable(false);
+        case.judge(&gpu, &scene);
+    }
+}

@@ -1,0 +1,347 @@
+//! A head of triangles among Gaussians, and a pane that cuts through both: in front of, behind and inside the
+//! Gaussians, held against the oracle's composite.
+
+use std::path::Path;
+
+use ash::vk;
+use gaurast::vk::GaussianCameraGAURAST;
+use gaurast_samples::camera::{Camera, DEFAULT_FOV};
+use gaurast_samples::scene::Scene;
+use gaurast_tests::compare::{Limits, assert_contract, for_people};
+use gaurast_tests::contexts::Settings;
+use gaurast_tests::data::require_data;
+use gaurast_tests::hybrid::{
+    GaussianOptions, GaussianPipeline, GaussianScene, Held, depth_format, held,
+};
+use gaurast_tests::oracle::{OracleCamera, OracleTests, render_tested, sample_tests::compare};
+use gaurast_tests::scenes::SceneBuffers;
+use gaurast_tests::triangles::models::Model;
+use gaurast_tests::triangles::{
+    Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
+};
+use glam::{DMat3, DVec3, Vec3};
+
+const SIZE: [u32; 2] = [320, 240];
+
+/// Gaussians, triangles in their world, and how they are seen.
+struct Hybrid {
+    name: &'static str,
+    scene: SceneBuffers,
+    camera: GaussianCameraGAURAST<'static>,
+    /// In clip coordinates; drawn before the Gaussians.
+    head: Vec<Vertex>,
+    /// Drawn after them.
+    pane: Vec<Vertex>,
+    target: TargetOptions,
+    compare: vk::CompareOp,
+}
+
+/// What is drawn.
+#[derive(Clone, Copy, PartialEq)]
+enum What {
+    Head,
+    Pane,
+    Everything,
+}
+
+/// Takes points of the world to the clip coordinates of a Gaussian camera.
+struct ToClip(GaussianCameraGAURAST<'static>);
+
+impl ToClip {
+    fn position(&self, point: DVec3) -> [f32; 4] {
+        let rotation = DMat3::from_cols_array(&self.0.rotation.map(f64::from)).transpose();
+        let t = rotation * (point - DVec3::from(self.0.eye));
+        let place = |axis: usize, t: f64, z: f64| {
+            let (focal, principal) = (self.0.focal_length[axis], self.0.principal_point[axis]);
+            2.0 * (f64::from(focal) * t + f64::from(principal) * z) / f64::from(SIZE[axis]) - z
+        };
+        let [c0, c1] = self.0.depth_coefficients.map(f64::from);
+        [place(0, t.x, t.z), place(1, t.y, t.z), c0 * t.z + c1, t.z].map(|c| c as f32)
+    }
+}
+
+/// The head's triangles, with their texture's colours under a light; `place` takes its points to the world.
+fn head(model: &Model, place: impl Fn(DVec3) -> DVec3, to_clip: &ToClip) -> Vec<Vertex> {
+    let light = Vec3::new(0.4, 0.5, 0.8).normalize();
+    let mut vertices = Vec::new();
+    for part in &model.parts {
+        let (width, height) = part.diffuse.dimensions();
+        for &index in &part.indices {
+            let corner = &part.corners[index as usize];
+            let at = |coordinate: f32, size: u32| ((coordinate * size as f32) as u32).min(size - 1);
+            let texel = part
+                .diffuse
+                .get_pixel(at(corner.uv[0], width), at(corner.uv[1], height));
+            let lit = 0.3 + 0.7 * Vec3::from(corner.normal).dot(light).max(0.0);
+            let [r, g, b, _] = texel.0.map(|c| lit * f32::from(c) / 255.0);
+            let point = Vec3::from(corner.position).as_dvec3();
+            vertices.push(Vertex {
+                position: to_clip.position(place(point)),
+                color: [r, g, b, 1.0],
+            });
+        }
+    }
+    vertices
+}
+
+/// Two triangles of one colour.
+fn pane(corners: [DVec3; 4], to_clip: &ToClip) -> Vec<Vertex> {
+    let corner = |index: usize| Vertex {
+        position: to_clip.position(corners[index]),
+        color: [0.9, 0.75, 0.1, 1.0],
+    };
+    [0, 1, 2, 0, 2, 3].map(corner).to_vec()
+}
+
+impl Hybrid {
+    fn state(&self) -> vk::PipelineDepthStencilStateCreateInfo<'static> {
+        depth_test(self.compare)
+    }
+
+    fn is_reverse(&self) -> bool {
+        self.compare == vk::CompareOp::GREATER
+    }
+
+    fn draw(&self, gpu: &Gpu, what: What) -> Output {
+        let target = Target::new(gpu, &self.target);
+        let options = PipelineOptions {
+            depth_stencil: self.state(),
+            ..PipelineOptions::default()
+        };
+        let triangles = Pipeline::new(gpu, &target, &options);
+        let gaussians = GaussianPipeline::new(
+            gpu,
+            &target,
+            self.scene.degree,
+            &GaussianOptions {
+                depth_stencil: self.state(),
+                ..GaussianOptions::default()
+            },
+        );
+        let scene = GaussianScene::new(gpu, &self.scene);
+        let (head, pane) = (Buffer::of(gpu, &self.head), Buffer::of(gpu, &self.pane));
+        let pass = Pass {
+            color: vk::ClearColorValue { float32: [0.0; 4] },
+            depth: vk::ClearDepthStencilValue {
+                depth: if self.is_reverse() { 0.0 } else { 1.0 },
+                stencil: 0,
+            },
+            ..Pass::default()
+        };
+        target.draw(gpu, &pass, |commands| {
+            if what != What::Pane {
+                commands.bind(&triangles);
+                commands.vertices(&head);
+                commands.draw(0..self.head.len() as u32);
+            }
+            if what == What::Everything {
+                scene.draw(commands, &gaussians, &self.camera);
+            }
+            if what != What::Head {
+                commands.bind(&triangles);
+                commands.vertices(&pane);
+                commands.draw(0..self.pane.len() as u32);
+            }
+        })
+    }
+
+    /// Draws everything and holds each sample against the oracle's composite.
+    fn judge(&self) {
+        let gpu = Gpu::embedded(&Settings::default()).expect("a device");
+        let held_of = |output: &Output| held(&self.target, output);
+        let head = held_of(&self.draw(&gpu, What::Head));
+        let pane = held_of(&self.draw(&gpu, What::Pane));
+        let everything = self.draw(&gpu, What::Everything);
+        let picture = &everything.pictures[0];
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/pictures");
+        let saved = std::fs::create_dir_all(&folder).map_err(image::ImageError::from);
+        let saved = saved
+            .and_then(|()| for_people(picture).save(folder.join(format!("{}.png", self.name))));
+        assert!(saved.is_ok(), "{saved:?}");
+        for (sample, after) in held_of(&everything).iter().enumerate() {
+            let name = format!("{} sample {sample}", self.name);
+            self.judge_sample(&name, &head[sample], &pane[sample], after);
+        }
+    }
+
+    fn judge_sample(&self, name: &str, head: &Held, pane: &Held, after: &Held) {
+        let tests = OracleTests {
+            depth_coefficients: self.camera.depth_coefficients,
+            depth_range: [0.0, 1.0],
+            format: depth_format(&self.target),
+            depth: Some((self.compare, true)),
+            bounds: None,
+            stencil: None,
+        };
+        let camera = OracleCamera::new(&self.camera, SIZE).expect("a pinhole");
+        let state = (&GaussianOptions::default().state).into();
+        let scene = self.scene.as_oracle();
+        let drawn = render_tested(&scene, &camera, &state, &tests, &head.stored);
+        let behind: Vec<_> = head.color.iter().map(|c| c.map(f64::from)).collect();
+        let mut composite = drawn.color.over(&behind);
+        // The pane, where it passes against what the Gaussians may have stored.
+        let (mut shown, mut hidden) = (0, 0);
+        for (at, color) in pane.color.iter().enumerate().filter(|(_, c)| c[3] == 1.0) {
+            let depth = pane.stored.depth[at];
+            let known = drawn.depth[at].as_deref().unwrap_or_default();
+            let passes = |&stored: &u32| compare(self.compare, depth, stored);
+            let color = color.map(f64::from);
+            match (known.iter().any(passes), known.iter().all(passes)) {
+                _ if known.is_empty() => {
+                    composite.alternatives.entry(at).or_default().push(color);
+                }
+                (_, true) => {
+                    shown += 1;
+                    composite.nominal[at] = color;
+                    composite.alternatives.remove(&at);
+                    assert_eq!(after.stored.depth[at], depth, "{name}, pixel {at}");
+                }
+                (true, false) => composite.alternatives.entry(at).or_default().push(color),
+                (false, false) => hidden += 1,
+            }
+        }
+        let verdict = assert_contract(name, &after.color, &composite, Limits::ENVELOPE_ONLY);
+        eprintln!("{name}: {verdict}; {shown} samples of the pane shown, {hidden} hidden");
+        assert!(
+            shown > 500 && hidden > 500,
+            "the pane goes through the scene"
+        );
+        // The head is before some Gaussians and behind others.
+        let is_head = |at: &usize| head.color[*at][3] == 1.0;
+        let changed = |at: &usize| drawn.color.nominal[*at][3] > 0.0;
+        let pixels = 0..head.color.len();
+        let (all, through) = (
+            pixels.clone().filter(is_head).count(),
+            pixels.filter(is_head).filter(changed).count(),
+        );
+        assert!(
+            all > 1000 && through > 100 && through < all,
+            "{through} of {all}"
+        );
+    }
+}
+
+/// The garden's frame from one with y up.
+fn turn(point: DVec3) -> DVec3 {
+    DVec3::new(point.x, -point.y, -point.z)
+}
+
+fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Option<Hybrid> {
+    require_data("meshes/african_head/african_head.obj")?;
+    let model = Model::african_head().expect("its files");
+    let camera = Camera::of_generated(None, SIZE).expect("a camera");
+    let (near, far) = (0.5f32, 60.0f32);
+    let camera = camera
+        .to_vulkan()
+        .depth_coefficients([far / (far - near), -near * far / (far - near)]);
+    let to_clip = ToClip(camera);
+    // It stands in the meadow and looks to the camera.
+    let place = |point: DVec3| {
+        let (sin, cos) = 0.35f64.sin_cos();
+        let p = 0.75 * point;
+        let turned = DVec3::new(cos * p.x + sin * p.z, p.y, cos * p.z - sin * p.x);
+        turn(turned + DVec3::new(1.15, 0.62, 2.2))
+    };
+    let pane_corners = [
+        DVec3::new(-2.6, -0.2, 3.0),
+        DVec3::new(1.9, -0.2, -1.4),
+        DVec3::new(1.9, 0.9, -1.4),
+        DVec3::new(-2.6, 0.9, 3.0),
+    ];
+    Some(Hybrid {
+        name,
+        scene: SceneBuffers::from(&Scene::generate(1, 40_000)),
+        camera,
+        head: head(&model, place, &to_clip),
+        pane: pane(pane_corners.map(turn), &to_clip),
+        target: target(depth, samples),
+        compare: vk::CompareOp::LESS,
+    })
+}
+
+fn target(depth: vk::Format, samples: u32) -> TargetOptions {
+    TargetOptions {
+        size: SIZE,
+        colors: vec![vk::Format::R32G32B32A32_SFLOAT],
+        depth: Some(depth),
+        samples,
+        resolve: true,
+    }
+}
+
+#[test]
+fn a_head_stands_in_the_garden() {
+    if let Some(hybrid) = garden("head in the garden", vk::Format::D32_SFLOAT, 1) {
+        hybrid.judge();
+    }
+}
+
+#[test]
+fn a_head_stands_in_the_garden_with_four_samples() {
+    let format = vk::Format::X8_D24_UNORM_PACK32;
+    if let Some(hybrid) = garden("head in the garden with four samples", format, 4) {
+        hybrid.judge();
+    }
+}
+
+#[test]
+fn a_head_is_inside_a_trained_scene_with_reversed_depth() {
+    let (Some(_), Some(path)) = (
+        require_data("meshes/african_head/african_head.obj"),
+        require_data("splats/playbot-125k.ply"),
+    ) else {
+        return;
+    };
+    let model = Model::african_head().expect("its files");
+    let scene = Scene::load(&path).expect("a scene");
+    let (near, far) = (0.1f32, 200.0f32);
+    let camera = Camera::framing(&scene, DEFAULT_FOV, SIZE)
+        .to_vulkan()
+        .depth_coefficients([-near / (far - near), near * far / (far - near)]);
+    let to_clip = ToClip(camera);
+    // Around the point that the camera looks at, in its own axes: right, down and forward.
+    let rotation = DMat3::from_cols_array(&camera.rotation.map(f64::from));
+    let (middle, radius) = middle(&scene, &camera);
+    let from_view = |view: DVec3| middle + rotation * (radius * view);
+    let place = |p: DVec3| from_view(DVec3::new(0.7 * p.x, -0.7 * p.y, -0.7 * p.z));
+    let pane_corners = [
+        DVec3::new(-1.2, 0.5, -1.2),
+        DVec3::new(1.2, 0.5, 1.2),
+        DVec3::new(1.2, 0.1, 1.2),
+        DVec3::new(-1.2, 0.1, -1.2),
+    ];
+    Hybrid {
+        name: "head in playbot",
+        scene: SceneBuffers::from(&scene),
+        camera,
+        head: head(&model, place, &to_clip),
+        pane: pane(pane_corners.map(from_view), &to_clip),
+        target: target(vk::Format::D32_SFLOAT, 1),
+        compare: vk::CompareOp::GREATER,
+    }
+    .judge();
+}
+
+/// The middle of the Gaussians along the camera's axis, and the distance within which half of them are.
+fn middle(scene: &Scene, camera: &GaussianCameraGAURAST) -> (DVec3, f64) {
+    let points: Vec<DVec3> = (scene.positions().iter())
+        .map(|&position| Vec3::from(position).as_dvec3())
+        .collect();
+    let median = |mut values: Vec<f64>| {
+        let half = values.len() / 2;
+        *values.select_nth_unstable_by(half, f64::total_cmp).1
+    };
+    let forward = DVec3::from_slice(
+        &camera.rotation[6..]
+            .iter()
+            .map(|&r| r.into())
+            .collect::<Vec<f64>>(),
+    );
+    let eye = DVec3::from(camera.eye);
+    let along = median(points.iter().map(|p| (*p - eye).dot(forward)).collect());
+    let middle = eye + along * forward;
+    (
+        middle,
+        median(points.iter().map(|p| p.distance(middle)).collect()),
+    )
+}

@@ -1,0 +1,301 @@
+//! Depth and stencil tests of a draw, sample by sample, in their literal form.
+//!
+//! Depths here are the numbers that the attachment's format holds ([`OracleDepthFormat::code`]). What a sample stores
+//! before the draw is given; nothing that the draw does is seen by its own tests.
+
+use ash::vk;
+use rayon::prelude::*;
+
+use super::pixel::{Alpha, Outcome, Pixel};
+use super::render::{Bound, Projected, Reference, collect};
+use super::{OracleCamera, OracleModel, OracleScene, OracleState};
+
+/// How a depth attachment holds depths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OracleDepthFormat {
+    /// An integer of this many bits, of which the greatest is 1.
+    Unorm(u32),
+    /// binary32.
+    Float,
+}
+
+impl OracleDepthFormat {
+    /// The nearest number to a depth, which is clamped to 0 to 1.
+    pub fn code(self, depth: f64) -> u32 {
+        let depth = depth.clamp(0.0, 1.0);
+        match self {
+            Self::Float => (depth as f32).to_bits(),
+            Self::Unorm(bits) => (depth * ((1u64 << bits) - 1) as f64).round_ties_even() as u32,
+        }
+    }
+
+    /// The depth that a number means.
+    pub fn depth(self, code: u32) -> f64 {
+        match self {
+            Self::Float => f32::from_bits(code).into(),
+            Self::Unorm(bits) => f64::from(code) / ((1u64 << bits) - 1) as f64,
+        }
+    }
+}
+
+/// The stencil state of front faces; each of the operations is applied where it says.
+#[derive(Clone, Copy, Debug)]
+pub struct OracleStencil {
+    /// The reference is compared with what is stored, both masked.
+    pub state: vk::StencilOpState,
+}
+
+impl OracleStencil {
+    fn passes(&self, stored: u8) -> bool {
+        let s = &self.state;
+        compare(
+            s.compare_op,
+            s.reference & s.compare_mask,
+            u32::from(stored) & s.compare_mask,
+        )
+    }
+
+    fn apply(&self, op: vk::StencilOp, stored: u8) -> u8 {
+        let value = match op {
+            vk::StencilOp::KEEP => stored,
+            vk::StencilOp::ZERO => 0,
+            vk::StencilOp::REPLACE => self.state.reference as u8,
+            vk::StencilOp::INCREMENT_AND_CLAMP => stored.saturating_add(1),
+            vk::StencilOp::DECREMENT_AND_CLAMP => stored.saturating_sub(1),
+            vk::StencilOp::INVERT => !stored,
+            vk::StencilOp::INCREMENT_AND_WRAP => stored.wrapping_add(1),
+            vk::StencilOp::DECREMENT_AND_WRAP => stored.wrapping_sub(1),
+            other => panic!("{other:?} is no stencil operation"),
+        };
+        let mask = self.state.write_mask as u8;
+        stored & !mask | value & mask
+    }
+}
+
+/// What is tested of a draw, and how its depths come about.
+#[derive(Clone, Copy, Debug)]
+pub struct OracleTests {
+    /// The camera's `depthCoefficients`.
+    pub depth_coefficients: [f32; 2],
+    /// The viewport's depths of 0 and of 1.
+    pub depth_range: [f32; 2],
+    /// How the attachment holds depths.
+    pub format: OracleDepthFormat,
+    /// The comparison, and whether depth is written.
+    pub depth: Option<(vk::CompareOp, bool)>,
+    /// The least and the greatest stored depth.
+    pub bounds: Option<[f32; 2]>,
+    /// The stencil test.
+    pub stencil: Option<OracleStencil>,
+}
+
+impl OracleTests {
+    /// The depth of a centre with depth variable `z`, as the attachment holds it.
+    pub fn code(&self, model: OracleModel, z: f32) -> u32 {
+        let [c0, c1] = self.depth_coefficients.map(f64::from);
+        let [near, far] = self.depth_range.map(f64::from);
+        let z = f64::from(z);
+        let depth = match model {
+            OracleModel::Orthographic => c0 + c1 * z,
+            OracleModel::Pinhole | OracleModel::Fisheye => c0 + c1 / z,
+        };
+        self.format
+            .code(near + depth.clamp(0.0, 1.0) * (far - near))
+    }
+}
+
+/// `reference op stored`.
+pub fn compare<T: PartialOrd>(op: vk::CompareOp, reference: T, stored: T) -> bool {
+    match op {
+        vk::CompareOp::NEVER => false,
+        vk::CompareOp::LESS => reference < stored,
+        vk::CompareOp::EQUAL => reference == stored,
+        vk::CompareOp::LESS_OR_EQUAL => reference <= stored,
+        vk::CompareOp::GREATER => reference > stored,
+        vk::CompareOp::NOT_EQUAL => reference != stored,
+        vk::CompareOp::GREATER_OR_EQUAL => reference >= stored,
+        vk::CompareOp::ALWAYS => true,
+        other => panic!("{other:?} is no comparison"),
+    }
+}
+
+/// What one sample of each pixel stores.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stored {
+    /// Numbers of depths.
+    pub depth: Vec<u32>,
+    /// Stencils.
+    pub stencil: Vec<u8>,
+}
+
+/// What a draw makes of one sample of each pixel.
+#[derive(Clone, Debug)]
+pub struct TestedReference {
+    /// Its colours.
+    pub color: Reference,
+    /// Every depth that it may store afterwards, what binary64 says among them; `None` where that is not known.
+    pub depth: Vec<Option<Vec<u32>>>,
+    /// Every stencil that it may store afterwards.
+    pub stencil: Vec<Vec<u8>>,
+    /// Samples that have a fragment for certain, and those that may have one.
+    pub fragments: [usize; 2],
+}
+
+/// One sample while Gaussians are added to it.
+struct Sample {
+    pixel: Pixel,
+    stored: (u32, u8),
+    /// Whether depth bounds and stencil let it pass.
+    candidate: bool,
+    stencil_passes: bool,
+    /// Whether an alpha reached the floor for certain, and perhaps.
+    reached: [bool; 2],
+}
+
+impl Sample {
+    fn new(tests: &OracleTests, stored: (u32, u8)) -> Self {
+        let depth = tests.format.depth(stored.0);
+        let within = |[least, greatest]: [f32; 2]| {
+            let [least, greatest] = [least, greatest].map(|bound| {
+                let code = tests.format.code(bound.into());
+                tests.format.depth(code)
+            });
+            (least..=greatest).contains(&depth)
+        };
+        Self {
+            pixel: Pixel::EMPTY,
+            stored,
+            candidate: tests.bounds.is_none_or(within),
+            stencil_passes: tests.stencil.is_none_or(|stencil| stencil.passes(stored.1)),
+            reached: [false; 2],
+        }
+    }
+
+    /// Notes whether a Gaussian reaches the pixel at all.
+    fn reach(&mut self, alpha: Alpha, state: &OracleState) {
+        let floor = f64::from(state.alpha_floor);
+        self.reached[0] |= floor == 0.0 || alpha.value - alpha.error > floor;
+        self.reached[1] |= alpha.value + alpha.error >= floor;
+    }
+
+    /// What it may store afterwards: depths, if that is known, and stencils.
+    fn after(&self, tests: &OracleTests, code: impl Fn(f32) -> u32) -> (Option<Vec<u32>>, Vec<u8>) {
+        let writes = tests.depth.is_some_and(|(_, write)| write);
+        let (mut depths, mut stencils) = (Some(Vec::new()), Vec::new());
+        for outcome in self.pixel.outcomes() {
+            let Outcome {
+                covered, medians, ..
+            } = &outcome;
+            match &mut depths {
+                Some(depths) if *covered && writes => {
+                    depths.extend(medians.iter().map(|&z| code(z)));
+                }
+                Some(depths) => depths.push(self.stored.0),
+                None => {}
+            }
+            if *covered && writes && outcome.medians_exhausted {
+                depths = None;
+            }
+            stencils.extend(self.stencils(tests, *covered));
+        }
+        (depths, stencils)
+    }
+
+    fn stencils(&self, tests: &OracleTests, covered: bool) -> Vec<u8> {
+        let old = self.stored.1;
+        let Some(stencil) = tests.stencil.filter(|_| self.candidate) else {
+            return vec![old];
+        };
+        let state = &stencil.state;
+        if covered {
+            return vec![stencil.apply(state.pass_op, old)];
+        }
+        let failed = if self.stencil_passes {
+            state.depth_fail_op
+        } else {
+            state.fail_op
+        };
+        let failed = stencil.apply(failed, old);
+        match self.reached {
+            [true, _] => vec![failed],
+            [false, true] => vec![failed, old],
+            [false, false] => vec![old],
+        }
+    }
+}
+
+/// Draws every Gaussian, where it passes, at one sample of each pixel.
+pub fn render_tested(
+    scene: &OracleScene,
+    camera: &OracleCamera,
+    state: &OracleState,
+    tests: &OracleTests,
+    stored: &Stored,
+) -> TestedReference {
+    let projected = Projected::new(scene, camera, state);
+    let codes: Vec<u32> = projected
+        .splats
+        .iter()
+        .map(|splat| tests.code(camera.model, splat.z))
+        .collect();
+    let bounds: Vec<Bound> = projected
+        .splats
+        .iter()
+        .map(|splat| Bound::new(splat, state))
+        .collect();
+    let row = |y: u32| {
+        let first = (y * camera.width) as usize;
+        let mut row: Vec<Sample> = (first..first + camera.width as usize)
+            .map(|at| {
+                let stencil = stored.stencil.get(at).copied().unwrap_or(0);
+                Sample::new(tests, (stored.depth[at], stencil))
+            })
+            .collect();
+        for ((splat, bound), &code) in projected.splats.iter().zip(&bounds).zip(&codes) {
+            if !bound.rows(camera.height).contains(&y) {
+                continue;
+            }
+            for x in bound.columns(y, camera.width) {
+                let sample = &mut row[x as usize];
+                if !sample.candidate {
+                    continue;
+                }
+                let alpha = splat.alpha(x, y, state);
+                sample.reach(alpha, state);
+                let passes = sample.stencil_passes
+                    && tests
+                        .depth
+                        .is_none_or(|(op, _)| compare(op, code, sample.stored.0));
+                if passes && !sample.pixel.is_finished() {
+                    sample.pixel.add(splat, alpha, state);
+                }
+            }
+        }
+        row
+    };
+    let samples: Vec<Sample> = (0..camera.height)
+        .into_par_iter()
+        .flat_map_iter(row)
+        .collect();
+    let (depth, stencil) = samples
+        .iter()
+        .map(|sample| sample.after(tests, |z| tests.code(camera.model, z)))
+        .unzip();
+    let covered = |sample: &Sample| -> Vec<bool> {
+        let outcomes = sample.pixel.outcomes();
+        outcomes.map(|outcome| outcome.covered).collect()
+    };
+    let count = |holds: fn(&[bool]) -> bool| {
+        let holds = |sample: &&Sample| holds(&covered(sample));
+        samples.iter().filter(holds).count()
+    };
+    TestedReference {
+        color: collect(camera, &projected, || samples.iter().map(|s| &s.pixel)),
+        depth,
+        stencil,
+        fragments: [
+            count(|outcomes| outcomes.iter().all(|covered| *covered)),
+            count(|outcomes| outcomes.contains(&true)),
+        ],
+    }
+}
