@@ -325,7 +325,7 @@ impl Pass {
                     .filter(|blender| !blender.writes_nothing());
                 Ready::Gaussians(draw, blender)
             }
-            PassDraw::Primitives(draw) if draw.primitives.is_empty() => Ready::Nothing,
+            PassDraw::Primitives(draw) if draw.chunks.is_empty() => Ready::Nothing,
             PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TileDraw::new(
                 draw,
                 targets,

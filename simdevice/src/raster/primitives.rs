@@ -13,7 +13,7 @@ use super::setup::Setup;
 use super::tile::{AREA, SIDE, Tile};
 use super::{Plane, TILE_SIZE};
 use crate::counters::{Counter, Counters};
-use crate::geometry::Primitive;
+use crate::geometry::{Primitive, Varyings};
 use crate::packet::Rect;
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
@@ -59,7 +59,11 @@ impl TileDraw<'_> {
         counters: &mut Counters,
         cancel: &AtomicBool,
     ) -> Result<(), Stopped> {
-        if self.draw.bins.of(place.at, place.layer).is_empty() {
+        let chunks = &self.draw.chunks;
+        if chunks
+            .iter()
+            .all(|chunk| chunk.bins.of(place.at, place.layer).is_empty())
+        {
             return Ok(());
         }
         let mut machines = self
@@ -76,7 +80,7 @@ impl TileDraw<'_> {
             cancel,
             samples_passed: 0,
         };
-        renderer.batch.clear();
+        renderer.batch.begin(self.needs);
         let level = self.level;
         let done = if self.positions.len() == 1 {
             dispatch!(level, simd => renderer.run::<_, 1>(simd))
@@ -107,15 +111,15 @@ pub(super) struct Renderer<'a, 'd> {
 
 /// A primitive while it is rasterized.
 struct Current<'p> {
-    index: u32,
     primitive: &'p Primitive,
-    setup: Setup,
+    varyings: &'p Varyings,
+    setup: &'p Setup,
     /// Its record in the batch, once it has one.
     record: Option<u16>,
     range: (f32, f32),
 }
 
-impl<'d> Renderer<'_, 'd> {
+impl Renderer<'_, '_> {
     /// All primitives.
     #[inline(always)]
     fn run<S: Simd, const N: usize>(&mut self, simd: S) -> Result<(), Stopped> {
@@ -127,38 +131,34 @@ impl<'d> Renderer<'_, 'd> {
             height: size,
         };
         let mut coverage = Coverage::<N>::default();
+        let mut setup = Setup::default();
         let draw = self.draw;
-        let Some(primitive) = draw.draw.primitives.first() else {
-            return Ok(());
-        };
-        let mut current = Current {
-            index: 0,
-            primitive,
-            setup: Setup::default(),
-            record: None,
-            range: (0.0, 1.0),
-        };
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
-        for &index in draw.draw.bins.of(self.place.at, self.place.layer) {
-            let Some(primitive) = draw.draw.primitives.get(index as usize) else {
-                continue;
-            };
-            if clip.0 != primitive.viewport {
-                let Some(pixels) = draw.draw.regions.get(usize::from(primitive.viewport)) else {
+        for chunk in &draw.draw.chunks {
+            for &index in chunk.bins.of(self.place.at, self.place.layer) {
+                let Some(primitive) = chunk.primitives.get(index as usize) else {
                     continue;
                 };
-                clip = (primitive.viewport, pixels.intersect(whole));
+                if clip.0 != primitive.viewport {
+                    let Some(pixels) = draw.draw.regions.get(usize::from(primitive.viewport))
+                    else {
+                        continue;
+                    };
+                    clip = (primitive.viewport, pixels.intersect(whole));
+                }
+                if !setup.prepare(simd, primitive, draw.positions, clip.1) {
+                    continue;
+                }
+                let range = draw.ranges.get(usize::from(primitive.viewport));
+                let mut current = Current {
+                    primitive,
+                    varyings: &chunk.varyings,
+                    setup: &setup,
+                    record: None,
+                    range: range.copied().unwrap_or((0.0, 1.0)),
+                };
+                self.primitive(simd, &mut current, &mut coverage, [whole.x, whole.y])?;
             }
-            let setup = &mut current.setup;
-            if !setup.prepare(simd, primitive, draw.positions, clip.1) {
-                continue;
-            }
-            current.index = index;
-            current.primitive = primitive;
-            current.record = None;
-            let range = draw.ranges.get(usize::from(primitive.viewport));
-            current.range = range.copied().unwrap_or((0.0, 1.0));
-            self.primitive(simd, &mut current, &mut coverage, [whole.x, whole.y])?;
         }
         Ok(())
     }
@@ -168,7 +168,7 @@ impl<'d> Renderer<'_, 'd> {
     fn primitive<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut Current<'d>,
+        current: &mut Current<'_>,
         coverage: &mut Coverage<N>,
         corner: [i32; 2],
     ) -> Result<(), Stopped> {
@@ -186,7 +186,7 @@ impl<'d> Renderer<'_, 'd> {
             for column in first[0]..=last[0] {
                 let x = corner[0] + column * SIDE as i32;
                 let y = corner[1] + row * SIDE as i32;
-                if coverage.find(simd, &current.setup, x, y) {
+                if coverage.find(simd, current.setup, x, y) {
                     let tile = (row as u32 * side + column as u32) as usize;
                     self.tile(simd, current, coverage, tile, [x, y])?;
                 }
@@ -200,7 +200,7 @@ impl<'d> Renderer<'_, 'd> {
     fn tile<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut Current<'d>,
+        current: &mut Current<'_>,
         coverage: &Coverage<N>,
         tile: usize,
         at: [i32; 2],
@@ -232,7 +232,7 @@ impl<'d> Renderer<'_, 'd> {
             }
             let x = at[0] + (block % 4 * 4) as i32;
             let y = at[1] + (block / 4 * 4) as i32;
-            let setup = &current.setup;
+            let setup = current.setup;
             let [b1, b2] = setup.barycentrics(x, y);
             let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
             let mut values = BlockValues {
@@ -240,7 +240,7 @@ impl<'d> Renderer<'_, 'd> {
                 depth: f32x16::splat(simd, 0.0),
                 inverse_w: f32x16::splat(simd, 1.0),
             };
-            if early.is_some() || draw.needs_depth {
+            if early.is_some() || draw.needs.depth {
                 values.depth = add(setup.depth([b1, b2]), setup.lane_depth);
             }
             if let Some(tests) = early {
@@ -258,14 +258,14 @@ impl<'d> Renderer<'_, 'd> {
             if any == 0 || draw.stage.is_none() {
                 continue;
             }
-            let setup = &current.setup;
-            if draw.needs_barycentrics {
+            let setup = current.setup;
+            if draw.needs.barycentrics {
                 values.barycentrics = [
                     add(b1 as f32, setup.lane_barycentrics[0]),
                     add(b2 as f32, setup.lane_barycentrics[1]),
                 ];
             }
-            if draw.needs_w {
+            if draw.needs.inverse_w && !setup.affine {
                 values.inverse_w = add(setup.inverse_w([b1, b2]), setup.lane_w);
             }
             self.touch_colors(tile, coverage);
@@ -285,12 +285,12 @@ impl<'d> Renderer<'_, 'd> {
                             sample: sample as u8,
                             ..quad
                         };
-                        let values = at_sample(&values, setup_of(current), draw.positions[sample]);
-                        self.append(current, quad, &only, &values.lanes())?;
+                        let values = at_sample(&values, current.setup, draw.positions[sample]);
+                        self.append(current, quad, &only, &values)?;
                     }
                 }
             } else {
-                self.append(current, quad, &lanes, &values.lanes())?;
+                self.append(current, quad, &lanes, &values)?;
             }
         }
         Ok(())
@@ -299,12 +299,12 @@ impl<'d> Renderer<'_, 'd> {
     /// Adds the quads of a block that have samples to the batch, which is shaded when it is full. `quad` is the
     /// block's first.
     #[inline(always)]
-    fn append<const N: usize>(
+    fn append<S: Simd, const N: usize>(
         &mut self,
-        current: &mut Current<'d>,
+        current: &mut Current<'_>,
         quad: Quad,
         lanes: &[u16; N],
-        values: &[[f32; 16]; 4],
+        values: &BlockValues<S>,
     ) -> Result<(), Stopped> {
         if N == 1 && lanes[0] == u16::MAX && self.batch.count + 4 <= QUADS {
             let record = match current.record {
@@ -324,6 +324,7 @@ impl<'d> Renderer<'_, 'd> {
             self.batch.add_block(quads, values);
             return Ok(());
         }
+        let values = values.lanes();
         for number in 0..4 {
             let mut cover = 0;
             for (sample, lanes) in lanes.iter().enumerate() {
@@ -348,20 +349,20 @@ impl<'d> Renderer<'_, 'd> {
                 cover,
                 ..quad
             };
-            self.batch.add(quad, number, values);
+            self.batch.add(quad, number, &values);
         }
         Ok(())
     }
 
-    fn record(&mut self, current: &mut Current<'d>) -> u16 {
-        let (draw, stage) = (self.draw.draw, self.draw.stage);
-        let Some(stage) = stage else { return 0 };
+    fn record(&mut self, current: &mut Current<'_>) -> u16 {
+        let Some(stage) = self.draw.stage else {
+            return 0;
+        };
         let record = self.batch.add_primitive(
-            current.index,
             current.primitive,
-            &current.setup,
+            current.setup,
             &stage.interface,
-            &draw.varyings,
+            current.varyings,
         );
         current.record = Some(record);
         record
@@ -373,7 +374,7 @@ impl<'d> Renderer<'_, 'd> {
         &mut self,
         simd: S,
         tests: &Tests,
-        current: &Current<'d>,
+        current: &Current<'_>,
         values: &BlockValues<S>,
         lanes: &mut [u16; N],
         (tile, block): (usize, usize),
@@ -386,7 +387,7 @@ impl<'d> Renderer<'_, 'd> {
             let depth = if N == 1 {
                 values.depth
             } else {
-                at_sample(values, &current.setup, draw.positions[sample]).depth
+                at_sample(values, current.setup, draw.positions[sample]).depth
             };
             let code = tests.code.encode(simd, depth, current.range);
             let first = (tile * N + sample) * AREA + 16 * block;
@@ -412,7 +413,7 @@ impl<'d> Renderer<'_, 'd> {
         &mut self,
         simd: S,
         tests: &Tests,
-        current: &Current<'d>,
+        current: &Current<'_>,
         tile: usize,
         at: [i32; 2],
     ) -> bool {
@@ -503,13 +504,12 @@ impl<'d> Renderer<'_, 'd> {
         let machine = stage.machine(self.machines, size);
         let batch = &mut *self.batch;
         batch.prepare();
-        let primitives = &draw.draw.primitives[..];
         let samples = Samples {
             positions: draw.positions,
             each_shaded: draw.per_sample,
         };
         dispatch!(level, simd => batch.set_inputs(
-            simd, &stage.interface, samples, primitives, machine
+            simd, &stage.interface, samples, machine
         ));
         let watchdog = Watchdog {
             limit: draw.limit,
@@ -536,12 +536,6 @@ impl<'d> Renderer<'_, 'd> {
         self.batch.clear();
         Ok(())
     }
-}
-
-/// The set-up of a primitive.
-#[inline(always)]
-fn setup_of<'a>(current: &'a Current<'_>) -> &'a Setup {
-    &current.setup
 }
 
 #[cfg(test)]

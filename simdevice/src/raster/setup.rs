@@ -61,6 +61,8 @@ pub struct Setup {
     pub w_slopes: [f32; 2],
     /// 1 / w at corners 1 and 2, in units of `scale`.
     pub weights: [f32; 2],
+    /// Whether 1 / w is the same at all corners.
+    pub affine: bool,
     /// What 1 / w is in units of: its value if it is the same at all corners, so that nothing is lost.
     pub scale: f32,
 }
@@ -216,6 +218,7 @@ impl Setup {
         self.lane_w = lanes(w_slopes);
         self.w_slopes = w_slopes;
         self.weights = [weights[1], weights[2]];
+        self.affine = affine;
         self.scale = scale;
         true
     }
