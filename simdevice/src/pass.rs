@@ -479,7 +479,8 @@ impl Frame<'_> {
             let Some(target) = target else { continue };
             if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
                 plane.touch(target, layer, tile);
-                plane.resolve(target, (resolve, *mode), layer, tile);
+                let level = self.device.level();
+                plane.resolve(level, target, (resolve, *mode), layer, tile);
             }
             let keep = !self.last || target.store == StoreOp::Store;
             plane.finish(target, layer, tile, keep);

@@ -91,14 +91,9 @@ impl Quads {
     /// The tiles that they are in, of a plane of `samples` samples a pixel.
     #[inline(always)]
     pub fn tiles(&self, samples: usize) -> [usize; 4] {
-        let size = samples * AREA;
-        let [a, b, c, d] = self.first;
-        if self.consecutive {
-            let (first, last) = (a / size, d / size);
-            [first, first, last, last]
-        } else {
-            [a / size, b / size, c / size, d / size]
-        }
+        // A power of two.
+        let shift = (samples * AREA).trailing_zeros();
+        self.first.map(|first| first >> shift)
     }
 
     /// The words of 16 lanes' texels of a word each.
@@ -558,8 +553,9 @@ fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
     (rounded - one).to_bits()
 }
 
+/// Four bytes of 0 to 1 in a word, each to nearest.
 #[inline(always)]
-fn pack_unorm8<S: Simd>(simd: S, colors: &Colors<S>, bgra: bool) -> u32x16<S> {
+pub fn pack_unorm8<S: Simd>(simd: S, colors: &Colors<S>, bgra: bool) -> u32x16<S> {
     let mut clamped = *colors;
     for component in &mut clamped {
         *component = clamp(simd, *component, 0.0, 1.0);

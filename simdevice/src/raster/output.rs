@@ -32,8 +32,10 @@ pub fn test<S: Simd>(
         }
     }
     let passed = tests.test(simd, lanes, front, code, &mut depths, &mut stencils);
-    if tests.depth.is_some_and(|(_, write)| write) {
-        quads.store(buffers.depth.words_mut(), passed, &depths);
+    if passed != 0 && tests.depth.is_some_and(|(_, write)| write) {
+        // Those that did not pass are as they were.
+        let stored = if quads.consecutive { u16::MAX } else { passed };
+        quads.store(buffers.depth.words_mut(), stored, &depths);
         for tile in quads.tiles(buffers.depth.samples()) {
             buffers.depth.changed(tile);
         }

@@ -1,7 +1,7 @@
 //! Triangle mode of the tile engine: the primitives of a draw, one after another, through coverage, early tests and
 //! shading.
 
-use super::batch::{Batch, BlockValues, QUADS, Quad, Samples, at_sample};
+use super::batch::{Batch, BlockValues, Needs, QUADS, Quad, Samples, at_sample};
 use super::color::Quads;
 use super::coverage::{Coverage, bits};
 use super::depth::Tests;
@@ -133,6 +133,10 @@ impl Renderer<'_, '_> {
         let mut coverage = Coverage::<N>::default();
         let mut setup = Setup::default();
         let draw = self.draw;
+        let needs = Needs {
+            depth: draw.needs.depth || draw.tests.any(),
+            ..draw.needs
+        };
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
         for chunk in &draw.draw.chunks {
             for &index in chunk.bins.of(self.place.at, self.place.layer) {
@@ -146,7 +150,7 @@ impl Renderer<'_, '_> {
                     };
                     clip = (primitive.viewport, pixels.intersect(whole));
                 }
-                if !setup.prepare(simd, primitive, draw.positions, clip.1) {
+                if !setup.prepare(simd, primitive, draw.positions, clip.1, needs) {
                     continue;
                 }
                 let range = draw.ranges.get(usize::from(primitive.viewport));

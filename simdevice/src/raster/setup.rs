@@ -1,5 +1,6 @@
 //! A primitive made ready for tiles: its edges as exact integers, and what varies over it as planes.
 
+use super::batch::Needs;
 use super::coverage::{LANE_X, LANE_Y};
 use crate::geometry::{Primitive, PrimitiveKind};
 use crate::packet::Rect;
@@ -123,7 +124,8 @@ fn pixels(low: i32, high: i32, samples: usize) -> (i32, i32) {
 }
 
 impl Setup {
-    /// Becomes that of a primitive; returns false, and is undefined, if none of its samples lies in `clip`.
+    /// Becomes that of a primitive; returns false, and is undefined, if none of its samples lies in `clip`. What lanes
+    /// add is found only as far as it is needed.
     #[inline(always)]
     pub fn prepare<S: Simd>(
         &mut self,
@@ -131,6 +133,7 @@ impl Setup {
         primitive: &Primitive,
         positions: &[[i32; 2]],
         clip: Rect,
+        needs: Needs,
     ) -> bool {
         let [p0, p1, p2] = primitive.corners;
         let parallelogram = primitive.kind != PrimitiveKind::Triangle;
@@ -209,13 +212,19 @@ impl Setup {
         self.numerators = numerators;
         self.moved = moved;
         self.inverse_area = inverse_area;
-        self.lane_barycentrics = [lanes(slopes[0]), lanes(slopes[1])];
+        if needs.barycentrics {
+            self.lane_barycentrics = [lanes(slopes[0]), lanes(slopes[1])];
+        }
         self.slopes = slopes;
         self.depth = depth;
-        self.lane_depth = lanes(depth_slopes);
+        if needs.depth {
+            self.lane_depth = lanes(depth_slopes);
+        }
         self.depth_slopes = depth_slopes;
         self.inverse_w = inverse_w;
-        self.lane_w = lanes(w_slopes);
+        if needs.inverse_w && !affine {
+            self.lane_w = lanes(w_slopes);
+        }
         self.w_slopes = w_slopes;
         self.weights = [weights[1], weights[2]];
         self.affine = affine;
