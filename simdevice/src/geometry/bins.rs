@@ -246,3 +246,35 @@ impl Bins {
 fn tile_number(columns: u32, rows: u32, [column, row, layer]: [u32; 3]) -> u32 {
     (layer * rows + row) * columns + column
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_pairs_far_apart_make_few_lists() {
+        let area = Rect {
+            x: 0,
+            y: 0,
+            width: 1024,
+            height: 1024,
+        };
+        let grid = Grid::new(area, 64);
+        let layers = 2048;
+        let at = |column, row, layer| tile_number(16, 16, [column, row, layer]);
+        let pairs = [
+            (at(3, 2, 1000), 0),
+            (at(0, 0, 0), 1),
+            (at(3, 2, 1000), 2),
+            (at(15, 15, 2047), 3),
+        ];
+        let bins = Bins::new(&grid, layers, &pairs);
+        assert_eq!(bins.of([3, 2], 1000), [0, 2]);
+        assert_eq!(bins.of([0, 0], 0), [1]);
+        assert_eq!(bins.of([15, 15], 2047), [3]);
+        assert_eq!(bins.of([3, 3], 1000), [0; 0]);
+        assert_eq!(bins.of([15, 15], 2048), [0; 0]);
+        assert_eq!(bins.pairs(), 4);
+        assert!(bins.memory_bytes() < 100);
+    }
+}

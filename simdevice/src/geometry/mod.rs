@@ -32,7 +32,8 @@ use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::format::Format;
 use crate::packet::Rect;
-use crate::packet::draw::{Draw, VertexInput};
+use crate::packet::draw::{Draw, DrawState, PolygonMode, VertexInput};
+use assemble::corner_count;
 use bins::Grid;
 use depth_bias::DepthUnit;
 use elements::{Elements, Run, runs};
@@ -250,6 +251,11 @@ fn mixes_instances(draw: &Draw) -> bool {
         .any(|&(_, rate, input)| rate == Rate::Uniform && depends(input))
 }
 
+/// Whether primitives may become points.
+fn draws_points(state: &DrawState) -> bool {
+    corner_count(state.topology) == 1 || state.polygon_mode == PolygonMode::Point
+}
+
 /// What one worker takes chunks through.
 struct Worker<'a> {
     front: &'a FrontEnd<'a>,
@@ -279,6 +285,8 @@ impl<'a> Worker<'a> {
             fetcher: Fetcher::new(front.draw, &mut machine),
             machine,
             outputs: setup.outputs,
+            takes_extras: setup.outputs.has_extras(draws_points(setup.state)),
+            level: front.device.level(),
             transform: front.transforms.first().copied().unwrap_or(Transform::NONE),
             resources,
             watchdog: Watchdog {

@@ -17,9 +17,6 @@ pub const QUADS: usize = LANES / 4;
 /// A quad that is to be shaded.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quad {
-    /// Its first pixel in the framebuffer.
-    pub x: u16,
-    pub y: u16,
     /// Its primitive: an index into [`Batch::records`].
     pub record: u16,
     /// Its tile of the macro-tile.
@@ -77,6 +74,12 @@ pub struct Needs {
 pub struct Batch {
     /// What is kept of quads' values.
     needs: Needs,
+    /// The first pixel of the macro-tile in the framebuffer.
+    corner: [u32; 2],
+    /// Its side in tiles.
+    side: u32,
+    /// Whether some pixels of quads are not covered.
+    partial: bool,
     /// Whether 1 / w is the same all over each primitive, so that barycentrics need no correction.
     affine: bool,
     pub quads: [Quad; QUADS],
@@ -101,6 +104,9 @@ impl Default for Batch {
     fn default() -> Self {
         Self {
             needs: Needs::default(),
+            corner: [0; 2],
+            side: 1,
+            partial: false,
             affine: true,
             quads: [Quad::default(); QUADS],
             count: 0,
@@ -141,15 +147,18 @@ impl<S: Simd> BlockValues<S> {
 }
 
 impl Batch {
-    /// Empties it, for a draw whose fragments need this.
-    pub fn begin(&mut self, needs: Needs) {
+    /// Empties it, for a draw whose fragments need this, within a macro-tile: its column and row, and its side in
+    /// pixels.
+    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32) {
         self.needs = needs;
+        self.corner = at.map(|at| at * size);
+        self.side = size / super::TILE_SIZE;
         self.clear();
     }
 
     /// Empties it.
     pub fn clear(&mut self) {
-        self.affine = true;
+        (self.affine, self.partial) = (true, false);
         self.count = 0;
         self.records.clear();
         self.attributes.clear();
@@ -212,6 +221,7 @@ impl Batch {
         if self.needs.inverse_w {
             self.inverse_w[at..at + 4].copy_from_slice(&values[3][lanes]);
         }
+        self.partial |= covered_lanes(quad.cover) != 15;
         self.quads[self.count] = quad;
         self.count += 1;
     }
@@ -341,6 +351,9 @@ impl Batch {
         }
         self.active = LaneMask::first(4 * self.count);
         self.helpers = LaneMask::none();
+        if !self.partial {
+            return;
+        }
         for (number, quad) in self.quads[..self.count].iter().enumerate() {
             let covered = covered_lanes(quad.cover);
             if covered != 15 {
@@ -522,13 +535,22 @@ impl Batch {
         }
     }
 
+    /// The column or row of a lane of a quad in the framebuffer.
+    fn pixel(&self, quad: &Quad, lane: usize, axis: usize) -> u32 {
+        let tile = u32::from(quad.tile);
+        let tile = [tile % self.side, tile / self.side][axis];
+        // See `tile::place`.
+        let bits = (u32::from(quad.place) | lane as u32) >> axis;
+        let within = bits & 1 | bits >> 1 & 2 | bits >> (2 + axis) & 12;
+        self.corner[axis] + tile * super::TILE_SIZE + within
+    }
+
     /// As [`Batch::input`], for inputs that follow from the quad.
     fn scalar_input(&self, kind: FragmentInput, chunk: usize, samples: Samples) -> [u32; 16] {
         let quads = self.chunk_quads(chunk);
         let mut lanes = [0; 16];
         for (number, lane) in lanes.iter_mut().enumerate() {
             let quad = &quads[number / 4];
-            let (column, row) = ((number & 1) as u16, (number >> 1 & 1) as u16);
             let record = &self.records[usize::from(quad.record)];
             let sample = usize::from(quad.sample);
             // Samples shaded for themselves are where they are.
@@ -538,8 +560,11 @@ impl Batch {
                 [0.5; 2]
             };
             *lane = match kind {
-                FragmentInput::FragCoord(0) => (f32::from(quad.x + column) + within[0]).to_bits(),
-                FragmentInput::FragCoord(_) => (f32::from(quad.y + row) + within[1]).to_bits(),
+                FragmentInput::FragCoord(axis) => {
+                    let axis = axis.min(1);
+                    let pixel = self.pixel(quad, number % 4, axis);
+                    (pixel as f32 + within[axis]).to_bits()
+                }
                 FragmentInput::FrontFacing => {
                     if record.front {
                         u32::MAX

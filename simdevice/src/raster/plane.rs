@@ -11,8 +11,8 @@ use super::color::pack_unorm8;
 use super::tile::{AREA, SIDE, Target, Tile, place};
 use crate::format::{Format, MAX_TEXEL_SIZE};
 use crate::packet::{Rect, ResolveMode};
-use crate::transfer::resolve_row;
 use crate::texture::unorm8_fraction;
+use crate::transfer::resolve_row;
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 
 /// The most samples of a pixel.

@@ -80,7 +80,7 @@ impl TileDraw<'_> {
             cancel,
             samples_passed: 0,
         };
-        renderer.batch.begin(self.needs);
+        renderer.batch.begin(self.needs, place.at, place.size);
         let level = self.level;
         let done = if self.positions.len() == 1 {
             dispatch!(level, simd => renderer.run::<_, 1>(simd))
@@ -225,9 +225,11 @@ impl Renderer<'_, '_> {
             return Ok(());
         }
         let state = &draw.draw.state;
+        let masked = state.sample_mask & ((1 << N) - 1) != (1 << N) - 1;
+        let mut touched = false;
         for block in bits(coverage.blocks) {
             let mut lanes = coverage.lanes[block];
-            if state.sample_mask & ((1 << N) - 1) != (1 << N) - 1 {
+            if masked {
                 for (sample, lanes) in lanes.iter_mut().enumerate() {
                     if state.sample_mask >> sample & 1 == 0 {
                         *lanes = 0;
@@ -272,10 +274,11 @@ impl Renderer<'_, '_> {
             if draw.needs.inverse_w && !setup.affine {
                 values.inverse_w = add(setup.inverse_w([b1, b2]), setup.lane_w);
             }
-            self.touch_colors(tile, coverage);
+            if !touched {
+                self.touch_colors(tile, coverage);
+                touched = true;
+            }
             let quad = Quad {
-                x: x as u16,
-                y: y as u16,
                 tile: tile as u8,
                 place: (block * 16) as u8,
                 ..Quad::default()
@@ -321,8 +324,6 @@ impl Renderer<'_, '_> {
                 ..quad
             }; 4];
             for (number, quad) in quads.iter_mut().enumerate() {
-                quad.x += (number as u16 & 1) * 2;
-                quad.y += number as u16 & 2;
                 quad.place += 4 * number as u8;
             }
             self.batch.add_block(quads, values);
@@ -346,8 +347,6 @@ impl Renderer<'_, '_> {
                 None => self.record(current),
             };
             let quad = Quad {
-                x: quad.x + (number as u16 & 1) * 2,
-                y: quad.y + (number as u16 & 2),
                 place: quad.place + 4 * number as u8,
                 record,
                 cover,
