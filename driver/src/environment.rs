@@ -5,6 +5,8 @@
 //! - `GAURAST_THREADS`: how many worker threads a device has; 0 (the default) means one per processor.
 //! - `GAURAST_TIMEOUT_MS`: how many milliseconds one batch of shader invocations may take before the device is lost; a
 //!   loop without end is stopped so. A batch is a workgroup, or some 64 vertices or fragments.
+//! - `GAURAST_SKIP`: the work that is left out where it changes no image: all (the default), none, or names separated by
+//!   commas (see [`simdevice::skips`]).
 //! - `GAURAST_TRACE`: a file that the work of a device's last 64 render passes is written to, as JSON, when the device is
 //!   gone; `gaurast simulate` reads it. It costs a little time and changes no image.
 //! - `GAURAST_DUMP`: what is printed to standard error for people, by name: ir (the device's programs, as pipelines are
@@ -12,6 +14,7 @@
 
 use crate::error::Error;
 use simdevice::device::{Config, SimdLevel};
+use simdevice::skips::UnknownSkip;
 use simdevice::trace::{Recorder, Trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,6 +23,7 @@ use std::time::Duration;
 const SIMD: &str = "GAURAST_SIMD";
 const THREADS: &str = "GAURAST_THREADS";
 const TIMEOUT: &str = "GAURAST_TIMEOUT_MS";
+const SKIP: &str = "GAURAST_SKIP";
 const TRACE: &str = "GAURAST_TRACE";
 const DUMP: &str = "GAURAST_DUMP";
 
@@ -32,6 +36,7 @@ pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
         variable(SIMD)?.as_deref(),
         variable(THREADS)?.as_deref(),
         variable(TIMEOUT)?.as_deref(),
+        variable(SKIP)?.as_deref(),
     )?;
     if let Some(file) = variable(TRACE)?.filter(|file| !file.is_empty()) {
         let file = PathBuf::from(file);
@@ -96,6 +101,7 @@ fn config(
     simd: Option<&str>,
     threads: Option<&str>,
     timeout: Option<&str>,
+    skip: Option<&str>,
 ) -> Result<Config, Error> {
     let mut config = Config::default();
     if let Some(name) = simd {
@@ -115,24 +121,38 @@ fn config(
         })?;
         config.shader_timeout = Duration::from_millis(milliseconds);
     }
+    if let Some(names) = skip {
+        let unknown =
+            |error: UnknownSkip| Error::InitializationFailed(format!("{SKIP}={names}: {error}"));
+        config.skips = names.parse().map_err(unknown)?;
+    }
     Ok(config)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use simdevice::skips::Skip;
 
     #[test]
     fn values_are_understood_or_refused() {
-        assert_eq!(config(None, None, None).unwrap().threads, 0);
-        let chosen = config(Some("sse2"), Some("3"), Some("250")).unwrap();
+        assert_eq!(config(None, None, None, None).unwrap().threads, 0);
+        let chosen = config(Some("sse2"), Some("3"), Some("250"), Some("blocks,bounds")).unwrap();
         assert_eq!(chosen.shader_timeout, Duration::from_millis(250));
         assert_eq!((chosen.simd, chosen.threads), (SimdLevel::Baseline, 3));
-        let error = config(Some("mmx"), None, None).unwrap_err();
+        let error = config(Some("mmx"), None, None, None).unwrap_err();
         assert_eq!(error.result(), ash::vk::Result::ERROR_INITIALIZATION_FAILED);
         assert!(error.to_string().contains("GAURAST_SIMD=mmx"));
-        assert!(config(None, Some("-1"), None).is_err());
-        assert!(config(None, None, Some("soon")).is_err());
+        assert!(config(None, Some("-1"), None, None).is_err());
+        assert!(config(None, None, Some("soon"), None).is_err());
+        assert!(chosen.skips.has(Skip::Bounds) && !chosen.skips.has(Skip::Ellipse));
+        let error = config(None, None, None, Some("blocks,much")).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .contains("GAURAST_SKIP=blocks,much: much is"),
+            "{error}"
+        );
         assert!(parse_dump("ir").unwrap().ir);
         assert!(!parse_dump("").unwrap().ir);
         assert!(parse_dump("ir,everything").is_err());

@@ -64,6 +64,12 @@ counters! {
     SkippedFar: "gaussians skipped", "beyond far plane", Count, "Gaussians not before the far plane";
     SkippedDegenerate: "gaussians skipped", "degenerate covariance", Count, "Gaussians whose screen-space covariance is not positive and finite";
     SkippedOffScreen: "gaussians skipped", "off screen", Count, "Gaussians that reach no pixel of the scissored viewport at the alpha floor";
+    OutsideByBounds: "skips", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
+    TilesBesideEllipse: "skips", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
+    HarmonicsUnread: "skips", "harmonics unread", Count, "Gaussians whose spherical harmonics were not read";
+    BlocksBesideEllipse: "skips", "blocks beside ellipse", Count, "Pairs of an unfinished 4x4 block and a Gaussian of its tile that does not reach the block";
+    BlocksSaturated: "skips", "blocks saturated", Count, "Pairs of a finished 4x4 block and a Gaussian of its tile";
+    TilesUntouched: "skips", "tiles untouched", Count, "Tiles of attachments that were not loaded, because nothing was drawn to them";
     InputVertices: "geometry", "input vertices", Count, "Vertices or indices of draws of points, lines and triangles";
     InputPrimitives: "geometry", "input primitives", Count, "Points, lines and triangles that were assembled";
     VertexInvocations: "geometry", "vertex invocations", Count, "Vertices shaded";

@@ -1,6 +1,7 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::skips::Skips;
 use crate::trace::Recorder;
 use crate::workers::Workers;
 use fearless_simd::Level;
@@ -24,6 +25,8 @@ pub struct Config {
     pub flush: FlushPolicy,
     /// The longest time that one batch of shader invocations may take.
     pub shader_timeout: Duration,
+    /// The work that is left out where it changes no pixel.
+    pub skips: Skips,
     /// Gathers what draws do in tiles, if anybody wants to know. It never changes an image.
     pub recorder: Option<Arc<Recorder>>,
 }
@@ -46,6 +49,7 @@ impl Default for Config {
             bin_budget_bytes: 256 << 20,
             flush: FlushPolicy::WhenFull,
             shader_timeout: Duration::from_secs(5),
+            skips: Skips::default(),
             recorder: None,
         }
     }

@@ -22,6 +22,7 @@ pub mod packet;
 pub mod pass;
 pub mod query;
 pub mod raster;
+pub mod skips;
 pub mod texture;
 pub mod trace;
 pub mod transfer;

@@ -18,6 +18,7 @@ use crate::raster::blend::Blender;
 use crate::raster::gaussian::GaussianTile;
 use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
 use crate::raster::tile::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target, Tile};
+use crate::skips::Skip;
 use isa::exec::Stopped;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
@@ -450,10 +451,28 @@ impl Frame<'_> {
                 )?,
             }
         }
+        if !self.device.config().skips.has(Skip::EmptyTiles) {
+            tiles().for_each(|tile| self.touch_all(worker, layer, &tile));
+        }
         for tile in tiles() {
             self.finish(worker, layer, &tile);
         }
         Ok(())
+    }
+
+    /// Loads or clears what no draw has touched of a tile.
+    fn touch_all(&self, worker: &mut Worker, layer: u32, tile: &Tile) {
+        let (pass, buffers) = (self.pass, &mut worker.buffers);
+        let colors = buffers.color.iter_mut().zip(&pass.color);
+        let rest = [
+            (&mut buffers.depth, &pass.depth),
+            (&mut buffers.stencil, &pass.stencil),
+        ];
+        for (plane, target) in colors.chain(rest) {
+            if let Some(target) = target {
+                plane.touch(target, layer, tile);
+            }
+        }
     }
 
     /// Resolves and stores a tile.
@@ -477,6 +496,10 @@ impl Frame<'_> {
             ]);
         for (plane, target, resolve) in planes {
             let Some(target) = target else { continue };
+            let untouched = !plane.is_touched(tile.index);
+            worker
+                .counters
+                .add(Counter::TilesUntouched, untouched.into());
             if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
                 plane.touch(target, layer, tile);
                 let level = self.device.level();

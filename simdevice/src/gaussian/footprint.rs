@@ -65,9 +65,15 @@ impl Ellipse {
     /// Appends the spans of tiles that hold a visible pixel centre's column and row inside the ellipse.
     ///
     /// The ellipse is convex, so that in each row of tiles the reached ones follow one another, and the
-    /// columns that it spans within the row's pixel centres tell them exactly.
+    /// columns that it spans within the row's pixel centres tell them exactly. The tiles of its box that it does not
+    /// reach are added to `beside`; without it, the whole box is listed.
     #[inline(always)]
-    pub(crate) fn append_spans(&self, visible: &Visible, spans: &mut Vec<Span>) {
+    pub(crate) fn append_spans(
+        &self,
+        visible: &Visible,
+        spans: &mut Vec<Span>,
+        beside: Option<&mut u64>,
+    ) {
         let tile = i64::from(TILE_SIZE);
         let [x, y] = self.mean;
         let [half_x, half_y] = self.half;
@@ -91,6 +97,12 @@ impl Ellipse {
             push(spans, top / tile, left, right);
             return;
         }
+        let Some(beside) = beside else {
+            for row in top / tile..=bottom / tile {
+                push(spans, row, left, right);
+            }
+            return;
+        };
         // Both sides are monotonic above and below their furthest points, at -peak and peak.
         let side = |dy: f64, sign: f64| {
             let rest = (half_y * half_y - dy * dy).max(0.0);
@@ -101,8 +113,10 @@ impl Ellipse {
             let below = bottom.min(row * tile + tile - 1) as f64 + 0.5 - y;
             let low = side((-self.peak).max(above).min(below), -1.0);
             let high = side(self.peak.max(above).min(below), 1.0);
+            *beside += (right / tile - left / tile + 1) as u64;
             if let Some((left, right)) = centres(x + low, x + high, visible.left, visible.right) {
                 push(spans, row, left, right);
+                *beside -= (right / tile - left / tile + 1) as u64;
             }
         }
     }
@@ -163,7 +177,8 @@ mod tests {
 
         fn spans(&self) -> Vec<Span> {
             let mut spans = Vec::new();
-            self.ellipse().append_spans(&VISIBLE, &mut spans);
+            self.ellipse()
+                .append_spans(&VISIBLE, &mut spans, Some(&mut 0));
             spans
         }
 

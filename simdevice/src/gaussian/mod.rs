@@ -20,6 +20,7 @@ use crate::binning::TileLists;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::packet::{GaussianAppend, GaussianBegin, GaussianState, Rect, Viewport};
+use crate::skips::Skips;
 use crate::trace::{self, DrawRecord};
 use fearless_simd::dispatch;
 use fetch::{BATCH, Batch};
@@ -64,6 +65,8 @@ pub struct GaussianDraw {
     /// By batch; [`locate`] finds a primitive's.
     pub(crate) splats: Vec<Vec<Splat>>,
     pub(crate) tiles: TileLists,
+    /// What is left out in its tiles.
+    pub(crate) skips: Skips,
     /// Where the work of its tiles goes, if anybody wants to know.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
@@ -144,6 +147,7 @@ impl GaussianSet {
             bounds: self.bounds,
             splats,
             tiles,
+            skips: device.config().skips,
             record,
         })
     }
@@ -177,6 +181,7 @@ impl GaussianSet {
             &begin.camera,
             &begin.viewport,
             Visible::from(self.bounds),
+            device.config().skips,
         );
         let level = device.level();
         let one = |scratch: &mut Scratch, number: usize| {

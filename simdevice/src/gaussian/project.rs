@@ -16,6 +16,7 @@ use crate::counters::{Counter, Counters};
 use crate::packet::{
     Camera, CameraModel, GaussianAttributes, GaussianOrder, GaussianState, Viewport,
 };
+use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, prelude::*};
 
 /// A projected Gaussian: what the tile engine needs of it, in one cache line.
@@ -78,6 +79,7 @@ pub(crate) struct Projection {
     log2_floor: f64,
     sh_degree: u32,
     visible: Visible,
+    skips: Skips,
 }
 
 impl Projected {
@@ -105,6 +107,7 @@ impl Projection {
         camera: &Camera,
         viewport: &Viewport,
         visible: Visible,
+        skips: Skips,
     ) -> Self {
         let focal = camera.focal_length.map(f64::from);
         let principal = camera.principal_point.map(f64::from);
@@ -131,6 +134,7 @@ impl Projection {
             log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
             sh_degree: state.sh_degree,
             visible,
+            skips,
         }
     }
 
@@ -146,18 +150,43 @@ impl Projection {
     ) {
         scratch.fetch(attributes, batch);
         out.counters.add(Counter::GaussiansRead, batch.len as u64);
-        let kept = self.cull(simd, batch.len, scratch, &mut out.counters);
+        let mut colored = Bits::first(batch.len);
+        if !self.skips.has(Skip::Harmonics) {
+            colored = self.find_colored(simd, attributes, batch);
+        }
+        let kept = self.cull(simd, &colored, batch.len, scratch, &mut out.counters);
         scratch.gather(&kept);
         self.flatten(simd, scratch);
         self.emit(simd, attributes, batch, scratch, out);
     }
 
+    /// Finds which lanes have finite spherical harmonics, of all that the batch holds.
+    #[inline(always)]
+    fn find_colored<S: Simd>(
+        &self,
+        simd: S,
+        attributes: &GaussianAttributes,
+        batch: &Batch,
+    ) -> Bits {
+        let reader = CoefficientReader::new(&attributes.spherical_harmonics);
+        let mut coefficients = [0.0; COEFFICIENT_FLOATS];
+        let mut colored = Bits::default();
+        for lane in 0..batch.len {
+            reader.read(batch, lane, &mut coefficients);
+            let anywhere = [0.0, 0.0, 1.0];
+            let color = spherical_harmonics::color(simd, self.sh_degree, anywhere, &coefficients);
+            colored.set_one(lane, color.is_some());
+        }
+        colored
+    }
+
     /// Finds the camera-space mean of each lane, and counts the first reason to skip it, if there is one.
-    /// Returns which lanes have none.
+    /// Returns which lanes have none. Lanes that are not `colored` are not finite.
     #[inline(always)]
     fn cull<S: Simd>(
         &self,
         simd: S,
+        colored: &Bits,
         len: usize,
         scratch: &mut Scratch,
         counters: &mut Counters,
@@ -176,6 +205,7 @@ impl Projection {
         // A hundredth more than the ellipse needs, so that rounding loses nothing.
         let extent = number(2.02 * LN_2 * (largest_opacity.log2() - self.log2_floor));
         let low_pass = number(self.low_pass);
+        let bounded = self.model == CameraModel::Pinhole && self.skips.has(Skip::Bounds);
         let r = self.rotation;
         let [
             mut finite,
@@ -222,7 +252,7 @@ impl Projection {
                 t.store_slice(&mut lanes[at..at + S::f64s::LEN]);
             }
 
-            if self.model != CameraModel::Pinhole {
+            if !bounded {
                 inside.set(at, S::mask64s::splat(simd, true));
                 continue;
             }
@@ -252,6 +282,7 @@ impl Projection {
             before_far.set_one(lane, z < self.far);
         }
         let mut kept = Bits::first(len);
+        finite = finite.and(colored);
         for (passed, counter) in [
             (finite, Counter::SkippedNonFinite),
             (rotated, Counter::SkippedZeroRotation),
@@ -259,12 +290,14 @@ impl Projection {
             (bright, Counter::SkippedFaint),
             (beyond_near, Counter::SkippedNear),
             (before_far, Counter::SkippedFar),
-            (inside, Counter::SkippedOffScreen),
         ] {
             counters.add(counter, kept.without(&passed).count());
             kept = kept.and(&passed);
         }
-        kept
+        let outside = kept.without(&inside).count();
+        counters.add(Counter::SkippedOffScreen, outside);
+        counters.add(Counter::OutsideByBounds, outside);
+        kept.and(&inside)
     }
 
     /// The depth variable of each lane.
@@ -457,6 +490,8 @@ impl Projection {
         let mut coefficients = [0.0; COEFFICIENT_FLOATS];
         let flat = &*scratch.flat;
         out.reserve(scratch.lanes.len());
+        let mut beside = self.skips.has(Skip::Ellipse).then_some(0);
+        let mut read = 0;
         for (at, &lane) in scratch.lanes.iter().enumerate() {
             let at = at % BATCH;
             let determinant = flat.determinant[at];
@@ -474,13 +509,14 @@ impl Projection {
             };
             // The square root of a negative extent is not a number.
             if ellipse.half[1] >= 0.0 {
-                ellipse.append_spans(&self.visible, &mut out.spans);
+                ellipse.append_spans(&self.visible, &mut out.spans, beside.as_mut());
             }
             if out.spans.len() == first_span {
                 out.counters.add(Counter::SkippedOffScreen, 1);
                 continue;
             }
             reader.read(batch, lane, &mut coefficients);
+            read += 1;
             let d = &flat.direction;
             let direction = [d[0][at] as f32, d[1][at] as f32, d[2][at] as f32];
             let degree = self.sh_degree;
@@ -499,7 +535,11 @@ impl Projection {
             });
             out.span_ends.push(out.spans.len() as u32);
         }
-        out.counters
-            .add(Counter::GaussiansDrawn, out.splats.len() as u64);
+        let counters = &mut out.counters;
+        counters.add(Counter::GaussiansDrawn, out.splats.len() as u64);
+        counters.add(Counter::TilesBesideEllipse, beside.unwrap_or_default());
+        if self.skips.has(Skip::Harmonics) {
+            counters.add(Counter::HarmonicsUnread, batch.len as u64 - read);
+        }
     }
 }

@@ -14,6 +14,7 @@ use crate::counters::{Counter, Counters};
 use crate::gaussian::project::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::packet::{GaussianState, Rect};
+use crate::skips::Skip;
 use crate::trace::{self, Run, TileWork};
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 
@@ -24,6 +25,8 @@ const LANES: usize = 16;
 const BLOCK: usize = 4;
 /// Blocks of a tile.
 const BLOCKS: usize = 16;
+/// A bit for each of them.
+const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
 /// Gaussians of a chunk: as many as phase 1 and phase 2 pass through the first-level cache.
 const CHUNK: usize = 32;
 
@@ -115,7 +118,7 @@ impl GaussianTile {
         let thresholds = Thresholds::new(&draw.state);
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
         let work = dispatch!(level, simd =>
-            self.composite(simd, &draw.splats, list, corner, thresholds, runs.as_mut()));
+            self.composite(simd, draw, list, corner, thresholds, runs.as_mut()));
         if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
             record.add(TileWork {
                 at: [tile_x, tile_y],
@@ -127,6 +130,9 @@ impl GaussianTile {
         }
         counters.add(Counter::TilePairsEvaluated, work.pairs);
         counters.add(Counter::BlockEvaluations, work.items);
+        counters.add(Counter::BlocksBesideEllipse, work.open - work.items);
+        let blocks = (list.len() * BLOCKS) as u64;
+        counters.add(Counter::BlocksSaturated, blocks - work.open);
         counters.add(Counter::PixelContributions, work.contributions);
         self.covered.iter().any(|&lanes| lanes != 0)
     }
@@ -180,15 +186,23 @@ impl GaussianTile {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        splats: &[Vec<Splat>],
+        draw: &GaussianDraw,
         list: &[u32],
         corner: [u32; 2],
         thresholds: Thresholds,
         mut runs: Option<&mut Vec<Run>>,
     ) -> Work {
         let mut work = Work::default();
+        let (bounded, end_early) = (
+            draw.skips.has(Skip::Blocks),
+            draw.skips.has(Skip::Saturated),
+        );
         for chunk in list.chunks(CHUNK) {
-            let open = self.open_blocks();
+            let open = if end_early {
+                self.open_blocks()
+            } else {
+                ALL_BLOCKS
+            };
             if open == 0 {
                 break;
             }
@@ -198,17 +212,19 @@ impl GaussianTile {
             let mut items = 0;
             for (number, &primitive) in chunk.iter().enumerate() {
                 let (batch, place) = locate(primitive);
-                let splat = &splats[batch][place];
+                let splat = &draw.splats[batch][place];
                 let record = &mut self.chunk[number % CHUNK];
                 let reached = record.place(simd, splat, corner, thresholds.log2_floor);
                 let Some(room) = self.items.get_mut(items..items + LANES) else {
                     // There is room for all blocks of all records, and for a vector more.
                     break;
                 };
-                items += append_items(simd, number, reached & open, room);
+                let reached = if bounded { reached & open } else { open };
+                items += append_items(simd, number, reached, room);
             }
             work.pairs += chunk.len() as u64;
             work.items += items as u64;
+            work.open += chunk.len() as u64 * u64::from(blocks);
             if let Some(runs) = &mut runs {
                 let (primitives, reached) = (chunk.len() as u32, items as u32);
                 trace::push_run(
@@ -315,6 +331,8 @@ impl GaussianTile {
 struct Work {
     pairs: u64,
     items: u64,
+    /// Blocks that were not finished, summed over the pairs.
+    open: u64,
     contributions: u64,
 }
 
