@@ -185,7 +185,10 @@ const FARTHEST: f64 = 16_777_216.0;
 #[inline(always)]
 pub(super) fn snap(window: f32) -> i32 {
     let scaled = f64::from((window - 0.5) * ONE as f32);
-    // What is no number is far away.
+    #[expect(
+        clippy::manual_clamp,
+        reason = "it would leave what is no number as it is"
+    )]
     let scaled = scaled.max(-FARTHEST).min(FARTHEST);
     // The sum's low bits are the integer.
     (scaled + ROUND).to_bits() as i32 + ONE / 2

@@ -6,6 +6,7 @@ use super::fragment::{BATCH_LANES, Interface};
 use super::setup::Setup;
 use crate::geometry::{Primitive, PrimitiveKind, Varyings};
 use crate::packet::draw::{FragmentInput, Interpolation, Sampling};
+use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x16};
 use isa::exec::{Chunk, LaneMask, Machine};
 
@@ -80,6 +81,8 @@ pub struct Batch {
     side: u32,
     /// Whether some pixels of quads are not covered.
     partial: bool,
+    /// Whether it is looked at whether batches are affine.
+    detects_affine: bool,
     /// Whether 1 / w is the same all over each primitive, so that barycentrics need no correction.
     affine: bool,
     pub quads: [Quad; QUADS],
@@ -107,6 +110,7 @@ impl Default for Batch {
             corner: [0; 2],
             side: 1,
             partial: false,
+            detects_affine: true,
             affine: true,
             quads: [Quad::default(); QUADS],
             count: 0,
@@ -149,8 +153,9 @@ impl<S: Simd> BlockValues<S> {
 impl Batch {
     /// Empties it, for a draw whose fragments need this, within a macro-tile: its column and row, and its side in
     /// pixels.
-    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32) {
+    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32, skips: Skips) {
         self.needs = needs;
+        self.detects_affine = skips.has(Skip::Affine);
         self.corner = at.map(|at| at * size);
         self.side = size / super::TILE_SIZE;
         self.clear();
@@ -158,7 +163,7 @@ impl Batch {
 
     /// Empties it.
     pub fn clear(&mut self) {
-        (self.affine, self.partial) = (true, false);
+        (self.affine, self.partial) = (self.detects_affine, false);
         self.count = 0;
         self.records.clear();
         self.attributes.clear();
@@ -366,7 +371,7 @@ impl Batch {
         }
     }
 
-    /// Sets a program's inputs.
+    /// Sets a program's inputs. Returns whether perspective-correct ones needed no division.
     #[inline(always)]
     pub fn set_inputs<S: Simd>(
         &mut self,
@@ -374,12 +379,12 @@ impl Batch {
         interface: &Interface,
         samples: Samples,
         machine: &mut Machine,
-    ) {
-        let divided = !self.affine
-            && interface
-                .varyings
-                .iter()
-                .any(|(_, interpolation)| *interpolation == Interpolation::Perspective);
+    ) -> bool {
+        let perspective = interface
+            .varyings
+            .iter()
+            .any(|(_, interpolation)| *interpolation == Interpolation::Perspective);
+        let divided = perspective && !self.affine;
         if divided {
             self.divide(simd);
         }
@@ -410,6 +415,7 @@ impl Batch {
                 }
             }
         }
+        perspective && !divided
     }
 
     /// A varying of chunks from the first on.

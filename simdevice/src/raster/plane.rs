@@ -347,7 +347,7 @@ fn unorm8_means<S: Simd>(simd: S, words: &[u32], means: &mut [u32; AREA]) {
             }
         }
         for sum in &mut sums {
-            *sum = *sum * 0.25;
+            *sum *= 0.25;
         }
         *mean = pack_unorm8(simd, &sums, false).into();
     }

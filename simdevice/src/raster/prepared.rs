@@ -12,6 +12,7 @@ use crate::device::Device;
 use crate::geometry::PrimitiveDraw;
 use crate::packet::draw::{FragmentInput, Interpolation};
 use crate::packet::{BlendState, Rect};
+use crate::skips::Skips;
 use fearless_simd::Level;
 use std::time::Duration;
 
@@ -59,6 +60,8 @@ pub struct TileDraw<'a> {
     pub(super) ranges: Vec<(f32, f32)>,
     /// What fragments need.
     pub(super) needs: Needs,
+    /// What is left out in its tiles.
+    pub(super) skips: Skips,
     pub(super) level: Level,
     pub(super) limit: Duration,
 }
@@ -172,6 +175,7 @@ impl<'a> TileDraw<'a> {
                     )
                 }),
             },
+            skips: device.config().skips,
             level: device.level(),
             limit: device.config().shader_timeout,
         }

@@ -15,6 +15,7 @@ use super::{Plane, TILE_SIZE};
 use crate::counters::{Counter, Counters};
 use crate::geometry::{Primitive, Varyings};
 use crate::packet::Rect;
+use crate::skips::Skip;
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
@@ -79,8 +80,11 @@ impl TileDraw<'_> {
             counters,
             cancel,
             samples_passed: 0,
+            quads_masked: 0,
         };
-        renderer.batch.begin(self.needs, place.at, place.size);
+        renderer
+            .batch
+            .begin(self.needs, place.at, place.size, self.skips);
         let level = self.level;
         let done = if self.positions.len() == 1 {
             dispatch!(level, simd => renderer.run::<_, 1>(simd))
@@ -88,8 +92,11 @@ impl TileDraw<'_> {
             dispatch!(level, simd => renderer.run::<_, 4>(simd))
         };
         let done = done.and_then(|()| renderer.flush());
-        let passed = renderer.samples_passed;
+        let (passed, masked) = (renderer.samples_passed, renderer.quads_masked);
         counters.add(Counter::SamplesPassed, passed);
+        if self.skips.has(Skip::MaskedQuads) {
+            counters.add(Counter::QuadsMasked, masked);
+        }
         if let Some(stage) = self.stage {
             stage.put_back(machines, counters);
         }
@@ -107,6 +114,8 @@ pub(super) struct Renderer<'a, 'd> {
     pub counters: &'a mut Counters,
     pub cancel: &'a AtomicBool,
     pub samples_passed: u64,
+    /// Quads that were not shaded, because nothing is left of them.
+    pub quads_masked: u64,
 }
 
 /// A primitive while it is rasterized.
@@ -220,12 +229,14 @@ impl Renderer<'_, '_> {
         if let Some(tests) = early
             && coverage.blocks.count_ones() >= HIDDEN_BLOCKS
             && tests.stencil.is_none()
+            && draw.skips.has(Skip::HiddenTiles)
             && self.is_hidden(simd, tests, current, tile, at)
         {
             return Ok(());
         }
         let state = &draw.draw.state;
         let masked = state.sample_mask & ((1 << N) - 1) != (1 << N) - 1;
+        let skips_masked = draw.skips.has(Skip::MaskedQuads);
         let mut touched = false;
         for block in bits(coverage.blocks) {
             let mut lanes = coverage.lanes[block];
@@ -261,7 +272,11 @@ impl Renderer<'_, '_> {
             for lanes in lanes {
                 any |= lanes;
             }
-            if any == 0 || draw.stage.is_none() {
+            if draw.stage.is_none() {
+                continue;
+            }
+            if any == 0 && (skips_masked || draw.per_sample) {
+                self.quads_masked += 4;
                 continue;
             }
             let setup = current.setup;
@@ -330,12 +345,14 @@ impl Renderer<'_, '_> {
             return Ok(());
         }
         let values = values.lanes();
+        let skips_masked = self.draw.skips.has(Skip::MaskedQuads);
         for number in 0..4 {
             let mut cover = 0;
             for (sample, lanes) in lanes.iter().enumerate() {
                 cover |= (lanes >> (4 * number) & 15) << (4 * sample);
             }
-            if cover == 0 {
+            if cover == 0 && (skips_masked || self.draw.per_sample) {
+                self.quads_masked += 1;
                 continue;
             }
             if self.batch.count == QUADS {
@@ -465,8 +482,10 @@ impl Renderer<'_, '_> {
                 && output.overwrites()
                 && coverage.is_whole()
                 && state.sample_mask & 15 == 15
+                && self.draw.skips.has(Skip::OverwrittenTiles)
             {
                 self.buffers.color[index].touch_unread(tile);
+                self.counters.add(Counter::TilesOverwritten, 1);
             } else if let Some(target) = &self.draw.targets.color[index] {
                 let tile = self.tile_of(tile);
                 self.buffers.color[index].touch(target, self.place.layer, &tile);
@@ -511,9 +530,10 @@ impl Renderer<'_, '_> {
             positions: draw.positions,
             each_shaded: draw.per_sample,
         };
-        dispatch!(level, simd => batch.set_inputs(
+        let affine = dispatch!(level, simd => batch.set_inputs(
             simd, &stage.interface, samples, machine
         ));
+        self.counters.add(Counter::BatchesAffine, affine.into());
         let watchdog = Watchdog {
             limit: draw.limit,
             cancel: Some(self.cancel),
