@@ -327,7 +327,7 @@ impl Pass {
                 self.samples,
                 device.level(),
             ))),
-            PassDraw::Primitives(draw) if draw.primitives.is_empty() => Ready::Nothing,
+            PassDraw::Primitives(draw) if draw.chunks.is_empty() => Ready::Nothing,
             PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TileDraw::new(
                 draw,
                 targets,
@@ -505,7 +505,8 @@ impl Frame<'_> {
                 .add(Counter::TilesUntouched, untouched.into());
             if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
                 plane.touch(target, layer, tile);
-                plane.resolve(target, (resolve, *mode), layer, tile);
+                let level = self.device.level();
+                plane.resolve(level, target, (resolve, *mode), layer, tile);
             }
             let keep = !self.last || target.store == StoreOp::Store;
             plane.finish(target, layer, tile, keep);

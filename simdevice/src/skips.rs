@@ -41,6 +41,10 @@ skips! {
     Blocks: "blocks", BlocksBesideEllipse, "A Gaussian is evaluated only in blocks of 4x4 pixels that it may reach.";
     Saturated: "saturated", BlocksSaturated, "Nothing is evaluated in blocks and tiles whose pixels are all finished.";
     EmptyTiles: "empty-tiles", TilesUntouched, "Tiles that nothing draws to are neither loaded nor stored.";
+    OverwrittenTiles: "overwritten-tiles", TilesOverwritten, "Tiles of colour attachments are neither loaded nor cleared where the first primitive overwrites them as a whole.";
+    HiddenTiles: "hidden-tiles", TilesHidden, "A primitive that all depths of a tile hide is not tested there pixel by pixel.";
+    MaskedQuads: "masked-quads", QuadsMasked, "Quads of which coverage and early tests leave nothing are not shaded.";
+    Affine: "affine", BatchesAffine, "Barycentrics are not divided by 1 / w where that is the same all over each primitive.";
 }
 
 /// The skips that a device uses.
@@ -139,7 +143,7 @@ mod tests {
                 .unwrap_err()
                 .to_string(),
             "everything is neither all nor none nor a skip, which are chunks, bounds, ellipse, harmonics, blocks, saturated, \
-             empty-tiles"
+             empty-tiles, overwritten-tiles, hidden-tiles, masked-quads, affine"
         );
     }
 }

@@ -5,11 +5,133 @@
 mod common;
 
 use common::*;
+use simdevice::bindings::Bindings;
 use simdevice::counters::{Counter, Counters};
+use simdevice::geometry::DrawPipeline;
+use simdevice::isa::builder::Builder;
+use simdevice::isa::ir::{Program, Rate, Type};
+use simdevice::packet::draw::*;
 use simdevice::packet::*;
 use simdevice::skips::{Skip, Skips};
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
+
+/// Passes scalars on.
+fn pass_on(count: u32) -> Program {
+    let mut b = Builder::new();
+    for slot in 0..count {
+        let input = b.input(slot, Type::B32, Rate::Varying);
+        let output = b.output(slot, Type::B32);
+        b.assign(output, input);
+    }
+    b.finish().unwrap()
+}
+
+fn programs() -> DrawPrograms {
+    let attribute =
+        |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
+    let position = (0..4).map(|component| Some(VertexOutput::Position(component)));
+    let varyings = (0..4).map(|index| Some(VertexOutput::Varying(index)));
+    let inputs = (0..4).map(|index| {
+        Some(FragmentInput::Varying {
+            index,
+            interpolation: Interpolation::Perspective,
+            sampling: Sampling::Center,
+        })
+    });
+    let outputs = (0..4).map(|component| {
+        Some(FragmentOutput::Color {
+            attachment: 0,
+            component,
+            index: 0,
+        })
+    });
+    DrawPrograms {
+        vertex: pass_on(8),
+        vertex_inputs: attribute(0).chain(attribute(1)).collect(),
+        vertex_outputs: position.chain(varyings).collect(),
+        varyings: 4,
+        fragment: Some(FragmentPrograms {
+            program: pass_on(4),
+            inputs: inputs.collect(),
+            outputs: outputs.collect(),
+            early_tests: false,
+            discards: false,
+            per_sample: false,
+            has_side_effects: false,
+        }),
+    }
+}
+
+/// A draw of triangles, given by corners in clip space, that are tested for being nearer or not at all.
+fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet {
+    let vertices: Vec<[f32; 8]> = corners
+        .iter()
+        .map(|&[x, y, z, w]| [x, y, z, w, 0.5 + 0.4 * x, 0.5 + 0.4 * y, z, 0.7])
+        .collect();
+    let size = size_of_val(&vertices[..]) as u64;
+    let memory = Allocation::new_zeroed(size).unwrap();
+    memory.write(0, vertices.as_flattened()).unwrap();
+    let stream = |offset| AttributeStream {
+        buffer: BufferRange {
+            memory: memory.clone(),
+            offset: 0,
+            size,
+        },
+        stride: 32,
+        offset,
+        format: Format::R32G32B32A32Sfloat,
+        instance_divisor: None,
+    };
+    let mut state = DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT]);
+    state.depth_stencil.depth = tested.then_some(DepthTest {
+        compare: CompareOp::Less,
+        write: true,
+    });
+    Packet::Draw(Box::new(Draw {
+        pipeline: Arc::new(DrawPipeline::new(device, &programs()).unwrap()),
+        state: Arc::new(state),
+        attributes: vec![stream(0), stream(16)],
+        vertex_bindings: Bindings::default(),
+        fragment_bindings: Bindings::default(),
+        indices: None,
+        first: 0,
+        count: corners.len() as u32,
+        first_instance: 0,
+        instance_count: 1,
+        draw_index: 0,
+    }))
+}
+
+/// A triangle over half of the framebuffer and more, at a depth.
+fn large(z: f32) -> [[f32; 4]; 3] {
+    [
+        [-1.0, -1.0, z, 1.0],
+        [1.5, -1.0, z, 1.0],
+        [-1.0, 1.5, z, 1.0],
+    ]
+}
+
+/// Large triangles, one of them hidden, and small ones, some in perspective.
+fn all_triangles(device: &Device) -> Vec<Packet> {
+    let small = |number: u32| {
+        let at = |by: u32| (number * by % 97) as f32 / 50.0 - 0.95;
+        let (x, y, z) = (at(31), at(57), 0.1 + 0.008 * (number % 89) as f32);
+        let w = 1.0 + (number % 3) as f32;
+        [
+            [x, y, z, 1.0],
+            [x + 0.1, y, z, 1.0],
+            [x * w, (y + 0.2) * w, z * w, w],
+        ]
+    };
+    let several: Vec<[f32; 4]> = (0..200).flat_map(small).collect();
+    vec![
+        triangles(device, &large(0.9), false),
+        triangles(device, &large(0.5), true),
+        triangles(device, &several, true),
+        triangles(device, &large(0.7), true),
+    ]
+}
 
 /// Few Gaussians, many, many that only the device can write, of which all are equally deep in one scene, and several draws with a clear between them; how the attachment begins.
 fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
@@ -48,20 +170,33 @@ fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
     ]
 }
 
-/// Draws a scene on a device of its own.
+/// Draws a scene twice, over triangles where the attachment is loaded, on a device of its own; gives colours and depths.
 fn draw(skips: Skips, packets: &[Packet], load: LoadOp) -> (Vec<u8>, Counters) {
     let config = Config { skips, ..single() };
     let target = image(Format::R32G32B32A32Sfloat, 1, 0x3E);
-    let mut processor = CommandProcessor::new(Arc::new(Device::new(&config).unwrap()));
-    let begin = [Packet::BeginRendering(Box::new(rendering(attachment(
-        &target, load,
-    ))))];
+    let depth = image(Format::D32Sfloat, 1, 0);
+    let device = Arc::new(Device::new(&config).unwrap());
+    let mut processor = CommandProcessor::new(Arc::clone(&device));
+    let mut rendering = rendering(attachment(&target, load));
+    let far = ClearValue::DepthStencil {
+        depth: 1.0,
+        stencil: 0,
+    };
+    rendering.depth = Some(attachment(&depth, LoadOp::Clear(far)));
+    // A pipeline belongs to its device.
+    let triangles = match load {
+        LoadOp::Load => all_triangles(&device),
+        _ => Vec::new(),
+    };
+    let begin = [Packet::BeginRendering(Box::new(rendering))];
     for _ in 0..2 {
-        for packet in begin.iter().chain(packets).chain([&Packet::EndRendering]) {
+        let all = begin.iter().chain(&triangles).chain(packets);
+        for packet in all.chain([&Packet::EndRendering]) {
             processor.execute(packet).unwrap();
         }
     }
-    (bytes(&target), processor.counters().clone())
+    let images = [bytes(&target), bytes(&depth)].concat();
+    (images, processor.counters().clone())
 }
 
 #[test]

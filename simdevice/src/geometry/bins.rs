@@ -116,6 +116,9 @@ impl Outline {
     }
 }
 
+/// How many lists may be empty before only those that aren't are kept.
+const DENSE_LISTS: usize = 4096;
+
 /// Lists of primitives by macro-tile and layer, each in order.
 #[derive(Debug, Default)]
 pub struct Bins {
@@ -126,6 +129,8 @@ pub struct Bins {
     layers: u32,
     /// The macro-tile, numbered by layer, row and column, that the first list is of.
     first: u32,
+    /// The macro-tiles that have lists, ascending; empty if all from the first to the last have.
+    tiles: Box<[u32]>,
     /// Where each list begins, and where the last one ends.
     starts: Box<[u32]>,
     primitives: Box<[u32]>,
@@ -151,9 +156,17 @@ impl Bins {
         if pairs.is_empty() {
             return bins;
         }
-        let mut starts = vec![0u32; (last - first) as usize + 2];
+        let mut lists = (last - first) as usize + 1;
+        if lists > DENSE_LISTS + 4 * pairs.len() {
+            let mut distinct: Vec<u32> = tiles.clone().collect();
+            distinct.sort_unstable();
+            distinct.dedup();
+            lists = distinct.len();
+            bins.tiles = distinct.into();
+        }
+        let mut starts = vec![0u32; lists + 1];
         for tile in tiles {
-            starts[(tile - first) as usize + 1] += 1;
+            starts[bins.list(tile).unwrap_or_default() + 1] += 1;
         }
         for place in 1..starts.len() {
             starts[place] += starts[place - 1];
@@ -161,7 +174,7 @@ impl Bins {
         let mut next = starts.clone();
         let mut primitives = vec![0; pairs.len()];
         for &(tile, primitive) in pairs {
-            let next = &mut next[(tile - first) as usize];
+            let next = &mut next[bins.list(tile).unwrap_or_default()];
             primitives[*next as usize] = primitive;
             *next += 1;
         }
@@ -169,8 +182,18 @@ impl Bins {
         bins
     }
 
+    /// The number of a macro-tile's list.
+    #[inline]
+    fn list(&self, tile: u32) -> Option<usize> {
+        if self.tiles.is_empty() {
+            tile.checked_sub(self.first).map(|list| list as usize)
+        } else {
+            self.tiles.binary_search(&tile).ok()
+        }
+    }
+
     /// The primitives that may touch a macro-tile, given by column and row from the framebuffer's corner, in a layer:
-    /// indices into [`PrimitiveDraw::primitives`](super::PrimitiveDraw::primitives), ascending.
+    /// indices into [`PrimitiveChunk::primitives`](super::PrimitiveChunk::primitives), ascending.
     pub fn of(&self, macro_tile: [u32; 2], layer: u32) -> &[u32] {
         let within = |axis: usize, count: u32| {
             let at = macro_tile[axis].checked_sub(self.origin[axis]);
@@ -183,8 +206,8 @@ impl Bins {
             return &[];
         }
         let tile = tile_number(self.columns, self.rows, [column, row, layer]);
-        let list = tile.checked_sub(self.first);
-        let bounds = list.and_then(|list| self.starts.get(list as usize..list as usize + 2));
+        let list = self.list(tile);
+        let bounds = list.and_then(|list| self.starts.get(list..list + 2));
         match bounds {
             Some(&[start, end]) => &self.primitives[start as usize..end as usize],
             _ => &[],
@@ -215,11 +238,43 @@ impl Bins {
 
     /// Bytes of host memory that the lists take.
     pub(super) fn memory_bytes(&self) -> usize {
-        size_of_val(&*self.starts) + size_of_val(&*self.primitives)
+        size_of_val(&*self.starts) + size_of_val(&*self.tiles) + size_of_val(&*self.primitives)
     }
 }
 
 /// The number of a macro-tile, by column, row and layer, of so many columns and rows.
 fn tile_number(columns: u32, rows: u32, [column, row, layer]: [u32; 3]) -> u32 {
     (layer * rows + row) * columns + column
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_pairs_far_apart_make_few_lists() {
+        let area = Rect {
+            x: 0,
+            y: 0,
+            width: 1024,
+            height: 1024,
+        };
+        let grid = Grid::new(area, 64);
+        let layers = 2048;
+        let at = |column, row, layer| tile_number(16, 16, [column, row, layer]);
+        let pairs = [
+            (at(3, 2, 1000), 0),
+            (at(0, 0, 0), 1),
+            (at(3, 2, 1000), 2),
+            (at(15, 15, 2047), 3),
+        ];
+        let bins = Bins::new(&grid, layers, &pairs);
+        assert_eq!(bins.of([3, 2], 1000), [0, 2]);
+        assert_eq!(bins.of([0, 0], 0), [1]);
+        assert_eq!(bins.of([15, 15], 2047), [3]);
+        assert_eq!(bins.of([3, 3], 1000), [0; 0]);
+        assert_eq!(bins.of([15, 15], 2048), [0; 0]);
+        assert_eq!(bins.pairs(), 4);
+        assert!(bins.memory_bytes() < 100);
+    }
 }

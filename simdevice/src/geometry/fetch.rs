@@ -203,6 +203,16 @@ impl<'a> Source<'a> {
         }
     }
 
+    /// The words of elements of `N` words each, component by component.
+    fn words<const N: usize>(&self, starts: &[u32], words: &mut [[u32; LANES]; 4]) {
+        for (lane, &start) in starts.iter().enumerate() {
+            let bytes = &self.bytes[start as usize..][..4 * N];
+            for (component, word) in words.iter_mut().zip(bytes.as_chunks::<4>().0) {
+                component[lane] = u32::from_le_bytes(*word);
+            }
+        }
+    }
+
     /// Copies the elements to lie one after another.
     fn pack(&self, size: usize, count: usize, packed: &mut Vec<u8>) {
         packed.clear();
@@ -242,6 +252,14 @@ impl Out<'_> {
             1f32.to_bits()
         };
         let components = format.components();
+        let mut words = [[0; LANES]; 4];
+        let starts = &source.starts[..count];
+        match components.len() {
+            1 => source.words::<1>(starts, &mut words),
+            2 => source.words::<2>(starts, &mut words),
+            3 => source.words::<3>(starts, &mut words),
+            _ => source.words::<4>(starts, &mut words),
+        }
         for &(slot, component) in self.inputs {
             let chunks = self.machine.input_mut(slot);
             // The order in memory need not be the order of components.
@@ -255,15 +273,13 @@ impl Out<'_> {
                 chunks.fill(Chunk([if component == 3 { one } else { 0 }; 16]));
                 continue;
             };
-            let word = |&start: &u32| {
-                let at = start as usize + 4 * place;
-                let bytes: [u8; 4] = source.bytes[at..at + 4].try_into().unwrap_or_default();
-                u32::from_le_bytes(bytes)
-            };
-            if self.broadcast {
-                chunks.fill(Chunk([word(&source.starts[0]); 16]));
-            } else {
-                set_lanes(chunks, &source.starts[..count], word);
+            if self.broadcast || chunks.len() == 1 {
+                chunks.fill(Chunk([words[place][0]; 16]));
+                continue;
+            }
+            let used = count.div_ceil(16);
+            for (chunk, words) in chunks.iter_mut().zip(&words[place].as_chunks().0[..used]) {
+                chunk.0 = *words;
             }
         }
     }

@@ -25,15 +25,16 @@ mod viewport;
 pub use bins::Bins;
 pub use emit::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
 pub use pipeline::DrawPipeline;
-pub use primitive::{Primitive, PrimitiveDraw, PrimitiveKind, Varyings};
+pub use primitive::{Primitive, PrimitiveChunk, PrimitiveDraw, PrimitiveKind, Varyings};
 
 use crate::bindings::Prepared;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::format::Format;
 use crate::packet::Rect;
-use crate::packet::draw::{Draw, VertexInput};
-use bins::{Grid, Pair};
+use crate::packet::draw::{Draw, DrawState, PolygonMode, VertexInput};
+use assemble::corner_count;
+use bins::Grid;
 use depth_bias::DepthUnit;
 use elements::{Elements, Run, runs};
 use fetch::Fetcher;
@@ -52,9 +53,6 @@ const CHUNK: u64 = 2048;
 
 /// Chunks of a part: what is set up before any of it is rendered.
 const PART: u64 = 512;
-
-/// Chunks of a wave for each worker: what is set up before it is joined, and its memory used again.
-const WAVE: u64 = 4;
 
 /// What is drawn to.
 #[derive(Clone, Copy, Debug)]
@@ -152,17 +150,21 @@ impl<'a> FrontEnd<'a> {
         self.next = range.end;
         let done = self.process(range, counters);
         self.draw.vertex_bindings.bump_generations();
-        let part = done.map(|joined| self.finish(joined, counters));
+        let part = done.map(|chunks| PrimitiveDraw {
+            chunks,
+            regions: self.regions.clone(),
+            ..PrimitiveDraw::empty(self.draw)
+        });
         counters.add(Counter::GeometryTime, started.elapsed().as_nanos() as u64);
         part.map(Some)
     }
 
-    /// Takes chunks through all stages, in waves: workers fill outputs, which are then joined in order and used again.
+    /// Takes chunks through all stages, each by whichever worker is free.
     fn process(
         &self,
         range: std::ops::Range<u64>,
         counters: &mut Counters,
-    ) -> Result<Joined, Stopped> {
+    ) -> Result<Vec<PrimitiveChunk>, Stopped> {
         let setup = Setup {
             state: &self.draw.state,
             outputs: &self.draw.pipeline.vertex.outputs,
@@ -178,56 +180,31 @@ impl<'a> FrontEnd<'a> {
         let mut workers: Vec<_> = (0..count)
             .map(|_| Worker::new(self, &setup, &resources, &cancel))
             .collect();
-        let mut joined = Joined::default();
-        let mut start = range.start;
-        while start < range.end {
-            let end = range.end.min(start + count * WAVE);
-            let next = AtomicU64::new(start);
-            match &mut workers[..] {
-                [worker] => worker.run(&next, end),
-                workers => self.device.install(|| {
-                    workers
-                        .par_iter_mut()
-                        .for_each(|worker| worker.run(&next, end));
-                }),
-            }
-            let failures = workers
-                .iter_mut()
-                .filter_map(|worker| worker.stopped.take());
-            // That others were cancelled tells nothing.
-            if let Some(stopped) = failures.min_by_key(|stopped| *stopped == Stopped::Cancelled) {
-                return Err(stopped);
-            }
-            let mut done: Vec<_> = workers.iter_mut().flat_map(Worker::done).collect();
-            done.sort_unstable_by_key(|output| output.chunk);
-            for output in done {
-                joined.append(output, counters);
-            }
-            start = end;
+        let next = AtomicU64::new(range.start);
+        match &mut workers[..] {
+            [worker] => worker.run(&next, range.end),
+            workers => self.device.install(|| {
+                workers
+                    .par_iter_mut()
+                    .for_each(|worker| worker.run(&next, range.end));
+            }),
         }
-        Ok(joined)
+        let failures = workers.iter().filter_map(|worker| worker.stopped);
+        // That others were cancelled tells nothing.
+        if let Some(stopped) = failures.min_by_key(|stopped| *stopped == Stopped::Cancelled) {
+            return Err(stopped);
+        }
+        let mut done = Vec::new();
+        for worker in workers {
+            counters.add_all(&worker.counters);
+            done.extend(worker.done);
+        }
+        done.sort_unstable_by_key(|(chunk, _)| *chunk);
+        Ok(done.into_iter().map(|(_, chunk)| chunk).collect())
     }
 
     fn grid(&self) -> Grid {
         Grid::new(self.surface.area, self.device.config().macro_tile_size)
-    }
-
-    /// Sorts what was joined by macro-tile.
-    fn finish(&self, joined: Joined, counters: &mut Counters) -> PrimitiveDraw {
-        let started = Instant::now();
-        let bins = Bins::new(&self.grid(), self.surface.layers, &joined.pairs);
-        counters.add(Counter::BinnedPairs, bins.pairs());
-        counters.add(Counter::BinningTime, started.elapsed().as_nanos() as u64);
-        PrimitiveDraw {
-            primitives: joined.primitives,
-            varyings: Varyings {
-                values: joined.varyings,
-                per_vertex: self.draw.pipeline.vertex.outputs.varyings.len(),
-            },
-            bins,
-            regions: self.regions.clone(),
-            ..PrimitiveDraw::empty(self.draw)
-        }
     }
 
     /// Calls `each` with the runs, instances and primitives (first and end) of a chunk, in order.
@@ -274,6 +251,11 @@ fn mixes_instances(draw: &Draw) -> bool {
         .any(|&(_, rate, input)| rate == Rate::Uniform && depends(input))
 }
 
+/// Whether primitives may become points.
+fn draws_points(state: &DrawState) -> bool {
+    corner_count(state.topology) == 1 || state.polygon_mode == PolygonMode::Point
+}
+
 /// What one worker takes chunks through.
 struct Worker<'a> {
     front: &'a FrontEnd<'a>,
@@ -283,9 +265,10 @@ struct Worker<'a> {
     elements: Elements,
     shaded: Shaded,
     numbers: Vec<u32>,
-    /// The first `used` are of this wave.
-    outputs: Vec<Output>,
-    used: usize,
+    output: Output,
+    counters: Counters,
+    /// What became of the chunks that left anything, with their numbers.
+    done: Vec<(u64, PrimitiveChunk)>,
     /// Why it could not go on.
     stopped: Option<Stopped>,
 }
@@ -302,6 +285,8 @@ impl<'a> Worker<'a> {
             fetcher: Fetcher::new(front.draw, &mut machine),
             machine,
             outputs: setup.outputs,
+            takes_extras: setup.outputs.has_extras(draws_points(setup.state)),
+            level: front.device.level(),
             transform: front.transforms.first().copied().unwrap_or(Transform::NONE),
             resources,
             watchdog: Watchdog {
@@ -317,29 +302,25 @@ impl<'a> Worker<'a> {
             elements: Elements::default(),
             shaded: Shaded::default(),
             numbers: Vec::new(),
-            outputs: Vec::new(),
-            used: 0,
+            output: Output::default(),
+            counters: Counters::default(),
+            done: Vec::new(),
             stopped: None,
         }
     }
 
     /// Takes chunks up to `end` that nobody else took.
     fn run(&mut self, next: &AtomicU64, end: u64) {
-        self.used = 0;
         loop {
             let chunk = next.fetch_add(1, Relaxed);
             if chunk >= end {
                 return;
-            }
-            if self.used == self.outputs.len() {
-                self.outputs.push(Output::default());
             }
             if let Err(stopped) = self.run_chunk(chunk) {
                 self.cancel.store(true, Relaxed);
                 self.stopped = Some(stopped);
                 return;
             }
-            self.used += 1;
         }
     }
 
@@ -354,54 +335,42 @@ impl<'a> Worker<'a> {
             elements.push(front.draw, run, instance, first, end);
         });
         let ran = self.shader.shade(elements, &mut self.shaded);
-        let output = &mut self.outputs[self.used];
+        let (output, counters) = (&mut self.output, &mut self.counters);
         output.clear();
-        output.chunk = chunk;
-        output.work = self.shader.machine.take_work();
-        output.shaded = elements.vertices.len() as u64;
+        counters.add_work(&self.shader.machine.take_work());
+        counters.add(Counter::VertexInvocations, elements.vertices.len() as u64);
         ran?;
         if front.draw.state.rasterizer_discard || self.setup.transforms.is_empty() {
             output.assembled = elements.primitives();
         } else {
             Job::new(self.setup, &self.shaded, &mut self.numbers, output).run(elements);
         }
-        Ok(())
-    }
-
-    /// What it made of its chunks of this wave.
-    fn done(&mut self) -> &mut [Output] {
-        &mut self.outputs[..self.used]
-    }
-}
-
-/// Chunks' outputs in order, with vertices and primitives numbered through.
-#[derive(Debug, Default)]
-struct Joined {
-    primitives: Vec<Primitive>,
-    varyings: Vec<u32>,
-    pairs: Vec<Pair>,
-    vertices: u32,
-}
-
-impl Joined {
-    fn append(&mut self, output: &Output, counters: &mut Counters) {
-        counters.add_work(&output.work);
-        counters.add(Counter::VertexInvocations, output.shaded);
         counters.add(Counter::InputPrimitives, output.assembled);
         counters.add(Counter::ClippingInvocations, output.assembled);
         counters.add(Counter::ClippingPrimitives, output.clipped);
         counters.add(Counter::PrimitivesDrawn, output.primitives.len() as u64);
-        let (vertices, primitives) = (self.vertices, self.primitives.len() as u32);
-        let renumbered = output.primitives.iter().map(|primitive| Primitive {
-            vertices: primitive.vertices.map(|vertex| vertex + vertices),
-            provoking: primitive.provoking + vertices,
-            ..primitive.clone()
-        });
-        self.primitives.extend(renumbered);
-        self.varyings.extend_from_slice(&output.varyings);
-        let pairs = output.pairs.iter();
-        self.pairs
-            .extend(pairs.map(|&(tile, primitive)| (tile, primitives + primitive)));
-        self.vertices += output.vertices;
+        if !output.primitives.is_empty() {
+            let kept = self.keep();
+            self.done.push((chunk, kept));
+        }
+        Ok(())
+    }
+
+    /// What was made of a chunk, in memory of its size, sorted by macro-tile.
+    fn keep(&mut self) -> PrimitiveChunk {
+        let (output, setup) = (&self.output, self.setup);
+        let started = Instant::now();
+        let bins = Bins::new(&setup.grid, setup.layers, &output.pairs);
+        self.counters.add(Counter::BinnedPairs, bins.pairs());
+        let elapsed = started.elapsed().as_nanos() as u64;
+        self.counters.add(Counter::BinningTime, elapsed);
+        PrimitiveChunk {
+            primitives: output.primitives.clone(),
+            varyings: Varyings {
+                values: output.varyings.clone(),
+                per_vertex: setup.outputs.varyings.len(),
+            },
+            bins,
+        }
     }
 }

@@ -149,11 +149,17 @@ impl VertexOutputs {
         this
     }
 
-    /// Whether a vertex has more to it than position and varyings.
-    pub(super) fn has_extras(&self) -> bool {
-        let single = [self.point_size, self.layer, self.viewport];
-        let distances = self.clip.iter().chain(&self.cull);
-        single.iter().chain(distances).any(Option::is_some)
+    /// Whether a vertex has more to it than position and varyings, in draws of points or of others.
+    pub(super) fn has_extras(&self, points: bool) -> bool {
+        points && self.point_size.is_some()
+            || self.layer.is_some()
+            || self.viewport.is_some()
+            || self.has_distances()
+    }
+
+    /// Whether there are clip or cull distances.
+    pub(super) fn has_distances(&self) -> bool {
+        self.clip.iter().chain(&self.cull).any(Option::is_some)
     }
 }
 

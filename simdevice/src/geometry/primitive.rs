@@ -15,15 +15,22 @@ pub struct PrimitiveDraw {
     pub state: Arc<DrawState>,
     /// What the fragment program is bound to.
     pub bindings: Bindings,
+    /// The primitives, in order.
+    pub chunks: Vec<PrimitiveChunk>,
+    /// The pixels that they may touch, by viewport: those of the pass's area that lie in the scissor and in the
+    /// viewport. Primitives may reach farther.
+    pub regions: Vec<Rect>,
+}
+
+/// Consecutive primitives of a draw that were set up together.
+#[derive(Debug, Default)]
+pub struct PrimitiveChunk {
     /// The primitives in order.
     pub primitives: Vec<Primitive>,
     /// The varyings of their vertices.
     pub varyings: Varyings,
     /// Which of them each macro-tile has to look at.
     pub bins: Bins,
-    /// The pixels that they may touch, by viewport: those of the pass's area that lie in the scissor and in the
-    /// viewport. Primitives may reach farther.
-    pub regions: Vec<Rect>,
 }
 
 /// The varyings of vertices, those that clipping made included: 32-bit scalars, vertex by vertex.
@@ -49,7 +56,7 @@ pub enum PrimitiveKind {
 /// A convex polygon to be rasterized: a triangle, or the parallelogram whose fourth corner is c0 + c2 - c1. Whatever
 /// varies over it is affine in the framebuffer (after division by w where it is perspective-correct), and given at
 /// corners 0 to 2, or where those were before snapping.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Primitive {
     /// Framebuffer positions in 1/256 pixels, x and y down; ordered so that the signed area
     /// (c1 - c0) x (c2 - c0) is positive, whichever way the primitive faces.
@@ -61,7 +68,7 @@ pub struct Primitive {
     pub depth: [f32; 3],
     /// 1 / w at the vertices.
     pub inverse_w: [f32; 3],
-    /// The vertices at the corners, in [`PrimitiveDraw::varyings`].
+    /// The vertices at the corners, in [`PrimitiveChunk::varyings`].
     pub vertices: [u32; 3],
     /// The vertex that flat varyings are taken from.
     pub provoking: u32,
@@ -84,15 +91,19 @@ impl PrimitiveDraw {
             pipeline: Arc::clone(&draw.pipeline),
             state: Arc::clone(&draw.state),
             bindings: draw.fragment_bindings.clone(),
-            primitives: Vec::new(),
-            varyings: Varyings::default(),
-            bins: Bins::default(),
+            chunks: Vec::new(),
             regions: Vec::new(),
         }
     }
 
     /// Bytes of host memory that it holds while it waits.
     pub(crate) fn memory_bytes(&self) -> u64 {
+        self.chunks.iter().map(PrimitiveChunk::memory_bytes).sum()
+    }
+}
+
+impl PrimitiveChunk {
+    fn memory_bytes(&self) -> u64 {
         let primitives = size_of_val(&*self.primitives);
         let varyings = size_of_val(&*self.varyings.values);
         (primitives + varyings + self.bins.memory_bytes()) as u64

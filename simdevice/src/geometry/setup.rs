@@ -11,17 +11,10 @@ use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
 use super::viewport::{Projected, Transform, code};
 use crate::packet::Rect;
 use crate::packet::draw::{DrawState, PolygonMode};
-use isa::exec::Work;
 
 /// What a chunk of primitives became. Vertices and primitives are numbered from 0.
 #[derive(Debug, Default)]
 pub(super) struct Output {
-    /// The chunk's number.
-    pub chunk: u64,
-    /// What the shader cores did.
-    pub work: Work,
-    /// Vertices shaded.
-    pub shaded: u64,
     pub primitives: Vec<Primitive>,
     pub varyings: Vec<u32>,
     pub pairs: Vec<Pair>,

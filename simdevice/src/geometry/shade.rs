@@ -3,8 +3,9 @@
 use super::elements::Elements;
 use super::fetch::Fetcher;
 use super::pipeline::{LANES, Lease, VertexOutputs};
-use super::viewport::{Projected, Transform, code};
+use super::viewport::{Projected, Projections, Transform, code};
 use crate::packet::draw::MAX_CLIP_CULL_DISTANCES;
+use fearless_simd::{Level, dispatch};
 use isa::exec::{Chunk, LaneMask, Machine, Stopped, Watchdog};
 use isa::resources::Resources;
 
@@ -52,6 +53,9 @@ pub(super) struct Shader<'a> {
     pub machine: Lease<'a>,
     pub fetcher: Fetcher<'a>,
     pub outputs: &'a VertexOutputs,
+    /// Whether more than positions and varyings is looked at.
+    pub takes_extras: bool,
+    pub level: Level,
     pub transform: Transform,
     pub resources: &'a Resources<'a>,
     pub watchdog: Watchdog<'a>,
@@ -90,16 +94,36 @@ impl Shader<'_> {
         let first = shaded.vertices.len();
         shaded.vertices.resize(first + count, Vertex::default());
         let vertices = &mut shaded.vertices[first..];
-        for (component, &slot) in outputs.position.iter().enumerate() {
-            for_lanes(&self.machine, slot, vertices, |vertex, bits| {
-                vertex.position[component] = f32::from_bits(bits);
-            });
+        let lanes = outputs
+            .position
+            .map(|slot| slot.map_or(&[][..], |slot| self.machine.output_chunks(slot)));
+        for (chunk, vertices) in vertices.chunks_mut(16).enumerate() {
+            let mut position = [[0.0; 16]; 4];
+            for (component, lanes) in position.iter_mut().zip(&lanes) {
+                if let Some(lanes) = lanes.get(chunk) {
+                    *component = bytemuck::cast(lanes.0);
+                }
+            }
+            let projections = self.project(&position);
+            for (lane, vertex) in vertices.iter_mut().enumerate() {
+                *vertex = Vertex {
+                    position: [
+                        position[0][lane],
+                        position[1][lane],
+                        position[2][lane],
+                        position[3][lane],
+                    ],
+                    projected: Projected {
+                        window: [projections.window[0][lane], projections.window[1][lane]],
+                        snapped: [projections.snapped[0][lane], projections.snapped[1][lane]],
+                        depth: projections.depth[lane],
+                        inverse_w: projections.inverse_w[lane],
+                    },
+                    code: projections.code[lane],
+                };
+            }
         }
-        for vertex in &mut *vertices {
-            vertex.projected = self.transform.project(vertex.position);
-            vertex.code = self.transform.code(vertex.position, &vertex.projected);
-        }
-        if outputs.has_extras() {
+        if self.takes_extras {
             self.take_extras(count, shaded);
         }
         let per_vertex = outputs.varyings.len();
@@ -116,6 +140,12 @@ impl Shader<'_> {
                 }
             }
         }
+    }
+
+    #[inline(never)]
+    fn project(&self, position: &[[f32; 16]; 4]) -> Projections {
+        let transform = self.transform;
+        dispatch!(self.level, _ => transform.project_all(position))
     }
 
     fn take_extras(&self, count: usize, shaded: &mut Shaded) {
@@ -141,8 +171,10 @@ impl Shader<'_> {
                 extras.cull[index] = f32::from_bits(bits);
             });
         }
-        for (vertex, extras) in shaded.vertices[first..].iter_mut().zip(extras) {
-            vertex.code |= distance_code(extras);
+        if outputs.has_distances() {
+            for (vertex, extras) in shaded.vertices[first..].iter_mut().zip(extras) {
+                vertex.code |= distance_code(extras);
+            }
         }
     }
 }

@@ -65,7 +65,42 @@ pub(super) struct Projected {
     pub inverse_w: f32,
 }
 
+/// What 16 vertices become.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Projections {
+    pub window: [[f32; 16]; 2],
+    pub snapped: [[i32; 16]; 2],
+    pub depth: [f32; 16],
+    pub inverse_w: [f32; 16],
+    /// See [`code`].
+    pub code: [u32; 16],
+}
+
 impl Transform {
+    /// [`Transform::project`] and [`Transform::code`] of 16 positions: a loop for the compiler to vectorize.
+    #[inline(always)]
+    pub(super) fn project_all(&self, [x, y, z, w]: &[[f32; 16]; 4]) -> Projections {
+        let mut all = Projections {
+            window: [[0.0; 16]; 2],
+            snapped: [[0; 16]; 2],
+            depth: [0.0; 16],
+            inverse_w: [0.0; 16],
+            code: [0; 16],
+        };
+        for lane in 0..16 {
+            let position = [x[lane], y[lane], z[lane], w[lane]];
+            let one = self.project(position);
+            for axis in 0..2 {
+                all.window[axis][lane] = one.window[axis];
+                all.snapped[axis][lane] = one.snapped[axis];
+            }
+            all.depth[lane] = one.depth;
+            all.inverse_w[lane] = one.inverse_w;
+            all.code[lane] = self.code(position, &one);
+        }
+        all
+    }
+
     /// What stands in where a draw has no viewport.
     pub(super) const NONE: Self = Self {
         scale: [0.0; 3],
@@ -149,8 +184,14 @@ const FARTHEST: f64 = 16_777_216.0;
 /// Snaps a window coordinate to 1/256 pixels: the distance from the centre of pixel 0 is rounded, ties to even.
 #[inline(always)]
 pub(super) fn snap(window: f32) -> i32 {
-    let scaled = f64::from((window - 0.5) * ONE as f32).clamp(-FARTHEST, FARTHEST);
-    ((scaled + ROUND) - ROUND) as i32 + ONE / 2
+    let scaled = f64::from((window - 0.5) * ONE as f32);
+    #[expect(
+        clippy::manual_clamp,
+        reason = "it would leave what is no number as it is"
+    )]
+    let scaled = scaled.max(-FARTHEST).min(FARTHEST);
+    // The sum's low bits are the integer.
+    (scaled + ROUND).to_bits() as i32 + ONE / 2
 }
 
 /// As [`snap`], with ties away from zero, as lines and points are snapped.

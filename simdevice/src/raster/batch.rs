@@ -6,7 +6,8 @@ use super::fragment::{BATCH_LANES, Interface};
 use super::setup::Setup;
 use crate::geometry::{Primitive, PrimitiveKind, Varyings};
 use crate::packet::draw::{FragmentInput, Interpolation, Sampling};
-use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use crate::skips::{Skip, Skips};
+use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x16};
 use isa::exec::{Chunk, LaneMask, Machine};
 
 /// Lanes of the largest batch.
@@ -17,9 +18,6 @@ pub const QUADS: usize = LANES / 4;
 /// A quad that is to be shaded.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Quad {
-    /// Its first pixel in the framebuffer.
-    pub x: u16,
-    pub y: u16,
     /// Its primitive: an index into [`Batch::records`].
     pub record: u16,
     /// Its tile of the macro-tile.
@@ -44,9 +42,12 @@ pub struct Samples {
 /// What quads need of their primitive.
 #[derive(Clone, Debug)]
 pub struct Record {
-    pub primitive: u32,
+    /// Its number within the instance.
+    id: u32,
+    layer: u16,
     pub front: bool,
     pub viewport: u8,
+    is_point: bool,
     /// 1 / w at corners 1 and 2, as [`Setup::weights`].
     weights: [f32; 2],
     /// What [`BlockValues::inverse_w`] is to be multiplied by.
@@ -59,9 +60,31 @@ pub struct Record {
     pub depth_slopes: [f32; 2],
 }
 
+/// What fragments need of their primitive's planes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Needs {
+    pub barycentrics: bool,
+    /// After the early tests.
+    pub depth: bool,
+    /// 1 / w.
+    pub inverse_w: bool,
+}
+
 /// Fragments to be shaded together.
 #[derive(Debug)]
 pub struct Batch {
+    /// What is kept of quads' values.
+    needs: Needs,
+    /// The first pixel of the macro-tile in the framebuffer.
+    corner: [u32; 2],
+    /// Its side in tiles.
+    side: u32,
+    /// Whether some pixels of quads are not covered.
+    partial: bool,
+    /// Whether it is looked at whether batches are affine.
+    detects_affine: bool,
+    /// Whether 1 / w is the same all over each primitive, so that barycentrics need no correction.
+    affine: bool,
     pub quads: [Quad; QUADS],
     pub count: usize,
     pub records: Vec<Record>,
@@ -83,6 +106,12 @@ pub struct Batch {
 impl Default for Batch {
     fn default() -> Self {
         Self {
+            needs: Needs::default(),
+            corner: [0; 2],
+            side: 1,
+            partial: false,
+            detects_affine: true,
+            affine: true,
             quads: [Quad::default(); QUADS],
             count: 0,
             records: Vec::new(),
@@ -122,8 +151,19 @@ impl<S: Simd> BlockValues<S> {
 }
 
 impl Batch {
+    /// Empties it, for a draw whose fragments need this, within a macro-tile: its column and row, and its side in
+    /// pixels.
+    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32, skips: Skips) {
+        self.needs = needs;
+        self.detects_affine = skips.has(Skip::Affine);
+        self.corner = at.map(|at| at * size);
+        self.side = size / super::TILE_SIZE;
+        self.clear();
+    }
+
     /// Empties it.
     pub fn clear(&mut self) {
+        (self.affine, self.partial) = (self.detects_affine, false);
         self.count = 0;
         self.records.clear();
         self.attributes.clear();
@@ -132,32 +172,39 @@ impl Batch {
     /// Adds a primitive, of which quads may follow; returns its record.
     pub fn add_primitive(
         &mut self,
-        index: u32,
         primitive: &Primitive,
         setup: &Setup,
         interface: &Interface,
         varyings: &Varyings,
     ) -> u16 {
+        self.affine &= setup.affine;
         self.records.push(Record {
-            primitive: index,
+            id: primitive.id,
+            layer: primitive.layer,
             front: primitive.front,
             viewport: primitive.viewport,
+            is_point: primitive.kind == PrimitiveKind::Point,
             weights: setup.weights,
             scale: setup.scale,
             slopes: setup.slopes,
             w_slopes: setup.w_slopes,
             depth_slopes: setup.depth_slopes,
         });
-        let value = |vertex: u32, varying: u32| {
-            let at = vertex as usize * varyings.per_vertex + varying as usize;
-            f32::from_bits(varyings.values.get(at).copied().unwrap_or(0))
+        let of_vertex = |vertex: u32| {
+            let at = vertex as usize * varyings.per_vertex;
+            varyings.values.get(at..at + varyings.per_vertex)
+        };
+        let [a, b, c] = primitive.vertices.map(|v| of_vertex(v).unwrap_or_default());
+        let provoking = of_vertex(primitive.provoking).unwrap_or_default();
+        let value = |vertex: &[u32], varying: u32| {
+            f32::from_bits(vertex.get(varying as usize).copied().unwrap_or(0))
         };
         for &(varying, interpolation) in &interface.varyings {
             self.attributes.push(match interpolation {
-                Interpolation::Flat => [value(primitive.provoking, varying), 0.0, 0.0],
+                Interpolation::Flat => [value(provoking, varying), 0.0, 0.0],
                 _ => {
-                    let [a, b, c] = primitive.vertices.map(|vertex| value(vertex, varying));
-                    [a, b - a, c - a]
+                    let first = value(a, varying);
+                    [first, value(b, varying) - first, value(c, varying) - first]
                 }
             });
         }
@@ -169,22 +216,37 @@ impl Batch {
     pub fn add(&mut self, quad: Quad, number: usize, values: &[[f32; 16]; 4]) {
         let at = 4 * self.count;
         let lanes = 4 * number..4 * number + 4;
-        self.barycentrics[0][at..at + 4].copy_from_slice(&values[0][lanes.clone()]);
-        self.barycentrics[1][at..at + 4].copy_from_slice(&values[1][lanes.clone()]);
-        self.depth[at..at + 4].copy_from_slice(&values[2][lanes.clone()]);
-        self.inverse_w[at..at + 4].copy_from_slice(&values[3][lanes]);
+        if self.needs.barycentrics {
+            self.barycentrics[0][at..at + 4].copy_from_slice(&values[0][lanes.clone()]);
+            self.barycentrics[1][at..at + 4].copy_from_slice(&values[1][lanes.clone()]);
+        }
+        if self.needs.depth {
+            self.depth[at..at + 4].copy_from_slice(&values[2][lanes.clone()]);
+        }
+        if self.needs.inverse_w {
+            self.inverse_w[at..at + 4].copy_from_slice(&values[3][lanes]);
+        }
+        self.partial |= covered_lanes(quad.cover) != 15;
         self.quads[self.count] = quad;
         self.count += 1;
     }
 
     /// Adds all four quads of a block, for which there is room.
     #[inline(always)]
-    pub fn add_block(&mut self, quads: [Quad; 4], values: &[[f32; 16]; 4]) {
+    pub fn add_block<S: Simd>(&mut self, quads: [Quad; 4], values: &BlockValues<S>) {
         let at = 4 * self.count;
-        self.barycentrics[0][at..at + 16].copy_from_slice(&values[0]);
-        self.barycentrics[1][at..at + 16].copy_from_slice(&values[1]);
-        self.depth[at..at + 16].copy_from_slice(&values[2]);
-        self.inverse_w[at..at + 16].copy_from_slice(&values[3]);
+        if self.needs.barycentrics {
+            values.barycentrics[0].store_slice(&mut self.barycentrics[0][at..at + 16]);
+            values.barycentrics[1].store_slice(&mut self.barycentrics[1][at..at + 16]);
+        }
+        if self.needs.depth {
+            values.depth.store_slice(&mut self.depth[at..at + 16]);
+        }
+        if self.needs.inverse_w {
+            values
+                .inverse_w
+                .store_slice(&mut self.inverse_w[at..at + 16]);
+        }
         self.quads[self.count..self.count + 4].copy_from_slice(&quads);
         self.count += 4;
     }
@@ -212,11 +274,11 @@ impl Batch {
         if let Some(record) = self.common[chunk] {
             return f32x16::splat(simd, value(&self.records[usize::from(record)]));
         }
-        let mut lanes = [0.0; 16];
-        for (quad, lanes) in self.chunk_quads(chunk).iter().zip(lanes.as_chunks_mut().0) {
-            *lanes = [value(&self.records[usize::from(quad.record)]); 4];
+        let mut values = [0.0; 4];
+        for (quad, out) in self.chunk_quads(chunk).iter().zip(&mut values) {
+            *out = value(&self.records[usize::from(quad.record)]);
         }
-        f32x16::simd_from(simd, lanes)
+        spread(simd, values)
     }
 
     /// A varying's value at corner 0 and differences to the other corners, of each lane's primitive.
@@ -236,18 +298,17 @@ impl Batch {
                 f32x16::splat(simd, c),
             ];
         }
-        let mut lanes = [[0.0; 16]; 3];
+        let mut of_quads = [[0.0; 4]; 3];
         for (number, quad) in self.chunk_quads(chunk).iter().enumerate() {
-            let values = self.attributes[usize::from(quad.record) * per_record + varying];
-            for (lanes, value) in lanes.iter_mut().zip(values) {
-                lanes[4 * number..4 * number + 4].copy_from_slice(&[value; 4]);
-            }
+            let [a, b, c] = self.attributes[usize::from(quad.record) * per_record + varying];
+            of_quads[0][number] = a;
+            of_quads[1][number] = b;
+            of_quads[2][number] = c;
         }
-        let [a, b, c] = lanes;
         [
-            f32x16::simd_from(simd, a),
-            f32x16::simd_from(simd, b),
-            f32x16::simd_from(simd, c),
+            spread(simd, of_quads[0]),
+            spread(simd, of_quads[1]),
+            spread(simd, of_quads[2]),
         ]
     }
 
@@ -295,6 +356,9 @@ impl Batch {
         }
         self.active = LaneMask::first(4 * self.count);
         self.helpers = LaneMask::none();
+        if !self.partial {
+            return;
+        }
         for (number, quad) in self.quads[..self.count].iter().enumerate() {
             let covered = covered_lanes(quad.cover);
             if covered != 15 {
@@ -307,31 +371,69 @@ impl Batch {
         }
     }
 
-    /// Sets a program's inputs.
+    /// Sets a program's inputs. Returns whether perspective-correct ones needed no division.
     #[inline(always)]
     pub fn set_inputs<S: Simd>(
         &mut self,
         simd: S,
         interface: &Interface,
         samples: Samples,
-        primitives: &[Primitive],
         machine: &mut Machine,
-    ) {
-        if interface
+    ) -> bool {
+        let perspective = interface
             .varyings
             .iter()
-            .any(|(_, interpolation)| *interpolation == Interpolation::Perspective)
-        {
+            .any(|(_, interpolation)| *interpolation == Interpolation::Perspective);
+        let divided = perspective && !self.affine;
+        if divided {
             self.divide(simd);
         }
+        let at_centers = samples.positions.len() == 1 || samples.each_shaded;
         for &(slot, kind, place) in &interface.inputs {
-            for (chunk, lanes) in machine.input_mut(slot).iter_mut().enumerate() {
-                if chunk >= self.chunks() {
-                    break;
+            let lanes = machine.input_mut(slot);
+            let count = self.chunks().min(lanes.len());
+            let lanes = &mut lanes[..count];
+            match kind {
+                FragmentInput::Varying {
+                    interpolation,
+                    sampling,
+                    ..
+                } if interpolation != Interpolation::Flat
+                    && (at_centers || sampling != Sampling::Centroid) =>
+                {
+                    let barycentrics = match interpolation {
+                        Interpolation::Perspective if divided => &self.perspective,
+                        _ => &self.barycentrics,
+                    };
+                    self.interpolate(simd, place, interface.varyings.len(), barycentrics, lanes);
                 }
-                *lanes =
-                    Chunk(self.input(simd, (kind, place), chunk, interface, samples, primitives));
+                _ => {
+                    for (chunk, lanes) in lanes.iter_mut().enumerate() {
+                        let input = (kind, place);
+                        *lanes = Chunk(self.input(simd, input, chunk, interface, samples));
+                    }
+                }
             }
+        }
+        perspective && !divided
+    }
+
+    /// A varying of chunks from the first on.
+    #[inline(always)]
+    fn interpolate<S: Simd>(
+        &self,
+        simd: S,
+        varying: usize,
+        per_record: usize,
+        [b1, b2]: &[[f32; LANES]; 2],
+        out: &mut [Chunk],
+    ) {
+        let (b1, b2) = (b1.as_chunks::<16>().0, b2.as_chunks::<16>().0);
+        for (chunk, ((out, b1), b2)) in out.iter_mut().zip(b1).zip(b2).enumerate() {
+            let [a, da, db] = self.attribute(simd, chunk, varying, per_record);
+            let b1 = f32x16::simd_from(simd, *b1);
+            let b2 = f32x16::simd_from(simd, *b2);
+            *out = Chunk(db.mul_add(b2, da.mul_add(b1, a)).to_bits().into());
         }
     }
 
@@ -406,36 +508,16 @@ impl Batch {
         chunk: usize,
         interface: &Interface,
         samples: Samples,
-        primitives: &[Primitive],
     ) -> [u32; 16] {
         match kind {
-            FragmentInput::Varying {
-                interpolation,
-                sampling,
-                ..
-            } => {
+            FragmentInput::Varying { interpolation, .. } => {
                 let [a, da, db] = self.attribute(simd, chunk, place, interface.varyings.len());
-                let Samples { positions, .. } = samples;
-                let centroid =
-                    sampling == Sampling::Centroid && positions.len() > 1 && !samples.each_shaded;
+                // At the centres it is left to [`Batch::interpolate`].
+                let linear = self.centroid_at(simd, chunk, samples.positions);
                 let [b1, b2] = match interpolation {
                     Interpolation::Flat => return a.to_bits().into(),
-                    Interpolation::Linear if centroid => {
-                        let [b1, b2, _] = self.centroid_at(simd, chunk, positions);
-                        [b1, b2]
-                    }
-                    Interpolation::Perspective if centroid => {
-                        let linear = self.centroid_at(simd, chunk, positions);
-                        self.perspective_at(simd, chunk, linear)
-                    }
-                    Interpolation::Linear => {
-                        let [b1, b2, _] = self.linear_at(simd, chunk);
-                        [b1, b2]
-                    }
-                    Interpolation::Perspective => [
-                        f32x16::from_slice(simd, &self.perspective[0][16 * chunk..][..16]),
-                        f32x16::from_slice(simd, &self.perspective[1][16 * chunk..][..16]),
-                    ],
+                    Interpolation::Linear => [linear[0], linear[1]],
+                    Interpolation::Perspective => self.perspective_at(simd, chunk, linear),
                 };
                 db.mul_add(b2, da.mul_add(b1, a)).to_bits().into()
             }
@@ -452,33 +534,30 @@ impl Batch {
                 let [b1, b2, _] = self.linear_at(simd, chunk);
                 let value = if axis == 0 { b1 + b2 } else { b2 };
                 // Other primitives have none.
-                let is_point = self.of_records(simd, chunk, |record| {
-                    match primitives[record.primitive as usize].kind {
-                        PrimitiveKind::Point => 1.0,
-                        _ => 0.0,
-                    }
-                });
+                let is_point = self.of_records(simd, chunk, |record| f32::from(record.is_point));
                 (value * is_point).to_bits().into()
             }
-            _ => self.scalar_input(kind, chunk, samples, primitives),
+            _ => self.scalar_input(kind, chunk, samples),
         }
     }
 
+    /// The column or row of a lane of a quad in the framebuffer.
+    fn pixel(&self, quad: &Quad, lane: usize, axis: usize) -> u32 {
+        let tile = u32::from(quad.tile);
+        let tile = [tile % self.side, tile / self.side][axis];
+        // See `tile::place`.
+        let bits = (u32::from(quad.place) | lane as u32) >> axis;
+        let within = bits & 1 | bits >> 1 & 2 | bits >> (2 + axis) & 12;
+        self.corner[axis] + tile * super::TILE_SIZE + within
+    }
+
     /// As [`Batch::input`], for inputs that follow from the quad.
-    fn scalar_input(
-        &self,
-        kind: FragmentInput,
-        chunk: usize,
-        samples: Samples,
-        primitives: &[Primitive],
-    ) -> [u32; 16] {
+    fn scalar_input(&self, kind: FragmentInput, chunk: usize, samples: Samples) -> [u32; 16] {
         let quads = self.chunk_quads(chunk);
         let mut lanes = [0; 16];
         for (number, lane) in lanes.iter_mut().enumerate() {
             let quad = &quads[number / 4];
-            let (column, row) = ((number & 1) as u16, (number >> 1 & 1) as u16);
             let record = &self.records[usize::from(quad.record)];
-            let primitive = &primitives[record.primitive as usize];
             let sample = usize::from(quad.sample);
             // Samples shaded for themselves are where they are.
             let within = if samples.each_shaded {
@@ -487,29 +566,40 @@ impl Batch {
                 [0.5; 2]
             };
             *lane = match kind {
-                FragmentInput::FragCoord(0) => (f32::from(quad.x + column) + within[0]).to_bits(),
-                FragmentInput::FragCoord(_) => (f32::from(quad.y + row) + within[1]).to_bits(),
+                FragmentInput::FragCoord(axis) => {
+                    let axis = axis.min(1);
+                    let pixel = self.pixel(quad, number % 4, axis);
+                    (pixel as f32 + within[axis]).to_bits()
+                }
                 FragmentInput::FrontFacing => {
-                    if primitive.front {
+                    if record.front {
                         u32::MAX
                     } else {
                         0
                     }
                 }
-                FragmentInput::PrimitiveId => primitive.id,
+                FragmentInput::PrimitiveId => record.id,
                 FragmentInput::SampleId => sample as u32,
                 FragmentInput::SamplePosition(axis) => within[axis.min(1)].to_bits(),
                 FragmentInput::SampleMask => {
                     let cover = quad.cover >> (number % 4);
                     (0..4).map(|s| u32::from(cover >> (4 * s) & 1) << s).sum()
                 }
-                FragmentInput::Layer => primitive.layer.into(),
-                FragmentInput::ViewportIndex => primitive.viewport.into(),
+                FragmentInput::Layer => record.layer.into(),
+                FragmentInput::ViewportIndex => record.viewport.into(),
                 FragmentInput::Varying { .. } | FragmentInput::PointCoord(_) => 0,
             };
         }
         lanes
     }
+}
+
+/// A value of each quad for its lanes.
+#[inline(always)]
+fn spread<S: Simd>(simd: S, [a, b, c, d]: [f32; 4]) -> f32x16<S> {
+    let low = f32x4::splat(simd, a).combine(f32x4::splat(simd, b));
+    let high = f32x4::splat(simd, c).combine(f32x4::splat(simd, d));
+    low.combine(high)
 }
 
 /// A sample's offset from the pixel's centre in pixels, along an axis.

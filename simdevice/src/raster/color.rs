@@ -6,6 +6,7 @@ use super::tile::AREA;
 use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
 use crate::packet::draw::LogicOp;
 use crate::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
+use crate::texture::unorm8_fraction;
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
 /// Colours of 16 fragments, by component.
@@ -17,12 +18,46 @@ pub struct ColorOutput {
     format: Format,
     codec: Codec,
     equations: Option<(BlendEquation, BlendEquation)>,
+    /// The equations, if there is a kernel for them.
+    over: Option<Over>,
     constants: [f32; 4],
     /// What sources and constants are clamped to before they are blended.
     range: Option<(f32, f32)>,
     logic: Option<LogicOp>,
     /// The bits of a texel that are written, from its first byte on.
     written: u128,
+}
+
+/// The usual equations: a source over the destination.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Over {
+    /// Of a source that was multiplied by its alpha.
+    Premultiplied,
+    /// Of one that was not; alpha is treated as the colours are.
+    Straight,
+}
+
+/// `source * factor + destination * (1 - alpha)`.
+const fn over(source: BlendFactor) -> BlendEquation {
+    BlendEquation {
+        source,
+        destination: BlendFactor::OneMinusSrcAlpha,
+        op: BlendOp::Add,
+    }
+}
+const PREMULTIPLIED: BlendEquation = over(BlendFactor::One);
+const STRAIGHT: BlendEquation = over(BlendFactor::SrcAlpha);
+
+impl Over {
+    fn of(equations: (BlendEquation, BlendEquation)) -> Option<Self> {
+        if equations == (PREMULTIPLIED, PREMULTIPLIED) {
+            Some(Self::Premultiplied)
+        } else if equations == (STRAIGHT, STRAIGHT) {
+            Some(Self::Straight)
+        } else {
+            None
+        }
+    }
 }
 
 /// How texels are read and written.
@@ -56,14 +91,9 @@ impl Quads {
     /// The tiles that they are in, of a plane of `samples` samples a pixel.
     #[inline(always)]
     pub fn tiles(&self, samples: usize) -> [usize; 4] {
-        let size = samples * AREA;
-        let [a, b, c, d] = self.first;
-        if self.consecutive {
-            let (first, last) = (a / size, d / size);
-            [first, first, last, last]
-        } else {
-            [a / size, b / size, c / size, d / size]
-        }
+        // A power of two.
+        let shift = (samples * AREA).trailing_zeros();
+        self.first.map(|first| first >> shift)
     }
 
     /// The words of 16 lanes' texels of a word each.
@@ -95,16 +125,32 @@ impl Quads {
                 some => {
                     // Another quad of the vector may be at the same place with other lanes.
                     let texels = &mut words[*first..][..4];
-                    for (lane, texel) in texels.iter_mut().enumerate() {
-                        if some >> lane & 1 == 1 {
-                            *texel = values[lane];
-                        }
+                    let mask = &QUAD_MASKS[usize::from(some)];
+                    for lane in 0..4 {
+                        texels[lane] = values[lane] & mask[lane] | texels[lane] & !mask[lane];
                     }
                 }
             }
         }
     }
 }
+
+/// For each set of lanes of a quad: all ones in those.
+const QUAD_MASKS: [[u32; 4]; 16] = {
+    let mut masks = [[0; 4]; 16];
+    let mut set = 0;
+    while set < 16 {
+        let mut lane = 0;
+        while lane < 4 {
+            if set >> lane & 1 == 1 {
+                masks[set][lane] = u32::MAX;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    masks
+};
 
 impl ColorOutput {
     /// The output to an attachment of `format`; `None` if it never changes.
@@ -134,10 +180,12 @@ impl ColorOutput {
             Format::R32Sfloat | Format::R32Uint | Format::R32Sint => Codec::Word,
             _ => Codec::Other,
         };
+        let equations = state.equations.filter(|_| blends);
         (written != 0).then_some(Self {
             format,
             codec,
-            equations: state.equations.filter(|_| blends),
+            equations,
+            over: equations.and_then(Over::of),
             constants: match range {
                 Some((low, high)) => constants.map(|constant| constant.clamp(low, high)),
                 None => constants,
@@ -186,17 +234,23 @@ impl ColorOutput {
     ) {
         match self.codec {
             Codec::Unorm8 { bgra } => {
-                let stored = u32x16::simd_from(simd, quads.load(words));
-                let blended = match self.equations {
-                    None => *source,
-                    Some(equations) => {
-                        let destination = unpack_unorm8(simd, stored, bgra);
-                        self.blend(simd, equations, source, second, &destination)
-                    }
-                };
-                let mut packed = pack_unorm8(simd, &blended, bgra);
                 let written = self.written as u32;
+                let mut packed;
+                if let Some(equations) = self.equations {
+                    let stored = u32x16::simd_from(simd, quads.load(words));
+                    let destination = unpack_unorm8(simd, stored, bgra);
+                    if let Some(over) = self.over {
+                        let blended = blend_over(simd, over, source, &destination);
+                        packed = pack_unorm8_in_range(simd, &blended, bgra);
+                    } else {
+                        let blended = self.blend(simd, equations, source, second, &destination);
+                        packed = pack_unorm8(simd, &blended, bgra);
+                    }
+                } else {
+                    packed = pack_unorm8(simd, source, bgra);
+                }
                 if written != u32::MAX {
+                    let stored = u32x16::simd_from(simd, quads.load(words));
                     packed = (packed & written) | (stored & !written);
                 }
                 quads.store(words, lanes, &packed.into());
@@ -216,6 +270,19 @@ impl ColorOutput {
             }
             Codec::Words => self.write_words(simd, source, second, lanes, quads, words),
             Codec::Other => self.write_other(simd, source, second, lanes, quads, words),
+        }
+    }
+
+    /// The words that replace a plane's texels, whatever those are; `None` if they matter, or aren't words.
+    #[inline(always)]
+    pub fn replacement<S: Simd>(&self, simd: S, source: &Colors<S>) -> Option<[u32; 16]> {
+        match self.codec {
+            Codec::Unorm8 { bgra }
+                if self.equations.is_none() && self.written as u32 == u32::MAX =>
+            {
+                Some(pack_unorm8(simd, source, bgra).into())
+            }
+            _ => None,
         }
     }
 
@@ -422,22 +489,61 @@ impl<S: Simd> Operands<S> {
     }
 }
 
+/// Blends components of 0 to 1 by equations of which there is a kernel. The bits are those of [`ColorOutput::blend`].
+#[inline(always)]
+fn blend_over<S: Simd>(
+    simd: S,
+    over: Over,
+    source: &Colors<S>,
+    destination: &Colors<S>,
+) -> Colors<S> {
+    let mut blended = *source;
+    for component in &mut blended {
+        *component = clamp(simd, *component, 0.0, 1.0);
+    }
+    let alpha = blended[3];
+    let rest = f32x16::splat(simd, 1.0) - alpha;
+    for (component, destination) in blended.iter_mut().zip(destination) {
+        let own = match over {
+            Over::Premultiplied => *component,
+            Over::Straight => *component * alpha,
+        };
+        *component = own + *destination * rest;
+    }
+    blended
+}
+
 /// Clamps; NaN becomes the least.
 #[inline(always)]
 fn clamp<S: Simd>(simd: S, value: f32x16<S>, low: f32, high: f32) -> f32x16<S> {
     let (low, high) = (f32x16::splat(simd, low), f32x16::splat(simd, high));
-    let above: mask32x16<S> = value.simd_gt(low);
-    let value = above.select(value, low);
-    let below: mask32x16<S> = value.simd_lt(high);
-    below.select(value, high)
+    value.max_precise(low).min(high)
 }
 
-/// 8-bit codes of 0 to 1, to nearest, in the low bits; above them are bits of no meaning.
+/// Whether a level's multiplication and addition round once.
+#[inline(always)]
+fn is_fused<S: Simd>(simd: S) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    let fused = {
+        use fearless_simd::Level::{Avx2, Avx512};
+        matches!(simd.level(), Avx2(_) | Avx512(_))
+    };
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    let fused = false;
+    fused
+}
+
+/// 8-bit codes of 0 to 1, to nearest, in the low bits; above them are bits of no meaning. Numbers that are too great by
+/// some units in the last place do as well.
 #[inline(always)]
 fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
     // Leaves no bits for a fraction.
     const NO_FRACTION: f32 = 8_388_608.0;
-    let value = clamp(simd, value, 0.0, 1.0);
+    if is_fused(simd) {
+        // Rounded once, to the nearest integer; 127.5 is the only tie.
+        let scaled = value.mul_add(f32x16::splat(simd, 255.0), f32x16::splat(simd, NO_FRACTION));
+        return scaled.to_bits();
+    }
     // 255 v = 256 v - v: the first is exact, so the nearest integer to it is the result or one more.
     let scaled = value * 256.0;
     let rounded = scaled + NO_FRACTION;
@@ -447,8 +553,19 @@ fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
     (rounded - one).to_bits()
 }
 
+/// Four bytes of 0 to 1 in a word, each to nearest.
 #[inline(always)]
-fn pack_unorm8<S: Simd>(simd: S, [r, g, b, a]: &Colors<S>, bgra: bool) -> u32x16<S> {
+pub fn pack_unorm8<S: Simd>(simd: S, colors: &Colors<S>, bgra: bool) -> u32x16<S> {
+    let mut clamped = *colors;
+    for component in &mut clamped {
+        *component = clamp(simd, *component, 0.0, 1.0);
+    }
+    pack_unorm8_in_range(simd, &clamped, bgra)
+}
+
+/// As [`pack_unorm8`], of what needs no clamping.
+#[inline(always)]
+fn pack_unorm8_in_range<S: Simd>(simd: S, [r, g, b, a]: &Colors<S>, bgra: bool) -> u32x16<S> {
     let (first, third) = if bgra { (b, r) } else { (r, b) };
     (unorm8(simd, *first) & 255)
         | (unorm8(simd, *g) & 255) << 8
@@ -457,12 +574,11 @@ fn pack_unorm8<S: Simd>(simd: S, [r, g, b, a]: &Colors<S>, bgra: bool) -> u32x16
 }
 
 #[inline(always)]
-fn unpack_unorm8<S: Simd>(simd: S, texels: u32x16<S>, bgra: bool) -> Colors<S> {
-    let all = f32x16::splat(simd, 255.0);
-    let first = (texels & 255).to_float::<f32x16<S>>() / all;
-    let second = (texels >> 8 & 255).to_float::<f32x16<S>>() / all;
-    let third = (texels >> 16 & 255).to_float::<f32x16<S>>() / all;
-    let fourth = (texels >> 24).to_float::<f32x16<S>>() / all;
+fn unpack_unorm8<S: Simd>(_: S, texels: u32x16<S>, bgra: bool) -> Colors<S> {
+    let first = unorm8_fraction(texels, 0);
+    let second = unorm8_fraction(texels, 8);
+    let third = unorm8_fraction(texels, 16);
+    let fourth = unorm8_fraction(texels, 24);
     if bgra {
         [third, second, first, fourth]
     } else {

@@ -124,9 +124,11 @@ impl<const N: usize> Coverage<N> {
         for row in rows.0..rows.1 {
             self.blocks |= across << (4 * row);
         }
-        if steep {
+        if count == 0 {
+            self.lanes = [[u16::MAX; N]; 16];
+        } else if steep {
             self.evaluate_wide(crossings);
-        } else if count > 0 && self.blocks.count_ones() > 3 {
+        } else if self.blocks.count_ones() > 3 {
             self.evaluate_blocks(simd, crossings);
         } else {
             self.evaluate_few(simd, crossings);

@@ -30,8 +30,7 @@ impl DepthCode {
     #[inline(always)]
     pub fn encode<S: Simd>(self, simd: S, depth: f32x16<S>, range: (f32, f32)) -> u32x16<S> {
         let (low, high) = (f32x16::splat(simd, range.0), f32x16::splat(simd, range.1));
-        let depth = depth.simd_gt(low).select(depth, low);
-        let depth = depth.simd_lt(high).select(depth, high);
+        let depth = depth.max_precise(low).min(high);
         match self {
             // Negative zero becomes zero.
             Self::Float => (depth + 0.0).to_bits(),

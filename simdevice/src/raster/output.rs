@@ -32,8 +32,10 @@ pub fn test<S: Simd>(
         }
     }
     let passed = tests.test(simd, lanes, front, code, &mut depths, &mut stencils);
-    if tests.depth.is_some_and(|(_, write)| write) {
-        quads.store(buffers.depth.words_mut(), passed, &depths);
+    if passed != 0 && tests.depth.is_some_and(|(_, write)| write) {
+        // Those that did not pass are as they were.
+        let stored = if quads.consecutive { u16::MAX } else { passed };
+        quads.store(buffers.depth.words_mut(), stored, &depths);
         for tile in quads.tiles(buffers.depth.samples()) {
             buffers.depth.changed(tile);
         }
@@ -61,6 +63,10 @@ pub fn write<S: Simd>(
     killed: &LaneMask,
     buffers: &mut Buffers,
 ) -> u64 {
+    if draw.plain {
+        write_plain(simd, draw, interface, batch, machine, buffers);
+        return 0;
+    }
     let late = draw.timing == Timing::Late && draw.tests.any();
     let sources: Vec<Sources<'_>> = interface
         .colors
@@ -101,16 +107,86 @@ pub fn write<S: Simd>(
     if draw.count_late { passed } else { 0 }
 }
 
+/// As [`write`], for draws of which nothing is removed or tested after shading.
+#[inline(always)]
+fn write_plain<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    interface: &Interface,
+    batch: &Batch,
+    machine: &Machine,
+    buffers: &mut Buffers,
+) {
+    let count = draw.positions.len();
+    for (index, output) in draw.colors.iter().enumerate() {
+        let (Some(output), Some(slots)) = (output, interface.colors.get(index)) else {
+            continue;
+        };
+        let sources = slots.map(|slots| slots.map(|slot| lanes_of(machine, slot)));
+        let dual = output.is_dual_source();
+        let words = buffers.color[index].words_mut();
+        for chunk in 0..batch.chunks() {
+            let source = load(simd, &sources[0], chunk);
+            let covered = Covered::of(batch, chunk);
+            if let Some(packed) = output.replacement(simd, &source) {
+                // Quads are stored in order, so that the last of those at a place stays.
+                for sample in 0..count {
+                    let lanes = covered.lanes(sample);
+                    let quads = batch.places(chunk, sample, count);
+                    quads.store(words, lanes, &packed);
+                }
+                continue;
+            }
+            let mut second = [f32x16::splat(simd, 0.0); 4];
+            if dual {
+                second = load(simd, &sources[1], chunk);
+            }
+            let turns: &[u16] = if batch.overlaps(chunk) {
+                &[0xF, 0xF0, 0xF00, 0xF000]
+            } else {
+                &[0xFFFF]
+            };
+            for &turn in turns {
+                for sample in 0..count {
+                    let lanes = covered.lanes(sample) & turn;
+                    if lanes != 0 {
+                        let quads = batch.places(chunk, sample, count);
+                        output.write(simd, &source, &second, lanes, &quads, words);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What a chunk's quads cover: [`Quad::cover`](super::batch::Quad::cover) of each, from the lowest bits on.
+struct Covered(u64);
+
+impl Covered {
+    #[inline(always)]
+    fn of(batch: &Batch, chunk: usize) -> Self {
+        let [a, b, c, d] = batch.chunk_quads(chunk);
+        let at = |cover: u16, number: u32| u64::from(cover) << (16 * number);
+        Self(at(a.cover, 0) | at(b.cover, 1) | at(c.cover, 2) | at(d.cover, 3))
+    }
+
+    /// The lanes of which a sample is covered.
+    #[inline(always)]
+    fn lanes(&self, sample: usize) -> u16 {
+        let nibbles = self.0 >> (4 * sample) & 0x000F_000F_000F_000F;
+        (nibbles | nibbles >> 12 | nibbles >> 24 | nibbles >> 36) as u16
+    }
+}
+
 /// The lanes of a chunk covered, by sample.
 #[inline(always)]
 fn sample_lanes(batch: &Batch, chunk: usize, among: u16) -> [u16; 4] {
+    let covered = Covered::of(batch, chunk);
     let mut samples = [0; 4];
-    for (number, quad) in batch.chunk_quads(chunk).iter().enumerate() {
-        for (sample, lanes) in samples.iter_mut().enumerate() {
-            *lanes |= (quad.cover >> (4 * sample) & 15) << (4 * number);
-        }
+    for (sample, lanes) in samples.iter_mut().enumerate() {
+        *lanes = covered.lanes(sample) & among;
     }
-    samples.map(|lanes| lanes & among)
+    samples
 }
 
 /// Takes away the samples that alpha and the program's sample mask do not cover.

@@ -7,11 +7,13 @@
 //! changes nothing either.
 
 use super::TILE_SIZE;
+use super::color::pack_unorm8;
 use super::tile::{AREA, SIDE, Target, Tile, place};
 use crate::format::{Format, MAX_TEXEL_SIZE};
 use crate::packet::{Rect, ResolveMode};
+use crate::texture::unorm8_fraction;
 use crate::transfer::resolve_row;
-use fearless_simd::{Simd, prelude::*, u32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 
 /// The most samples of a pixel.
 const MAX_SAMPLES: usize = 4;
@@ -234,12 +236,29 @@ impl Plane {
     /// Resolves a tile that was touched: one sample for each of its pixels is written to `resolve`.
     pub fn resolve(
         &mut self,
+        level: Level,
         target: &Target,
         (resolve, mode): (&Target, ResolveMode),
         layer: u32,
         tile: &Tile,
     ) {
         let (format, samples, stride) = (target.format(), self.samples, self.stride);
+        if samples == MAX_SAMPLES
+            && mode == ResolveMode::Average
+            && is_unorm8(format)
+            && resolve.format() == format
+        {
+            let words = &self.words[tile.index * MAX_SAMPLES * AREA..][..MAX_SAMPLES * AREA];
+            let mut means = [0; AREA];
+            dispatch!(level, simd => unorm8_means(simd, words, &mut means));
+            let mut row = [0; 4 * SIDE];
+            for (y, columns) in tile.rows(tile.pixels) {
+                let bytes = &mut row[..4 * columns.len()];
+                get_row(bytemuck::cast_slice(&means), 4, y, columns.start, bytes);
+                resolve.write(layer, 0, tile.pixel(columns.start, y), bytes);
+            }
+            return;
+        }
         let (size, resolved_size) = (format.texel_size(), resolve.format().texel_size());
         let has_mean = mode != ResolveMode::Average || !format.is_integer();
         let copied = mode == ResolveMode::SampleZero || !has_mean || samples == 1;
@@ -284,6 +303,33 @@ impl Plane {
     }
 }
 
+/// Whether texels are four bytes of 0 to 1.
+fn is_unorm8(format: Format) -> bool {
+    matches!(
+        format,
+        Format::R8G8B8A8Unorm | Format::A8B8G8R8UnormPack32 | Format::B8G8R8A8Unorm
+    )
+}
+
+/// The means of a tile's samples of four bytes, as [`resolve_row`] and the format have them.
+#[inline(always)]
+fn unorm8_means<S: Simd>(simd: S, words: &[u32], means: &mut [u32; AREA]) {
+    for (block, mean) in means.as_chunks_mut::<16>().0.iter_mut().enumerate() {
+        let mut sums = [f32x16::splat(simd, 0.0); 4];
+        for (sample, words) in words.as_chunks::<AREA>().0.iter().enumerate() {
+            let texels = u32x16::simd_from(simd, words.as_chunks::<16>().0[block]);
+            for (byte, sum) in sums.iter_mut().enumerate() {
+                let value = unorm8_fraction(texels, 8 * byte as u32);
+                *sum = if sample == 0 { value } else { *sum + value };
+            }
+        }
+        for sum in &mut sums {
+            *sum *= 0.25;
+        }
+        *mean = pack_unorm8(simd, &sums, false).into();
+    }
+}
+
 /// Repeats `texel` over `bytes`.
 fn fill(bytes: &mut [u8], texel: &[u8]) {
     match texel.len() {
@@ -322,6 +368,14 @@ fn get_row(texels: &[u8], size: usize, y: usize, first: usize, row: &mut [u8]) {
 
 fn get_each<const N: usize>(texels: &[u8], y: usize, first: usize, row: &mut [u8]) {
     let (tiles, _) = texels.as_chunks::<N>().0.as_chunks::<AREA>();
+    if let ([row], []) = row.as_chunks_mut::<N>().0.as_chunks_mut::<SIDE>() {
+        let tile = &tiles[0];
+        for x in (0..SIDE).step_by(2) {
+            let at = place(x, y % SIDE);
+            (row[x], row[x + 1]) = (tile[at], tile[at + 1]);
+        }
+        return;
+    }
     for (x, texel) in row.as_chunks_mut::<N>().0.iter_mut().enumerate() {
         *texel = tiles[0][place(first + x, y)];
     }
@@ -345,6 +399,14 @@ fn set_row(texels: &mut [u8], size: usize, y: usize, first: usize, row: &[u8]) {
 
 fn set_each<const N: usize>(texels: &mut [u8], y: usize, first: usize, row: &[u8]) {
     let (tiles, _) = texels.as_chunks_mut::<N>().0.as_chunks_mut::<AREA>();
+    if let ([row], []) = row.as_chunks::<N>().0.as_chunks::<SIDE>() {
+        let tile = &mut tiles[0];
+        for x in (0..SIDE).step_by(2) {
+            let at = place(x, y % SIDE);
+            (tile[at], tile[at + 1]) = (row[x], row[x + 1]);
+        }
+        return;
+    }
     for (x, texel) in row.as_chunks::<N>().0.iter().enumerate() {
         tiles[0][place(first + x, y)] = *texel;
     }

@@ -1,6 +1,7 @@
 //! A draw's state made ready for tiles, once for all workers: what its fragments need, when they are tested, and where
 //! they go.
 
+use super::batch::Needs;
 use super::color::ColorOutput;
 use super::depth::Tests;
 use super::fragment::FragmentStage;
@@ -9,8 +10,9 @@ use super::tile::Target;
 use crate::bindings::Prepared;
 use crate::device::Device;
 use crate::geometry::PrimitiveDraw;
-use crate::packet::draw::FragmentInput;
+use crate::packet::draw::{FragmentInput, Interpolation};
 use crate::packet::{BlendState, Rect};
+use crate::skips::Skips;
 use fearless_simd::Level;
 use std::time::Duration;
 
@@ -45,6 +47,8 @@ pub struct TileDraw<'a> {
     pub(super) filter: Option<Tests>,
     /// Whether all that is covered is written.
     pub(super) keeps_all: bool,
+    /// Nothing happens between a fragment's shading and its blending: all that is covered is written.
+    pub(super) plain: bool,
     /// Samples are counted after shading, which may discard some.
     pub(super) count_late: bool,
     /// Every sample is shaded for itself.
@@ -54,12 +58,10 @@ pub struct TileDraw<'a> {
     pub(super) area: Rect,
     /// Of each viewport: the range that depth is clamped to.
     pub(super) ranges: Vec<(f32, f32)>,
-    /// Whether fragments need 1 / w.
-    pub(super) needs_w: bool,
-    /// Whether fragments need barycentrics.
-    pub(super) needs_barycentrics: bool,
-    /// Whether fragments need depth after the early tests.
-    pub(super) needs_depth: bool,
+    /// What fragments need.
+    pub(super) needs: Needs,
+    /// What is left out in its tiles.
+    pub(super) skips: Skips,
     pub(super) level: Level,
     pub(super) limit: Duration,
 }
@@ -93,7 +95,7 @@ impl<'a> TileDraw<'a> {
             ColorOutput::new(blend, state.logic_op, state.blend_constants, format)
         };
         let colors: Vec<_> = targets.color.iter().enumerate().map(color).collect();
-        let (mut timing, mut count_late) = (Timing::Early, false);
+        let (mut timing, mut count_late, mut plain) = (Timing::Early, false, true);
         let (mut filter, mut keeps_all) = (None, !tests.any());
         if let Some(interface) = stage.map(|stage| &stage.interface) {
             let removes =
@@ -110,6 +112,7 @@ impl<'a> TileDraw<'a> {
                     .filter(|_| !changes && !interface.has_side_effects);
             }
             keeps_all &= !removes;
+            plain = !removes && !late;
             count_late = late || removes && !interface.early_tests;
             let needed = interface.has_side_effects
                 || late
@@ -138,6 +141,7 @@ impl<'a> TileDraw<'a> {
             timing,
             filter,
             keeps_all,
+            plain: plain && !state.alpha_to_one,
             count_late,
             per_sample,
             positions: if multisampled { &SAMPLES_4 } else { &CENTER },
@@ -152,20 +156,26 @@ impl<'a> TileDraw<'a> {
                     }
                 })
                 .collect(),
-            needs_w: reads(|input| {
-                matches!(
-                    input,
-                    FragmentInput::Varying { .. } | FragmentInput::FragCoord(3)
-                )
-            }),
-            needs_barycentrics: reads(|input| {
-                matches!(
-                    input,
-                    FragmentInput::Varying { .. } | FragmentInput::PointCoord(_)
-                )
-            }),
-            needs_depth: timing == Timing::Late
-                || reads(|input| matches!(input, FragmentInput::FragCoord(2))),
+            needs: Needs {
+                barycentrics: reads(|input| {
+                    matches!(
+                        input,
+                        FragmentInput::Varying { .. } | FragmentInput::PointCoord(_)
+                    )
+                }),
+                depth: timing == Timing::Late
+                    || reads(|input| matches!(input, FragmentInput::FragCoord(2))),
+                inverse_w: reads(|input| {
+                    matches!(
+                        input,
+                        FragmentInput::Varying {
+                            interpolation: Interpolation::Perspective,
+                            ..
+                        } | FragmentInput::FragCoord(3)
+                    )
+                }),
+            },
+            skips: device.config().skips,
             level: device.level(),
             limit: device.config().shader_timeout,
         }

@@ -1,7 +1,7 @@
 //! Triangle mode of the tile engine: the primitives of a draw, one after another, through coverage, early tests and
 //! shading.
 
-use super::batch::{Batch, BlockValues, QUADS, Quad, Samples, at_sample};
+use super::batch::{Batch, BlockValues, Needs, QUADS, Quad, Samples, at_sample};
 use super::color::Quads;
 use super::coverage::{Coverage, bits};
 use super::depth::Tests;
@@ -13,8 +13,9 @@ use super::setup::Setup;
 use super::tile::{AREA, SIDE, Tile};
 use super::{Plane, TILE_SIZE};
 use crate::counters::{Counter, Counters};
-use crate::geometry::Primitive;
+use crate::geometry::{Primitive, Varyings};
 use crate::packet::Rect;
+use crate::skips::Skip;
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
@@ -59,7 +60,11 @@ impl TileDraw<'_> {
         counters: &mut Counters,
         cancel: &AtomicBool,
     ) -> Result<(), Stopped> {
-        if self.draw.bins.of(place.at, place.layer).is_empty() {
+        let chunks = &self.draw.chunks;
+        if chunks
+            .iter()
+            .all(|chunk| chunk.bins.of(place.at, place.layer).is_empty())
+        {
             return Ok(());
         }
         let mut machines = self
@@ -75,8 +80,11 @@ impl TileDraw<'_> {
             counters,
             cancel,
             samples_passed: 0,
+            quads_masked: 0,
         };
-        renderer.batch.clear();
+        renderer
+            .batch
+            .begin(self.needs, place.at, place.size, self.skips);
         let level = self.level;
         let done = if self.positions.len() == 1 {
             dispatch!(level, simd => renderer.run::<_, 1>(simd))
@@ -84,8 +92,11 @@ impl TileDraw<'_> {
             dispatch!(level, simd => renderer.run::<_, 4>(simd))
         };
         let done = done.and_then(|()| renderer.flush());
-        let passed = renderer.samples_passed;
+        let (passed, masked) = (renderer.samples_passed, renderer.quads_masked);
         counters.add(Counter::SamplesPassed, passed);
+        if self.skips.has(Skip::MaskedQuads) {
+            counters.add(Counter::QuadsMasked, masked);
+        }
         if let Some(stage) = self.stage {
             stage.put_back(machines, counters);
         }
@@ -103,19 +114,21 @@ pub(super) struct Renderer<'a, 'd> {
     pub counters: &'a mut Counters,
     pub cancel: &'a AtomicBool,
     pub samples_passed: u64,
+    /// Quads that were not shaded, because nothing is left of them.
+    pub quads_masked: u64,
 }
 
 /// A primitive while it is rasterized.
 struct Current<'p> {
-    index: u32,
     primitive: &'p Primitive,
-    setup: Setup,
+    varyings: &'p Varyings,
+    setup: &'p Setup,
     /// Its record in the batch, once it has one.
     record: Option<u16>,
     range: (f32, f32),
 }
 
-impl<'d> Renderer<'_, 'd> {
+impl Renderer<'_, '_> {
     /// All primitives.
     #[inline(always)]
     fn run<S: Simd, const N: usize>(&mut self, simd: S) -> Result<(), Stopped> {
@@ -127,38 +140,38 @@ impl<'d> Renderer<'_, 'd> {
             height: size,
         };
         let mut coverage = Coverage::<N>::default();
+        let mut setup = Setup::default();
         let draw = self.draw;
-        let Some(primitive) = draw.draw.primitives.first() else {
-            return Ok(());
-        };
-        let mut current = Current {
-            index: 0,
-            primitive,
-            setup: Setup::default(),
-            record: None,
-            range: (0.0, 1.0),
+        let needs = Needs {
+            depth: draw.needs.depth || draw.tests.any(),
+            ..draw.needs
         };
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
-        for &index in draw.draw.bins.of(self.place.at, self.place.layer) {
-            let Some(primitive) = draw.draw.primitives.get(index as usize) else {
-                continue;
-            };
-            if clip.0 != primitive.viewport {
-                let Some(pixels) = draw.draw.regions.get(usize::from(primitive.viewport)) else {
+        for chunk in &draw.draw.chunks {
+            for &index in chunk.bins.of(self.place.at, self.place.layer) {
+                let Some(primitive) = chunk.primitives.get(index as usize) else {
                     continue;
                 };
-                clip = (primitive.viewport, pixels.intersect(whole));
+                if clip.0 != primitive.viewport {
+                    let Some(pixels) = draw.draw.regions.get(usize::from(primitive.viewport))
+                    else {
+                        continue;
+                    };
+                    clip = (primitive.viewport, pixels.intersect(whole));
+                }
+                if !setup.prepare(simd, primitive, draw.positions, clip.1, needs) {
+                    continue;
+                }
+                let range = draw.ranges.get(usize::from(primitive.viewport));
+                let mut current = Current {
+                    primitive,
+                    varyings: &chunk.varyings,
+                    setup: &setup,
+                    record: None,
+                    range: range.copied().unwrap_or((0.0, 1.0)),
+                };
+                self.primitive(simd, &mut current, &mut coverage, [whole.x, whole.y])?;
             }
-            let setup = &mut current.setup;
-            if !setup.prepare(simd, primitive, draw.positions, clip.1) {
-                continue;
-            }
-            current.index = index;
-            current.primitive = primitive;
-            current.record = None;
-            let range = draw.ranges.get(usize::from(primitive.viewport));
-            current.range = range.copied().unwrap_or((0.0, 1.0));
-            self.primitive(simd, &mut current, &mut coverage, [whole.x, whole.y])?;
         }
         Ok(())
     }
@@ -168,7 +181,7 @@ impl<'d> Renderer<'_, 'd> {
     fn primitive<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut Current<'d>,
+        current: &mut Current<'_>,
         coverage: &mut Coverage<N>,
         corner: [i32; 2],
     ) -> Result<(), Stopped> {
@@ -186,7 +199,7 @@ impl<'d> Renderer<'_, 'd> {
             for column in first[0]..=last[0] {
                 let x = corner[0] + column * SIDE as i32;
                 let y = corner[1] + row * SIDE as i32;
-                if coverage.find(simd, &current.setup, x, y) {
+                if coverage.find(simd, current.setup, x, y) {
                     let tile = (row as u32 * side + column as u32) as usize;
                     self.tile(simd, current, coverage, tile, [x, y])?;
                 }
@@ -200,7 +213,7 @@ impl<'d> Renderer<'_, 'd> {
     fn tile<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut Current<'d>,
+        current: &mut Current<'_>,
         coverage: &Coverage<N>,
         tile: usize,
         at: [i32; 2],
@@ -216,14 +229,18 @@ impl<'d> Renderer<'_, 'd> {
         if let Some(tests) = early
             && coverage.blocks.count_ones() >= HIDDEN_BLOCKS
             && tests.stencil.is_none()
+            && draw.skips.has(Skip::HiddenTiles)
             && self.is_hidden(simd, tests, current, tile, at)
         {
             return Ok(());
         }
         let state = &draw.draw.state;
+        let masked = state.sample_mask & ((1 << N) - 1) != (1 << N) - 1;
+        let skips_masked = draw.skips.has(Skip::MaskedQuads);
+        let mut touched = false;
         for block in bits(coverage.blocks) {
             let mut lanes = coverage.lanes[block];
-            if state.sample_mask & ((1 << N) - 1) != (1 << N) - 1 {
+            if masked {
                 for (sample, lanes) in lanes.iter_mut().enumerate() {
                     if state.sample_mask >> sample & 1 == 0 {
                         *lanes = 0;
@@ -232,7 +249,7 @@ impl<'d> Renderer<'_, 'd> {
             }
             let x = at[0] + (block % 4 * 4) as i32;
             let y = at[1] + (block / 4 * 4) as i32;
-            let setup = &current.setup;
+            let setup = current.setup;
             let [b1, b2] = setup.barycentrics(x, y);
             let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
             let mut values = BlockValues {
@@ -240,7 +257,7 @@ impl<'d> Renderer<'_, 'd> {
                 depth: f32x16::splat(simd, 0.0),
                 inverse_w: f32x16::splat(simd, 1.0),
             };
-            if early.is_some() || draw.needs_depth {
+            if early.is_some() || draw.needs.depth {
                 values.depth = add(setup.depth([b1, b2]), setup.lane_depth);
             }
             if let Some(tests) = early {
@@ -255,23 +272,28 @@ impl<'d> Renderer<'_, 'd> {
             for lanes in lanes {
                 any |= lanes;
             }
-            if any == 0 || draw.stage.is_none() {
+            if draw.stage.is_none() {
                 continue;
             }
-            let setup = &current.setup;
-            if draw.needs_barycentrics {
+            if any == 0 && (skips_masked || draw.per_sample) {
+                self.quads_masked += 4;
+                continue;
+            }
+            let setup = current.setup;
+            if draw.needs.barycentrics {
                 values.barycentrics = [
                     add(b1 as f32, setup.lane_barycentrics[0]),
                     add(b2 as f32, setup.lane_barycentrics[1]),
                 ];
             }
-            if draw.needs_w {
+            if draw.needs.inverse_w && !setup.affine {
                 values.inverse_w = add(setup.inverse_w([b1, b2]), setup.lane_w);
             }
-            self.touch_colors(tile, coverage);
+            if !touched {
+                self.touch_colors(tile, coverage);
+                touched = true;
+            }
             let quad = Quad {
-                x: x as u16,
-                y: y as u16,
                 tile: tile as u8,
                 place: (block * 16) as u8,
                 ..Quad::default()
@@ -285,12 +307,12 @@ impl<'d> Renderer<'_, 'd> {
                             sample: sample as u8,
                             ..quad
                         };
-                        let values = at_sample(&values, setup_of(current), draw.positions[sample]);
-                        self.append(current, quad, &only, &values.lanes())?;
+                        let values = at_sample(&values, current.setup, draw.positions[sample]);
+                        self.append(current, quad, &only, &values)?;
                     }
                 }
             } else {
-                self.append(current, quad, &lanes, &values.lanes())?;
+                self.append(current, quad, &lanes, &values)?;
             }
         }
         Ok(())
@@ -299,12 +321,12 @@ impl<'d> Renderer<'_, 'd> {
     /// Adds the quads of a block that have samples to the batch, which is shaded when it is full. `quad` is the
     /// block's first.
     #[inline(always)]
-    fn append<const N: usize>(
+    fn append<S: Simd, const N: usize>(
         &mut self,
-        current: &mut Current<'d>,
+        current: &mut Current<'_>,
         quad: Quad,
         lanes: &[u16; N],
-        values: &[[f32; 16]; 4],
+        values: &BlockValues<S>,
     ) -> Result<(), Stopped> {
         if N == 1 && lanes[0] == u16::MAX && self.batch.count + 4 <= QUADS {
             let record = match current.record {
@@ -317,19 +339,20 @@ impl<'d> Renderer<'_, 'd> {
                 ..quad
             }; 4];
             for (number, quad) in quads.iter_mut().enumerate() {
-                quad.x += (number as u16 & 1) * 2;
-                quad.y += number as u16 & 2;
                 quad.place += 4 * number as u8;
             }
             self.batch.add_block(quads, values);
             return Ok(());
         }
+        let values = values.lanes();
+        let skips_masked = self.draw.skips.has(Skip::MaskedQuads);
         for number in 0..4 {
             let mut cover = 0;
             for (sample, lanes) in lanes.iter().enumerate() {
                 cover |= (lanes >> (4 * number) & 15) << (4 * sample);
             }
-            if cover == 0 {
+            if cover == 0 && (skips_masked || self.draw.per_sample) {
+                self.quads_masked += 1;
                 continue;
             }
             if self.batch.count == QUADS {
@@ -341,27 +364,25 @@ impl<'d> Renderer<'_, 'd> {
                 None => self.record(current),
             };
             let quad = Quad {
-                x: quad.x + (number as u16 & 1) * 2,
-                y: quad.y + (number as u16 & 2),
                 place: quad.place + 4 * number as u8,
                 record,
                 cover,
                 ..quad
             };
-            self.batch.add(quad, number, values);
+            self.batch.add(quad, number, &values);
         }
         Ok(())
     }
 
-    fn record(&mut self, current: &mut Current<'d>) -> u16 {
-        let (draw, stage) = (self.draw.draw, self.draw.stage);
-        let Some(stage) = stage else { return 0 };
+    fn record(&mut self, current: &mut Current<'_>) -> u16 {
+        let Some(stage) = self.draw.stage else {
+            return 0;
+        };
         let record = self.batch.add_primitive(
-            current.index,
             current.primitive,
-            &current.setup,
+            current.setup,
             &stage.interface,
-            &draw.varyings,
+            current.varyings,
         );
         current.record = Some(record);
         record
@@ -373,7 +394,7 @@ impl<'d> Renderer<'_, 'd> {
         &mut self,
         simd: S,
         tests: &Tests,
-        current: &Current<'d>,
+        current: &Current<'_>,
         values: &BlockValues<S>,
         lanes: &mut [u16; N],
         (tile, block): (usize, usize),
@@ -386,7 +407,7 @@ impl<'d> Renderer<'_, 'd> {
             let depth = if N == 1 {
                 values.depth
             } else {
-                at_sample(values, &current.setup, draw.positions[sample]).depth
+                at_sample(values, current.setup, draw.positions[sample]).depth
             };
             let code = tests.code.encode(simd, depth, current.range);
             let first = (tile * N + sample) * AREA + 16 * block;
@@ -412,7 +433,7 @@ impl<'d> Renderer<'_, 'd> {
         &mut self,
         simd: S,
         tests: &Tests,
-        current: &Current<'d>,
+        current: &Current<'_>,
         tile: usize,
         at: [i32; 2],
     ) -> bool {
@@ -461,8 +482,10 @@ impl<'d> Renderer<'_, 'd> {
                 && output.overwrites()
                 && coverage.is_whole()
                 && state.sample_mask & 15 == 15
+                && self.draw.skips.has(Skip::OverwrittenTiles)
             {
                 self.buffers.color[index].touch_unread(tile);
+                self.counters.add(Counter::TilesOverwritten, 1);
             } else if let Some(target) = &self.draw.targets.color[index] {
                 let tile = self.tile_of(tile);
                 self.buffers.color[index].touch(target, self.place.layer, &tile);
@@ -503,14 +526,14 @@ impl<'d> Renderer<'_, 'd> {
         let machine = stage.machine(self.machines, size);
         let batch = &mut *self.batch;
         batch.prepare();
-        let primitives = &draw.draw.primitives[..];
         let samples = Samples {
             positions: draw.positions,
             each_shaded: draw.per_sample,
         };
-        dispatch!(level, simd => batch.set_inputs(
-            simd, &stage.interface, samples, primitives, machine
+        let affine = dispatch!(level, simd => batch.set_inputs(
+            simd, &stage.interface, samples, machine
         ));
+        self.counters.add(Counter::BatchesAffine, affine.into());
         let watchdog = Watchdog {
             limit: draw.limit,
             cancel: Some(self.cancel),
@@ -536,12 +559,6 @@ impl<'d> Renderer<'_, 'd> {
         self.batch.clear();
         Ok(())
     }
-}
-
-/// The set-up of a primitive.
-#[inline(always)]
-fn setup_of<'a>(current: &'a Current<'_>) -> &'a Setup {
-    &current.setup
 }
 
 #[cfg(test)]

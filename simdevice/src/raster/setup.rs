@@ -1,5 +1,6 @@
 //! A primitive made ready for tiles: its edges as exact integers, and what varies over it as planes.
 
+use super::batch::Needs;
 use super::coverage::{LANE_X, LANE_Y};
 use crate::geometry::{Primitive, PrimitiveKind};
 use crate::packet::Rect;
@@ -61,6 +62,8 @@ pub struct Setup {
     pub w_slopes: [f32; 2],
     /// 1 / w at corners 1 and 2, in units of `scale`.
     pub weights: [f32; 2],
+    /// Whether 1 / w is the same at all corners.
+    pub affine: bool,
     /// What 1 / w is in units of: its value if it is the same at all corners, so that nothing is lost.
     pub scale: f32,
 }
@@ -121,7 +124,8 @@ fn pixels(low: i32, high: i32, samples: usize) -> (i32, i32) {
 }
 
 impl Setup {
-    /// Becomes that of a primitive; returns false, and is undefined, if none of its samples lies in `clip`.
+    /// Becomes that of a primitive; returns false, and is undefined, if none of its samples lies in `clip`. What lanes
+    /// add is found only as far as it is needed.
     #[inline(always)]
     pub fn prepare<S: Simd>(
         &mut self,
@@ -129,6 +133,7 @@ impl Setup {
         primitive: &Primitive,
         positions: &[[i32; 2]],
         clip: Rect,
+        needs: Needs,
     ) -> bool {
         let [p0, p1, p2] = primitive.corners;
         let parallelogram = primitive.kind != PrimitiveKind::Triangle;
@@ -207,15 +212,22 @@ impl Setup {
         self.numerators = numerators;
         self.moved = moved;
         self.inverse_area = inverse_area;
-        self.lane_barycentrics = [lanes(slopes[0]), lanes(slopes[1])];
+        if needs.barycentrics {
+            self.lane_barycentrics = [lanes(slopes[0]), lanes(slopes[1])];
+        }
         self.slopes = slopes;
         self.depth = depth;
-        self.lane_depth = lanes(depth_slopes);
+        if needs.depth {
+            self.lane_depth = lanes(depth_slopes);
+        }
         self.depth_slopes = depth_slopes;
         self.inverse_w = inverse_w;
-        self.lane_w = lanes(w_slopes);
+        if needs.inverse_w && !affine {
+            self.lane_w = lanes(w_slopes);
+        }
         self.w_slopes = w_slopes;
         self.weights = [weights[1], weights[2]];
+        self.affine = affine;
         self.scale = scale;
         true
     }

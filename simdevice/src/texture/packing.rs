@@ -299,9 +299,9 @@ const INV_255: [f32; 2] = {
     [high, (1.0 / 255.0 - high as f64) as f32]
 };
 
-/// One byte of each word as a fraction of 255.
+/// One byte of each word as a fraction of 255, as its quotient rounds.
 #[inline(always)]
-fn unorm8<S: Simd>(word: u32x16<S>, shift: u32) -> f32x16<S> {
+pub(crate) fn unorm8_fraction<S: Simd>(word: u32x16<S>, shift: u32) -> f32x16<S> {
     let code = if shift == 24 {
         word >> 24
     } else {
@@ -324,7 +324,7 @@ impl Texels for Unorm8 {
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
         let zero = f32x16::splat(simd, 0.0);
         let word = gather_narrow(simd, words, index, 4);
-        [unorm8(word, 0), zero, zero, zero]
+        [unorm8_fraction(word, 0), zero, zero, zero]
     }
 }
 
@@ -337,7 +337,12 @@ impl Texels for Unorm8x2 {
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
         let zero = f32x16::splat(simd, 0.0);
         let word = gather_narrow(simd, words, index, 2);
-        [unorm8(word, 0), unorm8(word, 8), zero, zero]
+        [
+            unorm8_fraction(word, 0),
+            unorm8_fraction(word, 8),
+            zero,
+            zero,
+        ]
     }
 }
 
@@ -350,10 +355,10 @@ impl Texels for Unorm8x4 {
     fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
         let word = gather(simd, words, index);
         [
-            unorm8(word, 0),
-            unorm8(word, 8),
-            unorm8(word, 16),
-            unorm8(word, 24),
+            unorm8_fraction(word, 0),
+            unorm8_fraction(word, 8),
+            unorm8_fraction(word, 16),
+            unorm8_fraction(word, 24),
         ]
     }
 }
@@ -380,7 +385,7 @@ impl Texels for Srgb8x4 {
             f32x16::simd_from(simd, r),
             f32x16::simd_from(simd, g),
             f32x16::simd_from(simd, b),
-            unorm8(word, 24),
+            unorm8_fraction(word, 24),
         ]
     }
 }

@@ -77,7 +77,7 @@ fn positions(count: usize) -> Vec<[f32; 4]> {
 }
 
 /// The primitives of a draw by id, instance, vertices in winding order, and provoking vertex.
-fn primitives(draw: &super::super::PrimitiveDraw) -> Vec<(u32, u32, Vec<u32>, u32)> {
+fn primitives(draw: &Found) -> Vec<(u32, u32, Vec<u32>, u32)> {
     let index = |vertex| varying_bits(draw, vertex, INDEX);
     let describe = |primitive: &super::super::Primitive| {
         let [a, b, c] = primitive.vertices.map(index);

@@ -76,12 +76,12 @@ fn macro_tiles_have_what_touches_them_in_order() {
         };
         let mut counters = Counters::default();
         let mut front = FrontEnd::new(&draw, surface, &device, &mut counters);
-        let found = front.next_part(&mut counters).unwrap().unwrap();
+        let found = Found::new(front.next_part(&mut counters).unwrap().unwrap());
         let mut pairs = 0;
         for layer in 0..5 {
             for row in 0..12 {
                 for column in 0..14 {
-                    let list = found.bins.of([column, row], layer);
+                    let list = found.binned([column, row], layer);
                     assert!(list.windows(2).all(|pair| pair[0] < pair[1]));
                     pairs += list.len();
                     let pixels = Rect {
@@ -110,11 +110,7 @@ fn macro_tiles_have_what_touches_them_in_order() {
                 }
             }
         }
-        assert_eq!(
-            pairs as u64,
-            found.bins.pairs(),
-            "nothing is binned elsewhere"
-        );
+        assert_eq!(pairs as u64, found.pairs(), "nothing is binned elsewhere");
         assert!(pairs > 100);
     }
 }

@@ -1,6 +1,5 @@
 //! Clipping against an oracle that does not clip: a pixel's ray is intersected with the triangle in clip space.
 
-use super::super::PrimitiveDraw;
 use super::scene::*;
 use crate::packet::draw::{Topology, VertexOutput};
 use rand::{Rng, SeedableRng};
@@ -50,7 +49,7 @@ fn visible(triangle: &[[f32; 4]], distances: &[[f32; 4]], clip_depth: bool, at: 
 }
 
 /// How many primitives cover a pixel's centre.
-fn coverage(draw: &PrimitiveDraw, id: Option<u32>, pixel: [i64; 2]) -> usize {
+fn coverage(draw: &Found, id: Option<u32>, pixel: [i64; 2]) -> usize {
     let at = pixel.map(|pixel| 256 * pixel + 128);
     let covers = |corners: [[i32; 2]; 3]| {
         let corners = corners.map(|corner| corner.map(i64::from));

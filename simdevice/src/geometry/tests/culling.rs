@@ -143,8 +143,8 @@ fn a_primitive_goes_to_the_provoking_vertexs_layer_and_viewport() {
     assert_eq!((b.layer, b.viewport), (3, 0));
     assert_eq!(a.corners, b.corners.map(|[x, y]| [x + 25_600, y]));
     assert_eq!(first.regions[1].width, 70);
-    assert_eq!(first.bins.of([2, 1], 2), [0]);
-    assert_eq!(first.bins.of([2, 1], 3), []);
+    assert_eq!(first.binned([2, 1], 2), [0]);
+    assert_eq!(first.binned([2, 1], 3), [0; 0]);
 }
 
 #[test]

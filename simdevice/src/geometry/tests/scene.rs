@@ -1,6 +1,6 @@
 //! Draws that the tests share.
 
-use super::super::{DrawPipeline, FrontEnd, PrimitiveDraw, Surface};
+use super::super::{Bins, DrawPipeline, FrontEnd, Primitive, PrimitiveDraw, Surface, Varyings};
 use crate::bindings::Bindings;
 use crate::counters::Counters;
 use crate::device::{Config, Device};
@@ -183,8 +183,56 @@ pub fn draw_with(
     }
 }
 
+/// What a draw becomes, with its chunks joined.
+#[derive(Debug, Default)]
+pub struct Found {
+    pub primitives: Vec<Primitive>,
+    pub varyings: Varyings,
+    pub bins: Vec<(u32, Bins)>,
+    pub regions: Vec<Rect>,
+}
+
+impl Found {
+    /// Joins the chunks of a part.
+    pub fn new(part: PrimitiveDraw) -> Self {
+        let mut found = Self {
+            regions: part.regions,
+            ..Self::default()
+        };
+        for chunk in part.chunks {
+            let per_vertex = chunk.varyings.per_vertex;
+            let vertices = (found.varyings.values.len() / per_vertex.max(1)) as u32;
+            found.bins.push((found.primitives.len() as u32, chunk.bins));
+            found
+                .primitives
+                .extend(chunk.primitives.iter().map(|primitive| Primitive {
+                    vertices: primitive.vertices.map(|vertex| vertex + vertices),
+                    provoking: primitive.provoking + vertices,
+                    ..*primitive
+                }));
+            found.varyings.values.extend(chunk.varyings.values);
+            found.varyings.per_vertex = per_vertex;
+        }
+        found
+    }
+
+    /// The primitives that a macro-tile has to look at.
+    pub fn binned(&self, macro_tile: [u32; 2], layer: u32) -> Vec<u32> {
+        let lists = self.bins.iter().flat_map(|(before, bins)| {
+            let list = bins.of(macro_tile, layer).iter();
+            list.map(move |number| before + number)
+        });
+        lists.collect()
+    }
+
+    /// How many pairs of a macro-tile and a primitive there are.
+    pub fn pairs(&self) -> u64 {
+        self.bins.iter().map(|(_, bins)| bins.pairs()).sum()
+    }
+}
+
 /// What a draw becomes, in parts.
-pub fn parts(device: &Device, draw: &Draw) -> (Vec<PrimitiveDraw>, Counters) {
+pub fn parts(device: &Device, draw: &Draw) -> (Vec<Found>, Counters) {
     let surface = Surface {
         area: EVERYTHING,
         layers: 4,
@@ -194,25 +242,25 @@ pub fn parts(device: &Device, draw: &Draw) -> (Vec<PrimitiveDraw>, Counters) {
     let mut front = FrontEnd::new(draw, surface, device, &mut counters);
     let mut parts = Vec::new();
     while let Some(part) = front.next_part(&mut counters).unwrap() {
-        parts.push(part);
+        parts.push(Found::new(part));
     }
     (parts, counters)
 }
 
 /// What a draw becomes; it must be one part or nothing.
-pub fn run(device: &Device, draw: &Draw) -> PrimitiveDraw {
+pub fn run(device: &Device, draw: &Draw) -> Found {
     let (mut parts, _) = parts(device, draw);
     assert!(parts.len() <= 1);
-    parts.pop().unwrap_or_else(|| PrimitiveDraw::empty(draw))
+    parts.pop().unwrap_or_default()
 }
 
 /// A varying of a vertex of the output, as a float.
-pub fn varying(draw: &PrimitiveDraw, vertex: u32, number: usize) -> f32 {
+pub fn varying(draw: &Found, vertex: u32, number: usize) -> f32 {
     f32::from_bits(varying_bits(draw, vertex, number))
 }
 
 /// A varying of a vertex of the output.
-pub fn varying_bits(draw: &PrimitiveDraw, vertex: u32, number: usize) -> u32 {
+pub fn varying_bits(draw: &Found, vertex: u32, number: usize) -> u32 {
     draw.varyings.values[vertex as usize * draw.varyings.per_vertex + number]
 }
 

@@ -1,11 +1,12 @@
 //! Points, lines, polygon modes and depth bias.
 
-use super::super::{PrimitiveDraw, PrimitiveKind};
+use super::super::PrimitiveKind;
+
 use super::scene::*;
 use crate::packet::draw::{DepthBias, PolygonMode, Topology, VertexOutput};
 
 /// The parallelogram's corners, the fourth included.
-fn corners(draw: &PrimitiveDraw, number: usize) -> Vec<[i32; 2]> {
+fn corners(draw: &Found, number: usize) -> Vec<[i32; 2]> {
     let [a, b, c] = draw.primitives[number].corners;
     vec![a, b, c, [a[0] + c[0] - b[0], a[1] + c[1] - b[1]]]
 }

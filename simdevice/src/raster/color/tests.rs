@@ -1,6 +1,8 @@
 use super::*;
 use fearless_simd::dispatch;
 use isa::level::SimdLevel;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// Every float around every code, its middle and its neighbours' middle.
 #[test]
@@ -56,4 +58,43 @@ fn stores_touch_only_their_lanes() {
     block.store(&mut words, u16::MAX, &values);
     assert_eq!(words, values);
     assert_eq!(block.load(&words), values);
+}
+
+#[test]
+fn kernels_of_usual_equations_have_the_bits_of_the_equations() {
+    let mut rng = ChaCha8Rng::seed_from_u64(19);
+    for equation in [PREMULTIPLIED, STRAIGHT] {
+        let state = BlendState {
+            equations: Some((equation, equation)),
+            write_mask: 0xF,
+        };
+        let kernel = ColorOutput::new(&state, None, [0.0; 4], Format::B8G8R8A8Unorm).unwrap();
+        assert!(kernel.over.is_some());
+        let general = ColorOutput {
+            over: None,
+            ..kernel.clone()
+        };
+        let other = ColorOutput::new(&state, None, [0.0; 4], Format::R16G16B16A16Sfloat).unwrap();
+        assert_eq!(other.codec, Codec::Other);
+        for (name, level) in SimdLevel::supported() {
+            let level = level.resolve().unwrap();
+            for _ in 0..200 {
+                let source: [[f32; 16]; 4] =
+                    std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
+                let stored: [u32; 16] = rng.random();
+                let write = |output: &ColorOutput| {
+                    let mut words = stored;
+                    dispatch!(level, simd => {
+                        let [r, g, b, a] = source;
+                        let load = |lanes| f32x16::simd_from(simd, lanes);
+                        let source = [load(r), load(g), load(b), load(a)];
+                        let quads = Quads { first: [0, 4, 8, 12], consecutive: true };
+                        output.write(simd, &source, &source, 0xFBFF, &quads, &mut words);
+                    });
+                    words
+                };
+                assert_eq!(write(&kernel), write(&general), "{name} {equation:?}");
+            }
+        }
+    }
 }

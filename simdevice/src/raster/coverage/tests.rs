@@ -1,3 +1,4 @@
+use super::super::batch::Needs;
 use super::*;
 use crate::geometry::{Primitive, PrimitiveKind};
 use crate::raster::setup::{CENTER, SAMPLES_4};
@@ -66,7 +67,8 @@ fn fast<const N: usize>(
 ) -> Vec<[bool; N]> {
     let mut out = vec![[false; N]; (SIZE * SIZE) as usize];
     let mut setup = Setup::default();
-    if !dispatch!(level, simd => setup.prepare(simd, primitive, positions, clip)) {
+    if !dispatch!(level, simd => setup.prepare(simd, primitive, positions, clip, Needs::default()))
+    {
         return out;
     }
     let mut coverage = Coverage::<N>::default();

@@ -3,6 +3,7 @@ use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::{Aspect, StoreOp};
 use crate::raster::tile::AttachmentError;
 use devmem::Allocation;
+use isa::level::SimdLevel;
 use std::sync::Arc;
 
 fn view(format: Format, extent: [u32; 3], kind: ImageKind, samples: u32) -> ImageView {
@@ -158,4 +159,42 @@ fn what_cannot_be_rendered_to_is_refused() {
     let solid = view(Format::R8Unorm, [4, 4, 3], ImageKind::D3, 1);
     let target = Target::new(&solid, Aspect::Color, 9, StoreOp::Store).unwrap();
     assert_eq!(target.layer_count(), 3, "slices are layers");
+}
+
+/// The mean of four samples of bytes has a kernel; a format beside it, of the same bytes, has none.
+#[test]
+fn means_of_bytes_are_those_of_the_format() {
+    let format = Format::R8G8B8A8Unorm;
+    let image = view(format, [20, 17, 1], ImageKind::D2, 4);
+    let memory = image.image.memory.clone();
+    let bytes: Vec<u8> = (0..memory.len())
+        .map(|at| (at * at * 31 % 256) as u8)
+        .collect();
+    memory.write(0, &bytes).unwrap();
+    let target = Target::new(&image, Aspect::Color, 1, StoreOp::Store).unwrap();
+    let resolved = view(format, [20, 17, 1], ImageKind::D2, 1);
+    let resolve = Target::new(&resolved, Aspect::Color, 1, StoreOp::Store).unwrap();
+    for (name, level) in SimdLevel::supported() {
+        let level = level.resolve().unwrap();
+        let mut plane = Plane::new(32, Some(&target));
+        for tile in Tile::of_macro_tile(32, [0, 0], AREA_20X17) {
+            plane.touch(&target, 0, &tile);
+            plane.resolve(level, &target, (&resolve, ResolveMode::Average), 0, &tile);
+        }
+        for y in 0..17 {
+            for x in 3..20 {
+                let mut samples = [[0; 4]; 4];
+                for (sample, bytes) in samples.iter_mut().enumerate() {
+                    target.read(0, sample as u32, [x, y], bytes);
+                }
+                let decoded = samples.map(|bytes| [format.decode(&bytes)]);
+                let mut mean = [[0.0; 4]];
+                let rows = decoded.iter().map(|texel| &texel[..]);
+                resolve_row(format, ResolveMode::Average, rows, &mut mean);
+                let mut found = [0; 4];
+                resolve.read(0, 0, [x, y], &mut found);
+                assert_eq!(found, format.encode(mean[0])[..4], "{name} {x} {y}");
+            }
+        }
+    }
 }

@@ -8,8 +8,8 @@ use crate::bindings::Bindings;
 use crate::device::Device;
 use crate::device::{Config, FlushPolicy};
 use crate::format::Format;
-use crate::geometry::PrimitiveDraw;
 use crate::geometry::{Bins, DrawPipeline, PrimitiveKind, Varyings};
+use crate::geometry::{PrimitiveChunk, PrimitiveDraw};
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::draw::*;
 use crate::packet::*;
@@ -170,15 +170,17 @@ fn draw(
         pipeline: Arc::new(DrawPipeline::new(device, &programs).unwrap()),
         state,
         bindings: Bindings::default(),
-        bins: Bins::everywhere(
-            &primitives,
-            area,
-            device.config().macro_tile_size,
-            layers.unwrap_or(1),
-        ),
         regions: scissors.map(|scissor| scissor.intersect(area)).collect(),
-        primitives,
-        varyings: Varyings { values, per_vertex },
+        chunks: vec![PrimitiveChunk {
+            bins: Bins::everywhere(
+                &primitives,
+                area,
+                device.config().macro_tile_size,
+                layers.unwrap_or(1),
+            ),
+            primitives,
+            varyings: Varyings { values, per_vertex },
+        }],
     }
 }
 
