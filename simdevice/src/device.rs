@@ -23,7 +23,8 @@ pub struct Config {
     /// A pass is flushed early when its bins exceed this many bytes.
     pub bin_budget_bytes: u64,
     /// How many bytes of host memory may hold Gaussians in an order that is faster to read (see
-    /// [`Skip::Chunks`](crate::skips::Skip::Chunks)): 48 for each.
+    /// [`Skip::Chunks`](crate::skips::Skip::Chunks)): 48 for each, and 192 for spherical harmonics
+    /// of degree 3 if there is room for them.
     pub chunk_budget_bytes: u64,
     /// When a pass is flushed.
     pub flush: FlushPolicy,

@@ -27,13 +27,16 @@ struct Stream {
 /// A draw that was seen.
 #[derive(Debug)]
 struct Entry {
-    streams: [Stream; 4],
+    /// Those of positions, scales, rotations, opacities and, if they are in the chunks, spherical harmonics.
+    streams: Vec<Stream>,
     first: u32,
     count: u32,
     /// When it was last drawn.
     used: u64,
     /// Its chunks, if they were made; they belong to the memory of its positions.
     chunks: Weak<Chunks>,
+    /// Bytes that they take.
+    bytes: u64,
 }
 
 #[derive(Debug, Default)]
@@ -77,40 +80,43 @@ impl Stream {
 }
 
 impl Entry {
-    fn new(append: &GaussianAppend) -> Self {
+    fn new(append: &GaussianAppend, with_harmonics: bool) -> Self {
         let attributes = &append.attributes;
-        let streams = [
-            &attributes.position,
-            &attributes.scale,
-            &attributes.rotation,
-            &attributes.opacity,
-        ];
+        let harmonics = attributes.spherical_harmonics.iter();
+        let shapes = shapes(append).into_iter();
+        let streams = shapes.chain(harmonics.filter(|_| with_harmonics));
         Self {
-            streams: streams.map(Stream::new),
+            streams: streams.map(Stream::new).collect(),
             first: append.first,
             count: append.count,
             used: 0,
             chunks: Weak::new(),
+            bytes: chunks::memory_bytes(append, with_harmonics),
         }
     }
 
     fn is_same(&self, other: &Self) -> bool {
         let mut streams = self.streams.iter().zip(&other.streams);
-        (self.first, self.count) == (other.first, other.count) && streams.all(|(a, b)| a.is_same(b))
+        (self.first, self.count, self.streams.len())
+            == (other.first, other.count, other.streams.len())
+            && streams.all(|(a, b)| a.is_same(b))
     }
 
     /// Bytes that its chunks take.
     fn memory_bytes(&self) -> u64 {
         match self.chunks.strong_count() {
             0 => 0,
-            _ => chunks::memory_bytes(self.count),
+            _ => self.bytes,
         }
     }
 
     /// Frees its chunks.
     fn release(&self) {
-        if let Some((memory, chunks)) = self.streams[0].memory.upgrade().zip(self.chunks.upgrade())
-        {
+        let memory = self
+            .streams
+            .first()
+            .and_then(|positions| positions.memory.upgrade());
+        if let Some((memory, chunks)) = memory.zip(self.chunks.upgrade()) {
             memory.drop_derived(&(chunks as _));
         }
     }
@@ -142,19 +148,21 @@ impl ChunkCache {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The chunks of what `append` draws, if it has any; `build` makes them. All chunks together take at most `budget`
-    /// bytes.
+    /// The chunks of what `append` draws, if it has any; `build` makes them, with spherical harmonics or without. All
+    /// chunks together take at most `budget` bytes.
     pub(super) fn get(
         &self,
         append: &GaussianAppend,
         budget: u64,
-        build: impl FnOnce() -> Chunks,
+        build: impl FnOnce(bool) -> Chunks,
     ) -> Option<Arc<Chunks>> {
-        if !is_eligible(append) || chunks::memory_bytes(append.count) > budget {
+        if !is_eligible(append) || chunks::memory_bytes(append, false) > budget {
             return None;
         }
+        let with_harmonics = append.attributes.spherical_harmonics.iter().all(is_fixed)
+            && chunks::memory_bytes(append, true) <= budget;
         // Generations are read before the memory, so that what is written meanwhile makes them old.
-        let mut drawn = Entry::new(append);
+        let mut drawn = Entry::new(append, with_harmonics);
         {
             let mut entries = self.lock();
             entries.now += 1;
@@ -177,9 +185,9 @@ impl ChunkCache {
                 return Some(chunks);
             }
             entries.entries.retain(|entry| !entry.is_same(&drawn));
-            entries.make_room(chunks::memory_bytes(append.count), budget);
+            entries.make_room(drawn.bytes, budget);
         }
-        let chunks = Arc::new(build());
+        let chunks = Arc::new(build(with_harmonics));
         drawn.chunks = Arc::downgrade(&chunks);
         let memory = &append.attributes.position.buffer.memory;
         memory.keep_derived(Arc::clone(&chunks) as _);
@@ -188,17 +196,24 @@ impl ChunkCache {
     }
 }
 
-/// Whether what is drawn is in memory that only the device writes, and all of it by vertex.
-fn is_eligible(append: &GaussianAppend) -> bool {
+/// The attributes that every chunk holds.
+fn shapes(append: &GaussianAppend) -> [&AttributeStream; 4] {
     let attributes = &append.attributes;
-    let streams = [
+    [
         &attributes.position,
         &attributes.scale,
         &attributes.rotation,
         &attributes.opacity,
-    ];
-    let fixed = |stream: &&AttributeStream| {
-        !stream.buffer.memory.is_host_visible() && stream.instance_divisor.is_none()
-    };
-    append.indices.is_none() && append.count >= LEAST_COUNT && streams.iter().all(fixed)
+    ]
+}
+
+/// Whether an attribute is in memory that only the device writes, and read by vertex.
+fn is_fixed(stream: &AttributeStream) -> bool {
+    !stream.buffer.memory.is_host_visible() && stream.instance_divisor.is_none()
+}
+
+/// Whether what is drawn can have chunks.
+fn is_eligible(append: &GaussianAppend) -> bool {
+    let fixed = shapes(append).into_iter().all(is_fixed);
+    append.indices.is_none() && append.count >= LEAST_COUNT && fixed
 }

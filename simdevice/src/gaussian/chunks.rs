@@ -3,7 +3,7 @@
 //!
 //! They are derived from memory that only the device can write, and never change an image.
 
-use super::fetch::{BATCH, Batch, Fetcher};
+use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader, Fetcher};
 use super::scratch::Attributes;
 use super::sort;
 use crate::packet::GaussianAppend;
@@ -28,12 +28,14 @@ pub(super) struct Chunk {
     /// The vertices' numbers in the draw.
     pub(super) numbers: Vec<u32>,
     pub(super) attributes: Attributes,
+    /// Spherical harmonics, if there was room for them: as many floats for each as [`CoefficientReader::floats`] says.
+    pub(super) harmonics: Vec<f32>,
     pub(super) bounds: Bounds,
     /// No Gaussian of it is skipped for what its attributes are.
     pub(super) is_sound: bool,
 }
 
-/// All Gaussians of a draw without indices, but for their colours.
+/// All Gaussians of a draw without indices.
 #[derive(Debug)]
 pub(super) struct Chunks {
     pub(super) chunks: Vec<Chunk>,
@@ -44,19 +46,22 @@ pub(super) struct Chunks {
 /// Bits of an axis in a Morton code.
 const AXIS_BITS: u32 = 10;
 
-/// Bytes of host memory that chunks of `count` Gaussians take.
-pub(super) fn memory_bytes(count: u32) -> u64 {
-    u64::from(count).div_ceil(BATCH as u64) * (size_of::<Chunk>() + 4 * BATCH) as u64
+/// Bytes of host memory that chunks of what `append` draws take, with and without spherical harmonics.
+pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64 {
+    let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
+    let floats = if with_harmonics { reader.floats() } else { 0 };
+    let chunk = size_of::<Chunk>() + 4 * BATCH * (1 + floats);
+    u64::from(append.count).div_ceil(BATCH as u64) * chunk as u64
 }
 
 impl Chunks {
     /// The chunks of what `append` draws, which has neither indices nor attributes by instance.
-    pub(super) fn build(append: &GaussianAppend) -> Self {
+    pub(super) fn build(append: &GaussianAppend, with_harmonics: bool) -> Self {
         let order = morton_order(append);
         let chunks: Vec<_> = order
             .par_chunks(BATCH)
             .map_init(Fetcher::default, |fetcher, numbers| {
-                Chunk::read(append, fetcher, numbers)
+                Chunk::read(append, fetcher, numbers, with_harmonics)
             })
             .collect();
         let opacities = chunks.iter().map(|chunk| chunk.bounds.opacity);
@@ -68,7 +73,12 @@ impl Chunks {
 }
 
 impl Chunk {
-    fn read(append: &GaussianAppend, fetcher: &mut Fetcher, numbers: &[u32]) -> Self {
+    fn read(
+        append: &GaussianAppend,
+        fetcher: &mut Fetcher,
+        numbers: &[u32],
+        with_harmonics: bool,
+    ) -> Self {
         let batch = Batch::of_chunk(append, append.first_instance, numbers);
         let mut attributes = Attributes::default();
         fetcher.read_all(&append.attributes, &batch, &mut attributes);
@@ -103,9 +113,20 @@ impl Chunk {
             bounds.scale = scale.into_iter().fold(bounds.scale, f32::max);
             bounds.opacity = bounds.opacity.max(opacity);
         }
+        let mut harmonics = Vec::new();
+        if with_harmonics {
+            let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
+            let mut coefficients = [0.0; COEFFICIENT_FLOATS];
+            harmonics.reserve_exact(reader.floats() * numbers.len());
+            for lane in 0..numbers.len() {
+                reader.read(&batch, lane, &mut coefficients);
+                harmonics.extend(&coefficients[..reader.floats()]);
+            }
+        }
         Self {
             numbers: numbers.to_vec(),
             attributes,
+            harmonics,
             bounds,
             is_sound,
         }

@@ -239,6 +239,11 @@ impl<'a> CoefficientReader<'a> {
         Self { streams, packed }
     }
 
+    /// How many numbers a vertex's coefficients are.
+    pub(super) fn floats(&self) -> usize {
+        3 * self.streams.len().min(MAX_COEFFICIENTS)
+    }
+
     /// Reads the coefficients of `lane`: red, green, blue of each in turn.
     pub(super) fn read(&self, batch: &Batch<'_>, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
         let at = |stream: &AttributeStream| {

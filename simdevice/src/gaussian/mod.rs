@@ -180,9 +180,9 @@ impl GaussianSet {
             return found;
         }
         for (append, found) in self.appends.iter().zip(&mut found) {
-            let build = || {
+            let build = |with_harmonics| {
                 let started = Instant::now();
-                let chunks = device.install(|| Chunks::build(append));
+                let chunks = device.install(|| Chunks::build(append, with_harmonics));
                 counters.add(Counter::ChunksBuilt, chunks.chunks.len() as u64);
                 counters.add(Counter::ChunkTime, started.elapsed().as_nanos() as u64);
                 chunks
@@ -357,6 +357,7 @@ impl<'a> Job<'a> {
                     batch,
                     attributes,
                     is_sound: false,
+                    harmonics: &[],
                     frustum: None,
                 }
             }
@@ -365,6 +366,7 @@ impl<'a> Job<'a> {
                 batch: Batch::of_chunk(self.append, self.instance, &chunk.numbers),
                 attributes: &chunk.attributes,
                 is_sound: chunk.is_sound,
+                harmonics: &chunk.harmonics,
                 frustum: None,
             },
         }

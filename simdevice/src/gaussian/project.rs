@@ -107,6 +107,8 @@ pub(super) struct Source<'a> {
     pub(super) attributes: &'a Attributes,
     /// None is skipped for what its attributes are.
     pub(super) is_sound: bool,
+    /// Their spherical harmonics, if they were read already, one after the other.
+    pub(super) harmonics: &'a [f32],
     /// What bounds those that can be seen; `None` tells nothing of them.
     pub(super) frustum: Option<&'a Frustum>,
 }
@@ -491,7 +493,11 @@ impl Projection {
         for group in scratch.reached.chunks(GROUP) {
             // Reading several at a time overlaps the waits for memory.
             for (&(at, _), coefficients) in group.iter().zip(&mut coefficients) {
-                reader.read(&source.batch, scratch.lanes[at], coefficients);
+                let (lane, floats) = (scratch.lanes[at], reader.floats());
+                match source.harmonics.get(lane * floats..(lane + 1) * floats) {
+                    Some(read) if floats > 0 => coefficients[..floats].copy_from_slice(read),
+                    _ => reader.read(&source.batch, lane, coefficients),
+                }
             }
             for (&(at, reach), coefficients) in group.iter().zip(&coefficients) {
                 let at = at % BATCH;
