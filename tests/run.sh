@@ -19,6 +19,7 @@ need vulkan-tools vulkaninfo
 need vulkan-validationlayers /usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json
 need glslang-tools glslangValidator
 need spirv-tools spirv-val
+need valgrind valgrind
 if [ ${#missing[@]} -gt 0 ]; then
     if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
         echo "installing: ${missing[*]}"
@@ -39,6 +40,8 @@ step cargo fmt --all --check
 step cargo clippy --workspace --all-targets --quiet -- -D warnings
 # With optimisation, since the oracle compares whole images, and with debug assertions and overflow checks.
 step cargo test --workspace --profile checked --quiet
+# What a frame costs, in instructions: times would depend on the machine.
+step tests/instructions/check.sh "${CARGO_TARGET_DIR:-target}/checked/gaurast"
 # The main job once more in a debug build, where overflow and bad pointers abort.
 picture=$(mktemp -d)
 trap 'rm -rf "$picture"' EXIT

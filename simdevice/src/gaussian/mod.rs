@@ -15,7 +15,8 @@ mod lanes;
 mod linearize;
 pub(crate) mod project;
 mod scratch;
-mod sort;
+#[doc(hidden)] // For the benchmarks.
+pub mod sort;
 pub mod spherical_harmonics;
 
 pub use footprint::TILE_SIZE;

@@ -14,7 +14,7 @@ const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
 
 /// Sorts `(key, payload)` pairs by ascending key; equal keys keep their order.
-pub(super) fn sort_by_key(pairs: &mut Vec<(u32, u32)>) {
+pub fn sort_by_key(pairs: &mut Vec<(u32, u32)>) {
     let (all, any) = pairs.iter().fold((u32::MAX, 0), |(all, any), &(key, _)| {
         (all & key, any | key)
     });

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand};
 use gaurast_samples::scene::{self, MAX_SH_DEGREE};
 
+use crate::bench::BenchArguments;
 use crate::simulate::SimulateArguments;
 
 /// The greatest width and height of a picture.
@@ -28,6 +29,11 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Tells what the simulated hardware would have spent on a scene: time, energy, area
     Simulate(Box<SimulateArguments>),
+    /// Measures run time and error, beside quads on lavapipe and on this driver
+    Bench(Box<BenchArguments>),
+    /// Draws for `bench`, which starts it
+    #[command(hide = true)]
+    BenchWorker,
 }
 
 impl Default for Command {

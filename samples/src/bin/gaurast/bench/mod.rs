@@ -1,0 +1,172 @@
+//! `gaurast bench`: run time against error, beside what a machine without a GPU offers otherwise.
+
+mod frames;
+mod growth;
+mod judge;
+mod machine;
+mod output;
+mod pareto;
+mod plot;
+mod roofline;
+pub mod worker;
+mod workload;
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use gaurast_samples::camera::{CameraError, CameraFileError};
+use gaurast_samples::renderer::RenderError;
+use gaurast_samples::scene::SceneError;
+use thiserror::Error;
+
+use crate::args::Size;
+use worker::Contender;
+use workload::{Source, Workload};
+
+/// Why there are no figures. Displayed as one sentence.
+#[derive(Debug, Error)]
+pub enum BenchError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    CameraFile(#[from] CameraFileError),
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    #[error("{}: there is no camera", .0.display())]
+    NoCamera(PathBuf),
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error("a worker failed: {0}")]
+    Worker(String),
+    #[error("a worker could not be spoken to: {0}")]
+    Io(#[from] std::io::Error),
+    #[error("a worker was not understood: {0}")]
+    Json(#[from] serde_json::Error),
+    #[error("the picture has no camera that the oracle knows")]
+    NoOracle,
+    #[error("the plot could not be drawn: {0}")]
+    Plot(String),
+    #[error("the plot could not be written: {0}")]
+    Image(#[from] image::ImageError),
+}
+
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct BenchArguments {
+    #[command(subcommand)]
+    command: Option<BenchCommand>,
+
+    #[command(flatten)]
+    frames: FramesArguments,
+}
+
+#[derive(Subcommand)]
+enum BenchCommand {
+    /// Sweeps settings and peers over several scenes and draws run time against error.
+    Pareto(SweepArguments),
+    /// How time and memory grow with Gaussians, pixels, overlap and the share off the screen.
+    Growth(SweepArguments),
+}
+
+/// What whole frames cost.
+#[derive(Args)]
+struct FramesArguments {
+    /// Scene files; the synthetic benchmark scene if there is none
+    scenes: Vec<PathBuf>,
+
+    /// Gaussians of the synthetic scene
+    #[arg(long, value_name = "N", default_value_t = 300_000)]
+    count: usize,
+
+    /// The pictures' size in pixels
+    #[arg(long, value_name = "WxH", default_value = "1280x720")]
+    size: Size,
+
+    /// Measured frames of each contender, each from another place; a first, cold one comes before
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    runs: u32,
+
+    /// Numbers of threads to draw with
+    #[arg(long, value_name = "N,N", value_delimiter = ',', default_values_t = [1, 2])]
+    threads: Vec<usize>,
+
+    /// Frames whose error is measured
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    judged: u32,
+
+    /// Writes every measured frame as a row
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+
+    /// Writes everything
+    #[arg(long, value_name = "FILE.json")]
+    json: Option<PathBuf>,
+}
+
+/// What a sweep takes.
+#[derive(Args)]
+struct SweepArguments {
+    /// Fewer frames of fewer pixels, and nothing that is larger than a million Gaussians
+    #[arg(long)]
+    quick: bool,
+
+    /// The folder that CSV, JSON, PNG and SVG files go to
+    #[arg(
+        short,
+        long,
+        value_name = "FOLDER",
+        default_value = "samples/benchmarks"
+    )]
+    output: PathBuf,
+
+    /// A folder with cameras/*.json and splats/*; what is not there is generated or left out
+    #[arg(long, value_name = "FOLDER", default_value = "../shared/data")]
+    data: PathBuf,
+
+    /// Measured frames of each point
+    #[arg(long, value_name = "N")]
+    runs: Option<u32>,
+
+    /// Threads to draw with, 0 for one for each processor
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    threads: usize,
+}
+
+/// Runs what was asked for.
+pub fn run(arguments: &BenchArguments) -> Result<(), BenchError> {
+    match &arguments.command {
+        Some(BenchCommand::Pareto(arguments)) => pareto::run(arguments),
+        Some(BenchCommand::Growth(arguments)) => growth::run(arguments),
+        None => frames::run(&arguments.frames),
+    }
+}
+
+/// All contenders, in the order of tables.
+const CONTENDERS: [Contender; 3] = [
+    Contender::Gaurast,
+    Contender::QuadsOnLavapipe,
+    Contender::QuadsOnGaurast,
+];
+
+/// The middle one of `values`, the mean of two if their number is even; NaN of none.
+fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    match values.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => values[n / 2],
+        n => f64::midpoint(values[n / 2 - 1], values[n / 2]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians() {
+        assert_eq!(median([3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median([4.0, 1.0, 2.0, 3.0]), 2.5);
+        assert!(median([]).is_nan());
+    }
+}

@@ -1,0 +1,164 @@
+//! Plots as PNG and SVG.
+
+use std::path::Path;
+use std::sync::Once;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::{FontStyle, register_font};
+
+use super::BenchError;
+
+/// A panel's size in pixels.
+const PANEL: [u32; 2] = [560, 420];
+
+/// Panels side by side.
+const COLUMNS: usize = 2;
+
+/// Colours of the series, for eyes of all kinds (Okabe and Ito).
+const COLORS: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
+
+/// Points of one colour.
+pub struct Series {
+    pub name: String,
+    /// x, y: both more than 0.
+    pub points: Vec<[f64; 2]>,
+    /// Whether a line joins them.
+    pub joined: bool,
+}
+
+/// Axes with series, both logarithmic.
+pub struct Panel {
+    pub title: String,
+    pub axes: [&'static str; 2],
+    pub series: Vec<Series>,
+    /// A line over everything: the Pareto front, say.
+    pub front: Vec<[f64; 2]>,
+}
+
+/// Draws the panels to `stem`.svg and `stem`.png.
+pub fn write(stem: &Path, caption: &str, panels: &[Panel]) -> Result<(), BenchError> {
+    static FONT: Once = Once::new();
+    FONT.call_once(|| {
+        let font = epaint_default_fonts::UBUNTU_LIGHT;
+        // The font is one, since it is part of the program.
+        let _ = register_font("sans-serif", FontStyle::Normal, font);
+    });
+    if let Some(folder) = stem.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    let rows = panels.len().div_ceil(COLUMNS).max(1);
+    let size = (PANEL[0] * COLUMNS as u32, PANEL[1] * rows as u32 + 30);
+    let svg = stem.with_extension("svg");
+    draw(
+        &SVGBackend::new(&svg, size).into_drawing_area(),
+        caption,
+        rows,
+        panels,
+    )?;
+    let mut pixels = vec![0; size.0 as usize * size.1 as usize * 3];
+    draw(
+        &BitMapBackend::with_buffer(&mut pixels, size).into_drawing_area(),
+        caption,
+        rows,
+        panels,
+    )?;
+    image::save_buffer(
+        stem.with_extension("png"),
+        &pixels,
+        size.0,
+        size.1,
+        image::ExtendedColorType::Rgb8,
+    )?;
+    Ok(())
+}
+
+fn draw<B: DrawingBackend>(
+    area: &DrawingArea<B, Shift>,
+    caption: &str,
+    rows: usize,
+    panels: &[Panel],
+) -> Result<(), BenchError> {
+    let failed = |error: DrawingAreaErrorKind<B::ErrorType>| BenchError::Plot(error.to_string());
+    area.fill(&WHITE).map_err(failed)?;
+    let (head, body) = area.split_vertically(30);
+    let style = ("sans-serif", 13).into_text_style(&head).color(&BLACK);
+    head.draw_text(caption, &style, (10, 8)).map_err(failed)?;
+    for (part, panel) in body.split_evenly((rows, COLUMNS)).iter().zip(panels) {
+        draw_panel(part, panel).map_err(failed)?;
+    }
+    area.present().map_err(failed)
+}
+
+fn draw_panel<B: DrawingBackend>(
+    area: &DrawingArea<B, Shift>,
+    panel: &Panel,
+) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
+    let range = |axis: usize| {
+        let values = panel
+            .series
+            .iter()
+            .flat_map(|series| &series.points)
+            .map(|point| point[axis]);
+        let (least, greatest) = values
+            .fold((f64::INFINITY, 0.0_f64), |(least, greatest), value| {
+                (least.min(value), greatest.max(value))
+            });
+        if least <= greatest {
+            least / 1.5..greatest * 1.5
+        } else {
+            0.1..10.0
+        }
+    };
+    let mut chart = ChartBuilder::on(area)
+        .caption(&panel.title, ("sans-serif", 16))
+        .margin(10)
+        .x_label_area_size(36)
+        .y_label_area_size(60)
+        .build_cartesian_2d(range(0).log_scale(), range(1).log_scale())?;
+    chart
+        .configure_mesh()
+        .light_line_style(WHITE)
+        .x_desc(panel.axes[0])
+        .y_desc(panel.axes[1])
+        .y_label_formatter(&|value| format!("{value:.0e}"))
+        .x_label_formatter(&|value| format!("{value}"))
+        .label_style(("sans-serif", 12))
+        .draw()?;
+    let line = |points: &[[f64; 2]]| -> Vec<(f64, f64)> {
+        points.iter().map(|point| (point[0], point[1])).collect()
+    };
+    if !panel.front.is_empty() {
+        chart
+            .draw_series(LineSeries::new(line(&panel.front), BLACK.stroke_width(1)))?
+            .label("Pareto front")
+            .legend(|(x, y)| PathElement::new([(x, y), (x + 16, y)], BLACK));
+    }
+    for (series, color) in panel.series.iter().zip(COLORS.iter().cycle().copied()) {
+        if series.joined {
+            chart.draw_series(LineSeries::new(line(&series.points), color))?;
+        }
+        chart
+            .draw_series(
+                line(&series.points)
+                    .into_iter()
+                    .map(|point| Circle::new(point, 4, color.filled())),
+            )?
+            .label(&series.name)
+            .legend(move |(x, y)| Circle::new((x + 8, y), 4, color.filled()));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerRight)
+        .background_style(WHITE.mix(0.8))
+        .border_style(BLACK.mix(0.3))
+        .label_font(("sans-serif", 12))
+        .draw()
+}

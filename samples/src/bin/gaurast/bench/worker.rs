@@ -1,0 +1,346 @@
+//! A contender draws in a process of its own, so that its threads, environment and memory are its own, and so that
+//! several can take turns. Parent and child speak lines of JSON.
+
+use std::io::{BufRead, BufReader, Write, stdin, stdout};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::time::Instant;
+
+use gaurast_samples::camera::Camera;
+use gaurast_samples::renderer::quads::QuadRenderer;
+use gaurast_samples::renderer::{DeviceScene, Frame, Renderer, Settings};
+use gaurast_samples::scene::Scene;
+use gaurast_samples::usage;
+use serde::{Deserialize, Serialize};
+
+use super::BenchError;
+use super::workload::Workload;
+
+/// The hidden command that makes a process a worker.
+pub const COMMAND: &str = "bench-worker";
+
+/// lavapipe's manifest, where distributions put it.
+const LAVAPIPE_FOLDERS: [&str; 3] = ["/usr/share", "/etc", "/usr/local/share"];
+
+/// What draws, and on what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Contender {
+    /// The Gaussian topology on this driver.
+    Gaurast,
+    /// Quads on lavapipe.
+    QuadsOnLavapipe,
+    /// Quads on this driver's triangles.
+    QuadsOnGaurast,
+}
+
+impl Contender {
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gaurast => "gaurast",
+            Self::QuadsOnLavapipe => "quads on lavapipe",
+            Self::QuadsOnGaurast => "quads on gaurast",
+        }
+    }
+}
+
+/// What a worker is told first.
+#[derive(Serialize, Deserialize)]
+struct Setup {
+    contender: Contender,
+    workload: Workload,
+    threads: usize,
+}
+
+/// What it is told then, again and again.
+#[derive(Serialize, Deserialize)]
+struct Request {
+    camera: Camera,
+    settings: Settings,
+    /// Where the picture goes, if it is wanted.
+    picture: Option<PathBuf>,
+}
+
+/// What it answers.
+#[derive(Serialize, Deserialize)]
+enum Reply {
+    Ready(Ready),
+    Drawn(Drawn),
+    Failed(String),
+}
+
+/// What a worker is, once it has its scene.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Ready {
+    /// The device's name.
+    pub device: String,
+    /// Milliseconds to make the device and copy the scene to it.
+    pub upload: f64,
+}
+
+/// What a frame took. Times are in milliseconds.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Drawn {
+    /// From the camera to the picture in host memory.
+    pub wall: f64,
+    /// Of all threads, if known.
+    pub processor: Option<f64>,
+    /// The device's counters, or the steps of quads: name, value; times in milliseconds.
+    pub counters: Vec<(String, f64)>,
+    /// Names of those counters that are times.
+    pub stages: Vec<String>,
+    /// The most memory since the worker was ready, in bytes, if known.
+    pub memory: Option<u64>,
+}
+
+impl Drawn {
+    /// A counter's value, 0 if there is none.
+    pub fn counter(&self, name: &str) -> f64 {
+        let found = self.counters.iter().find(|(own, _)| own == name);
+        found.map_or(0.0, |(_, value)| *value)
+    }
+}
+
+/// A worker as its parent sees it.
+pub struct Worker {
+    child: Child,
+    requests: Option<ChildStdin>,
+    replies: BufReader<ChildStdout>,
+    /// What it said when it was ready.
+    pub ready: Ready,
+}
+
+impl Worker {
+    /// Starts a worker that shares its work among `threads`; `None` if its device is not there.
+    pub fn start(
+        contender: Contender,
+        workload: &Workload,
+        threads: usize,
+    ) -> Result<Option<Self>, BenchError> {
+        let mut command = Command::new(std::env::current_exe()?);
+        command
+            .arg(COMMAND)
+            .env("GAURAST_THREADS", threads.to_string())
+            // The threads that rasterize; the queue has one more, for vertices.
+            .env("LP_NUM_THREADS", threads.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped());
+        if contender == Contender::QuadsOnLavapipe {
+            let Some(manifest) = lavapipe() else {
+                return Ok(None);
+            };
+            command.env("VK_DRIVER_FILES", &manifest);
+            command.env("VK_ICD_FILENAMES", &manifest);
+        }
+        let mut child = command.spawn()?;
+        let (Some(requests), Some(replies)) = (child.stdin.take(), child.stdout.take()) else {
+            unreachable!("both are pipes");
+        };
+        let mut worker = Self {
+            child,
+            requests: Some(requests),
+            replies: BufReader::new(replies),
+            ready: Ready {
+                device: String::new(),
+                upload: 0.0,
+            },
+        };
+        let setup = Setup {
+            contender,
+            workload: workload.clone(),
+            threads,
+        };
+        match worker.ask(&setup)? {
+            Reply::Ready(ready) => worker.ready = ready,
+            reply => return Err(reply.unexpected(contender)),
+        }
+        Ok(Some(worker))
+    }
+
+    /// Draws a frame, and leaves its pixels in the file `picture` if that is given.
+    pub fn draw(
+        &mut self,
+        camera: &Camera,
+        settings: Settings,
+        picture: Option<&Path>,
+    ) -> Result<Drawn, BenchError> {
+        let request = Request {
+            camera: camera.clone(),
+            settings,
+            picture: picture.map(Path::to_owned),
+        };
+        match self.ask(&request)? {
+            Reply::Drawn(drawn) => Ok(drawn),
+            Reply::Failed(reason) => Err(BenchError::Worker(reason)),
+            Reply::Ready(_) => Err(BenchError::Worker("it is ready twice".to_owned())),
+        }
+    }
+
+    fn ask(&mut self, message: &impl Serialize) -> Result<Reply, BenchError> {
+        let requests = self
+            .requests
+            .as_mut()
+            .ok_or_else(|| std::io::Error::from(std::io::ErrorKind::BrokenPipe))?;
+        say(requests, message)?;
+        let mut line = String::new();
+        self.replies.read_line(&mut line)?;
+        if line.is_empty() {
+            return Err(BenchError::Worker("it ended without a word".to_owned()));
+        }
+        Ok(serde_json::from_str(&line)?)
+    }
+}
+
+impl Reply {
+    fn unexpected(self, contender: Contender) -> BenchError {
+        let reason = match self {
+            Self::Failed(reason) => reason,
+            Self::Ready(_) | Self::Drawn(_) => "it answers out of turn".to_owned(),
+        };
+        BenchError::Worker(format!("{}: {reason}", contender.name()))
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        // Without further requests, it ends.
+        self.requests = None;
+        let _ = self.child.wait();
+    }
+}
+
+/// The path of lavapipe's manifest, if it is installed.
+pub fn lavapipe() -> Option<PathBuf> {
+    LAVAPIPE_FOLDERS
+        .iter()
+        .map(|folder| Path::new(folder).join("vulkan/icd.d"))
+        .flat_map(|folder| {
+            let arch = std::env::consts::ARCH;
+            [
+                folder.join(format!("lvp_icd.{arch}.json")),
+                folder.join("lvp_icd.json"),
+            ]
+        })
+        .find(|path| path.exists())
+}
+
+/// The pixels in a file that a worker left.
+pub fn read_picture(path: &Path) -> Result<Vec<[f32; 4]>, BenchError> {
+    Ok(bytemuck::pod_collect_to_vec(&std::fs::read(path)?))
+}
+
+fn say(to: &mut impl Write, message: &impl Serialize) -> Result<(), BenchError> {
+    let mut line = serde_json::to_vec(message)?;
+    line.push(b'\n');
+    to.write_all(&line)?;
+    Ok(to.flush()?)
+}
+
+/// A worker's life.
+pub fn run() -> Result<(), BenchError> {
+    let mut lines = stdin().lock().lines();
+    let Some(setup) = lines.next() else {
+        return Ok(());
+    };
+    let setup: Setup = serde_json::from_str(&setup?)?;
+    let mut artist = match Artist::new(&setup) {
+        Ok((artist, ready)) => {
+            say(&mut stdout(), &Reply::Ready(ready))?;
+            artist
+        }
+        Err(error) => return say(&mut stdout(), &Reply::Failed(error.to_string())),
+    };
+    usage::reset_peak_memory();
+    for line in lines {
+        let request: Request = serde_json::from_str(&line?)?;
+        let reply = match artist.answer(&request) {
+            Ok(drawn) => Reply::Drawn(drawn),
+            Err(error) => Reply::Failed(error.to_string()),
+        };
+        say(&mut stdout(), &reply)?;
+    }
+    Ok(())
+}
+
+/// A renderer with its scene.
+enum Artist {
+    Gaussians(Box<(Renderer, DeviceScene, Settings)>),
+    Quads(Box<(QuadRenderer, Scene)>),
+}
+
+impl Artist {
+    fn new(setup: &Setup) -> Result<(Self, Ready), BenchError> {
+        let scene = setup.workload.scene()?;
+        let start = Instant::now();
+        let (artist, device) = match setup.contender {
+            Contender::Gaurast => {
+                let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
+                let uploaded = renderer.upload(&scene, None)?;
+                let device = renderer.device_name().to_owned();
+                let parts = (renderer, uploaded, Settings::default());
+                (Self::Gaussians(Box::new(parts)), device)
+            }
+            Contender::QuadsOnLavapipe => {
+                let renderer = QuadRenderer::through_the_loader("llvmpipe", setup.threads)?;
+                let device = renderer.device_name().to_owned();
+                (Self::Quads(Box::new((renderer, scene))), device)
+            }
+            Contender::QuadsOnGaurast => {
+                let renderer = QuadRenderer::new(vulkan_gaurast::entry(), "", setup.threads)?;
+                let device = renderer.device_name().to_owned();
+                (Self::Quads(Box::new((renderer, scene))), device)
+            }
+        };
+        let upload = start.elapsed().as_secs_f64() * 1e3;
+        Ok((artist, Ready { device, upload }))
+    }
+
+    fn answer(&mut self, request: &Request) -> Result<Drawn, BenchError> {
+        let (camera, settings) = (&request.camera, request.settings);
+        let frame = match self {
+            Self::Gaussians(parts) => {
+                let (renderer, scene, current) = &mut **parts;
+                if *current != settings {
+                    renderer.set(scene, settings)?;
+                    *current = settings;
+                }
+                renderer.render(scene, camera)?
+            }
+            Self::Quads(parts) => {
+                let (renderer, scene) = &mut **parts;
+                renderer.render(scene, camera, settings.sh_degree, settings.alpha_floor)?
+            }
+        };
+        if let Some(path) = &request.picture {
+            std::fs::write(path, bytemuck::cast_slice(&frame.picture.pixels))?;
+        }
+        Ok(describe(&frame))
+    }
+}
+
+fn describe(frame: &Frame) -> Drawn {
+    let in_time = |category: &str| category == "time";
+    Drawn {
+        wall: frame.time.as_secs_f64() * 1e3,
+        processor: frame.processor_time.map(|time| time.as_secs_f64() * 1e3),
+        counters: frame
+            .counters
+            .iter()
+            .map(|counter| {
+                let scale = if in_time(&counter.category) {
+                    1e-6
+                } else {
+                    1.0
+                };
+                (counter.name.clone(), counter.value * scale)
+            })
+            .collect(),
+        stages: frame
+            .counters
+            .iter()
+            .filter(|counter| in_time(&counter.category) && counter.value > 0.0)
+            .map(|counter| counter.name.clone())
+            .collect(),
+        memory: usage::peak_memory(),
+    }
+}

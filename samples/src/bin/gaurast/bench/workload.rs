@@ -1,0 +1,218 @@
+//! What is drawn in a benchmark: scenes and the paths of their cameras.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use gaurast_samples::camera::{self, Camera, DEFAULT_FOV};
+use gaurast_samples::scene::{Scene, Shape};
+use serde::{Deserialize, Serialize};
+
+use super::BenchError;
+
+/// Seed of everything that is generated.
+const SEED: u64 = 1;
+
+/// Gaussians of [`Source::Tile`]: with what the kernel needs of them, they stay in a first-level cache.
+pub const TILE_GAUSSIANS: usize = 512;
+
+/// Where Gaussians and cameras come from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Source {
+    /// `Scene::benchmark` and a path around it.
+    Benchmark {
+        /// The number of Gaussians.
+        count: usize,
+    },
+    /// The generated garden and a path around it.
+    Garden {
+        /// The number of Gaussians.
+        count: usize,
+    },
+    /// `Scene::captured` before the cameras of a file, or an orbit.
+    Captured {
+        /// The number of Gaussians.
+        count: usize,
+        /// The camera file.
+        cameras: Option<PathBuf>,
+    },
+    /// A scene file and a path around it.
+    File {
+        /// The scene file.
+        path: PathBuf,
+    },
+    /// One tile full of Gaussians that cover all of it, or a pixel of it each.
+    Tile {
+        /// Whether they cover all of it.
+        whole: bool,
+    },
+}
+
+/// A scene, perhaps changed, and how many pixels its pictures have.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Workload {
+    /// The scene.
+    pub source: Source,
+    /// What its standard deviations are multiplied by.
+    pub scale: f32,
+    /// The share of its Gaussians that is moved off the screen.
+    pub away: f64,
+    /// The pictures' size.
+    pub size: [u32; 2],
+}
+
+impl Workload {
+    /// The scene as it is.
+    pub fn new(source: Source, size: [u32; 2]) -> Self {
+        Self {
+            source,
+            scale: 1.0,
+            away: 0.0,
+            size,
+        }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> Result<Scene, BenchError> {
+        let scene = match &self.source {
+            Source::Benchmark { count } => Scene::benchmark(SEED, *count),
+            Source::Garden { count } => Scene::generate(SEED, *count),
+            Source::Captured { count, .. } => {
+                Scene::captured(SEED, *count, &self.source.cameras(self.size)?)
+            }
+            Source::File { path } => Scene::load(path)?,
+            Source::Tile { whole } => tile(*whole),
+        };
+        Ok(scene.scaled(self.scale).partly_away(self.away))
+    }
+
+    /// `count` views that differ, in the order of the path.
+    pub fn views(&self, scene: &Scene, count: usize) -> Result<Vec<Camera>, BenchError> {
+        let size = self.size;
+        // A few degrees from frame to frame, so that nothing of the last frame helps.
+        let around = |camera: Camera, pivot: [f64; 3]| {
+            (0..count)
+                .map(|frame| camera.turned(pivot, [0.0, 1.0, 0.0], 0.05 * frame as f64))
+                .collect()
+        };
+        Ok(match &self.source {
+            Source::Benchmark { .. } => around(Camera::benchmark(size), [0.0; 3]),
+            Source::Garden { .. } => around(Camera::of_generated(None, size)?, [0.0; 3]),
+            Source::Captured { .. } => {
+                let cameras = self.source.cameras(size)?;
+                (0..count)
+                    .map(|frame| {
+                        cameras[frame * cameras.len() / count.max(1) % cameras.len()].clone()
+                    })
+                    .collect()
+            }
+            Source::File { .. } => {
+                let camera = Camera::framing(scene, DEFAULT_FOV, size);
+                // About a point ahead, as far as the scene's middle is.
+                let distance = distance_to(scene, &camera);
+                let pivot = std::array::from_fn(|axis| {
+                    camera.eye[axis] + distance * camera.rotation[2][axis]
+                });
+                around(camera, pivot)
+            }
+            Source::Tile { .. } => vec![tile_camera(); count],
+        })
+    }
+}
+
+impl Source {
+    fn cameras(&self, size: [u32; 2]) -> Result<Vec<Camera>, BenchError> {
+        let Self::Captured {
+            cameras: Some(path),
+            ..
+        } = self
+        else {
+            return Ok(Camera::orbit(90, size));
+        };
+        let views = camera::load(path, size)?;
+        if views.is_empty() {
+            return Err(BenchError::NoCamera(path.clone()));
+        }
+        Ok(views
+            .into_iter()
+            .map(|view| view.camera.resized(size))
+            .collect())
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let stem = |path: &Path| {
+            path.file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned()
+        };
+        match self {
+            Self::Benchmark { count } => write!(f, "synthetic {}", short(*count)),
+            Self::Garden { count } => write!(f, "garden {}", short(*count)),
+            Self::Captured { count, cameras } => {
+                let path = cameras.as_deref().map_or("orbit".to_owned(), stem);
+                write!(f, "{path}-like {}", short(*count))
+            }
+            Self::File { path } => write!(f, "{}", stem(path)),
+            Self::Tile { whole: true } => write!(f, "tile, covered"),
+            Self::Tile { whole: false } => write!(f, "tile, dust"),
+        }
+    }
+}
+
+/// 300k or 6M.
+fn short(count: usize) -> String {
+    match count {
+        1_000_000.. => format!("{}M", count as f64 / 1e6),
+        1000.. => format!("{}k", count as f64 / 1e3),
+        _ => count.to_string(),
+    }
+}
+
+/// How far the middle of the scene's Gaussians is along the line of sight.
+fn distance_to(scene: &Scene, camera: &Camera) -> f64 {
+    let mut depths: Vec<f64> = scene
+        .positions()
+        .iter()
+        .map(|position| {
+            (0..3)
+                .map(|axis| {
+                    camera.rotation[2][axis] * (f64::from(position[axis]) - camera.eye[axis])
+                })
+                .sum()
+        })
+        .filter(|depth: &f64| depth.is_finite())
+        .collect();
+    depths.sort_by(f64::total_cmp);
+    depths.get(depths.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// Gaussians of one tile, too faint to saturate it.
+fn tile(whole: bool) -> Scene {
+    let mut scene = Scene::with_capacity(0, TILE_GAUSSIANS);
+    for index in 0..TILE_GAUSSIANS {
+        let cell = |i: usize| (i % 16) as f32 - 7.5;
+        let (scale, opacity) = if whole { (40.0, 0.009) } else { (0.01, 0.05) };
+        let shape = Shape {
+            scale: [scale; 3],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            opacity,
+        };
+        let depth = 100.0 + 0.001 * index as f32;
+        scene.push([cell(index), cell(index / 16), depth], shape, &[[0.5; 3]]);
+    }
+    scene
+}
+
+/// A pixel a unit at a distance of 100.
+fn tile_camera() -> Camera {
+    Camera {
+        rotation: [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
+        eye: [0.0; 3],
+        focal: [100.0; 2],
+        principal: [8.0; 2],
+        width: 16,
+        height: 16,
+    }
+}

@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# Counts the instructions of one frame and holds them against the figure stored beside this script, since a count does
+# not depend on what else the machine does. `check.sh PROGRAM` checks the `gaurast` program; `check.sh PROGRAM --store`
+# stores its count. The figure is that of the profile that tests/run.sh builds.
+#
+# The frame is the second of frames.jsonl, at the AVX2 level on one thread: its count is that of a run with both frames
+# less that of a run with the first alone.
+set -euo pipefail
+program=$(realpath "$1")
+folder=$(cd "$(dirname "$0")" && pwd)
+tolerance=3 # percent
+if ! command -v valgrind >/dev/null; then
+    echo "skipped: valgrind is not there" >&2
+    exit 0
+fi
+if ! grep -qw avx2 /proc/cpuinfo; then
+    echo "skipped: this processor has no AVX2" >&2
+    exit 0
+fi
+
+count() { # count LINES: the instructions of a worker that is told that many lines
+    head -n "$1" "$folder/frames.jsonl" |
+        GAURAST_SIMD=avx2 GAURAST_THREADS=1 valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" \
+            bench-worker 2>&1 >/dev/null | sed -n 's/.*Collected : \([0-9]*\).*/\1/p'
+}
+frame=$(($(count 3) - $(count 2)))
+if [ "${2:-}" = --store ]; then
+    echo "$frame" >"$folder/stored.txt"
+    echo "stored: $frame instructions"
+    exit 0
+fi
+stored=$(cat "$folder/stored.txt")
+echo "a frame takes $frame instructions; $stored are stored"
+if [ $((frame * 100)) -gt $((stored * (100 + tolerance))) ]; then
+    echo "that is more than $tolerance % more: find out why, or store the new figure" >&2
+    exit 1
+elif [ $((frame * 100)) -lt $((stored * (100 - tolerance))) ]; then
+    echo "that is more than $tolerance % less: store the new figure, so that it stays so" >&2
+fi
