@@ -26,6 +26,8 @@ pub struct Config {
     pub shader_timeout: Duration,
     /// Gathers what draws do in tiles, if anybody wants to know. It never changes an image.
     pub recorder: Option<Arc<Recorder>>,
+    /// Timestamps count the simulated hardware's nanoseconds instead of the host's.
+    pub simulated_timestamps: bool,
 }
 
 /// When a pass's bins are rendered. It never changes an image.
@@ -47,6 +49,7 @@ impl Default for Config {
             flush: FlushPolicy::WhenFull,
             shader_timeout: Duration::from_secs(5),
             recorder: None,
+            simulated_timestamps: false,
         }
     }
 }
@@ -71,6 +74,7 @@ pub struct Device {
     workers: Workers,
     level: Level,
     config: Config,
+    recorder: Arc<Recorder>,
 }
 
 impl Device {
@@ -93,12 +97,27 @@ impl Device {
             workers,
             level,
             config: config.clone(),
+            recorder: config.recorder.clone().unwrap_or_default(),
         })
     }
 
     /// What was chosen when it was created.
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    /// Where what is done goes, if anybody wants to know now.
+    pub(crate) fn recorder(&self) -> Option<&Recorder> {
+        let config = &self.config;
+        let wanted = config.recorder.is_some()
+            || config.simulated_timestamps
+            || self.recorder.has_listeners();
+        wanted.then_some(&*self.recorder)
+    }
+
+    /// Where what is done goes once somebody wants to know.
+    pub(crate) fn listened_recorder(&self) -> &Recorder {
+        &self.recorder
     }
 
     /// The SIMD level of every kernel.

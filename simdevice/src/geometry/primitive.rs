@@ -4,6 +4,7 @@ use super::{Bins, DrawPipeline};
 use crate::bindings::Bindings;
 use crate::packet::Rect;
 use crate::packet::draw::{Draw, DrawState};
+use crate::trace::DrawRecord;
 use std::sync::Arc;
 
 /// A draw that was shaded, assembled, clipped, set up and binned.
@@ -24,6 +25,8 @@ pub struct PrimitiveDraw {
     /// The pixels that they may touch, by viewport: those of the pass's area that lie in the scissor and in the
     /// viewport. Primitives may reach farther.
     pub regions: Vec<Rect>,
+    /// Where the work of its tiles goes, if anybody wants to know.
+    pub(crate) record: Option<Arc<DrawRecord>>,
 }
 
 /// The varyings of vertices, those that clipping made included: 32-bit scalars, vertex by vertex.
@@ -88,6 +91,7 @@ impl PrimitiveDraw {
             varyings: Varyings::default(),
             bins: Bins::default(),
             regions: Vec::new(),
+            record: None,
         }
     }
 

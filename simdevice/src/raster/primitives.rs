@@ -15,6 +15,7 @@ use super::{Plane, TILE_SIZE};
 use crate::counters::{Counter, Counters};
 use crate::geometry::Primitive;
 use crate::packet::Rect;
+use crate::trace::MacroTileWork;
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
@@ -62,6 +63,8 @@ impl TileDraw<'_> {
         if self.draw.bins.of(place.at, place.layer).is_empty() {
             return Ok(());
         }
+        let record = self.draw.record.as_ref();
+        let before = record.map(|_| counters.clone());
         let mut machines = self
             .stage
             .map(FragmentStage::take_machines)
@@ -75,6 +78,7 @@ impl TileDraw<'_> {
             counters,
             cancel,
             samples_passed: 0,
+            work: record.map(|_| MacroTileWork::default()),
         };
         renderer.batch.clear();
         let level = self.level;
@@ -85,9 +89,13 @@ impl TileDraw<'_> {
         };
         let done = done.and_then(|()| renderer.flush());
         let passed = renderer.samples_passed;
+        let work = renderer.work;
         counters.add(Counter::SamplesPassed, passed);
         if let Some(stage) = self.stage {
             stage.put_back(machines, counters);
+        }
+        if let (Some(record), Some(before), Some(work)) = (record, before, work) {
+            record.add_macro_tile(place.at, place.size, work, &counters.since(&before));
         }
         done
     }
@@ -103,6 +111,8 @@ pub(super) struct Renderer<'a, 'd> {
     pub counters: &'a mut Counters,
     pub cancel: &'a AtomicBool,
     pub samples_passed: u64,
+    /// What is done in each tile, if anybody wants to know.
+    pub work: Option<MacroTileWork>,
 }
 
 /// A primitive while it is rasterized.
@@ -186,8 +196,12 @@ impl<'d> Renderer<'_, 'd> {
             for column in first[0]..=last[0] {
                 let x = corner[0] + column * SIDE as i32;
                 let y = corner[1] + row * SIDE as i32;
-                if coverage.find(simd, &current.setup, x, y) {
-                    let tile = (row as u32 * side + column as u32) as usize;
+                let tile = (row as u32 * side + column as u32) as usize;
+                let found = coverage.find(simd, &current.setup, x, y);
+                if let Some(work) = &mut self.work {
+                    work.list(tile, if found { coverage.blocks.count_ones() } else { 0 });
+                }
+                if found {
                     self.tile(simd, current, coverage, tile, [x, y])?;
                 }
             }
@@ -218,6 +232,9 @@ impl<'d> Renderer<'_, 'd> {
             && tests.stencil.is_none()
             && self.is_hidden(simd, tests, current, tile, at)
         {
+            if let Some(work) = &mut self.work {
+                work.hide(tile, coverage.blocks.count_ones());
+            }
             return Ok(());
         }
         let state = &draw.draw.state;
@@ -245,6 +262,9 @@ impl<'d> Renderer<'_, 'd> {
             }
             if let Some(tests) = early {
                 self.test(simd, tests, current, &values, &mut lanes, (tile, block));
+            }
+            if let Some(work) = &mut self.work {
+                work.test(tile, &coverage.lanes[block], &lanes);
             }
             if !draw.count_late {
                 for lanes in lanes {

@@ -179,6 +179,7 @@ fn draw(
         regions: scissors.map(|scissor| scissor.intersect(area)).collect(),
         primitives,
         varyings: Varyings { values, per_vertex },
+        record: None,
     }
 }
 

@@ -110,7 +110,7 @@ fn model() -> Result<Vec<Section>, ConfigError> {
                     raster.utilization() * 100.0
                 )),
         );
-        let spent = energy::rasterizer(&raster, blended, &config);
+        let spent = energy::rasterizer(&raster, energy::Changed::both(blended), &config);
         let baseline = scene.baseline_ms * config.soc.power_w;
         energy_rows.push(
             Row::new(
