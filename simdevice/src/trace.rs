@@ -82,8 +82,9 @@ impl Recorder {
     /// A recorder that gives the whole trace to `sink` when it is dropped.
     pub fn new(sink: impl FnOnce(Trace) + Send + 'static) -> Self {
         Self {
+            frames: Mutex::default(),
             sink: Mutex::new(Some(Box::new(sink))),
-            ..Self::default()
+            listeners: AtomicU32::default(),
         }
     }
 

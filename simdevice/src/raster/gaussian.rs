@@ -123,6 +123,7 @@ impl GaussianTile {
                 runs,
                 contributions: work.contributions,
                 terminated: self.finished_pixels(corner, draw.bounds),
+                ..TileWork::default()
             });
         }
         counters.add(Counter::TilePairsEvaluated, work.pairs);
