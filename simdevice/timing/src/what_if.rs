@@ -18,7 +18,8 @@ pub struct WhatIf {
 
 /// The variants, the least skipping first.
 pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
-    let variant = |name, frame: &FrameWork, [saturation, traversal], hierarchical_depth| {
+    let variant = |name, frame: &FrameWork, granularity: [Saturation; 2], hierarchical_depth| {
+        let [saturation, traversal] = granularity;
         let mut config = config.clone();
         config.rasterizer.saturation = saturation;
         config.rasterizer.triangle_traversal = traversal;
@@ -75,7 +76,9 @@ pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
         true,
     )];
     let gaussians = gaussians.into_iter().filter(|_| has(Mode::Gaussian));
-    let triangles = triangles.into_iter().filter(|_| has(Mode::Triangle));
+    // With Gaussians the variant before is that of whole tiles.
+    let triangles = triangles.into_iter().skip(usize::from(has(Mode::Gaussian)));
+    let triangles = triangles.filter(|_| has(Mode::Triangle));
     let hidden = tiles().any(|tile| tile.hidden > 0);
     let depth = depth.into_iter().filter(|_| hidden);
     gaussians.chain(triangles).chain(depth).collect()
