@@ -36,7 +36,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().ok_or("a folder of cameras.json files")?;
     let views: usize = arguments.next().map_or(Ok(8), |text| text.parse())?;
-    println!("# Means over {views} views of generated gardens; written by samples/examples/paper_scenes.rs.");
+    println!(
+        "# Means over {views} views of generated gardens; written by samples/examples/paper_scenes.rs."
+    );
     for (name, millions, size, path) in SCENES {
         let file = Path::new(&folder).join(format!("{path}.json"));
         let path_cameras: Vec<_> = camera::load(&file, size)?
@@ -110,8 +112,8 @@ fn looked_at(path: &[Camera]) -> DVec3 {
     let (mut matrix, mut vector) = (DMat3::ZERO, DVec3::ZERO);
     for camera in path {
         let along = DVec3::from_array(camera.rotation[2]);
-        let across = DMat3::IDENTITY
-            - DMat3::from_cols(along * along.x, along * along.y, along * along.z);
+        let across =
+            DMat3::IDENTITY - DMat3::from_cols(along * along.x, along * along.y, along * along.z);
         matrix += across;
         vector += across * DVec3::from_array(camera.eye);
     }

@@ -9,8 +9,8 @@ mod scenes;
 use scenes::{KINDS, Kind, draw, recording};
 use simdevice::counters::{Counter, Counters};
 use simdevice::query::{QueryKind, QueryPool, QueryResult};
-use simdevice::timing::raster::RasterReport;
 use simdevice::timing::config::{Config as Hardware, preset_names};
+use simdevice::timing::raster::RasterReport;
 use simdevice::timing::work::{Mode, TileWork, Trace};
 use simdevice::timing::{fast, schedule, simulate, stepped};
 use simdevice::{Config, Packet};
@@ -72,17 +72,16 @@ fn nobody_sees_in_the_image_that_work_is_recorded() {
 
 #[test]
 fn the_trace_of_triangles_agrees_with_the_counters() {
-    let counters = counted(
-        Kind::Triangles,
-        QueryKind::Performance,
-        &Config::default(),
-    );
+    let counters = counted(Kind::Triangles, QueryKind::Performance, &Config::default());
     let trace = trace(Kind::Triangles);
     let of = |of: fn(&TileWork) -> u64| sum(&trace, Mode::Triangle, of);
     let hidden = of(|tile| tile.hidden.into());
     assert_eq!(hidden, counters.get(Counter::TilesHidden));
     assert!(hidden > 0 && of(|tile| tile.killed.into()) > 0);
-    assert_eq!(of(|tile| tile.contributions), counters.get(Counter::SamplesPassed));
+    assert_eq!(
+        of(|tile| tile.contributions),
+        counters.get(Counter::SamplesPassed)
+    );
     assert_eq!(
         of(|tile| tile.contributions),
         counters.get(Counter::FragmentInvocations)
@@ -106,7 +105,10 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
         .map(|draw| draw.preprocess.operations() + draw.shade.operations())
         .sum();
     let lanes = counters.get(Counter::ShaderActiveLanes) + counters.get(Counter::ShaderUniform);
-    assert!((operations - lanes as f64).abs() < 0.5, "{operations} {lanes}");
+    assert!(
+        (operations - lanes as f64).abs() < 0.5,
+        "{operations} {lanes}"
+    );
     for draw in draws {
         assert!(draw.preprocess.float > 0.0 && draw.shade.float > 0.0);
         // 32 bytes of attributes and 32 of outputs a vertex, 36 a triangle.
@@ -115,17 +117,17 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
         assert!(draw.sized_pairs.is_sorted_by(|a, b| a > b), "{draw:?}");
         let listed: u64 = draw.pairs();
         // Bounding boxes are of what is drawn, so that lists have no more.
-        assert!(listed <= draw.sized_pairs[1], "{listed} {:?}", draw.sized_pairs);
+        assert!(
+            listed <= draw.sized_pairs[1],
+            "{listed} {:?}",
+            draw.sized_pairs
+        );
     }
 }
 
 #[test]
 fn dispatches_are_in_the_trace() {
-    let counters = counted(
-        Kind::Dispatches,
-        QueryKind::Performance,
-        &Config::default(),
-    );
+    let counters = counted(Kind::Dispatches, QueryKind::Performance, &Config::default());
     let alone = trace(Kind::Dispatches);
     assert_eq!(alone.frames.len(), 1);
     let frame = &alone.frames[0];
@@ -266,12 +268,19 @@ fn a_query_counts_what_the_model_says_of_the_trace() {
         for (counter, expected) in expected {
             for counters in [&counters, &recorded] {
                 let value = counters.get(counter) as f64;
-                assert!((value - expected).abs() <= 2.0, "{name}, {counter:?}: {value} {expected}");
+                assert!(
+                    (value - expected).abs() <= 2.0,
+                    "{name}, {counter:?}: {value} {expected}"
+                );
             }
         }
         assert!(counters.get(Counter::SimulatedTime) > 0, "{name}");
         let occupancy = counters.get(Counter::SimulatedOccupancy);
-        assert_eq!(occupancy > 0, kind != Kind::Dispatches, "{name}: {occupancy}");
+        assert_eq!(
+            occupancy > 0,
+            kind != Kind::Dispatches,
+            "{name}: {occupancy}"
+        );
         assert!(occupancy <= 100);
         // Nobody asked for the model.
         let plain = counted(kind, QueryKind::Performance, &Config::default());

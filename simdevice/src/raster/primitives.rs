@@ -199,7 +199,14 @@ impl<'d> Renderer<'_, 'd> {
                 let tile = (row as u32 * side + column as u32) as usize;
                 let found = coverage.find(simd, &current.setup, x, y);
                 if let Some(work) = &mut self.work {
-                    work.list(tile, if found { coverage.blocks.count_ones() } else { 0 });
+                    work.list(
+                        tile,
+                        if found {
+                            coverage.blocks.count_ones()
+                        } else {
+                            0
+                        },
+                    );
                 }
                 if found {
                     self.tile(simd, current, coverage, tile, [x, y])?;

@@ -91,7 +91,10 @@ impl DrawRecord {
         let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
         // A position and the varyings.
         let written = 4 * (4 + part.varyings.per_vertex as u64);
-        let index = draw.indices.as_ref().map_or(0, |indices| indices.index_size);
+        let index = draw
+            .indices
+            .as_ref()
+            .map_or(0, |indices| indices.index_size);
         let bytes = shaded * (read as u64 + written)
             + counters.get(Counter::InputVertices) * u64::from(index)
             + drawn * 4 * NUMBERS_IN;
@@ -106,7 +109,10 @@ impl DrawRecord {
                 let at = primitive.corners.map(|corner| corner[axis]);
                 f64::from(of(of(at[0], at[1]), at[2])) / 256.0
             };
-            let (low, high) = ([0, 1].map(|k| side(k, i32::min)), [0, 1].map(|k| side(k, i32::max)));
+            let (low, high) = (
+                [0, 1].map(|k| side(k, i32::min)),
+                [0, 1].map(|k| side(k, i32::max)),
+            );
             for (sum, tiles) in sized.iter_mut().zip(sized_tiles(low, high, region)) {
                 *sum += tiles;
             }

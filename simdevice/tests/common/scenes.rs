@@ -1,17 +1,17 @@
 //! Scenes whose work is traced: triangles, Gaussians, both in one pass, and dispatches before them.
 
 use super::common::*;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use simdevice::bindings::Bindings;
 use simdevice::compute::{ComputeProgram, Dispatch};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
 use simdevice::isa::op::Op;
 use simdevice::packet::draw::*;
+use simdevice::packet::*;
 use simdevice::trace::Recorder;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use simdevice::packet::*;
 use std::sync::Arc;
 
 /// What is drawn.
@@ -152,9 +152,8 @@ fn triangles(device: &Device, seed: u64, count: u32) -> Packet {
         format: Format::R32G32B32A32Sfloat,
         instance_divisor: None,
     };
-    let attribute = |stream| {
-        (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }))
-    };
+    let attribute =
+        |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
     let position = (0..4).map(|component| Some(VertexOutput::Position(component)));
     let color = (0..4).map(|component| FragmentOutput::Color {
         attachment: 0,

@@ -197,7 +197,7 @@ impl Rates {
 #[cfg(test)]
 mod tests {
     use super::*;
-    
+
     #[test]
     fn draws_of_a_tile_are_one_task() {
         let draw = |mode, tiles: &[[u32; 2]]| DrawWork {

@@ -2,9 +2,7 @@
 //! and blocks finish as they do in pictures. It needs no device, and is the same everywhere.
 
 use crate::stages::{self, GaussianCounts};
-use crate::work::{
-    DrawWork, FrameWork, Run, TILE_GROUPS, TILE_SIDE, TILE_SIDES, TileWork,
-};
+use crate::work::{DrawWork, FrameWork, Run, TILE_GROUPS, TILE_SIDE, TILE_SIDES, TileWork};
 
 /// Gaussians after which it is looked at what is finished, as in the device.
 const CHUNK: usize = 32;
@@ -155,13 +153,18 @@ fn tile(all: &[Round], at: [u32; 2]) -> TileWork {
             break;
         }
         let open_row = |row: &usize| {
-            (0..4).any(|column| (0..4).any(|x| transmittance[row / 4 * 4 + column][row % 4 * 4 + x] > 0.0))
+            (0..4).any(|column| {
+                (0..4).any(|x| transmittance[row / 4 * 4 + column][row % 4 * 4 + x] > 0.0)
+            })
         };
         let rows = (0..16).filter(open_row).count() as u8;
         let mut reached = 0;
         for g in chunk {
             for &block in &open {
-                let place = [corner[0] + (block % 4 * 4) as f64, corner[1] + (block / 4 * 4) as f64];
+                let place = [
+                    corner[0] + (block % 4 * 4) as f64,
+                    corner[1] + (block / 4 * 4) as f64,
+                ];
                 if reaches(g, place, 4.0) {
                     reached += 1;
                     work.contributions += blend(g, place, &mut transmittance[block]);

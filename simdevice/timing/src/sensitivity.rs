@@ -315,7 +315,11 @@ pub fn markdown() -> Result<String, ConfigError> {
                 result.energy.modules() + result.energy.memory,
             );
         }
-        let _ = write!(out, "\n![{}](sensitivity/{}.svg)\n\n", sweep.title, sweep.file);
+        let _ = write!(
+            out,
+            "\n![{}](sensitivity/{}.svg)\n\n",
+            sweep.title, sweep.file
+        );
         if sweep.file != "precision" {
             match sweep.knee() {
                 Some(knee) => {

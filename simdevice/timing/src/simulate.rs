@@ -157,8 +157,8 @@ fn collaborative(frame: &FrameWork, config: &Config, alone: &Both) -> Both {
 /// Simulates a frame.
 pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
     let policy = policy(config);
-    let baseline_raster_ms = shader_cores::stage_3_ms(baseline_evaluations(frame), config)
-        + triangles_ms(frame, config);
+    let baseline_raster_ms =
+        shader_cores::stage_3_ms(baseline_evaluations(frame), config) + triangles_ms(frame, config);
     let alone = serial(frame, config, baseline_raster_ms);
     let baseline_ms = milliseconds(&alone.shader) + baseline_raster_ms;
     let fps = |stages, collaborative| {
@@ -244,7 +244,11 @@ fn changed(frame: &FrameWork, config: &Config) -> Changed {
     let share = |mode| {
         let (mut changed, mut evaluated) = (0, 0);
         for draw in frame.draws.iter().filter(|draw| draw.mode == mode) {
-            changed += draw.tiles.iter().map(|tile| tile.contributions).sum::<u64>();
+            changed += draw
+                .tiles
+                .iter()
+                .map(|tile| tile.contributions)
+                .sum::<u64>();
             evaluated += draw.evaluations(config.rasterizer.granularity(mode));
         }
         match evaluated {

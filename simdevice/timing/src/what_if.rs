@@ -61,11 +61,7 @@ pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
     ];
     let reached = [Saturation::Reached; 2];
     let triangles = [
-        with(
-            "triangles in whole tiles",
-            frame,
-            Saturation::Reached,
-        ),
+        with("triangles in whole tiles", frame, Saturation::Reached),
         variant("triangles in the blocks they cover", frame, reached, false),
     ];
     let tiles = || frame.draws.iter().flat_map(|draw| &draw.tiles);

@@ -133,13 +133,7 @@ impl ShaderWork {
 
     /// All operations.
     pub fn operations(&self) -> f64 {
-        self.float
-            + self.integer
-            + self.special
-            + self.wide
-            + self.memory
-            + self.image
-            + self.other
+        self.float + self.integer + self.special + self.wide + self.memory + self.image + self.other
     }
 }
 

@@ -57,8 +57,18 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
         none(),
     );
     let evaluated = [
-        ("blended", result.blended, result.raster.gaussian_evaluations, "Gaussians'"),
-        ("covered", result.covered, result.raster.triangle_evaluations, "triangles'"),
+        (
+            "blended",
+            result.blended,
+            result.raster.gaussian_evaluations,
+            "Gaussians'",
+        ),
+        (
+            "covered",
+            result.covered,
+            result.raster.triangle_evaluations,
+            "triangles'",
+        ),
     ];
     for (name, changed, evaluations, whose) in evaluated {
         if evaluations > 0.0 {

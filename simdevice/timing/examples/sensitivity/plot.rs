@@ -32,7 +32,9 @@ pub fn svg(sweep: &Sweep) -> Result<String, Box<dyn Error>> {
         let name = |x: &f64| {
             let near = (x - x.round()).abs() < 0.01 && *x > -0.5;
             let point = sweep.points.get(x.round().max(0.0) as usize);
-            point.filter(|_| near).map_or(String::new(), |point| point.name.clone())
+            point
+                .filter(|_| near)
+                .map_or(String::new(), |point| point.name.clone())
         };
         chart
             .configure_mesh()
@@ -53,7 +55,11 @@ pub fn svg(sweep: &Sweep) -> Result<String, Box<dyn Error>> {
                 .draw_series(LineSeries::new(curve.clone(), color.stroke_width(2)))?
                 .label(label)
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color));
-            chart.draw_series(curve.into_iter().map(|at| Circle::new(at, 3, color.filled())))?;
+            chart.draw_series(
+                curve
+                    .into_iter()
+                    .map(|at| Circle::new(at, 3, color.filled())),
+            )?;
         }
         let knee = sweep.knee().filter(|_| sweep.file != "precision");
         let at = |wanted: f64| sweep.points.iter().position(|point| point.x == wanted);
