@@ -9,6 +9,8 @@ const SIZE: (u32, u32) = (640, 360);
 const RASTER: RGBColor = RGBColor(31, 119, 180);
 const FRAME: RGBColor = RGBColor(214, 96, 39);
 
+type SpeedUp = fn(&Simulation) -> f64;
+
 /// The raster stage's and the frame's speed-up over the number that is swept, each step of the same width.
 ///
 /// # Errors
@@ -44,7 +46,7 @@ pub fn svg(sweep: &Sweep) -> Result<String, Box<dyn Error>> {
             .y_desc("speed-up over the shader cores")
             .light_line_style(TRANSPARENT)
             .draw()?;
-        let curves: [(&str, RGBColor, fn(&Simulation) -> f64); 2] = [
+        let curves: [(&str, RGBColor, SpeedUp); 2] = [
             ("raster stage", RASTER, |result| result.raster_speedup),
             ("whole frame", FRAME, |result| result.speedup),
         ];
