@@ -210,24 +210,28 @@ pub(crate) fn shader_work(counters: &Counters) -> ShaderWork {
     }
 }
 
-/// Tiles of each of [`TILE_SIDES`] that the box from `low` to `high` touches, in pixels of `bounds`.
+/// Tiles of each of [`TILE_SIDES`] that the box from `low` to `high` touches, in pixels of `bounds`, which is not left of
+/// or above the framebuffer's corner.
 pub(crate) fn sized_tiles(low: [f64; 2], high: [f64; 2], bounds: Rect) -> [u64; TILE_SIDES.len()] {
-    let start = [bounds.x, bounds.y].map(f64::from);
-    let end = [
-        start[0] + f64::from(bounds.width),
-        start[1] + f64::from(bounds.height),
-    ];
-    TILE_SIDES.map(|side| {
-        let side = f64::from(side);
-        let along = |axis: usize| {
-            let (low, high) = (low[axis].max(start[axis]), high[axis].min(end[axis]));
-            if low < high {
-                ((high / side).ceil() - (low / side).floor()) as u64
-            } else {
-                0
-            }
+    // In whole pixels: a rounding of floats for every size would cost more than all the rest.
+    let pixels = |axis: usize| {
+        let (start, length) = match axis {
+            0 => (bounds.x, bounds.width),
+            _ => (bounds.y, bounds.height),
         };
-        along(0) * along(1)
+        let (start, end) = (f64::from(start), f64::from(start) + f64::from(length));
+        let (low, high) = (low[axis].max(start), high[axis].min(end));
+        let last = high as u64;
+        let end = last + u64::from(last as f64 != high);
+        (low < high).then_some((low as u64, end))
+    };
+    let (Some((left, right)), Some((top, bottom))) = (pixels(0), pixels(1)) else {
+        return [0; TILE_SIDES.len()];
+    };
+    TILE_SIDES.map(|side| {
+        let side = u64::from(side);
+        let along = |low: u64, end: u64| end.div_ceil(side) - low / side;
+        along(left, right) * along(top, bottom)
     })
 }
 
@@ -324,10 +328,13 @@ pub(crate) fn gaussian_draw(
     }
 }
 
+/// The binary logarithm of 1 / 255.
+const LOG2_FLOOR: f64 = -7.994_353_436_858_858;
+
 /// Tiles of each size that the bounding box of a Gaussian's ellipse touches, out to an alpha of 1 / 255.
 fn sized_boxes(splat: &Splat, bounds: Rect) -> [u64; TILE_SIDES.len()] {
     let [xx, _, yy] = covariance(splat);
-    let octaves = f64::from(splat.log2_opacity) + 255f64.log2();
+    let octaves = f64::from(splat.log2_opacity) - LOG2_FLOOR;
     let reach = (2.0 * std::f64::consts::LN_2 * octaves.max(0.0)).sqrt();
     let [x, y] = splat.mean;
     let (dx, dy) = (reach * xx.sqrt(), reach * yy.sqrt());
@@ -391,6 +398,16 @@ mod tests {
         assert_eq!(boxed_tiles(&splat([88.0, 40.0], 10.0), BOUNDS), 25);
         assert_eq!(boxed_tiles(&splat([-500.0, 40.0], 10.0), BOUNDS), 0);
         assert_eq!(boxed_tiles(&splat([80.0, 40.0], 1000.0), BOUNDS), 50);
+    }
+
+    #[test]
+    fn boxes_touch_tiles_of_every_size() {
+        let tiles = |low, high| sized_tiles(low, high, BOUNDS);
+        assert_eq!(tiles([16.0, 8.0], [32.0, 16.5]), [4, 2, 1, 1]);
+        assert_eq!(tiles([-50.0, 79.5], [0.25, 500.0]), [1; 4]);
+        assert_eq!(tiles([-9.0; 2], [1e9; 2]), [200, 50, 15, 6]);
+        assert_eq!(tiles([20.0, 5.0], [20.0, 9.0]), [0; 4]);
+        assert_eq!(tiles([f64::NAN, 5.0], [20.0, -9.0]), [0; 4]);
     }
 
     #[test]
