@@ -9,6 +9,10 @@
 //!   commas (see [`simdevice::skips`]).
 //! - `GAURAST_TRACE`: a file that the work of a device's last 64 render passes is written to, as JSON, when the device is
 //!   gone; `gaurast simulate` reads it. It costs a little time and changes no image.
+//! - `GAURAST_TIMESTAMPS`: whose nanoseconds timestamps count: host (the default) or simulated, those that the paper's
+//!   hardware would have spent since the device was created. Vulkan has no time domain for such a clock
+//!   (`VK_KHR_calibrated_timestamps` knows the device's and the host's), so that no application asks for it by
+//!   accident.
 //! - `GAURAST_DUMP`: what is printed to standard error for people, by name: ir (the device's programs, as pipelines are
 //!   created).
 
@@ -25,6 +29,7 @@ const THREADS: &str = "GAURAST_THREADS";
 const TIMEOUT: &str = "GAURAST_TIMEOUT_MS";
 const SKIP: &str = "GAURAST_SKIP";
 const TRACE: &str = "GAURAST_TRACE";
+const TIMESTAMPS: &str = "GAURAST_TIMESTAMPS";
 const DUMP: &str = "GAURAST_DUMP";
 
 /// Opens a simulated device as the environment says.
@@ -38,12 +43,25 @@ pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
         variable(TIMEOUT)?.as_deref(),
         variable(SKIP)?.as_deref(),
     )?;
+    config.simulated_timestamps =
+        simulated_timestamps(variable(TIMESTAMPS)?.as_deref().unwrap_or_default())?;
     if let Some(file) = variable(TRACE)?.filter(|file| !file.is_empty()) {
         let file = PathBuf::from(file);
         let recorder = Recorder::new(move |trace| write_trace(&file, &trace));
         config.recorder = Some(Arc::new(recorder));
     }
     simdevice::Device::new(&config).map_err(|error| Error::InitializationFailed(error.to_string()))
+}
+
+/// Whether timestamps count the simulated hardware's time.
+fn simulated_timestamps(name: &str) -> Result<bool, Error> {
+    match name {
+        "" | "host" => Ok(false),
+        "simulated" => Ok(true),
+        other => Err(Error::InitializationFailed(format!(
+            "{TIMESTAMPS}={other} is neither host nor simulated"
+        ))),
+    }
 }
 
 /// Writes a trace; whoever asked for it is told if that fails.
@@ -153,6 +171,9 @@ mod tests {
                 .contains("GAURAST_SKIP=blocks,much: much is"),
             "{error}"
         );
+        assert!(simulated_timestamps("simulated").unwrap());
+        assert!(!simulated_timestamps("host").unwrap() && !simulated_timestamps("").unwrap());
+        assert!(simulated_timestamps("device").is_err());
         assert!(parse_dump("ir").unwrap().ir);
         assert!(!parse_dump("").unwrap().ir);
         assert!(parse_dump("ir,everything").is_err());

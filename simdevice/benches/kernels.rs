@@ -129,14 +129,7 @@ fn begin(degree: u32) -> GaussianBegin {
     GaussianBegin {
         state: Arc::new(GaussianState {
             sh_degree: degree,
-            order: GaussianOrder::ViewDepth,
-            opacity_compensated: false,
-            low_pass_variance: 0.3,
-            alpha_floor: 1.0 / 255.0,
-            alpha_ceiling: 0.99,
-            transmittance_floor: 1e-4,
-            blend: Vec::new(),
-            blend_constants: [0.0; 4],
+            ..GaussianState::default()
         }),
         camera: Camera {
             model: CameraModel::Pinhole,
@@ -161,7 +154,7 @@ fn begin(degree: u32) -> GaussianBegin {
 }
 
 fn resolve(device: &Device, begin: &GaussianBegin, append: &GaussianAppend) -> GaussianDraw {
-    let mut set = GaussianSet::begin(begin, area());
+    let mut set = GaussianSet::begin(begin, area(), None);
     set.append(append);
     set.resolve(device, &mut Counters::default())
         .expect("not too many")

@@ -1,14 +1,17 @@
 //! The command processor: the one match over [`Packet`].
 
 use crate::compute;
-use crate::counters::Counters;
+use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::gaussian::{GaussianSet, TooManyGaussians};
 use crate::geometry::{FrontEnd, Surface};
+use crate::model::Model;
 use crate::packet::Packet;
+use crate::packet::draw::Draw;
 use crate::pass::{Pass, PassDraw};
-use crate::query::host_time;
+use crate::query::{QueryKind, host_time};
 use crate::raster::tile::AttachmentError;
+use crate::trace::DrawRecord;
 use crate::transfer::{self, Direction};
 use isa::exec::Stopped;
 use std::sync::Arc;
@@ -47,6 +50,7 @@ pub struct CommandProcessor {
     counters: Counters,
     pass: Option<Pass>,
     gaussians: Option<GaussianSet>,
+    model: Model,
 }
 
 impl CommandProcessor {
@@ -57,6 +61,7 @@ impl CommandProcessor {
             counters: Counters::default(),
             pass: None,
             gaussians: None,
+            model: Model::default(),
         }
     }
 
@@ -104,7 +109,7 @@ impl CommandProcessor {
                     return Err(ExecutionError::InsidePass);
                 }
                 let pass = Pass::begin(rendering)?;
-                if let Some(recorder) = &self.device.config().recorder {
+                if let Some(recorder) = self.device.recorder() {
                     recorder.begin_frame(pass.area());
                 }
                 self.pass = Some(pass);
@@ -131,43 +136,41 @@ impl CommandProcessor {
                 if self.pass.is_some() {
                     return Err(ExecutionError::InsidePass);
                 }
-                Ok(compute::dispatch(
-                    dispatch,
-                    &self.device,
-                    &mut self.counters,
-                )?)
-            }
-            Packet::Draw(draw) => {
-                let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
-                self.outside_gaussian_set()?;
-                let surface = Surface {
-                    area: pass.area(),
-                    layers: pass.layer_count(),
-                    depth: pass.depth_format(),
-                };
-                let device = Arc::clone(&self.device);
-                let mut front = FrontEnd::new(draw, surface, &device, &mut self.counters);
-                while let Some(part) = front.next_part(&mut self.counters)? {
-                    self.draw(PassDraw::Primitives(Box::new(part)))?;
+                let recorder = self.device.recorder();
+                let before = recorder.map(|_| self.counters.clone());
+                compute::dispatch(dispatch, &self.device, &mut self.counters)?;
+                if let (Some(recorder), Some(before)) = (recorder, before) {
+                    recorder.add_dispatch(&self.counters.since(&before));
                 }
                 Ok(())
             }
+            Packet::Draw(draw) => self.primitives(draw),
             Packet::Barrier => self.flush(),
             Packet::EndRendering => {
                 let pass = self.pass.take().ok_or(ExecutionError::OutsidePass)?;
                 if self.gaussians.take().is_some() {
                     return Err(ExecutionError::GaussianSetOpen);
                 }
-                Ok(pass.end(&self.device, &mut self.counters)?)
+                pass.end(&self.device, &mut self.counters)?;
+                self.model.account(&self.device, &mut self.counters, None);
+                Ok(())
             }
             // What a query measures is what was done, not what waits.
             Packet::BeginQuery { pool, index } => {
                 self.flush()?;
+                if pool.kind() == QueryKind::Simulated {
+                    let area = self.pass.as_ref().map(Pass::area);
+                    self.model.begin(&self.device, &mut self.counters, area);
+                }
                 pool.begin(*index, &self.counters);
                 Ok(())
             }
             Packet::EndQuery { pool, index } => {
                 self.flush()?;
+                if pool.kind() == QueryKind::Simulated {
+                    let area = self.pass.as_ref().map(Pass::area);
+                    self.model.end(&self.device, &mut self.counters, area);
+                }
                 pool.end(*index, &self.counters);
                 Ok(())
             }
@@ -177,7 +180,8 @@ impl CommandProcessor {
             }
             Packet::WriteTimestamp { pool, index } => {
                 self.flush()?;
-                pool.write_timestamp(*index, host_time());
+                let now = self.now();
+                pool.write_timestamp(*index, now);
                 Ok(())
             }
         }
@@ -204,6 +208,41 @@ impl CommandProcessor {
         self.outside_gaussian_set()?;
         let pass = self.pass.as_mut().ok_or(ExecutionError::OutsidePass)?;
         Ok(pass.push(draw, &self.device, &mut self.counters)?)
+    }
+
+    /// Points, lines or triangles, part by part.
+    fn primitives(&mut self, draw: &Draw) -> Result<(), ExecutionError> {
+        let pass = self.pass.as_ref().ok_or(ExecutionError::OutsidePass)?;
+        self.outside_gaussian_set()?;
+        let surface = Surface {
+            area: pass.area(),
+            layers: pass.layer_count(),
+            depth: pass.depth_format(),
+        };
+        let device = Arc::clone(&self.device);
+        let recorder = device.recorder();
+        let record = recorder.map(|recorder| recorder.begin_draw(DrawRecord::primitives()));
+        let mut before = recorder.map(|_| self.counters.clone());
+        let mut front = FrontEnd::new(draw, surface, &device, &mut self.counters);
+        while let Some(mut part) = front.next_part(&mut self.counters)? {
+            if let (Some(record), Some(before)) = (&record, &before) {
+                record.add_front_end(&self.counters.since(before), draw, &part);
+            }
+            part.record = record.clone();
+            self.draw(PassDraw::Primitives(Box::new(part)))?;
+            before = recorder.map(|_| self.counters.clone());
+        }
+        Ok(())
+    }
+
+    /// The time of a timestamp in nanoseconds.
+    fn now(&mut self) -> u64 {
+        if !self.device.config().simulated_timestamps {
+            return host_time();
+        }
+        let area = self.pass.as_ref().map(Pass::area);
+        self.model.account(&self.device, &mut self.counters, area);
+        self.counters.get(Counter::SimulatedTime)
     }
 
     /// Renders what waits in the pass, if there is one.

@@ -11,6 +11,16 @@ pub enum Unit {
     Count,
     /// Host nanoseconds.
     Nanoseconds,
+    /// Nanoseconds of the simulated hardware.
+    SimulatedNanoseconds,
+    /// Cycles of the simulated rasterizer's clock.
+    Cycles,
+    /// Bytes that the simulated hardware moves.
+    Bytes,
+    /// Nanojoules that the simulated hardware spends.
+    Nanojoules,
+    /// Hundredths.
+    Percent,
 }
 
 /// How a counter is presented to people.
@@ -113,6 +123,35 @@ counters! {
     BinningTime: "time", "binning", Nanoseconds, "Placing Gaussians and primitives in the lists of their tiles";
     ShaderTime: "time", "dispatches", Nanoseconds, "Running the workgroups of compute programs";
     RasterTime: "time", "raster", Nanoseconds, "Rendering tiles: load, evaluate, blend, store";
+    SimulatedTime: "simulated hardware", "simulated time", SimulatedNanoseconds, "All stages, one after the other";
+    SimulatedCompute: "simulated hardware", "simulated dispatches", SimulatedNanoseconds, "Compute programs on the shader cores";
+    SimulatedPreprocess: "simulated hardware", "simulated preprocess", SimulatedNanoseconds, "Stage 1 on the shader cores: vertex programs, or projection and colours of Gaussians";
+    SimulatedSort: "simulated hardware", "simulated sort", SimulatedNanoseconds, "Stage 2: making tile lists, of Gaussians in depth order";
+    SimulatedRaster: "simulated hardware", "simulated raster", SimulatedNanoseconds, "Stage 3 on the rasterizer";
+    SimulatedShade: "simulated hardware", "simulated fragments", SimulatedNanoseconds, "Fragment programs on the shader cores";
+    SimulatedRasterCycles: "simulated hardware", "raster cycles", Cycles, "Cycles of the rasterizer from the first fetch to the last byte written";
+    SimulatedBusy: "simulated hardware", "PE busy", Cycles, "Cycles of modules whose PEs evaluated pixels, summed over the modules";
+    SimulatedDependency: "simulated hardware", "PE stall, dependency", Cycles, "Cycles of modules that waited for a pixel's transmittance";
+    SimulatedMemoryStall: "simulated hardware", "PE stall, memory", Cycles, "Cycles of modules that waited for main memory";
+    SimulatedController: "simulated hardware", "PE stall, controller", Cycles, "Cycles of modules at a tile's beginning, or at primitives that reach no pixel";
+    SimulatedModeSwitch: "simulated hardware", "PE stall, mode switch", Cycles, "Cycles of modules that drained and reconfigured between triangles and Gaussians";
+    SimulatedIdle: "simulated hardware", "PE idle", Cycles, "Cycles of modules that had nothing left to do";
+    SimulatedOccupancy: "simulated hardware", "PE occupancy", Percent, "Busy cycles of all modules' cycles";
+    SimulatedSwitches: "simulated hardware", "mode switches", Count, "Switches between triangles and Gaussians, of all modules";
+    SimulatedBytesIn: "simulated hardware", "bytes fetched", Bytes, "Primitives and lists that modules fetched";
+    SimulatedBytesOut: "simulated hardware", "bytes written", Bytes, "Pixels that modules wrote";
+    SimulatedArithmeticEnergy: "simulated hardware", "energy, PE arithmetic", Nanojoules, "Nanojoules of adders, multipliers, dividers and exponentials";
+    SimulatedBufferEnergy: "simulated hardware", "energy, tile buffers", Nanojoules, "Nanojoules of tile buffers";
+    SimulatedLeakageEnergy: "simulated hardware", "energy, leakage", Nanojoules, "Nanojoules that modules spend whatever they do";
+    SimulatedMemoryEnergy: "simulated hardware", "energy, main memory", Nanojoules, "Nanojoules of main memory, for the rasterizer";
+    SimulatedShaderEnergy: "simulated hardware", "energy, shader cores", Nanojoules, "Nanojoules of the shader cores";
+}
+
+impl Counter {
+    /// Whether a model of the hardware must run for it.
+    pub fn is_simulated(self) -> bool {
+        self as usize >= Self::SimulatedTime as usize
+    }
 }
 
 /// The counter of a kind of instruction.
@@ -155,6 +194,21 @@ impl Counters {
     pub fn add(&mut self, counter: Counter, amount: u64) {
         let value = &mut self.values[counter as usize];
         *value = value.wrapping_add(amount);
+    }
+
+    /// Sets what follows from other counters.
+    pub(crate) fn derive(&mut self) {
+        let busy = self.get(Counter::SimulatedBusy);
+        let stalls = [
+            Counter::SimulatedDependency,
+            Counter::SimulatedMemoryStall,
+            Counter::SimulatedController,
+            Counter::SimulatedModeSwitch,
+            Counter::SimulatedIdle,
+        ];
+        let all = busy + stalls.iter().map(|&stall| self.get(stall)).sum::<u64>();
+        let percent = (100 * busy + all / 2).checked_div(all).unwrap_or(0);
+        self.values[Counter::SimulatedOccupancy as usize] = percent;
     }
 
     /// Adds what shader cores did.

@@ -34,6 +34,8 @@ pub struct Config {
     pub skips: Skips,
     /// Gathers what draws do in tiles, if anybody wants to know. It never changes an image.
     pub recorder: Option<Arc<Recorder>>,
+    /// Timestamps count the simulated hardware's nanoseconds instead of the host's.
+    pub simulated_timestamps: bool,
 }
 
 /// When a pass's bins are rendered. It never changes an image.
@@ -59,6 +61,7 @@ impl Default for Config {
             shader_timeout: Duration::from_secs(5),
             skips: Skips::default(),
             recorder: None,
+            simulated_timestamps: false,
         }
     }
 }
@@ -84,6 +87,7 @@ pub struct Device {
     level: Level,
     config: Config,
     chunks: ChunkCache,
+    recorder: Arc<Recorder>,
 }
 
 impl Device {
@@ -107,6 +111,7 @@ impl Device {
             level,
             config: config.clone(),
             chunks: ChunkCache::default(),
+            recorder: config.recorder.clone().unwrap_or_default(),
         })
     }
 
@@ -118,6 +123,20 @@ impl Device {
     /// The chunks of Gaussians that were drawn more than once.
     pub(crate) fn chunks(&self) -> &ChunkCache {
         &self.chunks
+    }
+
+    /// Where what is done goes, if anybody wants to know now.
+    pub(crate) fn recorder(&self) -> Option<&Recorder> {
+        let config = &self.config;
+        let wanted = config.recorder.is_some()
+            || config.simulated_timestamps
+            || self.recorder.has_listeners();
+        wanted.then_some(&*self.recorder)
+    }
+
+    /// Where what is done goes once somebody wants to know.
+    pub(crate) fn listened_recorder(&self) -> &Recorder {
+        &self.recorder
     }
 
     /// The SIMD level of every kernel.

@@ -18,6 +18,7 @@ pub mod format;
 pub mod gaussian;
 pub mod geometry;
 pub mod image;
+mod model;
 pub mod packet;
 pub mod pass;
 pub mod query;

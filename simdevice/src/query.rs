@@ -13,8 +13,10 @@ pub fn host_time() -> u64 {
 /// What the queries of a pool measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum QueryKind {
-    /// The device's counters.
+    /// The device's counters, those that a model of the hardware must run for apart.
     Performance,
+    /// All of the device's counters.
+    Simulated,
     /// The host's monotonic time in nanoseconds.
     Timestamp,
 }
@@ -101,9 +103,11 @@ impl QueryPool {
             Some(Slot::Active(begun)) => begun.clone(),
             _ => return,
         };
+        let mut counted = now.since(&begun);
+        counted.derive();
         self.set(
             index,
-            Slot::Available(QueryResult::Performance(Box::new(now.since(&begun)))),
+            Slot::Available(QueryResult::Performance(Box::new(counted))),
         );
     }
 

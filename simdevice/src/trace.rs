@@ -1,14 +1,23 @@
-//! The trace of work, for those who ask for it: what every Gaussian draw did in every tile. Off unless a
-//! [`Recorder`] is in the device's configuration; it reads what the tile engine has computed and changes no bit of it.
+//! The trace of work, for those who ask for it: what every draw did before tiles and in every tile, and what dispatches
+//! did. Off unless a [`Recorder`] is in the device's configuration or a query listens; it reads what the device has
+//! computed and counted, and changes no bit of it.
+
+mod primitives;
+
+pub(crate) use primitives::MacroTileWork;
 
 use crate::counters::{Counter, Counters};
 use crate::gaussian::{TILE_SIZE, project::Splat};
 use crate::packet::Rect;
 use std::collections::VecDeque;
 use std::fmt;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use timing::stages::{self, GaussianCounts};
-pub use timing::work::{DrawWork, FrameWork, Mode, Run, TRACE_VERSION, TileWork, Trace};
+use timing::work::TILE_SIDES;
+pub use timing::work::{
+    DrawWork, FrameWork, Mode, Run, ShaderWork, TRACE_VERSION, TileWork, Trace,
+};
 
 /// Render passes that are kept; older ones make room for newer ones.
 const MAX_FRAMES: usize = 64;
@@ -19,14 +28,44 @@ type Sink = Box<dyn FnOnce(Trace) + Send>;
 /// Gathers the work of a device's render passes, and hands it over when the device and all its draws are gone.
 #[derive(Default)]
 pub struct Recorder {
-    frames: Mutex<VecDeque<Frame>>,
+    frames: Mutex<Frames>,
     sink: Mutex<Option<Sink>>,
+    /// Queries that want to know.
+    listeners: AtomicU32,
+}
+
+#[derive(Default)]
+struct Frames {
+    kept: VecDeque<Frame>,
+    /// Frames that were begun before the first that is kept.
+    gone: u64,
+    /// Dispatches since the last pass began.
+    dispatched: Dispatched,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Dispatched {
+    work: ShaderWork,
+    count: u64,
 }
 
 #[derive(Default)]
 struct Frame {
     size: [u32; 2],
+    before: Dispatched,
     draws: Vec<Arc<DrawRecord>>,
+}
+
+impl Frame {
+    fn work(&self) -> Option<FrameWork> {
+        let some = !self.draws.is_empty() || self.before.count > 0;
+        some.then(|| FrameWork {
+            size: self.size,
+            compute: self.before.work,
+            dispatches: self.before.count,
+            draws: self.draws.iter().map(|draw| draw.finished()).collect(),
+        })
+    }
 }
 
 /// A draw's work, as far as it has been done.
@@ -45,31 +84,69 @@ impl Recorder {
         Self {
             frames: Mutex::default(),
             sink: Mutex::new(Some(Box::new(sink))),
+            listeners: AtomicU32::default(),
         }
     }
 
     /// What was done so far. Passes that drew nothing are left out.
     pub fn trace(&self) -> Trace {
-        let frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
-        let frames = frames.iter().filter(|frame| !frame.draws.is_empty());
-        let frames = frames.map(|frame| FrameWork {
-            size: frame.size,
-            draws: frame.draws.iter().map(|draw| draw.finished()).collect(),
-        });
         Trace {
             version: TRACE_VERSION,
-            frames: frames.collect(),
+            frames: self.work_since(&mut 0),
         }
+    }
+
+    /// What was done in frames from number `from` on, as far as they are kept; `from` becomes the next frame's number.
+    pub(crate) fn work_since(&self, from: &mut u64) -> Vec<FrameWork> {
+        let frames = self.lock();
+        let skipped = from.saturating_sub(frames.gone) as usize;
+        let kept = frames.kept.iter().skip(skipped);
+        let last = Frame {
+            before: frames.dispatched,
+            ..Frame::default()
+        };
+        *from = frames.gone + frames.kept.len() as u64;
+        kept.chain([&last]).filter_map(Frame::work).collect()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Frames> {
+        self.frames.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether a query wants to know what is done.
+    pub(crate) fn has_listeners(&self) -> bool {
+        self.listeners.load(Relaxed) > 0
+    }
+
+    /// Begins to listen.
+    pub(crate) fn listen(&self) {
+        self.listeners.fetch_add(1, Relaxed);
+    }
+
+    /// Ends what [`Recorder::listen`] began.
+    pub(crate) fn stop_listening(&self) {
+        self.listeners.fetch_sub(1, Relaxed);
+    }
+
+    /// Forgets all that was done.
+    pub(crate) fn clear(&self) {
+        let mut frames = self.lock();
+        frames.gone += frames.kept.len() as u64;
+        frames.kept.clear();
+        frames.dispatched = Dispatched::default();
     }
 
     /// Begins a render pass over `area`.
     pub(crate) fn begin_frame(&self, area: Rect) {
-        let mut frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
-        if frames.len() >= MAX_FRAMES {
-            frames.pop_front();
+        let mut frames = self.lock();
+        if frames.kept.len() >= MAX_FRAMES {
+            frames.kept.pop_front();
+            frames.gone += 1;
         }
-        frames.push_back(Frame {
+        let before = std::mem::take(&mut frames.dispatched);
+        frames.kept.push_back(Frame {
             size: [area.width, area.height],
+            before,
             draws: Vec::new(),
         });
     }
@@ -77,12 +154,85 @@ impl Recorder {
     /// Begins a draw of the last render pass.
     pub(crate) fn begin_draw(&self, work: DrawWork) -> Arc<DrawRecord> {
         let record = Arc::new(DrawRecord(Mutex::new(work)));
-        let mut frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(frame) = frames.back_mut() {
+        if let Some(frame) = self.lock().kept.back_mut() {
             frame.draws.push(Arc::clone(&record));
         }
         record
     }
+
+    /// Adds a dispatch, of which `counters` tell.
+    pub(crate) fn add_dispatch(&self, counters: &Counters) {
+        let mut frames = self.lock();
+        let dispatched = &mut frames.dispatched;
+        dispatched.work = dispatched.work.plus(&shader_work(counters));
+        dispatched.count += 1;
+    }
+}
+
+/// What shader cores did, in operations of single lanes. Instructions are counted by kind and lanes are not, so that
+/// all kinds are taken to have had as many active lanes; operations for all lanes of a batch at once count once. Every
+/// load, store and image access is taken to move 32 bits that no cache holds.
+pub(crate) fn shader_work(counters: &Counters) -> ShaderWork {
+    let count = |wanted: &[Counter]| -> u64 { wanted.iter().map(|&c| counters.get(c)).sum() };
+    let instructions = count(&[
+        Counter::ShaderFloat,
+        Counter::ShaderInteger,
+        Counter::ShaderSpecial,
+        Counter::ShaderWide,
+        Counter::ShaderMove,
+        Counter::ShaderCrossLane,
+        Counter::ShaderMemory,
+        Counter::ShaderAtomic,
+        Counter::ShaderImage,
+        Counter::ShaderControl,
+    ]);
+    if instructions == 0 {
+        return ShaderWork::default();
+    }
+    let operations = count(&[Counter::ShaderActiveLanes, Counter::ShaderUniform]);
+    let lanes = operations as f64 / instructions as f64;
+    let of = |wanted: &[Counter]| count(wanted) as f64 * lanes;
+    let memory = of(&[Counter::ShaderMemory, Counter::ShaderAtomic]);
+    let image = of(&[Counter::ShaderImage]);
+    ShaderWork {
+        float: of(&[Counter::ShaderFloat]),
+        integer: of(&[Counter::ShaderInteger]),
+        special: of(&[Counter::ShaderSpecial]),
+        wide: of(&[Counter::ShaderWide]),
+        memory,
+        image,
+        other: of(&[
+            Counter::ShaderMove,
+            Counter::ShaderCrossLane,
+            Counter::ShaderControl,
+        ]),
+        bytes: 4.0 * (memory + image),
+    }
+}
+
+/// Tiles of each of [`TILE_SIDES`] that the box from `low` to `high` touches, in pixels of `bounds`, which is not left of
+/// or above the framebuffer's corner.
+pub(crate) fn sized_tiles(low: [f64; 2], high: [f64; 2], bounds: Rect) -> [u64; TILE_SIDES.len()] {
+    // In whole pixels: a rounding of floats for every size would cost more than all the rest.
+    let pixels = |axis: usize| {
+        let (start, length) = match axis {
+            0 => (bounds.x, bounds.width),
+            _ => (bounds.y, bounds.height),
+        };
+        let (start, end) = (f64::from(start), f64::from(start) + f64::from(length));
+        let (low, high) = (low[axis].max(start), high[axis].min(end));
+        let last = high as u64;
+        let end = last + u64::from(last as f64 != high);
+        (low < high).then_some((low as u64, end))
+    };
+    let (Some((left, right)), Some((top, bottom))) = (pixels(0), pixels(1)) else {
+        return [0; TILE_SIDES.len()];
+    };
+    TILE_SIDES.map(|side| {
+        let side = u64::from(side);
+        let along = |low: u64, end: u64| end.div_ceil(side) - low / side;
+        along(left, right) * along(top, bottom)
+    })
 }
 
 impl Drop for Recorder {
@@ -165,20 +315,44 @@ pub(crate) fn gaussian_draw(
             .flatten()
             .map(|splat| boxed_tiles(splat, bounds))
             .sum(),
+        sized_pairs: splats
+            .iter()
+            .flatten()
+            .map(|splat| sized_boxes(splat, bounds))
+            .fold([0; TILE_SIDES.len()], |sum, tiles| {
+                std::array::from_fn(|index| sum[index] + tiles[index])
+            }),
         preprocess,
         sort,
-        tiles: Vec::new(),
+        ..DrawWork::default()
     }
+}
+
+/// The binary logarithm of 1 / 255.
+const LOG2_FLOOR: f64 = -7.994_353_436_858_858;
+
+/// Tiles of each size that the bounding box of a Gaussian's ellipse touches, out to an alpha of 1 / 255.
+fn sized_boxes(splat: &Splat, bounds: Rect) -> [u64; TILE_SIDES.len()] {
+    let [xx, _, yy] = covariance(splat);
+    let octaves = f64::from(splat.log2_opacity) - LOG2_FLOOR;
+    let reach = (2.0 * std::f64::consts::LN_2 * octaves.max(0.0)).sqrt();
+    let [x, y] = splat.mean;
+    let (dx, dy) = (reach * xx.sqrt(), reach * yy.sqrt());
+    sized_tiles([x - dx, y - dy], [x + dx, y + dy], bounds)
+}
+
+/// The covariance of x and x, x and y, y and y in px^2.
+fn covariance(splat: &Splat) -> [f64; 3] {
+    let [a, b, c] = splat.factor;
+    // It is the inverse of 2 ln 2 times the factor's square.
+    let scale = 1.0 / (2.0 * std::f64::consts::LN_2 * a * a * c * c);
+    [c * c * scale, -b * c * scale, (a * a + b * b) * scale]
 }
 
 /// Tiles of `bounds` under the square around the circle of three standard deviations, rounded up to pixels: what the
 /// original 3DGS code bins.
 fn boxed_tiles(splat: &Splat, bounds: Rect) -> u64 {
-    let [a, b, c] = splat.factor;
-    // The covariance is the inverse of 2 ln 2 times the factor's square.
-    let scale = 1.0 / (2.0 * std::f64::consts::LN_2 * a * a * c * c);
-    let (xx, yy) = (c * c * scale, (a * a + b * b) * scale);
-    let xy = -b * c * scale;
+    let [xx, xy, yy] = covariance(splat);
     let middle = 0.5 * (xx + yy);
     let spread = (middle * middle - (xx * yy - xy * xy)).max(0.1).sqrt();
     let radius = (3.0 * (middle + spread).sqrt()).ceil();
@@ -224,6 +398,16 @@ mod tests {
         assert_eq!(boxed_tiles(&splat([88.0, 40.0], 10.0), BOUNDS), 25);
         assert_eq!(boxed_tiles(&splat([-500.0, 40.0], 10.0), BOUNDS), 0);
         assert_eq!(boxed_tiles(&splat([80.0, 40.0], 1000.0), BOUNDS), 50);
+    }
+
+    #[test]
+    fn boxes_touch_tiles_of_every_size() {
+        let tiles = |low, high| sized_tiles(low, high, BOUNDS);
+        assert_eq!(tiles([16.0, 8.0], [32.0, 16.5]), [4, 2, 1, 1]);
+        assert_eq!(tiles([-50.0, 79.5], [0.25, 500.0]), [1; 4]);
+        assert_eq!(tiles([-9.0; 2], [1e9; 2]), [200, 50, 15, 6]);
+        assert_eq!(tiles([20.0, 5.0], [20.0, 9.0]), [0; 4]);
+        assert_eq!(tiles([f64::NAN, 5.0], [20.0, -9.0]), [0; 4]);
     }
 
     #[test]

@@ -12,8 +12,14 @@ pub(crate) const COUNT: usize = Counter::ALL.len();
 pub(crate) fn fill(index: usize, out: &mut vk::PerformanceCounterKHR<'_>) {
     let info = Counter::ALL[index].info();
     out.unit = match info.unit {
-        Unit::Count => vk::PerformanceCounterUnitKHR::GENERIC,
-        Unit::Nanoseconds => vk::PerformanceCounterUnitKHR::NANOSECONDS,
+        // Vulkan has no unit of energy; descriptions say that these are nanojoules.
+        Unit::Count | Unit::Nanojoules => vk::PerformanceCounterUnitKHR::GENERIC,
+        Unit::Nanoseconds | Unit::SimulatedNanoseconds => {
+            vk::PerformanceCounterUnitKHR::NANOSECONDS
+        }
+        Unit::Cycles => vk::PerformanceCounterUnitKHR::CYCLES,
+        Unit::Bytes => vk::PerformanceCounterUnitKHR::BYTES,
+        Unit::Percent => vk::PerformanceCounterUnitKHR::PERCENTAGE,
     };
     out.scope = vk::PerformanceCounterScopeKHR::COMMAND;
     out.storage = vk::PerformanceCounterStorageKHR::UINT64;
@@ -23,7 +29,12 @@ pub(crate) fn fill(index: usize, out: &mut vk::PerformanceCounterKHR<'_>) {
 /// Writes what people read of counter `index`.
 pub(crate) fn describe(index: usize, out: &mut vk::PerformanceCounterDescriptionKHR<'_>) {
     let info = Counter::ALL[index].info();
-    out.flags = vk::PerformanceCounterDescriptionFlagsKHR::empty();
+    // The model runs only where one of its counters is asked for.
+    out.flags = if Counter::ALL[index].is_simulated() {
+        vk::PerformanceCounterDescriptionFlagsKHR::PERFORMANCE_IMPACTING
+    } else {
+        vk::PerformanceCounterDescriptionFlagsKHR::empty()
+    };
     write(&mut out.name, info.name);
     write(&mut out.category, info.category);
     write(&mut out.description, info.description);

@@ -20,7 +20,7 @@ pub(crate) struct QueryPool {
 /// What the results of a pool's queries hold.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Contents {
-    /// The host's time.
+    /// The host's time, or the simulated hardware's.
     Timestamp,
     /// Counters as `VkPerformanceCounterResultKHR`s, in order.
     Performance(Vec<u32>),
@@ -77,6 +77,9 @@ impl Contents {
     fn kind(&self) -> QueryKind {
         match self {
             Self::Timestamp => QueryKind::Timestamp,
+            Self::Performance(counters) if counters.iter().any(is_simulated) => {
+                QueryKind::Simulated
+            }
             Self::Performance(_) | Self::Words(_) => QueryKind::Performance,
         }
     }
@@ -89,6 +92,12 @@ impl Contents {
             Self::Words(counters) => counters.len(),
         }
     }
+}
+
+/// Whether a model of the hardware must run for a counter.
+fn is_simulated(index: &u32) -> bool {
+    let counter = Counter::ALL.get(*index as usize);
+    counter.is_some_and(|counter| counter.is_simulated())
 }
 
 crate::objects! { ash::vk::QueryPool => QueryPool; }

@@ -216,6 +216,9 @@ impl Device {
                 category: text(&description.category),
                 name: text(&description.name),
                 description: text(&description.description),
+                impacting: description
+                    .flags
+                    .contains(vk::PerformanceCounterDescriptionFlagsKHR::PERFORMANCE_IMPACTING),
                 unit: counter.unit,
                 storage: counter.storage,
             })
@@ -245,6 +248,8 @@ pub(super) struct CounterDescription {
     pub(super) category: String,
     pub(super) name: String,
     pub(super) description: String,
+    /// Counting it changes how long things take.
+    pub(super) impacting: bool,
     pub(super) unit: vk::PerformanceCounterUnitKHR,
     pub(super) storage: vk::PerformanceCounterStorageKHR,
 }

@@ -178,12 +178,23 @@ impl Renderer {
     pub fn new(entry: ash::Entry) -> Result<Self, RenderError> {
         let device = Arc::new(Device::new(entry, Purpose::Gaussians)?);
         Ok(Self {
-            query: CounterQuery::new(&device)?,
+            query: CounterQuery::new(&device, false)?,
             target: None,
             commands: CommandBuffers::new(&device)?,
             gaussian: device.gaussian_functions(),
             device,
         })
+    }
+
+    /// Counts also what changes how long things take, such as what simulated hardware would spend.
+    ///
+    /// # Errors
+    /// If Vulkan fails.
+    pub fn count_everything(&mut self) -> Result<(), RenderError> {
+        // A device has one profiling lock.
+        self.query = None;
+        self.query = CounterQuery::new(&self.device, true)?;
+        Ok(())
     }
 
     /// The device's name.

@@ -35,13 +35,17 @@ pub(super) struct CounterQuery {
 }
 
 impl CounterQuery {
-    /// The query, unless the device counts nothing or not everything at once.
-    pub(super) fn new(device: &Arc<Device>) -> Result<Option<Self>, RenderError> {
+    /// The query, unless the device counts nothing or not everything at once. What would impact its performance is
+    /// counted only if it is asked for.
+    pub(super) fn new(device: &Arc<Device>, impacting: bool) -> Result<Option<Self>, RenderError> {
         let Some(performance_query) = device.performance() else {
             return Ok(None);
         };
-        let counters = device.counters()?;
-        let indices: Vec<u32> = (0..counters.len() as u32).collect();
+        let counters: Vec<_> = device.counters()?.into_iter().zip(0u32..).collect();
+        let counted = counters
+            .into_iter()
+            .filter(|(counter, _)| impacting || !counter.impacting);
+        let (counters, indices): (Vec<_>, Vec<u32>) = counted.unzip();
         let mut performance = vk::QueryPoolPerformanceCreateInfoKHR::default()
             .queue_family_index(device.queue_family())
             .counter_indices(&indices);

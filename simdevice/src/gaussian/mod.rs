@@ -153,7 +153,7 @@ impl GaussianSet {
         counters.add(Counter::SortTime, nanoseconds(projected, sorted));
         counters.add(Counter::BinningTime, nanoseconds(sorted, Instant::now()));
         let splats: Vec<_> = batches.into_iter().map(|batch| batch.splats).collect();
-        let record = device.config().recorder.as_ref().map(|recorder| {
+        let record = device.recorder().map(|recorder| {
             let degree = self.begin.state.sh_degree;
             let (pairs, bounds) = (tiles.pairs(), self.bounds);
             let draw = trace::gaussian_draw(&work, &splats, pairs, degree, bounds);

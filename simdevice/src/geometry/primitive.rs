@@ -4,6 +4,7 @@ use super::{Bins, DrawPipeline};
 use crate::bindings::Bindings;
 use crate::packet::Rect;
 use crate::packet::draw::{Draw, DrawState};
+use crate::trace::DrawRecord;
 use std::sync::Arc;
 
 /// A draw that was shaded, assembled, clipped, set up and binned.
@@ -20,6 +21,8 @@ pub struct PrimitiveDraw {
     /// The pixels that they may touch, by viewport: those of the pass's area that lie in the scissor and in the
     /// viewport. Primitives may reach farther.
     pub regions: Vec<Rect>,
+    /// Where the work of its tiles goes, if anybody wants to know.
+    pub(crate) record: Option<Arc<DrawRecord>>,
 }
 
 /// Consecutive primitives of a draw that were set up together.
@@ -85,6 +88,12 @@ pub struct Primitive {
 }
 
 impl PrimitiveDraw {
+    /// How many varyings each vertex has.
+    pub(crate) fn varyings_per_vertex(&self) -> usize {
+        let first = self.chunks.first();
+        first.map_or(0, |chunk| chunk.varyings.per_vertex)
+    }
+
     /// A draw without primitives.
     pub(crate) fn empty(draw: &Draw) -> Self {
         Self {
@@ -93,6 +102,7 @@ impl PrimitiveDraw {
             bindings: draw.fragment_bindings.clone(),
             chunks: Vec::new(),
             regions: Vec::new(),
+            record: None,
         }
     }
 

@@ -290,6 +290,7 @@ impl GaussianTile {
                 runs,
                 contributions: work.contributions,
                 terminated: count(&self.layers[layer].finished()).saturating_sub(outside),
+                ..TileWork::default()
             });
         }
         counters.add(Counter::TilePairsEvaluated, work.pairs);

@@ -16,6 +16,7 @@ use crate::counters::{Counter, Counters};
 use crate::geometry::{Primitive, Varyings};
 use crate::packet::Rect;
 use crate::skips::Skip;
+use crate::trace::MacroTileWork;
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
@@ -67,6 +68,8 @@ impl TileDraw<'_> {
         {
             return Ok(());
         }
+        let record = self.draw.record.as_ref();
+        let before = record.map(|_| counters.clone());
         let mut machines = self
             .stage
             .map(FragmentStage::take_machines)
@@ -81,6 +84,7 @@ impl TileDraw<'_> {
             cancel,
             samples_passed: 0,
             quads_masked: 0,
+            work: record.map(|_| MacroTileWork::default()),
         };
         renderer
             .batch
@@ -93,12 +97,16 @@ impl TileDraw<'_> {
         };
         let done = done.and_then(|()| renderer.flush());
         let (passed, masked) = (renderer.samples_passed, renderer.quads_masked);
+        let work = renderer.work;
         counters.add(Counter::SamplesPassed, passed);
         if self.skips.has(Skip::MaskedQuads) {
             counters.add(Counter::QuadsMasked, masked);
         }
         if let Some(stage) = self.stage {
             stage.put_back(machines, counters);
+        }
+        if let (Some(record), Some(before), Some(work)) = (record, before, work) {
+            record.add_macro_tile(place.at, place.size, work, &counters.since(&before));
         }
         done
     }
@@ -116,6 +124,8 @@ pub(super) struct Renderer<'a, 'd> {
     pub samples_passed: u64,
     /// Quads that were not shaded, because nothing is left of them.
     pub quads_masked: u64,
+    /// What is done in each tile, if anybody wants to know.
+    pub work: Option<MacroTileWork>,
 }
 
 /// A primitive while it is rasterized.
@@ -199,8 +209,17 @@ impl Renderer<'_, '_> {
             for column in first[0]..=last[0] {
                 let x = corner[0] + column * SIDE as i32;
                 let y = corner[1] + row * SIDE as i32;
-                if coverage.find(simd, current.setup, x, y) {
-                    let tile = (row as u32 * side + column as u32) as usize;
+                let tile = (row as u32 * side + column as u32) as usize;
+                let found = coverage.find(simd, current.setup, x, y);
+                if let Some(work) = &mut self.work {
+                    let blocks = if found {
+                        coverage.blocks.count_ones()
+                    } else {
+                        0
+                    };
+                    work.list(tile, blocks);
+                }
+                if found {
                     self.tile(simd, current, coverage, tile, [x, y])?;
                 }
             }
@@ -232,6 +251,9 @@ impl Renderer<'_, '_> {
             && draw.skips.has(Skip::HiddenTiles)
             && self.is_hidden(simd, tests, current, tile, at)
         {
+            if let Some(work) = &mut self.work {
+                work.hide(tile, coverage.blocks.count_ones());
+            }
             return Ok(());
         }
         let state = &draw.draw.state;
@@ -262,6 +284,9 @@ impl Renderer<'_, '_> {
             }
             if let Some(tests) = early {
                 self.test(simd, tests, current, &values, &mut lanes, (tile, block));
+            }
+            if let Some(work) = &mut self.work {
+                work.test(tile, &coverage.lanes[block], &lanes);
             }
             if !draw.count_late {
                 for lanes in lanes {

@@ -1,7 +1,7 @@
 //! Everything that can be chosen of the hardware, in one typed TOML file, and the presets. Where each number comes
 //! from is written beside it in `presets/paper-15x16.toml`; a preset may inherit from another.
 
-use crate::work::{Mode, Saturation, TILE_PIXELS};
+use crate::work::{Mode, Saturation, TILE_SIDES};
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
@@ -52,6 +52,12 @@ pub struct Rasterizer {
     pub opacity_folded: bool,
     /// What finished pixels are spared.
     pub saturation: Saturation,
+    /// Which pixels of a tile a triangle is evaluated at: those of the 4x4 blocks that it covers (`reached`), or all.
+    pub triangle_traversal: Saturation,
+    /// Whether a primitive that all of a tile's depths hide is dropped before its pixels are evaluated.
+    pub hierarchical_depth: bool,
+    /// Pixels along a side of a tile: 16, or 8, 32 and 64 as an estimate.
+    pub tile_side: u32,
     /// Primitives that half of the ping-pong tile buffer holds.
     pub batch: u32,
     /// Numbers that a primitive brings in.
@@ -74,6 +80,14 @@ impl Rasterizer {
     /// All PEs.
     pub fn pes(&self) -> u32 {
         self.modules * self.pes_per_module
+    }
+
+    /// Which pixels are spared in a mode.
+    pub fn granularity(&self, mode: Mode) -> Saturation {
+        match mode {
+            Mode::Triangle => self.triangle_traversal,
+            Mode::Gaussian => self.saturation,
+        }
     }
 
     /// Cycles from one pixel to the next in a PE.
@@ -112,7 +126,7 @@ impl Rasterizer {
 
     /// Bytes that a tile takes out.
     pub fn tile_bytes(&self) -> u32 {
-        TILE_PIXELS * self.numbers_out * self.number_bytes
+        self.tile_side * self.tile_side * self.numbers_out * self.number_bytes
     }
 }
 
@@ -143,6 +157,7 @@ pub struct Shader {
     pub special_per_cycle: f64,
     pub wide_per_cycle: f64,
     pub memory_per_cycle: f64,
+    pub image_per_cycle: f64,
     /// Of the issue slots, those used.
     pub efficiency: f64,
 }
@@ -380,6 +395,9 @@ impl Config {
                 "at most 4096 modules, and batches and PEs of 65536",
             ));
         }
+        if !TILE_SIDES.contains(&raster.tile_side) {
+            return Err(ConfigError::Range("tiles are of 8, 16, 32 or 64 pixels"));
+        }
         let positive = [
             raster.clock_ghz,
             raster.port_bytes_per_cycle,
@@ -391,6 +409,7 @@ impl Config {
             self.shader.special_per_cycle,
             self.shader.wide_per_cycle,
             self.shader.memory_per_cycle,
+            self.shader.image_per_cycle,
             self.shader.efficiency,
             self.baseline.efficiency,
             self.baseline.operations_per_evaluation,

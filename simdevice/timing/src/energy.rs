@@ -85,7 +85,8 @@ fn busy_cycle_pj(mode: Mode, config: &Config) -> f64 {
     let raster: &Rasterizer = &config.rasterizer;
     let [arithmetic, buffers] = evaluation_pj(mode, config.energy.blended_share, config);
     // A primitive passes through the buffer once for all PEs: written, then read.
-    let pixels = 256.0 * f64::from(raster.interval(mode)) / f64::from(raster.pes_per_module);
+    let pixels = f64::from(raster.tile_side).powi(2) * f64::from(raster.interval(mode))
+        / f64::from(raster.pes_per_module);
     let primitive =
         2.0 * f64::from(raster.primitive_bytes()) / pixels * config.energy.buffer_pj_per_byte;
     let interval = f64::from(raster.interval(mode));
@@ -132,16 +133,35 @@ pub fn static_w(config: &Config) -> f64 {
     measured.energy.module_power_w * measured.energy.static_share * size
 }
 
-/// What stage 3 of a frame spent on the rasterizer. `blended` is the share of evaluations that were blended.
-pub fn rasterizer(report: &RasterReport, blended: f64, config: &Config) -> Energy {
+/// Shares of evaluations that changed a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Changed {
+    /// Of Gaussians': those that were blended.
+    pub blended: f64,
+    /// Of triangles': those that were covered and passed the early tests.
+    pub covered: f64,
+}
+
+impl Changed {
+    /// The same share of both.
+    pub fn both(share: f64) -> Self {
+        Self {
+            blended: share,
+            covered: share,
+        }
+    }
+}
+
+/// What stage 3 of a frame spent on the rasterizer.
+pub fn rasterizer(report: &RasterReport, changed: Changed, config: &Config) -> Energy {
     let scale = scale(config) * 1e-9;
     let mut energy = Energy::default();
     let counts = [
-        (Mode::Gaussian, report.gaussian_evaluations),
-        (Mode::Triangle, report.triangle_evaluations),
+        (Mode::Gaussian, report.gaussian_evaluations, changed.blended),
+        (Mode::Triangle, report.triangle_evaluations, changed.covered),
     ];
-    for (mode, count) in counts {
-        let [arithmetic, buffers] = evaluation_pj(mode, blended, config);
+    for (mode, count, share) in counts {
+        let [arithmetic, buffers] = evaluation_pj(mode, share, config);
         energy.arithmetic += count * arithmetic * scale;
         energy.buffers += count * buffers * scale;
     }
@@ -176,6 +196,7 @@ mod tests {
             &FrameWork {
                 size: [320, 320],
                 draws,
+                ..FrameWork::default()
             },
             config,
             0.0,
@@ -186,7 +207,7 @@ mod tests {
     fn a_module_at_mean_activity_draws_the_papers_power() {
         let config = Config::preset("single-module", &[]).unwrap();
         let report = report(&config);
-        let energy = rasterizer(&report, config.energy.blended_share, &config);
+        let energy = rasterizer(&report, Changed::both(config.energy.blended_share), &config);
         let watts = energy.modules() / report.milliseconds(config.rasterizer.clock_ghz);
         // This frame is busier than the calibration frames.
         let dynamic = 1.7 * 0.8 * report.utilization() / CALIBRATION_UTILIZATION;
@@ -201,7 +222,7 @@ mod tests {
     fn power_is_what_the_configuration_says() {
         let config = Config::preset("single-module", &["module_power_w=0.64".to_owned()]).unwrap();
         let report = report(&config);
-        let energy = rasterizer(&report, config.energy.blended_share, &config);
+        let energy = rasterizer(&report, Changed::both(config.energy.blended_share), &config);
         let watts = energy.modules() / report.milliseconds(config.rasterizer.clock_ghz);
         assert!((watts / 0.64 - 1.0).abs() < 0.06, "{watts}");
         let wide = Config::preset("single-module", &["pes_per_module=32".to_owned()]).unwrap();
@@ -213,7 +234,8 @@ mod tests {
         let full = Config::preset("paper-15x16", &[]).unwrap();
         let half = Config::preset("fp16", &[]).unwrap();
         let (a, b) = (report(&full), report(&half));
-        let spent = |report, blended, config| rasterizer(report, blended, config).modules();
+        let spent =
+            |report, blended, config| rasterizer(report, Changed::both(blended), config).modules();
         assert!(spent(&b, 0.25, &half) < 0.6 * spent(&a, 0.25, &full));
         assert!(spent(&a, 0.1, &full) < spent(&a, 0.9, &full));
     }

@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 
 /// Rasterizes a frame while others move `others_gb_s` to and from main memory.
 pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> RasterReport {
-    let tasks = plan::tasks(frame, config.rasterizer.saturation);
+    let tasks = plan::tasks(frame, &config.rasterizer);
     let rates = Rates::new(config, others_gb_s);
     let mut report = RasterReport::default();
     let mut queue = tasks.iter();

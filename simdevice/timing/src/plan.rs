@@ -1,9 +1,11 @@
 //! The order in which rasterizer modules take up a frame: tile by tile, every draw of a tile before the next tile, as
 //! the device does. Both models start from here, and share nothing else but the cost of one primitive.
 
-use crate::config::Config;
-use crate::work::{FrameWork, Mode, Saturation, Segment};
-use std::collections::HashMap;
+use crate::config::{Config, Rasterizer};
+use crate::work::{
+    DrawWork, FrameWork, Mode, Saturation, Segment, TILE_GROUPS, TILE_SIDE, TILE_SIDES, TileWork,
+};
+use std::collections::{BTreeMap, HashMap};
 
 /// What one module does without interruption: all draws of a tile.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,32 +28,144 @@ pub struct Part {
 }
 
 /// The tasks of a frame in the order in which modules take them.
-pub fn tasks(frame: &FrameWork, saturation: Saturation) -> Vec<Task> {
+pub fn tasks(frame: &FrameWork, raster: &Rasterizer) -> Vec<Task> {
     let mut places = HashMap::new();
     let mut tasks: Vec<Task> = Vec::new();
     for draw in &frame.draws {
-        for tile in &draw.tiles {
-            let segments: Vec<_> = tile.segments(saturation).collect();
-            let needed: u32 = segments.iter().map(|segment| segment.primitives).sum();
-            if needed == 0 {
+        let tiles = draw
+            .tiles
+            .iter()
+            .map(|tile| (tile.at, part(draw.mode, tile, raster)));
+        let parts: Vec<_> = if raster.tile_side == TILE_SIDE {
+            tiles.collect()
+        } else {
+            resized(draw, tiles, raster)
+        };
+        for (at, part) in parts {
+            if part.needed == 0 {
                 continue;
             }
-            let place = *places.entry(tile.at).or_insert_with(|| {
+            let place = *places.entry(at).or_insert_with(|| {
                 tasks.push(Task { parts: Vec::new() });
                 tasks.len() - 1
             });
-            let part = Part {
-                mode: draw.mode,
-                segments,
-                needed,
-                left_over: tile.listed.saturating_sub(needed),
-            };
             if let Some(task) = tasks.get_mut(place) {
                 task.parts.push(part);
             }
         }
     }
     tasks
+}
+
+/// A draw in a tile of the trace, as the hardware sees it.
+fn part(mode: Mode, tile: &TileWork, raster: &Rasterizer) -> Part {
+    let granularity = raster.granularity(mode);
+    let mut segments: Vec<_> = tile.segments(granularity).collect();
+    if let Some(last) = segments.last_mut() {
+        // Hidden primitives are fetched in any case; a triangle that its bounding box alone brought here is no less.
+        let whole = u64::from(tile.hidden * TILE_GROUPS);
+        match (granularity, raster.hierarchical_depth) {
+            (Saturation::Reached, false) => last.groups += u64::from(tile.hidden_blocks),
+            (Saturation::Reached, true) | (_, false) => {}
+            (_, true) => last.groups = last.groups.saturating_sub(whole),
+        }
+    }
+    let needed: u32 = segments.iter().map(|segment| segment.primitives).sum();
+    Part {
+        mode,
+        segments,
+        needed,
+        left_over: tile.listed.saturating_sub(needed),
+    }
+}
+
+/// The lists of a draw in tiles of another size: an estimate. Lists grow as bounding boxes say, a larger tile is
+/// finished when the last of its parts is, and what was evaluated block by block is evaluated all the same.
+fn resized(
+    draw: &DrawWork,
+    tiles: impl Iterator<Item = ([u32; 2], Part)>,
+    raster: &Rasterizer,
+) -> Vec<([u32; 2], Part)> {
+    let pairs = |side: u32| {
+        let index = TILE_SIDES.iter().position(|&known| known == side)?;
+        Some(draw.sized_pairs[index] as f64).filter(|&pairs| pairs > 0.0)
+    };
+    // Where nothing is known, a primitive covers all that its tile is cut into, and no two of what is joined.
+    let unknown = f64::from(TILE_SIDE / raster.tile_side.min(TILE_SIDE)).powi(2);
+    let ratio = match (pairs(raster.tile_side), pairs(TILE_SIDE)) {
+        (Some(these), Some(known)) => these / known,
+        _ => unknown,
+    };
+    let per_pixel = matches!(raster.granularity(draw.mode), Saturation::Reached);
+    if raster.tile_side > TILE_SIDE {
+        let factor = raster.tile_side / TILE_SIDE;
+        let mut joined: BTreeMap<[u32; 2], Vec<Part>> = BTreeMap::new();
+        for ([x, y], part) in tiles {
+            let at = [y / factor, x / factor];
+            joined.entry(at).or_default().push(part);
+        }
+        let groups = u64::from(TILE_GROUPS * factor * factor);
+        let of = |([y, x], parts): ([u32; 2], Vec<Part>)| {
+            ([x, y], join(draw.mode, &parts, ratio, groups, per_pixel))
+        };
+        return joined.into_iter().map(of).collect();
+    }
+    let factor = TILE_SIDE / raster.tile_side;
+    let pieces = factor * factor;
+    let share = ratio / f64::from(pieces);
+    let mut out = Vec::new();
+    for ([x, y], part) in tiles {
+        let groups = u64::from(TILE_GROUPS / pieces);
+        let piece = join(draw.mode, &[part], share, groups, per_pixel);
+        for number in 0..pieces {
+            let mut piece = piece.clone();
+            for segment in &mut piece.segments {
+                // The groups of the whole are shared out among its pieces.
+                if per_pixel {
+                    let (n, k) = (u64::from(pieces), u64::from(number));
+                    segment.groups = (k + 1) * segment.groups / n - k * segment.groups / n;
+                }
+            }
+            out.push((
+                [x * factor + number % factor, y * factor + number / factor],
+                piece,
+            ));
+        }
+    }
+    out
+}
+
+/// Lists taken together, `ratio` times as long, of primitives that take so many `groups` each unless only what they
+/// reach is evaluated.
+fn join(mode: Mode, parts: &[Part], ratio: f64, groups: u64, per_pixel: bool) -> Part {
+    let listed = |part: &Part| f64::from(part.needed + part.left_over);
+    let longest = parts.iter().map(listed).fold(0.0, f64::max) * ratio.min(1.0);
+    let all = parts.iter().map(listed).sum::<f64>() * ratio;
+    let all = all.max(longest).round().max(1.0) as u32;
+    let finished = parts
+        .iter()
+        .map(|part| f64::from(part.needed) / listed(part).max(1.0))
+        .fold(0.0, f64::max);
+    let needed = ((f64::from(all) * finished).ceil() as u32).min(all);
+    let reached = parts
+        .iter()
+        .flat_map(|part| &part.segments)
+        .map(|segment| segment.groups)
+        .sum();
+    let segment = Segment {
+        primitives: needed,
+        groups: if per_pixel {
+            reached
+        } else {
+            u64::from(needed) * groups
+        },
+    };
+    Part {
+        mode,
+        segments: vec![segment; usize::from(needed > 0)],
+        needed,
+        left_over: all - needed,
+    }
 }
 
 /// The rates that the rasterizer's clock sees.
@@ -83,7 +197,6 @@ impl Rates {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::work::{DrawWork, TileWork};
 
     #[test]
     fn draws_of_a_tile_are_one_task() {
@@ -98,8 +211,10 @@ mod tests {
                 draw(Mode::Triangle, &[[0, 0], [1, 0]]),
                 draw(Mode::Gaussian, &[[2, 0], [1, 0]]),
             ],
+            ..FrameWork::default()
         };
-        let tasks = tasks(&frame, Saturation::Tile);
+        let config = Config::preset("paper-15x16", &[]).unwrap();
+        let tasks = tasks(&frame, &config.rasterizer);
         let modes: Vec<Vec<_>> = tasks
             .iter()
             .map(|task| task.parts.iter().map(|part| part.mode).collect())
@@ -115,5 +230,71 @@ mod tests {
         assert!((alone - 68.3 * 0.9).abs() < 1e-9);
         assert!((Rates::new(&config, 1e3).memory - alone / 2.0).abs() < 1e-9);
         assert!((Rates::new(&config, 10.0).memory - (alone - 10.0)).abs() < 1e-9);
+    }
+
+    /// Pixels and primitives evaluated together.
+    fn evaluations(tasks: &[Task]) -> u64 {
+        let parts = tasks.iter().flat_map(|task| &task.parts);
+        let segments = parts.flat_map(|part| &part.segments);
+        segments.map(|segment| segment.groups * 16).sum()
+    }
+
+    #[test]
+    fn hidden_primitives_cost_what_the_hardware_cannot_skip() {
+        let tile = TileWork {
+            listed: 10,
+            runs: vec![crate::work::Run {
+                primitives: 10,
+                rows: 16,
+                blocks: 16,
+                reached: 40,
+            }],
+            hidden: 4,
+            hidden_blocks: 24,
+            ..TileWork::default()
+        };
+        let frame = FrameWork {
+            draws: vec![DrawWork {
+                mode: Mode::Triangle,
+                tiles: vec![tile],
+                ..DrawWork::default()
+            }],
+            ..FrameWork::default()
+        };
+        let with = |traversal: &str, hierarchical: bool| {
+            let settings = [
+                format!("triangle_traversal={traversal}"),
+                format!("hierarchical_depth={hierarchical}"),
+            ];
+            let config = Config::preset("paper-15x16", &settings).unwrap();
+            evaluations(&tasks(&frame, &config.rasterizer)) / 16
+        };
+        assert_eq!([with("reached", false), with("reached", true)], [64, 40]);
+        assert_eq!([with("tile", false), with("tile", true)], [160, 96]);
+    }
+
+    #[test]
+    fn other_tile_sizes_keep_the_pixels_and_change_the_lists() {
+        let draw = DrawWork {
+            sized_pairs: [3200, 1600, 800, 400],
+            tiles: (0..16)
+                .map(|k| TileWork::open([k % 4, k / 4], 100))
+                .collect(),
+            ..DrawWork::default()
+        };
+        let frame = FrameWork {
+            draws: vec![draw],
+            ..FrameWork::default()
+        };
+        for (side, tiles, listed) in [(8u32, 64, 50), (16, 16, 100), (32, 4, 200), (64, 1, 400)] {
+            let setting = format!("tile_side={side}");
+            let config = Config::preset("paper-15x16", &[setting]).unwrap();
+            let tasks = tasks(&frame, &config.rasterizer);
+            assert_eq!(tasks.len(), tiles, "{side}");
+            assert!(tasks.iter().all(|task| task.parts[0].needed == listed));
+            let pixels = u64::from(side * side);
+            let all = tiles as u64 * u64::from(listed) * pixels;
+            assert_eq!(evaluations(&tasks), all, "{side}");
+        }
     }
 }

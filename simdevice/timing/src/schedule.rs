@@ -1,18 +1,31 @@
-//! Two engines, the shader cores and the rasterizer, and frames that pass through them: stages 1 and 2 on the one, stage
-//! 3 on the other. Collaborative scheduling lets the next frame's stages 1 and 2 run while a frame is rasterized;
-//! without it a frame ends before the next one begins. Without a rasterizer all three stages run on the shader cores.
+//! Two engines, the shader cores and the rasterizer, and frames that pass through them: dispatches, stages 1 and 2 and
+//! fragment programs on the one, stage 3 on the other. Collaborative scheduling lets the next frame's stages 1 and 2 run
+//! while a frame is rasterized; without it a frame ends before the next one begins. Without a rasterizer all stages run
+//! on the shader cores. A stage begins when the one before it has ended for the whole frame: fragments that could be
+//! shaded while their frame is still rasterized wait, which costs latency and, where frames overlap, no throughput.
 
 use serde::Serialize;
 
 /// Milliseconds of a frame's stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Stages {
+    /// Dispatches, before everything else.
+    pub compute: f64,
     /// Stage 1.
     pub preprocess: f64,
     /// Stage 2.
     pub sort: f64,
     /// Stage 3.
     pub raster: f64,
+    /// Fragment programs, of what triangles cover.
+    pub shade: f64,
+}
+
+impl Stages {
+    /// One after the other.
+    pub fn total(&self) -> f64 {
+        self.compute + self.preprocess + self.sort + self.raster + self.shade
+    }
 }
 
 /// Who works.
@@ -61,57 +74,107 @@ pub struct Policy {
     pub has_rasterizer: bool,
 }
 
-/// Lays frames out in time, each as early as the engines and the frames before it allow.
+/// A frame on its way through its stages.
+struct Progress {
+    frame: usize,
+    stages: Vec<(Engine, &'static str, f64)>,
+    /// Stages begun.
+    next: usize,
+    /// When the stage before the next one ends.
+    ready: f64,
+}
+
+/// Lays frames out in time. An engine that is free takes what can begin first, of the oldest frame if several can.
 pub fn timeline(frames: &[Stages], policy: Policy) -> Vec<Span> {
-    let mut spans: Vec<Span> = Vec::new();
-    let (mut shader_free, mut raster_free) = (0.0f64, 0.0f64);
-    let mut ends: Vec<f64> = Vec::new();
     let in_flight = if policy.collaborative {
         policy.frames_in_flight.max(1)
     } else {
         1
     };
-    for (frame, stages) in frames.iter().enumerate() {
-        let before = frame
-            .checked_sub(in_flight)
-            .and_then(|index| ends.get(index));
-        let mut now = shader_free.max(before.copied().unwrap_or(0.0));
-        let mut span = |engine, stage, begin_ms: f64, length: f64| {
-            let end_ms = begin_ms + length;
-            spans.push(Span {
-                engine,
-                frame,
-                stage,
-                begin_ms,
-                end_ms,
-            });
-            end_ms
+    let mut free = [0.0f64; 2];
+    let mut spans = Vec::new();
+    let mut waiting = frames.iter().enumerate();
+    let mut begun: Vec<Progress> = Vec::new();
+    // The ends of frames that left, by frame.
+    let mut ends: Vec<f64> = vec![0.0; frames.len()];
+    loop {
+        while begun.len() < in_flight
+            && let Some((frame, stages)) = waiting.next()
+        {
+            let before = frame.checked_sub(in_flight).map_or(0.0, |old| ends[old]);
+            begun.push(Progress::new(frame, stages, policy, before));
+        }
+        let start = |progress: &Progress| progress.start(&free);
+        let chosen = begun
+            .iter_mut()
+            .min_by(|a, b| start(a).total_cmp(&start(b)).then(a.frame.cmp(&b.frame)));
+        let Some(progress) = chosen else {
+            return spans;
         };
-        now = span(Engine::ShaderCores, "preprocess", now, stages.preprocess);
-        now = span(Engine::ShaderCores, "sort", now, stages.sort);
-        shader_free = now;
-        let end = if policy.has_rasterizer {
-            raster_free = span(
-                Engine::Rasterizer,
-                "raster",
-                now.max(raster_free),
-                stages.raster,
-            );
-            raster_free
-        } else {
-            shader_free = span(Engine::ShaderCores, "raster", now, stages.raster);
-            shader_free
+        let begin_ms = progress.start(&free);
+        let Some(&(engine, stage, length)) = progress.stages.get(progress.next) else {
+            // The frame has ended, and makes room for another.
+            let (frame, end) = (progress.frame, progress.ready);
+            ends[frame] = end;
+            begun.retain(|progress| progress.frame != frame);
+            continue;
         };
-        ends.push(end);
+        let end_ms = begin_ms + length;
+        progress.next += 1;
+        progress.ready = end_ms;
+        free[engine as usize] = end_ms;
+        spans.push(Span {
+            engine,
+            frame: progress.frame,
+            stage,
+            begin_ms,
+            end_ms,
+        });
     }
-    spans
+}
+
+impl Progress {
+    fn new(frame: usize, stages: &Stages, policy: Policy, ready: f64) -> Self {
+        let raster = if policy.has_rasterizer {
+            Engine::Rasterizer
+        } else {
+            Engine::ShaderCores
+        };
+        let all = [
+            (Engine::ShaderCores, "compute", stages.compute),
+            (Engine::ShaderCores, "preprocess", stages.preprocess),
+            (Engine::ShaderCores, "sort", stages.sort),
+            (raster, "raster", stages.raster),
+            (Engine::ShaderCores, "shade", stages.shade),
+        ];
+        // Only what every frame has is shown where it takes no time.
+        let shown = |&(_, stage, length): &(Engine, &str, f64)| {
+            length > 0.0 || !matches!(stage, "compute" | "shade")
+        };
+        Self {
+            frame,
+            stages: all.into_iter().filter(shown).collect(),
+            next: 0,
+            ready,
+        }
+    }
+
+    /// When the next stage can begin; a frame that has ended leaves at once.
+    fn start(&self, free: &[f64; 2]) -> f64 {
+        match self.stages.get(self.next) {
+            Some(&(engine, ..)) => self.ready.max(free[engine as usize]),
+            None => f64::NEG_INFINITY,
+        }
+    }
 }
 
 /// Frames per second that the same frame, over and over, settles at.
 pub fn fps(stages: Stages, policy: Policy) -> f64 {
     const WARM_UP: usize = 8;
     const MEASURED: usize = 64;
-    let spans = timeline(&[stages; WARM_UP + MEASURED], policy);
+    /// The last frames are not held up by others.
+    const AFTER: usize = 8;
+    let spans = timeline(&[stages; WARM_UP + MEASURED + AFTER], policy);
     let end_of = |frame: usize| {
         let ends = spans
             .iter()
@@ -199,9 +262,11 @@ mod tests {
     use super::*;
 
     const STAGES: Stages = Stages {
+        compute: 0.0,
         preprocess: 20.0,
         sort: 10.0,
         raster: 12.0,
+        shade: 0.0,
     };
     const POLICY: Policy = Policy {
         collaborative: true,
@@ -227,6 +292,13 @@ mod tests {
             ..POLICY
         };
         assert!((fps(STAGES, one) - 1e3 / 42.0).abs() < 1e-9);
+        // Fragments wait for their rasterizer, and the shader cores work on the next frame meanwhile.
+        let shaded = Stages {
+            shade: 5.0,
+            ..STAGES
+        };
+        assert!((fps(shaded, POLICY) - 1e3 / 35.0).abs() < 1e-9);
+        assert!((fps(shaded, serial) - 1e3 / 47.0).abs() < 1e-9);
         let none = Policy {
             has_rasterizer: false,
             ..POLICY
@@ -241,10 +313,12 @@ mod tests {
                 preprocess: f64::from(k * 7 % 5),
                 sort: 1.0,
                 raster: f64::from(k * 3 % 4),
+                shade: f64::from(k * 5 % 3),
+                compute: f64::from(k % 2),
             })
             .collect();
         let spans = timeline(&frames, POLICY);
-        assert_eq!(spans.len(), 27);
+        assert_eq!(spans.len(), 27 + 6 + 4);
         for (i, a) in spans.iter().enumerate() {
             assert!(a.end_ms >= a.begin_ms);
             for b in &spans[..i] {

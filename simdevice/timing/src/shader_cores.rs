@@ -28,6 +28,7 @@ pub fn roofline(work: &ShaderWork, shader: &Shader, memory: &Memory) -> Roofline
         work.special / shader.special_per_cycle,
         work.wide / shader.wide_per_cycle,
         work.memory / shader.memory_per_cycle,
+        work.image / shader.image_per_cycle,
         work.operations() / shader.float_per_cycle,
     ];
     let cycles = units.into_iter().fold(0.0, f64::max);

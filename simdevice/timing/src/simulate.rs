@@ -1,7 +1,7 @@
 //! One frame on one piece of hardware: every model of this crate put together.
 
 use crate::config::Config;
-use crate::energy::{self, Energy};
+use crate::energy::{self, Changed, Energy};
 use crate::fast;
 use crate::raster::RasterReport;
 use crate::schedule::{self, Policy, Span, Stages};
@@ -14,15 +14,21 @@ use serde::Serialize;
 pub struct Simulation {
     /// The rasterizer's cycles; zero if there is none.
     pub raster: RasterReport,
-    /// The share of evaluations that changed a pixel.
+    /// The share of Gaussians' evaluations that changed a pixel.
     pub blended: f64,
+    /// The share of triangles' evaluations that covered a pixel and passed the early tests.
+    pub covered: f64,
+    /// Dispatches.
+    pub compute: Roofline,
     /// Stage 1.
     pub preprocess: Roofline,
     /// Stage 2.
     pub sort: Roofline,
+    /// Fragment programs.
+    pub shade: Roofline,
     /// Milliseconds of the stages.
     pub stages: Stages,
-    /// GB/s that stages 1 and 2 take from the rasterizer while both run.
+    /// GB/s that the shader cores take from the rasterizer while both run.
     pub contention_gb_s: f64,
     /// Frames per second as configured.
     pub fps: f64,
@@ -30,7 +36,7 @@ pub struct Simulation {
     pub fps_collaborative: f64,
     /// Frames per second if they don't.
     pub fps_serial: f64,
-    /// Stage 3 on the shader cores, in ms.
+    /// Stage 3 without Gaussians in the rasterizer, in ms: Gaussians on the shader cores, triangles as before.
     pub baseline_raster_ms: f64,
     /// Frames per second without a rasterizer.
     pub baseline_fps: f64,
@@ -56,11 +62,29 @@ pub fn baseline_evaluations(frame: &FrameWork) -> f64 {
         };
         draw.evaluations(Saturation::Tile) as f64 * boxed
     };
-    frame.draws.iter().map(of_draw).sum()
+    let gaussians = |draw: &&crate::work::DrawWork| draw.mode == Mode::Gaussian;
+    frame.draws.iter().filter(gaussians).map(of_draw).sum()
 }
 
-/// Stages 1 and 2, of which a frame in flight's rasterizer takes bytes away.
-fn before_raster(frame: &FrameWork, config: &Config, rasters_bytes: f64) -> [Roofline; 2] {
+/// Milliseconds of the frame's triangles in a rasterizer for triangles alone, which every GPU has: this one or, where
+/// there is none for Gaussians, the paper's, since the published numbers tell nothing of it.
+fn triangles_ms(frame: &FrameWork, config: &Config) -> f64 {
+    if frame.draws.iter().all(|draw| draw.mode == Mode::Gaussian) {
+        return 0.0;
+    }
+    let mut config = config.clone();
+    if config.rasterizer.modules == 0 {
+        config.rasterizer.modules = TRIANGLE_MODULES;
+    }
+    let triangles = frame.of_mode(Mode::Triangle);
+    fast::rasterize(&triangles, &config, 0.0).milliseconds(config.rasterizer.clock_ghz)
+}
+
+/// Modules of the rasterizer that a machine without GauRast has for triangles: as many as the paper's.
+const TRIANGLE_MODULES: u32 = 15;
+
+/// What runs on shader cores, of which a frame in flight's rasterizer takes bytes away.
+fn on_shader_cores(frame: &FrameWork, config: &Config, rasters_bytes: f64) -> [Roofline; 4] {
     let stages = frame.shader();
     let bytes: f64 = stages.iter().map(|stage| stage.bytes).sum();
     stages.map(|mut stage| {
@@ -71,14 +95,14 @@ fn before_raster(frame: &FrameWork, config: &Config, rasters_bytes: f64) -> [Roo
     })
 }
 
-/// Milliseconds of stages 1 and 2.
-fn milliseconds(before: &[Roofline; 2]) -> f64 {
+/// Milliseconds of all that runs on shader cores.
+fn milliseconds(before: &[Roofline; 4]) -> f64 {
     before.iter().map(Roofline::milliseconds).sum()
 }
 
 /// Frames one at a time, and frames that overlap.
 struct Both {
-    before: [Roofline; 2],
+    shader: [Roofline; 4],
     raster: RasterReport,
     raster_ms: f64,
     contention_gb_s: f64,
@@ -86,11 +110,13 @@ struct Both {
 
 impl Both {
     fn stages(&self) -> Stages {
-        let [preprocess, sort] = self.before.map(|stage| stage.milliseconds());
+        let [compute, preprocess, sort, shade] = self.shader.map(|stage| stage.milliseconds());
         Stages {
+            compute,
             preprocess,
             sort,
             raster: self.raster_ms,
+            shade,
         }
     }
 }
@@ -105,23 +131,23 @@ fn serial(frame: &FrameWork, config: &Config, baseline_raster_ms: f64) -> Both {
         raster_ms = raster.milliseconds(config.rasterizer.clock_ghz);
     }
     Both {
-        before: before_raster(frame, config, 0.0),
+        shader: on_shader_cores(frame, config, 0.0),
         raster,
         raster_ms,
         contention_gb_s: 0.0,
     }
 }
 
-/// The stages where a frame's stages 1 and 2 run beside another's stage 3: both move their bytes through one memory.
+/// The stages where a frame's work for shader cores runs beside another's stage 3: both move their bytes through one memory.
 fn collaborative(frame: &FrameWork, config: &Config, alone: &Both) -> Both {
     let moved = alone.raster.bytes_in + alone.raster.bytes_out;
-    let before = before_raster(frame, config, moved);
+    let shader = on_shader_cores(frame, config, moved);
     let bytes: f64 = frame.shader().iter().map(|stage| stage.bytes).sum();
-    let time = milliseconds(&before);
+    let time = milliseconds(&shader);
     let contention_gb_s = if time > 0.0 { bytes / time * 1e-6 } else { 0.0 };
     let raster = fast::rasterize(frame, config, contention_gb_s);
     Both {
-        before,
+        shader,
         raster_ms: raster.milliseconds(config.rasterizer.clock_ghz),
         raster,
         contention_gb_s,
@@ -131,9 +157,10 @@ fn collaborative(frame: &FrameWork, config: &Config, alone: &Both) -> Both {
 /// Simulates a frame.
 pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
     let policy = policy(config);
-    let baseline_raster_ms = shader_cores::stage_3_ms(baseline_evaluations(frame), config);
+    let baseline_raster_ms =
+        shader_cores::stage_3_ms(baseline_evaluations(frame), config) + triangles_ms(frame, config);
     let alone = serial(frame, config, baseline_raster_ms);
-    let baseline_ms = milliseconds(&alone.before) + baseline_raster_ms;
+    let baseline_ms = milliseconds(&alone.shader) + baseline_raster_ms;
     let fps = |stages, collaborative| {
         schedule::fps(
             stages,
@@ -144,8 +171,8 @@ pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
         )
     };
     let fps_serial = fps(alone.stages(), false);
-    let on_shader_cores = if policy.has_rasterizer {
-        milliseconds(&alone.before)
+    let shader_ms = if policy.has_rasterizer {
+        milliseconds(&alone.shader)
     } else {
         baseline_ms
     };
@@ -158,23 +185,26 @@ pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
             chosen = together;
         }
     }
-    let blended = blended(frame, config);
+    let changed = changed(frame, config);
     let mut energy = Energy::default();
     if policy.has_rasterizer {
-        energy = energy::rasterizer(&chosen.raster, blended, config);
+        energy = energy::rasterizer(&chosen.raster, changed, config);
     }
-    energy.shader_cores = energy::shader_cores_mj(on_shader_cores, config);
+    energy.shader_cores = energy::shader_cores_mj(shader_ms, config);
     let fps = if policy.collaborative {
         fps_collaborative
     } else {
         fps_serial
     };
     let stages = chosen.stages();
-    let [preprocess, sort] = chosen.before;
+    let [compute, preprocess, sort, shade] = chosen.shader;
     Simulation {
-        blended,
+        blended: changed.blended,
+        covered: changed.covered,
+        compute,
         preprocess,
         sort,
+        shade,
         stages,
         contention_gb_s: chosen.contention_gb_s,
         fps,
@@ -182,7 +212,11 @@ pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
         fps_serial,
         baseline_raster_ms,
         baseline_fps: 1e3 / baseline_ms,
-        raster_speedup: baseline_raster_ms / stages.raster,
+        raster_speedup: if stages.raster > 0.0 {
+            baseline_raster_ms / stages.raster
+        } else {
+            1.0
+        },
         speedup: fps * baseline_ms * 1e-3,
         energy,
         baseline_mj: energy::shader_cores_mj(baseline_ms, config),
@@ -205,25 +239,26 @@ pub fn timeline(frames: &[Simulation], config: &Config) -> Vec<Span> {
     schedule::timeline(&stages, policy(config))
 }
 
-/// The share of evaluations that changed a pixel.
-fn blended(frame: &FrameWork, config: &Config) -> f64 {
-    let gaussians = frame
-        .draws
-        .iter()
-        .filter(|draw| draw.mode == Mode::Gaussian);
-    let (mut changed, mut evaluated) = (0, 0);
-    for draw in gaussians {
-        changed += draw
-            .tiles
-            .iter()
-            .map(|tile| tile.contributions)
-            .sum::<u64>();
-        evaluated += draw.evaluations(config.rasterizer.saturation);
-    }
-    if evaluated == 0 {
-        0.0
-    } else {
-        (changed as f64 / evaluated as f64).min(1.0)
+/// The shares of evaluations that changed a pixel.
+fn changed(frame: &FrameWork, config: &Config) -> Changed {
+    let share = |mode| {
+        let (mut changed, mut evaluated) = (0, 0);
+        for draw in frame.draws.iter().filter(|draw| draw.mode == mode) {
+            changed += draw
+                .tiles
+                .iter()
+                .map(|tile| tile.contributions)
+                .sum::<u64>();
+            evaluated += draw.evaluations(config.rasterizer.granularity(mode));
+        }
+        match evaluated {
+            0 => 0.0,
+            _ => (changed as f64 / evaluated as f64).min(1.0),
+        }
+    };
+    Changed {
+        blended: share(Mode::Gaussian),
+        covered: share(Mode::Triangle),
     }
 }
 
@@ -248,6 +283,7 @@ pub fn even_frame(size: [u32; 2], pairs: u64, contributions: f64) -> FrameWork {
     FrameWork {
         size,
         draws: vec![draw],
+        ..FrameWork::default()
     }
 }
 

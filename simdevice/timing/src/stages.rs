@@ -11,6 +11,8 @@ const CULL: ShaderWork = ShaderWork {
     special: 0.0,
     wide: 0.0,
     memory: 3.0,
+    image: 0.0,
+    other: 0.0,
     bytes: 12.0,
 };
 
@@ -22,6 +24,8 @@ const PROJECT: ShaderWork = ShaderWork {
     special: 6.0,
     wide: 0.0,
     memory: 20.0,
+    image: 0.0,
+    other: 0.0,
     bytes: 80.0,
 };
 
@@ -32,6 +36,8 @@ const DIRECTION: ShaderWork = ShaderWork {
     special: 2.0,
     wide: 0.0,
     memory: 3.0,
+    image: 0.0,
+    other: 0.0,
     bytes: 0.0,
 };
 
@@ -42,6 +48,8 @@ const COEFFICIENT: ShaderWork = ShaderWork {
     special: 0.0,
     wide: 0.0,
     memory: 3.0,
+    image: 0.0,
+    other: 0.0,
     bytes: 12.0,
 };
 
@@ -52,6 +60,8 @@ const EMIT: ShaderWork = ShaderWork {
     special: 0.0,
     wide: 0.0,
     memory: 4.0,
+    image: 0.0,
+    other: 0.0,
     bytes: 20.0,
 };
 
@@ -62,6 +72,8 @@ const SORT_PASS: ShaderWork = ShaderWork {
     special: 0.0,
     wide: 0.0,
     memory: 4.0,
+    image: 0.0,
+    other: 0.0,
     bytes: 24.0,
 };
 

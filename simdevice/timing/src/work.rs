@@ -10,7 +10,9 @@ pub const TILE_PIXELS: u32 = TILE_SIDE * TILE_SIDE;
 /// Groups of 16 pixels (rows, or 4x4 blocks) of such a tile.
 pub const TILE_GROUPS: u32 = 16;
 /// The version of [`Trace`]'s layout.
-pub const TRACE_VERSION: u32 = 1;
+pub const TRACE_VERSION: u32 = 2;
+/// Sides of the tiles that [`DrawWork::sized_pairs`] tells of, in pixels.
+pub const TILE_SIDES: [u32; 4] = [8, 16, 32, 64];
 
 /// What a program did, as a list of frames.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -18,7 +20,8 @@ pub const TRACE_VERSION: u32 = 1;
 pub struct Trace {
     /// [`TRACE_VERSION`].
     pub version: u32,
-    /// Frames, oldest first: render passes that drew something.
+    /// Frames, oldest first: render passes that drew something, with the dispatches before them. Dispatches after the
+    /// last pass are a frame without draws.
     pub frames: Vec<FrameWork>,
 }
 
@@ -28,6 +31,12 @@ pub struct Trace {
 pub struct FrameWork {
     /// Width and height of what is rendered to, in pixels.
     pub size: [u32; 2],
+    /// What compute programs did since the pass before, all dispatches together.
+    #[serde(default)]
+    pub compute: ShaderWork,
+    /// How many dispatches they were.
+    #[serde(default)]
+    pub dispatches: u64,
     /// Draws in submission order.
     pub draws: Vec<DrawWork>,
 }
@@ -56,11 +65,17 @@ pub struct DrawWork {
     /// Pairs of a tile and a Gaussian that the square around its 3-sigma circle gives (what the original 3DGS code
     /// bins); 0 where that is unknown.
     pub boxed_pairs: u64,
-    /// Stage 1, preprocessing: projection, spherical harmonics or vertex shaders; and for triangles the fragment
-    /// shaders.
+    /// Pairs of a tile and a primitive whose bounding box touches it, for tiles of each of [`TILE_SIDES`]; 0 where that
+    /// is unknown. Only their ratios mean something, for lists are made by exact tests.
+    #[serde(default)]
+    pub sized_pairs: [u64; TILE_SIDES.len()],
+    /// Stage 1, preprocessing: projection, spherical harmonics or vertex programs.
     pub preprocess: ShaderWork,
-    /// Stage 2: making tile lists in depth order.
+    /// Stage 2: making tile lists, of Gaussians in depth order.
     pub sort: ShaderWork,
+    /// What follows rasterization: fragment programs.
+    #[serde(default)]
+    pub shade: ShaderWork,
     /// Tiles whose list is not empty, in the order in which they are dispatched.
     pub tiles: Vec<TileWork>,
 }
@@ -77,8 +92,12 @@ pub struct ShaderWork {
     pub special: f64,
     /// 64-bit operations.
     pub wide: f64,
-    /// Loads and stores.
+    /// Loads, stores and atomics.
     pub memory: f64,
+    /// Texture samples, image reads and writes.
+    pub image: f64,
+    /// Moves, conversions, control flow and exchanges between lanes, which cost issue slots alone.
+    pub other: f64,
     /// Bytes moved to and from main memory.
     pub bytes: f64,
 }
@@ -92,6 +111,8 @@ impl ShaderWork {
             special: self.special + other.special,
             wide: self.wide + other.wide,
             memory: self.memory + other.memory,
+            image: self.image + other.image,
+            other: self.other + other.other,
             bytes: self.bytes + other.bytes,
         }
     }
@@ -104,13 +125,15 @@ impl ShaderWork {
             special: self.special * factor,
             wide: self.wide * factor,
             memory: self.memory * factor,
+            image: self.image * factor,
+            other: self.other * factor,
             bytes: self.bytes * factor,
         }
     }
 
     /// All operations.
     pub fn operations(&self) -> f64 {
-        self.float + self.integer + self.special + self.wide + self.memory
+        self.float + self.integer + self.special + self.wide + self.memory + self.image + self.other
     }
 }
 
@@ -129,6 +152,18 @@ pub struct TileWork {
     pub contributions: u64,
     /// Pixels that were finished before the list's end.
     pub terminated: u32,
+    /// Primitives of the runs that were skipped because all of the tile's depths hide them.
+    #[serde(default)]
+    pub hidden: u32,
+    /// Pairs of a hidden primitive and a 4x4 block that it covers; they are not in the runs' `reached`.
+    #[serde(default)]
+    pub hidden_blocks: u32,
+    /// Quads of 2x2 pixels that went to fragment programs.
+    #[serde(default)]
+    pub quads: u32,
+    /// Quads that were covered, and of which early tests left nothing. Those of hidden primitives are not counted.
+    #[serde(default)]
+    pub killed: u32,
 }
 
 /// Consecutive primitives of a tile's list between two changes of what is finished.
@@ -186,7 +221,7 @@ impl TileWork {
                 reached: listed * TILE_GROUPS,
             }],
             contributions: u64::from(listed) * u64::from(TILE_PIXELS),
-            terminated: 0,
+            ..Self::default()
         }
     }
 
@@ -267,13 +302,30 @@ impl FrameWork {
         self.draws.iter().map(DrawWork::pairs).sum()
     }
 
-    /// Stages 1 and 2 of all draws.
-    pub fn shader(&self) -> [ShaderWork; 2] {
-        self.draws
-            .iter()
-            .fold(Default::default(), |[one, two], draw| {
-                [one.plus(&draw.preprocess), two.plus(&draw.sort)]
-            })
+    /// What shader cores do: dispatches, stages 1 and 2 of all draws, and what follows rasterization.
+    pub fn shader(&self) -> [ShaderWork; 4] {
+        let zero = ShaderWork::default();
+        self.draws.iter().fold(
+            [self.compute, zero, zero, zero],
+            |[compute, one, two, after], draw| {
+                [
+                    compute,
+                    one.plus(&draw.preprocess),
+                    two.plus(&draw.sort),
+                    after.plus(&draw.shade),
+                ]
+            },
+        )
+    }
+
+    /// The frame with the draws of one mode only, and no dispatches.
+    pub fn of_mode(&self, mode: Mode) -> Self {
+        let draws = self.draws.iter().filter(|draw| draw.mode == mode);
+        Self {
+            size: self.size,
+            draws: draws.cloned().collect(),
+            ..Self::default()
+        }
     }
 }
 
@@ -294,6 +346,7 @@ mod tests {
             runs: vec![run(3, 16, 16, 20), run(4, 9, 7, 8)],
             contributions: 100,
             terminated: 256,
+            ..TileWork::default()
         }
     }
 
@@ -330,6 +383,7 @@ mod tests {
                     tiles: vec![tile()],
                     ..DrawWork::default()
                 }],
+                ..FrameWork::default()
             }],
         };
         let text = serde_json::to_string(&trace).unwrap();

@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use timing::config::{Config, preset_names};
-use timing::work::{DrawWork, Mode, Run, Saturation, TileWork};
+use timing::work::{DrawWork, Mode, Run, Saturation, TILE_SIDES, TileWork};
 use timing::{FrameWork, fast, stepped};
 
 /// What a random trace is to press.
@@ -59,12 +59,19 @@ fn tile(random: &mut ChaCha8Rng, at: [u32; 2], mode: Mode, largest: f64) -> Tile
         rows = random.random_range(1..=rows);
         blocks = random.random_range(1..=blocks);
     }
+    let hidden = match mode {
+        Mode::Triangle => random.random_range(0..=needed),
+        Mode::Gaussian => 0,
+    };
     TileWork {
         at,
         listed,
         runs,
         contributions: u64::from(needed) * 20,
         terminated: if saturates { 256 } else { 0 },
+        hidden,
+        hidden_blocks: hidden * random.random_range(1..=16),
+        ..TileWork::default()
     }
 }
 
@@ -102,6 +109,7 @@ fn trace(random: &mut ChaCha8Rng, kind: Kind) -> FrameWork {
     FrameWork {
         size: [128, 128],
         draws,
+        ..FrameWork::default()
     }
 }
 
@@ -113,6 +121,13 @@ fn hardware(random: &mut ChaCha8Rng, kind: Kind) -> Config {
     let mut config = Config::preset(presets[random.random_range(0..presets.len())], &[]).unwrap();
     let raster = &mut config.rasterizer;
     raster.saturation = Saturation::ALL[random.random_range(0..Saturation::ALL.len())];
+    raster.triangle_traversal = Saturation::ALL[random.random_range(0..Saturation::ALL.len())];
+    raster.hierarchical_depth = random.random_bool(0.5);
+    raster.tile_side = if random.random_bool(0.7) {
+        16
+    } else {
+        TILE_SIDES[random.random_range(0..TILE_SIDES.len())]
+    };
     raster.batch = [8, 16, 32, 64, 128][random.random_range(0..5)];
     raster.modules = random.random_range(1..=16);
     raster.port_bytes_per_cycle = [4.0, 8.0, 16.0, 32.0][random.random_range(0..4)];

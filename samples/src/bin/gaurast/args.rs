@@ -105,6 +105,12 @@ pub struct RenderArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_SH_DEGREE)))]
     pub sh_degree: Option<u32>,
 
+    /// Count also what the simulated hardware would spend: cycles, stalls, energy
+    ///
+    /// `gaurast simulate` tells more, of any hardware.
+    #[arg(long)]
+    pub counters: bool,
+
     /// Print nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
@@ -131,6 +137,7 @@ impl Default for RenderArguments {
             size: None,
             background: None,
             sh_degree: None,
+            counters: false,
             quiet: false,
             output: vec![DEFAULT_OUTPUT.into()],
         }

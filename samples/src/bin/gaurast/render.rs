@@ -70,6 +70,9 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
 
     let step = progress.step("rendering");
     let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
+    if arguments.counters {
+        renderer.count_everything()?;
+    }
     let uploaded = renderer.upload(&scene, arguments.sh_degree)?;
     let frame = renderer.render(&uploaded, &camera)?;
     step.finish_and_clear();

@@ -6,7 +6,7 @@ use timing::Config;
 use timing::area;
 use timing::paper::Section;
 use timing::simulate::Simulation;
-use timing::work::FrameWork;
+use timing::work::{FrameWork, TileWork};
 
 fn new_table() -> Table {
     let mut table = Table::new();
@@ -56,17 +56,48 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
         format!("{:.0}", result.raster.pairs),
         none(),
     );
-    row(
-        "work",
-        "blended",
-        share(result.blended, 1.0),
-        "of the evaluations".to_owned(),
-    );
+    let evaluated = [
+        (
+            "blended",
+            result.blended,
+            result.raster.gaussian_evaluations,
+            "Gaussians'",
+        ),
+        (
+            "covered",
+            result.covered,
+            result.raster.triangle_evaluations,
+            "triangles'",
+        ),
+    ];
+    for (name, changed, evaluations, whose) in evaluated {
+        if evaluations > 0.0 {
+            let note = format!("of {whose} {evaluations:.0} evaluations");
+            row("work", name, share(changed, 1.0), note);
+        }
+    }
+    let tiles = || frame.draws.iter().flat_map(|draw| &draw.tiles);
+    let count = |of: fn(&TileWork) -> u32| tiles().map(|tile| u64::from(of(tile))).sum::<u64>();
+    let quads = count(|tile| tile.quads);
+    if quads > 0 {
+        let note = format!(
+            "early tests killed {}, and hid {} primitives in whole tiles",
+            count(|tile| tile.killed),
+            count(|tile| tile.hidden)
+        );
+        row("work", "quads shaded", quads.to_string(), note);
+    }
     let stages = &result.stages;
+    let always = |name: &str| name.starts_with("stage");
     for (name, roofline) in [
+        ("dispatches", &result.compute),
         ("stage 1, preprocess", &result.preprocess),
         ("stage 2, sort", &result.sort),
+        ("fragment programs", &result.shade),
     ] {
+        if !always(name) && roofline.milliseconds() == 0.0 {
+            continue;
+        }
         let note = format!(
             "compute {:.3}, memory {:.3} ms",
             roofline.compute_ms, roofline.memory_ms
@@ -83,7 +114,7 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
     for (cause, cycles) in modules.by_cause() {
         row("PE cycles", cause, share(cycles, modules.total()), none());
     }
-    let gb_s = |bytes: f64| format!("{:.1} GB/s", bytes / stages.raster * 1e-6);
+    let gb_s = |bytes: f64| format!("{:.1} GB/s", bytes / stages.raster.max(1e-9) * 1e-6);
     row(
         "memory",
         "primitives",
@@ -93,7 +124,7 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
     row("memory", "pixels", gb_s(result.raster.bytes_out), none());
     row(
         "memory",
-        "stages 1-2 meanwhile",
+        "shader cores meanwhile",
         format!("{:.1} GB/s", result.contention_gb_s),
         none(),
     );

@@ -181,6 +181,7 @@ fn draw(
             primitives,
             varyings: Varyings { values, per_vertex },
         }],
+        record: None,
     }
 }
 

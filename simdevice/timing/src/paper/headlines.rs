@@ -61,8 +61,8 @@ fn raster() -> Section {
 fn fps(before: f64, raster: f64, collaborative: bool) -> f64 {
     let stages = Stages {
         preprocess: before,
-        sort: 0.0,
         raster,
+        ..Stages::default()
     };
     let policy = Policy {
         collaborative,

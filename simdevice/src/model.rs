@@ -1,0 +1,122 @@
+//! The model of the hardware beside the command processor: what was recorded becomes counters.
+
+use crate::counters::{Counter, Counters};
+use crate::device::Device;
+use crate::packet::Rect;
+use timing::FrameWork;
+use timing::config::{Config, DEFAULT_PRESET};
+use timing::simulate::simulate;
+
+/// A command processor's view of the simulated hardware, which is the paper's.
+#[derive(Debug, Default)]
+pub(crate) struct Model {
+    /// Read when it is first needed.
+    config: Option<Config>,
+    /// Queries that are active.
+    queries: u32,
+    /// The first frame of the recorder that was not accounted for.
+    next: u64,
+}
+
+impl Model {
+    /// Whether what is done is accounted for.
+    fn is_on(&self, device: &Device) -> bool {
+        self.queries > 0 || device.config().simulated_timestamps
+    }
+
+    /// Begins to account for what is done; `area` is the current pass's, if there is one.
+    pub(crate) fn begin(&mut self, device: &Device, counters: &mut Counters, area: Option<Rect>) {
+        self.account(device, counters, area);
+        let recorder = device.listened_recorder();
+        recorder.listen();
+        if !self.is_on(device) {
+            // What others recorded before is none of this query's.
+            recorder.work_since(&mut self.next);
+        }
+        self.queries += 1;
+        if let Some(area) = area {
+            recorder.begin_frame(area);
+        }
+    }
+
+    /// Ends what [`Model::begin`] began.
+    pub(crate) fn end(&mut self, device: &Device, counters: &mut Counters, area: Option<Rect>) {
+        self.account(device, counters, area);
+        if self.queries > 0 {
+            self.queries -= 1;
+            device.listened_recorder().stop_listening();
+        }
+    }
+
+    /// Counts what was recorded since the last time. What a pass does from here on is a frame of its own, as its
+    /// tiles have been written: `area` is that pass's.
+    pub(crate) fn account(&mut self, device: &Device, counters: &mut Counters, area: Option<Rect>) {
+        if !self.is_on(device) {
+            return;
+        }
+        let recorder = device.listened_recorder();
+        let frames = recorder.work_since(&mut self.next);
+        if device.config().recorder.is_none() {
+            recorder.clear();
+        }
+        if let Some(area) = area {
+            recorder.begin_frame(area);
+        }
+        if frames.is_empty() {
+            return;
+        }
+        let config = match &self.config {
+            Some(config) => config,
+            None => match Config::preset(DEFAULT_PRESET, &[]) {
+                Ok(config) => self.config.insert(config),
+                Err(_) => return,
+            },
+        };
+        for frame in &frames {
+            add(counters, frame, config);
+        }
+    }
+}
+
+/// Adds what a frame costs.
+fn add(counters: &mut Counters, frame: &FrameWork, config: &Config) {
+    use Counter as C;
+    // One frame at a time: a timestamp or counter after it has waited for all of it.
+    let mut serial = config.clone();
+    serial.schedule.collaborative = false;
+    let result = simulate(frame, &serial);
+    let (stages, raster, energy) = (&result.stages, &result.raster, &result.energy);
+    let nanoseconds = [
+        (C::SimulatedTime, stages.total()),
+        (C::SimulatedCompute, stages.compute),
+        (C::SimulatedPreprocess, stages.preprocess),
+        (C::SimulatedSort, stages.sort),
+        (C::SimulatedRaster, stages.raster),
+        (C::SimulatedShade, stages.shade),
+    ];
+    let nanojoules = [
+        (C::SimulatedArithmeticEnergy, energy.arithmetic),
+        (C::SimulatedBufferEnergy, energy.buffers),
+        (C::SimulatedLeakageEnergy, energy.leakage),
+        (C::SimulatedMemoryEnergy, energy.memory),
+        (C::SimulatedShaderEnergy, energy.shader_cores),
+    ];
+    let modules = &raster.modules;
+    let counts = [
+        (C::SimulatedRasterCycles, raster.cycles),
+        (C::SimulatedBusy, modules.busy),
+        (C::SimulatedDependency, modules.dependency),
+        (C::SimulatedMemoryStall, modules.memory),
+        (C::SimulatedController, modules.controller),
+        (C::SimulatedModeSwitch, modules.mode_switch),
+        (C::SimulatedIdle, modules.idle),
+        (C::SimulatedSwitches, raster.switches),
+        (C::SimulatedBytesIn, raster.bytes_in),
+        (C::SimulatedBytesOut, raster.bytes_out),
+    ];
+    let millis = nanoseconds.into_iter().chain(nanojoules);
+    let scaled = millis.map(|(counter, value)| (counter, value * 1e6));
+    for (counter, value) in scaled.chain(counts) {
+        counters.add(counter, value.max(0.0).round() as u64);
+    }
+}

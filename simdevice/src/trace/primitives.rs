@@ -1,0 +1,176 @@
+//! Points, lines and triangles in the trace.
+
+use super::{DrawRecord, ShaderWork, shader_work, sized_tiles};
+use crate::counters::{Counter, Counters};
+use crate::geometry::PrimitiveDraw;
+use crate::packet::draw::Draw;
+use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use std::sync::PoisonError;
+use timing::work::{DrawWork, Mode, Run, TILE_GROUPS, TileWork};
+
+/// Numbers of a primitive that the rasterizer takes; GauRast, Table II.
+const NUMBERS_IN: u64 = 9;
+
+/// What a draw does in the tiles of a macro-tile.
+#[derive(Debug)]
+pub(crate) struct MacroTileWork {
+    tiles: Vec<TileWork>,
+}
+
+impl Default for MacroTileWork {
+    fn default() -> Self {
+        let tiles = (MAX_MACRO_TILE_SIZE / TILE_SIZE).pow(2);
+        Self {
+            tiles: vec![TileWork::default(); tiles as usize],
+        }
+    }
+}
+
+impl MacroTileWork {
+    /// A primitive's bounding box touches a tile, and it covers so many 4x4 blocks of it.
+    pub(crate) fn list(&mut self, tile: usize, blocks: u32) {
+        let tile = &mut self.tiles[tile];
+        tile.listed += 1;
+        if tile.runs.is_empty() {
+            tile.runs.push(Run {
+                rows: TILE_GROUPS as u8,
+                blocks: TILE_GROUPS as u8,
+                ..Run::default()
+            });
+        }
+        for run in &mut tile.runs {
+            run.primitives += 1;
+            run.reached += blocks;
+        }
+    }
+
+    /// The primitive that was listed last is hidden in all of a tile.
+    pub(crate) fn hide(&mut self, tile: usize, blocks: u32) {
+        let tile = &mut self.tiles[tile];
+        tile.hidden += 1;
+        tile.hidden_blocks += blocks;
+        for run in &mut tile.runs {
+            run.reached -= blocks;
+        }
+    }
+
+    /// Of a block's lanes that were covered, by sample, early tests left some.
+    pub(crate) fn test<const N: usize>(
+        &mut self,
+        tile: usize,
+        covered: &[u16; N],
+        left: &[u16; N],
+    ) {
+        let any = |lanes: &[u16; N]| lanes.iter().fold(0, |any, lanes| any | lanes);
+        let quads = |lanes: u16| {
+            let pairs = lanes | lanes >> 1;
+            ((pairs | pairs >> 2) & 0x1111).count_ones()
+        };
+        let (covered, left) = (any(covered), any(left));
+        let tile = &mut self.tiles[tile];
+        tile.quads += quads(left);
+        tile.killed += quads(covered) - quads(left);
+        tile.contributions += u64::from(left.count_ones());
+    }
+}
+
+impl DrawRecord {
+    /// A draw of primitives of which nothing is known yet.
+    pub(crate) fn primitives() -> DrawWork {
+        DrawWork {
+            mode: Mode::Triangle,
+            ..DrawWork::default()
+        }
+    }
+
+    /// Adds what came before the tiles of a part of a draw; `counters` are those of it alone.
+    pub(crate) fn add_front_end(&self, counters: &Counters, draw: &Draw, part: &PrimitiveDraw) {
+        let shaded = counters.get(Counter::VertexInvocations);
+        let drawn = counters.get(Counter::PrimitivesDrawn);
+        let attributes = draw.attributes.iter();
+        let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
+        // A position and the varyings.
+        let written = 4 * (4 + part.varyings_per_vertex() as u64);
+        let index = draw
+            .indices
+            .as_ref()
+            .map_or(0, |indices| indices.index_size);
+        let bytes = shaded * (read as u64 + written)
+            + counters.get(Counter::InputVertices) * u64::from(index)
+            + drawn * 4 * NUMBERS_IN;
+        let mut preprocess = shader_work(counters);
+        preprocess.bytes += bytes as f64;
+        let mut sized = [0; 4];
+        for primitive in part.chunks.iter().flat_map(|chunk| &chunk.primitives) {
+            let Some(&region) = part.regions.get(usize::from(primitive.viewport)) else {
+                continue;
+            };
+            let side = |axis: usize, of: fn(i32, i32) -> i32| {
+                let at = primitive.corners.map(|corner| corner[axis]);
+                f64::from(of(of(at[0], at[1]), at[2])) / 256.0
+            };
+            let (low, high) = (
+                [0, 1].map(|k| side(k, i32::min)),
+                [0, 1].map(|k| side(k, i32::max)),
+            );
+            for (sum, tiles) in sized.iter_mut().zip(sized_tiles(low, high, region)) {
+                *sum += tiles;
+            }
+        }
+        let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        work.primitives += counters.get(Counter::InputPrimitives);
+        work.drawn += drawn;
+        work.preprocess = work.preprocess.plus(&preprocess);
+        // Lists are made beside the shader cores, and cost them nothing but memory.
+        work.sort.bytes += 4.0 * sized[1] as f64;
+        for (sum, tiles) in work.sized_pairs.iter_mut().zip(sized) {
+            *sum += tiles;
+        }
+    }
+
+    /// Adds what was done in macro-tile `at` of `size` pixels; `counters` are those of it alone.
+    pub(crate) fn add_macro_tile(
+        &self,
+        at: [u32; 2],
+        size: u32,
+        done: MacroTileWork,
+        counters: &Counters,
+    ) {
+        let side = size / TILE_SIZE;
+        let listed = done.tiles.into_iter().enumerate();
+        let listed = listed.filter(|(_, tile)| tile.listed > 0);
+        let shade: ShaderWork = shader_work(counters);
+        let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        work.shade = work.shade.plus(&shade);
+        work.tiles.extend(listed.map(|(index, tile)| TileWork {
+            at: [
+                at[0] * side + index as u32 % side,
+                at[1] * side + index as u32 / side,
+            ],
+            ..tile
+        }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quads_and_blocks_are_counted_once() {
+        let mut work = MacroTileWork::default();
+        work.list(3, 5);
+        // Lanes of a quad are consecutive: of three quads covered, early tests leave one.
+        work.test(3, &[0x0F31], &[0x0030]);
+        work.test(3, &[0x0001, 0x0002], &[0x0001, 0]);
+        work.list(3, 16);
+        work.hide(3, 16);
+        work.list(3, 0);
+        let tile = &work.tiles[3];
+        assert_eq!((tile.listed, tile.runs[0].primitives), (3, 3));
+        assert_eq!((tile.runs[0].reached, tile.hidden_blocks), (5, 16));
+        assert_eq!((tile.quads, tile.killed, tile.hidden), (2, 2, 1));
+        assert_eq!(tile.contributions, 3);
+        assert_eq!(work.tiles[0], TileWork::default());
+    }
+}

@@ -1,0 +1,209 @@
+//! Scenes whose work is traced: triangles, Gaussians, both in one pass, and dispatches before them.
+
+use super::common::*;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use simdevice::bindings::Bindings;
+use simdevice::compute::{ComputeProgram, Dispatch};
+use simdevice::isa::builder::Builder;
+use simdevice::isa::ir::{Program, Rate, Type};
+use simdevice::isa::op::Op;
+use simdevice::packet::draw::*;
+use simdevice::packet::*;
+use simdevice::trace::Recorder;
+use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
+use std::sync::Arc;
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Triangles,
+    Gaussians,
+    /// Triangles, Gaussians, and triangles again, in one pass.
+    Mixed,
+    /// Dispatches alone.
+    Dispatches,
+}
+
+/// Every kind, with the name that files of it have.
+pub const KINDS: [(Kind, &str); 4] = [
+    (Kind::Triangles, "triangles"),
+    (Kind::Gaussians, "gaussians"),
+    (Kind::Mixed, "mixed"),
+    (Kind::Dispatches, "dispatches"),
+];
+
+/// A recording device's configuration, and where its work goes.
+pub fn recording() -> (Config, Arc<Recorder>) {
+    let recorder = Arc::new(Recorder::default());
+    let config = Config {
+        recorder: Some(Arc::clone(&recorder)),
+        ..Config::default()
+    };
+    (config, recorder)
+}
+
+/// Draws a scene in two frames, with `around` packets before and after all of it; the colour that it leaves.
+pub fn draw(kind: Kind, config: &Config, around: [&[Packet]; 2]) -> Vec<u8> {
+    let device = Arc::new(Device::new(config).unwrap());
+    let color = image(Format::R8G8B8A8Unorm, 1, 0);
+    let depth = image(Format::D32Sfloat, 1, 0);
+    let mut processor = CommandProcessor::new(Arc::clone(&device));
+    let mut packets = around[0].to_vec();
+    for frame in 0..2 {
+        if matches!(kind, Kind::Mixed | Kind::Dispatches) {
+            packets.push(dispatch(&device));
+        }
+        if kind == Kind::Dispatches {
+            continue;
+        }
+        let clear = |value| LoadOp::Clear(value);
+        packets.push(Packet::BeginRendering(Box::new(Rendering {
+            depth: Some(attachment(
+                &depth,
+                clear(ClearValue::DepthStencil {
+                    depth: 1.0,
+                    stencil: 0,
+                }),
+            )),
+            ..rendering(attachment(&color, clear(ClearValue::Float([0.0; 4]))))
+        })));
+        if kind != Kind::Gaussians {
+            packets.push(triangles(&device, 3 + frame, 300));
+        }
+        if kind != Kind::Triangles {
+            packets.extend(gaussians(5 + frame, 2000, OVER));
+        }
+        if kind == Kind::Mixed {
+            packets.push(triangles(&device, 7 + frame, 40));
+        }
+        packets.push(Packet::EndRendering);
+    }
+    for packet in packets.iter().chain(around[1]) {
+        processor.execute(packet).unwrap();
+    }
+    bytes(&color)
+}
+
+/// Of a triangle's vertex: a position and a colour, four numbers each.
+const FLOATS: usize = 8;
+
+/// A program that copies its inputs to outputs, the colours by way of some arithmetic.
+fn program(squared: std::ops::Range<usize>, count: usize) -> Program {
+    let mut b = Builder::new();
+    let inputs: Vec<_> = (0..count)
+        .map(|slot| b.input(slot as u32, Type::B32, Rate::Varying))
+        .collect();
+    for (slot, &input) in inputs.iter().enumerate() {
+        let value = if squared.contains(&slot) {
+            b.compute(Op::FMul, &[input, input])
+        } else {
+            input
+        };
+        let output = b.output(slot as u32, Type::B32);
+        b.assign(output, value);
+    }
+    b.finish().unwrap()
+}
+
+/// A dispatch that computes and keeps nothing.
+fn dispatch(device: &Device) -> Packet {
+    let mut b = Builder::new();
+    let mut value = b.lane_index();
+    for _ in 0..50 {
+        value = b.compute(Op::IMul, &[value, value]);
+    }
+    let output = b.output(0, Type::B32);
+    b.assign(output, value);
+    let program = b.finish().unwrap();
+    Packet::Dispatch(Box::new(Dispatch {
+        program: Arc::new(ComputeProgram::new(device, program, 64, 32, Vec::new()).unwrap()),
+        base: [0; 3],
+        count: [40, 2, 1],
+        bindings: Bindings::default(),
+    }))
+}
+
+/// `count` random triangles that hide each other, large ones first.
+fn triangles(device: &Device, seed: u64, count: u32) -> Packet {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut floats: Vec<f32> = Vec::new();
+    for number in 0..count {
+        let middle = [0; 2].map(|_| rng.random_range(-1.0..1.0f32));
+        let size = if number % 20 == 0 { 1.5 } else { 0.15 };
+        let z = rng.random_range(0.1..0.9f32);
+        for _ in 0..3 {
+            let [x, y] = middle.map(|at| at + rng.random_range(-size..size));
+            floats.extend([x, y, z, 1.0]);
+            floats.extend([0; 4].map(|_| rng.random_range(0.0..1.0f32)));
+        }
+    }
+    let size = 4 * floats.len() as u64;
+    let memory = Allocation::new_zeroed(size).unwrap();
+    memory.write(0, &floats).unwrap();
+    let stream = |offset| AttributeStream {
+        buffer: BufferRange {
+            memory: memory.clone(),
+            offset: 0,
+            size,
+        },
+        stride: 4 * FLOATS as u32,
+        offset,
+        format: Format::R32G32B32A32Sfloat,
+        instance_divisor: None,
+    };
+    let attribute =
+        |stream| (0..4).map(move |component| Some(VertexInput::Attribute { stream, component }));
+    let position = (0..4).map(|component| Some(VertexOutput::Position(component)));
+    let color = (0..4).map(|component| FragmentOutput::Color {
+        attachment: 0,
+        component,
+        index: 0,
+    });
+    let varying = |index| FragmentInput::Varying {
+        index,
+        interpolation: Interpolation::Perspective,
+        sampling: Sampling::Center,
+    };
+    let programs = DrawPrograms {
+        vertex: program(4..8, FLOATS),
+        vertex_inputs: attribute(0).chain(attribute(1)).collect(),
+        vertex_outputs: position
+            .chain((0..4).map(|number| Some(VertexOutput::Varying(number))))
+            .collect(),
+        varyings: 4,
+        fragment: Some(FragmentPrograms {
+            program: program(0..4, 4),
+            inputs: (0..4).map(|index| Some(varying(index))).collect(),
+            outputs: color.map(Some).collect(),
+            early_tests: false,
+            discards: false,
+            per_sample: false,
+            has_side_effects: false,
+        }),
+    };
+    let state = DrawState {
+        depth_stencil: DepthStencil {
+            depth: Some(DepthTest {
+                compare: CompareOp::Less,
+                write: true,
+            }),
+            bounds: None,
+            stencil: None,
+        },
+        ..DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT])
+    };
+    Packet::Draw(Box::new(Draw {
+        pipeline: Arc::new(DrawPipeline::new(device, &programs).unwrap()),
+        state: Arc::new(state),
+        attributes: vec![stream(0), stream(16)],
+        vertex_bindings: Bindings::default(),
+        fragment_bindings: Bindings::default(),
+        indices: None,
+        first: 0,
+        count: 3 * count,
+        first_instance: 0,
+        instance_count: 1,
+        draw_index: 0,
+    }))
+}
