@@ -489,7 +489,8 @@ impl<S: Simd> Operands<S> {
     }
 }
 
-/// Blends components of 0 to 1 by equations of which there is a kernel. The bits are those of [`ColorOutput::blend`].
+/// Blends components of 0 to 1 by equations of which there is a kernel; exceeds that only by rounding. What is stored has
+/// the bits that [`ColorOutput::blend`] leads to.
 #[inline(always)]
 fn blend_over<S: Simd>(
     simd: S,
@@ -504,11 +505,11 @@ fn blend_over<S: Simd>(
     let alpha = blended[3];
     let rest = f32x16::splat(simd, 1.0) - alpha;
     for (component, destination) in blended.iter_mut().zip(destination) {
-        let own = match over {
-            Over::Premultiplied => *component,
-            Over::Straight => *component * alpha,
+        *component = match over {
+            // The source may be brighter than its alpha allows.
+            Over::Premultiplied => (*component + *destination * rest).min(1.0),
+            Over::Straight => *component * alpha + *destination * rest,
         };
-        *component = own + *destination * rest;
     }
     blended
 }
