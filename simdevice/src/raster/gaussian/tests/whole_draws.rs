@@ -427,7 +427,7 @@ fn hidden(coefficients: [f32; 2], compare: CompareOp, stored: f32) -> Counters {
     );
     let mut tile = Box::new(GaussianTile::default());
     let mut counters = Counters::default();
-    let lanes = [ALL_LANES; BLOCKS];
+    let lanes = [u32::from(u16::MAX); BLOCKS];
     tile.passing.set(compare, &[stored.to_bits(); 256], &lanes);
     tile.run::<TEST_DEPTH>(&draw, device.level(), [2, 2], 0, &lanes, &mut counters);
     let pairs = counters.get(Counter::TilePairsEvaluated);

@@ -1,0 +1,138 @@
+//! What Gaussian mode accumulates for a tile's pixels, or for one sample of each.
+
+use super::{BLOCKS, LANES, TILE};
+use crate::gaussian::TILE_SIZE;
+use crate::packet::Rect;
+use crate::raster::tile::place;
+use fearless_simd::{Simd, f32x16, prelude::*};
+
+/// Accumulated colour and transmittance of a tile's pixels, or of one sample of each.
+///
+/// Arrays are indexed by block, row by row, then by pixel of the block in the order of [`place`].
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Layer {
+    pub(super) color: [[[f32; LANES]; BLOCKS]; 3],
+    /// Transmittance; negative where the pixel is finished or is not to be touched.
+    pub(super) transmittance: [[f32; LANES]; BLOCKS],
+    /// Bit `lane` of entry `block` tells that some Gaussian contributed.
+    pub(super) covered: [u32; BLOCKS],
+    /// The median depth as the attachment holds it, where covered, if the draw writes depth.
+    pub(super) median: [[u32; LANES]; BLOCKS],
+}
+
+/// Lanes by block.
+pub(super) type Lanes = [u32; BLOCKS];
+
+/// Every lane of a block.
+pub(super) const ALL_LANES: u32 = (1 << LANES) - 1;
+
+/// The block of a pixel of a tile, and the lane in it.
+pub(super) fn block_and_lane(x: usize, y: usize) -> (usize, usize) {
+    let place = place(x, y);
+    (place / LANES % BLOCKS, place % LANES)
+}
+
+impl Layer {
+    pub(super) const EMPTY: Self = Self {
+        color: [[[0.0; LANES]; BLOCKS]; 3],
+        transmittance: [[1.0; LANES]; BLOCKS],
+        covered: [0; BLOCKS],
+        median: [[0; LANES]; BLOCKS],
+    };
+
+    /// Makes the pixels in `lanes` fresh, and the others finished.
+    pub(super) fn clear(&mut self, lanes: &Lanes) {
+        self.color = [[[0.0; LANES]; BLOCKS]; 3];
+        self.covered = [0; BLOCKS];
+        for (block, &lanes) in self.transmittance.iter_mut().zip(lanes) {
+            if lanes == ALL_LANES {
+                *block = [1.0; LANES];
+                continue;
+            }
+            for (lane, t) in block.iter_mut().enumerate() {
+                *t = if lanes >> lane & 1 == 1 { 1.0 } else { -1.0 };
+            }
+        }
+    }
+
+    /// The premultiplied colour and coverage (C, 1 - T) of a block's lanes.
+    #[inline(always)]
+    pub(super) fn fragments<S: Simd>(&self, simd: S, block: usize) -> [f32x16<S>; 4] {
+        let [r, g, b] = &self.color;
+        let load = |lanes: &[f32; LANES]| f32x16::from_slice(simd, lanes);
+        let rest = load(&self.transmittance[block]).abs();
+        [
+            load(&r[block]),
+            load(&g[block]),
+            load(&b[block]),
+            f32x16::splat(simd, 1.0) - rest,
+        ]
+    }
+
+    /// Bit `block` tells that a pixel of the block is not finished.
+    #[inline(always)]
+    pub(super) fn open_blocks(&self) -> u64 {
+        let mut open = 0;
+        for (block, lanes) in self.transmittance.iter().enumerate() {
+            let any = lanes
+                .iter()
+                .fold(false, |any, &t| any | (t.to_bits() >> 31 == 0));
+            open |= u64::from(any) << block;
+        }
+        open
+    }
+
+    /// How many rows have a pixel that is not finished.
+    pub(super) fn open_rows(&self) -> u8 {
+        let open = |&y: &usize| {
+            (0..TILE).any(|x| {
+                let (block, lane) = block_and_lane(x, y);
+                self.transmittance[block][lane].is_sign_positive()
+            })
+        };
+        (0..TILE).filter(open).count() as u8
+    }
+
+    /// Pixels that are finished or were not to be touched.
+    pub(super) fn finished(&self) -> Lanes {
+        let mut finished = [0; BLOCKS];
+        for (finished, lanes) in finished.iter_mut().zip(&self.transmittance) {
+            for (lane, t) in lanes.iter().enumerate() {
+                *finished |= u32::from(t.is_sign_negative()) << lane;
+            }
+        }
+        finished
+    }
+}
+
+/// How many pixels `lanes` has.
+pub(super) fn count(lanes: &Lanes) -> u32 {
+    lanes.iter().map(|lanes| lanes.count_ones()).sum()
+}
+
+/// The pixels of `bounds` in the tile at `corner`.
+pub(super) fn lanes_within(bounds: Rect, corner: [u32; 2]) -> Lanes {
+    let tile = Rect {
+        x: corner[0] as i32,
+        y: corner[1] as i32,
+        width: TILE_SIZE,
+        height: TILE_SIZE,
+    };
+    let inside = bounds.intersect(tile);
+    if [inside.width, inside.height] == [TILE_SIZE; 2] {
+        return [ALL_LANES; BLOCKS];
+    }
+    let mut lanes = [0; BLOCKS];
+    if inside.is_empty() {
+        return lanes;
+    }
+    let first = [inside.x as u32 - corner[0], inside.y as u32 - corner[1]];
+    for y in first[1]..first[1] + inside.height {
+        for x in first[0]..first[0] + inside.width {
+            let (block, lane) = block_and_lane(x as usize, y as usize);
+            lanes[block] |= 1 << lane;
+        }
+    }
+    lanes
+}
