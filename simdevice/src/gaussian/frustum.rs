@@ -200,7 +200,7 @@ impl Frustum {
             for &([nx, ny, nz], per_scale, offset, error) in planes {
                 let slack = size.mul_add(error, scale.mul_add(per_scale, offset));
                 let value = x.mul_add(nx, y.mul_add(ny, z.mul_add(nz, slack)));
-                beside = beside | value.simd_lt(0.0);
+                beside |= value.simd_lt(0.0);
             }
             outside.beside.set(at, beside);
         }

@@ -433,9 +433,9 @@ impl Projection {
         let z = scratch.depth[at] as f32;
         let determinant = scratch.flat.determinant[at];
         // What is not a number is nowhere.
-        if !(self.near < z) {
+        if z.is_nan() || z <= self.near {
             Some(Counter::SkippedNear)
-        } else if !(z < self.far) {
+        } else if z >= self.far {
             Some(Counter::SkippedFar)
         } else if !(determinant > 0.0 && determinant.is_finite()) {
             Some(Counter::SkippedDegenerate)
@@ -548,11 +548,11 @@ fn find_sound<S: Simd>(simd: S, attributes: &Attributes, len: usize) -> [Bits; 3
         let mut largest = zero;
         for lanes in &attributes.rotation {
             let part = load(lanes);
-            nothing = nothing + part * zero;
+            nothing += part * zero;
             largest = largest.max(part.abs());
         }
         for lanes in attributes.position.iter().chain(&attributes.scale) {
-            nothing = nothing + load(lanes) * zero;
+            nothing += load(lanes) * zero;
         }
         let [finite, rotated, positive] = &mut sound;
         finite.set(at, nothing.simd_eq(zero));
