@@ -413,7 +413,8 @@ fn frames_are_benchmarked_and_held_against_the_oracle() {
         of.expect("measured")["error"].clone()
     };
     let max = error("Gaurast")["max"].as_f64().expect("a number");
-    assert!(max < 1e-3, "{max}");
+    // A Gaussian that counts or not at the floor of alpha makes this much.
+    assert!(max < 2.0 / 255.0, "{max}");
     let psnr = error("QuadsOnGaurast")["psnr"].as_f64().expect("a number");
     assert!(psnr > 40.0, "{psnr}");
 }
