@@ -13,6 +13,7 @@ use crate::camera::Camera;
 /// Gaussians of the object and of the ground, of a hundred; the others are background.
 const OBJECT: u32 = 30;
 const GROUND: u32 = 40;
+const DENSE: u32 = OBJECT + GROUND;
 
 /// The blobs that the object is made of.
 const BLOBS: usize = 12;
@@ -35,8 +36,8 @@ impl Scene {
         let mut sh = [[0.0; 3]; 16];
         for _ in 0..count {
             let (offset, spacing) = match rng.random_range(0..100) {
-                0..OBJECT => object(&mut rng, &blobs, count),
-                ..70 => ground(&mut rng, place.radius, count),
+                ..OBJECT => object(&mut rng, &blobs, count),
+                OBJECT..DENSE => ground(&mut rng, place.radius, count),
                 _ => background(&mut rng, place.radius, count),
             };
             let size = 0.8 * spacing * (0.7 * normal(&mut rng)).exp();
@@ -171,10 +172,7 @@ fn background(rng: &mut ChaCha8Rng, radius: f64, count: usize) -> (DVec3, f64) {
     let mut towards = direction(rng);
     towards.z = 0.7 * towards.z.abs() - 0.1;
     let area = TAU * distance * distance;
-    (
-        distance * towards,
-        spacing(area, 100 - OBJECT - GROUND, count),
-    )
+    (distance * towards, spacing(area, 100 - DENSE, count))
 }
 
 #[cfg(test)]

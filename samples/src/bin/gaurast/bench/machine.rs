@@ -75,7 +75,7 @@ impl Machine {
             "{}, {} processors, {:.0} GiB, {}; {}; load {:.1}",
             self.processor,
             self.processors,
-            self.memory as f64 / (1 << 30) as f64,
+            self.memory as f64 / f64::from(1 << 30),
             self.system,
             self.program,
             self.load

@@ -162,3 +162,43 @@ fn draw_panel<B: DrawingBackend>(
         .label_font(("sans-serif", 12))
         .draw()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plot_is_a_picture_and_a_drawing_with_its_words() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let stem = folder.path().join("new/plot");
+        let panel = |title: &str, points: Vec<[f64; 2]>| Panel {
+            title: title.to_owned(),
+            axes: ["time", "error"],
+            front: points.clone(),
+            series: vec![Series {
+                name: "contender".to_owned(),
+                points,
+                joined: true,
+            }],
+        };
+        let panels = [
+            panel("first", vec![[1.0, 1e-3], [10.0, 1e-7]]),
+            panel("one point", vec![[5.0, 2.0]]),
+            panel("nothing", Vec::new()),
+        ];
+        write(&stem, "machine", &panels).expect("plots");
+        let svg = std::fs::read_to_string(stem.with_extension("svg")).expect("a drawing");
+        for word in ["machine", "first", "one point", "contender", "Pareto front"] {
+            assert!(svg.contains(word), "{word}");
+        }
+        let png = image::open(stem.with_extension("png"))
+            .expect("a picture")
+            .into_rgb8();
+        assert_eq!(png.dimensions(), (2 * PANEL[0], 2 * PANEL[1] + 30));
+        let blue = COLORS[0];
+        assert!(
+            png.pixels()
+                .any(|pixel| pixel.0 == [blue.0, blue.1, blue.2])
+        );
+    }
+}
