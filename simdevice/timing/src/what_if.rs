@@ -138,9 +138,9 @@ mod tests {
         let mut frame = even_frame([320, 160], 60_000, 0.2);
         frame.draws[0].mode = Mode::Triangle;
         for tile in &mut frame.draws[0].tiles {
-            tile.runs[0].reached /= 4;
+            tile.runs[0].reached /= 2;
             tile.hidden = tile.listed / 3;
-            tile.hidden_blocks = 4 * tile.hidden;
+            tile.hidden_blocks = 8 * tile.hidden;
         }
         let config = Config::preset("single-module", &[]).unwrap();
         let variants = what_ifs(&frame, &config);

@@ -76,8 +76,8 @@ pub fn section() -> Option<Section> {
         title: "Pairs of generated scenes",
         text: "An illustration only: generated gardens with the published counts of Gaussians and sizes of pictures, drawn \
                along camera paths of the data set (stump along garden's, counter and kitchen along room's, which alone are \
-               at hand), turned and scaled to go around the garden. A garden's Gaussians are smaller and more even than a \
-               trained scene's, so that nothing here confirms or refutes the pairs that the times imply. Measured by \
+               at hand), turned and scaled to go around the garden. What lies in front of what decides how many \
+               pairs are needed, and in a garden that is another matter, so that nothing here confirms or refutes the pairs that the times imply. Measured by \
                `cargo run --release -p gaurast-samples --example paper_scenes -- CAMERAS > \
                simdevice/timing/generated_scenes.toml`; the test of this document doesn't repeat it."
             .to_owned(),
