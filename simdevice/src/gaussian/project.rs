@@ -38,6 +38,21 @@ pub(crate) struct Splat {
     pub color: [f32; 3],
     /// The centre's depth as the depth attachment holds it, if the draw tests or writes depth.
     pub depth: u32,
+    /// Whether its exponent is a difference of numbers so large that binary32 would lose it.
+    pub steep: bool,
+}
+
+/// The greatest logarithm of the opacity for which exponents are formed in binary32: what is lost of them grows with it.
+const STEEP_LOG2_OPACITY: f64 = 4.0;
+
+/// The greatest factor, in 1/px, for which they are: from a block's middle a pixel is 1.5 times this away. A low-pass
+/// variance of 0.3 px^2 keeps all factors below 1.6.
+const STEEP_FACTOR: f64 = 8.0;
+
+/// Whether a Gaussian's exponents must be formed in binary64. It depends on the Gaussian alone.
+fn is_steep(factor: [f64; 3], log2_opacity: f64) -> bool {
+    let largest = factor.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+    largest > STEEP_FACTOR || log2_opacity > STEEP_LOG2_OPACITY
 }
 
 /// Gaussians whose spherical harmonics are read together.
@@ -512,12 +527,14 @@ impl Projection {
                 };
                 let sequence = sequence(scratch.lanes[at]);
                 out.keys.push([self.key(at, sequence, scratch), sequence]);
+                let factor = [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]];
                 out.splats.push(Splat {
                     mean: [flat.mean[0][at], flat.mean[1][at]],
-                    factor: [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]],
+                    factor,
                     log2_opacity: flat.log2_opacity[at] as f32,
                     color,
                     depth: self.center_depth(at, scratch),
+                    steep: is_steep(factor, flat.log2_opacity[at]),
                 });
                 out.reaches.push(reach);
             }

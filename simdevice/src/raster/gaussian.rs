@@ -8,7 +8,9 @@
 //! Exponents are formed from the block's middle: the Cholesky factor times its offset from the mean is computed in
 //! binary64 and rounded once, and from there pixels are at most 1.5 away in x and y. Needles that cross many tiles
 //! and dust smaller than a pixel lose nothing alike; no position is ever rounded to binary32, and no value depends
-//! on where tiles begin.
+//! on where tiles begin. Where no filter widens a Gaussian thinner than a tenth of a pixel, or an opacity far above 1
+//! is to be outweighed, exponents are small differences of large numbers: those of such steep Gaussians are formed in
+//! binary64 at every pixel.
 //!
 //! A draw that tests depth leaves out, pixel by pixel, the Gaussians whose centre fails against what was stored before
 //! the draw ([`passing`]). What the tests of a whole draw do to a tile's samples is said in [`tile_draw`].
@@ -253,12 +255,38 @@ impl GaussianTile {
             let blocks = open.count_ones() as u8;
             let rows = if runs.is_some() { layer.open_rows() } else { 0 };
             let open = mask32x16::from_bitmask(simd, open);
-            let mut items = 0;
+            let (mut items, mut reached_before) = (0, 0);
             for (number, &primitive) in chunk.iter().enumerate() {
                 let (batch, place) = locate(primitive);
                 let splat = &task.splats[batch][place];
                 if DEPTH != NO_DEPTH && self.passing.hides(splat.depth) {
                     work.tiles_hidden += 1;
+                    continue;
+                }
+                if splat.steep {
+                    // What is before it is composited first.
+                    let before = &self.items[..items];
+                    work.contributions += layer.evaluate::<_, DEPTH>(
+                        simd,
+                        before,
+                        &self.chunk,
+                        &self.passing,
+                        task.thresholds,
+                    );
+                    let shown = if DEPTH == NO_DEPTH {
+                        open
+                    } else {
+                        open & self.passing.blocks(simd, splat.depth)
+                    };
+                    let (open, shown) = (u64::from(blocks), shown.to_bitmask());
+                    let exact = u64::from(shown.count_ones());
+                    work.open += open;
+                    work.blocks_hidden += open - exact;
+                    work.items += items as u64 + exact;
+                    reached_before += items as u32 + exact as u32;
+                    items = 0;
+                    work.contributions +=
+                        layer.evaluate_steep::<_, DEPTH>(simd, splat, shown, &self.passing, task);
                     continue;
                 }
                 let record = &mut self.chunk[number % CHUNK];
@@ -281,7 +309,7 @@ impl GaussianTile {
             work.pairs += chunk.len() as u64;
             work.items += items as u64;
             if let Some(runs) = &mut runs {
-                let (primitives, reached) = (chunk.len() as u32, items as u32);
+                let (primitives, reached) = (chunk.len() as u32, reached_before + items as u32);
                 trace::push_run(
                     runs,
                     Run {
@@ -313,10 +341,6 @@ impl Layer {
     ) -> u64 {
         let across = f32x16::simd_from(simd, LANE_X);
         let down = f32x16::simd_from(simd, LANE_Y);
-        let floor = f32x16::splat(simd, thresholds.alpha_floor);
-        let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
-        let finish = f32x16::splat(simd, thresholds.transmittance_floor);
-        let zero = f32x16::splat(simd, 0.0);
         let mut contributions = 0;
         for &item in items {
             let block = item as usize % BLOCKS;
@@ -326,36 +350,87 @@ impl Layer {
             let v = down.mul_add(f32x16::splat(simd, c), f32x16::splat(simd, g.v[block]));
             let v = across.mul_add(f32x16::splat(simd, b), v);
             let exponent = f32x16::splat(simd, g.log2_opacity) - v.mul_add(v, u * u);
-            let alpha = exp2(simd, exponent).min(ceiling);
-
-            let t = f32x16::from_slice(simd, &self.transmittance[block]);
-            let weight = t * alpha;
-            let rest = t - weight;
-            let mut reached = alpha.simd_ge(floor) & t.simd_ge(zero);
-            if DEPTH != NO_DEPTH {
-                reached &= passing.pixels(simd, block, g.depth);
-            }
-            let accepted = reached & rest.simd_ge(finish);
-            let finished = reached & rest.simd_lt(finish);
-            if DEPTH == FIND_MEDIAN {
-                let median = u32x16::from_slice(simd, &self.median[block]);
-                let first_half = accepted & t.simd_ge(0.5);
-                let median = first_half.select(u32x16::splat(simd, g.depth), median);
-                median.store_slice(&mut self.median[block]);
-            }
-            let t = accepted.select(rest, finished.select(zero - t, t));
-            t.store_slice(&mut self.transmittance[block]);
-            let weight = accepted.select(weight, zero);
-            for (channel, color) in self.color.iter_mut().zip(g.color) {
-                let sum = f32x16::from_slice(simd, &channel[block]);
-                let sum = weight.mul_add(f32x16::splat(simd, color), sum);
-                sum.store_slice(&mut channel[block]);
-            }
-            let accepted = accepted.to_bitmask() as u32;
-            self.covered[block] |= accepted;
-            contributions += u64::from(accepted.count_ones());
+            let look = (g.color, g.depth);
+            contributions +=
+                self.accumulate::<_, DEPTH>(simd, block, exponent, look, passing, thresholds);
         }
         contributions
+    }
+
+    /// As [`Layer::evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
+    #[inline(always)]
+    fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
+        &mut self,
+        simd: S,
+        splat: &Splat,
+        blocks: u64,
+        passing: &Passing,
+        task: &Task<'_>,
+    ) -> u64 {
+        let [a, b, c] = splat.factor;
+        let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
+        let (from_x, from_y) = (from_mean(0), from_mean(1));
+        let opacity = f64x8::splat(simd, splat.log2_opacity.into());
+        let mut contributions = 0;
+        for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
+            let middle = [BLOCK_X[block] + from_x, BLOCK_Y[block] + from_y];
+            let exponent = |first: usize| {
+                let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
+                let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
+                let (u, v) = (dx * a, dx * b + dy * c);
+                opacity - (u * u + v * v)
+            };
+            let exponent: f32x16<S> = exponent(0).narrow(exponent(8));
+            let look = (splat.color, splat.depth);
+            contributions +=
+                self.accumulate::<_, DEPTH>(simd, block, exponent, look, passing, task.thresholds);
+        }
+        contributions
+    }
+
+    /// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `exponent`; returns
+    /// how many pixels accepted it.
+    #[inline(always)]
+    fn accumulate<S: Simd, const DEPTH: DepthMode>(
+        &mut self,
+        simd: S,
+        block: usize,
+        exponent: f32x16<S>,
+        (color, depth): ([f32; 3], u32),
+        passing: &Passing,
+        thresholds: Thresholds,
+    ) -> u64 {
+        let floor = f32x16::splat(simd, thresholds.alpha_floor);
+        let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
+        let finish = f32x16::splat(simd, thresholds.transmittance_floor);
+        let zero = f32x16::splat(simd, 0.0);
+        let alpha = exp2(simd, exponent).min(ceiling);
+        let t = f32x16::from_slice(simd, &self.transmittance[block]);
+        let weight = t * alpha;
+        let rest = t - weight;
+        let mut reached = alpha.simd_ge(floor) & t.simd_ge(zero);
+        if DEPTH != NO_DEPTH {
+            reached &= passing.pixels(simd, block, depth);
+        }
+        let accepted = reached & rest.simd_ge(finish);
+        let finished = reached & rest.simd_lt(finish);
+        if DEPTH == FIND_MEDIAN {
+            let median = u32x16::from_slice(simd, &self.median[block]);
+            let first_half = accepted & t.simd_ge(0.5);
+            let median = first_half.select(u32x16::splat(simd, depth), median);
+            median.store_slice(&mut self.median[block]);
+        }
+        let t = accepted.select(rest, finished.select(zero - t, t));
+        t.store_slice(&mut self.transmittance[block]);
+        let weight = accepted.select(weight, zero);
+        for (channel, color) in self.color.iter_mut().zip(color) {
+            let sum = f32x16::from_slice(simd, &channel[block]);
+            let sum = weight.mul_add(f32x16::splat(simd, color), sum);
+            sum.store_slice(&mut channel[block]);
+        }
+        let accepted = accepted.to_bitmask() as u32;
+        self.covered[block] |= accepted;
+        u64::from(accepted.count_ones())
     }
 }
 
@@ -395,6 +470,8 @@ const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;
 /// The offset of each lane's pixel from the middle of its block.
 const LANE_X: [f32; LANES] = grid(true);
 const LANE_Y: [f32; LANES] = grid(false);
+const LANE_X_64: [f64; LANES] = widened(LANE_X);
+const LANE_Y_64: [f64; LANES] = widened(LANE_Y);
 /// The offset of the middle of each block from its tile's corner.
 const BLOCK_X: [f64; BLOCKS] = middles(true);
 const BLOCK_Y: [f64; BLOCKS] = middles(false);
@@ -409,6 +486,17 @@ const fn grid(column: bool) -> [f32; LANES] {
         let (x, y) = (pixel % BLOCK, pixel / BLOCK);
         out[place(x, y) % LANES] = (if column { x } else { y }) as f32 - HALF;
         pixel += 1;
+    }
+    out
+}
+
+/// The same numbers in binary64.
+const fn widened(lanes: [f32; LANES]) -> [f64; LANES] {
+    let mut out = [0.0; LANES];
+    let mut lane = 0;
+    while lane < LANES {
+        out[lane] = lanes[lane] as f64;
+        lane += 1;
     }
     out
 }

@@ -205,7 +205,13 @@ fn naive_sample(
         let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
         let u = mul_add(dx, f[0] as f32, u);
         let v = mul_add(dx, f[1] as f32, mul_add(dy, f[2] as f32, v));
-        let exponent = g.log2_opacity - mul_add(v, v, u * u);
+        let exponent = if g.steep {
+            let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
+            let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
+            (f64::from(g.log2_opacity) - (u * u + v * v)) as f32
+        } else {
+            g.log2_opacity - mul_add(v, v, u * u)
+        };
         let alpha = power(exponent).min(state.alpha_ceiling);
         if alpha < state.alpha_floor {
             continue;
@@ -305,6 +311,20 @@ fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint() {
             height: 51,
         },
     );
+}
+
+#[test]
+fn it_does_so_where_gaussians_are_steep() {
+    // Without a filter dust is thinner than a pixel by far.
+    let state = GaussianState {
+        low_pass_variance: 0.0,
+        ..defaults()
+    };
+    let device = Device::new(&Config::default()).unwrap();
+    let drawn = draw(5, 300, state.clone(), &device, WHOLE);
+    let steep = drawn.splats.iter().flatten().filter(|splat| splat.steep);
+    assert!(steep.count() > 10);
+    check(5, 300, &state, WHOLE);
 }
 
 #[test]
