@@ -16,7 +16,6 @@ use simdevice::skips::{Skip, Skips};
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 
-<<<<<<< HEAD
 /// Passes scalars on.
 fn pass_on(count: u32) -> Program {
     let mut b = Builder::new();
@@ -132,7 +131,8 @@ fn all_triangles(device: &Device) -> Vec<Packet> {
         triangles(device, &several, true),
         triangles(device, &large(0.7), true),
     ]
-=======
+}
+
 /// Gaussians in memory that only the device writes, most of them beside the scissor.
 fn mostly_beside(seed: u64, count: u32) -> Vec<Packet> {
     let mut packets = gaussians_in(false, seed, count, OVER);
@@ -145,7 +145,6 @@ fn mostly_beside(seed: u64, count: u32) -> Vec<Packet> {
         };
     }
     packets
->>>>>>> gsspeed
 }
 
 /// Few Gaussians, many, many that only the device can write, of which all are equally deep in one scene, and several draws with a clear between them; how the attachment begins.
