@@ -40,9 +40,13 @@ mod tests {
     fn work_and_memory_are_seen() {
         let before = processor_time().expect("known");
         let memory = std::hint::black_box(vec![1_u8; 32 << 20]);
-        let sum: u64 = memory.iter().map(|byte| u64::from(*byte)).sum();
-        assert_eq!(sum, 32 << 20);
-        assert!(processor_time().expect("known") > before);
+        // Other tests' threads may end meanwhile, and take their time with them.
+        let is_seen = (0..200).any(|_| {
+            let sum: u64 = memory.iter().map(|byte| u64::from(*byte)).sum();
+            assert_eq!(sum, 32 << 20);
+            processor_time().expect("known") > before
+        });
+        assert!(is_seen);
         assert!(peak_memory().expect("known") > 32 << 20);
     }
 }

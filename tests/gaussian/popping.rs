@@ -166,7 +166,12 @@ fn compare(name: &str, scene: SceneBuffers, camera: GaussianCameraGAURAST<'stati
 #[test]
 fn turning_pops_by_view_depth_and_not_by_distance() {
     let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
-    compare("a cloud", scenes::cloud(70, 4000, 1), camera);
+    let mut cloud = scenes::cloud(70, 4000, 1);
+    // Large enough to overlap, so that their order shows.
+    for scale in cloud.scales.as_flattened_mut() {
+        *scale *= 6.0;
+    }
+    compare("a cloud", cloud, camera);
 }
 
 #[test]

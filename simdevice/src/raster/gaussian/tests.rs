@@ -321,10 +321,10 @@ fn it_does_so_where_gaussians_are_steep() {
         ..defaults()
     };
     let device = Device::new(&Config::default()).unwrap();
-    let drawn = draw(5, 300, state.clone(), &device, WHOLE);
+    let drawn = draw(5, 3000, state.clone(), &device, WHOLE);
     let steep = drawn.splats.iter().flatten().filter(|splat| splat.steep);
     assert!(steep.count() > 10);
-    check(5, 300, &state, WHOLE);
+    check(5, 3000, &state, WHOLE);
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! A sweep as a picture.
 
 use plotters::prelude::*;
+use plotters::style::{FontStyle, register_font};
 use std::error::Error;
+use std::sync::Once;
 use timing::sensitivity::{Point, Sweep};
 use timing::simulate::Simulation;
 
@@ -16,6 +18,15 @@ type SpeedUp = fn(&Simulation) -> f64;
 /// # Errors
 /// What plotters cannot do.
 pub fn svg(sweep: &Sweep) -> Result<String, Box<dyn Error>> {
+    static FONT: Once = Once::new();
+    FONT.call_once(|| {
+        // The font is one, since it is part of the program.
+        let _ = register_font(
+            "sans-serif",
+            FontStyle::Normal,
+            epaint_default_fonts::UBUNTU_LIGHT,
+        );
+    });
     let mut out = String::new();
     {
         let root = SVGBackend::with_string(&mut out, SIZE).into_drawing_area();

@@ -419,7 +419,7 @@ fn hidden(coefficients: [f32; 2], compare: CompareOp, stored: f32) -> Counters {
     };
     let draw = draw_with_depth(
         3,
-        2000,
+        300,
         state,
         &device,
         WHOLE,
