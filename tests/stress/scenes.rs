@@ -405,7 +405,7 @@ fn attributes() -> Vec<Stress> {
     extremes.retain(is_mild);
     let lengths = |length: f32| {
         many(40, 100, move |_, g| {
-            g.rotation = g.rotation.map(|c| c * length)
+            g.rotation = g.rotation.map(|c| c * length);
         })
     };
     vec![
