@@ -3,8 +3,8 @@
 # not depend on what else the machine does. `check.sh PROGRAM` checks the `gaurast` program; `check.sh PROGRAM --store`
 # stores its count. The figure is that of the profile that tests/run.sh builds.
 #
-# The frame is the second of frames.jsonl, at the AVX2 level on one thread: its count is that of a run with both frames
-# less that of a run with the first alone.
+# The frame is the third of frames.jsonl, at the AVX2 level on one thread, since the second one makes the chunks: its
+# count is that of a run with all frames less that of a run with the first two.
 set -euo pipefail
 program=$(realpath "$1")
 folder=$(cd "$(dirname "$0")" && pwd)
@@ -23,7 +23,7 @@ count() { # count LINES: the instructions of a worker that is told that many lin
         GAURAST_SIMD=avx2 GAURAST_THREADS=1 valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" \
             bench-worker 2>&1 >/dev/null | sed -n 's/.*Collected : \([0-9]*\).*/\1/p'
 }
-frame=$(($(count 3) - $(count 2)))
+frame=$(($(count 4) - $(count 3)))
 if [ "${2:-}" = --store ]; then
     echo "$frame" >"$folder/stored.txt"
     echo "stored: $frame instructions"
