@@ -16,6 +16,7 @@ use gaurast_tests::contexts::{
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use plotters::prelude::*;
+use plotters::style::{FontStyle, register_font};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -211,6 +212,9 @@ fn errors(contexts: &[Context], view: &View) -> Vec<f64> {
 type Points = Vec<(f64, Vec<f64>)>;
 
 fn plot(path: &Path, results: &[(Sweep, Points)], levels: &[&str]) -> Result<(), Box<dyn Error>> {
+    // The font is one, since it is part of the program.
+    let font = epaint_default_fonts::UBUNTU_LIGHT;
+    let _ = register_font("sans-serif", FontStyle::Normal, font);
     let root = SVGBackend::new(path, (1200, 700)).into_drawing_area();
     root.fill(&WHITE)?;
     let cells = root.split_evenly((2, 3));
