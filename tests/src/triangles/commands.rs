@@ -67,11 +67,6 @@ impl Pass {
     }
 }
 
-// SAFETY of all calls: see `triangles`.
-#[expect(
-    clippy::undocumented_unsafe_blocks,
-    reason = "one reason for all of them, in the module's documentation"
-)]
 impl Commands {
     pub(super) fn new(gpu: &Gpu, raw: vk::CommandBuffer) -> Self {
         Self {
@@ -102,6 +97,7 @@ impl Commands {
             .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)];
         let all = vk::PipelineStageFlags::ALL_COMMANDS;
         let flags = vk::DependencyFlags::empty();
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_pipeline_barrier(self.raw, all, all, flags, &memory, &[], images);
@@ -123,6 +119,7 @@ impl Commands {
     /// Copies a buffer to an image.
     pub fn upload(&self, from: &Buffer, to: &Image, regions: &[vk::BufferImageCopy]) {
         let layout = vk::ImageLayout::GENERAL;
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_copy_buffer_to_image(self.raw, from.raw, to.raw, layout, regions);
@@ -134,6 +131,7 @@ impl Commands {
     pub fn download(&self, from: &Image, to: &Buffer, regions: &[vk::BufferImageCopy]) {
         let layout = vk::ImageLayout::GENERAL;
         self.barrier();
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_copy_image_to_buffer(self.raw, from.raw, layout, to.raw, regions);
@@ -149,6 +147,7 @@ impl Commands {
             self.whole(target);
         }
         draws();
+        // SAFETY: see `triangles`.
         unsafe { self.device().cmd_end_rendering(self.raw) };
         self.barrier();
     }
@@ -170,6 +169,7 @@ impl Commands {
             min_depth,
             max_depth,
         };
+        // SAFETY: see `triangles`.
         unsafe { self.device().cmd_set_viewport(self.raw, 0, &[viewport]) };
     }
 
@@ -179,12 +179,14 @@ impl Commands {
             offset: vk::Offset2D { x, y },
             extent: vk::Extent2D { width, height },
         };
+        // SAFETY: see `triangles`.
         unsafe { self.device().cmd_set_scissor(self.raw, 0, &[scissor]) };
     }
 
     /// Sets the stencil reference of both faces.
     pub fn stencil_reference(&self, reference: u32) {
         let faces = vk::StencilFaceFlags::FRONT_AND_BACK;
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_set_stencil_reference(self.raw, faces, reference);
@@ -195,6 +197,7 @@ impl Commands {
     pub fn bind(&self, pipeline: &Pipeline) {
         self.layout.set(pipeline.layout);
         let point = vk::PipelineBindPoint::GRAPHICS;
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_bind_pipeline(self.raw, point, pipeline.raw);
@@ -204,6 +207,7 @@ impl Commands {
     /// Binds a descriptor set to the pipeline bound last.
     pub fn bind_set(&self, bindings: &Bindings, dynamic_offsets: &[u32]) {
         let point = vk::PipelineBindPoint::GRAPHICS;
+        // SAFETY: see `triangles`.
         unsafe {
             self.device().cmd_bind_descriptor_sets(
                 self.raw,
@@ -220,6 +224,7 @@ impl Commands {
     pub fn push<T: bytemuck::Pod>(&self, offset: u32, constants: &[T]) {
         let bytes = bytemuck::cast_slice(constants);
         let stages = vk::ShaderStageFlags::ALL_GRAPHICS;
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_push_constants(self.raw, self.layout.get(), stages, offset, bytes);
@@ -233,6 +238,7 @@ impl Commands {
 
     /// Binds a vertex buffer to any binding.
     pub fn vertex_buffer(&self, binding: u32, buffer: &Buffer, offset: u64) {
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_bind_vertex_buffers(self.raw, binding, &[buffer.raw], &[offset]);
@@ -241,6 +247,7 @@ impl Commands {
 
     /// Binds an index buffer.
     pub fn indices(&self, buffer: &Buffer, offset: u64, index_type: vk::IndexType) {
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_bind_index_buffer(self.raw, buffer.raw, offset, index_type);
@@ -256,6 +263,7 @@ impl Commands {
     pub fn draw_instances(&self, vertices: std::ops::Range<u32>, instances: std::ops::Range<u32>) {
         let (count, first) = (vertices.end - vertices.start, vertices.start);
         let (many, first_instance) = (instances.end - instances.start, instances.start);
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_draw(self.raw, count, many, first, first_instance);
@@ -265,6 +273,7 @@ impl Commands {
     /// Draws indexed vertices, once.
     pub fn draw_indexed(&self, indices: std::ops::Range<u32>, vertex_offset: i32) {
         let (count, first) = (indices.end - indices.start, indices.start);
+        // SAFETY: see `triangles`.
         unsafe {
             self.device()
                 .cmd_draw_indexed(self.raw, count, 1, first, vertex_offset, 0);
