@@ -15,6 +15,7 @@
 //! A draw that tests depth leaves out, pixel by pixel, the Gaussians whose centre fails against what was stored before
 //! the draw ([`passing`]). What the tests of a whole draw do to a tile's samples is said in [`tile_draw`].
 
+mod exp2;
 mod layer;
 mod passing;
 pub(crate) mod tile_draw;
@@ -27,6 +28,7 @@ use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::packet::GaussianState;
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
+use exp2::exp2;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 use layer::{Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
@@ -558,45 +560,6 @@ fn append_items<S: Simd>(simd: S, number: usize, blocks: mask32x16<S>, items: &m
     let named = u32x16::simd_from(simd, BLOCK_NUMBERS) + (number * BLOCKS) as u32;
     named.compress(blocks).store_slice(items);
     blocks.to_bitmask().count_ones() as usize
-}
-
-/// A polynomial fitted to 2^f for f in [-1/2, 1/2], highest power first; relative error 9.2e-8.
-#[allow(
-    clippy::approx_constant,
-    reason = "the coefficients are fitted; one comes near ln 2"
-)]
-const POWER_OF_TWO: [f32; 6] = [
-    0.001_326_472_7,
-    0.009_671_513,
-    0.055_507_336,
-    0.240_222_42,
-    0.693_147,
-    1.0,
-];
-
-/// 2 to the power of `x`, for `x` below 1; below -126 the result is 2^-126. Error: at most 1.9 ulp with
-/// fused multiply-add, 2.1 ulp without (measured).
-///
-/// `x = n + f` with `f` in [-1/2, 1/2], and 2^f is [`POWER_OF_TWO`].
-#[allow(
-    clippy::approx_constant,
-    reason = "the coefficients are fitted; one comes near ln 2"
-)]
-#[inline(always)]
-fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
-    let constant = |value| f32x16::splat(simd, value);
-    let x = x.max(constant(-126.0)).min(constant(1.0));
-    // Adding 1.5 * 2^23 rounds to an integer, which then stands in the low bits.
-    let shifter = constant(12_582_912.0);
-    let shifted = x + shifter;
-    let f = x - (shifted - shifter);
-    let [first, rest @ ..] = POWER_OF_TWO;
-    let mut p = constant(first);
-    for coefficient in rest {
-        p = p.mul_add(f, constant(coefficient));
-    }
-    let exponent = shifted.to_bits() << 23;
-    f32x16::from_bits(p.to_bits() + exponent)
 }
 
 #[cfg(test)]

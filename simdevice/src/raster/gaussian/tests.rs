@@ -1,5 +1,6 @@
 mod whole_draws;
 
+use super::exp2::POWER_OF_TWO;
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;
