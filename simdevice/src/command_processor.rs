@@ -3,7 +3,7 @@
 use crate::compute;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
-use crate::gaussian::{GaussianSet, TooManyGaussians};
+use crate::gaussian::{GaussianSet, TooManyGaussians, Unresolved};
 use crate::geometry::{FrontEnd, Surface};
 use crate::model::Model;
 use crate::packet::Packet;
@@ -41,6 +41,15 @@ pub enum ExecutionError {
     /// A program ran for too long; what it wrote until then stays written.
     #[error(transparent)]
     Stopped(#[from] Stopped),
+}
+
+impl From<Unresolved> for ExecutionError {
+    fn from(why: Unresolved) -> Self {
+        match why {
+            Unresolved::TooManyGaussians(too_many) => too_many.into(),
+            Unresolved::Stopped(stopped) => stopped.into(),
+        }
+    }
 }
 
 /// Executes packets in order. Dropping it in the middle of a pass drops what was not flushed.
@@ -125,6 +134,17 @@ impl CommandProcessor {
             Packet::GaussianAppend(append) => {
                 let set = self.gaussians.as_mut();
                 set.ok_or(ExecutionError::NoGaussianSet)?.append(append);
+                Ok(())
+            }
+            Packet::GaussianAppendDraw(draw) => {
+                let set = self.gaussians.as_mut();
+                set.ok_or(ExecutionError::NoGaussianSet)?.append_draw(draw);
+                Ok(())
+            }
+            Packet::GaussianResolveShader(shader) => {
+                let set = self.gaussians.as_mut();
+                set.ok_or(ExecutionError::NoGaussianSet)?
+                    .shade_fragments(shader);
                 Ok(())
             }
             Packet::GaussianResolve => {

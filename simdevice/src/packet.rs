@@ -54,6 +54,12 @@ pub enum Packet {
     GaussianBegin(Box<GaussianBegin>),
     /// Adds Gaussians to the set.
     GaussianAppend(Box<GaussianAppend>),
+    /// Adds the Gaussians that a vertex program projects, one for each vertex: see [`draw::gaussian`]. Of the draw's
+    /// state only the first viewport counts, which may be upside down. Where keys are equal, they come after those that
+    /// were added with attributes.
+    GaussianAppendDraw(Box<draw::Draw>),
+    /// Has a fragment program make the colours of the set's fragments.
+    GaussianResolveShader(Box<draw::ResolveShader>),
     /// Ends the set: it is sorted, binned and becomes one draw of the current pass.
     GaussianResolve,
     /// Runs workgroups of a compute program.
@@ -297,6 +303,22 @@ pub struct Camera {
     pub depth_coefficients: [f32; 2],
 }
 
+impl Default for Camera {
+    /// At the origin, with focal lengths of one pixel, 3DGS's planes and a depth of 0.
+    fn default() -> Self {
+        Self {
+            model: CameraModel::Pinhole,
+            rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            eye: [0.0; 3],
+            focal_length: [1.0; 2],
+            principal_point: [0.0; 2],
+            near_plane: 0.2,
+            far_plane: f32::INFINITY,
+            depth_coefficients: [0.0; 2],
+        }
+    }
+}
+
 /// What Gaussians are sorted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GaussianOrder {
@@ -418,7 +440,7 @@ pub struct BlendState {
 pub struct GaussianBegin {
     /// What the pipeline fixes.
     pub state: Arc<GaussianState>,
-    /// The camera.
+    /// The camera, which means nothing to what a vertex program projects.
     pub camera: Camera,
     /// The viewport; its width and height are the W and H of the projection.
     pub viewport: Viewport,

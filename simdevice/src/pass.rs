@@ -305,8 +305,10 @@ impl Pass {
         };
         let done = device.install(|| rayon::broadcast(|_| work()));
         for draw in &frame.draws {
-            if let Ready::Primitives(draw) = draw {
-                draw.finish();
+            match draw {
+                Ready::Primitives(draw) => draw.finish(),
+                Ready::Gaussians(draw) => draw.finish(),
+                Ready::Nothing | Ready::Clear(_) => {}
             }
         }
         done
@@ -325,7 +327,7 @@ impl Pass {
                 draw,
                 targets,
                 self.samples,
-                device.level(),
+                device,
             ))),
             PassDraw::Primitives(draw) if draw.chunks.is_empty() => Ready::Nothing,
             PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TileDraw::new(
@@ -441,7 +443,8 @@ impl Frame<'_> {
                 Ready::Gaussians(draw) if layer == 0 => {
                     let (buffers, fragments) = (&mut worker.buffers, &mut worker.gaussians);
                     for tile in tiles() {
-                        draw.render(&tile, buffers, fragments, &mut worker.counters);
+                        let counters = &mut worker.counters;
+                        draw.render(&tile, buffers, fragments, counters, &self.cancel)?;
                     }
                 }
                 Ready::Gaussians(_) => {}

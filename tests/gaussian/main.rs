@@ -8,3 +8,4 @@ mod hybrid_scenes;
 mod interleavings;
 mod popping;
 mod reference;
+mod shaded;

@@ -74,8 +74,8 @@ impl GaussianAttributeLocationsGAURAST {
 ///
 /// Used with [`GaussianProjectionModeGAURAST::VERTEX_SHADER`]. The mean and the fragment depth come
 /// from `gl_Position`, by division and the viewport; no camera is read, and a Gaussian whose centre
-/// lies outside the clip volume in depth (0 <= z <= w) or has w <= 0 is skipped. The default has
-/// every location unused.
+/// lies outside the clip volume in depth (0 <= z <= w) or has w <= 0 is skipped. The locations that
+/// are used must differ from one another. The default has every location unused.
 #[repr(C)]
 #[derive(Copy, Clone, Debug, PartialEq, Eq, Hash)]
 #[must_use]
@@ -85,9 +85,10 @@ pub struct GaussianVertexOutputLocationsGAURAST {
     pub covariance: u32,
     /// The opacity, a `float`. Required.
     pub opacity: u32,
-    /// The colour, a `vec3`. Required.
+    /// The colour, a `vec3`, which is taken as it is written. Required.
     pub color: u32,
-    /// The key by which Gaussians are ordered, ascending, a `float`. Unused means `gl_Position.w`.
+    /// The key by which Gaussians are ordered, ascending, a `float`. Unused means `gl_Position.w`,
+    /// which an order by radial distance does not allow.
     pub depth_key: u32,
 }
 
@@ -123,9 +124,9 @@ impl GaussianVertexOutputLocationsGAURAST {
 pub struct GaussianResolveInputLocationsGAURAST {
     /// The accumulated colour and alpha, a `vec4`: (C, 1 - T), premultiplied.
     pub accumulated_color: u32,
-    /// The expected and the median fragment depth, a `vec2`: the mean weighted by T alpha, divided
-    /// by 1 - T; and the depth of the Gaussian at which T falls below one half, or of the last one
-    /// that contributed.
+    /// The expected and the median fragment depth, a `vec2`: the mean of the Gaussians that
+    /// contributed, weighted by T alpha; and the depth of the Gaussian at which T falls below one
+    /// half, or of the last one that contributed.
     pub depth: u32,
 }
 

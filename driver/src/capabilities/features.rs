@@ -114,7 +114,9 @@ const SUPPORTED: &[&str] = &[
     "orthographic_camera",
     "primitive_order",
     "radial_distance_order",
+    "resolve_fragment_shader",
     "uniform_buffer_camera",
+    "vertex_shader_projection",
 ];
 
 /// The extensions whose features can't be enabled without them. (Features of core need none.)
@@ -535,7 +537,7 @@ mod tests {
         >(2));
         names.extend(all_true::<
             PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-        >(10));
+        >(12));
         let names: HashSet<_> = names.into_iter().collect();
         assert_eq!(names, SUPPORTED.iter().copied().collect());
     }

@@ -58,6 +58,12 @@ fn end_set(command: &Command, state: &mut State, executor: &mut dyn Executor) ->
         | Command::DrawIndirect(_)
         | Command::BindVertexBuffers { .. }
         | Command::BindIndexBuffer(_) => Ok(()),
+        // What a vertex shader is bound to may change from draw to draw.
+        Command::BindSets(_) | Command::PushDescriptors(_) | Command::PushConstants { .. }
+            if state.shades_gaussians() =>
+        {
+            Ok(())
+        }
         _ => close_set(state, executor),
     }
 }
@@ -173,13 +179,13 @@ fn packets(state: &mut State, numbers: &Draw, draw_index: u32) -> Result<Vec<Pac
     let pipeline = state.pipeline.clone().ok_or(Undrawn::Pipeline)?;
     match &pipeline.primitive {
         Primitive::Gaussian(gaussian) => {
-            let append = gaussian::append(state, &pipeline, gaussian, numbers)?;
+            let append = gaussian::append(state, &pipeline, gaussian, numbers, draw_index)?;
             if state.set_is_open {
                 return Ok(vec![append]);
             }
-            let begin = gaussian::begin(state, gaussian)?;
+            let mut packets = gaussian::begin(state, gaussian)?;
             state.set_is_open = gaussian.merges_draws;
-            let mut packets = vec![begin, append];
+            packets.push(append);
             if !gaussian.merges_draws {
                 packets.push(Packet::GaussianResolve);
             }

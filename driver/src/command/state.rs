@@ -4,7 +4,7 @@ use super::bound::{BindPoint, BoundSets};
 use super::record::{IndexBuffer, VertexBuffer};
 use crate::object::pipeline::compute::ComputePipeline;
 use crate::object::pipeline::setting::Settings;
-use crate::object::pipeline::{GaussianPipeline, GraphicsPipeline};
+use crate::object::pipeline::{GaussianPipeline, GaussianSource, GraphicsPipeline, Primitive};
 use simdevice::packet::draw::DrawState;
 use simdevice::packet::{Camera, Rect, Viewport};
 use std::sync::Arc;
@@ -57,6 +57,13 @@ impl State {
         pipeline
             .scissor
             .or_else(|| self.scissors.first().copied().flatten())
+    }
+
+    /// Whether the pipeline's Gaussians are projected by a vertex shader.
+    pub(crate) fn shades_gaussians(&self) -> bool {
+        let primitive = self.pipeline.as_ref().map(|pipeline| &pipeline.primitive);
+        matches!(primitive, Some(Primitive::Gaussian(gaussian))
+            if matches!(gaussian.source, GaussianSource::VertexShader(_)))
     }
 
     /// The descriptor sets of a bind point.

@@ -1,12 +1,18 @@
 //! Lowers Gaussian draws: pipeline, bound buffers, viewport and camera to the packets of a sorted set.
 
-use super::bindings::Unbound;
+use super::bindings::{self, Unbound};
 use super::camera;
 use super::draw::{Undrawn, attribute_stream, indices};
 use crate::command::record::Draw;
 use crate::command::state::State;
-use crate::object::pipeline::{AttributeSource, CameraSource, GaussianPipeline, GraphicsPipeline};
+use crate::object::pipeline::gaussian_stages::VertexProjection;
+use crate::object::pipeline::{
+    AttributeSource, CameraSource, GaussianAttributeSources, GaussianPipeline, GaussianSource,
+    GraphicsPipeline,
+};
 use simdevice::Packet;
+use simdevice::bindings::Bindings;
+use simdevice::packet::draw::{self, DrawState, ResolveShader, Topology};
 use simdevice::packet::{
     Camera, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, Viewport,
 };
@@ -16,13 +22,24 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// [`Undrawn`] where bound state that the set needs is missing.
-pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Packet, Undrawn> {
-    Ok(Packet::GaussianBegin(Box::new(GaussianBegin {
+pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Packet>, Undrawn> {
+    let mut packets = vec![Packet::GaussianBegin(Box::new(GaussianBegin {
         state: fixed_state(state, gaussian)?,
         camera: enabled_camera(state, gaussian)?,
         viewport: upright(state.viewport(gaussian).ok_or(Undrawn::Viewport)?),
         scissor: state.scissor(gaussian).ok_or(Undrawn::Scissor)?,
-    })))
+    }))];
+    if let Some(stage) = &gaussian.resolve {
+        let (sets, constants) = (&state.graphics_sets, &state.push_constants);
+        packets.push(Packet::GaussianResolveShader(Box::new(ResolveShader {
+            program: Arc::clone(&stage.program),
+            bindings: bindings::bindings(&stage.descriptors, sets, constants)?,
+            sample_shading: stage.sample_shading,
+            alpha_to_coverage: stage.alpha_to_coverage,
+            alpha_to_one: stage.alpha_to_one,
+        })));
+    }
+    Ok(packets)
 }
 
 /// What adds a draw to a sorted set.
@@ -34,14 +51,55 @@ pub(crate) fn append(
     pipeline: &GraphicsPipeline,
     gaussian: &GaussianPipeline,
     draw: &Draw,
+    draw_index: u32,
 ) -> Result<Packet, Undrawn> {
+    let sources = match &gaussian.source {
+        GaussianSource::Attributes(sources) => sources,
+        GaussianSource::VertexShader(projection) => {
+            return shaded(state, pipeline, gaussian, projection, draw, draw_index);
+        }
+    };
     Ok(Packet::GaussianAppend(Box::new(GaussianAppend {
-        attributes: attributes(state, pipeline, gaussian)?,
+        attributes: attributes(state, pipeline, sources)?,
         indices: indices(state, draw)?,
         first: draw.first,
         count: draw.count,
         first_instance: draw.first_instance,
         instance_count: draw.instance_count,
+    })))
+}
+
+/// What adds a draw whose Gaussians a vertex shader projects.
+fn shaded(
+    state: &State,
+    pipeline: &GraphicsPipeline,
+    gaussian: &GaussianPipeline,
+    projection: &VertexProjection,
+    numbers: &Draw,
+    draw_index: u32,
+) -> Result<Packet, Undrawn> {
+    let attributes = projection
+        .attributes
+        .iter()
+        .map(|source| attribute_stream(state, pipeline, source));
+    let descriptors = &projection.descriptors;
+    let bindings = bindings::bindings(descriptors, &state.graphics_sets, &state.push_constants)?;
+    let viewport = state.viewport(gaussian).ok_or(Undrawn::Viewport)?;
+    Ok(Packet::GaussianAppendDraw(Box::new(draw::Draw {
+        pipeline: Arc::clone(&projection.programs),
+        attributes: attributes.collect::<Result<_, _>>()?,
+        vertex_bindings: bindings,
+        fragment_bindings: Bindings::default(),
+        indices: indices(state, numbers)?,
+        first: numbers.first,
+        count: numbers.count,
+        first_instance: numbers.first_instance,
+        instance_count: numbers.instance_count,
+        draw_index,
+        state: Arc::new(DrawState {
+            viewports: vec![viewport],
+            ..DrawState::new(Topology::PointList, [0; 2])
+        }),
     })))
 }
 
@@ -57,6 +115,7 @@ fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, 
 /// The camera that a draw is given.
 fn camera(state: &State, source: CameraSource) -> Result<Camera, Undrawn> {
     let (set, binding) = match source {
+        CameraSource::None => return Ok(Camera::default()),
         CameraSource::Command => return state.camera.ok_or(Undrawn::Camera),
         CameraSource::UniformBuffer { set, binding } => (set, binding),
     };
@@ -100,15 +159,15 @@ fn upright(viewport: Viewport) -> Viewport {
 fn attributes(
     state: &State,
     pipeline: &GraphicsPipeline,
-    gaussian: &GaussianPipeline,
+    sources: &GaussianAttributeSources,
 ) -> Result<GaussianAttributes, Undrawn> {
     let stream = |source: &AttributeSource| attribute_stream(state, pipeline, source);
     Ok(GaussianAttributes {
-        position: stream(&gaussian.position)?,
-        scale: stream(&gaussian.scale)?,
-        rotation: stream(&gaussian.rotation)?,
-        opacity: stream(&gaussian.opacity)?,
-        spherical_harmonics: gaussian
+        position: stream(&sources.position)?,
+        scale: stream(&sources.scale)?,
+        rotation: stream(&sources.rotation)?,
+        opacity: stream(&sources.opacity)?,
+        spherical_harmonics: sources
             .spherical_harmonics
             .iter()
             .map(stream)

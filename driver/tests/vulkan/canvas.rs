@@ -43,6 +43,7 @@ pub struct Canvas {
 }
 
 /// A descriptor set and what it is made of.
+#[derive(Clone, Copy)]
 pub struct Set {
     pub set: vk::DescriptorSet,
     pub layout: vk::DescriptorSetLayout,

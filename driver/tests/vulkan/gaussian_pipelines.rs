@@ -5,8 +5,7 @@ use crate::scene::{PipelineRequest, over, replace};
 use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
-    GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -102,10 +101,6 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
     let gpu = Gpu::new();
     let bad = [
         (
-            with_state(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)),
-            "vertexShaderProjection",
-        ),
-        (
             with_state(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
             "perPixelOrder",
         ),
@@ -185,7 +180,7 @@ fn attributes_must_be_in_the_vertex_input_state() {
 }
 
 #[test]
-fn fixed_function_projection_has_no_stages() {
+fn fixed_function_projection_has_no_vertex_stage() {
     let gpu = Gpu::new();
     // SAFETY: see the crate.
     unsafe {
@@ -204,9 +199,10 @@ fn fixed_function_projection_has_no_stages() {
         };
         let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
         assert_refused(&gpu, &request, error, "VERTEX");
-        request.stages = vec![stage(vk::ShaderStageFlags::FRAGMENT)];
-        let error = vk::Result::ERROR_FEATURE_NOT_PRESENT;
-        assert_refused(&gpu, &request, error, "resolveFragmentShader");
+        request.stages = vec![stage(vk::ShaderStageFlags::GEOMETRY)];
+        assert_refused(&gpu, &request, error, "GEOMETRY");
+        request.stages = vec![stage(vk::ShaderStageFlags::FRAGMENT); 2];
+        assert_refused(&gpu, &request, error, "several");
         gpu.device.destroy_shader_module(module, None);
         let text = vk::ShaderModuleCreateInfo::default().code(&[1, 2, 3]);
         assert!(gpu.device.create_shader_module(&text, None).is_err());

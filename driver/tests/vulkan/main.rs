@@ -11,6 +11,7 @@ mod dynamic_states;
 mod gaussian_draws;
 mod gaussian_modes;
 mod gaussian_pipelines;
+mod gaussian_shaders;
 mod gpu;
 mod image_transfers;
 mod images_in_shaders;

@@ -209,6 +209,9 @@ fn every_statement_is_reported_by_its_id() {
         "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
         with_a_vertex_stage(&gpu),
     );
+    for (id, messages) in crate::gaussian_shaders::broken() {
+        heard(id, messages);
+    }
     for (id, camera) in cameras() {
         let recorded = gpu.record(|_, commands| {
             // SAFETY: see the crate.

@@ -43,9 +43,14 @@ impl CenterDepth {
     pub(crate) fn code(&self, z: f32) -> u32 {
         let z = f64::from(z);
         let [c0, c1] = self.coefficients;
-        let depth = clamp(c0 + if self.is_linear { c1 * z } else { c1 / z });
+        self.encode(c0 + if self.is_linear { c1 * z } else { c1 / z })
+    }
+
+    /// The depth of a centre whose normalised device coordinate is `depth`, clamped, mapped and rounded so.
+    #[inline]
+    pub(crate) fn encode(&self, depth: f64) -> u32 {
         let [near, far] = self.range;
-        let depth = clamp(near + depth * (far - near));
+        let depth = clamp(near + clamp(depth) * (far - near));
         match self.code {
             DepthCode::Float => (depth as f32).to_bits(),
             DepthCode::Unorm(bits) => {
@@ -53,6 +58,11 @@ impl CenterDepth {
                 (depth * greatest).round_ties_even() as u32
             }
         }
+    }
+
+    /// How the numbers mean depths.
+    pub(crate) fn unit(&self) -> DepthCode {
+        self.code
     }
 
     /// How [`CenterDepth::code`] changes as z grows; every operation in it is monotonic, its rounding included. Only

@@ -1,7 +1,7 @@
 //! Gaussian draws: from vertex attributes to a binned, depth-sorted set that the tile engine renders.
 //!
 //! Stages, each in a module: [`fetch`] (attributes to lanes), [`project`] (3D to the rasterizer's nine numbers, with
-//! [`linearize`] for cameras that are no pinholes),
+//! [`linearize`] for cameras that are no pinholes; [`shaded`] where a vertex program does it instead),
 //! [`depth`] (what the depth test compares), [`footprint`] (which tiles), [`spherical_harmonics`] (colour), [`sort`] (depth order); then
 //! [`binning`](crate::binning) places them in tile lists.
 
@@ -15,6 +15,7 @@ mod lanes;
 mod linearize;
 pub(crate) mod project;
 mod scratch;
+mod shaded;
 #[doc(hidden)] // For the benchmarks.
 pub mod sort;
 pub mod spherical_harmonics;
@@ -25,7 +26,9 @@ use crate::binning::TileLists;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::format::Format;
+use crate::packet::draw::{Draw, ResolveShader};
 use crate::packet::{GaussianAppend, GaussianBegin, GaussianOrder, GaussianState, Rect, Viewport};
+use crate::raster::DepthCode;
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, DrawRecord};
 use chunks::{Chunk, Chunks};
@@ -34,6 +37,7 @@ use fearless_simd::dispatch;
 use fetch::{BATCH, Batch, Fetcher};
 use footprint::Visible;
 use frustum::{Frustum, Outside};
+use isa::exec::Stopped;
 use project::{Projected, Projection, Source, Splat};
 use rayon::prelude::*;
 use scratch::{Attributes, Scratch};
@@ -52,7 +56,12 @@ pub struct GaussianSet {
     begin: GaussianBegin,
     bounds: Rect,
     depth: Option<CenterDepth>,
+    /// What depths are rounded to.
+    depth_format: Format,
+    resolve: Option<ResolveShader>,
     appends: Vec<GaussianAppend>,
+    /// Those that a vertex program projects, which come after the others.
+    draws: Vec<Draw>,
 }
 
 /// The set has more Gaussians than one draw can sort.
@@ -63,6 +72,17 @@ pub struct GaussianSet {
 pub struct TooManyGaussians {
     /// How many batches it would take.
     pub batches: u64,
+}
+
+/// Why a set could not be resolved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unresolved {
+    /// It is too large.
+    #[error(transparent)]
+    TooManyGaussians(#[from] TooManyGaussians),
+    /// A vertex program ran for too long.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// A resolved set: sorted, binned, immutable.
@@ -77,6 +97,10 @@ pub struct GaussianDraw {
     pub(crate) tiles: TileLists,
     /// What is left out in its tiles.
     pub(crate) skips: Skips,
+    /// What makes the colours of its fragments.
+    pub(crate) resolve: Option<ResolveShader>,
+    /// How its depths are numbers.
+    pub(crate) depth_unit: DepthCode,
     /// How the depths of a tile's list follow one another.
     pub(crate) depth_trend: Trend,
     /// Where the work of its tiles goes, if anybody wants to know.
@@ -114,7 +138,10 @@ impl GaussianSet {
             depth: depth
                 .filter(|_| begin.state.depth_stencil.depth.is_some())
                 .map(|format| CenterDepth::new(&begin.camera, &begin.viewport, format)),
+            depth_format: depth.unwrap_or(Format::D32Sfloat),
+            resolve: None,
             appends: Vec::new(),
+            draws: Vec::new(),
         }
     }
 
@@ -125,19 +152,40 @@ impl GaussianSet {
         }
     }
 
+    /// Has a fragment program make the colours of the set's fragments.
+    pub fn shade_fragments(&mut self, shader: &ResolveShader) {
+        if shader.program.reads_depth() {
+            let begin = &self.begin;
+            self.depth = Some(CenterDepth::new(
+                &begin.camera,
+                &begin.viewport,
+                self.depth_format,
+            ));
+        }
+        self.resolve = Some(shader.clone());
+    }
+
+    /// Adds Gaussians that a vertex program projects.
+    pub fn append_draw(&mut self, draw: &Draw) {
+        if draw.count > 0 && draw.instance_count > 0 {
+            self.draws.push(draw.clone());
+        }
+    }
+
     /// Projects, sorts and bins the set.
     ///
     /// # Errors
-    /// [`TooManyGaussians`] if the set exceeds what 32 bits can name.
+    /// [`Unresolved`] if the set exceeds what 32 bits can name, or a vertex program runs for too long.
     pub fn resolve(
         self,
         device: &Device,
         counters: &mut Counters,
-    ) -> Result<GaussianDraw, TooManyGaussians> {
+    ) -> Result<GaussianDraw, Unresolved> {
         let chunks = self.find_chunks(device, counters);
         let started = Instant::now();
         let mut work = Counters::default();
-        let batches = self.project(device, &chunks, &mut work)?;
+        let mut batches = self.project(device, &chunks, &mut work)?;
+        self.shade(device, &mut batches)?;
         for batch in &batches {
             work.add_all(&batch.counters);
         }
@@ -161,9 +209,12 @@ impl GaussianSet {
         });
         Ok(GaussianDraw {
             depth_trend: match (self.depth, self.begin.state.order) {
-                (Some(depth), GaussianOrder::ViewDepth) => depth.trend(),
+                // What a program sorts by need not follow its depths.
+                (Some(depth), GaussianOrder::ViewDepth) if self.draws.is_empty() => depth.trend(),
                 _ => Trend::None,
             },
+            depth_unit: self.depth.map_or(DepthCode::Float, |depth| depth.unit()),
+            resolve: self.resolve,
             state: self.begin.state,
             bounds: self.bounds,
             splats,
@@ -207,6 +258,7 @@ impl GaussianSet {
             u64::from(per_instance) * u64::from(append.instance_count)
         };
         let batches = self.appends.iter().map(batches);
+        let batches = batches.chain(self.draws.iter().map(shaded::batches));
         let batches = batches.fold(0, u64::saturating_add);
         if batches > MAX_BATCHES {
             return Err(TooManyGaussians { batches });
@@ -264,7 +316,22 @@ impl GaussianSet {
         true
     }
 
-    /// Projects everything. What is left out with its chunk is counted in `counters`.
+    /// Shades and projects what vertex programs project.
+    fn shade(&self, device: &Device, batches: &mut Vec<Projected>) -> Result<(), Stopped> {
+        let mut sequence = 0u32;
+        for append in &self.appends {
+            let gaussians = append.count.wrapping_mul(append.instance_count);
+            sequence = sequence.wrapping_add(gaussians);
+        }
+        for draw in &self.draws {
+            batches.extend(shaded::project(self, draw, sequence, device)?);
+            let gaussians = draw.count.wrapping_mul(draw.instance_count);
+            sequence = sequence.wrapping_add(gaussians);
+        }
+        Ok(())
+    }
+
+    /// Projects what has attributes. What is left out with its chunk is counted in `counters`.
     fn project(
         &self,
         device: &Device,

@@ -11,7 +11,7 @@ use super::footprint::{Ellipse, Reach, Span, Visible};
 use super::frustum::Frustum;
 use super::lanes::{Bits, F32_LANES, Lanes, log2};
 use super::linearize;
-use super::scratch::{Attributes, Scratch};
+use super::scratch::{Attributes, Flat, Scratch};
 use super::sort::ordered_bits;
 use super::spherical_harmonics;
 use crate::counters::{Counter, Counters};
@@ -40,6 +40,22 @@ pub(crate) struct Splat {
     pub depth: u32,
     /// Whether its exponent is a difference of numbers so large that binary32 would lose it.
     pub steep: bool,
+}
+
+impl Splat {
+    /// A lane's.
+    #[inline(always)]
+    pub(super) fn new(flat: &Flat, at: usize, color: [f32; 3], depth: u32) -> Self {
+        let factor = [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]];
+        Self {
+            mean: [flat.mean[0][at], flat.mean[1][at]],
+            factor,
+            log2_opacity: flat.log2_opacity[at] as f32,
+            color,
+            depth,
+            steep: is_steep(factor, flat.log2_opacity[at]),
+        }
+    }
 }
 
 /// The greatest logarithm of the opacity for which exponents are formed in binary32: what is lost of them grows with it.
@@ -107,7 +123,7 @@ pub(crate) struct Projection {
 }
 
 impl Projected {
-    fn reserve(&mut self, count: usize) {
+    pub(super) fn reserve(&mut self, count: usize) {
         self.splats.reserve_exact(count);
         self.keys.reserve_exact(count);
         self.reaches.reserve_exact(count);
@@ -341,7 +357,7 @@ impl Projection {
         let (scale, rotation, opacity) = (&*scratch.scale, &*scratch.rotation, &*scratch.opacity);
         let flat = &mut *scratch.flat;
         let r = self.rotation;
-        let (one, two, low_pass) = (number(1.0), number(2.0), number(self.low_pass));
+        let (one, two) = (number(1.0), number(2.0));
         for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
             let store = |value: S::f64s, lanes: &mut Lanes| {
                 value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
@@ -403,33 +419,14 @@ impl Projection {
             let area2 = cx * cx + cy * cy + cz * cz;
             let xx = ax * ax + ay * ay + az * az;
             let yy = bx * bx + by * by + bz * bz;
-            let determinant = area2 + low_pass * (xx + yy) + low_pass * low_pass;
-            store(determinant, &mut flat.determinant);
-            let mut o = load(opacity, at);
-            if self.compensated {
-                o *= (area2 / determinant).sqrt();
-            }
-            let log2_opacity = log2(simd, o);
-            store(log2_opacity, &mut flat.log2_opacity);
-
-            let (a, b, c) = (xx + low_pass, ax * bx + ay * by + az * bz, yy + low_pass);
-            // alpha = opacity exp(-q / 2) = 2^(log2 opacity - q / (2 ln 2)), and
-            // q = d.x^2 / a + (a / det) (d.y - (b / a) d.x)^2.
-            let unit = (0.5 / LN_2).sqrt();
-            let vertical = (a / determinant).sqrt() * unit;
-            store(number(unit) / a.sqrt(), &mut flat.factor[0]);
-            store(-(b / a) * vertical, &mut flat.factor[1]);
-            store(vertical, &mut flat.factor[2]);
-            // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
-            // pixel that it would accept. What cannot reach the floor even so has a negative extent.
-            let room = log2_opacity - self.log2_floor;
-            let extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
-            let half_x = (a * extent).sqrt();
-            store(half_x, &mut flat.half[0]);
-            store((c * extent).sqrt(), &mut flat.half[1]);
-            store(b / c, &mut flat.slope);
-            store(determinant / (c * c), &mut flat.narrowing);
-            store(b * half_x / a, &mut flat.peak);
+            self.shape(
+                simd,
+                at,
+                [xx, ax * bx + ay * by + az * bz, yy],
+                area2,
+                load(opacity, at),
+                flat,
+            );
 
             let d = &scratch.offset;
             let [dx, dy, dz] = [load(&d[0], at), load(&d[1], at), load(&d[2], at)];
@@ -440,6 +437,51 @@ impl Projection {
                 store(d / norm, lanes);
             }
         }
+    }
+
+    /// What the tile engine and the search for tiles need of Gaussians from lane `at` on, given their covariances on the
+    /// screen before the low-pass filter (xx, xy, yy), the determinants of those, and opacities.
+    #[inline(always)]
+    pub(super) fn shape<S: Simd>(
+        &self,
+        simd: S,
+        at: usize,
+        [xx, xy, yy]: [S::f64s; 3],
+        area2: S::f64s,
+        mut o: S::f64s,
+        flat: &mut Flat,
+    ) {
+        let number = |value: f64| S::f64s::splat(simd, value);
+        let store = |value: S::f64s, lanes: &mut Lanes| {
+            value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
+        };
+        let low_pass = number(self.low_pass);
+        let determinant = area2 + low_pass * (xx + yy) + low_pass * low_pass;
+        store(determinant, &mut flat.determinant);
+        if self.compensated {
+            o *= (area2 / determinant).sqrt();
+        }
+        let log2_opacity = log2(simd, o);
+        store(log2_opacity, &mut flat.log2_opacity);
+
+        let (a, b, c) = (xx + low_pass, xy, yy + low_pass);
+        // alpha = opacity exp(-q / 2) = 2^(log2 opacity - q / (2 ln 2)), and
+        // q = d.x^2 / a + (a / det) (d.y - (b / a) d.x)^2.
+        let unit = (0.5 / LN_2).sqrt();
+        let vertical = (a / determinant).sqrt() * unit;
+        store(number(unit) / a.sqrt(), &mut flat.factor[0]);
+        store(-(b / a) * vertical, &mut flat.factor[1]);
+        store(vertical, &mut flat.factor[2]);
+        // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
+        // pixel that it would accept. What cannot reach the floor even so has a negative extent.
+        let room = log2_opacity - self.log2_floor;
+        let extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+        let half_x = (a * extent).sqrt();
+        store(half_x, &mut flat.half[0]);
+        store((c * extent).sqrt(), &mut flat.half[1]);
+        store(b / c, &mut flat.slope);
+        store(determinant / (c * c), &mut flat.narrowing);
+        store(b * half_x / a, &mut flat.peak);
     }
 
     /// Why a kept Gaussian is skipped after all, by what does not depend on tiles and colours.
@@ -461,7 +503,7 @@ impl Projection {
 
     /// Finds the kept Gaussians that reach a tile.
     #[inline(always)]
-    fn find_tiles(&self, scratch: &mut Scratch, out: &mut Projected) {
+    pub(super) fn find_tiles(&self, scratch: &mut Scratch, out: &mut Projected) {
         let mut beside = self.skips.has(Skip::Ellipse).then_some(0);
         scratch.reached.clear();
         for at in 0..scratch.lanes.len().min(BATCH) {
@@ -527,15 +569,8 @@ impl Projection {
                 };
                 let sequence = sequence(scratch.lanes[at]);
                 out.keys.push([self.key(at, sequence, scratch), sequence]);
-                let factor = [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]];
-                out.splats.push(Splat {
-                    mean: [flat.mean[0][at], flat.mean[1][at]],
-                    factor,
-                    log2_opacity: flat.log2_opacity[at] as f32,
-                    color,
-                    depth: self.center_depth(at, scratch),
-                    steep: is_steep(factor, flat.log2_opacity[at]),
-                });
+                let depth = self.center_depth(at, scratch);
+                out.splats.push(Splat::new(flat, at, color, depth));
                 out.reaches.push(reach);
             }
         }

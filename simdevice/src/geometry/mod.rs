@@ -15,6 +15,7 @@ mod elements;
 mod emit;
 mod fetch;
 mod pipeline;
+pub(crate) mod points;
 mod primitive;
 mod setup;
 mod shade;

@@ -53,17 +53,35 @@ impl DrawPipeline {
     /// # Errors
     /// [`InvalidProgram`] if one of them cannot run on the device.
     pub fn new(device: &Device, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
-        let vertex = VertexProgram::new(device, programs)?;
+        // Without a fragment stage nobody reads varyings.
+        let varyings = programs.fragment.as_ref().map_or(0, |_| programs.varyings);
+        let vertex = VertexProgram::new(device, programs, varyings)?;
         let fragment = programs.fragment.as_ref();
         let fragment = fragment
             .map(|fragment| FragmentStage::new(device.level(), fragment))
             .transpose()?;
         Ok(Self { vertex, fragment })
     }
+
+    /// Makes a vertex program ready that projects Gaussians; see [`gaussian`](crate::packet::draw::gaussian).
+    ///
+    /// # Errors
+    /// [`InvalidProgram`] if it cannot run on the device.
+    pub fn of_gaussians(device: &Device, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
+        Ok(Self {
+            vertex: VertexProgram::new(device, programs, programs.varyings)?,
+            fragment: None,
+        })
+    }
 }
 
 impl VertexProgram {
-    fn new(device: &Device, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
+    /// `varyings` are those that somebody reads.
+    fn new(
+        device: &Device,
+        programs: &DrawPrograms,
+        varyings: u32,
+    ) -> Result<Self, InvalidProgram> {
         let options = Options {
             lanes: LANES,
             subgroup_size: 64,
@@ -84,7 +102,7 @@ impl VertexProgram {
             .collect();
         Ok(Self {
             inputs,
-            outputs: VertexOutputs::new(programs),
+            outputs: VertexOutputs::new(programs, varyings as usize),
             executable,
             idle: Mutex::default(),
         })
@@ -106,11 +124,7 @@ impl VertexProgram {
 }
 
 impl VertexOutputs {
-    fn new(programs: &DrawPrograms) -> Self {
-        let varyings = match programs.fragment {
-            Some(_) => programs.varyings as usize,
-            None => 0,
-        };
+    fn new(programs: &DrawPrograms, varyings: usize) -> Self {
         let mut this = Self {
             varyings: vec![None; varyings],
             interpolation: vec![Interpolation::Flat; varyings],

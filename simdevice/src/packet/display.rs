@@ -259,18 +259,33 @@ fn gaussian_begin(begin: &GaussianBegin) -> impl Display + '_ {
     })
 }
 
-fn gaussian_append(append: &GaussianAppend) -> impl Display + '_ {
-    By(|f: &mut Formatter<'_>| {
-        let what = if append.indices.is_some() {
-            "indices"
-        } else {
-            "gaussians"
-        };
-        let end = u64::from(append.first) + u64::from(append.count);
-        write!(f, "append {what} {}..{end}", append.first)?;
-        if [append.first_instance, append.instance_count] != [0, 1] {
-            let end = u64::from(append.first_instance) + u64::from(append.instance_count);
-            write!(f, " instances {}..{end}", append.first_instance)?;
+fn gaussian_append(append: &GaussianAppend) -> impl Display {
+    let (vertices, instances) = (
+        [append.first, append.count],
+        [append.first_instance, append.instance_count],
+    );
+    appended(append.indices.is_some(), vertices, instances)
+}
+
+fn gaussian_append_draw(draw: &Draw) -> impl Display {
+    let (vertices, instances) = (
+        [draw.first, draw.count],
+        [draw.first_instance, draw.instance_count],
+    );
+    let what = appended(draw.indices.is_some(), vertices, instances);
+    By(move |f: &mut Formatter<'_>| write!(f, "{what}, shaded"))
+}
+
+/// First and count of vertices and of instances.
+fn appended(indexed: bool, [first, count]: [u32; 2], instances: [u32; 2]) -> impl Display {
+    By(move |f: &mut Formatter<'_>| {
+        let what = if indexed { "indices" } else { "gaussians" };
+        let end = u64::from(first) + u64::from(count);
+        write!(f, "append {what} {first}..{end}")?;
+        if instances != [0, 1] {
+            let [first, count] = instances;
+            let end = u64::from(first) + u64::from(count);
+            write!(f, " instances {first}..{end}")?;
         }
         Ok(())
     })
@@ -345,6 +360,8 @@ impl Display for Packet {
             Self::ClearAttachments(clear) => write!(f, "{}", clear_attachments(clear)),
             Self::GaussianBegin(begin) => write!(f, "{}", gaussian_begin(begin)),
             Self::GaussianAppend(append) => write!(f, "{}", gaussian_append(append)),
+            Self::GaussianAppendDraw(draw) => write!(f, "{}", gaussian_append_draw(draw)),
+            Self::GaussianResolveShader(_) => f.write_str("shade the fragments of gaussians"),
             Self::GaussianResolve => f.write_str("resolve gaussians"),
             Self::Dispatch(dispatch) => {
                 let [x, y, z] = dispatch.count;

@@ -3,6 +3,7 @@
 use super::{AttributeStream, BlendState, IndexStream, Rect, Viewport};
 use crate::bindings::Bindings;
 pub use crate::geometry::DrawPipeline;
+pub use crate::raster::gaussian::resolve::ResolveProgram;
 use isa::ir::Program;
 use std::sync::Arc;
 
@@ -13,7 +14,48 @@ pub const MAX_VIEWPORTS: usize = 16;
 /// The most clip and cull distances together.
 pub const MAX_CLIP_CULL_DISTANCES: usize = 8;
 
-/// See [`Packet::Draw`](crate::Packet::Draw).
+/// What the varyings of a vertex program are that projects Gaussians, by number. Its position is the Gaussian's centre.
+pub mod gaussian {
+    /// The first of three: the covariance xx, xy, yy in px^2, along the framebuffer's axes.
+    pub const COVARIANCE: u32 = 0;
+    /// The opacity.
+    pub const OPACITY: u32 = 3;
+    /// The first of three: red, green, blue.
+    pub const COLOR: u32 = 4;
+    /// What the Gaussians are sorted by. If it is not written, that is the position's w.
+    pub const DEPTH_KEY: u32 = 7;
+    /// How many there are.
+    pub const VARYINGS: u32 = 8;
+}
+
+/// What the varyings of a fragment program are that makes colours of what Gaussians accumulate, by number. All of them
+/// are zero where no Gaussian contributed.
+pub mod resolve {
+    /// The first of four: (C, 1 - T).
+    pub const ACCUMULATED: u32 = 0;
+    /// The mean depth, weighted by contributions.
+    pub const EXPECTED_DEPTH: u32 = 4;
+    /// The depth of the last Gaussian that contributed where half of the transmittance or more was left.
+    pub const MEDIAN_DEPTH: u32 = 5;
+}
+
+/// See [`Packet::GaussianResolveShader`](crate::Packet::GaussianResolveShader). Blending and write masks are those of the
+/// [`GaussianState`](super::GaussianState), one per attachment.
+#[derive(Clone, Debug)]
+pub struct ResolveShader {
+    /// The program.
+    pub program: Arc<ResolveProgram>,
+    /// What it is bound to.
+    pub bindings: Bindings,
+    /// Whether every sample is shaded for itself.
+    pub sample_shading: bool,
+    /// Alpha makes coverage.
+    pub alpha_to_coverage: bool,
+    /// Alpha becomes 1 after that.
+    pub alpha_to_one: bool,
+}
+
+/// See [`Packet::Draw`](crate::Packet::Draw) and [`Packet::GaussianAppendDraw`](crate::Packet::GaussianAppendDraw).
 #[derive(Clone, Debug)]
 pub struct Draw {
     /// The programs.

@@ -47,6 +47,14 @@ impl DepthCode {
         }
     }
 
+    /// The depth that a number means.
+    pub fn decode(self, code: u32) -> f32 {
+        match self {
+            Self::Float => f32::from_bits(code),
+            Self::Unorm(bits) => (f64::from(code) / f64::from((1u32 << bits) - 1)) as f32,
+        }
+    }
+
     /// As [`DepthCode::encode`], of one depth.
     pub fn encode_one(self, depth: f32) -> u32 {
         let depth = if depth > 0.0 { depth.min(1.0) } else { 0.0 };

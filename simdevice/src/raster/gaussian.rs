@@ -18,14 +18,15 @@
 mod exp2;
 mod layer;
 mod passing;
+pub mod resolve;
 pub(crate) mod tile_draw;
 
+use super::DepthCode;
 use super::tile::place;
 use crate::counters::{Counter, Counters};
 use crate::gaussian::depth::Trend;
 use crate::gaussian::project::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
-use crate::packet::GaussianState;
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
 use exp2::exp2;
@@ -65,6 +66,8 @@ const NO_DEPTH: DepthMode = 0;
 const TEST_DEPTH: DepthMode = 1;
 /// It also finds the median.
 const FIND_MEDIAN: DepthMode = 2;
+/// And what the mean is made of.
+const FIND_MEAN: DepthMode = 3;
 
 /// What the two phases need of a Gaussian in this tile.
 #[derive(Clone, Copy, Debug, Default)]
@@ -88,11 +91,15 @@ struct Thresholds {
     alpha_floor: f32,
     alpha_ceiling: f32,
     transmittance_floor: f32,
+    /// What numbers of depths mean.
+    depth_unit: DepthCode,
 }
 
 impl Thresholds {
-    fn new(state: &GaussianState) -> Self {
+    fn new(draw: &GaussianDraw) -> Self {
+        let state = &draw.state;
         Self {
+            depth_unit: draw.depth_unit,
             log2_floor: state.alpha_floor.log2().max(-150.0),
             alpha_floor: state.alpha_floor,
             alpha_ceiling: state.alpha_ceiling,
@@ -142,6 +149,9 @@ impl GaussianTile {
         let list = draw.tiles.list(tile_x, tile_y);
         let to = &mut self.layers[layer];
         to.clear(lanes);
+        if DEPTH == FIND_MEAN {
+            to.clear_means();
+        }
         if list.is_empty() {
             return;
         }
@@ -152,7 +162,7 @@ impl GaussianTile {
             skips: draw.skips,
             trend: draw.depth_trend,
             corner,
-            thresholds: Thresholds::new(&draw.state),
+            thresholds: Thresholds::new(draw),
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
         let work = dispatch!(level, simd =>
@@ -200,7 +210,7 @@ impl GaussianTile {
             // The first Gaussian that reaches a pixel finishes it.
             thresholds: Thresholds {
                 transmittance_floor: f32::INFINITY,
-                ..Thresholds::new(&draw.state)
+                ..Thresholds::new(draw)
             },
         };
         dispatch!(level, simd => self.composite::<_, NO_DEPTH>(simd, &task, LAYER, None));
@@ -416,7 +426,7 @@ impl Layer {
         }
         let accepted = reached & rest.simd_ge(finish);
         let finished = reached & rest.simd_lt(finish);
-        if DEPTH == FIND_MEDIAN {
+        if DEPTH >= FIND_MEDIAN {
             let median = u32x16::from_slice(simd, &self.median[block]);
             let first_half = accepted & t.simd_ge(0.5);
             let median = first_half.select(u32x16::splat(simd, depth), median);
@@ -425,6 +435,14 @@ impl Layer {
         let t = accepted.select(rest, finished.select(zero - t, t));
         t.store_slice(&mut self.transmittance[block]);
         let weight = accepted.select(weight, zero);
+        if DEPTH == FIND_MEAN {
+            let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
+            let [depths, weights] = &mut self.means;
+            let sum = f32x16::from_slice(simd, &depths[block]);
+            weight.mul_add(depth, sum).store_slice(&mut depths[block]);
+            let sum = f32x16::from_slice(simd, &weights[block]) + weight;
+            sum.store_slice(&mut weights[block]);
+        }
         for (channel, color) in self.color.iter_mut().zip(color) {
             let sum = f32x16::from_slice(simd, &channel[block]);
             let sum = weight.mul_add(f32x16::splat(simd, color), sum);

@@ -50,7 +50,7 @@ pub fn test<S: Simd>(
 }
 
 /// The components of both sources of an attachment, by chunk; those that are not written are empty.
-type Sources<'a> = [[&'a [Chunk]; 4]; 2];
+pub type Sources<'a> = [[&'a [Chunk]; 4]; 2];
 
 /// Takes a batch's results to the attachments, in order; returns how many samples passed if they are counted here.
 #[inline(always)]
@@ -214,16 +214,26 @@ fn remove<S: Simd>(
     if draw.draw.state.alpha_to_coverage {
         let alpha = interface.colors.first().and_then(|[first, _]| first[3]);
         if let Some(alpha) = alpha.and_then(|slot| machine.output_chunks(slot).get(chunk)) {
-            let alpha = as_floats(simd, alpha);
-            if draw.positions.len() == 1 {
-                samples[0] &= alpha.simd_ge(0.5).to_bitmask() as u16;
-            } else {
-                for (sample, lanes) in samples.iter_mut().enumerate() {
-                    *lanes &= alpha.simd_gt(sample as f32 / 4.0).to_bitmask() as u16;
-                }
+            let covered = covered_by_alpha(simd, alpha, draw.positions.len());
+            for (lanes, covered) in samples.iter_mut().zip(covered) {
+                *lanes &= covered;
             }
         }
     }
+}
+
+/// The lanes that alpha covers, by sample of a pixel's.
+#[inline(always)]
+pub fn covered_by_alpha<S: Simd>(simd: S, alpha: &Chunk, samples: usize) -> [u16; 4] {
+    let alpha = as_floats(simd, alpha);
+    if samples == 1 {
+        return [alpha.simd_ge(0.5).to_bitmask() as u16; 4];
+    }
+    let mut covered = [0; 4];
+    for (sample, lanes) in covered.iter_mut().enumerate() {
+        *lanes = alpha.simd_gt(sample as f32 / 4.0).to_bitmask() as u16;
+    }
+    covered
 }
 
 /// The depths of a chunk's samples as the attachment holds them.
@@ -303,7 +313,7 @@ fn write_colors<S: Simd>(
 
 /// A source of 16 fragments; components that are not written are 0.
 #[inline(always)]
-fn load<S: Simd>(simd: S, source: &[&[Chunk]; 4], chunk: usize) -> Colors<S> {
+pub fn load<S: Simd>(simd: S, source: &[&[Chunk]; 4], chunk: usize) -> Colors<S> {
     let mut color = [f32x16::splat(simd, 0.0); 4];
     for (component, lanes) in color.iter_mut().zip(source) {
         if let Some(lanes) = lanes.get(chunk) {
@@ -314,6 +324,6 @@ fn load<S: Simd>(simd: S, source: &[&[Chunk]; 4], chunk: usize) -> Colors<S> {
 }
 
 /// What a program wrote to a slot, if there is one.
-fn lanes_of(machine: &Machine, slot: Option<u32>) -> &[Chunk] {
+pub fn lanes_of(machine: &Machine, slot: Option<u32>) -> &[Chunk] {
     slot.map_or(&[], |slot| machine.output_chunks(slot))
 }

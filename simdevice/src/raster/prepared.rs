@@ -10,7 +10,7 @@ use super::tile::Target;
 use crate::bindings::Prepared;
 use crate::device::Device;
 use crate::geometry::PrimitiveDraw;
-use crate::packet::draw::{FragmentInput, Interpolation};
+use crate::packet::draw::{FragmentInput, Interpolation, LogicOp};
 use crate::packet::{BlendState, Rect};
 use crate::skips::Skips;
 use fearless_simd::Level;
@@ -75,10 +75,6 @@ impl<'a> TileDraw<'a> {
         area: Rect,
         device: &Device,
     ) -> Self {
-        const REPLACE: BlendState = BlendState {
-            equations: None,
-            write_mask: 0xF,
-        };
         let state = &*draw.state;
         let multisampled = samples.unwrap_or(state.samples) > 1;
         let mut stage = draw.pipeline.fragment.as_ref();
@@ -87,14 +83,13 @@ impl<'a> TileDraw<'a> {
             targets.depth.map(Target::format),
             targets.stencil.is_some(),
         );
-        let color = |(index, target): (usize, &Option<Target>)| {
-            let written = stage?.interface.colors.get(index)?;
-            written.iter().flatten().flatten().next()?;
-            let blend = state.blend.get(index).unwrap_or(&REPLACE);
-            let format = target.as_ref()?.format();
-            ColorOutput::new(blend, state.logic_op, state.blend_constants, format)
-        };
-        let colors: Vec<_> = targets.color.iter().enumerate().map(color).collect();
+        let colors = color_outputs(
+            stage,
+            targets.color,
+            &state.blend,
+            state.logic_op,
+            state.blend_constants,
+        );
         let (mut timing, mut count_late, mut plain) = (Timing::Early, false, true);
         let (mut filter, mut keeps_all) = (None, !tests.any());
         if let Some(interface) = stage.map(|stage| &stage.interface) {
@@ -187,4 +182,25 @@ impl<'a> TileDraw<'a> {
             self.draw.bindings.bump_generations();
         }
     }
+}
+
+/// What becomes of the attachments that a program writes to.
+pub(super) fn color_outputs(
+    stage: Option<&FragmentStage>,
+    targets: &[Option<Target>],
+    blend: &[BlendState],
+    logic: Option<LogicOp>,
+    constants: [f32; 4],
+) -> Vec<Option<ColorOutput>> {
+    const REPLACE: BlendState = BlendState {
+        equations: None,
+        write_mask: 0xF,
+    };
+    let color = |(index, target): (usize, &Option<Target>)| {
+        let written = stage?.interface.colors.get(index)?;
+        written.iter().flatten().flatten().next()?;
+        let blend = blend.get(index).unwrap_or(&REPLACE);
+        ColorOutput::new(blend, logic, constants, target.as_ref()?.format())
+    };
+    targets.iter().enumerate().map(color).collect()
 }

@@ -1,13 +1,18 @@
 //! Pipelines of the Gaussian list topology.
 
 use super::fixed::FixedState;
+use super::gaussian_stages::{ResolveStage, VertexProjection};
 use super::vertex_input::attribute;
-use super::{CameraSource, GaussianPipeline, GraphicsPipelineInfo, blend, viewport};
+use super::{
+    CameraSource, GaussianAttributeSources, GaussianPipeline, GaussianSource, GraphicsPipelineInfo,
+    blend, viewport,
+};
 use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
 use crate::lower::camera::CameraModels;
 use crate::lower::rendering;
 use crate::object::descriptor::layout::Binding;
+use crate::object::device::Device;
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST,
@@ -26,10 +31,8 @@ const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
 
 impl GaussianPipeline {
     /// Validates and converts the Gaussian part of a pipeline.
-    pub(super) fn new(
-        info: &GraphicsPipelineInfo,
-        features: &EnabledFeatures,
-    ) -> Result<Self, Error> {
+    pub(super) fn new(device: &Device, info: &GraphicsPipelineInfo) -> Result<Self, Error> {
+        let features = device.features();
         require(features, TOPOLOGY, "the topology is the Gaussian list")?;
         let Some(gaussian) = &info.gaussian else {
             return Err(Error::usage(
@@ -41,35 +44,15 @@ impl GaussianPipeline {
                 ),
             ));
         };
-        validate_stages(info, gaussian)?;
+        validate_stages(info, gaussian, features)?;
         validate_modes(gaussian, features)?;
         validate_values(gaussian)?;
         validate_fixed_state(info, features)?;
         let fragments = FixedState::of_gaussians(info)?;
 
-        let locations = &gaussian.attribute_locations;
-        for (name, location) in [
-            ("firstModelMatrix", locations.first_model_matrix),
-            ("modelOpacity", locations.model_opacity),
-        ] {
-            if location != GAUSSIAN_LOCATION_UNUSED_GAURAST {
-                require(features, INSTANCING, &format!("{name} is used"))?;
-            }
-        }
-        let degree = gaussian.spherical_harmonics_degree;
-        let coefficients = (degree + 1) * (degree + 1);
-        let first = locations.first_spherical_harmonics;
         Ok(Self {
-            position: attribute(info, "position", locations.position, 3)?,
-            scale: attribute(info, "scale", locations.scale, 3)?,
-            rotation: attribute(info, "rotation", locations.rotation, 4)?,
-            opacity: attribute(info, "opacity", locations.opacity, 1)?,
-            spherical_harmonics: (0..coefficients)
-                .map(|k| {
-                    let name = format!("spherical harmonics coefficient {k}");
-                    attribute(info, &name, first.saturating_add(k), 3)
-                })
-                .collect::<Result<_, _>>()?,
+            source: source(device, info, gaussian)?,
+            resolve: ResolveStage::new(device, info, gaussian, &fragments)?,
             state: Arc::new(state(gaussian, features, fragments.lower())?),
             dynamic: info.dynamic.iter().copied().filter(is_taken).collect(),
             fixed: fragments,
@@ -94,6 +77,52 @@ impl GaussianPipeline {
                 .contains(PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS),
         })
     }
+}
+
+/// Where Gaussians come from.
+fn source(
+    device: &Device,
+    info: &GraphicsPipelineInfo,
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+) -> Result<GaussianSource, Error> {
+    if is_shaded(gaussian) {
+        let projection = VertexProjection::new(device, info, gaussian)?;
+        return Ok(GaussianSource::VertexShader(projection));
+    }
+    let locations = &gaussian.attribute_locations;
+    for (name, location) in [
+        ("firstModelMatrix", locations.first_model_matrix),
+        ("modelOpacity", locations.model_opacity),
+    ] {
+        if location != GAUSSIAN_LOCATION_UNUSED_GAURAST {
+            require(device.features(), INSTANCING, &format!("{name} is used"))?;
+        }
+    }
+    let degree = gaussian.spherical_harmonics_degree;
+    let coefficients = (degree + 1) * (degree + 1);
+    let first = locations.first_spherical_harmonics;
+    Ok(GaussianSource::Attributes(GaussianAttributeSources {
+        position: attribute(info, "position", locations.position, 3)?,
+        scale: attribute(info, "scale", locations.scale, 3)?,
+        rotation: attribute(info, "rotation", locations.rotation, 4)?,
+        opacity: attribute(info, "opacity", locations.opacity, 1)?,
+        spherical_harmonics: (0..coefficients)
+            .map(|k| {
+                let name = format!("spherical harmonics coefficient {k}");
+                attribute(info, &name, first.saturating_add(k), 3)
+            })
+            .collect::<Result<_, _>>()?,
+    }))
+}
+
+fn has_fragment_stage(info: &GraphicsPipelineInfo) -> bool {
+    let mut stages = info.stages.iter();
+    stages.any(|(stage, _)| *stage == vk::ShaderStageFlags::FRAGMENT)
+}
+
+/// Whether a vertex shader projects, so that what fixed-function projection is told is ignored.
+fn is_shaded(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> bool {
+    gaussian.projection_mode == GaussianProjectionModeGAURAST::VERTEX_SHADER
 }
 
 /// The state's first element, unless it is dynamic.
@@ -129,6 +158,13 @@ fn state(
         GaussianOrderGAURAST::VIEW_DEPTH => GaussianOrder::ViewDepth,
         GaussianOrderGAURAST::RADIAL_DISTANCE => {
             require(features, RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
+            let depth_key = gaussian.vertex_output_locations.depth_key;
+            if is_shaded(gaussian) && depth_key == GAUSSIAN_LOCATION_UNUSED_GAURAST {
+                return Err(Error::usage(
+                    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-order",
+                    format!("{STRUCTURE}: order is RADIAL_DISTANCE, but depthKey is unused"),
+                ));
+            }
             GaussianOrder::RadialDistance
         }
         GaussianOrderGAURAST::PRIMITIVE => {
@@ -141,7 +177,11 @@ fn state(
         other => return Err(unknown("order", &other)),
     };
     Ok(GaussianState {
-        sh_degree: gaussian.spherical_harmonics_degree,
+        sh_degree: if is_shaded(gaussian) {
+            0
+        } else {
+            gaussian.spherical_harmonics_degree
+        },
         order,
         opacity_compensated,
         low_pass_variance: gaussian.low_pass_variance,
@@ -159,32 +199,51 @@ fn state(
 fn validate_stages(
     info: &GraphicsPipelineInfo,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+    features: &EnabledFeatures,
 ) -> Result<(), Error> {
     match gaussian.projection_mode {
         GaussianProjectionModeGAURAST::FIXED_FUNCTION => {}
         GaussianProjectionModeGAURAST::VERTEX_SHADER => {
-            return Err(not_enabled(
-                VERTEX_SHADER_PROJECTION,
-                "projectionMode is VERTEX_SHADER",
-            ));
+            let what = "projectionMode is VERTEX_SHADER";
+            require(features, VERTEX_SHADER_PROJECTION, what)?;
         }
         other => return Err(unknown("projectionMode", &other)),
     }
-    let has_fragment_stage = info
+    if has_fragment_stage(info) {
+        let what = "the pipeline has a fragment stage";
+        require(features, RESOLVE_FRAGMENT_SHADER, what)?;
+    }
+    let shaded = is_shaded(gaussian);
+    let of = |wanted| {
+        info.stages
+            .iter()
+            .filter(move |(stage, _)| *stage == wanted)
+    };
+    let known = vk::ShaderStageFlags::FRAGMENT
+        | if shaded {
+            vk::ShaderStageFlags::VERTEX
+        } else {
+            vk::ShaderStageFlags::empty()
+        };
+    let unwanted = info
         .stages
         .iter()
-        .any(|(stage, _)| *stage == vk::ShaderStageFlags::FRAGMENT);
-    if has_fragment_stage {
-        return Err(not_enabled(
-            RESOLVE_FRAGMENT_SHADER,
-            "the pipeline has a fragment stage",
-        ));
-    }
-    if let Some((stage, _)) = info.stages.first() {
+        .find(|(stage, _)| !known.contains(*stage));
+    let wrong = if let Some((stage, _)) = unwanted {
+        Some(format!("must not have a stage {stage:?}"))
+    } else if of(vk::ShaderStageFlags::VERTEX).count() != usize::from(shaded) {
+        Some("must have one vertex stage".into())
+    } else if of(vk::ShaderStageFlags::FRAGMENT).count() > 1 {
+        Some("must not have several fragment stages".into())
+    } else {
+        None
+    };
+    if let Some(wrong) = wrong {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
             format!(
-                "projectionMode is FIXED_FUNCTION, so the pipeline must not have a stage {stage:?}"
+                "projectionMode is {:?}, so the pipeline {wrong}",
+                gaussian.projection_mode
             ),
         ));
     }
@@ -197,10 +256,8 @@ fn validate_stages(
     Ok(())
 }
 
-fn validate_modes(
-    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &EnabledFeatures,
-) -> Result<(), Error> {
+/// What fixed-function projection alone is told.
+fn validate_projection(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
     match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_3D => {}
         GaussianGeometryGAURAST::GAUSSIAN_2D => {
@@ -217,6 +274,16 @@ fn validate_modes(
             ));
         }
         other => return Err(unknown("linearization", &other)),
+    }
+    Ok(())
+}
+
+fn validate_modes(
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+    features: &EnabledFeatures,
+) -> Result<(), Error> {
+    if !is_shaded(gaussian) {
+        validate_projection(gaussian)?;
     }
     match gaussian.precision {
         GaussianPrecisionGAURAST::FLOAT32 => {}
@@ -242,6 +309,7 @@ fn camera_source(
     features: &EnabledFeatures,
 ) -> Result<CameraSource, Error> {
     match gaussian.camera_source {
+        _ if is_shaded(gaussian) => return Ok(CameraSource::None),
         GaussianCameraSourceGAURAST::COMMAND => return Ok(CameraSource::Command),
         GaussianCameraSourceGAURAST::UNIFORM_BUFFER => {}
         other => return Err(unknown("cameraSource", &other)),
@@ -304,7 +372,7 @@ fn validate_values(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<
     // Comparisons are false for NaN, which is therefore refused.
     let g = gaussian;
     check(
-        g.spherical_harmonics_degree <= MAX_SPHERICAL_HARMONICS_DEGREE,
+        is_shaded(g) || g.spherical_harmonics_degree <= MAX_SPHERICAL_HARMONICS_DEGREE,
         named!("sphericalHarmonicsDegree"),
         &g.spherical_harmonics_degree,
         "at most maxSphericalHarmonicsDegree (3)",
@@ -380,11 +448,13 @@ fn validate_fixed_state(
             "rasterizerDiscardEnable with Gaussians".into(),
         ));
     }
-    if multisample.alpha_to_coverage_enable != vk::FALSE
-        || multisample.alpha_to_one_enable != vk::FALSE
+    let shades = has_fragment_stage(info);
+    if !shades
+        && (multisample.alpha_to_coverage_enable != vk::FALSE
+            || multisample.alpha_to_one_enable != vk::FALSE)
     {
         return Err(Error::FeatureNotPresent(
-            "alphaToCoverageEnable or alphaToOneEnable with Gaussians".into(),
+            "alphaToCoverageEnable or alphaToOneEnable with Gaussians and no fragment stage".into(),
         ));
     }
     if let Some(state) = info.dynamic.iter().find(|state| !may_be_dynamic(**state)) {
@@ -392,9 +462,10 @@ fn validate_fixed_state(
             "the dynamic state {state:?} with Gaussians"
         )));
     }
-    if info.blend.iter().any(blend::reads_second_source) {
+    if !shades && info.blend.iter().any(blend::reads_second_source) {
         return Err(Error::FeatureNotPresent(
-            "a second source of blending (feature dualSrcBlend) with Gaussians".into(),
+            "a second source of blending (feature dualSrcBlend) with Gaussians and no fragment stage"
+                .into(),
         ));
     }
     if info.viewport_count > 1 {

@@ -26,10 +26,10 @@ pub(super) struct Effects<'a> {
 }
 
 /// A location and a component of it.
-type Place = (u32, u32);
+pub(super) type Place = (u32, u32);
 
 /// The varyings by their place.
-type Varyings = HashMap<Place, u32>;
+pub(super) type Varyings = HashMap<Place, u32>;
 
 /// Links programs. `stream` says in which attribute stream a vertex input's location is.
 ///
@@ -49,6 +49,51 @@ pub(super) fn link(
             varyings(&vertex.interface, &fragment.interface)
         }
     };
+    Ok(DrawPrograms {
+        varyings: varyings.len() as u32,
+        fragment: fragment.map(|fragment| fragment_programs(fragment, &varyings, effects)),
+        ..vertex_programs(vertex, &varyings, stream, effects)
+    })
+}
+
+/// Links a vertex program that projects Gaussians: what it writes to `places` becomes the varyings of those numbers.
+///
+/// # Errors
+/// As [`link`].
+pub(super) fn link_projection(
+    vertex: Shader,
+    stream: impl Fn(u32) -> Option<usize>,
+    places: &[Place],
+) -> Result<DrawPrograms, Error> {
+    check_widths(&vertex.interface)?;
+    let varyings: Varyings = places.iter().copied().zip(0..).collect();
+    Ok(DrawPrograms {
+        varyings: places.len() as u32,
+        fragment: None,
+        ..vertex_programs(vertex, &varyings, stream, Effects::default())
+    })
+}
+
+/// Links a fragment program that makes colours of what Gaussians accumulate, of which `varyings` says the numbers.
+///
+/// # Errors
+/// As [`link`].
+pub(super) fn link_resolve(
+    fragment: Shader,
+    varyings: &Varyings,
+    effects: Effects<'_>,
+) -> Result<FragmentPrograms, Error> {
+    check_widths(&fragment.interface)?;
+    Ok(fragment_programs(fragment, varyings, effects))
+}
+
+/// The vertex program alone.
+fn vertex_programs(
+    vertex: Shader,
+    varyings: &Varyings,
+    stream: impl Fn(u32) -> Option<usize>,
+    effects: Effects<'_>,
+) -> DrawPrograms {
     let Shader {
         program: mut vertex,
         interface,
@@ -62,16 +107,16 @@ pub(super) fn link(
     let vertex_outputs: Vec<_> = interface
         .outputs
         .iter()
-        .map(|output| vertex_output(output, &varyings, effects))
+        .map(|output| vertex_output(output, varyings, effects))
         .collect();
     drop_outputs(&mut vertex, &vertex_outputs);
-    Ok(DrawPrograms {
+    DrawPrograms {
         vertex,
         vertex_inputs,
         vertex_outputs,
-        varyings: varyings.len() as u32,
-        fragment: fragment.map(|fragment| fragment_programs(fragment, &varyings, effects)),
-    })
+        varyings: 0,
+        fragment: None,
+    }
 }
 
 fn fragment_programs(

@@ -8,6 +8,7 @@ pub(crate) mod compute;
 pub(crate) mod convert;
 pub(crate) mod fixed;
 mod gaussian;
+pub(crate) mod gaussian_stages;
 pub(crate) mod layout;
 mod link;
 pub(crate) mod polygon;
@@ -23,6 +24,7 @@ use fixed::FixedState;
 use gaurast::vk::{
     PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaussian_stages::{ResolveStage, VertexProjection};
 use layout::PipelineLayout;
 use polygon::PolygonPipeline;
 use simdevice::packet::{GaussianState, Rect, Viewport};
@@ -50,7 +52,7 @@ pub(crate) struct GraphicsPipeline {
 /// What a pipeline draws.
 #[derive(Debug)]
 pub(crate) enum Primitive {
-    /// Gaussians with fixed-function projection.
+    /// Gaussians.
     Gaussian(Box<GaussianPipeline>),
     /// Points, lines or triangles.
     Polygons(Box<PolygonPipeline>),
@@ -75,6 +77,24 @@ pub(crate) struct GaussianPipeline {
     pub(crate) camera_models: CameraModels,
     /// Whether consecutive draws are sorted together.
     pub(crate) merges_draws: bool,
+    /// Where Gaussians come from.
+    pub(crate) source: GaussianSource,
+    /// What makes colours of what they accumulate.
+    pub(crate) resolve: Option<ResolveStage>,
+}
+
+/// Where the Gaussians of a pipeline come from.
+#[derive(Debug)]
+pub(crate) enum GaussianSource {
+    /// Vertex attributes, which the device projects.
+    Attributes(GaussianAttributeSources),
+    /// A vertex shader, which projects them itself.
+    VertexShader(VertexProjection),
+}
+
+/// The attributes of fixed-function projection.
+#[derive(Debug)]
+pub(crate) struct GaussianAttributeSources {
     /// Where means are read from.
     pub(crate) position: AttributeSource,
     /// Where standard deviations are read from.
@@ -90,6 +110,8 @@ pub(crate) struct GaussianPipeline {
 /// Where Gaussian draws take their camera from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CameraSource {
+    /// There is none: a vertex shader projects.
+    None,
     /// `vkCmdSetGaussianCameraGAURAST`.
     Command,
     /// A uniform buffer, read when the draw executes.
@@ -182,7 +204,7 @@ impl GraphicsPipeline {
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(crate) fn new(device: &Device, info: &GraphicsPipelineInfo) -> Result<Self, Error> {
         let primitive = if info.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
-            let gaussian = GaussianPipeline::new(info, device.features())?;
+            let gaussian = GaussianPipeline::new(device, info)?;
             Primitive::Gaussian(Box::new(gaussian))
         } else {
             Primitive::Polygons(Box::new(PolygonPipeline::new(device, info)?))

@@ -157,7 +157,7 @@ impl<'a> Stages<'a> {
 }
 
 /// Translates a stage and compares it with the layout.
-fn translate(
+pub(super) fn translate(
     device: &Device,
     layout: &PipelineLayout,
     stage: &StageInfo,
@@ -191,7 +191,7 @@ fn translate(
 }
 
 /// Where each location is read from.
-fn attributes(
+pub(super) fn attributes(
     info: &GraphicsPipelineInfo,
     locations: &[(u32, Numeric)],
 ) -> Result<Vec<AttributeSource>, Error> {
@@ -207,7 +207,7 @@ fn attributes(
 }
 
 /// Compares the types of attributes with what the shader reads.
-fn check_attributes(
+pub(super) fn check_attributes(
     interface: &Interface,
     locations: &[(u32, Numeric)],
     attributes: &[AttributeSource],
@@ -249,7 +249,7 @@ fn warn_of_unwritten(device: &Device, vertex: &Interface, fragment: &Interface) 
 }
 
 /// For each colour attachment, whether anything comes of its source.
-fn color_effects(info: &GraphicsPipelineInfo, fixed: &FixedState) -> Vec<bool> {
+pub(super) fn color_effects(info: &GraphicsPipelineInfo, fixed: &FixedState) -> Vec<bool> {
     let mut effects: Vec<_> = std::iter::zip(&fixed.draw.blend, &info.color_formats)
         .map(|(blend, format)| blend.write_mask != 0 && *format != vk::Format::UNDEFINED)
         .collect();

@@ -3,6 +3,7 @@
 use super::{BLOCKS, LANES, TILE};
 use crate::gaussian::TILE_SIZE;
 use crate::packet::Rect;
+use crate::raster::DepthCode;
 use crate::raster::tile::place;
 use fearless_simd::{Simd, f32x16, prelude::*};
 
@@ -19,6 +20,8 @@ pub(super) struct Layer {
     pub(super) covered: [u32; BLOCKS],
     /// The median depth as the attachment holds it, where covered, if the draw writes depth.
     pub(super) median: [[u32; LANES]; BLOCKS],
+    /// The sums of weighted depths and of weights, if a fragment program reads their ratio.
+    pub(super) means: [[[f32; LANES]; BLOCKS]; 2],
 }
 
 /// Lanes by block.
@@ -39,6 +42,7 @@ impl Layer {
         transmittance: [[1.0; LANES]; BLOCKS],
         covered: [0; BLOCKS],
         median: [[0; LANES]; BLOCKS],
+        means: [[[0.0; LANES]; BLOCKS]; 2],
     };
 
     /// Makes the pixels in `lanes` fresh, and the others finished.
@@ -54,6 +58,29 @@ impl Layer {
                 *t = if lanes >> lane & 1 == 1 { 1.0 } else { -1.0 };
             }
         }
+    }
+
+    /// Makes the sums of depths fresh.
+    pub(super) fn clear_means(&mut self) {
+        self.means = [[[0.0; LANES]; BLOCKS]; 2];
+    }
+
+    /// The expected and the median depth of a block's lanes; zero where nothing is covered.
+    pub(super) fn depths(&self, block: usize, unit: DepthCode) -> [[f32; LANES]; 2] {
+        let mut out = [[0.0; LANES]; 2];
+        let [depths, weights] = &self.means;
+        for lane in 0..LANES {
+            if self.covered[block] >> lane & 1 == 0 {
+                continue;
+            }
+            let median = unit.decode(self.median[block][lane]);
+            let weight = weights[block][lane];
+            // An alpha that underflows weighs nothing.
+            let mean = depths[block][lane] / weight;
+            out[0][lane] = if weight > 0.0 { mean } else { median };
+            out[1][lane] = median;
+        }
+        out
     }
 
     /// The premultiplied colour and coverage (C, 1 - T) of a block's lanes.

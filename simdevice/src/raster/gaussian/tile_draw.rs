@@ -4,11 +4,14 @@
 //! Alpha is that of the pixel's centre, so samples of a pixel differ only in what their tests let pass. The kernel runs
 //! once for all samples that agree in all of a block, and again only in the blocks of a tile where some differ.
 
+use super::passing::Passing;
+use super::resolve::{ResolveDraw, Tools};
 use super::{
-    BLOCKS, DepthMode, FIND_MEDIAN, GaussianTile, LANES, Lanes, NO_DEPTH, TEST_DEPTH, TILE_SIZE,
-    count, lanes_within,
+    BLOCKS, DepthMode, FIND_MEAN, FIND_MEDIAN, GaussianTile, LANES, Lanes, NO_DEPTH, TEST_DEPTH,
+    TILE_SIZE, count, lanes_within,
 };
 use crate::counters::{Counter, Counters};
+use crate::device::Device;
 use crate::gaussian::GaussianDraw;
 use crate::packet::BlendState;
 use crate::packet::draw::{StencilFace, StencilOp};
@@ -18,16 +21,19 @@ use crate::raster::depth::{Tests, apply, compare};
 use crate::raster::primitives::{Buffers, Targets};
 use crate::raster::tile::{AREA, Target, Tile};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use isa::exec::Stopped;
+use std::sync::atomic::AtomicBool;
 
-const SAMPLES: usize = MAX_SAMPLES as usize;
+pub(super) const SAMPLES: usize = MAX_SAMPLES as usize;
 
 /// A Gaussian draw made ready for tiles, which all workers share.
-#[derive(Debug)]
 pub struct GaussianTileDraw<'a> {
     draw: &'a GaussianDraw,
     targets: Targets<'a>,
     /// The first colour attachment, unless the draw leaves it as it is.
     color: Option<ColorOutput>,
+    /// What makes colours in its place.
+    resolve: Option<ResolveDraw<'a>>,
     tests: Tests,
     /// Samples of a pixel.
     samples: usize,
@@ -36,13 +42,25 @@ pub struct GaussianTileDraw<'a> {
 
 /// What becomes of a tile's samples: lanes by sample and block.
 #[derive(Debug, Default)]
-struct Samples {
+pub(super) struct Samples {
     /// Those that the draw may touch, and whose stored depth lies within bounds.
     candidates: [Lanes; SAMPLES],
     /// Those of them that pass the stencil test.
     tested: [Lanes; SAMPLES],
     /// The layer that a sample's block is composited in.
-    layers: [[usize; BLOCKS]; SAMPLES],
+    pub(super) layers: [[usize; BLOCKS]; SAMPLES],
+}
+
+impl Samples {
+    /// Leaves alone what was covered and then discarded, as if nothing had reached it.
+    fn leave(&mut self, covered: &[Lanes; SAMPLES], kept: &[Lanes; SAMPLES]) {
+        let lanes = covered.iter().zip(kept);
+        for (candidates, (covered, kept)) in self.candidates.iter_mut().zip(lanes) {
+            for (block, candidates) in candidates.iter_mut().enumerate() {
+                *candidates &= !(covered[block] & !kept[block]);
+            }
+        }
+    }
 }
 
 impl<'a> GaussianTileDraw<'a> {
@@ -51,7 +69,7 @@ impl<'a> GaussianTileDraw<'a> {
         draw: &'a GaussianDraw,
         targets: Targets<'a>,
         samples: Option<u32>,
-        level: Level,
+        device: &Device,
     ) -> Self {
         const REPLACE: BlendState = BlendState {
             equations: None,
@@ -68,26 +86,33 @@ impl<'a> GaussianTileDraw<'a> {
                 ColorOutput::new(blend, state.logic_op, state.blend_constants, format)
             });
         let depth = targets.depth.map(Target::format);
+        let samples = samples.map_or(1, |samples| samples as usize).min(SAMPLES);
+        let resolve = draw.resolve.as_ref();
         Self {
             draw,
             targets,
             color,
+            resolve: resolve.map(|shader| ResolveDraw::new(draw, shader, targets, samples, device)),
             tests: Tests::new(&state.depth_stencil, depth, targets.stencil.is_some()),
-            samples: samples.map_or(1, |samples| samples as usize).min(SAMPLES),
-            level,
+            samples,
+            level: device.level(),
         }
     }
 
     /// Renders what it covers of a tile.
+    ///
+    /// # Errors
+    /// [`Stopped`] if its resolve shader ran for too long, or `cancel` was set.
     pub fn render(
         &self,
         tile: &Tile,
         buffers: &mut Buffers,
         fragments: &mut GaussianTile,
         counters: &mut Counters,
-    ) {
+        cancel: &AtomicBool,
+    ) -> Result<(), Stopped> {
         if !self.draw.touches(tile.pixels) {
-            return;
+            return Ok(());
         }
         if let Some(target) = self.targets.depth.filter(|_| self.tests.reads_depth()) {
             buffers.depth.touch(target, 0, tile);
@@ -100,7 +125,11 @@ impl<'a> GaussianTileDraw<'a> {
             buffers.stencil.touch(target, 0, tile);
         }
         let mut samples = self.test_first(tile, buffers);
+        let reads_depth = self.resolve.as_ref().is_some_and(ResolveDraw::reads_depth);
         match self.tests.depth {
+            _ if reads_depth => {
+                self.composite::<FIND_MEAN>(tile, &mut samples, buffers, fragments, counters);
+            }
             None => self.composite::<NO_DEPTH>(tile, &mut samples, buffers, fragments, counters),
             Some((_, false)) => {
                 self.composite::<TEST_DEPTH>(tile, &mut samples, buffers, fragments, counters);
@@ -109,22 +138,48 @@ impl<'a> GaussianTileDraw<'a> {
                 self.composite::<FIND_MEDIAN>(tile, &mut samples, buffers, fragments, counters);
             }
         }
-        let covered: [Lanes; SAMPLES] = std::array::from_fn(|sample| {
+        let mut covered: [Lanes; SAMPLES] = std::array::from_fn(|sample| {
             std::array::from_fn(|block| {
                 let layer = &fragments.layers[samples.layers[sample][block]];
                 layer.covered[block] & samples.tested[sample][block]
             })
         });
+        let mut shaded = covered;
+        if let Some(resolve) = &self.resolve
+            && covered != [[0; BLOCKS]; SAMPLES]
+        {
+            let mut tools = Tools {
+                buffers,
+                fragments,
+                counters,
+                cancel,
+            };
+            resolve.run(tile, &samples, &mut shaded, &mut tools)?;
+            if !resolve.tests_early() {
+                samples.leave(&covered, &shaded);
+                covered = shaded;
+            }
+        }
         let passed: u32 = covered.iter().take(self.samples).map(count).sum();
         counters.add(Counter::SamplesPassed, passed.into());
         if passed > 0 {
-            self.write_color(tile, &samples, &covered, buffers, fragments);
+            if self.resolve.is_none() {
+                self.write_color(tile, &samples, &covered, buffers, fragments);
+            }
             if self.tests.depth.is_some_and(|(_, write)| write) {
                 self.write_depth(tile, &samples, &covered, buffers, fragments);
             }
         }
         if let Some([face, _]) = &self.tests.stencil {
             self.write_stencil(face, tile, &samples, &covered, buffers, fragments);
+        }
+        Ok(())
+    }
+
+    /// Marks what a resolve shader may have written to as changed.
+    pub fn finish(&self) {
+        if let Some(resolve) = &self.resolve {
+            resolve.finish();
         }
     }
 
@@ -174,7 +229,7 @@ impl<'a> GaussianTileDraw<'a> {
                 let same = |earlier: &usize| {
                     let tested = &samples.tested;
                     tested[*earlier][block] == tested[sample][block]
-                        && (DEPTH == NO_DEPTH
+                        && (self.tests.depth.is_none()
                             || self.depths(tile, buffers, *earlier, block)
                                 == self.depths(tile, buffers, sample, block))
                 };
@@ -193,6 +248,8 @@ impl<'a> GaussianTileDraw<'a> {
                 let start = buffers.depth.start(tile.index, sample);
                 let stored = &buffers.depth.words_mut()[start..][..AREA];
                 fragments.passing.set(op, stored, &lanes);
+            } else if DEPTH != NO_DEPTH {
+                fragments.passing = Passing::default();
             }
             fragments.run::<DEPTH>(self.draw, self.level, tile.at, sample, &lanes, counters);
         }

@@ -8,8 +8,10 @@
 //! |---|---|---|
 //! | 1, 2 | what is skipped, and under which reason | [`project`] |
 //! | 3, 4 | mean, covariance, determinant, opacity compensation | [`project`] |
+//! | 1 to 5 | of what a vertex shader has projected | [`shaded`] |
 //! | 5 | colour from spherical harmonics | [`spherical_harmonics`] |
 //! | 6, 7 | alpha at a pixel centre, compositing front to back | [`pixel`] |
+//! | then | what a resolve shader reads | [`resolve`] |
 //! | then | depth and stencil, sample by sample | [`sample_tests`] |
 //!
 //! The inputs are attributes and camera *after* conversion to binary32 (the eye: binary64), which
@@ -42,7 +44,9 @@ pub mod error_model;
 pub mod pixel;
 pub mod project;
 mod render;
+pub mod resolve;
 pub mod sample_tests;
+pub mod shaded;
 pub mod spherical_harmonics;
 
 #[cfg(test)]

@@ -90,6 +90,8 @@ pub struct Outcome {
     pub medians: Vec<f32>,
     /// Whether those are not all.
     pub medians_exhausted: bool,
+    /// The sums of weighted depths and of weights.
+    pub depths: [f64; 2],
 }
 
 /// One way in which a pixel may come about.
@@ -99,6 +101,7 @@ struct Path {
     transmittance: Transmittance,
     covered: bool,
     medians: Medians,
+    depths: [f64; 2],
     finished: bool,
     /// Undecidable decisions behind it, each of which was followed both ways.
     decisions: u32,
@@ -114,6 +117,7 @@ impl Path {
             count: 0,
             exhausted: false,
         },
+        depths: [0.0; 2],
         finished: false,
         decisions: 0,
     };
@@ -124,6 +128,7 @@ impl Path {
             covered: self.covered,
             medians: self.medians.z[..self.medians.count].to_vec(),
             medians_exhausted: self.medians.exhausted,
+            depths: self.depths,
         }
     }
 
@@ -165,6 +170,7 @@ impl Pixel {
         let mut step = Step {
             color: splat.color,
             z: splat.z,
+            depth: splat.depth,
             alpha,
             state,
             forks: Vec::new(),
@@ -205,6 +211,7 @@ impl Pixel {
 struct Step<'a> {
     color: [f64; 3],
     z: f32,
+    depth: f64,
     alpha: Alpha,
     state: &'a OracleState,
     /// Paths that part from others at this Gaussian, which is already added to them.
@@ -265,6 +272,8 @@ impl Step<'_> {
         for (sum, color) in path.color.iter_mut().zip(self.color) {
             *sum += weight * color;
         }
+        path.depths[0] += weight * self.depth;
+        path.depths[1] += weight;
         path.covered = true;
         path.medians.add(self.z, path.transmittance);
         path.transmittance = behind;

@@ -21,8 +21,10 @@ pub struct Splat {
     pub color: [f64; 3],
     /// What it is sorted by, rounded to binary32.
     pub key: f32,
-    /// The depth variable, rounded to binary32.
+    /// The depth variable, rounded to binary32. (With vertex-shader projection the depth, rounded so.)
     pub z: f32,
+    /// The depth of its centre, of which a pixel has a mean; zero until somebody asks for that.
+    pub depth: f64,
     /// Whether the key is within its own error of the middle between two keys.
     pub key_undecidable: bool,
     /// How far a binary32 implementation may err on this Gaussian.
@@ -40,7 +42,7 @@ pub struct Cholesky {
 
 impl Cholesky {
     /// Factors `[xx, xy, yy]`. The last pivot comes from the determinant, not from a difference.
-    fn new([xx, xy, yy]: [f64; 3], determinant: f64) -> Self {
+    pub(super) fn new([xx, xy, yy]: [f64; 3], determinant: f64) -> Self {
         let swapped = yy > xx;
         let larger = if swapped { yy } else { xx };
         let l11 = larger.sqrt();
@@ -145,6 +147,7 @@ pub fn project(
         color,
         key: sort_by as f32,
         z,
+        depth: 0.0,
         key_undecidable: state.order != OracleOrder::Primitive
             && key_is_undecidable(&rotation, offset, sort_by),
         error: ErrorModel::new(spread, opacity, area_for_opacity),

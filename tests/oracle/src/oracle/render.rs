@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::pixel::Pixel;
 use super::project::{Splat, project};
-use super::{OracleCamera, OracleScene, OracleState, SkipCounts};
+use super::{OracleCamera, OracleScene, OracleState, SkipCounts, SkipReason};
 
 /// How far beyond the ellipse on which alpha reaches its floor [`render_bounded`] looks, in px.
 /// It covers the rounding of the bound itself.
@@ -97,7 +97,9 @@ pub fn render_literal(
         row
     });
     let rows: Vec<Vec<Pixel>> = rows.collect();
-    collect(camera, &projected, || rows.iter().flatten())
+    collect([camera.width, camera.height], &projected, || {
+        rows.iter().flatten()
+    })
 }
 
 /// Draws every Gaussian where its alpha can reach the floor, rows in parallel.
@@ -110,26 +112,41 @@ pub fn render_bounded(
     state: &OracleState,
 ) -> Reference {
     let projected = Projected::new(scene, camera, state);
+    bounded(&projected, [camera.width, camera.height], state)
+}
+
+/// Draws projected Gaussians where their alphas can reach the floor.
+pub(super) fn bounded(projected: &Projected, size: [u32; 2], state: &OracleState) -> Reference {
+    let rows = bounded_pixels(projected, size, state);
+    collect(size, projected, || rows.iter().flatten())
+}
+
+/// The rows of pixels that [`bounded`] draws.
+pub(super) fn bounded_pixels(
+    projected: &Projected,
+    [width, height]: [u32; 2],
+    state: &OracleState,
+) -> Vec<Vec<Pixel>> {
     let bounds: Vec<Bound> = projected
         .splats
         .iter()
         .map(|splat| Bound::new(splat, state))
         .collect();
-    let mut members = vec![Vec::new(); camera.height as usize];
+    let mut members = vec![Vec::new(); height as usize];
     for (index, bound) in bounds.iter().enumerate() {
-        for y in bound.rows(camera.height) {
+        for y in bound.rows(height) {
             members[y as usize].push(index);
         }
     }
-    let rows = members
+    members
         .par_iter()
         .enumerate()
         .map(|(y, members)| {
             let y = y as u32;
-            let mut row = vec![Pixel::EMPTY; camera.width as usize];
+            let mut row = vec![Pixel::EMPTY; width as usize];
             for &index in members {
                 let splat = &projected.splats[index];
-                for x in bounds[index].columns(y, camera.width) {
+                for x in bounds[index].columns(y, width) {
                     let pixel = &mut row[x as usize];
                     if !pixel.is_finished() {
                         pixel.add(splat, splat.alpha(x, y, state), state);
@@ -138,9 +155,7 @@ pub fn render_bounded(
             }
             row
         })
-        .collect();
-    let rows: Vec<Vec<Pixel>> = rows;
-    collect(camera, &projected, || rows.iter().flatten())
+        .collect()
 }
 
 /// The Gaussians that are drawn, nearest first, and a tally of the others.
@@ -151,10 +166,15 @@ pub(super) struct Projected {
 
 impl Projected {
     pub(super) fn new(scene: &OracleScene, camera: &OracleCamera, state: &OracleState) -> Self {
+        Self::sort((0..scene.len()).map(|index| project(scene, camera, state, index)))
+    }
+
+    /// What is drawn of Gaussians in primitive order, sorted.
+    pub(super) fn sort(all: impl Iterator<Item = Result<Splat, SkipReason>>) -> Self {
         let mut skips = SkipCounts::default();
-        let mut splats = Vec::with_capacity(scene.len());
-        for index in 0..scene.len() {
-            match project(scene, camera, state, index) {
+        let mut splats = Vec::new();
+        for one in all {
+            match one {
                 Ok(splat) => splats.push(splat),
                 Err(reason) => skips.count(reason),
             }
@@ -166,13 +186,13 @@ impl Projected {
 }
 
 pub(super) fn collect<'a, I: Iterator<Item = &'a Pixel>>(
-    camera: &OracleCamera,
+    [width, height]: [u32; 2],
     projected: &Projected,
     pixels: impl Fn() -> I,
 ) -> Reference {
     Reference {
-        width: camera.width,
-        height: camera.height,
+        width,
+        height,
         nominal: pixels().map(Pixel::rgba).collect(),
         alternatives: pixels()
             .map(Pixel::alternatives)

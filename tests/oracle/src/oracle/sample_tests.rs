@@ -290,7 +290,9 @@ pub fn render_tested(
         samples.iter().filter(holds).count()
     };
     TestedReference {
-        color: collect(camera, &projected, || samples.iter().map(|s| &s.pixel)),
+        color: collect([camera.width, camera.height], &projected, || {
+            samples.iter().map(|s| &s.pixel)
+        }),
         depth,
         stencil,
         fragments: [

@@ -1,0 +1,96 @@
+//! Vertex shading alone: what the vertex program of a draw of points writes, for those who make something other than
+//! points of it.
+
+use super::elements::{Elements, Run};
+use super::fetch::Fetcher;
+use super::shade::{Shaded, Shader};
+use super::viewport::Transform;
+use crate::counters::{Counter, Counters};
+use crate::device::Device;
+use crate::packet::draw::Draw;
+use isa::exec::{Stopped, Watchdog};
+use isa::resources::Resources;
+use std::sync::atomic::AtomicBool;
+
+/// Runs the vertex program of a draw whose topology is the point list.
+pub(crate) struct PointShader<'a> {
+    draw: &'a Draw,
+    shader: Shader<'a>,
+    elements: Elements,
+    shaded: Shaded,
+}
+
+impl<'a> PointShader<'a> {
+    /// Makes a machine ready. `cancel` stops it.
+    pub(crate) fn new(
+        draw: &'a Draw,
+        device: &Device,
+        resources: &'a Resources<'a>,
+        cancel: &'a AtomicBool,
+    ) -> Self {
+        let program = &draw.pipeline.vertex;
+        let mut machine = program.lease();
+        Self {
+            draw,
+            shader: Shader {
+                fetcher: Fetcher::new(draw, &mut machine),
+                machine,
+                outputs: &program.outputs,
+                takes_extras: false,
+                level: device.level(),
+                transform: Transform::NONE,
+                resources,
+                watchdog: Watchdog {
+                    limit: device.config().shader_timeout,
+                    cancel: Some(cancel),
+                },
+            },
+            elements: Elements::default(),
+            shaded: Shaded::default(),
+        }
+    }
+
+    /// Whether the program writes a varying.
+    pub(crate) fn writes(&self, varying: u32) -> bool {
+        let varyings = &self.shader.outputs.varyings;
+        varyings.get(varying as usize).is_some_and(Option::is_some)
+    }
+
+    /// Shades points `first..end` of an instance, counted from the draw's first. Each distinct vertex is shaded once.
+    ///
+    /// # Errors
+    /// [`Stopped`] if the program ran for too long.
+    pub(crate) fn shade(
+        &mut self,
+        instance: u32,
+        first: u32,
+        end: u32,
+        counters: &mut Counters,
+    ) -> Result<(), Stopped> {
+        let run = Run {
+            start: 0,
+            primitives_before: 0,
+            primitives: self.draw.count,
+        };
+        self.elements.clear();
+        self.elements.push(self.draw, &run, instance, first, end);
+        let ran = self.shader.shade(&self.elements, &mut self.shaded);
+        counters.add_work(&self.shader.machine.take_work());
+        let invocations = self.elements.vertices.len() as u64;
+        counters.add(Counter::VertexInvocations, invocations);
+        ran
+    }
+
+    /// The position in clip space and the varyings of each point that was shaded last, in order.
+    pub(crate) fn points(&self) -> impl Iterator<Item = ([f32; 4], &[u32])> {
+        let pieces = self.elements.pieces.iter();
+        let slots = pieces.flat_map(|piece| {
+            (piece.first..piece.end).map(|place| self.elements.slot(piece, place) as usize)
+        });
+        let per_vertex = self.shader.outputs.varyings.len();
+        slots.map(move |slot| {
+            let varyings = &self.shaded.varyings[slot * per_vertex..(slot + 1) * per_vertex];
+            (self.shaded.vertices[slot].position, varyings)
+        })
+    }
+}

@@ -1,0 +1,341 @@
+//! A device that is driven by packets, whose vertex program writes what it reads.
+
+use gaurast_tests::compare::{Limits, assert_contract};
+use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, render_shaded};
+use gaurast_tests::oracle::{OracleOrder, OracleState};
+use simdevice::bindings::Bindings;
+use simdevice::counters::Counters;
+use simdevice::device::SimdLevel;
+use simdevice::image::{ImageDesc, ImageKind};
+use simdevice::isa::builder::Builder;
+use simdevice::isa::ir::{Rate, Type};
+use simdevice::packet::draw::{
+    CompareOp, DepthStencil, DepthTest, Draw, DrawPipeline, DrawPrograms, DrawState, ResolveShader,
+    Topology, VertexInput, VertexOutput, gaussian,
+};
+use simdevice::packet::{
+    Aspect, Attachment, AttributeStream, BlendState, BufferRange, Camera, ClearValue,
+    GaussianBegin, GaussianOrder, GaussianState, LoadOp, Rect, Rendering, ResolveMode, StoreOp,
+    Viewport,
+};
+use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
+use std::sync::Arc;
+
+/// Neither side is a multiple of a tile's.
+pub const SIZE: [u32; 2] = [150, 83];
+
+/// Numbers of a vertex: position, covariance, opacity, colour, key.
+const NUMBERS: usize = 12;
+
+pub const UPRIGHT: OracleViewport = OracleViewport {
+    corner: [0.0, 0.0],
+    size: [SIZE[0] as f32, SIZE[1] as f32],
+};
+
+fn numbers(one: &OracleOutputs) -> [f32; NUMBERS] {
+    let mut numbers = [0.0; NUMBERS];
+    numbers[..4].copy_from_slice(&one.position);
+    numbers[4..7].copy_from_slice(&one.covariance);
+    numbers[7] = one.opacity;
+    numbers[8..11].copy_from_slice(&one.color);
+    numbers[11] = one.key.unwrap_or(0.0);
+    numbers
+}
+
+/// A program that writes what it reads.
+fn pipeline(device: &Device, with_key: bool) -> Arc<DrawPipeline> {
+    let mut builder = Builder::new();
+    for slot in 0..NUMBERS as u32 {
+        let input = builder.input(slot, Type::B32, Rate::Varying);
+        let output = builder.output(slot, Type::B32);
+        builder.assign(output, input);
+    }
+    let varyings = if with_key {
+        gaussian::VARYINGS
+    } else {
+        gaussian::DEPTH_KEY
+    };
+    let positions = (0..4).map(|axis| Some(VertexOutput::Position(axis)));
+    let varying = |number| (number < varyings).then_some(VertexOutput::Varying(number));
+    let programs = DrawPrograms {
+        vertex: builder.finish().expect("a program"),
+        vertex_inputs: (0..NUMBERS)
+            .map(|number| {
+                Some(VertexInput::Attribute {
+                    stream: number / 4,
+                    component: number % 4,
+                })
+            })
+            .collect(),
+        vertex_outputs: positions
+            .chain((0..gaussian::VARYINGS).map(varying))
+            .collect(),
+        varyings,
+        fragment: None,
+    };
+    Arc::new(DrawPipeline::of_gaussians(device, &programs).expect("a pipeline"))
+}
+
+/// A fragment replaces what the attachment holds.
+pub const REPLACE: BlendState = BlendState {
+    equations: None,
+    write_mask: 0xF,
+};
+
+fn image(format: Format, samples: u32) -> ImageView {
+    let desc = ImageDesc {
+        kind: ImageKind::D2,
+        format,
+        extent: [SIZE[0], SIZE[1], 1],
+        mip_levels: 1,
+        array_layers: 1,
+        samples,
+    };
+    let memory = Allocation::new_zeroed(desc.memory_size().expect("a size")).expect("memory");
+    ImageView {
+        image: Arc::new(Image::new(desc, memory, 0).expect("an image")),
+        format,
+        base_mip_level: 0,
+        level_count: 1,
+        base_layer: 0,
+        layer_count: 1,
+    }
+}
+
+/// The texels of an image.
+fn texels<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+    view: &ImageView,
+    aspect: Aspect,
+) -> Vec<T> {
+    let mut texels = vec![T::zeroed(); (SIZE[0] * SIZE[1]) as usize];
+    let layout = view.image.subresource(aspect, 0, 0).expect("it has one");
+    for (y, row) in (0..).zip(texels.chunks_exact_mut(SIZE[0] as usize)) {
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(row);
+        view.image
+            .read_row(&layout, [0, y, 0], bytes)
+            .expect("a row");
+    }
+    texels
+}
+
+pub fn buffer<T: bytemuck::NoUninit>(data: &[T]) -> BufferRange {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
+    let memory = Allocation::new_zeroed(bytes.len().max(4) as u64).expect("memory");
+    memory.write(0, bytes).expect("it has room");
+    BufferRange {
+        size: memory.len(),
+        memory,
+        offset: 0,
+    }
+}
+
+/// A set of Gaussians to draw.
+pub struct Case<'a> {
+    pub state: OracleState,
+    pub viewport: OracleViewport,
+    pub outputs: &'a [OracleOutputs],
+    /// Parts of them that are draws of their own.
+    pub draws: Vec<Draw>,
+    pub depth: Option<(CompareOp, bool)>,
+    pub resolve: Option<ResolveShader>,
+    /// One for each colour attachment, of which all hold `clear` before.
+    pub blend: Vec<BlendState>,
+    pub clear: [f32; 4],
+    /// The depth attachment's format.
+    pub depth_format: Format,
+    pub samples: u32,
+}
+
+/// What became of it.
+pub struct Drawn {
+    /// Of the first attachment.
+    pub color: Vec<[f32; 4]>,
+    /// Of the others.
+    pub others: Vec<Vec<[f32; 4]>>,
+    /// If its format is of binary32.
+    pub depth: Vec<f32>,
+    pub counters: Counters,
+}
+
+/// A draw of Gaussians `first..first + count`.
+pub fn draw(device: &Device, outputs: &[OracleOutputs], first: u32, count: u32) -> Draw {
+    let numbers: Vec<_> = outputs.iter().flat_map(numbers).collect();
+    let numbers = buffer(&numbers);
+    let stream = |number: u32| AttributeStream {
+        buffer: numbers.clone(),
+        stride: 4 * NUMBERS as u32,
+        offset: 16 * number,
+        format: Format::R32G32B32A32Sfloat,
+        instance_divisor: None,
+    };
+    Draw {
+        pipeline: pipeline(device, outputs.iter().all(|one| one.key.is_some())),
+        state: Arc::new(DrawState::new(Topology::PointList, [0; 2])),
+        attributes: (0..3).map(stream).collect(),
+        vertex_bindings: Bindings::default(),
+        fragment_bindings: Bindings::default(),
+        indices: None,
+        first,
+        count,
+        first_instance: 0,
+        instance_count: 1,
+        draw_index: 0,
+    }
+}
+
+pub fn whole<'a>(device: &Device, outputs: &'a [OracleOutputs]) -> Case<'a> {
+    Case {
+        state: OracleState::default(),
+        viewport: UPRIGHT,
+        outputs,
+        draws: vec![draw(device, outputs, 0, outputs.len() as u32)],
+        depth: None,
+        resolve: None,
+        blend: vec![REPLACE],
+        clear: [0.0; 4],
+        depth_format: Format::D32Sfloat,
+        samples: 1,
+    }
+}
+
+impl Case<'_> {
+    fn state(&self) -> GaussianState {
+        let state = &self.state;
+        GaussianState {
+            order: match state.order {
+                OracleOrder::ViewDepth => GaussianOrder::ViewDepth,
+                OracleOrder::RadialDistance => GaussianOrder::RadialDistance,
+                OracleOrder::Primitive => GaussianOrder::Primitive,
+            },
+            opacity_compensated: state.opacity_compensated,
+            low_pass_variance: state.low_pass,
+            alpha_floor: state.alpha_floor,
+            alpha_ceiling: state.alpha_ceiling,
+            transmittance_floor: state.transmittance_floor,
+            depth_stencil: DepthStencil {
+                depth: self
+                    .depth
+                    .map(|(compare, write)| DepthTest { compare, write }),
+                ..DepthStencil::default()
+            },
+            blend: self.blend.clone(),
+            ..GaussianState::default()
+        }
+    }
+
+    /// Draws it over nothing, with depths of one half.
+    pub fn run(&self, device: &Arc<Device>) -> Drawn {
+        let color = |_: &BlendState| image(Format::R32G32B32A32Sfloat, self.samples);
+        let colors: Vec<_> = self.blend.iter().map(color).collect();
+        let resolved: Vec<_> = (self.blend.iter())
+            .map(|_| image(Format::R32G32B32A32Sfloat, 1))
+            .collect();
+        let depth = image(self.depth_format, self.samples);
+        let attachment = |view: &ImageView, value| Attachment {
+            view: view.clone(),
+            load: LoadOp::Clear(value),
+            store: StoreOp::Store,
+            resolve: None,
+        };
+        let everything = Rect {
+            x: 0,
+            y: 0,
+            width: SIZE[0],
+            height: SIZE[1],
+        };
+        let stored = ClearValue::DepthStencil {
+            depth: 0.5,
+            stencil: 0,
+        };
+        let given = Viewport {
+            x: self.viewport.corner[0],
+            y: self.viewport.corner[1],
+            width: self.viewport.size[0],
+            height: self.viewport.size[1],
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
+        let mut packets = vec![
+            Packet::BeginRendering(Box::new(Rendering {
+                area: everything,
+                layer_count: 1,
+                color: std::iter::zip(&colors, &resolved)
+                    .map(|(color, to)| {
+                        let attachment = attachment(color, ClearValue::Float(self.clear));
+                        let mode = ResolveMode::Average;
+                        Some(Attachment {
+                            resolve: (self.samples > 1).then(|| (to.clone(), mode)),
+                            ..attachment
+                        })
+                    })
+                    .collect(),
+                depth: Some(attachment(&depth, stored)),
+                stencil: None,
+            })),
+            Packet::GaussianBegin(Box::new(GaussianBegin {
+                state: Arc::new(self.state()),
+                camera: Camera::default(),
+                viewport: Viewport {
+                    x: 0.0,
+                    y: 0.0,
+                    width: SIZE[0] as f32,
+                    height: SIZE[1] as f32,
+                    ..given
+                },
+                scissor: everything,
+            })),
+        ];
+        let shader = self.resolve.iter().cloned();
+        packets.extend(shader.map(|shader| Packet::GaussianResolveShader(Box::new(shader))));
+        packets.extend(self.draws.iter().map(|draw| {
+            let state = DrawState {
+                viewports: vec![given],
+                ..DrawState::clone(&draw.state)
+            };
+            Packet::GaussianAppendDraw(Box::new(Draw {
+                state: Arc::new(state),
+                ..draw.clone()
+            }))
+        }));
+        packets.extend([Packet::GaussianResolve, Packet::EndRendering]);
+        let mut processor = CommandProcessor::new(Arc::clone(device));
+        for packet in &packets {
+            processor.execute(packet).expect("it fits");
+        }
+        let drawn = if self.samples > 1 { &resolved } else { &colors };
+        let mut drawn = drawn.iter().map(|view| texels(view, Aspect::Color));
+        let has_floats = self.depth_format == Format::D32Sfloat && self.samples == 1;
+        Drawn {
+            color: drawn.next().expect("an attachment"),
+            others: drawn.collect(),
+            depth: if has_floats {
+                texels(&depth, Aspect::Depth)
+            } else {
+                Vec::new()
+            },
+            counters: processor.counters().clone(),
+        }
+    }
+
+    /// Draws it and holds it against the reference.
+    #[track_caller]
+    pub fn check(&self, name: &str, device: &Arc<Device>) -> Drawn {
+        let drawn = self.run(device);
+        let reference = render_shaded(self.outputs, SIZE, &self.viewport, &self.state);
+        assert!(
+            reference.nominal.iter().any(|rgba| rgba[3] > 0.9),
+            "{name}: it is empty"
+        );
+        assert_contract(name, &drawn.color, &reference, Limits::ENVELOPE_ONLY);
+        drawn
+    }
+}
+
+pub fn device(simd: SimdLevel) -> Arc<Device> {
+    let config = Config {
+        threads: 2,
+        simd,
+        ..Config::default()
+    };
+    Arc::new(Device::new(&config).expect("a device"))
+}

@@ -1,0 +1,305 @@
+//! Gaussians that a vertex program projects, and fragments that a fragment program makes, as packets to the device,
+//! against the reference given what the vertex program writes.
+
+mod device;
+mod resolved;
+
+use device::buffer;
+use device::{Case, SIZE, UPRIGHT, device, draw, whole};
+use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, project, render_shaded};
+use gaurast_tests::oracle::{OracleOrder, OracleState, SkipReason};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use simdevice::counters::Counter;
+use simdevice::device::{FlushPolicy, SimdLevel};
+use simdevice::packet::IndexStream;
+use simdevice::packet::draw::{CompareOp, Draw};
+use simdevice::{Config, Device};
+use std::sync::Arc;
+
+/// Gaussians of any shape, on the screen and beside it, with some depths that are equal.
+fn cloud(seed: u64, count: usize) -> Vec<OracleOutputs> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..count)
+        .map(|_| {
+            let w: f32 = rng.random_range(0.5..8.0);
+            let depth: f32 = rng.random_range(0.0..1.0);
+            let ndc: [f32; 2] = std::array::from_fn(|_| rng.random_range(-1.2..1.2));
+            let size: f32 = rng.random_range(-2.0f32..3.0).exp();
+            let thin: f32 = size * rng.random_range(-5.0f32..0.0).exp();
+            let angle: f32 = rng.random_range(0.0..std::f32::consts::PI);
+            let (sin, cos) = angle.sin_cos();
+            let (long, short) = (size * size, thin * thin);
+            let key: f32 = rng.random_range(1.0..4.0);
+            OracleOutputs {
+                position: [ndc[0] * w, ndc[1] * w, depth * w, w],
+                covariance: [
+                    long * cos * cos + short * sin * sin,
+                    (long - short) * sin * cos,
+                    long * sin * sin + short * cos * cos,
+                ],
+                opacity: rng.random_range(0.02..1.5),
+                color: std::array::from_fn(|_| rng.random_range(-0.1..1.0)),
+                key: Some((16.0 * key).round() / 16.0),
+            }
+        })
+        .collect()
+}
+
+/// One that is not drawn, for each reason.
+fn skipped() -> Vec<(OracleOutputs, SkipReason)> {
+    let sound = OracleOutputs {
+        position: [0.0, 0.0, 0.5, 1.0],
+        covariance: [4.0, 0.0, 4.0],
+        opacity: 0.9,
+        color: [1.0; 3],
+        key: Some(1.0),
+    };
+    let nan = f32::NAN;
+    let at = |position| OracleOutputs { position, ..sound };
+    let shaped = |covariance| OracleOutputs {
+        covariance,
+        ..sound
+    };
+    let (not_finite, near) = (SkipReason::NonFinite, SkipReason::Near);
+    let degenerate = SkipReason::DegenerateCovariance;
+    vec![
+        (at([nan, 0.0, 0.5, 1.0]), not_finite),
+        (at([0.0, f32::INFINITY, 0.5, 1.0]), not_finite),
+        (shaped([4.0, nan, 4.0]), not_finite),
+        (
+            OracleOutputs {
+                opacity: nan,
+                ..sound
+            },
+            not_finite,
+        ),
+        (
+            OracleOutputs {
+                color: [0.5, nan, 0.5],
+                ..sound
+            },
+            not_finite,
+        ),
+        (
+            OracleOutputs {
+                key: Some(nan),
+                ..sound
+            },
+            not_finite,
+        ),
+        (
+            OracleOutputs {
+                opacity: 0.003,
+                ..sound
+            },
+            SkipReason::OpacityBelowFloor,
+        ),
+        (at([0.0, 0.0, 0.5, 0.0]), near),
+        (at([0.0, 0.0, -0.5, -1.0]), near),
+        (at([0.0, 0.0, -0.001, 1.0]), near),
+        (at([0.0, 0.0, 1.001, 1.0]), SkipReason::Far),
+        // Negative definite, indefinite and half definite.
+        (shaped([-4.0, 0.0, -4.0]), degenerate),
+        (shaped([4.0, 9.0, 4.0]), degenerate),
+        (shaped([4.0, 0.0, -0.3]), degenerate),
+    ]
+}
+
+#[test]
+fn pictures_keep_the_contract_at_every_level() {
+    let outputs = cloud(31, 3000);
+    for (name, level) in SimdLevel::supported() {
+        let device = device(level);
+        let drawn = whole(&device, &outputs).check(&format!("shaded_{name}"), &device);
+        let invocations = drawn.counters.get(Counter::VertexInvocations);
+        assert_eq!(invocations, 3000, "{name}");
+        assert_eq!(drawn.counters.get(Counter::GaussiansRead), 3000, "{name}");
+    }
+}
+
+#[test]
+fn modes_keep_the_contract() {
+    let outputs = cloud(32, 800);
+    let device = device(SimdLevel::Best);
+    let default = OracleState::default();
+    for (name, state) in [
+        (
+            "compensated",
+            OracleState {
+                opacity_compensated: true,
+                ..default
+            },
+        ),
+        (
+            "primitive_order",
+            OracleState {
+                order: OracleOrder::Primitive,
+                ..default
+            },
+        ),
+        (
+            "by_distance",
+            OracleState {
+                order: OracleOrder::RadialDistance,
+                ..default
+            },
+        ),
+        (
+            "unfiltered",
+            OracleState {
+                low_pass: 0.0,
+                ..default
+            },
+        ),
+    ] {
+        let case = Case {
+            state,
+            ..whole(&device, &outputs)
+        };
+        case.check(&format!("shaded_{name}"), &device);
+    }
+    // Without a key the order is that of w.
+    let unkeyed: Vec<_> = (outputs.iter())
+        .map(|one| OracleOutputs { key: None, ..*one })
+        .collect();
+    whole(&device, &unkeyed).check("shaded_unkeyed", &device);
+    // Viewports that are upside down, or begin anywhere, move means and nothing else.
+    for (name, corner, size) in [
+        (
+            "flipped",
+            [0.0, SIZE[1] as f32],
+            [SIZE[0] as f32, -(SIZE[1] as f32)],
+        ),
+        ("large", [-20.25, -7.5], [190.5, 101.25]),
+    ] {
+        let case = Case {
+            viewport: OracleViewport { corner, size },
+            ..whole(&device, &outputs)
+        };
+        case.check(&format!("shaded_{name}"), &device);
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_skipped_and_counted() {
+    let device = device(SimdLevel::Best);
+    let mut outputs = cloud(33, 300);
+    let state = OracleState::default();
+    let all = skipped();
+    for (one, reason) in &all {
+        assert_eq!(
+            project(one, &UPRIGHT, &state).err(),
+            Some(*reason),
+            "{one:?}"
+        );
+        outputs.push(*one);
+    }
+    let drawn = whole(&device, &outputs).check("shaded_skipped", &device);
+    let expected = render_shaded(&outputs, SIZE, &UPRIGHT, &state).skips;
+    let counted = |counter| drawn.counters.get(counter) as usize;
+    assert_eq!(counted(Counter::SkippedNonFinite), expected.non_finite);
+    assert_eq!(counted(Counter::SkippedFaint), expected.opacity_below_floor);
+    assert_eq!(counted(Counter::SkippedNear), expected.near);
+    assert_eq!(counted(Counter::SkippedFar), expected.far);
+    assert_eq!(
+        counted(Counter::SkippedDegenerate),
+        expected.degenerate_covariance
+    );
+}
+
+#[test]
+fn draws_indices_and_instances_make_one_sorted_set() {
+    let device = device(SimdLevel::Best);
+    let outputs = cloud(34, 700);
+    let expected = whole(&device, &outputs).run(&device);
+    let in_two = Case {
+        draws: vec![
+            draw(&device, &outputs, 0, 300),
+            draw(&device, &outputs, 300, 400),
+        ],
+        ..whole(&device, &outputs)
+    };
+    assert!(in_two.run(&device).color == expected.color);
+    // Indices that name every Gaussian in turn, twice, and the order is that of places.
+    let indices: Vec<u16> = (0..700).chain((0..700).rev()).collect();
+    let indexed = Draw {
+        indices: Some(IndexStream {
+            buffer: buffer(&indices),
+            index_size: 2,
+            vertex_offset: 0,
+        }),
+        ..draw(&device, &outputs, 0, 1400)
+    };
+    let twice: Vec<_> = indices
+        .iter()
+        .map(|&index| outputs[usize::from(index)])
+        .collect();
+    let case = Case {
+        outputs: &twice,
+        draws: vec![indexed],
+        ..whole(&device, &outputs)
+    };
+    case.check("shaded_indexed", &device);
+    // An instance draws all again, behind where depths are equal.
+    let instances = Draw {
+        instance_count: 2,
+        ..draw(&device, &outputs, 0, 700)
+    };
+    let again: Vec<_> = outputs.iter().chain(&outputs).copied().collect();
+    let case = Case {
+        outputs: &again,
+        draws: vec![instances],
+        ..whole(&device, &outputs)
+    };
+    case.check("shaded_instances", &device);
+}
+
+#[test]
+fn centres_are_tested_for_depth_and_the_median_is_stored() {
+    let device = device(SimdLevel::Best);
+    let outputs = cloud(35, 1200);
+    let depth = |one: &OracleOutputs| {
+        let [_, _, z, w] = one.position.map(f64::from);
+        (z / w) as f32
+    };
+    let before: Vec<_> = outputs
+        .iter()
+        .filter(|one| depth(one) < 0.5)
+        .copied()
+        .collect();
+    assert!(before.len() > 400 && before.len() < 800);
+    let all = whole(&device, &outputs);
+    let case = Case {
+        outputs: &before,
+        depth: Some((CompareOp::Less, true)),
+        ..all
+    };
+    let drawn = case.check("shaded_depth", &device);
+    let depths: Vec<f32> = before.iter().map(depth).collect();
+    let covered = std::iter::zip(&drawn.color, &drawn.depth).filter(|(rgba, _)| rgba[3] > 0.0);
+    let mut count = 0;
+    for (_, stored) in covered {
+        assert!(depths.contains(stored), "{stored} is no centre's depth");
+        count += 1;
+    }
+    assert!(count > 1000, "{count}");
+}
+
+#[test]
+fn neither_threads_nor_flushes_change_a_bit() {
+    let outputs = cloud(36, 5000);
+    let one = device(SimdLevel::Best);
+    let expected = whole(&one, &outputs).run(&one);
+    for (threads, flush) in [(1, FlushPolicy::WhenFull), (3, FlushPolicy::EveryDraw)] {
+        let config = Config {
+            threads,
+            flush,
+            macro_tile_size: 32,
+            ..Config::default()
+        };
+        let device = Arc::new(Device::new(&config).expect("a device"));
+        let drawn = whole(&device, &outputs).run(&device);
+        assert!(drawn.color == expected.color, "{threads} threads");
+    }
+}

@@ -1,0 +1,275 @@
+//! Resolve shaders: what they read is what the reference says of each pixel, and what they write goes where it should.
+
+use super::cloud;
+use super::device::{Case, REPLACE, SIZE, UPRIGHT, device, whole};
+use gaurast_tests::oracle::OracleState;
+use gaurast_tests::oracle::resolve::{Resolved, resolve_shaded};
+use simdevice::Format;
+use simdevice::bindings::Bindings;
+use simdevice::counters::Counter;
+use simdevice::device::SimdLevel;
+use simdevice::isa::builder::Builder;
+use simdevice::isa::ir::{Rate, Type};
+use simdevice::packet::draw::{
+    CompareOp, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, ResolveProgram,
+    ResolveShader, Sampling, resolve,
+};
+use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
+use std::sync::Arc;
+
+/// Passes its inputs on: four to each attachment in turn.
+fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> ResolveShader {
+    let mut builder = Builder::new();
+    for slot in 0..inputs.len() as u32 {
+        let input = builder.input(slot, Type::B32, Rate::Varying);
+        let output = builder.output(slot, Type::B32);
+        builder.assign(output, input);
+    }
+    let output = |slot: usize| FragmentOutput::Color {
+        attachment: slot / 4,
+        component: slot % 4,
+        index: 0,
+    };
+    let programs = FragmentPrograms {
+        program: builder.finish().expect("a program"),
+        inputs: inputs.iter().copied().map(Some).collect(),
+        outputs: (0..inputs.len()).map(|slot| Some(output(slot))).collect(),
+        early_tests: false,
+        discards: false,
+        per_sample: false,
+        has_side_effects: false,
+    };
+    ResolveShader {
+        program: Arc::new(ResolveProgram::new(device, &programs).expect("a program")),
+        bindings: Bindings::default(),
+        sample_shading: false,
+        alpha_to_coverage: false,
+        alpha_to_one: false,
+    }
+}
+
+fn varying(index: u32) -> FragmentInput {
+    FragmentInput::Varying {
+        index,
+        interpolation: Interpolation::Perspective,
+        sampling: Sampling::Center,
+    }
+}
+
+/// The accumulated colour, then depths and places.
+fn everything() -> [FragmentInput; 8] {
+    [
+        varying(resolve::ACCUMULATED),
+        varying(resolve::ACCUMULATED + 1),
+        varying(resolve::ACCUMULATED + 2),
+        varying(resolve::ACCUMULATED + 3),
+        varying(resolve::EXPECTED_DEPTH),
+        varying(resolve::MEDIAN_DEPTH),
+        FragmentInput::FragCoord(0),
+        FragmentInput::FragCoord(1),
+    ]
+}
+
+const TOLERANCE: f64 = 5e-6;
+
+/// Whether a pixel lies within the envelope of its outcomes.
+fn within(ways: &[Resolved], value: f32, of: impl Fn(&Resolved) -> Vec<f64>) -> bool {
+    let all = ways.iter().flat_map(of);
+    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+        (low.min(v), high.max(v))
+    });
+    let value = f64::from(value);
+    low - TOLERANCE <= value && value <= high + TOLERANCE
+}
+
+/// Holds what a program passed on against the reference; returns how many pixels were covered.
+#[track_caller]
+fn check(name: &str, ways: &[Vec<Resolved>], color: &[[f32; 4]], shown: &[[f32; 4]]) -> usize {
+    let mut covered = 0;
+    for (index, ways) in ways.iter().enumerate() {
+        let (color, shown) = (color[index], shown[index]);
+        let fragment = shown != [-1.0; 4];
+        let may_be = |is: bool| ways.iter().any(|way| way.covered == is);
+        assert!(may_be(fragment), "{name}: pixel {index}");
+        if !fragment {
+            continue;
+        }
+        covered += 1;
+        let ways: Vec<Resolved> = ways.iter().filter(|way| way.covered).cloned().collect();
+        for channel in 0..4 {
+            let is_within = within(&ways, color[channel], |way| vec![way.accumulated[channel]]);
+            assert!(is_within, "{name}: pixel {index}: {color:?}, {ways:?}");
+        }
+        let [expected, median, x, y] = shown;
+        let is_within = within(&ways, expected, |way| vec![way.expected_depth]);
+        assert!(is_within, "{name}: pixel {index}: {expected}, {ways:?}");
+        let mut medians = ways.iter().flat_map(|way| &way.median_depths);
+        let is_one = medians.any(|depth| (depth - f64::from(median)).abs() <= 1e-7);
+        let unknown = ways.iter().any(|way| way.medians_exhausted);
+        assert!(
+            is_one || unknown,
+            "{name}: pixel {index}: {median}, {ways:?}"
+        );
+        let (column, row) = (index as u32 % SIZE[0], index as u32 / SIZE[0]);
+        assert_eq!([x, y], [column as f32 + 0.5, row as f32 + 0.5], "{name}");
+    }
+    covered
+}
+
+#[test]
+fn what_is_read_is_what_was_accumulated_at_every_level() {
+    let outputs = cloud(41, 2000);
+    let state = OracleState::default();
+    let ways = resolve_shaded(&outputs, SIZE, &UPRIGHT, &state);
+    for (name, level) in SimdLevel::supported() {
+        let device = device(level);
+        let case = Case {
+            resolve: Some(passing_on(&device, &everything())),
+            blend: vec![REPLACE; 2],
+            clear: [-1.0; 4],
+            ..whole(&device, &outputs)
+        };
+        let drawn = case.run(&device);
+        let covered = check(&name, &ways, &drawn.color, &drawn.others[0]);
+        assert!(covered > 8000, "{name}: {covered}");
+        let shaded = drawn.counters.get(Counter::FragmentInvocations);
+        assert_eq!(shaded, covered as u64, "{name}");
+        assert_eq!(
+            drawn.counters.get(Counter::SamplesPassed),
+            covered as u64,
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn depths_are_rounded_to_the_attachment_and_tested() {
+    let outputs = cloud(42, 1500);
+    let device = device(SimdLevel::Best);
+    let depth = |one: &super::OracleOutputs| {
+        let [_, _, z, w] = one.position.map(f64::from);
+        (z / w) as f32
+    };
+    let before: Vec<_> = outputs
+        .iter()
+        .filter(|one| depth(one) < 0.5)
+        .copied()
+        .collect();
+    let ways = resolve_shaded(&before, SIZE, &UPRIGHT, &OracleState::default());
+    let case = Case {
+        resolve: Some(passing_on(&device, &everything())),
+        blend: vec![REPLACE; 2],
+        clear: [-1.0; 4],
+        depth: Some((CompareOp::Less, true)),
+        ..whole(&device, &outputs)
+    };
+    let drawn = case.run(&device);
+    check("tested", &ways, &drawn.color, &drawn.others[0]);
+    // What is stored is the median that was read.
+    for (shown, stored) in std::iter::zip(&drawn.others[0], &drawn.depth) {
+        let expected = if *shown == [-1.0; 4] { 0.5 } else { shown[1] };
+        assert_eq!(*stored, expected);
+    }
+    let coarse = Case {
+        depth_format: Format::D16Unorm,
+        depth: None,
+        ..case
+    };
+    let coarse = coarse.run(&device);
+    let mut fragments = coarse.others[0].iter().filter(|shown| **shown != [-1.0; 4]);
+    assert!(fragments.clone().count() > 5000);
+    let is_held = |shown: &[f32; 4]| {
+        let steps = f64::from(shown[1]) * 65535.0;
+        (steps - steps.round()).abs() < 0.01
+    };
+    assert!(fragments.all(is_held));
+}
+
+#[test]
+fn what_a_program_writes_is_blended() {
+    let outputs = cloud(43, 1000);
+    let device = device(SimdLevel::Best);
+    let over = BlendEquation {
+        source: BlendFactor::One,
+        destination: BlendFactor::OneMinusSrcAlpha,
+        op: BlendOp::Add,
+    };
+    let blended = BlendState {
+        equations: Some((over, over)),
+        write_mask: 0b0101,
+    };
+    let inputs = everything();
+    let accumulated = [&inputs[..4], &inputs[..4]].concat();
+    let case = |resolve| Case {
+        resolve,
+        blend: vec![blended, REPLACE],
+        clear: [0.5, 0.25, 0.125, 1.0],
+        ..whole(&device, &outputs)
+    };
+    let plain = case(None).run(&device);
+    let shaded = case(Some(passing_on(&device, &accumulated))).run(&device);
+    assert!(plain.color == shaded.color);
+    // The second attachment is only written by a program.
+    assert!(
+        plain.others[0]
+            .iter()
+            .all(|texel| *texel == [0.5, 0.25, 0.125, 1.0])
+    );
+    let unblended = Case {
+        blend: vec![REPLACE; 2],
+        ..case(None)
+    };
+    assert!(unblended.run(&device).color == shaded.others[0]);
+    // Alpha may become coverage.
+    let by_alpha = ResolveShader {
+        alpha_to_coverage: true,
+        alpha_to_one: true,
+        ..passing_on(&device, &accumulated)
+    };
+    let by_alpha = case(Some(by_alpha)).run(&device);
+    let mut kept = 0;
+    for (all, some) in std::iter::zip(&shaded.others[0], &by_alpha.others[0]) {
+        if all[3] >= 0.5 && *all != [0.5, 0.25, 0.125, 1.0] {
+            assert_eq!((&some[..3], some[3]), (&all[..3], 1.0));
+            kept += 1;
+        } else {
+            assert_eq!(*some, [0.5, 0.25, 0.125, 1.0]);
+        }
+    }
+    assert!(kept > 1000, "{kept}");
+}
+
+#[test]
+fn samples_share_invocations_unless_each_is_shaded() {
+    let outputs = cloud(44, 500);
+    let device = device(SimdLevel::Best);
+    let inputs = [
+        varying(resolve::ACCUMULATED + 3),
+        varying(resolve::ACCUMULATED),
+        FragmentInput::FragCoord(0),
+        FragmentInput::FragCoord(3),
+    ];
+    let case = |sample_shading| Case {
+        resolve: Some(ResolveShader {
+            sample_shading,
+            ..passing_on(&device, &inputs)
+        }),
+        samples: 4,
+        ..whole(&device, &outputs)
+    };
+    let (shared, each) = (case(false).run(&device), case(true).run(&device));
+    let invocations =
+        [&shared, &each].map(|drawn| drawn.counters.get(Counter::FragmentInvocations));
+    assert_eq!(4 * invocations[0], invocations[1]);
+    let covered = shared.color.iter().filter(|texel| texel[3] == 1.0).count();
+    assert_eq!(covered as u64, invocations[0]);
+    for (index, (shared, each)) in std::iter::zip(&shared.color, &each.color).enumerate() {
+        if shared[3] == 0.0 {
+            continue;
+        }
+        // The mean of the samples' places is the centre, and all are alike in the rest.
+        assert_eq!(shared[..2], each[..2]);
+        assert_eq!(shared[2], (index as u32 % SIZE[0]) as f32 + 0.5);
+        assert!((shared[2] - each[2]).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,86 @@
+//! What a resolve shader reads of a pixel, in its literal form.
+
+use super::OracleState;
+use super::pixel::{Outcome, Pixel};
+use super::project::Splat;
+use super::render::{Projected, bounded_pixels};
+use super::sample_tests::OracleTests;
+use super::shaded::{OracleOutputs, OracleViewport, project};
+use super::{OracleCamera, OracleScene};
+
+/// One way in which a pixel may come about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Resolved {
+    /// (C, 1 - T).
+    pub accumulated: [f64; 4],
+    /// Whether a Gaussian contributed, so that there is a fragment.
+    pub covered: bool,
+    /// The mean of the contributing centres' depths, weighted by T alpha.
+    pub expected_depth: f64,
+    /// Every median depth that it may have.
+    pub median_depths: Vec<f64>,
+    /// Whether those are not all.
+    pub medians_exhausted: bool,
+}
+
+impl Resolved {
+    fn new(outcome: &Outcome, depth: impl Fn(f32) -> f64) -> Self {
+        let median_depths: Vec<f64> = outcome.medians.iter().map(|&z| depth(z)).collect();
+        let [depths, weights] = outcome.depths;
+        let last = median_depths.last().copied().unwrap_or(0.0);
+        Self {
+            accumulated: outcome.rgba,
+            covered: outcome.covered,
+            expected_depth: if weights > 0.0 {
+                depths / weights
+            } else {
+                last
+            },
+            median_depths,
+            medians_exhausted: outcome.medians_exhausted,
+        }
+    }
+}
+
+/// Every way in which each pixel may come about, what binary64 says first. `depth` is a centre's depth, of the depth
+/// variable.
+fn resolve(
+    mut projected: Projected,
+    size: [u32; 2],
+    state: &OracleState,
+    depth: impl Fn(f32) -> f64,
+) -> Vec<Vec<Resolved>> {
+    let set_depth = |splat: &mut Splat| splat.depth = depth(splat.z);
+    projected.splats.iter_mut().for_each(set_depth);
+    let pixels = bounded_pixels(&projected, size, state);
+    let ways = |pixel: &Pixel| {
+        let outcomes = pixel.outcomes();
+        outcomes
+            .map(|outcome| Resolved::new(&outcome, &depth))
+            .collect()
+    };
+    pixels.iter().flatten().map(ways).collect()
+}
+
+/// What a resolve shader reads after fixed-function projection. Of `tests` only how depths come about counts.
+pub fn resolve_scene(
+    scene: &OracleScene,
+    camera: &OracleCamera,
+    state: &OracleState,
+    tests: &OracleTests,
+) -> Vec<Vec<Resolved>> {
+    let projected = Projected::new(scene, camera, state);
+    let depth = |z| tests.format.depth(tests.code(camera.model, z));
+    resolve(projected, [camera.width, camera.height], state, depth)
+}
+
+/// What it reads after vertex-shader projection, with a viewport of depths from 0 to 1 and a depth of binary32.
+pub fn resolve_shaded(
+    outputs: &[OracleOutputs],
+    size: [u32; 2],
+    viewport: &OracleViewport,
+    state: &OracleState,
+) -> Vec<Vec<Resolved>> {
+    let all = outputs.iter().map(|one| project(one, viewport, state));
+    resolve(Projected::sort(all), size, state, f64::from)
+}
