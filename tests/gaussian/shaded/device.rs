@@ -3,6 +3,7 @@
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, render_shaded};
 use gaurast_tests::oracle::{OracleOrder, OracleState};
+use gaurast_tests::scenes::SceneBuffers;
 use simdevice::bindings::Bindings;
 use simdevice::counters::Counters;
 use simdevice::device::SimdLevel;
@@ -15,8 +16,8 @@ use simdevice::packet::draw::{
 };
 use simdevice::packet::{
     Aspect, Attachment, AttributeStream, BlendState, BufferRange, Camera, ClearValue,
-    GaussianBegin, GaussianOrder, GaussianState, LoadOp, Rect, Rendering, ResolveMode, StoreOp,
-    Viewport,
+    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianOrder, GaussianState, LoadOp, Rect,
+    Rendering, ResolveMode, StoreOp, Viewport,
 };
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
@@ -40,6 +41,93 @@ fn numbers(one: &OracleOutputs) -> [f32; NUMBERS] {
     numbers[8..11].copy_from_slice(&one.color);
     numbers[11] = one.key.unwrap_or(0.0);
     numbers
+}
+
+/// A triangle at a depth of a quarter, whose edges cross pixels, that only writes depth.
+pub fn triangle(device: &Device, samples: u32) -> Draw {
+    let mut builder = Builder::new();
+    for slot in 0..4 {
+        let input = builder.input(slot, Type::B32, Rate::Varying);
+        let output = builder.output(slot, Type::B32);
+        builder.assign(output, input);
+    }
+    let component = |component| {
+        Some(VertexInput::Attribute {
+            stream: 0,
+            component,
+        })
+    };
+    let programs = DrawPrograms {
+        vertex: builder.finish().expect("a program"),
+        vertex_inputs: (0..4).map(component).collect(),
+        vertex_outputs: (0..4)
+            .map(|axis| Some(VertexOutput::Position(axis)))
+            .collect(),
+        varyings: 0,
+        fragment: None,
+    };
+    let corners = [
+        [-0.9f32, -0.8, 0.25, 1.0],
+        [0.8, -0.3, 0.25, 1.0],
+        [-0.2, 0.9, 0.25, 1.0],
+    ];
+    let state = DrawState {
+        samples,
+        depth_stencil: DepthStencil {
+            depth: Some(DepthTest {
+                compare: CompareOp::Always,
+                write: true,
+            }),
+            ..DepthStencil::default()
+        },
+        ..DrawState::new(Topology::TriangleList, SIZE)
+    };
+    Draw {
+        pipeline: Arc::new(DrawPipeline::new(device, &programs).expect("a pipeline")),
+        state: Arc::new(state),
+        attributes: vec![AttributeStream {
+            buffer: buffer(&corners),
+            stride: 16,
+            offset: 0,
+            format: Format::R32G32B32A32Sfloat,
+            instance_divisor: None,
+        }],
+        vertex_bindings: Bindings::default(),
+        fragment_bindings: Bindings::default(),
+        indices: None,
+        first: 0,
+        count: 3,
+        first_instance: 0,
+        instance_count: 1,
+        draw_index: 0,
+    }
+}
+
+/// All Gaussians of a scene of degree 0, as the device projects them.
+pub fn append(scene: &SceneBuffers) -> GaussianAppend {
+    let stream = |buffer: BufferRange, stride, format| AttributeStream {
+        buffer,
+        stride,
+        offset: 0,
+        format,
+        instance_divisor: None,
+    };
+    let triples = |data: &[[f32; 3]]| stream(buffer(data), 12, Format::R32G32B32Sfloat);
+    let rotations = buffer(&scene.rotations);
+    GaussianAppend {
+        attributes: GaussianAttributes {
+            position: triples(&scene.positions),
+            scale: triples(&scene.scales),
+            rotation: stream(rotations, 16, Format::R32G32B32A32Sfloat),
+            opacity: stream(buffer(&scene.opacities), 4, Format::R32Sfloat),
+            spherical_harmonics: vec![triples(&scene.sh)],
+        },
+        indices: None,
+        first: 0,
+        count: scene.positions.len() as u32,
+        first_instance: 0,
+        instance_count: 1,
+    }
 }
 
 /// A program that writes what it reads.
@@ -138,6 +226,10 @@ pub struct Case<'a> {
     pub draws: Vec<Draw>,
     pub depth: Option<(CompareOp, bool)>,
     pub resolve: Option<ResolveShader>,
+    /// What is drawn before.
+    pub before: Vec<Draw>,
+    /// Gaussians that the device projects, with the camera that sees them, in place of the draws.
+    pub fixed: Option<(GaussianAppend, Camera)>,
     /// One for each colour attachment, of which all hold `clear` before.
     pub blend: Vec<BlendState>,
     pub clear: [f32; 4],
@@ -191,6 +283,8 @@ pub fn whole<'a>(device: &Device, outputs: &'a [OracleOutputs]) -> Case<'a> {
         draws: vec![draw(device, outputs, 0, outputs.len() as u32)],
         depth: None,
         resolve: None,
+        before: Vec::new(),
+        fixed: None,
         blend: vec![REPLACE],
         clear: [0.0; 4],
         depth_format: Format::D32Sfloat,
@@ -255,39 +349,50 @@ impl Case<'_> {
             min_depth: 0.0,
             max_depth: 1.0,
         };
-        let mut packets = vec![
-            Packet::BeginRendering(Box::new(Rendering {
-                area: everything,
-                layer_count: 1,
-                color: std::iter::zip(&colors, &resolved)
-                    .map(|(color, to)| {
-                        let attachment = attachment(color, ClearValue::Float(self.clear));
-                        let mode = ResolveMode::Average;
-                        Some(Attachment {
-                            resolve: (self.samples > 1).then(|| (to.clone(), mode)),
-                            ..attachment
-                        })
+        let (appends, camera) = match &self.fixed {
+            Some((append, camera)) => (vec![append.clone()], *camera),
+            None => (Vec::new(), Camera::default()),
+        };
+        let draws = if appends.is_empty() {
+            &self.draws[..]
+        } else {
+            &[]
+        };
+        let mut packets = vec![Packet::BeginRendering(Box::new(Rendering {
+            area: everything,
+            layer_count: 1,
+            color: std::iter::zip(&colors, &resolved)
+                .map(|(color, to)| {
+                    let attachment = attachment(color, ClearValue::Float(self.clear));
+                    let mode = ResolveMode::Average;
+                    Some(Attachment {
+                        resolve: (self.samples > 1).then(|| (to.clone(), mode)),
+                        ..attachment
                     })
-                    .collect(),
-                depth: Some(attachment(&depth, stored)),
-                stencil: None,
-            })),
-            Packet::GaussianBegin(Box::new(GaussianBegin {
-                state: Arc::new(self.state()),
-                camera: Camera::default(),
-                viewport: Viewport {
-                    x: 0.0,
-                    y: 0.0,
-                    width: SIZE[0] as f32,
-                    height: SIZE[1] as f32,
-                    ..given
-                },
-                scissor: everything,
-            })),
-        ];
+                })
+                .collect(),
+            depth: Some(attachment(&depth, stored)),
+            stencil: None,
+        }))];
+        let before = self.before.iter().cloned();
+        packets.extend(before.map(|draw| Packet::Draw(Box::new(draw))));
+        packets.push(Packet::GaussianBegin(Box::new(GaussianBegin {
+            state: Arc::new(self.state()),
+            camera,
+            viewport: Viewport {
+                x: 0.0,
+                y: 0.0,
+                width: SIZE[0] as f32,
+                height: SIZE[1] as f32,
+                ..given
+            },
+            scissor: everything,
+        })));
         let shader = self.resolve.iter().cloned();
         packets.extend(shader.map(|shader| Packet::GaussianResolveShader(Box::new(shader))));
-        packets.extend(self.draws.iter().map(|draw| {
+        let append = |append| Packet::GaussianAppend(Box::new(append));
+        packets.extend(appends.into_iter().map(append));
+        packets.extend(draws.iter().map(|draw| {
             let state = DrawState {
                 viewports: vec![given],
                 ..DrawState::clone(&draw.state)

@@ -1,9 +1,10 @@
 //! Resolve shaders: what they read is what the reference says of each pixel, and what they write goes where it should.
 
 use super::cloud;
-use super::device::{Case, REPLACE, SIZE, UPRIGHT, device, whole};
-use gaurast_tests::oracle::OracleState;
-use gaurast_tests::oracle::resolve::{Resolved, resolve_shaded};
+use super::device::{Case, REPLACE, SIZE, UPRIGHT, append, device, triangle, whole};
+use gaurast_tests::oracle::resolve::{Resolved, resolve_scene, resolve_shaded};
+use gaurast_tests::oracle::{OracleDepthFormat, OracleState, OracleTests};
+use gaurast_tests::scenes;
 use simdevice::Format;
 use simdevice::bindings::Bindings;
 use simdevice::counters::Counter;
@@ -14,7 +15,7 @@ use simdevice::packet::draw::{
     CompareOp, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, ResolveProgram,
     ResolveShader, Sampling, resolve,
 };
-use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
+use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState, Camera};
 use std::sync::Arc;
 
 /// Passes its inputs on: four to each attachment in turn.
@@ -226,16 +227,23 @@ fn what_a_program_writes_is_blended() {
         alpha_to_one: true,
         ..passing_on(&device, &accumulated)
     };
-    let by_alpha = case(Some(by_alpha)).run(&device);
+    let by_alpha = Case {
+        depth: Some((CompareOp::Always, true)),
+        ..case(Some(by_alpha))
+    };
+    let by_alpha = by_alpha.run(&device);
     let mut kept = 0;
-    for (all, some) in std::iter::zip(&shaded.others[0], &by_alpha.others[0]) {
+    for (index, (all, some)) in std::iter::zip(&shaded.others[0], &by_alpha.others[0]).enumerate() {
         if all[3] >= 0.5 && *all != [0.5, 0.25, 0.125, 1.0] {
             assert_eq!((&some[..3], some[3]), (&all[..3], 1.0));
             kept += 1;
         } else {
+            // What is taken away leaves depths, too, and is not counted.
             assert_eq!(*some, [0.5, 0.25, 0.125, 1.0]);
+            assert_eq!(by_alpha.depth[index], 0.5);
         }
     }
+    assert_eq!(by_alpha.counters.get(Counter::SamplesPassed), kept);
     assert!(kept > 1000, "{kept}");
 }
 
@@ -271,5 +279,81 @@ fn samples_share_invocations_unless_each_is_shaded() {
         assert_eq!(shared[..2], each[..2]);
         assert_eq!(shared[2], (index as u32 % SIZE[0]) as f32 + 0.5);
         assert!((shared[2] - each[2]).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn samples_that_differ_are_shaded_for_themselves() {
+    let outputs = cloud(45, 800);
+    let device = device(SimdLevel::Best);
+    let case = |sample_shading| Case {
+        resolve: Some(ResolveShader {
+            sample_shading,
+            ..passing_on(&device, &everything()[..6])
+        }),
+        blend: vec![REPLACE; 2],
+        before: vec![triangle(&device, 4)],
+        depth: Some((CompareOp::Less, true)),
+        samples: 4,
+        ..whole(&device, &outputs)
+    };
+    let (shared, each) = (case(false).run(&device), case(true).run(&device));
+    let invocations =
+        |drawn: &super::device::Drawn| drawn.counters.get(Counter::FragmentInvocations);
+    assert!(shared.color == each.color && shared.others == each.others);
+    let samples = invocations(&each);
+    // Most pixels have samples that agree, and some at the triangle's edges have not.
+    let flat = Case {
+        before: Vec::new(),
+        ..case(false)
+    };
+    let flat = flat.run(&device);
+    let pixels = invocations(&flat);
+    assert_eq!(4 * pixels, flat.counters.get(Counter::SamplesPassed));
+    assert!(invocations(&shared) < samples / 3, "{samples}");
+    assert!(4 * invocations(&shared) > samples + 400, "{samples}");
+}
+
+#[test]
+fn fixed_function_projection_is_resolved_in_the_depths_of_its_camera() {
+    let scene = scenes::cloud(46, 2500, 0);
+    let camera = scenes::camera(SIZE[0], SIZE[1]);
+    let device = device(SimdLevel::Best);
+    let depth_coefficients = [1.05, -2.1];
+    let seen = Camera {
+        focal_length: camera.focal,
+        principal_point: camera.principal,
+        depth_coefficients,
+        ..Camera::default()
+    };
+    for (name, format, oracle) in [
+        ("float", Format::D32Sfloat, OracleDepthFormat::Float),
+        ("16 bits", Format::D16Unorm, OracleDepthFormat::Unorm(16)),
+        (
+            "24 bits",
+            Format::X8D24UnormPack32,
+            OracleDepthFormat::Unorm(24),
+        ),
+    ] {
+        let tests = OracleTests {
+            depth_coefficients,
+            depth_range: [0.0, 1.0],
+            format: oracle,
+            depth: None,
+            bounds: None,
+            stencil: None,
+        };
+        let ways = resolve_scene(&scene.as_oracle(), &camera, &OracleState::default(), &tests);
+        let case = Case {
+            resolve: Some(passing_on(&device, &everything())),
+            fixed: Some((append(&scene), seen)),
+            blend: vec![REPLACE; 2],
+            clear: [-1.0; 4],
+            depth_format: format,
+            ..whole(&device, &[])
+        };
+        let drawn = case.run(&device);
+        let covered = check(name, &ways, &drawn.color, &drawn.others[0]);
+        assert!(covered > 3000, "{name}: {covered}");
     }
 }
