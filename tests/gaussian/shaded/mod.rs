@@ -303,3 +303,44 @@ fn neither_threads_nor_flushes_change_a_bit() {
         assert!(drawn.color == expected.color, "{threads} threads");
     }
 }
+
+#[test]
+fn extreme_values_keep_the_contract() {
+    let device = device(SimdLevel::Best);
+    let mut outputs = cloud(37, 200);
+    let sound = outputs[0];
+    let at = |position| OracleOutputs { position, ..sound };
+    let shaped = |covariance| OracleOutputs {
+        position: [0.25, -0.25, 0.5, 1.0],
+        covariance,
+        opacity: 0.5,
+        ..sound
+    };
+    outputs.extend([
+        at([1e30, -1e30, 0.5, 1.0]),
+        at([f32::MAX, f32::MAX, 0.0, 1e-38]),
+        at([1e-39, 1e-39, 1e-39, 2e-39]),
+        at([0.0, 0.0, f32::MAX, f32::MAX]),
+        // Everywhere, nowhere, thin, thinner than binary32 can say, and round but for rounding.
+        shaped([1e30, 0.0, 1e30]),
+        shaped([f32::MAX, 0.0, f32::MAX]),
+        shaped([1e-30, 0.0, 1e-30]),
+        shaped([1e6, 999_999.9, 1e6]),
+        shaped([0.0; 3]),
+        shaped([1e4, 0.0, 0.0]),
+        shaped([9.0, 9.0, 9.0]),
+        OracleOutputs {
+            opacity: 1e30,
+            ..shaped([4.0, 1.0, 4.0])
+        },
+    ]);
+    whole(&device, &outputs).check("shaded_extremes", &device);
+    let compensated = Case {
+        state: OracleState {
+            opacity_compensated: true,
+            ..OracleState::default()
+        },
+        ..whole(&device, &outputs)
+    };
+    compensated.check("shaded_extremes_compensated", &device);
+}

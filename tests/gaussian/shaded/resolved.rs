@@ -131,7 +131,7 @@ fn what_is_read_is_what_was_accumulated_at_every_level() {
             ..whole(&device, &outputs)
         };
         let drawn = case.run(&device);
-        let covered = check(&name, &ways, &drawn.color, &drawn.others[0]);
+        let covered = check(name, &ways, &drawn.color, &drawn.others[0]);
         assert!(covered > 8000, "{name}: {covered}");
         let shaded = drawn.counters.get(Counter::FragmentInvocations);
         assert_eq!(shaded, covered as u64, "{name}");
