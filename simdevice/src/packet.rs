@@ -274,6 +274,8 @@ pub enum CameraModel {
     Orthographic,
     /// Equidistant: focal lengths are pixels per radian from the axis.
     Fisheye,
+    /// Longitude and latitude: focal lengths are pixels per radian. Pictures repeat after a period of a whole turn.
+    Equirectangular,
 }
 
 /// The camera of a Gaussian draw: +x right, +y down, +z forward.
@@ -300,7 +302,7 @@ pub struct Camera {
 /// What Gaussians are sorted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GaussianOrder {
-    /// The centre's depth variable: camera-space z, or the distance for a fisheye.
+    /// The centre's depth variable: camera-space z, or the distance for a fisheye and a panorama.
     ViewDepth,
     /// The centre's distance from the eye.
     RadialDistance,

@@ -185,6 +185,9 @@ fn other_cameras() -> Vec<View> {
         .focal_length([31.0, 29.0])
         .depth_coefficients([0.0, 0.05]);
     let fisheye = pinhole.model(GaussianCameraModelGAURAST::FISHEYE);
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let eye = [0.2, -0.1, 5.0];
+    let panorama = GaussianCameraGAURAST::panorama(&axes, eye, [211.0, 157.0]).expect("a camera");
     vec![
         view("parallel", parallel),
         view(
@@ -195,6 +198,19 @@ fn other_cameras() -> Vec<View> {
         view(
             "fisheye, from its middle",
             fisheye.eye([0.2, -0.1, 5.0]).focal_length([32.0; 2]),
+        ),
+        view("panorama, from its middle", panorama),
+        view(
+            "panorama, a part, turned to a pole",
+            panorama
+                .rotation([1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0])
+                .focal_length([60.0, 45.0])
+                .principal_point([180.0, 70.0]),
+        ),
+        // More than three periods wide.
+        view(
+            "panorama, many times around",
+            panorama.focal_length([9.0, 40.0]),
         ),
     ]
 }

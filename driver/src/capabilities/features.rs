@@ -106,6 +106,7 @@ const SUPPORTED: &[&str] = &[
     "performance_counter_query_pools",
     // VK_GAURAST_gaussian_primitive_topology.
     "gaussian_primitive_topology",
+    "equirectangular_camera",
     "fisheye_camera",
     "gaussian_depth_stencil",
     "gaussian_multisample",

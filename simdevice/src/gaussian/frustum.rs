@@ -105,7 +105,7 @@ impl Frustum {
         let r = &projection.rotation;
         let depth = ([r[6], r[7], r[8]], projection.near, projection.far);
         let (depth, sides) = match projection.model {
-            CameraModel::Fisheye => (None, Vec::new()),
+            CameraModel::Fisheye | CameraModel::Equirectangular => (None, Vec::new()),
             _ => (
                 Some(depth),
                 vec![side(0, 1.0), side(0, -1.0), side(1, 1.0), side(1, -1.0)],

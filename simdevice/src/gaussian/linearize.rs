@@ -9,6 +9,7 @@ pub(super) fn linearize(model: CameraModel, t: [f64; 3]) -> ([f64; 2], [[f64; 3]
         CameraModel::Pinhole => pinhole(t),
         CameraModel::Orthographic => ([t[0], t[1]], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
         CameraModel::Fisheye => fisheye(t),
+        CameraModel::Equirectangular => equirectangular(t),
     }
 }
 
@@ -39,11 +40,32 @@ fn fisheye([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     )
 }
 
+/// How near to a pole, as the cosine of the latitude, a panorama's Jacobian is taken at most: beyond, meridians run so
+/// close together that it would be infinite at the pole.
+const POLE: f64 = 1.0 / 1024.0;
+
+/// Longitude, from straight ahead to the right, and latitude, downwards.
+fn equirectangular([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let r = x.hypot(z);
+    let length = r.hypot(y);
+    // At a pole every longitude is as good; that of straight ahead is taken.
+    let (sin, cos) = if r > 0.0 { (x / r, z / r) } else { (0.0, 1.0) };
+    let across = 1.0 / r.max(POLE * length);
+    let (rise, run) = (y / length, r / length);
+    (
+        [x.atan2(z), y.atan2(r)],
+        [
+            [cos * across, 0.0, -sin * across],
+            [-sin * rise / length, run / length, -cos * rise / length],
+        ],
+    )
+}
+
 /// The depth variable: what near and far plane, fragment depth and the view-depth order go by.
 pub(super) fn depth(model: CameraModel, [x, y, z]: [f64; 3]) -> f64 {
     match model {
         CameraModel::Pinhole | CameraModel::Orthographic => z,
-        CameraModel::Fisheye => (x * x + y * y + z * z).sqrt(),
+        CameraModel::Fisheye | CameraModel::Equirectangular => (x * x + y * y + z * z).sqrt(),
     }
 }
 
@@ -51,6 +73,13 @@ pub(super) fn depth(model: CameraModel, [x, y, z]: [f64; 3]) -> f64 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    const MODELS: [CameraModel; 4] = [
+        CameraModel::Pinhole,
+        CameraModel::Orthographic,
+        CameraModel::Fisheye,
+        CameraModel::Equirectangular,
+    ];
 
     /// Central differences.
     fn jacobian(model: CameraModel, t: [f64; 3]) -> [[f64; 3]; 2] {
@@ -73,10 +102,10 @@ mod tests {
     proptest! {
         #[test]
         fn the_jacobian_is_the_derivative(x in -3.0..3.0f64, y in -3.0..3.0f64, z in 0.5..9.0f64, behind: bool) {
-            for model in [CameraModel::Pinhole, CameraModel::Orthographic, CameraModel::Fisheye] {
-                // A fisheye sees what is beside and behind it, but not what is straight behind.
+            for model in MODELS {
+                // Fisheyes and panoramas see what is beside and behind them; a fisheye not what is straight behind.
                 let t = match model {
-                    CameraModel::Fisheye if behind => [x + x.signum(), y, -z],
+                    CameraModel::Fisheye | CameraModel::Equirectangular if behind => [x + x.signum(), y, -z],
                     _ => [x, y, z],
                 };
                 let (_, rows) = linearize(model, t);
@@ -103,8 +132,26 @@ mod tests {
     }
 
     #[test]
-    fn a_fisheye_s_depth_is_the_distance() {
+    fn a_panorama_sees_all_directions() {
+        let place = |t| linearize(CameraModel::Equirectangular, t).0;
+        let right = std::f64::consts::FRAC_PI_2;
+        assert_eq!(place([0.0, 0.0, 3.0]), [0.0, 0.0]);
+        assert_eq!(place([2.0, 0.0, 0.0]), [right, 0.0]);
+        assert_eq!(place([0.0, 0.0, -1.0]), [2.0 * right, 0.0]);
+        assert_eq!(place([0.0, 5.0, 0.0]), [0.0, right]);
+        assert_eq!(place([0.0, -5.0, 0.0]), [0.0, -right]);
+        // At a pole, and a little beside it, a point moves no faster than the stated limit.
+        for x in [0.0, 1e-9] {
+            let (_, rows) = linearize(CameraModel::Equirectangular, [0.0, 2.0, x]);
+            assert_eq!(rows[0], [512.0, 0.0, 0.0]);
+            assert!((rows[1][2] + 0.5).abs() < 1e-9, "{rows:?}");
+        }
+    }
+
+    #[test]
+    fn the_depth_of_what_sees_all_around_is_the_distance() {
         assert_eq!(depth(CameraModel::Fisheye, [2.0, 3.0, -6.0]), 7.0);
+        assert_eq!(depth(CameraModel::Equirectangular, [2.0, 3.0, -6.0]), 7.0);
         assert_eq!(depth(CameraModel::Orthographic, [2.0, 3.0, -6.0]), -6.0);
     }
 }

@@ -13,6 +13,7 @@ pub(crate) mod footprint;
 mod frustum;
 mod lanes;
 mod linearize;
+mod panorama;
 pub(crate) mod project;
 mod scratch;
 #[doc(hidden)] // For the benchmarks.
@@ -79,6 +80,8 @@ pub struct GaussianDraw {
     pub(crate) skips: Skips,
     /// How the depths of a tile's list follow one another.
     pub(crate) depth_trend: Trend,
+    /// Half the pixels after which the picture repeats, or infinity.
+    pub(crate) half_period: f64,
     /// Where the work of its tiles goes, if anybody wants to know.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
@@ -164,6 +167,7 @@ impl GaussianSet {
                 (Some(depth), GaussianOrder::ViewDepth) => depth.trend(),
                 _ => Trend::None,
             },
+            half_period: panorama::period(&self.begin.camera).map_or(f64::INFINITY, |p| 0.5 * p),
             state: self.begin.state,
             bounds: self.bounds,
             splats,
@@ -208,6 +212,9 @@ impl GaussianSet {
         };
         let batches = self.appends.iter().map(batches);
         let batches = batches.fold(0, u64::saturating_add);
+        // A picture that repeats has copies on both sides.
+        let sides = if projection.period.is_some() { 3 } else { 1 };
+        let batches = batches.saturating_mul(sides);
         if batches > MAX_BATCHES {
             return Err(TooManyGaussians { batches });
         }
@@ -317,12 +324,14 @@ impl GaussianSet {
             dispatch!(level, simd => projection.run(simd, &source, scratch, sequence, &mut out));
             out
         };
-        Ok(device.install(|| {
+        let mut batches: Vec<Projected> = device.install(|| {
             jobs.par_iter()
                 .with_min_len(BATCHES_PER_TASK)
                 .map_init(Worker::new, one)
                 .collect()
-        }))
+        });
+        panorama::append_copies(&mut batches);
+        Ok(batches)
     }
 }
 

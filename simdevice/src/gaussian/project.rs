@@ -11,6 +11,7 @@ use super::footprint::{Ellipse, Reach, Span, Visible};
 use super::frustum::Frustum;
 use super::lanes::{Bits, F32_LANES, Lanes, log2};
 use super::linearize;
+use super::panorama;
 use super::scratch::{Attributes, Scratch};
 use super::sort::ordered_bits;
 use super::spherical_harmonics;
@@ -40,6 +41,9 @@ pub(crate) struct Splat {
     pub depth: u32,
     /// Whether its exponent is a difference of numbers so large that binary32 would lose it.
     pub steep: bool,
+    /// Whether it is wider than the period of a panorama: it then counts within half a period of its mean only, where
+    /// its copies do not. Such a one is steep.
+    pub wide: bool,
 }
 
 /// The greatest logarithm of the opacity for which exponents are formed in binary32: what is lost of them grows with it.
@@ -71,6 +75,8 @@ pub(crate) struct Projected {
     pub spans: Vec<Span>,
     /// What was skipped and why.
     pub counters: Counters,
+    /// What is drawn a period to the right or to the left of where it is, by side.
+    pub copies: Vec<Projected>,
 }
 
 /// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
@@ -90,6 +96,8 @@ pub(crate) struct Projection {
     pub(super) focal: [f64; 2],
     /// The principal point in framebuffer pixels.
     pub(super) center: [f64; 2],
+    /// After how many pixels the picture repeats to the right and to the left, if it does.
+    pub(super) period: Option<f64>,
     /// Bounds of `t.x / t.z` and `t.y / t.z` in the Jacobian.
     pub(super) slope_min: [f64; 2],
     pub(super) slope_max: [f64; 2],
@@ -152,6 +160,7 @@ impl Projection {
                 principal[0] + f64::from(viewport.x),
                 principal[1] + f64::from(viewport.y),
             ],
+            period: panorama::period(camera),
             slope_min: [0, 1].map(|axis| -(principal[axis] / focal[axis] + margin[axis])),
             slope_max: [0, 1]
                 .map(|axis| (size[axis] - principal[axis]) / focal[axis] + margin[axis]),
@@ -464,6 +473,7 @@ impl Projection {
     fn find_tiles(&self, scratch: &mut Scratch, out: &mut Projected) {
         let mut beside = self.skips.has(Skip::Ellipse).then_some(0);
         scratch.reached.clear();
+        scratch.copies.clear();
         for at in 0..scratch.lanes.len().min(BATCH) {
             if let Some(reason) = self.why_skipped(at, scratch) {
                 out.counters.add(reason, 1);
@@ -480,7 +490,13 @@ impl Projection {
             let mut reach = None;
             // The square root of a negative extent is not a number.
             if ellipse.half[1] >= 0.0 {
-                reach = ellipse.reach(&self.visible, &mut out.spans, beside.as_mut());
+                reach = match self.period {
+                    None => ellipse.reach(&self.visible, &mut out.spans, beside.as_mut()),
+                    Some(period) => {
+                        let (visible, copies) = (&self.visible, &mut scratch.copies);
+                        panorama::reach(at, &ellipse, period, visible, copies, out, beside.as_mut())
+                    }
+                };
             }
             match reach {
                 Some(reach) => scratch.reached.push((at, reach)),
@@ -505,6 +521,7 @@ impl Projection {
         self.find_tiles(scratch, out);
         let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
         let mut coefficients = [[0.0; COEFFICIENT_FLOATS]; GROUP];
+        let mut copies = &*scratch.copies;
         for group in scratch.reached.chunks(GROUP) {
             // Reading several at a time overlaps the waits for memory.
             for (&(at, _), coefficients) in group.iter().zip(&mut coefficients) {
@@ -528,15 +545,22 @@ impl Projection {
                 let sequence = sequence(scratch.lanes[at]);
                 out.keys.push([self.key(at, sequence, scratch), sequence]);
                 let factor = [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]];
+                let wide = self
+                    .period
+                    .is_some_and(|period| 2.0 * flat.half[0][at] >= period);
                 out.splats.push(Splat {
                     mean: [flat.mean[0][at], flat.mean[1][at]],
                     factor,
                     log2_opacity: flat.log2_opacity[at] as f32,
                     color,
                     depth: self.center_depth(at, scratch),
-                    steep: is_steep(factor, flat.log2_opacity[at]),
+                    steep: wide || is_steep(factor, flat.log2_opacity[at]),
+                    wide,
                 });
                 out.reaches.push(reach);
+                if let Some(period) = self.period {
+                    panorama::copy_last(at, period, &mut copies, out);
+                }
             }
         }
         let counters = &mut out.counters;

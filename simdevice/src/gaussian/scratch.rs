@@ -32,6 +32,8 @@ pub(crate) struct Scratch {
     pub(super) flat: Box<Flat>,
     /// Which of them reach tiles, and which tiles.
     pub(super) reached: Vec<(usize, Reach)>,
+    /// The same of their copies a period beside, in the same order: which side's, 0 or 1, in the middle.
+    pub(super) copies: Vec<(usize, usize, Reach)>,
 }
 
 /// Gaussians on the screen.
@@ -92,6 +94,7 @@ impl Scratch {
             jacobian: Box::new([[NO_LANES; 3]; 2]),
             flat: Box::default(),
             reached: Vec::with_capacity(BATCH),
+            copies: Vec::new(),
         }
     }
 

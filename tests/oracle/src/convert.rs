@@ -15,6 +15,7 @@ impl OracleCamera {
             GaussianCameraModelGAURAST::PINHOLE => OracleModel::Pinhole,
             GaussianCameraModelGAURAST::ORTHOGRAPHIC => OracleModel::Orthographic,
             GaussianCameraModelGAURAST::FISHEYE => OracleModel::Fisheye,
+            GaussianCameraModelGAURAST::EQUIRECTANGULAR => OracleModel::Equirectangular,
             _ => return None,
         };
         Some(Self {
@@ -36,6 +37,7 @@ impl OracleCamera {
             OracleModel::Pinhole => GaussianCameraModelGAURAST::PINHOLE,
             OracleModel::Orthographic => GaussianCameraModelGAURAST::ORTHOGRAPHIC,
             OracleModel::Fisheye => GaussianCameraModelGAURAST::FISHEYE,
+            OracleModel::Equirectangular => GaussianCameraModelGAURAST::EQUIRECTANGULAR,
         };
         GaussianCameraGAURAST::default()
             .model(model)
@@ -84,7 +86,7 @@ mod tests {
         assert!(OracleCamera::new(&camera, [8, 8]).is_some());
         let own = crate::scenes::camera(8, 8);
         assert_eq!(OracleCamera::new(&own.to_vulkan(), [8, 8]), Some(own));
-        let camera = camera.model(GaussianCameraModelGAURAST::EQUIRECTANGULAR);
+        let camera = camera.model(GaussianCameraModelGAURAST::from_raw(77));
         assert_eq!(OracleCamera::new(&camera, [8, 8]), None);
     }
 }

@@ -82,7 +82,8 @@ impl Context {
             .radial_distance_order(true)
             .primitive_order(true)
             .orthographic_camera(true)
-            .fisheye_camera(true);
+            .fisheye_camera(true)
+            .equirectangular_camera(true);
         let mut vulkan_1_3 = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
         let device_info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)

@@ -209,7 +209,11 @@ fn naive_sample(
         let exponent = if g.steep {
             let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
             let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
-            (f64::from(g.log2_opacity) - (u * u + v * v)) as f32
+            if g.wide && !(-draw.half_period..draw.half_period).contains(&dx) {
+                -1e3
+            } else {
+                (f64::from(g.log2_opacity) - (u * u + v * v)) as f32
+            }
         } else {
             g.log2_opacity - mul_add(v, v, u * u)
         };

@@ -39,6 +39,7 @@
 //!   value to within the error itself.
 
 pub mod error_model;
+mod panorama;
 pub mod pixel;
 pub mod project;
 mod render;
@@ -111,6 +112,8 @@ pub enum OracleModel {
     Orthographic,
     /// Equidistant fisheye.
     Fisheye,
+    /// Longitude and latitude of all directions.
+    Equirectangular,
 }
 
 /// What Gaussians are sorted by.

@@ -1,6 +1,7 @@
 //! Steps 1 to 5: from a Gaussian in world space to the numbers that a pixel needs.
 
 use super::error_model::ErrorModel;
+use super::panorama;
 use super::spherical_harmonics;
 use super::{OracleCamera, OracleModel, OracleOrder, OracleScene, OracleState, SkipReason};
 
@@ -13,6 +14,8 @@ pub struct Splat {
     pub covariance: [f64; 3],
     /// Its determinant, evaluated without cancellation.
     pub determinant: f64,
+    /// After how many pixels the picture repeats to the right and to the left, or infinity.
+    pub period: f64,
     /// The factor with which the quadratic form is evaluated.
     pub cholesky: Cholesky,
     /// Opacity, compensated if the state says so.
@@ -102,6 +105,7 @@ pub fn project(
         OracleModel::Pinhole => pinhole(camera, t),
         OracleModel::Orthographic => orthographic(camera, t),
         OracleModel::Fisheye => fisheye(camera, t),
+        OracleModel::Equirectangular => panorama::equirectangular(camera, t),
     };
     let scale = scene.scales[index].map(f64::from);
     let axes = rotation_matrix(scene.rotations[index].map(f64::from));
@@ -140,6 +144,7 @@ pub fn project(
         mean,
         covariance,
         determinant,
+        period: panorama::period(camera),
         cholesky: Cholesky::new(covariance, determinant),
         opacity,
         color,
@@ -222,7 +227,7 @@ fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], sort_by: f64) -> bo
 fn depth_variable(model: OracleModel, t: [f64; 3]) -> f64 {
     match model {
         OracleModel::Pinhole | OracleModel::Orthographic => t[2],
-        OracleModel::Fisheye => length(t),
+        OracleModel::Fisheye | OracleModel::Equirectangular => length(t),
     }
 }
 
