@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_samples::camera::{Camera, DEFAULT_FOV};
 use gaurast_samples::scene::Scene;
@@ -233,6 +233,27 @@ fn every_camera_and_every_order_keep_the_contract() {
             State::default().order(order),
             &views,
         );
+    }
+}
+
+#[test]
+fn unscented_projection_keeps_the_contract_through_every_camera() {
+    let devices = Devices::new();
+    let state = State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED);
+    let compensated = state.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED);
+    let mut scene = scenes::cloud(13, 2000, 1);
+    // Large ones make a difference.
+    for scale in scene.scales.iter_mut().step_by(5) {
+        *scale = scale.map(|s| 8.0 * s);
+    }
+    let mut views = other_cameras();
+    views.push(generated_view(Limits::ENVELOPE_ONLY));
+    for (name, state) in [("unscented", state), ("compensated", compensated)] {
+        devices.judge(&format!("cloud 13 {name}"), &scene, state, &views);
+    }
+    for seed in 200..212 {
+        let scene = scenes::awkward(seed, 20, (seed % 4) as u32);
+        devices.judge(&format!("awkward {seed} unscented"), &scene, state, &views);
     }
 }
 

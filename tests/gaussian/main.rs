@@ -6,6 +6,7 @@ mod depth_stencil;
 mod determinism;
 mod given_scenes;
 mod hybrid_scenes;
+mod instances;
 mod interleavings;
 mod popping;
 mod reference;

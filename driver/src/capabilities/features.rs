@@ -109,6 +109,7 @@ const SUPPORTED: &[&str] = &[
     "equirectangular_camera",
     "fisheye_camera",
     "gaussian_depth_stencil",
+    "gaussian_instancing",
     "gaussian_multisample",
     "merged_draws",
     "opacity_compensation",
@@ -116,6 +117,7 @@ const SUPPORTED: &[&str] = &[
     "primitive_order",
     "radial_distance_order",
     "uniform_buffer_camera",
+    "unscented_projection",
 ];
 
 /// The extensions whose features can't be enabled without them. (Features of core need none.)

@@ -8,7 +8,8 @@ use crate::command::state::State;
 use crate::object::pipeline::{AttributeSource, CameraSource, GaussianPipeline, GraphicsPipeline};
 use simdevice::Packet;
 use simdevice::packet::{
-    Camera, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, Viewport,
+    Camera, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, ModelAttributes,
+    Viewport,
 };
 use std::sync::Arc;
 
@@ -113,6 +114,13 @@ fn attributes(
             .iter()
             .map(stream)
             .collect::<Result<_, _>>()?,
+        model: ModelAttributes {
+            matrix: match &gaussian.model_matrix {
+                None => None,
+                Some([x, y, z]) => Some(Box::new([stream(x)?, stream(y)?, stream(z)?])),
+            },
+            opacity: gaussian.model_opacity.as_ref().map(stream).transpose()?,
+        },
     })
 }
 

@@ -11,6 +11,7 @@ pub(crate) mod depth;
 mod fetch;
 pub(crate) mod footprint;
 mod frustum;
+mod instances;
 mod lanes;
 mod linearize;
 mod panorama;
@@ -19,6 +20,7 @@ mod scratch;
 #[doc(hidden)] // For the benchmarks.
 pub mod sort;
 pub mod spherical_harmonics;
+mod unscented;
 
 pub use footprint::TILE_SIZE;
 
@@ -35,6 +37,7 @@ use fearless_simd::dispatch;
 use fetch::{BATCH, Batch, Fetcher};
 use footprint::Visible;
 use frustum::{Frustum, Outside};
+use instances::Matrices;
 use project::{Projected, Projection, Source, Splat};
 use rayon::prelude::*;
 use scratch::{Attributes, Scratch};
@@ -299,9 +302,10 @@ impl GaussianSet {
             let Worker {
                 fetcher,
                 attributes,
+                matrices,
                 scratch,
             } = worker;
-            let source = job.read(fetcher, attributes);
+            let source = job.read(fetcher, attributes, matrices);
             // A frustum is for opacities that it was told of.
             let wider;
             let mut frustum = &*job.frustum;
@@ -313,8 +317,16 @@ impl GaussianSet {
                     frustum = &wider;
                 }
             }
+            let placed;
+            let mut bounds = skips.has(Skip::Bounds).then_some(frustum);
+            if let Some(matrices) = source.matrices {
+                // What is yet to be placed in the world by the same matrix sees the planes where they are for it.
+                let uniform = bounds.and(matrices.uniform());
+                placed = uniform.and_then(|matrix| frustum.within(matrix));
+                bounds = placed.as_ref();
+            }
             let source = Source {
-                frustum: skips.has(Skip::Bounds).then_some(frustum),
+                frustum: bounds,
                 ..source
             };
             let sequence = |lane: usize| match &job.part {
@@ -355,17 +367,28 @@ enum Part<'a> {
 
 impl<'a> Job<'a> {
     /// Reads the batch, if it lies in no chunk.
-    fn read<'b>(&'b self, fetcher: &mut Fetcher, attributes: &'b mut Attributes) -> Source<'b> {
+    fn read<'b>(
+        &'b self,
+        fetcher: &mut Fetcher,
+        attributes: &'b mut Attributes,
+        matrices: &'b mut Option<Box<Matrices>>,
+    ) -> Source<'b> {
         let streams = &self.append.attributes;
         match self.part {
             Part::From(start) => {
                 let len = (self.append.count - start).min(BATCH as u32) as usize;
                 let batch = Batch::new(self.append, self.instance, start, len);
                 fetcher.read_all(streams, &batch, attributes);
+                let matrices = streams.model.matrix.as_ref().map(|rows| {
+                    let matrices = matrices.get_or_insert_default();
+                    matrices.read(fetcher, rows, &batch);
+                    &**matrices
+                });
                 Source {
                     streams,
                     batch,
                     attributes,
+                    matrices,
                     is_sound: false,
                     harmonics: &[],
                     frustum: None,
@@ -375,6 +398,7 @@ impl<'a> Job<'a> {
                 streams,
                 batch: Batch::of_chunk(self.append, self.instance, &chunk.numbers),
                 attributes: &chunk.attributes,
+                matrices: None,
                 is_sound: chunk.is_sound,
                 harmonics: &chunk.harmonics,
                 frustum: None,
@@ -387,6 +411,8 @@ impl<'a> Job<'a> {
 struct Worker {
     fetcher: Fetcher,
     attributes: Box<Attributes>,
+    /// Made when they are needed.
+    matrices: Option<Box<Matrices>>,
     scratch: Scratch,
 }
 
@@ -437,6 +463,7 @@ impl Worker {
         Self {
             fetcher: Fetcher::default(),
             attributes: Box::default(),
+            matrices: None,
             scratch: Scratch::new(),
         }
     }

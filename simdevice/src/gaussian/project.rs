@@ -9,15 +9,16 @@ use super::depth::CenterDepth;
 use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader};
 use super::footprint::{Ellipse, Reach, Span, Visible};
 use super::frustum::Frustum;
+use super::instances::Matrices;
 use super::lanes::{Bits, F32_LANES, Lanes, log2};
-use super::linearize;
 use super::panorama;
 use super::scratch::{Attributes, Scratch};
 use super::sort::ordered_bits;
 use super::spherical_harmonics;
 use crate::counters::{Counter, Counters};
 use crate::packet::{
-    Camera, CameraModel, GaussianAttributes, GaussianOrder, GaussianState, Viewport,
+    Camera, CameraModel, GaussianAttributes, GaussianLinearization, GaussianOrder, GaussianState,
+    Viewport,
 };
 use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, prelude::*};
@@ -90,6 +91,8 @@ const LN_2: f64 = std::f64::consts::LN_2;
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
     pub(super) model: CameraModel,
+    /// Whether covariances are those of projected points.
+    pub(super) unscented: bool,
     pub(super) order: GaussianOrder,
     pub(super) rotation: [f64; 9],
     pub(super) eye: [f64; 3],
@@ -128,6 +131,8 @@ pub(super) struct Source<'a> {
     pub(super) streams: &'a GaussianAttributes,
     pub(super) batch: Batch<'a>,
     pub(super) attributes: &'a Attributes,
+    /// Matrices that place them in the world, if it is not their own space.
+    pub(super) matrices: Option<&'a Matrices>,
     /// None is skipped for what its attributes are.
     pub(super) is_sound: bool,
     /// Their spherical harmonics, if they were read already, one after the other.
@@ -152,6 +157,7 @@ impl Projection {
         let margin = [0, 1].map(|axis| 0.15 * size[axis] / focal[axis]);
         Self {
             model: camera.model,
+            unscented: state.linearization == GaussianLinearization::Unscented,
             order: state.order,
             rotation: camera.rotation.map(f64::from),
             eye: camera.eye,
@@ -191,7 +197,10 @@ impl Projection {
         counters.add(Counter::GaussiansRead, source.batch.len as u64);
         let kept = self.cull(simd, source, counters);
         scratch.gather(source.attributes, &kept);
-        self.flatten(simd, scratch);
+        if let Some(matrices) = source.matrices {
+            scratch.gather_matrices(matrices);
+        }
+        self.flatten(simd, source.matrices.is_some(), scratch);
         self.emit(simd, source, scratch, sequence, out);
     }
 
@@ -224,6 +233,9 @@ impl Projection {
         if !self.skips.has(Skip::Harmonics) {
             let colored = self.find_colored(simd, source);
             keep(&colored, Counter::SkippedNonFinite);
+        }
+        if let Some(matrices) = source.matrices {
+            keep(&matrices.find_finite(len), Counter::SkippedNonFinite);
         }
         if !source.is_sound {
             let [finite, rotated, positive] = find_sound(simd, source.attributes, len);
@@ -279,25 +291,6 @@ impl Projection {
         ordered_bits(depth as f32)
     }
 
-    /// Depths, means and Jacobians of the kept Gaussians, for cameras that are no pinholes.
-    fn linearize(&self, scratch: &mut Scratch) {
-        let [x, y, z] = &*scratch.camera;
-        let r = &self.rotation;
-        for at in 0..scratch.lanes.len().min(BATCH) {
-            let t = [x[at], y[at], z[at]];
-            scratch.depth[at] = linearize::depth(self.model, t);
-            let (place, rows) = linearize::linearize(self.model, t);
-            for (axis, row) in rows.iter().enumerate() {
-                scratch.flat.mean[axis][at] = place[axis] * self.focal[axis] + self.center[axis];
-                let j = row.map(|element| element * self.focal[axis]);
-                for column in 0..3 {
-                    scratch.jacobian[axis][column][at] =
-                        j[0] * r[column] + j[1] * r[3 + column] + j[2] * r[6 + column];
-                }
-            }
-        }
-    }
-
     /// Finds the place of the kept Gaussians in camera space.
     #[inline(always)]
     fn place<S: Simd>(&self, simd: S, scratch: &mut Scratch) {
@@ -324,6 +317,11 @@ impl Projection {
         }
     }
 
+    /// The bounds of slopes in a pinhole's Jacobian: the least ones and the greatest.
+    pub(super) fn slopes(&self) -> [[f64; 2]; 2] {
+        [self.slope_min, self.slope_max]
+    }
+
     /// Bounds of the visible pixels' centres along an axis, with a pixel to spare.
     pub(super) fn visible_range(&self, axis: usize) -> [f64; 2] {
         let Visible {
@@ -338,12 +336,25 @@ impl Projection {
 
     /// Computes mean, covariance and opacity on the screen of the kept Gaussians.
     #[inline(always)]
-    fn flatten<S: Simd>(&self, simd: S, scratch: &mut Scratch) {
-        self.place(simd, scratch);
-        let is_pinhole = self.model == CameraModel::Pinhole;
-        if !is_pinhole {
-            self.linearize(scratch);
+    fn flatten<S: Simd>(&self, simd: S, by_matrices: bool, scratch: &mut Scratch) {
+        if by_matrices {
+            self.place_by_matrices(scratch);
+        } else {
+            self.place(simd, scratch);
         }
+        let unscented = self.unscented;
+        let is_pinhole = self.model == CameraModel::Pinhole && !by_matrices && !unscented;
+        if !is_pinhole {
+            self.linearize(by_matrices, scratch);
+        }
+        if unscented {
+            self.transform(by_matrices, scratch);
+        }
+        let moments = &*scratch.moments;
+        let toward = match &scratch.placed {
+            Some(placed) if by_matrices => &placed.toward,
+            _ => &*scratch.offset,
+        };
         let number = |value: f64| S::f64s::splat(simd, value);
         let load =
             |lanes: &Lanes, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
@@ -409,9 +420,18 @@ impl Projection {
             }
             let [[ax, ay, az], [bx, by, bz]] = m;
             let [cx, cy, cz] = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
-            let area2 = cx * cx + cy * cy + cz * cz;
-            let xx = ax * ax + ay * ay + az * az;
-            let yy = bx * bx + by * by + bz * bz;
+            let mut area2 = cx * cx + cy * cy + cz * cz;
+            let mut xx = ax * ax + ay * ay + az * az;
+            let mut xy = ax * bx + ay * by + az * bz;
+            let mut yy = bx * bx + by * by + bz * bz;
+            if unscented {
+                [xx, xy, yy, area2] = [
+                    load(&moments[0], at),
+                    load(&moments[1], at),
+                    load(&moments[2], at),
+                    load(&moments[3], at),
+                ];
+            }
             let determinant = area2 + low_pass * (xx + yy) + low_pass * low_pass;
             store(determinant, &mut flat.determinant);
             let mut o = load(opacity, at);
@@ -421,7 +441,7 @@ impl Projection {
             let log2_opacity = log2(simd, o);
             store(log2_opacity, &mut flat.log2_opacity);
 
-            let (a, b, c) = (xx + low_pass, ax * bx + ay * by + az * bz, yy + low_pass);
+            let (a, b, c) = (xx + low_pass, xy, yy + low_pass);
             // alpha = opacity exp(-q / 2) = 2^(log2 opacity - q / (2 ln 2)), and
             // q = d.x^2 / a + (a / det) (d.y - (b / a) d.x)^2.
             let unit = (0.5 / LN_2).sqrt();
@@ -440,8 +460,8 @@ impl Projection {
             store(determinant / (c * c), &mut flat.narrowing);
             store(b * half_x / a, &mut flat.peak);
 
-            let d = &scratch.offset;
-            let [dx, dy, dz] = [load(&d[0], at), load(&d[1], at), load(&d[2], at)];
+            let [dx, dy, dz] = toward;
+            let [dx, dy, dz] = [load(dx, at), load(dy, at), load(dz, at)];
             let largest = dx.abs().max(dy.abs()).max(dz.abs());
             let [dx, dy, dz] = [dx / largest, dy / largest, dz / largest];
             let norm = (dx * dx + dy * dy + dz * dz).sqrt();

@@ -2,7 +2,7 @@
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::oracle::{OracleCamera, OracleModel, OracleOrder, OracleState};
@@ -59,6 +59,7 @@ impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
             transmittance_floor: info.transmittance_floor,
             opacity_compensated: info.antialiasing
                 == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
+            unscented: info.linearization == GaussianLinearizationGAURAST::UNSCENTED,
             order: match info.order {
                 GaussianOrderGAURAST::RADIAL_DISTANCE => OracleOrder::RadialDistance,
                 GaussianOrderGAURAST::PRIMITIVE => OracleOrder::Primitive,

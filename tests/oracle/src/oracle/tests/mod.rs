@@ -5,6 +5,7 @@ mod bounded;
 mod meaning;
 mod skips;
 mod undecidable;
+mod unscented;
 
 use super::{OracleCamera, OracleModel, OracleState, Reference, render_literal};
 use crate::scenes::{Gaussian, SceneBuffers};
