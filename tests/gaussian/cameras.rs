@@ -1,9 +1,11 @@
 //! Panoramas: what their seam does to nothing.
 
 use gaurast::vk::{GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST};
+use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, simd_levels,
 };
+use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -102,4 +104,34 @@ fn what_straddles_the_seam_is_seen_on_both_sides() {
         assert!((left - right).abs() < 1e-4, "{x}: {left} {right}");
     }
     assert_eq!(alpha(width / 2, row), 0.0);
+}
+
+#[test]
+fn a_gaussian_over_a_pole_is_no_denser_than_elsewhere() {
+    let contexts = simd_levels().into_iter().map(|simd| {
+        Context::embedded(&Settings {
+            simd: Some(simd),
+            ..Settings::default()
+        })
+    });
+    let above = [[0.2, -2.1, 5.0], [0.25, 1.4, 4.98], [1.2, 0.4, 5.1]];
+    let scene = SceneBuffers {
+        positions: above.to_vec(),
+        scales: vec![[0.3; 3]; 3],
+        rotations: vec![[1.0, 0.0, 0.0, 0.0]; 3],
+        opacities: vec![0.5; 3],
+        sh: vec![[0.3; 3]; 3],
+        degree: 0,
+    };
+    let (camera, state) = (panorama(1), State::default());
+    let oracle = OracleCamera::new(&camera, SIZE).expect("a panorama");
+    let expected = render_bounded(&scene.as_oracle(), &oracle, &OracleState::from(&state));
+    for context in contexts {
+        let picture = draw(&context, &scene, state, &camera, SIZE);
+        assert_contract("poles", &picture, &expected, Limits::ENVELOPE_ONLY);
+        let [width, _] = SIZE.map(|side| side as usize);
+        // It holds the pole, hence all longitudes, once each.
+        let top = &picture[..width];
+        assert!(top.iter().all(|pixel| (0.49..0.500_01).contains(&pixel[3])));
+    }
 }
