@@ -6,6 +6,8 @@ mod scenes;
 
 use std::error::Error;
 use std::fmt::Write;
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::Path;
 
 use ash::vk::SampleCountFlags as Samples;
@@ -15,8 +17,9 @@ use gaurast::vk::{
     GaussianOrderGAURAST as Order, PipelineGaussianStateCreateInfoGAURAST as State,
 };
 use gpu::{Gpu, Picture, Triangle};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 
-const SIZE: [u32; 2] = [200, 130];
+const SIZE: [u32; 2] = [192, 120];
 
 /// A picture with its file's name and what is said about it.
 struct Exhibit<'a> {
@@ -150,7 +153,8 @@ fn projections<'a>(wide: &'a [gpu::Splat]) -> Room<'a> {
     };
     Room {
         title: "Projection",
-        text: "Round Gaussians of one size in a field 138 degrees wide. In perspective they grow longer towards the corners.",
+        text: "Gaussians that point away from the eye, in a field 137 degrees wide. The Jacobian knows how their middles move; the \
+               unscented transform knows their ends, too.",
         exhibits: vec![
             one("jacobian", "`JACOBIAN`", Linearization::JACOBIAN),
             one("unscented", "`UNSCENTED`", Linearization::UNSCENTED),
@@ -177,7 +181,7 @@ fn triangles<'a>(still: &'a [gpu::Splat]) -> Room<'a> {
 }
 
 fn instances<'a>(flower: &'a [gpu::Splat], meadow: &'a [gpu::Instance]) -> Room<'a> {
-    let mut many = exhibit("instances", "and 60 of them in one draw", flower);
+    let mut many = exhibit("instances", "60 of them in one draw", flower);
     many.picture.instances = meadow;
     Room {
         title: "Instances",
@@ -215,8 +219,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             picture,
         } in &room.exhibits
         {
-            gpu.draw(picture)?
-                .save(pictures.join(format!("{name}.png")))?;
+            let file = BufWriter::new(File::create(pictures.join(format!("{name}.png")))?);
+            let encoder =
+                PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
+            gpu.draw(picture)?.write_with_encoder(encoder)?;
             write!(images, "| ![{name}](pictures/gallery/{name}.png) ")?;
             write!(captions, "| {caption} ")?;
         }

@@ -83,14 +83,15 @@ pub fn around() -> Vec<Splat> {
     splats
 }
 
-/// Round Gaussians of one size on a plane across the view.
+/// Gaussians on a plane across the view, that point away from it.
 pub fn wide() -> Vec<Splat> {
     let mut splats = Vec::new();
     for row in -2..=2i32 {
-        for column in -4..=4i32 {
-            let position = [0.62 * column as f32, 0.62 * row as f32, 1.0];
-            let color = hue(0.11 * (row + column) as f32);
-            splats.push(splat(position, [0.15; 3], STRAIGHT, 0.9, color));
+        for column in -3..=3i32 {
+            let position = [0.8 * column as f32, 0.62 * row as f32, 1.0];
+            let color = hue(0.13 * (row + column) as f32);
+            let size = [0.07, 0.07, 0.36];
+            splats.push(splat(position, size, STRAIGHT, 0.95, color));
         }
     }
     splats
@@ -156,18 +157,18 @@ pub fn meadow() -> Vec<Instance> {
         for column in 0..10 {
             let number = (row * 10 + column) as f32;
             let random = |seed: f32| (number * seed).sin();
-            let size = 0.45 + 0.12 * random(12.9);
+            let size = 0.42 + 0.1 * random(12.9);
             let lean = 0.5 * random(78.2);
             let (sin, cos) = (1.2 * random(37.7)).sin_cos();
-            let depth = 2.2 + 0.75 * row as f32;
-            let x = 0.34 * depth * (column as f32 - 4.5 + 0.4 * random(93.9)) / 2.2;
+            let depth = 2.2 + 1.1 * row as f32;
+            let x = 0.36 * depth * (column as f32 - 4.5 + 0.4 * random(93.9)) / 2.2;
             // About y, then sheared; the model stands around (0, 0, 4).
             let rows = [
                 [size * cos, size * lean, size * sin],
                 [0.0, size, 0.0],
                 [-size * sin, 0.0, size * cos],
             ];
-            let to = [x, 0.42, depth];
+            let to = [x, 0.62, depth];
             let mut instance = [1.0; 13];
             for (axis, row) in rows.iter().enumerate() {
                 instance[4 * axis..][..3].copy_from_slice(row);
