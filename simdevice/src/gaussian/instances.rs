@@ -133,7 +133,7 @@ impl Placed {
 
     /// Takes a row vector from the world's axes to those of a kept Gaussian's space. It is not a number where the matrix
     /// is singular.
-    pub(super) fn from_world(&self, at: usize, row: [f64; 3]) -> [f64; 3] {
+    pub(super) fn row_from_world(&self, at: usize, row: [f64; 3]) -> [f64; 3] {
         let a = self.linear(at);
         if is_singular(a) {
             return [f64::NAN; 3];
@@ -199,10 +199,10 @@ mod tests {
         let a = [[1.0, 2.0, 0.5], [-1.0, 3.0, 0.25], [0.0, 4.0, -2.0]];
         let columns = cofactors(a);
         let determinant = dot(a[0], columns[0]);
-        for row in 0..3 {
-            for column in 0..3 {
+        for (row, of_a) in a.into_iter().enumerate() {
+            for (column, of_inverse) in columns.into_iter().enumerate() {
                 let expected = if row == column { determinant } else { 0.0 };
-                assert!((dot(a[row], columns[column]) - expected).abs() < 1e-12);
+                assert!((dot(of_a, of_inverse) - expected).abs() < 1e-12);
             }
         }
     }

@@ -22,7 +22,7 @@ impl Projection {
                     |column| j[0] * r[column] + j[1] * r[3 + column] + j[2] * r[6 + column];
                 let mut row = [0, 1, 2].map(of_column);
                 if let Some(placed) = placed {
-                    row = placed.from_world(at, row);
+                    row = placed.row_from_world(at, row);
                 }
                 for (lanes, element) in scratch.jacobian[axis].iter_mut().zip(row) {
                     lanes[at] = element;
