@@ -1,7 +1,8 @@
 //! Gaussian draws: from vertex attributes to a binned, depth-sorted set that the tile engine renders.
 //!
 //! Stages, each in a module: [`fetch`] (attributes to lanes), [`project`] (3D to the rasterizer's nine numbers, with
-//! [`linearize`] for cameras that are no pinholes),
+//! [`linearize`] for cameras that are no pinholes, [`unscented`] for those who ask for it, [`instances`] for what matrices
+//! place in the world, and [`panorama`] for pictures that repeat),
 //! [`depth`] (what the depth test compares), [`footprint`] (which tiles), [`spherical_harmonics`] (colour), [`sort`] (depth order); then
 //! [`binning`](crate::binning) places them in tile lists.
 

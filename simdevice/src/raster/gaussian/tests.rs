@@ -245,6 +245,17 @@ fn naive_sample(
 
 /// Every pixel of every tile equals the naive twin's, bit for bit, at every level.
 fn check(seed: u64, count: u32, state: &GaussianState, bounds: Rect) {
+    check_changed(seed, count, state, bounds, |_| {});
+}
+
+/// The same of a draw that is changed before it is rendered.
+fn check_changed(
+    seed: u64,
+    count: u32,
+    state: &GaussianState,
+    bounds: Rect,
+    change: impl Fn(&mut GaussianDraw),
+) {
     for (name, simd) in SimdLevel::supported() {
         let device = Device::new(&Config {
             threads: 2,
@@ -253,7 +264,8 @@ fn check(seed: u64, count: u32, state: &GaussianState, bounds: Rect) {
         })
         .unwrap();
         let fused = matches!(simd, SimdLevel::Avx2 | SimdLevel::Avx512);
-        let draw = draw(seed, count, state.clone(), &device, bounds);
+        let mut draw = draw(seed, count, state.clone(), &device, bounds);
+        change(&mut draw);
         let mut tile = Box::new(GaussianTile::default());
         let mut covered = 0;
         for at in (0..4).flat_map(|y| (0..6).map(move |x| [x, y])) {
@@ -317,6 +329,16 @@ fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint() {
             height: 51,
         },
     );
+}
+
+#[test]
+fn it_does_so_where_gaussians_are_wider_than_a_period() {
+    check_changed(6, 400, &defaults(), WHOLE, |draw| {
+        draw.half_period = 2.25;
+        for splat in draw.splats.iter_mut().flatten().step_by(3) {
+            (splat.wide, splat.steep) = (true, true);
+        }
+    });
 }
 
 #[test]
