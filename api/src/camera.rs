@@ -122,6 +122,42 @@ impl GaussianCameraGAURAST<'_> {
             .principal_point(principal_point))
     }
 
+    /// A panorama of all 360 by 180 degrees that fills a viewport of the given width and height in pixels, with the
+    /// direction forward in its middle. Give it twice the width of its height, and as many pixels go to a degree of
+    /// longitude (on the horizon) as to one of latitude.
+    ///
+    /// `camera_to_world` and `eye` are as for [`from_pose`](Self::from_pose).
+    ///
+    /// # Errors
+    ///
+    /// [`CameraError::EmptyViewport`], and as for [`from_pose`](Self::from_pose).
+    pub fn panorama(
+        camera_to_world: &[[f64; 3]; 3],
+        eye: [f64; 3],
+        viewport: [f32; 2],
+    ) -> Result<Self, CameraError> {
+        let [width, height] = viewport.map(f64::from);
+        if !viewport.iter().all(|side| side.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        if width <= 0.0 || height == 0.0 {
+            return Err(CameraError::EmptyViewport);
+        }
+        let height = height.abs();
+        let focal_length = [
+            width / core::f64::consts::TAU,
+            height / core::f64::consts::PI,
+        ];
+        let principal_point = [0.5 * width, 0.5 * height];
+        let camera = Self::from_pose(
+            camera_to_world,
+            eye,
+            focal_length.map(|f| f as f32),
+            principal_point.map(|c| c as f32),
+        )?;
+        Ok(camera.model(GaussianCameraModelGAURAST::EQUIRECTANGULAR))
+    }
+
     /// Sets the planes to `near` and `far` and the depth coefficients such that depth is 0 at `near`
     /// and 1 at `far`. `far` may be infinite unless the camera is orthographic.
     ///

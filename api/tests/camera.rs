@@ -237,6 +237,24 @@ fn single_precision_matrices_are_accepted() {
 }
 
 #[test]
+fn a_panorama_fills_its_viewport() {
+    let axes = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let camera = GaussianCameraGAURAST::panorama(&axes, [1.0, 2.0, 3.0], [512.0, 256.0]).unwrap();
+    assert_eq!(camera.model, GaussianCameraModelGAURAST::EQUIRECTANGULAR);
+    assert_eq!(camera.eye, [1.0, 2.0, 3.0]);
+    assert_eq!(camera.rotation[3..6], [0.0, 0.0, 1.0]);
+    assert_eq!(camera.principal_point, [256.0, 128.0]);
+    let [x, y] = camera.focal_length.map(f64::from);
+    assert!((x * core::f64::consts::TAU - 512.0).abs() < 1e-4);
+    assert!((y * core::f64::consts::PI - 256.0).abs() < 1e-4);
+    let error =
+        |axes, viewport| GaussianCameraGAURAST::panorama(axes, [0.0; 3], viewport).unwrap_err();
+    assert_eq!(error(&axes, [0.0, 8.0]), CameraError::EmptyViewport);
+    assert_eq!(error(&axes, [8.0, f32::NAN]), CameraError::NotFinite);
+    assert_eq!(error(&[[2.0; 3]; 3], [8.0; 2]), CameraError::NotRigid);
+}
+
+#[test]
 fn a_pose_sees_its_axes() {
     let rotation = DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(-0.2);
     let rows = rotation.transpose().to_cols_array_2d();

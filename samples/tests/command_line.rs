@@ -111,6 +111,36 @@ fn one_gaussian_is_drawn_where_it_is() {
 }
 
 #[test]
+fn a_panorama_and_a_fisheye_see_what_is_behind_and_beside() {
+    let folder = folder();
+    write(&folder, "one.ply", ONE);
+    // Away from the Gaussian, then with it on the right.
+    for (model, target, at) in [
+        ("equirectangular", "0,0,-1", [0, 31]),
+        ("equirectangular", "-1,0,0", [24, 24]),
+        ("fisheye", "-1,0,0", [31, 31]),
+    ] {
+        let size = if model == "fisheye" { "32x32" } else { "32x16" };
+        let arguments = [
+            "render", "one.ply", "-o", "a.png", "--camera", model, "--size", size, "--eye",
+            "0,0,0", "--target", target,
+        ];
+        let output = gaurast(&folder, &arguments);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{stderr}");
+        let picture = image::open(folder.path().join("a.png")).expect("a PNG");
+        let picture = picture.to_rgb8();
+        let row: Vec<u8> = picture
+            .rows()
+            .nth(picture.height() as usize / 2)
+            .map_or(Vec::new(), |row| row.map(|pixel| pixel.0[0]).collect());
+        for at in at {
+            assert!(row[at] > 120, "{model} {target}: {row:?}");
+        }
+    }
+}
+
+#[test]
 fn a_camera_file_gives_view_and_size() {
     let folder = folder();
     write(&folder, "one.ply", ONE);

@@ -104,6 +104,7 @@ fn append(gaussians: &[Gaussian], degree: u32) -> GaussianAppend {
             scale: stream(3, Format::R32G32B32Sfloat),
             rotation: stream(6, Format::R32G32B32A32Sfloat),
             opacity: stream(10, Format::R32Sfloat),
+            model: ModelAttributes::default(),
             spherical_harmonics: (0..(degree + 1).pow(2))
                 .map(|k| stream(11 + 3 * k, Format::R32G32B32Sfloat))
                 .collect(),

@@ -168,6 +168,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             scale: stream(&shape, 0, Format::R32G32B32Sfloat),
             rotation: stream(&shape, 12, Format::R32G32B32A32Sfloat),
             opacity: stream(&shape, 28, Format::R32Sfloat),
+            model: ModelAttributes::default(),
             spherical_harmonics: (0..16)
                 .map(|k| stream(&harmonics, 12 * k, Format::R32G32B32Sfloat))
                 .collect(),

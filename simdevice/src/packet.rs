@@ -280,6 +280,8 @@ pub enum CameraModel {
     Orthographic,
     /// Equidistant: focal lengths are pixels per radian from the axis.
     Fisheye,
+    /// Longitude and latitude: focal lengths are pixels per radian. Pictures repeat after a period of a whole turn.
+    Equirectangular,
 }
 
 /// The camera of a Gaussian draw: +x right, +y down, +z forward.
@@ -322,7 +324,7 @@ impl Default for Camera {
 /// What Gaussians are sorted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GaussianOrder {
-    /// The centre's depth variable: camera-space z, or the distance for a fisheye.
+    /// The centre's depth variable: camera-space z, or the distance for a fisheye and a panorama.
     ViewDepth,
     /// The centre's distance from the eye.
     RadialDistance,
@@ -330,11 +332,23 @@ pub enum GaussianOrder {
     Primitive,
 }
 
+/// How a Gaussian in space becomes one in the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum GaussianLinearization {
+    /// By the camera's Jacobian at the mean.
+    #[default]
+    Jacobian,
+    /// By the mean and the covariance of seven points, where a camera sees all of them.
+    Unscented,
+}
+
 /// The state of a Gaussian draw that its pipeline fixes. See the extension for each value's meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GaussianState {
     /// The spherical harmonics degree drawn, 0 to 3.
     pub sh_degree: u32,
+    /// How they are projected.
+    pub linearization: GaussianLinearization,
     /// What the Gaussians are sorted by.
     pub order: GaussianOrder,
     /// Whether opacity is scaled by the ratio of determinants, so that the low-pass filter conserves energy.
@@ -364,6 +378,7 @@ impl Default for GaussianState {
     fn default() -> Self {
         Self {
             sh_degree: 0,
+            linearization: GaussianLinearization::Jacobian,
             order: GaussianOrder::ViewDepth,
             opacity_compensated: false,
             low_pass_variance: 0.3,
@@ -476,6 +491,17 @@ pub struct GaussianAttributes {
     pub opacity: AttributeStream,
     /// `(degree + 1)^2` spherical harmonics coefficients of red, green and blue.
     pub spherical_harmonics: Vec<AttributeStream>,
+    /// What is done to them, usually by instance.
+    pub model: ModelAttributes,
+}
+
+/// The vertex attributes that place a copy of Gaussians in the world.
+#[derive(Clone, Debug, Default)]
+pub struct ModelAttributes {
+    /// The rows of a 3x4 matrix from the Gaussians' space to the world, 4 components each; the identity without it.
+    pub matrix: Option<Box<[AttributeStream; 3]>>,
+    /// A factor of the opacity; 1 without it.
+    pub opacity: Option<AttributeStream>,
 }
 
 /// An index buffer.

@@ -147,6 +147,54 @@ fn mostly_beside(seed: u64, count: u32) -> Vec<Packet> {
     packets
 }
 
+/// Gaussians that only the device can write, in a set that begins otherwise.
+fn changed(seed: u64, change: impl FnOnce(&mut GaussianBegin)) -> Vec<Packet> {
+    let mut packets = gaussians_in(false, seed, 2000, OVER);
+    if let Packet::GaussianBegin(begin) = &mut packets[0] {
+        change(begin);
+    }
+    packets
+}
+
+/// Three instances of Gaussians, each placed by a matrix and fainter than the one before.
+fn placed() -> Vec<Packet> {
+    let mut packets = changed(10, |_| {});
+    let matrix = |number: f32| {
+        let turn = 0.3 * number;
+        [
+            [turn.cos(), -turn.sin(), 0.0, 0.8 * number],
+            [turn.sin(), turn.cos(), 0.2, -0.3 * number],
+            [0.0, 0.1, 1.0 - 0.2 * number, 0.4],
+            [1.0 - 0.3 * number; 4],
+        ]
+    };
+    let elements = [0.0, 1.0, 2.0].map(matrix);
+    let size = size_of_val(&elements) as u64;
+    let memory = Allocation::new_zeroed(size).unwrap();
+    memory
+        .write(0, elements.as_flattened().as_flattened())
+        .unwrap();
+    let stream = |row: u32| AttributeStream {
+        buffer: BufferRange {
+            memory: memory.clone(),
+            offset: 0,
+            size,
+        },
+        stride: 64,
+        offset: 16 * row,
+        format: Format::R32G32B32A32Sfloat,
+        instance_divisor: Some(1),
+    };
+    if let Packet::GaussianAppend(append) = &mut packets[1] {
+        append.instance_count = 3;
+        append.attributes.model = ModelAttributes {
+            matrix: Some(Box::new([stream(0), stream(1), stream(2)])),
+            opacity: Some(stream(3)),
+        };
+    }
+    packets
+}
+
 /// Few Gaussians, many, many that only the device can write, of which all are equally deep in one scene, and several draws with a clear between them; how the attachment begins.
 fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
     let clear_part = clear(
@@ -174,7 +222,24 @@ fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
             ..(*begin.state).clone()
         });
     }
+    let panorama = changed(8, |begin| {
+        begin.camera = Camera {
+            model: CameraModel::Equirectangular,
+            eye: [0.1, 0.2, 3.5],
+            focal_length: [WIDTH as f32 / std::f32::consts::TAU, 24.0],
+            ..begin.camera
+        };
+    });
+    let unscented = changed(9, |begin| {
+        begin.state = Arc::new(GaussianState {
+            linearization: GaussianLinearization::Unscented,
+            ..(*begin.state).clone()
+        });
+    });
     vec![
+        ("panorama", panorama, over_black),
+        ("unscented", unscented, LoadOp::Load),
+        ("placed", placed(), over_black),
         ("few", gaussians(1, 12, OVER), LoadOp::Load),
         ("many", gaussians(2, 5000, OVER), over_black),
         ("chunks", mostly_beside(5, 6000), over_black),

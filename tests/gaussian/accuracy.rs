@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_samples::camera::{Camera, DEFAULT_FOV};
 use gaurast_samples::scene::Scene;
@@ -185,6 +185,9 @@ fn other_cameras() -> Vec<View> {
         .focal_length([31.0, 29.0])
         .depth_coefficients([0.0, 0.05]);
     let fisheye = pinhole.model(GaussianCameraModelGAURAST::FISHEYE);
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let eye = [0.2, -0.1, 5.0];
+    let panorama = GaussianCameraGAURAST::panorama(&axes, eye, [211.0, 157.0]).expect("a camera");
     vec![
         view("parallel", parallel),
         view(
@@ -195,6 +198,19 @@ fn other_cameras() -> Vec<View> {
         view(
             "fisheye, from its middle",
             fisheye.eye([0.2, -0.1, 5.0]).focal_length([32.0; 2]),
+        ),
+        view("panorama, from its middle", panorama),
+        view(
+            "panorama, a part, turned to a pole",
+            panorama
+                .rotation([1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0])
+                .focal_length([60.0, 45.0])
+                .principal_point([180.0, 70.0]),
+        ),
+        // More than three periods wide.
+        view(
+            "panorama, many times around",
+            panorama.focal_length([9.0, 40.0]),
         ),
     ]
 }
@@ -217,6 +233,27 @@ fn every_camera_and_every_order_keep_the_contract() {
             State::default().order(order),
             &views,
         );
+    }
+}
+
+#[test]
+fn unscented_projection_keeps_the_contract_through_every_camera() {
+    let devices = Devices::new();
+    let state = State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED);
+    let compensated = state.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED);
+    let mut scene = scenes::cloud(13, 2000, 1);
+    // Large ones make a difference.
+    for scale in scene.scales.iter_mut().step_by(5) {
+        *scale = scale.map(|s| 8.0 * s);
+    }
+    let mut views = other_cameras();
+    views.push(generated_view(Limits::ENVELOPE_ONLY));
+    for (name, state) in [("unscented", state), ("compensated", compensated)] {
+        devices.judge(&format!("cloud 13 {name}"), &scene, state, &views);
+    }
+    for seed in 200..212 {
+        let scene = scenes::awkward(seed, 20, (seed % 4) as u32);
+        devices.judge(&format!("awkward {seed} unscented"), &scene, state, &views);
     }
 }
 

@@ -1,10 +1,12 @@
 //! Gaussian draws, from an application's calls to pixels.
 
 mod accuracy;
+mod cameras;
 mod depth_stencil;
 mod determinism;
 mod given_scenes;
 mod hybrid_scenes;
+mod instances;
 mod interleavings;
 mod popping;
 mod reference;

@@ -63,7 +63,8 @@ vk_enum! {
     pub struct GaussianLinearizationGAURAST {
         /// By the projection's Jacobian at the mean (EWA splatting, as in 3DGS).
         JACOBIAN = 0,
-        /// By the unscented transform, from projected sigma points. Needs `unscentedProjection`.
+        /// By the unscented transform, from projected sigma points (alpha 1, beta 2, kappa 0, as in 3DGUT); by the
+        /// Jacobian where some point is not seen. Needs `unscentedProjection`.
         UNSCENTED = 1,
     }
 }

@@ -34,7 +34,8 @@ pub struct GaussianAttributeLocationsGAURAST {
     /// The colour is max(0, 0.5 + SH(direction from the eye) . k). Required.
     pub first_spherical_harmonics: u32,
     /// The first of 3 consecutive locations of 4 components each: the rows of a 3x4 matrix from
-    /// model to world space, as in `VkTransformMatrixKHR`; usually per instance. Unused means the
+    /// model to world space, as in `VkTransformMatrixKHR`; usually per instance. What a Gaussian
+    /// looks like turns with it; one whose matrix is singular is not drawn. Unused means the
     /// identity. Needs `gaussianInstancing`.
     pub first_model_matrix: u32,
     /// A factor of the opacity, 1 component, usually per instance. Unused means 1. Needs

@@ -106,8 +106,10 @@ const SUPPORTED: &[&str] = &[
     "performance_counter_query_pools",
     // VK_GAURAST_gaussian_primitive_topology.
     "gaussian_primitive_topology",
+    "equirectangular_camera",
     "fisheye_camera",
     "gaussian_depth_stencil",
+    "gaussian_instancing",
     "gaussian_multisample",
     "merged_draws",
     "opacity_compensation",
@@ -117,6 +119,7 @@ const SUPPORTED: &[&str] = &[
     "resolve_fragment_shader",
     "uniform_buffer_camera",
     "vertex_shader_projection",
+    "unscented_projection",
 ];
 
 /// The extensions whose features can't be enabled without them. (Features of core need none.)
@@ -537,7 +540,7 @@ mod tests {
         >(2));
         names.extend(all_true::<
             PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-        >(12));
+        >(14));
         let names: HashSet<_> = names.into_iter().collect();
         assert_eq!(names, SUPPORTED.iter().copied().collect());
     }

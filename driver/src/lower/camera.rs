@@ -10,6 +10,7 @@ use simdevice::packet::{BufferRange, Camera, CameraModel};
 pub(crate) struct CameraModels {
     orthographic: bool,
     fisheye: bool,
+    equirectangular: bool,
 }
 
 impl CameraModels {
@@ -18,6 +19,7 @@ impl CameraModels {
         Self {
             orthographic: features.has("orthographic_camera"),
             fisheye: features.has("fisheye_camera"),
+            equirectangular: features.has("equirectangular_camera"),
         }
     }
 
@@ -27,6 +29,7 @@ impl CameraModels {
             CameraModel::Pinhole => true,
             CameraModel::Orthographic => self.orthographic,
             CameraModel::Fisheye => self.fisheye,
+            CameraModel::Equirectangular => self.equirectangular,
         }
     }
 }
@@ -41,12 +44,7 @@ pub(crate) fn camera(camera: &GaussianCameraGAURAST) -> Result<Camera, Error> {
         GaussianCameraModelGAURAST::PINHOLE => CameraModel::Pinhole,
         GaussianCameraModelGAURAST::ORTHOGRAPHIC => CameraModel::Orthographic,
         GaussianCameraModelGAURAST::FISHEYE => CameraModel::Fisheye,
-        GaussianCameraModelGAURAST::EQUIRECTANGULAR => {
-            return Err(Error::FeatureNotPresent(format!(
-                "the camera model {:?}",
-                camera.model
-            )));
-        }
+        GaussianCameraModelGAURAST::EQUIRECTANGULAR => CameraModel::Equirectangular,
         other => {
             return Err(Error::usage(
                 "VUID-VkGaussianCameraGAURAST-model-parameter",
@@ -237,7 +235,6 @@ mod tests {
             good().near_plane(2.0).far_plane(1.0),
             good().far_plane(f32::NAN),
             good().depth_coefficients([f32::NAN, 0.0]),
-            good().model(GaussianCameraModelGAURAST::EQUIRECTANGULAR),
             good().model(GaussianCameraModelGAURAST::from_raw(77)),
         ];
         for bad in bad {

@@ -14,7 +14,8 @@ use simdevice::Packet;
 use simdevice::bindings::Bindings;
 use simdevice::packet::draw::{self, DrawState, ResolveShader, Topology};
 use simdevice::packet::{
-    Camera, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, Viewport,
+    Camera, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, ModelAttributes,
+    Viewport,
 };
 use std::sync::Arc;
 
@@ -172,6 +173,13 @@ fn attributes(
             .iter()
             .map(stream)
             .collect::<Result<_, _>>()?,
+        model: ModelAttributes {
+            matrix: match &gaussian.model_matrix {
+                None => None,
+                Some([x, y, z]) => Some(Box::new([stream(x)?, stream(y)?, stream(z)?])),
+            },
+            opacity: gaussian.model_opacity.as_ref().map(stream).transpose()?,
+        },
     })
 }
 

@@ -4,8 +4,9 @@ use crate::gpu::Gpu;
 use crate::scene::{PipelineRequest, over, replace};
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
-    GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianGeometryGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -113,14 +114,6 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
             "gaussian2D",
         ),
         (
-            with_state(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)),
-            "unscentedProjection",
-        ),
-        (
-            with_state(|s| s.attribute_locations(s.attribute_locations.model_opacity(3))),
-            "gaussianInstancing",
-        ),
-        (
             PipelineRequest {
                 blend: vec![over().src_color_blend_factor(vk::BlendFactor::SRC1_COLOR)],
                 ..PipelineRequest::default()
@@ -140,6 +133,25 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
     }
     let compensated = GaussianAntialiasingGAURAST::OPACITY_COMPENSATED;
     create(&gpu, &with_state(|s| s.antialiasing(compensated))).unwrap();
+    let unscented = GaussianLinearizationGAURAST::UNSCENTED;
+    create(&gpu, &with_state(|s| s.linearization(unscented))).unwrap();
+    let placed = |matrix, opacity| {
+        with_state(|s| {
+            let locations = s.attribute_locations;
+            let locations = locations.first_model_matrix(matrix).model_opacity(opacity);
+            s.attribute_locations(locations)
+        })
+    };
+    let unused = GAUSSIAN_LOCATION_UNUSED_GAURAST;
+    create(&gpu, &placed(unused, 3)).unwrap();
+    // Location 2 alone has four components.
+    for (request, word) in [
+        (placed(2, unused), "matrix"),
+        (placed(unused, 9), "modelOpacity"),
+    ] {
+        let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
+        assert_refused(&gpu, &request, error, word);
+    }
     let logic = PipelineRequest {
         logic_op: true,
         ..PipelineRequest::default()

@@ -292,6 +292,7 @@ fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so() {
     for model in [
         GaussianCameraModelGAURAST::ORTHOGRAPHIC,
         GaussianCameraModelGAURAST::FISHEYE,
+        GaussianCameraModelGAURAST::EQUIRECTANGULAR,
     ] {
         let pixels = scene.draw([0.25; 4], |device, commands| {
             // SAFETY: see the crate.

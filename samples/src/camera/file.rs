@@ -6,7 +6,7 @@ use std::{fs, io};
 use serde::Deserialize;
 use thiserror::Error;
 
-use super::Camera;
+use super::{Camera, Model};
 
 /// The most pixels along an axis that a camera file may claim.
 const MAX_SIZE: f64 = 1e6;
@@ -270,6 +270,7 @@ fn camera(
         return Err(ViewError::Rotation);
     }
     Ok(Camera {
+        model: Model::Pinhole,
         rotation,
         eye,
         focal,

@@ -1,9 +1,9 @@
-//! Pinhole cameras: given by hand, framing a scene, or read from camera files.
+//! Cameras: given by hand, framing a scene, or read from camera files.
 
 mod file;
 mod frame;
 
-use gaurast::vk::GaussianCameraGAURAST;
+use gaurast::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -13,9 +13,24 @@ pub use file::{CameraFileError, View, load};
 /// The vertical field of view where none is given, in degrees.
 pub const DEFAULT_FOV: f64 = 50.0;
 
-/// A pinhole camera with its picture's size.
+/// How a camera projects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+pub enum Model {
+    /// Perspective.
+    #[default]
+    Pinhole,
+    /// Equidistant fisheye: focal lengths are pixels per radian.
+    Fisheye,
+    /// A panorama of longitude and latitude: focal lengths are pixels per radian.
+    Equirectangular,
+}
+
+/// A camera with its picture's size.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Camera {
+    /// How it projects.
+    #[serde(default)]
+    pub model: Model,
     /// World to camera, row by row: the directions right, down and forward in the world.
     pub rotation: [[f64; 3]; 3],
     /// The camera's position in the world.
@@ -90,12 +105,37 @@ impl Camera {
         let [width, height] = size.map(f64::from);
         let focal = height / 2.0 / (fov.to_radians() / 2.0).tan();
         Self {
+            model: Model::Pinhole,
             rotation,
             eye,
             focal: [focal; 2],
             principal: [width / 2.0, height / 2.0],
             width: size[0],
             height: size[1],
+        }
+    }
+
+    /// A fisheye with the same axes, whose vertical field of view is `fov` degrees.
+    #[must_use]
+    pub fn fisheye(&self, fov: f64) -> Self {
+        let height = f64::from(self.height);
+        Self {
+            model: Model::Fisheye,
+            focal: [height / fov.to_radians(); 2],
+            principal: [f64::from(self.width) / 2.0, height / 2.0],
+            ..*self
+        }
+    }
+
+    /// A panorama with the same axes: all 360 by 180 degrees fill the picture.
+    #[must_use]
+    pub fn panorama(&self) -> Self {
+        let [width, height] = [self.width, self.height].map(f64::from);
+        Self {
+            model: Model::Equirectangular,
+            focal: [width / std::f64::consts::TAU, height / std::f64::consts::PI],
+            principal: [width / 2.0, height / 2.0],
+            ..*self
         }
     }
 
@@ -145,7 +185,7 @@ impl Camera {
             .collect()
     }
 
-    /// Where `point` of the world appears, in pixels, if it is in front of the camera.
+    /// Where `point` of the world appears, in pixels, to a pinhole, if it is in front of the camera.
     pub fn project(&self, point: [f64; 3]) -> Option<[f64; 2]> {
         let rotation = DMat3::from_cols_array_2d(&self.rotation).transpose();
         let t = rotation * (DVec3::from_array(point) - DVec3::from_array(self.eye));
@@ -160,7 +200,13 @@ impl Camera {
     /// The camera as a draw takes it, with the default planes: 0.2 and infinity.
     pub fn to_vulkan(&self) -> GaussianCameraGAURAST<'static> {
         let rotation = self.rotation.as_flattened();
+        let model = match self.model {
+            Model::Pinhole => GaussianCameraModelGAURAST::PINHOLE,
+            Model::Fisheye => GaussianCameraModelGAURAST::FISHEYE,
+            Model::Equirectangular => GaussianCameraModelGAURAST::EQUIRECTANGULAR,
+        };
         GaussianCameraGAURAST::default()
+            .model(model)
             .rotation(std::array::from_fn(|i| rotation[i] as f32))
             .eye(self.eye)
             .focal_length(self.focal.map(|f| f as f32))
@@ -233,6 +279,27 @@ mod tests {
             assert!((rows.determinant() - 1.0).abs() < 1e-9);
         }
         assert!(cameras[0] != cameras[1]);
+    }
+
+    #[test]
+    fn a_panorama_fills_its_picture() {
+        let pinhole = Camera::orbit(1, [200, 100]).remove(0);
+        let panorama = pinhole.panorama();
+        assert_eq!(panorama.rotation, pinhole.rotation);
+        let turn = [
+            panorama.focal[0] * std::f64::consts::TAU,
+            panorama.focal[1] * std::f64::consts::PI,
+        ];
+        close(Some(turn), [200.0, 100.0]);
+        let fisheye = pinhole.fisheye(180.0);
+        close(
+            Some(fisheye.focal.map(|focal| focal * std::f64::consts::PI)),
+            [100.0; 2],
+        );
+        assert_eq!(
+            panorama.to_vulkan().model,
+            GaussianCameraModelGAURAST::EQUIRECTANGULAR
+        );
     }
 
     #[test]

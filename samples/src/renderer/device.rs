@@ -64,6 +64,8 @@ struct PhysicalDevice {
     queue_family: u32,
     name: String,
     counts: bool,
+    /// Whether it has fisheye cameras and panoramas.
+    cameras: [bool; 2],
     max_size: u32,
     max_gaussians: u64,
     max_sh_degree: u32,
@@ -81,7 +83,11 @@ impl Device {
             .queue_family_index(physical.queue_family)
             .queue_priorities(&priorities)];
         let mut extensions = Vec::new();
-        let mut gaussian = GaussianFeatures::default().gaussian_primitive_topology(true);
+        let [fisheye, equirectangular] = physical.cameras;
+        let mut gaussian = GaussianFeatures::default()
+            .gaussian_primitive_topology(true)
+            .fisheye_camera(fisheye)
+            .equirectangular_camera(equirectangular);
         let mut rendering =
             vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
         let mut counting = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()
@@ -342,6 +348,13 @@ impl PhysicalDevice {
             unsafe { instance.get_physical_device_features2(handle, &mut chain) };
             counting.performance_counter_query_pools == vk::TRUE
         };
+        let mut features = GaussianFeatures::default();
+        if draws_gaussians && has(gaussian_primitive_topology::NAME) {
+            let mut chain = vk::PhysicalDeviceFeatures2::default().push_next(&mut features);
+            // SAFETY: as above.
+            unsafe { instance.get_physical_device_features2(handle, &mut chain) };
+        }
+        let cameras = [features.fisheye_camera, features.equirectangular_camera];
         let limits = &properties.limits;
         let max_size = [
             limits.max_image_dimension2_d,
@@ -355,6 +368,7 @@ impl PhysicalDevice {
             queue_family: queue_family as u32,
             name: name.to_owned(),
             counts,
+            cameras: cameras.map(|camera| camera == vk::TRUE),
             max_size: max_size.into_iter().min().unwrap_or_default(),
             max_gaussians: gaussian.max_gaussians_per_draw,
             max_sh_degree: gaussian.max_spherical_harmonics_degree,

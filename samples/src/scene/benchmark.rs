@@ -6,7 +6,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{SH_C0, Scene, Shape, sigmoid};
-use crate::camera::Camera;
+use crate::camera::{Camera, Model};
 
 impl Scene {
     /// `count` Gaussians of degree 3 as trained scenes have them: 35 % on a sphere of radius 1.5,
@@ -43,6 +43,7 @@ impl Camera {
     /// pixels at 1280 x 720 and in proportion to the height otherwise.
     pub fn benchmark([width, height]: [u32; 2]) -> Self {
         Self {
+            model: Model::Pinhole,
             rotation: [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
             eye: [0., 0., -6.],
             focal: [1000.0 / 720.0 * f64::from(height); 2],

@@ -215,5 +215,7 @@ fn is_fixed(stream: &AttributeStream) -> bool {
 /// Whether what is drawn can have chunks.
 fn is_eligible(append: &GaussianAppend) -> bool {
     let fixed = shapes(append).into_iter().all(is_fixed);
-    append.indices.is_none() && append.count >= LEAST_COUNT && fixed
+    let model = &append.attributes.model;
+    let is_placed = model.matrix.is_some() || model.opacity.is_some();
+    append.indices.is_none() && append.count >= LEAST_COUNT && fixed && !is_placed
 }

@@ -137,6 +137,14 @@ impl Fetcher {
         mut out: [&mut [f32; F32_LANES]; COMPONENTS],
     ) {
         let (size, floats) = layout(stream.format);
+        if stream.instance_divisor.is_some() && batch.len > 0 {
+            let element = self.read_element(stream, batch.element(stream, 0), size);
+            let value = stream.format.decode(element);
+            for (component, out) in out.iter_mut().enumerate() {
+                out[..batch.len].fill(value[component]);
+            }
+            return;
+        }
         let step = self.read_bytes(stream, batch, size);
         let elements = self.bytes.chunks(step).take(batch.len).enumerate();
         if floats && size >= 4 * COMPONENTS {
@@ -167,6 +175,24 @@ impl Fetcher {
         self.read(&streams.scale, batch, out.scale.each_mut());
         self.read(&streams.rotation, batch, out.rotation.each_mut());
         self.read(&streams.opacity, batch, [&mut out.opacity]);
+        if let Some(stream) = &streams.model.opacity {
+            let mut factor = [0.0; F32_LANES];
+            self.read(stream, batch, [&mut factor]);
+            for (opacity, factor) in out.opacity.iter_mut().zip(factor) {
+                *opacity *= factor;
+            }
+        }
+    }
+
+    /// Reads an element of `size` bytes.
+    fn read_element(&mut self, stream: &AttributeStream, element: u64, size: usize) -> &[u8] {
+        self.grow(size);
+        let offset = element
+            .saturating_mul(u64::from(stream.stride))
+            .saturating_add(u64::from(stream.offset));
+        let bytes = &mut self.bytes[..size];
+        read_clipped(&stream.buffer, offset, bytes);
+        bytes
     }
 
     /// Fills the scratch with one element every returned number of bytes.

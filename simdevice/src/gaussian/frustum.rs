@@ -2,6 +2,7 @@
 //! that they are off the screen. The answer is conservative: what is not surely outside is inside.
 
 use super::chunks::Bounds;
+use super::instances::{Linear, inverse};
 use super::lanes::{Bits, F32_LANES};
 use super::project::Projection;
 use super::scratch::Attributes;
@@ -13,6 +14,9 @@ const MARGIN: f64 = 1e-5;
 
 /// Bounds of binary32's error relative to the sum of the magnitudes of what is summed.
 const ERROR: f64 = 1.0 / 1_048_576.0;
+
+/// The greatest condition of a matrix by which planes are taken to another space.
+const MAX_CONDITION: f64 = 1e5;
 
 /// A Gaussian at `d` from the eye whose largest scale is `s` is outside where
 /// `normal . d + per_scale s + offset < 0`.
@@ -105,7 +109,9 @@ impl Frustum {
         let r = &projection.rotation;
         let depth = ([r[6], r[7], r[8]], projection.near, projection.far);
         let (depth, sides) = match projection.model {
-            CameraModel::Fisheye => (None, Vec::new()),
+            CameraModel::Fisheye | CameraModel::Equirectangular => (None, Vec::new()),
+            // The Jacobian bounds how far a Gaussian reaches; the unscented transform knows no such bound.
+            _ if projection.unscented => (Some(depth), Vec::new()),
             _ => (
                 Some(depth),
                 vec![side(0, 1.0), side(0, -1.0), side(1, 1.0), side(1, -1.0)],
@@ -117,6 +123,32 @@ impl Frustum {
             sides,
             alpha_floor: projection.alpha_floor,
         }
+    }
+
+    /// The same, of Gaussians that a matrix and a translation place in the world, in their own space; `None` if rounding
+    /// makes that uncertain.
+    pub(super) fn within(&self, (a, b): (Linear, [f64; 3])) -> Option<Self> {
+        let (inverse, condition) = inverse(a);
+        if condition.is_nan() || condition > MAX_CONDITION {
+            return None;
+        }
+        let multiply = |a: Linear, v: [f64; 3]| a.map(|row| dot(row, v));
+        let transposed = [0, 1, 2].map(|row| a.map(|of| of[row]));
+        // No axis grows by more.
+        let growth = a.map(|row| dot(row, row)).iter().sum::<f64>().sqrt();
+        let sides = self.sides.iter().map(|side| Plane {
+            normal: multiply(transposed, side.normal),
+            per_scale: side.per_scale * growth,
+            offset: side.offset,
+        });
+        Some(Self {
+            eye: multiply(inverse, [0, 1, 2].map(|axis| self.eye[axis] - b[axis])),
+            depth: self
+                .depth
+                .map(|(forward, near, far)| (multiply(transposed, forward), near, far)),
+            sides: sides.collect(),
+            alpha_floor: self.alpha_floor,
+        })
     }
 
     /// Why a whole chunk is outside, if it is.

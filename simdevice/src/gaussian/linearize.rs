@@ -1,20 +1,57 @@
-//! Cameras other than the pinhole: where a point appears, and how it moves in the picture as it moves in space.
+//! Cameras: where a point appears, and how it moves in the picture as it moves in space.
 
+use super::fetch::BATCH;
+use super::project::Projection;
+use super::scratch::Scratch;
 use crate::packet::CameraModel;
 
-/// A point's place in the picture relative to the principal point, and the two rows of the place's Jacobian, both
-/// for focal lengths of 1. `t` is in camera axes. What has no place is not a number.
-pub(super) fn linearize(model: CameraModel, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
-    match model {
-        CameraModel::Pinhole => pinhole(t),
-        CameraModel::Orthographic => ([t[0], t[1]], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
-        CameraModel::Fisheye => fisheye(t),
+impl Projection {
+    /// Depths, means and Jacobians of the kept Gaussians, unless a pinhole sees the world itself.
+    pub(super) fn linearize(&self, by_matrices: bool, scratch: &mut Scratch) {
+        let [x, y, z] = &*scratch.camera;
+        let placed = scratch.placed.as_deref().filter(|_| by_matrices);
+        let r = &self.rotation;
+        for at in 0..scratch.lanes.len().min(BATCH) {
+            let t = [x[at], y[at], z[at]];
+            scratch.depth[at] = depth(self.model, t);
+            let (place, rows) = linearize(self.model, self.slopes(), t);
+            for (axis, row) in rows.iter().enumerate() {
+                scratch.flat.mean[axis][at] = place[axis] * self.focal[axis] + self.center[axis];
+                let j = row.map(|element| element * self.focal[axis]);
+                let of_column =
+                    |column| j[0] * r[column] + j[1] * r[3 + column] + j[2] * r[6 + column];
+                let mut row = [0, 1, 2].map(of_column);
+                if let Some(placed) = placed {
+                    row = placed.row_from_world(at, row);
+                }
+                for (lanes, element) in scratch.jacobian[axis].iter_mut().zip(row) {
+                    lanes[at] = element;
+                }
+            }
+        }
     }
 }
 
-fn pinhole([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
-    let (u, v) = (x / z, y / z);
-    ([u, v], [[1.0 / z, 0.0, -u / z], [0.0, 1.0 / z, -v / z]])
+/// A point's place in the picture relative to the principal point, and the two rows of the place's Jacobian, both
+/// for focal lengths of 1. `t` is in camera axes. A pinhole's Jacobian is taken at a slope that is clamped to the least and the
+/// greatest of `slopes`. What has no place is not a number.
+pub(super) fn linearize(
+    model: CameraModel,
+    slopes: [[f64; 2]; 2],
+    t: [f64; 3],
+) -> ([f64; 2], [[f64; 3]; 2]) {
+    match model {
+        CameraModel::Pinhole => pinhole(slopes, t),
+        CameraModel::Orthographic => ([t[0], t[1]], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        CameraModel::Fisheye => fisheye(t),
+        CameraModel::Equirectangular => equirectangular(t),
+    }
+}
+
+fn pinhole([least, greatest]: [[f64; 2]; 2], [x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let place = [x / z, y / z];
+    let [u, v] = [0, 1].map(|axis| place[axis].max(least[axis]).min(greatest[axis]));
+    (place, [[1.0 / z, 0.0, -u / z], [0.0, 1.0 / z, -v / z]])
 }
 
 /// Equidistant: the distance from the principal point is the angle from the axis.
@@ -39,11 +76,32 @@ fn fisheye([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     )
 }
 
+/// How near to a pole, as the cosine of the latitude, a panorama's Jacobian is taken at most: beyond, meridians run so
+/// close together that it would be infinite at the pole.
+const POLE: f64 = 1.0 / 1024.0;
+
+/// Longitude, from straight ahead to the right, and latitude, downwards.
+fn equirectangular([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let r = x.hypot(z);
+    let length = r.hypot(y);
+    // At a pole every longitude is as good; that of straight ahead is taken.
+    let (sin, cos) = if r > 0.0 { (x / r, z / r) } else { (0.0, 1.0) };
+    let across = 1.0 / r.max(POLE * length);
+    let (rise, run) = (y / length, r / length);
+    (
+        [x.atan2(z), y.atan2(r)],
+        [
+            [cos * across, 0.0, -sin * across],
+            [-sin * rise / length, run / length, -cos * rise / length],
+        ],
+    )
+}
+
 /// The depth variable: what near and far plane, fragment depth and the view-depth order go by.
 pub(super) fn depth(model: CameraModel, [x, y, z]: [f64; 3]) -> f64 {
     match model {
         CameraModel::Pinhole | CameraModel::Orthographic => z,
-        CameraModel::Fisheye => (x * x + y * y + z * z).sqrt(),
+        CameraModel::Fisheye | CameraModel::Equirectangular => (x * x + y * y + z * z).sqrt(),
     }
 }
 
@@ -51,6 +109,16 @@ pub(super) fn depth(model: CameraModel, [x, y, z]: [f64; 3]) -> f64 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// Wider than any slope here.
+    const SLOPES: [[f64; 2]; 2] = [[-1e3; 2], [1e3; 2]];
+
+    const MODELS: [CameraModel; 4] = [
+        CameraModel::Pinhole,
+        CameraModel::Orthographic,
+        CameraModel::Fisheye,
+        CameraModel::Equirectangular,
+    ];
 
     /// Central differences.
     fn jacobian(model: CameraModel, t: [f64; 3]) -> [[f64; 3]; 2] {
@@ -60,7 +128,7 @@ mod tests {
             let moved = |by: f64| {
                 let mut t = t;
                 t[axis] += by;
-                linearize(model, t).0
+                linearize(model, SLOPES, t).0
             };
             let (ahead, behind) = (moved(step), moved(-step));
             for (row, (a, b)) in rows.iter_mut().zip(ahead.into_iter().zip(behind)) {
@@ -73,13 +141,13 @@ mod tests {
     proptest! {
         #[test]
         fn the_jacobian_is_the_derivative(x in -3.0..3.0f64, y in -3.0..3.0f64, z in 0.5..9.0f64, behind: bool) {
-            for model in [CameraModel::Pinhole, CameraModel::Orthographic, CameraModel::Fisheye] {
-                // A fisheye sees what is beside and behind it, but not what is straight behind.
+            for model in MODELS {
+                // Fisheyes and panoramas see what is beside and behind them; a fisheye not what is straight behind.
                 let t = match model {
-                    CameraModel::Fisheye if behind => [x + x.signum(), y, -z],
+                    CameraModel::Fisheye | CameraModel::Equirectangular if behind => [x + x.signum(), y, -z],
                     _ => [x, y, z],
                 };
-                let (_, rows) = linearize(model, t);
+                let (_, rows) = linearize(model, SLOPES, t);
                 for (row, expected) in rows.iter().zip(jacobian(model, t)) {
                     for (a, b) in row.iter().zip(expected) {
                         prop_assert!((a - b).abs() < 1e-6, "{model:?} {t:?}: {rows:?}");
@@ -91,20 +159,38 @@ mod tests {
 
     #[test]
     fn on_the_axis_a_fisheye_is_a_pinhole_and_behind_it_nothing() {
-        let (place, rows) = linearize(CameraModel::Fisheye, [0.0, 0.0, 4.0]);
+        let (place, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, 4.0]);
         assert_eq!(
             (place, rows),
-            linearize(CameraModel::Pinhole, [0.0, 0.0, 4.0])
+            linearize(CameraModel::Pinhole, SLOPES, [0.0, 0.0, 4.0])
         );
-        let (_, rows) = linearize(CameraModel::Fisheye, [1e-9, 0.0, 4.0]);
+        let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [1e-9, 0.0, 4.0]);
         assert!((rows[1][1] - 0.25).abs() < 1e-12);
-        let (_, rows) = linearize(CameraModel::Fisheye, [0.0, 0.0, -4.0]);
+        let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, -4.0]);
         assert!(rows[0][0].is_nan());
     }
 
     #[test]
-    fn a_fisheye_s_depth_is_the_distance() {
+    fn a_panorama_sees_all_directions() {
+        let place = |t| linearize(CameraModel::Equirectangular, SLOPES, t).0;
+        let right = std::f64::consts::FRAC_PI_2;
+        assert_eq!(place([0.0, 0.0, 3.0]), [0.0, 0.0]);
+        assert_eq!(place([2.0, 0.0, 0.0]), [right, 0.0]);
+        assert_eq!(place([0.0, 0.0, -1.0]), [2.0 * right, 0.0]);
+        assert_eq!(place([0.0, 5.0, 0.0]), [0.0, right]);
+        assert_eq!(place([0.0, -5.0, 0.0]), [0.0, -right]);
+        // At a pole, and a little beside it, a point moves no faster than the stated limit.
+        for x in [0.0, 1e-9] {
+            let (_, rows) = linearize(CameraModel::Equirectangular, SLOPES, [0.0, 2.0, x]);
+            assert_eq!(rows[0], [512.0, 0.0, 0.0]);
+            assert!((rows[1][2] + 0.5).abs() < 1e-9, "{rows:?}");
+        }
+    }
+
+    #[test]
+    fn the_depth_of_what_sees_all_around_is_the_distance() {
         assert_eq!(depth(CameraModel::Fisheye, [2.0, 3.0, -6.0]), 7.0);
+        assert_eq!(depth(CameraModel::Equirectangular, [2.0, 3.0, -6.0]), 7.0);
         assert_eq!(depth(CameraModel::Orthographic, [2.0, 3.0, -6.0]), -6.0);
     }
 }

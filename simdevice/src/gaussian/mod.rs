@@ -1,7 +1,8 @@
 //! Gaussian draws: from vertex attributes to a binned, depth-sorted set that the tile engine renders.
 //!
 //! Stages, each in a module: [`fetch`] (attributes to lanes), [`project`] (3D to the rasterizer's nine numbers, with
-//! [`linearize`] for cameras that are no pinholes; [`shaded`] where a vertex program does it instead),
+//! [`linearize`] for cameras that are no pinholes, [`unscented`] for those who ask for it, [`instances`] for what matrices
+//! place in the world, and [`panorama`] for pictures that repeat; [`shaded`] where a vertex program does it instead),
 //! [`depth`] (what the depth test compares), [`footprint`] (which tiles), [`spherical_harmonics`] (colour), [`sort`] (depth order); then
 //! [`binning`](crate::binning) places them in tile lists.
 
@@ -11,14 +12,17 @@ pub(crate) mod depth;
 mod fetch;
 pub(crate) mod footprint;
 mod frustum;
+mod instances;
 mod lanes;
 mod linearize;
+mod panorama;
 pub(crate) mod project;
 mod scratch;
 mod shaded;
 #[doc(hidden)] // For the benchmarks.
 pub mod sort;
 pub mod spherical_harmonics;
+mod unscented;
 
 pub use footprint::TILE_SIZE;
 
@@ -37,6 +41,7 @@ use fearless_simd::dispatch;
 use fetch::{BATCH, Batch, Fetcher};
 use footprint::Visible;
 use frustum::{Frustum, Outside};
+use instances::Matrices;
 use isa::exec::Stopped;
 use project::{Projected, Projection, Source, Splat};
 use rayon::prelude::*;
@@ -103,6 +108,8 @@ pub struct GaussianDraw {
     pub(crate) depth_unit: DepthCode,
     /// How the depths of a tile's list follow one another.
     pub(crate) depth_trend: Trend,
+    /// Half the pixels after which the picture repeats, or infinity.
+    pub(crate) half_period: f64,
     /// Where the work of its tiles goes, if anybody wants to know.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
@@ -215,6 +222,7 @@ impl GaussianSet {
             },
             depth_unit: self.depth.map_or(DepthCode::Float, |depth| depth.unit()),
             resolve: self.resolve,
+            half_period: panorama::period(&self.begin.camera).map_or(f64::INFINITY, |p| 0.5 * p),
             state: self.begin.state,
             bounds: self.bounds,
             splats,
@@ -260,6 +268,9 @@ impl GaussianSet {
         let batches = self.appends.iter().map(batches);
         let batches = batches.chain(self.draws.iter().map(shaded::batches));
         let batches = batches.fold(0, u64::saturating_add);
+        // A picture that repeats has copies on both sides.
+        let sides = if projection.period.is_some() { 3 } else { 1 };
+        let batches = batches.saturating_mul(sides);
         if batches > MAX_BATCHES {
             return Err(TooManyGaussians { batches });
         }
@@ -359,9 +370,10 @@ impl GaussianSet {
             let Worker {
                 fetcher,
                 attributes,
+                matrices,
                 scratch,
             } = worker;
-            let source = job.read(fetcher, attributes);
+            let source = job.read(fetcher, attributes, matrices);
             // A frustum is for opacities that it was told of.
             let wider;
             let mut frustum = &*job.frustum;
@@ -373,8 +385,16 @@ impl GaussianSet {
                     frustum = &wider;
                 }
             }
+            let placed;
+            let mut bounds = skips.has(Skip::Bounds).then_some(frustum);
+            if let Some(matrices) = source.matrices {
+                // What is yet to be placed in the world by the same matrix sees the planes where they are for it.
+                let uniform = bounds.and(matrices.uniform());
+                placed = uniform.and_then(|matrix| frustum.within(matrix));
+                bounds = placed.as_ref();
+            }
             let source = Source {
-                frustum: skips.has(Skip::Bounds).then_some(frustum),
+                frustum: bounds,
                 ..source
             };
             let sequence = |lane: usize| match &job.part {
@@ -384,12 +404,14 @@ impl GaussianSet {
             dispatch!(level, simd => projection.run(simd, &source, scratch, sequence, &mut out));
             out
         };
-        Ok(device.install(|| {
+        let mut batches: Vec<Projected> = device.install(|| {
             jobs.par_iter()
                 .with_min_len(BATCHES_PER_TASK)
                 .map_init(Worker::new, one)
                 .collect()
-        }))
+        });
+        panorama::append_copies(&mut batches);
+        Ok(batches)
     }
 }
 
@@ -413,17 +435,28 @@ enum Part<'a> {
 
 impl<'a> Job<'a> {
     /// Reads the batch, if it lies in no chunk.
-    fn read<'b>(&'b self, fetcher: &mut Fetcher, attributes: &'b mut Attributes) -> Source<'b> {
+    fn read<'b>(
+        &'b self,
+        fetcher: &mut Fetcher,
+        attributes: &'b mut Attributes,
+        matrices: &'b mut Option<Box<Matrices>>,
+    ) -> Source<'b> {
         let streams = &self.append.attributes;
         match self.part {
             Part::From(start) => {
                 let len = (self.append.count - start).min(BATCH as u32) as usize;
                 let batch = Batch::new(self.append, self.instance, start, len);
                 fetcher.read_all(streams, &batch, attributes);
+                let matrices = streams.model.matrix.as_ref().map(|rows| {
+                    let matrices = matrices.get_or_insert_default();
+                    matrices.read(fetcher, rows, &batch);
+                    &**matrices
+                });
                 Source {
                     streams,
                     batch,
                     attributes,
+                    matrices,
                     is_sound: false,
                     harmonics: &[],
                     frustum: None,
@@ -433,6 +466,7 @@ impl<'a> Job<'a> {
                 streams,
                 batch: Batch::of_chunk(self.append, self.instance, &chunk.numbers),
                 attributes: &chunk.attributes,
+                matrices: None,
                 is_sound: chunk.is_sound,
                 harmonics: &chunk.harmonics,
                 frustum: None,
@@ -445,6 +479,8 @@ impl<'a> Job<'a> {
 struct Worker {
     fetcher: Fetcher,
     attributes: Box<Attributes>,
+    /// Made when they are needed.
+    matrices: Option<Box<Matrices>>,
     scratch: Scratch,
 }
 
@@ -495,6 +531,7 @@ impl Worker {
         Self {
             fetcher: Fetcher::default(),
             attributes: Box::default(),
+            matrices: None,
             scratch: Scratch::new(),
         }
     }

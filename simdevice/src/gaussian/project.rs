@@ -9,14 +9,17 @@ use super::depth::CenterDepth;
 use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader};
 use super::footprint::{Ellipse, Reach, Span, Visible};
 use super::frustum::Frustum;
+use super::instances::Matrices;
 use super::lanes::{Bits, F32_LANES, Lanes, log2};
 use super::linearize;
+use super::panorama;
 use super::scratch::{Attributes, Flat, Scratch};
 use super::sort::ordered_bits;
 use super::spherical_harmonics;
 use crate::counters::{Counter, Counters};
 use crate::packet::{
-    Camera, CameraModel, GaussianAttributes, GaussianOrder, GaussianState, Viewport,
+    Camera, CameraModel, GaussianAttributes, GaussianLinearization, GaussianOrder, GaussianState,
+    Viewport,
 };
 use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, prelude::*};
@@ -40,6 +43,9 @@ pub(crate) struct Splat {
     pub depth: u32,
     /// Whether its exponent is a difference of numbers so large that binary32 would lose it.
     pub steep: bool,
+    /// Whether it is wider than the period of a panorama: it then counts within half a period of its mean only, where
+    /// its copies do not. Such a one is steep.
+    pub wide: bool,
 }
 
 impl Splat {
@@ -54,6 +60,7 @@ impl Splat {
             color,
             depth,
             steep: is_steep(factor, flat.log2_opacity[at]),
+            wide: false,
         }
     }
 }
@@ -87,6 +94,8 @@ pub(crate) struct Projected {
     pub spans: Vec<Span>,
     /// What was skipped and why.
     pub counters: Counters,
+    /// What is drawn a period to the right or to the left of where it is, by side.
+    pub copies: Vec<Projected>,
 }
 
 /// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
@@ -100,12 +109,16 @@ const LN_2: f64 = std::f64::consts::LN_2;
 #[derive(Clone, Debug)]
 pub(crate) struct Projection {
     pub(super) model: CameraModel,
+    /// Whether covariances are those of projected points.
+    pub(super) unscented: bool,
     pub(super) order: GaussianOrder,
     pub(super) rotation: [f64; 9],
     pub(super) eye: [f64; 3],
     pub(super) focal: [f64; 2],
     /// The principal point in framebuffer pixels.
     pub(super) center: [f64; 2],
+    /// After how many pixels the picture repeats to the right and to the left, if it does.
+    pub(super) period: Option<f64>,
     /// Bounds of `t.x / t.z` and `t.y / t.z` in the Jacobian.
     pub(super) slope_min: [f64; 2],
     pub(super) slope_max: [f64; 2],
@@ -136,6 +149,8 @@ pub(super) struct Source<'a> {
     pub(super) streams: &'a GaussianAttributes,
     pub(super) batch: Batch<'a>,
     pub(super) attributes: &'a Attributes,
+    /// Matrices that place them in the world, if it is not their own space.
+    pub(super) matrices: Option<&'a Matrices>,
     /// None is skipped for what its attributes are.
     pub(super) is_sound: bool,
     /// Their spherical harmonics, if they were read already, one after the other.
@@ -160,6 +175,7 @@ impl Projection {
         let margin = [0, 1].map(|axis| 0.15 * size[axis] / focal[axis]);
         Self {
             model: camera.model,
+            unscented: state.linearization == GaussianLinearization::Unscented,
             order: state.order,
             rotation: camera.rotation.map(f64::from),
             eye: camera.eye,
@@ -168,6 +184,7 @@ impl Projection {
                 principal[0] + f64::from(viewport.x),
                 principal[1] + f64::from(viewport.y),
             ],
+            period: panorama::period(camera),
             slope_min: [0, 1].map(|axis| -(principal[axis] / focal[axis] + margin[axis])),
             slope_max: [0, 1]
                 .map(|axis| (size[axis] - principal[axis]) / focal[axis] + margin[axis]),
@@ -198,7 +215,10 @@ impl Projection {
         counters.add(Counter::GaussiansRead, source.batch.len as u64);
         let kept = self.cull(simd, source, counters);
         scratch.gather(source.attributes, &kept);
-        self.flatten(simd, scratch);
+        if let Some(matrices) = source.matrices {
+            scratch.gather_matrices(matrices);
+        }
+        self.flatten(simd, source.matrices.is_some(), scratch);
         self.emit(simd, source, scratch, sequence, out);
     }
 
@@ -231,6 +251,9 @@ impl Projection {
         if !self.skips.has(Skip::Harmonics) {
             let colored = self.find_colored(simd, source);
             keep(&colored, Counter::SkippedNonFinite);
+        }
+        if let Some(matrices) = source.matrices {
+            keep(&matrices.find_finite(len), Counter::SkippedNonFinite);
         }
         if !source.is_sound {
             let [finite, rotated, positive] = find_sound(simd, source.attributes, len);
@@ -286,25 +309,6 @@ impl Projection {
         ordered_bits(depth as f32)
     }
 
-    /// Depths, means and Jacobians of the kept Gaussians, for cameras that are no pinholes.
-    fn linearize(&self, scratch: &mut Scratch) {
-        let [x, y, z] = &*scratch.camera;
-        let r = &self.rotation;
-        for at in 0..scratch.lanes.len().min(BATCH) {
-            let t = [x[at], y[at], z[at]];
-            scratch.depth[at] = linearize::depth(self.model, t);
-            let (place, rows) = linearize::linearize(self.model, t);
-            for (axis, row) in rows.iter().enumerate() {
-                scratch.flat.mean[axis][at] = place[axis] * self.focal[axis] + self.center[axis];
-                let j = row.map(|element| element * self.focal[axis]);
-                for column in 0..3 {
-                    scratch.jacobian[axis][column][at] =
-                        j[0] * r[column] + j[1] * r[3 + column] + j[2] * r[6 + column];
-                }
-            }
-        }
-    }
-
     /// Finds the place of the kept Gaussians in camera space.
     #[inline(always)]
     fn place<S: Simd>(&self, simd: S, scratch: &mut Scratch) {
@@ -331,6 +335,11 @@ impl Projection {
         }
     }
 
+    /// The bounds of slopes in a pinhole's Jacobian: the least ones and the greatest.
+    pub(super) fn slopes(&self) -> [[f64; 2]; 2] {
+        [self.slope_min, self.slope_max]
+    }
+
     /// Bounds of the visible pixels' centres along an axis, with a pixel to spare.
     pub(super) fn visible_range(&self, axis: usize) -> [f64; 2] {
         let Visible {
@@ -345,12 +354,25 @@ impl Projection {
 
     /// Computes mean, covariance and opacity on the screen of the kept Gaussians.
     #[inline(always)]
-    fn flatten<S: Simd>(&self, simd: S, scratch: &mut Scratch) {
-        self.place(simd, scratch);
-        let is_pinhole = self.model == CameraModel::Pinhole;
-        if !is_pinhole {
-            self.linearize(scratch);
+    fn flatten<S: Simd>(&self, simd: S, by_matrices: bool, scratch: &mut Scratch) {
+        if by_matrices {
+            self.place_by_matrices(scratch);
+        } else {
+            self.place(simd, scratch);
         }
+        let unscented = self.unscented;
+        let is_pinhole = self.model == CameraModel::Pinhole && !by_matrices && !unscented;
+        if !is_pinhole {
+            self.linearize(by_matrices, scratch);
+        }
+        if unscented {
+            self.transform(by_matrices, scratch);
+        }
+        let moments = &*scratch.moments;
+        let toward = match &scratch.placed {
+            Some(placed) if by_matrices => &placed.toward,
+            _ => &*scratch.offset,
+        };
         let number = |value: f64| S::f64s::splat(simd, value);
         let load =
             |lanes: &Lanes, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
@@ -416,20 +438,20 @@ impl Projection {
             }
             let [[ax, ay, az], [bx, by, bz]] = m;
             let [cx, cy, cz] = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
-            let area2 = cx * cx + cy * cy + cz * cz;
-            let xx = ax * ax + ay * ay + az * az;
-            let yy = bx * bx + by * by + bz * bz;
-            self.shape(
-                simd,
-                at,
-                [xx, ax * bx + ay * by + az * bz, yy],
-                area2,
-                load(opacity, at),
-                flat,
-            );
+            let mut area2 = cx * cx + cy * cy + cz * cz;
+            let mut covariance = [
+                ax * ax + ay * ay + az * az,
+                ax * bx + ay * by + az * bz,
+                bx * bx + by * by + bz * bz,
+            ];
+            if unscented {
+                covariance = [load(&moments[0], at), load(&moments[1], at), load(&moments[2], at)];
+                area2 = load(&moments[3], at);
+            }
+            self.shape(simd, at, covariance, area2, load(opacity, at), flat);
 
-            let d = &scratch.offset;
-            let [dx, dy, dz] = [load(&d[0], at), load(&d[1], at), load(&d[2], at)];
+            let [dx, dy, dz] = toward;
+            let [dx, dy, dz] = [load(dx, at), load(dy, at), load(dz, at)];
             let largest = dx.abs().max(dy.abs()).max(dz.abs());
             let [dx, dy, dz] = [dx / largest, dy / largest, dz / largest];
             let norm = (dx * dx + dy * dy + dz * dz).sqrt();
@@ -506,6 +528,7 @@ impl Projection {
     pub(super) fn find_tiles(&self, scratch: &mut Scratch, out: &mut Projected) {
         let mut beside = self.skips.has(Skip::Ellipse).then_some(0);
         scratch.reached.clear();
+        scratch.copies.clear();
         for at in 0..scratch.lanes.len().min(BATCH) {
             if let Some(reason) = self.why_skipped(at, scratch) {
                 out.counters.add(reason, 1);
@@ -522,7 +545,13 @@ impl Projection {
             let mut reach = None;
             // The square root of a negative extent is not a number.
             if ellipse.half[1] >= 0.0 {
-                reach = ellipse.reach(&self.visible, &mut out.spans, beside.as_mut());
+                reach = match self.period {
+                    None => ellipse.reach(&self.visible, &mut out.spans, beside.as_mut()),
+                    Some(period) => {
+                        let (visible, copies) = (&self.visible, &mut scratch.copies);
+                        panorama::reach(at, &ellipse, period, visible, copies, out, beside.as_mut())
+                    }
+                };
             }
             match reach {
                 Some(reach) => scratch.reached.push((at, reach)),
@@ -547,6 +576,7 @@ impl Projection {
         self.find_tiles(scratch, out);
         let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
         let mut coefficients = [[0.0; COEFFICIENT_FLOATS]; GROUP];
+        let mut copies = &*scratch.copies;
         for group in scratch.reached.chunks(GROUP) {
             // Reading several at a time overlaps the waits for memory.
             for (&(at, _), coefficients) in group.iter().zip(&mut coefficients) {
@@ -570,8 +600,19 @@ impl Projection {
                 let sequence = sequence(scratch.lanes[at]);
                 out.keys.push([self.key(at, sequence, scratch), sequence]);
                 let depth = self.center_depth(at, scratch);
-                out.splats.push(Splat::new(flat, at, color, depth));
+                let wide = self
+                    .period
+                    .is_some_and(|period| 2.0 * flat.half[0][at] >= period);
+                let splat = Splat::new(flat, at, color, depth);
+                out.splats.push(Splat {
+                    steep: wide || splat.steep,
+                    wide,
+                    ..splat
+                });
                 out.reaches.push(reach);
+                if let Some(period) = self.period {
+                    panorama::copy_last(at, period, &mut copies, out);
+                }
             }
         }
         let counters = &mut out.counters;

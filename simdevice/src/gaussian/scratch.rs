@@ -2,6 +2,7 @@
 
 use super::fetch::BATCH;
 use super::footprint::Reach;
+use super::instances::Placed;
 use super::lanes::{Bits, F32_LANES, Lanes, NO_LANES};
 
 /// Vertex attributes by lane, as they are read.
@@ -27,11 +28,17 @@ pub(crate) struct Scratch {
     pub(super) camera: Box<[Lanes; 3]>,
     /// The depth variable.
     pub(super) depth: Box<Lanes>,
-    /// The Jacobian's rows in world axes, of cameras that are no pinholes.
+    /// What model matrices make of them, if there are any.
+    pub(super) placed: Option<Box<Placed>>,
+    /// The Jacobian's rows in the axes of the Gaussians' space, unless a pinhole sees the world itself.
     pub(super) jacobian: Box<[[Lanes; 3]; 2]>,
+    /// Of covariances in the picture: xx, xy, yy and the determinant, where the unscented transform finds them.
+    pub(super) moments: Box<[Lanes; 4]>,
     pub(super) flat: Box<Flat>,
     /// Which of them reach tiles, and which tiles.
     pub(super) reached: Vec<(usize, Reach)>,
+    /// The same of their copies a period beside, in the same order: which side's, 0 or 1, in the middle.
+    pub(super) copies: Vec<(usize, usize, Reach)>,
 }
 
 /// Gaussians on the screen.
@@ -46,7 +53,7 @@ pub(super) struct Flat {
     pub(super) slope: Lanes,
     pub(super) narrowing: Lanes,
     pub(super) peak: Lanes,
-    /// The unit vector from the eye, in world axes.
+    /// The unit vector from the eye, in the axes of the Gaussians' space.
     pub(super) direction: [Lanes; 3],
 }
 
@@ -89,9 +96,12 @@ impl Scratch {
             offset: Box::new([NO_LANES; 3]),
             camera: Box::new([NO_LANES; 3]),
             depth: Box::new(NO_LANES),
+            placed: None,
             jacobian: Box::new([[NO_LANES; 3]; 2]),
+            moments: Box::new([NO_LANES; 4]),
             flat: Box::default(),
             reached: Vec::with_capacity(BATCH),
+            copies: Vec::new(),
         }
     }
 

@@ -161,6 +161,7 @@ impl GaussianTile {
             list,
             skips: draw.skips,
             trend: draw.depth_trend,
+            half_period: draw.half_period,
             corner,
             thresholds: Thresholds::new(draw),
         };
@@ -206,6 +207,7 @@ impl GaussianTile {
             list: draw.tiles.list(tile_x, tile_y),
             skips: Skips::ALL,
             trend: Trend::None,
+            half_period: draw.half_period,
             corner: [tile_x, tile_y].map(|tile| tile * TILE_SIZE),
             // The first Gaussian that reaches a pixel finishes it.
             thresholds: Thresholds {
@@ -383,6 +385,14 @@ impl Layer {
         let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
         let (from_x, from_y) = (from_mean(0), from_mean(1));
         let opacity = f64x8::splat(simd, splat.log2_opacity.into());
+        // What is wider than the period of a panorama counts where it is nearer than its copies.
+        let half_period = if splat.wide {
+            task.half_period
+        } else {
+            f64::INFINITY
+        };
+        let within = f64x8::splat(simd, half_period);
+        let nothing = f64x8::splat(simd, -1e3);
         let mut contributions = 0;
         for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
             let middle = [BLOCK_X[block] + from_x, BLOCK_Y[block] + from_y];
@@ -390,7 +400,9 @@ impl Layer {
                 let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
                 let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
                 let (u, v) = (dx * a, dx * b + dy * c);
-                opacity - (u * u + v * v)
+                let exponent = opacity - (u * u + v * v);
+                let inside = dx.simd_ge(-within) & dx.simd_lt(within);
+                inside.select(exponent, nothing)
             };
             let exponent: f32x16<S> = exponent(0).narrow(exponent(8));
             let look = (splat.color, splat.depth);
@@ -461,6 +473,8 @@ struct Task<'a> {
     /// What is left out.
     skips: Skips,
     trend: Trend,
+    /// As [`GaussianDraw::half_period`].
+    half_period: f64,
     corner: [u32; 2],
     thresholds: Thresholds,
 }

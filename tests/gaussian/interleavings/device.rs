@@ -19,8 +19,8 @@ use simdevice::packet::{
     Aspect, Attachment, AttachmentClear, AttributeStream, BlendEquation, BlendFactor, BlendOp,
     BlendState, BufferCopyRegion, BufferImageRegion, BufferRange, Camera, CameraModel,
     ClearAttachments, ClearImage, ClearValue, CopyBuffer, CopyBufferImage, GaussianAppend,
-    GaussianAttributes, GaussianBegin, GaussianState, LoadOp, Rect, Rendering, StoreOp,
-    SubresourceLayers, SubresourceRange, Viewport,
+    GaussianAttributes, GaussianBegin, GaussianState, LoadOp, ModelAttributes, Rect, Rendering,
+    StoreOp, SubresourceLayers, SubresourceRange, Viewport,
 };
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
@@ -169,6 +169,7 @@ fn attributes(scene: &SceneBuffers) -> GaussianAttributes {
         scale: triples(&scene.scales),
         rotation: stream(&buffer(&scene.rotations), 16, 0, Format::R32G32B32A32Sfloat),
         opacity: stream(&buffer(&scene.opacities), 4, 0, Format::R32Sfloat),
+        model: ModelAttributes::default(),
         spherical_harmonics: vec![triples(&scene.sh)],
     }
 }

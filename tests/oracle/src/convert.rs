@@ -2,7 +2,7 @@
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianLinearizationGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::oracle::{OracleCamera, OracleModel, OracleOrder, OracleState};
@@ -15,6 +15,7 @@ impl OracleCamera {
             GaussianCameraModelGAURAST::PINHOLE => OracleModel::Pinhole,
             GaussianCameraModelGAURAST::ORTHOGRAPHIC => OracleModel::Orthographic,
             GaussianCameraModelGAURAST::FISHEYE => OracleModel::Fisheye,
+            GaussianCameraModelGAURAST::EQUIRECTANGULAR => OracleModel::Equirectangular,
             _ => return None,
         };
         Some(Self {
@@ -36,6 +37,7 @@ impl OracleCamera {
             OracleModel::Pinhole => GaussianCameraModelGAURAST::PINHOLE,
             OracleModel::Orthographic => GaussianCameraModelGAURAST::ORTHOGRAPHIC,
             OracleModel::Fisheye => GaussianCameraModelGAURAST::FISHEYE,
+            OracleModel::Equirectangular => GaussianCameraModelGAURAST::EQUIRECTANGULAR,
         };
         GaussianCameraGAURAST::default()
             .model(model)
@@ -57,6 +59,7 @@ impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
             transmittance_floor: info.transmittance_floor,
             opacity_compensated: info.antialiasing
                 == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
+            unscented: info.linearization == GaussianLinearizationGAURAST::UNSCENTED,
             order: match info.order {
                 GaussianOrderGAURAST::RADIAL_DISTANCE => OracleOrder::RadialDistance,
                 GaussianOrderGAURAST::PRIMITIVE => OracleOrder::Primitive,
@@ -84,7 +87,7 @@ mod tests {
         assert!(OracleCamera::new(&camera, [8, 8]).is_some());
         let own = crate::scenes::camera(8, 8);
         assert_eq!(OracleCamera::new(&own.to_vulkan(), [8, 8]), Some(own));
-        let camera = camera.model(GaussianCameraModelGAURAST::EQUIRECTANGULAR);
+        let camera = camera.model(GaussianCameraModelGAURAST::from_raw(77));
         assert_eq!(OracleCamera::new(&camera, [8, 8]), None);
     }
 }

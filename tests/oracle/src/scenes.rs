@@ -67,6 +67,7 @@ impl SceneBuffers {
             sh: &self.sh,
             stored_degree: self.degree,
             requested_degree: self.degree,
+            instances: &[],
         }
     }
 }

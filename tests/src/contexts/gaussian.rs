@@ -6,6 +6,8 @@ use gaurast::vk::{
     PipelineGaussianStateCreateInfoGAURAST,
 };
 
+use half::f16;
+
 use super::{Buffer, Context};
 use crate::scenes::SceneBuffers;
 
@@ -36,6 +38,31 @@ impl DeviceScene {
             degree: scene.degree,
         }
     }
+
+    /// Copies `scene` to the device as half floats, triples with a fourth component.
+    pub fn half(context: &Context, scene: &SceneBuffers) -> Self {
+        let half = |values: &[f32]| -> Vec<u16> {
+            let values = values.iter();
+            values
+                .map(|&value| f16::from_f32(value).to_bits())
+                .collect()
+        };
+        let triples = |triples: &[[f32; 3]]| {
+            let padded: Vec<[f32; 4]> = triples.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
+            Buffer::of(context, &half(padded.as_flattened()))
+        };
+        Self {
+            buffers: [
+                triples(&scene.positions),
+                triples(&scene.scales),
+                Buffer::of(context, &half(scene.rotations.as_flattened())),
+                Buffer::of(context, &half(&scene.opacities)),
+                triples(&scene.sh),
+            ],
+            count: scene.positions.len() as u32,
+            degree: scene.degree,
+        }
+    }
 }
 
 /// What a [`Pipeline`] is made of.
@@ -55,7 +82,20 @@ pub struct PipelineOptions<'a> {
     pub render_pass: vk::RenderPass,
     /// Whether opacity and coefficients advance by instance.
     pub looks_by_instance: bool,
+    /// Whether scenes are stored as half floats.
+    pub half: bool,
+    /// Whether there are model matrices and factors of the opacity, and how they advance; see [`Instance`].
+    pub instances: Option<vk::VertexInputRate>,
 }
+
+/// A model matrix's rows and a factor of the opacity, as [`Commands::bind_instances`](super::Commands::bind_instances)
+/// takes them.
+pub type Instance = [f32; 13];
+
+/// The binding of [`Instance`]s, and the locations of what they hold.
+pub(super) const INSTANCES: u32 = BINDINGS;
+const MODEL_MATRIX: u32 = 24;
+const MODEL_OPACITY: u32 = 27;
 
 impl PipelineOptions<'_> {
     /// Draws scenes of `degree` in the default state, replacing what a 32-bit float target holds.
@@ -68,6 +108,8 @@ impl PipelineOptions<'_> {
             blend: replace(),
             render_pass: vk::RenderPass::null(),
             looks_by_instance: false,
+            half: false,
+            instances: None,
         }
     }
 }
@@ -102,7 +144,7 @@ impl Pipeline {
     /// If the driver refuses it.
     pub fn new(context: &Context, options: &PipelineOptions) -> Self {
         let bindings = bindings(options);
-        let attributes = attributes(options.drawn_degree);
+        let attributes = all_attributes(options);
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&bindings)
             .vertex_attribute_descriptions(&attributes);
@@ -121,7 +163,12 @@ impl Pipeline {
         let formats = [options.format];
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
-        let locations = attribute_locations();
+        let mut locations = attribute_locations();
+        if options.instances.is_some() {
+            locations = locations
+                .first_model_matrix(MODEL_MATRIX)
+                .model_opacity(MODEL_OPACITY);
+        }
         let mut state = options
             .state
             .spherical_harmonics_degree(options.drawn_degree)
@@ -158,8 +205,48 @@ impl Pipeline {
     }
 }
 
-fn bindings(options: &PipelineOptions) -> [vk::VertexInputBindingDescription; BINDINGS as usize] {
-    scene_bindings(options.stored_degree, options.looks_by_instance)
+fn bindings(options: &PipelineOptions) -> Vec<vk::VertexInputBindingDescription> {
+    let mut bindings = scene_bindings(options.stored_degree, options.looks_by_instance).to_vec();
+    if options.half {
+        let triples = (options.stored_degree + 1).pow(2);
+        for (binding, stride) in bindings.iter_mut().zip([8, 8, 8, 2, 8 * triples]) {
+            binding.stride = stride;
+        }
+    }
+    bindings.extend(
+        options
+            .instances
+            .map(|input_rate| vk::VertexInputBindingDescription {
+                binding: INSTANCES,
+                stride: size_of::<Instance>() as u32,
+                input_rate,
+            }),
+    );
+    bindings
+}
+
+fn all_attributes(options: &PipelineOptions) -> Vec<vk::VertexInputAttributeDescription> {
+    let mut attributes = attributes(options.drawn_degree);
+    if options.half {
+        for attribute in &mut attributes {
+            (attribute.format, attribute.offset) = match attribute.format {
+                vk::Format::R32_SFLOAT => (vk::Format::R16_SFLOAT, 0),
+                _ => (vk::Format::R16G16B16A16_SFLOAT, attribute.offset / 12 * 8),
+            };
+        }
+    }
+    let attribute = |location, format, floats: u32| vk::VertexInputAttributeDescription {
+        location,
+        binding: INSTANCES,
+        format,
+        offset: 4 * floats,
+    };
+    if options.instances.is_some() {
+        let row = |row| attribute(MODEL_MATRIX + row, vk::Format::R32G32B32A32_SFLOAT, 4 * row);
+        attributes.extend((0..3).map(row));
+        attributes.push(attribute(MODEL_OPACITY, vk::Format::R32_SFLOAT, 12));
+    }
+    attributes
 }
 
 /// Where those attributes are.

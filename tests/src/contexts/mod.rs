@@ -11,7 +11,7 @@ mod pass;
 mod resource;
 mod settings;
 
-pub use gaussian::{DeviceScene, Pipeline, PipelineOptions, over, replace};
+pub use gaussian::{DeviceScene, Instance, Pipeline, PipelineOptions, over, replace};
 pub use pass::{Commands, Pass, PassObject};
 pub use resource::{Buffer, Target};
 pub use settings::{Settings, simd_levels, with_settings};
@@ -82,7 +82,10 @@ impl Context {
             .radial_distance_order(true)
             .primitive_order(true)
             .orthographic_camera(true)
-            .fisheye_camera(true);
+            .fisheye_camera(true)
+            .equirectangular_camera(true)
+            .gaussian_instancing(true)
+            .unscented_projection(true);
         let mut vulkan_1_3 = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
         let device_info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)

@@ -3,6 +3,7 @@
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
 
+use super::gaussian::INSTANCES;
 use super::{Buffer, Context, DeviceScene, Pipeline, Target};
 
 /// How a pass begins.
@@ -103,6 +104,13 @@ impl<'a> Commands<'a> {
             let gaussian = self.context.gaussian();
             gaussian.cmd_set_gaussian_camera(self.raw, camera);
         }
+    }
+
+    /// Binds what a pipeline with [`PipelineOptions::instances`](super::PipelineOptions::instances) needs besides.
+    pub fn bind_instances(&self, instances: &Buffer) {
+        let (device, raw) = (self.context.device(), instances.raw());
+        // SAFETY: see `contexts`.
+        unsafe { device.cmd_bind_vertex_buffers(self.raw, INSTANCES, &[raw], &[0]) };
     }
 
     /// Binds 32-bit indices.

@@ -21,7 +21,7 @@ use gaurast::vk::{
     PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::packet::draw::DrawState;
-use simdevice::packet::{GaussianOrder, GaussianState};
+use simdevice::packet::{GaussianLinearization, GaussianOrder, GaussianState};
 use std::sync::Arc;
 
 /// The greatest degree of spherical harmonics that a pipeline may ask for.
@@ -112,6 +112,17 @@ fn source(
                 attribute(info, &name, first.saturating_add(k), 3)
             })
             .collect::<Result<_, _>>()?,
+        model_matrix: match locations.first_model_matrix {
+            GAUSSIAN_LOCATION_UNUSED_GAURAST => None,
+            first => {
+                let row = |k| attribute(info, "a model matrix's row", first.saturating_add(k), 4);
+                Some([row(0)?, row(1)?, row(2)?])
+            }
+        },
+        model_opacity: match locations.model_opacity {
+            GAUSSIAN_LOCATION_UNUSED_GAURAST => None,
+            location => Some(attribute(info, "modelOpacity", location, 1)?),
+        },
     }))
 }
 
@@ -181,6 +192,10 @@ fn state(
             0
         } else {
             gaussian.spherical_harmonics_degree
+        },
+        linearization: match gaussian.linearization {
+            GaussianLinearizationGAURAST::UNSCENTED => GaussianLinearization::Unscented,
+            _ => GaussianLinearization::Jacobian,
         },
         order,
         opacity_compensated,
@@ -268,10 +283,7 @@ fn validate_projection(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Res
     match gaussian.linearization {
         GaussianLinearizationGAURAST::JACOBIAN => {}
         GaussianLinearizationGAURAST::UNSCENTED => {
-            return Err(not_enabled(
-                UNSCENTED_PROJECTION,
-                "linearization is UNSCENTED",
-            ));
+            require(features, UNSCENTED_PROJECTION, "linearization is UNSCENTED")?;
         }
         other => return Err(unknown("linearization", &other)),
     }

@@ -105,6 +105,10 @@ pub(crate) struct GaussianAttributeSources {
     pub(crate) opacity: AttributeSource,
     /// Where the spherical harmonics' coefficients are read from.
     pub(crate) spherical_harmonics: Vec<AttributeSource>,
+    /// Where the rows of model matrices are read from, if there are any.
+    pub(crate) model_matrix: Option<[AttributeSource; 3]>,
+    /// Where factors of the opacity are read from, if there are any.
+    pub(crate) model_opacity: Option<AttributeSource>,
 }
 
 /// Where Gaussian draws take their camera from.

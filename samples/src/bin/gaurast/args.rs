@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use gaurast_samples::scene::{self, MAX_SH_DEGREE};
 
 use crate::bench::BenchArguments;
@@ -86,7 +86,14 @@ pub struct RenderArguments {
     )]
     pub up: Option<Triple>,
 
-    /// The vertical field of view [default: 50; 42 for the garden]
+    /// How the camera projects
+    ///
+    /// An equirectangular picture is a panorama of 360 by 180 degrees about the camera's position, with the direction
+    /// in which it looks in the middle; give it twice as many columns as rows.
+    #[arg(long, value_name = "MODEL", value_enum, default_value_t)]
+    pub camera: CameraModel,
+
+    /// The vertical field of view; of no account for a panorama [default: 50; 42 for the garden; 180 for a fisheye]
     #[arg(long, value_name = "DEGREES", value_parser = field_of_view)]
     pub fov: Option<f64>,
 
@@ -122,6 +129,18 @@ pub struct RenderArguments {
     pub output: Vec<PathBuf>,
 }
 
+/// What `--camera` may be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum CameraModel {
+    /// Perspective
+    #[default]
+    Pinhole,
+    /// An equidistant fisheye
+    Fisheye,
+    /// A panorama by longitude and latitude
+    Equirectangular,
+}
+
 const DEFAULT_OUTPUT: &str = "gaurast.png";
 
 impl Default for RenderArguments {
@@ -133,6 +152,7 @@ impl Default for RenderArguments {
             eye: None,
             target: None,
             up: None,
+            camera: CameraModel::default(),
             fov: None,
             size: None,
             background: None,

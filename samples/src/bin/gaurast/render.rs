@@ -10,7 +10,7 @@ use gaurast_samples::renderer::{RenderError, Renderer};
 use gaurast_samples::scene::{DEFAULT_COUNT, Scene, SceneError};
 use thiserror::Error;
 
-use crate::args::RenderArguments;
+use crate::args::{CameraModel, RenderArguments};
 use crate::progress::Progress;
 use crate::report;
 
@@ -66,6 +66,11 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     let camera = match view {
         Some(camera) => camera,
         None => scene_camera(&scene, arguments)?,
+    };
+    let camera = match arguments.camera {
+        CameraModel::Pinhole => camera,
+        CameraModel::Fisheye => camera.fisheye(arguments.fov.unwrap_or(180.0)),
+        CameraModel::Equirectangular => camera.panorama(),
     };
 
     let step = progress.step("rendering");

@@ -112,6 +112,7 @@ fn draw_with_depth(
             scale: stream(12, Format::R32G32B32Sfloat),
             rotation: stream(24, Format::R32G32B32A32Sfloat),
             opacity: stream(40, Format::R32Sfloat),
+            model: ModelAttributes::default(),
             spherical_harmonics: vec![stream(44, Format::R32G32B32Sfloat)],
         },
         indices: None,
@@ -209,7 +210,11 @@ fn naive_sample(
         let exponent = if g.steep {
             let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
             let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
-            (f64::from(g.log2_opacity) - (u * u + v * v)) as f32
+            if g.wide && !(-draw.half_period..draw.half_period).contains(&dx) {
+                -1e3
+            } else {
+                (f64::from(g.log2_opacity) - (u * u + v * v)) as f32
+            }
         } else {
             g.log2_opacity - mul_add(v, v, u * u)
         };
@@ -240,6 +245,17 @@ fn naive_sample(
 
 /// Every pixel of every tile equals the naive twin's, bit for bit, at every level.
 fn check(seed: u64, count: u32, state: &GaussianState, bounds: Rect) {
+    check_changed(seed, count, state, bounds, |_| {});
+}
+
+/// The same of a draw that is changed before it is rendered.
+fn check_changed(
+    seed: u64,
+    count: u32,
+    state: &GaussianState,
+    bounds: Rect,
+    change: impl Fn(&mut GaussianDraw),
+) {
     for (name, simd) in SimdLevel::supported() {
         let device = Device::new(&Config {
             threads: 2,
@@ -248,7 +264,8 @@ fn check(seed: u64, count: u32, state: &GaussianState, bounds: Rect) {
         })
         .unwrap();
         let fused = matches!(simd, SimdLevel::Avx2 | SimdLevel::Avx512);
-        let draw = draw(seed, count, state.clone(), &device, bounds);
+        let mut draw = draw(seed, count, state.clone(), &device, bounds);
+        change(&mut draw);
         let mut tile = Box::new(GaussianTile::default());
         let mut covered = 0;
         for at in (0..4).flat_map(|y| (0..6).map(move |x| [x, y])) {
@@ -312,6 +329,16 @@ fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint() {
             height: 51,
         },
     );
+}
+
+#[test]
+fn it_does_so_where_gaussians_are_wider_than_a_period() {
+    check_changed(6, 400, &defaults(), WHOLE, |draw| {
+        draw.half_period = 2.25;
+        for splat in draw.splats.iter_mut().flatten().step_by(3) {
+            (splat.wide, splat.steep) = (true, true);
+        }
+    });
 }
 
 #[test]

@@ -41,6 +41,8 @@
 //!   value to within the error itself.
 
 pub mod error_model;
+mod instance;
+mod panorama;
 pub mod pixel;
 pub mod project;
 mod render;
@@ -48,6 +50,7 @@ pub mod resolve;
 pub mod sample_tests;
 pub mod shaded;
 pub mod spherical_harmonics;
+mod unscented;
 
 #[cfg(test)]
 mod tests;
@@ -79,6 +82,30 @@ pub struct OracleScene<'a> {
     pub stored_degree: u32,
     /// Degree that the pipeline asks for; the lower of the two is drawn.
     pub requested_degree: u32,
+    /// The model matrix and the factor of the opacity of each Gaussian, or nothing.
+    pub instances: &'a [OracleInstance],
+}
+
+/// What places a copy of a Gaussian in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OracleInstance {
+    /// The rows of a matrix from model to world space.
+    pub matrix: [[f32; 4]; 3],
+    /// The factor of the opacity.
+    pub opacity: f32,
+}
+
+impl Default for OracleInstance {
+    fn default() -> Self {
+        Self {
+            matrix: [
+                [1.0, 0.0, 0.0, 0.0],
+                [0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, 1.0, 0.0],
+            ],
+            opacity: 1.0,
+        }
+    }
 }
 
 impl OracleScene<'_> {
@@ -115,6 +142,8 @@ pub enum OracleModel {
     Orthographic,
     /// Equidistant fisheye.
     Fisheye,
+    /// Longitude and latitude of all directions.
+    Equirectangular,
 }
 
 /// What Gaussians are sorted by.
@@ -165,6 +194,8 @@ pub struct OracleState {
     pub transmittance_floor: f32,
     /// Whether opacity makes up for the area that the low-pass filter adds.
     pub opacity_compensated: bool,
+    /// Whether Gaussians are projected by the unscented transform.
+    pub unscented: bool,
     /// What Gaussians are sorted by.
     pub order: OracleOrder,
 }
@@ -177,6 +208,7 @@ impl Default for OracleState {
             alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
             opacity_compensated: false,
+            unscented: false,
             order: OracleOrder::ViewDepth,
         }
     }
@@ -198,7 +230,7 @@ pub enum SkipReason {
     Near,
     /// `z < far` does not hold.
     Far,
-    /// The determinant of the projected covariance is not positive and finite.
+    /// The determinant of the projected covariance is not positive and finite, or the model matrix is singular.
     DegenerateCovariance,
 }
 

@@ -3,6 +3,7 @@
 
 use super::OracleState;
 use super::error_model::{Transmittance, UNIT_ROUNDOFF};
+use super::panorama;
 use super::project::Splat;
 
 /// How many undecidable decisions are followed both ways along one path; later ones follow
@@ -18,13 +19,21 @@ pub struct Alpha {
     pub error: f64,
 }
 
+impl Alpha {
+    const NOTHING: Self = Self {
+        value: 0.0,
+        error: 0.0,
+    };
+}
+
 impl Splat {
     /// Step 6 at the centre of pixel (x, y).
     pub fn alpha(&self, x: u32, y: u32, state: &OracleState) -> Alpha {
-        let d = [
-            f64::from(x) + 0.5 - self.mean[0],
-            f64::from(y) + 0.5 - self.mean[1],
-        ];
+        let dx = f64::from(x) + 0.5 - self.mean[0];
+        let Some(dx) = panorama::nearest(dx, self.period) else {
+            return Alpha::NOTHING;
+        };
+        let d = [dx, f64::from(y) + 0.5 - self.mean[1]];
         let (q, w) = self.cholesky.solve(d);
         let unclamped = self.opacity * (-0.5 * q).exp();
         let error = unclamped * self.error.alpha(w, q);

@@ -1,8 +1,13 @@
 //! Steps 1 to 5: from a Gaussian in world space to the numbers that a pixel needs.
 
 use super::error_model::ErrorModel;
+use super::instance::Model;
+use super::panorama;
 use super::spherical_harmonics;
-use super::{OracleCamera, OracleModel, OracleOrder, OracleScene, OracleState, SkipReason};
+use super::unscented;
+use super::{
+    OracleCamera, OracleInstance, OracleModel, OracleOrder, OracleScene, OracleState, SkipReason,
+};
 
 /// A Gaussian as the pixels see it.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +18,8 @@ pub struct Splat {
     pub covariance: [f64; 3],
     /// Its determinant, evaluated without cancellation.
     pub determinant: f64,
+    /// After how many pixels the picture repeats to the right and to the left, or infinity.
+    pub period: f64,
     /// The factor with which the quadratic form is evaluated.
     pub cholesky: Cholesky,
     /// Opacity, compensated if the state says so.
@@ -81,7 +88,8 @@ pub fn project(
     // Step 2. Camera space, and the depth key.
     let rotation = camera.rotation.map(f64::from);
     let position = scene.positions[index].map(f64::from);
-    let offset = subtract(position, camera.eye);
+    let model = Model::new(&scene.instance(index));
+    let offset = subtract(model.point(position), camera.eye);
     let t = transform(&rotation, offset);
     let depth = depth_variable(camera.model, t);
     let z = depth as f32;
@@ -100,16 +108,12 @@ pub fn project(
     };
 
     // Step 3. The mean and the Jacobian of the projection.
-    let (mean, jacobian) = match camera.model {
-        OracleModel::Pinhole => pinhole(camera, t),
-        OracleModel::Orthographic => orthographic(camera, t),
-        OracleModel::Fisheye => fisheye(camera, t),
-    };
+    let (mut mean, jacobian) = mean_and_jacobian(camera, t);
     let scale = scene.scales[index].map(f64::from);
     let axes = rotation_matrix(scene.rotations[index].map(f64::from));
     let m = jacobian.map(|row| {
         let in_world = multiply_row(row, &rotation);
-        let in_axes = multiply_row(in_world, &axes);
+        let in_axes = multiply_row(model.row(in_world), &axes);
         [
             in_axes[0] * scale[0],
             in_axes[1] * scale[1],
@@ -117,31 +121,61 @@ pub fn project(
         ]
     });
 
+    // The columns of M, or those of the unscented transform in their place.
+    let mut columns: Vec<[f64; 2]> = (0..3).map(|k| [m[0][k], m[1][k]]).collect();
+    let largest_scale = scale[0].max(scale[1]).max(scale[2]);
+    let mut spread = jacobian.map(|row| {
+        let row = model.row(multiply_row(row, &rotation));
+        length(row) * largest_scale
+    });
+    if state.unscented && model.is_regular() {
+        let axes = [0, 1, 2].map(|k| {
+            let axis = [axes[k], axes[3 + k], axes[6 + k]].map(|c| c * scale[k]);
+            transform(&rotation, model.vector(axis))
+        });
+        if let Some((sigma_mean, deviations)) = unscented::transform(camera, t, &axes) {
+            spread = [0, 1].map(|i| deviations.iter().map(|d| d[i].abs()).sum());
+            (mean, columns) = (sigma_mean, deviations);
+        }
+    }
+
     // Step 4. Covariance and determinant.
     let low_pass = f64::from(state.low_pass);
-    let area = length(cross(m[0], m[1]));
-    let (s_xx, s_xy, s_yy) = (dot(m[0], m[0]), dot(m[0], m[1]), dot(m[1], m[1]));
+    let spread = spread.map(|spread| spread.hypot(low_pass.sqrt()));
+    let area = area(&columns);
+    let sum = |i: usize, j: usize| columns.iter().map(|c| c[i] * c[j]).sum::<f64>();
+    let (s_xx, s_xy, s_yy) = (sum(0, 0), sum(0, 1), sum(1, 1));
     let determinant = area * area + low_pass * (s_xx + s_yy) + low_pass * low_pass;
-    if !(determinant > 0.0 && determinant.is_finite()) {
+    if !(determinant > 0.0 && determinant.is_finite() && model.is_regular()) {
         return Err(SkipReason::DegenerateCovariance);
     }
     let covariance = [s_xx + low_pass, s_xy, s_yy + low_pass];
-    let mut opacity = f64::from(scene.opacities[index]);
+    let mut opacity = f64::from(scene.opacity(index));
     if state.opacity_compensated {
         opacity *= area / determinant.sqrt();
     }
 
     // Step 5. Colour.
-    let direction = offset.map(|c| c / length(offset));
+    let toward = model.solve(offset);
+    let direction = toward.map(|c| c / length(toward));
     let color = spherical_harmonics::color(scene.degree(), direction, scene.coefficients(index));
 
-    let largest_scale = scale[0].max(scale[1]).max(scale[2]);
-    let spread = jacobian.map(|row| (length(row) * largest_scale).hypot(low_pass.sqrt()));
+    // What a model matrix's products and sums lose; a difference of two numbers alone is rounded once.
+    let instance = scene.instance(index);
+    let lost = if instance == OracleInstance::default() {
+        0.0
+    } else {
+        let terms = model
+            .linear
+            .map(|row| dot(row.map(f64::abs), position.map(f64::abs)));
+        4.0 * f64::EPSILON * (length(terms) + length(model.translation) + length(camera.eye))
+    };
     let area_for_opacity = state.opacity_compensated.then_some(area);
     Ok(Splat {
         mean,
         covariance,
         determinant,
+        period: panorama::period(camera),
         cholesky: Cholesky::new(covariance, determinant),
         opacity,
         color,
@@ -149,9 +183,21 @@ pub fn project(
         z,
         depth: 0.0,
         key_undecidable: state.order != OracleOrder::Primitive
-            && key_is_undecidable(&rotation, offset, sort_by),
+            && key_is_undecidable(&rotation, offset, lost, sort_by),
         error: ErrorModel::new(spread, opacity, area_for_opacity),
     })
+}
+
+/// The root of the determinant of a covariance that is a sum of squares of columns: that of the squares of their 2x2
+/// minors; of three columns, |m0 x m1|.
+fn area(columns: &[[f64; 2]]) -> f64 {
+    let mut sum = 0.0;
+    for (index, a) in columns.iter().enumerate() {
+        for b in &columns[..index] {
+            sum += (a[0] * b[1] - a[1] * b[0]).powi(2);
+        }
+    }
+    sum.sqrt()
 }
 
 /// Step 1: what is known without a camera.
@@ -161,11 +207,13 @@ fn check_attributes(
     index: usize,
 ) -> Result<(), SkipReason> {
     let (scale, quaternion) = (scene.scales[index], scene.rotations[index]);
-    let opacity = scene.opacities[index];
+    let opacity = scene.opacity(index);
+    let matrix = scene.instance(index).matrix;
     let finite = scene.positions[index].iter().all(|c| c.is_finite())
         && scale.iter().all(|c| c.is_finite())
         && quaternion.iter().all(|c| c.is_finite())
         && opacity.is_finite()
+        && matrix.as_flattened().iter().all(|c| c.is_finite())
         && scene
             .coefficients(index)
             .as_flattened()
@@ -210,22 +258,33 @@ fn rotation_matrix(quaternion: [f64; 4]) -> [f64; 9] {
 ///
 /// Camera coordinates are sums of three products of differences: five roundings at most on each term. A length adds
 /// three more, and errs by no more than the vector.
-fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], sort_by: f64) -> bool {
+fn key_is_undecidable(rotation: &[f64; 9], offset: [f64; 3], lost: f64, sort_by: f64) -> bool {
     let magnitude = |row: usize| -> f64 {
         (0..3)
             .map(|i| (rotation[3 * row + i] * offset[i]).abs())
             .sum()
     };
-    let error =
-        2.5 * f64::EPSILON * length([0, 1, 2].map(magnitude)) + 2.0 * f64::EPSILON * sort_by.abs();
+    let error = lost
+        + 2.5 * f64::EPSILON * length([0, 1, 2].map(magnitude))
+        + 2.0 * f64::EPSILON * sort_by.abs();
     (sort_by - error) as f32 != (sort_by + error) as f32
+}
+
+/// The mean of a camera's picture of a point in camera axes, and the Jacobian there.
+pub(super) fn mean_and_jacobian(camera: &OracleCamera, t: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    match camera.model {
+        OracleModel::Pinhole => pinhole(camera, t),
+        OracleModel::Orthographic => orthographic(camera, t),
+        OracleModel::Fisheye => fisheye(camera, t),
+        OracleModel::Equirectangular => panorama::equirectangular(camera, t),
+    }
 }
 
 /// The depth variable of a point in camera axes.
 fn depth_variable(model: OracleModel, t: [f64; 3]) -> f64 {
     match model {
         OracleModel::Pinhole | OracleModel::Orthographic => t[2],
-        OracleModel::Fisheye => length(t),
+        OracleModel::Fisheye | OracleModel::Equirectangular => length(t),
     }
 }
 
@@ -294,15 +353,15 @@ fn subtract(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn length(a: [f64; 3]) -> f64 {
+pub(super) fn length(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],

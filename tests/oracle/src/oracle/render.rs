@@ -214,6 +214,8 @@ pub(super) struct Bound {
     mean: [f64; 2],
     covariance: [f64; 3],
     determinant: f64,
+    /// Whether it has copies beside it.
+    repeats: bool,
     /// The quadratic form on the ellipse; negative if there is none, infinite if it is the plane.
     q: f64,
 }
@@ -232,6 +234,7 @@ impl Bound {
             mean: splat.mean,
             covariance: splat.covariance,
             determinant: splat.determinant,
+            repeats: splat.period != f64::INFINITY,
             q: if q.is_finite() {
                 q + 1e-9 * (1.0 + q.abs())
             } else {
@@ -250,6 +253,9 @@ impl Bound {
 
     /// Pixels of row `y` that the ellipse and its margin reach.
     pub(super) fn columns(&self, y: u32, width: u32) -> Range<u32> {
+        if self.repeats {
+            return 0..width;
+        }
         let [_, xy, yy] = self.covariance;
         let dy = f64::from(y) + 0.5 - self.mean[1];
         let centre = self.mean[0] + xy / yy * dy;

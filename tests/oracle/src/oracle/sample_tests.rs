@@ -97,7 +97,9 @@ impl OracleTests {
         let z = f64::from(z);
         let depth = match model {
             OracleModel::Orthographic => c0 + c1 * z,
-            OracleModel::Pinhole | OracleModel::Fisheye => c0 + c1 / z,
+            OracleModel::Pinhole | OracleModel::Fisheye | OracleModel::Equirectangular => {
+                c0 + c1 / z
+            }
         };
         self.format
             .code(near + depth.clamp(0.0, 1.0) * (far - near))

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use gaurast_samples::camera::{self, Camera, DEFAULT_FOV};
+use gaurast_samples::camera::{self, Camera, DEFAULT_FOV, Model};
 use gaurast_samples::scene::{Scene, Shape};
 use serde::{Deserialize, Serialize};
 
@@ -208,6 +208,7 @@ fn tile(whole: bool) -> Scene {
 /// A pixel a unit at a distance of 100.
 fn tile_camera() -> Camera {
     Camera {
+        model: Model::Pinhole,
         rotation: [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
         eye: [0.0; 3],
         focal: [100.0; 2],

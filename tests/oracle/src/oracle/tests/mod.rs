@@ -6,6 +6,7 @@ mod meaning;
 mod shaded;
 mod skips;
 mod undecidable;
+mod unscented;
 
 use super::{OracleCamera, OracleModel, OracleState, Reference, render_literal};
 use crate::scenes::{Gaussian, SceneBuffers};

@@ -1,0 +1,186 @@
+//! What the pictures show.
+
+use crate::gpu::{Instance, Splat};
+use std::f32::consts::{PI, TAU};
+
+/// The depth of the middle of [`still_life`].
+pub const MIDDLE: f32 = 4.0;
+
+const STRAIGHT: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
+
+fn splat(
+    [x, y, z]: [f32; 3],
+    [sx, sy, sz]: [f32; 3],
+    [qw, qx, qy, qz]: [f32; 4],
+    opacity: f32,
+    color: [f32; 3],
+) -> Splat {
+    // The constant harmonic is 1 / (2 sqrt(pi)).
+    let [r, g, b] = color.map(|c| (c - 0.5) * 2.0 * PI.sqrt());
+    [x, y, z, sx, sy, sz, qw, qx, qy, qz, opacity, r, g, b]
+}
+
+/// A colour around the circle of hues, from 0 to 1.
+fn hue(at: f32) -> [f32; 3] {
+    [0.0, 1.0 / 3.0, 2.0 / 3.0].map(|shift| 0.5 + 0.45 * (TAU * (at - shift)).cos())
+}
+
+/// A turn by `angle` about z.
+fn turned(angle: f32) -> [f32; 4] {
+    [(angle / 2.0).cos(), 0.0, 0.0, (angle / 2.0).sin()]
+}
+
+/// Large Gaussians that no two orders see alike: at the sides, what lies deeper is nearer.
+pub fn crossing() -> Vec<Splat> {
+    (0..9)
+        .map(|i| {
+            let x = i as f32 - 4.0;
+            let z = 2.6 + 0.12 * x.abs() * (i % 2) as f32;
+            let size = [0.42, 0.9, 0.05];
+            splat(
+                [0.8 * x, 0.0, z],
+                size,
+                turned(0.35 * x),
+                0.95,
+                hue(0.38 * i as f32),
+            )
+        })
+        .collect()
+}
+
+/// Needles that grow thinner to the right.
+pub fn needles() -> Vec<Splat> {
+    (0..24)
+        .map(|i| {
+            let x = 0.23 * (i as f32 - 11.5);
+            let width = 0.03 * 0.82f32.powi(i);
+            let size = [width, 0.9, width];
+            splat([x, 0.0, 4.5], size, turned(0.12), 0.9, hue(i as f32 / 24.0))
+        })
+        .collect()
+}
+
+/// Gaussians on a sphere.
+pub fn around() -> Vec<Splat> {
+    let mut splats = Vec::new();
+    for ring in -4..=4i32 {
+        let latitude = PI * ring as f32 / 8.0;
+        let count = (24.0 * latitude.cos()).round().max(1.0) as usize;
+        for i in 0..count {
+            let longitude = TAU * i as f32 / count as f32;
+            let (sin, cos) = longitude.sin_cos();
+            let out = 3.0 * latitude.cos();
+            let position = [out * sin, 3.0 * latitude.sin(), out * cos];
+            let color = if ring == 0 {
+                [0.95; 3]
+            } else {
+                hue(longitude / TAU)
+            };
+            let size = if ring == 0 { 0.1 } else { 0.19 };
+            splats.push(splat(position, [size; 3], STRAIGHT, 0.95, color));
+        }
+    }
+    splats
+}
+
+/// Gaussians on a plane across the view, that point away from it.
+pub fn wide() -> Vec<Splat> {
+    let mut splats = Vec::new();
+    for row in -2..=2i32 {
+        for column in -3..=3i32 {
+            let position = [0.8 * column as f32, 0.62 * row as f32, 1.0];
+            let color = hue(0.13 * (row + column) as f32);
+            let size = [0.07, 0.07, 0.36];
+            splats.push(splat(position, size, STRAIGHT, 0.95, color));
+        }
+    }
+    splats
+}
+
+/// Rings of Gaussians in front of one another.
+pub fn still_life() -> Vec<Splat> {
+    let mut splats = Vec::new();
+    for ring in 0..3 {
+        let z = MIDDLE + 0.8 * (ring as f32 - 1.0) + 0.2;
+        for i in 0..10 {
+            let angle = TAU * (i as f32 / 10.0 + 0.07 * ring as f32);
+            let (sin, cos) = angle.sin_cos();
+            let radius = 0.55 + 0.35 * ring as f32;
+            let position = [radius * cos * 1.3, radius * sin, z];
+            let size = [0.3, 0.12, 0.08];
+            let color = hue(0.33 * ring as f32 + 0.02 * i as f32);
+            splats.push(splat(position, size, turned(angle), 0.95, color));
+        }
+    }
+    splats
+}
+
+/// Petals about a middle, on a stem.
+pub fn flower() -> Vec<Splat> {
+    let z = 4.0;
+    let mut splats = vec![
+        splat(
+            [0.0, 0.45, z],
+            [0.03, 0.3, 0.03],
+            STRAIGHT,
+            0.95,
+            [0.15, 0.5, 0.15],
+        ),
+        splat(
+            [0.0, 0.0, z - 0.06],
+            [0.09; 3],
+            STRAIGHT,
+            0.98,
+            [0.95, 0.8, 0.2],
+        ),
+    ];
+    for i in 0..7 {
+        let angle = TAU * i as f32 / 7.0;
+        let (sin, cos) = angle.sin_cos();
+        let position = [0.22 * cos, 0.22 * sin, z];
+        let color = [0.9, 0.35 + 0.03 * i as f32, 0.6];
+        splats.push(splat(
+            position,
+            [0.12, 0.07, 0.02],
+            turned(angle),
+            0.95,
+            color,
+        ));
+    }
+    splats
+}
+
+/// Where the flowers of a meadow stand, turned, leaning and of many sizes.
+pub fn meadow() -> Vec<Instance> {
+    let mut instances = Vec::new();
+    for row in 0..6 {
+        for column in 0..10 {
+            let number = (row * 10 + column) as f32;
+            let random = |seed: f32| (number * seed).sin();
+            let size = 0.42 + 0.1 * random(12.9);
+            let lean = 0.5 * random(78.2);
+            let (sin, cos) = (1.2 * random(37.7)).sin_cos();
+            let depth = 2.2 + 1.1 * row as f32;
+            let x = 0.36 * depth * (column as f32 - 4.5 + 0.4 * random(93.9)) / 2.2;
+            // About y, then sheared; the model stands around (0, 0, 4).
+            let rows = [
+                [size * cos, size * lean, size * sin],
+                [0.0, size, 0.0],
+                [-size * sin, 0.0, size * cos],
+            ];
+            let to = [x, 0.62, depth];
+            let mut instance = [1.0; 13];
+            for (axis, row) in rows.iter().enumerate() {
+                instance[4 * axis..][..3].copy_from_slice(row);
+                instance[4 * axis + 3] = to[axis] - 4.0 * row[2];
+            }
+            instance[12] = if row < 4 {
+                1.0
+            } else {
+                0.75 - 0.3 * (row - 4) as f32
+            };
+            instances.push(instance);
+        }
+    }
+    instances
+}

@@ -1,0 +1,209 @@
+//! Gaussians that a matrix places in the world, usually one for each instance.
+//!
+//! The matrix [A b] takes a mean p to A p + b and a covariance S to A S A^T. What a Gaussian looks like it takes along: the
+//! direction from which it is seen is turned back by the inverse of A, so that what was trained in its own space is seen
+//! there by an eye that moved with it.
+
+use super::fetch::{BATCH, Batch, Fetcher};
+use super::lanes::{Bits, F32_LANES, Lanes, NO_LANES};
+use super::project::Projection;
+use super::scratch::Scratch;
+use crate::packet::AttributeStream;
+
+/// Matrices by lane, as they are read.
+#[derive(Clone, Debug)]
+pub(super) struct Matrices {
+    rows: [[[f32; F32_LANES]; 4]; 3],
+    /// Whether all lanes have the same.
+    is_uniform: bool,
+}
+
+/// Rows of a matrix, without the translation.
+pub(super) type Linear = [[f64; 3]; 3];
+
+/// What matrices make of the kept Gaussians of a batch.
+#[derive(Clone, Debug)]
+pub(super) struct Placed {
+    matrix: [[Lanes; 4]; 3],
+    /// A vector from the eye in the Gaussians' space, of any length.
+    pub(super) toward: [Lanes; 3],
+}
+
+/// A matrix is singular if its determinant is not greater than this times the product of its rows' lengths.
+const SINGULAR: f64 = 1.0 / (1u64 << 40) as f64;
+
+impl Default for Matrices {
+    fn default() -> Self {
+        Self {
+            rows: [[[0.0; F32_LANES]; 4]; 3],
+            is_uniform: false,
+        }
+    }
+}
+
+impl Matrices {
+    /// Reads a batch's.
+    pub(super) fn read(
+        &mut self,
+        fetcher: &mut Fetcher,
+        rows: &[AttributeStream; 3],
+        batch: &Batch<'_>,
+    ) {
+        self.is_uniform = rows.iter().all(|stream| stream.instance_divisor.is_some());
+        for (stream, row) in rows.iter().zip(&mut self.rows) {
+            fetcher.read(stream, batch, row.each_mut());
+        }
+    }
+
+    /// The matrix that all lanes have and its translation, if it is one.
+    pub(super) fn uniform(&self) -> Option<(Linear, [f64; 3])> {
+        let element = |row: usize, column: usize| f64::from(self.rows[row][column][0]);
+        let linear = [0, 1, 2].map(|row| [0, 1, 2].map(|column| element(row, column)));
+        self.is_uniform
+            .then(|| (linear, [0, 1, 2].map(|row| element(row, 3))))
+    }
+
+    /// Which of the first `len` lanes are finite.
+    pub(super) fn find_finite(&self, len: usize) -> Bits {
+        let mut finite = Bits::default();
+        for lane in 0..len.min(BATCH) {
+            let elements = self.rows.as_flattened();
+            finite.set_one(lane, elements.iter().all(|lanes| lanes[lane].is_finite()));
+        }
+        finite
+    }
+}
+
+impl Scratch {
+    /// Packs the kept lanes' matrices densely.
+    pub(super) fn gather_matrices(&mut self, matrices: &Matrices) {
+        let placed = self.placed.get_or_insert_with(|| {
+            Box::new(Placed {
+                matrix: [[NO_LANES; 4]; 3],
+                toward: [NO_LANES; 3],
+            })
+        });
+        let to = placed.matrix.as_flattened_mut().iter_mut();
+        for (from, to) in matrices.rows.as_flattened().iter().zip(to) {
+            for (to, &lane) in to.iter_mut().zip(&self.lanes) {
+                *to = from[lane % BATCH].into();
+            }
+        }
+    }
+}
+
+impl Projection {
+    /// Finds the place of the kept Gaussians in camera space, and from where they are seen in their own.
+    pub(super) fn place_by_matrices(&self, scratch: &mut Scratch) {
+        let Some(placed) = &mut scratch.placed else {
+            return;
+        };
+        let r = &self.rotation;
+        for at in 0..scratch.lanes.len().min(BATCH) {
+            let a = placed.linear(at);
+            let p = scratch.position.each_ref().map(|lanes| lanes[at]);
+            let d = [0, 1, 2]
+                .map(|axis| dot(a[axis], p) + (placed.matrix[axis][3][at] - self.eye[axis]));
+            let t = [0, 3, 6].map(|row| d[0] * r[row] + d[1] * r[row + 1] + d[2] * r[row + 2]);
+            // The columns of the inverse, but for the determinant's magnitude.
+            let columns = cofactors(a);
+            let sign = dot(a[0], columns[0]).signum();
+            for axis in 0..3 {
+                scratch.offset[axis][at] = d[axis];
+                scratch.camera[axis][at] = t[axis];
+                let sum =
+                    d[0] * columns[0][axis] + d[1] * columns[1][axis] + d[2] * columns[2][axis];
+                placed.toward[axis][at] = sign * sum;
+            }
+            scratch.depth[at] = t[2];
+        }
+    }
+}
+
+impl Placed {
+    /// A kept Gaussian's matrix, without the translation.
+    fn linear(&self, at: usize) -> Linear {
+        [0, 1, 2].map(|row| [0, 1, 2].map(|column| self.matrix[row][column][at]))
+    }
+
+    /// Takes a vector from the axes of a kept Gaussian's space to the world's.
+    pub(super) fn to_world(&self, at: usize, vector: [f64; 3]) -> [f64; 3] {
+        self.linear(at).map(|row| dot(row, vector))
+    }
+
+    /// Takes a row vector from the world's axes to those of a kept Gaussian's space. It is not a number where the matrix
+    /// is singular.
+    pub(super) fn row_from_world(&self, at: usize, row: [f64; 3]) -> [f64; 3] {
+        let a = self.linear(at);
+        if is_singular(a) {
+            return [f64::NAN; 3];
+        }
+        [0, 1, 2]
+            .map(|column| row[0] * a[0][column] + row[1] * a[1][column] + row[2] * a[2][column])
+    }
+}
+
+fn is_singular(a: Linear) -> bool {
+    let determinant = dot(a[0], cofactors(a)[0]).abs();
+    let lengths = a.map(|row| dot(row, row).sqrt());
+    let regular = determinant > SINGULAR * lengths[0] * lengths[1] * lengths[2];
+    !regular
+}
+
+/// The inverse of a matrix, and its condition: the product of both matrices' norms. Neither is a number where there is none.
+pub(super) fn inverse(a: Linear) -> (Linear, f64) {
+    let columns = cofactors(a);
+    let determinant = dot(a[0], columns[0]);
+    let inverse = [0, 1, 2].map(|row| columns.map(|column| column[row] / determinant));
+    let norm = |a: Linear| a.map(|row| dot(row, row)).iter().sum::<f64>().sqrt();
+    (inverse, norm(a) * norm(inverse))
+}
+
+/// The columns of the inverse, times the determinant.
+fn cofactors(a: Linear) -> Linear {
+    [cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn matrices_that_flatten_space_are_singular() {
+        assert!(!is_singular([
+            [1e-9, 0.0, 0.0],
+            [0.0, 1e9, 0.0],
+            [3.0, 0.0, -2.0]
+        ]));
+        assert!(is_singular([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3]]));
+        let third = 1.0f32 / 3.0;
+        let row = [0.1f32, 0.7, third].map(f64::from);
+        assert!(is_singular([row, row.map(|x| 3.0 * x), [0.3, 0.2, 0.9]]));
+        assert!(is_singular([[f64::NAN; 3]; 3]));
+    }
+
+    #[test]
+    fn cofactors_are_the_inverse() {
+        let a = [[1.0, 2.0, 0.5], [-1.0, 3.0, 0.25], [0.0, 4.0, -2.0]];
+        let columns = cofactors(a);
+        let determinant = dot(a[0], columns[0]);
+        for (row, of_a) in a.into_iter().enumerate() {
+            for (column, of_inverse) in columns.into_iter().enumerate() {
+                let expected = if row == column { determinant } else { 0.0 };
+                assert!((dot(of_a, of_inverse) - expected).abs() < 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Pictures that repeat: a panorama's right edge goes on at its left one.
+//!
+//! Every Gaussian is drawn where it is and, where that reaches the picture, a period to the right and to the left. A
+//! pixel counts one of the three at most: that whose mean is less than half a period away. Ellipses that are narrower
+//! than the period see to that themselves; wider ones are marked ([`Splat::wide`]) and cut off by the tile engine.
+//!
+//! [`Splat::wide`]: super::project::Splat::wide
+
+use super::footprint::{Ellipse, Reach, Visible};
+use super::project::Projected;
+use crate::packet::{Camera, CameraModel};
+
+/// The sides to which Gaussians are copied: right and left.
+const SIDES: [f64; 2] = [1.0, -1.0];
+
+/// After how many pixels a camera's picture repeats to the right and to the left, if it does.
+pub(super) fn period(camera: &Camera) -> Option<f64> {
+    let focal = f64::from(camera.focal_length[0]);
+    (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
+}
+
+/// What lies within half a period of a mean at `x`, with a pixel to spare.
+fn near(visible: &Visible, x: f64, period: f64) -> Visible {
+    let half = 0.5 * period + 1.0;
+    Visible {
+        left: visible.left.max((x - half).floor() as i64),
+        right: visible.right.min((x + half).ceil() as i64),
+        ..*visible
+    }
+}
+
+/// The tiles that a Gaussian and its copies reach, if there are any. Copies that reach some are added to `copies`; where
+/// only they do, the Gaussian itself reaches no tiles.
+pub(super) fn reach(
+    at: usize,
+    ellipse: &Ellipse,
+    period: f64,
+    visible: &Visible,
+    copies: &mut Vec<(usize, usize, Reach)>,
+    out: &mut Projected,
+    mut beside: Option<&mut u64>,
+) -> Option<Reach> {
+    out.copies.resize_with(SIDES.len(), Projected::default);
+    let [x, y] = ellipse.mean;
+    let before = copies.len();
+    for (side, direction) in SIDES.into_iter().enumerate() {
+        let x = x + direction * period;
+        let copy = Ellipse {
+            mean: [x, y],
+            ..*ellipse
+        };
+        let spans = &mut out.copies[side].spans;
+        let visible = near(visible, x, period);
+        if let Some(reach) = copy.reach(&visible, spans, beside.as_deref_mut()) {
+            copies.push((at, side, reach));
+        }
+    }
+    let reach = ellipse.reach(&near(visible, x, period), &mut out.spans, beside);
+    let by_copies = (copies.len() > before).then(Reach::default);
+    reach.or(by_copies)
+}
+
+/// Appends the copies of the kept Gaussian `at`, the last one of `out`, and takes them from `copies`, which also holds
+/// those of Gaussians that were skipped before it.
+pub(super) fn copy_last(
+    at: usize,
+    period: f64,
+    copies: &mut &[(usize, usize, Reach)],
+    out: &mut Projected,
+) {
+    while let Some((&(of, side, reach), rest)) = copies.split_first().filter(|(c, _)| c.0 <= at) {
+        *copies = rest;
+        let last = out.splats.last().zip(out.keys.last());
+        let Some((mut splat, &key)) = last.map(|(splat, key)| (*splat, key)).filter(|_| of == at)
+        else {
+            continue;
+        };
+        splat.mean[0] += SIDES[side] * period;
+        let to = &mut out.copies[side];
+        to.splats.push(splat);
+        to.keys.push(key);
+        to.reaches.push(reach);
+    }
+}
+
+/// Makes batches of the copies, behind all others. Copies have the keys and the places in the order of what they are
+/// copies of; since no pixel counts two of them, their order among themselves is of no account.
+pub(super) fn append_copies(batches: &mut Vec<Projected>) {
+    let copies: Vec<Projected> = batches
+        .iter_mut()
+        .flat_map(|batch| std::mem::take(&mut batch.copies))
+        .filter(|copies| !copies.splats.is_empty())
+        .collect();
+    batches.extend(copies);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VISIBLE: Visible = Visible {
+        left: 0,
+        top: 0,
+        right: 100,
+        bottom: 50,
+    };
+
+    fn tiles(x: f64, half: f64) -> [Vec<u32>; 3] {
+        let ellipse = Ellipse {
+            mean: [x, 20.0],
+            half: [half, 2.0],
+            slope: 0.0,
+            narrowing: (half / 2.0).powi(2),
+            peak: 0.0,
+        };
+        let (mut out, mut copies) = (Projected::default(), Vec::new());
+        let reach = reach(
+            0,
+            &ellipse,
+            100.0,
+            &VISIBLE,
+            &mut copies,
+            &mut out,
+            Some(&mut 0),
+        );
+        let columns = |reach: &Reach, spans: &[_]| {
+            let spans = reach.spans(spans);
+            spans
+                .flat_map(|(_, span)| span.first.into()..span.end.into())
+                .collect::<Vec<u32>>()
+        };
+        let mut found: [Vec<u32>; 3] = Default::default();
+        if let Some(reach) = reach {
+            found[0] = columns(&reach, &out.spans);
+        }
+        for (_, side, reach) in copies {
+            found[1 + side] = columns(&reach, &out.copies[side].spans);
+        }
+        found
+    }
+
+    #[test]
+    fn what_straddles_the_seam_is_on_both_sides() {
+        let nothing = Vec::new;
+        assert_eq!(tiles(50.0, 5.0), [vec![2, 3], nothing(), nothing()]);
+        assert_eq!(tiles(2.0, 5.0), [vec![0], vec![6], nothing()]);
+        assert_eq!(tiles(99.0, 5.0), [vec![5, 6], nothing(), vec![0]]);
+        // Its own place is outside of the picture.
+        assert_eq!(tiles(-30.0, 5.0), [nothing(), vec![4], nothing()]);
+        assert_eq!(tiles(-200.0, 5.0), [nothing(), nothing(), nothing()]);
+    }
+
+    #[test]
+    fn a_wide_one_is_cut_off_half_a_period_away() {
+        let [itself, right, left] = tiles(20.0, 300.0);
+        assert_eq!(itself, (0..5).collect::<Vec<u32>>());
+        assert_eq!(right, [4, 5, 6]);
+        assert_eq!(left, Vec::<u32>::new());
+    }
+}

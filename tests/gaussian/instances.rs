@@ -1,0 +1,376 @@
+//! Gaussians that are drawn more than once, each time where a matrix places them; and scenes far from the origin.
+
+use ash::vk;
+use gaurast::vk::{
+    GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use gaurast_tests::compare::{Limits, assert_contract};
+use gaurast_tests::contexts::{
+    Buffer, Context, DeviceScene, Instance, Pass, Pipeline, PipelineOptions, Settings, Target,
+    simd_levels,
+};
+use gaurast_tests::oracle::{
+    OracleCamera, OracleInstance, OracleScene, OracleState, Reference, render_bounded,
+};
+use gaurast_tests::scenes::{self, Gaussian, SceneBuffers};
+use half::f16;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
+type Camera = GaussianCameraGAURAST<'static>;
+
+const SIZE: [u32; 2] = [131, 97];
+
+const IDENTITY: [[f32; 4]; 3] = [
+    [1.0, 0.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0, 0.0],
+];
+
+/// How a scene is drawn.
+#[derive(Clone, Copy)]
+struct Way<'a> {
+    state: State,
+    camera: Camera,
+    /// What places the Gaussians, by instance or by vertex.
+    instances: Option<(&'a [OracleInstance], vk::VertexInputRate)>,
+    half: bool,
+}
+
+impl Way<'_> {
+    fn new(camera: Camera) -> Self {
+        Self {
+            state: State::default(),
+            camera,
+            instances: None,
+            half: false,
+        }
+    }
+}
+
+fn draw(context: &Context, scene: &SceneBuffers, way: &Way<'_>) -> Vec<[f32; 4]> {
+    let options = PipelineOptions {
+        state: way.state,
+        half: way.half,
+        instances: way.instances.map(|(_, rate)| rate),
+        ..PipelineOptions::new(scene.degree)
+    };
+    let pipeline = Pipeline::new(context, &options);
+    let on_device = if way.half {
+        DeviceScene::half(context, scene)
+    } else {
+        DeviceScene::new(context, scene)
+    };
+    let placed = way.instances.map(|(instances, rate)| {
+        let flat = |instance: &OracleInstance| -> Instance {
+            let elements = instance.matrix.as_flattened();
+            std::array::from_fn(|i| *elements.get(i).unwrap_or(&instance.opacity))
+        };
+        let flat: Vec<Instance> = instances.iter().map(flat).collect();
+        let count = match rate {
+            vk::VertexInputRate::INSTANCE => instances.len() as u32,
+            _ => 1,
+        };
+        (Buffer::of(context, &flat), count)
+    });
+    let target = Target::new(context, options.format, SIZE);
+    context.run(|commands| {
+        commands.pass(&target, &Pass::clear([0.0; 4]), || {
+            commands.bind(&pipeline, &on_device, &way.camera);
+            let mut count = 1;
+            if let Some((buffer, instances)) = &placed {
+                commands.bind_instances(buffer);
+                count = *instances;
+            }
+            commands.draw([on_device.count, count, 0, 0]);
+        });
+    });
+    assert_eq!(context.messages(), []);
+    target.read()
+}
+
+/// What a scene means that is drawn once for each of `instances`.
+fn reference(
+    scene: &SceneBuffers,
+    instances: &[OracleInstance],
+    state: &State,
+    camera: &Camera,
+) -> Reference {
+    let one = scene.as_oracle();
+    let (copies, count) = (instances.len(), scene.positions.len());
+    let expanded: Vec<OracleInstance> = instances
+        .iter()
+        .flat_map(|&instance| std::iter::repeat_n(instance, count))
+        .collect();
+    let whole = OracleScene {
+        positions: &one.positions.repeat(copies),
+        scales: &one.scales.repeat(copies),
+        rotations: &one.rotations.repeat(copies),
+        opacities: &one.opacities.repeat(copies),
+        sh: &one.sh.repeat(copies),
+        instances: &expanded,
+        ..one
+    };
+    let camera = OracleCamera::new(camera, SIZE).expect("a model that the oracle has");
+    render_bounded(&whole, &camera, &OracleState::from(state))
+}
+
+/// One device for each SIMD level.
+fn devices() -> Vec<(&'static str, Context)> {
+    let device = |simd| {
+        let settings = Settings {
+            simd: Some(simd),
+            threads: Some(2),
+        };
+        (simd, Context::embedded(&settings))
+    };
+    simd_levels().into_iter().map(device).collect()
+}
+
+/// Matrices that turn, stretch, shear, mirror and move, one that is singular and one that is none, and factors.
+fn any_instances(seed: u64) -> Vec<OracleInstance> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut instances: Vec<OracleInstance> = (0..7)
+        .map(|_| OracleInstance {
+            matrix: std::array::from_fn(|row| {
+                std::array::from_fn(|column| match column {
+                    3 => rng.random_range(-1.0..1.0) + [0.0, 0.0, 1.0][row],
+                    _ => rng.random_range(-0.4..0.4) + if row == column { 0.6 } else { 0.0 },
+                })
+            }),
+            opacity: rng.random_range(0.2..1.4),
+        })
+        .collect();
+    for element in &mut instances[2].matrix[0] {
+        *element = -*element;
+    }
+    instances[4].matrix[1] = [0.0, 0.0, 0.0, 0.5];
+    instances[5].matrix[2][3] = f32::NAN;
+    instances
+}
+
+fn pinhole() -> Camera {
+    scenes::camera(SIZE[0], SIZE[1]).to_vulkan()
+}
+
+fn cameras() -> [(&'static str, Camera); 4] {
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let middle = [0.1, -0.2, 3.5];
+    let panorama = Camera::panorama(&axes, middle, SIZE.map(|side| side as f32));
+    let parallel = pinhole()
+        .model(GaussianCameraModelGAURAST::ORTHOGRAPHIC)
+        .focal_length([21.0, 19.0]);
+    let fisheye = pinhole()
+        .model(GaussianCameraModelGAURAST::FISHEYE)
+        .focal_length([80.0, 70.0]);
+    [
+        ("pinhole", pinhole()),
+        ("parallel", parallel),
+        ("fisheye", fisheye),
+        ("panorama", panorama.expect("a camera")),
+    ]
+}
+
+#[test]
+fn instances_keep_the_contract_through_every_camera() {
+    let scene = scenes::cloud(31, 500, 2);
+    let instances = any_instances(31);
+    let states = [
+        State::default(),
+        State::default().order(GaussianOrderGAURAST::RADIAL_DISTANCE),
+        State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED),
+    ];
+    let devices = devices();
+    for (name, camera) in cameras() {
+        for state in states {
+            let expected = reference(&scene, &instances, &state, &camera);
+            assert!(expected.nominal.iter().filter(|p| p[3] > 0.1).count() > 500);
+            assert!(expected.skips.degenerate_covariance > 0 || name == "panorama");
+            assert!(expected.skips.non_finite == 500);
+            for (level, context) in &devices {
+                let way = Way {
+                    state,
+                    instances: Some((&instances, vk::VertexInputRate::INSTANCE)),
+                    ..Way::new(camera)
+                };
+                let picture = draw(context, &scene, &way);
+                let name = format!("{name}, {:?}, {level}", state.linearization);
+                assert_contract(&name, &picture, &expected, Limits::ENVELOPE_ONLY);
+            }
+        }
+    }
+}
+
+/// A Gaussian with numbers of few bits, so that what is done to them below is exact.
+fn exact(scene: &SceneBuffers) -> SceneBuffers {
+    let round = |value: f32| (value * 1024.0).round() / 1024.0;
+    SceneBuffers {
+        positions: scene.positions.iter().map(|p| p.map(round)).collect(),
+        rotations: scene.rotations.iter().map(|q| q.map(round)).collect(),
+        ..scene.clone()
+    }
+}
+
+/// Half a turn about y, twice the size, and moved.
+const SIMILARITY: [[f32; 4]; 3] = [
+    [-2.0, 0.0, 0.0, 0.25],
+    [0.0, 2.0, 0.0, -0.5],
+    [0.0, 0.0, -2.0, 16.0],
+];
+
+/// What that makes of a scene of degree 1.
+fn transformed(scene: &SceneBuffers) -> SceneBuffers {
+    let gaussians = (0..scene.positions.len()).map(|i| {
+        let [w, x, y, z] = scene.rotations[i];
+        let [px, py, pz] = scene.positions[i];
+        let sh = &scene.sh[4 * i..][..4];
+        Gaussian {
+            position: [0.25 - 2.0 * px, 2.0 * py - 0.5, 16.0 - 2.0 * pz],
+            scale: scene.scales[i].map(|s| 2.0 * s),
+            rotation: [-y, z, w, -x],
+            opacity: scene.opacities[i],
+            // The functions of the first degree are -y, z and -x.
+            sh: vec![sh[0], sh[1], sh[2].map(|c| -c), sh[3].map(|c| -c)],
+        }
+    });
+    SceneBuffers::new(1, gaussians)
+}
+
+#[test]
+fn an_instance_is_a_scene_that_was_transformed_before() {
+    let scene = exact(&scenes::cloud(32, 900, 1));
+    let both = {
+        let (a, b) = (scene.clone(), transformed(&scene));
+        SceneBuffers {
+            positions: [a.positions, b.positions].concat(),
+            scales: [a.scales, b.scales].concat(),
+            rotations: [a.rotations, b.rotations].concat(),
+            opacities: [a.opacities, b.opacities].concat(),
+            sh: [a.sh, b.sh].concat(),
+            degree: 1,
+        }
+    };
+    let camera = pinhole();
+    let oracle = OracleCamera::new(&camera, SIZE).expect("a pinhole");
+    let instances = [IDENTITY, SIMILARITY].map(|matrix| OracleInstance {
+        matrix,
+        opacity: 1.0,
+    });
+    // Together in one sorted set, as one draw or as one instance each.
+    for state in [
+        State::default(),
+        State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED),
+    ] {
+        let expected = render_bounded(&both.as_oracle(), &oracle, &OracleState::from(&state));
+        for (level, context) in devices() {
+            let way = Way {
+                state,
+                instances: Some((&instances, vk::VertexInputRate::INSTANCE)),
+                ..Way::new(camera)
+            };
+            let picture = draw(&context, &scene, &way);
+            assert_contract(level, &picture, &expected, Limits::ENVELOPE_ONLY);
+        }
+    }
+}
+
+#[test]
+fn every_vertex_may_have_a_matrix_of_its_own() {
+    let context = Context::embedded(&Settings::default());
+    let scene = scenes::cloud(33, 300, 0);
+    let some = any_instances(33);
+    let of_vertex: Vec<OracleInstance> = (0..300).map(|vertex| some[vertex % some.len()]).collect();
+    let way = Way {
+        instances: Some((&of_vertex, vk::VertexInputRate::VERTEX)),
+        ..Way::new(pinhole())
+    };
+    let picture = draw(&context, &scene, &way);
+    let camera = OracleCamera::new(&way.camera, SIZE).expect("a pinhole");
+    let whole = OracleScene {
+        instances: &of_vertex,
+        ..scene.as_oracle()
+    };
+    let expected = render_bounded(&whole, &camera, &OracleState::from(&way.state));
+    assert_contract("by vertex", &picture, &expected, Limits::ENVELOPE_ONLY);
+}
+
+#[test]
+fn half_floats_are_the_floats_that_they_are() {
+    let scene = scenes::cloud(34, 2000, 2);
+    let round = |value: f32| f16::from_f32(value).to_f32();
+    let triples = |values: &[[f32; 3]]| values.iter().map(|v| v.map(round)).collect();
+    let rounded = SceneBuffers {
+        positions: triples(&scene.positions),
+        scales: triples(&scene.scales),
+        rotations: scene.rotations.iter().map(|q| q.map(round)).collect(),
+        opacities: scene.opacities.iter().copied().map(round).collect(),
+        sh: triples(&scene.sh),
+        degree: scene.degree,
+    };
+    let way = Way::new(pinhole());
+    for (level, context) in devices() {
+        let half = draw(&context, &scene, &Way { half: true, ..way });
+        let float = draw(&context, &rounded, &way);
+        assert!(half == float, "{level}");
+        // Eleven bits of a position are a thousandth of it; the picture moves by a fraction of a pixel.
+        let exact = draw(&context, &scene, &way);
+        let pairs = exact.as_flattened().iter().zip(half.as_flattened());
+        let squares: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        let deviation = (squares / (4 * exact.len()) as f64).sqrt();
+        assert!(deviation > 0.0 && deviation < 0.02, "{level}: {deviation}");
+    }
+}
+
+#[test]
+fn a_scene_that_moves_far_away_with_its_camera_looks_the_same() {
+    const FAR: f32 = 1_048_576.0;
+    let mut scene = scenes::cloud(35, 1500, 1);
+    // What binary32 holds so far out, too.
+    let round = |value: f32| (value * 8.0).round() / 8.0;
+    for position in &mut scene.positions {
+        *position = position.map(round);
+    }
+    let camera = pinhole().eye([0.03, -0.02, 0.01]);
+    let expected = reference(
+        &scene,
+        &[OracleInstance::default()],
+        &State::default(),
+        &camera,
+    );
+    let far = camera.eye(camera.eye.map(|at| at + f64::from(FAR)));
+    let moved = SceneBuffers {
+        positions: (scene.positions.iter())
+            .map(|position| position.map(|at| at + FAR))
+            .collect(),
+        ..scene.clone()
+    };
+    let mut matrix = IDENTITY;
+    for row in &mut matrix {
+        row[3] = FAR;
+    }
+    let instances = [OracleInstance {
+        matrix,
+        opacity: 1.0,
+    }];
+    for (level, context) in devices() {
+        for (name, picture) in [
+            ("by its positions", draw(&context, &moved, &Way::new(far))),
+            (
+                "by a matrix",
+                draw(
+                    &context,
+                    &scene,
+                    &Way {
+                        instances: Some((&instances, vk::VertexInputRate::INSTANCE)),
+                        ..Way::new(far)
+                    },
+                ),
+            ),
+        ] {
+            let name = format!("{name}, {level}");
+            assert_contract(&name, &picture, &expected, Limits::ENVELOPE_ONLY);
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! The unscented transform.
+
+use super::{OracleCamera, OracleModel, panorama, project};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Dimensions of what is projected.
+const N: f64 = 3.0;
+/// The transform's parameters.
+const ALPHA: f64 = 1.0;
+const BETA: f64 = 2.0;
+const KAPPA: f64 = 0.0;
+
+/// Points in the picture, less their mean, each times the root of its weight; the covariance is the sum of their squares.
+pub type Deviations = Vec<[f64; 2]>;
+
+/// The mean of the picture of a Gaussian at `t` with these axes (each as long as a standard deviation), all in camera axes,
+/// and its deviations; nothing if some sigma point is not seen beside the mean.
+pub fn transform(
+    camera: &OracleCamera,
+    t: [f64; 3],
+    axes: &[[f64; 3]; 3],
+) -> Option<([f64; 2], Deviations)> {
+    let lambda = ALPHA * ALPHA * (N + KAPPA) - N;
+    let mut points = vec![t];
+    for axis in axes {
+        for sign in [1.0, -1.0] {
+            points.push(std::array::from_fn(|k| {
+                t[k] + sign * (N + lambda).sqrt() * axis[k]
+            }));
+        }
+    }
+    if !points[1..].iter().all(|&point| is_seen(camera, t, point)) {
+        return None;
+    }
+    let center = project::mean_and_jacobian(camera, t).0;
+    let period = panorama::period(camera);
+    let places: Vec<[f64; 2]> = points
+        .iter()
+        .map(|&point| {
+            let [x, y] = project::mean_and_jacobian(camera, point).0;
+            let dx = panorama::nearest(x - center[0], period).unwrap_or(x - center[0]);
+            [center[0] + dx, y]
+        })
+        .collect();
+    let other = 1.0 / (2.0 * (N + lambda));
+    let in_mean = |index: usize| {
+        if index == 0 {
+            lambda / (N + lambda)
+        } else {
+            other
+        }
+    };
+    let in_covariance = |index: usize| match index {
+        0 => lambda / (N + lambda) + 1.0 - ALPHA * ALPHA + BETA,
+        _ => other,
+    };
+    let mean = [0, 1].map(|axis| {
+        let places = places.iter().enumerate();
+        places
+            .map(|(index, place)| in_mean(index) * place[axis])
+            .sum::<f64>()
+    });
+    let deviations = places.iter().enumerate().map(|(index, place)| {
+        [0, 1].map(|axis| in_covariance(index).sqrt() * (place[axis] - mean[axis]))
+    });
+    Some((mean, deviations.collect()))
+}
+
+/// Whether a sigma point of a Gaussian at `t` is seen beside it: beyond the near plane; by a fisheye, less than a right
+/// angle away, with what is straight behind outside of the cone of that angle about `t`; by a panorama, with the poles
+/// outside of that cone.
+fn is_seen(camera: &OracleCamera, t: [f64; 3], point: [f64; 3]) -> bool {
+    let cosine = project::dot(t, point);
+    let sine = project::length(project::cross(t, point));
+    let apart = sine.atan2(cosine);
+    let from =
+        |axis: f64, rest: [f64; 2]| (rest[0] * rest[0] + rest[1] * rest[1]).sqrt().atan2(axis);
+    match camera.model {
+        OracleModel::Orthographic => true,
+        OracleModel::Pinhole => point[2] > f64::from(camera.near),
+        OracleModel::Fisheye => apart < FRAC_PI_2 && from(t[2], [t[0], t[1]]) + apart < PI,
+        OracleModel::Equirectangular => from(t[1].abs(), [t[0], t[2]]) > apart,
+    }
+}
