@@ -306,6 +306,26 @@ pub enum GaussianOrder {
     RadialDistance,
     /// Nothing: the order of the draw.
     Primitive,
+    /// At each pixel, the depth at which the Gaussian is greatest on the pixel's ray.
+    PerPixel,
+}
+
+/// What a Gaussian is in space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum GaussianGeometry {
+    /// A volume with three standard deviations, whose picture is approximated by an ellipse's.
+    Volume,
+    /// A flat disc with two, whose picture is exact. Not for fisheyes.
+    Surfel,
+}
+
+/// The rasterizer's arithmetic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum GaussianPrecision {
+    /// binary32, or better.
+    Float32,
+    /// Every operation of a processing element is rounded to binary16. Only for volumes, and not in the per-pixel order.
+    Float16,
 }
 
 /// The state of a Gaussian draw that its pipeline fixes. See the extension for each value's meaning.
@@ -313,6 +333,10 @@ pub enum GaussianOrder {
 pub struct GaussianState {
     /// The spherical harmonics degree drawn, 0 to 3.
     pub sh_degree: u32,
+    /// The rasterizer's arithmetic.
+    pub precision: GaussianPrecision,
+    /// What the Gaussians are.
+    pub geometry: GaussianGeometry,
     /// What the Gaussians are sorted by.
     pub order: GaussianOrder,
     /// Whether opacity is scaled by the ratio of determinants, so that the low-pass filter conserves energy.
@@ -342,6 +366,8 @@ impl Default for GaussianState {
     fn default() -> Self {
         Self {
             sh_degree: 0,
+            precision: GaussianPrecision::Float32,
+            geometry: GaussianGeometry::Volume,
             order: GaussianOrder::ViewDepth,
             opacity_compensated: false,
             low_pass_variance: 0.3,

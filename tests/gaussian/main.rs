@@ -7,4 +7,5 @@ mod given_scenes;
 mod hybrid_scenes;
 mod interleavings;
 mod popping;
+mod rasterization_modes;
 mod reference;

@@ -107,13 +107,16 @@ const SUPPORTED: &[&str] = &[
     // VK_GAURAST_gaussian_primitive_topology.
     "gaussian_primitive_topology",
     "fisheye_camera",
+    "gaussian_2d",
     "gaussian_depth_stencil",
     "gaussian_multisample",
     "merged_draws",
     "opacity_compensation",
     "orthographic_camera",
+    "per_pixel_order",
     "primitive_order",
     "radial_distance_order",
+    "rasterization_float16",
     "uniform_buffer_camera",
 ];
 
@@ -583,10 +586,10 @@ mod tests {
         );
         let mut missing = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
             .gaussian_primitive_topology(true)
-            .per_pixel_order(true);
+            .gaussian_instancing(true);
         refused(
             requested(&vk::DeviceCreateInfo::default().push_next(&mut missing)),
-            "per_pixel_order",
+            "gaussian_instancing",
         );
 
         let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()

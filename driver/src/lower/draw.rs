@@ -21,6 +21,11 @@ pub(crate) enum Undrawn {
         "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-parameter)"
     )]
     CameraModel(CameraModel),
+    /// A camera of a model that 2D Gaussians cannot be seen by.
+    #[error(
+        "the geometry is GAUSSIAN_2D, and the camera's model is {0:?} (VUID-vkCmdDraw-geometry-GAURAST)"
+    )]
+    FlatCameraModel(CameraModel),
     /// No uniform buffer where the camera should be.
     #[error(
         "no uniform buffer is bound at set {set}, binding {binding}, where the camera should be"

@@ -8,7 +8,8 @@ use crate::command::state::State;
 use crate::object::pipeline::{AttributeSource, CameraSource, GaussianPipeline, GraphicsPipeline};
 use simdevice::Packet;
 use simdevice::packet::{
-    Camera, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, Viewport,
+    Camera, CameraModel, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianGeometry,
+    GaussianState, Viewport,
 };
 use std::sync::Arc;
 
@@ -50,6 +51,15 @@ fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, 
     let camera = camera(state, gaussian.camera)?;
     if !gaussian.camera_models.have(camera.model) {
         return Err(Undrawn::CameraModel(camera.model));
+    }
+    let is_flat = gaussian.state.geometry == GaussianGeometry::Surfel;
+    if is_flat
+        && !matches!(
+            camera.model,
+            CameraModel::Pinhole | CameraModel::Orthographic
+        )
+    {
+        return Err(Undrawn::FlatCameraModel(camera.model));
     }
     Ok(camera)
 }

@@ -4,9 +4,8 @@ use crate::gpu::Gpu;
 use crate::scene::{PipelineRequest, over, replace};
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
-    GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAntialiasingGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
@@ -104,18 +103,6 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
         (
             with_state(|s| s.projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)),
             "vertexShaderProjection",
-        ),
-        (
-            with_state(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
-            "perPixelOrder",
-        ),
-        (
-            with_state(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16)),
-            "rasterizationFloat16",
-        ),
-        (
-            with_state(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
-            "gaussian2D",
         ),
         (
             with_state(|s| s.linearization(GaussianLinearizationGAURAST::UNSCENTED)),

@@ -2,10 +2,10 @@
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianGeometryGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
-use crate::oracle::{OracleCamera, OracleModel, OracleOrder, OracleState};
+use crate::oracle::{OracleCamera, OracleGeometry, OracleModel, OracleOrder, OracleState};
 
 impl OracleCamera {
     /// The camera of a draw and its viewport's width and height, or `None` if the oracle lacks its
@@ -57,9 +57,14 @@ impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
             transmittance_floor: info.transmittance_floor,
             opacity_compensated: info.antialiasing
                 == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
+            geometry: match info.geometry {
+                GaussianGeometryGAURAST::GAUSSIAN_2D => OracleGeometry::Surfel,
+                _ => OracleGeometry::Volume,
+            },
             order: match info.order {
                 GaussianOrderGAURAST::RADIAL_DISTANCE => OracleOrder::RadialDistance,
                 GaussianOrderGAURAST::PRIMITIVE => OracleOrder::Primitive,
+                GaussianOrderGAURAST::PER_PIXEL => OracleOrder::PerPixel,
                 _ => OracleOrder::ViewDepth,
             },
         }

@@ -81,6 +81,9 @@ impl Context {
             .opacity_compensation(true)
             .radial_distance_order(true)
             .primitive_order(true)
+            .per_pixel_order(true)
+            .gaussian_2d(true)
+            .rasterization_float16(true)
             .orthographic_camera(true)
             .fisheye_camera(true);
         let mut vulkan_1_3 = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);

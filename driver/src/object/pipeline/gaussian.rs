@@ -16,7 +16,7 @@ use gaurast::vk::{
     PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::packet::draw::DrawState;
-use simdevice::packet::{GaussianOrder, GaussianState};
+use simdevice::packet::{GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState};
 use std::sync::Arc;
 
 /// The greatest degree of spherical harmonics that a pipeline may ask for.
@@ -41,6 +41,7 @@ impl GaussianPipeline {
                 ),
             ));
         };
+        validate_combinations(gaussian)?;
         validate_stages(info, gaussian)?;
         validate_modes(gaussian, features)?;
         validate_values(gaussian)?;
@@ -61,7 +62,15 @@ impl GaussianPipeline {
         let first = locations.first_spherical_harmonics;
         Ok(Self {
             position: attribute(info, "position", locations.position, 3)?,
-            scale: attribute(info, "scale", locations.scale, 3)?,
+            scale: attribute(
+                info,
+                "scale",
+                locations.scale,
+                match gaussian.geometry {
+                    GaussianGeometryGAURAST::GAUSSIAN_2D => 2,
+                    _ => 3,
+                },
+            )?,
             rotation: attribute(info, "rotation", locations.rotation, 4)?,
             opacity: attribute(info, "opacity", locations.opacity, 1)?,
             spherical_harmonics: (0..coefficients)
@@ -136,11 +145,20 @@ fn state(
             GaussianOrder::Primitive
         }
         GaussianOrderGAURAST::PER_PIXEL => {
-            return Err(not_enabled(PER_PIXEL_ORDER, "order is PER_PIXEL"));
+            require(features, PER_PIXEL_ORDER, "order is PER_PIXEL")?;
+            GaussianOrder::PerPixel
         }
         other => return Err(unknown("order", &other)),
     };
     Ok(GaussianState {
+        precision: match gaussian.precision {
+            GaussianPrecisionGAURAST::FLOAT16 => GaussianPrecision::Float16,
+            _ => GaussianPrecision::Float32,
+        },
+        geometry: match gaussian.geometry {
+            GaussianGeometryGAURAST::GAUSSIAN_2D => GaussianGeometry::Surfel,
+            _ => GaussianGeometry::Volume,
+        },
         sh_degree: gaussian.spherical_harmonics_degree,
         order,
         opacity_compensated,
@@ -154,6 +172,44 @@ fn state(
         blend: fragments.blend,
         blend_constants: fragments.blend_constants,
     })
+}
+
+/// Refuses modes that mean nothing together.
+fn validate_combinations(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
+    if gaussian.order == GaussianOrderGAURAST::PER_PIXEL
+        && gaussian.projection_mode == GaussianProjectionModeGAURAST::VERTEX_SHADER
+    {
+        return Err(Error::usage(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-projectionMode",
+            format!(
+                "{STRUCTURE}: order is PER_PIXEL, but projectionMode is VERTEX_SHADER, whose Gaussians have no depth \
+                 along a ray"
+            ),
+        ));
+    }
+    if gaussian.geometry == GaussianGeometryGAURAST::GAUSSIAN_2D
+        && gaussian.antialiasing == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED
+    {
+        return Err(Error::usage(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-antialiasing",
+            format!(
+                "{STRUCTURE}: antialiasing is OPACITY_COMPENSATED, but geometry is GAUSSIAN_2D, which is not dilated"
+            ),
+        ));
+    }
+    if gaussian.precision == GaussianPrecisionGAURAST::FLOAT16 {
+        let is_flat = gaussian.geometry == GaussianGeometryGAURAST::GAUSSIAN_2D;
+        if is_flat || gaussian.order == GaussianOrderGAURAST::PER_PIXEL {
+            return Err(Error::usage(
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-modes",
+                format!(
+                    "{STRUCTURE}: precision is FLOAT16, but geometry is GAUSSIAN_2D or order is PER_PIXEL, which are \
+                     for FLOAT32"
+                ),
+            ));
+        }
+    }
+    Ok(())
 }
 
 fn validate_stages(
@@ -204,7 +260,7 @@ fn validate_modes(
     match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_3D => {}
         GaussianGeometryGAURAST::GAUSSIAN_2D => {
-            return Err(not_enabled(GAUSSIAN_2D, "geometry is GAUSSIAN_2D"));
+            require(features, GAUSSIAN_2D, "geometry is GAUSSIAN_2D")?;
         }
         other => return Err(unknown("geometry", &other)),
     }
@@ -221,7 +277,7 @@ fn validate_modes(
     match gaussian.precision {
         GaussianPrecisionGAURAST::FLOAT32 => {}
         GaussianPrecisionGAURAST::FLOAT16 => {
-            return Err(not_enabled(RASTERIZATION_FLOAT16, "precision is FLOAT16"));
+            require(features, RASTERIZATION_FLOAT16, "precision is FLOAT16")?;
         }
         other => return Err(unknown("precision", &other)),
     }

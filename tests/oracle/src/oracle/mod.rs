@@ -28,6 +28,9 @@
 //! A third one, `T >= 1/2`, says which Gaussian is a pixel's median; nothing else follows from it, so a pixel
 //! simply has every median that it may have.
 //!
+//! In the per-pixel order, neighbours whose depths along the ray may round either way are followed in both orders
+//! ([`rays`]).
+//!
 //! Three more decisions exist and are not followed both ways:
 //! - the depth key is `t.z` rounded to binary32. Where the binary64 value lies within its own
 //!   rounding error of the middle between two binary32 values, the key could be either; that
@@ -41,9 +44,11 @@
 pub mod error_model;
 pub mod pixel;
 pub mod project;
+pub mod rays;
 mod render;
 pub mod sample_tests;
 pub mod spherical_harmonics;
+pub mod surfel;
 
 #[cfg(test)]
 mod tests;
@@ -113,6 +118,16 @@ pub enum OracleModel {
     Fisheye,
 }
 
+/// What a Gaussian is in space.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OracleGeometry {
+    /// A volume.
+    #[default]
+    Volume,
+    /// A flat disc; the third scale is not read.
+    Surfel,
+}
+
 /// What Gaussians are sorted by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OracleOrder {
@@ -123,6 +138,8 @@ pub enum OracleOrder {
     RadialDistance,
     /// The order of the draw.
     Primitive,
+    /// At each pixel, the depth at which a Gaussian is greatest on the pixel's ray.
+    PerPixel,
 }
 
 /// A camera and the viewport that it fills, as `VkGaussianCameraGAURAST` holds them.
@@ -161,6 +178,8 @@ pub struct OracleState {
     pub transmittance_floor: f32,
     /// Whether opacity makes up for the area that the low-pass filter adds.
     pub opacity_compensated: bool,
+    /// What Gaussians are.
+    pub geometry: OracleGeometry,
     /// What Gaussians are sorted by.
     pub order: OracleOrder,
 }
@@ -173,6 +192,7 @@ impl Default for OracleState {
             alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
             opacity_compensated: false,
+            geometry: OracleGeometry::Volume,
             order: OracleOrder::ViewDepth,
         }
     }

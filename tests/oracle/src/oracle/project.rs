@@ -1,8 +1,12 @@
 //! Steps 1 to 5: from a Gaussian in world space to the numbers that a pixel needs.
 
-use super::error_model::ErrorModel;
+use super::error_model::{self, ErrorModel};
+use super::rays::OwnAxes;
 use super::spherical_harmonics;
-use super::{OracleCamera, OracleModel, OracleOrder, OracleScene, OracleState, SkipReason};
+use super::surfel::Surfel;
+use super::{
+    OracleCamera, OracleGeometry, OracleModel, OracleOrder, OracleScene, OracleState, SkipReason,
+};
 
 /// A Gaussian as the pixels see it.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +27,10 @@ pub struct Splat {
     pub key: f32,
     /// The depth variable, rounded to binary32.
     pub z: f32,
+    /// What it is in space, if that is a disc.
+    pub surfel: Option<Surfel>,
+    /// What its depth along rays comes from.
+    pub own_axes: OwnAxes,
     /// Whether the key is within its own error of the middle between two keys.
     pub key_undecidable: bool,
     /// How far a binary32 implementation may err on this Gaussian.
@@ -94,7 +102,7 @@ pub fn project(
     let sort_by = match state.order {
         OracleOrder::ViewDepth => depth,
         OracleOrder::RadialDistance => length(offset),
-        OracleOrder::Primitive => 0.0,
+        OracleOrder::Primitive | OracleOrder::PerPixel => 0.0,
     };
 
     // Step 3. The mean and the Jacobian of the projection.
@@ -103,7 +111,7 @@ pub fn project(
         OracleModel::Orthographic => orthographic(camera, t),
         OracleModel::Fisheye => fisheye(camera, t),
     };
-    let scale = scene.scales[index].map(f64::from);
+    let scale = scales(scene, state, index).map(f64::from);
     let axes = rotation_matrix(scene.rotations[index].map(f64::from));
     let m = jacobian.map(|row| {
         let in_world = multiply_row(row, &rotation);
@@ -120,7 +128,8 @@ pub fn project(
     let area = length(cross(m[0], m[1]));
     let (s_xx, s_xy, s_yy) = (dot(m[0], m[0]), dot(m[0], m[1]), dot(m[1], m[1]));
     let determinant = area * area + low_pass * (s_xx + s_yy) + low_pass * low_pass;
-    if !(determinant > 0.0 && determinant.is_finite()) {
+    let is_flat = state.geometry == OracleGeometry::Surfel;
+    if !is_flat && !(determinant > 0.0 && determinant.is_finite()) {
         return Err(SkipReason::DegenerateCovariance);
     }
     let covariance = [s_xx + low_pass, s_xy, s_yy + low_pass];
@@ -145,10 +154,31 @@ pub fn project(
         color,
         key: sort_by as f32,
         z,
-        key_undecidable: state.order != OracleOrder::Primitive
+        surfel: is_flat.then(|| Surfel {
+            camera: *camera,
+            axes: [0, 1].map(|axis| {
+                let own = [axes[axis], axes[3 + axis], axes[6 + axis]];
+                transform(&rotation, own.map(|c| c * scale[axis]))
+            }),
+            centre: t,
+            mean,
+            low_pass,
+            fixed: error_model::FIXED + 2.0 * opacity.max(f64::MIN_POSITIVE).log2().abs(),
+        }),
+        own_axes: OwnAxes::new(&axes, scale, offset),
+        key_undecidable: !matches!(state.order, OracleOrder::Primitive | OracleOrder::PerPixel)
             && key_is_undecidable(&rotation, offset, sort_by),
         error: ErrorModel::new(spread, opacity, area_for_opacity),
     })
+}
+
+/// The scales that are read.
+fn scales(scene: &OracleScene, state: &OracleState, index: usize) -> [f32; 3] {
+    let [x, y, z] = scene.scales[index];
+    match state.geometry {
+        OracleGeometry::Volume => [x, y, z],
+        OracleGeometry::Surfel => [x, y, 0.0],
+    }
 }
 
 /// Step 1: what is known without a camera.
@@ -157,7 +187,7 @@ fn check_attributes(
     state: &OracleState,
     index: usize,
 ) -> Result<(), SkipReason> {
-    let (scale, quaternion) = (scene.scales[index], scene.rotations[index]);
+    let (scale, quaternion) = (scales(scene, state, index), scene.rotations[index]);
     let opacity = scene.opacities[index];
     let finite = scene.positions[index].iter().all(|c| c.is_finite())
         && scale.iter().all(|c| c.is_finite())
