@@ -330,6 +330,26 @@ pub enum GaussianOrder {
     RadialDistance,
     /// Nothing: the order of the draw.
     Primitive,
+    /// At each pixel, the depth at which the Gaussian is greatest on the pixel's ray.
+    PerPixel,
+}
+
+/// What a Gaussian is in space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum GaussianGeometry {
+    /// A volume with three standard deviations, whose picture is approximated by an ellipse's.
+    Volume,
+    /// A flat disc with two, whose picture is exact. Not for fisheyes.
+    Surfel,
+}
+
+/// The rasterizer's arithmetic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum GaussianPrecision {
+    /// binary32, or better.
+    Float32,
+    /// Every operation of a processing element is rounded to binary16. Only for volumes, and not in the per-pixel order.
+    Float16,
 }
 
 /// How a Gaussian in space becomes one in the picture.
@@ -349,6 +369,10 @@ pub struct GaussianState {
     pub sh_degree: u32,
     /// How they are projected.
     pub linearization: GaussianLinearization,
+    /// The rasterizer's arithmetic.
+    pub precision: GaussianPrecision,
+    /// What the Gaussians are.
+    pub geometry: GaussianGeometry,
     /// What the Gaussians are sorted by.
     pub order: GaussianOrder,
     /// Whether opacity is scaled by the ratio of determinants, so that the low-pass filter conserves energy.
@@ -379,6 +403,8 @@ impl Default for GaussianState {
         Self {
             sh_degree: 0,
             linearization: GaussianLinearization::Jacobian,
+            precision: GaussianPrecision::Float32,
+            geometry: GaussianGeometry::Volume,
             order: GaussianOrder::ViewDepth,
             opacity_compensated: false,
             low_pass_variance: 0.3,

@@ -195,7 +195,7 @@ fn placed() -> Vec<Packet> {
     packets
 }
 
-/// Few Gaussians, many, many that only the device can write, of which all are equally deep in one scene, and several draws with a clear between them; how the attachment begins.
+/// Gaussians in modes that have no fast path, few Gaussians, many, many that only the device can write, of which all are equally deep in one scene, and several draws with a clear between them; how the attachment begins.
 fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
     let clear_part = clear(
         vec![AttachmentClear::Color {
@@ -236,7 +236,20 @@ fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
             ..(*begin.state).clone()
         });
     });
+    let in_mode = |seed: u64, change: fn(&mut GaussianState)| {
+        let mut packets = gaussians(seed, 500, OVER);
+        if let Packet::GaussianBegin(begin) = &mut packets[0] {
+            change(Arc::make_mut(&mut begin.state));
+        }
+        packets
+    };
+    let per_pixel = in_mode(8, |state| state.order = GaussianOrder::PerPixel);
+    let flat = in_mode(9, |state| state.geometry = GaussianGeometry::Surfel);
+    let half = in_mode(10, |state| state.precision = GaussianPrecision::Float16);
     vec![
+        ("per pixel", per_pixel, LoadOp::Load),
+        ("flat", flat, over_black),
+        ("binary16", half, over_black),
         ("panorama", panorama, over_black),
         ("unscented", unscented, LoadOp::Load),
         ("placed", placed(), over_black),

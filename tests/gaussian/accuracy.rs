@@ -23,10 +23,10 @@ use glam::DVec3;
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
 /// One device for each SIMD level and each of one and two threads.
-struct Devices(Vec<(&'static str, [Context; 2])>);
+pub(crate) struct Devices(Vec<(&'static str, [Context; 2])>);
 
 impl Devices {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let devices = |simd| {
             [1, 2].map(|threads| {
                 Context::embedded(&Settings {
@@ -40,7 +40,7 @@ impl Devices {
     }
 
     /// Draws `scene` in `state` from each of `views` on every device and judges the pictures.
-    fn judge(&self, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
+    pub(crate) fn judge(&self, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
         let references: Vec<Reference> = views
             .iter()
             .map(|view| {
@@ -81,11 +81,11 @@ impl Devices {
 }
 
 /// Where a scene is seen from, and how its picture is judged.
-struct View {
-    name: String,
-    camera: GaussianCameraGAURAST<'static>,
-    size: [u32; 2],
-    limits: Limits,
+pub(crate) struct View {
+    pub(crate) name: String,
+    pub(crate) camera: GaussianCameraGAURAST<'static>,
+    pub(crate) size: [u32; 2],
+    pub(crate) limits: Limits,
 }
 
 /// Pictures of `scene`, each with the seconds that it took.
@@ -142,9 +142,12 @@ fn states() -> [(&'static str, State); 4] {
     ]
 }
 
-/// The view of a generated scene, with an odd size, so that tiles are cut.
-fn generated_view(limits: Limits) -> View {
-    let size = [211, 157];
+/// Odd, so that tiles are cut.
+pub(crate) const SIZE: [u32; 2] = [211, 157];
+
+/// The view of a generated scene.
+pub(crate) fn generated_view(limits: Limits) -> View {
+    let size = SIZE;
     View {
         name: "in front".to_owned(),
         camera: scenes::camera(size[0], size[1]).to_vulkan(),
@@ -223,6 +226,7 @@ fn every_camera_and_every_order_keep_the_contract() {
         ("by view depth", GaussianOrderGAURAST::VIEW_DEPTH),
         ("by distance", GaussianOrderGAURAST::RADIAL_DISTANCE),
         ("as drawn", GaussianOrderGAURAST::PRIMITIVE),
+        ("pixel by pixel", GaussianOrderGAURAST::PER_PIXEL),
     ];
     for (name, order) in orders {
         let mut views = other_cameras();
@@ -274,6 +278,8 @@ fn orders_give_different_pictures() {
     let by_depth = picture(GaussianOrderGAURAST::VIEW_DEPTH);
     assert!(by_depth != picture(GaussianOrderGAURAST::RADIAL_DISTANCE));
     assert!(by_depth != picture(GaussianOrderGAURAST::PRIMITIVE));
+    let by_pixel = picture(GaussianOrderGAURAST::PER_PIXEL);
+    assert!(by_depth != by_pixel && by_pixel != picture(GaussianOrderGAURAST::RADIAL_DISTANCE));
 }
 
 #[test]

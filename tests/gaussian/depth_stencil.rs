@@ -345,6 +345,7 @@ fn depth_ranges_bounds_and_orders_apply() {
     for order in [
         GaussianOrderGAURAST::RADIAL_DISTANCE,
         GaussianOrderGAURAST::PRIMITIVE,
+        GaussianOrderGAURAST::PER_PIXEL,
     ] {
         let mut case = Case::new(format!("{order:?}"), vk::Format::D32_SFLOAT, 1);
         case.options.depth_stencil = less;

@@ -9,5 +9,6 @@ mod hybrid_scenes;
 mod instances;
 mod interleavings;
 mod popping;
+mod rasterization_modes;
 mod reference;
 mod shaded;

@@ -11,11 +11,16 @@ use gaurast::vk::{
 };
 use gaurast_samples::camera::{Camera, DEFAULT_FOV};
 use gaurast_samples::scene::Scene;
+use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{
     Buffer, Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
 use gaurast_tests::data::require_data;
+use gaurast_tests::oracle::project::project;
+use gaurast_tests::oracle::rays::rounded;
+use gaurast_tests::oracle::{OracleCamera, OracleOrder, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
+use glam::{DMat3, DVec3};
 
 type Picture = Vec<[f32; 4]>;
 
@@ -172,6 +177,113 @@ fn turning_pops_by_view_depth_and_not_by_distance() {
         *scale *= 6.0;
     }
     compare("a cloud", cloud, camera);
+}
+
+/// Every few pixels of a picture, in x and y, are looked at one by one.
+const STRIDE: usize = 5;
+
+/// The greatest change of any sampled pixel by a step's new order, where each pixel has an order of its own: that of the
+/// same ray in the view before. `by_axis` takes depth along the camera's axis instead, at each pixel.
+fn popping_of_rays(
+    scene: &SceneBuffers,
+    camera: &GaussianCameraGAURAST<'static>,
+    by_axis: bool,
+) -> f64 {
+    let state = OracleState {
+        order: OracleOrder::PerPixel,
+        ..OracleState::default()
+    };
+    let input = scene.as_oracle();
+    let mut greatest = 0.0f64;
+    for step in 1..=3 {
+        let views = [step - 1, step].map(|step| {
+            OracleCamera::new(&turned(camera, step), SIZE).expect("a camera of the oracle")
+        });
+        let splats = views.map(|view| -> Vec<_> {
+            (0..input.len())
+                .map(|index| project(&input, &view, &state, index).ok())
+                .collect()
+        });
+        // A point of the new picture, in the old one.
+        // Row by row read as columns: camera to world.
+        let world = views.map(|view| DMat3::from_cols_array(&view.rotation.map(f64::from)));
+        let to_old = world[0].inverse() * world[1];
+        let [fx, fy] = views[1].focal.map(f64::from);
+        let [cx, cy] = views[1].principal.map(f64::from);
+        let sampled = SIZE.map(|side| side as usize / STRIDE);
+        for at in 0..sampled[0] * sampled[1] {
+            let [x, y] = [at % sampled[0], at / sampled[0]].map(|i| (STRIDE * i) as u32);
+            let new = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+            let ray = to_old * DVec3::new((new[0] - cx) / fx, (new[1] - cy) / fy, 1.0);
+            let old = [fx * ray.x / ray.z + cx, fy * ray.y / ray.z + cy];
+            let mut reached = Vec::new();
+            for (before, now) in splats[0].iter().zip(&splats[1]) {
+                let (Some(before), Some(now)) = (before, now) else {
+                    continue;
+                };
+                let alpha = now.alpha(x, y, &state).value;
+                if alpha < f64::from(state.alpha_floor) {
+                    continue;
+                }
+                let keys = if by_axis {
+                    [f64::from(before.z), f64::from(now.z)]
+                } else {
+                    let depths = [
+                        before.own_axes.depth(&views[0], old),
+                        now.own_axes.depth(&views[1], new),
+                    ];
+                    depths.map(|depth| rounded(depth.value))
+                };
+                reached.push((keys, alpha, now.color));
+            }
+            let [before, now] = [0, 1].map(|which| {
+                let mut order = reached.clone();
+                order.sort_by(|a, b| a.0[which].total_cmp(&b.0[which]));
+                let (mut sum, mut t) = ([0.0; 3], 1.0);
+                for (_, alpha, color) in order {
+                    for (sum, color) in sum.iter_mut().zip(color) {
+                        *sum += t * alpha * color;
+                    }
+                    t *= 1.0 - alpha;
+                }
+                sum
+            });
+            for (before, now) in before.iter().zip(now) {
+                greatest = greatest.max((before - now).abs());
+            }
+        }
+    }
+    greatest
+}
+
+#[test]
+fn turning_pops_nowhere_where_each_pixel_sorts_for_itself() {
+    let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
+    let mut cloud = scenes::cloud(70, 4000, 1);
+    for scale in cloud.scales.as_flattened_mut() {
+        *scale *= 6.0;
+    }
+    let [by_axis, by_ray] = [true, false].map(|by_axis| popping_of_rays(&cloud, &camera, by_axis));
+    println!(
+        "a cloud, every {STRIDE}th pixel, by view depth: {by_axis:.4}, pixel by pixel: {by_ray:.2e}"
+    );
+    assert!(by_axis > 1e-3, "nothing pops");
+    // The sums themselves are rounded.
+    assert!(by_ray < 1e-12, "{by_ray}");
+
+    // These are the orders that the device draws in.
+    let bench = Bench::new(cloud);
+    let order = GaussianOrderGAURAST::PER_PIXEL;
+    let pipeline = Bench::pipeline(&bench.context, &bench.scene, order);
+    let picture = bench.draw(&pipeline, &camera, None);
+    let state = OracleState {
+        order: OracleOrder::PerPixel,
+        ..OracleState::default()
+    };
+    let view = OracleCamera::new(&camera, SIZE).expect("a camera of the oracle");
+    let reference = render_bounded(&bench.scene.as_oracle(), &view, &state);
+    let verdict = assert_contract("a cloud", &picture, &reference, Limits::ENVELOPE_ONLY);
+    println!("{verdict}");
 }
 
 #[test]

@@ -79,7 +79,8 @@ vk_enum! {
         RADIAL_DISTANCE = 1,
         /// The order of the draw: the application has sorted. Needs `primitiveOrder`.
         PRIMITIVE = 2,
-        /// At each pixel, ascending depth of the Gaussian's peak along that pixel's ray. Needs
+        /// At each pixel, ascending depth of the Gaussian's peak along that pixel's ray: an exact
+        /// sort, in which nothing pops as the camera turns. Fixed-function projection only. Needs
         /// `perPixelOrder`.
         PER_PIXEL = 3,
     }

@@ -108,15 +108,18 @@ const SUPPORTED: &[&str] = &[
     "gaussian_primitive_topology",
     "equirectangular_camera",
     "fisheye_camera",
+    "gaussian_2d",
     "gaussian_depth_stencil",
     "gaussian_instancing",
     "gaussian_multisample",
     "merged_draws",
     "opacity_compensation",
     "orthographic_camera",
+    "per_pixel_order",
     "primitive_order",
     "radial_distance_order",
     "resolve_fragment_shader",
+    "rasterization_float16",
     "uniform_buffer_camera",
     "vertex_shader_projection",
     "unscented_projection",
@@ -588,10 +591,10 @@ mod tests {
         );
         let mut missing = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
             .gaussian_primitive_topology(true)
-            .per_pixel_order(true);
+            .gaussian_instancing(true);
         refused(
             requested(&vk::DeviceCreateInfo::default().push_next(&mut missing)),
-            "per_pixel_order",
+            "gaussian_instancing",
         );
 
         let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()

@@ -21,6 +21,12 @@ pub(crate) enum Undrawn {
         "the camera's model is {0:?}, and its feature is not enabled (VUID-VkGaussianCameraGAURAST-model-parameter)"
     )]
     CameraModel(CameraModel),
+    /// A camera of a model that Gaussians of the pipeline's modes cannot be seen by.
+    #[error(
+        "the pipeline's geometry, order and precision do not go with a camera whose model is {0:?} \
+         (VUID-vkCmdDraw-geometry-GAURAST)"
+    )]
+    ModeOfCameraModel(CameraModel),
     /// No uniform buffer where the camera should be.
     #[error(
         "no uniform buffer is bound at set {set}, binding {binding}, where the camera should be"

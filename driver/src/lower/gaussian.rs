@@ -14,8 +14,8 @@ use simdevice::Packet;
 use simdevice::bindings::Bindings;
 use simdevice::packet::draw::{self, DrawState, ResolveShader, Topology};
 use simdevice::packet::{
-    Camera, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianState, ModelAttributes,
-    Viewport,
+    Camera, CameraModel, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianGeometry,
+    GaussianOrder, GaussianPrecision, GaussianState, ModelAttributes, Viewport,
 };
 use std::sync::Arc;
 
@@ -109,6 +109,19 @@ fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, 
     let camera = camera(state, gaussian.camera)?;
     if !gaussian.camera_models.have(camera.model) {
         return Err(Undrawn::CameraModel(camera.model));
+    }
+    let state = &gaussian.state;
+    let is_seen = match camera.model {
+        CameraModel::Pinhole | CameraModel::Orthographic => true,
+        CameraModel::Fisheye => state.geometry == GaussianGeometry::Volume,
+        CameraModel::Equirectangular => {
+            state.geometry == GaussianGeometry::Volume
+                && state.order != GaussianOrder::PerPixel
+                && state.precision == GaussianPrecision::Float32
+        }
+    };
+    if !is_seen {
+        return Err(Undrawn::ModeOfCameraModel(camera.model));
     }
     Ok(camera)
 }

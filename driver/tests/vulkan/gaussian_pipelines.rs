@@ -4,8 +4,7 @@ use crate::gpu::Gpu;
 use crate::scene::{PipelineRequest, over, replace};
 use ash::vk;
 use gaurast::vk::{
-    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianGeometryGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    GaussianAntialiasingGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
     GaussianProjectionModeGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
@@ -101,18 +100,6 @@ fn values_outside_their_ranges_are_refused() {
 fn modes_that_are_not_built_are_refused_by_their_feature() {
     let gpu = Gpu::new();
     let bad = [
-        (
-            with_state(|s| s.order(GaussianOrderGAURAST::PER_PIXEL)),
-            "perPixelOrder",
-        ),
-        (
-            with_state(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16)),
-            "rasterizationFloat16",
-        ),
-        (
-            with_state(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
-            "gaussian2D",
-        ),
         (
             PipelineRequest {
                 blend: vec![over().src_color_blend_factor(vk::BlendFactor::SRC1_COLOR)],

@@ -83,6 +83,27 @@ fn pipelines() -> Vec<(&'static str, PipelineRequest<'static>)> {
             missing(2),
         ),
         (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-projectionMode",
+            with(|s| {
+                s.order(GaussianOrderGAURAST::PER_PIXEL)
+                    .projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)
+            }),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-antialiasing",
+            with(|s| {
+                s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)
+                    .antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED)
+            }),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-modes",
+            with(|s| {
+                s.precision(GaussianPrecisionGAURAST::FLOAT16)
+                    .order(GaussianOrderGAURAST::PER_PIXEL)
+            }),
+        ),
+        (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
             with(|s| s.camera_source(buffer)),
         ),
@@ -220,6 +241,7 @@ fn every_statement_is_reported_by_its_id() {
         assert_eq!(recorded.unwrap_err(), invalid, "{id}");
         heard(id, gpu.take_messages().concat());
     }
+    heard("VUID-vkCmdDraw-geometry-GAURAST", flat_through_a_fisheye());
     let bare = Gpu::without_modes();
     let absent = vk::Result::ERROR_FEATURE_NOT_PRESENT;
     let stated = stated();
@@ -244,6 +266,24 @@ fn every_statement_is_reported_by_its_id() {
     );
     let untested: Vec<_> = stated.difference(&tested).collect();
     assert!(untested.is_empty(), "no test breaks {untested:?}");
+}
+
+/// What is heard when 2D Gaussians are drawn through a fisheye, which draws nothing.
+fn flat_through_a_fisheye() -> String {
+    let scene = Scene::new(
+        &[splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3])],
+        &with(|s| s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)),
+    );
+    let pixels = scene.draw([0.25; 4], |device, commands| {
+        let fisheye = camera().model(GaussianCameraModelGAURAST::FISHEYE);
+        // SAFETY: see the crate.
+        unsafe {
+            (scene.gpu.gaussian).cmd_set_gaussian_camera(commands, &fisheye);
+            device.cmd_draw(commands, 1, 1, 0, 0);
+        }
+    });
+    assert!(pixels.iter().all(|pixel| *pixel == [0.25; 4]));
+    scene.gpu.take_messages().concat()
 }
 
 /// What is heard when a pipeline has a stage.

@@ -83,11 +83,14 @@ impl Device {
             .queue_family_index(physical.queue_family)
             .queue_priorities(&priorities)];
         let mut extensions = Vec::new();
-        let [fisheye, equirectangular] = physical.cameras;
-        let mut gaussian = GaussianFeatures::default()
-            .gaussian_primitive_topology(true)
-            .fisheye_camera(fisheye)
-            .equirectangular_camera(equirectangular);
+        // Every mode that there is.
+        let mut gaussian = GaussianFeatures::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut gaussian);
+        // SAFETY: the structures are valid; a device without the extension leaves its structure as it is.
+        unsafe {
+            (instance.raw).get_physical_device_features2(physical.handle, &mut features);
+        }
+        gaussian.p_next = std::ptr::null_mut();
         let mut rendering =
             vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
         let mut counting = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()

@@ -16,6 +16,7 @@
 //! ```
 
 mod device;
+mod modes;
 mod pipeline;
 pub mod quads;
 mod query;
@@ -33,6 +34,7 @@ use crate::scene::{MAX_SH_DEGREE, Scene, Shape};
 use crate::usage::processor_time;
 use device::{Device, Purpose};
 use gaurast::gaussian_primitive_topology;
+pub use modes::{Geometry, Order, Precision};
 use pipeline::{BINDINGS, GaussianPipeline};
 pub use query::Counter;
 use query::CounterQuery;
@@ -128,6 +130,12 @@ pub struct Settings {
     pub alpha_floor: f32,
     /// A pixel is finished before its transmittance would fall below this.
     pub transmittance_floor: f32,
+    /// What Gaussians are sorted by.
+    pub order: Order,
+    /// What Gaussians are.
+    pub geometry: Geometry,
+    /// The rasterizer's arithmetic; binary16 is for volumes in another order than the pixels' own.
+    pub precision: Precision,
 }
 
 impl Default for Settings {
@@ -137,6 +145,9 @@ impl Default for Settings {
             sh_degree: MAX_SH_DEGREE,
             alpha_floor: 1.0 / 255.0,
             transmittance_floor: 1e-4,
+            order: Order::Depth,
+            geometry: Geometry::Volume,
+            precision: Precision::Fp32,
         }
     }
 }

@@ -75,6 +75,10 @@ impl GaussianPipeline {
             .spherical_harmonics_degree(settings.sh_degree)
             .alpha_floor(settings.alpha_floor)
             .transmittance_floor(settings.transmittance_floor)
+            .order(settings.order.raw())
+            .geometry(settings.geometry.raw())
+            .precision(settings.precision.raw())
+            .low_pass_variance(settings.geometry.low_pass_variance())
             .attribute_locations(
                 GaussianAttributeLocationsGAURAST::default()
                     .position(0)

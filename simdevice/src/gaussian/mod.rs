@@ -17,11 +17,13 @@ mod lanes;
 mod linearize;
 mod panorama;
 pub(crate) mod project;
+pub(crate) mod rays;
 mod scratch;
 mod shaded;
 #[doc(hidden)] // For the benchmarks.
 pub mod sort;
 pub mod spherical_harmonics;
+pub(crate) mod surfel;
 mod unscented;
 
 pub use footprint::TILE_SIZE;
@@ -31,7 +33,10 @@ use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::format::Format;
 use crate::packet::draw::{Draw, ResolveShader};
-use crate::packet::{GaussianAppend, GaussianBegin, GaussianOrder, GaussianState, Rect, Viewport};
+use crate::packet::{
+    GaussianAppend, GaussianBegin, GaussianGeometry, GaussianOrder, GaussianPrecision,
+    GaussianState, Rect, Viewport,
+};
 use crate::raster::DepthCode;
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, DrawRecord};
@@ -45,9 +50,11 @@ use instances::Matrices;
 use isa::exec::Stopped;
 use project::{Projected, Projection, Source, Splat};
 use rayon::prelude::*;
+use rays::{PixelRays, RayDepth, RayDepths};
 use scratch::{Attributes, Scratch};
 use std::sync::Arc;
 use std::time::Instant;
+use surfel::Surfel;
 
 /// The most batches of a set: a survivor is named by its batch and its place there, in 32 bits.
 const MAX_BATCHES: u64 = (1 << 32) / BATCH as u64;
@@ -110,6 +117,10 @@ pub struct GaussianDraw {
     pub(crate) depth_trend: Trend,
     /// Half the pixels after which the picture repeats, or infinity.
     pub(crate) half_period: f64,
+    /// By batch, as the splats, if they are 2D Gaussians.
+    surfels: Option<Vec<Vec<Surfel>>>,
+    /// By batch, as the splats, if each pixel sorts for itself.
+    ray_depths: Option<(Vec<Vec<RayDepth>>, PixelRays)>,
     /// Where the work of its tiles goes, if anybody wants to know.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
@@ -207,7 +218,13 @@ impl GaussianSet {
         counters.add(Counter::PreprocessTime, nanoseconds(started, projected));
         counters.add(Counter::SortTime, nanoseconds(projected, sorted));
         counters.add(Counter::BinningTime, nanoseconds(sorted, Instant::now()));
-        let splats: Vec<_> = batches.into_iter().map(|batch| batch.splats).collect();
+        let (splats, (surfels, depths)): (Vec<_>, (Vec<_>, Vec<_>)) = batches
+            .into_iter()
+            .map(|batch| (batch.splats, (batch.surfels, batch.ray_depths)))
+            .unzip();
+        let is_per_pixel = self.begin.state.order == GaussianOrder::PerPixel;
+        let is_flat = self.begin.state.geometry == GaussianGeometry::Surfel;
+        let rays = PixelRays::new(&self.begin.camera, &self.begin.viewport);
         let record = device.recorder().map(|recorder| {
             let degree = self.begin.state.sh_degree;
             let (pairs, bounds) = (tiles.pairs(), self.bounds);
@@ -228,6 +245,8 @@ impl GaussianSet {
             splats,
             tiles,
             skips: device.config().skips,
+            surfels: is_flat.then_some(surfels),
+            ray_depths: is_per_pixel.then_some((depths, rays)),
             record,
         })
     }
@@ -236,7 +255,7 @@ impl GaussianSet {
     fn find_chunks(&self, device: &Device, counters: &mut Counters) -> Vec<Option<Arc<Chunks>>> {
         let config = device.config();
         let mut found = vec![None; self.appends.len()];
-        if !config.skips.has(Skip::Chunks) {
+        if !is_bounded(&self.begin.state) || !config.skips.has(Skip::Chunks) {
             return found;
         }
         for (append, found) in self.appends.iter().zip(&mut found) {
@@ -365,6 +384,7 @@ impl GaussianSet {
             counters.add(Counter::HarmonicsUnread, unread);
         }
         let level = device.level();
+        let is_flat = begin.state.geometry == GaussianGeometry::Surfel;
         let one = |worker: &mut Worker, job: &Job<'_>| {
             let mut out = Projected::default();
             let Worker {
@@ -373,7 +393,7 @@ impl GaussianSet {
                 matrices,
                 scratch,
             } = worker;
-            let source = job.read(fetcher, attributes, matrices);
+            let source = job.read(fetcher, attributes, matrices, is_flat);
             // A frustum is for opacities that it was told of.
             let wider;
             let mut frustum = &*job.frustum;
@@ -386,7 +406,8 @@ impl GaussianSet {
                 }
             }
             let placed;
-            let mut bounds = skips.has(Skip::Bounds).then_some(frustum);
+            let mut bounds =
+                (skips.has(Skip::Bounds) && is_bounded(&begin.state)).then_some(frustum);
             if let Some(matrices) = source.matrices {
                 // What is yet to be placed in the world by the same matrix sees the planes where they are for it.
                 let uniform = bounds.and(matrices.uniform());
@@ -415,6 +436,11 @@ impl GaussianSet {
     }
 }
 
+/// Whether chunks' and the frustum's bounds hold: they are made for volumes in binary32.
+fn is_bounded(state: &GaussianState) -> bool {
+    state.geometry == GaussianGeometry::Volume && state.precision == GaussianPrecision::Float32
+}
+
 /// A batch to project.
 #[derive(Clone)]
 struct Job<'a> {
@@ -440,6 +466,7 @@ impl<'a> Job<'a> {
         fetcher: &mut Fetcher,
         attributes: &'b mut Attributes,
         matrices: &'b mut Option<Box<Matrices>>,
+        is_flat: bool,
     ) -> Source<'b> {
         let streams = &self.append.attributes;
         match self.part {
@@ -447,6 +474,9 @@ impl<'a> Job<'a> {
                 let len = (self.append.count - start).min(BATCH as u32) as usize;
                 let batch = Batch::new(self.append, self.instance, start, len);
                 fetcher.read_all(streams, &batch, attributes);
+                if is_flat {
+                    attributes.scale[2][..len].fill(0.0);
+                }
                 let matrices = streams.model.matrix.as_ref().map(|rows| {
                     let matrices = matrices.get_or_insert_default();
                     matrices.read(fetcher, rows, &batch);
@@ -516,7 +546,22 @@ impl GaussianDraw {
     /// Bytes of host memory that it holds while it waits to be rendered.
     pub fn memory_bytes(&self) -> u64 {
         let splats = self.splats.iter().map(|batch| size_of_val(&**batch) as u64);
-        splats.sum::<u64>() + self.tiles.memory_bytes()
+        let depths = self.ray_depths.iter().flat_map(|(depths, _)| depths);
+        let depths = depths.map(|batch| size_of_val(&**batch) as u64);
+        let surfels = self.surfels.iter().flatten();
+        let surfels = surfels.map(|batch| size_of_val(&**batch) as u64);
+        splats.sum::<u64>() + depths.sum::<u64>() + surfels.sum::<u64>() + self.tiles.memory_bytes()
+    }
+
+    /// What the splats are, if they are 2D Gaussians.
+    pub(crate) fn surfels(&self) -> Option<&[Vec<Surfel>]> {
+        self.surfels.as_deref()
+    }
+
+    /// What pixels sort by, if each does so for itself.
+    pub(crate) fn ray_depths(&self) -> Option<RayDepths<'_>> {
+        let (of, rays) = self.ray_depths.as_ref()?;
+        Some(RayDepths { of, rays: *rays })
     }
 
     /// Whether it may touch a pixel of `rect`.

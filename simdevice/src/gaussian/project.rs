@@ -13,13 +13,15 @@ use super::instances::Matrices;
 use super::lanes::{Bits, F32_LANES, Lanes, log2};
 use super::linearize;
 use super::panorama;
+use super::rays::{self, RayDepth};
 use super::scratch::{Attributes, Flat, Scratch};
 use super::sort::ordered_bits;
 use super::spherical_harmonics;
+use super::surfel::{Placed, Surfel};
 use crate::counters::{Counter, Counters};
 use crate::packet::{
-    Camera, CameraModel, GaussianAttributes, GaussianLinearization, GaussianOrder, GaussianState,
-    Viewport,
+    Camera, CameraModel, GaussianAttributes, GaussianGeometry, GaussianLinearization,
+    GaussianOrder, GaussianPrecision, GaussianState, Viewport,
 };
 use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, prelude::*};
@@ -78,6 +80,24 @@ fn is_steep(factor: [f64; 3], log2_opacity: f64) -> bool {
     largest > STEEP_FACTOR || log2_opacity > STEEP_LOG2_OPACITY
 }
 
+/// The least factor, in 1/px, whose binary16 value is as exact as that of others.
+const LEAST_HALF_FACTOR: f64 = 1.0 / 16384.0;
+
+/// How far, in units of `u^2 + v^2`, what is rasterized in binary16 reaches where exact arithmetic reaches `room`.
+///
+/// With a unit roundoff of 2^-11, `u` and the two terms of `v` err by three units each, and `v` by one more. The terms of
+/// `v` are at most `|v| + 2 |factor[1] / factor[0]| |u|`, so that needles, where they cancel, err most. Sums, exponent,
+/// logarithm, power and floor add less than a quarter.
+pub(crate) fn half_room(factor: [f64; 3], room: f64) -> f64 {
+    const UNIT: f64 = 1.0 / 2048.0;
+    let [a, b, c] = factor.map(f64::abs);
+    if !(a.min(c) >= LEAST_HALF_FACTOR) {
+        return f64::INFINITY;
+    }
+    let stretch = 1.0 + 8.0 * UNIT * (1.0 + b / a);
+    (room + 0.25 + 0.02 * room.abs()) * stretch * stretch
+}
+
 /// Gaussians whose spherical harmonics are read together.
 const GROUP: usize = 16;
 
@@ -88,6 +108,10 @@ pub(crate) struct Projected {
     pub splats: Vec<Splat>,
     /// The depth key of each, and its place in the set, which decides between equal keys.
     pub keys: Vec<[u32; 2]>,
+    /// What each is sorted by at a pixel, in the per-pixel order.
+    pub ray_depths: Vec<RayDepth>,
+    /// What each is on the screen, if they are 2D Gaussians.
+    pub surfels: Vec<Surfel>,
     /// The tiles of each.
     pub reaches: Vec<Reach>,
     /// The tiles of those that reach many.
@@ -112,6 +136,8 @@ pub(crate) struct Projection {
     /// Whether covariances are those of projected points.
     pub(super) unscented: bool,
     pub(super) order: GaussianOrder,
+    pub(super) geometry: GaussianGeometry,
+    pub(super) precision: GaussianPrecision,
     pub(super) rotation: [f64; 9],
     pub(super) eye: [f64; 3],
     pub(super) focal: [f64; 2],
@@ -177,6 +203,8 @@ impl Projection {
             model: camera.model,
             unscented: state.linearization == GaussianLinearization::Unscented,
             order: state.order,
+            geometry: state.geometry,
+            precision: state.precision,
             rotation: camera.rotation.map(f64::from),
             eye: camera.eye,
             focal,
@@ -304,9 +332,54 @@ impl Projection {
                 let [x, y, z] = &*scratch.offset;
                 (x[at] * x[at] + y[at] * y[at] + z[at] * z[at]).sqrt()
             }
-            GaussianOrder::Primitive => return sequence,
+            // Pixels sort later, and take the order of the draw for equal depths.
+            GaussianOrder::Primitive | GaussianOrder::PerPixel => return sequence,
         };
         ordered_bits(depth as f32)
+    }
+
+    /// What a kept lane is sorted by at a pixel.
+    fn ray_depth(&self, at: usize, scratch: &Scratch) -> RayDepth {
+        let [w, x, y, z] = &*scratch.rotation;
+        let [sx, sy, sz] = &*scratch.scale;
+        let [dx, dy, dz] = &*scratch.offset;
+        RayDepth::new(
+            &self.rotation,
+            [w[at], x[at], y[at], z[at]],
+            [sx[at], sy[at], sz[at]],
+            [dx[at], dy[at], dz[at]],
+        )
+    }
+
+    /// A kept lane as a 2D Gaussian, and the tiles that it reaches, if there are any.
+    fn surfel(
+        &self,
+        at: usize,
+        scratch: &Scratch,
+        spans: &mut Vec<Span>,
+    ) -> (Surfel, Option<Reach>) {
+        let [w, x, y, z] = &*scratch.rotation;
+        let axes = rays::axes([w[at], x[at], y[at], z[at]]);
+        let r = &self.rotation;
+        let placed = |axis: usize| {
+            let [x, y, z] = axes[axis].map(|c| c * scratch.scale[axis][at]);
+            [0, 1, 2].map(|row| x * r[3 * row] + y * r[3 * row + 1] + z * r[3 * row + 2])
+        };
+        let [x, y, z] = &*scratch.camera;
+        let mut surfel = Surfel::new(&Placed {
+            model: self.model,
+            focal: self.focal,
+            near: self.near.into(),
+            axes: [placed(0), placed(1)],
+            centre: [x[at], y[at], z[at]],
+        });
+        let flat = &*scratch.flat;
+        // As wide as for volumes: see there.
+        let room = flat.log2_opacity[at] - self.log2_floor;
+        let extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+        let mean = [flat.mean[0][at], flat.mean[1][at]];
+        let reach = surfel.reach(mean, (extent, self.low_pass), &self.visible, spans);
+        (surfel, reach)
     }
 
     /// Finds the place of the kept Gaussians in camera space.
@@ -497,7 +570,15 @@ impl Projection {
         // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
         // pixel that it would accept. What cannot reach the floor even so has a negative extent.
         let room = log2_opacity - self.log2_floor;
-        let extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+        let mut extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+        if self.precision == GaussianPrecision::Float16 {
+            for lane in at..at + S::f64s::LEN {
+                let factor = [0, 1, 2].map(|element| flat.factor[element][lane]);
+                let room = flat.log2_opacity[lane] - self.log2_floor;
+                flat.half[0][lane] = half_room(factor, room) * (2.0 * LN_2);
+            }
+            extent = S::f64s::from_slice(simd, &flat.half[0][at..at + S::f64s::LEN]);
+        }
         let half_x = (a * extent).sqrt();
         store(half_x, &mut flat.half[0]);
         store((c * extent).sqrt(), &mut flat.half[1]);
@@ -516,7 +597,9 @@ impl Projection {
             Some(Counter::SkippedNear)
         } else if z >= self.far {
             Some(Counter::SkippedFar)
-        } else if !(determinant > 0.0 && determinant.is_finite()) {
+        } else if self.geometry == GaussianGeometry::Volume
+            && !(determinant > 0.0 && determinant.is_finite())
+        {
             Some(Counter::SkippedDegenerate)
         } else {
             None
@@ -529,9 +612,17 @@ impl Projection {
         let mut beside = self.skips.has(Skip::Ellipse).then_some(0);
         scratch.reached.clear();
         scratch.copies.clear();
+        let is_flat = self.geometry == GaussianGeometry::Surfel;
         for at in 0..scratch.lanes.len().min(BATCH) {
             if let Some(reason) = self.why_skipped(at, scratch) {
                 out.counters.add(reason, 1);
+                continue;
+            }
+            if is_flat {
+                match self.surfel(at, scratch, &mut out.spans).1 {
+                    Some(reach) => scratch.reached.push((at, reach)),
+                    None => out.counters.add(Counter::SkippedOffScreen, 1),
+                }
                 continue;
             }
             let flat = &*scratch.flat;
@@ -612,6 +703,13 @@ impl Projection {
                 out.reaches.push(reach);
                 if let Some(period) = self.period {
                     panorama::copy_last(at, period, &mut copies, out);
+                }
+                if self.geometry == GaussianGeometry::Surfel {
+                    let (surfel, _) = self.surfel(at, scratch, &mut Vec::new());
+                    out.surfels.push(surfel);
+                }
+                if self.order == GaussianOrder::PerPixel {
+                    out.ray_depths.push(self.ray_depth(at, scratch));
                 }
             }
         }

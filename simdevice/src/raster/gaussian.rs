@@ -15,9 +15,12 @@
 //! A draw that tests depth leaves out, pixel by pixel, the Gaussians whose centre fails against what was stored before
 //! the draw ([`passing`]). What the tests of a whole draw do to a tile's samples is said in [`tile_draw`].
 
+mod by_block;
 mod exp2;
+mod half;
 mod layer;
 mod passing;
+mod per_pixel;
 pub mod resolve;
 pub(crate) mod tile_draw;
 
@@ -29,10 +32,12 @@ use crate::gaussian::project::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
+use by_block::TileMode;
 use exp2::exp2;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 use layer::{Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
+use per_pixel::PerPixel;
 
 const TILE: usize = TILE_SIZE as usize;
 /// Pixels of a block, which are the lanes of a vector.
@@ -56,6 +61,9 @@ pub struct GaussianTile {
     passing: Passing,
     chunk: [Record; CHUNK],
     items: [u32; CHUNK * BLOCKS + LANES],
+    /// What may reach each block, where a mode parts lists so.
+    lists: [Vec<u32>; BLOCKS],
+    per_pixel: PerPixel,
 }
 
 /// What the kernel does about depth; a constant, so that what isn't done costs nothing.
@@ -115,6 +123,8 @@ impl Default for GaussianTile {
             passing: Passing::default(),
             chunk: [Record::default(); CHUNK],
             items: [0; CHUNK * BLOCKS + LANES],
+            lists: Default::default(),
+            per_pixel: PerPixel::default(),
         }
     }
 }
@@ -158,6 +168,7 @@ impl GaussianTile {
         let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
         let task = Task {
             splats: &draw.splats,
+            mode: TileMode::of(draw),
             list,
             skips: draw.skips,
             trend: draw.depth_trend,
@@ -166,8 +177,11 @@ impl GaussianTile {
             thresholds: Thresholds::new(draw),
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
-        let work = dispatch!(level, simd =>
-            self.composite::<_, DEPTH>(simd, &task, layer, runs.as_mut()));
+        let work = match task.mode {
+            TileMode::Fast => dispatch!(level, simd =>
+                self.composite::<_, DEPTH>(simd, &task, layer, runs.as_mut())),
+            _ => self.composite_by_block::<DEPTH>(level, &task, layer, runs.as_mut()),
+        };
         if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
             let outside = TILE_SIZE * TILE_SIZE - count(lanes);
             record.add(TileWork {
@@ -204,6 +218,7 @@ impl GaussianTile {
         self.layers[LAYER].clear(lanes);
         let task = Task {
             splats: &draw.splats,
+            mode: TileMode::of(draw).in_list_order(),
             list: draw.tiles.list(tile_x, tile_y),
             skips: Skips::ALL,
             trend: Trend::None,
@@ -215,7 +230,14 @@ impl GaussianTile {
                 ..Thresholds::new(draw)
             },
         };
-        dispatch!(level, simd => self.composite::<_, NO_DEPTH>(simd, &task, LAYER, None));
+        match task.mode {
+            TileMode::Fast => {
+                dispatch!(level, simd => self.composite::<_, NO_DEPTH>(simd, &task, LAYER, None));
+            }
+            _ => {
+                self.composite_by_block::<NO_DEPTH>(level, &task, LAYER, None);
+            }
+        }
         let finished = self.layers[LAYER].finished();
         std::array::from_fn(|block| finished[block] & lanes[block])
     }
@@ -381,30 +403,9 @@ impl Layer {
         passing: &Passing,
         task: &Task<'_>,
     ) -> u64 {
-        let [a, b, c] = splat.factor;
-        let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
-        let (from_x, from_y) = (from_mean(0), from_mean(1));
-        let opacity = f64x8::splat(simd, splat.log2_opacity.into());
-        // What is wider than the period of a panorama counts where it is nearer than its copies.
-        let half_period = if splat.wide {
-            task.half_period
-        } else {
-            f64::INFINITY
-        };
-        let within = f64x8::splat(simd, half_period);
-        let nothing = f64x8::splat(simd, -1e3);
         let mut contributions = 0;
         for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
-            let middle = [BLOCK_X[block] + from_x, BLOCK_Y[block] + from_y];
-            let exponent = |first: usize| {
-                let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
-                let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
-                let (u, v) = (dx * a, dx * b + dy * c);
-                let exponent = opacity - (u * u + v * v);
-                let inside = dx.simd_ge(-within) & dx.simd_lt(within);
-                inside.select(exponent, nothing)
-            };
-            let exponent: f32x16<S> = exponent(0).narrow(exponent(8));
+            let exponent = exponents_64(simd, splat, task, block);
             let look = (splat.color, splat.depth);
             contributions +=
                 self.accumulate::<_, DEPTH>(simd, block, exponent, look, passing, task.thresholds);
@@ -466,9 +467,37 @@ impl Layer {
     }
 }
 
+/// The exponents of a Gaussian's alpha at a block's pixels, formed in binary64.
+///
+/// What is wider than the period of a panorama counts where it is nearer than its copies.
+#[inline(always)]
+fn exponents_64<S: Simd>(simd: S, splat: &Splat, task: &Task<'_>, block: usize) -> f32x16<S> {
+    let [a, b, c] = splat.factor;
+    let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
+    let opacity = f64x8::splat(simd, splat.log2_opacity.into());
+    let half_period = if splat.wide {
+        task.half_period
+    } else {
+        f64::INFINITY
+    };
+    let within = f64x8::splat(simd, half_period);
+    let nothing = f64x8::splat(simd, -1e3);
+    let middle = [BLOCK_X[block] + from_mean(0), BLOCK_Y[block] + from_mean(1)];
+    let exponent = |first: usize| {
+        let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
+        let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
+        let (u, v) = (dx * a, dx * b + dy * c);
+        let exponent = opacity - (u * u + v * v);
+        let inside = dx.simd_ge(-within) & dx.simd_lt(within);
+        inside.select(exponent, nothing)
+    };
+    exponent(0).narrow(exponent(8))
+}
+
 /// What a tile's Gaussians are.
 struct Task<'a> {
     splats: &'a [Vec<Splat>],
+    mode: TileMode<'a>,
     list: &'a [u32],
     /// What is left out.
     skips: Skips,

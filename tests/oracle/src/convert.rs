@@ -2,10 +2,11 @@
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 
-use crate::oracle::{OracleCamera, OracleModel, OracleOrder, OracleState};
+use crate::oracle::{OracleCamera, OracleGeometry, OracleModel, OracleOrder, OracleState};
 
 impl OracleCamera {
     /// The camera of a draw and its viewport's width and height, or `None` if the oracle lacks its
@@ -60,9 +61,14 @@ impl From<&PipelineGaussianStateCreateInfoGAURAST<'_>> for OracleState {
             opacity_compensated: info.antialiasing
                 == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
             unscented: info.linearization == GaussianLinearizationGAURAST::UNSCENTED,
+            geometry: match info.geometry {
+                GaussianGeometryGAURAST::GAUSSIAN_2D => OracleGeometry::Surfel,
+                _ => OracleGeometry::Volume,
+            },
             order: match info.order {
                 GaussianOrderGAURAST::RADIAL_DISTANCE => OracleOrder::RadialDistance,
                 GaussianOrderGAURAST::PRIMITIVE => OracleOrder::Primitive,
+                GaussianOrderGAURAST::PER_PIXEL => OracleOrder::PerPixel,
                 _ => OracleOrder::ViewDepth,
             },
         }

@@ -21,7 +21,9 @@ use gaurast::vk::{
     PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::packet::draw::DrawState;
-use simdevice::packet::{GaussianLinearization, GaussianOrder, GaussianState};
+use simdevice::packet::{
+    GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
+};
 use std::sync::Arc;
 
 /// The greatest degree of spherical harmonics that a pipeline may ask for.
@@ -44,6 +46,7 @@ impl GaussianPipeline {
                 ),
             ));
         };
+        validate_combinations(info, gaussian)?;
         validate_stages(info, gaussian, features)?;
         validate_modes(gaussian, features)?;
         validate_values(gaussian)?;
@@ -101,9 +104,13 @@ fn source(
     let degree = gaussian.spherical_harmonics_degree;
     let coefficients = (degree + 1) * (degree + 1);
     let first = locations.first_spherical_harmonics;
+    let scales = match gaussian.geometry {
+        GaussianGeometryGAURAST::GAUSSIAN_2D => 2,
+        _ => 3,
+    };
     Ok(GaussianSource::Attributes(GaussianAttributeSources {
         position: attribute(info, "position", locations.position, 3)?,
-        scale: attribute(info, "scale", locations.scale, 3)?,
+        scale: attribute(info, "scale", locations.scale, scales)?,
         rotation: attribute(info, "rotation", locations.rotation, 4)?,
         opacity: attribute(info, "opacity", locations.opacity, 1)?,
         spherical_harmonics: (0..coefficients)
@@ -183,18 +190,30 @@ fn state(
             GaussianOrder::Primitive
         }
         GaussianOrderGAURAST::PER_PIXEL => {
-            return Err(not_enabled(PER_PIXEL_ORDER, "order is PER_PIXEL"));
+            require(features, PER_PIXEL_ORDER, "order is PER_PIXEL")?;
+            GaussianOrder::PerPixel
         }
         other => return Err(unknown("order", &other)),
     };
     Ok(GaussianState {
+        precision: match gaussian.precision {
+            GaussianPrecisionGAURAST::FLOAT16 => GaussianPrecision::Float16,
+            _ => GaussianPrecision::Float32,
+        },
+        // What a vertex shader projects has neither.
+        geometry: match gaussian.geometry {
+            GaussianGeometryGAURAST::GAUSSIAN_2D if !is_shaded(gaussian) => GaussianGeometry::Surfel,
+            _ => GaussianGeometry::Volume,
+        },
         sh_degree: if is_shaded(gaussian) {
             0
         } else {
             gaussian.spherical_harmonics_degree
         },
         linearization: match gaussian.linearization {
-            GaussianLinearizationGAURAST::UNSCENTED => GaussianLinearization::Unscented,
+            GaussianLinearizationGAURAST::UNSCENTED if !is_shaded(gaussian) => {
+                GaussianLinearization::Unscented
+            }
             _ => GaussianLinearization::Jacobian,
         },
         order,
@@ -209,6 +228,61 @@ fn state(
         blend: fragments.blend,
         blend_constants: fragments.blend_constants,
     })
+}
+
+/// Refuses modes that mean nothing together.
+fn validate_combinations(
+    info: &GraphicsPipelineInfo,
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+) -> Result<(), Error> {
+    let broken = |id: &'static str, what: &str| Err(Error::usage(id, format!("{STRUCTURE}: {what}")));
+    let shaded = is_shaded(gaussian);
+    let per_pixel = gaussian.order == GaussianOrderGAURAST::PER_PIXEL;
+    let flat = gaussian.geometry == GaussianGeometryGAURAST::GAUSSIAN_2D;
+    let half = gaussian.precision == GaussianPrecisionGAURAST::FLOAT16;
+    let placed =
+        gaussian.attribute_locations.first_model_matrix != GAUSSIAN_LOCATION_UNUSED_GAURAST;
+    if per_pixel && shaded {
+        return broken(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-projectionMode",
+            "order is PER_PIXEL, but projectionMode is VERTEX_SHADER, whose Gaussians have no depth along a ray",
+        );
+    }
+    if !shaded && placed && (per_pixel || flat) {
+        return broken(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-modes",
+            "firstModelMatrix is used, but order is PER_PIXEL or geometry is GAUSSIAN_2D",
+        );
+    }
+    if !shaded && flat && gaussian.linearization != GaussianLinearizationGAURAST::JACOBIAN {
+        return broken(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-linearization",
+            "linearization is not JACOBIAN, but geometry is GAUSSIAN_2D, which is not linearized",
+        );
+    }
+    if flat && gaussian.antialiasing == GaussianAntialiasingGAURAST::OPACITY_COMPENSATED {
+        return broken(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-antialiasing",
+            "antialiasing is OPACITY_COMPENSATED, but geometry is GAUSSIAN_2D, which is not dilated",
+        );
+    }
+    if half && (flat || per_pixel || shaded) {
+        return broken(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-precision-modes",
+            "precision is FLOAT16, but geometry is GAUSSIAN_2D, order is PER_PIXEL or projectionMode is \
+             VERTEX_SHADER, which are for FLOAT32",
+        );
+    }
+    let reads_depth = has_fragment_stage(info)
+        && gaussian.resolve_input_locations.depth != GAUSSIAN_LOCATION_UNUSED_GAURAST;
+    if reads_depth && (half || per_pixel) {
+        return broken(
+            "VUID-VkGaussianResolveInputLocationsGAURAST-depth-modes",
+            "a fragment stage has depths for an input, but precision is FLOAT16 or order is PER_PIXEL, which \
+             accumulate none",
+        );
+    }
+    Ok(())
 }
 
 fn validate_stages(
@@ -276,7 +350,7 @@ fn validate_projection(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Res
     match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_3D => {}
         GaussianGeometryGAURAST::GAUSSIAN_2D => {
-            return Err(not_enabled(GAUSSIAN_2D, "geometry is GAUSSIAN_2D"));
+            require(features, GAUSSIAN_2D, "geometry is GAUSSIAN_2D")?;
         }
         other => return Err(unknown("geometry", &other)),
     }
@@ -300,7 +374,7 @@ fn validate_modes(
     match gaussian.precision {
         GaussianPrecisionGAURAST::FLOAT32 => {}
         GaussianPrecisionGAURAST::FLOAT16 => {
-            return Err(not_enabled(RASTERIZATION_FLOAT16, "precision is FLOAT16"));
+            require(features, RASTERIZATION_FLOAT16, "precision is FLOAT16")?;
         }
         other => return Err(unknown("precision", &other)),
     }

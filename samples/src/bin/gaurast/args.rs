@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use gaurast_samples::renderer::{Geometry, Order, Precision};
 use gaurast_samples::scene::{self, MAX_SH_DEGREE};
 
 use crate::bench::BenchArguments;
@@ -112,6 +113,18 @@ pub struct RenderArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=i64::from(MAX_SH_DEGREE)))]
     pub sh_degree: Option<u32>,
 
+    /// What the Gaussians are sorted by
+    #[arg(long, value_enum, default_value_t)]
+    pub order: Order,
+
+    /// What the Gaussians are
+    #[arg(long, value_enum, default_value_t)]
+    pub geometry: Geometry,
+
+    /// The rasterizer's arithmetic
+    #[arg(long, value_enum, default_value_t)]
+    pub precision: Precision,
+
     /// Count also what the simulated hardware would spend: cycles, stalls, energy
     ///
     /// `gaurast simulate` tells more, of any hardware.
@@ -157,6 +170,9 @@ impl Default for RenderArguments {
             size: None,
             background: None,
             sh_degree: None,
+            order: Order::default(),
+            geometry: Geometry::default(),
+            precision: Precision::default(),
             counters: false,
             quiet: false,
             output: vec![DEFAULT_OUTPUT.into()],

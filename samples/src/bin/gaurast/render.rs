@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use gaurast_samples::camera::{self, Camera, CameraError, CameraFileError, DEFAULT_FOV};
 use gaurast_samples::output::{self, OutputError};
-use gaurast_samples::renderer::{RenderError, Renderer};
-use gaurast_samples::scene::{DEFAULT_COUNT, Scene, SceneError};
+use gaurast_samples::renderer::{RenderError, Renderer, Settings};
+use gaurast_samples::scene::{DEFAULT_COUNT, MAX_SH_DEGREE, Scene, SceneError};
 use thiserror::Error;
 
 use crate::args::{CameraModel, RenderArguments};
@@ -78,7 +78,15 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     if arguments.counters {
         renderer.count_everything()?;
     }
-    let uploaded = renderer.upload(&scene, arguments.sh_degree)?;
+    let mut uploaded = renderer.upload(&scene, arguments.sh_degree)?;
+    let settings = Settings {
+        sh_degree: arguments.sh_degree.unwrap_or(MAX_SH_DEGREE),
+        order: arguments.order,
+        geometry: arguments.geometry,
+        precision: arguments.precision,
+        ..Settings::default()
+    };
+    renderer.set(&mut uploaded, settings)?;
     let frame = renderer.render(&uploaded, &camera)?;
     step.finish_and_clear();
 

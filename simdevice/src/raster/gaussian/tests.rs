@@ -1,3 +1,5 @@
+mod half;
+mod per_pixel;
 mod whole_draws;
 
 use super::exp2::POWER_OF_TWO;
@@ -189,6 +191,12 @@ fn naive_sample(
         let p = POWER_OF_TWO.iter().fold(0.0, |p, &c| mul_add(p, f, c));
         f32::from_bits(p.to_bits().wrapping_add_signed((n as i32) << 23))
     };
+    if draw.state.precision == GaussianPrecision::Float16 {
+        return half::naive_sample(draw, tile, [x, y], passes);
+    }
+    if draw.ray_depths().is_some() {
+        return per_pixel::naive_sample(draw, tile, [x, y], power, passes);
+    }
     let state = &draw.state;
     let corner = tile.map(|tile| tile * TILE_SIZE);
     let (mut c, mut t, mut covered) = ([0.0f32; 3], 1.0f32, false);

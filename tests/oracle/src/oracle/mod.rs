@@ -30,6 +30,9 @@
 //! A third one, `T >= 1/2`, says which Gaussian is a pixel's median; nothing else follows from it, so a pixel
 //! simply has every median that it may have.
 //!
+//! In the per-pixel order, neighbours whose depths along the ray may round either way are followed in both orders
+//! ([`rays`]).
+//!
 //! Three more decisions exist and are not followed both ways:
 //! - the depth key is `t.z` rounded to binary32. Where the binary64 value lies within its own
 //!   rounding error of the middle between two binary32 values, the key could be either; that
@@ -45,11 +48,13 @@ mod instance;
 mod panorama;
 pub mod pixel;
 pub mod project;
+pub mod rays;
 mod render;
 pub mod resolve;
 pub mod sample_tests;
 pub mod shaded;
 pub mod spherical_harmonics;
+pub mod surfel;
 mod unscented;
 
 #[cfg(test)]
@@ -146,6 +151,16 @@ pub enum OracleModel {
     Equirectangular,
 }
 
+/// What a Gaussian is in space.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OracleGeometry {
+    /// A volume.
+    #[default]
+    Volume,
+    /// A flat disc; the third scale is not read.
+    Surfel,
+}
+
 /// What Gaussians are sorted by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OracleOrder {
@@ -156,6 +171,8 @@ pub enum OracleOrder {
     RadialDistance,
     /// The order of the draw.
     Primitive,
+    /// At each pixel, the depth at which a Gaussian is greatest on the pixel's ray.
+    PerPixel,
 }
 
 /// A camera and the viewport that it fills, as `VkGaussianCameraGAURAST` holds them.
@@ -196,6 +213,8 @@ pub struct OracleState {
     pub opacity_compensated: bool,
     /// Whether Gaussians are projected by the unscented transform.
     pub unscented: bool,
+    /// What Gaussians are.
+    pub geometry: OracleGeometry,
     /// What Gaussians are sorted by.
     pub order: OracleOrder,
 }
@@ -209,6 +228,7 @@ impl Default for OracleState {
             transmittance_floor: 1e-4,
             opacity_compensated: false,
             unscented: false,
+            geometry: OracleGeometry::Volume,
             order: OracleOrder::ViewDepth,
         }
     }

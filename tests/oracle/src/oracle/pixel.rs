@@ -34,9 +34,15 @@ impl Splat {
             return Alpha::NOTHING;
         };
         let d = [dx, f64::from(y) + 0.5 - self.mean[1]];
-        let (q, w) = self.cholesky.solve(d);
+        let (q, relative) = match &self.surfel {
+            Some(surfel) => surfel.distance([f64::from(x) + 0.5, f64::from(y) + 0.5]),
+            None => {
+                let (q, w) = self.cholesky.solve(d);
+                (q, self.error.alpha(w, q))
+            }
+        };
         let unclamped = self.opacity * (-0.5 * q).exp();
-        let error = unclamped * self.error.alpha(w, q);
+        let error = unclamped * relative;
         let ceiling = f64::from(state.alpha_ceiling);
         if unclamped - error > ceiling {
             Alpha {
@@ -191,6 +197,18 @@ impl Pixel {
         }
         self.exhausted |= step.exhausted;
         self.alternatives.append(&mut step.forks);
+    }
+
+    /// Takes all ways of a pixel that came about in another order.
+    pub(super) fn take_ways_of(&mut self, other: Self) {
+        self.alternatives.push(other.nominal);
+        self.alternatives.extend(other.alternatives);
+        self.exhausted |= other.exhausted;
+    }
+
+    /// Notes that there are ways which were not followed.
+    pub(super) fn exhaust(&mut self) {
+        self.exhausted = true;
     }
 
     /// What binary64 says: (C, 1 - T).

@@ -1,12 +1,15 @@
 //! Steps 1 to 5: from a Gaussian in world space to the numbers that a pixel needs.
 
-use super::error_model::ErrorModel;
+use super::error_model::{self, ErrorModel};
 use super::instance::Model;
 use super::panorama;
+use super::rays::OwnAxes;
 use super::spherical_harmonics;
+use super::surfel::Surfel;
 use super::unscented;
 use super::{
-    OracleCamera, OracleInstance, OracleModel, OracleOrder, OracleScene, OracleState, SkipReason,
+    OracleCamera, OracleGeometry, OracleInstance, OracleModel, OracleOrder, OracleScene,
+    OracleState, SkipReason,
 };
 
 /// A Gaussian as the pixels see it.
@@ -32,6 +35,10 @@ pub struct Splat {
     pub z: f32,
     /// The depth of its centre, of which a pixel has a mean; zero until somebody asks for that.
     pub depth: f64,
+    /// What it is in space, if that is a disc.
+    pub surfel: Option<Surfel>,
+    /// What its depth along rays comes from.
+    pub own_axes: OwnAxes,
     /// Whether the key is within its own error of the middle between two keys.
     pub key_undecidable: bool,
     /// How far a binary32 implementation may err on this Gaussian.
@@ -104,12 +111,12 @@ pub fn project(
     let sort_by = match state.order {
         OracleOrder::ViewDepth => depth,
         OracleOrder::RadialDistance => length(offset),
-        OracleOrder::Primitive => 0.0,
+        OracleOrder::Primitive | OracleOrder::PerPixel => 0.0,
     };
 
     // Step 3. The mean and the Jacobian of the projection.
     let (mut mean, jacobian) = mean_and_jacobian(camera, t);
-    let scale = scene.scales[index].map(f64::from);
+    let scale = scales(scene, state, index).map(f64::from);
     let axes = rotation_matrix(scene.rotations[index].map(f64::from));
     let m = jacobian.map(|row| {
         let in_world = multiply_row(row, &rotation);
@@ -146,7 +153,9 @@ pub fn project(
     let sum = |i: usize, j: usize| columns.iter().map(|c| c[i] * c[j]).sum::<f64>();
     let (s_xx, s_xy, s_yy) = (sum(0, 0), sum(0, 1), sum(1, 1));
     let determinant = area * area + low_pass * (s_xx + s_yy) + low_pass * low_pass;
-    if !(determinant > 0.0 && determinant.is_finite() && model.is_regular()) {
+    let is_flat = state.geometry == OracleGeometry::Surfel;
+    let is_regular = determinant > 0.0 && determinant.is_finite() && model.is_regular();
+    if !is_flat && !is_regular {
         return Err(SkipReason::DegenerateCovariance);
     }
     let covariance = [s_xx + low_pass, s_xy, s_yy + low_pass];
@@ -182,7 +191,19 @@ pub fn project(
         key: sort_by as f32,
         z,
         depth: 0.0,
-        key_undecidable: state.order != OracleOrder::Primitive
+        surfel: is_flat.then(|| Surfel {
+            camera: *camera,
+            axes: [0, 1].map(|axis| {
+                let own = [axes[axis], axes[3 + axis], axes[6 + axis]];
+                transform(&rotation, own.map(|c| c * scale[axis]))
+            }),
+            centre: t,
+            mean,
+            low_pass,
+            fixed: error_model::FIXED + 2.0 * opacity.max(f64::MIN_POSITIVE).log2().abs(),
+        }),
+        own_axes: OwnAxes::new(&axes, scale, offset),
+        key_undecidable: !matches!(state.order, OracleOrder::Primitive | OracleOrder::PerPixel)
             && key_is_undecidable(&rotation, offset, lost, sort_by),
         error: ErrorModel::new(spread, opacity, area_for_opacity),
     })
@@ -200,13 +221,22 @@ fn area(columns: &[[f64; 2]]) -> f64 {
     sum.sqrt()
 }
 
+/// The scales that are read.
+fn scales(scene: &OracleScene, state: &OracleState, index: usize) -> [f32; 3] {
+    let [x, y, z] = scene.scales[index];
+    match state.geometry {
+        OracleGeometry::Volume => [x, y, z],
+        OracleGeometry::Surfel => [x, y, 0.0],
+    }
+}
+
 /// Step 1: what is known without a camera.
 fn check_attributes(
     scene: &OracleScene,
     state: &OracleState,
     index: usize,
 ) -> Result<(), SkipReason> {
-    let (scale, quaternion) = (scene.scales[index], scene.rotations[index]);
+    let (scale, quaternion) = (scales(scene, state, index), scene.rotations[index]);
     let opacity = scene.opacity(index);
     let matrix = scene.instance(index).matrix;
     let finite = scene.positions[index].iter().all(|c| c.is_finite())

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::pixel::Pixel;
 use super::project::{Splat, project};
-use super::{OracleCamera, OracleScene, OracleState, SkipCounts, SkipReason};
+use super::rays;
+use super::{OracleCamera, OracleOrder, OracleScene, OracleState, SkipCounts, SkipReason};
 
 /// How far beyond the ellipse on which alpha reaches its floor [`render_bounded`] looks, in px.
 /// It covers the rounding of the bound itself.
@@ -87,6 +88,9 @@ pub fn render_literal(
     state: &OracleState,
 ) -> Reference {
     let projected = Projected::new(scene, camera, state);
+    if state.order == OracleOrder::PerPixel {
+        return render_per_pixel(camera, state, &projected, |_, _| 0..camera.width);
+    }
     let rows = (0..camera.height).map(|y| {
         let mut row = vec![Pixel::EMPTY; camera.width as usize];
         for (x, pixel) in (0..).zip(&mut row) {
@@ -112,6 +116,16 @@ pub fn render_bounded(
     state: &OracleState,
 ) -> Reference {
     let projected = Projected::new(scene, camera, state);
+    if state.order == OracleOrder::PerPixel {
+        let bounds = bounds(&projected, state);
+        return render_per_pixel(camera, state, &projected, |index, y| {
+            if bounds[index].rows(camera.height).contains(&y) {
+                bounds[index].columns(y, camera.width)
+            } else {
+                0..0
+            }
+        });
+    }
     bounded(&projected, [camera.width, camera.height], state)
 }
 
@@ -121,17 +135,19 @@ pub(super) fn bounded(projected: &Projected, size: [u32; 2], state: &OracleState
     collect(size, projected, || rows.iter().flatten())
 }
 
+/// Where each splat's alpha can reach the floor.
+fn bounds(projected: &Projected, state: &OracleState) -> Vec<Bound> {
+    let splats = projected.splats.iter();
+    splats.map(|splat| Bound::new(splat, state)).collect()
+}
+
 /// The rows of pixels that [`bounded`] draws.
 pub(super) fn bounded_pixels(
     projected: &Projected,
     [width, height]: [u32; 2],
     state: &OracleState,
 ) -> Vec<Vec<Pixel>> {
-    let bounds: Vec<Bound> = projected
-        .splats
-        .iter()
-        .map(|splat| Bound::new(splat, state))
-        .collect();
+    let bounds = bounds(projected, state);
     let mut members = vec![Vec::new(); height as usize];
     for (index, bound) in bounds.iter().enumerate() {
         for y in bound.rows(height) {
@@ -156,6 +172,38 @@ pub(super) fn bounded_pixels(
             row
         })
         .collect()
+}
+
+/// Draws in the per-pixel order: every Gaussian, by its index, in those columns of a row that it may reach.
+fn render_per_pixel(
+    camera: &OracleCamera,
+    state: &OracleState,
+    projected: &Projected,
+    columns: impl Fn(usize, u32) -> Range<u32> + Sync,
+) -> Reference {
+    let row = |y: u32| {
+        let mut row = vec![Vec::new(); camera.width as usize];
+        for (index, splat) in projected.splats.iter().enumerate() {
+            for x in columns(index, y) {
+                let alpha = splat.alpha(x, y, state);
+                if alpha.value + alpha.error >= f64::from(state.alpha_floor) {
+                    let center = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+                    let depth = splat.own_axes.depth(camera, center);
+                    row[x as usize].push((depth, (splat, alpha)));
+                }
+            }
+        }
+        row.into_iter().map(|reached| {
+            rays::composite(&reached, |pixel, (splat, alpha)| {
+                pixel.add(splat, *alpha, state);
+            })
+        })
+    };
+    let pixels: Vec<Pixel> = (0..camera.height)
+        .into_par_iter()
+        .flat_map_iter(row)
+        .collect();
+    collect([camera.width, camera.height], projected, || pixels.iter())
 }
 
 /// The Gaussians that are drawn, nearest first, and a tally of the others.
@@ -218,6 +266,8 @@ pub(super) struct Bound {
     repeats: bool,
     /// The quadratic form on the ellipse; negative if there is none, infinite if it is the plane.
     q: f64,
+    /// Of a disc: left, right, top and bottom instead.
+    rectangle: Option<[f64; 4]>,
 }
 
 impl Bound {
@@ -236,6 +286,10 @@ impl Bound {
             determinant: splat.determinant,
             repeats: splat.period != f64::INFINITY,
             q: if q.is_finite() {
+            rectangle: splat.surfel.map(|surfel| surfel.bounds(furthest)),
+            q: if splat.surfel.is_some() {
+                level + 2.0 * std::f64::consts::LN_2
+            } else if q.is_finite() {
                 q + 1e-9 * (1.0 + q.abs())
             } else {
                 q
@@ -248,6 +302,9 @@ impl Bound {
         if self.q < 0.0 {
             return 0..0;
         }
+        if let Some([_, _, top, bottom]) = self.rectangle {
+            return self.pixels(0.5 * (top + bottom), 0.5 * (bottom - top), height);
+        }
         self.pixels(self.mean[1], (self.q * self.covariance[2]).sqrt(), height)
     }
 
@@ -255,6 +312,9 @@ impl Bound {
     pub(super) fn columns(&self, y: u32, width: u32) -> Range<u32> {
         if self.repeats {
             return 0..width;
+        }
+        if let Some([left, right, ..]) = self.rectangle {
+            return self.pixels(0.5 * (left + right), 0.5 * (right - left), width);
         }
         let [_, xy, yy] = self.covariance;
         let dy = f64::from(y) + 0.5 - self.mean[1];

@@ -7,8 +7,10 @@ use ash::vk;
 use rayon::prelude::*;
 
 use super::pixel::{Alpha, Outcome, Pixel};
+use super::project::Splat;
+use super::rays::{self, RayDepth};
 use super::render::{Bound, Projected, Reference, collect};
-use super::{OracleCamera, OracleModel, OracleScene, OracleState};
+use super::{OracleCamera, OracleModel, OracleOrder, OracleScene, OracleState};
 
 /// How a depth attachment holds depths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,8 +146,10 @@ pub struct TestedReference {
 }
 
 /// One sample while Gaussians are added to it.
-struct Sample {
+struct Sample<'a> {
     pixel: Pixel,
+    /// In the per-pixel order, what has passed and is yet to be put into order.
+    passed: Vec<(RayDepth, (&'a Splat, Alpha))>,
     stored: (u32, u8),
     /// Whether depth bounds and stencil let it pass.
     candidate: bool,
@@ -154,7 +158,7 @@ struct Sample {
     reached: [bool; 2],
 }
 
-impl Sample {
+impl Sample<'_> {
     fn new(tests: &OracleTests, stored: (u32, u8)) -> Self {
         let depth = tests.format.depth(stored.0);
         let within = |[least, greatest]: [f32; 2]| {
@@ -166,6 +170,7 @@ impl Sample {
         };
         Self {
             pixel: Pixel::EMPTY,
+            passed: Vec::new(),
             stored,
             candidate: tests.bounds.is_none_or(within),
             stencil_passes: tests.stencil.is_none_or(|stencil| stencil.passes(stored.1)),
@@ -245,6 +250,7 @@ pub fn render_tested(
         .iter()
         .map(|splat| Bound::new(splat, state))
         .collect();
+    let per_pixel = state.order == OracleOrder::PerPixel;
     let row = |y: u32| {
         let first = (y * camera.width) as usize;
         let mut row: Vec<Sample> = (first..first + camera.width as usize)
@@ -268,10 +274,20 @@ pub fn render_tested(
                     && tests
                         .depth
                         .is_none_or(|(op, _)| compare(op, code, sample.stored.0));
-                if passes && !sample.pixel.is_finished() {
+                if passes && per_pixel {
+                    let center = [f64::from(x) + 0.5, f64::from(y) + 0.5];
+                    let depth = splat.own_axes.depth(camera, center);
+                    sample.passed.push((depth, (splat, alpha)));
+                } else if passes && !sample.pixel.is_finished() {
                     sample.pixel.add(splat, alpha, state);
                 }
             }
+        }
+        for sample in row.iter_mut().filter(|_| per_pixel) {
+            let passed = std::mem::take(&mut sample.passed);
+            sample.pixel = rays::composite(&passed, |pixel, (splat, alpha)| {
+                pixel.add(splat, *alpha, state);
+            });
         }
         row
     };

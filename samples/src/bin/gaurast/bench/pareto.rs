@@ -145,6 +145,7 @@ fn variants() -> Vec<Variant> {
         sh_degree,
         alpha_floor: alpha / 255.0,
         transmittance_floor,
+        ..exact
     };
     let all = [
         ("as meant", exact, 1),

@@ -86,7 +86,16 @@ fn random_state(rng: &mut ChaCha8Rng) -> GaussianState {
         destination: BlendFactor::OneMinusSrcAlpha,
         op: BlendOp::Add,
     };
+    let precision = one_of(
+        rng,
+        &[
+            GaussianPrecision::Float32,
+            GaussianPrecision::Float32,
+            GaussianPrecision::Float16,
+        ],
+    );
     GaussianState {
+        precision,
         order: one_of(
             rng,
             &[
@@ -94,6 +103,7 @@ fn random_state(rng: &mut ChaCha8Rng) -> GaussianState {
                 GaussianOrder::ViewDepth,
                 GaussianOrder::RadialDistance,
                 GaussianOrder::Primitive,
+                GaussianOrder::PerPixel,
             ],
         ),
         transmittance_floor: one_of(rng, &[1e-4, 0.3]),

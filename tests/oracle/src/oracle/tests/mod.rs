@@ -3,6 +3,7 @@
 mod binary32;
 mod bounded;
 mod meaning;
+mod modes;
 mod shaded;
 mod skips;
 mod undecidable;

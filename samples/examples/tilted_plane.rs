@@ -1,0 +1,66 @@
+//! A floor of large 2D Gaussians, textured as a chessboard and seen at a grazing angle, beside the same floor of flat 3D
+//! Gaussians: `tilted_plane FOLDER` writes surfels.png and ellipses.png.
+//!
+//! A surfel is evaluated where each pixel's ray meets its plane, so that lines of the board stay straight up to the
+//! viewer's feet. A 3D Gaussian's picture is an ellipse, whose error grows with what it covers of the field of view.
+
+use std::error::Error;
+use std::path::Path;
+
+use gaurast_samples::camera::Camera;
+use gaurast_samples::output;
+use gaurast_samples::renderer::{Geometry, Renderer, Settings};
+use gaurast_samples::scene::{Scene, Shape};
+
+/// Discs to a side of the floor, and their distance.
+const SIDE: i32 = 24;
+const STEP: f32 = 0.5;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = std::env::args().nth(1).ok_or("a folder for the pictures")?;
+    let mut scene = Scene::with_capacity(0, (SIDE * SIDE) as usize);
+    for row in 0..SIDE {
+        for column in 0..SIDE {
+            let position = [(column - SIDE / 2) as f32 * STEP, 0.0, row as f32 * STEP];
+            let shape = Shape {
+                scale: [0.22 * STEP, 0.22 * STEP, 0.0],
+                // From x and y to x and z.
+                rotation: [0.5f32.sqrt(), 0.5f32.sqrt(), 0.0, 0.0],
+                opacity: 0.98,
+            };
+            let bright = (row + column) % 2 == 0;
+            let color = if bright {
+                [1.6, 1.3, 0.7]
+            } else {
+                [-0.6, -1.2, -0.4]
+            };
+            scene.push(position, shape, &[color]);
+        }
+    }
+    let camera = Camera::look_at(
+        [0.0, -0.8, -0.4],
+        [0.0, 0.3, 3.0],
+        [0.0, -1.0, 0.0],
+        75.0,
+        [960, 540],
+    )?;
+    let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
+    let mut uploaded = renderer.upload(&scene, None)?;
+    for (name, geometry) in [
+        ("surfels.png", Geometry::Surfel),
+        ("ellipses.png", Geometry::Volume),
+    ] {
+        let settings = Settings {
+            geometry,
+            ..Settings::default()
+        };
+        renderer.set(&mut uploaded, settings)?;
+        let frame = renderer.render(&uploaded, &camera)?;
+        output::write(
+            &Path::new(&folder).join(name),
+            &frame.picture,
+            Some([0.1; 3]),
+        )?;
+    }
+    Ok(())
+}

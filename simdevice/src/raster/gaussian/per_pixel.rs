@@ -1,0 +1,322 @@
+//! The per-pixel order: each pixel sorts what reaches it by depth along its own ray.
+//!
+//! Blocks are taken one by one. What reaches a block is evaluated for its 16 pixels at once, alpha and depth, in binary64;
+//! each pixel gathers what contributes to it, sorts it exactly and composites it front to back in binary64. A pixel holds
+//! the nearest [`HELD`] at a time: memory is bounded whatever a scene stacks up, and what a pass leaves out is gathered by
+//! the next, so that time stays near linear.
+
+use super::layer::Layer;
+use super::{
+    BLOCK_X, BLOCK_Y, BLOCKS, DepthMode, FIND_MEDIAN, GaussianTile, LANE_X_64, LANE_Y_64, LANES,
+    NO_DEPTH, Task, Work,
+};
+use crate::gaussian::locate;
+use crate::gaussian::rays::{PixelRays, RayDepths, Rays, ordered_key};
+use crate::trace::Run;
+use fearless_simd::{Simd, f32x16, prelude::*};
+
+/// The most contributions that a pixel sorts at a time.
+#[cfg(not(test))]
+const HELD: usize = 16_384;
+/// Few, so that tests see several passes.
+#[cfg(test)]
+pub(super) const HELD: usize = 64;
+
+/// What a Gaussian contributes to a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Contribution {
+    /// Its place in the pixel's order: depth, then the place in the block's list, which follows the draw.
+    place: (u64, u32),
+    /// The bits of its alpha.
+    alpha: u32,
+}
+
+/// What comes before everything.
+const START: (u64, u32) = (0, 0);
+/// What comes after everything.
+const END: (u64, u32) = (u64::MAX, u32::MAX);
+
+/// One pixel's contributions: the nearest of those beyond `after`.
+#[derive(Clone, Debug)]
+struct Gathered {
+    list: Vec<Contribution>,
+    after: (u64, u32),
+    /// Those from here on are left to the next pass.
+    limit: (u64, u32),
+}
+
+impl Default for Gathered {
+    fn default() -> Self {
+        Self {
+            list: Vec::new(),
+            after: START,
+            limit: END,
+        }
+    }
+}
+
+impl Gathered {
+    fn clear(&mut self) {
+        self.list.clear();
+        (self.after, self.limit) = (START, END);
+    }
+
+    fn add(&mut self, contribution: Contribution) {
+        let place = contribution.place;
+        if place <= self.after || place >= self.limit {
+            return;
+        }
+        self.list.push(contribution);
+        if self.list.len() == 2 * HELD {
+            let (_, next, _) = self.list.select_nth_unstable(HELD);
+            self.limit = next.place;
+            self.list.truncate(HELD);
+        }
+    }
+
+    /// What was gathered, in order.
+    fn sorted(&mut self) -> &[Contribution] {
+        self.list.sort_unstable();
+        &self.list
+    }
+
+    /// Makes it gather what the last pass left out, if that left anything out.
+    fn advance(&mut self) -> bool {
+        let more = self.limit != END;
+        if let Some(last) = self.list.last() {
+            self.after = last.place;
+        }
+        self.list.clear();
+        self.limit = END;
+        more
+    }
+}
+
+/// What a pixel accumulates.
+#[derive(Clone, Copy, Debug)]
+struct Sum {
+    color: [f64; 3],
+    transmittance: f64,
+    median: u32,
+    covered: bool,
+    finished: bool,
+}
+
+impl Sum {
+    const EMPTY: Self = Self {
+        color: [0.0; 3],
+        transmittance: 1.0,
+        median: 0,
+        covered: false,
+        finished: false,
+    };
+}
+
+/// A worker's scratch for tiles in the per-pixel order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PerPixel {
+    pixels: [Gathered; LANES],
+}
+
+impl GaussianTile {
+    /// Composites a tile in the per-pixel order.
+    #[inline(always)]
+    pub(super) fn composite_per_pixel<S: Simd, const DEPTH: DepthMode>(
+        &mut self,
+        simd: S,
+        task: &Task<'_>,
+        depths: RayDepths<'_>,
+        layer: usize,
+        runs: Option<&mut Vec<Run>>,
+    ) -> Work {
+        let mut work = self.part::<_, DEPTH>(simd, task, layer, runs);
+        for block in 0..BLOCKS {
+            if self.lists[block].is_empty() {
+                continue;
+            }
+            work.contributions +=
+                self.composite_block::<_, DEPTH>(simd, task, depths, (layer, block));
+        }
+        work
+    }
+
+    /// Composites a block of a layer; returns how many Gaussians its pixels accepted.
+    #[inline(always)]
+    fn composite_block<S: Simd, const DEPTH: DepthMode>(
+        &mut self,
+        simd: S,
+        task: &Task<'_>,
+        depths: RayDepths<'_>,
+        (layer, block): (usize, usize),
+    ) -> u64 {
+        let layer = &mut self.layers[layer];
+        let mut open = layer.open_lanes(block);
+        let rays = block_rays(&depths.rays, task.corner, block);
+        let mut sums = [Sum::EMPTY; LANES];
+        for pixel in &mut self.per_pixel.pixels {
+            pixel.clear();
+        }
+        let mut contributions = 0;
+        while open != 0 {
+            for (number, &primitive) in (0..).zip(&self.lists[block]) {
+                let (batch, place) = locate(primitive);
+                let splat = &task.splats[batch][place];
+                let exponent = task.exponents(simd, (batch, place), block);
+                let ceiling = f32x16::splat(simd, task.thresholds.alpha_ceiling);
+                let alpha = super::exp2(simd, exponent).min(ceiling);
+                let mut reached = alpha.simd_ge(task.thresholds.alpha_floor);
+                if DEPTH != NO_DEPTH {
+                    reached &= self.passing.pixels(simd, block, splat.depth);
+                }
+                let mut reached = reached.to_bitmask() as u32 & open;
+                if reached == 0 {
+                    continue;
+                }
+                let (alpha, along) = (alpha.to_array(), {
+                    let depth = &depths.of[batch][place];
+                    let mut along = [0.0; LANES];
+                    depth.along(simd, &rays, 0).store_slice(&mut along[..8]);
+                    depth.along(simd, &rays, 8).store_slice(&mut along[8..]);
+                    along
+                });
+                while reached != 0 {
+                    let lane = reached.trailing_zeros() as usize % LANES;
+                    self.per_pixel.pixels[lane].add(Contribution {
+                        place: (ordered_key(along[lane]), number),
+                        alpha: alpha[lane].to_bits(),
+                    });
+                    reached &= reached - 1;
+                }
+            }
+            for lane in 0..LANES {
+                if open >> lane & 1 == 0 {
+                    continue;
+                }
+                let pixel = &mut self.per_pixel.pixels[lane];
+                let names = &self.lists[block];
+                contributions += composite_pixel::<DEPTH>(&mut sums[lane], pixel, names, task);
+                if sums[lane].finished || !pixel.advance() {
+                    open &= !(1 << lane);
+                }
+            }
+        }
+        layer.store(block, &sums);
+        contributions
+    }
+}
+
+/// Composites what a pixel gathered, front to back; returns how many it accepted.
+fn composite_pixel<const DEPTH: DepthMode>(
+    sum: &mut Sum,
+    pixel: &mut Gathered,
+    names: &[u32],
+    task: &Task<'_>,
+) -> u64 {
+    let floor = f64::from(task.thresholds.transmittance_floor);
+    let mut accepted = 0;
+    for contribution in pixel.sorted() {
+        let alpha = f64::from(f32::from_bits(contribution.alpha));
+        let weight = sum.transmittance * alpha;
+        let rest = sum.transmittance - weight;
+        if rest < floor {
+            sum.finished = true;
+            break;
+        }
+        let (batch, place) = locate(names[contribution.place.1 as usize]);
+        let splat = &task.splats[batch][place];
+        for (sum, color) in sum.color.iter_mut().zip(splat.color) {
+            *sum += weight * f64::from(color);
+        }
+        if DEPTH >= FIND_MEDIAN && sum.transmittance >= 0.5 {
+            sum.median = splat.depth;
+        }
+        sum.transmittance = rest;
+        sum.covered = true;
+        accepted += 1;
+    }
+    accepted
+}
+
+/// The rays of a block's pixels.
+fn block_rays(rays: &PixelRays, corner: [u32; 2], block: usize) -> Rays {
+    let middle = [
+        BLOCK_X[block] + f64::from(corner[0]),
+        BLOCK_Y[block] + f64::from(corner[1]),
+    ];
+    rays.of(
+        LANE_X_64.map(|x| x + middle[0]),
+        LANE_Y_64.map(|y| y + middle[1]),
+    )
+}
+
+impl Layer {
+    /// The pixels of a block that are not finished.
+    pub(super) fn open_lanes(&self, block: usize) -> u32 {
+        let lanes = self.transmittance[block].iter().enumerate();
+        lanes.fold(0, |open, (lane, t)| {
+            open | u32::from(t.is_sign_positive()) << lane
+        })
+    }
+
+    /// Takes what the open pixels of a block accumulated.
+    fn store(&mut self, block: usize, sums: &[Sum; LANES]) {
+        let open = self.open_lanes(block);
+        for (lane, sum) in sums.iter().enumerate() {
+            if open >> lane & 1 == 0 {
+                continue;
+            }
+            let t = sum.transmittance as f32;
+            self.transmittance[block][lane] = if sum.finished { -t } else { t };
+            for (channel, &color) in self.color.iter_mut().zip(&sum.color) {
+                channel[block][lane] = color as f32;
+            }
+            self.median[block][lane] = sum.median;
+            self.covered[block] |= u32::from(sum.covered) << lane;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn passes_give_everything_once_and_in_order() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for count in [
+            0,
+            1,
+            HELD,
+            2 * HELD - 1,
+            2 * HELD,
+            2 * HELD + 1,
+            20 * HELD + 3,
+        ] {
+            // Many are equal.
+            let all: Vec<Contribution> = (0..count as u32)
+                .map(|number| Contribution {
+                    place: (1 << 63 | rng.random_range(0..HELD as u64), number),
+                    alpha: number,
+                })
+                .collect();
+            let mut sorted = all.clone();
+            sorted.sort();
+            let (mut pixel, mut given, mut passes) = (Gathered::default(), Vec::new(), 0);
+            loop {
+                for &contribution in &all {
+                    pixel.add(contribution);
+                    assert!(pixel.list.len() < 2 * HELD);
+                }
+                given.extend_from_slice(pixel.sorted());
+                passes += 1;
+                if !pixel.advance() {
+                    break;
+                }
+            }
+            assert!(given == sorted, "{count}");
+            assert!(passes <= 1 + count / HELD, "{count}: {passes}");
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! What binary16 rasterization costs in exactness: `cargo run --release -p gaurast-tests --example binary16_error
+//! [SCENE FILE...] > tests/stress/binary16.md`.
+//!
+//! Each scene is drawn in binary16 and in binary32, and both are held against the binary64 oracle.
+
+use gaurast::vk::{GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST};
+use gaurast_samples::camera::{Camera, DEFAULT_FOV};
+use gaurast_samples::scene::Scene;
+use gaurast_tests::contexts::{
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+};
+use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
+use gaurast_tests::scenes::{self, SceneBuffers};
+use std::error::Error;
+use std::path::Path;
+
+const SIZE: [u32; 2] = [640, 480];
+
+/// Differences of a picture from the oracle's, over all channels.
+struct Figures {
+    greatest: f64,
+    mean: f64,
+    /// In dB, for a peak of 1.
+    psnr: f64,
+    /// Share of pixels that differ by a level of 8 bits or more, in percent.
+    visible: f64,
+}
+
+fn figures(picture: &[[f32; 4]], exact: &[[f64; 4]]) -> Figures {
+    let difference = |(a, b): (&[f32; 4], &[f64; 4])| {
+        [0, 1, 2, 3].map(|channel| (f64::from(a[channel]) - b[channel]).abs())
+    };
+    let differences: Vec<[f64; 4]> = picture.iter().zip(exact).map(difference).collect();
+    let all = differences.as_flattened();
+    let (count, pixels) = (all.len() as f64, differences.len() as f64);
+    let is_visible = |pixel: &&[f64; 4]| pixel.iter().any(|d| *d >= 1.0 / 255.0);
+    Figures {
+        greatest: all.iter().fold(0.0, |a, &b| a.max(b)),
+        mean: all.iter().sum::<f64>() / count,
+        psnr: -10.0 * (all.iter().map(|d| d * d).sum::<f64>() / count).log10(),
+        visible: 100.0 * differences.iter().filter(is_visible).count() as f64 / pixels,
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut subjects = Vec::new();
+    for (name, count, enlarged) in [
+        ("a cloud of 20,000", 20_000, 1.0),
+        ("4,000 large ones", 4_000, 6.0),
+    ] {
+        let mut scene = scenes::cloud(70, count, 1);
+        for scale in scene.scales.as_flattened_mut() {
+            *scale *= enlarged;
+        }
+        let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
+        subjects.push((name.to_owned(), scene, camera));
+    }
+    let garden = Scene::generate(1, 100_000);
+    let camera = Camera::of_generated(None, SIZE)?.to_vulkan();
+    subjects.push((
+        "a garden of 100,000".to_owned(),
+        SceneBuffers::from(&garden),
+        camera,
+    ));
+    for file in std::env::args().skip(1) {
+        let path = Path::new(&file);
+        let scene = Scene::load(path)?;
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let camera = Camera::framing(&scene, DEFAULT_FOV, SIZE).to_vulkan();
+        subjects.push((name, SceneBuffers::from(&scene), camera));
+    }
+
+    println!("# Errors of binary16 rasterization\n");
+    println!(
+        "Pictures of {}x{} pixels against the binary64 oracle, over (C, 1 - T); written by \
+         `tests/examples/binary16_error.rs`.\n",
+        SIZE[0], SIZE[1]
+    );
+    println!(
+        "| scene | precision | greatest error | mean error | PSNR, dB | pixels off by 1/255 or more |"
+    );
+    println!("|---|---|---:|---:|---:|---:|");
+    let context = Context::embedded(&Settings::default());
+    for (name, scene, camera) in &subjects {
+        let on_device = DeviceScene::new(&context, scene);
+        let view = OracleCamera::new(camera, SIZE).ok_or("a camera that the oracle lacks")?;
+        let reference = render_bounded(&scene.as_oracle(), &view, &OracleState::default());
+        for (precision_name, precision) in [
+            ("binary16", GaussianPrecisionGAURAST::FLOAT16),
+            ("binary32", GaussianPrecisionGAURAST::FLOAT32),
+        ] {
+            let options = PipelineOptions {
+                state: PipelineGaussianStateCreateInfoGAURAST::default().precision(precision),
+                ..PipelineOptions::new(scene.degree)
+            };
+            let pipeline = Pipeline::new(&context, &options);
+            let target = Target::new(&context, options.format, SIZE);
+            context.run(|commands| {
+                commands.pass(&target, &Pass::clear([0.0; 4]), || {
+                    commands.bind(&pipeline, &on_device, camera);
+                    commands.draw([on_device.count, 1, 0, 0]);
+                });
+            });
+            let Figures {
+                greatest,
+                mean,
+                psnr,
+                visible,
+            } = figures(&target.read(), &reference.nominal);
+            println!(
+                "| {name} | {precision_name} | {greatest:.2e} | {mean:.2e} | {psnr:.1} | {visible:.3} % |"
+            );
+        }
+    }
+    Ok(())
+}

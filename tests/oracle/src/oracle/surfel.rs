@@ -1,0 +1,123 @@
+//! 2D Gaussians: where a pixel's ray meets a disc's plane.
+//!
+//! In camera axes a disc has the scaled axes `a` and `b` and the centre `t`. A ray from `g` along `r` meets its plane where
+//! `u a + v b + t - g = tau r`: by Cramer's rule `u = ((b x t') . r) / w`, `v = ((t' x a) . r) / w`,
+//! `tau = ((a x b) . t') / w`, `w = (a x b) . r`, `t' = t - g`. The squared distance is `u^2 + v^2` where the ray meets the
+//! plane (for a pinhole: at `tau > nearPlane`), or the filter's `|x - mean|^2 / lowPass` if that is less.
+
+use super::error_model::UNIT_ROUNDOFF;
+use super::{OracleCamera, OracleModel};
+
+/// Roundings of binary64 granted to the numerators and to `w`.
+const ROUNDINGS: f64 = 64.0;
+
+/// A disc before a camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Surfel {
+    pub(super) camera: OracleCamera,
+    /// `a` and `b`.
+    pub(super) axes: [[f64; 3]; 2],
+    /// `t`.
+    pub(super) centre: [f64; 3],
+    /// The centre's pixel.
+    pub(super) mean: [f64; 2],
+    /// The filter's variance.
+    pub(super) low_pass: f64,
+    /// Relative error of alpha that every disc is granted.
+    pub(super) fixed: f64,
+}
+
+impl Surfel {
+    /// The squared distance of the pixel at (x, y), and the relative error of alpha.
+    pub(super) fn distance(&self, [x, y]: [f64; 2]) -> (f64, f64) {
+        let camera = &self.camera;
+        let place = [x, y];
+        let ray = [0, 1].map(|axis| {
+            (place[axis] - f64::from(camera.principal[axis])) / f64::from(camera.focal[axis])
+        });
+        let (origin, direction) = match camera.model {
+            OracleModel::Orthographic => ([ray[0], ray[1], 0.0], [0.0, 0.0, 1.0]),
+            _ => ([0.0; 3], [ray[0], ray[1], 1.0]),
+        };
+        let t = [0, 1, 2].map(|i| self.centre[i] - origin[i]);
+        let [a, b] = self.axes;
+        let w = dot(cross(a, b), direction);
+        let [u, v] = [cross(b, t), cross(t, a)].map(|c| dot(c, direction) / w);
+        let depth = dot(cross(a, b), t) / w;
+        let is_met = match camera.model {
+            OracleModel::Orthographic => w != 0.0,
+            _ => w != 0.0 && depth > f64::from(camera.near),
+        };
+        let unit = 0.5 * f64::EPSILON * ROUNDINGS;
+        let (size_a, size_b) = (length(a), length(b));
+        let error_w = unit * size_a * size_b * length(direction) / w.abs();
+        let error_uv =
+            unit * (size_a + size_b) * (length(self.centre) + length(origin)) * length(direction)
+                / w.abs();
+        let met = u * u + v * v;
+        let met_error = 2.0 * met.sqrt() * error_uv + 2.0 * met * error_w;
+        let d = [x - self.mean[0], y - self.mean[1]];
+        let filter = (d[0] * d[0] + d[1] * d[1]) / self.low_pass;
+        let (distance, error) = if is_met && !(self.low_pass > 0.0 && filter < met) {
+            (met, met_error)
+        } else if self.low_pass > 0.0 {
+            (filter, 0.0)
+        } else {
+            (f64::INFINITY, 0.0)
+        };
+        // The exponent is rounded once, and once more where it is put together.
+        let rounding = UNIT_ROUNDOFF * (self.fixed + 4.0 * distance.min(1e4));
+        (distance, (rounding + 0.5 * error).min(1.0))
+    }
+
+    /// Left, right, top and bottom of the pixels that a squared distance of `q` may reach.
+    pub(super) fn bounds(&self, q: f64) -> [f64; 4] {
+        let everything = [
+            f64::NEG_INFINITY,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::INFINITY,
+        ];
+        // The ball about the disc.
+        let radius = q.sqrt() * (length(self.axes[0]) + length(self.axes[1]));
+        let circle = (q * self.low_pass).sqrt();
+        let z = self.centre[2];
+        let mut bounds = everything;
+        for axis in 0..2 {
+            let (focal, principal) = (
+                f64::from(self.camera.focal[axis]),
+                f64::from(self.camera.principal[axis]),
+            );
+            let sides = [self.centre[axis] - radius, self.centre[axis] + radius];
+            let places = match self.camera.model {
+                OracleModel::Orthographic => vec![sides[0], sides[1]],
+                _ if z - radius > 1e-6 * z => sides
+                    .iter()
+                    .flat_map(|side| [side / (z - radius), side / (z + radius)])
+                    .collect(),
+                _ => return everything,
+            };
+            let pixels = places.iter().map(|place| focal * place + principal);
+            let least = pixels.clone().fold(self.mean[axis] - circle, f64::min);
+            let greatest = pixels.fold(self.mean[axis] + circle, f64::max);
+            (bounds[2 * axis], bounds[2 * axis + 1]) = (least, greatest);
+        }
+        bounds
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn length(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
