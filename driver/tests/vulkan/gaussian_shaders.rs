@@ -410,6 +410,14 @@ pub fn broken() -> Vec<(&'static str, String)> {
             ..request
         }
     };
+    let per_pixel = || {
+        let request = request(true);
+        let state = request.gaussian;
+        PipelineRequest {
+            gaussian: state.map(|state| state.order(GaussianOrderGAURAST::PER_PIXEL)),
+            ..request
+        }
+    };
     let resolved = |module, locations| stage.resolved(request(false), module, locations);
     let read = "VUID-VkGaussianResolveInputLocationsGAURAST-location";
     let requests = [
@@ -429,6 +437,10 @@ pub fn broken() -> Vec<(&'static str, String)> {
         (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-order",
             by_distance(),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-order",
+            per_pixel(),
         ),
     ];
     let heard = requests.map(|(id, request)| {

@@ -176,13 +176,6 @@ fn state(
         GaussianOrderGAURAST::VIEW_DEPTH => GaussianOrder::ViewDepth,
         GaussianOrderGAURAST::RADIAL_DISTANCE => {
             require(features, RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
-            let depth_key = gaussian.vertex_output_locations.depth_key;
-            if is_shaded(gaussian) && depth_key == GAUSSIAN_LOCATION_UNUSED_GAURAST {
-                return Err(Error::usage(
-                    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-order",
-                    format!("{STRUCTURE}: order is RADIAL_DISTANCE, but depthKey is unused"),
-                ));
-            }
             GaussianOrder::RadialDistance
         }
         GaussianOrderGAURAST::PRIMITIVE => {

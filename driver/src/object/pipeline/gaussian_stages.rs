@@ -11,7 +11,9 @@ use crate::shader::{
     BuiltIn, Descriptor, InputSource, Interface, Numeric, OutputTarget, Stage, reflect,
 };
 use ash::vk;
-use gaurast::vk::{GAUSSIAN_LOCATION_UNUSED_GAURAST, PipelineGaussianStateCreateInfoGAURAST};
+use gaurast::vk::{
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
 use simdevice::packet::draw::{DrawPipeline, ResolveProgram, gaussian, resolve};
 use std::sync::Arc;
 
@@ -42,6 +44,7 @@ impl VertexProjection {
                 "projectionMode is VERTEX_SHADER, and there is no vertex stage",
             )
         })?;
+        check_order(state)?;
         // Nothing of a vertex stage depends on samples.
         let vertex = polygon::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
         let places = places(state, &vertex.interface)?;
@@ -59,6 +62,23 @@ impl VertexProjection {
             descriptors,
         })
     }
+}
+
+/// Refuses orders that a vertex shader's outputs do not tell.
+fn check_order(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
+    let has_key = state.vertex_output_locations.depth_key != GAUSSIAN_LOCATION_UNUSED_GAURAST;
+    let (vuid, what) = match state.order {
+        GaussianOrderGAURAST::RADIAL_DISTANCE if !has_key => (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-order",
+            "order is RADIAL_DISTANCE, but depthKey is unused",
+        ),
+        GaussianOrderGAURAST::PER_PIXEL => (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-order",
+            "order is PER_PIXEL, but projectionMode is VERTEX_SHADER",
+        ),
+        _ => return Ok(()),
+    };
+    Err(Error::usage(vuid, what))
 }
 
 /// A resolve shader.

@@ -257,6 +257,10 @@ impl<'a> ResolveDraw<'a> {
         } else {
             [[0.0; LANES]; 2]
         };
+        let accumulated: [[f32; LANES]; 4] = dispatch!(self.level, simd => {
+            let [r, g, b, a] = layer.fragments(simd, block);
+            [r.into(), g.into(), b.into(), a.into()]
+        });
         let within = match (self.per_sample, self.samples) {
             (true, 2..) => SAMPLES_4[group.leader],
             _ => CENTER[0],
@@ -265,8 +269,7 @@ impl<'a> ResolveDraw<'a> {
         for &(slot, input, _) in &self.stage.interface.inputs {
             let value = match input {
                 FragmentInput::Varying { index, .. } => match index {
-                    0..3 => bits(layer.color[index as usize][block]),
-                    3 => bits(layer.transmittance[block].map(|t| 1.0 - t.abs())),
+                    0..4 => bits(accumulated[index as usize]),
                     resolve::EXPECTED_DEPTH => bits(depths[0]),
                     resolve::MEDIAN_DEPTH => bits(depths[1]),
                     _ => [0; LANES],
