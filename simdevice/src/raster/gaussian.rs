@@ -33,7 +33,7 @@ use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
 use by_block::TileMode;
-use exp2::exp2;
+use exp2::exp2_of_negated;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 use layer::{Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
@@ -48,8 +48,13 @@ const BLOCK: usize = 4;
 const BLOCKS: usize = 16;
 /// A bit for each of them.
 const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
+/// The sign bit of a binary32 number.
+const SIGN: u32 = 1 << 31;
 /// Gaussians of a chunk: as many as phase 1 and phase 2 pass through the first-level cache.
 const CHUNK: usize = 32;
+
+/// Powers of two are formed down to this one.
+const MOST_FALL: f64 = 126.0;
 
 /// Layers of a tile: one for each sample, and one to find what is reached at all.
 const LAYERS: usize = super::MAX_SAMPLES as usize + 1;
@@ -59,6 +64,8 @@ const LAYERS: usize = super::MAX_SAMPLES as usize + 1;
 pub struct GaussianTile {
     layers: [Layer; LAYERS],
     passing: Passing,
+    /// Where the chunk's Gaussians are brought together before they are looked at.
+    splats: [Splat; CHUNK],
     chunk: [Record; CHUNK],
     items: [u32; CHUNK * BLOCKS + LANES],
     /// What may reach each block, where a mode parts lists so.
@@ -95,7 +102,9 @@ struct Record {
 /// The constants of a draw.
 #[derive(Clone, Copy, Debug)]
 struct Thresholds {
-    log2_floor: f32,
+    /// Minus the base-2 logarithm of the alpha floor: no Gaussian contributes where its alpha has fallen further.
+    most_fall: f32,
+    /// For modes that compare alpha itself.
     alpha_floor: f32,
     alpha_ceiling: f32,
     transmittance_floor: f32,
@@ -106,9 +115,16 @@ struct Thresholds {
 impl Thresholds {
     fn new(draw: &GaussianDraw) -> Self {
         let state = &draw.state;
+        // Alpha is as large as a binary32 number's reciprocal where there is no floor. No alpha reaches one above the
+        // ceiling.
+        let most_fall = if state.alpha_floor <= state.alpha_ceiling {
+            (-f64::from(state.alpha_floor).log2()).min(MOST_FALL) as f32
+        } else {
+            f32::NEG_INFINITY
+        };
         Self {
             depth_unit: draw.depth_unit,
-            log2_floor: state.alpha_floor.log2().max(-150.0),
+            most_fall,
             alpha_floor: state.alpha_floor,
             alpha_ceiling: state.alpha_ceiling,
             transmittance_floor: state.transmittance_floor,
@@ -121,6 +137,7 @@ impl Default for GaussianTile {
         Self {
             layers: [Layer::EMPTY; LAYERS],
             passing: Passing::default(),
+            splats: [Splat::default(); CHUNK],
             chunk: [Record::default(); CHUNK],
             items: [0; CHUNK * BLOCKS + LANES],
             lists: Default::default(),
@@ -284,7 +301,7 @@ impl GaussianTile {
             if open == 0 {
                 break;
             }
-            if DEPTH != NO_DEPTH && self.passing.hides_from(task.depth(chunk[0]), task.trend) {
+            if DEPTH != NO_DEPTH && self.passing.hides_from(task.splat(chunk[0]).depth, task.trend) {
                 work.tiles_hidden += (task.list.len() - number * CHUNK) as u64;
                 break;
             }
@@ -292,9 +309,11 @@ impl GaussianTile {
             let rows = if runs.is_some() { layer.open_rows() } else { 0 };
             let open = mask32x16::from_bitmask(simd, open);
             let (mut items, mut reached_before) = (0, 0);
-            for (number, &primitive) in chunk.iter().enumerate() {
-                let (batch, place) = locate(primitive);
-                let splat = &task.splats[batch][place];
+            // Before any is looked at, so that the waits for memory overlap.
+            for (splat, &primitive) in self.splats.iter_mut().zip(chunk) {
+                *splat = *task.splat(primitive);
+            }
+            for (number, splat) in self.splats.iter().enumerate().take(chunk.len()) {
                 if DEPTH != NO_DEPTH && self.passing.hides(splat.depth) {
                     work.tiles_hidden += 1;
                     continue;
@@ -326,7 +345,7 @@ impl GaussianTile {
                     continue;
                 }
                 let record = &mut self.chunk[number % CHUNK];
-                let reached = record.place(simd, splat, task.corner, task.thresholds.log2_floor);
+                let reached = record.place(simd, splat, task.corner, task.thresholds.most_fall);
                 let mut reached = if bounded { reached & open } else { open };
                 work.open += u64::from(blocks);
                 if DEPTH != NO_DEPTH {
@@ -385,10 +404,11 @@ impl Layer {
             let u = across.mul_add(f32x16::splat(simd, a), f32x16::splat(simd, g.u[block]));
             let v = down.mul_add(f32x16::splat(simd, c), f32x16::splat(simd, g.v[block]));
             let v = across.mul_add(f32x16::splat(simd, b), v);
-            let exponent = f32x16::splat(simd, g.log2_opacity) - v.mul_add(v, u * u);
+            let opacity = f32x16::splat(simd, g.log2_opacity);
+            let fall = v.mul_add(v, u.mul_sub(u, opacity));
             let look = (g.color, g.depth);
             contributions +=
-                self.accumulate::<_, DEPTH>(simd, block, exponent, look, passing, thresholds);
+                self.accumulate::<_, DEPTH>(simd, block, fall, look, passing, thresholds);
         }
         contributions
     }
@@ -405,49 +425,50 @@ impl Layer {
     ) -> u64 {
         let mut contributions = 0;
         for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
-            let exponent = exponents_64(simd, splat, task, block);
+            let fall = falls_64(simd, splat, task, block);
             let look = (splat.color, splat.depth);
             contributions +=
-                self.accumulate::<_, DEPTH>(simd, block, exponent, look, passing, task.thresholds);
+                self.accumulate::<_, DEPTH>(simd, block, fall, look, passing, task.thresholds);
         }
         contributions
     }
 
-    /// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `exponent`; returns
+    /// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `-fall`; returns
     /// how many pixels accepted it.
     #[inline(always)]
     fn accumulate<S: Simd, const DEPTH: DepthMode>(
         &mut self,
         simd: S,
         block: usize,
-        exponent: f32x16<S>,
+        fall: f32x16<S>,
         (color, depth): ([f32; 3], u32),
         passing: &Passing,
         thresholds: Thresholds,
     ) -> u64 {
-        let floor = f32x16::splat(simd, thresholds.alpha_floor);
+        let most_fall = f32x16::splat(simd, thresholds.most_fall);
         let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
         let finish = f32x16::splat(simd, thresholds.transmittance_floor);
-        let zero = f32x16::splat(simd, 0.0);
-        let alpha = exp2(simd, exponent).min(ceiling);
+        // Where alpha has fallen too far this is meaningless, and so is what follows from it; `reached` leaves it out.
+        let alpha = exp2_of_negated(simd, fall).min(ceiling);
         let t = f32x16::from_slice(simd, &self.transmittance[block]);
         let weight = t * alpha;
         let rest = t - weight;
-        let mut reached = alpha.simd_ge(floor) & t.simd_ge(zero);
+        let mut reached = fall.simd_le(most_fall);
         if DEPTH != NO_DEPTH {
             reached &= passing.pixels(simd, block, depth);
         }
+        // A finished pixel's transmittance is negative, and what is left of it fails like one below the floor.
         let accepted = reached & rest.simd_ge(finish);
-        let finished = reached & rest.simd_lt(finish);
         if DEPTH >= FIND_MEDIAN {
             let median = u32x16::from_slice(simd, &self.median[block]);
             let first_half = accepted & t.simd_ge(0.5);
             let median = first_half.select(u32x16::splat(simd, depth), median);
             median.store_slice(&mut self.median[block]);
         }
-        let t = accepted.select(rest, finished.select(zero - t, t));
+        let finished = t.to_bits() | reached.select(u32x16::splat(simd, SIGN), u32x16::splat(simd, 0));
+        let t = accepted.select(rest, f32x16::from_bits(finished));
         t.store_slice(&mut self.transmittance[block]);
-        let weight = accepted.select(weight, zero);
+        let weight = accepted.select(weight, f32x16::splat(simd, 0.0));
         if DEPTH == FIND_MEAN {
             let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
             let [depths, weights] = &mut self.means;
@@ -467,11 +488,12 @@ impl Layer {
     }
 }
 
-/// The exponents of a Gaussian's alpha at a block's pixels, formed in binary64.
+/// How far a Gaussian's alpha has fallen at a block's pixels, formed in binary64: minus its base-2 logarithm, but no less
+/// than -1, which is more than any ceiling, and still a power that is formed.
 ///
 /// What is wider than the period of a panorama counts where it is nearer than its copies.
 #[inline(always)]
-fn exponents_64<S: Simd>(simd: S, splat: &Splat, task: &Task<'_>, block: usize) -> f32x16<S> {
+fn falls_64<S: Simd>(simd: S, splat: &Splat, task: &Task<'_>, block: usize) -> f32x16<S> {
     let [a, b, c] = splat.factor;
     let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
     let opacity = f64x8::splat(simd, splat.log2_opacity.into());
@@ -481,17 +503,18 @@ fn exponents_64<S: Simd>(simd: S, splat: &Splat, task: &Task<'_>, block: usize) 
         f64::INFINITY
     };
     let within = f64x8::splat(simd, half_period);
-    let nothing = f64x8::splat(simd, -1e3);
+    let nothing = f64x8::splat(simd, 1e3);
     let middle = [BLOCK_X[block] + from_mean(0), BLOCK_Y[block] + from_mean(1)];
-    let exponent = |first: usize| {
+    let fall = |first: usize| {
         let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
         let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
         let (u, v) = (dx * a, dx * b + dy * c);
-        let exponent = opacity - (u * u + v * v);
+        let fall = u * u + v * v - opacity;
         let inside = dx.simd_ge(-within) & dx.simd_lt(within);
-        inside.select(exponent, nothing)
+        inside.select(fall, nothing)
     };
-    exponent(0).narrow(exponent(8))
+    let fall: f32x16<S> = fall(0).narrow(fall(8));
+    fall.max(-1.0)
 }
 
 /// What a tile's Gaussians are.
@@ -509,10 +532,10 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// A primitive's depth.
-    fn depth(&self, primitive: u32) -> u32 {
+    #[inline(always)]
+    fn splat(&self, primitive: u32) -> &Splat {
         let (batch, place) = locate(primitive);
-        self.splats[batch][place].depth
+        &self.splats[batch][place]
     }
 }
 
@@ -584,7 +607,7 @@ impl Record {
         simd: S,
         splat: &Splat,
         corner: [u32; 2],
-        log2_floor: f32,
+        most_fall: f32,
     ) -> mask32x16<S> {
         let [a, b, c] = splat.factor;
         let from_mean = |axis: usize| f64::from(corner[axis]) - splat.mean[axis];
@@ -604,7 +627,7 @@ impl Record {
         self.log2_opacity = splat.log2_opacity;
         self.color = splat.color;
         // How far the exponent may fall, with a margin for rounding.
-        let room = splat.log2_opacity - log2_floor;
+        let room = splat.log2_opacity + most_fall;
         let room = room + 1e-3 + 1e-5 * room.abs();
         // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
         let least_u = (u.abs() - HALF * a.abs()).max(0.0);
@@ -619,8 +642,18 @@ impl Record {
 #[inline(always)]
 fn append_items<S: Simd>(simd: S, number: usize, blocks: mask32x16<S>, items: &mut [u32]) -> usize {
     let named = u32x16::simd_from(simd, BLOCK_NUMBERS) + (number * BLOCKS) as u32;
-    named.compress(blocks).store_slice(items);
-    blocks.to_bitmask().count_ones() as usize
+    if S::f32s::LEN == LANES {
+        named.compress(blocks).store_slice(items);
+        return blocks.to_bitmask().count_ones() as usize;
+    }
+    // Halves are compressed without a branch.
+    let (first, second) = named.split();
+    let (in_first, in_second) = simd.split_mask32x16(blocks);
+    let (first, second) = (first.compress(in_first), second.compress(in_second));
+    let count = in_first.to_bitmask().count_ones() as usize;
+    first.store_slice(&mut items[..LANES / 2]);
+    second.store_slice(&mut items[count..][..LANES / 2]);
+    count + in_second.to_bitmask().count_ones() as usize
 }
 
 #[cfg(test)]

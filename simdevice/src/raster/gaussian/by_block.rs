@@ -3,7 +3,7 @@
 
 use super::{
     BLOCK_X, BLOCK_Y, BLOCKS, CHUNK, DepthMode, GaussianTile, LANE_X_64, LANE_Y_64, NO_DEPTH,
-    Record, Task, Work, exponents_64,
+    Record, Task, Work, falls_64,
 };
 use crate::gaussian::project::{Splat, half_room};
 use crate::gaussian::rays::RayDepths;
@@ -32,10 +32,10 @@ pub(super) enum TileMode<'a> {
     },
 }
 
-/// A floor that keeps whatever binary16 does not put below `log2_floor`.
-fn half_log2_floor(splat: &Splat, log2_floor: f32) -> f32 {
+/// How far alpha may fall in exact arithmetic where binary16 does not put it below `most_fall`.
+fn half_most_fall(splat: &Splat, most_fall: f32) -> f32 {
     let opacity = f64::from(splat.log2_opacity);
-    (opacity - half_room(splat.factor, opacity - f64::from(log2_floor))) as f32
+    (half_room(splat.factor, opacity + f64::from(most_fall)) - opacity) as f32
 }
 
 impl<'a> TileMode<'a> {
@@ -80,9 +80,9 @@ impl<'a> TileMode<'a> {
 }
 
 impl Task<'_> {
-    /// The exponents of a primitive's alpha at a block's pixels.
+    /// How far a primitive's alpha has fallen at a block's pixels.
     #[inline(always)]
-    pub(super) fn exponents<S: Simd>(
+    pub(super) fn falls<S: Simd>(
         &self,
         simd: S,
         (batch, place): (usize, usize),
@@ -95,18 +95,19 @@ impl Task<'_> {
             ..
         } = self.mode
         else {
-            return exponents_64(simd, splat, self, block);
+            return falls_64(simd, splat, self, block);
         };
         let surfel = &surfels[batch][place];
         let from_mean = |axis: usize| f64::from(self.corner[axis]) - splat.mean[axis];
         let middle = [BLOCK_X[block] + from_mean(0), BLOCK_Y[block] + from_mean(1)];
         let opacity = f64x8::splat(simd, splat.log2_opacity.into());
-        let exponent = |first: usize| {
+        let fall = |first: usize| {
             let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
             let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
-            opacity - surfel.falloff(simd, dx, dy, inverse_low_pass)
+            surfel.falloff(simd, dx, dy, inverse_low_pass) - opacity
         };
-        exponent(0).narrow(exponent(8))
+        let fall: f32x16<S> = fall(0).narrow(fall(8));
+        fall.max(-1.0)
     }
 }
 
@@ -151,12 +152,12 @@ impl GaussianTile {
                 for &primitive in chunk {
                     let (batch, place) = locate(primitive);
                     let splat = &task.splats[batch][place];
-                    let exponent = task.exponents(simd, (batch, place), block);
+                    let fall = task.falls(simd, (batch, place), block);
                     let look = (splat.color, splat.depth);
                     work.contributions += layer.accumulate::<_, DEPTH>(
                         simd,
                         block,
-                        exponent,
+                        fall,
                         look,
                         &self.passing,
                         task.thresholds,
@@ -194,15 +195,15 @@ impl GaussianTile {
                 continue;
             }
             work.open += BLOCKS as u64;
-            let floor = match task.mode {
-                TileMode::Half => half_log2_floor(splat, task.thresholds.log2_floor),
-                _ => task.thresholds.log2_floor,
+            let most_fall = match task.mode {
+                TileMode::Half => half_most_fall(splat, task.thresholds.most_fall),
+                _ => task.thresholds.most_fall,
             };
             let mut reached = match task.mode.surfel((batch, place)) {
                 _ if !bounded => all,
                 Some(surfel) => mask32x16::from_bitmask(simd, surfel.blocks(task.corner)),
                 None if splat.steep => all,
-                None => record.place(simd, splat, task.corner, floor),
+                None => record.place(simd, splat, task.corner, most_fall),
             };
             if DEPTH != NO_DEPTH {
                 let shown = self.passing.blocks(simd, splat.depth);

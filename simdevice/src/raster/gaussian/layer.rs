@@ -14,7 +14,7 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 #[repr(align(64))]
 pub(super) struct Layer {
     pub(super) color: [[[f32; LANES]; BLOCKS]; 3],
-    /// Transmittance; negative where the pixel is finished or is not to be touched.
+    /// Transmittance; negative where the pixel is finished, [`UNTOUCHED`] where it is not to be touched.
     pub(super) transmittance: [[f32; LANES]; BLOCKS],
     /// Bit `lane` of entry `block` tells that some Gaussian contributed.
     pub(super) covered: [u32; BLOCKS],
@@ -23,6 +23,9 @@ pub(super) struct Layer {
     /// The sums of weighted depths and of weights, if a fragment program reads their ratio.
     pub(super) means: [[[f32; LANES]; BLOCKS]; 2],
 }
+
+/// What no layer leaves anything of, neither more nor less than a floor.
+const UNTOUCHED: f32 = f32::NEG_INFINITY;
 
 /// Lanes by block.
 pub(super) type Lanes = [u32; BLOCKS];
@@ -55,7 +58,7 @@ impl Layer {
                 continue;
             }
             for (lane, t) in block.iter_mut().enumerate() {
-                *t = if lanes >> lane & 1 == 1 { 1.0 } else { -1.0 };
+                *t = if lanes >> lane & 1 == 1 { 1.0 } else { UNTOUCHED };
             }
         }
     }

@@ -161,10 +161,10 @@ impl GaussianTile {
             for (number, &primitive) in (0..).zip(&self.lists[block]) {
                 let (batch, place) = locate(primitive);
                 let splat = &task.splats[batch][place];
-                let exponent = task.exponents(simd, (batch, place), block);
+                let fall = task.falls(simd, (batch, place), block);
                 let ceiling = f32x16::splat(simd, task.thresholds.alpha_ceiling);
-                let alpha = super::exp2(simd, exponent).min(ceiling);
-                let mut reached = alpha.simd_ge(task.thresholds.alpha_floor);
+                let alpha = super::exp2_of_negated(simd, fall).min(ceiling);
+                let mut reached = fall.simd_le(task.thresholds.most_fall);
                 if DEPTH != NO_DEPTH {
                     reached &= self.passing.pixels(simd, block, splat.depth);
                 }

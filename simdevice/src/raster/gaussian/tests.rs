@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// A vector's worth of one value, its power at a level, and that level's name.
 fn exp2_at(level: Level, x: [f32; LANES]) -> [f32; LANES] {
-    dispatch!(level, simd => exp2(simd, f32x16::simd_from(simd, x)).to_array())
+    dispatch!(level, simd => exp2_of_negated(simd, -f32x16::simd_from(simd, x)).to_array())
 }
 
 #[test]
@@ -24,33 +24,16 @@ fn powers_of_two_are_within_their_bound_at_every_level() {
         let level = level.resolve().unwrap();
         let mut worst = 0.0f64;
         let mut x = -126.0f32;
-        while x <= 1.0 {
+        while x <= 4.0 {
             let steps: [f32; LANES] = std::array::from_fn(|lane| x + lane as f32 / 1024.0);
             for (x, power) in steps.into_iter().zip(exp2_at(level, steps)) {
-                let exact = f64::from(x.min(1.0)).exp2();
+                let exact = f64::from(x).exp2();
                 let ulp = f64::from((exact as f32).next_up()) - f64::from(exact as f32);
                 worst = worst.max((f64::from(power) - exact).abs() / ulp);
             }
             x += 16.0 / 1024.0;
         }
         assert!(worst <= 2.1, "{name}: {worst} ulp");
-        let special = [
-            f32::NEG_INFINITY,
-            -1e30,
-            -127.0,
-            0.0,
-            1.0,
-            2.0,
-            f32::INFINITY,
-        ];
-        let mut lanes = [0.0; LANES];
-        lanes[..7].copy_from_slice(&special);
-        let least = f32::MIN_POSITIVE;
-        assert_eq!(
-            exp2_at(level, lanes)[..7],
-            [least, least, least, 1.0, 2.0, 2.0, 2.0],
-            "{name}"
-        );
     }
 }
 
@@ -185,7 +168,6 @@ fn naive_sample(
     let mut out = Naive::default();
     let mul_add = |a: f32, b: f32, c: f32| if fused { a.mul_add(b, c) } else { a * b + c };
     let power = |x: f32| {
-        let x = x.clamp(-126.0, 1.0);
         let n = (x + 12_582_912.0) - 12_582_912.0;
         let f = x - n;
         let p = POWER_OF_TWO.iter().fold(0.0, |p, &c| mul_add(p, f, c));
@@ -198,6 +180,7 @@ fn naive_sample(
         return per_pixel::naive_sample(draw, tile, [x, y], power, passes);
     }
     let state = &draw.state;
+    let most_fall = (-f64::from(state.alpha_floor).log2()).min(126.0) as f32;
     let corner = tile.map(|tile| tile * TILE_SIZE);
     let (mut c, mut t, mut covered) = ([0.0f32; 3], 1.0f32, false);
     for &primitive in draw.tiles.list(tile[0], tile[1]) {
@@ -215,21 +198,21 @@ fn naive_sample(
         let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
         let u = mul_add(dx, f[0] as f32, u);
         let v = mul_add(dx, f[1] as f32, mul_add(dy, f[2] as f32, v));
-        let exponent = if g.steep {
+        let fall = if g.steep {
             let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
             let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
             if g.wide && !(-draw.half_period..draw.half_period).contains(&dx) {
-                -1e3
+                1e3
             } else {
-                (f64::from(g.log2_opacity) - (u * u + v * v)) as f32
+                ((u * u + v * v - f64::from(g.log2_opacity)) as f32).max(-1.0)
             }
         } else {
-            g.log2_opacity - mul_add(v, v, u * u)
+            mul_add(v, v, mul_add(u, u, -g.log2_opacity))
         };
-        let alpha = power(exponent).min(state.alpha_ceiling);
-        if alpha < state.alpha_floor {
+        if fall > most_fall {
             continue;
         }
+        let alpha = power(-fall).min(state.alpha_ceiling);
         out.reached = true;
         if !passes(g.depth) {
             continue;

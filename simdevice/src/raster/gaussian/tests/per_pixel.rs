@@ -13,6 +13,7 @@ pub(super) fn naive_sample(
 ) -> Naive {
     let mut out = Naive::default();
     let state = &draw.state;
+    let most_fall = (-f64::from(state.alpha_floor).log2()).min(126.0) as f32;
     let depths = draw.ray_depths().unwrap();
     let at = [x, y].map(|at| at as f64 + 0.5);
     let at = [0, 1].map(|axis| at[axis] + f64::from(tile[axis] * TILE_SIZE));
@@ -30,11 +31,11 @@ pub(super) fn naive_sample(
         };
         let (dx, dy) = (from(0, x), from(1, y));
         let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
-        let exponent = (f64::from(g.log2_opacity) - (u * u + v * v)) as f32;
-        let alpha = power(exponent).min(state.alpha_ceiling);
-        if alpha < state.alpha_floor {
+        let fall = ((u * u + v * v - f64::from(g.log2_opacity)) as f32).max(-1.0);
+        if fall > most_fall {
             continue;
         }
+        let alpha = power(-fall).min(state.alpha_ceiling);
         out.reached = true;
         if passes(g.depth) {
             let depth = &depths.of[batch][place];
