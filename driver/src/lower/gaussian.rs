@@ -187,11 +187,11 @@ fn attributes(
             .map(stream)
             .collect::<Result<_, _>>()?,
         model: ModelAttributes {
-            matrix: match &gaussian.model_matrix {
+            matrix: match &sources.model_matrix {
                 None => None,
                 Some([x, y, z]) => Some(Box::new([stream(x)?, stream(y)?, stream(z)?])),
             },
-            opacity: gaussian.model_opacity.as_ref().map(stream).transpose()?,
+            opacity: sources.model_opacity.as_ref().map(stream).transpose()?,
         },
     })
 }

@@ -64,8 +64,6 @@ struct PhysicalDevice {
     queue_family: u32,
     name: String,
     counts: bool,
-    /// Whether it has fisheye cameras and panoramas.
-    cameras: [bool; 2],
     max_size: u32,
     max_gaussians: u64,
     max_sh_degree: u32,
@@ -357,7 +355,6 @@ impl PhysicalDevice {
             // SAFETY: as above.
             unsafe { instance.get_physical_device_features2(handle, &mut chain) };
         }
-        let cameras = [features.fisheye_camera, features.equirectangular_camera];
         let limits = &properties.limits;
         let max_size = [
             limits.max_image_dimension2_d,
@@ -371,7 +368,6 @@ impl PhysicalDevice {
             queue_family: queue_family as u32,
             name: name.to_owned(),
             counts,
-            cameras: cameras.map(|camera| camera == vk::TRUE),
             max_size: max_size.into_iter().min().unwrap_or_default(),
             max_gaussians: gaussian.max_gaussians_per_draw,
             max_sh_degree: gaussian.max_spherical_harmonics_degree,

@@ -11,7 +11,6 @@ use super::footprint::{Ellipse, Reach, Span, Visible};
 use super::frustum::Frustum;
 use super::instances::Matrices;
 use super::lanes::{Bits, F32_LANES, Lanes, log2};
-use super::linearize;
 use super::panorama;
 use super::rays::{self, RayDepth};
 use super::scratch::{Attributes, Flat, Scratch};

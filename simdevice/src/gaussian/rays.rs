@@ -191,6 +191,10 @@ impl PixelRays {
                     };
                     [u * across, v * across, angle.cos()]
                 }
+                CameraModel::Equirectangular => {
+                    let ((sin_u, cos_u), (sin_v, cos_v)) = (u.sin_cos(), v.sin_cos());
+                    [sin_u * cos_v, sin_v, cos_u * cos_v]
+                }
             };
             for (lanes, component) in rays.direction.iter_mut().zip(direction) {
                 lanes[lane] = component;

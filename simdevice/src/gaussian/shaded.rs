@@ -285,7 +285,7 @@ impl Shading {
                 GaussianOrder::ViewDepth | GaussianOrder::RadialDistance => {
                     ordered_bits(kept.key[at])
                 }
-                GaussianOrder::Primitive => sequence,
+                GaussianOrder::Primitive | GaussianOrder::PerPixel => sequence,
             };
             let [_, _, z, w] = &kept.position;
             let depth = self.depth.map_or(0, |depth| depth.encode(z[at] / w[at]));

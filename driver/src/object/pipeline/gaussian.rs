@@ -339,7 +339,10 @@ fn validate_stages(
 }
 
 /// What fixed-function projection alone is told.
-fn validate_projection(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
+fn validate_projection(
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+    features: &EnabledFeatures,
+) -> Result<(), Error> {
     match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_3D => {}
         GaussianGeometryGAURAST::GAUSSIAN_2D => {
@@ -362,7 +365,7 @@ fn validate_modes(
     features: &EnabledFeatures,
 ) -> Result<(), Error> {
     if !is_shaded(gaussian) {
-        validate_projection(gaussian)?;
+        validate_projection(gaussian, features)?;
     }
     match gaussian.precision {
         GaussianPrecisionGAURAST::FLOAT32 => {}

@@ -1,7 +1,7 @@
 //! Longitude and latitude, and pictures that repeat.
 
 use super::{OracleCamera, OracleModel};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// The cosine of the latitude beyond which the Jacobian no longer grows.
 const POLE: f64 = 1.0 / 1024.0;
@@ -46,6 +46,9 @@ pub fn nearest(dx: f64, period: f64) -> Option<f64> {
     let copies = [dx, dx - period, dx + period];
     copies.into_iter().find(|dx| (-half..half).contains(dx))
 }
+
+#[cfg(test)]
+use std::f64::consts::PI;
 
 #[test]
 fn the_nearest_copy_counts() {

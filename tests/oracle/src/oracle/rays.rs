@@ -36,6 +36,12 @@ pub struct RayDepth {
 }
 
 impl OwnAxes {
+    /// Of what is nowhere but in the picture.
+    pub(super) const NONE: Self = Self {
+        rows: [[0.0; 3]; 3],
+        offset: [0.0; 3],
+    };
+
     /// Of a Gaussian whose own axes are the columns of `axes` (row-major), `offset` from the eye.
     pub(super) fn new(axes: &[f64; 9], scale: [f64; 3], offset: [f64; 3]) -> Self {
         let greatest = scale[0].max(scale[1]).max(scale[2]);
@@ -65,6 +71,10 @@ impl OwnAxes {
                     angle.sin() / angle
                 };
                 ([0.0; 3], [across * u, across * v, angle.cos()])
+            }
+            OracleModel::Equirectangular => {
+                let level = v.cos();
+                ([0.0; 3], [level * u.sin(), v.sin(), level * u.cos()])
             }
         };
         let to_world = |camera_axes: [f64; 3]| {

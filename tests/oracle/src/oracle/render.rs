@@ -285,7 +285,6 @@ impl Bound {
             covariance: splat.covariance,
             determinant: splat.determinant,
             repeats: splat.period != f64::INFINITY,
-            q: if q.is_finite() {
             rectangle: splat.surfel.map(|surfel| surfel.bounds(furthest)),
             q: if splat.surfel.is_some() {
                 level + 2.0 * std::f64::consts::LN_2

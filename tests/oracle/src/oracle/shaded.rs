@@ -1,5 +1,6 @@
 //! Vertex-shader projection: from what a shader wrote of a Gaussian to the numbers that a pixel needs.
 
+use super::rays::OwnAxes;
 use super::error_model::ErrorModel;
 use super::project::{Cholesky, Splat};
 use super::render::{Projected, Reference, bounded};
@@ -80,11 +81,14 @@ pub fn project(
         mean,
         covariance,
         determinant,
+        period: f64::INFINITY,
+        surfel: None,
+        own_axes: OwnAxes::NONE,
         cholesky: Cholesky::new(covariance, determinant),
         opacity,
         color: outputs.color.map(f64::from),
         key: match state.order {
-            OracleOrder::Primitive => 0.0,
+            OracleOrder::Primitive | OracleOrder::PerPixel => 0.0,
             // Zero has no sign here.
             OracleOrder::ViewDepth | OracleOrder::RadialDistance => key + 0.0,
         },
