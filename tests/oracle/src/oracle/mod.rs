@@ -10,6 +10,8 @@
 //! | 3, 4 | mean, covariance, determinant, opacity compensation | [`project`] |
 //! | 5 | colour from spherical harmonics | [`spherical_harmonics`] |
 //! | 6, 7 | alpha at a pixel centre, compositing front to back | [`pixel`] |
+//! | 7 | the per-pixel order | [`rays`] |
+//! | 3, 6 | 2D Gaussians | [`surfel`] |
 //! | then | depth and stencil, sample by sample | [`sample_tests`] |
 //!
 //! The inputs are attributes and camera *after* conversion to binary32 (the eye: binary64), which
