@@ -1,5 +1,5 @@
 //! What binary16 rasterization costs in exactness: `cargo run --release -p gaurast-tests --example binary16_error
-//! [SCENE FILE...] > tests/stress/binary16.md`.
+//! [SCENE FILE...]` prints a table.
 //!
 //! Each scene is drawn in binary16 and in binary32, and both are held against the binary64 oracle.
 

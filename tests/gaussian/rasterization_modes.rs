@@ -70,7 +70,7 @@ fn modes_keep_the_contract() {
 #[test]
 fn awkward_scenes_stay_within_the_envelope() {
     let devices = Devices::new();
-    for seed in 200..230 {
+    for seed in 200..215 {
         let scene = scenes::awkward(seed, 10 + 2 * (seed % 20) as usize, (seed % 2) as u32);
         for (name, state) in states() {
             let name = format!("awkward {seed} {name}");

@@ -53,7 +53,9 @@ vk_enum! {
         /// A volume with three standard deviations (3DGS).
         GAUSSIAN_3D = 0,
         /// A flat disc (surfel) with two standard deviations, along the rotated x and y axes
-        /// (2DGS); the scale attribute's third component is not read. Needs `gaussian2D`.
+        /// (2DGS), evaluated where each pixel's ray meets its plane; the scale attribute's third
+        /// component is not read. Seen by pinhole and orthographic cameras, with dilation only.
+        /// Needs `gaussian2D`.
         GAUSSIAN_2D = 1,
     }
 }
@@ -91,7 +93,8 @@ vk_enum! {
     pub struct GaussianPrecisionGAURAST {
         /// binary32.
         FLOAT32 = 0,
-        /// binary16 evaluation and accumulation. Needs `rasterizationFloat16`.
+        /// binary16 evaluation and accumulation, of 3D Gaussians in another order than `PER_PIXEL`.
+        /// Needs `rasterizationFloat16`.
         FLOAT16 = 1,
     }
 }

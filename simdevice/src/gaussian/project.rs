@@ -517,7 +517,11 @@ impl Projection {
                 bx * bx + by * by + bz * bz,
             ];
             if unscented {
-                covariance = [load(&moments[0], at), load(&moments[1], at), load(&moments[2], at)];
+                covariance = [
+                    load(&moments[0], at),
+                    load(&moments[1], at),
+                    load(&moments[2], at),
+                ];
                 area2 = load(&moments[3], at);
             }
             self.shape(simd, at, covariance, area2, load(opacity, at), flat);

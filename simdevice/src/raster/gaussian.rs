@@ -301,7 +301,11 @@ impl GaussianTile {
             if open == 0 {
                 break;
             }
-            if DEPTH != NO_DEPTH && self.passing.hides_from(task.splat(chunk[0]).depth, task.trend) {
+            if DEPTH != NO_DEPTH
+                && self
+                    .passing
+                    .hides_from(task.splat(chunk[0]).depth, task.trend)
+            {
                 work.tiles_hidden += (task.list.len() - number * CHUNK) as u64;
                 break;
             }
@@ -465,7 +469,8 @@ impl Layer {
             let median = first_half.select(u32x16::splat(simd, depth), median);
             median.store_slice(&mut self.median[block]);
         }
-        let finished = t.to_bits() | reached.select(u32x16::splat(simd, SIGN), u32x16::splat(simd, 0));
+        let finished =
+            t.to_bits() | reached.select(u32x16::splat(simd, SIGN), u32x16::splat(simd, 0));
         let t = accepted.select(rest, f32x16::from_bits(finished));
         t.store_slice(&mut self.transmittance[block]);
         let weight = accepted.select(weight, f32x16::splat(simd, 0.0));

@@ -16,8 +16,8 @@ use simdevice::packet::draw::{
 };
 use simdevice::packet::{
     Aspect, Attachment, AttributeStream, BlendState, BufferRange, Camera, ClearValue,
-    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianOrder, GaussianState, LoadOp, Rect,
-    Rendering, ResolveMode, StoreOp, Viewport,
+    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianOrder, GaussianState, LoadOp,
+    ModelAttributes, Rect, Rendering, ResolveMode, StoreOp, Viewport,
 };
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;

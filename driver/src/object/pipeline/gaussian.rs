@@ -195,7 +195,9 @@ fn state(
         },
         // What a vertex shader projects has neither.
         geometry: match gaussian.geometry {
-            GaussianGeometryGAURAST::GAUSSIAN_2D if !is_shaded(gaussian) => GaussianGeometry::Surfel,
+            GaussianGeometryGAURAST::GAUSSIAN_2D if !is_shaded(gaussian) => {
+                GaussianGeometry::Surfel
+            }
             _ => GaussianGeometry::Volume,
         },
         sh_degree: if is_shaded(gaussian) {
@@ -228,7 +230,8 @@ fn validate_combinations(
     info: &GraphicsPipelineInfo,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
 ) -> Result<(), Error> {
-    let broken = |id: &'static str, what: &str| Err(Error::usage(id, format!("{STRUCTURE}: {what}")));
+    let broken =
+        |id: &'static str, what: &str| Err(Error::usage(id, format!("{STRUCTURE}: {what}")));
     let shaded = is_shaded(gaussian);
     let per_pixel = gaussian.order == GaussianOrderGAURAST::PER_PIXEL;
     let flat = gaussian.geometry == GaussianGeometryGAURAST::GAUSSIAN_2D;

@@ -58,7 +58,11 @@ impl Layer {
                 continue;
             }
             for (lane, t) in block.iter_mut().enumerate() {
-                *t = if lanes >> lane & 1 == 1 { 1.0 } else { UNTOUCHED };
+                *t = if lanes >> lane & 1 == 1 {
+                    1.0
+                } else {
+                    UNTOUCHED
+                };
             }
         }
     }

@@ -11,6 +11,8 @@
 //! | 1 to 5 | of what a vertex shader has projected | [`shaded`] |
 //! | 5 | colour from spherical harmonics | [`spherical_harmonics`] |
 //! | 6, 7 | alpha at a pixel centre, compositing front to back | [`pixel`] |
+//! | 7 | the per-pixel order | [`rays`] |
+//! | 3, 6 | 2D Gaussians | [`surfel`] |
 //! | then | what a resolve shader reads | [`resolve`] |
 //! | then | depth and stencil, sample by sample | [`sample_tests`] |
 //!

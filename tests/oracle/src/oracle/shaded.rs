@@ -1,8 +1,8 @@
 //! Vertex-shader projection: from what a shader wrote of a Gaussian to the numbers that a pixel needs.
 
-use super::rays::OwnAxes;
 use super::error_model::ErrorModel;
 use super::project::{Cholesky, Splat};
+use super::rays::OwnAxes;
 use super::render::{Projected, Reference, bounded};
 use super::{OracleOrder, OracleState, SkipReason};
 
