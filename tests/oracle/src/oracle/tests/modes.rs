@@ -76,7 +76,10 @@ fn discs_that_cross_are_in_front_of_each_other() {
         let picture = render(&crossing, &camera(), &state);
         let [left, right] = [31, 33].map(|x| at(&picture, x, 32));
         // The first goes back on the left, where its x is negative: -x sin.
-        assert!(left[1] > left[0] && right[0] > right[1], "{left:?} {right:?}");
+        assert!(
+            left[1] > left[0] && right[0] > right[1],
+            "{left:?} {right:?}"
+        );
         // In the middle they are equally deep, and in the order of the draw.
         assert_close(at(&picture, 32, 32), [0.5, 0.25, 0.0, 0.75], 1e-6);
     }
