@@ -4,8 +4,8 @@ use crate::gpu::Gpu;
 use crate::scene::{PipelineRequest, over, replace};
 use ash::vk;
 use gaurast::vk::{
-    GaussianAntialiasingGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
-    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;

@@ -8,7 +8,7 @@ use crate::spirv;
 use ash::vk;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST,
-    GaussianProjectionModeGAURAST, GaussianResolveInputLocationsGAURAST,
+    GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST, GaussianResolveInputLocationsGAURAST,
     GaussianVertexOutputLocationsGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
@@ -419,6 +419,13 @@ pub fn broken() -> Vec<(&'static str, String)> {
         }
     };
     let resolved = |module, locations| stage.resolved(request(false), module, locations);
+    let half = |mut request: PipelineRequest<'static>| {
+        let state = request
+            .gaussian
+            .map(|s| s.precision(GaussianPrecisionGAURAST::FLOAT16));
+        request.gaussian = state;
+        request
+    };
     let read = "VUID-VkGaussianResolveInputLocationsGAURAST-location";
     let requests = [
         // Nothing is there, or too little, or the same.
@@ -428,6 +435,10 @@ pub fn broken() -> Vec<(&'static str, String)> {
         (
             "VUID-VkGraphicsPipelineCreateInfo-FragDepth-GAURAST",
             resolved(stage.deep, [0, 1]),
+        ),
+        (
+            "VUID-VkGaussianResolveInputLocationsGAURAST-depth-modes",
+            half(resolved(stage.toned, [0, 1])),
         ),
         // Not written, too narrow, and named twice.
         (location, with(outputs().covariance(9))),

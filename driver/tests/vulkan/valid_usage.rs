@@ -83,10 +83,17 @@ fn pipelines() -> Vec<(&'static str, PipelineRequest<'static>)> {
             missing(2),
         ),
         (
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-projectionMode",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-modes",
             with(|s| {
                 s.order(GaussianOrderGAURAST::PER_PIXEL)
-                    .projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)
+                    .attribute_locations(s.attribute_locations.first_model_matrix(0))
+            }),
+        ),
+        (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-geometry-linearization",
+            with(|s| {
+                s.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D)
+                    .linearization(GaussianLinearizationGAURAST::UNSCENTED)
             }),
         ),
         (

@@ -238,12 +238,6 @@ fn validate_combinations(
     let half = gaussian.precision == GaussianPrecisionGAURAST::FLOAT16;
     let placed =
         gaussian.attribute_locations.first_model_matrix != GAUSSIAN_LOCATION_UNUSED_GAURAST;
-    if per_pixel && shaded {
-        return broken(
-            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-order-projectionMode",
-            "order is PER_PIXEL, but projectionMode is VERTEX_SHADER, whose Gaussians have no depth along a ray",
-        );
-    }
     if !shaded && placed && (per_pixel || flat) {
         return broken(
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-modes",
