@@ -239,7 +239,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let draw = set.resolve(&device, &mut counters)?;
         let started = Instant::now();
         let mut pass = Pass::begin(&rendering)?;
-        pass.push(PassDraw::Gaussians(draw), &device, &mut counters)?;
+        pass.push(PassDraw::Gaussians(Box::new(draw)), &device, &mut counters)?;
         pass.end(&device, &mut counters)?;
         let raster = started.elapsed().as_secs_f64() * 1e3;
         let ms = |counter| counters.get(counter) as f64 / 1e6;

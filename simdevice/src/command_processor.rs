@@ -150,7 +150,7 @@ impl CommandProcessor {
             Packet::GaussianResolve => {
                 let set = self.gaussians.take().ok_or(ExecutionError::NoGaussianSet)?;
                 let draw = set.resolve(&self.device, &mut self.counters)?;
-                self.draw(PassDraw::Gaussians(draw))
+                self.draw(PassDraw::Gaussians(Box::new(draw)))
             }
             Packet::Dispatch(dispatch) => {
                 if self.pass.is_some() {

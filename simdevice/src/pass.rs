@@ -29,7 +29,7 @@ pub enum PassDraw {
     /// Rectangles of attachments to clear.
     Clear(ClearAttachments),
     /// A sorted and binned set of Gaussians.
-    Gaussians(GaussianDraw),
+    Gaussians(Box<GaussianDraw>),
     /// Points, lines or triangles.
     Primitives(Box<PrimitiveDraw>),
 }

@@ -90,11 +90,13 @@ const LEAST_HALF_FACTOR: f64 = 1.0 / 16384.0;
 pub(crate) fn half_room(factor: [f64; 3], room: f64) -> f64 {
     const UNIT: f64 = 1.0 / 2048.0;
     let [a, b, c] = factor.map(f64::abs);
-    if !(a.min(c) >= LEAST_HALF_FACTOR) {
-        return f64::INFINITY;
+    // What is not a number is bounded by nothing.
+    if a.min(c) >= LEAST_HALF_FACTOR {
+        let stretch = 1.0 + 8.0 * UNIT * (1.0 + b / a);
+        (room + 0.25 + 0.02 * room.abs()) * stretch * stretch
+    } else {
+        f64::INFINITY
     }
-    let stretch = 1.0 + 8.0 * UNIT * (1.0 + b / a);
-    (room + 0.25 + 0.02 * room.abs()) * stretch * stretch
 }
 
 /// Gaussians whose spherical harmonics are read together.

@@ -188,14 +188,14 @@ impl GaussianTile {
                     reached &= reached - 1;
                 }
             }
-            for lane in 0..LANES {
+            let pixels = sums.iter_mut().zip(&mut self.per_pixel.pixels);
+            for (lane, (sum, pixel)) in pixels.enumerate() {
                 if open >> lane & 1 == 0 {
                     continue;
                 }
-                let pixel = &mut self.per_pixel.pixels[lane];
                 let names = &self.lists[block];
-                contributions += composite_pixel::<DEPTH>(&mut sums[lane], pixel, names, task);
-                if sums[lane].finished || !pixel.advance() {
+                contributions += composite_pixel::<DEPTH>(sum, pixel, names, task);
+                if sum.finished || !pixel.advance() {
                     open &= !(1 << lane);
                 }
             }

@@ -350,7 +350,7 @@ impl Scene {
         })
         .unwrap();
         let mut counters = Counters::default();
-        let draw = PassDraw::Gaussians(self.draw(device));
+        let draw = PassDraw::Gaussians(Box::new(self.draw(device)));
         pass.push(draw, device, &mut counters).unwrap();
         pass.end(device, &mut counters).unwrap();
         let read = |view: &ImageView, aspect| {
