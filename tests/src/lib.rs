@@ -8,6 +8,7 @@ pub mod data;
 pub mod fuzzing;
 pub mod hybrid;
 pub mod kernels;
+pub mod long_run;
 pub mod programs;
 pub mod triangles;
 
