@@ -298,6 +298,8 @@ pub(crate) fn push_run(runs: &mut Vec<Run>, run: Run) {
         Some(last) if (last.rows, last.blocks) == (run.rows, run.blocks) => {
             last.primitives += run.primitives;
             last.reached += run.reached;
+            last.hidden += run.hidden;
+            last.hidden_blocks += run.hidden_blocks;
         }
         _ => runs.push(run),
     }
@@ -492,6 +494,8 @@ mod tests {
             rows,
             blocks,
             reached: 5,
+            hidden: 2,
+            hidden_blocks: 1,
         };
         let mut runs = Vec::new();
         for next in [run(16, 16), run(16, 16), run(12, 9), run(12, 8)] {
@@ -499,5 +503,6 @@ mod tests {
         }
         assert_eq!(runs.len(), 3);
         assert_eq!((runs[0].primitives, runs[0].reached), (64, 10));
+        assert_eq!((runs[0].hidden, runs[0].hidden_blocks), (4, 2));
     }
 }

@@ -75,7 +75,7 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
     let counters = counted(Kind::Triangles, QueryKind::Performance, &Config::default());
     let trace = trace(Kind::Triangles);
     let of = |of: fn(&TileWork) -> u64| sum(&trace, Mode::Triangle, of);
-    let hidden = of(|tile| tile.hidden.into());
+    let hidden = of(|tile| tile.hidden().into());
     assert_eq!(hidden, counters.get(Counter::TilesHidden));
     assert!(hidden > 0 && of(|tile| tile.killed.into()) > 0);
     assert_eq!(
@@ -93,7 +93,7 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
             panic!("one run: {tile:?}")
         };
         assert_eq!(run.primitives, tile.listed);
-        assert!(run.reached + tile.hidden_blocks <= 16 * tile.listed);
+        assert!(run.reached + tile.hidden_blocks() <= 16 * tile.listed);
         assert!(tile.quads + tile.killed <= 4 * run.reached);
     }
     let draws: Vec<_> = trace.frames.iter().map(|frame| &frame.draws[0]).collect();
