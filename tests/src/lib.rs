@@ -10,6 +10,7 @@ pub mod hybrid;
 pub mod kernels;
 pub mod long_run;
 pub mod programs;
+pub mod recorded;
 pub mod triangles;
 
 pub use gaurast_oracle::{oracle, scenes};

@@ -3,5 +3,6 @@
 
 mod long_run;
 mod properties;
+mod recorded_work;
 mod scenes;
 mod verdicts;
