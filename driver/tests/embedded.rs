@@ -135,11 +135,10 @@ fn what_is_not_there_is_refused() {
         "{text}"
     );
 
-    let mut gaussian =
-        PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default().gaussian_2d(true);
+    let mut chained = vk::PhysicalDeviceVulkan13Features::default().inline_uniform_block(true);
     let (error, _) = refusal(
         &[gaussian_primitive_topology::NAME],
-        &mut vk::PhysicalDeviceFeatures2::default().push_next(&mut gaussian),
+        &mut vk::PhysicalDeviceFeatures2::default().push_next(&mut chained),
     );
     assert_eq!(error, Some(vk::Result::ERROR_FEATURE_NOT_PRESENT));
 

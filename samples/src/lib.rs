@@ -2,6 +2,7 @@
 //! is an ordinary application of the Gaussian primitive topology.
 
 pub mod camera;
+pub mod file;
 pub mod output;
 pub mod renderer;
 pub mod scene;

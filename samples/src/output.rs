@@ -4,13 +4,15 @@
 //! files hold exactly that in 32-bit floats. PNG's alpha is not premultiplied and eight bits
 //! cannot undo that, so a PNG is always opaque: over the background, which is black by default.
 
-use std::io::{self, BufWriter, Seek, Write};
+use std::io::{self, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use image::codecs::openexr::OpenExrEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use thiserror::Error;
+
+use crate::file;
 
 /// Pixels as a draw leaves them: RGBA in rows from the top, premultiplied.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,21 +111,13 @@ pub fn check(path: &Path) -> Result<(), OutputError> {
         source,
     };
     let is_folder = |path: &Path| path.metadata().map(|metadata| metadata.is_dir());
-    if !is_folder(folder(path)).map_err(io)? {
+    if !is_folder(file::folder(path)).map_err(io)? {
         return Err(io(io::ErrorKind::NotADirectory.into()));
     }
     if is_folder(path).unwrap_or(false) {
         return Err(io(io::ErrorKind::IsADirectory.into()));
     }
     Ok(())
-}
-
-/// The folder that the file `path` is in.
-fn folder(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    }
 }
 
 /// Writes `picture` to `path`, in the format of its extension, over `background` if there is one.
@@ -141,24 +135,15 @@ pub fn write(
         source,
     };
     let format = ImageFormat::of(path)?;
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".gaurast-");
-    // Readable like any other new file; the crate's own default is for secrets.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder(path)).map_err(io)?;
-    let mut writer = BufWriter::new(&mut file);
-    encode(&mut writer, format, picture, background).map_err(|source| match source {
+    let mut encoded = Cursor::new(Vec::new());
+    encode(&mut encoded, format, picture, background).map_err(|source| match source {
         image::ImageError::IoError(source) => io(source),
         source => OutputError::Encode {
             path: path.to_owned(),
             source,
         },
     })?;
-    writer.flush().map_err(io)?;
-    drop(writer);
-    file.persist(path).map_err(|error| io(error.error))?;
-    Ok(())
+    file::replace(path, encoded.get_ref()).map_err(io)
 }
 
 fn encode(

@@ -11,10 +11,11 @@ use crate::packet::draw::Draw;
 use crate::pass::{Pass, PassDraw};
 use crate::query::{QueryKind, host_time};
 use crate::raster::tile::AttachmentError;
-use crate::trace::DrawRecord;
+use crate::trace::{DrawRecord, Owner};
 use crate::transfer::{self, Direction};
 use isa::exec::Stopped;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Why a packet could not be executed. The command processor stays usable: nothing of the packet was done, unless the error
 /// says otherwise, and a Gaussian set or a pass that it would have ended has ended.
@@ -56,6 +57,8 @@ impl From<Unresolved> for ExecutionError {
 #[derive(Debug)]
 pub struct CommandProcessor {
     device: Arc<Device>,
+    /// Whose work is recorded.
+    owner: Owner,
     counters: Counters,
     pass: Option<Pass>,
     gaussians: Option<GaussianSet>,
@@ -65,12 +68,15 @@ pub struct CommandProcessor {
 impl CommandProcessor {
     /// A command processor outside of any pass, with all counters at zero.
     pub fn new(device: Arc<Device>) -> Self {
+        static OWNERS: AtomicU64 = AtomicU64::new(0);
+        let owner = OWNERS.fetch_add(1, Relaxed);
         Self {
             device,
+            owner,
             counters: Counters::default(),
             pass: None,
             gaussians: None,
-            model: Model::default(),
+            model: Model::new(owner),
         }
     }
 
@@ -119,7 +125,7 @@ impl CommandProcessor {
                 }
                 let pass = Pass::begin(rendering)?;
                 if let Some(recorder) = self.device.recorder() {
-                    recorder.begin_frame(pass.area());
+                    recorder.begin_frame(self.owner, pass.area());
                 }
                 self.pass = Some(pass);
                 Ok(())
@@ -150,6 +156,9 @@ impl CommandProcessor {
             Packet::GaussianResolve => {
                 let set = self.gaussians.take().ok_or(ExecutionError::NoGaussianSet)?;
                 let draw = set.resolve(&self.device, &mut self.counters)?;
+                if let Some((recorder, record)) = self.device.recorder().zip(draw.record.as_ref()) {
+                    recorder.add_draw(self.owner, record);
+                }
                 self.draw(PassDraw::Gaussians(Box::new(draw)))
             }
             Packet::Dispatch(dispatch) => {
@@ -160,7 +169,7 @@ impl CommandProcessor {
                 let before = recorder.map(|_| self.counters.clone());
                 compute::dispatch(dispatch, &self.device, &mut self.counters)?;
                 if let (Some(recorder), Some(before)) = (recorder, before) {
-                    recorder.add_dispatch(&self.counters.since(&before));
+                    recorder.add_dispatch(self.owner, &self.counters.since(&before));
                 }
                 Ok(())
             }
@@ -241,7 +250,11 @@ impl CommandProcessor {
         };
         let device = Arc::clone(&self.device);
         let recorder = device.recorder();
-        let record = recorder.map(|recorder| recorder.begin_draw(DrawRecord::primitives()));
+        let record = recorder.map(|recorder| {
+            let record = DrawRecord::new(DrawRecord::primitives());
+            recorder.add_draw(self.owner, &record);
+            record
+        });
         let mut before = recorder.map(|_| self.counters.clone());
         let mut front = FrontEnd::new(draw, surface, &device, &mut self.counters);
         while let Some(mut part) = front.next_part(&mut self.counters)? {

@@ -3,13 +3,16 @@
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::packet::Rect;
+use crate::trace::Owner;
 use timing::FrameWork;
 use timing::config::{Config, DEFAULT_PRESET};
 use timing::simulate::simulate;
 
 /// A command processor's view of the simulated hardware, which is the paper's.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Model {
+    /// Whose work it accounts for: other command processors' queries have models of their own.
+    owner: Owner,
     /// Read when it is first needed.
     config: Option<Config>,
     /// Queries that are active.
@@ -19,6 +22,16 @@ pub(crate) struct Model {
 }
 
 impl Model {
+    /// What accounts for an owner's work.
+    pub(crate) fn new(owner: Owner) -> Self {
+        Self {
+            owner,
+            config: None,
+            queries: 0,
+            next: 0,
+        }
+    }
+
     /// Whether what is done is accounted for.
     fn is_on(&self, device: &Device) -> bool {
         self.queries > 0 || device.config().simulated_timestamps
@@ -31,11 +44,11 @@ impl Model {
         recorder.listen();
         if !self.is_on(device) {
             // What others recorded before is none of this query's.
-            recorder.work_since(&mut self.next);
+            recorder.work_since(self.owner, &mut self.next);
         }
         self.queries += 1;
         if let Some(area) = area {
-            recorder.begin_frame(area);
+            recorder.begin_frame(self.owner, area);
         }
     }
 
@@ -55,12 +68,12 @@ impl Model {
             return;
         }
         let recorder = device.listened_recorder();
-        let frames = recorder.work_since(&mut self.next);
+        let frames = recorder.work_since(self.owner, &mut self.next);
         if device.config().recorder.is_none() {
-            recorder.clear();
+            recorder.clear(self.owner);
         }
         if let Some(area) = area {
-            recorder.begin_frame(area);
+            recorder.begin_frame(self.owner, area);
         }
         if frames.is_empty() {
             return;

@@ -9,7 +9,7 @@ pub(crate) use primitives::MacroTileWork;
 use crate::counters::{Counter, Counters};
 use crate::gaussian::{TILE_SIZE, project::Splat};
 use crate::packet::Rect;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -34,13 +34,16 @@ pub struct Recorder {
     listeners: AtomicU32,
 }
 
+/// Whose work it is: each command processor of a device has a number of its own.
+pub(crate) type Owner = u64;
+
 #[derive(Default)]
 struct Frames {
     kept: VecDeque<Frame>,
-    /// Frames that were begun before the first that is kept.
-    gone: u64,
-    /// Dispatches since the last pass began.
-    dispatched: Dispatched,
+    /// Frames that were begun so far.
+    begun: u64,
+    /// Dispatches of each owner since its last pass began.
+    dispatched: BTreeMap<Owner, Dispatched>,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -51,6 +54,9 @@ struct Dispatched {
 
 #[derive(Default)]
 struct Frame {
+    owner: Owner,
+    /// How many were begun before it.
+    number: u64,
     size: [u32; 2],
     before: Dispatched,
     draws: Vec<Arc<DrawRecord>>,
@@ -90,23 +96,30 @@ impl Recorder {
 
     /// What was done so far. Passes that drew nothing are left out.
     pub fn trace(&self) -> Trace {
+        let frames = self.lock();
+        let last = frames.dispatched.values().map(|&before| Frame {
+            before,
+            ..Frame::default()
+        });
+        let kept = frames.kept.iter().filter_map(Frame::work);
         Trace {
             version: TRACE_VERSION,
-            frames: self.work_since(&mut 0),
+            frames: kept.chain(last.filter_map(|frame| frame.work())).collect(),
         }
     }
 
-    /// What was done in frames from number `from` on, as far as they are kept; `from` becomes the next frame's number.
-    pub(crate) fn work_since(&self, from: &mut u64) -> Vec<FrameWork> {
-        let frames = self.lock();
-        let skipped = from.saturating_sub(frames.gone) as usize;
-        let kept = frames.kept.iter().skip(skipped);
-        let last = Frame {
-            before: frames.dispatched,
-            ..Frame::default()
-        };
-        *from = frames.gone + frames.kept.len() as u64;
-        kept.chain([&last]).filter_map(Frame::work).collect()
+    /// What an owner did in frames from number `from` on, as far as they are kept; `from` becomes the next frame's
+    /// number. Dispatches since its last pass are a frame of their own from now on.
+    pub(crate) fn work_since(&self, owner: Owner, from: &mut u64) -> Vec<FrameWork> {
+        let mut frames = self.lock();
+        if frames.dispatched.contains_key(&owner) {
+            frames.begin(owner, [0; 2]);
+        }
+        let first = std::mem::replace(from, frames.begun);
+        let kept = frames.kept.iter();
+        kept.filter(|frame| frame.owner == owner && frame.number >= first)
+            .filter_map(Frame::work)
+            .collect()
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Frames> {
@@ -128,44 +141,50 @@ impl Recorder {
         self.listeners.fetch_sub(1, Relaxed);
     }
 
-    /// Forgets all that was done.
-    pub(crate) fn clear(&self) {
+    /// Forgets all that an owner did.
+    pub(crate) fn clear(&self, owner: Owner) {
         let mut frames = self.lock();
-        frames.gone += frames.kept.len() as u64;
-        frames.kept.clear();
-        frames.dispatched = Dispatched::default();
+        frames.kept.retain(|frame| frame.owner != owner);
+        frames.dispatched.remove(&owner);
     }
 
-    /// Begins a render pass over `area`.
-    pub(crate) fn begin_frame(&self, area: Rect) {
-        let mut frames = self.lock();
-        if frames.kept.len() >= MAX_FRAMES {
-            frames.kept.pop_front();
-            frames.gone += 1;
-        }
-        let before = std::mem::take(&mut frames.dispatched);
-        frames.kept.push_back(Frame {
-            size: [area.width, area.height],
-            before,
-            draws: Vec::new(),
-        });
+    /// Begins an owner's render pass over `area`.
+    pub(crate) fn begin_frame(&self, owner: Owner, area: Rect) {
+        self.lock().begin(owner, [area.width, area.height]);
     }
 
-    /// Begins a draw of the last render pass.
-    pub(crate) fn begin_draw(&self, work: DrawWork) -> Arc<DrawRecord> {
-        let record = Arc::new(DrawRecord(Mutex::new(work)));
-        if let Some(frame) = self.lock().kept.back_mut() {
-            frame.draws.push(Arc::clone(&record));
+    /// Adds a draw to the last render pass of its owner.
+    pub(crate) fn add_draw(&self, owner: Owner, record: &Arc<DrawRecord>) {
+        let mut frames = self.lock();
+        let mut last_first = frames.kept.iter_mut().rev();
+        if let Some(frame) = last_first.find(|frame| frame.owner == owner) {
+            frame.draws.push(Arc::clone(record));
         }
-        record
     }
 
     /// Adds a dispatch, of which `counters` tell.
-    pub(crate) fn add_dispatch(&self, counters: &Counters) {
+    pub(crate) fn add_dispatch(&self, owner: Owner, counters: &Counters) {
         let mut frames = self.lock();
-        let dispatched = &mut frames.dispatched;
+        let dispatched = frames.dispatched.entry(owner).or_default();
         dispatched.work = dispatched.work.plus(&shader_work(counters));
         dispatched.count += 1;
+    }
+}
+
+impl Frames {
+    fn begin(&mut self, owner: Owner, size: [u32; 2]) {
+        if self.kept.len() >= MAX_FRAMES {
+            self.kept.pop_front();
+        }
+        let before = self.dispatched.remove(&owner).unwrap_or_default();
+        self.kept.push_back(Frame {
+            owner,
+            number: self.begun,
+            size,
+            before,
+            draws: Vec::new(),
+        });
+        self.begun += 1;
     }
 }
 
@@ -249,6 +268,11 @@ impl Drop for Recorder {
 }
 
 impl DrawRecord {
+    /// A draw of which so much is known.
+    pub(crate) fn new(work: DrawWork) -> Arc<Self> {
+        Arc::new(Self(Mutex::new(work)))
+    }
+
     /// Adds a tile.
     pub(crate) fn add(&self, tile: TileWork) {
         let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -274,6 +298,8 @@ pub(crate) fn push_run(runs: &mut Vec<Run>, run: Run) {
         Some(last) if (last.rows, last.blocks) == (run.rows, run.blocks) => {
             last.primitives += run.primitives;
             last.reached += run.reached;
+            last.hidden += run.hidden;
+            last.hidden_blocks += run.hidden_blocks;
         }
         _ => runs.push(run),
     }
@@ -414,9 +440,10 @@ mod tests {
     fn the_sink_gets_the_trace_in_the_order_of_tiles() {
         let (send, receive) = std::sync::mpsc::channel();
         let recorder = Recorder::new(move |trace| send.send(trace).unwrap());
-        recorder.begin_frame(BOUNDS);
-        recorder.begin_frame(BOUNDS);
-        let draw = recorder.begin_draw(DrawWork::default());
+        recorder.begin_frame(0, BOUNDS);
+        recorder.begin_frame(0, BOUNDS);
+        let draw = DrawRecord::new(DrawWork::default());
+        recorder.add_draw(0, &draw);
         for at in [[1, 1], [0, 1], [3, 0]] {
             draw.add(TileWork {
                 at,
@@ -435,12 +462,40 @@ mod tests {
     }
 
     #[test]
+    fn owners_have_frames_and_dispatches_of_their_own() {
+        let recorder = Recorder::default();
+        let draw = |primitives| {
+            DrawRecord::new(DrawWork {
+                primitives,
+                ..DrawWork::default()
+            })
+        };
+        recorder.begin_frame(1, BOUNDS);
+        recorder.begin_frame(2, BOUNDS);
+        recorder.add_dispatch(1, &Counters::default());
+        recorder.add_draw(1, &draw(10));
+        recorder.add_draw(2, &draw(20));
+        let mut from = [0; 2];
+        let mut since = |owner: Owner| recorder.work_since(owner, &mut from[owner as usize - 1]);
+        let (one, two) = (since(1), since(2));
+        assert_eq!(one[0].draws[0].primitives, 10);
+        assert_eq!((one.len(), one[1].dispatches), (2, 1));
+        assert_eq!((two.len(), two[0].draws[0].primitives), (1, 20));
+        assert!(since(1).is_empty() && since(2).is_empty(), "counted once");
+        recorder.clear(1);
+        let left = recorder.trace().frames;
+        assert_eq!((left.len(), left[0].draws[0].primitives), (1, 20));
+    }
+
+    #[test]
     fn runs_grow_until_something_finishes() {
         let run = |rows, blocks| Run {
             primitives: 32,
             rows,
             blocks,
             reached: 5,
+            hidden: 2,
+            hidden_blocks: 1,
         };
         let mut runs = Vec::new();
         for next in [run(16, 16), run(16, 16), run(12, 9), run(12, 8)] {
@@ -448,5 +503,6 @@ mod tests {
         }
         assert_eq!(runs.len(), 3);
         assert_eq!((runs[0].primitives, runs[0].reached), (64, 10));
+        assert_eq!((runs[0].hidden, runs[0].hidden_blocks), (4, 2));
     }
 }

@@ -6,14 +6,14 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
-use scenes::{KINDS, Kind, draw, recording};
+use scenes::{KINDS, Kind, draw, draw_on, recording};
 use simdevice::counters::{Counter, Counters};
 use simdevice::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::timing::config::{Config as Hardware, preset_names};
 use simdevice::timing::raster::RasterReport;
 use simdevice::timing::work::{Mode, TileWork, Trace};
 use simdevice::timing::{fast, schedule, simulate, stepped};
-use simdevice::{Config, Packet};
+use simdevice::{Config, Device, Packet};
 use std::sync::Arc;
 
 const NOTHING: [&[Packet]; 2] = [&[], &[]];
@@ -75,7 +75,7 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
     let counters = counted(Kind::Triangles, QueryKind::Performance, &Config::default());
     let trace = trace(Kind::Triangles);
     let of = |of: fn(&TileWork) -> u64| sum(&trace, Mode::Triangle, of);
-    let hidden = of(|tile| tile.hidden.into());
+    let hidden = of(|tile| tile.hidden().into());
     assert_eq!(hidden, counters.get(Counter::TilesHidden));
     assert!(hidden > 0 && of(|tile| tile.killed.into()) > 0);
     assert_eq!(
@@ -93,7 +93,7 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
             panic!("one run: {tile:?}")
         };
         assert_eq!(run.primitives, tile.listed);
-        assert!(run.reached + tile.hidden_blocks <= 16 * tile.listed);
+        assert!(run.reached + tile.hidden_blocks() <= 16 * tile.listed);
         assert!(tile.quads + tile.killed <= 4 * run.reached);
     }
     let draws: Vec<_> = trace.frames.iter().map(|frame| &frame.draws[0]).collect();
@@ -285,6 +285,51 @@ fn a_query_counts_what_the_model_says_of_the_trace() {
         // Nobody asked for the model.
         let plain = counted(kind, QueryKind::Performance, &Config::default());
         assert_eq!(plain.get(Counter::SimulatedTime), 0);
+    }
+}
+
+/// What a query on a device counts that others may use.
+fn counted_on(device: &Arc<Device>, kind: Kind) -> Counters {
+    let pool = Arc::new(QueryPool::new(QueryKind::Simulated, 1));
+    let [begin, end] = [true, false].map(|begins| {
+        let (pool, index) = (Arc::clone(&pool), 0);
+        if begins {
+            Packet::BeginQuery { pool, index }
+        } else {
+            Packet::EndQuery { pool, index }
+        }
+    });
+    draw_on(device, kind, [&[begin], &[end]]);
+    match pool.result(0) {
+        Some(QueryResult::Performance(counters)) => *counters,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn queries_of_several_queues_count_what_is_their_own() {
+    for config in [Config::default(), recording().0] {
+        let device = Arc::new(Device::new(&config).unwrap());
+        let alone: Vec<_> = KINDS.map(|(kind, _)| counted_on(&device, kind)).into();
+        std::thread::scope(|scope| {
+            for round in 0..3 {
+                let (device, alone) = (&device, &alone);
+                scope.spawn(move || {
+                    for step in 0..2 * KINDS.len() {
+                        let index = (step * (round + 1) + round) % KINDS.len();
+                        let (kind, name) = KINDS[index];
+                        let counted = counted_on(device, kind);
+                        for counter in Counter::ALL {
+                            // Nanoseconds of the host are of the machine.
+                            if counter.info().category != "time" {
+                                let values = [&counted, &alone[index]].map(|c| c.get(*counter));
+                                assert_eq!(values[0], values[1], "{name}, {counter:?}");
+                            }
+                        }
+                    }
+                });
+            }
+        });
     }
 }
 

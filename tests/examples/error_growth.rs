@@ -253,6 +253,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Context::embedded(&Settings {
             simd: Some(simd),
             threads: None,
+            ..Settings::default()
         })
     });
     let mut csv = format!("sweep,value,{}\n", levels.join(","));

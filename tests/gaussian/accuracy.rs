@@ -32,6 +32,7 @@ impl Devices {
                 Context::embedded(&Settings {
                     simd: Some(simd),
                     threads: Some(threads),
+                    ..Settings::default()
                 })
             })
         };

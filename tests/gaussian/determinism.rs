@@ -147,6 +147,7 @@ fn threads_change_nothing() {
             let settings = Settings {
                 simd: Some(simd),
                 threads: Some(threads),
+                ..Settings::default()
             };
             Bench::with(&scene, &settings, &PipelineOptions::new(scene.degree)).whole()
         };

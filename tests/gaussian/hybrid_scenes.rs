@@ -24,8 +24,8 @@ use glam::{DMat3, DVec3, Vec3};
 const SIZE: [u32; 2] = [320, 240];
 
 /// Gaussians, triangles in their world, and how they are seen.
-struct Hybrid {
-    name: &'static str,
+pub(super) struct Hybrid {
+    pub(super) name: &'static str,
     scene: SceneBuffers,
     camera: GaussianCameraGAURAST<'static>,
     /// In clip coordinates; drawn before the Gaussians.
@@ -38,7 +38,7 @@ struct Hybrid {
 
 /// What is drawn.
 #[derive(Clone, Copy, PartialEq)]
-enum What {
+pub(super) enum What {
     Head,
     Pane,
     Everything,
@@ -102,7 +102,7 @@ impl Hybrid {
         self.compare == vk::CompareOp::GREATER
     }
 
-    fn draw(&self, gpu: &Gpu, what: What) -> Output {
+    pub(super) fn draw(&self, gpu: &Gpu, what: What) -> Output {
         let target = Target::new(gpu, &self.target);
         let options = PipelineOptions {
             depth_stencil: self.state(),
@@ -226,7 +226,7 @@ fn turn(point: DVec3) -> DVec3 {
     DVec3::new(point.x, -point.y, -point.z)
 }
 
-fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Option<Hybrid> {
+pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Option<Hybrid> {
     require_data("meshes/african_head/african_head.obj")?;
     let model = Model::african_head().expect("its files");
     let camera = Camera::of_generated(None, SIZE).expect("a camera");
@@ -284,14 +284,10 @@ fn a_head_stands_in_the_garden_with_four_samples() {
     }
 }
 
-#[test]
-fn a_head_is_inside_a_trained_scene_with_reversed_depth() {
-    let (Some(_), Some(path)) = (
-        require_data("meshes/african_head/african_head.obj"),
-        require_data("splats/playbot-125k.ply"),
-    ) else {
-        return;
-    };
+/// A head inside a trained scene, with reversed depth.
+pub(super) fn playbot() -> Option<Hybrid> {
+    require_data("meshes/african_head/african_head.obj")?;
+    let path = require_data("splats/playbot-125k.ply")?;
     let model = Model::african_head().expect("its files");
     let scene = Scene::load(&path).expect("a scene");
     let (near, far) = (0.1f32, 200.0f32);
@@ -310,7 +306,7 @@ fn a_head_is_inside_a_trained_scene_with_reversed_depth() {
         DVec3::new(1.2, 0.1, 1.2),
         DVec3::new(-1.2, 0.1, -1.2),
     ];
-    Hybrid {
+    Some(Hybrid {
         name: "head in playbot",
         scene: SceneBuffers::from(&scene),
         camera,
@@ -318,8 +314,14 @@ fn a_head_is_inside_a_trained_scene_with_reversed_depth() {
         pane: pane(pane_corners.map(from_view), &to_clip),
         target: target(vk::Format::D32_SFLOAT, 1),
         compare: vk::CompareOp::GREATER,
+    })
+}
+
+#[test]
+fn a_head_is_inside_a_trained_scene_with_reversed_depth() {
+    if let Some(hybrid) = playbot() {
+        hybrid.judge();
     }
-    .judge();
 }
 
 /// The middle of the Gaussians along the camera's axis, and the distance within which half of them are.

@@ -123,6 +123,7 @@ fn devices() -> Vec<(&'static str, Context)> {
         let settings = Settings {
             simd: Some(simd),
             threads: Some(2),
+            ..Settings::default()
         };
         (simd, Context::embedded(&settings))
     };

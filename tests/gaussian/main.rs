@@ -10,5 +10,6 @@ mod instances;
 mod interleavings;
 mod popping;
 mod rasterization_modes;
+mod recorded_work;
 mod reference;
 mod shaded;

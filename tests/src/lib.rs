@@ -8,7 +8,9 @@ pub mod data;
 pub mod fuzzing;
 pub mod hybrid;
 pub mod kernels;
+pub mod long_run;
 pub mod programs;
+pub mod recorded;
 pub mod triangles;
 
 pub use gaurast_oracle::{oracle, scenes};

@@ -42,6 +42,7 @@ fn every_scene_keeps_its_limit_at_every_level() {
         Context::embedded(&Settings {
             simd: Some(simd),
             threads: Some(2),
+            ..Settings::default()
         })
     };
     let contexts: Vec<_> = simd_levels()

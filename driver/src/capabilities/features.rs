@@ -543,7 +543,7 @@ mod tests {
         >(2));
         names.extend(all_true::<
             PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-        >(14));
+        >(18));
         let names: HashSet<_> = names.into_iter().collect();
         assert_eq!(names, SUPPORTED.iter().copied().collect());
     }
@@ -589,12 +589,12 @@ mod tests {
             requested(&vk::DeviceCreateInfo::default().push_next(&mut core)),
             "sparse_binding",
         );
-        let mut missing = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
-            .gaussian_primitive_topology(true)
-            .gaussian_instancing(true);
+        let mut missing = vk::PhysicalDeviceVulkan13Features::default()
+            .dynamic_rendering(true)
+            .inline_uniform_block(true);
         refused(
             requested(&vk::DeviceCreateInfo::default().push_next(&mut missing)),
-            "gaussian_instancing",
+            "inline_uniform_block",
         );
 
         let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()

@@ -225,11 +225,11 @@ impl GaussianSet {
         let is_per_pixel = self.begin.state.order == GaussianOrder::PerPixel;
         let is_flat = self.begin.state.geometry == GaussianGeometry::Surfel;
         let rays = PixelRays::new(&self.begin.camera, &self.begin.viewport);
-        let record = device.recorder().map(|recorder| {
+        let record = device.recorder().map(|_| {
             let degree = self.begin.state.sh_degree;
             let (pairs, bounds) = (tiles.pairs(), self.bounds);
             let draw = trace::gaussian_draw(&work, &splats, pairs, degree, bounds);
-            recorder.begin_draw(draw)
+            DrawRecord::new(draw)
         });
         Ok(GaussianDraw {
             depth_trend: match (self.depth, self.begin.state.order) {

@@ -207,6 +207,7 @@ impl GaussianTile {
                 runs,
                 contributions: work.contributions,
                 terminated: count(&self.layers[layer].finished()).saturating_sub(outside),
+                hidden_rest: work.hidden_rest,
                 ..TileWork::default()
             });
         }
@@ -301,18 +302,24 @@ impl GaussianTile {
             if open == 0 {
                 break;
             }
+            let blocks = open.count_ones() as u8;
+            let rows = if runs.is_some() { layer.open_rows() } else { 0 };
+            let open = mask32x16::from_bitmask(simd, open);
             if DEPTH != NO_DEPTH
                 && self
                     .passing
                     .hides_from(task.splat(chunk[0]).depth, task.trend)
             {
-                work.tiles_hidden += (task.list.len() - number * CHUNK) as u64;
+                let rest = &task.list[number * CHUNK..];
+                work.tiles_hidden += rest.len() as u64;
+                if let Some(runs) = &mut runs {
+                    work.hidden_rest = rest.len() as u32;
+                    trace::push_run(runs, hidden_run(simd, task, rest, (open, rows, blocks)));
+                }
                 break;
             }
-            let blocks = open.count_ones() as u8;
-            let rows = if runs.is_some() { layer.open_rows() } else { 0 };
-            let open = mask32x16::from_bitmask(simd, open);
             let (mut items, mut reached_before) = (0, 0);
+            let (hidden_before, mut hidden) = (work, 0);
             // Before any is looked at, so that the waits for memory overlap.
             for (splat, &primitive) in self.splats.iter_mut().zip(chunk) {
                 *splat = *task.splat(primitive);
@@ -320,6 +327,9 @@ impl GaussianTile {
             for (number, splat) in self.splats.iter().enumerate().take(chunk.len()) {
                 if DEPTH != NO_DEPTH && self.passing.hides(splat.depth) {
                     work.tiles_hidden += 1;
+                    if runs.is_some() {
+                        hidden += hidden_blocks(simd, splat, task, open);
+                    }
                     continue;
                 }
                 if splat.steep {
@@ -376,6 +386,9 @@ impl GaussianTile {
                         rows,
                         blocks,
                         reached,
+                        hidden: (work.tiles_hidden - hidden_before.tiles_hidden) as u32,
+                        hidden_blocks: hidden
+                            + (work.blocks_hidden - hidden_before.blocks_hidden) as u32,
                     },
                 );
             }
@@ -554,6 +567,43 @@ struct Work {
     contributions: u64,
     tiles_hidden: u64,
     blocks_hidden: u64,
+    /// Of the hidden, those that end a list, if work is recorded.
+    hidden_rest: u32,
+}
+
+/// Of the `open` blocks of a tile, those that a Gaussian would be evaluated in if depths did not hide it.
+#[inline(always)]
+fn hidden_blocks<S: Simd>(simd: S, splat: &Splat, task: &Task<'_>, open: mask32x16<S>) -> u32 {
+    let bounded = task.skips.has(Skip::Blocks) && !splat.steep;
+    let reached = if bounded {
+        let most_fall = task.thresholds.most_fall;
+        open & Record::default().place(simd, splat, task.corner, most_fall)
+    } else {
+        open
+    };
+    reached.to_bitmask().count_ones()
+}
+
+/// What a trace tells of the Gaussians at a list's end that depths hide in all of the tile, of which `open` blocks and
+/// so many rows and blocks are unfinished.
+#[inline(always)]
+fn hidden_run<S: Simd>(
+    simd: S,
+    task: &Task<'_>,
+    rest: &[u32],
+    (open, rows, blocks): (mask32x16<S>, u8, u8),
+) -> Run {
+    let mut run = Run {
+        primitives: rest.len() as u32,
+        rows,
+        blocks,
+        hidden: rest.len() as u32,
+        ..Run::default()
+    };
+    for &primitive in rest {
+        run.hidden_blocks += hidden_blocks(simd, task.splat(primitive), task, open);
+    }
+    run
 }
 
 /// Half of the distance between a block's first and last pixel centres.

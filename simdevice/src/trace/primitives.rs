@@ -47,9 +47,9 @@ impl MacroTileWork {
     /// The primitive that was listed last is hidden in all of a tile.
     pub(crate) fn hide(&mut self, tile: usize, blocks: u32) {
         let tile = &mut self.tiles[tile];
-        tile.hidden += 1;
-        tile.hidden_blocks += blocks;
         for run in &mut tile.runs {
+            run.hidden += 1;
+            run.hidden_blocks += blocks;
             run.reached -= blocks;
         }
     }
@@ -168,8 +168,8 @@ mod tests {
         work.list(3, 0);
         let tile = &work.tiles[3];
         assert_eq!((tile.listed, tile.runs[0].primitives), (3, 3));
-        assert_eq!((tile.runs[0].reached, tile.hidden_blocks), (5, 16));
-        assert_eq!((tile.quads, tile.killed, tile.hidden), (2, 2, 1));
+        assert_eq!((tile.runs[0].reached, tile.hidden_blocks()), (5, 16));
+        assert_eq!((tile.quads, tile.killed, tile.hidden()), (2, 2, 1));
         assert_eq!(tile.contributions, 3);
         assert_eq!(work.tiles[0], TileWork::default());
     }

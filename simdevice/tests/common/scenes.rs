@@ -21,15 +21,18 @@ pub enum Kind {
     Gaussians,
     /// Triangles, Gaussians, and triangles again, in one pass.
     Mixed,
+    /// Triangles, and Gaussians of which they hide some.
+    Hidden,
     /// Dispatches alone.
     Dispatches,
 }
 
 /// Every kind, with the name that files of it have.
-pub const KINDS: [(Kind, &str); 4] = [
+pub const KINDS: [(Kind, &str); 5] = [
     (Kind::Triangles, "triangles"),
     (Kind::Gaussians, "gaussians"),
     (Kind::Mixed, "mixed"),
+    (Kind::Hidden, "hidden"),
     (Kind::Dispatches, "dispatches"),
 ];
 
@@ -45,14 +48,18 @@ pub fn recording() -> (Config, Arc<Recorder>) {
 
 /// Draws a scene in two frames, with `around` packets before and after all of it; the colour that it leaves.
 pub fn draw(kind: Kind, config: &Config, around: [&[Packet]; 2]) -> Vec<u8> {
-    let device = Arc::new(Device::new(config).unwrap());
+    draw_on(&Arc::new(Device::new(config).unwrap()), kind, around)
+}
+
+/// As [`draw`], on a device that others may draw on at the same time.
+pub fn draw_on(device: &Arc<Device>, kind: Kind, around: [&[Packet]; 2]) -> Vec<u8> {
     let color = image(Format::R8G8B8A8Unorm, 1, 0);
     let depth = image(Format::D32Sfloat, 1, 0);
-    let mut processor = CommandProcessor::new(Arc::clone(&device));
+    let mut processor = CommandProcessor::new(Arc::clone(device));
     let mut packets = around[0].to_vec();
     for frame in 0..2 {
         if matches!(kind, Kind::Mixed | Kind::Dispatches) {
-            packets.push(dispatch(&device));
+            packets.push(dispatch(device));
         }
         if kind == Kind::Dispatches {
             continue;
@@ -69,13 +76,15 @@ pub fn draw(kind: Kind, config: &Config, around: [&[Packet]; 2]) -> Vec<u8> {
             ..rendering(attachment(&color, clear(ClearValue::Float([0.0; 4]))))
         })));
         if kind != Kind::Gaussians {
-            packets.push(triangles(&device, 3 + frame, 300));
+            packets.push(triangles(device, 3 + frame, 300));
         }
-        if kind != Kind::Triangles {
+        if kind == Kind::Hidden {
+            packets.extend(tested(gaussians(5 + frame, 2000, OVER)));
+        } else if kind != Kind::Triangles {
             packets.extend(gaussians(5 + frame, 2000, OVER));
         }
         if kind == Kind::Mixed {
-            packets.push(triangles(&device, 7 + frame, 40));
+            packets.push(triangles(device, 7 + frame, 40));
         }
         packets.push(Packet::EndRendering);
     }
@@ -83,6 +92,23 @@ pub fn draw(kind: Kind, config: &Config, around: [&[Packet]; 2]) -> Vec<u8> {
         processor.execute(packet).unwrap();
     }
     bytes(&color)
+}
+
+/// The packets of a draw of Gaussians, which depths hide.
+fn tested(mut packets: Vec<Packet>) -> Vec<Packet> {
+    for packet in &mut packets {
+        if let Packet::GaussianBegin(begin) = packet {
+            let mut state = GaussianState::clone(&begin.state);
+            state.depth_stencil.depth = Some(DepthTest {
+                compare: CompareOp::Less,
+                write: false,
+            });
+            begin.state = Arc::new(state);
+            // Beyond the near plane at 1, depths are those of a perspective projection.
+            begin.camera.depth_coefficients = [1.2, -1.2];
+        }
+    }
+    packets
 }
 
 /// Of a triangle's vertex: a position and a colour, four numbers each.

@@ -59,17 +59,10 @@ pub fn tasks(frame: &FrameWork, raster: &Rasterizer) -> Vec<Task> {
 
 /// A draw in a tile of the trace, as the hardware sees it.
 fn part(mode: Mode, tile: &TileWork, raster: &Rasterizer) -> Part {
-    let granularity = raster.granularity(mode);
-    let mut segments: Vec<_> = tile.segments(granularity).collect();
-    if let Some(last) = segments.last_mut() {
-        // Hidden primitives are fetched in any case; a triangle that its bounding box alone brought here is no less.
-        let whole = u64::from(tile.hidden * TILE_GROUPS);
-        match (granularity, raster.hierarchical_depth) {
-            (Saturation::Reached, false) => last.groups += u64::from(tile.hidden_blocks),
-            (Saturation::Reached, true) | (_, false) => {}
-            (_, true) => last.groups = last.groups.saturating_sub(whole),
-        }
-    }
+    // Hidden primitives are fetched in any case; a triangle that its bounding box alone brought here is no less.
+    let segments: Vec<_> = tile
+        .segments(raster.granularity(mode), raster.hierarchical_depth)
+        .collect();
     let needed: u32 = segments.iter().map(|segment| segment.primitives).sum();
     Part {
         mode,
@@ -248,9 +241,9 @@ mod tests {
                 rows: 16,
                 blocks: 16,
                 reached: 40,
+                hidden: 4,
+                hidden_blocks: 24,
             }],
-            hidden: 4,
-            hidden_blocks: 24,
             ..TileWork::default()
         };
         let frame = FrameWork {

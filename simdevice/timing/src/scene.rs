@@ -176,6 +176,7 @@ fn tile(all: &[Round], at: [u32; 2]) -> TileWork {
             rows,
             blocks: open.len() as u8,
             reached,
+            ..Run::default()
         });
     }
     let finished = transmittance.iter().flatten().filter(|&&t| t < 0.0);
@@ -219,7 +220,7 @@ mod tests {
         // Exact tests find fewer than boxes do.
         assert!(draw.pairs() < draw.sized_pairs[1]);
         assert!(draw.needed_pairs() < draw.pairs());
-        let evaluations = Saturation::ALL.map(|saturation| draw.evaluations(saturation));
+        let evaluations = Saturation::ALL.map(|saturation| draw.evaluations(saturation, false));
         assert!(evaluations.is_sorted_by(|a, b| a > b), "{evaluations:?}");
         let contributions: u64 = draw.tiles.iter().map(|tile| tile.contributions).sum();
         assert!(contributions > 0 && contributions < evaluations[4]);

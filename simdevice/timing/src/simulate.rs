@@ -60,7 +60,7 @@ pub fn baseline_evaluations(frame: &FrameWork) -> f64 {
         } else {
             (draw.boxed_pairs as f64 / pairs as f64).max(1.0)
         };
-        draw.evaluations(Saturation::Tile) as f64 * boxed
+        draw.evaluations(Saturation::Tile, false) as f64 * boxed
     };
     let gaussians = |draw: &&crate::work::DrawWork| draw.mode == Mode::Gaussian;
     frame.draws.iter().filter(gaussians).map(of_draw).sum()
@@ -249,7 +249,8 @@ fn changed(frame: &FrameWork, config: &Config) -> Changed {
                 .iter()
                 .map(|tile| tile.contributions)
                 .sum::<u64>();
-            evaluated += draw.evaluations(config.rasterizer.granularity(mode));
+            let raster = &config.rasterizer;
+            evaluated += draw.evaluations(raster.granularity(mode), raster.hierarchical_depth);
         }
         match evaluated {
             0 => 0.0,
@@ -374,6 +375,7 @@ mod tests {
                 rows,
                 blocks,
                 reached: primitives * u32::from(blocks) / 2,
+                ..crate::work::Run::default()
             };
             tile.runs = vec![run(n / 3, 16, 16), run(n / 3, 12, 8)];
         }

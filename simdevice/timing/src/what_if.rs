@@ -75,7 +75,7 @@ pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
     // With Gaussians the variant before is that of whole tiles.
     let triangles = triangles.into_iter().skip(usize::from(has(Mode::Gaussian)));
     let triangles = triangles.filter(|_| has(Mode::Triangle));
-    let hidden = tiles().any(|tile| tile.hidden > 0);
+    let hidden = tiles().any(|tile| tile.hidden() > 0 || tile.hidden_blocks() > 0);
     let depth = depth.into_iter().filter(|_| hidden);
     gaussians.chain(triangles).chain(depth).collect()
 }
@@ -96,7 +96,9 @@ fn boxed(frame: &FrameWork) -> FrameWork {
         for tile in &mut draw.tiles {
             for run in &mut tile.runs {
                 run.primitives = longer(run.primitives);
+                run.hidden = longer(run.hidden).min(run.primitives);
             }
+            tile.hidden_rest = longer(tile.hidden_rest);
             tile.listed = longer(tile.listed).max(tile.needed());
         }
     }
@@ -121,6 +123,7 @@ mod tests {
                 rows,
                 blocks,
                 reached: primitives * u32::from(blocks) / 2,
+                ..Run::default()
             };
             tile.runs = vec![run(n / 4, 16, 16), run(n / 4, 13, 9), run(n / 4, 8, 7)];
         }
@@ -139,8 +142,8 @@ mod tests {
         frame.draws[0].mode = Mode::Triangle;
         for tile in &mut frame.draws[0].tiles {
             tile.runs[0].reached /= 2;
-            tile.hidden = tile.listed / 3;
-            tile.hidden_blocks = 8 * tile.hidden;
+            tile.runs[0].hidden = tile.listed / 3;
+            tile.runs[0].hidden_blocks = 8 * (tile.listed / 3);
         }
         let config = Config::preset("single-module", &[]).unwrap();
         let variants = what_ifs(&frame, &config);

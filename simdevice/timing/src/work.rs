@@ -10,7 +10,7 @@ pub const TILE_PIXELS: u32 = TILE_SIDE * TILE_SIDE;
 /// Groups of 16 pixels (rows, or 4x4 blocks) of such a tile.
 pub const TILE_GROUPS: u32 = 16;
 /// The version of [`Trace`]'s layout.
-pub const TRACE_VERSION: u32 = 2;
+pub const TRACE_VERSION: u32 = 3;
 /// Sides of the tiles that [`DrawWork::sized_pairs`] tells of, in pixels.
 pub const TILE_SIDES: [u32; 4] = [8, 16, 32, 64];
 
@@ -152,12 +152,10 @@ pub struct TileWork {
     pub contributions: u64,
     /// Pixels that were finished before the list's end.
     pub terminated: u32,
-    /// Primitives of the runs that were skipped because all of the tile's depths hide them.
+    /// Primitives at the end of the last run that all depths of the tile hide, in a list whose depths only grow or only
+    /// shrink: hierarchical depth ends the list before them.
     #[serde(default)]
-    pub hidden: u32,
-    /// Pairs of a hidden primitive and a 4x4 block that it covers; they are not in the runs' `reached`.
-    #[serde(default)]
-    pub hidden_blocks: u32,
+    pub hidden_rest: u32,
     /// Quads of 2x2 pixels that went to fragment programs.
     #[serde(default)]
     pub quads: u32,
@@ -176,8 +174,46 @@ pub struct Run {
     pub rows: u8,
     /// Blocks of 4x4 pixels with an unfinished pixel, 0 to 16.
     pub blocks: u8,
-    /// Pairs of a primitive and an unfinished 4x4 block that it reaches, summed over the primitives.
+    /// Pairs of a primitive and an unfinished 4x4 block that it reaches, summed over the primitives; without
+    /// `hidden_blocks`.
     pub reached: u32,
+    /// Of the primitives, those that all of the tile's depths hide.
+    #[serde(default)]
+    pub hidden: u32,
+    /// Pairs of a primitive and an unfinished 4x4 block that it reaches, where all of the block's depths hide it: of
+    /// triangles those that the whole tile hides, of Gaussians all of them.
+    #[serde(default)]
+    pub hidden_blocks: u32,
+}
+
+impl Run {
+    /// Groups of 16 pixels that hardware evaluates, which saturates like this and has a hierarchy of depths or not.
+    fn groups(&self, saturation: Saturation, hierarchical_depth: bool) -> u64 {
+        let evaluated = if hierarchical_depth {
+            self.primitives.saturating_sub(self.hidden)
+        } else {
+            self.primitives
+        };
+        let open = match saturation {
+            Saturation::None | Saturation::Tile => TILE_GROUPS,
+            Saturation::Row => self.rows.into(),
+            Saturation::Block => self.blocks.into(),
+            Saturation::Reached if hierarchical_depth => return self.reached.into(),
+            Saturation::Reached => {
+                return u64::from(self.reached) + u64::from(self.hidden_blocks);
+            }
+        };
+        u64::from(evaluated) * u64::from(open)
+    }
+
+    /// The run without so many hidden primitives at its end.
+    fn without(&self, rest: u32) -> Self {
+        Self {
+            primitives: self.primitives.saturating_sub(rest),
+            hidden: self.hidden.saturating_sub(rest),
+            ..*self
+        }
+    }
 }
 
 /// Which pixels are spared a primitive once they are finished.
@@ -219,38 +255,53 @@ impl TileWork {
                 rows: 16,
                 blocks: 16,
                 reached: listed * TILE_GROUPS,
+                ..Run::default()
             }],
             contributions: u64::from(listed) * u64::from(TILE_PIXELS),
             ..Self::default()
         }
     }
 
-    /// Primitives that the tile's unfinished pixels needed.
+    /// Primitives that the tile's unfinished pixels needed, or would have if depths had not hidden them.
     pub fn needed(&self) -> u32 {
         self.runs.iter().map(|run| run.primitives).sum()
     }
 
-    /// The list as hardware that saturates like this sees it: how many primitives, and how many groups of 16 pixels
-    /// they are evaluated in together. In order.
-    pub fn segments(&self, saturation: Saturation) -> impl Iterator<Item = Segment> {
+    /// Primitives that all of the tile's depths hide.
+    pub fn hidden(&self) -> u32 {
+        self.runs.iter().map(|run| run.hidden).sum()
+    }
+
+    /// Pairs of a primitive and a 4x4 block whose depths hide it; see [`Run::hidden_blocks`].
+    pub fn hidden_blocks(&self) -> u32 {
+        self.runs.iter().map(|run| run.hidden_blocks).sum()
+    }
+
+    /// The list as hardware that saturates like this, and has a hierarchy of depths or not, sees it: how many primitives
+    /// it fetches, and how many groups of 16 pixels they are evaluated in together. In order.
+    pub fn segments(
+        &self,
+        saturation: Saturation,
+        hierarchical_depth: bool,
+    ) -> impl Iterator<Item = Segment> {
         let all = matches!(saturation, Saturation::None);
         let rest = if all {
             self.listed.saturating_sub(self.needed())
         } else {
             0
         };
-        let groups = move |run: &Run| {
-            let n = u64::from(run.primitives);
-            match saturation {
-                Saturation::None | Saturation::Tile => n * u64::from(TILE_GROUPS),
-                Saturation::Row => n * u64::from(run.rows),
-                Saturation::Block => n * u64::from(run.blocks),
-                Saturation::Reached => u64::from(run.reached),
+        let last = self.runs.len().wrapping_sub(1);
+        let ends_early = hierarchical_depth && !all;
+        let runs = self.runs.iter().enumerate().map(move |(index, run)| {
+            let run = if ends_early && index == last {
+                run.without(self.hidden_rest)
+            } else {
+                *run
+            };
+            Segment {
+                primitives: run.primitives,
+                groups: run.groups(saturation, hierarchical_depth),
             }
-        };
-        let runs = self.runs.iter().map(move |run| Segment {
-            primitives: run.primitives,
-            groups: groups(run),
         });
         let rest = Segment {
             primitives: rest,
@@ -259,9 +310,9 @@ impl TileWork {
         runs.chain([rest]).filter(|segment| segment.primitives > 0)
     }
 
-    /// Pairs of a pixel and a primitive that hardware which saturates like this evaluates.
-    pub fn evaluations(&self, saturation: Saturation) -> u64 {
-        self.segments(saturation)
+    /// Pairs of a pixel and a primitive that such hardware evaluates.
+    pub fn evaluations(&self, saturation: Saturation, hierarchical_depth: bool) -> u64 {
+        self.segments(saturation, hierarchical_depth)
             .map(|segment| segment.groups * u64::from(TILE_PIXELS / TILE_GROUPS))
             .sum()
     }
@@ -287,11 +338,11 @@ impl DrawWork {
         self.tiles.iter().map(|tile| u64::from(tile.needed())).sum()
     }
 
-    /// Pairs of a pixel and a primitive that are evaluated.
-    pub fn evaluations(&self, saturation: Saturation) -> u64 {
+    /// Pairs of a pixel and a primitive that are evaluated; see [`TileWork::evaluations`].
+    pub fn evaluations(&self, saturation: Saturation, hierarchical_depth: bool) -> u64 {
         self.tiles
             .iter()
-            .map(|tile| tile.evaluations(saturation))
+            .map(|tile| tile.evaluations(saturation, hierarchical_depth))
             .sum()
     }
 }
@@ -339,6 +390,7 @@ mod tests {
             rows,
             blocks,
             reached,
+            ..Run::default()
         };
         TileWork {
             at: [0, 0],
@@ -352,7 +404,7 @@ mod tests {
 
     #[test]
     fn finer_saturation_evaluates_less() {
-        let evaluations = Saturation::ALL.map(|saturation| tile().evaluations(saturation));
+        let evaluations = Saturation::ALL.map(|saturation| tile().evaluations(saturation, false));
         assert_eq!(
             evaluations,
             [10 * 256, 7 * 256, (48 + 36) * 16, (48 + 28) * 16, 28 * 16]
@@ -361,7 +413,7 @@ mod tests {
 
     #[test]
     fn what_was_not_needed_is_a_segment_without_saturation() {
-        let segments: Vec<_> = tile().segments(Saturation::None).collect();
+        let segments: Vec<_> = tile().segments(Saturation::None, false).collect();
         assert_eq!(segments.len(), 3);
         assert_eq!(
             segments[2],
@@ -370,7 +422,33 @@ mod tests {
                 groups: 48
             }
         );
-        assert_eq!(tile().segments(Saturation::Row).count(), 2);
+        assert_eq!(tile().segments(Saturation::Row, false).count(), 2);
+    }
+
+    #[test]
+    fn hierarchical_depth_spares_what_is_hidden() {
+        let mut tile = tile();
+        // Of the last run's four, one is hidden, two more are behind everything, and a block hides the fourth.
+        tile.runs[1] = Run {
+            hidden: 3,
+            hidden_blocks: 6,
+            reached: 2,
+            ..tile.runs[1]
+        };
+        tile.hidden_rest = 2;
+        let groups = |hierarchical| {
+            Saturation::ALL.map(|saturation| tile.evaluations(saturation, hierarchical) / 16)
+        };
+        assert_eq!(groups(false), [160, 112, 84, 76, 28]);
+        // Without saturation the list is fetched to its end, and what nobody looked at is evaluated.
+        assert_eq!(groups(true), [112, 64, 57, 55, 22]);
+        let fetched = |saturation, hierarchical| -> u32 {
+            let segments = tile.segments(saturation, hierarchical);
+            segments.map(|segment| segment.primitives).sum()
+        };
+        assert_eq!(Saturation::ALL.map(|s| fetched(s, false)), [10, 7, 7, 7, 7]);
+        assert_eq!(Saturation::ALL.map(|s| fetched(s, true)), [10, 5, 5, 5, 5]);
+        assert_eq!((tile.hidden(), tile.hidden_blocks()), (3, 6));
     }
 
     #[test]

@@ -49,19 +49,23 @@ fn tile(random: &mut ChaCha8Rng, at: [u32; 2], mode: Mode, largest: f64) -> Tile
             break;
         }
         left -= primitives;
-        let reached = (f64::from(primitives) * f64::from(blocks) * density).round() as u32;
+        let hidden = random.random_range(0..=primitives);
+        let reached = f64::from(primitives - hidden) * f64::from(blocks) * density;
         runs.push(Run {
             primitives,
             rows,
             blocks,
-            reached,
+            reached: reached.round() as u32,
+            hidden,
+            hidden_blocks: hidden * random.random_range(0..=u32::from(blocks)),
         });
         rows = random.random_range(1..=rows);
         blocks = random.random_range(1..=blocks);
     }
-    let hidden = match mode {
-        Mode::Triangle => random.random_range(0..=needed),
-        Mode::Gaussian => 0,
+    let last = runs.last().map_or(0, |run| run.hidden);
+    let hidden_rest = match mode {
+        Mode::Triangle => 0,
+        Mode::Gaussian => random.random_range(0..=last),
     };
     TileWork {
         at,
@@ -69,8 +73,7 @@ fn tile(random: &mut ChaCha8Rng, at: [u32; 2], mode: Mode, largest: f64) -> Tile
         runs,
         contributions: u64::from(needed) * 20,
         terminated: if saturates { 256 } else { 0 },
-        hidden,
-        hidden_blocks: hidden * random.random_range(1..=16),
+        hidden_rest,
         ..TileWork::default()
     }
 }

@@ -22,6 +22,7 @@ use simdevice::packet::{
     GaussianAttributes, GaussianBegin, GaussianState, LoadOp, ModelAttributes, Rect, Rendering,
     StoreOp, SubresourceLayers, SubresourceRange, Viewport,
 };
+use simdevice::trace::Recorder;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
@@ -276,11 +277,17 @@ impl Resources {
 impl Player {
     /// A device of one thread, since interleavings are played by several.
     pub fn new(flush: FlushPolicy) -> Self {
+        Self::recording(flush, None)
+    }
+
+    /// As [`Player::new`], and its work is recorded.
+    pub fn recording(flush: FlushPolicy, recorder: Option<Arc<Recorder>>) -> Self {
         let config = Config {
             threads: 1,
             simd: SimdLevel::Best,
             macro_tile_size: 32,
             flush,
+            recorder,
             ..Config::default()
         };
         let device = Arc::new(Device::new(&config).expect("a device"));

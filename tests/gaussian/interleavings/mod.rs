@@ -7,6 +7,7 @@ mod model;
 use std::collections::HashSet;
 use std::mem::discriminant;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use ash::vk::CompareOp;
 use device::Player;
@@ -19,6 +20,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use simdevice::device::FlushPolicy;
+use simdevice::trace::{Recorder, Trace};
 
 /// The side of the framebuffer in pixels, so that units of a position are halves of a pixel.
 const SIZE: u32 = 64;
@@ -234,6 +236,14 @@ fn outside(rng: &mut ChaCha8Rng) -> Step {
             to: rng.random_range(0..TRIANGLES),
         },
     }
+}
+
+/// The work of a random interleaving.
+pub(super) fn work(seed: u64) -> Trace {
+    let recorder = Arc::new(Recorder::default());
+    let player = Player::recording(FlushPolicy::WhenFull, Some(Arc::clone(&recorder)));
+    player.play(&Interleaving::random(seed));
+    recorder.trace()
 }
 
 /// What the attachments hold: colours, and depths as bits.

@@ -1,16 +1,19 @@
 //! How a device of the embedded driver works: the environment variables that it reads when it is
 //! created.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 /// What a device is told by the environment.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Settings {
+pub struct Settings<'a> {
     /// The SIMD level by name, `GAURAST_SIMD`; as it is by default.
     pub simd: Option<&'static str>,
     /// Worker threads, `GAURAST_THREADS`; as it is by default.
     pub threads: Option<usize>,
+    /// Where its work is written when it is gone, `GAURAST_TRACE`.
+    pub trace: Option<&'a Path>,
 }
 
 /// The names of the SIMD levels that this processor has, the simplest first.
@@ -38,10 +41,13 @@ pub fn with_settings<R>(settings: &Settings, create: impl FnOnce() -> R) -> R {
     let _lock = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
     let _simd = settings
         .simd
-        .map(|simd| Variable::set("GAURAST_SIMD", simd));
+        .map(|simd| Variable::set("GAURAST_SIMD", simd.as_ref()));
     let _threads = settings
         .threads
-        .map(|threads| Variable::set("GAURAST_THREADS", &threads.to_string()));
+        .map(|threads| Variable::set("GAURAST_THREADS", threads.to_string().as_ref()));
+    let _trace = settings
+        .trace
+        .map(|trace| Variable::set("GAURAST_TRACE", trace.as_os_str()));
     create()
 }
 
@@ -52,7 +58,7 @@ struct Variable {
 }
 
 impl Variable {
-    fn set(name: &'static str, value: &str) -> Self {
+    fn set(name: &'static str, value: &OsStr) -> Self {
         let before = std::env::var_os(name);
         // SAFETY: the standard library guards the environment against its own readers and writers,
         // and the embedded driver, the only other code that reads it meanwhile, uses those.

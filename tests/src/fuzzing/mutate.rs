@@ -19,6 +19,40 @@ fn instructions(words: &[u32]) -> Vec<(usize, usize)> {
     all
 }
 
+/// Bytes with a few changes: some set, some cut out or doubled, some taken from `other`.
+pub fn mutate_bytes(random: &mut ChaCha8Rng, bytes: &[u8], other: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    for _ in 0..random.random_range(1..=6) {
+        let at = random.random_range(0..=bytes.len());
+        let len = random.random_range(0..=16.min(bytes.len() - at));
+        match random.random_range(0..8) {
+            0 => drop(bytes.drain(at..at + len)),
+            1 => {
+                let copy = bytes[at..at + len].to_vec();
+                bytes.splice(at..at, copy);
+            }
+            2 => bytes.truncate(at),
+            3 if !other.is_empty() => {
+                let from = random.random_range(0..other.len());
+                let to = other.len().min(from + random.random_range(0..40usize));
+                bytes.splice(at..at + len, other[from..to].iter().copied());
+            }
+            4 => {
+                let number = number(random, 100).to_le_bytes();
+                for (byte, new) in bytes[at..].iter_mut().zip(number) {
+                    *byte = new;
+                }
+            }
+            _ => {
+                if let Some(byte) = bytes.get_mut(at) {
+                    *byte = random.random();
+                }
+            }
+        }
+    }
+    bytes
+}
+
 /// A number with which something may go wrong, or any.
 fn number(random: &mut ChaCha8Rng, bound: u32) -> u32 {
     match random.random_range(0..5) {

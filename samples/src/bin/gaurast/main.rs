@@ -15,6 +15,12 @@ use clap::Parser;
 use args::{Arguments, Command};
 
 fn main() -> ExitCode {
+    // A file that grows beyond the process's limit is an error like a full disk, and no signal.
+    #[cfg(unix)]
+    // SAFETY: no other thread runs yet, and ignoring a signal runs no code of ours.
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+    }
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
     let arguments = Arguments::parse();
     let result = match arguments.command.unwrap_or_default() {

@@ -39,6 +39,8 @@ pub enum Error {
     Render(#[from] RenderError),
     #[error(transparent)]
     Output(#[from] OutputError),
+    #[error("the pictures are written, but not the report: {0}")]
+    Report(std::io::Error),
 }
 
 /// Draws a scene and writes the picture.
@@ -99,8 +101,8 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     }
     step.finish_and_clear();
     if !arguments.quiet {
-        // Whoever reads this may have gone; the picture is there all the same.
-        let _ = print(&report::table(&scene, loading, &frame), &arguments.output);
+        // Whoever reads this may have gone, and scripts should know; the pictures are there all the same.
+        print(&report::table(&scene, loading, &frame), &arguments.output).map_err(Error::Report)?;
     }
     Ok(())
 }
@@ -111,7 +113,7 @@ fn print(table: &comfy_table::Table, outputs: &[PathBuf]) -> std::io::Result<()>
     for path in outputs {
         writeln!(stdout, "wrote {}", path.display())?;
     }
-    Ok(())
+    stdout.flush()
 }
 
 fn load(path: &Path, progress: Progress) -> Result<Scene, Error> {

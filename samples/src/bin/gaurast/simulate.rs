@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use clap::{Args, ValueEnum};
+use gaurast_samples::file;
 use thiserror::Error;
 use timing::config::{Config, ConfigError, DEFAULT_PRESET};
 use timing::schedule;
@@ -189,11 +190,9 @@ fn what_if_text(format: Format, variants: &[WhatIf]) -> Result<String, Error> {
 }
 
 fn print(text: &str) -> Result<(), Error> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        // Whoever reads this may have gone.
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(()),
-    }
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(text.as_bytes())?;
+    Ok(stdout.flush()?)
 }
 
 fn machine_name(arguments: &SimulateArguments) -> String {
@@ -315,7 +314,7 @@ fn write_timeline(path: &Path, trace: &Trace, config: &Config, count: u16) -> Re
     let frames: Vec<_> = once.into_iter().cycle().take(count.into()).collect();
     let spans = simulate::timeline(&frames, config);
     let json = schedule::chrome_trace(&spans, config);
-    std::fs::write(path, serde_json::to_vec(&json)?).map_err(|source| Error::File {
+    file::replace(path, &serde_json::to_vec(&json)?).map_err(|source| Error::File {
         path: path.to_owned(),
         source,
     })

@@ -83,7 +83,7 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
         let note = format!(
             "early tests killed {}, and hid {} primitives in whole tiles",
             count(|tile| tile.killed),
-            count(|tile| tile.hidden)
+            count(TileWork::hidden)
         );
         row("work", "quads shaded", quads.to_string(), note);
     }

@@ -187,14 +187,19 @@ impl GaussianTile {
             list.clear();
         }
         let mut record = Record::default();
+        let (mut hidden_alone, recorded) = (0, runs.is_some());
         for &primitive in task.list {
             let (batch, place) = locate(primitive);
             let splat = &task.splats[batch][place];
-            if DEPTH != NO_DEPTH && self.passing.hides(splat.depth) {
+            let hidden = DEPTH != NO_DEPTH && self.passing.hides(splat.depth);
+            if hidden {
                 work.tiles_hidden += 1;
-                continue;
+                if !recorded {
+                    continue;
+                }
+            } else {
+                work.open += BLOCKS as u64;
             }
-            work.open += BLOCKS as u64;
             let most_fall = match task.mode {
                 TileMode::Half => half_most_fall(splat, task.thresholds.most_fall),
                 _ => task.thresholds.most_fall,
@@ -205,6 +210,10 @@ impl GaussianTile {
                 None if splat.steep => all,
                 None => record.place(simd, splat, task.corner, most_fall),
             };
+            if hidden {
+                hidden_alone += reached.to_bitmask().count_ones();
+                continue;
+            }
             if DEPTH != NO_DEPTH {
                 let shown = self.passing.blocks(simd, splat.depth);
                 work.blocks_hidden += u64::from((reached & !shown).to_bitmask().count_ones());
@@ -225,6 +234,8 @@ impl GaussianTile {
                     rows: self.layers[layer].open_rows(),
                     blocks: BLOCKS as u8,
                     reached: work.items as u32,
+                    hidden: work.tiles_hidden as u32,
+                    hidden_blocks: hidden_alone + work.blocks_hidden as u32,
                 },
             );
         }

@@ -408,10 +408,13 @@ fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
             ..Config::default()
         })
         .unwrap();
-        recorder.begin_frame(bounds);
+        recorder.begin_frame(0, bounds);
         let pictures = [&quiet, &recording].map(|device| {
             let draw = draw(seed, 3000, defaults(), device, bounds);
             assert_eq!(draw.record.is_some(), device.config().recorder.is_some());
+            if let Some((recorder, record)) = device.recorder().zip(draw.record.as_ref()) {
+                recorder.add_draw(0, record);
+            }
             let mut tile = Box::new(GaussianTile::default());
             let mut counters = Counters::default();
             let mut pixels = Vec::new();

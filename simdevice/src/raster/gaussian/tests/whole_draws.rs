@@ -6,7 +6,9 @@ use crate::packet::draw::*;
 use crate::pass::{Pass, PassDraw};
 use crate::raster::blend::Blender;
 use crate::raster::depth::{apply, compare};
+use crate::trace::Recorder;
 use rand::seq::IndexedRandom;
+use timing::work::Saturation;
 
 const DEPTHS: [Format; 5] = [
     Format::D16Unorm,
@@ -414,10 +416,29 @@ fn random_tests_agree_with_the_twin_at_every_level() {
     assert!(changed > 60, "hardly anything was drawn");
 }
 
-/// The draw's counters, and the counters when nothing can be hidden, for a stored depth that is the same everywhere.
+/// The counters of a draw in a tile whose stored depths are the same everywhere, and its work.
 fn hidden(coefficients: [f32; 2], compare: CompareOp, stored: f32) -> Counters {
-    let device = Device::new(&Config::default()).unwrap();
+    hidden_work(coefficients, compare, [stored; 256], None)
+}
+
+/// As [`hidden`], of any stored depths, for whoever records.
+fn hidden_work(
+    coefficients: [f32; 2],
+    compare: CompareOp,
+    stored: [f32; 256],
+    recorder: Option<Arc<Recorder>>,
+) -> Counters {
+    let device = Device::new(&Config {
+        recorder,
+        ..Config::default()
+    })
+    .unwrap();
+    if let Some(recorder) = &device.config().recorder {
+        recorder.begin_frame(0, WHOLE);
+    }
     let state = GaussianState {
+        // No pixel finishes, so that what is hidden is all that differs.
+        transmittance_floor: 0.0,
         depth_stencil: DepthStencil {
             depth: Some(DepthTest {
                 compare,
@@ -435,10 +456,13 @@ fn hidden(coefficients: [f32; 2], compare: CompareOp, stored: f32) -> Counters {
         WHOLE,
         Some((Format::D32Sfloat, coefficients)),
     );
+    if let Some((recorder, record)) = device.recorder().zip(draw.record.as_ref()) {
+        recorder.add_draw(0, record);
+    }
     let mut tile = Box::new(GaussianTile::default());
     let mut counters = Counters::default();
     let lanes = [u32::from(u16::MAX); BLOCKS];
-    tile.passing.set(compare, &[stored.to_bits(); 256], &lanes);
+    tile.passing.set(compare, &stored.map(f32::to_bits), &lanes);
     tile.run::<TEST_DEPTH>(&draw, device.level(), [2, 2], 0, &lanes, &mut counters);
     let pairs = counters.get(Counter::TilePairsEvaluated);
     assert!(pairs <= draw.tiles.list(2, 2).len() as u64);
@@ -468,4 +492,56 @@ fn what_is_behind_a_whole_tile_is_not_even_fetched() {
     let nothing = hidden(FORWARD, CompareOp::Less, 0.0);
     assert_eq!(nothing.get(Counter::BlockEvaluations), 0);
     assert_eq!(everything.get(Counter::GaussianTilesHidden), 0);
+}
+
+#[test]
+fn the_trace_tells_what_depths_hide() {
+    let tile_of = |coefficients, compare, stored: [f32; 256]| {
+        let recorder = Arc::new(Recorder::default());
+        let counters = hidden_work(coefficients, compare, stored, Some(Arc::clone(&recorder)));
+        assert_eq!(
+            counters,
+            hidden_work(coefficients, compare, stored, None),
+            "recording changes no counter"
+        );
+        let tile = recorder.trace().frames[0].draws[0].tiles[0].clone();
+        (tile, counters)
+    };
+    // Half of the tile's pixels are nearer.
+    let slope: [f32; 256] = std::array::from_fn(|at| if at < 128 { 0.3 } else { 0.35 });
+    for (coefficients, compare, stored, ends) in [
+        (FORWARD, CompareOp::Less, [0.3; 256], true),
+        (FORWARD, CompareOp::Less, slope, true),
+        (FORWARD, CompareOp::Less, [0.0; 256], true),
+        (REVERSE, CompareOp::Greater, [0.7; 256], true),
+        (FORWARD, CompareOp::Greater, [0.3; 256], false),
+    ] {
+        let (tile, counters) = tile_of(coefficients, compare, stored);
+        let (open, everything) = tile_of(coefficients, CompareOp::Always, stored);
+        let reached = |tile: &TileWork| tile.runs.iter().map(|run| run.reached).sum::<u32>();
+        assert_eq!(
+            u64::from(tile.hidden()),
+            counters.get(Counter::GaussianTilesHidden)
+        );
+        assert_eq!(
+            u64::from(reached(&tile)),
+            counters.get(Counter::BlockEvaluations)
+        );
+        assert_eq!(reached(&tile) + tile.hidden_blocks(), reached(&open));
+        assert_eq!(
+            u64::from(reached(&open)),
+            everything.get(Counter::BlockEvaluations)
+        );
+        assert_eq!((tile.needed(), open.needed()), (tile.listed, tile.listed));
+        assert_eq!((open.hidden(), open.hidden_blocks()), (0, 0));
+        assert!(tile.hidden() > 0 && tile.hidden_blocks() > 0);
+        assert_eq!(tile.hidden_rest > 0, ends, "{compare:?}");
+        assert!(tile.hidden_rest <= tile.runs.last().unwrap().hidden);
+        for saturation in Saturation::ALL {
+            let evaluations = |hierarchical| tile.evaluations(saturation, hierarchical);
+            assert!(evaluations(true) < evaluations(false), "{saturation:?}");
+            let open = open.evaluations(saturation, false);
+            assert_eq!(evaluations(false), open, "hardware that cannot hide");
+        }
+    }
 }

@@ -1,0 +1,154 @@
+//! Thousands of frames on one device, of tiny scenes that come again and again: memory must stay as it is, and so must
+//! every picture, to the bit.
+
+use gaurast::vk::{GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianOrderGAURAST};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::contexts::{
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over,
+};
+use crate::scenes::{Gaussian, SceneBuffers};
+
+/// How many scenes there are.
+pub const SCENES: usize = 24;
+
+/// A scene and how it is drawn.
+struct Scene {
+    buffers: SceneBuffers,
+    camera: GaussianCameraGAURAST<'static>,
+    options: PipelineOptions<'static>,
+    size: [u32; 2],
+    /// How often it is drawn over itself, in one pass.
+    draws: u32,
+}
+
+impl Scene {
+    fn new(number: usize) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(number as u64);
+        let size = [0; 2].map(|_| rng.random_range(1..70));
+        let degree = rng.random_range(0..=2);
+        let mut gaussian = |_| {
+            let z = rng.random_range(1.0..6.0f32);
+            Gaussian {
+                position: [
+                    z * rng.random_range(-0.8..0.8),
+                    z * rng.random_range(-0.8..0.8),
+                    z,
+                ],
+                scale: [0; 3].map(|_| rng.random_range(-7.0..0.5f32).exp()),
+                rotation: [0; 4].map(|_| rng.random_range(-1.0..1.0)),
+                opacity: rng.random_range(0.0..1.1),
+                sh: (0..(degree + 1) * (degree + 1))
+                    .map(|_| [0; 3].map(|_| rng.random_range(-1.0..1.5)))
+                    .collect(),
+            }
+        };
+        let count = 1 + number * 37 % 700;
+        let buffers = SceneBuffers::new(degree, (0..count).map(&mut gaussian));
+        let mut options = PipelineOptions::new(degree);
+        options.state = options
+            .state
+            .order(
+                [
+                    GaussianOrderGAURAST::VIEW_DEPTH,
+                    GaussianOrderGAURAST::RADIAL_DISTANCE,
+                    GaussianOrderGAURAST::PRIMITIVE,
+                ][number % 3],
+            )
+            .antialiasing(
+                [
+                    GaussianAntialiasingGAURAST::DILATE,
+                    GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
+                ][number % 2],
+            )
+            .transmittance_floor([1e-4, 0.0][number / 2 % 2]);
+        options.blend = over();
+        Self {
+            buffers,
+            camera: GaussianCameraGAURAST::default()
+                .focal_length([0.8 * size[0] as f32; 2])
+                .principal_point(size.map(|side| 0.5 * side as f32)),
+            options,
+            size,
+            draws: 1 + number as u32 % 3,
+        }
+    }
+
+    /// Draws it with objects of its own, all of which are gone afterwards.
+    fn draw(&self, context: &Context) -> Vec<[f32; 4]> {
+        let pipeline = Pipeline::new(context, &self.options);
+        let scene = DeviceScene::new(context, &self.buffers);
+        let target = Target::new(context, self.options.format, self.size);
+        context.run(|commands| {
+            commands.pass(&target, &Pass::clear([0.0; 4]), || {
+                commands.bind(&pipeline, &scene, &self.camera);
+                for _ in 0..self.draws {
+                    commands.draw([scene.count, 1, 0, 0]);
+                }
+            });
+        });
+        target.read()
+    }
+}
+
+/// What a long run found.
+#[derive(Clone, Copy, Debug)]
+pub struct Report {
+    /// Frames that were drawn.
+    pub frames: usize,
+    /// Bytes of memory that the process held after a quarter of them and at the end; nothing where the system doesn't
+    /// tell.
+    pub memory: Option<[u64; 2]>,
+}
+
+/// Draws so many frames; `progress` hears the number of each.
+///
+/// # Panics
+/// If a scene's picture is ever another than it was at first, or if memory grows by more than 16 MiB.
+pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
+    let context = Context::embedded(&Settings {
+        threads: Some(2),
+        ..Settings::default()
+    });
+    let scenes: Vec<_> = (0..SCENES).map(Scene::new).collect();
+    let first: Vec<_> = scenes.iter().map(|scene| scene.draw(&context)).collect();
+    assert!(first.iter().flatten().any(|pixel| pixel[3] > 0.0));
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut early = None;
+    for frame in 0..frames {
+        let number = rng.random_range(0..SCENES);
+        let drawn = scenes[number].draw(&context);
+        let same = drawn.iter().zip(&first[number]);
+        let same = same
+            .clone()
+            .all(|(a, b)| a.map(f32::to_bits) == b.map(f32::to_bits));
+        assert!(same, "scene {number} is another in frame {frame}");
+        if frame == frames / 4 {
+            early = resident();
+        }
+        progress(frame);
+    }
+    let memory = early.zip(resident());
+    if let Some((early, late)) = memory {
+        assert!(
+            late <= early + (16 << 20),
+            "memory grew from {early} to {late} bytes"
+        );
+    }
+    assert!(context.messages().is_empty(), "nothing went wrong");
+    Report {
+        frames,
+        memory: memory.map(|(early, late)| [early, late]),
+    }
+}
+
+/// Bytes of memory that the process holds, as Linux tells.
+fn resident() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmRSS:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
+    Some(kibibytes * 1024)
+}

@@ -1,0 +1,103 @@
+//! Work that devices recorded, and how well the closed form of the rasterizer's timing agrees with the model that steps
+//! every cycle on it.
+
+use std::path::Path;
+
+use simdevice::timing::config::Config;
+use simdevice::timing::work::Trace;
+use simdevice::timing::{fast, stepped};
+
+/// Machines that traces are run on: a preset, and what is changed of it.
+const MACHINES: [(&str, &[&str]); 6] = [
+    ("paper-15x16", &[]),
+    (
+        "paper-15x16",
+        &[
+            "saturation=reached",
+            "triangle_traversal=reached",
+            "hierarchical_depth=true",
+        ],
+    ),
+    (
+        "paper-15x16",
+        &["saturation=none", "batch=128", "mode_switch=100"],
+    ),
+    (
+        "paper-300",
+        &["saturation=block", "memory.bandwidth_gb_s=20"],
+    ),
+    ("single-module", &["saturation=row", "batch=8"]),
+    ("fp16", &["saturation=reached", "port_bytes_per_cycle=4"]),
+];
+
+/// The trace in a file that a device wrote.
+///
+/// # Panics
+/// If there is none.
+pub fn read(path: &Path) -> Trace {
+    let text = std::fs::read(path).expect("the device wrote its trace");
+    serde_json::from_slice(&text).expect("a trace")
+}
+
+/// How far the closed form is from the stepped model.
+#[derive(Default)]
+pub struct Agreement {
+    /// Relative differences of cycles, and what of.
+    errors: Vec<(f64, String)>,
+    /// Frames that had Gaussians which depths hid.
+    hiding: usize,
+}
+
+impl Agreement {
+    /// Runs every frame of a trace through both models on every machine.
+    ///
+    /// # Panics
+    /// If the models don't agree on what was done.
+    pub fn add(&mut self, name: &str, trace: &Trace) {
+        for (number, frame) in trace.frames.iter().enumerate() {
+            let mut tiles = frame.draws.iter().flat_map(|draw| &draw.tiles);
+            self.hiding += usize::from(tiles.any(|tile| tile.hidden() > 0));
+            for (preset, settings) in MACHINES {
+                let settings: Vec<_> = settings.iter().map(|&setting| setting.into()).collect();
+                let machine = Config::preset(preset, &settings).expect("a machine");
+                let fast = fast::rasterize(frame, &machine, 0.0);
+                let slow = stepped::rasterize(frame, &machine, 0.0);
+                let name = format!("{name}, frame {number}, {preset} {settings:?}");
+                assert_eq!(fast.switches, slow.switches, "{name}");
+                assert_eq!(
+                    fast.gaussian_evaluations, slow.gaussian_evaluations,
+                    "{name}"
+                );
+                assert_eq!(
+                    fast.triangle_evaluations, slow.triangle_evaluations,
+                    "{name}"
+                );
+                if slow.cycles > 0.0 {
+                    let error = (fast.cycles - slow.cycles).abs() / slow.cycles;
+                    self.errors.push((error, name));
+                }
+            }
+        }
+    }
+
+    /// Holds the differences against the limits: 2 % at most and 0.5 % on average, over at least `least` runs.
+    ///
+    /// # Panics
+    /// If they are not kept.
+    pub fn judge(&self, least: usize) {
+        let worst = self.errors.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        let (worst, name) = worst.expect("traces of something");
+        let mean =
+            self.errors.iter().map(|(error, _)| error).sum::<f64>() / self.errors.len() as f64;
+        println!(
+            "{} runs, {} frames with hidden Gaussians: mean {:.4} %, largest {:.4} % ({name})",
+            self.errors.len(),
+            self.hiding,
+            100.0 * mean,
+            100.0 * worst
+        );
+        assert!(self.errors.len() >= least, "{} runs", self.errors.len());
+        assert!(*worst <= 0.02, "{name}: {worst}");
+        assert!(mean <= 0.005, "mean {mean}");
+    }
+}

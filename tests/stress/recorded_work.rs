@@ -1,0 +1,24 @@
+//! Both models of the rasterizer's timing over the stress scenes.
+
+use gaurast_tests::contexts::{Context, Settings};
+use gaurast_tests::recorded::{Agreement, read};
+
+use crate::scenes::all;
+use crate::verdicts::draw;
+
+#[test]
+fn models_of_the_rasterizer_agree_on_stress_scenes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut agreement = Agreement::default();
+    for (number, stress) in all().iter().enumerate() {
+        let path = folder.path().join(format!("{number}.json"));
+        let context = Context::embedded(&Settings {
+            trace: Some(&path),
+            ..Settings::default()
+        });
+        draw(&context, stress);
+        drop(context);
+        agreement.add(stress.name, &read(&path));
+    }
+    agreement.judge(100);
+}
