@@ -274,7 +274,7 @@ fn packets(bytes: &mut Bytes<'_>, resources: &Resources) -> Vec<Packet> {
 }
 
 fn rendering(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> {
-    let mut attachment = |bytes: &mut Bytes<'_>| {
+    let attachment = |bytes: &mut Bytes<'_>| {
         let image = resources.image(bytes)?;
         let mut of = |image| Attachment {
             view: view(bytes, image),
@@ -448,7 +448,7 @@ fn image_packet(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> 
 }
 
 fn begin(bytes: &mut Bytes<'_>) -> Packet {
-    let mut or = |bytes: &mut Bytes<'_>, usual: f32| {
+    let or = |bytes: &mut Bytes<'_>, usual: f32| {
         if bytes.rarely(6) {
             bytes.float()
         } else {
