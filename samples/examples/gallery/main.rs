@@ -13,8 +13,9 @@ use std::path::Path;
 use ash::vk::SampleCountFlags as Samples;
 use gaurast::vk::{
     GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraGAURAST as Camera,
-    GaussianCameraModelGAURAST as Model, GaussianLinearizationGAURAST as Linearization,
-    GaussianOrderGAURAST as Order, PipelineGaussianStateCreateInfoGAURAST as State,
+    GaussianCameraModelGAURAST as Model, GaussianGeometryGAURAST as Geometry,
+    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
+    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateInfoGAURAST as State,
 };
 use gpu::{Gpu, Picture, Triangle};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -94,7 +95,8 @@ fn orders<'a>(crossing: &'a [gpu::Splat]) -> Room<'a> {
     };
     Room {
         title: "Orders",
-        text: "The same Gaussians, front to back by depth along the view, by distance from the eye, and as they are drawn.",
+        text: "The same Gaussians, front to back by depth along the view, by distance from the eye, as they are drawn, and at \
+               each pixel by where they are greatest along its ray.",
         exhibits: vec![
             one("order-view-depth", "`VIEW_DEPTH`", Order::VIEW_DEPTH),
             one(
@@ -103,6 +105,28 @@ fn orders<'a>(crossing: &'a [gpu::Splat]) -> Room<'a> {
                 Order::RADIAL_DISTANCE,
             ),
             one("order-primitive", "`PRIMITIVE`", Order::PRIMITIVE),
+            one("order-per-pixel", "`PER_PIXEL`", Order::PER_PIXEL),
+        ],
+    }
+}
+
+fn rasterization<'a>(crossing: &'a [gpu::Splat]) -> Room<'a> {
+    let one = |name, caption, change: fn(State<'static>) -> State<'static>| {
+        exhibit(name, caption, crossing)
+            .camera(camera(60.0))
+            .state(change)
+    };
+    Room {
+        title: "Geometry and precision",
+        text: "The same again as volumes, as discs that rays meet exactly, and in binary16.",
+        exhibits: vec![
+            one("volumes", "`GAUSSIAN_3D`", |state| state),
+            one("discs", "`GAUSSIAN_2D`", |state| {
+                state.geometry(Geometry::GAUSSIAN_2D)
+            }),
+            one("binary16", "`FLOAT16`", |state| {
+                state.precision(Precision::FLOAT16)
+            }),
         ],
     }
 }
@@ -205,6 +229,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         cameras(&around),
         projections(&wide),
         orders(&crossing),
+        rasterization(&crossing),
         antialiasing(&needles),
         triangles(&still),
         instances(&flower, &meadow),
