@@ -52,6 +52,8 @@ fn fuzz(runs: u64, seeds: &[Vec<u8>], longest: usize, mut target: impl FnMut(&[u
         eprintln!("{info}\n{}", std::backtrace::Backtrace::force_capture());
         lock(&PANICS).push(info.to_string());
     }));
+    // Those of a test that failed before are that test's.
+    lock(&PANICS).clear();
     for (number, seed) in seeds.iter().enumerate() {
         target(seed);
         let panics = std::mem::take(&mut *lock(&PANICS));

@@ -92,7 +92,8 @@ impl Buffer {
 /// The requirements of a resource of `size` bytes.
 pub(crate) fn requirements(size: u64, memory_type_bits: u32) -> vk::MemoryRequirements {
     vk::MemoryRequirements {
-        size: size.next_multiple_of(ALIGNMENT),
+        // No memory has room for what cannot be rounded up.
+        size: size.checked_next_multiple_of(ALIGNMENT).unwrap_or(u64::MAX),
         alignment: ALIGNMENT,
         memory_type_bits,
     }
