@@ -608,7 +608,7 @@ impl Run {
                     );
                 }
                 (2, _) => {
-                    device.cmd_update_buffer(commands, to, bytes.long(3000), &[bytes.byte(); 64])
+                    device.cmd_update_buffer(commands, to, bytes.long(3000), &[bytes.byte(); 64]);
                 }
                 (3, Some(image)) => {
                     device.cmd_copy_buffer_to_image(commands, from, image, layout, &texels);
@@ -777,7 +777,7 @@ impl Run {
         // SAFETY: see above.
         unsafe {
             self.device
-                .cmd_clear_attachments(self.commands, &clear, &rect)
+                .cmd_clear_attachments(self.commands, &clear, &rect);
         };
     }
 

@@ -152,7 +152,7 @@ impl Resources {
     /// A range between the guards. Packets may say what they like of what lies within.
     fn range(&self, bytes: &mut Bytes<'_>) -> BufferRange {
         let inside = BUFFER - 2 * GUARD;
-        let offset = u64::from(bytes.word()) % inside & !3;
+        let offset = (u64::from(bytes.word()) % inside) & !3;
         BufferRange {
             memory: bytes.one(&self.buffers),
             offset: GUARD + offset,
