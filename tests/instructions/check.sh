@@ -19,11 +19,18 @@ if ! grep -qw avx2 /proc/cpuinfo; then
 fi
 
 count() { # count LINES: the instructions of a worker that is told that many lines
-    head -n "$1" "$folder/frames.jsonl" |
+    local said
+    said=$(head -n "$1" "$folder/frames.jsonl" |
         GAURAST_SIMD=avx2 GAURAST_THREADS=1 valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" \
-            bench-worker 2>&1 >/dev/null | sed -n 's/.*Collected : \([0-9]*\).*/\1/p'
+            bench-worker 2>&1 >/dev/null) || {
+        echo "the worker failed: $said" >&2
+        return 1
+    }
+    sed -n 's/.*Collected : \([0-9]*\).*/\1/p' <<<"$said"
 }
-frame=$(($(count 4) - $(count 3)))
+all=$(count 4)
+first=$(count 3)
+frame=$((all - first))
 if [ "${2:-}" = --store ]; then
     echo "$frame" >"$folder/stored.txt"
     echo "stored: $frame instructions"

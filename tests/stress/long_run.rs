@@ -1,4 +1,4 @@
-//! The short form of the example `long_run`.
+//! The short form of the example `long_run`, in a process that does nothing else.
 
 use gaurast_tests::long_run;
 

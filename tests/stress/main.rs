@@ -1,7 +1,6 @@
 //! Numerical stress: scenes made to break a renderer, each held against the binary64 oracle, and
 //! properties that every picture has.
 
-mod long_run;
 mod properties;
 mod recorded_work;
 mod scenes;
