@@ -1,6 +1,6 @@
 //! `gaurast` where the system fails it: interrupted, without room, with nobody to read. What was there before stays,
 //! nothing is left half-written, and there is one sentence.
-#![cfg(unix)]
+#![cfg(target_os = "linux")]
 
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
@@ -12,8 +12,10 @@ use tempfile::TempDir;
 const SIGINT: i32 = 2;
 
 fn gaurast(folder: &TempDir, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gaurast"));
+    let mut command = Command::new("env");
     command
+        // Whoever runs the tests in the background has interrupts ignored, and so would what they start.
+        .args(["--default-signal=INT", env!("CARGO_BIN_EXE_gaurast")])
         .args(arguments)
         .current_dir(folder)
         .env_remove("RUST_LOG")
