@@ -232,9 +232,6 @@ fn every_camera_and_every_order_keep_the_contract() {
     for (name, order) in orders {
         let mut views = other_cameras();
         views.push(generated_view(Limits::ENVELOPE_ONLY));
-        if order == GaussianOrderGAURAST::PER_PIXEL {
-            views.retain(|view| view.camera.model != GaussianCameraModelGAURAST::EQUIRECTANGULAR);
-        }
         devices.judge(
             &format!("cloud 11 {name}"),
             &scene,

@@ -23,7 +23,7 @@ pub(crate) enum Undrawn {
     CameraModel(CameraModel),
     /// A camera of a model that Gaussians of the pipeline's modes cannot be seen by.
     #[error(
-        "the pipeline's geometry, order and precision do not go with a camera whose model is {0:?} \
+        "the pipeline's geometry and precision do not go with a camera whose model is {0:?} \
          (VUID-vkCmdDraw-geometry-GAURAST)"
     )]
     ModeOfCameraModel(CameraModel),

@@ -15,7 +15,7 @@ use simdevice::bindings::Bindings;
 use simdevice::packet::draw::{self, DrawState, ResolveShader, Topology};
 use simdevice::packet::{
     Camera, CameraModel, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianGeometry,
-    GaussianOrder, GaussianPrecision, GaussianState, ModelAttributes, Viewport,
+    GaussianPrecision, GaussianState, ModelAttributes, Viewport,
 };
 use std::sync::Arc;
 
@@ -116,7 +116,6 @@ fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, 
         CameraModel::Fisheye => state.geometry == GaussianGeometry::Volume,
         CameraModel::Equirectangular => {
             state.geometry == GaussianGeometry::Volume
-                && state.order != GaussianOrder::PerPixel
                 && state.precision == GaussianPrecision::Float32
         }
     };

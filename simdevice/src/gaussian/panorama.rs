@@ -78,6 +78,8 @@ pub(super) fn copy_last(
         splat.mean[0] += SIDES[side] * period;
         let to = &mut out.copies[side];
         to.splats.push(splat);
+        // The same Gaussian lies as deep along a pixel's ray.
+        to.ray_depths.extend(out.ray_depths.last().copied());
         to.keys.push(key);
         to.reaches.push(reach);
     }

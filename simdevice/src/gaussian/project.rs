@@ -213,7 +213,8 @@ impl Projection {
                 principal[0] + f64::from(viewport.x),
                 principal[1] + f64::from(viewport.y),
             ],
-            period: panorama::period(camera),
+            // Discs are not drawn by panoramas.
+            period: panorama::period(camera).filter(|_| state.geometry == GaussianGeometry::Volume),
             slope_min: [0, 1].map(|axis| -(principal[axis] / focal[axis] + margin[axis])),
             slope_max: [0, 1]
                 .map(|axis| (size[axis] - principal[axis]) / focal[axis] + margin[axis]),
@@ -706,15 +707,15 @@ impl Projection {
                     ..splat
                 });
                 out.reaches.push(reach);
-                if let Some(period) = self.period {
-                    panorama::copy_last(at, period, &mut copies, out);
-                }
                 if self.geometry == GaussianGeometry::Surfel {
                     let (surfel, _) = self.surfel(at, scratch, &mut Vec::new());
                     out.surfels.push(surfel);
                 }
                 if self.order == GaussianOrder::PerPixel {
                     out.ray_depths.push(self.ray_depth(at, scratch));
+                }
+                if let Some(period) = self.period {
+                    panorama::copy_last(at, period, &mut copies, out);
                 }
             }
         }

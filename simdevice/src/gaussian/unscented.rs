@@ -8,6 +8,7 @@
 use super::fetch::BATCH;
 use super::linearize::linearize;
 use super::project::Projection;
+use super::rays;
 use super::scratch::Scratch;
 use crate::packet::CameraModel;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -81,27 +82,7 @@ impl Projection {
 
 /// The axes of a Gaussian, as long as its standard deviations.
 fn axes(quaternion: [f64; 4], scale: [f64; 3]) -> [[f64; 3]; 3] {
-    let largest = quaternion.iter().fold(0.0f64, |a, c| a.max(c.abs()));
-    let scaled = quaternion.map(|c| c / largest);
-    let norm = scaled.iter().map(|c| c * c).sum::<f64>().sqrt();
-    let [w, x, y, z] = scaled.map(|c| c / norm);
-    let columns = [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y + w * z),
-            2.0 * (x * z - w * y),
-        ],
-        [
-            2.0 * (x * y - w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z + w * x),
-        ],
-        [
-            2.0 * (x * z + w * y),
-            2.0 * (y * z - w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
-    ];
+    let columns = rays::axes(quaternion);
     [0, 1, 2].map(|axis| columns[axis].map(|c| c * scale[axis]))
 }
 

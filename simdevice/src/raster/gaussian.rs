@@ -115,7 +115,7 @@ struct Thresholds {
 impl Thresholds {
     fn new(draw: &GaussianDraw) -> Self {
         let state = &draw.state;
-        // Alpha is as large as a binary32 number's reciprocal where there is no floor. No alpha reaches one above the
+        // Where there is no floor, less than the least normal number is nothing. No alpha reaches a floor above the
         // ceiling.
         let most_fall = if state.alpha_floor <= state.alpha_ceiling {
             (-f64::from(state.alpha_floor).log2()).min(MOST_FALL) as f32
