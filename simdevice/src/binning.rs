@@ -1,15 +1,15 @@
 //! Binning: depth-sorted primitives to lists per tile.
 //!
 //! Sorting comes first, and placement is stable, so that every list is in depth order without a sort of its
-//! own. What each primitive reaches is brought into the sorted order; then each worker takes a band of rows of tiles,
-//! walks the whole sequence, counts, and places. A band's counters stay in the first-level cache.
+//! own. Workers take runs of the sorted sequence and write down the pairs of a tile and a primitive, apart for each band
+//! of rows of tiles; then workers take bands, count and place. What primitives reach differs in ways that no branch
+//! foresees, so that pairs are written first and are all alike later.
 
-use crate::gaussian::footprint::{Reach, TILE_SIZE};
+use crate::gaussian::footprint::{Reach, Span, TILE_SIZE};
 use crate::gaussian::locate;
 use crate::gaussian::project::Projected;
 use crate::packet::Rect;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// The lists of some rows of tiles.
 #[derive(Debug, Default)]
@@ -31,11 +31,25 @@ pub(crate) struct TileLists {
     bands: Vec<Band>,
 }
 
-/// A primitive and what it reaches.
-type Reaching = (u32, Reach);
+/// The rows of tiles that a draw may touch.
+struct Rows {
+    first: u32,
+    /// Of each row: its band, and the number that its first tile has there.
+    places: Vec<(u32, u32)>,
+}
 
-/// Primitives that a worker brings into order at a time.
-const RUN: usize = 4096;
+/// Pairs of a tile, by its number in the band, and a primitive. There is room behind them.
+#[derive(Debug, Default)]
+struct Pairs {
+    pairs: Vec<[u32; 2]>,
+    len: usize,
+}
+
+/// Pairs that are written together, whether they are wanted or not.
+const TOGETHER: usize = 4;
+
+/// Primitives whose reaches are brought together at a time.
+const GATHERED: usize = 64;
 
 impl TileLists {
     /// Places the survivors named by `order`, in that order, in the lists of the tiles they reach.
@@ -58,23 +72,23 @@ impl TileLists {
         let first_row = tile(bounds.y.into());
         let rows = tile(i64::from(bounds.y) + i64::from(bounds.height) - 1) - first_row + 1;
         let columns = tile(i64::from(bounds.x) + i64::from(bounds.width) - 1) + 1;
-        let band_rows = rows.div_ceil(threads.max(1) as u32);
-
-        let sorted: Vec<Reaching> = order
-            .par_iter()
-            .with_min_len(RUN)
-            .map(|&(_, primitive)| {
-                let (batch, place) = locate(primitive);
-                (primitive, batches[batch].reaches[place])
-            })
+        let threads = threads.max(1);
+        let band_rows = rows.div_ceil(threads as u32);
+        let bands = rows.div_ceil(band_rows) as usize;
+        let places = |row: u32| (row / band_rows, row % band_rows * columns);
+        let grid = Rows {
+            first: first_row,
+            places: (0..rows).map(places).collect(),
+        };
+        let runs: Vec<Vec<Pairs>> = order
+            .par_chunks(order.len().div_ceil(threads))
+            .map(|run| grid.expand(batches, run, bands))
             .collect();
-        let bands = (0..rows)
+        let bands = (0..bands)
             .into_par_iter()
-            .step_by(band_rows as usize)
-            .map(|row| {
-                let row = first_row + row;
-                let end = (row + band_rows).min(first_row + rows);
-                Band::place(batches, &sorted, row..end, columns)
+            .map(|band| {
+                let pairs: Vec<&[[u32; 2]]> = runs.iter().map(|run| run[band].written()).collect();
+                Band::place(&pairs, (band_rows * columns) as usize)
             })
             .collect();
         Self {
@@ -127,56 +141,93 @@ impl TileLists {
     }
 }
 
-impl Band {
-    /// Counts, then places what `sorted` reaches of the rows, in its order.
-    fn place(batches: &[Projected], sorted: &[Reaching], rows: Range<u32>, columns: u32) -> Self {
-        let tiles = (rows.end - rows.start) as usize * columns as usize;
-        let mut starts = vec![0u32; tiles + 1];
-        each_span(batches, sorted, &rows, columns, |_, tiles| {
-            for count in &mut starts[tiles] {
-                *count += 1;
+impl Rows {
+    /// The pairs of a run of the sorted sequence, in its order, by band.
+    fn expand(&self, batches: &[Projected], run: &[(u32, u32)], bands: usize) -> Vec<Pairs> {
+        let mut pairs: Vec<Pairs> = (0..bands).map(|_| Pairs::default()).collect();
+        let mut push = |row: u32, span: Span, primitive: u32| {
+            let row = row.wrapping_sub(self.first) as usize;
+            // Rows without tiles may lie outside.
+            if let Some(&(band, first)) = self.places.get(row) {
+                let first = first + u32::from(span.first);
+                pairs[band as usize].push(first, span.len(), primitive);
             }
-        });
+        };
+        let mut reaches = [Reach::default(); GATHERED];
+        for some in run.chunks(GATHERED) {
+            // Before any is looked at, so that the waits for memory overlap.
+            for (reach, &(_, primitive)) in reaches.iter_mut().zip(some) {
+                let (batch, place) = locate(primitive);
+                *reach = batches[batch].reaches[place];
+            }
+            for (reach, &(_, primitive)) in reaches.iter().zip(some) {
+                if let Some(rows) = reach.held() {
+                    for (row, span) in rows {
+                        push(row, span, primitive);
+                    }
+                } else {
+                    let others = &batches[locate(primitive).0].spans;
+                    for (row, span) in reach.spans(others) {
+                        push(row, span, primitive);
+                    }
+                }
+            }
+        }
+        pairs
+    }
+}
+
+impl Pairs {
+    /// Adds a primitive and `count` tiles from `first` on.
+    #[inline(always)]
+    fn push(&mut self, first: u32, count: usize, primitive: u32) {
+        let mut rest = count;
+        let mut tile = first;
+        loop {
+            if self.pairs.len() < self.len + TOGETHER {
+                self.grow();
+            }
+            let room = &mut self.pairs[self.len..self.len + TOGETHER];
+            for (pair, tile) in room.iter_mut().zip(tile..) {
+                *pair = [tile, primitive];
+            }
+            self.len += rest.min(TOGETHER);
+            if rest <= TOGETHER {
+                return;
+            }
+            rest -= TOGETHER;
+            tile += TOGETHER as u32;
+        }
+    }
+
+    #[cold]
+    fn grow(&mut self) {
+        self.pairs.resize((2 * self.pairs.len()).max(1024), [0; 2]);
+    }
+
+    fn written(&self) -> &[[u32; 2]] {
+        &self.pairs[..self.len]
+    }
+}
+
+impl Band {
+    /// Counts, then places the pairs of a band of so many tiles, in their order.
+    fn place(runs: &[&[[u32; 2]]], tiles: usize) -> Self {
+        let pairs = || runs.iter().flat_map(|run| run.iter());
+        let mut starts = vec![0u32; tiles + 1];
+        pairs().for_each(|&[tile, _]| starts[tile as usize] += 1);
         let mut total = 0;
         for start in &mut starts {
             total += std::mem::replace(start, total);
         }
         let mut next = starts.clone();
         let mut primitives = vec![0; total as usize];
-        each_span(batches, sorted, &rows, columns, |primitive, tiles| {
-            for next in &mut next[tiles] {
-                primitives[*next as usize] = primitive;
-                *next += 1;
-            }
+        pairs().for_each(|&[tile, primitive]| {
+            let next = &mut next[tile as usize];
+            primitives[*next as usize] = primitive;
+            *next += 1;
         });
         Self { starts, primitives }
-    }
-}
-
-/// Calls `visit` with each primitive and the tiles that it reaches in a row of a band, numbered from the band's corner.
-#[inline(always)]
-fn each_span(
-    batches: &[Projected],
-    sorted: &[Reaching],
-    rows: &Range<u32>,
-    columns: u32,
-    mut visit: impl FnMut(u32, Range<usize>),
-) {
-    for (primitive, reach) in sorted {
-        if !reach.is_within(rows.start, rows.end) {
-            continue;
-        }
-        let others = &batches[locate(*primitive).0].spans;
-        for (row, span) in reach.spans(others) {
-            if rows.contains(&row) {
-                let corner = ((row - rows.start) * columns) as usize;
-                let first = corner + usize::from(span.first);
-                visit(
-                    *primitive,
-                    first..first + usize::from(span.end - span.first),
-                );
-            }
-        }
     }
 }
 

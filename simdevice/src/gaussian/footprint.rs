@@ -15,6 +15,14 @@ pub(crate) struct Span {
     pub end: u16,
 }
 
+impl Span {
+    /// How many tiles it has.
+    #[inline(always)]
+    pub(crate) fn len(self) -> usize {
+        usize::from(self.end.saturating_sub(self.first))
+    }
+}
+
 /// Rows of tiles that a [`Reach`] holds itself.
 const HELD_ROWS: usize = 3;
 
@@ -82,11 +90,17 @@ impl Reach {
         (u32::from(self.row)..).zip(spans.iter().copied())
     }
 
-    /// Whether it has rows in `first..end`.
+    /// The rows that it holds itself and, so that there are always as many, rows without tiles that may lie anywhere;
+    /// `None` if its spans lie elsewhere.
     #[inline(always)]
-    pub(crate) fn is_within(&self, first: u32, end: u32) -> bool {
+    pub(crate) fn held(&self) -> Option<[(u32, Span); HELD_ROWS]> {
         let row = u32::from(self.row);
-        row < end && first < row + u32::from(self.rows)
+        let rows = [
+            (row, self.held[0]),
+            (row + 1, self.held[1]),
+            (row + 2, self.held[2]),
+        ];
+        (usize::from(self.rows) <= HELD_ROWS).then_some(rows)
     }
 }
 
@@ -126,12 +140,36 @@ pub(crate) struct Ellipse {
     pub peak: f64,
 }
 
-/// The first and last integer `p` of `first..end` with `low <= p + 0.5 <= high`.
+/// The first and last whole number `p` of `first..=last` with `low <= p + 0.5 <= high`.
+///
+/// Whole numbers stay binary64 here: to convert them would cost more than all else.
 #[inline(always)]
-fn centres(low: f64, high: f64, first: i64, end: i64) -> Option<(i64, i64)> {
-    let low = ((low - 0.5).ceil() as i64).max(first);
-    let high = ((high - 0.5).floor() as i64).min(end - 1);
-    (low <= high).then_some((low, high))
+fn centres(low: f64, high: f64, first: f64, last: f64) -> Option<[f64; 2]> {
+    let low = larger((low - 0.5).ceil(), first);
+    let high = smaller((high - 0.5).floor(), last);
+    (low <= high).then_some([low, high])
+}
+
+/// The larger one; `b` if either is not a number.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// The smaller one; `b` if either is not a number.
+#[inline(always)]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The tile of a pixel whose whole coordinate is less than 2^20: added to 1.5 * 2^52, a number is rounded and stands in
+/// the low bits.
+#[inline(always)]
+fn tile_of(pixel: f64) -> u16 {
+    const PER_PIXEL: f64 = 1.0 / TILE_SIZE as f64;
+    // The middle of its tile rounds to the tile's number.
+    let middle = pixel * PER_PIXEL - 0.5 * (1.0 - PER_PIXEL);
+    (middle + (3u64 << 51) as f64).to_bits() as u16
 }
 
 impl Ellipse {
@@ -148,25 +186,24 @@ impl Ellipse {
         others: &mut Vec<Span>,
         beside: Option<&mut u64>,
     ) -> Option<Reach> {
-        let tile = i64::from(TILE_SIZE);
         let [x, y] = self.mean;
         let [half_x, half_y] = self.half;
-        let columns = centres(x - half_x, x + half_x, visible.left, visible.right);
-        let rows = centres(y - half_y, y + half_y, visible.top, visible.bottom);
-        let (Some((left, right)), Some((top, bottom))) = (columns, rows) else {
+        let (first_x, last_x) = (visible.left as f64, (visible.right - 1) as f64);
+        let (first_y, last_y) = (visible.top as f64, (visible.bottom - 1) as f64);
+        let columns = centres(x - half_x, x + half_x, first_x, last_x);
+        let rows = centres(y - half_y, y + half_y, first_y, last_y);
+        let (Some([left, right]), Some([top, bottom])) = (columns, rows) else {
             return None;
         };
         // Visible pixels are few enough for 16 bits of tiles.
-        let span = |left: i64, right: i64| Span {
-            first: (left / tile) as u16,
-            end: (right / tile + 1) as u16,
+        let span = |[left, right]: [f64; 2]| Span {
+            first: tile_of(left),
+            end: tile_of(right) + 1,
         };
-        let (row, rows) = ((top / tile) as u16, (bottom / tile - top / tile + 1) as u16);
-        let clipped = left == visible.left
-            || right == visible.right - 1
-            || top == visible.top
-            || bottom == visible.bottom - 1;
-        let boxed = span(left, right);
+        let row = tile_of(top);
+        let rows = tile_of(bottom) - row + 1;
+        let clipped = left == first_x || right == last_x || top == first_y || bottom == last_y;
+        let boxed = span([left, right]);
         let one = boxed.end - boxed.first == 1 && rows == 1 && !clipped;
         let mut reach = Reach::new(row, rows, others);
         let Some(beside) = beside.filter(|_| !one) else {
@@ -175,13 +212,16 @@ impl Ellipse {
             }
             return Some(reach);
         };
+        let tile = f64::from(TILE_SIZE);
         let mut reached = 0;
+        let mut row_top = f64::from(row) * tile;
         for number in 0..rows {
-            let top = top.max(i64::from(row + number) * tile);
-            let bottom = bottom.min(i64::from(row + number) * tile + tile - 1);
-            let [low, high] = self.sides(top as f64 + 0.5 - y, bottom as f64 + 0.5 - y);
-            if let Some((left, right)) = centres(x + low, x + high, visible.left, visible.right) {
-                let span = span(left, right);
+            let above = larger(top, row_top) + 0.5 - y;
+            let below = smaller(bottom, row_top + (tile - 1.0)) + 0.5 - y;
+            row_top += tile;
+            let [low, high] = self.sides(above, below);
+            if let Some(columns) = centres(x + low, x + high, first_x, last_x) {
+                let span = span(columns);
                 reached += u64::from(span.end - span.first);
                 reach.set(others, number, span);
             }
@@ -195,12 +235,12 @@ impl Ellipse {
     #[inline(always)]
     fn sides(&self, above: f64, below: f64) -> [f64; 2] {
         // Both sides are monotonic above and below their furthest points, at -peak and peak.
-        let left = (-self.peak).max(above).min(below);
-        let right = self.peak.max(above).min(below);
+        let left = smaller(larger(-self.peak, above), below);
+        let right = smaller(larger(self.peak, above), below);
         let square = self.half[1] * self.half[1];
         let width = [
-            (self.narrowing * (square - left * left).max(0.0)).sqrt(),
-            (self.narrowing * (square - right * right).max(0.0)).sqrt(),
+            (self.narrowing * larger(square - left * left, 0.0)).sqrt(),
+            (self.narrowing * larger(square - right * right, 0.0)).sqrt(),
         ];
         [self.slope * left - width[0], self.slope * right + width[1]]
     }

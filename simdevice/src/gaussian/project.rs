@@ -15,7 +15,7 @@ use super::panorama;
 use super::rays::{self, RayDepth};
 use super::scratch::{Attributes, Flat, Scratch};
 use super::sort::ordered_bits;
-use super::spherical_harmonics;
+use super::spherical_harmonics::{Bases, DIRECTIONS};
 use super::surfel::{Placed, Surfel};
 use crate::counters::{Counter, Counters};
 use crate::packet::{
@@ -98,9 +98,6 @@ pub(crate) fn half_room(factor: [f64; 3], room: f64) -> f64 {
         f64::INFINITY
     }
 }
-
-/// Gaussians whose spherical harmonics are read together.
-const GROUP: usize = 16;
 
 /// What came of a batch.
 #[derive(Debug, Default)]
@@ -257,11 +254,11 @@ impl Projection {
     fn find_colored<S: Simd>(&self, simd: S, source: &Source<'_>) -> Bits {
         let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
         let mut coefficients = [0.0; COEFFICIENT_FLOATS];
+        let anywhere = Bases::default();
         let mut colored = Bits::default();
         for lane in 0..source.batch.len {
             reader.read(&source.batch, lane, &mut coefficients);
-            let anywhere = [0.0, 0.0, 1.0];
-            let color = spherical_harmonics::color(simd, self.sh_degree, anywhere, &coefficients);
+            let color = anywhere.color(simd, self.sh_degree, 0, &coefficients);
             colored.set_one(lane, color.is_some());
         }
         colored
@@ -461,42 +458,31 @@ impl Projection {
             };
             let [w, x] = [load(&rotation[0], at), load(&rotation[1], at)];
             let [y, z] = [load(&rotation[2], at), load(&rotation[3], at)];
-            // Divided by the largest component first, a quaternion of any size can be squared.
-            let largest = w.abs().max(x.abs()).max(y.abs().max(z.abs()));
-            let [w, x, y, z] = [w / largest, x / largest, y / largest, z / largest];
-            let norm = (w * w + x * x + y * y + z * z).sqrt();
-            let [w, x, y, z] = [w / norm, x / norm, y / norm, z / norm];
+            // What was binary32 can be squared in binary64, whatever its size.
+            let double = two / (w * w + x * x + y * y + z * z);
+            let [dx, dy, dz] = [double * x, double * y, double * z];
+            let (xx, yy, zz) = (dx * x, dy * y, dz * z);
+            let (xy, xz, yz) = (dx * y, dx * z, dy * z);
+            let (wx, wy, wz) = (dx * w, dy * w, dz * w);
             let columns = [
-                [
-                    one - two * (y * y + z * z),
-                    two * (x * y + w * z),
-                    two * (x * z - w * y),
-                ],
-                [
-                    two * (x * y - w * z),
-                    one - two * (x * x + z * z),
-                    two * (y * z + w * x),
-                ],
-                [
-                    two * (x * z + w * y),
-                    two * (y * z - w * x),
-                    one - two * (x * x + y * y),
-                ],
+                [one - (yy + zz), xy + wz, xz - wy],
+                [xy - wz, one - (xx + zz), yz + wx],
+                [xz + wy, yz - wx, one - (xx + yy)],
             ];
             let scale = [
                 load(&scale[0], at),
                 load(&scale[1], at),
                 load(&scale[2], at),
             ];
-            let depth = load(&scratch.camera[2], at);
+            let per_depth = one / load(&scratch.camera[2], at);
             let mut m = [[one; 3]; 2];
             for axis in 0..2 {
                 let [kx, ky, kz] = if is_pinhole {
-                    let slope = load(&scratch.camera[axis], at) / depth;
+                    let slope = load(&scratch.camera[axis], at) * per_depth;
                     let focal = number(self.focal[axis]);
                     store(slope * focal + self.center[axis], &mut flat.mean[axis]);
                     let clamped = slope.max(self.slope_min[axis]).min(self.slope_max[axis]);
-                    let to_screen = focal / depth;
+                    let to_screen = focal * per_depth;
                     [
                         to_screen * (number(r[3 * axis]) - clamped * r[6]),
                         to_screen * (number(r[3 * axis + 1]) - clamped * r[7]),
@@ -531,11 +517,11 @@ impl Projection {
 
             let [dx, dy, dz] = toward;
             let [dx, dy, dz] = [load(dx, at), load(dy, at), load(dz, at)];
-            let largest = dx.abs().max(dy.abs()).max(dz.abs());
-            let [dx, dy, dz] = [dx / largest, dy / largest, dz / largest];
-            let norm = (dx * dx + dy * dy + dz * dz).sqrt();
+            let unit = one / dx.abs().max(dy.abs()).max(dz.abs());
+            let [dx, dy, dz] = [dx * unit, dy * unit, dz * unit];
+            let per_norm = one / (dx * dx + dy * dy + dz * dz).sqrt();
             for (lanes, d) in flat.direction.iter_mut().zip([dx, dy, dz]) {
-                store(d / norm, lanes);
+                store(d * per_norm, lanes);
             }
         }
     }
@@ -569,9 +555,10 @@ impl Projection {
         // alpha = opacity exp(-q / 2) = 2^(log2 opacity - q / (2 ln 2)), and
         // q = d.x^2 / a + (a / det) (d.y - (b / a) d.x)^2.
         let unit = (0.5 / LN_2).sqrt();
+        let (per_a, per_c) = (number(1.0) / a, number(1.0) / c);
         let vertical = (a / determinant).sqrt() * unit;
-        store(number(unit) / a.sqrt(), &mut flat.factor[0]);
-        store(-(b / a) * vertical, &mut flat.factor[1]);
+        store(per_a.sqrt() * unit, &mut flat.factor[0]);
+        store(-(b * per_a) * vertical, &mut flat.factor[1]);
         store(vertical, &mut flat.factor[2]);
         // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
         // pixel that it would accept. What cannot reach the floor even so has a negative extent.
@@ -588,9 +575,9 @@ impl Projection {
         let half_x = (a * extent).sqrt();
         store(half_x, &mut flat.half[0]);
         store((c * extent).sqrt(), &mut flat.half[1]);
-        store(b / c, &mut flat.slope);
-        store(determinant / (c * c), &mut flat.narrowing);
-        store(b * half_x / a, &mut flat.peak);
+        store(b * per_c, &mut flat.slope);
+        store(determinant * per_c * per_c, &mut flat.narrowing);
+        store(b * per_a * half_x, &mut flat.peak);
     }
 
     /// Why a kept Gaussian is skipped after all, by what does not depend on tiles and colours.
@@ -672,9 +659,11 @@ impl Projection {
         out.reserve(scratch.lanes.len());
         self.find_tiles(scratch, out);
         let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
-        let mut coefficients = [[0.0; COEFFICIENT_FLOATS]; GROUP];
+        let mut coefficients = [[0.0; COEFFICIENT_FLOATS]; DIRECTIONS];
+        let (mut directions, mut bases) = ([[0.0; DIRECTIONS]; 3], Bases::default());
+        let degree = self.sh_degree;
         let mut copies = &*scratch.copies;
-        for group in scratch.reached.chunks(GROUP) {
+        for group in scratch.reached.chunks(DIRECTIONS) {
             // Reading several at a time overlaps the waits for memory.
             for (&(at, _), coefficients) in group.iter().zip(&mut coefficients) {
                 let (lane, floats) = (scratch.lanes[at], reader.floats());
@@ -683,14 +672,17 @@ impl Projection {
                     _ => reader.read(&source.batch, lane, coefficients),
                 }
             }
-            for (&(at, reach), coefficients) in group.iter().zip(&coefficients) {
+            for (parts, lanes) in directions.iter_mut().zip(&scratch.flat.direction) {
+                for (part, &(at, _)) in parts.iter_mut().zip(group) {
+                    *part = lanes[at % BATCH] as f32;
+                }
+            }
+            bases.find(simd, degree, &directions);
+            for (number, &(at, reach)) in group.iter().enumerate() {
                 let at = at % BATCH;
                 let flat = &*scratch.flat;
-                let d = &flat.direction;
-                let direction = [d[0][at] as f32, d[1][at] as f32, d[2][at] as f32];
-                let degree = self.sh_degree;
-                let Some(color) = spherical_harmonics::color(simd, degree, direction, coefficients)
-                else {
+                let coefficients = &coefficients[number % DIRECTIONS];
+                let Some(color) = bases.color(simd, degree, number, coefficients) else {
                     out.counters.add(Counter::SkippedNonFinite, 1);
                     continue;
                 };

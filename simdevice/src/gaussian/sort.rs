@@ -10,8 +10,8 @@ pub(super) fn ordered_bits(value: f32) -> u32 {
     }
 }
 
-const DIGIT_BITS: u32 = 11;
-const DIGITS: usize = 1 << DIGIT_BITS;
+/// The most bits of a digit: a first-level cache holds a line for each of its values.
+const MAX_DIGIT_BITS: u32 = 9;
 
 /// Sorts `(key, payload)` pairs by ascending key; equal keys keep their order.
 pub fn sort_by_key(pairs: &mut Vec<(u32, u32)>) {
@@ -19,22 +19,26 @@ pub fn sort_by_key(pairs: &mut Vec<(u32, u32)>) {
         (all & key, any | key)
     });
     let differing = all ^ any;
+    if differing == 0 || pairs.is_empty() {
+        return;
+    }
+    let first = differing.trailing_zeros();
+    let width = u32::BITS - differing.leading_zeros() - first;
+    let bits = width.div_ceil(width.div_ceil(MAX_DIGIT_BITS));
     let mut other = vec![(0, 0); pairs.len()];
-    let mut shift = 0;
-    while shift < u32::BITS {
-        let digit = (differing >> shift) & (DIGITS as u32 - 1);
-        if digit != 0 {
-            scatter(pairs, &mut other, shift);
+    for shift in (first..first + width).step_by(bits as usize) {
+        if (differing >> shift) & ((1 << bits) - 1) != 0 {
+            scatter(pairs, &mut other, shift, bits);
             std::mem::swap(pairs, &mut other);
         }
-        shift += DIGIT_BITS;
     }
 }
 
-/// One counting-sort pass over the digit at `shift`.
-fn scatter(from: &[(u32, u32)], to: &mut [(u32, u32)], shift: u32) {
-    let digit = |key: u32| (key >> shift) as usize & (DIGITS - 1);
-    let mut next = [0usize; DIGITS];
+/// One counting-sort pass over the digit of so many bits at `shift`.
+fn scatter(from: &[(u32, u32)], to: &mut [(u32, u32)], shift: u32, bits: u32) {
+    let mask = (1usize << bits.min(MAX_DIGIT_BITS)) - 1;
+    let digit = |key: u32| (key >> shift) as usize & mask;
+    let mut next = [0u32; 1 << MAX_DIGIT_BITS];
     for &(key, _) in from {
         next[digit(key)] += 1;
     }
@@ -44,7 +48,7 @@ fn scatter(from: &[(u32, u32)], to: &mut [(u32, u32)], shift: u32) {
     }
     for &pair in from {
         let slot = &mut next[digit(pair.0)];
-        to[*slot] = pair;
+        to[*slot as usize] = pair;
         *slot += 1;
     }
 }

@@ -27,82 +27,122 @@ pub fn coefficient_count(degree: u32) -> usize {
     (degree as usize + 1).pow(2)
 }
 
-/// The basis functions of degrees 0 to `degree` (at most 3) in the unit direction from the eye.
-#[inline(always)]
-fn basis(degree: u32, [x, y, z]: [f32; 3]) -> [f32; MAX_COEFFICIENTS] {
-    let mut b = [0.0; MAX_COEFFICIENTS];
-    b[0] = C0;
-    if degree >= 1 {
-        b[1] = -C1 * y;
-        b[2] = C1 * z;
-        b[3] = -C1 * x;
+/// Directions whose basis functions are found together.
+pub(super) const DIRECTIONS: usize = 16;
+
+/// The basis functions of degrees 0 to 3 in some directions: by function, then by direction.
+pub(super) struct Bases([[f32; DIRECTIONS]; MAX_COEFFICIENTS]);
+
+impl Default for Bases {
+    fn default() -> Self {
+        Self([[0.0; DIRECTIONS]; MAX_COEFFICIENTS])
     }
-    let (xx, yy, zz) = (x * x, y * y, z * z);
-    if degree >= 2 {
-        b[4] = C2[0] * (x * y);
-        b[5] = C2[1] * (y * z);
-        b[6] = C2[2] * (2.0 * zz - xx - yy);
-        b[7] = C2[3] * (x * z);
-        b[8] = C2[4] * (xx - yy);
-    }
-    if degree >= 3 {
-        b[9] = C3[0] * y * (3.0 * xx - yy);
-        b[10] = C3[1] * (x * y) * z;
-        b[11] = C3[2] * y * (4.0 * zz - xx - yy);
-        b[12] = C3[3] * z * (2.0 * zz - 3.0 * xx - 3.0 * yy);
-        b[13] = C3[4] * x * (4.0 * zz - xx - yy);
-        b[14] = C3[5] * z * (xx - yy);
-        b[15] = C3[6] * x * (xx - 3.0 * yy);
-    }
-    b
 }
 
-/// The colour `max(0, 0.5 + SH)` in the unit direction from the eye; `None` if a coefficient is not finite.
-///
-/// `coefficients` holds red, green and blue of each coefficient in turn; what follows them is not used.
-#[inline(always)]
-pub(super) fn color<S: Simd>(
-    simd: S,
-    degree: u32,
-    direction: [f32; 3],
-    coefficients: &[f32; COEFFICIENT_FLOATS],
-) -> Option<[f32; 3]> {
-    let count = coefficient_count(degree).min(MAX_COEFFICIENTS);
-    let basis = basis(degree, direction);
-    // A vector holds a coefficient's three components and the next one's first, which is not used. Two sums
-    // halve the wait for one another; the largest terms, the constant one and 0.5, are added last.
-    let (mut even, mut odd) = (f32x4::splat(simd, 0.0), f32x4::splat(simd, 0.0));
-    for k in (1..count).step_by(2) {
-        odd = term(simd, coefficients, &basis, k, odd);
+impl Bases {
+    /// Finds the functions of degrees 0 to `degree` (at most 3) in unit directions from the eye: their x, y and z.
+    #[inline(always)]
+    pub(super) fn find<S: Simd>(
+        &mut self,
+        simd: S,
+        degree: u32,
+        [x, y, z]: &[[f32; DIRECTIONS]; 3],
+    ) {
+        let load = |lanes: &[f32; DIRECTIONS]| f32x16::from_slice(simd, lanes);
+        let (x, y, z) = (load(x), load(y), load(z));
+        let mut set = |k: usize, value: f32x16<S>| value.store_slice(&mut self.0[k]);
+        set(0, f32x16::splat(simd, C0));
+        if degree >= 1 {
+            set(1, y * -C1);
+            set(2, z * C1);
+            set(3, x * -C1);
+        }
+        let (xx, yy, zz) = (x * x, y * y, z * z);
+        if degree >= 2 {
+            set(4, x * y * C2[0]);
+            set(5, y * z * C2[1]);
+            set(6, (zz * 2.0 - xx - yy) * C2[2]);
+            set(7, x * z * C2[3]);
+            set(8, (xx - yy) * C2[4]);
+        }
+        if degree >= 3 {
+            set(9, y * C3[0] * (xx * 3.0 - yy));
+            set(10, x * y * C3[1] * z);
+            set(11, y * C3[2] * (zz * 4.0 - xx - yy));
+            set(12, z * C3[3] * (zz * 2.0 - xx * 3.0 - yy * 3.0));
+            set(13, x * C3[4] * (zz * 4.0 - xx - yy));
+            set(14, z * C3[5] * (xx - yy));
+            set(15, x * C3[6] * (xx - yy * 3.0));
+        }
     }
-    for k in (2..count).step_by(2) {
-        even = term(simd, coefficients, &basis, k, even);
-    }
-    let sum = term(simd, coefficients, &basis, 0, even + odd) + 0.5;
-    // Multiplied by zero, what is not finite becomes NaN.
-    let (whole, rest) = coefficients[..3 * count].as_chunks::<16>();
-    let mut nothing = f32x16::splat(simd, 0.0);
-    for part in whole {
-        nothing += f32x16::simd_from(simd, *part) * 0.0;
-    }
-    let mut finite = nothing.simd_eq(0.0).to_bitmask() == 0xFFFF;
-    for coefficient in rest {
-        finite &= coefficient.is_finite();
-    }
-    finite.then_some([sum[0].max(0.0), sum[1].max(0.0), sum[2].max(0.0)])
-}
 
-/// `sum` and coefficient `k` times its basis function.
-#[inline(always)]
-fn term<S: Simd>(
-    simd: S,
-    coefficients: &[f32; COEFFICIENT_FLOATS],
-    basis: &[f32; MAX_COEFFICIENTS],
-    k: usize,
-    sum: f32x4<S>,
-) -> f32x4<S> {
-    let coefficient = f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
-    coefficient.mul_add(f32x4::splat(simd, basis[k]), sum)
+    /// The colour `max(0, 0.5 + SH)` in one of the directions; `None` if a coefficient of degrees 0 to `degree` is not
+    /// finite.
+    ///
+    /// `coefficients` holds red, green and blue of each coefficient in turn; what follows them is not used.
+    #[inline(always)]
+    pub(super) fn color<S: Simd>(
+        &self,
+        simd: S,
+        degree: u32,
+        direction: usize,
+        coefficients: &[f32; COEFFICIENT_FLOATS],
+    ) -> Option<[f32; 3]> {
+        let at = direction % DIRECTIONS;
+        let sum = match degree {
+            0 => self.sum::<S, 1>(simd, at, coefficients),
+            1 => self.sum::<S, 4>(simd, at, coefficients),
+            2 => self.sum::<S, 9>(simd, at, coefficients),
+            3 => self.sum::<S, 16>(simd, at, coefficients),
+            _ => self.sum::<S, MAX_COEFFICIENTS>(simd, at, coefficients),
+        };
+        // What is not finite makes the sum so, whatever it is multiplied by; the sum may also be too large.
+        if !sum.iter().all(|value| value.is_finite()) {
+            let count = coefficient_count(degree).min(MAX_COEFFICIENTS);
+            let all = coefficients[..3 * count].iter();
+            if !all.copied().all(f32::is_finite) {
+                return None;
+            }
+        }
+        Some(sum.map(|value| value.max(0.0)))
+    }
+
+    /// 0.5 and the sum of `COUNT` coefficients times their functions.
+    #[inline(always)]
+    fn sum<S: Simd, const COUNT: usize>(
+        &self,
+        simd: S,
+        at: usize,
+        coefficients: &[f32; COEFFICIENT_FLOATS],
+    ) -> [f32; 3] {
+        // Two sums halve the wait for one another; the largest terms, the constant one and 0.5, are added last.
+        let (mut even, mut odd) = (f32x4::splat(simd, 0.0), f32x4::splat(simd, 0.0));
+        let mut k = 1;
+        while k < COUNT {
+            odd = self.term(simd, at, coefficients, k, odd);
+            if k + 1 < COUNT {
+                even = self.term(simd, at, coefficients, k + 1, even);
+            }
+            k += 2;
+        }
+        let sum = self.term(simd, at, coefficients, 0, even + odd) + 0.5;
+        [sum[0], sum[1], sum[2]]
+    }
+
+    /// `sum` and coefficient `k` times its function. A vector holds the coefficient's three components and the next one's
+    /// first, which is not used.
+    #[inline(always)]
+    fn term<S: Simd>(
+        &self,
+        simd: S,
+        at: usize,
+        coefficients: &[f32; COEFFICIENT_FLOATS],
+        k: usize,
+        sum: f32x4<S>,
+    ) -> f32x4<S> {
+        let coefficient = f32x4::from_slice(simd, &coefficients[3 * k..3 * k + 4]);
+        coefficient.mul_add(f32x4::splat(simd, self.0[k][at]), sum)
+    }
 }
 
 #[cfg(test)]
@@ -111,8 +151,16 @@ mod tests {
 
     use fearless_simd::{Level, dispatch};
 
+    fn bases(degree: u32, direction: [f32; 3]) -> Bases {
+        let mut bases = Bases::default();
+        let directions = direction.map(|part| [part; DIRECTIONS]);
+        dispatch!(Level::new(), simd => bases.find(simd, degree, &directions));
+        bases
+    }
+
     fn color(degree: u32, direction: [f32; 3], sh: &[f32; COEFFICIENT_FLOATS]) -> Option<[f32; 3]> {
-        dispatch!(Level::new(), simd => super::color(simd, degree, direction, sh))
+        let bases = bases(degree, direction);
+        dispatch!(Level::new(), simd => bases.color(simd, degree, 5, sh))
     }
 
     fn coefficients(values: &[(usize, [f32; 3])]) -> [f32; COEFFICIENT_FLOATS] {
@@ -163,7 +211,7 @@ mod tests {
             for column in 0..columns {
                 let angle = (f64::from(column) + 0.5) * std::f64::consts::TAU / f64::from(columns);
                 let direction = [radius * angle.cos(), radius * angle.sin(), z].map(|v| v as f32);
-                let b = basis(3, direction);
+                let b = bases(3, direction).0.map(|lanes| lanes[0]);
                 for i in 0..16 {
                     for j in 0..16 {
                         products[i][j] += f64::from(b[i]) * f64::from(b[j]);

@@ -2,8 +2,8 @@
 //!
 //! Most trained Gaussians are a few pixels wide, so a tile is taken as 16 blocks of 4x4 pixels, and lists are
 //! worked off in two phases, a chunk at a time. Phase 1 tests one Gaussian against all 16 blocks in one vector,
-//! conservatively, and appends (Gaussian, block) items; phase 2 is a flat loop over the items, each evaluating
-//! 16 pixels, without a branch that is hard to predict.
+//! conservatively, and sets its bit in the words of those that it may reach; phase 2 ([`pixels`]) takes the blocks in
+//! turn, each with its 16 pixels in registers, through the Gaussians of its word.
 //!
 //! Exponents are formed from the block's middle: the Cholesky factor times its offset from the mean is computed in
 //! binary64 and rounded once, and from there pixels are at most 1.5 away in x and y. Needles that cross many tiles
@@ -21,6 +21,7 @@ mod half;
 mod layer;
 mod passing;
 mod per_pixel;
+mod pixels;
 pub mod resolve;
 pub(crate) mod tile_draw;
 
@@ -33,11 +34,11 @@ use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
 use by_block::TileMode;
-use exp2::exp2_of_negated;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 use layer::{Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
 use per_pixel::PerPixel;
+use pixels::Reaching;
 
 const TILE: usize = TILE_SIZE as usize;
 /// Pixels of a block, which are the lanes of a vector.
@@ -48,9 +49,7 @@ const BLOCK: usize = 4;
 const BLOCKS: usize = 16;
 /// A bit for each of them.
 const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
-/// The sign bit of a binary32 number.
-const SIGN: u32 = 1 << 31;
-/// Gaussians of a chunk: as many as phase 1 and phase 2 pass through the first-level cache.
+/// Gaussians of a chunk: as many as phase 1 and phase 2 pass through the first-level cache, and a word has bits.
 const CHUNK: usize = 32;
 
 /// Powers of two are formed down to this one.
@@ -67,22 +66,23 @@ pub struct GaussianTile {
     /// Where the chunk's Gaussians are brought together before they are looked at.
     splats: [Splat; CHUNK],
     chunk: [Record; CHUNK],
-    items: [u32; CHUNK * BLOCKS + LANES],
     /// What may reach each block, where a mode parts lists so.
     lists: [Vec<u32>; BLOCKS],
     per_pixel: PerPixel,
 }
 
-/// What the kernel does about depth; a constant, so that what isn't done costs nothing.
+/// What the kernel does about depth; a constant, so that what isn't done costs nothing. Each does what those before it do.
 type DepthMode = u8;
-/// Nothing.
-const NO_DEPTH: DepthMode = 0;
+/// Nothing: it only finishes the pixels that some Gaussian reaches.
+const FIND_REACHED: DepthMode = 0;
+/// It composites.
+const NO_DEPTH: DepthMode = 1;
 /// It leaves out what fails the test.
-const TEST_DEPTH: DepthMode = 1;
+const TEST_DEPTH: DepthMode = 2;
 /// It also finds the median.
-const FIND_MEDIAN: DepthMode = 2;
+const FIND_MEDIAN: DepthMode = 3;
 /// And what the mean is made of.
-const FIND_MEAN: DepthMode = 3;
+const FIND_MEAN: DepthMode = 4;
 
 /// What the two phases need of a Gaussian in this tile.
 #[derive(Clone, Copy, Debug, Default)]
@@ -108,6 +108,10 @@ struct Thresholds {
     alpha_floor: f32,
     alpha_ceiling: f32,
     transmittance_floor: f32,
+    /// Zero, unknown to the compiler: what it knows to be zero it selects by two operations, not one.
+    nothing: f32,
+    /// Whether an alpha may be so small that it leaves the transmittance what it was.
+    may_be_invisible: bool,
     /// What numbers of depths mean.
     depth_unit: DepthCode,
 }
@@ -128,6 +132,8 @@ impl Thresholds {
             alpha_floor: state.alpha_floor,
             alpha_ceiling: state.alpha_ceiling,
             transmittance_floor: state.transmittance_floor,
+            nothing: 0.0,
+            may_be_invisible: state.alpha_floor < f32::EPSILON,
         }
     }
 }
@@ -139,7 +145,6 @@ impl Default for GaussianTile {
             passing: Passing::default(),
             splats: [Splat::default(); CHUNK],
             chunk: [Record::default(); CHUNK],
-            items: [0; CHUNK * BLOCKS + LANES],
             lists: Default::default(),
             per_pixel: PerPixel::default(),
         }
@@ -250,10 +255,11 @@ impl GaussianTile {
         };
         match task.mode {
             TileMode::Fast => {
-                dispatch!(level, simd => self.composite::<_, NO_DEPTH>(simd, &task, LAYER, None));
+                dispatch!(level, simd =>
+                    self.composite::<_, FIND_REACHED>(simd, &task, LAYER, None));
             }
             _ => {
-                self.composite_by_block::<NO_DEPTH>(level, &task, LAYER, None);
+                self.composite_by_block::<FIND_REACHED>(level, &task, LAYER, None);
             }
         }
         let finished = self.layers[LAYER].finished();
@@ -305,7 +311,7 @@ impl GaussianTile {
             let blocks = open.count_ones() as u8;
             let rows = if runs.is_some() { layer.open_rows() } else { 0 };
             let open = mask32x16::from_bitmask(simd, open);
-            if DEPTH != NO_DEPTH
+            if DEPTH > NO_DEPTH
                 && self
                     .passing
                     .hides_from(task.splat(chunk[0]).depth, task.trend)
@@ -318,14 +324,15 @@ impl GaussianTile {
                 }
                 break;
             }
-            let (mut items, mut reached_before) = (0, 0);
+            let mut reaching = u32x16::splat(simd, 0);
+            let items_before = work.items;
             let (hidden_before, mut hidden) = (work, 0);
             // Before any is looked at, so that the waits for memory overlap.
             for (splat, &primitive) in self.splats.iter_mut().zip(chunk) {
                 *splat = *task.splat(primitive);
             }
             for (number, splat) in self.splats.iter().enumerate().take(chunk.len()) {
-                if DEPTH != NO_DEPTH && self.passing.hides(splat.depth) {
+                if DEPTH > NO_DEPTH && self.passing.hides(splat.depth) {
                     work.tiles_hidden += 1;
                     if runs.is_some() {
                         hidden += hidden_blocks(simd, splat, task, open);
@@ -334,15 +341,17 @@ impl GaussianTile {
                 }
                 if splat.steep {
                     // What is before it is composited first.
-                    let before = &self.items[..items];
+                    let before = reaching.to_array();
+                    reaching = u32x16::splat(simd, 0);
+                    work.items += count_bits(&before);
                     work.contributions += layer.evaluate::<_, DEPTH>(
                         simd,
-                        before,
+                        &before,
                         &self.chunk,
                         &self.passing,
                         task.thresholds,
                     );
-                    let shown = if DEPTH == NO_DEPTH {
+                    let shown = if DEPTH <= NO_DEPTH {
                         open
                     } else {
                         open & self.passing.blocks(simd, splat.depth)
@@ -351,9 +360,7 @@ impl GaussianTile {
                     let exact = u64::from(shown.count_ones());
                     work.open += open;
                     work.blocks_hidden += open - exact;
-                    work.items += items as u64 + exact;
-                    reached_before += items as u32 + exact as u32;
-                    items = 0;
+                    work.items += exact;
                     work.contributions +=
                         layer.evaluate_steep::<_, DEPTH>(simd, splat, shown, &self.passing, task);
                     continue;
@@ -362,177 +369,39 @@ impl GaussianTile {
                 let reached = record.place(simd, splat, task.corner, task.thresholds.most_fall);
                 let mut reached = if bounded { reached & open } else { open };
                 work.open += u64::from(blocks);
-                if DEPTH != NO_DEPTH {
+                if DEPTH > NO_DEPTH {
                     record.depth = splat.depth;
                     let shown = self.passing.blocks(simd, splat.depth);
                     let hidden = (reached & !shown).to_bitmask();
                     work.blocks_hidden += u64::from(hidden.count_ones());
                     reached &= shown;
                 }
-                let Some(room) = self.items.get_mut(items..items + LANES) else {
-                    // There is room for all blocks of all records, and for a vector more.
-                    break;
-                };
-                items += append_items(simd, number, reached, room);
+                let bit = u32x16::splat(simd, 1 << (number % CHUNK));
+                reaching |= reached.select(bit, u32x16::splat(simd, 0));
             }
+            let reaching = reaching.to_array();
             work.pairs += chunk.len() as u64;
-            work.items += items as u64;
+            work.items += count_bits(&reaching);
             if let Some(runs) = &mut runs {
-                let (primitives, reached) = (chunk.len() as u32, reached_before + items as u32);
                 trace::push_run(
                     runs,
                     Run {
-                        primitives,
+                        primitives: chunk.len() as u32,
                         rows,
                         blocks,
-                        reached,
+                        reached: (work.items - items_before) as u32,
                         hidden: (work.tiles_hidden - hidden_before.tiles_hidden) as u32,
                         hidden_blocks: hidden
                             + (work.blocks_hidden - hidden_before.blocks_hidden) as u32,
                     },
                 );
             }
-            let (items, chunk) = (&self.items[..items], &self.chunk);
+            let (chunk, passing) = (&self.chunk, &self.passing);
             work.contributions +=
-                layer.evaluate::<_, DEPTH>(simd, items, chunk, &self.passing, task.thresholds);
+                layer.evaluate::<_, DEPTH>(simd, &reaching, chunk, passing, task.thresholds);
         }
         work
     }
-}
-
-impl Layer {
-    /// Phase 2: composites `items`; returns how many pixels accepted one.
-    #[inline(always)]
-    fn evaluate<S: Simd, const DEPTH: DepthMode>(
-        &mut self,
-        simd: S,
-        items: &[u32],
-        chunk: &[Record; CHUNK],
-        passing: &Passing,
-        thresholds: Thresholds,
-    ) -> u64 {
-        let across = f32x16::simd_from(simd, LANE_X);
-        let down = f32x16::simd_from(simd, LANE_Y);
-        let mut contributions = 0;
-        for &item in items {
-            let block = item as usize % BLOCKS;
-            let g = &chunk[item as usize / BLOCKS % CHUNK];
-            let [a, b, c] = g.factor;
-            let u = across.mul_add(f32x16::splat(simd, a), f32x16::splat(simd, g.u[block]));
-            let v = down.mul_add(f32x16::splat(simd, c), f32x16::splat(simd, g.v[block]));
-            let v = across.mul_add(f32x16::splat(simd, b), v);
-            let opacity = f32x16::splat(simd, g.log2_opacity);
-            let fall = v.mul_add(v, u.mul_sub(u, opacity));
-            let look = (g.color, g.depth);
-            contributions +=
-                self.accumulate::<_, DEPTH>(simd, block, fall, look, passing, thresholds);
-        }
-        contributions
-    }
-
-    /// As [`Layer::evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
-    #[inline(always)]
-    fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
-        &mut self,
-        simd: S,
-        splat: &Splat,
-        blocks: u64,
-        passing: &Passing,
-        task: &Task<'_>,
-    ) -> u64 {
-        let mut contributions = 0;
-        for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
-            let fall = falls_64(simd, splat, task, block);
-            let look = (splat.color, splat.depth);
-            contributions +=
-                self.accumulate::<_, DEPTH>(simd, block, fall, look, passing, task.thresholds);
-        }
-        contributions
-    }
-
-    /// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `-fall`; returns
-    /// how many pixels accepted it.
-    #[inline(always)]
-    fn accumulate<S: Simd, const DEPTH: DepthMode>(
-        &mut self,
-        simd: S,
-        block: usize,
-        fall: f32x16<S>,
-        (color, depth): ([f32; 3], u32),
-        passing: &Passing,
-        thresholds: Thresholds,
-    ) -> u64 {
-        let most_fall = f32x16::splat(simd, thresholds.most_fall);
-        let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
-        let finish = f32x16::splat(simd, thresholds.transmittance_floor);
-        // Where alpha has fallen too far this is meaningless, and so is what follows from it; `reached` leaves it out.
-        let alpha = exp2_of_negated(simd, fall).min(ceiling);
-        let t = f32x16::from_slice(simd, &self.transmittance[block]);
-        let weight = t * alpha;
-        let rest = t - weight;
-        let mut reached = fall.simd_le(most_fall);
-        if DEPTH != NO_DEPTH {
-            reached &= passing.pixels(simd, block, depth);
-        }
-        // A finished pixel's transmittance is negative, and what is left of it fails like one below the floor.
-        let accepted = reached & rest.simd_ge(finish);
-        if DEPTH >= FIND_MEDIAN {
-            let median = u32x16::from_slice(simd, &self.median[block]);
-            let first_half = accepted & t.simd_ge(0.5);
-            let median = first_half.select(u32x16::splat(simd, depth), median);
-            median.store_slice(&mut self.median[block]);
-        }
-        let finished =
-            t.to_bits() | reached.select(u32x16::splat(simd, SIGN), u32x16::splat(simd, 0));
-        let t = accepted.select(rest, f32x16::from_bits(finished));
-        t.store_slice(&mut self.transmittance[block]);
-        let weight = accepted.select(weight, f32x16::splat(simd, 0.0));
-        if DEPTH == FIND_MEAN {
-            let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
-            let [depths, weights] = &mut self.means;
-            let sum = f32x16::from_slice(simd, &depths[block]);
-            weight.mul_add(depth, sum).store_slice(&mut depths[block]);
-            let sum = f32x16::from_slice(simd, &weights[block]) + weight;
-            sum.store_slice(&mut weights[block]);
-        }
-        for (channel, color) in self.color.iter_mut().zip(color) {
-            let sum = f32x16::from_slice(simd, &channel[block]);
-            let sum = weight.mul_add(f32x16::splat(simd, color), sum);
-            sum.store_slice(&mut channel[block]);
-        }
-        let accepted = accepted.to_bitmask() as u32;
-        self.covered[block] |= accepted;
-        u64::from(accepted.count_ones())
-    }
-}
-
-/// How far a Gaussian's alpha has fallen at a block's pixels, formed in binary64: minus its base-2 logarithm, but no less
-/// than -1, which is more than any ceiling, and still a power that is formed.
-///
-/// What is wider than the period of a panorama counts where it is nearer than its copies.
-#[inline(always)]
-fn falls_64<S: Simd>(simd: S, splat: &Splat, task: &Task<'_>, block: usize) -> f32x16<S> {
-    let [a, b, c] = splat.factor;
-    let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
-    let opacity = f64x8::splat(simd, splat.log2_opacity.into());
-    let half_period = if splat.wide {
-        task.half_period
-    } else {
-        f64::INFINITY
-    };
-    let within = f64x8::splat(simd, half_period);
-    let nothing = f64x8::splat(simd, 1e3);
-    let middle = [BLOCK_X[block] + from_mean(0), BLOCK_Y[block] + from_mean(1)];
-    let fall = |first: usize| {
-        let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
-        let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
-        let (u, v) = (dx * a, dx * b + dy * c);
-        let fall = u * u + v * v - opacity;
-        let inside = dx.simd_ge(-within) & dx.simd_lt(within);
-        inside.select(fall, nothing)
-    };
-    let fall: f32x16<S> = fall(0).narrow(fall(8));
-    fall.max(-1.0)
 }
 
 /// What a tile's Gaussians are.
@@ -617,8 +486,6 @@ const LANE_Y_64: [f64; LANES] = widened(LANE_Y);
 const BLOCK_X: [f64; BLOCKS] = middles(true);
 const BLOCK_Y: [f64; BLOCKS] = middles(false);
 
-const BLOCK_NUMBERS: [u32; BLOCKS] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-
 /// The column or row of each lane's pixel, from the block's middle.
 const fn grid(column: bool) -> [f32; LANES] {
     let mut out = [0.0; LANES];
@@ -692,23 +559,12 @@ impl Record {
     }
 }
 
-/// Writes an item `number * BLOCKS + block` for each of `blocks` to the front of `items`, in order; returns how many
-/// there are.
-#[inline(always)]
-fn append_items<S: Simd>(simd: S, number: usize, blocks: mask32x16<S>, items: &mut [u32]) -> usize {
-    let named = u32x16::simd_from(simd, BLOCK_NUMBERS) + (number * BLOCKS) as u32;
-    if S::f32s::LEN == LANES {
-        named.compress(blocks).store_slice(items);
-        return blocks.to_bitmask().count_ones() as usize;
-    }
-    // Halves are compressed without a branch.
-    let (first, second) = named.split();
-    let (in_first, in_second) = simd.split_mask32x16(blocks);
-    let (first, second) = (first.compress(in_first), second.compress(in_second));
-    let count = in_first.to_bitmask().count_ones() as usize;
-    first.store_slice(&mut items[..LANES / 2]);
-    second.store_slice(&mut items[count..][..LANES / 2]);
-    count + in_second.to_bitmask().count_ones() as usize
+/// How many pairs of a block and a Gaussian there are.
+fn count_bits(reaching: &Reaching) -> u64 {
+    reaching
+        .iter()
+        .map(|bits| u64::from(bits.count_ones()))
+        .sum()
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::{
     BLOCK_X, BLOCK_Y, BLOCKS, CHUNK, DepthMode, GaussianTile, LANE_X_64, LANE_Y_64, NO_DEPTH,
-    Record, Task, Work, falls_64,
+    Record, Task, Work, pixels::falls_64,
 };
 use crate::gaussian::project::{Splat, half_room};
 use crate::gaussian::rays::RayDepths;
@@ -191,7 +191,7 @@ impl GaussianTile {
         for &primitive in task.list {
             let (batch, place) = locate(primitive);
             let splat = &task.splats[batch][place];
-            let hidden = DEPTH != NO_DEPTH && self.passing.hides(splat.depth);
+            let hidden = DEPTH > NO_DEPTH && self.passing.hides(splat.depth);
             if hidden {
                 work.tiles_hidden += 1;
                 if !recorded {
@@ -214,7 +214,7 @@ impl GaussianTile {
                 hidden_alone += reached.to_bitmask().count_ones();
                 continue;
             }
-            if DEPTH != NO_DEPTH {
+            if DEPTH > NO_DEPTH {
                 let shown = self.passing.blocks(simd, splat.depth);
                 work.blocks_hidden += u64::from((reached & !shown).to_bitmask().count_ones());
                 reached &= shown;

@@ -1,6 +1,6 @@
 //! Powers of two, 16 at a time.
 
-use fearless_simd::{Simd, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 
 /// A polynomial fitted to 2^f for f in [-1/2, 1/2], highest power first; relative error 9.2e-8.
 #[allow(
@@ -32,6 +32,6 @@ pub(super) fn exp2_of_negated<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     for coefficient in rest {
         p = p.mul_add(f, constant(coefficient));
     }
-    let exponent = shifted.to_bits() << 23;
-    f32x16::from_bits(p.to_bits() + exponent)
+    let (exponent, bits): (u32x16<S>, u32x16<S>) = (shifted.bitcast(), p.bitcast());
+    (bits + (exponent << 23)).bitcast()
 }

@@ -86,7 +86,7 @@ impl GaussianTile {
                     let rounded = Splat16::new(splat);
                     let d = offsets(simd, splat, task.corner, block);
                     let alpha = alpha(simd, &rounded, d, thresholds.alpha_ceiling);
-                    let shown = if DEPTH == NO_DEPTH {
+                    let shown = if DEPTH <= NO_DEPTH {
                         mask32x16::splat(simd, true)
                     } else {
                         self.passing.pixels(simd, block, splat.depth)

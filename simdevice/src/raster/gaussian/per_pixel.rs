@@ -163,9 +163,9 @@ impl GaussianTile {
                 let splat = &task.splats[batch][place];
                 let fall = task.falls(simd, (batch, place), block);
                 let ceiling = f32x16::splat(simd, task.thresholds.alpha_ceiling);
-                let alpha = super::exp2_of_negated(simd, fall).min(ceiling);
+                let alpha = super::exp2::exp2_of_negated(simd, fall).min(ceiling);
                 let mut reached = fall.simd_le(task.thresholds.most_fall);
-                if DEPTH != NO_DEPTH {
+                if DEPTH > NO_DEPTH {
                     reached &= self.passing.pixels(simd, block, splat.depth);
                 }
                 let mut reached = reached.to_bitmask() as u32 & open;

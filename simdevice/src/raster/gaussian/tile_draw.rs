@@ -248,7 +248,7 @@ impl<'a> GaussianTileDraw<'a> {
                 let start = buffers.depth.start(tile.index, sample);
                 let stored = &buffers.depth.words_mut()[start..][..AREA];
                 fragments.passing.set(op, stored, &lanes);
-            } else if DEPTH != NO_DEPTH {
+            } else if DEPTH > NO_DEPTH {
                 fragments.passing = Passing::default();
             }
             fragments.run::<DEPTH>(self.draw, self.level, tile.at, sample, &lanes, counters);
