@@ -8,6 +8,7 @@ use crate::gaussian::footprint::{Reach, TILE_SIZE};
 use crate::gaussian::locate;
 use crate::gaussian::project::Projected;
 use crate::packet::Rect;
+use devmem::host;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -60,14 +61,16 @@ impl TileLists {
         let columns = tile(i64::from(bounds.x) + i64::from(bounds.width) - 1) + 1;
         let band_rows = rows.div_ceil(threads.max(1) as u32);
 
-        let sorted: Vec<Reaching> = order
+        let mut sorted: Vec<Reaching> = host::with_capacity(order.len());
+        // It writes to the room that there is.
+        order
             .par_iter()
             .with_min_len(RUN)
             .map(|&(_, primitive)| {
                 let (batch, place) = locate(primitive);
                 (primitive, batches[batch].reaches[place])
             })
-            .collect();
+            .collect_into_vec(&mut sorted);
         let bands = (0..rows)
             .into_par_iter()
             .step_by(band_rows as usize)
@@ -131,7 +134,7 @@ impl Band {
     /// Counts, then places what `sorted` reaches of the rows, in its order.
     fn place(batches: &[Projected], sorted: &[Reaching], rows: Range<u32>, columns: u32) -> Self {
         let tiles = (rows.end - rows.start) as usize * columns as usize;
-        let mut starts = vec![0u32; tiles + 1];
+        let mut starts: Vec<u32> = host::zeroed(tiles + 1);
         each_span(batches, sorted, &rows, columns, |_, tiles| {
             for count in &mut starts[tiles] {
                 *count += 1;
@@ -141,8 +144,8 @@ impl Band {
         for start in &mut starts {
             total += std::mem::replace(start, total);
         }
-        let mut next = starts.clone();
-        let mut primitives = vec![0; total as usize];
+        let mut next = host::copied(&starts);
+        let mut primitives: Vec<u32> = host::zeroed(total as usize);
         each_span(batches, sorted, &rows, columns, |primitive, tiles| {
             for next in &mut next[tiles] {
                 primitives[*next as usize] = primitive;

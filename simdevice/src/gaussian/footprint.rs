@@ -2,6 +2,7 @@
 //! pixel centres.
 
 use crate::packet::Rect;
+use devmem::host;
 
 /// The side in pixels of the tiles that hold Gaussian lists, as in the paper.
 pub const TILE_SIZE: u32 = 16;
@@ -46,7 +47,8 @@ impl Reach {
                 first: at as u16,
                 end: (at >> 16) as u16,
             };
-            others.resize(others.len() + usize::from(rows), Span::default());
+            let len = others.len() + usize::from(rows);
+            host::resize(others, len, Span::default());
         }
         reach
     }

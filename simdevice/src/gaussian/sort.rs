@@ -1,5 +1,7 @@
 //! The depth sort: a stable radix sort on exactly the bits that differ.
 
+use devmem::host;
+
 /// Maps a binary32 number to an integer that orders alike (negative zero before zero).
 pub(super) fn ordered_bits(value: f32) -> u32 {
     let bits = value.to_bits();
@@ -19,7 +21,7 @@ pub fn sort_by_key(pairs: &mut Vec<(u32, u32)>) {
         (all & key, any | key)
     });
     let differing = all ^ any;
-    let mut other = vec![(0, 0); pairs.len()];
+    let mut other: Vec<(u32, u32)> = host::zeroed(pairs.len());
     let mut shift = 0;
     while shift < u32::BITS {
         let digit = (differing >> shift) & (DIGITS as u32 - 1);

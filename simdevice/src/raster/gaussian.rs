@@ -23,6 +23,7 @@ mod passing;
 mod per_pixel;
 pub mod resolve;
 pub(crate) mod tile_draw;
+mod wide_sums;
 
 use super::DepthCode;
 use super::tile::place;
