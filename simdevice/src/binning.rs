@@ -3,14 +3,18 @@
 //! Sorting comes first, and placement is stable, so that every list is in depth order without a sort of its
 //! own. What each primitive reaches is brought into the sorted order; then each worker takes a band of rows of tiles,
 //! walks the whole sequence, counts, and places. A band's counters stay in the first-level cache.
+//!
+//! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
+//! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
-use crate::gaussian::footprint::{Reach, TILE_SIZE};
+use crate::gaussian::footprint::{Reach, Span, TILE_SIZE};
 use crate::gaussian::locate;
 use crate::gaussian::project::Projected;
 use crate::packet::Rect;
 use devmem::host;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// The lists of some rows of tiles.
 #[derive(Debug, Default)]
@@ -30,6 +34,62 @@ pub(crate) struct TileLists {
     /// Rows of a band; the last may have fewer.
     band_rows: u32,
     bands: Vec<Band>,
+    /// What there is instead of lists.
+    stream: Option<Stream>,
+}
+
+/// The survivors in depth order, for tiles to find theirs among them.
+#[derive(Debug)]
+pub(crate) struct Stream {
+    sorted: Vec<Reaching>,
+    /// Of each batch.
+    spans: Vec<Vec<Span>>,
+    pairs: u64,
+}
+
+impl Stream {
+    fn new(batches: &mut [Projected], sorted: Vec<Reaching>) -> Self {
+        let taken = batches
+            .iter_mut()
+            .map(|batch| std::mem::take(&mut batch.spans));
+        let spans = host::collect(taken);
+        let tiles = |(primitive, reach): &Reaching| {
+            let spans = reach.spans(&spans[locate(*primitive).0]);
+            let lengths = spans.map(|(_, span)| u64::from(span.end - span.first));
+            lengths.sum::<u64>()
+        };
+        Self {
+            pairs: sorted.par_iter().with_min_len(RUN).map(tiles).sum(),
+            sorted,
+            spans,
+        }
+    }
+
+    /// Makes `list` the next primitives of a tile, at most so many, from place `from` of the sequence on, which moves
+    /// on. Empty if there are no more.
+    pub(crate) fn next(
+        &self,
+        [x, y]: [u32; 2],
+        from: &mut usize,
+        most: usize,
+        list: &mut Vec<u32>,
+    ) {
+        list.clear();
+        while let Some((primitive, reach)) = self.sorted.get(*from) {
+            if list.len() == most {
+                break;
+            }
+            *from += 1;
+            if reach.covers(&self.spans[locate(*primitive).0], x, y) {
+                host::push(list, *primitive);
+            }
+        }
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        let spans = self.spans.iter().map(|spans| size_of_val(&**spans) as u64);
+        size_of_val(&*self.sorted) as u64 + spans.sum::<u64>()
+    }
 }
 
 /// A primitive and what it reaches.
@@ -37,14 +97,18 @@ type Reaching = (u32, Reach);
 
 /// Primitives that a worker brings into order at a time.
 const RUN: usize = 4096;
+/// Primitives that a worker counts the tiles of before it looks at the budget.
+const COUNTED: usize = 64;
 
 impl TileLists {
-    /// Places the survivors named by `order`, in that order, in the lists of the tiles they reach.
+    /// Places the survivors named by `order`, in that order, in the lists of the tiles they reach, unless those had more
+    /// than `most_pairs` entries together.
     pub(crate) fn build(
-        batches: &[Projected],
+        batches: &mut [Projected],
         order: &[(u32, u32)],
         bounds: Rect,
         threads: usize,
+        most_pairs: u64,
     ) -> Self {
         if bounds.is_empty() || order.is_empty() {
             return Self {
@@ -52,6 +116,7 @@ impl TileLists {
                 columns: 0,
                 band_rows: 1,
                 bands: Vec::new(),
+                stream: None,
             };
         }
         // Visible pixels have coordinates from zero on: the render area lies inside its attachments.
@@ -71,20 +136,25 @@ impl TileLists {
                 (primitive, batches[batch].reaches[place])
             })
             .collect_into_vec(&mut sorted);
-        let bands = (0..rows)
+        let pairs = AtomicU64::new(0);
+        let seen = &*batches;
+        let bands: Option<Vec<Band>> = (0..rows)
             .into_par_iter()
             .step_by(band_rows as usize)
             .map(|row| {
                 let row = first_row + row;
                 let end = (row + band_rows).min(first_row + rows);
-                Band::place(batches, &sorted, row..end, columns)
+                Band::place(seen, &sorted, row..end, columns, |more| {
+                    pairs.fetch_add(more, Relaxed) + more <= most_pairs
+                })
             })
             .collect();
         Self {
             first_row,
             columns,
             band_rows,
-            bands,
+            stream: bands.is_none().then(|| Stream::new(batches, sorted)),
+            bands: bands.unwrap_or_default(),
         }
     }
 
@@ -105,14 +175,23 @@ impl TileLists {
         }
     }
 
+    /// What there is instead of lists, if those are too long.
+    pub(crate) fn stream(&self) -> Option<&Stream> {
+        self.stream.as_ref()
+    }
+
     /// How many pairs of tile and primitive there are.
     pub(crate) fn pairs(&self) -> u64 {
         let pairs = |band: &Band| band.primitives.len() as u64;
-        self.bands.iter().map(pairs).sum()
+        let streamed = self.stream.as_ref().map_or(0, |stream| stream.pairs);
+        self.bands.iter().map(pairs).sum::<u64>() + streamed
     }
 
-    /// Whether a tile that shares pixels with `rect` has a primitive.
+    /// Whether a tile that shares pixels with `rect` has a primitive, or may have one.
     pub(crate) fn any_in(&self, rect: Rect) -> bool {
+        if self.stream.is_some() {
+            return true;
+        }
         let tiles = |start: i32, size: u32| {
             let start = i64::from(start).max(0);
             let end = (start + i64::from(size)).max(start + 1);
@@ -126,20 +205,35 @@ impl TileLists {
     /// Bytes of host memory that the lists take.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let bytes = |band: &Band| size_of_val(&*band.starts) + size_of_val(&*band.primitives);
-        self.bands.iter().map(|band| bytes(band) as u64).sum()
+        let lists = self.bands.iter().map(|band| bytes(band) as u64);
+        lists.sum::<u64>() + self.stream.as_ref().map_or(0, Stream::memory_bytes)
     }
 }
 
 impl Band {
-    /// Counts, then places what `sorted` reaches of the rows, in its order.
-    fn place(batches: &[Projected], sorted: &[Reaching], rows: Range<u32>, columns: u32) -> Self {
+    /// Counts, then places what `sorted` reaches of the rows, in its order; `None` once the budget does not `allow` for
+    /// so many more.
+    fn place(
+        batches: &[Projected],
+        sorted: &[Reaching],
+        rows: Range<u32>,
+        columns: u32,
+        allow: impl Fn(u64) -> bool,
+    ) -> Option<Self> {
         let tiles = (rows.end - rows.start) as usize * columns as usize;
         let mut starts: Vec<u32> = host::zeroed(tiles + 1);
-        each_span(batches, sorted, &rows, columns, |_, tiles| {
-            for count in &mut starts[tiles] {
-                *count += 1;
+        for some in sorted.chunks(COUNTED) {
+            let mut pairs = 0;
+            each_span(batches, some, &rows, columns, |_, tiles| {
+                pairs += tiles.len() as u64;
+                for count in &mut starts[tiles] {
+                    *count += 1;
+                }
+            });
+            if !allow(pairs) {
+                return None;
             }
-        });
+        }
         let mut total = 0;
         for start in &mut starts {
             total += std::mem::replace(start, total);
@@ -152,7 +246,7 @@ impl Band {
                 *next += 1;
             }
         });
-        Self { starts, primitives }
+        Some(Self { starts, primitives })
     }
 }
 
@@ -209,7 +303,7 @@ mod tests {
             width: 40,
             height: 32,
         };
-        let lists = TileLists::build(&[batch], &order, bounds, 2);
+        let lists = TileLists::build(&mut [batch], &order, bounds, 2, u64::MAX);
         assert_eq!(lists.list(0, 1), [2, 0]);
         assert_eq!(lists.list(1, 1), [0, 1]);
         assert_eq!(lists.list(2, 1), []);

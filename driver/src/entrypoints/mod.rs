@@ -41,6 +41,7 @@ pub(crate) mod transfer;
 pub(crate) mod unsupported;
 
 use crate::error::Error;
+use crate::float_control::FloatControl;
 use crate::handle::{self, Handle, Object};
 use crate::object::instance::Instance;
 use ash::vk;
@@ -148,12 +149,14 @@ impl<T> Caller for *mut T {
     }
 }
 
-/// Runs an entry point's body: no panic leaves it, and no error leaves it unreported.
+/// Runs an entry point's body: no panic leaves it, no error leaves it unreported, and how the application's thread rounds
+/// does not matter.
 pub(crate) fn guard<C: Caller, R: Return, T: Outcome<R>>(
     caller: C,
     function: &str,
     body: impl FnOnce() -> Result<T, Error>,
 ) -> R {
+    let _control = FloatControl::usual();
     match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(value)) => value.into_return(),
         Ok(Err(error)) => {

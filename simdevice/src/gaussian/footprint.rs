@@ -84,6 +84,21 @@ impl Reach {
         (u32::from(self.row)..).zip(spans.iter().copied())
     }
 
+    /// Whether it has a tile.
+    #[inline(always)]
+    pub(crate) fn covers(&self, others: &[Span], column: u32, row: u32) -> bool {
+        let number = row.wrapping_sub(u32::from(self.row)) as usize;
+        if number >= usize::from(self.rows) {
+            return false;
+        }
+        let span = if usize::from(self.rows) <= HELD_ROWS {
+            self.held[number]
+        } else {
+            others[self.start() + number]
+        };
+        (u32::from(span.first)..u32::from(span.end)).contains(&column)
+    }
+
     /// Whether it has rows in `first..end`.
     #[inline(always)]
     pub(crate) fn is_within(&self, first: u32, end: u32) -> bool {

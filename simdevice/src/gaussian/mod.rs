@@ -212,8 +212,11 @@ impl GaussianSet {
         let projected = Instant::now();
         let order = sorted(&batches);
         let sorted = Instant::now();
-        let tiles =
-            device.install(|| TileLists::build(&batches, &order, self.bounds, device.threads()));
+        // Four bytes a pair: four times the budget of all lists of a pass.
+        let most_pairs = device.config().bin_budget_bytes;
+        let threads = device.threads();
+        let tiles = device
+            .install(|| TileLists::build(&mut batches, &order, self.bounds, threads, most_pairs));
         counters.add(Counter::TilePairs, tiles.pairs());
         let nanoseconds = |from: Instant, to: Instant| (to - from).as_nanos() as u64;
         counters.add(Counter::PreprocessTime, nanoseconds(started, projected));

@@ -1,5 +1,6 @@
 mod half;
 mod per_pixel;
+mod streamed;
 mod whole_draws;
 
 use super::exp2::POWER_OF_TWO;
