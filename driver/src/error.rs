@@ -29,6 +29,9 @@ pub(crate) enum Error {
     /// The device has no memory for it.
     #[error("out of device memory: {0}")]
     OutOfDeviceMemory(String),
+    /// The host has no memory for it.
+    #[error("out of host memory: {0}")]
+    OutOfHostMemory(String),
     /// A descriptor pool has nothing left of what is wanted.
     #[error("out of pool memory: {0}")]
     OutOfPoolMemory(String),
@@ -95,6 +98,7 @@ impl Error {
             Self::Unsupported { .. }
             | Self::FeatureNotPresent(_)
             | Self::FeatureNotEnabled { .. } => vk::Result::ERROR_FEATURE_NOT_PRESENT,
+            Self::OutOfHostMemory(_) => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
             Self::OutOfDeviceMemory(_) => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
             Self::OutOfPoolMemory(_) => vk::Result::ERROR_OUT_OF_POOL_MEMORY,
             Self::InvalidShader(_) => vk::Result::ERROR_INVALID_SHADER_NV,

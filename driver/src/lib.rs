@@ -13,6 +13,7 @@ mod embed;
 mod entrypoints;
 mod environment;
 mod error;
+mod float_control;
 mod handle;
 mod icd;
 mod lower;

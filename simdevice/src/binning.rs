@@ -4,12 +4,17 @@
 //! own. Workers take runs of the sorted sequence and write down the pairs of a tile and a primitive, apart for each band
 //! of rows of tiles; then workers take bands, count and place. What primitives reach differs in ways that no branch
 //! foresees, so that pairs are written first and are all alike later.
+//!
+//! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
+//! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
 use crate::gaussian::footprint::{Reach, Span, TILE_SIZE};
 use crate::gaussian::locate;
 use crate::gaussian::project::Projected;
 use crate::packet::Rect;
+use devmem::host;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// The lists of some rows of tiles.
 #[derive(Debug, Default)]
@@ -29,6 +34,76 @@ pub(crate) struct TileLists {
     /// Rows of a band; the last may have fewer.
     band_rows: u32,
     bands: Vec<Band>,
+    /// What there is instead of lists.
+    stream: Option<Stream>,
+}
+
+/// A primitive and what it reaches.
+type Reaching = (u32, Reach);
+
+/// The survivors in depth order, for tiles to find theirs among them.
+#[derive(Debug)]
+pub(crate) struct Stream {
+    sorted: Vec<Reaching>,
+    /// Of each batch.
+    spans: Vec<Vec<Span>>,
+    pairs: u64,
+}
+
+impl Stream {
+    fn new(batches: &mut [Projected], order: &[(u32, u32)]) -> Self {
+        let mut sorted: Vec<Reaching> = host::with_capacity(order.len());
+        let seen = &*batches;
+        // It writes to the room that there is.
+        order
+            .par_iter()
+            .with_min_len(RUN)
+            .map(|&(_, primitive)| {
+                let (batch, place) = locate(primitive);
+                (primitive, seen[batch].reaches[place])
+            })
+            .collect_into_vec(&mut sorted);
+        let taken = batches
+            .iter_mut()
+            .map(|batch| std::mem::take(&mut batch.spans));
+        let spans = host::collect(taken);
+        let tiles = |(primitive, reach): &Reaching| {
+            let spans = reach.spans(&spans[locate(*primitive).0]);
+            let lengths = spans.map(|(_, span)| u64::from(span.end - span.first));
+            lengths.sum::<u64>()
+        };
+        Self {
+            pairs: sorted.par_iter().with_min_len(RUN).map(tiles).sum(),
+            sorted,
+            spans,
+        }
+    }
+
+    /// Makes `list` the next primitives of a tile, at most so many, from place `from` of the sequence on, which moves
+    /// on. Empty if there are no more.
+    pub(crate) fn next(
+        &self,
+        [x, y]: [u32; 2],
+        from: &mut usize,
+        most: usize,
+        list: &mut Vec<u32>,
+    ) {
+        list.clear();
+        while let Some((primitive, reach)) = self.sorted.get(*from) {
+            if list.len() == most {
+                break;
+            }
+            *from += 1;
+            if reach.covers(&self.spans[locate(*primitive).0], x, y) {
+                host::push(list, *primitive);
+            }
+        }
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        let spans = self.spans.iter().map(|spans| size_of_val(&**spans) as u64);
+        size_of_val(&*self.sorted) as u64 + spans.sum::<u64>()
+    }
 }
 
 /// The rows of tiles that a draw may touch.
@@ -48,16 +123,21 @@ struct Pairs {
 /// Pairs that are written together, whether they are wanted or not.
 const TOGETHER: usize = 4;
 
-/// Primitives whose reaches are brought together at a time.
+/// Primitives whose reaches are brought together, and whose pairs are counted before the budget is looked at.
 const GATHERED: usize = 64;
 
+/// Primitives that a worker brings into order at a time.
+const RUN: usize = 4096;
+
 impl TileLists {
-    /// Places the survivors named by `order`, in that order, in the lists of the tiles they reach.
+    /// Places the survivors named by `order`, in that order, in the lists of the tiles they reach, unless those had more
+    /// than `most_pairs` entries together.
     pub(crate) fn build(
-        batches: &[Projected],
+        batches: &mut [Projected],
         order: &[(u32, u32)],
         bounds: Rect,
         threads: usize,
+        most_pairs: u64,
     ) -> Self {
         if bounds.is_empty() || order.is_empty() {
             return Self {
@@ -65,6 +145,7 @@ impl TileLists {
                 columns: 0,
                 band_rows: 1,
                 bands: Vec::new(),
+                stream: None,
             };
         }
         // Visible pixels have coordinates from zero on: the render area lies inside its attachments.
@@ -78,17 +159,29 @@ impl TileLists {
         let places = |row: u32| (row / band_rows, row % band_rows * columns);
         let grid = Rows {
             first: first_row,
-            places: (0..rows).map(places).collect(),
+            places: host::collect((0..rows).map(places)),
         };
-        let runs: Vec<Vec<Pairs>> = order
+        let pairs = AtomicU64::new(0);
+        let allow = |more: u64| pairs.fetch_add(more, Relaxed) + more <= most_pairs;
+        let seen = &*batches;
+        let runs: Option<Vec<Vec<Pairs>>> = order
             .par_chunks(order.len().div_ceil(threads))
-            .map(|run| grid.expand(batches, run, bands))
+            .map(|run| grid.expand(seen, run, bands, allow))
             .collect();
+        let Some(runs) = runs else {
+            return Self {
+                first_row,
+                columns,
+                band_rows,
+                bands: Vec::new(),
+                stream: Some(Stream::new(batches, order)),
+            };
+        };
         let bands = (0..bands)
             .into_par_iter()
             .map(|band| {
-                let pairs: Vec<&[[u32; 2]]> = runs.iter().map(|run| run[band].written()).collect();
-                Band::place(&pairs, (band_rows * columns) as usize)
+                let written = runs.iter().map(|run| run[band].written());
+                Band::place(&host::collect(written), (band_rows * columns) as usize)
             })
             .collect();
         Self {
@@ -96,6 +189,7 @@ impl TileLists {
             columns,
             band_rows,
             bands,
+            stream: None,
         }
     }
 
@@ -116,14 +210,23 @@ impl TileLists {
         }
     }
 
+    /// What there is instead of lists, if those are too long.
+    pub(crate) fn stream(&self) -> Option<&Stream> {
+        self.stream.as_ref()
+    }
+
     /// How many pairs of tile and primitive there are.
     pub(crate) fn pairs(&self) -> u64 {
         let pairs = |band: &Band| band.primitives.len() as u64;
-        self.bands.iter().map(pairs).sum()
+        let streamed = self.stream.as_ref().map_or(0, |stream| stream.pairs);
+        self.bands.iter().map(pairs).sum::<u64>() + streamed
     }
 
-    /// Whether a tile that shares pixels with `rect` has a primitive.
+    /// Whether a tile that shares pixels with `rect` has a primitive, or may have one.
     pub(crate) fn any_in(&self, rect: Rect) -> bool {
+        if self.stream.is_some() {
+            return true;
+        }
         let tiles = |start: i32, size: u32| {
             let start = i64::from(start).max(0);
             let end = (start + i64::from(size)).max(start + 1);
@@ -137,19 +240,29 @@ impl TileLists {
     /// Bytes of host memory that the lists take.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let bytes = |band: &Band| size_of_val(&*band.starts) + size_of_val(&*band.primitives);
-        self.bands.iter().map(|band| bytes(band) as u64).sum()
+        let lists = self.bands.iter().map(|band| bytes(band) as u64);
+        lists.sum::<u64>() + self.stream.as_ref().map_or(0, Stream::memory_bytes)
     }
 }
 
 impl Rows {
     /// The pairs of a run of the sorted sequence, in its order, by band.
-    fn expand(&self, batches: &[Projected], run: &[(u32, u32)], bands: usize) -> Vec<Pairs> {
-        let mut pairs: Vec<Pairs> = (0..bands).map(|_| Pairs::default()).collect();
-        let mut push = |row: u32, span: Span, primitive: u32| {
+    /// `None` once the budget does not `allow` for so many more.
+    fn expand(
+        &self,
+        batches: &[Projected],
+        run: &[(u32, u32)],
+        bands: usize,
+        allow: impl Fn(u64) -> bool,
+    ) -> Option<Vec<Pairs>> {
+        let mut pairs = host::collect((0..bands).map(|_| Pairs::default()));
+        let mut count = 0;
+        let mut push = |row: u32, span: Span, primitive: u32, count: &mut u64| {
             let row = row.wrapping_sub(self.first) as usize;
             // Rows without tiles may lie outside.
             if let Some(&(band, first)) = self.places.get(row) {
                 let first = first + u32::from(span.first);
+                *count += span.len() as u64;
                 pairs[band as usize].push(first, span.len(), primitive);
             }
         };
@@ -163,17 +276,20 @@ impl Rows {
             for (reach, &(_, primitive)) in reaches.iter().zip(some) {
                 if let Some(rows) = reach.held() {
                     for (row, span) in rows {
-                        push(row, span, primitive);
+                        push(row, span, primitive, &mut count);
                     }
                 } else {
                     let others = &batches[locate(primitive).0].spans;
                     for (row, span) in reach.spans(others) {
-                        push(row, span, primitive);
+                        push(row, span, primitive, &mut count);
                     }
                 }
             }
+            if !allow(std::mem::take(&mut count)) {
+                return None;
+            }
         }
-        pairs
+        Some(pairs)
     }
 }
 
@@ -202,7 +318,8 @@ impl Pairs {
 
     #[cold]
     fn grow(&mut self) {
-        self.pairs.resize((2 * self.pairs.len()).max(1024), [0; 2]);
+        let len = (2 * self.pairs.len()).max(1024);
+        host::resize(&mut self.pairs, len, [0; 2]);
     }
 
     fn written(&self) -> &[[u32; 2]] {
@@ -214,14 +331,14 @@ impl Band {
     /// Counts, then places the pairs of a band of so many tiles, in their order.
     fn place(runs: &[&[[u32; 2]]], tiles: usize) -> Self {
         let pairs = || runs.iter().flat_map(|run| run.iter());
-        let mut starts = vec![0u32; tiles + 1];
+        let mut starts: Vec<u32> = host::zeroed(tiles + 1);
         pairs().for_each(|&[tile, _]| starts[tile as usize] += 1);
         let mut total = 0;
         for start in &mut starts {
             total += std::mem::replace(start, total);
         }
-        let mut next = starts.clone();
-        let mut primitives = vec![0; total as usize];
+        let mut next = host::copied(&starts);
+        let mut primitives: Vec<u32> = host::zeroed(total as usize);
         pairs().for_each(|&[tile, primitive]| {
             let next = &mut next[tile as usize];
             primitives[*next as usize] = primitive;
@@ -257,7 +374,7 @@ mod tests {
             width: 40,
             height: 32,
         };
-        let lists = TileLists::build(&[batch], &order, bounds, 2);
+        let lists = TileLists::build(&mut [batch], &order, bounds, 2, u64::MAX);
         assert_eq!(lists.list(0, 1), [2, 0]);
         assert_eq!(lists.list(1, 1), [0, 1]);
         assert_eq!(lists.list(2, 1), []);

@@ -13,6 +13,7 @@ use crate::query::{QueryKind, host_time};
 use crate::raster::tile::AttachmentError;
 use crate::trace::{DrawRecord, Owner};
 use crate::transfer::{self, Direction};
+use devmem::host::{self, OutOfMemory};
 use isa::exec::Stopped;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -42,6 +43,10 @@ pub enum ExecutionError {
     /// A program ran for too long; what it wrote until then stays written.
     #[error(transparent)]
     Stopped(#[from] Stopped),
+    /// The host has no memory for what the packet asks for. What it had begun is undefined, so that nothing more may be
+    /// executed.
+    #[error(transparent)]
+    OutOfMemory(#[from] OutOfMemory),
 }
 
 impl From<Unresolved> for ExecutionError {
@@ -101,6 +106,11 @@ impl CommandProcessor {
     /// # Errors
     /// [`ExecutionError`] if the packet does not fit what came before, or asks for too much.
     pub fn execute(&mut self, packet: &Packet) -> Result<(), ExecutionError> {
+        host::catch(|| self.try_execute(packet))?
+    }
+
+    /// As [`CommandProcessor::execute`]; where memory is wanting it unwinds.
+    fn try_execute(&mut self, packet: &Packet) -> Result<(), ExecutionError> {
         match packet {
             Packet::CopyBuffer(copy) => self.transfer(|| transfer::copy_buffer(copy)),
             Packet::CopyBufferToImage(copy) => {

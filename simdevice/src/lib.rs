@@ -31,7 +31,7 @@ mod workers;
 
 pub use command_processor::CommandProcessor;
 pub use device::{Config, Device};
-pub use devmem::Allocation;
+pub use devmem::{Allocation, host};
 pub use format::Format;
 pub use image::{Image, ImageView};
 pub use isa;

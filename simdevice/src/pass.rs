@@ -19,6 +19,7 @@ use crate::raster::gaussian::tile_draw::GaussianTileDraw;
 use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
 use crate::raster::tile::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target, Tile};
 use crate::skips::Skip;
+use devmem::host;
 use isa::exec::Stopped;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
@@ -180,7 +181,7 @@ impl Pass {
         counters: &mut Counters,
     ) -> Result<(), Stopped> {
         self.bin_bytes = self.bin_bytes.saturating_add(draw.memory_bytes());
-        self.draws.push(draw);
+        host::push(&mut self.draws, draw);
         self.pushed += 1;
         let config = device.config();
         let full = match config.flush {
@@ -338,7 +339,7 @@ impl Pass {
                 device,
             ))),
         };
-        self.draws.iter().map(ready).collect()
+        host::collect(self.draws.iter().map(ready))
     }
 }
 

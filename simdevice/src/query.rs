@@ -1,6 +1,7 @@
 //! Query pools: results that packets write and the host reads.
 
 use crate::counters::Counters;
+use devmem::host;
 use std::sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -53,7 +54,7 @@ impl QueryPool {
     pub fn new(kind: QueryKind, count: u32) -> Self {
         Self {
             kind,
-            slots: Mutex::new(vec![Slot::Unavailable; count as usize]),
+            slots: Mutex::new(host::filled(Slot::Unavailable, count as usize)),
             changed: Condvar::new(),
         }
     }

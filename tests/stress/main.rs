@@ -1,6 +1,7 @@
 //! Numerical stress: scenes made to break a renderer, each held against the binary64 oracle, and
 //! properties that every picture has.
 
+mod extremes;
 mod properties;
 mod recorded_work;
 mod scenes;

@@ -16,6 +16,7 @@ pub type Camera = GaussianCameraGAURAST<'static>;
 const CONTRACT: f64 = 5e-6;
 
 /// A scene, how it is seen, and how far the picture may be off.
+#[derive(Clone)]
 pub struct Stress {
     pub name: &'static str,
     pub scene: SceneBuffers,
@@ -142,6 +143,9 @@ fn layers(count: usize, opacity: impl Fn(usize) -> f32) -> Vec<Gaussian> {
 const BY_CONTRACT: &str = "the contract: exponents are formed in binary64 and rounded once";
 const BY_LAYERS: &str =
     "the contract: a layer adds half a unit in the last place, and what is behind weighs less";
+
+const BY_WIDE_SUMS: &str =
+    "the contract: where floors are below the usual ones, sums are binary64 and rounded once";
 
 /// Every scene.
 pub fn all() -> Vec<Stress> {
@@ -326,13 +330,31 @@ fn compositing() -> Vec<Stress> {
         )),
         small(Stress::new(
             "10,000 layers of 1/254, to the end",
-            BY_LAYERS,
+            BY_WIDE_SUMS,
             layers(10_000, |_| 1.0 / 254.0),
         ))
         .drawn(|s| s.transmittance_floor(0.0)),
         small(Stress::new(
+            "4,096 layers of 0.004, to the end",
+            BY_WIDE_SUMS,
+            layers(4096, |_| 0.004),
+        ))
+        .drawn(|s| s.transmittance_floor(0.0)),
+        small(Stress::new(
+            "4,096 layers of 1/512, to the end",
+            BY_WIDE_SUMS,
+            layers(4096, |_| 1.0 / 512.0),
+        ))
+        .drawn(|s| s.transmittance_floor(0.0).alpha_floor(1.0 / 1024.0)),
+        small(Stress::new(
+            "30,000 layers of 1/4096, no floors",
+            BY_WIDE_SUMS,
+            layers(30_000, |_| 1.0 / 4096.0),
+        ))
+        .drawn(|s| s.transmittance_floor(0.0).alpha_floor(0.0)),
+        small(Stress::new(
             "10,000 layers from 1/254 to 0.999",
-            BY_LAYERS,
+            BY_WIDE_SUMS,
             layers(10_000, |index| {
                 1.0 / 254.0 + 0.995 * (index % 100) as f32 / 100.0
             }),

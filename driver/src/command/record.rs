@@ -86,7 +86,7 @@ pub(crate) enum Command {
     /// `vkCmdCopyQueryPoolResults`: the results are read when it executes.
     CopyQueryResults(CopyQueryResults),
     /// `vkCmdExecuteCommands`: what the secondary command buffers held when this was recorded.
-    Execute(Vec<Arc<[Command]>>),
+    Execute(Vec<Arc<Vec<Command>>>),
 }
 
 /// Descriptor sets to be bound.

@@ -3,6 +3,7 @@
 use super::record::Command;
 use crate::error::Error;
 use crate::lower::rendering::BegunPass;
+use simdevice::host;
 use simdevice::{Format, Packet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -46,7 +47,7 @@ pub(crate) struct Recorder {
     status: Status,
     usage: Usage,
     commands: Vec<Command>,
-    finished: Option<Arc<[Command]>>,
+    finished: Option<Arc<Vec<Command>>>,
     pass: Option<Pass>,
     error: Option<Error>,
     pending: Arc<AtomicUsize>,
@@ -155,7 +156,7 @@ impl Recorder {
                 "a render pass has not ended",
             ));
         }
-        self.finished = Some(std::mem::take(&mut self.commands).into());
+        self.finished = Some(Arc::new(std::mem::take(&mut self.commands)));
         self.status = Status::Executable;
         Ok(())
     }
@@ -171,7 +172,7 @@ impl Recorder {
     ///
     /// # Errors
     /// [`Error::Usage`] if it is not executable, or pending and not for simultaneous use.
-    pub(crate) fn submit(&mut self) -> Result<(Arc<[Command]>, Pending), Error> {
+    pub(crate) fn submit(&mut self) -> Result<(Arc<Vec<Command>>, Pending), Error> {
         let Some(commands) = self
             .finished
             .as_ref()
@@ -198,7 +199,7 @@ impl Recorder {
     ///
     /// # Errors
     /// [`Error::Usage`] if it is not executable.
-    pub(crate) fn contents(&self) -> Result<Arc<[Command]>, Error> {
+    pub(crate) fn contents(&self) -> Result<Arc<Vec<Command>>, Error> {
         self.finished.clone().ok_or_else(|| {
             Error::usage(
                 "VUID-vkCmdExecuteCommands-pCommandBuffers-00089",
@@ -212,12 +213,12 @@ impl Recorder {
 
     /// Appends a command.
     pub(crate) fn push(&mut self, command: Command) {
-        self.commands.push(command);
+        host::push(&mut self.commands, command);
     }
 
     /// Appends a packet.
     pub(crate) fn packet(&mut self, packet: Packet) {
-        self.commands.push(Command::Packet(packet));
+        host::push(&mut self.commands, Command::Packet(packet));
     }
 
     /// Fails inside a pass.

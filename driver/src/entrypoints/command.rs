@@ -255,7 +255,7 @@ crate::entry_points! {
         }
         record(command_buffer, |recorder| {
             let secondaries = pointer::slice(command_buffers, command_buffer_count)?;
-            let mut contents = Vec::with_capacity(secondaries.len());
+            let mut contents = simdevice::host::with_capacity(secondaries.len());
             for &secondary in secondaries {
                 let secondary = handle::get(secondary)?;
                 if !secondary.is_secondary() {
@@ -370,7 +370,7 @@ unsafe fn bind_vertex_buffers(
             format!("there are {bindings} vertex input bindings"),
         ));
     }
-    let mut bound = Vec::with_capacity(buffers.len());
+    let mut bound = simdevice::host::with_capacity(buffers.len());
     for (index, (&buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
         let size = sizes.get(index).copied().unwrap_or(vk::WHOLE_SIZE);
         // SAFETY: the caller's promise.

@@ -28,7 +28,7 @@ crate::entry_points! {
             let sets = pointer::slice(descriptor_sets, descriptor_set_count)?;
             let offsets = pointer::slice(dynamic_offsets, dynamic_offset_count)?;
             let mut rest = offsets;
-            let mut bound = Vec::with_capacity(sets.len());
+            let mut bound = simdevice::host::with_capacity(sets.len());
             for (number, &set) in (first_set..).zip(sets) {
                 layout.set_layout(number)?;
                 let set = handle::get(set)?;

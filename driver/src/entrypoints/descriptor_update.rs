@@ -5,32 +5,36 @@ use crate::object::descriptor::layout::DescriptorSetLayout;
 use crate::object::descriptor::set::Write;
 use crate::object::descriptor::template::UpdateTemplate;
 use crate::object::descriptor::{BufferDescriptor, Descriptor};
+use crate::object::device::Device;
 use crate::{handle, pointer};
 use ash::vk;
+use simdevice::host;
 use std::ffi::c_void;
 use std::sync::Arc;
 
 crate::entry_points! {
     fn update_descriptor_sets(
-        _device: vk::Device,
+        device: vk::Device,
         descriptor_write_count: u32,
         descriptor_writes: *const vk::WriteDescriptorSet<'_>,
         descriptor_copy_count: u32,
         descriptor_copies: *const vk::CopyDescriptorSet<'_>,
     ) {
-        for info in pointer::slice(descriptor_writes, descriptor_write_count)? {
-            let set = handle::get(info.dst_set)?;
-            set.write(&write(info, set.layout())?)?;
-        }
-        for copy in pointer::slice(descriptor_copies, descriptor_copy_count)? {
-            handle::get(copy.dst_set)?.copy(
-                (copy.dst_binding, copy.dst_array_element),
-                handle::get(copy.src_set)?,
-                (copy.src_binding, copy.src_array_element),
-                copy.descriptor_count,
-            )?;
-        }
-        Ok(())
+        update(handle::get(device)?, || {
+            for info in pointer::slice(descriptor_writes, descriptor_write_count)? {
+                let set = handle::get(info.dst_set)?;
+                set.write(&write(info, set.layout())?)?;
+            }
+            for copy in pointer::slice(descriptor_copies, descriptor_copy_count)? {
+                handle::get(copy.dst_set)?.copy(
+                    (copy.dst_binding, copy.dst_array_element),
+                    handle::get(copy.src_set)?,
+                    (copy.src_binding, copy.src_array_element),
+                    copy.descriptor_count,
+                )?;
+            }
+            Ok(())
+        })
     }
 
     fn create_descriptor_update_template(
@@ -46,7 +50,7 @@ crate::entry_points! {
         )?;
         let pushes = info.template_type == vk::DescriptorUpdateTemplateType::PUSH_DESCRIPTORS_KHR;
         let template = UpdateTemplate {
-            entries: entries.to_vec(),
+            entries: host::copied(entries),
             push_bind_point: pushes.then_some(info.pipeline_bind_point),
         };
         pointer::output(descriptor_update_template, handle::create(Arc::new(template)))
@@ -61,16 +65,27 @@ crate::entry_points! {
     }
 
     fn update_descriptor_set_with_template(
-        _device: vk::Device,
+        device: vk::Device,
         descriptor_set: vk::DescriptorSet,
         descriptor_update_template: vk::DescriptorUpdateTemplate,
         data: *const c_void,
     ) {
-        let set = handle::get(descriptor_set)?;
-        let template = handle::get(descriptor_update_template)?;
-        let writes = template_writes(template, set.layout(), data)?;
-        writes.iter().try_for_each(|write| set.write(write))
+        update(handle::get(device)?, || {
+            let set = handle::get(descriptor_set)?;
+            let template = handle::get(descriptor_update_template)?;
+            let writes = template_writes(template, set.layout(), data)?;
+            writes.iter().try_for_each(|write| set.write(write))
+        })
     }
+}
+
+/// Updates descriptors. There is no result to return, so that the device is lost where memory is wanting: what is drawn
+/// with them would be something else.
+fn update(device: &Device, body: impl FnOnce() -> Result<(), Error>) -> Result<(), Error> {
+    host::catch(body).unwrap_or_else(|memory| {
+        device.signals().lose(&memory.to_string());
+        Err(Error::OutOfHostMemory(memory.to_string()))
+    })
 }
 
 /// A write to a set of a layout, with its pointers followed and its objects looked up.
@@ -136,7 +151,11 @@ pub(super) unsafe fn template_writes(
             descriptors,
         })
     };
-    template.entries.iter().map(write).collect()
+    let mut writes = host::with_capacity(template.entries.len());
+    for entry in &template.entries {
+        writes.push(write(entry)?);
+    }
+    Ok(writes)
 }
 
 /// The structure that describes a descriptor, and what of it counts.
@@ -218,7 +237,11 @@ unsafe fn descriptors(
             }
         }
     };
-    (0..count).map(one).collect()
+    let mut all = host::with_capacity(count as usize);
+    for index in 0..count {
+        all.push(one(index)?);
+    }
+    Ok(all)
 }
 
 /// An image's view and a sampler, as far as they count; what doesn't may be anything.

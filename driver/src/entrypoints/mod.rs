@@ -41,9 +41,11 @@ pub(crate) mod transfer;
 pub(crate) mod unsupported;
 
 use crate::error::Error;
+use crate::float_control::FloatControl;
 use crate::handle::{self, Handle, Object};
 use crate::object::instance::Instance;
 use ash::vk;
+use simdevice::host::OutOfMemory;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -147,12 +149,14 @@ impl<T> Caller for *mut T {
     }
 }
 
-/// Runs an entry point's body: no panic leaves it, and no error leaves it unreported.
+/// Runs an entry point's body: no panic leaves it, no error leaves it unreported, and how the application's thread rounds
+/// does not matter.
 pub(crate) fn guard<C: Caller, R: Return, T: Outcome<R>>(
     caller: C,
     function: &str,
     body: impl FnOnce() -> Result<T, Error>,
 ) -> R {
+    let _control = FloatControl::usual();
     match catch_unwind(AssertUnwindSafe(body)) {
         Ok(Ok(value)) => value.into_return(),
         Ok(Err(error)) => {
@@ -164,7 +168,10 @@ pub(crate) fn guard<C: Caller, R: Return, T: Outcome<R>>(
         }
         Err(panic) => {
             // The panic may have come from the caller's own destruction, so its instance is not looked for.
-            let error = Error::Panic(panic_message(panic.as_ref()).to_owned());
+            let error = match OutOfMemory::of_panic(panic.as_ref()) {
+                Some(memory) => Error::OutOfHostMemory(memory.to_string()),
+                None => Error::Panic(panic_message(panic.as_ref()).to_owned()),
+            };
             report(None, function, &error);
             R::failure(&error)
         }
@@ -224,5 +231,14 @@ mod tests {
             panic!("caught")
         });
         assert_eq!(result, vk::Result::ERROR_UNKNOWN);
+    }
+
+    #[test]
+    fn want_of_memory_is_an_error_of_its_own() {
+        let result: vk::Result = guard(std::ptr::null::<u8>(), "test", || {
+            drop(simdevice::host::with_capacity::<u64>(1 << 60));
+            Ok(())
+        });
+        assert_eq!(result, vk::Result::ERROR_OUT_OF_HOST_MEMORY);
     }
 }

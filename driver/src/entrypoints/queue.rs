@@ -18,7 +18,7 @@ crate::entry_points! {
     ) -> vk::Result {
         let queue = handle::get(queue)?;
         let submits = pointer::slice(submits, submit_count)?;
-        let mut batches = Vec::with_capacity(submits.len());
+        let mut batches = simdevice::host::with_capacity(submits.len());
         for submit in submits {
             batches.push(batch(submit)?);
         }
@@ -33,7 +33,7 @@ crate::entry_points! {
     ) -> vk::Result {
         let queue = handle::get(queue)?;
         let submits = pointer::slice(submits, submit_count)?;
-        let mut batches = Vec::with_capacity(submits.len());
+        let mut batches = simdevice::host::with_capacity(submits.len());
         for submit in submits {
             batches.push(batch2(submit)?);
         }

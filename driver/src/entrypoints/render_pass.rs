@@ -23,7 +23,7 @@ crate::entry_points! {
         }
         let attachments = pointer::slice(info.p_attachments, info.attachment_count)?;
         let subpasses = pointer::slice(info.p_subpasses, info.subpass_count)?;
-        let mut object_subpasses = Vec::with_capacity(subpasses.len());
+        let mut object_subpasses = simdevice::host::with_capacity(subpasses.len());
         for subpass in subpasses {
             object_subpasses.push(new_subpass(subpass)?);
         }
@@ -47,7 +47,7 @@ crate::entry_points! {
         let info = pointer::input(create_info)?;
         let attachments = pointer::slice(info.p_attachments, info.attachment_count)?;
         let subpasses = pointer::slice(info.p_subpasses, info.subpass_count)?;
-        let mut object_subpasses = Vec::with_capacity(subpasses.len());
+        let mut object_subpasses = simdevice::host::with_capacity(subpasses.len());
         for subpass in subpasses {
             object_subpasses.push(new_subpass2(subpass)?);
         }

@@ -277,8 +277,8 @@ crate::entry_points! {
             }
             let rects = rects
                 .iter()
-                .map(|r| (rendering::rect(r.rect), r.base_array_layer, r.layer_count))
-                .collect();
+                .map(|r| (rendering::rect(r.rect), r.base_array_layer, r.layer_count));
+            let rects = simdevice::host::collect(rects);
             recorder.packet(Packet::ClearAttachments(ClearAttachments { clears, rects }));
             Ok(())
         })
@@ -317,7 +317,7 @@ unsafe fn converted<T, U>(
 ) -> Result<Vec<U>, Error> {
     // SAFETY: the caller's promise.
     let regions = unsafe { pointer::slice(regions, count)? };
-    Ok(regions.iter().map(convert).collect())
+    Ok(simdevice::host::collect(regions.iter().map(convert)))
 }
 
 fn buffer_copy2(region: &vk::BufferCopy) -> vk::BufferCopy2<'static> {

@@ -7,6 +7,7 @@ use crate::object::image::ImageView;
 use crate::shader::{self, DescriptorKind};
 use simdevice::Allocation;
 use simdevice::bindings::Bindings;
+use simdevice::host;
 use simdevice::texture::{ImageBinding, SampledImage, StorageImage, TexelBuffer};
 use std::sync::Arc;
 
@@ -111,6 +112,7 @@ fn note_written(used: &shader::Descriptor, memory: &Arc<Allocation>, bindings: &
 /// The element at a bind point, of a list that grows as needed.
 fn element<T: Default>(slots: &mut Vec<T>, index: usize) -> &mut T {
     if slots.len() <= index {
+        host::reserve(slots, index + 1 - slots.len());
         slots.resize_with(index + 1, T::default);
     }
     &mut slots[index]

@@ -86,7 +86,7 @@ pub(crate) fn copy_image(
         ));
     }
     let (source_image, target_image) = (source, target);
-    let mut lowered = Vec::with_capacity(regions.len());
+    let mut lowered = simdevice::host::with_capacity(regions.len());
     for region in regions {
         let pairs = layer_pairs(
             (source, &region.src_subresource),
@@ -128,7 +128,7 @@ pub(crate) fn blit_image(
             format!("texels of format {from:?} do not convert to {to:?}"),
         ));
     }
-    let mut lowered = Vec::with_capacity(regions.len());
+    let mut lowered = simdevice::host::with_capacity(regions.len());
     for region in regions {
         let pairs = layer_pairs(
             (source, &region.src_subresource),
@@ -277,7 +277,7 @@ fn clear_image(
     value: ClearValue,
     ranges: &[vk::ImageSubresourceRange],
 ) -> Result<Packet, Error> {
-    let mut lowered = Vec::with_capacity(ranges.len());
+    let mut lowered = simdevice::host::with_capacity(ranges.len());
     for range in ranges {
         for aspect in aspects(image, range.aspect_mask)? {
             lowered.push(subresource_range(image, aspect, range)?);

@@ -6,6 +6,7 @@ use crate::handle;
 use crate::object::device::Device;
 use crate::object::instance::Instance;
 use ash::vk;
+use simdevice::host;
 use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -151,7 +152,9 @@ impl CommandBuffer {
     ) -> Result<(), Error> {
         let mut recorder = self.recorder();
         recorder.require_recording()?;
-        record(&mut recorder).inspect_err(|error| recorder.fail(error.clone()))
+        let recorded = host::catch(|| record(&mut recorder))
+            .unwrap_or_else(|memory| Err(Error::OutOfHostMemory(memory.to_string())));
+        recorded.inspect_err(|error| recorder.fail(error.clone()))
     }
 }
 

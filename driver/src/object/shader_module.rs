@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::shader::{self, Module, Options, Shader, Specialization, Stage};
+use simdevice::host;
 
 /// The first word of SPIR-V.
 const MAGIC: u32 = 0x0723_0203;
@@ -28,7 +29,7 @@ impl ShaderModule {
             ));
         }
         Ok(Self {
-            words: words.into(),
+            words: host::boxed(words),
         })
     }
 

@@ -15,7 +15,7 @@ use simdevice::{CommandProcessor, Packet};
 use std::sync::Arc;
 
 /// What a command buffer held when it was submitted.
-pub(crate) type Commands = (Arc<[Command]>, Pending);
+pub(crate) type Commands = (Arc<Vec<Command>>, Pending);
 
 /// A batch: semaphores to wait for, command buffers, semaphores to signal; each semaphore with a timeline's value.
 #[derive(Debug, Default)]

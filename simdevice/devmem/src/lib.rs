@@ -8,6 +8,7 @@
 //! All of the simulated device's `unsafe` lives here.
 
 mod atomic;
+pub mod host;
 
 use bytemuck::{AnyBitPattern, NoUninit};
 use memmap2::{MmapOptions, MmapRaw};
@@ -94,6 +95,9 @@ impl Allocation {
             .ok()
             .filter(|&bytes| bytes > 0 && bytes <= isize::MAX as usize)
             .ok_or_else(|| refuse(std::io::ErrorKind::InvalidInput.into()))?;
+        if host::injection::fails() {
+            return Err(refuse(std::io::ErrorKind::OutOfMemory.into()));
+        }
         let map = MmapOptions::new()
             .len(bytes)
             .no_reserve_swap()

@@ -7,6 +7,7 @@ use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader, Fetcher}
 use super::scratch::Attributes;
 use super::sort;
 use crate::packet::GaussianAppend;
+use devmem::host;
 use rayon::prelude::*;
 
 /// Bounds of the Gaussians of a chunk that can be drawn at all.
@@ -58,12 +59,13 @@ impl Chunks {
     /// The chunks of what `append` draws, which has neither indices nor attributes by instance.
     pub(super) fn build(append: &GaussianAppend, with_harmonics: bool) -> Self {
         let order = morton_order(append);
-        let chunks: Vec<_> = order
+        let mut chunks = host::with_capacity(order.len().div_ceil(BATCH));
+        order
             .par_chunks(BATCH)
             .map_init(Fetcher::default, |fetcher, numbers| {
                 Chunk::read(append, fetcher, numbers, with_harmonics)
             })
-            .collect();
+            .collect_into_vec(&mut chunks);
         let opacities = chunks.iter().map(|chunk| chunk.bounds.opacity);
         Self {
             opacity: opacities.fold(0.0, f32::max),
@@ -117,7 +119,7 @@ impl Chunk {
         if with_harmonics {
             let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
             let mut coefficients = [0.0; COEFFICIENT_FLOATS];
-            harmonics.reserve_exact(reader.floats() * numbers.len());
+            host::reserve(&mut harmonics, reader.floats() * numbers.len());
             for lane in 0..numbers.len() {
                 reader.read(&batch, lane, &mut coefficients);
                 harmonics.extend(&coefficients[..reader.floats()]);
@@ -135,22 +137,22 @@ impl Chunk {
 
 /// The numbers of the draw's vertices in an order in which neighbours are mostly near one another.
 fn morton_order(append: &GaussianAppend) -> Vec<u32> {
-    let starts: Vec<u32> = (0..append.count).step_by(BATCH).collect();
-    let positions: Vec<[f32; 3]> = starts
-        .into_par_iter()
-        .map_init(
+    let mut positions: Vec<[f32; 3]> = host::zeroed(append.count as usize);
+    positions
+        .par_chunks_mut(BATCH)
+        .zip((0..append.count).into_par_iter().step_by(BATCH))
+        .for_each_init(
             || (Fetcher::default(), Attributes::default()),
-            |(fetcher, attributes), start| {
-                let len = (append.count - start).min(BATCH as u32) as usize;
-                let batch = Batch::new(append, append.first_instance, start, len);
+            |(fetcher, attributes), (positions, start)| {
+                let batch = Batch::new(append, append.first_instance, start, positions.len());
                 let streams = &append.attributes;
                 fetcher.read(&streams.position, &batch, attributes.position.each_mut());
                 let [x, y, z] = &attributes.position;
-                (0..len).map(|at| [x[at], y[at], z[at]]).collect::<Vec<_>>()
+                for (at, position) in positions.iter_mut().enumerate() {
+                    *position = [x[at], y[at], z[at]];
+                }
             },
-        )
-        .flatten_iter()
-        .collect();
+        );
     let (low, per_cell) = grid(&positions);
     let code = |position: &[f32; 3]| {
         [0, 1, 2]
@@ -162,9 +164,9 @@ fn morton_order(append: &GaussianAppend) -> Vec<u32> {
             })
             .sum()
     };
-    let mut order: Vec<(u32, u32)> = positions.iter().map(code).zip(0..).collect();
+    let mut order: Vec<(u32, u32)> = host::collect(positions.iter().map(code).zip(0..));
     sort::sort_by_key(&mut order);
-    order.into_iter().map(|(_, number)| number).collect()
+    host::collect(order.into_iter().map(|(_, number)| number))
 }
 
 /// The corner and the cells' side of a grid that holds most positions, whatever lies far off.

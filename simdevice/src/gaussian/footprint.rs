@@ -2,6 +2,7 @@
 //! pixel centres.
 
 use crate::packet::Rect;
+use devmem::host;
 
 /// The side in pixels of the tiles that hold Gaussian lists, as in the paper.
 pub const TILE_SIZE: u32 = 16;
@@ -54,7 +55,8 @@ impl Reach {
                 first: at as u16,
                 end: (at >> 16) as u16,
             };
-            others.resize(others.len() + usize::from(rows), Span::default());
+            let len = others.len() + usize::from(rows);
+            host::resize(others, len, Span::default());
         }
         reach
     }
@@ -88,6 +90,21 @@ impl Reach {
             &others[start..start + rows]
         };
         (u32::from(self.row)..).zip(spans.iter().copied())
+    }
+
+    /// Whether it has a tile.
+    #[inline(always)]
+    pub(crate) fn covers(&self, others: &[Span], column: u32, row: u32) -> bool {
+        let number = row.wrapping_sub(u32::from(self.row)) as usize;
+        if number >= usize::from(self.rows) {
+            return false;
+        }
+        let span = if usize::from(self.rows) <= HELD_ROWS {
+            self.held[number]
+        } else {
+            others[self.start() + number]
+        };
+        (u32::from(span.first)..u32::from(span.end)).contains(&column)
     }
 
     /// The rows that it holds itself and, so that there are always as many, rows without tiles that may lie anywhere;

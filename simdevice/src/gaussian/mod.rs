@@ -42,6 +42,7 @@ use crate::skips::{Skip, Skips};
 use crate::trace::{self, DrawRecord};
 use chunks::{Chunk, Chunks};
 use depth::{CenterDepth, Trend};
+use devmem::host;
 use fearless_simd::dispatch;
 use fetch::{BATCH, Batch, Fetcher};
 use footprint::Visible;
@@ -166,7 +167,7 @@ impl GaussianSet {
     /// Adds Gaussians.
     pub fn append(&mut self, append: &GaussianAppend) {
         if append.count > 0 && append.instance_count > 0 {
-            self.appends.push(append.clone());
+            host::push(&mut self.appends, append.clone());
         }
     }
 
@@ -211,17 +212,24 @@ impl GaussianSet {
         let projected = Instant::now();
         let order = sorted(&batches);
         let sorted = Instant::now();
-        let tiles =
-            device.install(|| TileLists::build(&batches, &order, self.bounds, device.threads()));
+        // Twelve bytes a pair while lists are made: four times the budget of all lists of a pass.
+        let most_pairs = device.config().bin_budget_bytes / 3;
+        let threads = device.threads();
+        let tiles = device
+            .install(|| TileLists::build(&mut batches, &order, self.bounds, threads, most_pairs));
         counters.add(Counter::TilePairs, tiles.pairs());
         let nanoseconds = |from: Instant, to: Instant| (to - from).as_nanos() as u64;
         counters.add(Counter::PreprocessTime, nanoseconds(started, projected));
         counters.add(Counter::SortTime, nanoseconds(projected, sorted));
         counters.add(Counter::BinningTime, nanoseconds(sorted, Instant::now()));
-        let (splats, (surfels, depths)): (Vec<_>, (Vec<_>, Vec<_>)) = batches
-            .into_iter()
-            .map(|batch| (batch.splats, (batch.surfels, batch.ray_depths)))
-            .unzip();
+        let mut splats = host::with_capacity(batches.len());
+        let mut surfels = host::with_capacity(batches.len());
+        let mut depths = host::with_capacity(batches.len());
+        for batch in batches {
+            splats.push(batch.splats);
+            surfels.push(batch.surfels);
+            depths.push(batch.ray_depths);
+        }
         let is_per_pixel = self.begin.state.order == GaussianOrder::PerPixel;
         let is_flat = self.begin.state.geometry == GaussianGeometry::Surfel;
         let rays = PixelRays::new(&self.begin.camera, &self.begin.viewport);
@@ -307,6 +315,11 @@ impl GaussianSet {
                     part: Part::From(0),
                     frustum: Arc::clone(&frustum),
                 };
+                let batches = match chunks {
+                    None => append.count.div_ceil(BATCH as u32) as usize,
+                    Some(chunks) => chunks.chunks.len(),
+                };
+                host::reserve(&mut jobs, batches);
                 match chunks {
                     None => jobs.extend((0..append.count).step_by(BATCH).map(|start| Job {
                         part: Part::From(start),
@@ -354,7 +367,9 @@ impl GaussianSet {
             sequence = sequence.wrapping_add(gaussians);
         }
         for draw in &self.draws {
-            batches.extend(shaded::project(self, draw, sequence, device)?);
+            let shaded = shaded::project(self, draw, sequence, device)?;
+            host::reserve(batches, shaded.len());
+            batches.extend(shaded);
             let gaussians = draw.count.wrapping_mul(draw.instance_count);
             sequence = sequence.wrapping_add(gaussians);
         }
@@ -385,8 +400,7 @@ impl GaussianSet {
         }
         let level = device.level();
         let is_flat = begin.state.geometry == GaussianGeometry::Surfel;
-        let one = |worker: &mut Worker, job: &Job<'_>| {
-            let mut out = Projected::default();
+        let one = |worker: &mut Worker, (job, out): (&Job<'_>, &mut Projected)| {
             let Worker {
                 fetcher,
                 attributes,
@@ -422,14 +436,14 @@ impl GaussianSet {
                 Part::From(start) => job.sequence + start + lane as u32,
                 Part::Chunk(chunk) => job.sequence + chunk.numbers[lane],
             };
-            dispatch!(level, simd => projection.run(simd, &source, scratch, sequence, &mut out));
-            out
+            dispatch!(level, simd => projection.run(simd, &source, scratch, sequence, out));
         };
-        let mut batches: Vec<Projected> = device.install(|| {
+        let mut batches = host::collect(jobs.iter().map(|_| Projected::default()));
+        device.install(|| {
             jobs.par_iter()
+                .zip(&mut batches)
                 .with_min_len(BATCHES_PER_TASK)
-                .map_init(Worker::new, one)
-                .collect()
+                .for_each_init(Worker::new, one);
         });
         panorama::append_copies(&mut batches);
         Ok(batches)
@@ -517,7 +531,7 @@ struct Worker {
 /// The survivors in depth order, as key and batch number times `BATCH` plus place in the batch.
 fn sorted(batches: &[Projected]) -> Vec<(u32, u32)> {
     let count = batches.iter().map(|batch| batch.keys.len()).sum();
-    let mut order = Vec::with_capacity(count);
+    let mut order = host::with_capacity(count);
     for (number, batch) in batches.iter().enumerate() {
         let keys = batch.keys.iter().map(|&[key, _]| key);
         order.extend(keys.zip((number * BATCH) as u32..));

@@ -9,6 +9,7 @@
 use super::footprint::{Ellipse, Reach, Visible};
 use super::project::Projected;
 use crate::packet::{Camera, CameraModel};
+use devmem::host;
 
 /// The sides to which Gaussians are copied: right and left.
 const SIDES: [f64; 2] = [1.0, -1.0];
@@ -88,11 +89,12 @@ pub(super) fn copy_last(
 /// Makes batches of the copies, behind all others. Copies have the keys and the places in the order of what they are
 /// copies of; since no pixel counts two of them, their order among themselves is of no account.
 pub(super) fn append_copies(batches: &mut Vec<Projected>) {
-    let copies: Vec<Projected> = batches
+    let copies = batches
         .iter_mut()
         .flat_map(|batch| std::mem::take(&mut batch.copies))
-        .filter(|copies| !copies.splats.is_empty())
-        .collect();
+        .filter(|copies| !copies.splats.is_empty());
+    let copies = host::collect(copies);
+    host::reserve(batches, copies.len());
     batches.extend(copies);
 }
 

@@ -23,6 +23,7 @@ use crate::packet::{
     GaussianOrder, GaussianPrecision, GaussianState, Viewport,
 };
 use crate::skips::{Skip, Skips};
+use devmem::host;
 use fearless_simd::{Simd, prelude::*};
 
 /// A projected Gaussian: what the tile engine needs of it, in one cache line.
@@ -161,9 +162,9 @@ pub(crate) struct Projection {
 
 impl Projected {
     pub(super) fn reserve(&mut self, count: usize) {
-        self.splats.reserve_exact(count);
-        self.keys.reserve_exact(count);
-        self.reaches.reserve_exact(count);
+        host::reserve(&mut self.splats, count);
+        host::reserve(&mut self.keys, count);
+        host::reserve(&mut self.reaches, count);
     }
 }
 

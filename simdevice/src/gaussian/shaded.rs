@@ -14,6 +14,7 @@ use crate::device::Device;
 use crate::geometry::points::PointShader;
 use crate::packet::draw::{Draw, gaussian};
 use crate::packet::{Camera, GaussianOrder, Viewport};
+use devmem::host;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use isa::exec::Stopped;
 use rayon::prelude::*;
@@ -77,16 +78,15 @@ pub(super) fn project(
     let Some(viewport) = draw.state.viewports.first() else {
         return Ok(Vec::new());
     };
-    let jobs: Vec<Job> = (0..draw.instance_count)
-        .flat_map(|instance| {
-            let start = sequence.wrapping_add(instance.wrapping_mul(draw.count));
-            (0..draw.count).step_by(BATCH).map(move |first| Job {
-                instance,
-                first,
-                sequence: start.wrapping_add(first),
-            })
+    let jobs = (0..draw.instance_count).flat_map(|instance| {
+        let start = sequence.wrapping_add(instance.wrapping_mul(draw.count));
+        (0..draw.count).step_by(BATCH).map(move |first| Job {
+            instance,
+            first,
+            sequence: start.wrapping_add(first),
         })
-        .collect();
+    });
+    let jobs = host::collect(jobs);
     let prepared = draw.vertex_bindings.prepare(device.level());
     let (resources, cancel) = (prepared.resources(), AtomicBool::new(false));
     let worker = || {
@@ -109,18 +109,19 @@ pub(super) fn project(
         }
         done
     };
-    let done: Vec<_> = device.install(|| {
+    let mut done = host::with_capacity(jobs.len());
+    device.install(|| {
         jobs.par_iter()
             .with_min_len(BATCHES_PER_TASK)
             .map_init(worker, one)
-            .collect()
+            .collect_into_vec(&mut done);
     });
     draw.vertex_bindings.bump_generations();
     // That others were cancelled tells nothing.
     let failures = done.iter().filter_map(|done| done.as_ref().err());
     match failures.min_by_key(|stopped| **stopped == Stopped::Cancelled) {
         Some(stopped) => Err(*stopped),
-        None => done.into_iter().collect(),
+        None => Ok(host::collect(done.into_iter().flatten())),
     }
 }
 

@@ -1,5 +1,7 @@
 //! The depth sort: a stable radix sort on exactly the bits that differ.
 
+use devmem::host;
+
 /// Maps a binary32 number to an integer that orders alike (negative zero before zero).
 pub(super) fn ordered_bits(value: f32) -> u32 {
     let bits = value.to_bits();
@@ -25,7 +27,7 @@ pub fn sort_by_key(pairs: &mut Vec<(u32, u32)>) {
     let first = differing.trailing_zeros();
     let width = u32::BITS - differing.leading_zeros() - first;
     let bits = width.div_ceil(width.div_ceil(MAX_DIGIT_BITS));
-    let mut other = vec![(0, 0); pairs.len()];
+    let mut other: Vec<(u32, u32)> = host::zeroed(pairs.len());
     for shift in (first..first + width).step_by(bits as usize) {
         if (differing >> shift) & ((1 << bits) - 1) != 0 {
             scatter(pairs, &mut other, shift, bits);

@@ -2,6 +2,7 @@
 
 use super::primitive::Primitive;
 use crate::packet::Rect;
+use devmem::host;
 
 /// The macro-tiles that a pass's area touches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,7 +68,7 @@ pub(super) fn bin(
     if columns.start() == columns.end() || rows.start() == rows.end() {
         for row in rows {
             for column in columns.clone() {
-                pairs.push((grid.tile(column, row, layer), number));
+                host::push(pairs, (grid.tile(column, row, layer), number));
             }
         }
         return;
@@ -79,7 +80,7 @@ pub(super) fn bin(
                 [column, row].map(|tile| i64::from(tile) * i64::from(grid.size)),
                 grid.size,
             ) {
-                pairs.push((grid.tile(column, row, layer), number));
+                host::push(pairs, (grid.tile(column, row, layer), number));
             }
         }
     }
@@ -158,21 +159,21 @@ impl Bins {
         }
         let mut lists = (last - first) as usize + 1;
         if lists > DENSE_LISTS + 4 * pairs.len() {
-            let mut distinct: Vec<u32> = tiles.clone().collect();
+            let mut distinct: Vec<u32> = host::collect(tiles.clone());
             distinct.sort_unstable();
             distinct.dedup();
             lists = distinct.len();
             bins.tiles = distinct.into();
         }
-        let mut starts = vec![0u32; lists + 1];
+        let mut starts: Vec<u32> = host::zeroed(lists + 1);
         for tile in tiles {
             starts[bins.list(tile).unwrap_or_default() + 1] += 1;
         }
         for place in 1..starts.len() {
             starts[place] += starts[place - 1];
         }
-        let mut next = starts.clone();
-        let mut primitives = vec![0; pairs.len()];
+        let mut next = host::copied(&starts);
+        let mut primitives: Vec<u32> = host::zeroed(pairs.len());
         for &(tile, primitive) in pairs {
             let next = &mut next[bins.list(tile).unwrap_or_default()];
             primitives[*next as usize] = primitive;

@@ -4,6 +4,7 @@
 use super::assemble::{places, primitive_count, uses_pivot};
 use crate::packet::IndexStream;
 use crate::packet::draw::{Draw, Topology};
+use devmem::host;
 
 /// Vertices that no restart interrupts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,11 +71,12 @@ impl Runs {
         let primitives = primitive_count(self.topology, vertices);
         self.vertices += u64::from(vertices);
         if primitives > 0 {
-            self.runs.push(Run {
+            let run = Run {
                 start,
                 primitives_before: self.primitives,
                 primitives,
-            });
+            };
+            host::push(&mut self.runs, run);
             self.primitives += primitives;
         }
     }
@@ -103,7 +105,7 @@ fn known_indices(stream: &IndexStream) -> u64 {
 fn read_indices(stream: &IndexStream, first: u64, len: u32, out: &mut Vec<u32>) {
     let size = u64::from(stream.index_size.max(1));
     out.clear();
-    out.resize(len as usize, 0);
+    host::resize(out, len as usize, 0);
     let known = known_indices(stream).saturating_sub(first).min(len.into()) as usize;
     if known == 0 {
         return;
@@ -115,14 +117,14 @@ fn read_indices(stream: &IndexStream, first: u64, len: u32, out: &mut Vec<u32>) 
     // What was known to lie inside cannot be refused.
     match stream.index_size {
         1 => {
-            let mut bytes = vec![0u8; known];
+            let mut bytes: Vec<u8> = host::zeroed(known);
             let _ = memory.read(start, &mut bytes);
             out.iter_mut()
                 .zip(bytes)
                 .for_each(|(out, byte)| *out = byte.into());
         }
         2 => {
-            let mut halves = vec![0u16; known];
+            let mut halves: Vec<u16> = host::zeroed(known);
             let _ = memory.read(start, &mut halves);
             out.iter_mut()
                 .zip(halves)
@@ -278,7 +280,7 @@ impl Elements {
     /// By a table of all indices in the range. Slots ascend with indices, so that memory is read in order.
     fn place_dense(&mut self, indices: &[u32], least: u32, range: usize, offset: i64) {
         self.table.clear();
-        self.table.resize(range, 0);
+        host::resize(&mut self.table, range, 0);
         for &index in indices {
             self.table[(index - least) as usize] = 1;
         }
@@ -301,7 +303,7 @@ impl Elements {
             .trailing_zeros()
             .max(1);
         self.table.clear();
-        self.table.resize(1 << bits, FREE);
+        host::resize(&mut self.table, 1 << bits, FREE);
         let mask = (1usize << bits) - 1;
         for &index in indices {
             let number = i64::from(index) + offset;

@@ -6,6 +6,7 @@ use super::primitive::{Primitive, PrimitiveKind};
 use super::setup::{Current, Job, NONE, Origin, Place, cross};
 use super::viewport::{ONE, Projected, snap_away, snap_length};
 use crate::packet::draw::Interpolation;
+use devmem::host;
 
 /// The greatest side of a point, in pixels.
 pub const MAX_POINT_SIZE: f32 = 255.0;
@@ -161,7 +162,7 @@ impl Job<'_> {
             shape.pixels,
             &mut self.out.pairs,
         );
-        self.out.primitives.push(primitive);
+        host::push(&mut self.out.primitives, primitive);
     }
 
     /// The number of a vertex in the output, which it enters when it is first asked for.
@@ -176,7 +177,7 @@ impl Job<'_> {
             self.out.vertices += 1;
             let per_vertex = self.setup.outputs.varyings.len();
             let varyings = &self.shaded.varyings[slot * per_vertex..][..per_vertex];
-            self.out.varyings.extend_from_slice(varyings);
+            host::extend(&mut self.out.varyings, varyings);
         }
         self.numbers[slot]
     }
@@ -214,7 +215,7 @@ impl Job<'_> {
                 Interpolation::Linear => mix(linear),
                 Interpolation::Flat => of(current.provoking, varying),
             };
-            self.out.varyings.push(value);
+            host::push(&mut self.out.varyings, value);
         }
         Origin::New { number }
     }

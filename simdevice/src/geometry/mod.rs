@@ -37,6 +37,7 @@ use crate::packet::draw::{Draw, DrawState, PolygonMode, VertexInput};
 use assemble::corner_count;
 use bins::Grid;
 use depth_bias::DepthUnit;
+use devmem::host;
 use elements::{Elements, Run, runs};
 use fetch::Fetcher;
 use isa::exec::{Stopped, Watchdog};
@@ -198,10 +199,11 @@ impl<'a> FrontEnd<'a> {
         let mut done = Vec::new();
         for worker in workers {
             counters.add_all(&worker.counters);
+            host::reserve(&mut done, worker.done.len());
             done.extend(worker.done);
         }
         done.sort_unstable_by_key(|(chunk, _)| *chunk);
-        Ok(done.into_iter().map(|(_, chunk)| chunk).collect())
+        Ok(host::collect(done.into_iter().map(|(_, chunk)| chunk)))
     }
 
     fn grid(&self) -> Grid {
@@ -352,7 +354,7 @@ impl<'a> Worker<'a> {
         counters.add(Counter::PrimitivesDrawn, output.primitives.len() as u64);
         if !output.primitives.is_empty() {
             let kept = self.keep();
-            self.done.push((chunk, kept));
+            host::push(&mut self.done, (chunk, kept));
         }
         Ok(())
     }
@@ -366,9 +368,9 @@ impl<'a> Worker<'a> {
         let elapsed = started.elapsed().as_nanos() as u64;
         self.counters.add(Counter::BinningTime, elapsed);
         PrimitiveChunk {
-            primitives: output.primitives.clone(),
+            primitives: host::copied(&output.primitives),
             varyings: Varyings {
-                values: output.varyings.clone(),
+                values: host::copied(&output.varyings),
                 per_vertex: setup.outputs.varyings.len(),
             },
             bins,

@@ -5,6 +5,7 @@ use super::fetch::Fetcher;
 use super::pipeline::{LANES, Lease, VertexOutputs};
 use super::viewport::{Projected, Projections, Transform, code};
 use crate::packet::draw::MAX_CLIP_CULL_DISTANCES;
+use devmem::host;
 use fearless_simd::{Level, dispatch};
 use isa::exec::{Chunk, LaneMask, Machine, Stopped, Watchdog};
 use isa::resources::Resources;
@@ -92,7 +93,7 @@ impl Shader<'_> {
     fn take(&self, count: usize, shaded: &mut Shaded) {
         let outputs = self.outputs;
         let first = shaded.vertices.len();
-        shaded.vertices.resize(first + count, Vertex::default());
+        host::resize(&mut shaded.vertices, first + count, Vertex::default());
         let vertices = &mut shaded.vertices[first..];
         let lanes = outputs
             .position
@@ -129,7 +130,7 @@ impl Shader<'_> {
         let per_vertex = outputs.varyings.len();
         if per_vertex > 0 {
             let first = shaded.varyings.len();
-            shaded.varyings.resize(first + count * per_vertex, 0);
+            host::resize(&mut shaded.varyings, first + count * per_vertex, 0);
             for (number, &slot) in outputs.varyings.iter().enumerate() {
                 let mut vertices = shaded.varyings[first..].chunks_exact_mut(per_vertex);
                 let chunks = slot.map_or(&[][..], |slot| self.machine.output_chunks(slot));

@@ -4,7 +4,7 @@
 use super::{Image, ImageDesc, ImageView, SubresourceLayout};
 use crate::format::MAX_TEXEL_SIZE;
 use crate::packet::Aspect;
-use devmem::Allocation;
+use devmem::{Allocation, host};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// What is kept of a compressed image: its texels, and the generation of its memory that they were decoded from.
@@ -62,9 +62,10 @@ impl Image {
         let side = format.block_side();
         let [columns, rows, slices] = blocks.extent;
         let block_size = format.texel_size();
-        let mut bytes = vec![0; columns as usize * block_size];
+        let mut bytes: Vec<u8> = host::zeroed(columns as usize * block_size);
         let pitch = side as usize * texels.format.texel_size();
-        let mut decoded = vec![vec![0; columns as usize * pitch]; side as usize];
+        let mut decoded: Vec<Vec<u8>> =
+            host::collect((0..side).map(|_| host::zeroed(columns as usize * pitch)));
         let row_size = texels.extent[0] as usize * texels.format.texel_size();
         for z in 0..slices {
             for row in 0..rows {

@@ -23,7 +23,9 @@ mod passing;
 mod per_pixel;
 mod pixels;
 pub mod resolve;
+mod stream;
 pub(crate) mod tile_draw;
+mod wide_sums;
 
 use super::DepthCode;
 use super::tile::place;
@@ -69,6 +71,8 @@ pub struct GaussianTile {
     /// What may reach each block, where a mode parts lists so.
     lists: [Vec<u32>; BLOCKS],
     per_pixel: PerPixel,
+    /// A piece of a tile's list, where the draw has none.
+    piece: Vec<u32>,
 }
 
 /// What the kernel does about depth; a constant, so that what isn't done costs nothing. Each does what those before it do.
@@ -110,8 +114,6 @@ struct Thresholds {
     transmittance_floor: f32,
     /// Zero, unknown to the compiler: what it knows to be zero it selects by two operations, not one.
     nothing: f32,
-    /// Whether an alpha may be so small that it leaves the transmittance what it was.
-    may_be_invisible: bool,
     /// What numbers of depths mean.
     depth_unit: DepthCode,
 }
@@ -133,7 +135,6 @@ impl Thresholds {
             alpha_ceiling: state.alpha_ceiling,
             transmittance_floor: state.transmittance_floor,
             nothing: 0.0,
-            may_be_invisible: state.alpha_floor < f32::EPSILON,
         }
     }
 }
@@ -147,6 +148,7 @@ impl Default for GaussianTile {
             chunk: [Record::default(); CHUNK],
             lists: Default::default(),
             per_pixel: PerPixel::default(),
+            piece: Vec::new(),
         }
     }
 }
@@ -184,7 +186,7 @@ impl GaussianTile {
         if DEPTH == FIND_MEAN {
             to.clear_means();
         }
-        if list.is_empty() {
+        if list.is_empty() && draw.tiles.stream().is_none() {
             return;
         }
         let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
@@ -199,16 +201,17 @@ impl GaussianTile {
             thresholds: Thresholds::new(draw),
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
-        let work = match task.mode {
-            TileMode::Fast => dispatch!(level, simd =>
-                self.composite::<_, DEPTH>(simd, &task, layer, runs.as_mut())),
-            _ => self.composite_by_block::<DEPTH>(level, &task, layer, runs.as_mut()),
+        let work = match draw.tiles.stream() {
+            None => self.composite_list::<DEPTH>(level, &task, layer, runs.as_mut()),
+            Some(stream) => {
+                self.composite_stream::<DEPTH>(level, &task, stream, layer, runs.as_mut())
+            }
         };
         if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
             let outside = TILE_SIZE * TILE_SIZE - count(lanes);
             record.add(TileWork {
                 at: [tile_x, tile_y],
-                listed: list.len() as u32,
+                listed: work.listed as u32,
                 runs,
                 contributions: work.contributions,
                 terminated: count(&self.layers[layer].finished()).saturating_sub(outside),
@@ -224,7 +227,7 @@ impl GaussianTile {
             Counter::BlocksBesideEllipse,
             work.open - work.items - work.blocks_hidden,
         );
-        let blocks = (list.len() as u64 - work.tiles_hidden) * BLOCKS as u64;
+        let blocks = (work.listed - work.tiles_hidden) * BLOCKS as u64;
         counters.add(Counter::BlocksSaturated, blocks - work.open);
         counters.add(Counter::PixelContributions, work.contributions);
     }
@@ -253,17 +256,34 @@ impl GaussianTile {
                 ..Thresholds::new(draw)
             },
         };
-        match task.mode {
-            TileMode::Fast => {
-                dispatch!(level, simd =>
-                    self.composite::<_, FIND_REACHED>(simd, &task, LAYER, None));
+        match draw.tiles.stream() {
+            None => self.composite_list::<FIND_REACHED>(level, &task, LAYER, None),
+            Some(stream) => {
+                self.composite_stream::<FIND_REACHED>(level, &task, stream, LAYER, None)
             }
-            _ => {
-                self.composite_by_block::<FIND_REACHED>(level, &task, LAYER, None);
-            }
-        }
+        };
         let finished = self.layers[LAYER].finished();
         std::array::from_fn(|block| finished[block] & lanes[block])
+    }
+
+    /// Composites the task's list; the way depends on the draw's mode.
+    fn composite_list<const DEPTH: DepthMode>(
+        &mut self,
+        level: Level,
+        task: &Task<'_>,
+        layer: usize,
+        runs: Option<&mut Vec<Run>>,
+    ) -> Work {
+        let work = match task.mode {
+            TileMode::Fast => {
+                dispatch!(level, simd => self.composite::<_, DEPTH>(simd, task, layer, runs))
+            }
+            _ => self.composite_by_block::<DEPTH>(level, task, layer, runs),
+        };
+        Work {
+            listed: task.list.len() as u64,
+            ..work
+        }
     }
 
     /// How many pixels of the tile were covered.
@@ -405,6 +425,7 @@ impl GaussianTile {
 }
 
 /// What a tile's Gaussians are.
+#[derive(Clone, Copy)]
 struct Task<'a> {
     splats: &'a [Vec<Splat>],
     mode: TileMode<'a>,
@@ -429,6 +450,8 @@ impl Task<'_> {
 /// What compositing a tile took.
 #[derive(Clone, Copy, Debug, Default)]
 struct Work {
+    /// Entries of the tile's list, as far as there was need of it.
+    listed: u64,
     pairs: u64,
     items: u64,
     /// Blocks that were not finished, summed over the pairs.

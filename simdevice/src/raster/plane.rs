@@ -13,6 +13,7 @@ use crate::format::{Format, MAX_TEXEL_SIZE};
 use crate::packet::{Rect, ResolveMode};
 use crate::texture::unorm8_fraction;
 use crate::transfer::resolve_row;
+use devmem::host;
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 
 /// The most samples of a pixel.
@@ -84,12 +85,12 @@ impl Plane {
         let (stride, samples) = (stride(target.format()), target.samples() as usize);
         let bytes = (size * size) as usize * samples * stride;
         Self {
-            words: vec![0; bytes.div_ceil(4)],
+            words: host::zeroed(bytes.div_ceil(4)),
             stride,
             samples,
             touched: 0,
             ranged: 0,
-            ranges: vec![[0; 2]; (size / TILE_SIZE).pow(2) as usize],
+            ranges: host::zeroed((size / TILE_SIZE).pow(2) as usize),
         }
     }
 

@@ -10,6 +10,7 @@ use crate::format::Format;
 use crate::image::{Image, SubresourceLayout};
 use crate::packet::{Aspect, BlitImage, ImageBlitRegion};
 use crate::texture::Filter;
+use devmem::host;
 use std::ops::Range;
 
 /// Executes [`Packet::BlitImage`](crate::Packet::BlitImage).
@@ -94,7 +95,7 @@ impl Axis {
             Tap { index, weight }
         };
         // An empty box has no texels, so that nothing is divided by zero.
-        let taps = target.clone().map(tap).collect();
+        let taps = host::collect(target.clone().map(tap));
         Self { target, taps }
     }
 
@@ -137,8 +138,8 @@ fn blit_layer(
     }
     let mut rows = Rows::new(&blit.source, from, &x);
     let same = from.format == to.format && filter == Filter::Nearest;
-    let mut bytes = vec![0; x.taps.len() * to.format.texel_size()];
-    let mut texels = vec![[0.0; 4]; x.taps.len()];
+    let mut bytes: Vec<u8> = host::zeroed(x.taps.len() * to.format.texel_size());
+    let mut texels: Vec<[f32; 4]> = host::zeroed(x.taps.len());
     for (target_z, tap_z) in z.target.clone().zip(&z.taps) {
         for (target_y, tap_y) in y.target.clone().zip(&y.taps) {
             let row = if same {
@@ -175,7 +176,7 @@ const KEPT_ROWS: usize = 4;
 impl<'a> Rows<'a> {
     fn new(image: &'a Image, layout: SubresourceLayout, x: &Axis) -> Self {
         let columns = x.source();
-        let bytes = vec![0; columns.len() * layout.format.texel_size()];
+        let bytes = host::zeroed(columns.len() * layout.format.texel_size());
         Self {
             image,
             layout: layout.sample(0),
@@ -213,7 +214,7 @@ impl<'a> Rows<'a> {
             None => {
                 self.read(place[0], place[1])?;
                 let mut row = if self.decoded.len() < KEPT_ROWS {
-                    vec![[0.0; 4]; self.columns.len()]
+                    host::zeroed(self.columns.len())
                 } else {
                     self.decoded.pop()?.1
                 };

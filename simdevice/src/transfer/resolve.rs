@@ -6,6 +6,7 @@ mod tests;
 use super::image_copy::{SlicePair, below, for_each_slice};
 use crate::format::{Format, Numeric};
 use crate::packet::{ResolveImage, ResolveMode};
+use devmem::host;
 
 /// Executes [`Packet::ResolveImage`](crate::Packet::ResolveImage).
 pub fn resolve_image(resolve: &ResolveImage) {
@@ -20,10 +21,11 @@ pub fn resolve_image(resolve: &ResolveImage) {
 fn resolve_slice(resolve: &ResolveImage, pair: &SlicePair) {
     let ((source, from), (target, to)) = (&pair.source, &pair.target);
     let [width, height] = pair.extent.map(|texels| texels as usize);
-    let mut bytes = vec![0; width * source.format.texel_size()];
-    let mut encoded = vec![0; width * target.format.texel_size()];
-    let mut samples = vec![vec![[0.0; 4]; width]; resolve.source.desc.samples as usize];
-    let mut resolved = vec![[0.0; 4]; width];
+    let mut bytes: Vec<u8> = host::zeroed(width * source.format.texel_size());
+    let mut encoded: Vec<u8> = host::zeroed(width * target.format.texel_size());
+    let samples = 0..resolve.source.desc.samples;
+    let mut samples: Vec<Vec<[f32; 4]>> = host::collect(samples.map(|_| host::zeroed(width)));
+    let mut resolved: Vec<[f32; 4]> = host::zeroed(width);
     for row in 0..height as u32 {
         for (sample, texels) in (0..).zip(&mut samples) {
             let layout = source.sample(sample);

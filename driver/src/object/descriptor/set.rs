@@ -4,6 +4,7 @@ use super::Descriptor;
 use super::layout::{Binding, DescriptorSetLayout};
 use crate::error::Error;
 use ash::vk;
+use simdevice::host;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A descriptor set. Commands read it when they execute.
@@ -31,7 +32,7 @@ crate::objects! { vk::DescriptorSet => DescriptorSet; }
 impl DescriptorSet {
     /// A set that holds nothing but immutable samplers.
     pub(crate) fn new(layout: Arc<DescriptorSetLayout>) -> Self {
-        let mut descriptors = Vec::with_capacity(layout.count());
+        let mut descriptors = host::with_capacity(layout.count());
         for binding in layout.bindings() {
             let samplers = binding
                 .immutable_samplers
@@ -113,7 +114,7 @@ impl DescriptorSet {
         let found = source
             .lock()
             .get(start..start + count as usize)
-            .map(<[_]>::to_vec);
+            .map(host::copied);
         let Some(descriptors) = found else {
             return Err(Error::usage(
                 "VUID-VkCopyDescriptorSet-srcArrayElement-00346",

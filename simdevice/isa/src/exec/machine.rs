@@ -4,6 +4,8 @@ use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
+use devmem::host;
+
 use super::super::ir::{Reg, Type};
 use super::super::resources::Resources;
 use super::batch::Batch;
@@ -32,12 +34,12 @@ impl Machine {
     pub fn new(executable: Arc<Executable>) -> Self {
         let width = executable.lanes / 16;
         let mut machine = Self {
-            registers: vec![Chunk::default(); executable.chunks],
-            masks: vec![0; executable.masks * executable.lanes.div_ceil(64)],
-            shared: (0..executable.shared_bytes.div_ceil(4))
-                .map(|_| AtomicU32::new(0))
-                .collect(),
-            private: vec![Chunk::default(); executable.private_words() * width],
+            registers: host::filled(Chunk::default(), executable.chunks),
+            masks: host::zeroed(executable.masks * executable.lanes.div_ceil(64)),
+            shared: host::collect(
+                (0..executable.shared_bytes.div_ceil(4)).map(|_| AtomicU32::new(0)),
+            ),
+            private: host::filled(Chunk::default(), executable.private_words() * width),
             work: Work::default(),
             runs: vec![(0, 0); executable.runs.len()],
             executable,

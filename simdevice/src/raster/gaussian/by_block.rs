@@ -3,7 +3,7 @@
 
 use super::{
     BLOCK_X, BLOCK_Y, BLOCKS, CHUNK, DepthMode, GaussianTile, LANE_X_64, LANE_Y_64, NO_DEPTH,
-    Record, Task, Work, pixels::falls_64,
+    Record, Task, Work, pixels::falls_64, wide_sums,
 };
 use crate::gaussian::project::{Splat, half_room};
 use crate::gaussian::rays::RayDepths;
@@ -12,6 +12,7 @@ use crate::gaussian::{GaussianDraw, locate};
 use crate::packet::GaussianPrecision;
 use crate::skips::Skip;
 use crate::trace::{self, Run};
+use devmem::host;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*};
 
 /// How a tile is composited; chosen once for a draw.
@@ -29,6 +30,8 @@ pub(super) enum TileMode<'a> {
         inverse_low_pass: Option<f64>,
         /// What pixels sort by, if each does so for itself.
         depths: Option<RayDepths<'a>>,
+        /// Whether sums are kept in binary64 where the order is the list's; each pixel's own order always does so.
+        wide_sums: bool,
     },
 }
 
@@ -43,7 +46,7 @@ impl<'a> TileMode<'a> {
         let (surfels, depths) = (draw.surfels(), draw.ray_depths());
         if draw.state.precision == GaussianPrecision::Float16 {
             Self::Half
-        } else if surfels.is_none() && depths.is_none() {
+        } else if surfels.is_none() && depths.is_none() && !wide_sums::pays(&draw.state) {
             Self::Fast
         } else {
             let variance = f64::from(draw.state.low_pass_variance);
@@ -51,6 +54,7 @@ impl<'a> TileMode<'a> {
                 surfels,
                 inverse_low_pass: (variance > 0.0).then(|| 1.0 / variance),
                 depths,
+                wide_sums: wide_sums::pays(&draw.state),
             }
         }
     }
@@ -61,11 +65,13 @@ impl<'a> TileMode<'a> {
             Self::Exact {
                 surfels,
                 inverse_low_pass,
+                wide_sums,
                 ..
             } => Self::Exact {
                 surfels,
                 inverse_low_pass,
                 depths: None,
+                wide_sums,
             },
             other => other,
         }
@@ -128,6 +134,10 @@ impl GaussianTile {
                 ..
             } => dispatch!(level, simd =>
                 self.composite_per_pixel::<_, DEPTH>(simd, task, depths, layer, runs)),
+            TileMode::Exact {
+                wide_sums: true, ..
+            } => dispatch!(level, simd =>
+                self.composite_wide::<_, DEPTH>(simd, task, layer, runs)),
             TileMode::Fast | TileMode::Exact { .. } => dispatch!(level, simd =>
                 self.composite_in_order::<_, DEPTH>(simd, task, layer, runs)),
         }
@@ -222,7 +232,8 @@ impl GaussianTile {
             let mut reached = reached.to_bitmask();
             work.items += u64::from(reached.count_ones());
             while reached != 0 {
-                self.lists[reached.trailing_zeros() as usize % BLOCKS].push(primitive);
+                let list = &mut self.lists[reached.trailing_zeros() as usize % BLOCKS];
+                host::push(list, primitive);
                 reached &= reached - 1;
             }
         }

@@ -13,6 +13,7 @@ use super::{
 use crate::gaussian::locate;
 use crate::gaussian::rays::{PixelRays, RayDepths, Rays, ordered_key};
 use crate::trace::Run;
+use devmem::host;
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// The most contributions that a pixel sorts at a time.
@@ -66,7 +67,7 @@ impl Gathered {
         if place <= self.after || place >= self.limit {
             return;
         }
-        self.list.push(contribution);
+        host::push(&mut self.list, contribution);
         if self.list.len() == 2 * HELD {
             let (_, next, _) = self.list.select_nth_unstable(HELD);
             self.limit = next.place;

@@ -122,6 +122,7 @@ impl Layer {
         pixels
             .transmittance
             .store_slice(&mut self.transmittance[block]);
+        // No alpha is so small that it leaves a transmittance what it was: low floors are for wider sums.
         let seen = pixels.transmittance.abs().simd_lt(1.0);
         self.covered[block] |= seen.to_bitmask() as u32;
     }
@@ -180,10 +181,6 @@ impl Layer {
         pixels.red = weight.mul_add(f32x16::splat(simd, red), pixels.red);
         pixels.green = weight.mul_add(f32x16::splat(simd, green), pixels.green);
         pixels.blue = weight.mul_add(f32x16::splat(simd, blue), pixels.blue);
-        // Elsewhere a pixel that accepted one shows it by its transmittance.
-        if thresholds.may_be_invisible {
-            self.covered[block] |= accepted.to_bitmask() as u32;
-        }
         pixels.accepted -= i32x16::simd_from(simd, <[i32; LANES]>::from(accepted));
     }
 }

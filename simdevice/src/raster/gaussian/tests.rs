@@ -1,8 +1,9 @@
 mod half;
 mod per_pixel;
+mod streamed;
 mod whole_draws;
 
-use super::exp2::POWER_OF_TWO;
+use super::exp2::{POWER_OF_TWO, exp2_of_negated};
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;
@@ -183,6 +184,7 @@ fn naive_sample(
     let most_fall = (-f64::from(state.alpha_floor).log2()).min(126.0) as f32;
     let corner = tile.map(|tile| tile * TILE_SIZE);
     let (mut c, mut t, mut covered) = ([0.0f32; 3], 1.0f32, false);
+    let (mut wide_c, mut wide_t) = ([0.0f64; 3], 1.0f64);
     for &primitive in draw.tiles.list(tile[0], tile[1]) {
         let (batch, place) = locate(primitive);
         let g = &draw.splats[batch][place];
@@ -198,7 +200,7 @@ fn naive_sample(
         let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
         let u = mul_add(dx, f[0] as f32, u);
         let v = mul_add(dy, f[2] as f32, mul_add(dx, f[1] as f32, v));
-        let fall = if g.steep {
+        let fall = if g.steep || wide_sums::pays(state) {
             let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
             let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
             if g.wide && !(-draw.half_period..draw.half_period).contains(&dx) {
@@ -215,6 +217,22 @@ fn naive_sample(
         let alpha = power(-fall).min(state.alpha_ceiling);
         out.reached = true;
         if !passes(g.depth) {
+            continue;
+        }
+        if wide_sums::pays(state) {
+            let weight = wide_t * f64::from(alpha);
+            if wide_t - weight < f64::from(state.transmittance_floor) {
+                break;
+            }
+            if wide_t >= 0.5 {
+                out.median = g.depth;
+            }
+            for (c, color) in wide_c.iter_mut().zip(g.color) {
+                *c += weight * f64::from(color);
+            }
+            wide_t -= weight;
+            (c, t) = (wide_c.map(|c| c as f32), wide_t as f32);
+            covered = true;
             continue;
         }
         let weight = t * alpha;

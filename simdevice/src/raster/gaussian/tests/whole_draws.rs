@@ -108,7 +108,7 @@ fn random_state(rng: &mut ChaCha8Rng) -> GaussianState {
                 GaussianOrder::PerPixel,
             ],
         ),
-        transmittance_floor: one_of(rng, &[1e-4, 0.3]),
+        transmittance_floor: one_of(rng, &[0.0, 1e-4, 0.3]),
         sample_mask: one_of(rng, &[u32::MAX, u32::MAX, 0b1011]),
         depth_stencil: DepthStencil {
             depth: rng.random_bool(0.9).then(|| DepthTest {
@@ -438,7 +438,7 @@ fn hidden_work(
     }
     let state = GaussianState {
         // No pixel finishes, so that what is hidden is all that differs.
-        transmittance_floor: 0.0,
+        alpha_ceiling: 0.02,
         depth_stencil: DepthStencil {
             depth: Some(DepthTest {
                 compare,

@@ -1,0 +1,182 @@
+//! Host memory for what grows with an application's sizes: sorted sets, bins, tile lists, copies of descriptors.
+//!
+//! The standard library's vectors abort the process where the host has no more. These functions unwind instead, with
+//! [`OutOfMemory`] as the payload and without the panic hook, to the nearest boundary that can tell the application: a
+//! packet, which loses the device with a message, or an entry point, which returns `VK_ERROR_OUT_OF_HOST_MEMORY`. Both
+//! call [`catch`]. What was half-built is dropped on the way, as with every error.
+//!
+//! Every call here, and every allocation of device memory, is a place where [`injection`] can fail.
+
+use bytemuck::Zeroable;
+use std::alloc::{Layout, alloc_zeroed};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+/// The host has no more memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the host has no {bytes} bytes of memory left")]
+pub struct OutOfMemory {
+    /// How many were asked for.
+    pub bytes: u64,
+}
+
+impl OutOfMemory {
+    /// Leaves for the nearest [`catch`].
+    fn unwind(self) -> ! {
+        resume_unwind(Box::new(self))
+    }
+
+    /// What a panic's payload says of memory, if it was for want of it.
+    pub fn of_panic(payload: &(dyn Any + Send)) -> Option<Self> {
+        payload.downcast_ref().copied()
+    }
+}
+
+/// Calls `body`; other panics go on.
+///
+/// # Errors
+/// [`OutOfMemory`] if something in it had no memory.
+pub fn catch<R>(body: impl FnOnce() -> R) -> Result<R, OutOfMemory> {
+    catch_unwind(AssertUnwindSafe(body)).map_err(|payload| {
+        OutOfMemory::of_panic(payload.as_ref()).unwrap_or_else(|| resume_unwind(payload))
+    })
+}
+
+fn refused<T>(count: usize) -> OutOfMemory {
+    OutOfMemory {
+        bytes: (count as u64).saturating_mul(size_of::<T>() as u64),
+    }
+}
+
+/// Makes room in `items` for so many more.
+#[inline]
+pub fn reserve<T>(items: &mut Vec<T>, additional: usize) {
+    if items.capacity() - items.len() < additional {
+        grow(items, additional);
+    }
+}
+
+#[cold]
+fn grow<T>(items: &mut Vec<T>, additional: usize) {
+    // What is empty is mostly never grown again.
+    let reserved = if items.is_empty() {
+        items.try_reserve_exact(additional)
+    } else {
+        items.try_reserve(additional)
+    };
+    if injection::fails() || reserved.is_err() {
+        refused::<T>(additional).unwind();
+    }
+}
+
+/// Adds an item.
+#[inline]
+pub fn push<T>(items: &mut Vec<T>, item: T) {
+    if items.len() == items.capacity() {
+        grow(items, items.len().max(4));
+    }
+    items.push(item);
+}
+
+/// Adds copies of all items of a slice.
+#[inline]
+pub fn extend<T: Clone>(items: &mut Vec<T>, more: &[T]) {
+    reserve(items, more.len());
+    items.extend_from_slice(more);
+}
+
+/// Makes `items` so long, with copies of `value` where it grows.
+pub fn resize<T: Clone>(items: &mut Vec<T>, len: usize, value: T) {
+    reserve(items, len.saturating_sub(items.len()));
+    items.resize(len, value);
+}
+
+/// A vector with room for so many.
+pub fn with_capacity<T>(count: usize) -> Vec<T> {
+    let mut items = Vec::new();
+    reserve(&mut items, count);
+    items
+}
+
+/// So many copies of a value.
+pub fn filled<T: Clone>(value: T, count: usize) -> Vec<T> {
+    let mut items = with_capacity(count);
+    items.resize(count, value);
+    items
+}
+
+/// A copy of a slice.
+pub fn copied<T: Clone>(items: &[T]) -> Vec<T> {
+    let mut copy = with_capacity(items.len());
+    copy.extend_from_slice(items);
+    copy
+}
+
+/// As [`copied`], in a box.
+pub fn boxed<T: Clone>(items: &[T]) -> Box<[T]> {
+    // Nothing is allocated anew: the capacity is exact.
+    copied(items).into_boxed_slice()
+}
+
+/// All items of an iterator that knows how many it has at least.
+pub fn collect<T>(items: impl Iterator<Item = T>) -> Vec<T> {
+    let mut all = with_capacity(items.size_hint().0);
+    for item in items {
+        push(&mut all, item);
+    }
+    all
+}
+
+/// So many zeros. Large ones cost nothing until they are touched.
+pub fn zeroed<T: Zeroable>(count: usize) -> Vec<T> {
+    let layout = match Layout::array::<T>(count) {
+        Ok(layout) if !injection::fails() => layout,
+        _ => refused::<T>(count).unwind(),
+    };
+    if layout.size() == 0 {
+        let mut nothing = Vec::new();
+        nothing.resize_with(count, T::zeroed);
+        return nothing;
+    }
+    // SAFETY: the layout's size is not zero.
+    let memory = unsafe { alloc_zeroed(layout) }.cast::<T>();
+    if memory.is_null() {
+        refused::<T>(count).unwind();
+    }
+    // SAFETY: the global allocator gave this memory for the layout of `count` values, and zeros are values of `T`
+    // (`Zeroable`).
+    unsafe { Vec::from_raw_parts(memory, count, count) }
+}
+
+/// Faults for tests.
+pub mod injection {
+    use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+    /// How many allocations until one fails, and 1 more; 0 if nobody injects.
+    static LEFT: AtomicU64 = AtomicU64::new(0);
+
+    /// Fails the `n`-th allocation from now on, of any thread, counted from 0, and none after it. [`left`] tells whether
+    /// it came to that.
+    pub fn fail(n: u64) {
+        LEFT.store(n.saturating_add(2), Relaxed);
+    }
+
+    /// Ends what [`fail`] began; how many more allocations there could have been before one failed, or nothing if one
+    /// has.
+    pub fn stop() -> Option<u64> {
+        LEFT.swap(0, Relaxed).checked_sub(2)
+    }
+
+    /// Whether this allocation fails.
+    #[inline]
+    pub(crate) fn fails() -> bool {
+        // The whole cost where nobody injects.
+        LEFT.load(Relaxed) > 1 && count()
+    }
+
+    #[cold]
+    fn count() -> bool {
+        let down = |left: u64| (left > 1).then(|| left - 1);
+        LEFT.fetch_update(Relaxed, Relaxed, down) == Ok(2)
+    }
+}

@@ -1,0 +1,49 @@
+//! A million Gaussians that each fill a screen of 8192x8192 pixels: 2.6e11 pairs of tile and Gaussian, far more than any
+//! list holds. `screen_fillers [COUNT [SIDE]]` draws them once and says how long that took and how much memory the process
+//! held at most.
+
+use gaurast::vk::GaussianCameraGAURAST;
+use gaurast_tests::contexts::{
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+};
+use gaurast_tests::scenes::{Gaussian, SceneBuffers};
+use std::error::Error;
+use std::time::Instant;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let mut number = |otherwise: u32| arguments.next().map_or(Ok(otherwise), |text| text.parse());
+    let (count, side) = (number(1_000_000)?, number(8192)?);
+    let one = |index: u32| Gaussian {
+        position: [0.0, 0.0, 2.0 + index as f32 * 1e-5],
+        scale: [1e4; 3],
+        rotation: [1.0, 0.0, 0.0, 0.0],
+        opacity: 0.05,
+        sh: vec![[0, 1, 2].map(|c| (index * (3 + c) % 7) as f32 / 2.0 - 1.5)],
+    };
+    let scene = SceneBuffers::new(0, (0..count).map(one));
+    let context = Context::embedded(&Settings::default());
+    let options = PipelineOptions::new(0);
+    let pipeline = Pipeline::new(&context, &options);
+    let on_device = DeviceScene::new(&context, &scene);
+    let target = Target::new(&context, options.format, [side; 2]);
+    let camera = GaussianCameraGAURAST::default()
+        .focal_length([side as f32; 2])
+        .principal_point([0.5 * side as f32; 2]);
+    let started = Instant::now();
+    context.run(|commands| {
+        commands.pass(&target, &Pass::clear([0.0; 4]), || {
+            commands.bind(&pipeline, &on_device, &camera);
+            commands.draw([on_device.count, 1, 0, 0]);
+        });
+    });
+    println!(
+        "{count} Gaussians at {side}x{side}: {:.1} s",
+        started.elapsed().as_secs_f64()
+    );
+    // Where the system tells.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let peak = status.lines().find(|line| line.starts_with("VmHWM"));
+    println!("{}", peak.unwrap_or("the system does not tell the memory"));
+    Ok(())
+}

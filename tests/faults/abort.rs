@@ -1,0 +1,179 @@
+//! The standard library aborts where an allocation fails that nobody asks about. So that there is no such one of any
+//! size, the host's allocator itself fails here, once in each of many processes, while the driver executes.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering::Relaxed};
+
+use ash::vk;
+use gaurast_tests::contexts::{Context, Settings};
+use gaurast_tests::triangles::{
+    Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
+};
+
+use crate::scenarios;
+
+/// Bytes from which on an allocation may fail. Less is of a size that no application chooses.
+const LARGE: usize = 64 << 10;
+/// Says to a process of this test which allocation fails in it.
+const VARIABLE: &str = "GAURAST_TEST_FAIL";
+
+struct Failing;
+
+static ARMED: AtomicBool = AtomicBool::new(false);
+static LEFT: AtomicI64 = AtomicI64::new(i64::MAX);
+
+fn fails(size: usize) -> bool {
+    size >= LARGE && ARMED.load(Relaxed) && LEFT.fetch_sub(1, Relaxed) == 0
+}
+
+// SAFETY: it is the system's allocator, which may fail at any time.
+unsafe impl GlobalAlloc for Failing {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        if fails(layout.size()) {
+            return std::ptr::null_mut();
+        }
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        if fails(layout.size()) {
+            return std::ptr::null_mut();
+        }
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        if fails(size) {
+            return std::ptr::null_mut();
+        }
+        // SAFETY: the caller's promise.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Failing = Failing;
+
+fn arm(armed: bool) {
+    ARMED.store(armed, Relaxed);
+}
+
+/// Many triangles that hide one another, some of them clipped, with four samples and a resolve.
+fn draw_triangles(gpu: &Gpu, count: usize) {
+    let target = Target::new(
+        gpu,
+        &TargetOptions {
+            size: [640, 480],
+            colors: vec![vk::Format::R8G8B8A8_UNORM],
+            depth: Some(vk::Format::D32_SFLOAT),
+            samples: 4,
+            resolve: true,
+        },
+    );
+    let options = PipelineOptions {
+        depth_stencil: depth_test(vk::CompareOp::LESS),
+        ..PipelineOptions::default()
+    };
+    let pipeline = Pipeline::new(gpu, &target, &options);
+    let vertex = |index: usize| {
+        let at = |factor: usize, period: usize| (index * factor % period) as f32 / period as f32;
+        Vertex {
+            position: [
+                3.0 * at(7, 101) - 1.5,
+                3.0 * at(13, 97) - 1.5,
+                at(29, 89),
+                1.0,
+            ],
+            color: [at(3, 7), at(5, 11), at(2, 5), 1.0],
+        }
+    };
+    let vertices: Vec<_> = (0..3 * count).map(vertex).collect();
+    let buffer = Buffer::of(gpu, &vertices);
+    arm(true);
+    gpu.run(|commands| {
+        commands.pass(&target, &Pass::default(), || {
+            commands.bind(&pipeline);
+            commands.vertices(&buffer);
+            commands.draw(0..vertices.len() as u32);
+        });
+    });
+    arm(false);
+}
+
+/// Fails an allocation while large draws are executed; whoever started the process sees how it ends.
+#[test]
+fn child() {
+    let Ok(which) = std::env::var(VARIABLE) else {
+        return;
+    };
+    let (scenario, n) = which.split_once(' ').expect("a scenario and a number");
+    LEFT.store(n.parse().expect("a number"), Relaxed);
+    let settings = Settings {
+        threads: Some(2),
+        ..Settings::default()
+    };
+    std::panic::set_hook(Box::new(|info| {
+        arm(false);
+        eprintln!("{info}");
+    }));
+    match scenario {
+        "gaussians" => {
+            let context = Context::embedded(&settings);
+            scenarios::draw(&context, &scenarios::scene(60_000), [640, 480], arm);
+        }
+        _ => {
+            let gpu = Gpu::embedded(&settings).expect("a device");
+            draw_triangles(&gpu, 40_000);
+        }
+    }
+    let left = LEFT.load(Relaxed);
+    println!(
+        "{}",
+        if left >= 0 {
+            "none failed"
+        } else {
+            "one failed"
+        }
+    );
+}
+
+#[test]
+fn no_large_allocation_aborts() {
+    if std::env::var_os(VARIABLE).is_some() {
+        return;
+    }
+    for scenario in ["gaussians", "triangles"] {
+        let (mut n, mut lost) = (0, 0);
+        loop {
+            let output = Command::new(std::env::current_exe().expect("this test"))
+                .args(["abort::child", "--exact", "--nocapture"])
+                .env(VARIABLE, format!("{scenario} {n}"))
+                .output()
+                .expect("it starts");
+            let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+            let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+            if stdout.contains("none failed") {
+                break;
+            }
+            // It may have done without; else it was told.
+            let told = stderr.contains("ERROR_DEVICE_LOST") || stderr.contains("OUT_OF");
+            assert!(
+                output.status.code().is_some() && (output.status.success() || told),
+                "{scenario}, allocation {n}: {:?}\n{stderr}",
+                output.status
+            );
+            lost += u32::from(told);
+            n += 1 + n / 8;
+        }
+        println!("{scenario}: {n} large allocations, {lost} told");
+        assert!(lost > 0, "{scenario}");
+    }
+}

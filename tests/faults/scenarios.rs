@@ -1,0 +1,229 @@
+//! What is done while memory is wanting.
+
+use gaurast::vk::{
+    GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use gaurast_tests::contexts::{
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
+};
+use gaurast_tests::kernels;
+use gaurast_tests::scenes::{Gaussian, SceneBuffers};
+use gaurast_tests::triangles::{Gpu, scenes};
+
+/// Uses a device: returns what it made, or panics with the result of the call that failed.
+pub type Use = Box<dyn Fn() -> Vec<u8>>;
+
+/// When a scenario's device is opened.
+pub enum Opened {
+    /// Before it is used, so that it is the same each time.
+    Before,
+    /// Each time that it is used.
+    Within,
+}
+
+/// Opens a device; what it returns may be called several times.
+pub struct Scenario {
+    pub name: String,
+    pub device: Opened,
+    pub open: Box<dyn Fn() -> Use>,
+}
+
+const SETTINGS: Settings = Settings {
+    simd: None,
+    threads: Some(2),
+    trace: None,
+};
+
+/// Scenes of triangles whose commands, descriptors and transfers differ.
+const TRIANGLES: [&str; 14] = [
+    "primitive_restart",
+    "indices_of_every_type",
+    "indexed_indirect_draws",
+    "depth_of_24_bits_and_stencil",
+    "several_attachments",
+    "four_samples_with_depth",
+    "linear_filter",
+    "texture_formats",
+    "uniform_buffer",
+    "fragments_write_storage",
+    "secondary_command_buffers",
+    "clears_within_a_pass",
+    "render_pass_object",
+    "input_attachments",
+];
+
+/// All of them.
+pub fn all() -> Vec<Scenario> {
+    let opening = scenario("opening a device", || {
+        Box::new(|| gaussians_on(&Context::embedded(&SETTINGS), Gaussians::default()))
+    });
+    let mut all = vec![Scenario {
+        device: Opened::Within,
+        ..opening
+    }];
+    for gaussians in Gaussians::all() {
+        all.push(scenario(gaussians.name, move || {
+            let context = Context::embedded(&SETTINGS);
+            Box::new(move || gaussians_on(&context, gaussians))
+        }));
+    }
+    all.extend(TRIANGLES.map(|name| {
+        scenario(name, move || {
+            let gpu = Gpu::embedded(&SETTINGS).expect("a device");
+            Box::new(move || triangles_on(&gpu, name))
+        })
+    }));
+    all.push(scenario("kernels", || {
+        let context = kernels::Context::gaurast().expect("a device");
+        Box::new(move || kernels_on(&context))
+    }));
+    all
+}
+
+fn scenario(name: &str, open: impl Fn() -> Use + 'static) -> Scenario {
+    Scenario {
+        name: name.to_owned(),
+        device: Opened::Before,
+        open: Box::new(open),
+    }
+}
+
+/// How Gaussians are drawn.
+#[derive(Clone, Copy)]
+struct Gaussians {
+    name: &'static str,
+    state: PipelineGaussianStateCreateInfoGAURAST<'static>,
+    model: GaussianCameraModelGAURAST,
+}
+
+impl Default for Gaussians {
+    fn default() -> Self {
+        Self {
+            name: "Gaussians",
+            state: PipelineGaussianStateCreateInfoGAURAST::default(),
+            model: GaussianCameraModelGAURAST::PINHOLE,
+        }
+    }
+}
+
+impl Gaussians {
+    /// The modes that keep lists of their own.
+    fn all() -> [Self; 5] {
+        let state = PipelineGaussianStateCreateInfoGAURAST::default();
+        let plain = Self::default();
+        [
+            plain,
+            Self {
+                name: "Gaussians in each pixel's order",
+                state: state.order(GaussianOrderGAURAST::PER_PIXEL),
+                ..plain
+            },
+            Self {
+                name: "discs",
+                state: state.geometry(GaussianGeometryGAURAST::GAUSSIAN_2D),
+                ..plain
+            },
+            Self {
+                name: "Gaussians in binary16",
+                state: state.precision(GaussianPrecisionGAURAST::FLOAT16),
+                ..plain
+            },
+            Self {
+                name: "a panorama",
+                model: GaussianCameraModelGAURAST::EQUIRECTANGULAR,
+                ..plain
+            },
+        ]
+    }
+}
+
+/// Gaussians of many sizes and depths.
+pub fn scene(count: usize) -> SceneBuffers {
+    let one = |index: usize| {
+        let at = |factor: usize, period: usize| (index * factor % period) as f32 / period as f32;
+        Gaussian {
+            position: [
+                4.0 * at(7, 101) - 2.0,
+                3.0 * at(13, 97) - 1.5,
+                2.0 + 4.0 * at(29, 89),
+            ],
+            scale: [0.02 + 0.1 * at(3, 31), 0.05, 0.03],
+            rotation: [1.0, at(5, 17), at(11, 19), 0.3],
+            opacity: 0.2 + 0.7 * at(17, 23),
+            sh: vec![[at(3, 7), at(5, 11), at(2, 5)]],
+        }
+    };
+    SceneBuffers::new(0, (0..count).map(one))
+}
+
+/// Draws a scene three times, so that it is put into chunks on the way. `drawing` is told when it begins and ends.
+pub fn draw(
+    context: &Context,
+    buffers: &SceneBuffers,
+    size: [u32; 2],
+    drawing: impl Fn(bool),
+) -> Vec<u8> {
+    draw_as(context, buffers, size, Gaussians::default(), drawing)
+}
+
+fn draw_as(
+    context: &Context,
+    buffers: &SceneBuffers,
+    size: [u32; 2],
+    how: Gaussians,
+    drawing: impl Fn(bool),
+) -> Vec<u8> {
+    let options = PipelineOptions {
+        state: how.state,
+        ..PipelineOptions::new(0)
+    };
+    let pipeline = Pipeline::new(context, &options);
+    let scene = DeviceScene::new(context, buffers);
+    let target = Target::new(context, options.format, size);
+    let focal_length = match how.model {
+        // Pixels in a radian; the picture is the whole way round.
+        GaussianCameraModelGAURAST::EQUIRECTANGULAR => size[0] as f32 / std::f32::consts::TAU,
+        _ => 0.8 * size[0] as f32,
+    };
+    let camera = GaussianCameraGAURAST::default()
+        .model(how.model)
+        .focal_length([focal_length; 2])
+        .principal_point(size.map(|side| 0.5 * side as f32));
+    drawing(true);
+    for _ in 0..3 {
+        context.run(|commands| {
+            commands.pass(&target, &Pass::clear([0.0; 4]), || {
+                commands.bind(&pipeline, &scene, &camera);
+                commands.draw([scene.count, 1, 0, 0]);
+            });
+        });
+    }
+    drawing(false);
+    let pixels: Vec<[f32; 4]> = target.read();
+    bytemuck::cast_slice(&pixels).to_vec()
+}
+
+fn gaussians_on(context: &Context, how: Gaussians) -> Vec<u8> {
+    draw_as(context, &scene(1500), [96, 80], how, |_| ())
+}
+
+fn triangles_on(gpu: &Gpu, name: &str) -> Vec<u8> {
+    let scene = scenes::find(name).expect("a scene");
+    let output = (scene.draw)(gpu).expect("the device has all of it");
+    let pictures = output.pictures.iter();
+    pictures.flat_map(|picture| picture.bytes.clone()).collect()
+}
+
+fn kernels_on(context: &kernels::Context) -> Vec<u8> {
+    let mut made = Vec::new();
+    for kernel in kernels::all(kernels::Size::Small) {
+        let prepared = context.prepare(&kernel).expect("it is prepared");
+        prepared.run().expect("it runs");
+        for expected in &kernel.expected {
+            let read = prepared.read(expected.binding).expect("it is read");
+            made.extend(bytemuck::cast_slice(&read));
+        }
+    }
+    made
+}

@@ -1,0 +1,213 @@
+//! Sizes, counts and values at the ends of what there is, and an application that changes how its threads round.
+
+use ash::vk;
+use gaurast::vk::GaussianCameraGAURAST;
+use gaurast_tests::compare::{Limits, verdict};
+use gaurast_tests::contexts::{
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over, replace,
+};
+use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
+use gaurast_tests::scenes::{Gaussian, SceneBuffers};
+
+type Camera = GaussianCameraGAURAST<'static>;
+
+fn context() -> Context {
+    Context::embedded(&Settings {
+        threads: Some(2),
+        ..Settings::default()
+    })
+}
+
+fn camera([width, height]: [u32; 2]) -> Camera {
+    Camera::default()
+        .focal_length([width as f32; 2])
+        .principal_point([0.5 * width as f32, 0.5 * height as f32])
+}
+
+fn gaussian(z: f32, scale: f32, opacity: f32, color: [f32; 3]) -> Gaussian {
+    Gaussian {
+        position: [0.0, 0.0, z],
+        scale: [scale; 3],
+        rotation: [1.0, 0.0, 0.0, 0.0],
+        opacity,
+        sh: vec![color],
+    }
+}
+
+/// Draws instances of a scene to a target.
+fn draw(
+    context: &Context,
+    scene: &SceneBuffers,
+    options: &PipelineOptions,
+    target: &Target,
+    clear: Option<[f32; 4]>,
+    instances: u32,
+) {
+    let size = [target.extent.width, target.extent.height];
+    let pipeline = Pipeline::new(context, options);
+    let on_device = DeviceScene::new(context, scene);
+    let pass = Pass {
+        clear,
+        ..Pass::default()
+    };
+    context.run(|commands| {
+        commands.pass(target, &pass, || {
+            commands.bind(&pipeline, &on_device, &camera(size));
+            commands.draw([on_device.count, instances, 0, 0]);
+        });
+    });
+}
+
+/// More primitives than binary32 has integers: those that are seen come last in each instance, at one depth, so that
+/// their order is that of their numbers.
+#[test]
+fn more_than_2_to_the_24_primitives_keep_their_order() {
+    const UNSEEN: usize = 32_766;
+    const INSTANCES: u32 = 513;
+    let size = [20, 18];
+    let unseen = (0..UNSEEN).map(|_| gaussian(-1.0, 0.1, 1.0, [0.0; 3]));
+    let colors = [[1.5, -1.5, 0.2], [-1.0, 1.0, 1.7]];
+    let seen = colors.map(|color| gaussian(2.0, 50.0, 1.0 / 128.0, color));
+    let scene = SceneBuffers::new(0, unseen.chain(seen.clone()));
+    assert!(scene.positions.len() as u64 * u64::from(INSTANCES) > 1 << 24);
+    let context = context();
+    let options = PipelineOptions::new(0);
+    let target = Target::new(&context, options.format, size);
+    draw(
+        &context,
+        &scene,
+        &options,
+        &target,
+        Some([0.0; 4]),
+        INSTANCES,
+    );
+    let image: Vec<[f32; 4]> = target.read();
+    let alone = SceneBuffers::new(0, seen.iter().cycle().take(2 * INSTANCES as usize).cloned());
+    let view = OracleCamera::new(&camera(size), size).expect("a camera");
+    let reference = render_bounded(&alone.as_oracle(), &view, &OracleState::default());
+    let judged = verdict(&image, &reference, Limits::ENVELOPE_ONLY);
+    assert!(judged.holds(), "{judged}");
+}
+
+/// Lists of all tiles would have 3.3e8 entries, beyond what is kept of them: tiles find theirs in the sorted sequence.
+/// `cargo run -p gaurast-tests --example screen_fillers` draws a million at 8192x8192.
+#[test]
+fn thousands_that_fill_a_large_screen_take_bounded_memory() {
+    const COUNT: usize = 20_000;
+    let size = [2048, 2048];
+    let one = |index: usize| {
+        let color = [0, 1, 2].map(|c| ((index * (3 + c)) % 7) as f32 / 2.0 - 1.5);
+        // Thin enough for tiles to look at several pieces of the sequence.
+        gaussian(2.0 + index as f32 * 1e-3, 1e4, 1.0 / 200.0, color)
+    };
+    let scene = SceneBuffers::new(0, (0..COUNT).map(one));
+    let context = context();
+    let options = PipelineOptions::new(0);
+    let target = Target::new(&context, options.format, size);
+    draw(&context, &scene, &options, &target, Some([0.0; 4]), 1);
+    let image: Vec<[f32; 4]> = target.read();
+    // All pixels see the same: the oracle draws one.
+    let view =
+        OracleCamera::new(&camera(size).principal_point([0.5; 2]), [1, 1]).expect("a camera");
+    let reference = render_bounded(&scene.as_oracle(), &view, &OracleState::default());
+    let middle = image[1024 * 2048 + 1024];
+    let judged = verdict(&[middle], &reference, Limits::ENVELOPE_ONLY);
+    assert!(judged.holds(), "{judged}");
+    let far = |pixel: &[f32; 4]| (0..4).any(|c| (pixel[c] - middle[c]).abs() > 1e-5);
+    assert_eq!(image.iter().position(far), None);
+}
+
+/// A target of half floats takes colours beyond its greatest, alone and over each other, and never holds what is no
+/// number.
+#[test]
+fn half_float_targets_overflow_to_infinity_at_most() {
+    let size = [48, 40];
+    let color = [4e5, 1e38, -2e5];
+    let scene = SceneBuffers::new(
+        0,
+        (0..3).map(|z| gaussian(2.0 + z as f32, 0.3, 0.99, color)),
+    );
+    let context = context();
+    for blend in [replace(), over()] {
+        let options = PipelineOptions {
+            format: vk::Format::R16G16B16A16_SFLOAT,
+            blend,
+            ..PipelineOptions::new(0)
+        };
+        let target = Target::new(&context, options.format, size);
+        draw(&context, &scene, &options, &target, Some([0.0; 4]), 1);
+        draw(&context, &scene, &options, &target, None, 1);
+        let texels: Vec<[u16; 4]> = target.read();
+        let magnitudes = texels.as_flattened().iter().map(|bits| bits & 0x7fff);
+        assert!(magnitudes.clone().all(|bits| bits <= 0x7c00), "no NaN");
+        assert!(magnitudes.clone().any(|bits| bits >= 0x7bff), "too bright");
+    }
+}
+
+/// What an application sets in its own threads' control registers does not reach the device's: denormals of a target stay
+/// what they are.
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn flushing_to_zero_changes_nothing() {
+    /// Denormals that are results become zero; those that are operands, too.
+    const FLUSH: u32 = 1 << 15 | 1 << 6;
+
+    /// Changes bits of the thread's control register for as long as it lives.
+    struct Control(u32);
+
+    impl Control {
+        fn with(bits: u32) -> Self {
+            let before = Self::read();
+            Self::write(before | bits);
+            Self(before)
+        }
+
+        fn read() -> u32 {
+            let mut control = 0u32;
+            // SAFETY: it stores the register to a variable of its size.
+            unsafe {
+                std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut control, options(nostack, preserves_flags));
+            }
+            control
+        }
+
+        fn write(control: u32) {
+            // SAFETY: all bits but two are what they were, and no exception is unmasked. Nothing in this test computes
+            // with denormals but the device.
+            unsafe {
+                std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const control, options(nostack, preserves_flags));
+            }
+        }
+    }
+
+    impl Drop for Control {
+        fn drop(&mut self) {
+            Self::write(self.0);
+        }
+    }
+
+    let size = [40, 36];
+    let black = [-4.0; 3];
+    let scene = SceneBuffers::new(0, [gaussian(2.0, 0.2, 0.7, black)]);
+    let options = PipelineOptions {
+        blend: over(),
+        ..PipelineOptions::new(0)
+    };
+    let picture = || {
+        let context = context();
+        let target = Target::new(&context, options.format, size);
+        draw(&context, &scene, &options, &target, Some([1e-39; 4]), 1);
+        target.read::<[u32; 4]>()
+    };
+    let expected = picture();
+    let middle = expected[18 * 40 + 20];
+    assert!(
+        middle[0] > 0 && f32::from_bits(middle[0]) < 1e-39,
+        "{middle:?}"
+    );
+    let flushed = {
+        let _control = Control::with(FLUSH);
+        picture()
+    };
+    assert!(flushed == expected);
+}
