@@ -356,15 +356,18 @@ fn a_scene_is_simulated_from_the_work_that_was_done() {
         events.iter().filter(|event| event["ph"] == "X").count(),
         6 * 3
     );
-    let sweep = simulate(&["--sweep", "modules=1..4", "--format", "csv"]);
+    let sweep = ["--sweep", "modules=1..4", "--format", "csv"];
+    let sweep = simulate(&[&sweep[..], &["--plot", "s.svg"]].concat());
     assert_eq!(sweep.lines().count(), 5, "{sweep}");
+    let plot = std::fs::read_to_string(folder.path().join("s.svg")).expect("a plot");
+    assert!(plot.contains("speed-up over the shader cores"));
     let compared = simulate(&["--stepped"]);
     assert!(compared.contains("+0.000 %"), "{compared}");
     assert!(simulate(&["--what-if"]).contains("blocks saturate"));
     assert!(simulate(&[]).contains("stage 3, raster"));
-    // Only the timeline was asked for.
+    // Only the timeline and the plot were asked for.
     let files = std::fs::read_dir(folder.path()).expect("readable").count();
-    assert_eq!(files, 2);
+    assert_eq!(files, 3);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use gaurast_tests::compare::{Limits, assert_contract, for_people};
 use gaurast_tests::contexts::Settings;
 use gaurast_tests::data::require_data;
 use gaurast_tests::hybrid::{
-    GaussianOptions, GaussianPipeline, GaussianScene, Held, depth_format, held,
+    GaussianOptions, GaussianPipeline, GaussianScene, Held, ToClip, depth_format, held,
 };
 use gaurast_tests::oracle::{OracleCamera, OracleTests, render_tested, sample_tests::compare};
 use gaurast_tests::scenes::SceneBuffers;
@@ -42,22 +42,6 @@ pub(super) enum What {
     Head,
     Pane,
     Everything,
-}
-
-/// Takes points of the world to the clip coordinates of a Gaussian camera.
-struct ToClip(GaussianCameraGAURAST<'static>);
-
-impl ToClip {
-    fn position(&self, point: DVec3) -> [f32; 4] {
-        let rotation = DMat3::from_cols_array(&self.0.rotation.map(f64::from)).transpose();
-        let t = rotation * (point - DVec3::from(self.0.eye));
-        let place = |axis: usize, t: f64, z: f64| {
-            let (focal, principal) = (self.0.focal_length[axis], self.0.principal_point[axis]);
-            2.0 * (f64::from(focal) * t + f64::from(principal) * z) / f64::from(SIZE[axis]) - z
-        };
-        let [c0, c1] = self.0.depth_coefficients.map(f64::from);
-        [place(0, t.x, t.z), place(1, t.y, t.z), c0 * t.z + c1, t.z].map(|c| c as f32)
-    }
 }
 
 /// The head's triangles, with their texture's colours under a light; `place` takes its points to the world.
@@ -234,7 +218,7 @@ pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Opt
     let camera = camera
         .to_vulkan()
         .depth_coefficients([far / (far - near), -near * far / (far - near)]);
-    let to_clip = ToClip(camera);
+    let to_clip = ToClip { camera, size: SIZE };
     // It stands in the meadow and looks to the camera.
     let place = |point: DVec3| {
         let (sin, cos) = 0.35f64.sin_cos();
@@ -294,7 +278,7 @@ pub(super) fn playbot() -> Option<Hybrid> {
     let camera = Camera::framing(&scene, DEFAULT_FOV, SIZE)
         .to_vulkan()
         .depth_coefficients([-near / (far - near), near * far / (far - near)]);
-    let to_clip = ToClip(camera);
+    let to_clip = ToClip { camera, size: SIZE };
     // Around the point that the camera looks at, in its own axes: right, down and forward.
     let rotation = DMat3::from_cols_array(&camera.rotation.map(f64::from));
     let (middle, radius) = middle(&scene, &camera);

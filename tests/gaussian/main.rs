@@ -13,3 +13,4 @@ mod rasterization_modes;
 mod recorded_work;
 mod reference;
 mod shaded;
+mod what_ifs;

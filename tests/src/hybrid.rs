@@ -8,6 +8,8 @@ use gaurast::vk::{
     PipelineGaussianStateCreateInfoGAURAST,
 };
 
+use glam::{DMat3, DVec3};
+
 use crate::contexts::gaussian::{attribute_locations, attributes, scene_bindings};
 use crate::contexts::over;
 use crate::oracle::{OracleDepthFormat, Stored};
@@ -177,6 +179,31 @@ impl GaussianScene {
                 .cmd_set_gaussian_camera(commands.raw, camera);
         }
         commands.draw(0..self.count);
+    }
+}
+
+/// Takes points of the world to clip coordinates, so that triangles are seen as Gaussians are.
+#[derive(Clone, Copy)]
+pub struct ToClip {
+    /// A pinhole, whose depth coefficients are those of a perspective projection.
+    pub camera: GaussianCameraGAURAST<'static>,
+    /// The picture's width and height in pixels.
+    pub size: [u32; 2],
+}
+
+impl ToClip {
+    /// A vertex's position.
+    pub fn position(&self, point: DVec3) -> [f32; 4] {
+        let camera = &self.camera;
+        let rotation = DMat3::from_cols_array(&camera.rotation.map(f64::from)).transpose();
+        let t = rotation * (point - DVec3::from(camera.eye));
+        let place = |axis: usize, t: f64, z: f64| {
+            let (focal, principal) = (camera.focal_length[axis], camera.principal_point[axis]);
+            let size = f64::from(self.size[axis]);
+            2.0 * (f64::from(focal) * t + f64::from(principal) * z) / size - z
+        };
+        let [c0, c1] = camera.depth_coefficients.map(f64::from);
+        [place(0, t.x, t.z), place(1, t.y, t.z), c0 * t.z + c1, t.z].map(|c| c as f32)
     }
 }
 

@@ -12,5 +12,6 @@ pub mod long_run;
 pub mod programs;
 pub mod recorded;
 pub mod triangles;
+pub mod what_ifs;
 
 pub use gaurast_oracle::{oracle, scenes};

@@ -1,6 +1,7 @@
 //! What skipping would bring as hardware: the same frame on the same machine, with each skip of the device added to
 //! those before it: exact tile tests instead of squares, lists that end with their tile, then finished rows and blocks,
-//! exact block tests; for triangles the blocks that they cover instead of whole tiles; and hierarchical depth.
+//! exact block tests; for triangles the blocks that they cover instead of whole tiles; and hierarchical depth. Or each
+//! alone.
 
 use crate::config::Config;
 use crate::simulate::{Simulation, simulate};
@@ -16,68 +17,153 @@ pub struct WhatIf {
     pub simulation: Simulation,
 }
 
-/// The variants, the least skipping first.
-pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
-    let variant = |name, frame: &FrameWork, granularity: [Saturation; 2], hierarchical_depth| {
-        let [saturation, traversal] = granularity;
+/// What a machine skips.
+#[derive(Clone, Copy)]
+struct Skipping {
+    saturation: Saturation,
+    traversal: Saturation,
+    hierarchical_depth: bool,
+}
+
+impl Skipping {
+    /// Finished pixels of Gaussian lists.
+    fn of(saturation: Saturation) -> Self {
+        Self {
+            saturation,
+            traversal: Saturation::Tile,
+            hierarchical_depth: false,
+        }
+    }
+
+    /// A frame on a machine that skips this.
+    fn simulate(self, name: &'static str, frame: &FrameWork, config: &Config) -> WhatIf {
         let mut config = config.clone();
-        config.rasterizer.saturation = saturation;
-        config.rasterizer.triangle_traversal = traversal;
-        config.rasterizer.hierarchical_depth = hierarchical_depth;
+        config.rasterizer.saturation = self.saturation;
+        config.rasterizer.triangle_traversal = self.traversal;
+        config.rasterizer.hierarchical_depth = self.hierarchical_depth;
         WhatIf {
             name,
             simulation: simulate(frame, &config),
         }
-    };
-    let has = |mode| frame.draws.iter().any(|draw| draw.mode == mode);
+    }
+}
+
+/// What of a frame there is to skip.
+struct Kinds {
+    gaussians: bool,
+    triangles: bool,
+    hidden: bool,
+}
+
+impl Kinds {
+    fn of(frame: &FrameWork) -> Self {
+        let has = |mode| frame.draws.iter().any(|draw| draw.mode == mode);
+        let mut tiles = frame.draws.iter().flat_map(|draw| &draw.tiles);
+        Self {
+            gaussians: has(Mode::Gaussian),
+            triangles: has(Mode::Triangle),
+            hidden: tiles.any(|tile| tile.hidden() > 0 || tile.hidden_blocks() > 0),
+        }
+    }
+}
+
+/// The variants, the least skipping first.
+pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
     let with = |name, frame: &FrameWork, saturation| {
-        variant(name, frame, [saturation, Saturation::Tile], false)
+        Skipping::of(saturation).simulate(name, frame, config)
     };
-    let boxed = boxed(frame);
-    let gaussians = [
-        with(
-            "3-sigma squares, no saturation (estimated)",
-            &boxed,
-            Saturation::None,
-        ),
-        with(
-            "3-sigma squares, tiles saturate (estimated)",
-            &boxed,
-            Saturation::Tile,
-        ),
-        with("exact tile tests, no saturation", frame, Saturation::None),
-        with("exact tile tests, tiles saturate", frame, Saturation::Tile),
-        with("exact tile tests, rows saturate", frame, Saturation::Row),
-        with(
-            "exact tile tests, blocks saturate",
-            frame,
-            Saturation::Block,
-        ),
-        with(
-            "exact tile and block tests, blocks saturate",
-            frame,
-            Saturation::Reached,
-        ),
-    ];
-    let reached = [Saturation::Reached; 2];
-    let triangles = [
-        with("triangles in whole tiles", frame, Saturation::Reached),
-        variant("triangles in the blocks they cover", frame, reached, false),
-    ];
-    let tiles = || frame.draws.iter().flat_map(|draw| &draw.tiles);
-    let depth = [variant(
-        "all of these, and hierarchical depth",
-        frame,
-        reached,
-        true,
-    )];
-    let gaussians = gaussians.into_iter().filter(|_| has(Mode::Gaussian));
-    // With Gaussians the variant before is that of whole tiles.
-    let triangles = triangles.into_iter().skip(usize::from(has(Mode::Gaussian)));
-    let triangles = triangles.filter(|_| has(Mode::Triangle));
-    let hidden = tiles().any(|tile| tile.hidden() > 0 || tile.hidden_blocks() > 0);
-    let depth = depth.into_iter().filter(|_| hidden);
-    gaussians.chain(triangles).chain(depth).collect()
+    let kinds = Kinds::of(frame);
+    let mut variants = Vec::new();
+    if kinds.gaussians {
+        let boxed = boxed(frame);
+        variants.extend([
+            with(
+                "3-sigma squares, no saturation (estimated)",
+                &boxed,
+                Saturation::None,
+            ),
+            with(
+                "3-sigma squares, tiles saturate (estimated)",
+                &boxed,
+                Saturation::Tile,
+            ),
+            with("exact tile tests, no saturation", frame, Saturation::None),
+            with("exact tile tests, tiles saturate", frame, Saturation::Tile),
+            with("exact tile tests, rows saturate", frame, Saturation::Row),
+            with(
+                "exact tile tests, blocks saturate",
+                frame,
+                Saturation::Block,
+            ),
+        ]);
+    }
+    // With Gaussians this is that of triangles in whole tiles, too.
+    let blocks = if kinds.gaussians {
+        "exact tile and block tests, blocks saturate"
+    } else {
+        "triangles in whole tiles"
+    };
+    if kinds.gaussians || kinds.triangles {
+        variants.push(with(blocks, frame, Saturation::Reached));
+    }
+    let reached = Skipping {
+        traversal: Saturation::Reached,
+        ..Skipping::of(Saturation::Reached)
+    };
+    if kinds.triangles {
+        let name = "triangles in the blocks they cover";
+        variants.push(reached.simulate(name, frame, config));
+    }
+    if kinds.hidden {
+        let depth = Skipping {
+            hierarchical_depth: true,
+            ..reached
+        };
+        let name = "all of these, and hierarchical depth";
+        variants.push(depth.simulate(name, frame, config));
+    }
+    variants
+}
+
+/// Each skip by itself on a machine that bins squares of 3 sigma, ends the lists of tiles that are finished, evaluates
+/// whole tiles and knows no depths but those of pixels: the first variant.
+pub fn each_alone(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
+    let kinds = Kinds::of(frame);
+    let (squares, plain) = (boxed(frame), Skipping::of(Saturation::Tile));
+    let mut variants = vec![plain.simulate("none of them (estimated)", &squares, config)];
+    let mut alone = |name, frame: &FrameWork, skipping: Skipping| {
+        variants.push(skipping.simulate(name, frame, config));
+    };
+    if kinds.gaussians {
+        alone("exact tile tests", frame, plain);
+        let blocks = Skipping::of(Saturation::Block);
+        alone("blocks saturate (estimated)", &squares, blocks);
+        let tests = Skipping::of(Saturation::Reached);
+        alone(
+            "exact block tests, blocks saturate (estimated)",
+            &squares,
+            tests,
+        );
+    }
+    if kinds.triangles {
+        let covered = Skipping {
+            traversal: Saturation::Reached,
+            ..plain
+        };
+        alone(
+            "triangles in the blocks they cover (estimated)",
+            &squares,
+            covered,
+        );
+    }
+    if kinds.hidden {
+        let depth = Skipping {
+            hierarchical_depth: true,
+            ..plain
+        };
+        alone("hierarchical depth (estimated)", &squares, depth);
+    }
+    variants
 }
 
 /// The frame with as many pairs as 3-sigma squares give. Which tiles they are in is not known: every list is lengthened
@@ -134,6 +220,40 @@ mod tests {
             .collect();
         assert!(cycles[0] > 1.9 * cycles[2]);
         assert!(cycles[2..].is_sorted_by(|a, b| a > b), "{cycles:?}");
+    }
+
+    #[test]
+    fn each_skip_alone_is_less_than_all_together() {
+        let mut frame = even_frame([320, 160], 60_000, 0.2);
+        let mut triangles = frame.draws[0].clone();
+        triangles.mode = Mode::Triangle;
+        for tile in &mut triangles.tiles {
+            tile.runs[0].reached /= 2;
+        }
+        let draw = &mut frame.draws[0];
+        draw.boxed_pairs = 2 * draw.pairs();
+        for tile in &mut draw.tiles {
+            let run = &mut tile.runs[0];
+            (run.hidden, run.reached) = (run.primitives / 3, run.reached / 3);
+            (run.blocks, tile.hidden_rest) = (12, run.hidden / 2);
+        }
+        frame.draws.insert(0, triangles);
+        let config = Config::preset("single-module", &[]).unwrap();
+        let cycles = |variants: Vec<WhatIf>| -> Vec<f64> {
+            let cycles = |variant: &WhatIf| variant.simulation.raster.cycles;
+            variants.iter().map(cycles).collect()
+        };
+        let alone = cycles(each_alone(&frame, &config));
+        let together = cycles(what_ifs(&frame, &config));
+        assert_eq!((alone.len(), together.len()), (6, 9));
+        // The second of those that are added has what the first alone has.
+        assert_eq!(alone[0], together[1]);
+        let last = together[together.len() - 1];
+        assert!(
+            alone[1..]
+                .iter()
+                .all(|&cycles| last < cycles && cycles < alone[0])
+        );
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod progress;
 mod render;
 mod report;
 mod simulate;
+mod simulate_plot;
 mod simulate_report;
 
 use std::process::ExitCode;

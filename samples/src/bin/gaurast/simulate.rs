@@ -18,6 +18,7 @@ use timing::work::{TRACE_VERSION, Trace};
 use timing::{FrameWork, fast, paper, stepped};
 
 use crate::args::Size;
+use crate::simulate_plot as plot;
 use crate::simulate_report as report;
 
 /// Why there is no simulation. Displayed as one sentence.
@@ -43,6 +44,8 @@ pub enum Error {
     Draw(String),
     #[error("--sweep {0}: not NAME=FIRST..LAST or NAME=VALUE,VALUE,...")]
     Sweep(String),
+    #[error("the plot: {0}")]
+    Plot(String),
     #[error("output: {0}")]
     Output(#[from] std::io::Error),
     #[error("output: {0}")]
@@ -81,6 +84,10 @@ pub struct SimulateArguments {
     /// Simulates one machine after the other, as in modules=1..32 or saturation=none,tile,block
     #[arg(long, value_name = "NAME=FIRST..LAST")]
     pub sweep: Option<String>,
+
+    /// Plots the sweep's speed-ups and energy
+    #[arg(long, value_name = "FILE.svg", requires = "sweep")]
+    pub plot: Option<PathBuf>,
 
     /// Shows what each skip would bring as hardware
     #[arg(long, conflicts_with = "sweep")]
@@ -159,6 +166,11 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
     if let Some(path) = &arguments.trace {
         let (_, config) = &machines[0];
         write_timeline(path, &trace, config, arguments.frames)?;
+    }
+    if let (Some(path), Some(sweep)) = (&arguments.plot, &arguments.sweep) {
+        let swept = sweep.split('=').next().unwrap_or_default();
+        let svg = plot::svg(swept, &results).map_err(Error::Plot)?;
+        replace(path, svg.as_bytes())?;
     }
     print(&match (arguments.format, results.as_slice()) {
         (Format::Table, [(_, one)]) => report::one(frame, one, &config),
@@ -314,7 +326,11 @@ fn write_timeline(path: &Path, trace: &Trace, config: &Config, count: u16) -> Re
     let frames: Vec<_> = once.into_iter().cycle().take(count.into()).collect();
     let spans = simulate::timeline(&frames, config);
     let json = schedule::chrome_trace(&spans, config);
-    file::replace(path, &serde_json::to_vec(&json)?).map_err(|source| Error::File {
+    replace(path, &serde_json::to_vec(&json)?)
+}
+
+fn replace(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    file::replace(path, bytes).map_err(|source| Error::File {
         path: path.to_owned(),
         source,
     })

@@ -1,0 +1,16 @@
+//! Prints what each of the device's skips would bring as hardware (`simdevice/timing/WHAT_IF.md`). `what_ifs FOLDER` writes
+//! pictures of the scenes, too.
+
+use gaurast_tests::compare::for_people;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let (text, scenes) = gaurast_tests::what_ifs::markdown();
+    print!("{text}");
+    if let Some(folder) = std::env::args().nth(1) {
+        for (number, scene) in scenes.iter().enumerate() {
+            let path = std::path::Path::new(&folder).join(format!("what_if {number}.png"));
+            for_people(&scene.pictures[0]).save(path)?;
+        }
+    }
+    Ok(())
+}
