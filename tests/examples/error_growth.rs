@@ -147,7 +147,7 @@ fn sweeps() -> Vec<Sweep> {
     vec![
         Sweep {
             name: "layers",
-            values: powers(4.0, 0..=6),
+            values: powers(4.0, 0..=7),
             view: layers,
         },
         Sweep {

@@ -12,6 +12,7 @@ use super::{
     Thresholds, Work, locate,
 };
 use crate::packet::GaussianState;
+use crate::skips::Skip;
 use crate::trace::Run;
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
@@ -112,7 +113,7 @@ impl GaussianTile {
         for block in 0..BLOCKS {
             let mut sums = Sums::load(layer, block);
             for chunk in self.lists[block].chunks(CHUNK) {
-                if !sums.is_open() {
+                if task.skips.has(Skip::Saturated) && !sums.is_open() {
                     break;
                 }
                 for &primitive in chunk {
