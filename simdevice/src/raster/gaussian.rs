@@ -30,6 +30,7 @@ use crate::counters::{Counter, Counters};
 use crate::gaussian::depth::Trend;
 use crate::gaussian::project::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
+use crate::lanes::{bits_of, floats_of};
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
 use by_block::TileMode;
@@ -483,8 +484,8 @@ impl Layer {
             median.store_slice(&mut self.median[block]);
         }
         let finished =
-            t.to_bits() | reached.select(u32x16::splat(simd, SIGN), u32x16::splat(simd, 0));
-        let t = accepted.select(rest, f32x16::from_bits(finished));
+            bits_of(t) | reached.select(u32x16::splat(simd, SIGN), u32x16::splat(simd, 0));
+        let t = accepted.select(rest, floats_of(finished));
         t.store_slice(&mut self.transmittance[block]);
         let weight = accepted.select(weight, f32x16::splat(simd, 0.0));
         if DEPTH == FIND_MEAN {
