@@ -143,7 +143,11 @@ fn all_triangles(device: &Device) -> Vec<Packet> {
     vec![
         triangles(device, &large(0.9), false),
         triangles(device, &layers, false),
-        triangles(device, &[&layers[..], &slanted[..], &layers[..]].concat(), true),
+        triangles(
+            device,
+            &[&layers[..], &slanted[..], &layers[..]].concat(),
+            true,
+        ),
         triangles(device, &large(0.5), true),
         triangles(device, &several, true),
         triangles(device, &large(0.7), true),
