@@ -83,10 +83,7 @@ fn request(texels_per_pixel: f32) -> SampleRequest {
             [0; 16],
             [0; 16],
         ],
-        lod: LodRequest::Implicit {
-            bias: [0; 16],
-            minimum: [0; 16],
-        },
+        lod: LodRequest::Automatic,
         offset: [[0; 16]; 3],
         compare: None,
         gather: None,

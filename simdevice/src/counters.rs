@@ -83,6 +83,7 @@ counters! {
     BlocksSaturated: "skips", "blocks saturated", Count, "Pairs of a finished 4x4 block and a Gaussian of its tile";
     TilesUntouched: "skips", "tiles untouched", Count, "Tiles of attachments that were not loaded, because nothing was drawn to them";
     TilesOverwritten: "skips", "tiles overwritten", Count, "Tiles of colour attachments that were neither loaded nor cleared, because a primitive overwrote them as a whole";
+    QuadsOverwritten: "skips", "quads overwritten", Count, "Quads of tiles that were not shaded, because a later primitive of the draw overwrote the tile as a whole";
     QuadsMasked: "skips", "quads masked", Count, "Quads of primitives' blocks that were not shaded, because no sample of them was left";
     BatchesAffine: "skips", "batches affine", Count, "Batches of fragments whose perspective-correct inputs needed no division";
     InputVertices: "geometry", "input vertices", Count, "Vertices or indices of draws of points, lines and triangles";

@@ -18,6 +18,7 @@ pub mod format;
 pub mod gaussian;
 pub mod geometry;
 pub mod image;
+mod lanes;
 mod model;
 pub mod packet;
 pub mod pass;

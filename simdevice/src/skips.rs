@@ -42,6 +42,7 @@ skips! {
     Saturated: "saturated", BlocksSaturated, "Nothing is evaluated in blocks and tiles whose pixels are all finished.";
     EmptyTiles: "empty-tiles", TilesUntouched, "Tiles that nothing draws to are neither loaded nor stored.";
     OverwrittenTiles: "overwritten-tiles", TilesOverwritten, "Tiles of colour attachments are neither loaded nor cleared where the first primitive overwrites them as a whole.";
+    OverwrittenQuads: "overwritten-quads", QuadsOverwritten, "Quads of tiles that one primitive covers and another of the draw overwrites are not shaded.";
     HiddenTiles: "hidden-tiles", TilesHidden, "A primitive that all depths of a tile hide is not tested there pixel by pixel.";
     MaskedQuads: "masked-quads", QuadsMasked, "Quads of which coverage and early tests leave nothing are not shaded.";
     Affine: "affine", BatchesAffine, "Barycentrics are not divided by 1 / w where that is the same all over each primitive.";
@@ -143,7 +144,7 @@ mod tests {
                 .unwrap_err()
                 .to_string(),
             "everything is neither all nor none nor a skip, which are chunks, bounds, ellipse, harmonics, blocks, saturated, \
-             empty-tiles, overwritten-tiles, hidden-tiles, masked-quads, affine"
+             empty-tiles, overwritten-tiles, overwritten-quads, hidden-tiles, masked-quads, affine"
         );
     }
 }

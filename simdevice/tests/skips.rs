@@ -125,8 +125,29 @@ fn all_triangles(device: &Device) -> Vec<Packet> {
         ]
     };
     let several: Vec<[f32; 4]> = (0..200).flat_map(small).collect();
+    // Each overwrites the one before it, as a whole or where it is nearer, with small ones between them.
+    let mut layers = Vec::new();
+    for layer in 0..12 {
+        let z = [0.97, 0.95, 0.99, 0.93][layer % 4] - 0.01 * (layer / 4) as f32;
+        layers.extend(large(z));
+        if layer % 3 == 1 {
+            layers.extend((0..5).flat_map(|number| small(9 * layer as u32 + number)));
+        }
+    }
+    // Where it begins before the others and where it ends behind them.
+    let slanted = [
+        [-1.0, -1.0, 0.2, 1.0],
+        [1.5, -1.0, 0.99, 1.0],
+        [-1.0, 1.5, 0.99, 1.0],
+    ];
     vec![
         triangles(device, &large(0.9), false),
+        triangles(device, &layers, false),
+        triangles(
+            device,
+            &[&layers[..], &slanted[..], &layers[..]].concat(),
+            true,
+        ),
         triangles(device, &large(0.5), true),
         triangles(device, &several, true),
         triangles(device, &large(0.7), true),

@@ -5,6 +5,10 @@
 //! say otherwise; they should be set alike. `--simd LEVEL` chooses this driver's SIMD level (as
 //! `GAURAST_SIMD` does), `--scene NAME` one workload, and `--no-memory` leaves out the processes
 //! that measure memory.
+//!
+//! `--runs-of DEVICE NAME TIMES BY` does a workload so many times and says nothing, with width,
+//! height and numbers of triangles divided by `BY`: for counts of instructions, which are those
+//! of more runs less those of fewer. DEVICE is `own` or `lavapipe`.
 
 use std::error::Error;
 use std::process::Command;
@@ -19,6 +23,9 @@ const RUNS: usize = 7;
 
 /// Given to a process that only measures memory: the device, and the workload.
 const MEMORY: &str = "--memory-of";
+
+/// Given to a process that only does a workload, for counts.
+const RUNS_OF: &str = "--runs-of";
 
 type Failure = Box<dyn Error>;
 
@@ -67,6 +74,14 @@ fn measure_memory(device: &str, name: &str) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Does a smaller workload some times.
+fn run(device: &str, name: &str, times: &str, by: &str) -> Result<(), Failure> {
+    let gpu = open(device)?;
+    let workload = Workload::smaller(&gpu, name, by.parse()?)?;
+    (0..times.parse()?).for_each(|_: u32| workload.run());
+    Ok(())
+}
+
 fn compare(own: &Gpu, lavapipe: &Gpu, name: &str, with_memory: bool) -> Result<f64, Failure> {
     let (ours, theirs) = (Workload::new(own, name)?, Workload::new(lavapipe, name)?);
     // The first run touches memory, and is not counted.
@@ -97,6 +112,11 @@ fn main() -> Result<(), Failure> {
         && flag == MEMORY
     {
         return measure_memory(device, name);
+    }
+    if let [flag, device, name, times, by] = &arguments[..]
+        && flag == RUNS_OF
+    {
+        return run(device, name, times, by);
     }
     let value_of = |flag: &str| {
         let position = arguments.iter().position(|argument| argument == flag)?;

@@ -93,6 +93,8 @@ pub type Lanes = [u32; CHUNK_LANES];
     reason = "one lives on the stack for each sample"
 )]
 pub enum LodRequest {
+    /// From differences within each quad of lanes, and nothing else: as [`LodRequest::Implicit`] with zeros.
+    Automatic,
     /// From differences within each quad of lanes.
     Implicit {
         /// Added to the level; floats.

@@ -1,6 +1,7 @@
 //! Binning: which primitives each macro-tile has to look at.
 
 use super::primitive::Primitive;
+use crate::lanes::{both, three};
 use crate::packet::Rect;
 use devmem::host;
 
@@ -77,7 +78,7 @@ pub(super) fn bin(
     for row in rows {
         for column in columns.clone() {
             if outline.touches(
-                [column, row].map(|tile| i64::from(tile) * i64::from(grid.size)),
+                both([column, row], |tile| i64::from(tile) * i64::from(grid.size)),
                 grid.size,
             ) {
                 host::push(pairs, (grid.tile(column, row, layer), number));
@@ -93,7 +94,7 @@ struct Outline {
 
 impl Outline {
     fn new(primitive: &Primitive) -> Self {
-        let [a, b, c] = primitive.corners.map(|corner| corner.map(i64::from));
+        let [a, b, c] = three(primitive.corners, |corner| both(corner, i64::from));
         let d = [a[0] + c[0] - b[0], a[1] + c[1] - b[1]];
         let edge = |from: [i64; 2], to: [i64; 2]| {
             let along = [from[1] - to[1], to[0] - from[0]];
@@ -108,7 +109,7 @@ impl Outline {
 
     /// Whether it may share a point with the square of pixels from `corner` on.
     fn touches(&self, corner: [i64; 2], size: i32) -> bool {
-        let (low, side) = (corner.map(|c| 256 * c), 256 * i64::from(size));
+        let (low, side) = (both(corner, |c| 256 * c), 256 * i64::from(size));
         self.edges.iter().all(|&(at, along)| {
             let greatest =
                 |axis: usize| along[axis] * (low[axis] + if along[axis] > 0 { side } else { 0 });

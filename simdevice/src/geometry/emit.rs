@@ -5,6 +5,7 @@ use super::clip::ClipVertex;
 use super::primitive::{Primitive, PrimitiveKind};
 use super::setup::{Current, Job, NONE, Origin, Place, cross};
 use super::viewport::{ONE, Projected, snap_away, snap_length};
+use crate::lanes::{both, three};
 use crate::packet::draw::Interpolation;
 use devmem::host;
 
@@ -35,7 +36,7 @@ impl Job<'_> {
     pub(super) fn push_triangle(&mut self, current: &Current, places: [Place; 3], area: i64) {
         let [a, b, c] = places;
         let places = if area > 0 { [a, b, c] } else { [a, c, b] };
-        let corners = places.map(|place| place.projected.snapped);
+        let corners = three(places, |place| place.projected.snapped);
         let Some(pixels) = self.pixels(current, &corners) else {
             return;
         };
@@ -47,7 +48,7 @@ impl Job<'_> {
             kind: PrimitiveKind::Triangle,
             corners,
             offsets: offsets(places),
-            depth: places.map(|place| place.projected.depth + bias),
+            depth: three(places, |place| place.projected.depth + bias),
             pixels,
         };
         self.push(current, &shape, places);
@@ -139,13 +140,13 @@ impl Job<'_> {
 
     #[inline(always)]
     fn push(&mut self, current: &Current, shape: &Shape, places: [Place; 3]) {
-        let vertices = places.map(|place| self.number(place.origin));
+        let vertices = three(places, |place| self.number(place.origin));
         let provoking = self.number(Origin::Slot(current.provoking));
         let primitive = Primitive {
             corners: shape.corners,
             offsets: shape.offsets,
             depth: shape.depth,
-            inverse_w: places.map(|place| place.projected.inverse_w),
+            inverse_w: three(places, |place| place.projected.inverse_w),
             vertices,
             provoking,
             id: current.id,
@@ -246,10 +247,12 @@ fn covers_nothing(corners: &[[i32; 2]; 3], pixels: Pixels) -> bool {
         return false;
     }
     let inside = |x: i32, y: i32| {
-        let [x, y] = [x, y].map(|pixel| i64::from(pixel) * 256 + 128);
+        let [x, y] = both([x, y], |pixel| i64::from(pixel) * 256 + 128);
         let mut inside = true;
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-            let ([ax, ay], [bx, by]) = (corners[from].map(i64::from), corners[to].map(i64::from));
+            let [[ax, ay], [bx, by]] = both([corners[from], corners[to]], |corner| {
+                both(corner, i64::from)
+            });
             let (dx, dy) = (bx - ax, by - ay);
             let value = dx * (y - ay) - dy * (x - ax);
             // Points on an edge belong to it if it is a left or a top one.

@@ -9,6 +9,7 @@ use super::pipeline::VertexOutputs;
 use super::primitive::Primitive;
 use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
 use super::viewport::{Projected, Transform, code};
+use crate::lanes::three;
 use crate::packet::Rect;
 use crate::packet::draw::{DrawState, PolygonMode};
 
@@ -114,7 +115,7 @@ impl<'a> Job<'a> {
         for piece in &elements.pieces {
             for number in piece.first..piece.end {
                 let found = corners(state.topology, state.provoking_last, number);
-                let slots = found.places.map(|place| elements.slot(piece, place));
+                let slots = three(found.places, |place| elements.slot(piece, place));
                 let mut current = Current {
                     id: piece.primitives_before.wrapping_add(number),
                     slots,
@@ -239,7 +240,7 @@ impl<'a> Job<'a> {
 
     #[inline(always)]
     fn triangle(&mut self, current: &mut Current, vertices: [&Vertex; 3]) {
-        let [a, b, c] = vertices.map(|vertex| vertex.code);
+        let [a, b, c] = three(vertices, |vertex| vertex.code);
         let (all, any) = (a & b & c, a | b | c);
         if all & code::OUTSIDE != 0 || any & code::INVALID != 0 {
             return;
@@ -249,7 +250,7 @@ impl<'a> Job<'a> {
             return;
         }
         self.out.clipped += 1;
-        let area = cross(vertices.map(|vertex| vertex.projected.snapped));
+        let area = cross(three(vertices, |vertex| vertex.projected.snapped));
         if !self.faces(current, area) {
             return;
         }

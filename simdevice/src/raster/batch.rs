@@ -5,6 +5,7 @@ use super::color::Quads;
 use super::fragment::{BATCH_LANES, Interface};
 use super::setup::Setup;
 use crate::geometry::{Primitive, PrimitiveKind, Varyings};
+use crate::lanes::{bits_of, both, three};
 use crate::packet::draw::{FragmentInput, Interpolation, Sampling};
 use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x16};
@@ -194,7 +195,7 @@ impl Batch {
             let at = vertex as usize * varyings.per_vertex;
             varyings.values.get(at..at + varyings.per_vertex)
         };
-        let [a, b, c] = primitive.vertices.map(|v| of_vertex(v).unwrap_or_default());
+        let [a, b, c] = three(primitive.vertices, |v| of_vertex(v).unwrap_or_default());
         let provoking = of_vertex(primitive.provoking).unwrap_or_default();
         let value = |vertex: &[u32], varying: u32| {
             f32::from_bits(vertex.get(varying as usize).copied().unwrap_or(0))
@@ -433,7 +434,7 @@ impl Batch {
             let [a, da, db] = self.attribute(simd, chunk, varying, per_record);
             let b1 = f32x16::simd_from(simd, *b1);
             let b2 = f32x16::simd_from(simd, *b2);
-            *out = Chunk(db.mul_add(b2, da.mul_add(b1, a)).to_bits().into());
+            *out = Chunk(bits_of(db.mul_add(b2, da.mul_add(b1, a))).into());
         }
     }
 
@@ -515,27 +516,27 @@ impl Batch {
                 // At the centres it is left to [`Batch::interpolate`].
                 let linear = self.centroid_at(simd, chunk, samples.positions);
                 let [b1, b2] = match interpolation {
-                    Interpolation::Flat => return a.to_bits().into(),
+                    Interpolation::Flat => return bits_of(a).into(),
                     Interpolation::Linear => [linear[0], linear[1]],
                     Interpolation::Perspective => self.perspective_at(simd, chunk, linear),
                 };
-                db.mul_add(b2, da.mul_add(b1, a)).to_bits().into()
+                bits_of(db.mul_add(b2, da.mul_add(b1, a))).into()
             }
             FragmentInput::FragCoord(2) => {
                 let depth = f32x16::from_slice(simd, &self.depth[16 * chunk..][..16]);
-                depth.to_bits().into()
+                bits_of(depth).into()
             }
             FragmentInput::FragCoord(3) => {
                 let [.., inverse_w] = self.linear_at(simd, chunk);
                 let scale = self.of_records(simd, chunk, |record| record.scale);
-                (inverse_w * scale).to_bits().into()
+                bits_of(inverse_w * scale).into()
             }
             FragmentInput::PointCoord(axis) => {
                 let [b1, b2, _] = self.linear_at(simd, chunk);
                 let value = if axis == 0 { b1 + b2 } else { b2 };
                 // Other primitives have none.
                 let is_point = self.of_records(simd, chunk, |record| f32::from(record.is_point));
-                (value * is_point).to_bits().into()
+                bits_of(value * is_point).into()
             }
             _ => self.scalar_input(kind, chunk, samples),
         }
@@ -620,7 +621,7 @@ pub fn at_sample<S: Simd>(
     setup: &Setup,
     position: [i32; 2],
 ) -> BlockValues<S> {
-    let [x, y] = position.map(offset);
+    let [x, y] = both(position, offset);
     let move_by = |value: f32x16<S>, [dx, dy]: [f32; 2]| value + (dx * x + dy * y);
     BlockValues {
         barycentrics: [
@@ -635,5 +636,5 @@ pub fn at_sample<S: Simd>(
 /// Bits as lanes.
 #[inline(always)]
 pub fn as_floats<S: Simd>(simd: S, chunk: &Chunk) -> f32x16<S> {
-    f32x16::from_bits(u32x16::simd_from(simd, chunk.0))
+    u32x16::simd_from(simd, chunk.0).bitcast()
 }

@@ -4,6 +4,7 @@
 use super::blend::clamp_range;
 use super::tile::AREA;
 use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
+use crate::lanes::bits_of;
 use crate::packet::draw::LogicOp;
 use crate::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
 use crate::texture::unorm8_fraction;
@@ -93,7 +94,8 @@ impl Quads {
     pub fn tiles(&self, samples: usize) -> [usize; 4] {
         // A power of two.
         let shift = (samples * AREA).trailing_zeros();
-        self.first.map(|first| first >> shift)
+        let [a, b, c, d] = self.first;
+        [a >> shift, b >> shift, c >> shift, d >> shift]
     }
 
     /// The words of 16 lanes' texels of a word each.
@@ -261,12 +263,12 @@ impl ColorOutput {
                     Some(equations) => {
                         let stored = u32x16::simd_from(simd, quads.load(words));
                         let mut destination = [f32x16::splat(simd, 0.0); 4];
-                        destination[0] = f32x16::from_bits(stored);
+                        destination[0] = stored.bitcast();
                         destination[3] = f32x16::splat(simd, 1.0);
                         self.blend(simd, equations, source, second, &destination)
                     }
                 };
-                quads.store(words, lanes, &red.to_bits().into());
+                quads.store(words, lanes, &bits_of(red).into());
             }
             Codec::Words => self.write_words(simd, source, second, lanes, quads, words),
             Codec::Other => self.write_other(simd, source, second, lanes, quads, words),
@@ -315,10 +317,10 @@ impl ColorOutput {
         };
         let [r, g, b, a] = blended;
         let components: [[u32; 16]; 4] = [
-            r.to_bits().into(),
-            g.to_bits().into(),
-            b.to_bits().into(),
-            a.to_bits().into(),
+            bits_of(r).into(),
+            bits_of(g).into(),
+            bits_of(b).into(),
+            bits_of(a).into(),
         ];
         for lane in 0..16 {
             if lanes >> lane & 1 == 1 {
@@ -543,7 +545,7 @@ fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
     if is_fused(simd) {
         // Rounded once, to the nearest integer; 127.5 is the only tie.
         let scaled = value.mul_add(f32x16::splat(simd, 255.0), f32x16::splat(simd, NO_FRACTION));
-        return scaled.to_bits();
+        return bits_of(scaled);
     }
     // 255 v = 256 v - v: the first is exact, so the nearest integer to it is the result or one more.
     let scaled = value * 256.0;
@@ -551,7 +553,7 @@ fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
     let excess = (scaled - (rounded - NO_FRACTION) + 0.5) - value;
     let more: mask32x16<S> = excess.simd_lt(0.0);
     let one = more.select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
-    (rounded - one).to_bits()
+    bits_of(rounded - one)
 }
 
 /// Four bytes of 0 to 1 in a word, each to nearest.

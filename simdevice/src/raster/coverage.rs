@@ -191,8 +191,7 @@ impl<const N: usize> Coverage<N> {
     #[inline(always)]
     fn evaluate_blocks<S: Simd>(&mut self, simd: S, crossings: &[Crossing<'_, N>]) {
         let mut values = [[0i32; 16]; 4];
-        let (mut whole, mut some) = ([0u32; N], [0u32; N]);
-        (whole, some) = (whole.map(|_| u32::MAX), some.map(|_| u32::MAX));
+        let (mut whole, mut some) = ([u32::MAX; N], [u32::MAX; N]);
         for (crossing, values) in crossings.iter().zip(&mut values) {
             let (a, b) = (crossing.edge.a as i32, crossing.edge.b as i32);
             let blocks =

@@ -4,6 +4,7 @@
 //! floating-point one, which are ordered as the numbers are because depth is clamped to 0 to 1.
 
 use crate::format::Format;
+use crate::lanes::bits_of;
 use crate::packet::draw::{CompareOp, DepthStencil, StencilFace, StencilOp};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
@@ -33,7 +34,7 @@ impl DepthCode {
         let depth = depth.max_precise(low).min(high);
         match self {
             // Negative zero becomes zero.
-            Self::Float => (depth + 0.0).to_bits(),
+            Self::Float => bits_of(depth + 0.0),
             Self::Unorm(bits) => {
                 let scaled = depth * (1u32 << bits) as f32;
                 // (2^n - 1) d = 2^n d - d: the first is exact, so the nearest integer to it is the result or one more.

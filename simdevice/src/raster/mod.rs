@@ -8,6 +8,7 @@ mod depth;
 pub mod fragment;
 pub mod gaussian;
 mod output;
+mod pending;
 mod plane;
 mod prepared;
 pub(crate) mod primitives;

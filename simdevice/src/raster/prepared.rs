@@ -12,7 +12,7 @@ use crate::device::Device;
 use crate::geometry::PrimitiveDraw;
 use crate::packet::draw::{FragmentInput, Interpolation, LogicOp};
 use crate::packet::{BlendState, Rect};
-use crate::skips::Skips;
+use crate::skips::{Skip, Skips};
 use fearless_simd::Level;
 use std::time::Duration;
 
@@ -49,6 +49,8 @@ pub struct TileDraw<'a> {
     pub(super) keeps_all: bool,
     /// Nothing happens between a fragment's shading and its blending: all that is covered is written.
     pub(super) plain: bool,
+    /// Tiles that a primitive covers may wait to be shaded until it is clear that none overwrites them.
+    pub(super) defers: bool,
     /// Samples are counted after shading, which may discard some.
     pub(super) count_late: bool,
     /// Every sample is shaded for itself.
@@ -126,6 +128,15 @@ impl<'a> TileDraw<'a> {
             })
         };
         let viewports = state.viewports.iter();
+        let plain = plain && !state.alpha_to_one;
+        // What was recorded is what hardware without this does.
+        let defers = device.config().skips.has(Skip::OverwrittenQuads)
+            && plain
+            && !multisampled
+            && state.sample_mask & 1 == 1
+            && interface.is_some_and(|interface| !interface.has_side_effects)
+            && colors.iter().flatten().all(ColorOutput::overwrites)
+            && draw.record.is_none();
         Self {
             draw,
             stage,
@@ -136,7 +147,8 @@ impl<'a> TileDraw<'a> {
             timing,
             filter,
             keeps_all,
-            plain: plain && !state.alpha_to_one,
+            plain,
+            defers,
             count_late,
             per_sample,
             positions: if multisampled { &SAMPLES_4 } else { &CENTER },

@@ -1,12 +1,13 @@
 //! Triangle mode of the tile engine: the primitives of a draw, one after another, through coverage, early tests and
 //! shading.
 
-use super::batch::{Batch, BlockValues, Needs, QUADS, Quad, Samples, at_sample};
+use super::batch::{Batch, BlockValues, Needs, QUADS, Quad, Samples, at_sample, offset};
 use super::color::Quads;
 use super::coverage::{Coverage, bits};
 use super::depth::Tests;
 use super::fragment::{FragmentStage, Machines};
 use super::output;
+use super::pending::Pending;
 use super::prepared::Timing;
 pub use super::prepared::{Targets, TileDraw};
 use super::setup::Setup;
@@ -14,12 +15,15 @@ use super::tile::{AREA, SIDE, Tile};
 use super::{Plane, TILE_SIZE};
 use crate::counters::{Counter, Counters};
 use crate::geometry::{Primitive, Varyings};
+use crate::lanes::both;
 use crate::packet::Rect;
 use crate::skips::Skip;
 use crate::trace::MacroTileWork;
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
+
+mod whole;
 
 /// The tile buffers of a worker.
 #[derive(Debug)]
@@ -33,6 +37,7 @@ pub struct Buffers {
 #[derive(Debug, Default)]
 pub struct Scratch {
     batch: Box<Batch>,
+    pending: Box<Pending>,
 }
 
 /// From how many blocks of a tile on it pays to ask whether a primitive is hidden in all of it.
@@ -90,10 +95,12 @@ impl TileDraw<'_> {
             .batch
             .begin(self.needs, place.at, place.size, self.skips);
         let level = self.level;
+        let pending = &mut *scratch.pending;
+        pending.clear();
         let done = if self.positions.len() == 1 {
-            dispatch!(level, simd => renderer.run::<_, 1>(simd))
+            dispatch!(level, simd => renderer.run::<_, 1>(simd, pending))
         } else {
-            dispatch!(level, simd => renderer.run::<_, 4>(simd))
+            dispatch!(level, simd => renderer.run::<_, 4>(simd, pending))
         };
         let done = done.and_then(|()| renderer.flush());
         let (passed, masked) = (renderer.samples_passed, renderer.quads_masked);
@@ -133,15 +140,23 @@ struct Current<'p> {
     primitive: &'p Primitive,
     varyings: &'p Varyings,
     setup: &'p Setup,
+    /// Its chunk among the draw's, and its place there.
+    place: (usize, u32),
     /// Its record in the batch, once it has one.
     record: Option<u16>,
+    /// Where it is kept, once a tile waits for it.
+    kept: Option<u8>,
     range: (f32, f32),
 }
 
 impl Renderer<'_, '_> {
     /// All primitives.
     #[inline(always)]
-    fn run<S: Simd, const N: usize>(&mut self, simd: S) -> Result<(), Stopped> {
+    fn run<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        pending: &mut Pending,
+    ) -> Result<(), Stopped> {
         let size = self.place.size;
         let whole = Rect {
             x: (self.place.at[0] * size) as i32,
@@ -157,7 +172,7 @@ impl Renderer<'_, '_> {
             ..draw.needs
         };
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
-        for chunk in &draw.draw.chunks {
+        for (number, chunk) in draw.draw.chunks.iter().enumerate() {
             for &index in chunk.bins.of(self.place.at, self.place.layer) {
                 let Some(primitive) = chunk.primitives.get(index as usize) else {
                     continue;
@@ -172,18 +187,32 @@ impl Renderer<'_, '_> {
                 if !setup.prepare(simd, primitive, draw.positions, clip.1, needs) {
                     continue;
                 }
-                let range = draw.ranges.get(usize::from(primitive.viewport));
                 let mut current = Current {
                     primitive,
                     varyings: &chunk.varyings,
                     setup: &setup,
+                    place: (number, index),
                     record: None,
-                    range: range.copied().unwrap_or((0.0, 1.0)),
+                    kept: None,
+                    range: self.depth_range(primitive),
                 };
-                self.primitive(simd, &mut current, &mut coverage, [whole.x, whole.y])?;
+                let corner = [whole.x, whole.y];
+                self.primitive(simd, &mut current, &mut coverage, pending, corner)?;
+            }
+        }
+        if N == 1 && draw.defers {
+            for tile in 0..(size / TILE_SIZE).pow(2) as usize {
+                self.shade_pending(simd, pending, tile)?;
             }
         }
         Ok(())
+    }
+
+    /// What a primitive's depth is clamped to.
+    #[inline(always)]
+    fn depth_range(&self, primitive: &Primitive) -> (f32, f32) {
+        let range = self.draw.ranges.get(usize::from(primitive.viewport));
+        range.copied().unwrap_or((0.0, 1.0))
     }
 
     /// One primitive, tile by tile.
@@ -193,6 +222,7 @@ impl Renderer<'_, '_> {
         simd: S,
         current: &mut Current<'_>,
         coverage: &mut Coverage<N>,
+        pending: &mut Pending,
         corner: [i32; 2],
     ) -> Result<(), Stopped> {
         let bounds = current.setup.bounds;
@@ -220,7 +250,7 @@ impl Renderer<'_, '_> {
                     work.list(tile, blocks);
                 }
                 if found {
-                    self.tile(simd, current, coverage, tile, [x, y])?;
+                    self.tile(simd, current, coverage, pending, (tile, [x, y]))?;
                 }
             }
         }
@@ -234,8 +264,8 @@ impl Renderer<'_, '_> {
         simd: S,
         current: &mut Current<'_>,
         coverage: &Coverage<N>,
-        tile: usize,
-        at: [i32; 2],
+        pending: &mut Pending,
+        (tile, at): (usize, [i32; 2]),
     ) -> Result<(), Stopped> {
         let draw = self.draw;
         let early = match draw.timing {
@@ -255,6 +285,16 @@ impl Renderer<'_, '_> {
                 work.hide(tile, coverage.blocks.count_ones());
             }
             return Ok(());
+        }
+        if N == 1 && draw.defers {
+            if coverage.is_whole() {
+                return self.whole_tile(simd, current, pending, (tile, at));
+            }
+            if pending.waits(tile) {
+                self.shade_pending(simd, pending, tile)?;
+                // The batch may have begun anew.
+                current.record = None;
+            }
         }
         let state = &draw.draw.state;
         let masked = state.sample_mask & ((1 << N) - 1) != (1 << N) - 1;
@@ -283,7 +323,8 @@ impl Renderer<'_, '_> {
                 values.depth = add(setup.depth([b1, b2]), setup.lane_depth);
             }
             if let Some(tests) = early {
-                self.test(simd, tests, current, &values, &mut lanes, (tile, block));
+                let depth = values.depth;
+                self.test(simd, tests, current, depth, &mut lanes, (tile, block));
             }
             if let Some(work) = &mut self.work {
                 work.test(tile, &coverage.lanes[block], &lanes);
@@ -420,7 +461,7 @@ impl Renderer<'_, '_> {
         simd: S,
         tests: &Tests,
         current: &Current<'_>,
-        values: &BlockValues<S>,
+        at_centers: f32x16<S>,
         lanes: &mut [u16; N],
         (tile, block): (usize, usize),
     ) {
@@ -429,11 +470,12 @@ impl Renderer<'_, '_> {
             if *lanes == 0 {
                 continue;
             }
-            let depth = if N == 1 {
-                values.depth
-            } else {
-                at_sample(values, current.setup, draw.positions[sample]).depth
-            };
+            let mut depth = at_centers;
+            if N != 1 {
+                let [x, y] = draw.positions[sample];
+                let [dx, dy] = current.setup.depth_slopes;
+                depth += dx * offset(x) + dy * offset(y);
+            }
             let code = tests.code.encode(simd, depth, current.range);
             let first = (tile * N + sample) * AREA + 16 * block;
             let quads = Quads {
@@ -469,7 +511,7 @@ impl Renderer<'_, '_> {
         let (low, high) = current.range;
         let code = |depth: f32| tests.code.encode_one(depth.max(low).min(high));
         let stored = self.buffers.depth.range(simd, tile);
-        let hidden = tests.hides(bounds.map(code), stored);
+        let hidden = tests.hides(both(bounds, code), stored);
         self.counters.add(Counter::TilesHidden, hidden.into());
         hidden
     }

@@ -3,6 +3,7 @@
 use super::batch::Needs;
 use super::coverage::{LANE_X, LANE_Y};
 use crate::geometry::{Primitive, PrimitiveKind};
+use crate::lanes::{both, three};
 use crate::packet::Rect;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
@@ -92,13 +93,14 @@ impl Moved {
     /// they were.
     #[inline(always)]
     fn new(numerators: [[i64; 2]; 2], area: i64, offsets: [[i16; 2]; 3]) -> Option<Self> {
-        let [o0, o1, o2] =
-            offsets.map(|offset| offset.map(|offset| f64::from(offset) / OFFSETS_IN_SUB_PIXEL));
+        let [o0, o1, o2] = three(offsets, |offset| {
+            both(offset, |offset| f64::from(offset) / OFFSETS_IN_SUB_PIXEL)
+        });
         let by = [
             [o2[1] - o0[1], o0[0] - o2[0]],
             [o0[1] - o1[1], o1[0] - o0[0]],
         ];
-        let [[a1, b1], [a2, b2]] = numerators.map(|n| n.map(|n| n as f64));
+        let [[a1, b1], [a2, b2]] = both(numerators, |n| both(n, |n| n as f64));
         let [[c1, d1], [c2, d2]] = by;
         // The large part is exact.
         let larger = a1 * d2 + c1 * (b2 + d2) - b1 * c2 - d1 * (a2 + c2);
@@ -140,12 +142,13 @@ impl Setup {
         let mut corners = [p0, p1, p2, p2];
         let edge_count = if parallelogram { 4 } else { 3 };
         if parallelogram {
-            corners[3] = std::array::from_fn(|axis| {
+            corners[3] = both([0, 1], |axis| {
                 p0[axis].saturating_add(p2[axis]).saturating_sub(p1[axis])
             });
         }
         let extent = |axis: usize| {
-            let [a, b, c, d] = corners.map(|corner| corner[axis]);
+            let [a, b, c, d] = corners;
+            let [a, b, c, d] = [a[axis], b[axis], c[axis], d[axis]];
             (a.min(b).min(c).min(d), a.max(b).max(c).max(d))
         };
         let ((left, right), (top, bottom)) = (extent(0), extent(1));
@@ -166,7 +169,7 @@ impl Setup {
         if bounds.is_empty() {
             return false;
         }
-        let wide = |p: [i32; 2]| p.map(i64::from);
+        let wide = |p: [i32; 2]| both(p, i64::from);
         let (w0, w1, w2) = (wide(p0), wide(p1), wide(p2));
         let area = (w1[0] - w0[0]) * (w2[1] - w0[1]) - (w1[1] - w0[1]) * (w2[0] - w0[0]);
         if area <= 0 {
@@ -187,24 +190,24 @@ impl Setup {
         let moved =
             Moved::new(numerators, area, primitive.offsets).unwrap_or_else(|| Moved::nowhere(area));
         let inverse_area = 1.0 / moved.area;
-        let sums: [[f64; 2]; 2] = std::array::from_fn(|corner| {
+        let sums = both([0, 1], |corner: usize| {
             let ([a, b], [c, d]) = (numerators[corner], moved.numerators[corner]);
             [a as f64 + c, b as f64 + d]
         });
-        let slopes = sums.map(|n| n.map(|n| n * ONE as f64 * inverse_area));
-        let depth = primitive.depth.map(f64::from);
+        let slopes = both(sums, |n| both(n, |n| n * ONE as f64 * inverse_area));
+        let depth = three(primitive.depth, f64::from);
         let (d1, d2) = (depth[1] - depth[0], depth[2] - depth[0]);
-        let depth_slopes: [f32; 2] =
-            std::array::from_fn(|axis| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32);
+        let along = |axis: usize| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32;
+        let depth_slopes = [along(0), along(1)];
         let [iw0, iw1, iw2] = primitive.inverse_w;
         let affine = iw0 == iw1 && iw0 == iw2;
         let scale = if affine { iw0 } else { 1.0 };
         let weights = if affine { [1.0; 3] } else { [iw0, iw1, iw2] };
-        let inverse_w = weights.map(f64::from);
+        let inverse_w = three(weights, f64::from);
         let (d1, d2) = (inverse_w[1] - inverse_w[0], inverse_w[2] - inverse_w[0]);
-        let w_slopes: [f32; 2] =
-            std::array::from_fn(|axis| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32);
-        let slopes = slopes.map(|slope| slope.map(|slope| slope as f32));
+        let along = |axis: usize| (d1 * slopes[0][axis] + d2 * slopes[1][axis]) as f32;
+        let w_slopes = [along(0), along(1)];
+        let slopes = both(slopes, |slope| both(slope, |slope| slope as f32));
         let lanes = |[dx, dy]: [f32; 2]| lane_offsets(simd, dx, dy);
         self.edge_count = edge_count;
         self.bounds = bounds;
@@ -264,7 +267,7 @@ impl Setup {
     pub fn depth_bounds(&self, x: i32, y: i32) -> [f32; 2] {
         let half = super::tile::SIDE as i32 / 2;
         let middle = self.depth(self.barycentrics(x + half, y + half));
-        let [dx, dy] = self.depth_slopes.map(f32::abs);
+        let [dx, dy] = both(self.depth_slopes, f32::abs);
         // From the middle of the pixel beside the tile's middle, samples are at most 8.5 pixels away.
         let reach = 8.6 * (dx + dy);
         let margin = 1e-5 * (middle.abs() + reach) + f32::MIN_POSITIVE;
@@ -279,11 +282,25 @@ impl Setup {
     }
 }
 
+/// The columns and rows of lanes as floats.
+const FLOAT_X: [f32; 16] = as_floats(LANE_X);
+const FLOAT_Y: [f32; 16] = as_floats(LANE_Y);
+
+const fn as_floats(of: [i32; 16]) -> [f32; 16] {
+    let mut out = [0.0; 16];
+    let mut lane = 0;
+    while lane < 16 {
+        out[lane] = of[lane] as f32;
+        lane += 1;
+    }
+    out
+}
+
 /// `dx x + dy y` of the lanes of a block.
 #[inline(always)]
 fn lane_offsets<S: Simd>(simd: S, dx: f32, dy: f32) -> [f32; 16] {
-    let x = f32x16::simd_from(simd, LANE_X.map(|x| x as f32));
-    let y = f32x16::simd_from(simd, LANE_Y.map(|y| y as f32));
+    let x = f32x16::simd_from(simd, FLOAT_X);
+    let y = f32x16::simd_from(simd, FLOAT_Y);
     (x * dx + y * dy).into()
 }
 

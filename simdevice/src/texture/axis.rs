@@ -88,6 +88,32 @@ fn vector_axis<S: Simd>(
     }
 }
 
+/// The texels of 16 coordinates along one axis for linear filters, in vectors: without borders or offsets.
+#[derive(Clone, Copy)]
+pub(super) struct Taps<S: Simd> {
+    pub first: u32x16<S>,
+    pub second: u32x16<S>,
+    /// Weight of the second.
+    pub weight: f32x16<S>,
+}
+
+/// As [`axis`], for normalized coordinates and a linear filter.
+#[inline(always)]
+pub(super) fn taps<S: Simd>(
+    simd: S,
+    mode: AddressMode,
+    coordinate: &Lanes,
+    size: f32x16<S>,
+) -> Taps<S> {
+    let shifted = texel_coordinate(simd, mode, true, *coordinate, size) - 0.5;
+    let whole = floor(simd, shifted);
+    Taps {
+        first: wrap(simd, mode, whole, size, false),
+        second: wrap(simd, mode, whole + 1.0, size, false),
+        weight: shifted - whole,
+    }
+}
+
 /// As [`super::address::texel_coordinate`].
 #[inline(always)]
 fn texel_coordinate<S: Simd>(

@@ -12,6 +12,49 @@ use isa::resources::{Lanes, LodRequest, SampleRequest};
 /// A float for each of 16 lanes.
 pub(super) type Floats = [f32; CHUNK_LANES];
 
+/// Quads of a chunk.
+pub(super) const QUADS: usize = CHUNK_LANES / 4;
+
+/// The mip levels of four quads, as [`Selection`] has them of lanes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct QuadSelection {
+    pub high: [u32; QUADS],
+    pub low: [u32; QUADS],
+    pub weight: [f32; QUADS],
+}
+
+/// As [`select`], for what asks for [`LodRequest::Automatic`] of an image that is no cube, where one filter serves.
+#[inline(always)]
+pub(super) fn select_quads(
+    surface: &Surface,
+    sampler: &Sampler,
+    request: &SampleRequest,
+) -> QuadSelection {
+    let mut selection = QuadSelection {
+        high: [0; QUADS],
+        low: [0; QUADS],
+        weight: [0.0; QUADS],
+    };
+    let last = surface.levels.len() as u32 - 1;
+    if last == 0 {
+        return selection;
+    }
+    let bias = sampler.mip_lod_bias.clamp(-MAX_LOD_BIAS, MAX_LOD_BIAS);
+    let least = sampler.min_lod.max(0.0);
+    let linear = sampler.mipmap_mode == MipmapMode::Linear && !surface.is_integer();
+    for (quad, lod) in of_quads(surface, request).into_iter().enumerate() {
+        let lambda = (lod + bias).max(least).min(sampler.max_lod);
+        let level = lambda.clamp(0.0, last as f32);
+        let whole = level as i32;
+        let fraction = level - whole as f32;
+        let up = i32::from(!linear && fraction > 0.5);
+        selection.high[quad] = (whole + up) as u32;
+        selection.low[quad] = (whole + 1).min(last as i32) as u32;
+        selection.weight[quad] = if linear { fraction } else { 0.0 };
+    }
+    selection
+}
+
 /// The mip levels of 16 lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Selection {
@@ -106,7 +149,7 @@ fn nearest_level(level: f32) -> u32 {
 fn biased(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Floats {
     let base: Floats = match &request.lod {
         LodRequest::Explicit(lod) => lod.map(f32::from_bits),
-        LodRequest::Implicit { .. } => implicit(surface, request),
+        LodRequest::Automatic | LodRequest::Implicit { .. } => implicit(surface, request),
         LodRequest::Gradient { dx, dy, .. } => std::array::from_fn(|lane| {
             let along = |d: &[Lanes; 3]| d.map(|lanes| f32::from_bits(lanes[lane]));
             let (x, y) = (along(dx), along(dy));
@@ -130,6 +173,7 @@ fn biased(surface: &Surface, sampler: &Sampler, request: &SampleRequest) -> Floa
 fn clamped(sampler: &Sampler, request: &SampleRequest, biased: &Floats) -> Floats {
     let minimum = match &request.lod {
         LodRequest::Implicit { minimum, .. } | LodRequest::Gradient { minimum, .. } => minimum,
+        LodRequest::Automatic => &[0; CHUNK_LANES],
         LodRequest::Explicit(_) => &[f32::NEG_INFINITY.to_bits(); CHUNK_LANES],
     };
     let mut clamped = *biased;
@@ -152,7 +196,19 @@ fn implicit(surface: &Surface, request: &SampleRequest) -> Floats {
             scale_lod(surface, request, lane, dx, dy)
         });
     }
-    let mut right = [0.0; CHUNK_LANES / 4];
+    let mut lods = [0.0; CHUNK_LANES];
+    let quads = of_quads(surface, request);
+    for (lods, quad) in lods.chunks_exact_mut(4).zip(quads) {
+        lods.fill(quad);
+    }
+    lods
+}
+
+/// As [`implicit`], a number for each quad, of images that aren't cubes.
+#[inline(always)]
+fn of_quads(surface: &Surface, request: &SampleRequest) -> [f32; QUADS] {
+    let value = |axis: usize, lane: usize| f32::from_bits(request.coordinate[axis][lane]);
+    let mut right = [0.0; QUADS];
     let mut below = right;
     for axis in 0..request.shape.dimension.coordinates() {
         let size = surface.levels[0].extent[axis] as f32;
@@ -164,9 +220,9 @@ fn implicit(surface: &Surface, request: &SampleRequest) -> Floats {
             *below += to_below * to_below;
         }
     }
-    let mut lods = [0.0; CHUNK_LANES];
-    for (lods, (right, below)) in lods.chunks_exact_mut(4).zip(right.iter().zip(below)) {
-        lods.fill(half_log2(right.max(below)));
+    let mut lods = [0.0; QUADS];
+    for quad in 0..QUADS {
+        lods[quad] = half_log2(right[quad].max(below[quad]));
     }
     lods
 }

@@ -16,6 +16,7 @@ mod fetch;
 mod filter;
 mod lod;
 mod packing;
+mod plain;
 mod sampler;
 mod surface;
 mod table;

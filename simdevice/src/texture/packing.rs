@@ -228,26 +228,54 @@ fn bilinear<S: Simd, T: Texels>(
     weight_x: &Floats,
     weight_y: &Floats,
 ) -> [Floats; 4] {
-    let (top, bottom) = (row_start(simd, rows, 0), row_start(simd, rows, 1));
-    let (left, right) = (
-        u32x16::simd_from(simd, rows.x[0]),
-        u32x16::simd_from(simd, rows.x[1]),
-    );
-    let x = f32x16::simd_from(simd, *weight_x);
-    let y = f32x16::simd_from(simd, *weight_y);
-    let mut upper = T::load(simd, words, top + left);
-    let other = T::load(simd, words, top + right);
-    for c in 0..T::COMPONENTS {
-        upper[c] = upper[c] + x * (other[c] - upper[c]);
-    }
-    let mut lower = T::load(simd, words, bottom + left);
-    let other = T::load(simd, words, bottom + right);
+    let around = Around {
+        rows: [row_start(simd, rows, 0), row_start(simd, rows, 1)],
+        columns: [
+            u32x16::simd_from(simd, rows.x[0]),
+            u32x16::simd_from(simd, rows.x[1]),
+        ],
+        weights: [
+            f32x16::simd_from(simd, *weight_x),
+            f32x16::simd_from(simd, *weight_y),
+        ],
+    };
+    let texel = around.filter::<T>(simd, words);
     let mut out = [[0.0; CHUNK_LANES]; 4];
     for c in 0..T::COMPONENTS {
-        lower[c] = lower[c] + x * (other[c] - lower[c]);
-        out[c] = (upper[c] + y * (lower[c] - upper[c])).into();
+        out[c] = texel[c].into();
     }
     out
+}
+
+/// Four texels around each of 16 points.
+#[derive(Clone, Copy)]
+pub(super) struct Around<S: Simd> {
+    /// Where the upper and the lower row begin.
+    pub rows: [u32x16<S>; 2],
+    /// The left and the right column.
+    pub columns: [u32x16<S>; 2],
+    /// Of the right column, and of the lower row.
+    pub weights: [f32x16<S>; 2],
+}
+
+impl<S: Simd> Around<S> {
+    /// The weighted mean.
+    #[inline(always)]
+    pub fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32]) -> [f32x16<S>; 4] {
+        let ([top, bottom], [left, right], [x, y]) = (self.rows, self.columns, self.weights);
+        let mut upper = T::load(simd, words, top + left);
+        let other = T::load(simd, words, top + right);
+        for c in 0..T::COMPONENTS {
+            upper[c] = upper[c] + x * (other[c] - upper[c]);
+        }
+        let mut lower = T::load(simd, words, bottom + left);
+        let other = T::load(simd, words, bottom + right);
+        for c in 0..T::COMPONENTS {
+            lower[c] = lower[c] + x * (other[c] - lower[c]);
+            upper[c] = upper[c] + y * (lower[c] - upper[c]);
+        }
+        upper
+    }
 }
 
 /// Where the lanes' row `j` of two begins.
@@ -258,7 +286,7 @@ fn row_start<S: Simd>(simd: S, rows: &Rows<'_>, j: usize) -> u32x16<S> {
 }
 
 /// A [`Kind`] as a type.
-trait Texels {
+pub(super) trait Texels {
     /// How many components are stored.
     const COMPONENTS: usize;
 
@@ -346,7 +374,7 @@ impl Texels for Unorm8x2 {
     }
 }
 
-struct Unorm8x4;
+pub(super) struct Unorm8x4;
 
 impl Texels for Unorm8x4 {
     const COMPONENTS: usize = 4;
@@ -363,7 +391,7 @@ impl Texels for Unorm8x4 {
     }
 }
 
-struct Srgb8x4;
+pub(super) struct Srgb8x4;
 
 impl Texels for Srgb8x4 {
     const COMPONENTS: usize = 4;

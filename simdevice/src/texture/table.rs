@@ -5,7 +5,7 @@ use fearless_simd::{Level, dispatch};
 use super::sampler::Sampler;
 use super::surface::Surface;
 use super::view::ImageBinding;
-use super::{batch, fetch, filter, lod};
+use super::{batch, fetch, filter, lod, plain};
 use isa::ir::{AtomicOp, Dimension, ImageShape};
 use isa::resources::{ImageUnit, Lanes, SampleRequest, TexelRequest};
 
@@ -65,7 +65,12 @@ impl ImageUnit for ImageTable {
             return Default::default();
         };
         let batched = if self.batched {
-            dispatch!(self.level, simd => batch::sample(simd, surface, sampler, request))
+            dispatch!(self.level, simd => {
+                match plain::sample(simd, surface, sampler, request) {
+                    None => batch::sample(simd, surface, sampler, request),
+                    found => found,
+                }
+            })
         } else {
             None
         };

@@ -42,12 +42,25 @@ impl Workload {
     /// # Panics
     /// If the device cannot do it, or there is no such name.
     pub fn new(gpu: &Gpu, name: &str) -> Result<Self, Missing> {
+        Self::smaller(gpu, name, 1)
+    }
+
+    /// As [`Workload::new`], with width, height and numbers of triangles divided by `by`.
+    ///
+    /// # Errors
+    /// As [`Workload::new`].
+    ///
+    /// # Panics
+    /// As [`Workload::new`].
+    pub fn smaller(gpu: &Gpu, name: &str, by: u32) -> Result<Self, Missing> {
+        let size = SIZE.map(|side| side / by);
+        let count = |triangles: usize| triangles / by as usize;
         let plain = TargetOptions {
-            size: SIZE,
+            size,
             ..TargetOptions::default()
         };
         let deep = TargetOptions {
-            size: SIZE,
+            size,
             ..TargetOptions::with_depth(vk::Format::D32_SFLOAT)
         };
         let tested = PipelineOptions {
@@ -65,15 +78,15 @@ impl Workload {
         let default = PipelineOptions::default();
         let workload = match name {
             "fill" => Self::of(gpu, &plain, &default, &one_big()),
-            "small triangles" => Self::of(gpu, &deep, &tested, &small(1_000_000)),
+            "small triangles" => Self::of(gpu, &deep, &tested, &small(count(1_000_000), size)),
             "trilinear texture" => Self::textured(gpu, &plain),
             "layers front to back" => Self::of(gpu, &deep, &tested, &layers(32, false)),
             "layers back to front" => Self::of(gpu, &deep, &tested, &layers(32, true)),
-            "vertices" => Self::vertices(gpu, &plain),
+            "vertices" => Self::vertices(gpu, &plain, by),
             "blended layers" => Self::of(gpu, &plain, &blended, &layers(8, true)),
             "four samples" => {
                 let target = TargetOptions { samples: 4, ..deep };
-                Self::of(gpu, &target, &tested, &small(100_000))
+                Self::of(gpu, &target, &tested, &small(count(100_000), size))
             }
             "african head 1080p" => Self::model(gpu, &deep)?,
             _ => panic!("no workload is called {name}"),
@@ -110,14 +123,14 @@ impl Workload {
     }
 
     /// A million vertices, shared by twice as many triangles that are too small to be seen.
-    fn vertices(gpu: &Gpu, target: &TargetOptions) -> Self {
-        const SIDE: u32 = 1000;
+    fn vertices(gpu: &Gpu, target: &TargetOptions, by: u32) -> Self {
+        let side = 1000 / by;
         let target = Target::new(gpu, target);
         let pipeline = Pipeline::new(gpu, &target, &PipelineOptions::default());
         let mut vertices = Vec::new();
-        for row in 0..SIDE {
-            for column in 0..SIDE {
-                let [x, y] = [column, row].map(|i| i as f32 / SIDE as f32 * 0.2 - 0.1);
+        for row in 0..side {
+            for column in 0..side {
+                let [x, y] = [column, row].map(|i| i as f32 / side as f32 * 0.2 - 0.1);
                 vertices.push(Vertex {
                     position: [x, y, 0.5, 1.0],
                     color: [x, y, 1.0, 1.0],
@@ -125,10 +138,10 @@ impl Workload {
             }
         }
         let mut indices = Vec::new();
-        for row in 0..SIDE - 1 {
-            for column in 0..SIDE - 1 {
-                let at = row * SIDE + column;
-                indices.extend([at, at + 1, at + SIDE, at + SIDE, at + 1, at + SIDE + 1]);
+        for row in 0..side - 1 {
+            for column in 0..side - 1 {
+                let at = row * side + column;
+                indices.extend([at, at + 1, at + side, at + side, at + 1, at + side + 1]);
             }
         }
         let buffer = Buffer::of(gpu, &vertices);
@@ -230,9 +243,9 @@ fn one_big() -> Vec<Vertex> {
 }
 
 /// Triangles of about four pixels.
-fn small(count: usize) -> Vec<Vertex> {
+fn small(count: usize, size: [u32; 2]) -> Vec<Vertex> {
     let mut rng = shapes::rng(302);
-    let pixel = [0, 1].map(|axis| 2.0 / SIZE[axis] as f32);
+    let pixel = size.map(|side| 2.0 / side as f32);
     let mut vertices = Vec::with_capacity(3 * count);
     for _ in 0..count {
         let center = [0; 2].map(|_| rng.random_range(-0.99..0.99f32));

@@ -55,10 +55,11 @@ impl Batch<'_> {
         }
     }
 
-    fn put_texel(&self, dst: &[Option<Reg>; 4], chunk: usize, texel: [Lanes; 4]) {
-        for (reg, lanes) in dst.iter().zip(texel) {
-            if let Some(reg) = reg {
-                self.file.set(self.slot(*reg), chunk, lanes);
+    #[inline(always)]
+    fn put_texel(&self, dst: &[Option<Reg>; 4], chunk: usize, texel: &[Lanes; 4]) {
+        for (index, lanes) in texel.iter().enumerate() {
+            if let Some(reg) = dst[index] {
+                self.file.set(self.slot(reg), chunk, *lanes);
             }
         }
     }
@@ -79,33 +80,62 @@ impl Batch<'_> {
     }
 
     pub fn sample(&self, sample: &Sample) {
+        // What isn't an operand stays as it is here for all chunks.
+        let mut request = SampleRequest {
+            mask: 0,
+            shape: sample.shape,
+            coordinate: [[0; CHUNK_LANES]; 4],
+            lod: LodRequest::Automatic,
+            offset: [[0; CHUNK_LANES]; 3],
+            compare: None,
+            gather: sample.gather,
+        };
+        let bound = fixed_point(&sample.image).zip(fixed_point(&sample.sampler));
         for chunk in 0..self.file.width() {
             let active = self.masks.chunk(MaskId::ACTIVE, chunk);
             if active == 0 {
                 continue;
             }
-            let images = self.bind_points(&sample.image, chunk);
-            let samplers = self.bind_points(&sample.sampler, chunk);
-            let mut request = SampleRequest {
-                mask: active,
-                shape: sample.shape,
-                coordinate: self.all_words(&sample.coordinate, chunk),
-                lod: self.lod_request(&sample.lod, chunk),
-                offset: self.all_words(&sample.offset, chunk),
-                compare: sample.compare.map(|reg| self.words(reg, chunk)),
-                gather: sample.gather,
+            for (index, reg) in sample.coordinate.iter().enumerate().take(4) {
+                request.coordinate[index] = self.words(*reg, chunk);
+            }
+            for (index, reg) in sample.offset.iter().enumerate().take(3) {
+                request.offset[index] = self.words(*reg, chunk);
+            }
+            if !is_automatic(&sample.lod) {
+                request.lod = self.lod_request(&sample.lod, chunk);
+            }
+            if let Some(reg) = sample.compare {
+                request.compare = Some(self.words(reg, chunk));
+            }
+            let texel = match bound {
+                Some((image, sampler)) => {
+                    request.mask = active;
+                    self.resources.images.sample(image, sampler, &request)
+                }
+                None => self.sample_each(sample, &mut request, chunk, active),
             };
-            let mut texel = [[0; CHUNK_LANES]; 4];
-            self.for_each_binding(&images, &samplers, active, |image, sampler, lanes| {
-                request.mask = lanes;
-                merge(
-                    &mut texel,
-                    &self.resources.images.sample(image, sampler, &request),
-                    lanes,
-                );
-            });
-            self.put_texel(&sample.dst, chunk, texel);
+            self.put_texel(&sample.dst, chunk, &texel);
         }
+    }
+
+    /// Samples of 16 lanes that may mean different images or samplers.
+    fn sample_each(
+        &self,
+        sample: &Sample,
+        request: &mut SampleRequest,
+        chunk: usize,
+        active: u16,
+    ) -> [Lanes; 4] {
+        let images = self.bind_points(&sample.image, chunk);
+        let samplers = self.bind_points(&sample.sampler, chunk);
+        let mut texel = [[0; CHUNK_LANES]; 4];
+        self.for_each_binding(&images, &samplers, active, |image, sampler, lanes| {
+            request.mask = lanes;
+            let found = self.resources.images.sample(image, sampler, request);
+            merge(&mut texel, &found, lanes);
+        });
+        texel
     }
 
     fn texel_request(
@@ -140,7 +170,7 @@ impl Batch<'_> {
                     lanes,
                 );
             });
-            self.put_texel(&read.dst, chunk, texel);
+            self.put_texel(&read.dst, chunk, &texel);
         }
     }
 
@@ -240,6 +270,22 @@ impl Batch<'_> {
         });
         answers
     }
+}
+
+/// The bind point that all lanes mean, if no index tells.
+fn fixed_point(binding: &Binding) -> Option<u32> {
+    (binding.index.is_none() && binding.count > 0).then_some(binding.slot)
+}
+
+/// Whether the level of detail comes from differences alone.
+fn is_automatic(lod: &Lod) -> bool {
+    matches!(
+        lod,
+        Lod::Implicit {
+            bias: None,
+            minimum: None
+        }
+    )
 }
 
 /// Takes some lanes of what was found.

@@ -1,6 +1,7 @@
 //! Powers of two, 16 at a time.
 
-use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use crate::lanes::{bits_of, floats_of};
+use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// A polynomial fitted to 2^f for f in [-1/2, 1/2], highest power first; relative error 9.2e-8.
 #[allow(
@@ -32,6 +33,6 @@ pub(super) fn exp2_of_negated<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     for coefficient in rest {
         p = p.mul_add(f, constant(coefficient));
     }
-    let (exponent, bits): (u32x16<S>, u32x16<S>) = (shifted.bitcast(), p.bitcast());
-    (bits + (exponent << 23)).bitcast()
+    let exponent = bits_of(shifted) << 23;
+    floats_of(bits_of(p) + exponent)
 }

@@ -13,6 +13,7 @@ use super::{
 };
 use crate::gaussian::locate;
 use crate::gaussian::project::Splat;
+use crate::lanes::{bits_of, floats_of};
 use crate::skips::Skip;
 use crate::trace::Run;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*, u32x16};
@@ -22,11 +23,11 @@ use scalar::Splat16;
 #[inline(always)]
 fn round<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let number = |value: f32| f32x16::splat(simd, value);
-    let bits: u32x16<S> = x.to_bits();
+    let bits: u32x16<S> = bits_of(x);
     // 13 bits go; a carry into the exponent is right.
     let even = (bits >> 13) & u32x16::splat(simd, 1);
     let normal = (bits + even + 0xFFF) & u32x16::splat(simd, !0x1FFF);
-    let normal = f32x16::from_bits(normal);
+    let normal = floats_of(normal);
     let infinite = normal * number(f32::INFINITY);
     let normal = normal.abs().simd_ge(65536.0).select(infinite, normal);
     // Below 2^-14 numbers are 2^-24 apart, as binary32's are between a half and one.
@@ -47,8 +48,8 @@ fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     for coefficient in rest {
         p = p * f + coefficient;
     }
-    let exponent = shifted.to_bits() << 23;
-    round(simd, f32x16::from_bits(p.to_bits() + exponent))
+    let exponent = bits_of(shifted) << 23;
+    round(simd, floats_of(bits_of(p) + exponent))
 }
 
 impl Thresholds {

@@ -8,6 +8,7 @@ use super::{
     LANE_X_64, LANE_Y, LANE_Y_64, LANES, NO_DEPTH, Record, Task, Thresholds,
 };
 use crate::gaussian::project::Splat;
+use crate::lanes::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, prelude::*, u32x16};
 
 /// The sign bit of a binary32 number.
@@ -143,8 +144,7 @@ impl Layer {
     ) {
         let mut reached = fall.simd_le(f32x16::splat(simd, thresholds.most_fall));
         let t = pixels.transmittance;
-        let bits: u32x16<S> = t.bitcast();
-        let finished: f32x16<S> = (bits | SIGN).bitcast();
+        let finished = floats_of(bits_of(t) | SIGN);
         if DEPTH == FIND_REACHED {
             pixels.transmittance = reached.select(finished, t);
             return;

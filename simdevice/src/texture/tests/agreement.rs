@@ -34,7 +34,8 @@ fn lanes(mut value: impl FnMut() -> u32) -> Lanes {
 }
 
 fn random_lod(rng: &mut ChaCha8Rng) -> LodRequest {
-    match rng.random_range(0..4) {
+    match rng.random_range(0..5) {
+        4 => LodRequest::Automatic,
         0 => LodRequest::Explicit(lanes(|| rng.random_range(-1f32..5.0).to_bits())),
         1 => LodRequest::Gradient {
             dx: [(); 3].map(|()| lanes(|| rng.random_range(-0.5f32..0.5).to_bits())),
@@ -176,6 +177,78 @@ fn at_once_or_one_by_one_is_the_same() {
             ];
             sampler.compare_op = Some(*ops.choose(&mut rng).unwrap());
             request.compare = Some(lanes(|| coordinate(&mut rng).to_bits()));
+        }
+        assert_agree(&image, sampler, &request);
+    }
+}
+
+/// Coordinates of four quads of a surface: anywhere, turned, near or far, or all of them odd.
+fn surface_coordinates(rng: &mut ChaCha8Rng) -> Vec<[f32; 4]> {
+    let mut at = Vec::new();
+    let odd = rng.random_range(0..4) == 0;
+    for _ in 0..4 {
+        let first = [(); 2].map(|()| rng.random_range(-2.0..3.0f32));
+        let step = 2f32.powf(rng.random_range(-9.0..1.0));
+        let [right, below] = [(); 2].map(|()| [(); 2].map(|()| step * rng.random_range(-1.0..1.0)));
+        for lane in 0..4 {
+            let (x, y) = ((lane & 1) as f32, (lane >> 1) as f32);
+            let [s, t] = [0, 1].map(|axis| first[axis] + x * right[axis] + y * below[axis]);
+            at.push(if odd {
+                [(); 4].map(|()| coordinate(rng))
+            } else {
+                [s, t, 0.0, 0.0]
+            });
+        }
+    }
+    at
+}
+
+#[test]
+fn plain_samples_are_the_same_one_by_one() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let formats = [
+        Format::R8G8B8A8Unorm,
+        Format::B8G8R8A8Unorm,
+        Format::R8G8B8A8Srgb,
+        Format::B8G8R8A8Srgb,
+    ];
+    for round in 0..1500 {
+        let [width, height] = [(); 2].map(|()| rng.random_range(1..70));
+        let desc = ImageDesc {
+            mip_levels: rng.random_range(1..=(width.max(height) as u32).ilog2() + 1),
+            ..desc(
+                ImageKind::D2,
+                *formats.choose(&mut rng).unwrap(),
+                [width, height, 1],
+            )
+        };
+        let texels: Vec<[f32; 4]> = (0..97).map(|_| rng.random()).collect();
+        let mut image = image(desc, |level, _, [x, y, _]| {
+            texels[(7 * level + x + 14 * y) as usize % texels.len()]
+        });
+        if round % 3 == 0 {
+            image.swizzle = [
+                ComponentSwizzle::Blue,
+                ComponentSwizzle::One,
+                ComponentSwizzle::Alpha,
+                ComponentSwizzle::Zero,
+            ];
+        }
+        let sampler = Sampler {
+            mag_filter: Filter::Linear,
+            min_filter: Filter::Linear,
+            unnormalized_coordinates: false,
+            ..random_sampler(&mut rng)
+        };
+        let mut request = request(Dimension::D2, &surface_coordinates(&mut rng));
+        request.lod = LodRequest::Automatic;
+        request.mask = if round % 2 == 0 {
+            u16::MAX
+        } else {
+            rng.random()
+        };
+        if round % 10 == 0 {
+            request.offset[round / 10 % 2] = [2; 16];
         }
         assert_agree(&image, sampler, &request);
     }

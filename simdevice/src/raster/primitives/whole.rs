@@ -1,0 +1,181 @@
+//! Tiles that a primitive covers as a whole, in draws of which nothing is left where another does so later: they wait to be
+//! shaded until a primitive touches them otherwise, or the draw ends.
+
+use super::super::batch::{BlockValues, Quad};
+use super::super::pending::Pending;
+use super::super::tile::{AREA, SIDE};
+use super::{Current, Renderer};
+use crate::counters::Counter;
+use crate::raster::TILE_SIZE;
+use crate::skips::Skip;
+use fearless_simd::{Simd, f32x16, prelude::*};
+use isa::exec::Stopped;
+
+/// Blocks of a tile.
+const BLOCKS: usize = 16;
+
+/// The first pixel of a block of the tile at pixel `at`.
+#[inline(always)]
+fn block_corner([x, y]: [i32; 2], block: usize) -> [i32; 2] {
+    [x + (block % 4 * 4) as i32, y + (block / 4 * 4) as i32]
+}
+
+impl Renderer<'_, '_> {
+    /// A tile at pixel `at` that a primitive covers as a whole, in a draw that lets tiles wait.
+    #[inline(always)]
+    pub(super) fn whole_tile<S: Simd>(
+        &mut self,
+        simd: S,
+        current: &mut Current<'_>,
+        pending: &mut Pending,
+        (tile, at): (usize, [i32; 2]),
+    ) -> Result<(), Stopped> {
+        let draw = self.draw;
+        let (mut lanes, mut passed) = ([u16::MAX; BLOCKS], AREA as u64);
+        if draw.tests.any() {
+            passed = 0;
+            for (block, lanes) in lanes.iter_mut().enumerate() {
+                let [x, y] = block_corner(at, block);
+                let setup = current.setup;
+                let base = setup.depth(setup.barycentrics(x, y));
+                let depth = f32x16::simd_from(simd, setup.lane_depth) + base;
+                let mut only = [*lanes];
+                self.test(simd, &draw.tests, current, depth, &mut only, (tile, block));
+                *lanes = only[0];
+                passed += u64::from(lanes.count_ones());
+            }
+        }
+        self.samples_passed += passed;
+        if passed == AREA as u64 {
+            self.touch_unread(tile);
+            let slot = match current.kept {
+                Some(slot) => slot,
+                None => {
+                    let (chunk, primitive) = current.place;
+                    *current
+                        .kept
+                        .insert(pending.keep(current.setup, chunk, primitive))
+                }
+            };
+            if pending.cover(tile, slot) {
+                self.counters
+                    .add(Counter::QuadsOverwritten, AREA as u64 / 4);
+            }
+            return Ok(());
+        }
+        self.shade_pending(simd, pending, tile)?;
+        // The batch may have begun anew.
+        current.record = None;
+        self.shade_tile(simd, current, (tile, at), &lanes)
+    }
+
+    /// Shades a tile that waits, if it does.
+    pub(super) fn shade_pending<S: Simd>(
+        &mut self,
+        simd: S,
+        pending: &mut Pending,
+        tile: usize,
+    ) -> Result<(), Stopped> {
+        let Some(kept) = pending.take(tile) else {
+            return Ok(());
+        };
+        let draw = self.draw;
+        let chunk = &draw.draw.chunks[kept.chunk];
+        let primitive = &chunk.primitives[kept.primitive as usize];
+        let mut current = Current {
+            primitive,
+            varyings: &chunk.varyings,
+            setup: &kept.setup,
+            place: (kept.chunk, kept.primitive),
+            record: None,
+            kept: None,
+            range: self.depth_range(primitive),
+        };
+        let side = (self.place.size / TILE_SIZE) as usize;
+        let place = [tile % side, tile / side];
+        let corner = [0, 1].map(|axis| {
+            (self.place.at[axis] * self.place.size) as i32 + (place[axis] * SIDE) as i32
+        });
+        simd.vectorize(
+            #[inline(always)]
+            || self.shade_tile(simd, &mut current, (tile, corner), &[u16::MAX; BLOCKS]),
+        )
+    }
+
+    /// Shades lanes of a tile's blocks, of which nothing is left to be tested, in a draw with one sample a pixel.
+    #[inline(always)]
+    fn shade_tile<S: Simd>(
+        &mut self,
+        simd: S,
+        current: &mut Current<'_>,
+        (tile, at): (usize, [i32; 2]),
+        lanes: &[u16; BLOCKS],
+    ) -> Result<(), Stopped> {
+        let needs = self.draw.needs;
+        let mut touched = false;
+        for (block, &lanes) in lanes.iter().enumerate() {
+            if lanes == 0 && self.draw.skips.has(Skip::MaskedQuads) {
+                self.quads_masked += 4;
+                continue;
+            }
+            let [x, y] = block_corner(at, block);
+            let setup = current.setup;
+            let [b1, b2] = setup.barycentrics(x, y);
+            let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
+            let mut values = BlockValues {
+                barycentrics: [f32x16::splat(simd, 0.0); 2],
+                depth: f32x16::splat(simd, 0.0),
+                inverse_w: f32x16::splat(simd, 1.0),
+            };
+            if needs.depth {
+                values.depth = add(setup.depth([b1, b2]), setup.lane_depth);
+            }
+            if needs.barycentrics {
+                values.barycentrics = [
+                    add(b1 as f32, setup.lane_barycentrics[0]),
+                    add(b2 as f32, setup.lane_barycentrics[1]),
+                ];
+            }
+            if needs.inverse_w && !setup.affine {
+                values.inverse_w = add(setup.inverse_w([b1, b2]), setup.lane_w);
+            }
+            if !touched {
+                self.touch_read(tile);
+                touched = true;
+            }
+            let quad = Quad {
+                tile: tile as u8,
+                place: (block * 16) as u8,
+                ..Quad::default()
+            };
+            self.append(current, quad, &[lanes], &values)?;
+        }
+        Ok(())
+    }
+
+    /// Makes sure that a tile of the colours written is there, of which nothing will be left.
+    fn touch_unread(&mut self, tile: usize) {
+        if !self.draw.skips.has(Skip::OverwrittenTiles) {
+            return self.touch_read(tile);
+        }
+        for (index, output) in self.draw.colors.iter().enumerate() {
+            if output.is_some() && !self.buffers.color[index].is_touched(tile) {
+                self.buffers.color[index].touch_unread(tile);
+                self.counters.add(Counter::TilesOverwritten, 1);
+            }
+        }
+    }
+
+    /// Makes sure that a tile of the colours written is there, with what it holds.
+    fn touch_read(&mut self, tile: usize) {
+        for (index, output) in self.draw.colors.iter().enumerate() {
+            if output.is_some()
+                && !self.buffers.color[index].is_touched(tile)
+                && let Some(target) = &self.draw.targets.color[index]
+            {
+                let tile = self.tile_of(tile);
+                self.buffers.color[index].touch(target, self.place.layer, &tile);
+            }
+        }
+    }
+}
