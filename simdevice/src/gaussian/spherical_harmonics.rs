@@ -22,12 +22,24 @@ const C3: [f32; 7] = [
     -0.590_043_6,
 ];
 
+const C4: [f32; 9] = [
+    2.503_343,
+    -1.770_130_8,
+    0.946_174_7,
+    -0.669_046_54,
+    0.105_785_55,
+    -0.669_046_54,
+    0.473_087_35,
+    -1.770_130_8,
+    0.625_835_7,
+];
+
 /// How many coefficients degrees 0 to `degree` have.
 pub fn coefficient_count(degree: u32) -> usize {
     (degree as usize + 1).pow(2)
 }
 
-/// The basis functions of degrees 0 to `degree` (at most 3) in the unit direction from the eye.
+/// The basis functions of degrees 0 to `degree` (at most 4) in the unit direction from the eye.
 #[inline(always)]
 fn basis(degree: u32, [x, y, z]: [f32; 3]) -> [f32; MAX_COEFFICIENTS] {
     let mut b = [0.0; MAX_COEFFICIENTS];
@@ -53,6 +65,17 @@ fn basis(degree: u32, [x, y, z]: [f32; 3]) -> [f32; MAX_COEFFICIENTS] {
         b[13] = C3[4] * x * (4.0 * zz - xx - yy);
         b[14] = C3[5] * z * (xx - yy);
         b[15] = C3[6] * x * (xx - 3.0 * yy);
+    }
+    if degree >= 4 {
+        b[16] = C4[0] * (x * y) * (xx - yy);
+        b[17] = C4[1] * (y * z) * (3.0 * xx - yy);
+        b[18] = C4[2] * (x * y) * (7.0 * zz - 1.0);
+        b[19] = C4[3] * (y * z) * (7.0 * zz - 3.0);
+        b[20] = C4[4] * (zz * (35.0 * zz - 30.0) + 3.0);
+        b[21] = C4[5] * (x * z) * (7.0 * zz - 3.0);
+        b[22] = C4[6] * (xx - yy) * (7.0 * zz - 1.0);
+        b[23] = C4[7] * (x * z) * (xx - 3.0 * yy);
+        b[24] = C4[8] * (xx * (xx - 3.0 * yy) - yy * (3.0 * xx - yy));
     }
     b
 }
@@ -156,16 +179,16 @@ mod tests {
     fn the_basis_is_orthonormal() {
         // A midpoint rule over the sphere is exact enough to tell any wrong constant or sign of a square.
         let (rows, columns) = (200u32, 400u32);
-        let mut products = vec![[0.0f64; 16]; 16];
+        let mut products = vec![[0.0f64; MAX_COEFFICIENTS]; MAX_COEFFICIENTS];
         for row in 0..rows {
             let z = -1.0 + (f64::from(row) + 0.5) * 2.0 / f64::from(rows);
             let radius = (1.0 - z * z).sqrt();
             for column in 0..columns {
                 let angle = (f64::from(column) + 0.5) * std::f64::consts::TAU / f64::from(columns);
                 let direction = [radius * angle.cos(), radius * angle.sin(), z].map(|v| v as f32);
-                let b = basis(3, direction);
-                for i in 0..16 {
-                    for j in 0..16 {
+                let b = basis(4, direction);
+                for i in 0..MAX_COEFFICIENTS {
+                    for j in 0..MAX_COEFFICIENTS {
                         products[i][j] += f64::from(b[i]) * f64::from(b[j]);
                     }
                 }
