@@ -76,7 +76,7 @@ fn the_device_says_what_it_is() {
             height: 16
         }
     );
-    assert_eq!(gaussian.max_spherical_harmonics_degree, 3);
+    assert_eq!(gaussian.max_spherical_harmonics_degree, 4);
 }
 
 #[test]

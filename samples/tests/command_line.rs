@@ -111,6 +111,33 @@ fn one_gaussian_is_drawn_where_it_is() {
 }
 
 #[test]
+fn counters_tell_of_every_stage_of_the_simulated_hardware_if_they_are_asked_for() {
+    let folder = folder();
+    write(&folder, "one.ply", ONE);
+    let simulated = [
+        "simulated preprocess",
+        "simulated sort",
+        "simulated raster",
+        "raster cycles",
+        "PE occupancy",
+        "energy, shader cores",
+    ];
+    for asked in [true, false] {
+        let counters: &[&str] = if asked { &["--counters"] } else { &[] };
+        let arguments = [&["render", "one.ply", "-o", "a.png"], &LOOK[..], counters].concat();
+        let output = gaurast(&folder, &arguments);
+        let stdout = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success());
+        for name in ["gaussians read", "tile pairs"] {
+            assert!(stdout.contains(name), "{name}: {stdout}");
+        }
+        for name in simulated {
+            assert_eq!(stdout.contains(name), asked, "{name}: {stdout}");
+        }
+    }
+}
+
+#[test]
 fn a_panorama_and_a_fisheye_see_what_is_behind_and_beside() {
     let folder = folder();
     write(&folder, "one.ply", ONE);

@@ -530,6 +530,13 @@ pub struct ModelAttributes {
     pub opacity: Option<AttributeStream>,
 }
 
+impl ModelAttributes {
+    /// Whether there is anything to be done.
+    pub fn is_some(&self) -> bool {
+        self.matrix.is_some() || self.opacity.is_some()
+    }
+}
+
 /// An index buffer.
 #[derive(Clone, Debug)]
 pub struct IndexStream {

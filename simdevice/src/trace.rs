@@ -74,9 +74,10 @@ impl Frame {
     }
 }
 
-/// A draw's work, as far as it has been done.
+/// A draw's work, as far as it has been done, and what fragment programs counted after rasterizing Gaussians: in whole
+/// numbers, so that it does not matter which tile was first.
 #[derive(Debug, Default)]
-pub struct DrawRecord(Mutex<DrawWork>);
+pub struct DrawRecord(Mutex<DrawWork>, Mutex<Counters>);
 
 impl fmt::Debug for Recorder {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -270,13 +271,19 @@ impl Drop for Recorder {
 impl DrawRecord {
     /// A draw of which so much is known.
     pub(crate) fn new(work: DrawWork) -> Arc<Self> {
-        Arc::new(Self(Mutex::new(work)))
+        Arc::new(Self(Mutex::new(work), Mutex::default()))
     }
 
     /// Adds a tile.
     pub(crate) fn add(&self, tile: TileWork) {
         let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         work.tiles.push(tile);
+    }
+
+    /// Adds what fragment programs did in a tile; `counters` are those of it alone.
+    pub(crate) fn add_shading(&self, counters: &Counters) {
+        let mut shading = self.1.lock().unwrap_or_else(PoisonError::into_inner);
+        shading.add_all(counters);
     }
 
     /// The draw with its tiles row by row, whichever worker was first.
@@ -286,6 +293,8 @@ impl DrawRecord {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .clone();
+        let shading = self.1.lock().unwrap_or_else(PoisonError::into_inner);
+        work.shade = work.shade.plus(&shader_work(&shading));
         work.tiles
             .sort_unstable_by_key(|tile| [tile.at[1], tile.at[0]]);
         work
@@ -305,50 +314,73 @@ pub(crate) fn push_run(runs: &mut Vec<Run>, run: Run) {
     }
 }
 
-/// What is known of a Gaussian draw before its tiles are rendered. `counters` are those of its preprocessing.
+/// The Gaussians of a set, by who projected them: what that counted, and what is drawn of it.
+pub(crate) struct Projected<'a> {
+    pub(crate) counters: &'a Counters,
+    pub(crate) splats: &'a [Vec<Splat>],
+}
+
+impl Projected<'_> {
+    /// Those that the draw named.
+    fn read(&self) -> u64 {
+        self.counters.get(Counter::GaussiansRead)
+    }
+
+    /// Those beyond the near plane and not faint.
+    fn kept(&self) -> u64 {
+        let early = [
+            Counter::SkippedNonFinite,
+            Counter::SkippedFaint,
+            Counter::SkippedNear,
+            Counter::SkippedFar,
+        ];
+        let skipped: u64 = early
+            .iter()
+            .map(|&counter| self.counters.get(counter))
+            .sum();
+        self.read().saturating_sub(skipped)
+    }
+
+    fn drawn(&self) -> u64 {
+        self.splats.iter().map(|batch| batch.len() as u64).sum()
+    }
+}
+
+/// What is known of a Gaussian draw before its tiles are rendered: of what the device projected, and of what vertex programs
+/// did, which moved `program_bytes` besides what their instructions do.
 pub(crate) fn gaussian_draw(
-    counters: &Counters,
-    splats: &[Vec<Splat>],
+    fixed: &Projected<'_>,
+    by_program: &Projected<'_>,
+    program_bytes: u64,
     pairs: u64,
     degree: u32,
     bounds: Rect,
 ) -> DrawWork {
-    let read = counters.get(Counter::GaussiansRead);
-    let early = [
-        Counter::SkippedNonFinite,
-        Counter::SkippedFaint,
-        Counter::SkippedNear,
-        Counter::SkippedFar,
-    ];
-    let skipped: u64 = early.iter().map(|&counter| counters.get(counter)).sum();
-    let drawn = splats.iter().map(|batch| batch.len() as u64).sum();
     let tiles = |side: u32| u64::from(side.div_ceil(TILE_SIZE));
     let counts = GaussianCounts {
-        read,
-        projected: read.saturating_sub(skipped),
-        drawn,
+        read: fixed.read(),
+        projected: fixed.kept(),
+        drawn: fixed.drawn(),
+        shaded: by_program.kept(),
         degree,
         pairs,
         tiles: tiles(bounds.width) * tiles(bounds.height),
     };
+    let mut program = shader_work(by_program.counters);
+    program.bytes += program_bytes as f64;
+    let splats = || fixed.splats.iter().chain(by_program.splats).flatten();
     let [preprocess, sort] = stages::gaussian(&counts);
     DrawWork {
         mode: Mode::Gaussian,
-        primitives: read,
-        drawn,
-        boxed_pairs: splats
-            .iter()
-            .flatten()
-            .map(|splat| boxed_tiles(splat, bounds))
-            .sum(),
-        sized_pairs: splats
-            .iter()
-            .flatten()
+        primitives: fixed.read() + by_program.read(),
+        drawn: fixed.drawn() + by_program.drawn(),
+        boxed_pairs: splats().map(|splat| boxed_tiles(splat, bounds)).sum(),
+        sized_pairs: splats()
             .map(|splat| sized_boxes(splat, bounds))
             .fold([0; TILE_SIDES.len()], |sum, tiles| {
                 std::array::from_fn(|index| sum[index] + tiles[index])
             }),
-        preprocess,
+        preprocess: preprocess.plus(&program),
         sort,
         ..DrawWork::default()
     }

@@ -216,6 +216,102 @@ fn placed() -> Vec<Packet> {
     packets
 }
 
+/// Small Gaussians in another mode, most of them beside the scissor.
+fn mode_beside(seed: u64, change: fn(&mut GaussianBegin)) -> Vec<Packet> {
+    let mut packets = mostly_beside(seed, 3000);
+    if let Packet::GaussianBegin(begin) = &mut packets[0] {
+        begin.camera.eye[0] = -0.8;
+        change(begin);
+    }
+    shrink(&packets[1]);
+    packets
+}
+
+/// Makes the Gaussians of an append a fifth as large.
+fn shrink(append: &Packet) {
+    let Packet::GaussianAppend(append) = append else {
+        panic!("what follows the beginning of a set");
+    };
+    let stream = &append.attributes.scale;
+    for vertex in 0..append.count {
+        let at = u64::from(vertex * stream.stride + stream.offset);
+        let mut scale = [0.0f32; 3];
+        stream.buffer.memory.read(at, &mut scale).unwrap();
+        let scale = scale.map(|scale| 0.2 * scale);
+        stream.buffer.memory.write(at, &scale).unwrap();
+    }
+}
+
+/// Modes that are bounded by other means than volumes in binary32 before a pinhole, with one of the ways in which those are
+/// drawn to compare with.
+fn bounded_modes() -> Vec<(&'static str, Vec<Packet>)> {
+    fn state(begin: &mut GaussianBegin) -> &mut GaussianState {
+        Arc::make_mut(&mut begin.state)
+    }
+    fn parallel(begin: &mut GaussianBegin) {
+        begin.camera.model = CameraModel::Orthographic;
+        begin.camera.focal_length = [30.0; 2];
+    }
+    let mut placed = placed();
+    shrink(&placed[1]);
+    if let Packet::GaussianBegin(begin) = &mut placed[0] {
+        begin.scissor = Rect {
+            x: 0,
+            y: 0,
+            width: 35,
+            height: 40,
+        };
+    }
+    let modes: [(&str, fn(&mut GaussianBegin)); 7] = [
+        ("volumes", |_| {}),
+        ("flat", |begin| {
+            state(begin).geometry = GaussianGeometry::Surfel;
+        }),
+        ("flat, orthographic", |begin| {
+            parallel(begin);
+            state(begin).geometry = GaussianGeometry::Surfel;
+        }),
+        ("binary16", |begin| {
+            state(begin).precision = GaussianPrecision::Float16;
+        }),
+        ("binary16, orthographic", |begin| {
+            parallel(begin);
+            state(begin).precision = GaussianPrecision::Float16;
+        }),
+        ("unscented", |begin| {
+            state(begin).linearization = GaussianLinearization::Unscented;
+            // The farther off, the smaller.
+            begin.camera.eye[2] = -6.0;
+        }),
+        ("unscented, orthographic", |begin| {
+            parallel(begin);
+            state(begin).linearization = GaussianLinearization::Unscented;
+        }),
+    ];
+    let modes = modes.into_iter().zip(20..);
+    let modes = modes.map(|((name, change), seed)| (name, mode_beside(seed, change)));
+    modes.chain([("placed", placed)]).collect()
+}
+
+#[test]
+fn every_mode_has_bounds_that_change_no_bit() {
+    let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
+    for (mode, packets) in bounded_modes() {
+        let (without, _) = draw(Skips::NONE, &packets, over_black);
+        let saved = |skips, counter| {
+            let (image, counters) = draw(skips, &packets, over_black);
+            assert!(image == without, "{mode}");
+            counters.get(counter)
+        };
+        let chunks = Skips::ALL.without(Skip::Bounds);
+        let by_chunks = saved(chunks, Counter::OutsideByChunks);
+        let bounds = Skips::ALL.without(Skip::Chunks);
+        let by_bounds = saved(bounds, Counter::OutsideByBounds);
+        assert!(by_chunks > 0, "{mode}: no chunk is beside the picture");
+        assert!(by_bounds > 2 * by_chunks, "{mode}: {by_bounds} {by_chunks}");
+    }
+}
+
 /// Gaussians in modes that have no fast path, few Gaussians, many, many that only the device can write, of which all are equally deep in one scene, and several draws with a clear between them; how the attachment begins.
 fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
     let clear_part = clear(

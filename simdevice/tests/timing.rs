@@ -6,12 +6,14 @@ mod common;
 #[path = "common/scenes.rs"]
 mod scenes;
 
+use common::{HEIGHT, WIDTH};
 use scenes::{KINDS, Kind, draw, draw_on, recording};
 use simdevice::counters::{Counter, Counters};
 use simdevice::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::skips::{Skip, Skips};
 use simdevice::timing::config::{Config as Hardware, preset_names};
 use simdevice::timing::raster::RasterReport;
+use simdevice::timing::stages::{self, GaussianCounts};
 use simdevice::timing::work::{Mode, TileWork, Trace};
 use simdevice::timing::{fast, schedule, simulate, stepped};
 use simdevice::{Config, Device, Packet};
@@ -129,6 +131,43 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
             draw.sized_pairs
         );
     }
+}
+
+#[test]
+fn programs_that_project_and_resolve_gaussians_are_charged_for_what_they_did() {
+    let counters = counted(Kind::Shaded, QueryKind::Performance, &Config::default());
+    let trace = trace(Kind::Shaded);
+    let draws: Vec<_> = trace.frames.iter().map(|frame| &frame.draws[0]).collect();
+    assert_eq!(draws.len(), 2);
+    let operations =
+        counters.get(Counter::ShaderActiveLanes) + counters.get(Counter::ShaderUniform);
+    let mut programs = 0.0;
+    for draw in &draws {
+        assert_eq!((draw.mode, draw.primitives), (Mode::Gaussian, 1000));
+        assert!(draw.drawn > 100 && draw.drawn < 1000, "{}", draw.drawn);
+        // What follows the vertex program is the device's: footprints, and no projection, and no harmonics.
+        let [footprints, sort] = stages::gaussian(&GaussianCounts {
+            shaded: 1000,
+            pairs: draw.pairs(),
+            tiles: u64::from(WIDTH.div_ceil(16) * HEIGHT.div_ceil(16)),
+            ..GaussianCounts::default()
+        });
+        assert_eq!(draw.sort, sort);
+        assert!(draw.preprocess.float > footprints.float && draw.shade.float > 0.0);
+        // 48 bytes of attributes and as many of outputs.
+        let bytes = footprints.bytes + 1000.0 * 96.0;
+        assert!(
+            draw.preprocess.bytes >= bytes
+                && draw.preprocess.bytes < bytes + 4.0 * operations as f64
+        );
+        programs +=
+            draw.preprocess.operations() - footprints.operations() + draw.shade.operations();
+    }
+    // Both programs, lane by lane.
+    assert!(
+        (programs - operations as f64).abs() < 0.5,
+        "{programs} {operations}"
+    );
 }
 
 #[test]

@@ -160,7 +160,7 @@ pub(crate) fn generated_view(limits: Limits) -> View {
 #[test]
 fn generated_scenes_keep_the_contract_in_every_state() {
     let devices = Devices::new();
-    for (seed, degree) in [(1, 0), (2, 1), (3, 2), (4, 3)] {
+    for (seed, degree) in [(1, 0), (2, 1), (3, 2), (4, 3), (5, 4)] {
         let scene = scenes::cloud(seed, 3000, degree);
         for (name, state) in states() {
             let name = format!("cloud {seed} {name}");

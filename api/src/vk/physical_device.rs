@@ -116,7 +116,7 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
 /// `VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST`: the device's shape and limits.
 ///
 /// Chain it to `VkPhysicalDeviceProperties2`. Vertex attributes are limited as ever by
-/// `maxVertexInputAttributes`, which is at least 32: degree 3 takes 20 locations.
+/// `maxVertexInputAttributes`, which is at least 32: degree 3 takes 20 locations, degree 4 takes 29.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 #[must_use]

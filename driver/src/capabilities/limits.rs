@@ -4,6 +4,7 @@
 
 use crate::capabilities::extensions::{API_VERSION, fill_string};
 use crate::capabilities::memory;
+use crate::object::pipeline::gaussian;
 use crate::pnext;
 use ash::vk;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST;
@@ -307,7 +308,7 @@ fn gaussian() -> PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'stati
         },
         rasterizer_module_count: RASTERIZER_MODULES,
         processing_element_count: PROCESSING_ELEMENTS,
-        max_spherical_harmonics_degree: 3,
+        max_spherical_harmonics_degree: gaussian::MAX_SPHERICAL_HARMONICS_DEGREE,
         gaussian_sample_counts: SAMPLE_COUNTS,
         max_gaussians_per_draw: MAX_GAUSSIANS,
         max_gaussians_per_set: MAX_GAUSSIANS,

@@ -7,3 +7,4 @@ pub(crate) mod formats;
 pub(crate) mod limits;
 pub(crate) mod memory;
 pub(crate) mod queues;
+pub(crate) mod spirv;

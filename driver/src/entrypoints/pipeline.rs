@@ -46,14 +46,14 @@ crate::entry_points! {
     }
 
     fn create_shader_module(
-        _device: vk::Device,
+        device: vk::Device,
         create_info: *const vk::ShaderModuleCreateInfo<'_>,
         _allocator: *const vk::AllocationCallbacks<'_>,
         shader_module: *mut vk::ShaderModule,
     ) -> vk::Result {
         let info = pointer::input(create_info)?;
         let words = u32::try_from(info.code_size / 4).unwrap_or(0);
-        let object = ShaderModule::new(pointer::slice(info.p_code, words)?)?;
+        let object = ShaderModule::new(pointer::slice(info.p_code, words)?, handle::get(device)?.features())?;
         pointer::output(shader_module, handle::create(Arc::new(object)))
     }
 

@@ -1,5 +1,7 @@
 //! Shader modules: SPIR-V, kept as words until a pipeline is made of it.
 
+use crate::capabilities::features::EnabledFeatures;
+use crate::capabilities::spirv;
 use crate::error::Error;
 use crate::shader::{self, Module, Options, Shader, Specialization, Stage};
 use simdevice::host;
@@ -20,14 +22,16 @@ impl ShaderModule {
     /// Keeps a copy of SPIR-V.
     ///
     /// # Errors
-    /// [`Error::Usage`] if it isn't SPIR-V in the host's byte order.
-    pub(crate) fn new(words: &[u32]) -> Result<Self, Error> {
+    /// [`Error::Usage`] if it isn't SPIR-V in the host's byte order; [`Error::FeatureNotEnabled`] if it declares a capability
+    /// whose feature isn't enabled.
+    pub(crate) fn new(words: &[u32], features: &EnabledFeatures) -> Result<Self, Error> {
         if words.first() != Some(&MAGIC) {
             return Err(Error::usage(
                 "VUID-VkShaderModuleCreateInfo-pCode-08738",
                 "the code is not SPIR-V",
             ));
         }
+        spirv::check(words, features)?;
         Ok(Self {
             words: host::boxed(words),
         })

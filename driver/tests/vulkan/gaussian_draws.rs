@@ -30,6 +30,40 @@ fn a_gaussian_is_brightest_at_its_mean() {
 }
 
 #[test]
+fn alpha_becomes_coverage_without_a_fragment_stage() {
+    let splats = [
+        splat([0.0, 0.0, 9.0], 0.3, 0.9, BLUE),
+        splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
+    ];
+    let clear = [0.2, 0.4, 0.6, 0.0];
+    let [plain, covering] = [false, true].map(|alpha_to_coverage| {
+        let request = PipelineRequest {
+            alpha_to_coverage,
+            ..PipelineRequest::default()
+        };
+        let scene = Scene::new(&splats, &request);
+        let pixels = scene.draw(clear, |device, commands| {
+            // SAFETY: see the crate.
+            unsafe { device.cmd_draw(commands, 2, 1, 0, 0) };
+        });
+        assert_eq!(scene.gpu.take_messages(), Vec::<String>::new());
+        pixels
+    });
+    let (mut covered, mut left) = (0, 0);
+    for (&[r, g, b, alpha], &found) in plain.iter().zip(&covering) {
+        // Of one sample, what is half covered or more.
+        if alpha >= 0.51 {
+            assert_eq!(found, [r, g, b, 1.0]);
+            covered += 1;
+        } else if alpha <= 0.49 {
+            assert_eq!(found, clear);
+            left += u32::from(alpha > 0.0);
+        }
+    }
+    assert!(covered > 20 && left > 20, "{covered} {left}");
+}
+
+#[test]
 fn gaussians_are_sorted_and_blended_over_the_background() {
     let splats = [
         splat([0.0, 0.0, 9.0], 0.1, 0.6, BLUE),

@@ -53,7 +53,7 @@ fn a_pipeline_without_the_structure_is_refused() {
 fn values_outside_their_ranges_are_refused() {
     let gpu = Gpu::new();
     let bad = [
-        (with_state(|s| s.spherical_harmonics_degree(4)), "Degree"),
+        (with_state(|s| s.spherical_harmonics_degree(5)), "Degree"),
         (with_state(|s| s.low_pass_variance(-0.1)), "lowPassVariance"),
         (
             with_state(|s| s.low_pass_variance(f32::INFINITY)),

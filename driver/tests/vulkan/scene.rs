@@ -54,6 +54,8 @@ pub struct PipelineRequest<'a> {
     pub logic_op: bool,
     pub depth_test: bool,
     pub samples: vk::SampleCountFlags,
+    /// Alpha makes coverage, and is one then.
+    pub alpha_to_coverage: bool,
     pub dynamic: Vec<vk::DynamicState>,
     pub formats: Vec<vk::Format>,
     pub render_pass: vk::RenderPass,
@@ -98,6 +100,7 @@ impl Default for PipelineRequest<'_> {
             logic_op: false,
             depth_test: false,
             samples: vk::SampleCountFlags::TYPE_1,
+            alpha_to_coverage: false,
             dynamic: vec![vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR],
             formats: vec![FORMAT],
             render_pass: vk::RenderPass::null(),
@@ -123,8 +126,10 @@ impl PipelineRequest<'_> {
             .viewport_count(1)
             .scissor_count(1);
         let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-        let multisample =
-            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(self.samples);
+        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
+            .rasterization_samples(self.samples)
+            .alpha_to_coverage_enable(self.alpha_to_coverage)
+            .alpha_to_one_enable(self.alpha_to_coverage);
         let depth_stencil =
             vk::PipelineDepthStencilStateCreateInfo::default().depth_test_enable(self.depth_test);
         let blend = vk::PipelineColorBlendStateCreateInfo::default()

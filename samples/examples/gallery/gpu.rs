@@ -13,6 +13,9 @@ const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 const MODEL_MATRIX: u32 = 5;
 const MODEL_OPACITY: u32 = 8;
 
+/// Bytes of the vertex shader's constants: the picture's size and the focal lengths.
+const CONSTANTS: u32 = 16;
+
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// Position, scale, rotation (w x y z), opacity, and the constant spherical harmonic's colour.
@@ -38,6 +41,25 @@ pub struct Picture<'a> {
     /// Drawn before the Gaussians, which are tested against its depth.
     pub triangle: Option<Triangle>,
     pub samples: vk::SampleCountFlags,
+    /// How many Gaussians each draw has, if not all are drawn at once.
+    pub draws: &'a [u32],
+    /// A vertex shader projects.
+    pub by_shader: bool,
+    /// What makes colours of what accumulates, if not the device alone.
+    pub resolve: Option<Resolve>,
+    /// Alpha becomes coverage.
+    pub coverage: bool,
+}
+
+/// A resolve shader.
+#[derive(Clone, Copy)]
+pub enum Resolve {
+    /// Tones with an edge.
+    Tones = 0,
+    /// Colours of the expected depth.
+    Expected = 1,
+    /// Colours of the median depth.
+    Median = 2,
 }
 
 /// A device with the extension, and everything that it draws Gaussians in.
@@ -46,6 +68,7 @@ pub struct Gpu {
     extension: gaussian_primitive_topology::Device,
     types: vk::PhysicalDeviceMemoryProperties,
     pool: vk::CommandPool,
+    layout: vk::PipelineLayout,
 }
 
 /// An image and its view.
@@ -81,7 +104,12 @@ impl Gpu {
                 .push_next(&mut gaussian)
                 .push_next(&mut rendering);
             let device = instance.create_device(physical, &info, None)?;
+            let constants = [vk::PushConstantRange::default()
+                .stage_flags(vk::ShaderStageFlags::VERTEX)
+                .size(CONSTANTS)];
+            let info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&constants);
             Ok(Self {
+                layout: device.create_pipeline_layout(&info, None)?,
                 extension: gaussian_primitive_topology::Device::new(&instance, &device),
                 types: instance.get_physical_device_memory_properties(physical),
                 pool: device.create_command_pool(&Default::default(), None)?,
@@ -152,8 +180,22 @@ impl Gpu {
                 device.cmd_set_viewport(c, 0, &[viewport(picture, [0.0, 1.0])]);
                 device.cmd_bind_vertex_buffers(c, 0, &[splats, instances], &[0; 2]);
                 self.extension.cmd_set_gaussian_camera(c, &picture.camera);
-                let count = picture.splats.len() as u32;
-                device.cmd_draw(c, count, picture.instances.len().max(1) as u32, 0, 0);
+                let [fx, fy] = picture.camera.focal_length;
+                let [width, height] = picture.size.map(|side| side as f32);
+                let (vertex, constants) = (vk::ShaderStageFlags::VERTEX, [width, height, fx, fy]);
+                let constants = bytemuck::bytes_of(&constants);
+                device.cmd_push_constants(c, self.layout, vertex, 0, constants);
+                let all = [picture.splats.len() as u32];
+                let draws = if picture.draws.is_empty() {
+                    &all
+                } else {
+                    picture.draws
+                };
+                let (mut first, instances) = (0, picture.instances.len().max(1) as u32);
+                for &count in draws {
+                    device.cmd_draw(c, count, instances, first, 0);
+                    first += count;
+                }
                 device.cmd_end_rendering(c);
             }
             Ok(())
@@ -293,6 +335,22 @@ impl Gpu {
         }
     }
 
+    /// A shader's stage.
+    fn stage(
+        &self,
+        spirv: &[u8],
+        kind: vk::ShaderStageFlags,
+    ) -> Outcome<vk::PipelineShaderStageCreateInfo<'static>> {
+        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))?;
+        let info = vk::ShaderModuleCreateInfo::default().code(&words);
+        // SAFETY: see above.
+        let module = unsafe { self.device.create_shader_module(&info, None)? };
+        Ok(vk::PipelineShaderStageCreateInfo::default()
+            .stage(kind)
+            .module(module)
+            .name(c"main"))
+    }
+
     /// A pipeline for a picture's Gaussians.
     fn gaussian_pipeline(&self, picture: &Picture<'_>) -> Outcome<vk::Pipeline> {
         let instanced = !picture.instances.is_empty();
@@ -338,6 +396,32 @@ impl Gpu {
                 .model_opacity(MODEL_OPACITY);
         }
         let mut gaussian = picture.state.attribute_locations(locations);
+        let mut stages = Vec::new();
+        if picture.by_shader {
+            gaussian = gaussian
+                .projection_mode(GaussianProjectionModeGAURAST::VERTEX_SHADER)
+                .vertex_output_locations(
+                    GaussianVertexOutputLocationsGAURAST::default()
+                        .covariance(0)
+                        .opacity(1)
+                        .color(2),
+                );
+            let code = include_bytes!("../shaders/project.vert.spv");
+            stages.push(self.stage(code, vk::ShaderStageFlags::VERTEX)?);
+        }
+        let kind = picture.resolve.map_or(0, |resolve| resolve as u32);
+        let kind = kind.to_ne_bytes();
+        let entries = [vk::SpecializationMapEntry::default().size(4)];
+        let special = vk::SpecializationInfo::default()
+            .map_entries(&entries)
+            .data(&kind);
+        if picture.resolve.is_some() {
+            let inputs = GaussianResolveInputLocationsGAURAST::default();
+            gaussian = gaussian.resolve_input_locations(inputs.accumulated_color(0).depth(1));
+            let code = include_bytes!("../shaders/resolve.frag.spv");
+            let stage = self.stage(code, vk::ShaderStageFlags::FRAGMENT)?;
+            stages.push(stage.specialization_info(&special));
+        }
         let vertices = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&bindings)
             .vertex_attribute_descriptions(&attributes);
@@ -349,29 +433,28 @@ impl Gpu {
             .src_alpha_blend_factor(vk::BlendFactor::ONE)
             .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
         let topology = PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
-        self.pipeline(picture, &vertices, topology, over, &[], Some(&mut gaussian))
+        self.pipeline(
+            picture,
+            &vertices,
+            topology,
+            over,
+            &stages,
+            Some(&mut gaussian),
+        )
     }
 
     /// A pipeline for a triangle.
     fn triangle_pipeline(&self, picture: &Picture<'_>) -> Outcome<vk::Pipeline> {
-        let spirv = [
-            &include_bytes!("../shaders/hello_triangle.vert.spv")[..],
-            &include_bytes!("../shaders/hello_triangle.frag.spv")[..],
+        let stages = [
+            self.stage(
+                include_bytes!("../shaders/hello_triangle.vert.spv"),
+                vk::ShaderStageFlags::VERTEX,
+            )?,
+            self.stage(
+                include_bytes!("../shaders/hello_triangle.frag.spv"),
+                vk::ShaderStageFlags::FRAGMENT,
+            )?,
         ];
-        let kinds = [vk::ShaderStageFlags::VERTEX, vk::ShaderStageFlags::FRAGMENT];
-        let mut stages = Vec::new();
-        for (spirv, kind) in spirv.into_iter().zip(kinds) {
-            let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv))?;
-            let info = vk::ShaderModuleCreateInfo::default().code(&words);
-            // SAFETY: see above.
-            let module = unsafe { self.device.create_shader_module(&info, None)? };
-            stages.push(
-                vk::PipelineShaderStageCreateInfo::default()
-                    .stage(kind)
-                    .module(module)
-                    .name(c"main"),
-            );
-        }
         let bindings = [vk::VertexInputBindingDescription::default().stride(5 * 4)];
         let attributes = [
             vk::VertexInputAttributeDescription::default().format(vk::Format::R32G32_SFLOAT),
@@ -405,7 +488,8 @@ impl Gpu {
             .scissors(&scissors);
         let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
         let samples = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(picture.samples);
+            .rasterization_samples(picture.samples)
+            .alpha_to_coverage_enable(picture.coverage);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(true)
             .depth_write_enable(true)
@@ -419,7 +503,6 @@ impl Gpu {
             .depth_attachment_format(DEPTH);
         // SAFETY: see above.
         unsafe {
-            let layout = (self.device).create_pipeline_layout(&Default::default(), None)?;
             let mut info = vk::GraphicsPipelineCreateInfo::default()
                 .stages(stages)
                 .vertex_input_state(vertices)
@@ -430,7 +513,7 @@ impl Gpu {
                 .depth_stencil_state(&depth)
                 .color_blend_state(&blend)
                 .dynamic_state(&dynamic)
-                .layout(layout)
+                .layout(self.layout)
                 .push_next(&mut rendering);
             if let Some(gaussian) = gaussian {
                 info = info.push_next(gaussian);

@@ -30,26 +30,158 @@ fn turned(angle: f32) -> [f32; 4] {
     [(angle / 2.0).cos(), 0.0, 0.0, (angle / 2.0).sin()]
 }
 
-/// Large Gaussians that no two orders see alike: at the sides, what lies deeper is nearer.
-pub fn crossing() -> Vec<Splat> {
-    (0..9)
-        .map(|i| {
-            let x = i as f32 - 4.0;
-            let z = 2.6 + 0.12 * x.abs() * (i % 2) as f32;
-            let size = [0.42, 0.9, 0.05];
-            splat(
-                [0.8 * x, 0.0, z],
+/// Everything that is shown.
+pub struct Scenes {
+    pub around: Vec<Splat>,
+    pub wide: Vec<Splat>,
+    pub crossing: Vec<Splat>,
+    pub links: Vec<Splat>,
+    pub floor: Vec<Splat>,
+    pub veils: Vec<Splat>,
+    pub needles: Vec<Splat>,
+    pub still: Vec<Splat>,
+    pub flower: Vec<Splat>,
+    pub meadow: Vec<Instance>,
+}
+
+impl Scenes {
+    pub fn new() -> Self {
+        Self {
+            around: around(),
+            wide: wide(),
+            crossing: crossing(),
+            links: links(),
+            floor: floor(),
+            veils: veils(),
+            needles: needles(),
+            still: still_life(),
+            flower: flower(),
+            meadow: meadow(),
+        }
+    }
+}
+
+/// A turn by `angle` about an axis.
+fn turned_about(axis: usize, angle: f32) -> [f32; 4] {
+    let mut quaternion = [(angle / 2.0).cos(), 0.0, 0.0, 0.0];
+    quaternion[1 + axis] = (angle / 2.0).sin();
+    quaternion
+}
+
+/// Two sheets that cross, and pairs beside them, of which the deeper is nearer. What is in front by depth comes last.
+fn crossing() -> Vec<Splat> {
+    let sheet = [0.75, 0.55, 0.01];
+    let mut splats = vec![
+        splat(
+            [0.0, 0.0, 2.65],
+            sheet,
+            turned_about(1, -1.0),
+            0.99,
+            hue(0.05),
+        ),
+        splat(
+            [0.0, 0.0, 2.6],
+            sheet,
+            turned_about(1, 1.0),
+            0.99,
+            hue(0.55),
+        ),
+    ];
+    for side in [-1.0, 1.0] {
+        let size = [0.35, 0.8, 0.1];
+        splats.push(splat(
+            [2.75 * side, 0.25, 2.5],
+            size,
+            STRAIGHT,
+            0.98,
+            hue(0.3),
+        ));
+        splats.push(splat(
+            [3.15 * side, -0.25, 2.4],
+            size,
+            STRAIGHT,
+            0.98,
+            hue(0.8),
+        ));
+    }
+    splats
+}
+
+/// How many Gaussians each ring of [`links`] has.
+pub const RINGS: [u32; 2] = [40, 40];
+
+/// Two rings, each through the other.
+fn links() -> Vec<Splat> {
+    let mut splats = Vec::new();
+    for (ring, count) in RINGS.into_iter().enumerate() {
+        for i in 0..count {
+            let (sin, cos) = (TAU * i as f32 / count as f32).sin_cos();
+            // One stands upright, the other lies and leans.
+            let position = match ring {
+                0 => [0.75 * cos - 0.4, 0.75 * sin, MIDDLE + 0.2 * cos],
+                _ => [0.75 * cos + 0.4, 0.25 * sin, MIDDLE + 0.7 * sin],
+            };
+            let color = hue(0.1 + 0.45 * ring as f32);
+            splats.push(splat(position, [0.085; 3], STRAIGHT, 0.97, color));
+        }
+    }
+    splats
+}
+
+/// Discs on a floor and on two walls.
+fn floor() -> Vec<Splat> {
+    let mut splats = Vec::new();
+    for row in (0..6).rev() {
+        let z = 0.75 + 0.75 * row as f32;
+        let lies = turned_about(0, PI / 2.0);
+        let stands = turned_about(1, PI / 2.0);
+        let size = [0.26, 0.26, 0.0];
+        for column in -1..=1 {
+            let at = [0.75 * column as f32, 0.55, z];
+            splats.push(splat(
+                at,
                 size,
-                turned(0.35 * x),
+                lies,
                 0.95,
-                hue(0.38 * i as f32),
-            )
-        })
-        .collect()
+                hue(0.13 * (row + column) as f32),
+            ));
+        }
+        for side in [-1.0, 1.0] {
+            let color = hue(0.5 + 0.13 * row as f32);
+            splats.push(splat([1.1 * side, -0.2, z], size, stands, 0.95, color));
+        }
+    }
+    splats
+}
+
+/// Needles that lean behind layers that are hardly there.
+fn veils() -> Vec<Splat> {
+    let mut splats = Vec::new();
+    for i in 0..60 {
+        let color = hue(i as f32 / 15.0);
+        let place = [
+            0.5 * (i as f32).sin(),
+            0.3 * (1.7 * i as f32).cos(),
+            3.0 + 0.01 * i as f32,
+        ];
+        splats.push(splat(place, [0.5, 0.5, 0.01], STRAIGHT, 0.03, color));
+    }
+    for i in 0..9 {
+        let x = 0.5 * (i as f32 - 4.0);
+        let turn = turned(0.35 + 0.1 * i as f32);
+        splats.push(splat(
+            [x, 0.0, 5.0],
+            [0.006, 1.3, 0.006],
+            turn,
+            0.95,
+            hue(i as f32 / 9.0),
+        ));
+    }
+    splats
 }
 
 /// Needles that grow thinner to the right.
-pub fn needles() -> Vec<Splat> {
+fn needles() -> Vec<Splat> {
     (0..24)
         .map(|i| {
             let x = 0.23 * (i as f32 - 11.5);
@@ -61,7 +193,7 @@ pub fn needles() -> Vec<Splat> {
 }
 
 /// Gaussians on a sphere.
-pub fn around() -> Vec<Splat> {
+fn around() -> Vec<Splat> {
     let mut splats = Vec::new();
     for ring in -4..=4i32 {
         let latitude = PI * ring as f32 / 8.0;
@@ -84,7 +216,7 @@ pub fn around() -> Vec<Splat> {
 }
 
 /// Gaussians on a plane across the view, that point away from it.
-pub fn wide() -> Vec<Splat> {
+fn wide() -> Vec<Splat> {
     let mut splats = Vec::new();
     for row in -2..=2i32 {
         for column in -3..=3i32 {
@@ -98,7 +230,7 @@ pub fn wide() -> Vec<Splat> {
 }
 
 /// Rings of Gaussians in front of one another.
-pub fn still_life() -> Vec<Splat> {
+fn still_life() -> Vec<Splat> {
     let mut splats = Vec::new();
     for ring in 0..3 {
         let z = MIDDLE + 0.8 * (ring as f32 - 1.0) + 0.2;
@@ -116,7 +248,7 @@ pub fn still_life() -> Vec<Splat> {
 }
 
 /// Petals about a middle, on a stem.
-pub fn flower() -> Vec<Splat> {
+fn flower() -> Vec<Splat> {
     let z = 4.0;
     let mut splats = vec![
         splat(
@@ -151,7 +283,7 @@ pub fn flower() -> Vec<Splat> {
 }
 
 /// Where the flowers of a meadow stand, turned, leaning and of many sizes.
-pub fn meadow() -> Vec<Instance> {
+fn meadow() -> Vec<Instance> {
     let mut instances = Vec::new();
     for row in 0..6 {
         for column in 0..10 {

@@ -31,6 +31,8 @@ struct Entry {
     streams: Vec<Stream>,
     first: u32,
     count: u32,
+    /// Whether they are 2D Gaussians, whose third scale means nothing.
+    is_flat: bool,
     /// When it was last drawn.
     used: u64,
     /// Its chunks, if they were made; they belong to the memory of its positions.
@@ -80,7 +82,7 @@ impl Stream {
 }
 
 impl Entry {
-    fn new(append: &GaussianAppend, with_harmonics: bool) -> Self {
+    fn new(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
         let attributes = &append.attributes;
         let harmonics = attributes.spherical_harmonics.iter();
         let shapes = shapes(append).into_iter();
@@ -89,6 +91,7 @@ impl Entry {
             streams: streams.map(Stream::new).collect(),
             first: append.first,
             count: append.count,
+            is_flat,
             used: 0,
             chunks: Weak::new(),
             bytes: chunks::memory_bytes(append, with_harmonics),
@@ -97,9 +100,11 @@ impl Entry {
 
     fn is_same(&self, other: &Self) -> bool {
         let mut streams = self.streams.iter().zip(&other.streams);
-        (self.first, self.count, self.streams.len())
-            == (other.first, other.count, other.streams.len())
-            && streams.all(|(a, b)| a.is_same(b))
+        let what = |entry: &Self| {
+            let Self { first, count, .. } = *entry;
+            (first, count, entry.is_flat, entry.streams.len())
+        };
+        what(self) == what(other) && streams.all(|(a, b)| a.is_same(b))
     }
 
     /// Bytes that its chunks take.
@@ -148,11 +153,12 @@ impl ChunkCache {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The chunks of what `append` draws, if it has any; `build` makes them, with spherical harmonics or without. All
+    /// The chunks of what `append` draws, as 2D Gaussians if `is_flat`, if it has any; `build` makes them, with spherical harmonics or without. All
     /// chunks together take at most `budget` bytes.
     pub(super) fn get(
         &self,
         append: &GaussianAppend,
+        is_flat: bool,
         budget: u64,
         build: impl FnOnce(bool) -> Chunks,
     ) -> Option<Arc<Chunks>> {
@@ -162,7 +168,7 @@ impl ChunkCache {
         let with_harmonics = append.attributes.spherical_harmonics.iter().all(is_fixed)
             && chunks::memory_bytes(append, true) <= budget;
         // Generations are read before the memory, so that what is written meanwhile makes them old.
-        let mut drawn = Entry::new(append, with_harmonics);
+        let mut drawn = Entry::new(append, is_flat, with_harmonics);
         {
             let mut entries = self.lock();
             entries.now += 1;
@@ -216,6 +222,12 @@ fn is_fixed(stream: &AttributeStream) -> bool {
 fn is_eligible(append: &GaussianAppend) -> bool {
     let fixed = shapes(append).into_iter().all(is_fixed);
     let model = &append.attributes.model;
-    let is_placed = model.matrix.is_some() || model.opacity.is_some();
-    append.indices.is_none() && append.count >= LEAST_COUNT && fixed && !is_placed
+    // What differs from vertex to vertex would have to be in the chunks.
+    let mut of_model = model.matrix.iter().flat_map(|rows| rows.iter());
+    let by_instance = of_model.all(is_by_instance) && model.opacity.iter().all(is_by_instance);
+    append.indices.is_none() && append.count >= LEAST_COUNT && fixed && by_instance
+}
+
+fn is_by_instance(stream: &AttributeStream) -> bool {
+    stream.instance_divisor.is_some()
 }

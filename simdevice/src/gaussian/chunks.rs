@@ -56,14 +56,15 @@ pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64
 }
 
 impl Chunks {
-    /// The chunks of what `append` draws, which has neither indices nor attributes by instance.
-    pub(super) fn build(append: &GaussianAppend, with_harmonics: bool) -> Self {
+    /// The chunks of what `append` draws, without what its model does to it. It has no indices, and of a model none by vertex.
+    /// 2D Gaussians' third scales are zero.
+    pub(super) fn build(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
         let order = morton_order(append);
         let mut chunks = host::with_capacity(order.len().div_ceil(BATCH));
         order
             .par_chunks(BATCH)
             .map_init(Fetcher::default, |fetcher, numbers| {
-                Chunk::read(append, fetcher, numbers, with_harmonics)
+                Chunk::read(append, fetcher, numbers, (is_flat, with_harmonics))
             })
             .collect_into_vec(&mut chunks);
         let opacities = chunks.iter().map(|chunk| chunk.bounds.opacity);
@@ -79,11 +80,14 @@ impl Chunk {
         append: &GaussianAppend,
         fetcher: &mut Fetcher,
         numbers: &[u32],
-        with_harmonics: bool,
+        (is_flat, with_harmonics): (bool, bool),
     ) -> Self {
         let batch = Batch::of_chunk(append, append.first_instance, numbers);
         let mut attributes = Attributes::default();
-        fetcher.read_all(&append.attributes, &batch, &mut attributes);
+        fetcher.read_own(&append.attributes, &batch, &mut attributes);
+        if is_flat {
+            attributes.scale[2].fill(0.0);
+        }
         let mut bounds = Bounds {
             low: [f32::INFINITY; 3],
             high: [f32::NEG_INFINITY; 3],

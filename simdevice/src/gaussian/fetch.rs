@@ -164,8 +164,8 @@ impl Fetcher {
         }
     }
 
-    /// Reads what a batch's Gaussians are, but for their colours.
-    pub(super) fn read_all(
+    /// Reads what a batch's Gaussians are in their own space, but for their colours.
+    pub(super) fn read_own(
         &mut self,
         streams: &GaussianAttributes,
         batch: &Batch<'_>,
@@ -175,6 +175,15 @@ impl Fetcher {
         self.read(&streams.scale, batch, out.scale.each_mut());
         self.read(&streams.rotation, batch, out.rotation.each_mut());
         self.read(&streams.opacity, batch, [&mut out.opacity]);
+    }
+
+    /// Multiplies a batch's opacities by the model's, if it has some.
+    pub(super) fn fade(
+        &mut self,
+        streams: &GaussianAttributes,
+        batch: &Batch<'_>,
+        out: &mut Attributes,
+    ) {
         if let Some(stream) = &streams.model.opacity {
             let mut factor = [0.0; F32_LANES];
             self.read(stream, batch, [&mut factor]);

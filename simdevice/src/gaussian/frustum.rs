@@ -1,6 +1,10 @@
 //! What of space a picture can show. Planes bound it, and tell in a few operations of Gaussians, alone or in a chunk,
 //! that they are off the screen. The answer is conservative: what is not surely outside is inside.
 
+mod reach;
+#[cfg(test)]
+mod tests;
+
 use super::chunks::Bounds;
 use super::instances::{Linear, inverse};
 use super::lanes::{Bits, F32_LANES};
@@ -8,9 +12,6 @@ use super::project::Projection;
 use super::scratch::Attributes;
 use crate::packet::CameraModel;
 use fearless_simd::{Simd, prelude::*};
-
-/// How much wider than exact bounds are, so that rounding loses nothing.
-const MARGIN: f64 = 1e-5;
 
 /// Bounds of binary32's error relative to the sum of the magnitudes of what is summed.
 const ERROR: f64 = 1.0 / 1_048_576.0;
@@ -33,10 +34,19 @@ pub(super) struct Frustum {
     eye: [f64; 3],
     /// The camera's axis and the least and greatest depths along it, if depths are measured along it.
     depth: Option<([f64; 3], f32, f32)>,
-    /// Left, right, top and bottom; none where a camera's sides are not planes.
+    /// Left, right, top and bottom; none where no plane bounds what is seen.
     sides: Vec<Plane>,
+    /// Outside of this plane Gaussians are so small that the sides hold for them, if they do not hold for all.
+    small: Option<Plane>,
     alpha_floor: f64,
+    /// What rounding may do to a length, relative to it.
+    rounding: f64,
+    /// And besides, however short it is.
+    displacement: f64,
 }
+
+/// More than binary64's rounding of a few operations, relative to their operands.
+const ROUNDING: f64 = 1e-12;
 
 /// Why Gaussians are not in a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,57 +81,24 @@ fn magnitude(v: [f64; 3]) -> f64 {
     v[0].abs() + v[1].abs() + v[2].abs()
 }
 
-impl Plane {
-    /// The side of the picture along `axis` that `sign` (1: the lower coordinates) names, for Gaussians whose ellipses
-    /// reach `sigmas` standard deviations.
-    fn side(projection: &Projection, axis: usize, sign: f64, sigmas: f64) -> Self {
-        let row = |axis: usize| [0, 1, 2].map(|i| projection.rotation[3 * axis + i]);
-        let (across, forward) = (row(axis), row(2));
-        let focal = projection.focal[axis];
-        let [first, end] = projection.visible_range(axis);
-        let edge = if sign > 0.0 { first } else { end };
-        // The low-pass variance and the scale add in quadrature: their deviations' sum is no less.
-        let center = sign * (projection.center[axis] - edge) + sigmas * projection.low_pass.sqrt();
-        let (normal, steepest, offset) = if projection.model == CameraModel::Orthographic {
-            (across.map(|a| sign * focal * a), length(across), center)
-        } else {
-            // Where sign (f x/z + c - edge) + reach < 0, times z, which is positive where it matters.
-            let normal = [0, 1, 2].map(|i| sign * focal * across[i] + center * forward[i]);
-            let ends = [projection.slope_min[axis], projection.slope_max[axis]];
-            let steepness = |slope: f64| length([0, 1, 2].map(|i| across[i] - slope * forward[i]));
-            (normal, steepness(ends[0]).max(steepness(ends[1])), 0.0)
-        };
-        Self {
-            normal,
-            per_scale: sigmas * focal.abs() * steepest * (1.0 + MARGIN),
-            offset: offset + offset.abs() * MARGIN,
-        }
-    }
-}
-
 impl Frustum {
     /// The frustum of Gaussians whose opacities are at most `opacity`.
     pub(super) fn new(projection: &Projection, opacity: f32) -> Self {
-        let room = f64::from(opacity.max(1.0)).log2() - projection.log2_floor;
-        // Wider than the ellipse that the tile engine's margins ask for.
-        let sigmas = (2.0 * std::f64::consts::LN_2 * (1.01 * room + 2e-3)).sqrt();
-        let side = |axis, sign| Plane::side(projection, axis, sign, sigmas);
         let r = &projection.rotation;
         let depth = ([r[6], r[7], r[8]], projection.near, projection.far);
-        let (depth, sides) = match projection.model {
-            CameraModel::Fisheye | CameraModel::Equirectangular => (None, Vec::new()),
-            // The Jacobian bounds how far a Gaussian reaches; the unscented transform knows no such bound.
-            _ if projection.unscented => (Some(depth), Vec::new()),
-            _ => (
-                Some(depth),
-                vec![side(0, 1.0), side(0, -1.0), side(1, 1.0), side(1, -1.0)],
-            ),
-        };
+        let is_along_axis = !matches!(
+            projection.model,
+            CameraModel::Fisheye | CameraModel::Equirectangular
+        );
+        let (sides, small) = reach::sides(projection, opacity);
         Self {
             eye: projection.eye,
-            depth,
+            depth: is_along_axis.then_some(depth),
             sides,
+            small,
             alpha_floor: projection.alpha_floor,
+            rounding: ROUNDING,
+            displacement: ROUNDING * magnitude(projection.eye),
         }
     }
 
@@ -136,18 +113,22 @@ impl Frustum {
         let transposed = [0, 1, 2].map(|row| a.map(|of| of[row]));
         // No axis grows by more.
         let growth = a.map(|row| dot(row, row)).iter().sum::<f64>().sqrt();
-        let sides = self.sides.iter().map(|side| Plane {
-            normal: multiply(transposed, side.normal),
-            per_scale: side.per_scale * growth,
-            offset: side.offset,
-        });
+        let rounding = ROUNDING * (1.0 + condition);
+        let place = |plane: &Plane| Plane {
+            normal: multiply(transposed, plane.normal),
+            per_scale: plane.per_scale * growth,
+            offset: plane.offset,
+        };
         Some(Self {
             eye: multiply(inverse, [0, 1, 2].map(|axis| self.eye[axis] - b[axis])),
             depth: self
                 .depth
                 .map(|(forward, near, far)| (multiply(transposed, forward), near, far)),
-            sides: sides.collect(),
+            sides: self.sides.iter().map(place).collect(),
+            small: self.small.as_ref().map(place),
             alpha_floor: self.alpha_floor,
+            rounding,
+            displacement: rounding * (magnitude(self.eye) + magnitude(b)) * condition / growth,
         })
     }
 
@@ -163,11 +144,9 @@ impl Frustum {
             half[axis] = 0.5 * (high - low);
         }
         // How far a linear function rises from the middle of the box to a corner, with room for rounding.
-        let size = magnitude(middle) + magnitude(half) + magnitude(self.eye);
-        let rise = |normal: [f64; 3]| {
-            let rise = dot(normal.map(f64::abs), half);
-            rise + 1e-12 * magnitude(normal) * size
-        };
+        let size = magnitude(middle) + magnitude(half);
+        let slack = self.rounding * size + self.displacement;
+        let rise = |normal: [f64; 3]| dot(normal.map(f64::abs), half) + magnitude(normal) * slack;
         if let Some((forward, near, far)) = self.depth {
             let (depth, rise) = (dot(forward, middle), rise(forward));
             if depth + rise <= f64::from(near) {
@@ -178,10 +157,11 @@ impl Frustum {
             }
         }
         let scale = f64::from(bounds.scale);
-        let beside = self.sides.iter().any(|side| {
-            let greatest = dot(side.normal, middle) + rise(side.normal);
-            greatest + side.per_scale * scale + side.offset < 0.0
-        });
+        let is_outside = |plane: &Plane| {
+            let greatest = dot(plane.normal, middle) + rise(plane.normal);
+            greatest + plane.per_scale * scale + plane.offset < 0.0
+        };
+        let beside = self.sides.iter().any(is_outside) && self.small.iter().all(is_outside);
         beside.then_some(Outside::Beside)
     }
 
@@ -235,6 +215,9 @@ impl Frustum {
                 beside |= value.simd_lt(0.0);
             }
             outside.beside.set(at, beside);
+        }
+        if let Some(small) = self.small_lanes(attributes, len) {
+            outside.beside = outside.beside.and(&small);
         }
         outside
     }

@@ -8,7 +8,7 @@ use super::fetch::{BATCH, Batch, Fetcher};
 use super::lanes::{Bits, F32_LANES, Lanes, NO_LANES};
 use super::project::Projection;
 use super::scratch::Scratch;
-use crate::packet::AttributeStream;
+use crate::packet::{AttributeStream, GaussianAppend};
 
 /// Matrices by lane, as they are read.
 #[derive(Clone, Debug)]
@@ -27,6 +27,44 @@ pub(super) struct Placed {
     matrix: [[Lanes; 4]; 3],
     /// A vector from the eye in the Gaussians' space, of any length.
     pub(super) toward: [Lanes; 3],
+}
+
+/// What a model does to all Gaussians of an instance.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Model {
+    /// The matrix that places them and its translation.
+    pub(super) matrix: Option<(Linear, [f64; 3])>,
+    opacity: Option<f32>,
+}
+
+impl Model {
+    /// Reads an instance's, whose attributes are by instance.
+    pub(super) fn read(append: &GaussianAppend, instance: u32) -> Self {
+        let mut fetcher = Fetcher::default();
+        let batch = Batch::new(append, instance, 0, 1);
+        let model = &append.attributes.model;
+        let matrix = model.matrix.as_ref().and_then(|rows| {
+            let mut matrices = Matrices::default();
+            matrices.read(&mut fetcher, rows, &batch);
+            matrices.uniform()
+        });
+        let opacity = model.opacity.as_ref().map(|stream| {
+            let mut factor = [0.0; F32_LANES];
+            fetcher.read(stream, &batch, [&mut factor]);
+            factor[0]
+        });
+        Self { matrix, opacity }
+    }
+
+    /// What no opacity exceeds, if none does `opacity` without the model.
+    pub(super) fn greatest_opacity(&self, opacity: f32) -> f32 {
+        match self.opacity {
+            None => opacity,
+            Some(factor) if factor >= 0.0 => opacity * factor,
+            // What was least is greatest now.
+            Some(_) => f32::INFINITY,
+        }
+    }
 }
 
 /// A matrix is singular if its determinant is not greater than this times the product of its rows' lengths.

@@ -13,6 +13,7 @@ mod fetch;
 pub(crate) mod footprint;
 mod frustum;
 mod instances;
+mod jobs;
 mod lanes;
 mod linearize;
 mod panorama;
@@ -34,21 +35,21 @@ use crate::device::Device;
 use crate::format::Format;
 use crate::packet::draw::{Draw, ResolveShader};
 use crate::packet::{
-    GaussianAppend, GaussianBegin, GaussianGeometry, GaussianOrder, GaussianPrecision,
-    GaussianState, Rect, Viewport,
+    GaussianAppend, GaussianBegin, GaussianGeometry, GaussianOrder, GaussianState, Rect, Viewport,
 };
 use crate::raster::DepthCode;
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, DrawRecord};
-use chunks::{Chunk, Chunks};
+use chunks::Chunks;
 use depth::{CenterDepth, Trend};
 use devmem::host;
 use fearless_simd::dispatch;
-use fetch::{BATCH, Batch, Fetcher};
+use fetch::{BATCH, Fetcher};
 use footprint::Visible;
-use frustum::{Frustum, Outside};
+use frustum::Frustum;
 use instances::Matrices;
 use isa::exec::Stopped;
+use jobs::{Job, Part};
 use project::{Projected, Projection, Source, Splat};
 use rayon::prelude::*;
 use rays::{PixelRays, RayDepth, RayDepths};
@@ -204,11 +205,19 @@ impl GaussianSet {
         let started = Instant::now();
         let mut work = Counters::default();
         let mut batches = self.project(device, &chunks, &mut work)?;
+        let fixed = batches.len();
         self.shade(device, &mut batches)?;
-        for batch in &batches {
-            work.add_all(&batch.counters);
+        let mut by_programs = Counters::default();
+        for (number, batch) in batches.iter().enumerate() {
+            let sum = if number < fixed {
+                &mut work
+            } else {
+                &mut by_programs
+            };
+            sum.add_all(&batch.counters);
         }
         counters.add_all(&work);
+        counters.add_all(&by_programs);
         let projected = Instant::now();
         let order = sorted(&batches);
         let sorted = Instant::now();
@@ -231,12 +240,22 @@ impl GaussianSet {
             depths.push(batch.ray_depths);
         }
         let is_per_pixel = self.begin.state.order == GaussianOrder::PerPixel;
-        let is_flat = self.begin.state.geometry == GaussianGeometry::Surfel;
+        let is_flat = self.is_flat();
         let rays = PixelRays::new(&self.begin.camera, &self.begin.viewport);
         let record = device.recorder().map(|_| {
             let degree = self.begin.state.sh_degree;
             let (pairs, bounds) = (tiles.pairs(), self.bounds);
-            let draw = trace::gaussian_draw(&work, &splats, pairs, degree, bounds);
+            let (by_device, by_program) = splats.split_at(fixed);
+            let fixed = trace::Projected {
+                counters: &work,
+                splats: by_device,
+            };
+            let by_program = trace::Projected {
+                counters: &by_programs,
+                splats: by_program,
+            };
+            let bytes = self.draws.iter().map(shaded::vertex_bytes).sum();
+            let draw = trace::gaussian_draw(&fixed, &by_program, bytes, pairs, degree, bounds);
             DrawRecord::new(draw)
         });
         Ok(GaussianDraw {
@@ -259,104 +278,31 @@ impl GaussianSet {
         })
     }
 
+    /// Whether it is of 2D Gaussians.
+    fn is_flat(&self) -> bool {
+        self.begin.state.geometry == GaussianGeometry::Surfel
+    }
+
     /// The chunks of each append that has some.
     fn find_chunks(&self, device: &Device, counters: &mut Counters) -> Vec<Option<Arc<Chunks>>> {
         let config = device.config();
         let mut found = vec![None; self.appends.len()];
-        if !is_bounded(&self.begin.state) || !config.skips.has(Skip::Chunks) {
+        if !config.skips.has(Skip::Chunks) {
             return found;
         }
+        let is_flat = self.is_flat();
         for (append, found) in self.appends.iter().zip(&mut found) {
             let build = |with_harmonics| {
                 let started = Instant::now();
-                let chunks = device.install(|| Chunks::build(append, with_harmonics));
+                let chunks = device.install(|| Chunks::build(append, is_flat, with_harmonics));
                 counters.add(Counter::ChunksBuilt, chunks.chunks.len() as u64);
                 counters.add(Counter::ChunkTime, started.elapsed().as_nanos() as u64);
                 chunks
             };
             let cache = device.chunks();
-            *found = cache.get(append, config.chunk_budget_bytes, build);
+            *found = cache.get(append, is_flat, config.chunk_budget_bytes, build);
         }
         found
-    }
-
-    /// What is to be projected, in the order of draw, instance and, but for chunks, position in the draw. What is left
-    /// out already is counted.
-    fn jobs<'a>(
-        &'a self,
-        chunks: &'a [Option<Arc<Chunks>>],
-        projection: &Projection,
-        counters: &mut Counters,
-    ) -> Result<Vec<Job<'a>>, TooManyGaussians> {
-        let batches = |append: &GaussianAppend| {
-            let per_instance = append.count.div_ceil(BATCH as u32);
-            u64::from(per_instance) * u64::from(append.instance_count)
-        };
-        let batches = self.appends.iter().map(batches);
-        let batches = batches.chain(self.draws.iter().map(shaded::batches));
-        let batches = batches.fold(0, u64::saturating_add);
-        // A picture that repeats has copies on both sides.
-        let sides = if projection.period.is_some() { 3 } else { 1 };
-        let batches = batches.saturating_mul(sides);
-        if batches > MAX_BATCHES {
-            return Err(TooManyGaussians { batches });
-        }
-        let mut jobs = Vec::new();
-        // There are no more Gaussians than places in batches, so that this stays within 32 bits but at the very end.
-        let mut sequence = 0u32;
-        for (append, chunks) in self.appends.iter().zip(chunks) {
-            let opacity = chunks.as_ref().map_or(1.0, |chunks| chunks.opacity);
-            let frustum = Arc::new(Frustum::new(projection, opacity));
-            for instance in 0..append.instance_count {
-                let job = Job {
-                    append,
-                    instance: append.first_instance.saturating_add(instance),
-                    sequence,
-                    part: Part::From(0),
-                    frustum: Arc::clone(&frustum),
-                };
-                let batches = match chunks {
-                    None => append.count.div_ceil(BATCH as u32) as usize,
-                    Some(chunks) => chunks.chunks.len(),
-                };
-                host::reserve(&mut jobs, batches);
-                match chunks {
-                    None => jobs.extend((0..append.count).step_by(BATCH).map(|start| Job {
-                        part: Part::From(start),
-                        ..job.clone()
-                    })),
-                    Some(chunks) => jobs.extend(
-                        chunks
-                            .chunks
-                            .iter()
-                            .filter(|chunk| !self.is_left_out(chunk, &frustum, counters))
-                            .map(|chunk| Job {
-                                part: Part::Chunk(chunk),
-                                ..job.clone()
-                            }),
-                    ),
-                }
-                sequence = sequence.wrapping_add(append.count);
-            }
-        }
-        Ok(jobs)
-    }
-
-    /// Whether a whole chunk is outside; its Gaussians are counted then.
-    fn is_left_out(&self, chunk: &Chunk, frustum: &Frustum, counters: &mut Counters) -> bool {
-        let Some(reason) = frustum.excludes(&chunk.bounds) else {
-            return false;
-        };
-        let reason = match reason {
-            Outside::Faint => Counter::SkippedFaint,
-            Outside::Near => Counter::SkippedNear,
-            Outside::Far => Counter::SkippedFar,
-            Outside::Beside => Counter::SkippedOffScreen,
-        };
-        for counter in [reason, Counter::GaussiansRead, Counter::OutsideByChunks] {
-            counters.add(counter, chunk.numbers.len() as u64);
-        }
-        true
     }
 
     /// Shades and projects what vertex programs project.
@@ -399,7 +345,7 @@ impl GaussianSet {
             counters.add(Counter::HarmonicsUnread, unread);
         }
         let level = device.level();
-        let is_flat = begin.state.geometry == GaussianGeometry::Surfel;
+        let is_flat = self.is_flat();
         let one = |worker: &mut Worker, (job, out): (&Job<'_>, &mut Projected)| {
             let Worker {
                 fetcher,
@@ -420,8 +366,7 @@ impl GaussianSet {
                 }
             }
             let placed;
-            let mut bounds =
-                (skips.has(Skip::Bounds) && is_bounded(&begin.state)).then_some(frustum);
+            let mut bounds = skips.has(Skip::Bounds).then_some(frustum);
             if let Some(matrices) = source.matrices {
                 // What is yet to be placed in the world by the same matrix sees the planes where they are for it.
                 let uniform = bounds.and(matrices.uniform());
@@ -447,75 +392,6 @@ impl GaussianSet {
         });
         panorama::append_copies(&mut batches);
         Ok(batches)
-    }
-}
-
-/// Whether chunks' and the frustum's bounds hold: they are made for volumes in binary32.
-fn is_bounded(state: &GaussianState) -> bool {
-    state.geometry == GaussianGeometry::Volume && state.precision == GaussianPrecision::Float32
-}
-
-/// A batch to project.
-#[derive(Clone)]
-struct Job<'a> {
-    append: &'a GaussianAppend,
-    instance: u32,
-    /// Which Gaussian of the set the instance's first is.
-    sequence: u32,
-    part: Part<'a>,
-    frustum: Arc<Frustum>,
-}
-
-#[derive(Clone, Copy)]
-enum Part<'a> {
-    /// The vertices from this one on.
-    From(u32),
-    Chunk(&'a Chunk),
-}
-
-impl<'a> Job<'a> {
-    /// Reads the batch, if it lies in no chunk.
-    fn read<'b>(
-        &'b self,
-        fetcher: &mut Fetcher,
-        attributes: &'b mut Attributes,
-        matrices: &'b mut Option<Box<Matrices>>,
-        is_flat: bool,
-    ) -> Source<'b> {
-        let streams = &self.append.attributes;
-        match self.part {
-            Part::From(start) => {
-                let len = (self.append.count - start).min(BATCH as u32) as usize;
-                let batch = Batch::new(self.append, self.instance, start, len);
-                fetcher.read_all(streams, &batch, attributes);
-                if is_flat {
-                    attributes.scale[2][..len].fill(0.0);
-                }
-                let matrices = streams.model.matrix.as_ref().map(|rows| {
-                    let matrices = matrices.get_or_insert_default();
-                    matrices.read(fetcher, rows, &batch);
-                    &**matrices
-                });
-                Source {
-                    streams,
-                    batch,
-                    attributes,
-                    matrices,
-                    is_sound: false,
-                    harmonics: &[],
-                    frustum: None,
-                }
-            }
-            Part::Chunk(chunk) => Source {
-                streams,
-                batch: Batch::of_chunk(self.append, self.instance, &chunk.numbers),
-                attributes: &chunk.attributes,
-                matrices: None,
-                is_sound: chunk.is_sound,
-                harmonics: &chunk.harmonics,
-                frustum: None,
-            },
-        }
     }
 }
 

@@ -81,7 +81,7 @@ fn is_steep(factor: [f64; 3], log2_opacity: f64) -> bool {
 }
 
 /// The least factor, in 1/px, whose binary16 value is as exact as that of others.
-const LEAST_HALF_FACTOR: f64 = 1.0 / 16384.0;
+pub(super) const LEAST_HALF_FACTOR: f64 = 1.0 / 16384.0;
 
 /// How far, in units of `u^2 + v^2`, what is rasterized in binary16 reaches where exact arithmetic reaches `room`.
 ///

@@ -65,6 +65,19 @@ pub(super) fn batches(draw: &Draw) -> u64 {
     u64::from(per_instance) * u64::from(draw.instance_count)
 }
 
+/// Bytes that a draw's vertices take as they are read, and as the Gaussians that the program writes.
+pub(super) fn vertex_bytes(draw: &Draw) -> u64 {
+    let attributes = draw.attributes.iter();
+    let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
+    let index = draw
+        .indices
+        .as_ref()
+        .map_or(0, |indices| indices.index_size);
+    let written = 4 * (4 + u64::from(gaussian::VARYINGS));
+    let vertices = u64::from(draw.count) * u64::from(draw.instance_count);
+    vertices * (read as u64 + u64::from(index) + written)
+}
+
 /// Shades and projects a draw whose first Gaussian is number `sequence` of the set.
 ///
 /// # Errors

@@ -22,6 +22,18 @@ const C3: [f32; 7] = [
     -0.590_043_6,
 ];
 
+const C4: [f32; 9] = [
+    2.503_343,
+    -1.770_130_8,
+    0.946_174_7,
+    -0.669_046_5,
+    0.105_785_55,
+    -0.669_046_5,
+    0.473_087_35,
+    -1.770_130_8,
+    0.625_835_7,
+];
+
 /// How many coefficients degrees 0 to `degree` have.
 pub fn coefficient_count(degree: u32) -> usize {
     (degree as usize + 1).pow(2)
@@ -30,7 +42,7 @@ pub fn coefficient_count(degree: u32) -> usize {
 /// Directions whose basis functions are found together.
 pub(super) const DIRECTIONS: usize = 16;
 
-/// The basis functions of degrees 0 to 3 in some directions: by function, then by direction.
+/// The basis functions of degrees 0 to 4 in some directions: by function, then by direction.
 pub(super) struct Bases([[f32; DIRECTIONS]; MAX_COEFFICIENTS]);
 
 impl Default for Bases {
@@ -40,7 +52,7 @@ impl Default for Bases {
 }
 
 impl Bases {
-    /// Finds the functions of degrees 0 to `degree` (at most 3) in unit directions from the eye: their x, y and z.
+    /// Finds the functions of degrees 0 to `degree` (at most 4) in unit directions from the eye: their x, y and z.
     #[inline(always)]
     pub(super) fn find<S: Simd>(
         &mut self,
@@ -73,6 +85,17 @@ impl Bases {
             set(13, x * C3[4] * (zz * 4.0 - xx - yy));
             set(14, z * C3[5] * (xx - yy));
             set(15, x * C3[6] * (xx - yy * 3.0));
+        }
+        if degree >= 4 {
+            set(16, x * y * C4[0] * (xx - yy));
+            set(17, y * z * C4[1] * (xx * 3.0 - yy));
+            set(18, x * y * C4[2] * (zz * 7.0 - 1.0));
+            set(19, y * z * C4[3] * (zz * 7.0 - 3.0));
+            set(20, (zz * (zz * 35.0 - 30.0) + 3.0) * C4[4]);
+            set(21, x * z * C4[5] * (zz * 7.0 - 3.0));
+            set(22, (xx - yy) * C4[6] * (zz * 7.0 - 1.0));
+            set(23, x * z * C4[7] * (xx - yy * 3.0));
+            set(24, (xx * (xx - yy * 3.0) - yy * (xx * 3.0 - yy)) * C4[8]);
         }
     }
 
@@ -204,16 +227,16 @@ mod tests {
     fn the_basis_is_orthonormal() {
         // A midpoint rule over the sphere is exact enough to tell any wrong constant or sign of a square.
         let (rows, columns) = (200u32, 400u32);
-        let mut products = vec![[0.0f64; 16]; 16];
+        let mut products = vec![[0.0f64; MAX_COEFFICIENTS]; MAX_COEFFICIENTS];
         for row in 0..rows {
             let z = -1.0 + (f64::from(row) + 0.5) * 2.0 / f64::from(rows);
             let radius = (1.0 - z * z).sqrt();
             for column in 0..columns {
                 let angle = (f64::from(column) + 0.5) * std::f64::consts::TAU / f64::from(columns);
                 let direction = [radius * angle.cos(), radius * angle.sin(), z].map(|v| v as f32);
-                let b = bases(3, direction).0.map(|lanes| lanes[0]);
-                for i in 0..16 {
-                    for j in 0..16 {
+                let b = bases(4, direction).0.map(|lanes| lanes[0]);
+                for i in 0..MAX_COEFFICIENTS {
+                    for j in 0..MAX_COEFFICIENTS {
                         products[i][j] += f64::from(b[i]) * f64::from(b[j]);
                     }
                 }

@@ -23,16 +23,19 @@ pub enum Kind {
     Mixed,
     /// Triangles, and Gaussians of which they hide some.
     Hidden,
+    /// Gaussians that a program projects and a program resolves.
+    Shaded,
     /// Dispatches alone.
     Dispatches,
 }
 
 /// Every kind, with the name that files of it have.
-pub const KINDS: [(Kind, &str); 5] = [
+pub const KINDS: [(Kind, &str); 6] = [
     (Kind::Triangles, "triangles"),
     (Kind::Gaussians, "gaussians"),
     (Kind::Mixed, "mixed"),
     (Kind::Hidden, "hidden"),
+    (Kind::Shaded, "shaded"),
     (Kind::Dispatches, "dispatches"),
 ];
 
@@ -75,10 +78,12 @@ pub fn draw_on(device: &Arc<Device>, kind: Kind, around: [&[Packet]; 2]) -> Vec<
             )),
             ..rendering(attachment(&color, clear(ClearValue::Float([0.0; 4]))))
         })));
-        if kind != Kind::Gaussians {
+        if !matches!(kind, Kind::Gaussians | Kind::Shaded) {
             packets.push(triangles(device, 3 + frame, 300));
         }
-        if kind == Kind::Hidden {
+        if kind == Kind::Shaded {
+            packets.extend(shaded(device, 9 + frame, 1000));
+        } else if kind == Kind::Hidden {
             packets.extend(tested(gaussians(5 + frame, 2000, OVER)));
         } else if kind != Kind::Triangles {
             packets.extend(gaussians(5 + frame, 2000, OVER));
@@ -148,6 +153,99 @@ fn dispatch(device: &Device) -> Packet {
         count: [40, 2, 1],
         bindings: Bindings::default(),
     }))
+}
+
+/// `count` Gaussians that programs project and resolve.
+fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut floats: Vec<f32> = Vec::new();
+    for _ in 0..count {
+        let [x, y] = [0; 2].map(|_| rng.random_range(-1.2..1.2f32));
+        let depth = rng.random_range(0.0..1.0f32);
+        let [xx, yy] = [0; 2].map(|_| rng.random_range(1.0..60.0f32));
+        let xy = rng.random_range(-0.9..0.9f32) * (xx * yy).sqrt();
+        floats.extend([x, y, depth, 1.0, xx, xy, yy, rng.random_range(0.1..1.0)]);
+        floats.extend([0; 3].map(|_| rng.random_range(0.0..1.0f32)));
+        floats.push(depth);
+    }
+    let size = 4 * floats.len() as u64;
+    let memory = Allocation::new_zeroed(size).unwrap();
+    memory.write(0, &floats).unwrap();
+    let stream = |offset| AttributeStream {
+        buffer: BufferRange {
+            memory: memory.clone(),
+            offset: 0,
+            size,
+        },
+        stride: 48,
+        offset,
+        format: Format::R32G32B32A32Sfloat,
+        instance_divisor: None,
+    };
+    let inputs = (0..12).map(|slot| {
+        Some(VertexInput::Attribute {
+            stream: slot / 4,
+            component: slot % 4,
+        })
+    });
+    let position = (0..4).map(|component| Some(VertexOutput::Position(component)));
+    let others = (0..gaussian::VARYINGS).map(|number| Some(VertexOutput::Varying(number)));
+    let programs = DrawPrograms {
+        vertex: program(8..11, 12),
+        vertex_inputs: inputs.collect(),
+        vertex_outputs: position.chain(others).collect(),
+        varyings: gaussian::VARYINGS,
+        fragment: None,
+    };
+    let resolved = FragmentPrograms {
+        program: program(0..3, 4),
+        inputs: (0..4)
+            .map(|number| {
+                Some(FragmentInput::Varying {
+                    index: resolve::ACCUMULATED + number,
+                    interpolation: Interpolation::Flat,
+                    sampling: Sampling::Center,
+                })
+            })
+            .collect(),
+        outputs: (0..4)
+            .map(|component| {
+                Some(FragmentOutput::Color {
+                    attachment: 0,
+                    component,
+                    index: 0,
+                })
+            })
+            .collect(),
+        early_tests: false,
+        discards: false,
+        per_sample: false,
+        has_side_effects: false,
+    };
+    vec![
+        Packet::GaussianBegin(Box::new(begin(OVER))),
+        Packet::GaussianResolveShader(Box::new(ResolveShader {
+            program: Arc::new(ResolveProgram::new(device, &resolved).unwrap()),
+            bindings: Bindings::default(),
+            sample_shading: false,
+            alpha_to_coverage: false,
+            alpha_to_one: false,
+        })),
+        Packet::GaussianAppendDraw(Box::new(Draw {
+            pipeline: Arc::new(DrawPipeline::of_gaussians(device, &programs).unwrap()),
+            state: Arc::new(DrawState::new(Topology::PointList, [WIDTH, HEIGHT])),
+            attributes: vec![stream(0), stream(16), stream(32)],
+            vertex_bindings: Bindings::default(),
+            fragment_bindings: Bindings::default(),
+            indices: None,
+            first: 0,
+            count,
+            first_instance: 0,
+            instance_count: 1,
+            draw_index: 0,
+        })),
+        Packet::GaussianResolve,
+    ]
 }
 
 /// `count` random triangles that hide each other, large ones first.

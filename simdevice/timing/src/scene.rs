@@ -76,6 +76,7 @@ pub fn gaussians(size: [u32; 2], count: usize, seed: u64) -> FrameWork {
         read: count as u64,
         projected: count as u64,
         drawn: count as u64,
+        shaded: 0,
         degree: 3,
         pairs,
         tiles: u64::from(columns * rows),

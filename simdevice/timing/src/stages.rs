@@ -29,6 +29,19 @@ const PROJECT: ShaderWork = ShaderWork {
     bytes: 80.0,
 };
 
+/// Every Gaussian that a vertex program projected and that passes: of projection only determinant, conic, radius and
+/// rectangle; 48 bytes out.
+const FOOTPRINT: ShaderWork = ShaderWork {
+    float: 40.0,
+    integer: 20.0,
+    special: 2.0,
+    wide: 0.0,
+    memory: 12.0,
+    image: 0.0,
+    other: 0.0,
+    bytes: 48.0,
+};
+
 /// Every Gaussian that is drawn: the direction and the basis.
 const DIRECTION: ShaderWork = ShaderWork {
     float: 45.0,
@@ -83,12 +96,15 @@ const DIGIT_BITS: u32 = 8;
 /// What a draw of Gaussians hands to its stages 1 and 2.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GaussianCounts {
-    /// Gaussians that the draw named.
+    /// Gaussians that the draw named and the device projects.
     pub read: u64,
     /// Of those, beyond the near plane and not faint.
     pub projected: u64,
     /// Of those, that reach a tile.
     pub drawn: u64,
+    /// Gaussians that a vertex program projected, beyond the near plane and not faint. What the program did is not among
+    /// what follows from these counts.
+    pub shaded: u64,
     /// Degree of the spherical harmonics.
     pub degree: u32,
     /// Pairs of a tile and a Gaussian.
@@ -103,6 +119,7 @@ pub fn gaussian(counts: &GaussianCounts) -> [ShaderWork; 2] {
     let preprocess = CULL
         .times(counts.read as f64)
         .plus(&PROJECT.times(counts.projected as f64))
+        .plus(&FOOTPRINT.times(counts.shaded as f64))
         .plus(
             &DIRECTION
                 .plus(&COEFFICIENT.times(coefficients))
@@ -127,6 +144,7 @@ mod tests {
             read: 10,
             projected: 8,
             drawn: 5,
+            shaded: 0,
             degree: 3,
             pairs: 20,
             tiles: 3600,
@@ -140,5 +158,10 @@ mod tests {
             ..counts
         });
         assert!(flat.float < one.float);
+        let [more, _] = gaussian(&GaussianCounts {
+            shaded: 7,
+            ..counts
+        });
+        assert!((more.bytes - one.bytes - 7.0 * 48.0).abs() < 1e-9);
     }
 }

@@ -14,7 +14,12 @@ use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
-use simdevice::packet::draw::{DrawPipeline, ResolveProgram, gaussian, resolve};
+use simdevice::isa::builder::Builder;
+use simdevice::isa::ir::{Rate, Type};
+use simdevice::packet::draw::{
+    DrawPipeline, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, ResolveProgram,
+    Sampling, gaussian, resolve,
+};
 use std::sync::Arc;
 
 /// A vertex shader that projects Gaussians.
@@ -107,10 +112,11 @@ impl ResolveStage {
         state: &PipelineGaussianStateCreateInfoGAURAST,
         fixed: &FixedState,
     ) -> Result<Option<Self>, Error> {
-        let Some(stage) = find(info, vk::ShaderStageFlags::FRAGMENT) else {
-            return Ok(None);
-        };
         let draw = &fixed.draw;
+        let Some(stage) = find(info, vk::ShaderStageFlags::FRAGMENT) else {
+            let is_needed = draw.alpha_to_coverage || draw.alpha_to_one;
+            return is_needed.then(|| Self::passing(device, fixed)).transpose();
+        };
         let fragment =
             polygon::translate(device, layout(info)?, stage, Stage::Fragment, draw.samples)?;
         let varyings = varyings(state)?;
@@ -132,6 +138,50 @@ impl ResolveStage {
             alpha_to_coverage: draw.alpha_to_coverage,
             alpha_to_one: draw.alpha_to_one,
         }))
+    }
+}
+
+impl ResolveStage {
+    /// One that leaves colours as they are, so that their alpha may become coverage, or one.
+    fn passing(device: &Device, fixed: &FixedState) -> Result<Self, Error> {
+        let mut builder = Builder::new();
+        for slot in 0..4 {
+            let input = builder.input(slot, Type::B32, Rate::Varying);
+            let output = builder.output(slot, Type::B32);
+            builder.assign(output, input);
+        }
+        let invalid = |error: &dyn std::fmt::Display| Error::InvalidShader(error.to_string());
+        let input = |component| {
+            Some(FragmentInput::Varying {
+                index: resolve::ACCUMULATED + component,
+                interpolation: Interpolation::Flat,
+                sampling: Sampling::Center,
+            })
+        };
+        let output = |component| {
+            Some(FragmentOutput::Color {
+                attachment: 0,
+                component,
+                index: 0,
+            })
+        };
+        let programs = FragmentPrograms {
+            program: builder.finish().map_err(|error| invalid(&error))?,
+            inputs: (0..4).map(input).collect(),
+            outputs: (0..4).map(output).collect(),
+            early_tests: false,
+            discards: false,
+            per_sample: false,
+            has_side_effects: false,
+        };
+        let program = ResolveProgram::new(device.simulated(), &programs);
+        Ok(Self {
+            program: Arc::new(program.map_err(|error| invalid(&error))?),
+            descriptors: Vec::new(),
+            sample_shading: false,
+            alpha_to_coverage: fixed.draw.alpha_to_coverage,
+            alpha_to_one: fixed.draw.alpha_to_one,
+        })
     }
 }
 

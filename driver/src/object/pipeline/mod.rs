@@ -7,7 +7,7 @@ mod blend;
 pub(crate) mod compute;
 pub(crate) mod convert;
 pub(crate) mod fixed;
-mod gaussian;
+pub(crate) mod gaussian;
 pub(crate) mod gaussian_stages;
 pub(crate) mod layout;
 mod link;

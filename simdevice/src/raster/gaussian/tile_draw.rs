@@ -148,13 +148,19 @@ impl<'a> GaussianTileDraw<'a> {
         if let Some(resolve) = &self.resolve
             && covered != [[0; BLOCKS]; SAMPLES]
         {
+            let mut done = Counters::default();
             let mut tools = Tools {
                 buffers,
                 fragments,
-                counters,
+                counters: &mut done,
                 cancel,
             };
-            resolve.run(tile, &samples, &mut shaded, &mut tools)?;
+            let ran = resolve.run(tile, &samples, &mut shaded, &mut tools);
+            counters.add_all(&done);
+            if let Some(record) = &self.draw.record {
+                record.add_shading(&done);
+            }
+            ran?;
             if !resolve.tests_early() {
                 samples.leave(&covered, &shaded);
                 covered = shaded;

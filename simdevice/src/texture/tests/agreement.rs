@@ -213,9 +213,9 @@ fn plain_samples_are_the_same_one_by_one() {
         Format::B8G8R8A8Srgb,
     ];
     for round in 0..1500 {
-        let [width, height] = [(); 2].map(|()| rng.random_range(1..70));
+        let [width, height]: [u32; 2] = [(); 2].map(|()| rng.random_range(1..70));
         let desc = ImageDesc {
-            mip_levels: rng.random_range(1..=(width.max(height) as u32).ilog2() + 1),
+            mip_levels: rng.random_range(1..=width.max(height).ilog2() + 1),
             ..desc(
                 ImageKind::D2,
                 *formats.choose(&mut rng).unwrap(),

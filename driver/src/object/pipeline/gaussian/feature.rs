@@ -1,0 +1,73 @@
+//! The extension's features, and what is said where one is missing.
+
+use super::STRUCTURE;
+use crate::capabilities::features::EnabledFeatures;
+use crate::error::Error;
+
+/// A feature bit of the extension: its name here, its name there, and the id of the rule that asks for it.
+pub(super) type Feature = (&'static str, &'static str, &'static str);
+
+macro_rules! feature {
+    ($field:literal, $name:literal) => {
+        (
+            $field,
+            $name,
+            concat!(
+                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-",
+                $name,
+                "-feature"
+            ),
+        )
+    };
+}
+
+pub(super) const TOPOLOGY: Feature =
+    feature!("gaussian_primitive_topology", "gaussianPrimitiveTopology");
+pub(super) const VERTEX_SHADER_PROJECTION: Feature =
+    feature!("vertex_shader_projection", "vertexShaderProjection");
+pub(super) const RESOLVE_FRAGMENT_SHADER: Feature =
+    feature!("resolve_fragment_shader", "resolveFragmentShader");
+pub(super) const RADIAL_DISTANCE_ORDER: Feature =
+    feature!("radial_distance_order", "radialDistanceOrder");
+pub(super) const PRIMITIVE_ORDER: Feature = feature!("primitive_order", "primitiveOrder");
+pub(super) const PER_PIXEL_ORDER: Feature = feature!("per_pixel_order", "perPixelOrder");
+pub(super) const RASTERIZATION_FLOAT16: Feature =
+    feature!("rasterization_float16", "rasterizationFloat16");
+pub(super) const OPACITY_COMPENSATION: Feature =
+    feature!("opacity_compensation", "opacityCompensation");
+pub(super) const UNSCENTED_PROJECTION: Feature =
+    feature!("unscented_projection", "unscentedProjection");
+pub(super) const GAUSSIAN_2D: Feature = feature!("gaussian_2d", "gaussian2D");
+pub(super) const UNIFORM_BUFFER_CAMERA: Feature =
+    feature!("uniform_buffer_camera", "uniformBufferCamera");
+pub(super) const MERGED_DRAWS: Feature = feature!("merged_draws", "mergedDraws");
+pub(super) const INSTANCING: Feature = feature!("gaussian_instancing", "gaussianInstancing");
+pub(super) const DEPTH_STENCIL: Feature =
+    feature!("gaussian_depth_stencil", "gaussianDepthStencil");
+pub(super) const MULTISAMPLE: Feature = feature!("gaussian_multisample", "gaussianMultisample");
+
+/// Refuses `what` unless its feature is enabled, which one that the device lacks never is.
+pub(super) fn require(
+    features: &EnabledFeatures,
+    feature: Feature,
+    what: &str,
+) -> Result<(), Error> {
+    if features.has(feature.0) {
+        return Ok(());
+    }
+    Err(not_enabled(feature, what))
+}
+
+fn not_enabled((_, name, vuid): Feature, what: &str) -> Error {
+    Error::FeatureNotEnabled {
+        vuid,
+        message: format!("{STRUCTURE}: {what}, but the feature {name} is not enabled"),
+    }
+}
+
+pub(super) fn unknown(field: &str, value: &dyn std::fmt::Debug) -> Error {
+    Error::usage(
+        "VUID-VkPipelineGaussianStateCreateInfoGAURAST-parameter",
+        format!("{STRUCTURE}: {field} has the unknown value {value:?}"),
+    )
+}

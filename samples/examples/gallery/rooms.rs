@@ -1,0 +1,391 @@
+//! What is shown beside what.
+
+use ash::vk::SampleCountFlags as Samples;
+use gaurast::vk::{
+    GaussianAntialiasingGAURAST as Antialiasing, GaussianCameraGAURAST as Camera,
+    GaussianCameraModelGAURAST as Model, GaussianGeometryGAURAST as Geometry,
+    GaussianLinearizationGAURAST as Linearization, GaussianOrderGAURAST as Order,
+    GaussianPrecisionGAURAST as Precision, PipelineGaussianStateCreateFlagsGAURAST as Flags,
+    PipelineGaussianStateCreateInfoGAURAST as State,
+};
+
+use crate::gpu::{Picture, Resolve, Splat, Triangle};
+use crate::scenes::{self, Scenes};
+
+const SIZE: [u32; 2] = [192, 120];
+
+/// What a picture shows.
+#[allow(clippy::large_enum_variant, reason = "there are some thirty of them")]
+pub enum Content<'a> {
+    Drawn(Picture<'a>),
+    /// How the second of two differs from the first, so many times as much.
+    Difference([Picture<'a>; 2], f32),
+}
+
+/// A picture with its file's name and what is said about it.
+pub struct Exhibit<'a> {
+    pub name: &'a str,
+    pub caption: &'a str,
+    pub content: Content<'a>,
+}
+
+/// Pictures that belong together.
+pub struct Room<'a> {
+    pub title: &'a str,
+    pub text: &'a str,
+    pub exhibits: Vec<Exhibit<'a>>,
+}
+
+/// All rooms.
+pub fn all(scenes: &Scenes) -> Vec<Room<'_>> {
+    vec![
+        cameras(scenes),
+        projections(scenes),
+        shaders(scenes),
+        orders(scenes),
+        merged(scenes),
+        geometry(scenes),
+        precision(scenes),
+        antialiasing(scenes),
+        limits(scenes),
+        triangles(scenes),
+        instances(scenes),
+    ]
+}
+
+/// Looks along +z from the origin, with a focal length in pixels.
+fn camera(focal: f32) -> Camera<'static> {
+    let [width, height] = SIZE.map(|side| side as f32);
+    Camera::default()
+        .focal_length([focal; 2])
+        .principal_point([width / 2.0, height / 2.0])
+        .depth_range(0.2, 100.0)
+        .expect("planes in front of the camera")
+}
+
+fn picture(splats: &[Splat], focal: f32) -> Picture<'_> {
+    Picture {
+        size: SIZE,
+        camera: camera(focal),
+        state: State::default(),
+        splats,
+        instances: &[],
+        triangle: None,
+        samples: Samples::TYPE_1,
+        draws: &[],
+        by_shader: false,
+        resolve: None,
+        coverage: false,
+    }
+}
+
+/// A picture in another state.
+fn with<'a>(
+    picture: Picture<'a>,
+    change: impl FnOnce(State<'static>) -> State<'static>,
+) -> Picture<'a> {
+    Picture {
+        state: change(picture.state),
+        ..picture
+    }
+}
+
+fn drawn<'a>(name: &'a str, caption: &'a str, picture: Picture<'a>) -> Exhibit<'a> {
+    Exhibit {
+        name,
+        caption,
+        content: Content::Drawn(picture),
+    }
+}
+
+fn difference<'a>(
+    name: &'a str,
+    caption: &'a str,
+    pictures: [Picture<'a>; 2],
+    times: f32,
+) -> Exhibit<'a> {
+    Exhibit {
+        name,
+        caption,
+        content: Content::Difference(pictures, times),
+    }
+}
+
+fn cameras(scenes: &Scenes) -> Room<'_> {
+    let [width, height] = SIZE.map(|side| side as f32);
+    let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let panorama = Camera::panorama(&axes, [0.0; 3], [width, height]).expect("a camera");
+    let by = |camera| Picture {
+        camera,
+        ..picture(&scenes.around, 1.0)
+    };
+    let aside = camera(80.0).principal_point([0.2 * width, 0.8 * height]);
+    Room {
+        title: "Cameras",
+        text: "Gaussians on a sphere about the eye, of a hue for each longitude, the horizon white.",
+        exhibits: vec![
+            drawn("pinhole", "`PINHOLE`", by(camera(80.0))),
+            drawn("off-centre", "its principal point elsewhere", by(aside)),
+            drawn(
+                "orthographic",
+                "`ORTHOGRAPHIC`",
+                by(camera(28.0).model(Model::ORTHOGRAPHIC)),
+            ),
+            drawn(
+                "fisheye",
+                "`FISHEYE`, 280 degrees wide",
+                by(camera(41.0).model(Model::FISHEYE)),
+            ),
+            drawn("panorama", "`EQUIRECTANGULAR`", by(panorama)),
+        ],
+    }
+}
+
+fn projections(scenes: &Scenes) -> Room<'_> {
+    let one = |way| {
+        with(picture(&scenes.wide, 38.0), |state| {
+            state.linearization(way)
+        })
+    };
+    Room {
+        title: "Projection",
+        text: "Gaussians that point away from the eye, in a field 137 degrees wide. The Jacobian knows how their middles move; the \
+               unscented transform knows their ends, too.",
+        exhibits: vec![
+            drawn("jacobian", "`JACOBIAN`", one(Linearization::JACOBIAN)),
+            drawn("unscented", "`UNSCENTED`", one(Linearization::UNSCENTED)),
+        ],
+    }
+}
+
+fn shaders(scenes: &Scenes) -> Room<'_> {
+    let fixed = || picture(&scenes.still, 150.0);
+    let shaded = || Picture {
+        by_shader: true,
+        ..fixed()
+    };
+    let resolved = |resolve| Picture {
+        resolve: Some(resolve),
+        ..fixed()
+    };
+    Room {
+        title: "Shaders",
+        text: "A vertex shader that projects as the device does, and fragment shaders that make colours of what accumulates: of \
+               its colour and alpha, or of its depths.",
+        exhibits: vec![
+            drawn("fixed-function", "`FIXED_FUNCTION`", fixed()),
+            drawn("vertex-shader", "`VERTEX_SHADER`", shaded()),
+            difference(
+                "vertex-shader-difference",
+                "their difference, 100 times",
+                [fixed(), shaded()],
+                100.0,
+            ),
+            drawn(
+                "resolve-tones",
+                "a resolve shader",
+                resolved(Resolve::Tones),
+            ),
+            drawn(
+                "resolve-expected",
+                "of the expected depth",
+                resolved(Resolve::Expected),
+            ),
+            drawn(
+                "resolve-median",
+                "of the median depth",
+                resolved(Resolve::Median),
+            ),
+        ],
+    }
+}
+
+fn orders(scenes: &Scenes) -> Room<'_> {
+    let one = |order| with(picture(&scenes.crossing, 60.0), |state| state.order(order));
+    Room {
+        title: "Orders",
+        text: "Two sheets that pass through one another in the middle, and at the sides pairs of which one is deeper and the other \
+               farther off: front to back by depth along the view, by distance from the eye, as they are drawn, and at \
+               each pixel by where they are greatest along its ray.",
+        exhibits: vec![
+            drawn("order-view-depth", "`VIEW_DEPTH`", one(Order::VIEW_DEPTH)),
+            drawn(
+                "order-distance",
+                "`RADIAL_DISTANCE`",
+                one(Order::RADIAL_DISTANCE),
+            ),
+            drawn("order-primitive", "`PRIMITIVE`", one(Order::PRIMITIVE)),
+            drawn("order-per-pixel", "`PER_PIXEL`", one(Order::PER_PIXEL)),
+        ],
+    }
+}
+
+fn merged(scenes: &Scenes) -> Room<'_> {
+    let apart = || Picture {
+        draws: &scenes::RINGS,
+        ..picture(&scenes.links, 150.0)
+    };
+    Room {
+        title: "Several draws",
+        text: "Two rings that are linked, a draw each. One draw is composited after the other, or they share a sorted set.",
+        exhibits: vec![
+            drawn("draws", "draws in their order", apart()),
+            drawn(
+                "draws-merged",
+                "`MERGE_DRAWS`",
+                with(apart(), |state| state.flags(Flags::MERGE_DRAWS)),
+            ),
+        ],
+    }
+}
+
+fn geometry(scenes: &Scenes) -> Room<'_> {
+    let volumes = || picture(&scenes.floor, 90.0);
+    let discs = || {
+        with(volumes(), |state| {
+            state.geometry(Geometry::GAUSSIAN_2D).low_pass_variance(0.5)
+        })
+    };
+    Room {
+        title: "Geometry",
+        text: "Round discs on a floor and on walls, near the eye. As volumes they are ellipses about the pictures of their middles; \
+               where rays meet discs exactly, the near half is larger.",
+        exhibits: vec![
+            drawn("volumes", "`GAUSSIAN_3D`", volumes()),
+            drawn("discs", "`GAUSSIAN_2D`", discs()),
+            difference(
+                "discs-difference",
+                "their difference",
+                [volumes(), discs()],
+                1.0,
+            ),
+        ],
+    }
+}
+
+fn precision(scenes: &Scenes) -> Room<'_> {
+    let single = || picture(&scenes.veils, 150.0);
+    let half = || with(single(), |state| state.precision(Precision::FLOAT16));
+    Room {
+        title: "Precision",
+        text: "Needles that lean, of which binary16 loses the middle, and many faint layers, of each of which it rounds the sum.",
+        exhibits: vec![
+            drawn("binary32", "`FLOAT32`", single()),
+            drawn("binary16", "`FLOAT16`", half()),
+            difference(
+                "binary16-difference",
+                "their difference, 8 times",
+                [single(), half()],
+                8.0,
+            ),
+        ],
+    }
+}
+
+fn antialiasing(scenes: &Scenes) -> Room<'_> {
+    let one = |variance, mode| {
+        with(picture(&scenes.needles, 150.0), |state| {
+            state.antialiasing(mode).low_pass_variance(variance)
+        })
+    };
+    let (dilate, compensate) = (Antialiasing::DILATE, Antialiasing::OPACITY_COMPENSATED);
+    Room {
+        title: "Anti-aliasing",
+        text: "Needles thinner than a pixel, more so to the right. A filter widens all of them; compensation makes them \
+               fainter by as much.",
+        exhibits: vec![
+            drawn("unfiltered", "no filter", one(0.0, dilate)),
+            drawn("dilated", "`DILATE`, 0.3 px^2", one(0.3, dilate)),
+            drawn(
+                "compensated",
+                "`OPACITY_COMPENSATED`, 0.3 px^2",
+                one(0.3, compensate),
+            ),
+            drawn(
+                "compensated-less",
+                "`OPACITY_COMPENSATED`, 0.1 px^2",
+                one(0.1, compensate),
+            ),
+        ],
+    }
+}
+
+fn limits(scenes: &Scenes) -> Room<'_> {
+    let one =
+        |change: fn(State<'static>) -> State<'static>| with(picture(&scenes.still, 150.0), change);
+    Room {
+        title: "Floors and ceilings",
+        text: "Where a Gaussian ends, how opaque it may be, and when a pixel is finished.",
+        exhibits: vec![
+            drawn("limits", "as 3DGS has them", one(|state| state)),
+            drawn(
+                "alpha-floor",
+                "`alphaFloor` 0.3",
+                one(|state| state.alpha_floor(0.3)),
+            ),
+            drawn(
+                "alpha-ceiling",
+                "`alphaCeiling` 0.4",
+                one(|state| state.alpha_ceiling(0.4)),
+            ),
+            drawn(
+                "transmittance-floor",
+                "`transmittanceFloor` 0.3",
+                one(|state| state.transmittance_floor(0.3)),
+            ),
+        ],
+    }
+}
+
+/// A triangle across the picture, half as deep as the still life.
+fn triangle() -> Option<Triangle> {
+    let [c0, c1] = camera(1.0).depth_coefficients;
+    Some(Triangle {
+        corners: [
+            [-0.9, 0.85, 0.75, 0.7, 0.6],
+            [0.1, -0.95, 0.9, 0.85, 0.75],
+            [0.85, 0.7, 0.6, 0.55, 0.5],
+        ],
+        depth: c0 + c1 / scenes::MIDDLE,
+    })
+}
+
+fn triangles(scenes: &Scenes) -> Room<'_> {
+    let one = |samples, coverage| Picture {
+        triangle: triangle(),
+        samples,
+        coverage,
+        ..picture(&scenes.still, 150.0)
+    };
+    Room {
+        title: "Depth and samples",
+        text: "Gaussians in front of a triangle and behind it, which share its depth buffer.",
+        exhibits: vec![
+            drawn("still-life", "no triangle", picture(&scenes.still, 150.0)),
+            drawn("depth", "one sample", one(Samples::TYPE_1, false)),
+            drawn("multisampled", "four samples", one(Samples::TYPE_4, false)),
+            difference(
+                "multisampled-difference",
+                "their difference",
+                [one(Samples::TYPE_1, false), one(Samples::TYPE_4, false)],
+                1.0,
+            ),
+            drawn("coverage", "alpha to coverage", one(Samples::TYPE_4, true)),
+        ],
+    }
+}
+
+fn instances(scenes: &Scenes) -> Room<'_> {
+    let many = Picture {
+        instances: &scenes.meadow,
+        ..picture(&scenes.flower, 150.0)
+    };
+    Room {
+        title: "Instances",
+        text: "One model, placed by a matrix for each instance and sorted together; the last rows fade.",
+        exhibits: vec![
+            drawn("model", "the model", picture(&scenes.flower, 280.0)),
+            drawn("instances", "60 of them in one draw", many),
+        ],
+    }
+}
