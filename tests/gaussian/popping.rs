@@ -4,7 +4,7 @@
 //! should never overtake each other. What a step's new order changes is measured without any
 //! warping of pictures: the next view is drawn in its own order and in that of the view before.
 //!
-//! `--nocapture` shows the figures; `POPPING.md` keeps them.
+//! `--nocapture` shows the figures.
 
 use gaurast::vk::{
     GaussianCameraGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
