@@ -262,7 +262,7 @@ fn bounded_modes() -> Vec<(&'static str, Vec<Packet>)> {
             height: 40,
         };
     }
-    let modes: [(&str, fn(&mut GaussianBegin)); 7] = [
+    let modes: [(&str, Change); 7] = [
         ("volumes", |_| {}),
         ("flat", |begin| {
             state(begin).geometry = GaussianGeometry::Surfel;
@@ -292,6 +292,9 @@ fn bounded_modes() -> Vec<(&'static str, Vec<Packet>)> {
     let modes = modes.map(|((name, change), seed)| (name, mode_beside(seed, change)));
     modes.chain([("placed", placed)]).collect()
 }
+
+/// Makes a set's state or camera another mode's.
+type Change = fn(&mut GaussianBegin);
 
 #[test]
 fn every_mode_has_bounds_that_change_no_bit() {
