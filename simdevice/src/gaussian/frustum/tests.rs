@@ -7,6 +7,7 @@ use crate::gaussian::fetch::{BATCH, Batch};
 use crate::gaussian::footprint::Visible;
 use crate::gaussian::project::{Projected, Source};
 use crate::gaussian::scratch::Scratch;
+use crate::gaussian::surfel::Surfel;
 use crate::packet::{
     AttributeStream, BufferRange, Camera, GaussianAppend, GaussianAttributes, GaussianGeometry,
     GaussianLinearization, GaussianPrecision, GaussianState, ModelAttributes, Viewport,
@@ -73,6 +74,9 @@ fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
     }
     attributes
 }
+
+/// The corner of a tile that no picture has.
+const FAR_OFF: [u32; 2] = [1 << 24; 2];
 
 /// A lane as a chunk of one.
 fn bounds(attributes: &Attributes, lane: usize) -> Bounds {
@@ -179,8 +183,10 @@ fn what_is_outside_is_drawn_nowhere() {
                 drawn += out.keys.len();
                 beside += outside.beside.count();
                 let mut is_drawn = [false; BATCH];
-                for [_, lane] in &out.keys {
-                    is_drawn[*lane as usize] = true;
+                for (at, &[_, lane]) in out.keys.iter().enumerate() {
+                    // Discs that reach the eye's plane are listed everywhere, wherever they are.
+                    let everywhere = |surfel: &Surfel| surfel.blocks(FAR_OFF) != 0;
+                    is_drawn[lane as usize] = !out.surfels.get(at).is_some_and(everywhere);
                 }
                 let all = Bits::first(BATCH);
                 for (of, what) in [
