@@ -282,7 +282,8 @@ fn rays_pop_not(
     println!(
         "{name}, every {stride}th pixel, by view depth: {by_axis:.4}, pixel by pixel: {by_ray:.1e}"
     );
-    assert!(by_axis > 1e-3, "nothing pops");
+    // Far more than rounding.
+    assert!(by_axis > 1e-4, "nothing pops");
     // The sums themselves are rounded.
     assert!(by_ray < 1e-12, "{by_ray}");
 }
