@@ -104,6 +104,14 @@ macro_rules! formats {
                 }
             }
 
+            /// Bytes per texel, or per block of a compressed format. Formats of both depth and stencil have no texel of
+            /// both: see [`Format::plane`].
+            pub const fn texel_size(self) -> usize {
+                match self {
+                    $(Self::$variant => (0 $(+ $bits)+) / 8,)*
+                }
+            }
+
             /// Its components, least significant bits first; a texel is little-endian.
             pub const fn components(self) -> &'static [Component] {
                 match self {
@@ -258,17 +266,6 @@ pub const MAX_TEXEL_SIZE: usize = 16;
 const ABSENT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
 impl Format {
-    /// Bytes per texel, or per block of a compressed format. Formats of both depth and stencil have no texel of both: see [`Format::plane`].
-    pub const fn texel_size(self) -> usize {
-        let components = self.components();
-        let (mut bits, mut index) = (0, 0);
-        while index < components.len() {
-            bits += components[index].bits;
-            index += 1;
-        }
-        (bits / 8) as usize
-    }
-
     /// Whether registers hold integers.
     pub const fn is_integer(self) -> bool {
         matches!(self.numeric(), Numeric::Uint | Numeric::Sint)

@@ -167,6 +167,7 @@ impl SubresourceLayout {
 
     /// The offset from the image's beginning of texel (x, y, z), and how many bytes of its row begin there; `None`
     /// outside the subresource.
+    #[inline]
     fn texel(&self, [x, y, z]: [u32; 3]) -> Option<(u64, u64)> {
         let [width, height, depth] = self.extent;
         if x > width || y >= height || z >= depth {
@@ -228,6 +229,7 @@ impl Image {
     }
 
     /// Bytes `size` from texel `at` on, as an offset into the memory, if they lie in one row of the subresource.
+    #[inline]
     pub(crate) fn row(&self, layout: &SubresourceLayout, at: [u32; 3], size: u64) -> Option<u64> {
         let (offset, rest) = layout.texel(at)?;
         (size <= rest)
@@ -237,6 +239,7 @@ impl Image {
 
     /// Reads the bytes of consecutive texels of a row from texel `at` (x, y, z) on. `None`, and `out` is untouched,
     /// if they do not lie in that row.
+    #[inline]
     pub fn read_row(&self, layout: &SubresourceLayout, at: [u32; 3], out: &mut [u8]) -> Option<()> {
         let offset = self.row(layout, at, out.len() as u64)?;
         self.memory.read(offset, out).ok()
@@ -244,6 +247,7 @@ impl Image {
 
     /// Writes the bytes of consecutive texels of a row from texel `at` (x, y, z) on. `None`, and nothing is
     /// written, if they do not lie in that row.
+    #[inline]
     pub fn write_row(&self, layout: &SubresourceLayout, at: [u32; 3], bytes: &[u8]) -> Option<()> {
         let offset = self.row(layout, at, bytes.len() as u64)?;
         self.memory.write(offset, bytes).ok()

@@ -5,6 +5,7 @@
 //! calls they are compiled without the SIMD level's instructions, and pass vectors through memory.
 
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use isa::exec::Chunk;
 
 /// The bits of floats.
 #[inline(always)]
@@ -16,6 +17,12 @@ pub(crate) fn bits_of<S: Simd>(floats: f32x16<S>) -> u32x16<S> {
 #[inline(always)]
 pub(crate) fn floats_of<S: Simd>(bits: u32x16<S>) -> f32x16<S> {
     bits.bitcast()
+}
+
+/// The floats that a chunk's lanes hold.
+#[inline(always)]
+pub(crate) fn as_floats<S: Simd>(simd: S, chunk: &Chunk) -> f32x16<S> {
+    floats_of(u32x16::simd_from(simd, chunk.0))
 }
 
 /// `f` of both.

@@ -61,27 +61,6 @@ impl Scene {
         }
         scene
     }
-
-    /// The scene with all standard deviations multiplied by `factor`: more of it overlaps.
-    #[must_use]
-    pub fn scaled(mut self, factor: f32) -> Self {
-        for shape in &mut self.shapes {
-            shape.scale = shape.scale.map(|s| s * factor);
-        }
-        self
-    }
-
-    /// The scene with `share` of its Gaussians, spread evenly, far away from where it was.
-    #[must_use]
-    pub fn partly_away(mut self, share: f64) -> Self {
-        for (index, position) in self.positions.iter_mut().enumerate() {
-            let passed = |count: usize| (count as f64 * share).floor();
-            if passed(index + 1) > passed(index) {
-                position[1] += 1e5;
-            }
-        }
-        self
-    }
 }
 
 /// Where cameras are and look.
@@ -194,18 +173,5 @@ mod tests {
             let seen = seen.count();
             assert!((2000..9000).contains(&seen), "{seen}");
         }
-    }
-
-    #[test]
-    fn a_share_goes_away() {
-        let scene = Scene::benchmark(1, 1000).partly_away(0.25);
-        let away = scene.positions().iter().filter(|p| p[1] > 1e4).count();
-        assert_eq!(away, 250);
-        let scene = Scene::benchmark(1, 10);
-        assert_eq!(scene.clone().partly_away(0.0), scene);
-        assert_eq!(
-            scene.shapes()[3].scale[1] * 2.0,
-            scene.scaled(2.0).shapes()[3].scale[1]
-        );
     }
 }

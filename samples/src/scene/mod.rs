@@ -7,6 +7,7 @@
 
 mod benchmark;
 mod captured;
+mod edit;
 mod error;
 mod format;
 mod generate;

@@ -8,7 +8,10 @@
 //! All of the simulated device's `unsafe` lives here.
 
 mod atomic;
+mod gather;
 pub mod host;
+
+pub use gather::gather;
 
 use bytemuck::{AnyBitPattern, NoUninit};
 use memmap2::{MmapOptions, MmapRaw};
@@ -155,6 +158,7 @@ impl Allocation {
     ///
     /// # Errors
     /// [`OutOfBounds`], and `out` is untouched, if the range does not lie inside the allocation.
+    #[inline]
     pub fn read<T: AnyBitPattern>(&self, offset: u64, out: &mut [T]) -> Result<(), OutOfBounds> {
         let source = self.checked(offset, size_of_val(out))?;
         // SAFETY: `checked` proved that the source range lies inside the mapping; `out` is a distinct,
@@ -171,6 +175,7 @@ impl Allocation {
     ///
     /// # Errors
     /// [`OutOfBounds`], and nothing is written, if the range does not lie inside the allocation.
+    #[inline]
     pub fn write<T: NoUninit>(&self, offset: u64, data: &[T]) -> Result<(), OutOfBounds> {
         let target = self.checked(offset, size_of_val(data))?;
         // SAFETY: `checked` proved that the target range lies inside the mapping, which no Rust reference
@@ -214,6 +219,7 @@ impl Allocation {
     }
 
     /// The address of byte `offset`, if `size` bytes from there on lie inside the allocation.
+    #[inline]
     fn checked(&self, offset: u64, size: usize) -> Result<*mut u8, OutOfBounds> {
         let out_of_bounds = OutOfBounds {
             offset,

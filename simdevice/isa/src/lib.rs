@@ -57,6 +57,7 @@ pub mod builder;
 mod display;
 mod escape;
 pub mod exec;
+mod forward;
 mod hoist;
 mod homes;
 pub mod ir;

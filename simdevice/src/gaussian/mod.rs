@@ -219,11 +219,11 @@ impl GaussianSet {
         counters.add_all(&work);
         counters.add_all(&by_programs);
         let projected = Instant::now();
-        let order = sorted(&batches);
+        let threads = device.threads();
+        let order = device.install(|| sorted(&batches, threads));
         let sorted = Instant::now();
         // Twelve bytes a pair while lists are made: four times the budget of all lists of a pass.
         let most_pairs = device.config().bin_budget_bytes / 3;
-        let threads = device.threads();
         let tiles = device
             .install(|| TileLists::build(&mut batches, &order, self.bounds, threads, most_pairs));
         counters.add(Counter::TilePairs, tiles.pairs());
@@ -405,25 +405,21 @@ struct Worker {
 }
 
 /// The survivors in depth order, as key and batch number times `BATCH` plus place in the batch.
-fn sorted(batches: &[Projected]) -> Vec<(u32, u32)> {
-    let count = batches.iter().map(|batch| batch.keys.len()).sum();
-    let mut order = host::with_capacity(count);
-    for (number, batch) in batches.iter().enumerate() {
-        let keys = batch.keys.iter().map(|&[key, _]| key);
-        order.extend(keys.zip((number * BATCH) as u32..));
-    }
-    sort::sort_by_key(&mut order);
+fn sorted(batches: &[Projected], workers: usize) -> Vec<(u32, u32)> {
     // Equal keys are in the order of batches, which chunks have changed.
     let sequence = |&(_, name): &(u32, u32)| {
         let (batch, place) = locate(name);
         batches[batch].keys[place][1]
     };
-    for ties in order.chunk_by_mut(|a, b| a.0 == b.0) {
-        if ties.len() > 1 && !ties.is_sorted_by_key(sequence) {
-            ties.sort_unstable_by_key(sequence);
+    let settle = |pairs: &mut [(u32, u32)]| {
+        for ties in pairs.chunk_by_mut(|a, b| a.0 == b.0) {
+            if ties.len() > 1 && !ties.is_sorted_by_key(sequence) {
+                ties.sort_unstable_by_key(sequence);
+            }
         }
-    }
-    order
+    };
+    let keys: Vec<&[[u32; 2]]> = host::collect(batches.iter().map(|batch| &batch.keys[..]));
+    sort::sort_lists(&keys, BATCH as u32, workers, settle)
 }
 
 /// The batch of a survivor's name, and its place there.

@@ -195,7 +195,7 @@ impl Bins {
     }
 
     /// The primitives that may touch a macro-tile, given by column and row from the framebuffer's corner, in a layer:
-    /// indices into [`PrimitiveChunk::primitives`](super::PrimitiveChunk::primitives), ascending.
+    /// indices into [`PrimitiveChunk::primitives`](super::PrimitiveChunk::primitives), in the order of the draw.
     pub fn of(&self, macro_tile: [u32; 2], layer: u32) -> &[u32] {
         let within = |axis: usize, count: u32| {
             let at = macro_tile[axis].checked_sub(self.origin[axis]);
@@ -214,6 +214,11 @@ impl Bins {
             Some(&[start, end]) => &self.primitives[start as usize..end as usize],
             _ => &[],
         }
+    }
+
+    /// The primitives of all lists, list by list, to be given other names.
+    pub(super) fn names_mut(&mut self) -> &mut [u32] {
+        &mut self.primitives
     }
 
     /// Every primitive in every macro-tile of its layer, for tests that set up primitives by hand.

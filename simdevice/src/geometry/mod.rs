@@ -14,6 +14,7 @@ mod depth_bias;
 mod elements;
 mod emit;
 mod fetch;
+mod order;
 mod pipeline;
 pub(crate) mod points;
 mod primitive;
@@ -363,16 +364,15 @@ impl<'a> Worker<'a> {
     fn keep(&mut self) -> PrimitiveChunk {
         let (output, setup) = (&self.output, self.setup);
         let started = Instant::now();
-        let bins = Bins::new(&setup.grid, setup.layers, &output.pairs);
+        let mut bins = Bins::new(&setup.grid, setup.layers, &output.pairs);
+        let per_vertex = setup.outputs.varyings.len();
+        let (primitives, values) = order::in_order(output, per_vertex, &mut bins);
         self.counters.add(Counter::BinnedPairs, bins.pairs());
         let elapsed = started.elapsed().as_nanos() as u64;
         self.counters.add(Counter::BinningTime, elapsed);
         PrimitiveChunk {
-            primitives: host::copied(&output.primitives),
-            varyings: Varyings {
-                values: host::copied(&output.varyings),
-                per_vertex: setup.outputs.varyings.len(),
-            },
+            primitives,
+            varyings: Varyings { values, per_vertex },
             bins,
         }
     }

@@ -28,7 +28,7 @@ pub struct PrimitiveDraw {
 /// Consecutive primitives of a draw that were set up together.
 #[derive(Debug, Default)]
 pub struct PrimitiveChunk {
-    /// The primitives in order.
+    /// The primitives, in the order in which macro-tiles look at them where there are many.
     pub primitives: Vec<Primitive>,
     /// The varyings of their vertices.
     pub varyings: Varyings,

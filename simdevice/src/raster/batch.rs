@@ -1,14 +1,14 @@
 //! Batches of fragments: 2x2 quads of any primitives of a draw within a macro-tile, and what the fragment program gets
 //! of them.
 
-use super::color::Quads;
 use super::fragment::{BATCH_LANES, Interface};
+use super::quads::Quads;
 use super::setup::Setup;
 use crate::geometry::{Primitive, PrimitiveKind, Varyings};
 use crate::lanes::{bits_of, both, three};
 use crate::packet::draw::{FragmentInput, Interpolation, Sampling};
 use crate::skips::{Skip, Skips};
-use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
 use isa::exec::{Chunk, LaneMask, Machine};
 
 /// Lanes of the largest batch.
@@ -88,9 +88,10 @@ pub struct Batch {
     affine: bool,
     pub quads: [Quad; QUADS],
     pub count: usize,
+    /// Bit `tile` tells that it has quads of that tile.
+    tiles: u64,
     pub records: Vec<Record>,
-    /// Of each record, each varying: its value at corner 0, and how much more it is at the others (the value alone if
-    /// it is flat).
+    /// Of each record, each varying: see [`add_attributes`].
     attributes: Vec<[f32; 3]>,
     /// The barycentrics of corners 1 and 2, lane by lane.
     barycentrics: [[f32; LANES]; 2],
@@ -115,6 +116,7 @@ impl Default for Batch {
             affine: true,
             quads: [Quad::default(); QUADS],
             count: 0,
+            tiles: 0,
             records: Vec::new(),
             attributes: Vec::new(),
             barycentrics: [[0.0; LANES]; 2],
@@ -165,7 +167,7 @@ impl Batch {
     /// Empties it.
     pub fn clear(&mut self) {
         (self.affine, self.partial) = (self.detects_affine, false);
-        self.count = 0;
+        (self.count, self.tiles) = (0, 0);
         self.records.clear();
         self.attributes.clear();
     }
@@ -191,24 +193,7 @@ impl Batch {
             w_slopes: setup.w_slopes,
             depth_slopes: setup.depth_slopes,
         });
-        let of_vertex = |vertex: u32| {
-            let at = vertex as usize * varyings.per_vertex;
-            varyings.values.get(at..at + varyings.per_vertex)
-        };
-        let [a, b, c] = three(primitive.vertices, |v| of_vertex(v).unwrap_or_default());
-        let provoking = of_vertex(primitive.provoking).unwrap_or_default();
-        let value = |vertex: &[u32], varying: u32| {
-            f32::from_bits(vertex.get(varying as usize).copied().unwrap_or(0))
-        };
-        for &(varying, interpolation) in &interface.varyings {
-            self.attributes.push(match interpolation {
-                Interpolation::Flat => [value(provoking, varying), 0.0, 0.0],
-                _ => {
-                    let first = value(a, varying);
-                    [first, value(b, varying) - first, value(c, varying) - first]
-                }
-            });
-        }
+        add_attributes(primitive, interface, varyings, &mut self.attributes);
         (self.records.len() - 1) as u16
     }
 
@@ -228,6 +213,7 @@ impl Batch {
             self.inverse_w[at..at + 4].copy_from_slice(&values[3][lanes]);
         }
         self.partial |= covered_lanes(quad.cover) != 15;
+        self.tiles |= 1 << quad.tile;
         self.quads[self.count] = quad;
         self.count += 1;
     }
@@ -248,8 +234,14 @@ impl Batch {
                 .inverse_w
                 .store_slice(&mut self.inverse_w[at..at + 16]);
         }
+        self.tiles |= 1 << quads[0].tile;
         self.quads[self.count..self.count + 4].copy_from_slice(&quads);
         self.count += 4;
+    }
+
+    /// Whether it has quads of a tile.
+    pub fn has_tile(&self, tile: usize) -> bool {
+        self.tiles >> tile & 1 == 1
     }
 
     /// Chunks of 16 lanes that have quads.
@@ -466,8 +458,7 @@ impl Batch {
     ) -> [f32x16<S>; 2] {
         let w1 = self.of_records(simd, chunk, |record| record.weights[0]);
         let w2 = self.of_records(simd, chunk, |record| record.weights[1]);
-        let inverse = f32x16::splat(simd, 1.0) / inverse_w;
-        [b1 * w1 * inverse, b2 * w2 * inverse]
+        divided(simd, [b1, b2], inverse_w, [w1, w2])
     }
 
     /// The barycentrics at a sample covered of each lane, the centre if all are.
@@ -595,6 +586,47 @@ impl Batch {
     }
 }
 
+/// Adds what a primitive's varyings are, in the order of the interface: each one's value at corner 0, and how much more it
+/// is at the others (the value alone if it is flat).
+#[inline(always)]
+pub fn add_attributes(
+    primitive: &Primitive,
+    interface: &Interface,
+    varyings: &Varyings,
+    attributes: &mut Vec<[f32; 3]>,
+) {
+    let of_vertex = |vertex: u32| {
+        let at = vertex as usize * varyings.per_vertex;
+        varyings.values.get(at..at + varyings.per_vertex)
+    };
+    let [a, b, c] = three(primitive.vertices, |v| of_vertex(v).unwrap_or_default());
+    let provoking = of_vertex(primitive.provoking).unwrap_or_default();
+    let value = |vertex: &[u32], varying: u32| {
+        f32::from_bits(vertex.get(varying as usize).copied().unwrap_or(0))
+    };
+    for &(varying, interpolation) in &interface.varyings {
+        attributes.push(match interpolation {
+            Interpolation::Flat => [value(provoking, varying), 0.0, 0.0],
+            _ => {
+                let first = value(a, varying);
+                [first, value(b, varying) - first, value(c, varying) - first]
+            }
+        });
+    }
+}
+
+/// Perspective-correct barycentrics: those of the framebuffer, 1 / w there, and at the corners.
+#[inline(always)]
+pub fn divided<S: Simd>(
+    simd: S,
+    [b1, b2]: [f32x16<S>; 2],
+    inverse_w: f32x16<S>,
+    [w1, w2]: [f32x16<S>; 2],
+) -> [f32x16<S>; 2] {
+    let inverse = f32x16::splat(simd, 1.0) / inverse_w;
+    [b1 * w1 * inverse, b2 * w2 * inverse]
+}
+
 /// A value of each quad for its lanes.
 #[inline(always)]
 fn spread<S: Simd>(simd: S, [a, b, c, d]: [f32; 4]) -> f32x16<S> {
@@ -631,10 +663,4 @@ pub fn at_sample<S: Simd>(
         depth: move_by(values.depth, setup.depth_slopes),
         inverse_w: move_by(values.inverse_w, setup.w_slopes),
     }
-}
-
-/// Bits as lanes.
-#[inline(always)]
-pub fn as_floats<S: Simd>(simd: S, chunk: &Chunk) -> f32x16<S> {
-    u32x16::simd_from(simd, chunk.0).bitcast()
 }

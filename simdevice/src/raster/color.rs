@@ -2,13 +2,15 @@
 //! attachment's format. [`super::blend::Blender`] says the same of one fragment.
 
 use super::blend::clamp_range;
+use super::quads::Quads;
 use super::tile::AREA;
 use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
-use crate::lanes::bits_of;
+use crate::lanes::{as_floats, bits_of};
 use crate::packet::draw::LogicOp;
 use crate::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
 use crate::texture::unorm8_fraction;
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
+use isa::exec::Chunk;
 
 /// Colours of 16 fragments, by component.
 pub type Colors<S> = [f32x16<S>; 4];
@@ -73,86 +75,6 @@ enum Codec {
     /// By [`Format`]'s rows.
     Other,
 }
-
-/// Where the quads of 16 lanes are in a plane: texels, from its beginning.
-#[derive(Clone, Copy, Debug)]
-pub struct Quads {
-    pub first: [usize; 4],
-    /// Whether they follow one another.
-    pub consecutive: bool,
-}
-
-impl Quads {
-    /// The texel of a lane.
-    #[inline(always)]
-    fn texel(&self, lane: usize) -> usize {
-        self.first[lane / 4] + lane % 4
-    }
-
-    /// The tiles that they are in, of a plane of `samples` samples a pixel.
-    #[inline(always)]
-    pub fn tiles(&self, samples: usize) -> [usize; 4] {
-        // A power of two.
-        let shift = (samples * AREA).trailing_zeros();
-        let [a, b, c, d] = self.first;
-        [a >> shift, b >> shift, c >> shift, d >> shift]
-    }
-
-    /// The words of 16 lanes' texels of a word each.
-    #[inline(always)]
-    pub fn load(&self, words: &[u32]) -> [u32; 16] {
-        let mut out = [0; 16];
-        if self.consecutive {
-            out.copy_from_slice(&words[self.first[0]..][..16]);
-        } else {
-            for (quad, out) in self.first.iter().zip(out.chunks_exact_mut(4)) {
-                out.copy_from_slice(&words[*quad..][..4]);
-            }
-        }
-        out
-    }
-
-    /// Sets the texels of some lanes.
-    #[inline(always)]
-    pub fn store(&self, words: &mut [u32], lanes: u16, values: &[u32; 16]) {
-        if self.consecutive && lanes == u16::MAX {
-            words[self.first[0]..][..16].copy_from_slice(values);
-            return;
-        }
-        for (quad, first) in self.first.iter().enumerate() {
-            let values = &values[4 * quad..][..4];
-            match lanes >> (4 * quad) & 15 {
-                0 => {}
-                15 => words[*first..][..4].copy_from_slice(values),
-                some => {
-                    // Another quad of the vector may be at the same place with other lanes.
-                    let texels = &mut words[*first..][..4];
-                    let mask = &QUAD_MASKS[usize::from(some)];
-                    for lane in 0..4 {
-                        texels[lane] = values[lane] & mask[lane] | texels[lane] & !mask[lane];
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// For each set of lanes of a quad: all ones in those.
-const QUAD_MASKS: [[u32; 4]; 16] = {
-    let mut masks = [[0; 4]; 16];
-    let mut set = 0;
-    while set < 16 {
-        let mut lane = 0;
-        while lane < 4 {
-            if set >> lane & 1 == 1 {
-                masks[set][lane] = u32::MAX;
-            }
-            lane += 1;
-        }
-        set += 1;
-    }
-    masks
-};
 
 impl ColorOutput {
     /// The output to an attachment of `format`; `None` if it never changes.
@@ -272,6 +194,48 @@ impl ColorOutput {
             }
             Codec::Words => self.write_words(simd, source, second, lanes, quads, words),
             Codec::Other => self.write_other(simd, source, second, lanes, quads, words),
+        }
+    }
+
+    /// Blends the fragments of a tile, which are all covered, into its texels: those of a plane (`words`, its memory) from
+    /// `first` on.
+    #[inline(always)]
+    pub fn write_tile<S: Simd>(
+        &self,
+        simd: S,
+        sources: &[[&[Chunk]; 4]; 2],
+        first: usize,
+        words: &mut [u32],
+    ) {
+        let dual = self.is_dual_source();
+        if let Codec::Unorm8 { bgra } = self.codec
+            && self.written as u32 == u32::MAX
+            && (self.equations.is_none() || self.over.is_some())
+        {
+            let blocks = words[first..first + AREA].as_chunks_mut::<16>().0;
+            for (chunk, texels) in blocks.iter_mut().enumerate() {
+                let source = load(simd, &sources[0], chunk);
+                let packed = match self.over {
+                    None => pack_unorm8(simd, &source, bgra),
+                    Some(over) => {
+                        let stored = u32x16::simd_from(simd, *texels);
+                        let destination = unpack_unorm8(simd, stored, bgra);
+                        let blended = blend_over(simd, over, &source, &destination);
+                        pack_unorm8_in_range(simd, &blended, bgra)
+                    }
+                };
+                *texels = packed.into();
+            }
+            return;
+        }
+        for chunk in 0..AREA / 16 {
+            let source = load(simd, &sources[0], chunk);
+            let mut second = [f32x16::splat(simd, 0.0); 4];
+            if dual {
+                second = load(simd, &sources[1], chunk);
+            }
+            let quads = Quads::block(first + 16 * chunk);
+            self.write(simd, &source, &second, u16::MAX, &quads, words);
         }
     }
 
@@ -419,6 +383,18 @@ impl ColorOutput {
             operands.evaluate(simd, alpha, 3),
         ]
     }
+}
+
+/// A source of 16 fragments; components that are not written are 0.
+#[inline(always)]
+pub fn load<S: Simd>(simd: S, source: &[&[Chunk]; 4], chunk: usize) -> Colors<S> {
+    let mut color = [f32x16::splat(simd, 0.0); 4];
+    for (component, lanes) in color.iter_mut().zip(source) {
+        if let Some(lanes) = lanes.get(chunk) {
+            *component = as_floats(simd, lanes);
+        }
+    }
+    color
 }
 
 /// What blend equations are about.

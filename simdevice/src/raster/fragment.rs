@@ -91,6 +91,12 @@ impl FragmentStage {
 }
 
 impl Interface {
+    /// Whether programs read nothing but varyings.
+    pub fn takes_varyings_alone(&self) -> bool {
+        let is_varying = |kind| matches!(kind, FragmentInput::Varying { .. });
+        self.inputs.iter().all(|&(_, kind, _)| is_varying(kind))
+    }
+
     fn new(programs: &FragmentPrograms, executable: &Executable) -> Self {
         let mut interface = Self {
             early_tests: programs.early_tests,

@@ -12,6 +12,7 @@ mod pending;
 mod plane;
 mod prepared;
 pub(crate) mod primitives;
+mod quads;
 mod setup;
 mod target;
 pub mod tile;

@@ -1,11 +1,13 @@
 //! What becomes of shaded fragments: coverage that the program takes away, late tests, and the colour attachments.
 
-use super::batch::{Batch, as_floats, offset};
-use super::color::{Colors, Quads};
+use super::batch::{Batch, offset};
+use super::color::load;
 use super::depth::Tests;
 use super::fragment::Interface;
 use super::prepared::{TileDraw, Timing};
 use super::primitives::Buffers;
+use super::quads::Quads;
+use crate::lanes::as_floats;
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::exec::{Chunk, LaneMask, Machine};
 
@@ -309,18 +311,6 @@ fn write_colors<S: Simd>(
         let words = buffers.color[index].words_mut();
         output.write(simd, &source, &second, lanes, quads, words);
     }
-}
-
-/// A source of 16 fragments; components that are not written are 0.
-#[inline(always)]
-pub fn load<S: Simd>(simd: S, source: &[&[Chunk]; 4], chunk: usize) -> Colors<S> {
-    let mut color = [f32x16::splat(simd, 0.0); 4];
-    for (component, lanes) in color.iter_mut().zip(source) {
-        if let Some(lanes) = lanes.get(chunk) {
-            *component = as_floats(simd, lanes);
-        }
-    }
-    color
 }
 
 /// What a program wrote to a slot, if there is one.

@@ -184,12 +184,14 @@ impl Plane {
                 fill(texels, &unpack(format, clear)[..stride]);
                 continue;
             }
+            let Some(rows) = target.sample(layer, sample as u32) else {
+                continue;
+            };
             let size = format.texel_size();
             let mut bytes = [0; SIDE * MAX_TEXEL_SIZE];
             for (y, columns) in tile.rows(tile.pixels) {
                 let bytes = &mut bytes[..columns.len() * size];
-                let at = tile.pixel(columns.start, y);
-                target.read(layer, sample as u32, at, bytes);
+                rows.read(tile.pixel(columns.start, y), bytes);
                 if stride == size && matches!(Kind::of(format), Kind::Same) {
                     set_row(texels, size, y, columns.start, bytes);
                     continue;
@@ -217,6 +219,9 @@ impl Plane {
             fill(&mut row[..SIDE * size], &clear[..size]);
         }
         for sample in 0..self.samples {
+            let Some(rows) = target.sample(layer, sample as u32) else {
+                continue;
+            };
             let texels = self.sample_mut(tile.index, sample);
             for (y, columns) in tile.rows(tile.pixels) {
                 let at = tile.pixel(columns.start, y);
@@ -229,7 +234,7 @@ impl Plane {
                         out.copy_from_slice(&texels[place(x, y) * stride..][..size]);
                     }
                 }
-                target.write(layer, sample as u32, at, bytes);
+                rows.write(at, bytes);
             }
         }
     }
@@ -244,6 +249,9 @@ impl Plane {
         tile: &Tile,
     ) {
         let (format, samples, stride) = (target.format(), self.samples, self.stride);
+        let Some(resolved_rows) = resolve.sample(layer, 0) else {
+            return;
+        };
         if samples == MAX_SAMPLES
             && mode == ResolveMode::Average
             && is_unorm8(format)
@@ -256,7 +264,7 @@ impl Plane {
             for (y, columns) in tile.rows(tile.pixels) {
                 let bytes = &mut row[..4 * columns.len()];
                 get_row(bytemuck::cast_slice(&means), 4, y, columns.start, bytes);
-                resolve.write(layer, 0, tile.pixel(columns.start, y), bytes);
+                resolved_rows.write(tile.pixel(columns.start, y), bytes);
             }
             return;
         }
@@ -285,7 +293,7 @@ impl Plane {
                 resolve_row(format, mode, rows, &mut resolved[..count]);
                 resolve.format().encode_row(&resolved[..count], bytes);
             }
-            resolve.write(layer, 0, tile.pixel(columns.start, y), bytes);
+            resolved_rows.write(tile.pixel(columns.start, y), bytes);
         }
     }
 

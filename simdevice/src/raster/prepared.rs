@@ -4,7 +4,7 @@
 use super::batch::Needs;
 use super::color::ColorOutput;
 use super::depth::Tests;
-use super::fragment::FragmentStage;
+use super::fragment::{FragmentStage, Interface};
 use super::setup::{CENTER, SAMPLES_4};
 use super::tile::Target;
 use crate::bindings::Prepared;
@@ -51,6 +51,8 @@ pub struct TileDraw<'a> {
     pub(super) plain: bool,
     /// Tiles that a primitive covers may wait to be shaded until it is clear that none overwrites them.
     pub(super) defers: bool,
+    /// Tiles that a primitive covers may be shaded at once: fragments take nothing but varyings.
+    pub(super) takes_tiles: bool,
     /// Samples are counted after shading, which may discard some.
     pub(super) count_late: bool,
     /// Every sample is shaded for itself.
@@ -137,6 +139,11 @@ impl<'a> TileDraw<'a> {
             && interface.is_some_and(|interface| !interface.has_side_effects)
             && colors.iter().flatten().all(ColorOutput::overwrites)
             && draw.record.is_none();
+        let takes_tiles = plain
+            && !multisampled
+            && state.sample_mask & 1 == 1
+            && interface.is_some_and(Interface::takes_varyings_alone)
+            && draw.record.is_none();
         Self {
             draw,
             stage,
@@ -149,6 +156,7 @@ impl<'a> TileDraw<'a> {
             keeps_all,
             plain,
             defers,
+            takes_tiles,
             count_late,
             per_sample,
             positions: if multisampled { &SAMPLES_4 } else { &CENTER },

@@ -2,7 +2,6 @@
 //! shading.
 
 use super::batch::{Batch, BlockValues, Needs, QUADS, Quad, Samples, at_sample, offset};
-use super::color::Quads;
 use super::coverage::{Coverage, bits};
 use super::depth::Tests;
 use super::fragment::{FragmentStage, Machines};
@@ -10,6 +9,7 @@ use super::output;
 use super::pending::Pending;
 use super::prepared::Timing;
 pub use super::prepared::{Targets, TileDraw};
+use super::quads::Quads;
 use super::setup::Setup;
 use super::tile::{AREA, SIDE, Tile};
 use super::{Plane, TILE_SIZE};
@@ -23,7 +23,10 @@ use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
 
+mod full_tile;
 mod whole;
+
+use full_tile::FullTile;
 
 /// The tile buffers of a worker.
 #[derive(Debug)]
@@ -37,6 +40,7 @@ pub struct Buffers {
 #[derive(Debug, Default)]
 pub struct Scratch {
     batch: Box<Batch>,
+    full: Box<FullTile>,
     pending: Box<Pending>,
 }
 
@@ -84,6 +88,7 @@ impl TileDraw<'_> {
             place,
             buffers,
             batch: &mut scratch.batch,
+            full: &mut scratch.full,
             machines: &mut machines,
             counters,
             cancel,
@@ -125,6 +130,7 @@ pub(super) struct Renderer<'a, 'd> {
     pub place: Place,
     pub buffers: &'a mut Buffers,
     pub batch: &'a mut Batch,
+    full: &'a mut FullTile,
     pub machines: &'a mut Machines,
     pub counters: &'a mut Counters,
     pub cancel: &'a AtomicBool,
@@ -286,9 +292,9 @@ impl Renderer<'_, '_> {
             }
             return Ok(());
         }
-        if N == 1 && draw.defers {
+        if N == 1 && (draw.defers || draw.takes_tiles) {
             if coverage.is_whole() {
-                return self.whole_tile(simd, current, pending, (tile, at));
+                return self.whole_tile(simd, current, coverage, pending, (tile, at));
             }
             if pending.waits(tile) {
                 self.shade_pending(simd, pending, tile)?;
@@ -478,10 +484,7 @@ impl Renderer<'_, '_> {
             }
             let code = tests.code.encode(simd, depth, current.range);
             let first = (tile * N + sample) * AREA + 16 * block;
-            let quads = Quads {
-                first: [first, first + 4, first + 8, first + 12],
-                consecutive: true,
-            };
+            let quads = Quads::block(first);
             *lanes = output::test(
                 simd,
                 tests,

@@ -128,23 +128,36 @@ impl Target {
         self.image.desc.samples
     }
 
-    /// Reads the bytes of one sample's texels from pixel (x, y) on; they stay as they are where there are none.
-    pub(super) fn read(&self, layer: u32, sample: u32, [x, y]: [u32; 2], bytes: &mut [u8]) {
-        if let Some((layout, z)) = self.layers.get(layer as usize) {
-            // Tiles are clipped to the attachments before they are rendered.
-            let _ = self
-                .image
-                .read_row(&layout.sample(sample), [x, y, *z], bytes);
-        }
+    /// One sample of all texels of a layer, if the attachment has that.
+    pub(super) fn sample(&self, layer: u32, sample: u32) -> Option<SampleRows<'_>> {
+        let (layout, z) = self.layers.get(layer as usize)?;
+        Some(SampleRows {
+            image: &self.image,
+            layout: layout.sample(sample),
+            z: *z,
+        })
+    }
+}
+
+/// One sample of all texels of an attachment's layer.
+pub(super) struct SampleRows<'a> {
+    image: &'a Image,
+    layout: SubresourceLayout,
+    z: u32,
+}
+
+impl SampleRows<'_> {
+    /// Reads the bytes of texels from pixel (x, y) on; they stay as they are where there are none.
+    #[inline]
+    pub fn read(&self, [x, y]: [u32; 2], bytes: &mut [u8]) {
+        // Tiles are clipped to the attachments before they are rendered.
+        let _ = self.image.read_row(&self.layout, [x, y, self.z], bytes);
     }
 
-    /// Writes the bytes of one sample's texels from pixel (x, y) on, where there are any.
-    pub(super) fn write(&self, layer: u32, sample: u32, [x, y]: [u32; 2], bytes: &[u8]) {
-        if let Some((layout, z)) = self.layers.get(layer as usize) {
-            // As above.
-            let _ = self
-                .image
-                .write_row(&layout.sample(sample), [x, y, *z], bytes);
-        }
+    /// Writes the bytes of texels from pixel (x, y) on, where there are any.
+    #[inline]
+    pub fn write(&self, [x, y]: [u32; 2], bytes: &[u8]) {
+        // As above.
+        let _ = self.image.write_row(&self.layout, [x, y, self.z], bytes);
     }
 }

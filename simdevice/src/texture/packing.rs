@@ -5,9 +5,10 @@
 
 use std::ops::Range;
 use std::sync::LazyLock;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::AtomicU32;
 
-use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use devmem::gather;
+use fearless_simd::{Simd, f32x8, f32x16, i32x8, i32x16, prelude::*, u32x8, u32x16};
 
 use super::lod::Floats;
 use super::surface::Surface;
@@ -210,14 +211,15 @@ fn load<S: Simd, T: Texels>(
     i: usize,
     j: usize,
 ) -> [Floats; 4] {
-    let row = row_start(simd, rows, j);
-    let texel = T::load(simd, words, row + u32x16::simd_from(simd, rows.x[i]));
-    [
-        texel[0].into(),
-        texel[1].into(),
-        texel[2].into(),
-        texel[3].into(),
-    ]
+    let index = row_start(simd, rows, j) + u32x16::simd_from(simd, rows.x[i]);
+    let (first, second) = index.split();
+    let first = T::load(simd, words, first);
+    let second = T::load(simd, words, second);
+    let mut out = [[0.0; CHUNK_LANES]; 4];
+    for c in 0..T::COMPONENTS {
+        out[c] = first[c].combine(second[c]).into();
+    }
+    out
 }
 
 #[inline(always)]
@@ -263,6 +265,43 @@ impl<S: Simd> Around<S> {
     #[inline(always)]
     pub fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32]) -> [f32x16<S>; 4] {
         let ([top, bottom], [left, right], [x, y]) = (self.rows, self.columns, self.weights);
+        // Half the lanes at a time, for which most processors have enough registers.
+        let (top, bottom) = (top.split(), bottom.split());
+        let (left, right) = (left.split(), right.split());
+        let (x, y) = (x.split(), y.split());
+        let first = Half {
+            rows: [top.0, bottom.0],
+            columns: [left.0, right.0],
+            weights: [x.0, y.0],
+        };
+        let second = Half {
+            rows: [top.1, bottom.1],
+            columns: [left.1, right.1],
+            weights: [x.1, y.1],
+        };
+        let (first, second) = (
+            first.filter::<T>(simd, words),
+            second.filter::<T>(simd, words),
+        );
+        let mut out = [f32x16::splat(simd, 0.0); 4];
+        for c in 0..T::COMPONENTS {
+            out[c] = first[c].combine(second[c]);
+        }
+        out
+    }
+}
+
+/// As [`Around`], of eight points.
+struct Half<S: Simd> {
+    rows: [u32x8<S>; 2],
+    columns: [u32x8<S>; 2],
+    weights: [f32x8<S>; 2],
+}
+
+impl<S: Simd> Half<S> {
+    #[inline(always)]
+    fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32]) -> [f32x8<S>; 4] {
+        let ([top, bottom], [left, right], [x, y]) = (self.rows, self.columns, self.weights);
         let mut upper = T::load(simd, words, top + left);
         let other = T::load(simd, words, top + right);
         for c in 0..T::COMPONENTS {
@@ -291,20 +330,7 @@ pub(super) trait Texels {
     const COMPONENTS: usize;
 
     /// The stored components of texels; those beyond [`Texels::COMPONENTS`] are zero.
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4];
-}
-
-/// The words at 16 places; zero beyond the end.
-#[inline(always)]
-fn gather<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> u32x16<S> {
-    let index: [u32; 16] = index.into();
-    let mut found = [0; 16];
-    for lane in 0..16 {
-        if let Some(word) = words.get(index[lane] as usize) {
-            found[lane] = word.load(Relaxed);
-        }
-    }
-    u32x16::simd_from(simd, found)
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4];
 }
 
 /// Of texels smaller than a word: their bits, moved to the low end.
@@ -312,9 +338,9 @@ fn gather<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> u32x16<S> 
 fn gather_narrow<S: Simd>(
     simd: S,
     words: &[AtomicU32],
-    index: u32x16<S>,
+    index: u32x8<S>,
     texels_per_word: u32,
-) -> u32x16<S> {
+) -> u32x8<S> {
     let word = gather(simd, words, index >> texels_per_word.trailing_zeros());
     let shift = (index & (texels_per_word - 1)) * (32 / texels_per_word);
     word >> shift
@@ -327,17 +353,25 @@ const INV_255: [f32; 2] = {
     [high, (1.0 / 255.0 - high as f64) as f32]
 };
 
-/// One byte of each word as a fraction of 255, as its quotient rounds.
-#[inline(always)]
-pub(crate) fn unorm8_fraction<S: Simd>(word: u32x16<S>, shift: u32) -> f32x16<S> {
-    let code = if shift == 24 {
-        word >> 24
-    } else {
-        (word >> shift) & 0xFF
+/// Defines how one byte of each word is a fraction of 255, as its quotient rounds.
+macro_rules! unorm8_fraction {
+    ($name:ident, $words:ident, $integers:ident, $floats:ident) => {
+        /// One byte of each word as a fraction of 255, as its quotient rounds.
+        #[inline(always)]
+        pub(crate) fn $name<S: Simd>(word: $words<S>, shift: u32) -> $floats<S> {
+            let code = if shift == 24 {
+                word >> 24
+            } else {
+                (word >> shift) & 0xFF
+            };
+            let code = $floats::float_from(code.bitcast::<$integers<S>>());
+            code * INV_255[0] + code * INV_255[1]
+        }
     };
-    let code = f32x16::float_from(code.bitcast::<fearless_simd::i32x16<S>>());
-    code * INV_255[0] + code * INV_255[1]
 }
+
+unorm8_fraction!(unorm8_fraction, u32x16, i32x16, f32x16);
+unorm8_fraction!(unorm8_fraction_8, u32x8, i32x8, f32x8);
 
 /// Linear values of sRGB codes.
 static LINEAR: LazyLock<[f32; 256]> =
@@ -349,10 +383,10 @@ impl Texels for Unorm8 {
     const COMPONENTS: usize = 1;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
-        let zero = f32x16::splat(simd, 0.0);
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+        let zero = f32x8::splat(simd, 0.0);
         let word = gather_narrow(simd, words, index, 4);
-        [unorm8_fraction(word, 0), zero, zero, zero]
+        [unorm8_fraction_8(word, 0), zero, zero, zero]
     }
 }
 
@@ -362,12 +396,12 @@ impl Texels for Unorm8x2 {
     const COMPONENTS: usize = 2;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
-        let zero = f32x16::splat(simd, 0.0);
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+        let zero = f32x8::splat(simd, 0.0);
         let word = gather_narrow(simd, words, index, 2);
         [
-            unorm8_fraction(word, 0),
-            unorm8_fraction(word, 8),
+            unorm8_fraction_8(word, 0),
+            unorm8_fraction_8(word, 8),
             zero,
             zero,
         ]
@@ -380,13 +414,13 @@ impl Texels for Unorm8x4 {
     const COMPONENTS: usize = 4;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
         let word = gather(simd, words, index);
         [
-            unorm8_fraction(word, 0),
-            unorm8_fraction(word, 8),
-            unorm8_fraction(word, 16),
-            unorm8_fraction(word, 24),
+            unorm8_fraction_8(word, 0),
+            unorm8_fraction_8(word, 8),
+            unorm8_fraction_8(word, 16),
+            unorm8_fraction_8(word, 24),
         ]
     }
 }
@@ -397,12 +431,12 @@ impl Texels for Srgb8x4 {
     const COMPONENTS: usize = 4;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
         let linear = &*LINEAR;
         let word = gather(simd, words, index);
-        let codes: [u32; 16] = word.into();
-        let mut values = [[0.0; 16]; 3];
-        for lane in 0..16 {
+        let codes: [u32; 8] = word.into();
+        let mut values = [[0.0; 8]; 3];
+        for lane in 0..8 {
             let [r, g, b, _] = codes[lane].to_le_bytes();
             values[0][lane] = linear[usize::from(r)];
             values[1][lane] = linear[usize::from(g)];
@@ -410,10 +444,10 @@ impl Texels for Srgb8x4 {
         }
         let [r, g, b] = values;
         [
-            f32x16::simd_from(simd, r),
-            f32x16::simd_from(simd, g),
-            f32x16::simd_from(simd, b),
-            unorm8_fraction(word, 24),
+            f32x8::simd_from(simd, r),
+            f32x8::simd_from(simd, g),
+            f32x8::simd_from(simd, b),
+            unorm8_fraction_8(word, 24),
         ]
     }
 }
@@ -424,10 +458,10 @@ impl Texels for Unorm16 {
     const COMPONENTS: usize = 1;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
-        let zero = f32x16::splat(simd, 0.0);
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+        let zero = f32x8::splat(simd, 0.0);
         let code = gather_narrow(simd, words, index, 2) & 0xFFFF;
-        let code = f32x16::float_from(code.bitcast::<fearless_simd::i32x16<S>>());
+        let code = f32x8::float_from(code.bitcast::<i32x8<S>>());
         [code / 65_535.0, zero, zero, zero]
     }
 }
@@ -436,8 +470,8 @@ struct Float16x4;
 
 /// The low 16 bits of words as binary16 numbers.
 #[inline(always)]
-fn float16<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
-    let splat = |word: u32| u32x16::splat(simd, word);
+fn float16<S: Simd>(simd: S, bits: u32x8<S>) -> f32x8<S> {
+    let splat = |word: u32| u32x8::splat(simd, word);
     let sign = (bits & 0x8000) << 16;
     let half = bits & 0x7FFF;
     // In binary32's place, the exponent still has binary16's bias.
@@ -445,14 +479,14 @@ fn float16<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
     let normal = shifted + ((127 - 15) << 23);
     // A denormal number stands below a leading one that it doesn't have. No operand is denormal, which would be slow.
     let least = splat((127 - 14) << 23);
-    let denormal = (shifted + least).bitcast::<f32x16<S>>() - least.bitcast::<f32x16<S>>();
+    let denormal = (shifted + least).bitcast::<f32x8<S>>() - least.bitcast::<f32x8<S>>();
     let infinity = splat(0x7C00);
     // NaN's mantissa is kept, and made quiet.
     let quiet = half.simd_gt(infinity).select(splat(1 << 22), splat(0));
     let special = shifted | splat(0x7F80_0000) | quiet;
     let magnitude = half.simd_ge(infinity).select(special, normal);
     let is_denormal = half.simd_lt(splat(0x0400));
-    let magnitude = is_denormal.select(denormal.bitcast::<u32x16<S>>(), magnitude);
+    let magnitude = is_denormal.select(denormal.bitcast::<u32x8<S>>(), magnitude);
     (magnitude | sign).bitcast()
 }
 
@@ -460,7 +494,7 @@ impl Texels for Float16x4 {
     const COMPONENTS: usize = 4;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
         let low = gather(simd, words, index * 2);
         let high = gather(simd, words, index * 2 + 1);
         [
@@ -478,8 +512,8 @@ impl Texels for Float32 {
     const COMPONENTS: usize = 1;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
-        let zero = f32x16::splat(simd, 0.0);
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
+        let zero = f32x8::splat(simd, 0.0);
         [gather(simd, words, index).bitcast(), zero, zero, zero]
     }
 }
@@ -490,7 +524,7 @@ impl Texels for Float32x4 {
     const COMPONENTS: usize = 4;
 
     #[inline(always)]
-    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x16<S>) -> [f32x16<S>; 4] {
+    fn load<S: Simd>(simd: S, words: &[AtomicU32], index: u32x8<S>) -> [f32x8<S>; 4] {
         let first = index * 4;
         [
             gather(simd, words, first).bitcast(),
@@ -514,12 +548,12 @@ mod tests {
         let size = format.texel_size();
         for (name, level) in SimdLevel::supported() {
             let level = level.resolve().unwrap();
-            for first in (0..bytes.len() / size).step_by(16) {
-                let found: [[f32; 16]; 4] = dispatch!(level, simd => {
-                    let index: [u32; 16] = std::array::from_fn(|lane| (first + lane) as u32);
-                    T::load(simd, &atomics, u32x16::simd_from(simd, index)).map(Into::into)
+            for first in (0..bytes.len() / size).step_by(8) {
+                let found: [[f32; 8]; 4] = dispatch!(level, simd => {
+                    let index: [u32; 8] = std::array::from_fn(|lane| (first + lane) as u32);
+                    T::load(simd, &atomics, u32x8::simd_from(simd, index)).map(Into::into)
                 });
-                for lane in 0..16.min(bytes.len() / size - first) {
+                for lane in 0..8.min(bytes.len() / size - first) {
                     let texel = &bytes[size * (first + lane)..][..size];
                     let expected = format.decode(texel);
                     for component in 0..T::COMPONENTS {

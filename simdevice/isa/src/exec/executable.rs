@@ -5,8 +5,9 @@ use std::sync::atomic::AtomicU32;
 
 use fearless_simd::Level;
 
+use super::super::forward::forward;
 use super::super::ir::{
-    CHUNK_LANES, Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Type,
+    CHUNK_LANES, Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Reg, Role, Type,
 };
 use super::super::optimize::optimize;
 use super::super::uniformity::varying_registers;
@@ -56,6 +57,8 @@ pub struct Executable {
     pub(super) constants: Vec<Constant>,
     pub(super) inputs: Vec<Input>,
     pub(super) outputs: Vec<Output>,
+    /// The registers of outputs that are zero until they are assigned.
+    pub(super) cleared: Vec<Reg>,
     pub(super) runs: Vec<RunCost>,
     pub(super) masks: usize,
     pub(super) chunks: usize,
@@ -92,6 +95,11 @@ impl Executable {
         let table = take_table(&mut program);
         let width = lanes / CHUNK_LANES;
         let varying = varying_registers(&program, table.is_some());
+        forward(&mut program, &varying);
+        let role = |reg: Reg| program.registers[reg.0 as usize].role;
+        let variables = program.outputs.iter().map(|output| output.reg);
+        let cleared = variables.filter(|reg| role(*reg) == Role::Variable);
+        let cleared = cleared.collect();
         let allocation = allocate(&program, &varying, width);
         if allocation.chunks > MAX_CHUNKS {
             return structure("too many registers are live at once");
@@ -111,6 +119,7 @@ impl Executable {
             constants: program.constants,
             inputs: program.inputs,
             outputs: program.outputs,
+            cleared,
             shared_bytes: program.shared_bytes,
             private_bytes: program.private_bytes,
             table: table.map(|words| words.into_iter().map(AtomicU32::new).collect()),

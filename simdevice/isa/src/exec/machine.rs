@@ -216,8 +216,8 @@ impl Machine {
             self.masks[usize::from(MaskId::ENTRY.0) * width + index] = word(active);
             self.masks[usize::from(MaskId::HELPER.0) * width + index] = word(helpers);
         }
-        for index in 0..self.executable.outputs.len() {
-            let range = self.chunks_of(self.executable.outputs[index].reg);
+        for index in 0..self.executable.cleared.len() {
+            let range = self.chunks_of(self.executable.cleared[index]);
             self.registers[range].fill(Chunk::default());
         }
         self.shared.iter().for_each(|word| word.store(0, Relaxed));

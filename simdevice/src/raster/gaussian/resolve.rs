@@ -11,11 +11,13 @@ use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::gaussian::GaussianDraw;
 use crate::packet::draw::{FragmentInput, FragmentPrograms, ResolveShader, resolve};
-use crate::raster::color::{ColorOutput, Quads};
+use crate::raster::color::ColorOutput;
+use crate::raster::color::load;
 use crate::raster::fragment::{FragmentStage, Machines};
-use crate::raster::output::{Sources, covered_by_alpha, lanes_of, load};
+use crate::raster::output::{Sources, covered_by_alpha, lanes_of};
 use crate::raster::prepared::color_outputs;
 use crate::raster::primitives::{Buffers, Targets};
+use crate::raster::quads::Quads;
 use crate::raster::setup::{CENTER, SAMPLES_4};
 use crate::raster::tile::Tile;
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
@@ -396,10 +398,7 @@ impl<'a> ResolveDraw<'a> {
             }
             let plane = &mut buffers.color[index];
             let first = plane.start(tile.index, sample) + block * LANES;
-            let quads = Quads {
-                first: [first, first + 4, first + 8, first + 12],
-                consecutive: true,
-            };
+            let quads = Quads::block(first);
             output.write(simd, &source, &second, lanes, &quads, plane.words_mut());
         }
     }

@@ -16,9 +16,10 @@ use crate::gaussian::GaussianDraw;
 use crate::packet::BlendState;
 use crate::packet::draw::{StencilFace, StencilOp};
 use crate::raster::MAX_SAMPLES;
-use crate::raster::color::{ColorOutput, Quads};
+use crate::raster::color::ColorOutput;
 use crate::raster::depth::{Tests, apply, compare};
 use crate::raster::primitives::{Buffers, Targets};
+use crate::raster::quads::Quads;
 use crate::raster::tile::{AREA, Target, Tile};
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use isa::exec::Stopped;
@@ -393,10 +394,7 @@ fn blend<S: Simd>(
         }
         let source = fragments.layers[layers[block]].fragments(simd, block);
         let first = start + block * LANES;
-        let quads = Quads {
-            first: [first, first + 4, first + 8, first + 12],
-            consecutive: true,
-        };
+        let quads = Quads::block(first);
         output.write(simd, &source, &no_second, lanes as u16, &quads, words);
     }
 }

@@ -185,14 +185,16 @@ fn means_of_bytes_are_those_of_the_format() {
             for x in 3..20 {
                 let mut samples = [[0; 4]; 4];
                 for (sample, bytes) in samples.iter_mut().enumerate() {
-                    target.read(0, sample as u32, [x, y], bytes);
+                    let rows = target.sample(0, sample as u32).unwrap();
+                    rows.read([x, y], bytes);
                 }
                 let decoded = samples.map(|bytes| [format.decode(&bytes)]);
                 let mut mean = [[0.0; 4]];
                 let rows = decoded.iter().map(|texel| &texel[..]);
                 resolve_row(format, ResolveMode::Average, rows, &mut mean);
                 let mut found = [0; 4];
-                resolve.read(0, 0, [x, y], &mut found);
+                let rows = resolve.sample(0, 0).unwrap();
+                rows.read([x, y], &mut found);
                 assert_eq!(found, format.encode(mean[0])[..4], "{name} {x} {y}");
             }
         }

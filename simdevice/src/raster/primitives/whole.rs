@@ -1,7 +1,8 @@
-//! Tiles that a primitive covers as a whole, in draws of which nothing is left where another does so later: they wait to be
+//! Tiles that a primitive covers as a whole. In draws of which nothing is left where another does so later they wait to be
 //! shaded until a primitive touches them otherwise, or the draw ends.
 
 use super::super::batch::{BlockValues, Quad};
+use super::super::coverage::Coverage;
 use super::super::pending::Pending;
 use super::super::tile::{AREA, SIDE};
 use super::{Current, Renderer};
@@ -12,21 +13,22 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::Stopped;
 
 /// Blocks of a tile.
-const BLOCKS: usize = 16;
+pub(super) const BLOCKS: usize = 16;
 
 /// The first pixel of a block of the tile at pixel `at`.
 #[inline(always)]
-fn block_corner([x, y]: [i32; 2], block: usize) -> [i32; 2] {
+pub(super) fn block_corner([x, y]: [i32; 2], block: usize) -> [i32; 2] {
     [x + (block % 4 * 4) as i32, y + (block / 4 * 4) as i32]
 }
 
 impl Renderer<'_, '_> {
-    /// A tile at pixel `at` that a primitive covers as a whole, in a draw that lets tiles wait.
+    /// A tile at pixel `at` that a primitive covers as a whole, in a draw with one sample a pixel.
     #[inline(always)]
-    pub(super) fn whole_tile<S: Simd>(
+    pub(super) fn whole_tile<S: Simd, const N: usize>(
         &mut self,
         simd: S,
         current: &mut Current<'_>,
+        coverage: &Coverage<N>,
         pending: &mut Pending,
         (tile, at): (usize, [i32; 2]),
     ) -> Result<(), Stopped> {
@@ -46,7 +48,9 @@ impl Renderer<'_, '_> {
             }
         }
         self.samples_passed += passed;
-        if passed == AREA as u64 {
+        if passed == AREA as u64 && !draw.defers {
+            self.touch_colors(tile, coverage);
+        } else if passed == AREA as u64 {
             self.touch_unread(tile);
             let slot = match current.kept {
                 Some(slot) => slot,
@@ -63,9 +67,11 @@ impl Renderer<'_, '_> {
             }
             return Ok(());
         }
-        self.shade_pending(simd, pending, tile)?;
-        // The batch may have begun anew.
-        current.record = None;
+        if pending.waits(tile) {
+            self.shade_pending(simd, pending, tile)?;
+            // The batch may have begun anew.
+            current.record = None;
+        }
         self.shade_tile(simd, current, (tile, at), &lanes)
     }
 
@@ -111,6 +117,10 @@ impl Renderer<'_, '_> {
         (tile, at): (usize, [i32; 2]),
         lanes: &[u16; BLOCKS],
     ) -> Result<(), Stopped> {
+        if self.draw.takes_tiles && *lanes == [u16::MAX; BLOCKS] {
+            self.touch_read(tile);
+            return self.shade_full_tile(simd, current, (tile, at));
+        }
         let needs = self.draw.needs;
         let mut touched = false;
         for (block, &lanes) in lanes.iter().enumerate() {

@@ -8,6 +8,7 @@ mod output;
 mod pareto;
 mod plot;
 mod roofline;
+mod skips;
 pub mod worker;
 mod workload;
 
@@ -21,7 +22,7 @@ use thiserror::Error;
 
 use crate::args::Size;
 use worker::Contender;
-use workload::{Source, Workload};
+use workload::{Extra, Source, Workload};
 
 /// Why there are no figures. Displayed as one sentence.
 #[derive(Debug, Error)]
@@ -66,6 +67,8 @@ enum BenchCommand {
     Pareto(SweepArguments),
     /// How time and memory grow with Gaussians, pixels, overlap and the share off the screen.
     Growth(SweepArguments),
+    /// What each skip saves, and what Gaussians cost that nobody sees.
+    Skips(SweepArguments),
 }
 
 /// What whole frames cost.
@@ -137,6 +140,7 @@ pub fn run(arguments: &BenchArguments) -> Result<(), BenchError> {
     match &arguments.command {
         Some(BenchCommand::Pareto(arguments)) => pareto::run(arguments),
         Some(BenchCommand::Growth(arguments)) => growth::run(arguments),
+        Some(BenchCommand::Skips(arguments)) => skips::run(arguments),
         None => frames::run(&arguments.frames),
     }
 }

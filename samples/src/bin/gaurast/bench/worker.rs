@@ -117,7 +117,20 @@ impl Worker {
         workload: &Workload,
         threads: usize,
     ) -> Result<Option<Self>, BenchError> {
+        Self::with_skips(contender, workload, threads, None)
+    }
+
+    /// As [`Worker::start`]; `skips` says what this driver leaves out, where it is not left to the environment.
+    pub fn with_skips(
+        contender: Contender,
+        workload: &Workload,
+        threads: usize,
+        skips: Option<&str>,
+    ) -> Result<Option<Self>, BenchError> {
         let mut command = Command::new(std::env::current_exe()?);
+        if let Some(skips) = skips {
+            command.env("GAURAST_SKIP", skips);
+        }
         command
             .arg(COMMAND)
             .env("GAURAST_THREADS", threads.to_string())

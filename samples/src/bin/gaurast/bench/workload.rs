@@ -45,6 +45,20 @@ pub enum Source {
         /// Whether they cover all of it.
         whole: bool,
     },
+    /// A wall around the benchmark's middle, which nothing shines through.
+    Wall,
+}
+
+/// Gaussians that are added, and that nobody sees.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Extra {
+    /// The scene again, beside the screen.
+    Beside,
+    /// A smaller benchmark scene behind the wall.
+    Behind {
+        /// The number of Gaussians.
+        count: usize,
+    },
 }
 
 /// A scene, perhaps changed, and how many pixels its pictures have.
@@ -56,6 +70,8 @@ pub struct Workload {
     pub scale: f32,
     /// The share of its Gaussians that is moved off the screen.
     pub away: f64,
+    /// What is added, in shuffled order.
+    pub extra: Option<Extra>,
     /// The pictures' size.
     pub size: [u32; 2],
 }
@@ -67,6 +83,7 @@ impl Workload {
             source,
             scale: 1.0,
             away: 0.0,
+            extra: None,
             size,
         }
     }
@@ -81,8 +98,17 @@ impl Workload {
             }
             Source::File { path } => Scene::load(path)?,
             Source::Tile { whole } => tile(*whole),
+            Source::Wall => wall(),
         };
-        Ok(scene.scaled(self.scale).partly_away(self.away))
+        let scene = scene.scaled(self.scale).partly_away(self.away);
+        let unseen = match self.extra {
+            None => return Ok(scene),
+            Some(Extra::Beside) => scene.clone().moved(|[x, y, z]| [x, y + 30.0, z]),
+            Some(Extra::Behind { count }) => {
+                Scene::benchmark(SEED, count).moved(|position| position.map(|at| 0.5 * at))
+            }
+        };
+        Ok(scene.shuffled_with(&unseen, SEED))
     }
 
     /// `count` views that differ, in the order of the path.
@@ -95,7 +121,7 @@ impl Workload {
                 .collect()
         };
         Ok(match &self.source {
-            Source::Benchmark { .. } => around(Camera::benchmark(size), [0.0; 3]),
+            Source::Benchmark { .. } | Source::Wall => around(Camera::benchmark(size), [0.0; 3]),
             Source::Garden { .. } => around(Camera::of_generated(None, size)?, [0.0; 3]),
             Source::Captured { .. } => {
                 let cameras = self.source.cameras(size)?;
@@ -155,6 +181,7 @@ impl fmt::Display for Source {
                 write!(f, "{path}-like {}", short(*count))
             }
             Self::File { path } => write!(f, "{}", stem(path)),
+            Self::Wall => write!(f, "wall"),
             Self::Tile { whole: true } => write!(f, "tile, covered"),
             Self::Tile { whole: false } => write!(f, "tile, dust"),
         }
@@ -201,6 +228,34 @@ fn tile(whole: bool) -> Scene {
         };
         let depth = 100.0 + 0.001 * index as f32;
         scene.push([cell(index), cell(index / 16), depth], shape, &[[0.5; 3]]);
+    }
+    scene
+}
+
+/// A cylinder of opaque Gaussians about the y axis, between the benchmark's camera and what is around the origin.
+fn wall() -> Scene {
+    const RADIUS: f32 = 4.5;
+    const LAYERS: u32 = 4;
+    let (columns, rows) = (96, 40);
+    let count = (LAYERS * columns * rows) as usize;
+    let mut scene = Scene::with_capacity(3, count);
+    let mut sh = [[0.0; 3]; 16];
+    for layer in 0..LAYERS {
+        for column in 0..columns {
+            for row in 0..rows {
+                let angle =
+                    std::f32::consts::TAU * (column as f32 + 0.25 * layer as f32) / columns as f32;
+                let radius = RADIUS + 0.01 * layer as f32;
+                let y = 0.25 * (row as f32 - 0.5 * rows as f32);
+                sh[0] = [0.3 + 0.4 * (column % 2) as f32, 0.1, 0.3 * (row % 2) as f32];
+                let shape = Shape {
+                    scale: [0.4; 3],
+                    rotation: [1.0, 0.0, 0.0, 0.0],
+                    opacity: 0.99,
+                };
+                scene.push([radius * angle.sin(), y, radius * angle.cos()], shape, &sh);
+            }
+        }
     }
     scene
 }
