@@ -225,12 +225,13 @@ mod tests {
             seed in any::<u64>(),
         ) {
             let mut random = seed | 1;
+            let common = above & !(u32::MAX >> keys.leading_zeros());
             let mut lists = Vec::new();
             for length in lengths {
                 let list: Vec<[u32; 2]> = (0..length)
                     .map(|_| {
                         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                        [((random >> 32) as u32 % keys) | (above & !(keys.next_power_of_two().wrapping_sub(1))), 0]
+                        [((random >> 32) as u32 % keys) | common, 0]
                     })
                     .collect();
                 lists.push(list);

@@ -366,7 +366,7 @@ impl<'a> Worker<'a> {
         let started = Instant::now();
         let mut bins = Bins::new(&setup.grid, setup.layers, &output.pairs);
         let per_vertex = setup.outputs.varyings.len();
-        let (primitives, values) = order::in_order(output, per_vertex, &mut bins);
+        let (primitives, values) = order::in_order(output, per_vertex, &mut bins, order::FEW);
         self.counters.add(Counter::BinnedPairs, bins.pairs());
         let elapsed = started.elapsed().as_nanos() as u64;
         self.counters.add(Counter::BinningTime, elapsed);
