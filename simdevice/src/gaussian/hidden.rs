@@ -17,6 +17,7 @@ use crate::packet::{
     CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState, Rect,
 };
 use crate::skips::Skip;
+use devmem::host;
 use std::sync::Arc;
 
 /// Regions of a picture along each axis: what is hidden is known of each.
@@ -187,8 +188,8 @@ impl Light {
             bounds,
             first,
             count,
-            left: vec![1.0; tiles],
-            depth: vec![f32::INFINITY; tiles],
+            left: host::filled(1.0, tiles),
+            depth: host::filled(f32::INFINITY, tiles),
             floor: f64::from(state.transmittance_floor) * (1.0 - MARGIN),
             alphas: [
                 f64::from(state.alpha_ceiling),
@@ -203,7 +204,7 @@ impl Light {
         for (number, batch) in batches.iter().enumerate() {
             for (place, &[key, _]) in batch.keys.iter().enumerate() {
                 if reaches_far(&batch.splats[place]) {
-                    order.push((key, number, place));
+                    host::push(&mut order, (key, number, place));
                 }
             }
         }
