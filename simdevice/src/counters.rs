@@ -76,6 +76,7 @@ counters! {
     SkippedDegenerate: "gaussians skipped", "degenerate covariance", Count, "Gaussians whose screen-space covariance is not positive and finite";
     SkippedOffScreen: "gaussians skipped", "off screen", Count, "Gaussians that reach no pixel of the scissored viewport at the alpha floor";
     OutsideByChunks: "skips", "outside by chunks", Count, "Gaussians that were not read because the bounds of their chunk are outside the picture";
+    HiddenByOthers: "skips", "hidden by others", Count, "Gaussians that were not read because others before their chunk finish all pixels that it reaches";
     OutsideByBounds: "skips", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
     TilesBesideEllipse: "skips", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
     HarmonicsUnread: "skips", "harmonics unread", Count, "Gaussians whose spherical harmonics were not read";

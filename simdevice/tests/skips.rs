@@ -216,6 +216,27 @@ fn placed() -> Vec<Packet> {
     packets
 }
 
+/// Gaussians that only the device can write, the first of which are a wall before the others: large, opaque, and at most
+/// `right` of the middle.
+fn walled(seed: u64, right: f32, opacity: f32) -> Vec<Packet> {
+    const FLOATS: u64 = 14;
+    let packets = gaussians_in(false, seed, 6000, OVER);
+    let Packet::GaussianAppend(append) = &packets[1] else {
+        panic!("what follows the beginning of a set");
+    };
+    let memory = &append.attributes.position.buffer.memory;
+    for vertex in 0..300u64 {
+        let (column, row) = (vertex % 20, vertex / 20);
+        let x = -1.0 + (1.0 + right) * column as f32 / 19.0;
+        let y = -0.8 + 0.11 * row as f32;
+        let z = 1.2 + 0.001 * ((vertex * 37) % 300) as f32;
+        let at = 4 * FLOATS * vertex;
+        memory.write(at, &[x, y, z, 0.2, 0.15, 0.25]).unwrap();
+        memory.write(at + 40, &[opacity]).unwrap();
+    }
+    packets
+}
+
 /// Small Gaussians in another mode, most of them beside the scissor.
 fn mode_beside(seed: u64, change: fn(&mut GaussianBegin)) -> Vec<Packet> {
     let mut packets = mostly_beside(seed, 3000);
@@ -297,6 +318,85 @@ fn bounded_modes() -> Vec<(&'static str, Vec<Packet>)> {
 type Change = fn(&mut GaussianBegin);
 
 #[test]
+fn what_is_hidden_changes_no_bit() {
+    let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
+    let changes: [(&str, Change, bool); 8] = [
+        ("as ever", |_| {}, true),
+        (
+            "parallel",
+            |begin| {
+                begin.camera.model = CameraModel::Orthographic;
+                begin.camera.focal_length = [60.0; 2];
+            },
+            true,
+        ),
+        (
+            "unscented",
+            |begin| {
+                Arc::make_mut(&mut begin.state).linearization = GaussianLinearization::Unscented;
+            },
+            true,
+        ),
+        (
+            "compensated, without a filter",
+            |begin| {
+                let state = Arc::make_mut(&mut begin.state);
+                (state.opacity_compensated, state.low_pass_variance) = (true, 0.0);
+            },
+            true,
+        ),
+        (
+            "a scissor",
+            |begin| {
+                begin.scissor = Rect {
+                    x: 21,
+                    y: 17,
+                    width: 61,
+                    height: 43,
+                };
+            },
+            true,
+        ),
+        (
+            "a lower floor",
+            |begin| Arc::make_mut(&mut begin.state).transmittance_floor = 1e-9,
+            true,
+        ),
+        (
+            "no floor",
+            |begin| Arc::make_mut(&mut begin.state).transmittance_floor = 0.0,
+            false,
+        ),
+        (
+            "tested",
+            |begin| {
+                Arc::make_mut(&mut begin.state).depth_stencil.depth = Some(DepthTest {
+                    compare: CompareOp::Less,
+                    write: false,
+                });
+            },
+            false,
+        ),
+    ];
+    for (seed, (name, change, hides)) in changes.into_iter().enumerate() {
+        for (right, opacity) in [(1.0, 0.99), (-0.3, 0.95), (0.4, 0.6)] {
+            let mut packets = walled(30 + seed as u64, right, opacity);
+            if let Packet::GaussianBegin(begin) = &mut packets[0] {
+                change(begin);
+            }
+            let (image, counters) = draw(Skips::ALL, &packets, over_black);
+            let (other, without) = draw(Skips::ALL.without(Skip::Hidden), &packets, over_black);
+            assert!(image == other, "{name}, {right}");
+            let hidden = counters.get(Counter::HiddenByOthers);
+            println!("{name}, {right}: {hidden}");
+            assert_eq!(hidden > 0, hides, "{name}, {right}: {hidden}");
+            let read = |counters: &Counters| counters.get(Counter::GaussiansRead);
+            assert_eq!(read(&counters), read(&without), "{name}, {right}");
+        }
+    }
+}
+
+#[test]
 fn every_mode_has_bounds_that_change_no_bit() {
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
     for (mode, packets) in bounded_modes() {
@@ -376,6 +476,8 @@ fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
         ("few", gaussians(1, 12, OVER), LoadOp::Load),
         ("many", gaussians(2, 5000, OVER), over_black),
         ("chunks", mostly_beside(5, 6000), over_black),
+        ("behind a wall", walled(11, 1.0, 0.99), over_black),
+        ("behind half a wall", walled(12, 0.0, 0.9), LoadOp::Load),
         ("ties", ties, LoadOp::Load),
         ("several", several.concat(), LoadOp::Load),
         ("nothing", Vec::new(), over_black),

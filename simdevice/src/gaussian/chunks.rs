@@ -40,9 +40,17 @@ pub(super) struct Chunk {
 #[derive(Debug)]
 pub(super) struct Chunks {
     pub(super) chunks: Vec<Chunk>,
+    /// Those among them that hide others best: large and opaque.
+    pub(super) screens: Vec<Chunk>,
     /// The greatest opacity.
     pub(super) opacity: f32,
 }
+
+/// The least opacity of a screen.
+const SCREEN_OPACITY: f32 = 0.5;
+
+/// The most screens of a draw.
+const MAX_SCREENS: usize = 8 * 1024;
 
 /// Bits of an axis in a Morton code.
 const AXIS_BITS: u32 = 10;
@@ -52,7 +60,10 @@ pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64
     let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
     let floats = if with_harmonics { reader.floats() } else { 0 };
     let chunk = size_of::<Chunk>() + 4 * BATCH * (1 + floats);
-    u64::from(append.count).div_ceil(BATCH as u64) * chunk as u64
+    let screen = size_of::<Chunk>() + 4 * BATCH;
+    let chunks = |count: u64| count.div_ceil(BATCH as u64);
+    let screens = chunks(u64::from(append.count).min(MAX_SCREENS as u64));
+    chunks(append.count.into()) * chunk as u64 + screens * screen as u64
 }
 
 impl Chunks {
@@ -68,11 +79,35 @@ impl Chunks {
             })
             .collect_into_vec(&mut chunks);
         let opacities = chunks.iter().map(|chunk| chunk.bounds.opacity);
+        let screens: Vec<u32> = screens(&chunks);
+        let screens = screens
+            .chunks(BATCH)
+            .map(|numbers| Chunk::read(append, &mut Fetcher::default(), numbers, (is_flat, false)));
         Self {
             opacity: opacities.fold(0.0, f32::max),
+            screens: host::collect(screens),
             chunks,
         }
     }
+}
+
+/// The numbers of the Gaussians that may hide others: of the opaque ones those whose second largest scale is greatest, in
+/// the order of chunks.
+fn screens(chunks: &[Chunk]) -> Vec<u32> {
+    let opaque = || {
+        chunks.iter().flat_map(|chunk| {
+            (0..chunk.numbers.len())
+                .filter(|&lane| chunk.attributes.opacity[lane] >= SCREEN_OPACITY)
+                .map(|lane| (chunk.attributes.second_scale(lane), chunk.numbers[lane]))
+        })
+    };
+    let mut seconds: Vec<f32> = host::collect(opaque().map(|(second, _)| second));
+    let mut least = 0.0;
+    if let Some(rest) = seconds.len().checked_sub(MAX_SCREENS) {
+        least = *seconds.select_nth_unstable_by(rest, f32::total_cmp).1;
+    }
+    let large = opaque().filter(|(second, _)| *second >= least);
+    host::collect(large.take(MAX_SCREENS).map(|(_, number)| number))
 }
 
 impl Chunk {
@@ -136,6 +171,29 @@ impl Chunk {
             bounds,
             is_sound,
         }
+    }
+}
+
+impl Chunk {
+    /// A chunk of one lane of another, without harmonics.
+    pub(super) fn of_one(from: &Self, lane: usize) -> Self {
+        let mut chunk = Self {
+            numbers: host::with_capacity(BATCH),
+            attributes: Attributes::default(),
+            harmonics: Vec::new(),
+            bounds: from.bounds,
+            is_sound: true,
+        };
+        chunk.push(from, lane);
+        chunk
+    }
+
+    /// Adds a lane of another chunk; `bounds` stays as it is.
+    pub(super) fn push(&mut self, from: &Self, lane: usize) {
+        self.attributes
+            .copy_lane(self.numbers.len(), &from.attributes, lane);
+        host::push(&mut self.numbers, from.numbers[lane]);
+        self.is_sound &= from.is_sound;
     }
 }
 

@@ -3,6 +3,7 @@
 use super::chunks::{Chunk, Chunks};
 use super::fetch::{BATCH, Batch, Fetcher};
 use super::frustum::{Frustum, Outside};
+use super::hidden::Hidden;
 use super::instances::{Matrices, Model};
 use super::project::{Projection, Source};
 use super::scratch::Attributes;
@@ -19,6 +20,7 @@ impl GaussianSet {
         &'a self,
         chunks: &'a [Option<Arc<Chunks>>],
         projection: &Projection,
+        hidden: Option<&Hidden>,
         counters: &mut Counters,
     ) -> Result<Vec<Job<'a>>, TooManyGaussians> {
         let batches = |append: &GaussianAppend| {
@@ -44,6 +46,7 @@ impl GaussianSet {
                 let instance = append.first_instance.saturating_add(instance);
                 let of_instance;
                 let mut view = &view;
+                let hidden = hidden.filter(|_| !append.attributes.model.is_some());
                 if chunks.is_some() && append.attributes.model.is_some() {
                     of_instance = View::of_instance(projection, append, instance, opacity);
                     view = &of_instance;
@@ -69,7 +72,10 @@ impl GaussianSet {
                         chunks
                             .chunks
                             .iter()
-                            .filter(|chunk| !view.leaves_out(chunk, counters))
+                            .filter(|chunk| {
+                                !view.leaves_out(chunk, counters)
+                                    && !hidden.is_some_and(|hidden| hidden.leaves_out(chunk, counters))
+                            })
                             .map(|chunk| Job {
                                 part: Part::Chunk(chunk),
                                 ..job.clone()

@@ -12,6 +12,7 @@ pub(crate) mod depth;
 mod fetch;
 pub(crate) mod footprint;
 mod frustum;
+mod hidden;
 mod instances;
 mod jobs;
 mod lanes;
@@ -339,59 +340,82 @@ impl GaussianSet {
             self.depth,
             skips,
         );
-        let jobs = self.jobs(chunks, &projection, counters)?;
+        let workers = Workers {
+            device,
+            projection: &projection,
+            is_flat: self.is_flat(),
+        };
+        let hidden = self.find_hidden(&workers, chunks);
+        let jobs = self.jobs(chunks, &projection, hidden.as_ref(), counters)?;
         if skips.has(Skip::Harmonics) {
-            let unread = counters.get(Counter::OutsideByChunks);
+            let unread =
+                counters.get(Counter::OutsideByChunks) + counters.get(Counter::HiddenByOthers);
             counters.add(Counter::HarmonicsUnread, unread);
         }
-        let level = device.level();
-        let is_flat = self.is_flat();
-        let one = |worker: &mut Worker, (job, out): (&Job<'_>, &mut Projected)| {
-            let Worker {
-                fetcher,
-                attributes,
-                matrices,
-                scratch,
-            } = worker;
-            let source = job.read(fetcher, attributes, matrices, is_flat);
-            // A frustum is for opacities that it was told of.
-            let wider;
-            let mut frustum = &*job.frustum;
-            if let Part::From(_) = job.part {
-                let opacities = &source.attributes.opacity[..source.batch.len];
-                let opacity = opacities.iter().copied().fold(1.0, f32::max);
-                if opacity > 1.0 {
-                    wider = Frustum::new(&projection, opacity);
-                    frustum = &wider;
-                }
-            }
-            let placed;
-            let mut bounds = skips.has(Skip::Bounds).then_some(frustum);
-            if let Some(matrices) = source.matrices {
-                // What is yet to be placed in the world by the same matrix sees the planes where they are for it.
-                let uniform = bounds.and(matrices.uniform());
-                placed = uniform.and_then(|matrix| frustum.within(matrix));
-                bounds = placed.as_ref();
-            }
-            let source = Source {
-                frustum: bounds,
-                ..source
-            };
-            let sequence = |lane: usize| match &job.part {
-                Part::From(start) => job.sequence + start + lane as u32,
-                Part::Chunk(chunk) => job.sequence + chunk.numbers[lane],
-            };
-            dispatch!(level, simd => projection.run(simd, &source, scratch, sequence, out));
-        };
+        let mut batches = workers.run(&jobs);
+        panorama::append_copies(&mut batches);
+        Ok(batches)
+    }
+}
+
+/// What projects jobs.
+struct Workers<'a> {
+    device: &'a Device,
+    projection: &'a Projection,
+    is_flat: bool,
+}
+
+impl Workers<'_> {
+    /// Does all jobs.
+    fn run(&self, jobs: &[Job<'_>]) -> Vec<Projected> {
         let mut batches = host::collect(jobs.iter().map(|_| Projected::default()));
-        device.install(|| {
+        self.device.install(|| {
             jobs.par_iter()
                 .zip(&mut batches)
                 .with_min_len(BATCHES_PER_TASK)
-                .for_each_init(Worker::new, one);
+                .for_each_init(Worker::new, |worker, (job, out)| self.job(worker, job, out));
         });
-        panorama::append_copies(&mut batches);
-        Ok(batches)
+        batches
+    }
+
+    /// Does a job.
+    fn job(&self, worker: &mut Worker, job: &Job<'_>, out: &mut Projected) {
+        let Worker {
+            fetcher,
+            attributes,
+            matrices,
+            scratch,
+        } = worker;
+        let projection = self.projection;
+        let source = job.read(fetcher, attributes, matrices, self.is_flat);
+        // A frustum is for opacities that it was told of.
+        let wider;
+        let mut frustum = &*job.frustum;
+        if let Part::From(_) = job.part {
+            let opacities = &source.attributes.opacity[..source.batch.len];
+            let opacity = opacities.iter().copied().fold(1.0, f32::max);
+            if opacity > 1.0 {
+                wider = Frustum::new(projection, opacity);
+                frustum = &wider;
+            }
+        }
+        let placed;
+        let mut bounds = projection.skips.has(Skip::Bounds).then_some(frustum);
+        if let Some(matrices) = source.matrices {
+            // What is yet to be placed in the world by the same matrix sees the planes where they are for it.
+            let uniform = bounds.and(matrices.uniform());
+            placed = uniform.and_then(|matrix| frustum.within(matrix));
+            bounds = placed.as_ref();
+        }
+        let source = Source {
+            frustum: bounds,
+            ..source
+        };
+        let sequence = |lane: usize| match &job.part {
+            Part::From(start) => job.sequence + start + lane as u32,
+            Part::Chunk(chunk) => job.sequence + chunk.numbers[lane],
+        };
+        dispatch!(self.device.level(), simd => projection.run(simd, &source, scratch, sequence, out));
     }
 }
 

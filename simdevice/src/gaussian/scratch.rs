@@ -68,6 +68,29 @@ impl Default for Attributes {
     }
 }
 
+impl Attributes {
+    /// The second largest scale of a lane.
+    pub(super) fn second_scale(&self, lane: usize) -> f32 {
+        let [a, b, c] = self.scale.each_ref().map(|scale| scale[lane]);
+        a.max(b).min(a.max(c)).min(b.max(c))
+    }
+
+    /// Makes a lane what a lane of others is.
+    pub(super) fn copy_lane(&mut self, to: usize, others: &Self, from: usize) {
+        let mut copy = |own: &mut [f32; F32_LANES], other: &[f32; F32_LANES]| own[to] = other[from];
+        for (own, other) in self.position.iter_mut().zip(&others.position) {
+            copy(own, other);
+        }
+        for (own, other) in self.scale.iter_mut().zip(&others.scale) {
+            copy(own, other);
+        }
+        for (own, other) in self.rotation.iter_mut().zip(&others.rotation) {
+            copy(own, other);
+        }
+        copy(&mut self.opacity, &others.opacity);
+    }
+}
+
 impl Default for Flat {
     fn default() -> Self {
         Self {

@@ -14,6 +14,15 @@ pub(super) fn ordered_bits(value: f32) -> u32 {
     }
 }
 
+/// The number whose [`ordered_bits`] these are.
+pub(super) fn value_of(bits: u32) -> f32 {
+    f32::from_bits(if bits >> 31 == 1 {
+        bits & !(1 << 31)
+    } else {
+        !bits
+    })
+}
+
 /// The most bits of a digit: a first-level cache holds a line for each of its values.
 const MAX_DIGIT_BITS: u32 = 9;
 
@@ -210,6 +219,9 @@ mod tests {
             3e38,
             f32::INFINITY,
         ];
+        for value in ascending {
+            assert_eq!(value_of(ordered_bits(value)).to_bits(), value.to_bits());
+        }
         for pair in ascending.windows(2) {
             assert!(ordered_bits(pair[0]) < ordered_bits(pair[1]), "{pair:?}");
         }

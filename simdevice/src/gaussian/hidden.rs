@@ -1,0 +1,320 @@
+//! Gaussians behind others that leave no light for them. Large opaque ones, screens, are projected first, and followed front
+//! to back: each takes of a tile's light at least what it takes of the pixel that it covers least. Where a tile's pixels are
+//! all finished by then, nothing farther away contributes to it, whatever else is drawn; what reaches only such tiles is
+//! hidden. The answer is conservative, and the picture the same.
+
+use super::chunks::{Bounds, Chunk, Chunks};
+use super::fetch::BATCH;
+use super::footprint::{TILE_SIZE, Visible};
+use super::frustum::Frustum;
+use super::jobs::{Job, Part};
+use super::project::{Projected, Projection, Splat};
+use super::scratch::Attributes;
+use super::{GaussianSet, Workers};
+use crate::counters::{Counter, Counters};
+use crate::packet::draw::DepthStencil;
+use crate::packet::{
+    CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState, Rect,
+};
+use crate::skips::Skip;
+use devmem::host;
+use std::sync::Arc;
+
+/// Regions of a picture along each axis: what is hidden is known of each.
+const REGIONS: usize = 8;
+
+/// Screens are at least as wide in the picture, in pixels: smaller ones cover no tile.
+const LEAST_DEVIATION: f64 = 10.0;
+
+/// What takes less of a tile is not followed.
+const LEAST_ALPHA: f64 = 0.2;
+
+/// Pairs of a tile and a screen that are looked at, for each tile.
+const PAIRS_PER_TILE: usize = 24;
+
+/// What rounding may do to an alpha and to a product of many, relative to it.
+const MARGIN: f64 = 1e-3;
+
+/// What is hidden.
+pub(super) struct Hidden {
+    /// The parts of a picture, each as far as anything is seen there.
+    regions: Vec<Frustum>,
+}
+
+impl Hidden {
+    /// Whether nothing of a chunk is seen that is not placed by a model; its Gaussians are counted then.
+    pub(super) fn leaves_out(&self, chunk: &Chunk, counters: &mut Counters) -> bool {
+        if !self.hides(&chunk.bounds) {
+            return false;
+        }
+        for counter in [Counter::GaussiansRead, Counter::HiddenByOthers] {
+            counters.add(counter, chunk.numbers.len() as u64);
+        }
+        true
+    }
+
+    fn hides(&self, bounds: &Bounds) -> bool {
+        self.regions
+            .iter()
+            .all(|region| region.excludes(bounds).is_some())
+    }
+}
+
+impl GaussianSet {
+    /// What screens hide; `None` if that is nothing, or not to be known.
+    pub(super) fn find_hidden(
+        &self,
+        workers: &Workers<'_>,
+        chunks: &[Option<Arc<Chunks>>],
+    ) -> Option<Hidden> {
+        let projection = workers.projection;
+        if !self.may_hide(workers) {
+            return None;
+        }
+        let mut found = Vec::new();
+        for (append, chunks) in self.appends.iter().zip(chunks) {
+            if let Some(chunks) = chunks
+                && !append.attributes.model.is_some()
+            {
+                let frustum = Arc::new(Frustum::new(projection, chunks.opacity));
+                let screens = large_screens(projection, &frustum, chunks);
+                found.push((append, frustum, screens));
+            }
+        }
+        let mut jobs = Vec::new();
+        for (append, frustum, screens) in &found {
+            jobs.extend(screens.iter().map(|chunk| Job {
+                append,
+                instance: append.first_instance,
+                sequence: 0,
+                part: Part::Chunk(chunk),
+                frustum: Arc::clone(frustum),
+            }));
+        }
+        if jobs.is_empty() {
+            return None;
+        }
+        let mut light = Light::new(self.bounds, &self.begin.state);
+        light.pass(&workers.run(&jobs));
+        light.hidden(projection, chunks)
+    }
+
+    /// Whether a finished pixel is all that it takes for what is farther away not to be seen.
+    fn may_hide(&self, workers: &Workers<'_>) -> bool {
+        let state = &self.begin.state;
+        let is_along_axis = matches!(
+            workers.projection.model,
+            CameraModel::Pinhole | CameraModel::Orthographic
+        );
+        workers.projection.skips.has(Skip::Hidden)
+            // What was recorded is what hardware without this does.
+            && workers.device.recorder().is_none()
+            && is_along_axis
+            && state.order == GaussianOrder::ViewDepth
+            && state.geometry == GaussianGeometry::Volume
+            && state.precision == GaussianPrecision::Float32
+            && state.transmittance_floor > 0.0
+            // What is tested may not take the light that it could.
+            && state.depth_stencil == DepthStencil::default()
+            && self.resolve.is_none()
+            && !self.bounds.is_empty()
+    }
+}
+
+/// The screens of chunks that may be wide enough in the picture, packed.
+fn large_screens(projection: &Projection, frustum: &Frustum, chunks: &Chunks) -> Vec<Chunk> {
+    let mut packed: Vec<Chunk> = Vec::new();
+    for chunk in &chunks.screens {
+        if frustum.excludes(&chunk.bounds).is_some() {
+            continue;
+        }
+        for lane in 0..chunk.numbers.len() {
+            if is_large(projection, &chunk.attributes, lane) {
+                match packed.last_mut() {
+                    Some(last) if last.numbers.len() < BATCH => last.push(chunk, lane),
+                    _ => packed.push(Chunk::of_one(chunk, lane)),
+                }
+            }
+        }
+    }
+    packed
+}
+
+/// Whether a Gaussian is about as wide as screens are.
+fn is_large(projection: &Projection, attributes: &Attributes, lane: usize) -> bool {
+    let mut per_unit = projection.focal[0].abs().max(projection.focal[1].abs());
+    if projection.model == CameraModel::Pinhole {
+        let forward = &projection.rotation[6..9];
+        let depth: f64 = (0..3)
+            .map(|axis| {
+                let position = f64::from(attributes.position[axis][lane]);
+                forward[axis] * (position - projection.eye[axis])
+            })
+            .sum();
+        if depth <= f64::from(projection.near) {
+            return false;
+        }
+        per_unit /= depth;
+    }
+    f64::from(attributes.second_scale(lane)) * per_unit >= LEAST_DEVIATION
+}
+
+/// What light is left of each tile of a picture.
+struct Light {
+    bounds: Rect,
+    /// The first column and row of tiles, and how many.
+    first: [u32; 2],
+    count: [u32; 2],
+    /// No pixel of the tile has more.
+    left: Vec<f64>,
+    /// The depth of what finished the tile, or infinity.
+    depth: Vec<f32>,
+    /// Pixels with less light are finished.
+    floor: f64,
+    /// The greatest alpha, and what is taken for the least.
+    alphas: [f64; 2],
+}
+
+impl Light {
+    fn new(bounds: Rect, state: &GaussianState) -> Self {
+        let [x, y] = [bounds.x.max(0) as u32, bounds.y.max(0) as u32];
+        let first = [x / TILE_SIZE, y / TILE_SIZE];
+        let count = [
+            (x + bounds.width).div_ceil(TILE_SIZE) - first[0],
+            (y + bounds.height).div_ceil(TILE_SIZE) - first[1],
+        ];
+        let tiles = count[0] as usize * count[1] as usize;
+        Self {
+            bounds,
+            first,
+            count,
+            left: host::filled(1.0, tiles),
+            depth: host::filled(f32::INFINITY, tiles),
+            floor: f64::from(state.transmittance_floor) * (1.0 - MARGIN),
+            alphas: [
+                f64::from(state.alpha_ceiling),
+                LEAST_ALPHA.max(f64::from(state.alpha_floor) * (1.0 + MARGIN)),
+            ],
+        }
+    }
+
+    /// Lets screens take light, front to back.
+    fn pass(&mut self, batches: &[Projected]) {
+        let mut order = Vec::new();
+        for (number, batch) in batches.iter().enumerate() {
+            for (place, &[key, _]) in batch.keys.iter().enumerate() {
+                if reaches_far(&batch.splats[place]) {
+                    host::push(&mut order, (key, number, place));
+                }
+            }
+        }
+        order.sort_unstable();
+        let mut budget = PAIRS_PER_TILE * self.left.len();
+        for (key, number, place) in order {
+            let batch = &batches[number];
+            let splat = &batch.splats[place];
+            for (row, span) in batch.reaches[place].spans(&batch.spans) {
+                let Some(pairs) = budget.checked_sub(span.len()) else {
+                    return;
+                };
+                budget = pairs;
+                for column in span.first..span.end {
+                    self.take(splat, key, [column.into(), row]);
+                }
+            }
+        }
+    }
+
+    /// What a screen takes of a tile.
+    fn take(&mut self, splat: &Splat, key: u32, [column, row]: [u32; 2]) {
+        let at = [
+            column.wrapping_sub(self.first[0]),
+            row.wrapping_sub(self.first[1]),
+        ];
+        if at[0] >= self.count[0] || at[1] >= self.count[1] {
+            return;
+        }
+        let tile = (at[1] * self.count[0] + at[0]) as usize;
+        if self.depth[tile] < f32::INFINITY {
+            return;
+        }
+        let [ceiling, least] = self.alphas;
+        let alpha = least_alpha(splat, [column, row]).min(ceiling);
+        if alpha > least {
+            self.left[tile] *= 1.0 - alpha * (1.0 - MARGIN);
+            if self.left[tile] < self.floor {
+                self.depth[tile] = super::sort::value_of(key);
+            }
+        }
+    }
+
+    /// What is hidden, if any region is finished; of chunks that may be as opaque as these.
+    fn hidden(
+        &self,
+        projection: &Projection,
+        chunks: &[Option<Arc<Chunks>>],
+    ) -> Option<Hidden> {
+        let opacities = chunks.iter().flatten().map(|chunks| chunks.opacity);
+        let opacity = opacities.fold(0.0, f32::max);
+        let mut regions = Vec::new();
+        let mut any = false;
+        for row in 0..REGIONS {
+            for column in 0..REGIONS {
+                let part = |axis: usize, number: usize| {
+                    let end = |number: usize| self.count[axis] as usize * number / REGIONS;
+                    end(number)..end(number + 1)
+                };
+                let (columns, rows) = (part(0, column), part(1, row));
+                if columns.is_empty() || rows.is_empty() {
+                    continue;
+                }
+                let mut farthest = f32::NEG_INFINITY;
+                for y in rows.clone() {
+                    for x in columns.clone() {
+                        farthest = farthest.max(self.depth[y * self.count[0] as usize + x]);
+                    }
+                }
+                any |= farthest < f32::INFINITY;
+                let edge = |axis: usize, tile: usize| {
+                    i64::from(TILE_SIZE) * (i64::from(self.first[axis]) + tile as i64)
+                };
+                let whole = Visible::from(self.bounds);
+                let visible = Visible {
+                    left: edge(0, columns.start).max(whole.left),
+                    top: edge(1, rows.start).max(whole.top),
+                    right: edge(0, columns.end).min(whole.right),
+                    bottom: edge(1, rows.end).min(whole.bottom),
+                };
+                let projection = Projection {
+                    visible,
+                    // What is as far comes before or after.
+                    far: projection.far.min(farthest.next_up()),
+                    ..projection.clone()
+                };
+                regions.push(Frustum::new(&projection, opacity));
+            }
+        }
+        any.then_some(Hidden { regions })
+    }
+}
+
+/// Whether a splat may take light of a whole tile.
+fn reaches_far(splat: &Splat) -> bool {
+    // In units of the exponent, a tile's middle to its corners.
+    let [a, _, c] = splat.factor.map(f64::abs);
+    !splat.wide && a.max(c) * LEAST_DEVIATION < 1.5
+}
+
+/// The least alpha of a splat at the pixel centres of a tile: that at a corner, since exponents are convex.
+fn least_alpha(splat: &Splat, [column, row]: [u32; 2]) -> f64 {
+    let last = f64::from(TILE_SIZE) - 1.0;
+    let [x, y] = [column, row].map(|tile| f64::from(tile * TILE_SIZE) + 0.5);
+    let [a, b, c] = splat.factor;
+    let mut greatest = 0.0f64;
+    for [x, y] in [[x, y], [x + last, y], [x, y + last], [x + last, y + last]] {
+        let (dx, dy) = (x - splat.mean[0], y - splat.mean[1]);
+        let (u, v) = (a * dx, b * dx + c * dy);
+        greatest = greatest.max(u * u + v * v);
+    }
+    (f64::from(splat.log2_opacity) - greatest).exp2()
+}
