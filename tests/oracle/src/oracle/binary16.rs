@@ -20,6 +20,8 @@ const SLACK: f64 = 1e-10;
 const OF_POWER: f64 = 0.501;
 /// What a few roundings to binary32 may lose of a colour, relative to its terms' sizes.
 const OF_COLOR: f64 = 24.0 / 16_777_216.0;
+/// The greatest binary16 number, which is also the greatest colour.
+const GREATEST: f64 = 65504.0;
 /// Transmittances that a pixel may have at a time before the reference gives up.
 const MAX_WAYS: usize = 64;
 
@@ -123,7 +125,12 @@ fn exp2(exponent: f64) -> Few {
 
 /// A colour's terms without their signs. No basis function is greater than 3.
 fn magnitude(coefficients: &[[f32; 3]]) -> [f64; 3] {
-    let sum = |c: usize| coefficients.iter().map(|k| f64::from(k[c]).abs()).sum::<f64>();
+    let sum = |c: usize| {
+        coefficients
+            .iter()
+            .map(|k| f64::from(k[c]).abs())
+            .sum::<f64>()
+    };
     [0, 1, 2].map(|c| 0.5 + 3.0 * sum(c))
 }
 
@@ -147,7 +154,8 @@ impl<'a> Rounded<'a> {
         let log2_opacity = splat.opacity.log2();
         let color = |by: f64| {
             let moved = |c: usize| (splat.color[c] + by * OF_COLOR * magnitude[c]).max(0.0);
-            [0, 1, 2].map(moved).map(round)
+            let rounded = |c| round(c).clamp(-GREATEST, GREATEST);
+            [0, 1, 2].map(moved).map(rounded)
         };
         Self {
             splat,
