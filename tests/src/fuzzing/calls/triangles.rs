@@ -73,15 +73,18 @@ impl Run {
         }
         let bindings = [0, 1].map(|binding| vk::VertexInputBindingDescription {
             binding,
-            stride: bytes.one(&[16, 32, 0, 4])
-                + bytes.rarely(8).then(|| bytes.number(60)).unwrap_or(0),
+            stride: if bytes.rarely(8) {
+                bytes.number(60)
+            } else {
+                bytes.one(&[16, 32, 0, 4])
+            },
             input_rate: vk::VertexInputRate::from_raw(bytes.rarely(4).into()),
         });
         let attributes = [0, 1].map(|location| vk::VertexInputAttributeDescription {
             location,
             binding: location,
             format: bytes.one(&VERTEX_FORMATS),
-            offset: bytes.rarely(4).then(|| bytes.number(40)).unwrap_or(0),
+            offset: if bytes.rarely(4) { bytes.number(40) } else { 0 },
         });
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&bindings)
