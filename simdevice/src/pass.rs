@@ -57,6 +57,9 @@ struct Resolves {
 /// What an attachment is resolved to, and how.
 type Resolve = (Target, ResolveMode);
 
+/// Layers of a pass at most, where no attachment has fewer.
+const MAX_FRAMEBUFFER_LAYERS: u32 = 2048;
+
 /// A render pass between its beginning and its end.
 #[derive(Debug)]
 pub struct Pass {
@@ -126,8 +129,8 @@ impl Pass {
             pushed: 0,
             bin_bytes: 0,
         };
-        // The smallest attachment bounds the others; without any the area is all there is.
-        let (mut extent, mut layers) = ([MAX_FRAMEBUFFER_SIZE; 2], pass.layer_count);
+        // The smallest attachment bounds the others; without any the area and the layers are all there is.
+        let (mut extent, mut layers) = ([MAX_FRAMEBUFFER_SIZE; 2], MAX_FRAMEBUFFER_LAYERS);
         let mut samples = None;
         for target in pass.targets() {
             let [width, height] = target.extent();
@@ -554,6 +557,31 @@ impl Frame<'_> {
                     plane.fill_rect(format, tile, rect, &format.encode_clear(aspect, value));
                 }
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_attachments_there_are_as_many_layers_as_a_framebuffer_may_have() {
+        let rendering = |layer_count| Rendering {
+            area: Rect {
+                x: 0,
+                y: 0,
+                width: 40,
+                height: 30,
+            },
+            layer_count,
+            color: Vec::new(),
+            depth: None,
+            stencil: None,
+        };
+        for (asked, given) in [(0, 1), (3, 3), (u32::MAX, MAX_FRAMEBUFFER_LAYERS)] {
+            let pass = Pass::begin(&rendering(asked)).unwrap();
+            assert_eq!(pass.layer_count(), given);
         }
     }
 }

@@ -93,7 +93,7 @@ fn scene_files_are_read_or_refused() {
 fn packets_are_executed_or_refused() {
     let player = Player::new();
     let (mut executed, mut refused) = (0, 0);
-    fuzz(4000, &corpus("packets"), 6000, |data| {
+    fuzz(4000, &corpus("packets"), 2000, |data| {
         let fared = player.run(data);
         executed += fared.executed;
         refused += fared.refused;

@@ -1,7 +1,7 @@
 //! Sizes, counts and values at the ends of what there is, and an application that changes how its threads round.
 
 use ash::vk;
-use gaurast::vk::GaussianCameraGAURAST;
+use gaurast::vk::{GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST};
 use gaurast_tests::compare::{Limits, verdict};
 use gaurast_tests::contexts::{
     Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over, replace,
@@ -141,6 +141,69 @@ fn half_float_targets_overflow_to_infinity_at_most() {
         let magnitudes = texels.as_flattened().iter().map(|bits| bits & 0x7fff);
         assert!(magnitudes.clone().all(|bits| bits <= 0x7c00), "no NaN");
         assert!(magnitudes.clone().any(|bits| bits >= 0x7bff), "too bright");
+    }
+}
+
+/// Colours whose sums overflow, behind what lets nothing through and at alphas that underflow: infinity times nothing would be
+/// no number.
+#[test]
+fn colors_beyond_every_number_leave_numbers() {
+    const MOST: f32 = f32::MAX;
+    let size = [48, 40];
+    let colors = [
+        [[MOST; 3]; 9],
+        [[MOST, -MOST, 7e4]; 9],
+        std::array::from_fn(|k| [if k % 2 == 0 { MOST } else { -MOST }; 3]),
+    ];
+    let opaque = gaussian(2.0, 50.0, 1.0, [1.0; 3]);
+    let mut gaussians = vec![Gaussian {
+        sh: vec![[1.0; 3]; 9],
+        ..opaque
+    }];
+    for (index, color) in (0u8..).zip(colors) {
+        let z = 1.0 + f32::from(index);
+        for scale in [1e-3, 0.3, 50.0] {
+            gaussians.push(Gaussian {
+                sh: color.to_vec(),
+                ..gaussian(z, scale, 0.5, [0.0; 3])
+            });
+        }
+    }
+    let scene = SceneBuffers::new(2, gaussians);
+    let context = context();
+    for precision in [
+        GaussianPrecisionGAURAST::FLOAT32,
+        GaussianPrecisionGAURAST::FLOAT16,
+    ] {
+        for order in [
+            GaussianOrderGAURAST::VIEW_DEPTH,
+            GaussianOrderGAURAST::PRIMITIVE,
+            GaussianOrderGAURAST::PER_PIXEL,
+        ] {
+            if order == GaussianOrderGAURAST::PER_PIXEL
+                && precision == GaussianPrecisionGAURAST::FLOAT16
+            {
+                continue;
+            }
+            let mut options = PipelineOptions::new(2);
+            options.state = options
+                .state
+                .precision(precision)
+                .order(order)
+                .alpha_floor(0.0)
+                .alpha_ceiling(1.0)
+                .transmittance_floor(0.0);
+            let target = Target::new(&context, options.format, size);
+            draw(&context, &scene, &options, &target, Some([0.0; 4]), 1);
+            let image: Vec<[f32; 4]> = target.read();
+            assert!(
+                image.as_flattened().iter().all(|c| !c.is_nan()),
+                "{precision:?} {order:?}"
+            );
+            // In its own order the opaque one may hide them.
+            let is_bright = image.iter().any(|rgba| rgba[0] > 3e4);
+            assert!(is_bright || order == GaussianOrderGAURAST::PRIMITIVE);
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 //! properties that every picture has.
 
 mod extremes;
+mod known_failures;
 mod properties;
 mod recorded_work;
 mod scenes;

@@ -1,8 +1,12 @@
 //! Properties that pictures have whatever is drawn, on scenes made up at random.
 
-use gaurast::vk::GaussianCameraGAURAST;
+use ash::vk;
+use gaurast::vk::{
+    GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST,
+};
 use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over,
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over, simd_levels,
 };
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use proptest::prelude::*;
@@ -72,6 +76,16 @@ fn one(context: &Context, gaussians: &[Gaussian], camera: &Camera) -> Vec<[f32; 
     draw(context, &[gaussians], &PipelineOptions::new(0), camera)
 }
 
+/// Without floors, since those flip whole contributions where rounding differs.
+fn without_floors() -> PipelineOptions<'static> {
+    let mut options = PipelineOptions::new(0);
+    options.state = options.state.alpha_floor(0.0).transmittance_floor(0.0);
+    options
+}
+
+/// Twice the contract's distance from one truth.
+const TWO_PICTURES: f32 = 1e-5;
+
 /// The greatest difference of a channel.
 fn distance(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
     let pairs = a.as_flattened().iter().zip(b.as_flattened());
@@ -121,9 +135,7 @@ proptest! {
     fn mirrors_agree(seed: u64, count in 1..60usize) {
         let context = Context::embedded(&Settings::default());
         let mut gaussians = scene(seed, count);
-        // Floors would flip whole contributions where rounding differs.
-        let mut options = PipelineOptions::new(0);
-        options.state = options.state.alpha_floor(0.0).transmittance_floor(0.0);
+        let options = without_floors();
         let straight = draw(&context, &[&gaussians], &options, &camera());
         for gaussian in &mut gaussians {
             gaussian.position[0] *= -1.0;
@@ -134,7 +146,7 @@ proptest! {
         let mut mirrored = draw(&context, &[&gaussians], &options, &camera());
         mirrored.chunks_mut(SIZE[0] as usize).for_each(<[_]>::reverse);
         let distance = distance(&straight, &mirrored);
-        prop_assert!(distance <= 1e-5, "{distance:e}");
+        prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
     }
 
     /// A draw cut in two by depth, the near part blended over the far one, is the whole draw, where
@@ -151,7 +163,7 @@ proptest! {
         let (near, far) = gaussians.split_at((share * count as f64) as usize);
         let parts = draw(&context, &[far, near], &options, &camera());
         let distance = distance(&whole, &parts);
-        prop_assert!(distance <= 1e-5, "{distance:e}");
+        prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
     }
 
     /// With a floor, each part begins with a transmittance of 1, so the far part may show by as much
@@ -172,12 +184,103 @@ proptest! {
         prop_assert!(distance <= bound, "{distance:e}");
     }
 
-    /// Colours are finite and not negative, alpha lies in [0, 1].
+    /// How many threads draw changes no bit.
     #[test]
-    fn pictures_are_sane(seed: u64, count in 1..60usize) {
+    fn threads_do_not_matter(seed: u64, count in 1..150usize, threads in 2..9usize) {
+        let picture = |threads| {
+            let settings = Settings { threads: Some(threads), ..Settings::default() };
+            one(&Context::embedded(&settings), &scene(seed, count), &camera())
+        };
+        prop_assert!(picture(1) == picture(threads));
+    }
+
+    /// SIMD levels differ by rounding alone.
+    #[test]
+    fn levels_agree(seed: u64, count in 1..100usize) {
+        let scene = scene(seed, count);
+        let pictures: Vec<_> = simd_levels().into_iter().map(|level| {
+            let settings = Settings { simd: Some(level), ..Settings::default() };
+            draw(&Context::embedded(&settings), &[&scene], &without_floors(), &camera())
+        }).collect();
+        for other in &pictures {
+            let distance = distance(&pictures[0], other);
+            prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
+        }
+    }
+
+    /// Where tiles cut a picture doesn't matter: it is the same wherever the viewport is in a larger target.
+    #[test]
+    fn tiles_do_not_matter(seed: u64, count in 1..100usize, corner in prop::array::uniform2(0..70u32)) {
+        let context = Context::embedded(&Settings::default());
+        let options = without_floors();
+        let scene = scene(seed, count);
+        let whole = draw(&context, &[&scene], &options, &camera());
+        let pipeline = Pipeline::new(&context, &options);
+        let on_device = DeviceScene::new(&context, &buffers(&scene));
+        let size = [0, 1].map(|axis| SIZE[axis] + corner[axis]);
+        let target = Target::new(&context, options.format, size);
+        let viewport = vk::Viewport {
+            x: corner[0] as f32,
+            y: corner[1] as f32,
+            width: SIZE[0] as f32,
+            height: SIZE[1] as f32,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
+        context.run(|commands| {
+            commands.pass(&target, &Pass::clear([0.0; 4]), || {
+                commands.bind(&pipeline, &on_device, &camera());
+                commands.viewport(viewport);
+                commands.draw([on_device.count, 1, 0, 0]);
+            });
+        });
+        let moved: Vec<[f32; 4]> = target.read();
+        let rows = moved.chunks(size[0] as usize).skip(corner[1] as usize);
+        let moved: Vec<[f32; 4]> = rows.flat_map(|row| &row[corner[0] as usize..]).copied().collect();
+        let distance = distance(&whole, &moved);
+        prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
+    }
+
+    /// Draws that make one sorted set are one draw, to the bit.
+    #[test]
+    fn draws_may_be_merged(seed: u64, count in 1..150u32, cuts in prop::array::uniform2(0.0..1.0f64)) {
+        let context = Context::embedded(&Settings::default());
+        let mut options = PipelineOptions::new(0);
+        options.state = options.state.flags(PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS);
+        let mut gaussians = scene(seed, count as usize);
+        gaussians.shuffle(&mut ChaCha8Rng::seed_from_u64(!seed));
+        let whole = one(&context, &gaussians, &camera());
+        let mut cuts = cuts.map(|cut| (cut * f64::from(count)) as u32);
+        cuts.sort_unstable();
+        let pipeline = Pipeline::new(&context, &options);
+        let on_device = DeviceScene::new(&context, &buffers(&gaussians));
+        let target = Target::new(&context, options.format, SIZE);
+        context.run(|commands| {
+            commands.pass(&target, &Pass::clear([0.0; 4]), || {
+                commands.bind(&pipeline, &on_device, &camera());
+                for [from, to] in [[0, cuts[0]], cuts, [cuts[1], count]] {
+                    commands.draw([to - from, 1, from, 0]);
+                }
+            });
+        });
+        prop_assert!(whole == target.read::<[f32; 4]>());
+    }
+
+    /// Colours are finite and not negative, alpha lies in [0, 1], in both precisions, with floors and without.
+    #[test]
+    fn pictures_are_sane(seed: u64, count in 1..60usize, binary16: bool, floors: bool, per_pixel: bool) {
         let context = Context::embedded(&Settings::default());
         let scene = gaurast_tests::scenes::awkward(seed, count, 1);
-        let options = PipelineOptions::new(1);
+        let mut options = PipelineOptions::new(1);
+        if binary16 {
+            options.state = options.state.precision(GaussianPrecisionGAURAST::FLOAT16);
+        }
+        if !floors {
+            options.state = options.state.alpha_floor(0.0).alpha_ceiling(1.0).transmittance_floor(0.0);
+        }
+        if per_pixel && !binary16 {
+            options.state = options.state.order(GaussianOrderGAURAST::PER_PIXEL);
+        }
         let pipeline = Pipeline::new(&context, &options);
         let on_device = DeviceScene::new(&context, &scene);
         let target = Target::new(&context, options.format, SIZE);

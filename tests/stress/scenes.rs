@@ -3,7 +3,7 @@
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use rand::{Rng, SeedableRng};
@@ -62,6 +62,11 @@ impl Stress {
             state: change(self.state),
             ..self
         }
+    }
+
+    /// The same scene rasterized in binary16.
+    pub fn in_binary16(self) -> Self {
+        self.drawn(|state| state.precision(GaussianPrecisionGAURAST::FLOAT16))
     }
 
     fn sized(self, size: [u32; 2]) -> Self {

@@ -2,11 +2,11 @@
 //!
 //! `--nocapture` shows the table.
 
-use gaurast_tests::compare::{Limits, assert_contract};
+use gaurast_tests::compare::{Limits, assert_contract, verdict};
 use gaurast_tests::contexts::{
     Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, simd_levels,
 };
-use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
+use gaurast_tests::oracle::{OracleCamera, OracleState, render_binary16, render_bounded};
 
 use crate::scenes::{Stress, all};
 
@@ -36,8 +36,8 @@ fn assert_sane(name: &str, image: &[[f32; 4]]) {
     }
 }
 
-#[test]
-fn every_scene_keeps_its_limit_at_every_level() {
+/// A device of each SIMD level.
+fn contexts() -> Vec<(&'static str, Context)> {
     let context = |simd| {
         Context::embedded(&Settings {
             simd: Some(simd),
@@ -45,10 +45,13 @@ fn every_scene_keeps_its_limit_at_every_level() {
             ..Settings::default()
         })
     };
-    let contexts: Vec<_> = simd_levels()
-        .into_iter()
-        .map(|level| (level, context(level)))
-        .collect();
+    let levels = simd_levels().into_iter();
+    levels.map(|level| (level, context(level))).collect()
+}
+
+#[test]
+fn every_scene_keeps_its_limit_at_every_level() {
+    let contexts = contexts();
     println!("| scene | limit | reason | {} |", simd_levels().join(" | "));
     let mut failures = Vec::new();
     for stress in all() {
@@ -88,5 +91,36 @@ fn every_scene_keeps_its_limit_at_every_level() {
             cells.join(" | ")
         );
     }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// binary16 is defined to the bit: its limit is zero, beyond what the last digits of a mean, a covariance or a colour
+/// may round to.
+#[test]
+fn binary16_is_as_defined_at_every_level() {
+    let contexts = contexts();
+    let (mut failures, mut several, mut pixels) = (Vec::new(), 0, 0);
+    for stress in all() {
+        let stress = stress.in_binary16();
+        let camera = OracleCamera::new(&stress.camera, stress.size).expect("a camera");
+        let state = OracleState::from(&stress.state);
+        let reference = render_binary16(&stress.scene.as_oracle(), &camera, &state);
+        pixels += reference.nominal.len();
+        several += reference.alternatives.len();
+        let limits = Limits {
+            distance: 0.0,
+            ..Limits::ENVELOPE_ONLY
+        };
+        for (level, context) in &contexts {
+            let image = draw(context, &stress);
+            let name = format!("{}, binary16, {level}", stress.name);
+            let judged = verdict(&image, &reference, limits);
+            println!("{name}: {judged}");
+            if !judged.holds() || judged.exhausted > 0 {
+                failures.push(format!("{name}: {judged}"));
+            }
+        }
+    }
+    println!("{several} of {pixels} pixels may be one of several");
     assert!(failures.is_empty(), "{failures:#?}");
 }

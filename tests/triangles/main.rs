@@ -3,5 +3,6 @@
 mod coverage;
 mod devices;
 mod doors;
+mod extremes;
 mod interpolation;
 mod sweep;

@@ -23,9 +23,11 @@ pub(super) fn period(camera: &Camera) -> Option<f64> {
 /// What lies within half a period of a mean at `x`, with a pixel to spare.
 fn near(visible: &Visible, x: f64, period: f64) -> Visible {
     let half = 0.5 * period + 1.0;
+    // However far outside, there is no pixel but the visible ones.
+    let pixel = |x: f64| (x as i64).clamp(visible.left, visible.right);
     Visible {
-        left: visible.left.max((x - half).floor() as i64),
-        right: visible.right.min((x + half).ceil() as i64),
+        left: pixel((x - half).floor()),
+        right: pixel((x + half).ceil()),
         ..*visible
     }
 }
@@ -141,6 +143,16 @@ mod tests {
             found[1 + side] = columns(&reach, &out.copies[side].spans);
         }
         found
+    }
+
+    #[test]
+    fn only_visible_tiles_are_reached_from_however_far() {
+        for x in [-1e30, -1e19, 1e19, 1e30, f64::INFINITY, f64::NAN] {
+            for half in [2.0, 1e18, 1e31, f64::INFINITY, f64::NAN] {
+                let all = tiles(x, half);
+                assert!(all.iter().flatten().all(|&column| column < 7), "{x} {half}");
+            }
+        }
     }
 
     #[test]

@@ -99,8 +99,8 @@ impl Bases {
         }
     }
 
-    /// The colour `max(0, 0.5 + SH)` in one of the directions; `None` if a coefficient of degrees 0 to `degree` is not
-    /// finite.
+    /// The colour `max(0, 0.5 + SH)` in one of the directions, at most the greatest number; `None` if a coefficient of
+    /// degrees 0 to `degree` is not finite.
     ///
     /// `coefficients` holds red, green and blue of each coefficient in turn; what follows them is not used.
     #[inline(always)]
@@ -121,13 +121,30 @@ impl Bases {
         };
         // What is not finite makes the sum so, whatever it is multiplied by; the sum may also be too large.
         if !sum.iter().all(|value| value.is_finite()) {
-            let count = coefficient_count(degree).min(MAX_COEFFICIENTS);
-            let all = coefficients[..3 * count].iter();
-            if !all.copied().all(f32::is_finite) {
-                return None;
-            }
+            return self.wide_color(degree, at, coefficients);
         }
         Some(sum.map(|value| value.max(0.0)))
+    }
+
+    /// The same where a sum is not finite: in binary64, where no sum of numbers overflows.
+    #[cold]
+    fn wide_color(
+        &self,
+        degree: u32,
+        direction: usize,
+        coefficients: &[f32; COEFFICIENT_FLOATS],
+    ) -> Option<[f32; 3]> {
+        let count = coefficient_count(degree).min(MAX_COEFFICIENTS);
+        if !coefficients[..3 * count].iter().all(|k| k.is_finite()) {
+            return None;
+        }
+        let mut sum = [0.5f64; 3];
+        for (lanes, of_function) in self.0[..count].iter().zip(coefficients.chunks(3)) {
+            for (sum, k) in sum.iter_mut().zip(of_function) {
+                *sum += f64::from(lanes[direction]) * f64::from(*k);
+            }
+        }
+        Some(sum.map(|value| value.max(0.0).min(f64::from(f32::MAX)) as f32))
     }
 
     /// 0.5 and the sum of `COUNT` coefficients times their functions.
@@ -221,6 +238,24 @@ mod tests {
             assert_eq!(color(1, [0.0, 1.0, 0.0], &sh), None);
             assert!(color(0, [0.0, 1.0, 0.0], &sh).is_some());
         }
+    }
+
+    #[test]
+    fn sums_beyond_the_greatest_number_are_that() {
+        const MAX: f32 = f32::MAX;
+        let sh = coefficients(&[
+            (0, [MAX, -MAX, -MAX]),
+            (2, [MAX, MAX, -MAX]),
+            (6, [MAX, MAX, -MAX]),
+        ]);
+        let [red, green, blue] = color(2, [0.0, 0.0, 1.0], &sh).unwrap();
+        assert_eq!((red, blue), (MAX, 0.0));
+        // What overflows on the way does not matter.
+        let expected = f64::from(C1) + 2.0 * f64::from(C2[2]) - f64::from(C0);
+        assert!(
+            (f64::from(green) / f64::from(MAX) - expected).abs() < 1e-6,
+            "{green:e}"
+        );
     }
 
     #[test]

@@ -88,6 +88,7 @@ impl Context {
             .fisheye_camera(true)
             .equirectangular_camera(true)
             .gaussian_instancing(true)
+            .merged_draws(true)
             .unscented_projection(true);
         let mut vulkan_1_3 = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
         let device_info = vk::DeviceCreateInfo::default()

@@ -116,10 +116,11 @@ impl Resources {
             memory
         };
         let buffers = vec![buffer(true), buffer(false)];
-        // Something like Gaussians: floats of ordinary size.
-        let floats: Vec<f32> = (0..(BUFFER - 2 * GUARD) / 4)
-            .map(|_| bytes.float())
-            .collect();
+        // Something like Gaussians: floats of ordinary size. Few, so that most bytes are left for packets, and again and
+        // again, a prime number of them so that they meet anew.
+        let pattern = [0; 61].map(|_| bytes.float());
+        let count = (BUFFER - 2 * GUARD) as usize / 4;
+        let floats: Vec<f32> = pattern.into_iter().cycle().take(count).collect();
         for memory in &buffers {
             memory.write(GUARD, &floats).expect("it has room");
         }
@@ -303,7 +304,7 @@ fn rendering(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> {
         }
         Some(attachment)
     };
-    let color = (0..bytes.below(3)).map(|_| attachment(bytes)).collect();
+    let color: Vec<_> = (0..bytes.below(3)).map(|_| attachment(bytes)).collect();
     let depth = if bytes.rarely(2) {
         attachment(bytes)
     } else {
@@ -314,9 +315,15 @@ fn rendering(bytes: &mut Bytes<'_>, resources: &Resources) -> Option<Packet> {
     } else {
         None
     };
+    let (mut area, mut layer_count) = (rect(bytes), bytes.number(3));
+    if color.iter().flatten().next().is_none() && depth.is_none() && stencil.is_none() {
+        // Nothing else bounds them. More is no other than much, but takes long.
+        (area.width, area.height) = (area.width % 3000, area.height % 3000);
+        layer_count %= 5;
+    }
     Some(Packet::BeginRendering(Box::new(Rendering {
-        area: rect(bytes),
-        layer_count: bytes.number(3),
+        area,
+        layer_count,
         color,
         depth,
         stencil,

@@ -190,6 +190,9 @@ pub(super) mod scalar {
         }
     }
 
+    /// The greatest binary16 number.
+    const GREATEST: f32 = 65504.0;
+
     /// What an element is given of a Gaussian.
     #[derive(Clone, Copy, Debug)]
     pub(in super::super) struct Splat16 {
@@ -203,7 +206,8 @@ pub(super) mod scalar {
             Self {
                 factor: splat.factor.map(|f| round(f as f32)),
                 log2_opacity: round(splat.log2_opacity),
-                color: splat.color.map(round),
+                // An infinite colour times a weight that underflows would be no number.
+                color: splat.color.map(|c| round(c).clamp(-GREATEST, GREATEST)),
             }
         }
     }

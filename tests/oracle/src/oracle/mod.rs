@@ -11,6 +11,7 @@
 //! | 1 to 5 | of what a vertex shader has projected | [`shaded`] |
 //! | 5 | colour from spherical harmonics | [`spherical_harmonics`] |
 //! | 6, 7 | alpha at a pixel centre, compositing front to back | [`pixel`] |
+//! | 6, 7 | the same in binary16 | [`render_binary16`] |
 //! | 7 | the per-pixel order | [`rays`] |
 //! | 3, 6 | 2D Gaussians | [`surfel`] |
 //! | then | what a resolve shader reads | [`resolve`] |
@@ -45,6 +46,7 @@
 //! - the clamps (ceiling of alpha, `u` and `v`, colour) are continuous: either side gives the same
 //!   value to within the error itself.
 
+mod binary16;
 pub mod error_model;
 mod instance;
 mod panorama;
@@ -62,6 +64,7 @@ mod unscented;
 #[cfg(test)]
 mod tests;
 
+pub use binary16::render_binary16;
 pub use pixel::MAX_DECISIONS;
 pub use render::{Reference, render_bounded, render_literal};
 pub use sample_tests::{

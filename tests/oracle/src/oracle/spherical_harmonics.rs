@@ -53,7 +53,7 @@ pub fn basis(degree: u32, direction: [f64; 3]) -> [f64; 25] {
     b
 }
 
-/// Step 5: `max(0, 0.5 + SH(direction) . k)` for each of red, green and blue.
+/// Step 5: `max(0, 0.5 + SH(direction) . k)` for each of red, green and blue, at most the greatest binary32 number.
 ///
 /// `coefficients` has `(degree + 1)^2` entries.
 pub fn color(degree: u32, direction: [f64; 3], coefficients: &[[f32; 3]]) -> [f64; 3] {
@@ -64,7 +64,7 @@ pub fn color(degree: u32, direction: [f64; 3], coefficients: &[[f32; 3]]) -> [f6
             .zip(coefficients)
             .map(|(b, k)| b * f64::from(k[channel]))
             .sum();
-        (0.5 + sum).max(0.0)
+        (0.5 + sum).max(0.0).min(f32::MAX.into())
     })
 }
 

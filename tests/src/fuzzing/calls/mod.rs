@@ -4,6 +4,7 @@
 
 mod create;
 mod record;
+mod triangles;
 
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
@@ -23,6 +24,8 @@ const FORMATS: [vk::Format; 6] = [
     vk::Format::D24_UNORM_S8_UINT,
     vk::Format::R16_UINT,
 ];
+
+const DEPTH_FORMATS: [vk::Format; 2] = [vk::Format::D32_SFLOAT, vk::Format::D24_UNORM_S8_UINT];
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, Default)]
@@ -106,7 +109,9 @@ impl Run {
                 .gaussian_depth_stencil(true)
                 .gaussian_multisample(true);
             let mut core = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
+            let features = instance.get_physical_device_features(physical);
             let info = vk::DeviceCreateInfo::default()
+                .enabled_features(&features)
                 .queue_create_infos(&queues)
                 .enabled_extension_names(&extensions)
                 .push_next(&mut core)
@@ -123,7 +128,10 @@ impl Run {
             let commands = device
                 .allocate_command_buffers(&info)
                 .expect("a command buffer")[0];
-            let layout = vk::PipelineLayoutCreateInfo::default();
+            let constants = [vk::PushConstantRange::default()
+                .stage_flags(vk::ShaderStageFlags::VERTEX)
+                .size(16)];
+            let layout = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&constants);
             let queries = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(4);
@@ -169,6 +177,7 @@ impl Run {
         match bytes.below(32) {
             0 | 1 => self.create_buffer(bytes),
             2 | 3 => self.create_image(bytes),
+            4 if bytes.rarely(2) => self.create_triangle_pipeline(bytes),
             4 => self.create_pipeline(bytes),
             5 => self.map(bytes),
             6 => self.destroy(bytes),

@@ -3,7 +3,7 @@
 use ash::vk;
 use gaurast::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST};
 
-use super::{Bytes, Run, pick};
+use super::{Bytes, DEPTH_FORMATS, Run, pick};
 
 impl Run {
     pub(super) fn begin_rendering(&mut self, bytes: &mut Bytes<'_>) {
@@ -11,7 +11,8 @@ impl Run {
             return;
         };
         let depth =
-            pick(bytes, &self.images).filter(|(image, _)| image.format == vk::Format::D32_SFLOAT);
+            pick(bytes, &self.images).filter(|(image, _)| DEPTH_FORMATS.contains(&image.format));
+        let has_stencil = depth.is_some_and(|(image, _)| image.format == DEPTH_FORMATS[1]);
         let color = [vk::RenderingAttachmentInfo::default()
             .image_view(*view)
             .image_layout(vk::ImageLayout::GENERAL)
@@ -52,6 +53,9 @@ impl Run {
             .color_attachments(&color);
         if let Some(depth) = &depth {
             info = info.depth_attachment(depth);
+            if has_stencil {
+                info = info.stencil_attachment(depth);
+            }
         }
         // SAFETY: see above.
         unsafe { self.device.cmd_begin_rendering(self.commands, &info) };
@@ -217,6 +221,18 @@ impl Run {
             self.device
                 .cmd_set_viewport(self.commands, bytes.number(1), &[viewport]);
             self.device.cmd_set_scissor(self.commands, 0, &[scissor]);
+            if bytes.rarely(2) {
+                let (offset, stage) = (bytes.number(1), vk::ShaderStageFlags::VERTEX);
+                let constants = [0; 4].map(|_| bytes.float());
+                let constants: &[u8] = bytemuck::cast_slice(&constants);
+                self.device.cmd_push_constants(
+                    self.commands,
+                    self.layout,
+                    stage,
+                    offset,
+                    constants,
+                );
+            }
             if let Some(pipeline) = pick(bytes, &self.pipelines) {
                 let point = vk::PipelineBindPoint::GRAPHICS;
                 self.device
