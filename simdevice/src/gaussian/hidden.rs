@@ -249,11 +249,7 @@ impl Light {
     }
 
     /// What is hidden, if any region is finished; of chunks that may be as opaque as these.
-    fn hidden(
-        &self,
-        projection: &Projection,
-        chunks: &[Option<Arc<Chunks>>],
-    ) -> Option<Hidden> {
+    fn hidden(&self, projection: &Projection, chunks: &[Option<Arc<Chunks>>]) -> Option<Hidden> {
         let opacities = chunks.iter().flatten().map(|chunks| chunks.opacity);
         let opacity = opacities.fold(0.0, f32::max);
         let mut regions = Vec::new();
@@ -285,12 +281,10 @@ impl Light {
                     right: edge(0, columns.end).min(whole.right),
                     bottom: edge(1, rows.end).min(whole.bottom),
                 };
-                let projection = Projection {
-                    visible,
-                    // What is as far comes before or after.
-                    far: projection.far.min(farthest.next_up()),
-                    ..projection.clone()
-                };
+                let mut projection = projection.clone();
+                projection.visible = visible;
+                // What is as far comes before or after.
+                projection.far = projection.far.min(farthest.next_up());
                 regions.push(Frustum::new(&projection, opacity));
             }
         }

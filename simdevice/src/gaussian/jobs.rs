@@ -74,7 +74,8 @@ impl GaussianSet {
                             .iter()
                             .filter(|chunk| {
                                 !view.leaves_out(chunk, counters)
-                                    && !hidden.is_some_and(|hidden| hidden.leaves_out(chunk, counters))
+                                    && !hidden
+                                        .is_some_and(|hidden| hidden.leaves_out(chunk, counters))
                             })
                             .map(|chunk| Job {
                                 part: Part::Chunk(chunk),

@@ -77,7 +77,7 @@ impl Attributes {
 
     /// Makes a lane what a lane of others is.
     pub(super) fn copy_lane(&mut self, to: usize, others: &Self, from: usize) {
-        let mut copy = |own: &mut [f32; F32_LANES], other: &[f32; F32_LANES]| own[to] = other[from];
+        let copy = |own: &mut [f32; F32_LANES], other: &[f32; F32_LANES]| own[to] = other[from];
         for (own, other) in self.position.iter_mut().zip(&others.position) {
             copy(own, other);
         }
