@@ -29,8 +29,11 @@ const LEAST_DEVIATION: f64 = 10.0;
 /// What takes less of a tile is not followed.
 const LEAST_ALPHA: f64 = 0.2;
 
-/// Pairs of a tile and a screen that are looked at, for each tile.
-const PAIRS_PER_TILE: usize = 24;
+/// What following screens may cost for each tile, in units of what it costs to see that a tile is finished.
+const COST_PER_TILE: usize = 512;
+
+/// What it costs to find what a screen takes of a tile, in the same units.
+const TAKING: usize = 8;
 
 /// What rounding may do to an alpha and to a product of many, relative to it.
 const MARGIN: f64 = 1e-3;
@@ -209,37 +212,55 @@ impl Light {
             }
         }
         order.sort_unstable();
-        let mut budget = PAIRS_PER_TILE * self.left.len();
+        let mut budget = COST_PER_TILE * self.left.len();
+        let mut unfinished = self.left.len();
         for (key, number, place) in order {
-            let batch = &batches[number];
-            let splat = &batch.splats[place];
-            for (row, span) in batch.reaches[place].spans(&batch.spans) {
-                let Some(pairs) = budget.checked_sub(span.len()) else {
-                    return;
-                };
-                budget = pairs;
-                for column in span.first..span.end {
-                    self.take(splat, key, [column.into(), row]);
+            let splat = &batches[number].splats[place];
+            let [columns, rows] = self.covered(splat);
+            for row in rows {
+                for column in columns.clone() {
+                    let tile = (row * self.count[0] + column) as usize;
+                    let is_finished = self.depth[tile] < f32::INFINITY;
+                    let cost = if is_finished { 1 } else { TAKING };
+                    let Some(rest) = budget.checked_sub(cost) else {
+                        return;
+                    };
+                    budget = rest;
+                    if !is_finished {
+                        self.take(splat, key, [column, row]);
+                        unfinished -= usize::from(self.depth[tile] < f32::INFINITY);
+                    }
                 }
+            }
+            if unfinished == 0 {
+                return;
             }
         }
     }
 
+    /// The columns and rows of the tiles of which a screen may take enough.
+    fn covered(&self, splat: &Splat) -> [std::ops::Range<u32>; 2] {
+        let [a, b, c] = splat.factor;
+        let extent = f64::from(splat.log2_opacity) - self.alphas[1].log2();
+        let half = extent.max(0.0).sqrt() / a.abs();
+        let half = [half, half * a.hypot(b) / c.abs()];
+        let along = |axis: usize| {
+            let tile = |pixel: f64| pixel / f64::from(TILE_SIZE) - f64::from(self.first[axis]);
+            // Centres are half a pixel within.
+            let first = tile(splat.mean[axis] - half[axis] - 0.5).ceil();
+            let end = tile(splat.mean[axis] + half[axis] + 0.5).floor();
+            let within = |tile: f64| tile.clamp(0.0, self.count[axis].into()) as u32;
+            within(first)..within(end)
+        };
+        [along(0), along(1)]
+    }
+
     /// What a screen takes of a tile.
     fn take(&mut self, splat: &Splat, key: u32, [column, row]: [u32; 2]) {
-        let at = [
-            column.wrapping_sub(self.first[0]),
-            row.wrapping_sub(self.first[1]),
-        ];
-        if at[0] >= self.count[0] || at[1] >= self.count[1] {
-            return;
-        }
-        let tile = (at[1] * self.count[0] + at[0]) as usize;
-        if self.depth[tile] < f32::INFINITY {
-            return;
-        }
+        let tile = (row * self.count[0] + column) as usize;
+        let [first_column, first_row] = self.first;
         let [ceiling, least] = self.alphas;
-        let alpha = least_alpha(splat, [column, row]).min(ceiling);
+        let alpha = least_alpha(splat, [first_column + column, first_row + row]).min(ceiling);
         if alpha > least {
             self.left[tile] *= 1.0 - alpha * (1.0 - MARGIN);
             if self.left[tile] < self.floor {

@@ -129,7 +129,10 @@ fn draw_panel<B: DrawingBackend>(
         .x_desc(panel.axes[0])
         .y_desc(panel.axes[1])
         .y_label_formatter(&|value| format!("{value:.0e}"))
-        .x_label_formatter(&|value| format!("{value}"))
+        .x_label_formatter(&|value| tick(*value))
+        // On logarithmic axes, more crowd one another.
+        .x_labels(5)
+        .y_labels(6)
         .label_style(("sans-serif", 12))
         .draw()?;
     let line = |points: &[[f64; 2]]| -> Vec<(f64, f64)> {
@@ -163,9 +166,24 @@ fn draw_panel<B: DrawingBackend>(
         .draw()
 }
 
+/// A number beside a tick, as short as it can be: 0.5, 300, 6M.
+fn tick(value: f64) -> String {
+    match value {
+        1e6.. => format!("{}M", value / 1e6),
+        1e4.. => format!("{}k", value / 1e3),
+        _ => format!("{value}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ticks_are_short() {
+        let shown = [0.25, 300.0, 30_000.0, 6e6].map(tick);
+        assert_eq!(shown, ["0.25", "300", "30k", "6M"]);
+    }
 
     #[test]
     fn a_plot_is_a_picture_and_a_drawing_with_its_words() {
