@@ -229,6 +229,7 @@ fn plot(path: &Path, results: &[(Sweep, Points)], levels: &[&str]) -> Result<(),
         chart
             .configure_mesh()
             .y_desc("error")
+            .x_label_formatter(&|x| format!("{x:.0e}"))
             .y_label_formatter(&|y| format!("{y:.0e}"))
             .draw()?;
         chart.draw_series(LineSeries::new([(first, 5e-6), (last, 5e-6)], &RED))?;
@@ -273,7 +274,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             let cells: Vec<_> = worst.iter().map(|error| format!("{error:.2e}")).collect();
             println!("  {value:9.3e}  {}", cells.join("  "));
-            writeln!(csv, "{},{value},{}", sweep.name, cells.join(","))?;
+            writeln!(csv, "\"{}\",{value},{}", sweep.name, cells.join(","))?;
             points.push((value, worst));
         }
         results.push((sweep, points));
