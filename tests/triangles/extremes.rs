@@ -87,8 +87,7 @@ fn additive() -> PipelineOptions<'static> {
 }
 
 /// A ground that begins near the eye's plane, at it or behind it, and ends far away. Its distance is exact to what a 256th of a
-/// pixel is worth, to which corners are rounded, and to binary32's rounding of the distance, and, where the ground passes through
-/// the eye's plane, of the furthest corner, from which values are formed by differences.
+/// pixel is worth, to which corners are rounded, and to binary32's rounding of the distance.
 #[test]
 fn grounds_reach_from_the_eye_to_the_horizon() {
     let Some(gpu) = device() else { return };
@@ -96,9 +95,9 @@ fn grounds_reach_from_the_eye_to_the_horizon() {
         (0.5f32, 1e6f32),
         (1e-6, 1e6),
         (1e-30, 1e6),
-        (0.0, 40.0),
-        (-5.0, 40.0),
-        (-1e6, 40.0),
+        (0.0, 1e6),
+        (-5.0, 1e6),
+        (-1e6, 1e6),
     ] {
         let wide = 2.0 * far;
         let corner = |x: f32, w: f32| vertex([x, 1.0, 0.5 * w, w], w);
@@ -110,11 +109,6 @@ fn grounds_reach_from_the_eye_to_the_horizon() {
         ]);
         let target = TargetOptions::of(FORMAT);
         let image = draw(gpu, &target, &PipelineOptions::default(), &ground);
-        let of_corner = if near > 0.0 {
-            0.0
-        } else {
-            1e-6 * f64::from(far)
-        };
         for (row, values) in image.chunks(SIZE).enumerate() {
             let below = (row as f64 + 0.5) / 64.0 - 1.0;
             let distance = 1.0 / below;
@@ -123,7 +117,7 @@ fn grounds_reach_from_the_eye_to_the_horizon() {
                 assert!(is_empty || below > 0.0, "row {row}, {near}");
                 continue;
             }
-            let tolerance = distance * distance / 64.0 / 256.0 + 1e-6 * distance + of_corner;
+            let tolerance = distance * distance / 64.0 / 256.0 + 1e-6 * distance;
             for value in values {
                 let error = (f64::from(*value) - distance).abs();
                 assert!(

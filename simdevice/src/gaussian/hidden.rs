@@ -40,7 +40,9 @@ const MARGIN: f64 = 1e-3;
 
 /// What is hidden.
 pub(super) struct Hidden {
-    /// The parts of a picture, each as far as anything is seen there.
+    /// The whole picture, as far as anything is seen.
+    whole: Frustum,
+    /// Its parts, each as far as anything is seen there.
     regions: Vec<Frustum>,
 }
 
@@ -57,9 +59,8 @@ impl Hidden {
     }
 
     fn hides(&self, bounds: &Bounds) -> bool {
-        self.regions
-            .iter()
-            .all(|region| region.excludes(bounds).is_some())
+        let excludes = |part: &Frustum| part.excludes(bounds).is_some();
+        excludes(&self.whole) || self.regions.iter().all(excludes)
     }
 }
 
@@ -273,6 +274,13 @@ impl Light {
     fn hidden(&self, projection: &Projection, chunks: &[Option<Arc<Chunks>>]) -> Option<Hidden> {
         let opacities = chunks.iter().flatten().map(|chunks| chunks.opacity);
         let opacity = opacities.fold(0.0, f32::max);
+        let frustum_up_to = |farthest: f32, visible: Visible| {
+            let mut projection = projection.clone();
+            projection.visible = visible;
+            // What is as far comes before or after.
+            projection.far = projection.far.min(farthest.next_up());
+            Frustum::new(&projection, opacity)
+        };
         let mut regions = Vec::new();
         let mut any = false;
         for row in 0..REGIONS {
@@ -302,14 +310,14 @@ impl Light {
                     right: edge(0, columns.end).min(whole.right),
                     bottom: edge(1, rows.end).min(whole.bottom),
                 };
-                let mut projection = projection.clone();
-                projection.visible = visible;
-                // What is as far comes before or after.
-                projection.far = projection.far.min(farthest.next_up());
-                regions.push(Frustum::new(&projection, opacity));
+                regions.push(frustum_up_to(farthest, visible));
             }
         }
-        any.then_some(Hidden { regions })
+        let farthest = self.depth.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        any.then(|| Hidden {
+            whole: frustum_up_to(farthest, self.bounds.into()),
+            regions,
+        })
     }
 }
 

@@ -35,7 +35,7 @@ impl Job<'_> {
     #[inline(always)]
     pub(super) fn push_triangle(&mut self, current: &Current, places: [Place; 3], area: i64) {
         let [a, b, c] = places;
-        let places = if area > 0 { [a, b, c] } else { [a, c, b] };
+        let places = nearest_first(if area > 0 { [a, b, c] } else { [a, c, b] });
         let corners = three(places, |place| place.projected.snapped);
         let Some(pixels) = self.pixels(current, &corners) else {
             return;
@@ -219,6 +219,20 @@ impl Job<'_> {
             host::push(&mut self.out.varyings, value);
         }
         Origin::New { number }
+    }
+}
+
+/// Turned so that no vertex is nearer than the first. What varies is found as its value there and what others add: a far
+/// vertex may have a value so great that too little is left of the sum near the eye.
+#[inline(always)]
+fn nearest_first([a, b, c]: [Place<'_>; 3]) -> [Place<'_>; 3] {
+    let [wa, wb, wc] = three([a, b, c], |place| place.projected.inverse_w);
+    if wb > wa && wb >= wc {
+        [b, c, a]
+    } else if wc > wa && wc > wb {
+        [c, a, b]
+    } else {
+        [a, b, c]
     }
 }
 

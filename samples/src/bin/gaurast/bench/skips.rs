@@ -138,9 +138,9 @@ fn frames(workers: &mut [(Workload, Worker)], runs: usize) -> Result<Vec<Vec<Dra
         views.push(workload.views(&workload.scene()?, runs + 1)?);
     }
     for run in 0..=runs {
-        for (number, (_, worker)) in workers.iter_mut().enumerate() {
-            let drawn = worker.draw(&views[number][run], Settings::default(), None)?;
-            frames[number].push(drawn);
+        let of_workers = workers.iter_mut().zip(&views).zip(&mut frames);
+        for (((_, worker), views), frames) in of_workers {
+            frames.push(worker.draw(&views[run], Settings::default(), None)?);
         }
     }
     Ok(frames)
