@@ -1,6 +1,7 @@
 //! Lets the caller read outputs where they were computed, where else each batch would copy them.
 
 use super::ir::{Block, Program, Reg, Role, Statement};
+use super::optimize::reads;
 
 /// Makes outputs that all lanes assign once, to a value of each lane, that value. `varying` says which registers have a
 /// value for each lane.
@@ -10,7 +11,11 @@ pub fn forward(program: &mut Program, varying: &[bool]) {
     let mut copied = vec![false; program.body.len()];
     for output in &mut program.outputs {
         let variable = output.reg;
-        if assignments(&program.body, variable) != 1 || is_read(&program.body, variable) {
+        let is_read = program
+            .body
+            .iter()
+            .any(|statement| reads(statement, variable));
+        if is_read || assignments(&program.body, variable) != 1 {
             continue;
         }
         let assigned = program.body[..stay].iter().position(
@@ -48,12 +53,45 @@ fn assignments(block: &Block, variable: Reg) -> usize {
     block.iter().map(of).sum()
 }
 
-fn is_read(block: &Block, variable: Reg) -> bool {
-    block.iter().any(|statement| {
-        statement.uses().contains(&variable)
-            || statement
-                .blocks()
-                .into_iter()
-                .any(|block| is_read(block, variable))
-    })
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::Builder;
+    use crate::ir::{Rate, Type};
+    use crate::uniformity::varying_registers;
+
+    /// Whether the only output of a program is read where it was computed.
+    fn is_forwarded(rate: Rate, write: impl FnOnce(&mut Builder, Reg, Reg)) -> bool {
+        let mut builder = Builder::new();
+        let input = builder.input(0, Type::B32, rate);
+        let output = builder.output(0, Type::B32);
+        write(&mut builder, input, output);
+        let mut program = builder.finish().expect("a valid program");
+        let varying = varying_registers(&program, false);
+        forward(&mut program, &varying);
+        program.outputs[0].reg != output
+    }
+
+    #[test]
+    fn what_every_lane_assigns_once_is_forwarded() {
+        let once = |b: &mut Builder, input, output| b.assign(output, input);
+        assert!(is_forwarded(Rate::Varying, once));
+        assert!(
+            !is_forwarded(Rate::Uniform, once),
+            "it has one value for all"
+        );
+        let twice = |b: &mut Builder, input, output| {
+            b.assign(output, input);
+            b.assign(output, input);
+        };
+        assert!(!is_forwarded(Rate::Varying, twice));
+        let after_leaving = |b: &mut Builder, input, output| {
+            let condition = b.compute(crate::op::Op::INe, &[input, input]);
+            b.begin_if(condition);
+            b.kill();
+            b.end();
+            b.assign(output, input);
+        };
+        assert!(!is_forwarded(Rate::Varying, after_leaving));
+    }
 }

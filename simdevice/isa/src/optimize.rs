@@ -80,7 +80,7 @@ fn touches(statement: &Statement, reg: Reg) -> bool {
 }
 
 /// Whether a statement, or one within, reads a register.
-fn reads(statement: &Statement, reg: Reg) -> bool {
+pub fn reads(statement: &Statement, reg: Reg) -> bool {
     statement.uses().contains(&reg)
         || statement
             .blocks()

@@ -49,8 +49,10 @@ pub(super) struct Chunks {
 /// The least opacity of a screen.
 const SCREEN_OPACITY: f32 = 0.5;
 
-/// The most screens of a draw.
-const MAX_SCREENS: usize = 8 * 1024;
+/// The most screens of a draw of so many Gaussians: looking for large ones among them must not cost what it saves.
+fn max_screens(count: usize) -> usize {
+    (count / 16).min(8 * 1024)
+}
 
 /// Bits of an axis in a Morton code.
 const AXIS_BITS: u32 = 10;
@@ -62,7 +64,7 @@ pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64
     let chunk = size_of::<Chunk>() + 4 * BATCH * (1 + floats);
     let screen = size_of::<Chunk>() + 4 * BATCH;
     let chunks = |count: u64| count.div_ceil(BATCH as u64);
-    let screens = chunks(u64::from(append.count).min(MAX_SCREENS as u64));
+    let screens = chunks(max_screens(append.count as usize) as u64);
     chunks(append.count.into()) * chunk as u64 + screens * screen as u64
 }
 
@@ -79,7 +81,7 @@ impl Chunks {
             })
             .collect_into_vec(&mut chunks);
         let opacities = chunks.iter().map(|chunk| chunk.bounds.opacity);
-        let screens: Vec<u32> = screens(&chunks);
+        let screens = screens(&chunks, max_screens(order.len()));
         let screens = screens
             .chunks(BATCH)
             .map(|numbers| Chunk::read(append, &mut Fetcher::default(), numbers, (is_flat, false)));
@@ -91,9 +93,9 @@ impl Chunks {
     }
 }
 
-/// The numbers of the Gaussians that may hide others: of the opaque ones those whose second largest scale is greatest, in
-/// the order of chunks.
-fn screens(chunks: &[Chunk]) -> Vec<u32> {
+/// The numbers of at most so many Gaussians that may hide others: of the opaque ones those whose second largest scale is
+/// greatest, in the order of chunks.
+fn screens(chunks: &[Chunk], most: usize) -> Vec<u32> {
     let opaque = || {
         chunks.iter().flat_map(|chunk| {
             (0..chunk.numbers.len())
@@ -103,11 +105,11 @@ fn screens(chunks: &[Chunk]) -> Vec<u32> {
     };
     let mut seconds: Vec<f32> = host::collect(opaque().map(|(second, _)| second));
     let mut least = 0.0;
-    if let Some(rest) = seconds.len().checked_sub(MAX_SCREENS) {
+    if let Some(rest) = seconds.len().checked_sub(most).filter(|_| most > 0) {
         least = *seconds.select_nth_unstable_by(rest, f32::total_cmp).1;
     }
     let large = opaque().filter(|(second, _)| *second >= least);
-    host::collect(large.take(MAX_SCREENS).map(|(_, number)| number))
+    host::collect(large.take(most).map(|(_, number)| number))
 }
 
 impl Chunk {

@@ -1,14 +1,14 @@
 //! Tiles that one primitive covers as a whole, with nothing that is tested later and fragments that take nothing but
 //! varyings: a batch that needs no list of quads.
 
-use super::super::batch::{LANES, add_attributes, divided};
+use super::super::batch::{BlockValues, LANES, Needs, add_attributes, divided, varying};
 use super::super::output::lanes_of;
 use super::super::setup::Setup;
 use super::super::tile::AREA;
 use super::whole::{BLOCKS, block_corner};
 use super::{Current, Renderer};
 use crate::counters::Counter;
-use crate::lanes::{bits_of, both};
+use crate::lanes::{bits_of, both, three};
 use crate::packet::draw::{FragmentInput, Interpolation};
 use crate::skips::Skip;
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -67,7 +67,11 @@ impl Renderer<'_, '_> {
         let affine = current.setup.affine && draw.skips.has(Skip::Affine);
         let divides = draw.needs.inverse_w && !affine;
         if draw.needs.barycentrics {
-            full.find_barycentrics(simd, current.setup, at, divides);
+            let needs = Needs {
+                inverse_w: divides,
+                ..draw.needs
+            };
+            full.find_barycentrics(simd, current.setup, at, needs);
         }
         let machine = stage.machine(self.machines, 1);
         for &(slot, kind, place) in &interface.inputs {
@@ -99,26 +103,18 @@ impl Renderer<'_, '_> {
 }
 
 impl FullTile {
-    /// Finds the barycentrics of all pixels; perspective-correct ones, too, if that takes a division.
+    /// Finds the barycentrics of all pixels; perspective-correct ones, too, if 1 / w is needed.
     #[inline(always)]
-    fn find_barycentrics<S: Simd>(&mut self, simd: S, setup: &Setup, at: [i32; 2], divides: bool) {
+    fn find_barycentrics<S: Simd>(&mut self, simd: S, setup: &Setup, at: [i32; 2], needs: Needs) {
         for block in 0..BLOCKS {
             let pixels = 16 * block..16 * (block + 1);
-            let [x, y] = block_corner(at, block);
-            let bases = setup.barycentrics(x, y);
-            let [b1, b2] = both([0, 1], |corner: usize| {
-                let lanes = f32x16::simd_from(simd, setup.lane_barycentrics[corner]);
-                lanes + bases[corner] as f32
-            });
-            b1.store_slice(&mut self.linear[0][pixels.clone()]);
-            b2.store_slice(&mut self.linear[1][pixels.clone()]);
-            if divides {
-                let mut inverse_w = f32x16::splat(simd, 1.0);
-                if !setup.affine {
-                    inverse_w = f32x16::simd_from(simd, setup.lane_w) + setup.inverse_w(bases);
-                }
+            let values = BlockValues::new(simd, setup, block_corner(at, block), needs);
+            for (linear, lanes) in self.linear.iter_mut().zip(values.barycentrics) {
+                lanes.store_slice(&mut linear[pixels.clone()]);
+            }
+            if needs.inverse_w {
                 let weights = both(setup.weights, |weight| f32x16::splat(simd, weight));
-                let [p1, p2] = divided(simd, [b1, b2], inverse_w, weights);
+                let [p1, p2] = divided(simd, values.barycentrics, values.inverse_w, weights);
                 p1.store_slice(&mut self.perspective[0][pixels.clone()]);
                 p2.store_slice(&mut self.perspective[1][pixels]);
             }
@@ -132,21 +128,20 @@ impl FullTile {
         simd: S,
         interpolation: Interpolation,
         divides: bool,
-        [a, da, db]: [f32; 3],
+        attribute: [f32; 3],
         out: &mut [Chunk],
     ) {
         let [b1, b2] = match interpolation {
-            Interpolation::Flat => return out.fill(Chunk([a.to_bits(); 16])),
+            Interpolation::Flat => return out.fill(Chunk([attribute[0].to_bits(); 16])),
             Interpolation::Perspective if divides => &self.perspective,
             _ => &self.linear,
         };
         let (b1, b2) = (b1.as_chunks::<16>().0, b2.as_chunks::<16>().0);
-        let a = f32x16::splat(simd, a);
-        let (da, db) = (f32x16::splat(simd, da), f32x16::splat(simd, db));
+        let attribute = three(attribute, |value| f32x16::splat(simd, value));
         for (out, (b1, b2)) in out.iter_mut().zip(b1.iter().zip(b2)) {
             let b1 = f32x16::simd_from(simd, *b1);
             let b2 = f32x16::simd_from(simd, *b2);
-            *out = Chunk(bits_of(db.mul_add(b2, da.mul_add(b1, a))).into());
+            *out = Chunk(bits_of(varying(attribute, [b1, b2])).into());
         }
     }
 }

@@ -128,27 +128,8 @@ impl Renderer<'_, '_> {
                 self.quads_masked += 4;
                 continue;
             }
-            let [x, y] = block_corner(at, block);
-            let setup = current.setup;
-            let [b1, b2] = setup.barycentrics(x, y);
-            let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
-            let mut values = BlockValues {
-                barycentrics: [f32x16::splat(simd, 0.0); 2],
-                depth: f32x16::splat(simd, 0.0),
-                inverse_w: f32x16::splat(simd, 1.0),
-            };
-            if needs.depth {
-                values.depth = add(setup.depth([b1, b2]), setup.lane_depth);
-            }
-            if needs.barycentrics {
-                values.barycentrics = [
-                    add(b1 as f32, setup.lane_barycentrics[0]),
-                    add(b2 as f32, setup.lane_barycentrics[1]),
-                ];
-            }
-            if needs.inverse_w && !setup.affine {
-                values.inverse_w = add(setup.inverse_w([b1, b2]), setup.lane_w);
-            }
+            let corner = block_corner(at, block);
+            let values = BlockValues::new(simd, current.setup, corner, needs);
             if !touched {
                 self.touch_read(tile);
                 touched = true;
@@ -161,31 +142,5 @@ impl Renderer<'_, '_> {
             self.append(current, quad, &[lanes], &values)?;
         }
         Ok(())
-    }
-
-    /// Makes sure that a tile of the colours written is there, of which nothing will be left.
-    fn touch_unread(&mut self, tile: usize) {
-        if !self.draw.skips.has(Skip::OverwrittenTiles) {
-            return self.touch_read(tile);
-        }
-        for (index, output) in self.draw.colors.iter().enumerate() {
-            if output.is_some() && !self.buffers.color[index].is_touched(tile) {
-                self.buffers.color[index].touch_unread(tile);
-                self.counters.add(Counter::TilesOverwritten, 1);
-            }
-        }
-    }
-
-    /// Makes sure that a tile of the colours written is there, with what it holds.
-    fn touch_read(&mut self, tile: usize) {
-        for (index, output) in self.draw.colors.iter().enumerate() {
-            if output.is_some()
-                && !self.buffers.color[index].is_touched(tile)
-                && let Some(target) = &self.draw.targets.color[index]
-            {
-                let tile = self.tile_of(tile);
-                self.buffers.color[index].touch(target, self.place.layer, &tile);
-            }
-        }
     }
 }

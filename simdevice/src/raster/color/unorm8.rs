@@ -1,0 +1,73 @@
+//! Four bytes of 0 to 1 in a word, 16 words at a time.
+
+use super::{Colors, clamp};
+use crate::lanes::bits_of;
+use crate::texture::unorm8_fraction;
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
+
+/// Whether a level's multiplication and addition round once.
+#[inline(always)]
+fn is_fused<S: Simd>(simd: S) -> bool {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    let fused = {
+        use fearless_simd::Level::{Avx2, Avx512};
+        matches!(simd.level(), Avx2(_) | Avx512(_))
+    };
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    let fused = false;
+    fused
+}
+
+/// 8-bit codes of 0 to 1, to nearest, in the low bits; above them are bits of no meaning. Numbers that are too great by
+/// some units in the last place do as well.
+#[inline(always)]
+fn unorm8<S: Simd>(simd: S, value: f32x16<S>) -> u32x16<S> {
+    // Leaves no bits for a fraction.
+    const NO_FRACTION: f32 = 8_388_608.0;
+    if is_fused(simd) {
+        // Rounded once, to the nearest integer; 127.5 is the only tie.
+        let scaled = value.mul_add(f32x16::splat(simd, 255.0), f32x16::splat(simd, NO_FRACTION));
+        return bits_of(scaled);
+    }
+    // 255 v = 256 v - v: the first is exact, so the nearest integer to it is the result or one more.
+    let scaled = value * 256.0;
+    let rounded = scaled + NO_FRACTION;
+    let excess = (scaled - (rounded - NO_FRACTION) + 0.5) - value;
+    let more: mask32x16<S> = excess.simd_lt(0.0);
+    let one = more.select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0));
+    bits_of(rounded - one)
+}
+
+/// Four bytes of 0 to 1 in a word, each to nearest.
+#[inline(always)]
+pub fn pack_unorm8<S: Simd>(simd: S, colors: &Colors<S>, bgra: bool) -> u32x16<S> {
+    let mut clamped = *colors;
+    for component in &mut clamped {
+        *component = clamp(simd, *component, 0.0, 1.0);
+    }
+    pack_unorm8_in_range(simd, &clamped, bgra)
+}
+
+/// As [`pack_unorm8`], of what needs no clamping.
+#[inline(always)]
+pub fn pack_unorm8_in_range<S: Simd>(simd: S, [r, g, b, a]: &Colors<S>, bgra: bool) -> u32x16<S> {
+    let (first, third) = if bgra { (b, r) } else { (r, b) };
+    (unorm8(simd, *first) & 255)
+        | (unorm8(simd, *g) & 255) << 8
+        | (unorm8(simd, *third) & 255) << 16
+        | unorm8(simd, *a) << 24
+}
+
+/// Four bytes of each word as numbers from 0 to 1.
+#[inline(always)]
+pub fn unpack_unorm8<S: Simd>(_: S, texels: u32x16<S>, bgra: bool) -> Colors<S> {
+    let first = unorm8_fraction(texels, 0);
+    let second = unorm8_fraction(texels, 8);
+    let third = unorm8_fraction(texels, 16);
+    let fourth = unorm8_fraction(texels, 24);
+    if bgra {
+        [third, second, first, fourth]
+    } else {
+        [first, second, third, fourth]
+    }
+}
