@@ -35,7 +35,7 @@ macro_rules! skips {
 
 skips! {
     Chunks: "chunks", OutsideByChunks, "Gaussians that are drawn again are in chunks, of which those outside the picture are not read.";
-    Hidden: "hidden", HiddenByOthers, "Gaussians that are drawn again are not read in chunks that others hide.";
+    HiddenChunks: "hidden-chunks", HiddenByOthers, "Gaussians that are drawn again are not read in chunks that others hide.";
     Bounds: "bounds", OutsideByBounds, "A Gaussian whose bounding sphere is off the screen is not projected further.";
     Ellipse: "ellipse", TilesBesideEllipse, "A Gaussian is listed only in tiles that its ellipse reaches, not in all of its box.";
     Harmonics: "harmonics", HarmonicsUnread, "Spherical harmonics are read only for Gaussians that reach a tile.";
@@ -144,7 +144,7 @@ mod tests {
                 .parse::<Skips>()
                 .unwrap_err()
                 .to_string(),
-            "everything is neither all nor none nor a skip, which are chunks, hidden, bounds, ellipse, harmonics, blocks, saturated, \
+            "everything is neither all nor none nor a skip, which are chunks, hidden-chunks, bounds, ellipse, harmonics, blocks, saturated, \
              empty-tiles, overwritten-tiles, overwritten-quads, hidden-tiles, masked-quads, affine"
         );
     }

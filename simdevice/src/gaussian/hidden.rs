@@ -110,7 +110,7 @@ impl GaussianSet {
             workers.projection.model,
             CameraModel::Pinhole | CameraModel::Orthographic
         );
-        workers.projection.skips.has(Skip::Hidden)
+        workers.projection.skips.has(Skip::HiddenChunks)
             // What was recorded is what hardware without this does.
             && workers.device.recorder().is_none()
             && is_along_axis

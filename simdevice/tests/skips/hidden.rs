@@ -93,7 +93,8 @@ fn what_is_hidden_changes_no_bit() {
                 change(begin);
             }
             let (image, counters) = draw(Skips::ALL, &packets, over_black);
-            let (other, without) = draw(Skips::ALL.without(Skip::Hidden), &packets, over_black);
+            let (other, without) =
+                draw(Skips::ALL.without(Skip::HiddenChunks), &packets, over_black);
             assert!(image == other, "{name}, {right}");
             hidden += counters.get(Counter::HiddenByOthers);
             let read = |counters: &Counters| counters.get(Counter::GaussiansRead);

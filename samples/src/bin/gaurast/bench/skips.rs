@@ -11,8 +11,9 @@ use super::worker::{Contender, Drawn, Worker};
 use super::{BenchError, Extra, Source, SweepArguments, Workload, median};
 
 /// Skips of Gaussian draws, and the counter of each, as the device has them.
-const SKIPS: [(&str, &str); 7] = [
+const SKIPS: [(&str, &str); 8] = [
     ("chunks", "outside by chunks"),
+    ("hidden-chunks", "hidden by others"),
     ("bounds", "outside by bounds"),
     ("ellipse", "tiles beside ellipse"),
     ("harmonics", "harmonics unread"),
@@ -85,23 +86,24 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
         extra: Some(extra),
         ..base.clone()
     };
+    let wall = Workload::new(Source::Wall, SIZE);
+    let hidden = Workload {
+        extra: Some(Extra::Behind { count }),
+        ..wall.clone()
+    };
     let scenes = [
         (base.source.to_string(), base.clone()),
         (
             format!("{}, as many beside the screen", base.source),
             with(Extra::Beside),
         ),
+        (format!("{count} behind a wall"), hidden.clone()),
     ];
     for (name, workload) in scenes {
         results
             .skips
             .extend(saved(&name, &workload, arguments.threads, runs)?);
     }
-    let wall = Workload::new(Source::Wall, SIZE);
-    let hidden = Workload {
-        extra: Some(Extra::Behind { count }),
-        ..wall.clone()
-    };
     let pairs = [
         ("off the screen", with(Extra::Beside), base),
         ("behind a wall", hidden, wall),
