@@ -10,7 +10,7 @@
 
 use crate::gaussian::footprint::{Reach, Span, TILE_SIZE};
 use crate::gaussian::locate;
-use crate::gaussian::project::Projected;
+use crate::gaussian::splat::Projected;
 use crate::packet::Rect;
 use devmem::host;
 use rayon::prelude::*;

@@ -77,9 +77,11 @@ counters! {
     SkippedOffScreen: "gaussians skipped", "off screen", Count, "Gaussians that reach no pixel of the scissored viewport at the alpha floor";
     OutsideByChunks: "skips", "outside by chunks", Count, "Gaussians that were not read because the bounds of their chunk are outside the picture";
     HiddenByOthers: "skips", "hidden by others", Count, "Gaussians that were not read because others before their chunk finish all pixels that it reaches";
+    SetsUnchanged: "skips", "sets unchanged", Count, "sets of Gaussians that were drawn as they had been projected, sorted and binned before";
     OutsideByBounds: "skips", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
     TilesBesideEllipse: "skips", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
     HarmonicsUnread: "skips", "harmonics unread", Count, "Gaussians whose spherical harmonics were not read";
+    BandsOfZeros: "skips", "bands of zeros", Count, "directions in which spherical harmonics were evaluated without the higher degrees, whose coefficients are zero";
     BlocksBesideEllipse: "skips", "blocks beside ellipse", Count, "Pairs of an unfinished 4x4 block and a Gaussian of its tile that does not reach the block";
     BlocksSaturated: "skips", "blocks saturated", Count, "Pairs of a finished 4x4 block and a Gaussian of its tile";
     TilesUntouched: "skips", "tiles untouched", Count, "Tiles of attachments that were not loaded, because nothing was drawn to them";

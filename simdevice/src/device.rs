@@ -1,6 +1,7 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
 use crate::gaussian::cache::ChunkCache;
+use crate::gaussian::unchanged::LastSets;
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
 use crate::skips::Skips;
 use crate::trace::Recorder;
@@ -87,6 +88,7 @@ pub struct Device {
     level: Level,
     config: Config,
     chunks: ChunkCache,
+    last_sets: LastSets,
     recorder: Arc<Recorder>,
 }
 
@@ -111,6 +113,7 @@ impl Device {
             level,
             config: config.clone(),
             chunks: ChunkCache::default(),
+            last_sets: LastSets::default(),
             recorder: config.recorder.clone().unwrap_or_default(),
         })
     }
@@ -118,6 +121,11 @@ impl Device {
     /// What was chosen when it was created.
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    /// What was last made of Gaussians that may be drawn again.
+    pub(crate) fn last_sets(&self) -> &LastSets {
+        &self.last_sets
     }
 
     /// The chunks of Gaussians that were drawn more than once.

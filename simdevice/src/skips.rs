@@ -36,9 +36,11 @@ macro_rules! skips {
 skips! {
     Chunks: "chunks", OutsideByChunks, "Gaussians that are drawn again are in chunks, of which those outside the picture are not read.";
     HiddenChunks: "hidden-chunks", HiddenByOthers, "Gaussians that are drawn again are not read in chunks that others hide.";
+    Unchanged: "unchanged", SetsUnchanged, "Gaussians in memory that only the device writes are not projected, sorted and binned again while neither they nor the view change.";
     Bounds: "bounds", OutsideByBounds, "A Gaussian whose bounding sphere is off the screen is not projected further.";
     Ellipse: "ellipse", TilesBesideEllipse, "A Gaussian is listed only in tiles that its ellipse reaches, not in all of its box.";
     Harmonics: "harmonics", HarmonicsUnread, "Spherical harmonics are read only for Gaussians that reach a tile.";
+    Bands: "bands", BandsOfZeros, "Degrees of spherical harmonics whose coefficients are zero are not evaluated for Gaussians that are drawn again.";
     Blocks: "blocks", BlocksBesideEllipse, "A Gaussian is evaluated only in blocks of 4x4 pixels that it may reach.";
     Saturated: "saturated", BlocksSaturated, "Nothing is evaluated in blocks and tiles whose pixels are all finished.";
     EmptyTiles: "empty-tiles", TilesUntouched, "Tiles that nothing draws to are neither loaded nor stored.";
@@ -144,7 +146,7 @@ mod tests {
                 .parse::<Skips>()
                 .unwrap_err()
                 .to_string(),
-            "everything is neither all nor none nor a skip, which are chunks, hidden-chunks, bounds, ellipse, harmonics, blocks, saturated, \
+            "everything is neither all nor none nor a skip, which are chunks, hidden-chunks, unchanged, bounds, ellipse, harmonics, bands, blocks, saturated, \
              empty-tiles, overwritten-tiles, overwritten-quads, hidden-tiles, masked-quads, affine"
         );
     }

@@ -7,7 +7,7 @@ mod primitives;
 pub(crate) use primitives::MacroTileWork;
 
 use crate::counters::{Counter, Counters};
-use crate::gaussian::{TILE_SIZE, project::Splat};
+use crate::gaussian::{TILE_SIZE, splat::Splat};
 use crate::packet::Rect;
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt;

@@ -16,12 +16,13 @@ const MAX_ENTRIES: usize = 256;
 
 /// What an attribute is read from.
 #[derive(Debug)]
-struct Stream {
+pub(super) struct Stream {
     memory: Weak<Allocation>,
     generation: u64,
     /// Offset and size of the buffer, stride and offset of the attribute.
     place: [u64; 4],
     format: Format,
+    instance_divisor: Option<u32>,
 }
 
 /// A draw that was seen.
@@ -53,7 +54,7 @@ struct Entries {
 pub(crate) struct ChunkCache(Mutex<Entries>);
 
 impl Stream {
-    fn new(stream: &AttributeStream) -> Self {
+    pub(super) fn new(stream: &AttributeStream) -> Self {
         let buffer = &stream.buffer;
         Self {
             memory: Arc::downgrade(&buffer.memory),
@@ -65,19 +66,29 @@ impl Stream {
                 stream.offset.into(),
             ],
             format: stream.format,
+            instance_divisor: stream.instance_divisor,
         }
     }
 
+    /// The memory, while it is there.
+    pub(super) fn memory(&self) -> Option<Arc<Allocation>> {
+        self.memory.upgrade()
+    }
+
     /// Whether the memory still holds what it held.
-    fn is_current(&self) -> bool {
+    pub(super) fn is_current(&self) -> bool {
         let memory = self.memory.upgrade();
         memory.is_some_and(|memory| memory.generation() == self.generation)
     }
 
-    fn is_same(&self, other: &Self) -> bool {
-        self.memory.ptr_eq(&other.memory)
-            && (self.generation, self.place, self.format)
-                == (other.generation, other.place, other.format)
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        let how = |own: &Self| (own.generation, own.format, own.instance_divisor);
+        self.is_same_buffer(other) && how(self) == how(other)
+    }
+
+    /// Whether both are read from the same place, whatever is there.
+    pub(super) fn is_same_buffer(&self, other: &Self) -> bool {
+        self.memory.ptr_eq(&other.memory) && self.place == other.place
     }
 }
 
@@ -213,9 +224,14 @@ fn shapes(append: &GaussianAppend) -> [&AttributeStream; 4] {
     ]
 }
 
-/// Whether an attribute is in memory that only the device writes, and read by vertex.
+/// Whether an attribute is in memory that only the device writes.
+pub(super) fn is_device_local(stream: &AttributeStream) -> bool {
+    !stream.buffer.memory.is_host_visible()
+}
+
+/// Whether it is, and read by vertex.
 fn is_fixed(stream: &AttributeStream) -> bool {
-    !stream.buffer.memory.is_host_visible() && stream.instance_divisor.is_none()
+    is_device_local(stream) && stream.instance_divisor.is_none()
 }
 
 /// Whether what is drawn can have chunks.

@@ -5,7 +5,7 @@
 
 use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader, Fetcher};
 use super::scratch::Attributes;
-use super::sort;
+use super::{sort, spherical_harmonics};
 use crate::packet::GaussianAppend;
 use devmem::host;
 use rayon::prelude::*;
@@ -31,6 +31,8 @@ pub(super) struct Chunk {
     pub(super) attributes: Attributes,
     /// Spherical harmonics, if there was room for them: as many floats for each as [`CoefficientReader::floats`] says.
     pub(super) harmonics: Vec<f32>,
+    /// No coefficient of a greater degree is other than zero.
+    pub(super) degree: u32,
     pub(super) bounds: Bounds,
     /// No Gaussian of it is skipped for what its attributes are.
     pub(super) is_sound: bool,
@@ -157,12 +159,15 @@ impl Chunk {
             bounds.opacity = bounds.opacity.max(opacity);
         }
         let mut harmonics = Vec::new();
+        let mut degree = u32::MAX;
         if with_harmonics {
+            degree = 0;
             let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
             let mut coefficients = [0.0; COEFFICIENT_FLOATS];
             host::reserve(&mut harmonics, reader.floats() * numbers.len());
             for lane in 0..numbers.len() {
                 reader.read(&batch, lane, &mut coefficients);
+                degree = degree.max(spherical_harmonics::degree_of(&coefficients));
                 harmonics.extend(&coefficients[..reader.floats()]);
             }
         }
@@ -170,6 +175,7 @@ impl Chunk {
             numbers: numbers.to_vec(),
             attributes,
             harmonics,
+            degree,
             bounds,
             is_sound,
         }
@@ -183,6 +189,7 @@ impl Chunk {
             numbers: host::with_capacity(BATCH),
             attributes: Attributes::default(),
             harmonics: Vec::new(),
+            degree: u32::MAX,
             bounds: from.bounds,
             is_sound: true,
         };

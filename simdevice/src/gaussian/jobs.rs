@@ -216,6 +216,10 @@ impl<'a> Job<'a> {
             matrices,
             is_sound,
             harmonics,
+            degree: match self.part {
+                Part::Chunk(chunk) => chunk.degree,
+                Part::From(_) => u32::MAX,
+            },
             frustum: None,
         }
     }

@@ -25,7 +25,9 @@ mod shaded;
 #[doc(hidden)] // For the benchmarks.
 pub mod sort;
 pub mod spherical_harmonics;
+pub(crate) mod splat;
 pub(crate) mod surfel;
+pub(crate) mod unchanged;
 mod unscented;
 
 pub use footprint::TILE_SIZE;
@@ -51,13 +53,15 @@ use frustum::Frustum;
 use instances::Matrices;
 use isa::exec::Stopped;
 use jobs::{Job, Part};
-use project::{Projected, Projection, Source, Splat};
+use project::{Projection, Source};
 use rayon::prelude::*;
 use rays::{PixelRays, RayDepth, RayDepths};
 use scratch::{Attributes, Scratch};
+use splat::{Projected, Splat};
 use std::sync::Arc;
 use std::time::Instant;
 use surfel::Surfel;
+use unchanged::Key;
 
 /// The most batches of a set: a survivor is named by its batch and its place there, in 32 bits.
 const MAX_BATCHES: u64 = (1 << 32) / BATCH as u64;
@@ -100,6 +104,20 @@ pub enum Unresolved {
     Stopped(#[from] Stopped),
 }
 
+/// What projection, sort and binning make of a set. Rasterization changes nothing of it.
+#[derive(Debug)]
+pub(crate) struct Sorted {
+    /// By batch; [`locate`] finds a primitive's.
+    pub(crate) splats: Vec<Vec<Splat>>,
+    pub(crate) tiles: TileLists,
+    /// By batch, as the splats, if they are 2D Gaussians.
+    surfels: Option<Vec<Vec<Surfel>>>,
+    /// By batch, as the splats, if each pixel sorts for itself.
+    ray_depths: Option<Vec<Vec<RayDepth>>>,
+    /// What became of the set's Gaussians.
+    counters: Counters,
+}
+
 /// A resolved set: sorted, binned, immutable.
 #[derive(Debug)]
 pub struct GaussianDraw {
@@ -107,9 +125,7 @@ pub struct GaussianDraw {
     pub state: Arc<GaussianState>,
     /// The pixels that it may touch.
     pub bounds: Rect,
-    /// By batch; [`locate`] finds a primitive's.
-    pub(crate) splats: Vec<Vec<Splat>>,
-    pub(crate) tiles: TileLists,
+    pub(crate) sorted: Arc<Sorted>,
     /// What is left out in its tiles.
     pub(crate) skips: Skips,
     /// What makes the colours of its fragments.
@@ -120,10 +136,8 @@ pub struct GaussianDraw {
     pub(crate) depth_trend: Trend,
     /// Half the pixels after which the picture repeats, or infinity.
     pub(crate) half_period: f64,
-    /// By batch, as the splats, if they are 2D Gaussians.
-    surfels: Option<Vec<Vec<Surfel>>>,
-    /// By batch, as the splats, if each pixel sorts for itself.
-    ray_depths: Option<(Vec<Vec<RayDepth>>, PixelRays)>,
+    /// The pixels' rays.
+    rays: PixelRays,
     /// Where the work of its tiles goes, if anybody wants to know.
     pub(crate) record: Option<Arc<DrawRecord>>,
 }
@@ -203,9 +217,60 @@ impl GaussianSet {
         counters: &mut Counters,
     ) -> Result<GaussianDraw, Unresolved> {
         let chunks = self.find_chunks(device, counters);
+        let config = device.config();
+        let is_kept = config.skips.has(Skip::Unchanged) && device.recorder().is_none();
+        let key = Key::new(&self, &chunks).filter(|_| is_kept);
+        if let Some(sorted) = key.as_ref().and_then(|key| device.last_sets().find(key)) {
+            counters.add_all(&sorted.counters);
+            counters.add(Counter::SetsUnchanged, 1);
+            return Ok(self.drawn(sorted, None, device));
+        }
+        let (sorted, record) = self.sort(&chunks, device, counters)?;
+        let sorted = Arc::new(sorted);
+        if let Some(key) = key {
+            let bytes = sorted.memory_bytes();
+            let sets = device.last_sets();
+            sets.keep(key, &sorted, bytes, config.chunk_budget_bytes);
+        }
+        Ok(self.drawn(sorted, record, device))
+    }
+
+    /// The set as it is drawn.
+    fn drawn(
+        self,
+        sorted: Arc<Sorted>,
+        record: Option<Arc<DrawRecord>>,
+        device: &Device,
+    ) -> GaussianDraw {
+        let begin = self.begin;
+        GaussianDraw {
+            depth_trend: match (self.depth, begin.state.order) {
+                // What a program sorts by need not follow its depths.
+                (Some(depth), GaussianOrder::ViewDepth) if self.draws.is_empty() => depth.trend(),
+                _ => Trend::None,
+            },
+            depth_unit: self.depth.map_or(DepthCode::Float, |depth| depth.unit()),
+            resolve: self.resolve,
+            half_period: panorama::period(&begin.camera).map_or(f64::INFINITY, |p| 0.5 * p),
+            rays: PixelRays::new(&begin.camera, &begin.viewport),
+            state: begin.state,
+            bounds: self.bounds,
+            sorted,
+            skips: device.config().skips,
+            record,
+        }
+    }
+
+    /// Projects, sorts and bins; and begins an account of it, if anybody wants to know.
+    fn sort(
+        &self,
+        chunks: &[Option<Arc<Chunks>>],
+        device: &Device,
+        counters: &mut Counters,
+    ) -> Result<(Sorted, Option<Arc<DrawRecord>>), Unresolved> {
         let started = Instant::now();
         let mut work = Counters::default();
-        let mut batches = self.project(device, &chunks, &mut work)?;
+        let mut batches = self.project(device, chunks, &mut work)?;
         let fixed = batches.len();
         self.shade(device, &mut batches)?;
         let mut by_programs = Counters::default();
@@ -217,8 +282,6 @@ impl GaussianSet {
             };
             sum.add_all(&batch.counters);
         }
-        counters.add_all(&work);
-        counters.add_all(&by_programs);
         let projected = Instant::now();
         let threads = device.threads();
         let order = device.install(|| sorted(&batches, threads));
@@ -227,11 +290,7 @@ impl GaussianSet {
         let most_pairs = device.config().bin_budget_bytes / 3;
         let tiles = device
             .install(|| TileLists::build(&mut batches, &order, self.bounds, threads, most_pairs));
-        counters.add(Counter::TilePairs, tiles.pairs());
-        let nanoseconds = |from: Instant, to: Instant| (to - from).as_nanos() as u64;
-        counters.add(Counter::PreprocessTime, nanoseconds(started, projected));
-        counters.add(Counter::SortTime, nanoseconds(projected, sorted));
-        counters.add(Counter::BinningTime, nanoseconds(sorted, Instant::now()));
+        let binned = Instant::now();
         let mut splats = host::with_capacity(batches.len());
         let mut surfels = host::with_capacity(batches.len());
         let mut depths = host::with_capacity(batches.len());
@@ -240,9 +299,6 @@ impl GaussianSet {
             surfels.push(batch.surfels);
             depths.push(batch.ray_depths);
         }
-        let is_per_pixel = self.begin.state.order == GaussianOrder::PerPixel;
-        let is_flat = self.is_flat();
-        let rays = PixelRays::new(&self.begin.camera, &self.begin.viewport);
         let record = device.recorder().map(|_| {
             let degree = self.begin.state.sh_degree;
             let (pairs, bounds) = (tiles.pairs(), self.bounds);
@@ -259,24 +315,22 @@ impl GaussianSet {
             let draw = trace::gaussian_draw(&fixed, &by_program, bytes, pairs, degree, bounds);
             DrawRecord::new(draw)
         });
-        Ok(GaussianDraw {
-            depth_trend: match (self.depth, self.begin.state.order) {
-                // What a program sorts by need not follow its depths.
-                (Some(depth), GaussianOrder::ViewDepth) if self.draws.is_empty() => depth.trend(),
-                _ => Trend::None,
-            },
-            depth_unit: self.depth.map_or(DepthCode::Float, |depth| depth.unit()),
-            resolve: self.resolve,
-            half_period: panorama::period(&self.begin.camera).map_or(f64::INFINITY, |p| 0.5 * p),
-            state: self.begin.state,
-            bounds: self.bounds,
+        work.add_all(&by_programs);
+        work.add(Counter::TilePairs, tiles.pairs());
+        counters.add_all(&work);
+        let nanoseconds = |from: Instant, to: Instant| (to - from).as_nanos() as u64;
+        counters.add(Counter::PreprocessTime, nanoseconds(started, projected));
+        counters.add(Counter::SortTime, nanoseconds(projected, sorted));
+        counters.add(Counter::BinningTime, nanoseconds(sorted, binned));
+        let is_per_pixel = self.begin.state.order == GaussianOrder::PerPixel;
+        let sorted = Sorted {
             splats,
             tiles,
-            skips: device.config().skips,
-            surfels: is_flat.then_some(surfels),
-            ray_depths: is_per_pixel.then_some((depths, rays)),
-            record,
-        })
+            surfels: self.is_flat().then_some(surfels),
+            ray_depths: is_per_pixel.then_some(depths),
+            counters: work,
+        };
+        Ok((sorted, record))
     }
 
     /// Whether it is of 2D Gaussians.
@@ -452,32 +506,42 @@ pub(crate) fn locate(name: u32) -> (usize, usize) {
     (name as usize / BATCH, name as usize % BATCH)
 }
 
-impl GaussianDraw {
-    /// Bytes of host memory that it holds while it waits to be rendered.
-    pub fn memory_bytes(&self) -> u64 {
+impl Sorted {
+    /// Bytes of host memory that it holds.
+    fn memory_bytes(&self) -> u64 {
         let splats = self.splats.iter().map(|batch| size_of_val(&**batch) as u64);
-        let depths = self.ray_depths.iter().flat_map(|(depths, _)| depths);
+        let depths = self.ray_depths.iter().flatten();
         let depths = depths.map(|batch| size_of_val(&**batch) as u64);
         let surfels = self.surfels.iter().flatten();
         let surfels = surfels.map(|batch| size_of_val(&**batch) as u64);
         splats.sum::<u64>() + depths.sum::<u64>() + surfels.sum::<u64>() + self.tiles.memory_bytes()
     }
+}
+
+impl GaussianDraw {
+    /// Bytes of host memory that it holds while it waits to be rendered.
+    pub fn memory_bytes(&self) -> u64 {
+        self.sorted.memory_bytes()
+    }
 
     /// What the splats are, if they are 2D Gaussians.
     pub(crate) fn surfels(&self) -> Option<&[Vec<Surfel>]> {
-        self.surfels.as_deref()
+        self.sorted.surfels.as_deref()
     }
 
     /// What pixels sort by, if each does so for itself.
     pub(crate) fn ray_depths(&self) -> Option<RayDepths<'_>> {
-        let (of, rays) = self.ray_depths.as_ref()?;
-        Some(RayDepths { of, rays: *rays })
+        let of = self.sorted.ray_depths.as_ref()?;
+        Some(RayDepths {
+            of,
+            rays: self.rays,
+        })
     }
 
     /// Whether it may touch a pixel of `rect`.
     pub fn touches(&self, rect: Rect) -> bool {
         let shared = self.bounds.intersect(rect);
-        !shared.is_empty() && self.tiles.any_in(shared)
+        !shared.is_empty() && self.sorted.tiles.any_in(shared)
     }
 }
 

@@ -7,7 +7,7 @@
 //! [`Splat::wide`]: super::project::Splat::wide
 
 use super::footprint::{Ellipse, Reach, Visible};
-use super::project::Projected;
+use super::splat::Projected;
 use crate::packet::{Camera, CameraModel};
 use devmem::host;
 

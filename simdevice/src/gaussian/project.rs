@@ -16,6 +16,7 @@ use super::rays::{self, RayDepth};
 use super::scratch::{Attributes, Flat, Scratch};
 use super::sort::ordered_bits;
 use super::spherical_harmonics::{Bases, DIRECTIONS};
+use super::splat::{Projected, Splat, half_room};
 use super::surfel::{Placed, Surfel};
 use crate::counters::{Counter, Counters};
 use crate::packet::{
@@ -23,103 +24,7 @@ use crate::packet::{
     GaussianOrder, GaussianPrecision, GaussianState, Viewport,
 };
 use crate::skips::{Skip, Skips};
-use devmem::host;
 use fearless_simd::{Simd, prelude::*};
-
-/// A projected Gaussian: what the tile engine needs of it, in one cache line.
-///
-/// At offset `d` pixels from the mean, `log2(alpha) = log2_opacity - u^2 - v^2` with `u = factor[0] d.x` and
-/// `v = factor[1] d.x + factor[2] d.y`: the Cholesky factor of the conic, scaled so that base 2 needs no more.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(align(64))]
-pub(crate) struct Splat {
-    /// The mean in framebuffer pixels.
-    pub mean: [f64; 2],
-    /// The scaled Cholesky factor of the conic, in 1/px.
-    pub factor: [f64; 3],
-    /// Base-2 logarithm of the opacity.
-    pub log2_opacity: f32,
-    /// Red, green, blue.
-    pub color: [f32; 3],
-    /// The centre's depth as the depth attachment holds it, if the draw tests or writes depth.
-    pub depth: u32,
-    /// Whether its exponent is a difference of numbers so large that binary32 would lose it.
-    pub steep: bool,
-    /// Whether it is wider than the period of a panorama: it then counts within half a period of its mean only, where
-    /// its copies do not. Such a one is steep.
-    pub wide: bool,
-}
-
-impl Splat {
-    /// A lane's.
-    #[inline(always)]
-    pub(super) fn new(flat: &Flat, at: usize, color: [f32; 3], depth: u32) -> Self {
-        let factor = [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]];
-        Self {
-            mean: [flat.mean[0][at], flat.mean[1][at]],
-            factor,
-            log2_opacity: flat.log2_opacity[at] as f32,
-            color,
-            depth,
-            steep: is_steep(factor, flat.log2_opacity[at]),
-            wide: false,
-        }
-    }
-}
-
-/// The greatest logarithm of the opacity for which exponents are formed in binary32: what is lost of them grows with it.
-const STEEP_LOG2_OPACITY: f64 = 4.0;
-
-/// The greatest factor, in 1/px, for which they are: from a block's middle a pixel is 1.5 times this away. A low-pass
-/// variance of 0.3 px^2 keeps all factors below 1.6.
-const STEEP_FACTOR: f64 = 8.0;
-
-/// Whether a Gaussian's exponents must be formed in binary64. It depends on the Gaussian alone.
-fn is_steep(factor: [f64; 3], log2_opacity: f64) -> bool {
-    let largest = factor.iter().fold(0.0f64, |a, b| a.max(b.abs()));
-    largest > STEEP_FACTOR || log2_opacity > STEEP_LOG2_OPACITY
-}
-
-/// The least factor, in 1/px, whose binary16 value is as exact as that of others.
-pub(super) const LEAST_HALF_FACTOR: f64 = 1.0 / 16384.0;
-
-/// How far, in units of `u^2 + v^2`, what is rasterized in binary16 reaches where exact arithmetic reaches `room`.
-///
-/// With a unit roundoff of 2^-11, `u` and the two terms of `v` err by three units each, and `v` by one more. The terms of
-/// `v` are at most `|v| + 2 |factor[1] / factor[0]| |u|`, so that needles, where they cancel, err most. Sums, exponent,
-/// logarithm, power and floor add less than a quarter.
-pub(crate) fn half_room(factor: [f64; 3], room: f64) -> f64 {
-    const UNIT: f64 = 1.0 / 2048.0;
-    let [a, b, c] = factor.map(f64::abs);
-    // What is not a number is bounded by nothing.
-    if a.min(c) >= LEAST_HALF_FACTOR {
-        let stretch = 1.0 + 8.0 * UNIT * (1.0 + b / a);
-        (room + 0.25 + 0.02 * room.abs()) * stretch * stretch
-    } else {
-        f64::INFINITY
-    }
-}
-
-/// What came of a batch.
-#[derive(Debug, Default)]
-pub(crate) struct Projected {
-    /// What is drawn, in the order of the draw.
-    pub splats: Vec<Splat>,
-    /// The depth key of each, and its place in the set, which decides between equal keys.
-    pub keys: Vec<[u32; 2]>,
-    /// What each is sorted by at a pixel, in the per-pixel order.
-    pub ray_depths: Vec<RayDepth>,
-    /// What each is on the screen, if they are 2D Gaussians.
-    pub surfels: Vec<Surfel>,
-    /// The tiles of each.
-    pub reaches: Vec<Reach>,
-    /// The tiles of those that reach many.
-    pub spans: Vec<Span>,
-    /// What was skipped and why.
-    pub counters: Counters,
-    /// What is drawn a period to the right or to the left of where it is, by side.
-    pub copies: Vec<Projected>,
-}
 
 /// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
 /// underflows binary32.
@@ -160,14 +65,6 @@ pub(crate) struct Projection {
     depth: Option<CenterDepth>,
 }
 
-impl Projected {
-    pub(super) fn reserve(&mut self, count: usize) {
-        host::reserve(&mut self.splats, count);
-        host::reserve(&mut self.keys, count);
-        host::reserve(&mut self.reaches, count);
-    }
-}
-
 /// A batch of Gaussians that were read.
 pub(super) struct Source<'a> {
     /// Where their colours are.
@@ -180,6 +77,8 @@ pub(super) struct Source<'a> {
     pub(super) is_sound: bool,
     /// Their spherical harmonics, if they were read already, one after the other.
     pub(super) harmonics: &'a [f32],
+    /// No coefficient of theirs of a greater degree is other than zero.
+    pub(super) degree: u32,
     /// What bounds those that can be seen; `None` tells nothing of them.
     pub(super) frustum: Option<&'a Frustum>,
 }
@@ -647,6 +546,25 @@ impl Projection {
         out.counters.add(Counter::TilesBesideEllipse, beside);
     }
 
+    /// The degree up to which spherical harmonics of a batch make a difference in some directions.
+    #[inline(always)]
+    fn degree_in(
+        &self,
+        source: &Source<'_>,
+        directions: &[[f32; DIRECTIONS]; 3],
+        out: &mut Projected,
+    ) -> u32 {
+        if source.degree >= self.sh_degree || !self.skips.has(Skip::Bands) {
+            return self.sh_degree;
+        }
+        // Nothing makes zero of what is not a number.
+        if directions.as_flattened().iter().any(|part| part.is_nan()) {
+            return self.sh_degree;
+        }
+        out.counters.add(Counter::BandsOfZeros, DIRECTIONS as u64);
+        source.degree
+    }
+
     /// Finds the tiles and the colour of the kept Gaussians and appends what reaches a tile to `out`.
     #[inline(always)]
     fn emit<S: Simd>(
@@ -662,7 +580,6 @@ impl Projection {
         let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
         let mut coefficients = [[0.0; COEFFICIENT_FLOATS]; DIRECTIONS];
         let (mut directions, mut bases) = ([[0.0; DIRECTIONS]; 3], Bases::default());
-        let degree = self.sh_degree;
         let mut copies = &*scratch.copies;
         for group in scratch.reached.chunks(DIRECTIONS) {
             // Reading several at a time overlaps the waits for memory.
@@ -678,6 +595,7 @@ impl Projection {
                     *part = lanes[at % BATCH] as f32;
                 }
             }
+            let degree = self.degree_in(source, &directions, out);
             bases.find(simd, degree, &directions);
             for (number, &(at, reach)) in group.iter().enumerate() {
                 let at = at % BATCH;

@@ -31,7 +31,7 @@ use super::DepthCode;
 use super::tile::place;
 use crate::counters::{Counter, Counters};
 use crate::gaussian::depth::Trend;
-use crate::gaussian::project::Splat;
+use crate::gaussian::splat::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
@@ -180,18 +180,18 @@ impl GaussianTile {
         lanes: &Lanes,
         counters: &mut Counters,
     ) {
-        let list = draw.tiles.list(tile_x, tile_y);
+        let list = draw.sorted.tiles.list(tile_x, tile_y);
         let to = &mut self.layers[layer];
         to.clear(lanes);
         if DEPTH == FIND_MEAN {
             to.clear_means();
         }
-        if list.is_empty() && draw.tiles.stream().is_none() {
+        if list.is_empty() && draw.sorted.tiles.stream().is_none() {
             return;
         }
         let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
         let task = Task {
-            splats: &draw.splats,
+            splats: &draw.sorted.splats,
             mode: TileMode::of(draw),
             list,
             skips: draw.skips,
@@ -201,7 +201,7 @@ impl GaussianTile {
             thresholds: Thresholds::new(draw),
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
-        let work = match draw.tiles.stream() {
+        let work = match draw.sorted.tiles.stream() {
             None => self.composite_list::<DEPTH>(level, &task, layer, runs.as_mut()),
             Some(stream) => {
                 self.composite_stream::<DEPTH>(level, &task, stream, layer, runs.as_mut())
@@ -243,9 +243,9 @@ impl GaussianTile {
         const LAYER: usize = LAYERS - 1;
         self.layers[LAYER].clear(lanes);
         let task = Task {
-            splats: &draw.splats,
+            splats: &draw.sorted.splats,
             mode: TileMode::of(draw).in_list_order(),
-            list: draw.tiles.list(tile_x, tile_y),
+            list: draw.sorted.tiles.list(tile_x, tile_y),
             skips: Skips::ALL,
             trend: Trend::None,
             half_period: draw.half_period,
@@ -256,7 +256,7 @@ impl GaussianTile {
                 ..Thresholds::new(draw)
             },
         };
-        match draw.tiles.stream() {
+        match draw.sorted.tiles.stream() {
             None => self.composite_list::<FIND_REACHED>(level, &task, LAYER, None),
             Some(stream) => {
                 self.composite_stream::<FIND_REACHED>(level, &task, stream, LAYER, None)

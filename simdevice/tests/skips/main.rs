@@ -5,6 +5,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod hidden;
+mod unchanged;
 
 use common::*;
 use simdevice::bindings::Bindings;
@@ -384,6 +385,8 @@ fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
             hidden::walled(12, 0.0, 0.9),
             LoadOp::Load,
         ),
+        ("bands", unchanged::with_bands_of_zeros(), over_black),
+        ("alone", gaussians_in(false, 13, 300, OVER), over_black),
         ("ties", ties, LoadOp::Load),
         ("several", several.concat(), LoadOp::Load),
         ("nothing", Vec::new(), over_black),

@@ -3,8 +3,9 @@
 
 use super::{Frustum, Plane, dot, length};
 use crate::gaussian::lanes::{Bits, F32_LANES};
-use crate::gaussian::project::{LEAST_HALF_FACTOR, Projection, half_room};
+use crate::gaussian::project::Projection;
 use crate::gaussian::scratch::Attributes;
+use crate::gaussian::splat::{LEAST_HALF_FACTOR, half_room};
 use crate::packet::{CameraModel, GaussianGeometry, GaussianPrecision};
 use std::f64::consts::LN_2;
 

@@ -5,8 +5,9 @@ use crate::device::SimdLevel;
 use crate::format::Format;
 use crate::gaussian::fetch::{BATCH, Batch};
 use crate::gaussian::footprint::Visible;
-use crate::gaussian::project::{Projected, Source};
+use crate::gaussian::project::Source;
 use crate::gaussian::scratch::Scratch;
+use crate::gaussian::splat::Projected;
 use crate::gaussian::surfel::Surfel;
 use crate::packet::{
     AttributeStream, BufferRange, Camera, GaussianAppend, GaussianAttributes, GaussianGeometry,
@@ -171,6 +172,7 @@ fn what_is_outside_is_drawn_nowhere() {
                     matrices: None,
                     is_sound: false,
                     harmonics: &[],
+                    degree: u32::MAX,
                     frustum: None,
                 };
                 let mut out = Projected::default();

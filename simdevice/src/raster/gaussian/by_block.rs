@@ -5,8 +5,8 @@ use super::{
     BLOCK_X, BLOCK_Y, BLOCKS, CHUNK, DepthMode, GaussianTile, LANE_X_64, LANE_Y_64, NO_DEPTH,
     Record, Task, Work, pixels::falls_64, wide_sums,
 };
-use crate::gaussian::project::{Splat, half_room};
 use crate::gaussian::rays::RayDepths;
+use crate::gaussian::splat::{Splat, half_room};
 use crate::gaussian::surfel::Surfel;
 use crate::gaussian::{GaussianDraw, locate};
 use crate::packet::GaussianPrecision;

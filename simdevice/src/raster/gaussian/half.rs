@@ -12,7 +12,7 @@ use super::{
     Task, Thresholds, Work,
 };
 use crate::gaussian::locate;
-use crate::gaussian::project::Splat;
+use crate::gaussian::splat::Splat;
 use crate::lanes::{bits_of, floats_of};
 use crate::skips::Skip;
 use crate::trace::Run;

@@ -7,7 +7,7 @@ use super::{
     BLOCK_X, BLOCK_Y, BLOCKS, CHUNK, DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, LANE_X,
     LANE_X_64, LANE_Y, LANE_Y_64, LANES, NO_DEPTH, Record, Task, Thresholds,
 };
-use crate::gaussian::project::Splat;
+use crate::gaussian::splat::Splat;
 use crate::lanes::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, prelude::*, u32x16};
 

@@ -185,9 +185,9 @@ fn naive_sample(
     let corner = tile.map(|tile| tile * TILE_SIZE);
     let (mut c, mut t, mut covered) = ([0.0f32; 3], 1.0f32, false);
     let (mut wide_c, mut wide_t) = ([0.0f64; 3], 1.0f64);
-    for &primitive in draw.tiles.list(tile[0], tile[1]) {
+    for &primitive in draw.sorted.tiles.list(tile[0], tile[1]) {
         let (batch, place) = locate(primitive);
-        let g = &draw.splats[batch][place];
+        let g = &draw.sorted.splats[batch][place];
         let middle = |at: usize, corner: u32, mean: f64| {
             (4 * (at / 4)) as f64 + 2.0 + (f64::from(corner) - mean)
         };
@@ -344,7 +344,8 @@ fn it_does_so_where_nothing_ends_early_and_nothing_is_too_faint() {
 fn it_does_so_where_gaussians_are_wider_than_a_period() {
     check_changed(6, 400, &defaults(), WHOLE, |draw| {
         draw.half_period = 2.25;
-        for splat in draw.splats.iter_mut().flatten().step_by(3) {
+        let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
+        for splat in sorted.splats.iter_mut().flatten().step_by(3) {
             (splat.wide, splat.steep) = (true, true);
         }
     });
@@ -359,7 +360,12 @@ fn it_does_so_where_gaussians_are_steep() {
     };
     let device = Device::new(&Config::default()).unwrap();
     let drawn = draw(5, 3000, state.clone(), &device, WHOLE);
-    let steep = drawn.splats.iter().flatten().filter(|splat| splat.steep);
+    let steep = drawn
+        .sorted
+        .splats
+        .iter()
+        .flatten()
+        .filter(|splat| splat.steep);
     assert!(steep.count() > 10);
     check(5, 3000, &state, WHOLE);
 }
@@ -392,7 +398,7 @@ fn a_saturated_tile_fetches_no_more() {
         let draw = draw(30, 4000, state, &device, WHOLE);
         let mut counters = Counters::default();
         tile.render(&draw, device.level(), 2, 2, &mut counters);
-        let list = draw.tiles.list(2, 2).len() as u64;
+        let list = draw.sorted.tiles.list(2, 2).len() as u64;
         (counters.get(Counter::TilePairsEvaluated), list)
     };
     let (ends, list) = evaluated(defaults());
@@ -437,13 +443,13 @@ fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
             let mut counters = Counters::default();
             let mut pixels = Vec::new();
             for (y, x) in (0..8).flat_map(|y| (0..8).map(move |x| (y, x))) {
-                if !draw.tiles.list(x, y).is_empty() {
+                if !draw.sorted.tiles.list(x, y).is_empty() {
                     tile.render(&draw, device.level(), x, y, &mut counters);
                     let all = (0..TILE * TILE).map(|at| tile.pixel(at % TILE, at / TILE));
                     pixels.extend(all.map(|pixel| pixel.map(|rgba| rgba.map(f32::to_bits))));
                 }
             }
-            (pixels, counters, draw.tiles.pairs())
+            (pixels, counters, draw.sorted.tiles.pairs())
         });
         let [(without, counters, _), (with, counted, pairs)] = pictures;
         assert!(without == with && !with.is_empty());

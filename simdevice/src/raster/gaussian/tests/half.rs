@@ -13,9 +13,9 @@ pub(super) fn naive_sample(
     let mut out = Naive::default();
     let state = scalar::State::new(&draw.state);
     let mut pixel = scalar::Pixel::default();
-    for &primitive in draw.tiles.list(tile[0], tile[1]) {
+    for &primitive in draw.sorted.tiles.list(tile[0], tile[1]) {
         let (batch, place) = locate(primitive);
-        let g = &draw.splats[batch][place];
+        let g = &draw.sorted.splats[batch][place];
         let alpha = alpha_at(
             draw,
             g,
@@ -125,13 +125,13 @@ fn tiles_and_blocks_list_whatever_it_reaches() {
         };
         let draw = draw(seed, 600, state.clone(), &device, WHOLE);
         let mut reached = 0;
-        for (batch, splats) in draw.splats.iter().enumerate() {
+        for (batch, splats) in draw.sorted.splats.iter().enumerate() {
             for (place, g) in splats.iter().enumerate() {
                 for (x, y) in (0..64).flat_map(|y| (0..96).map(move |x| (x, y))) {
                     if alpha_at(&draw, g, [x, y]) < state.alpha_floor {
                         continue;
                     }
-                    let list = draw.tiles.list((x / TILE) as u32, (y / TILE) as u32);
+                    let list = draw.sorted.tiles.list((x / TILE) as u32, (y / TILE) as u32);
                     let named = list.iter().any(|&name| locate(name) == (batch, place));
                     assert!(named, "seed {seed}: {g:?} at {x}, {y}");
                     reached += 1;

@@ -19,9 +19,9 @@ pub(super) fn naive_sample(
     let at = [0, 1].map(|axis| at[axis] + f64::from(tile[axis] * TILE_SIZE));
     let rays = depths.rays.of([at[0]; 16], [at[1]; 16]);
     let mut reached = Vec::new();
-    for &primitive in draw.tiles.list(tile[0], tile[1]) {
+    for &primitive in draw.sorted.tiles.list(tile[0], tile[1]) {
         let (batch, place) = locate(primitive);
-        let g = &draw.splats[batch][place];
+        let g = &draw.sorted.splats[batch][place];
         let f = g.factor;
         // The kernel's roundings: from the corner to the mean, to the middle of the block, to the pixel.
         let from = |axis: usize, at: usize| {

@@ -31,7 +31,7 @@ fn lists_and_streams_agree_at_every_level() {
                 })
                 .unwrap();
                 let draw = draw(seed, 4000, state.clone(), &device, WHOLE);
-                assert_eq!(draw.tiles.stream().is_some(), budget == 100);
+                assert_eq!(draw.sorted.tiles.stream().is_some(), budget == 100);
                 let mut tile = Box::new(GaussianTile::default());
                 let mut counters = Counters::default();
                 let mut pixels = Vec::new();
@@ -41,7 +41,7 @@ fn lists_and_streams_agree_at_every_level() {
                     pixels.extend(places.map(|(x, y)| tile.pixel(x, y)));
                 }
                 let contributions = counters.get(Counter::PixelContributions);
-                (pixels, draw.tiles.pairs(), contributions)
+                (pixels, draw.sorted.tiles.pairs(), contributions)
             });
             assert!(streamed == listed, "{name}, seed {seed}");
             assert!(listed.2 > 0);

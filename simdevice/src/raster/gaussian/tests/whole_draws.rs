@@ -158,7 +158,13 @@ fn random_scene(seed: u64) -> Scene {
         ..state.clone()
     };
     let draw = draw_with_depth(seed, 300, tested, &device, WHOLE, like);
-    let depths: Vec<u32> = draw.splats.iter().flatten().map(|g| g.depth).collect();
+    let depths: Vec<u32> = draw
+        .sorted
+        .splats
+        .iter()
+        .flatten()
+        .map(|g| g.depth)
+        .collect();
     let count = (96 * 64 * samples) as usize;
     let mut before = Picture {
         color: Vec::with_capacity(count),
@@ -465,7 +471,7 @@ fn hidden_work(
     tile.passing.set(compare, &stored.map(f32::to_bits), &lanes);
     tile.run::<TEST_DEPTH>(&draw, device.level(), [2, 2], 0, &lanes, &mut counters);
     let pairs = counters.get(Counter::TilePairsEvaluated);
-    assert!(pairs <= draw.tiles.list(2, 2).len() as u64);
+    assert!(pairs <= draw.sorted.tiles.list(2, 2).len() as u64);
     counters
 }
 
