@@ -47,6 +47,16 @@ impl Scene {
         self
     }
 
+    /// The scene with colours that are the same from everywhere: coefficients of degrees above 0 are zero, and still there.
+    #[must_use]
+    pub fn plain(mut self) -> Self {
+        let stride = self.sh_stride();
+        for coefficients in self.sh.chunks_mut(stride) {
+            coefficients[1..].fill([0.0; 3]);
+        }
+        self
+    }
+
     /// The scene with `share` of its Gaussians, spread evenly, far away from where it was.
     #[must_use]
     pub fn partly_away(mut self, share: f64) -> Self {

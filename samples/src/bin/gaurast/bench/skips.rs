@@ -11,16 +11,21 @@ use super::worker::{Contender, Drawn, Worker};
 use super::{BenchError, Extra, Source, SweepArguments, Workload, median};
 
 /// Skips of Gaussian draws, and the counter of each, as the device has them.
-const SKIPS: [(&str, &str); 8] = [
+const SKIPS: [(&str, &str); 10] = [
     ("chunks", "outside by chunks"),
     ("hidden-chunks", "hidden by others"),
     ("bounds", "outside by bounds"),
     ("ellipse", "tiles beside ellipse"),
     ("harmonics", "harmonics unread"),
+    ("bands", "bands of zeros"),
     ("blocks", "blocks beside ellipse"),
     ("saturated", "blocks saturated"),
     ("empty-tiles", "tiles untouched"),
+    (UNCHANGED, "sets unchanged"),
 ];
+
+/// What only a still camera shows.
+const UNCHANGED: &str = "unchanged";
 
 /// The pictures' size.
 const SIZE: [u32; 2] = [1280, 720];
@@ -91,8 +96,13 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
         extra: Some(Extra::Behind { count }),
         ..wall.clone()
     };
+    let plain = Workload {
+        plain: true,
+        ..base.clone()
+    };
     let scenes = [
         (base.source.to_string(), base.clone()),
+        (format!("{}, plain colours", base.source), plain),
         (
             format!("{}, as many beside the screen", base.source),
             with(Extra::Beside),
@@ -104,6 +114,9 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
             .skips
             .extend(saved(&name, &workload, arguments.threads, runs)?);
     }
+    let name = format!("{}, still camera", base.source);
+    let saved = saved_by(UNCHANGED, &name, &base, arguments.threads, runs)?;
+    results.skips.push(saved);
     let pairs = [
         ("off the screen", with(Extra::Beside), base),
         ("behind a wall", hidden, wall),
@@ -133,16 +146,21 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
 }
 
 /// Frames of workers that take turns; the first, cold frame of each comes first.
-fn frames(workers: &mut [(Workload, Worker)], runs: usize) -> Result<Vec<Vec<Drawn>>, BenchError> {
+fn frames(
+    workers: &mut [(Workload, Worker)],
+    runs: usize,
+    is_still: bool,
+) -> Result<Vec<Vec<Drawn>>, BenchError> {
     let mut frames: Vec<Vec<Drawn>> = workers.iter().map(|_| Vec::new()).collect();
     let mut views = Vec::new();
     for (workload, _) in workers.iter() {
         views.push(workload.views(&workload.scene()?, runs + 1)?);
     }
     for run in 0..=runs {
+        let view = if is_still { 0 } else { run };
         let of_workers = workers.iter_mut().zip(&views).zip(&mut frames);
         for (((_, worker), views), frames) in of_workers {
-            frames.push(worker.draw(&views[run], Settings::default(), None)?);
+            frames.push(worker.draw(&views[view], Settings::default(), None)?);
         }
     }
     Ok(frames)
@@ -164,33 +182,47 @@ fn time(frames: &[Drawn]) -> f64 {
     median(warm.map(|frame| frame.processor.unwrap_or(frame.wall)))
 }
 
+/// What each skip saves while the camera moves.
 fn saved(
     scene: &str,
     workload: &Workload,
     threads: usize,
     runs: usize,
 ) -> Result<Vec<Saved>, BenchError> {
-    let mut saved = Vec::new();
-    for (skip, counter) in SKIPS {
-        let all_but: Vec<&str> = SKIPS
-            .iter()
-            .map(|(name, _)| *name)
-            .filter(|name| *name != skip)
-            .collect();
-        let mut workers = [
-            start(workload, threads, "all")?,
-            start(workload, threads, &all_but.join(","))?,
-        ];
-        let frames = frames(&mut workers, runs)?;
-        saved.push(Saved {
-            scene: scene.to_owned(),
-            skip,
-            counter: median(frames[0][1..].iter().map(|frame| frame.counter(counter))),
-            with: time(&frames[0]),
-            without: time(&frames[1]),
-        });
-    }
-    Ok(saved)
+    let names = SKIPS.iter().map(|(name, _)| *name);
+    names
+        .filter(|&name| name != UNCHANGED)
+        .map(|name| saved_by(name, scene, workload, threads, runs))
+        .collect()
+}
+
+/// What a skip saves; the camera moves but for the one that needs it still.
+fn saved_by(
+    skip: &'static str,
+    scene: &str,
+    workload: &Workload,
+    threads: usize,
+    runs: usize,
+) -> Result<Saved, BenchError> {
+    let all_but: Vec<&str> = SKIPS
+        .iter()
+        .map(|(name, _)| *name)
+        .filter(|name| *name != skip)
+        .collect();
+    let counter = SKIPS.iter().find(|(name, _)| *name == skip);
+    let counter = counter.map_or("", |(_, counter)| *counter);
+    let mut workers = [
+        start(workload, threads, "all")?,
+        start(workload, threads, &all_but.join(","))?,
+    ];
+    let frames = frames(&mut workers, runs, skip == UNCHANGED)?;
+    Ok(Saved {
+        scene: scene.to_owned(),
+        skip,
+        counter: median(frames[0][1..].iter().map(|frame| frame.counter(counter))),
+        with: time(&frames[0]),
+        without: time(&frames[1]),
+    })
 }
 
 fn unseen(
@@ -205,7 +237,7 @@ fn unseen(
         start(with, threads, "all")?,
         start(without, threads, "all")?,
     ];
-    let frames = frames(&mut workers, runs)?;
+    let frames = frames(&mut workers, runs, false)?;
     let chunks = frames[0].iter().map(|frame| frame.counter("chunks"));
     Ok(Unseen {
         kind,

@@ -70,6 +70,9 @@ pub struct Workload {
     pub scale: f32,
     /// The share of its Gaussians that is moved off the screen.
     pub away: f64,
+    /// Whether the scene's colours are the same from everywhere.
+    #[serde(default)]
+    pub plain: bool,
     /// What is added, in shuffled order.
     pub extra: Option<Extra>,
     /// The pictures' size.
@@ -83,6 +86,7 @@ impl Workload {
             source,
             scale: 1.0,
             away: 0.0,
+            plain: false,
             extra: None,
             size,
         }
@@ -100,7 +104,10 @@ impl Workload {
             Source::Tile { whole } => tile(*whole),
             Source::Wall => wall(),
         };
-        let scene = scene.scaled(self.scale).partly_away(self.away);
+        let mut scene = scene.scaled(self.scale).partly_away(self.away);
+        if self.plain {
+            scene = scene.plain();
+        }
         let unseen = match self.extra {
             None => return Ok(scene),
             Some(Extra::Beside) => scene.clone().moved(|[x, y, z]| [x, y + 30.0, z]),
