@@ -15,6 +15,7 @@
 //! A draw that tests depth leaves out, pixel by pixel, the Gaussians whose centre fails against what was stored before
 //! the draw ([`passing`]). What the tests of a whole draw do to a tile's samples is said in [`tile_draw`].
 
+mod approximation;
 mod by_block;
 mod exp2;
 mod half;
@@ -35,6 +36,7 @@ use crate::gaussian::project::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
+use approximation::{Pruning, mode_of, prunes};
 use by_block::TileMode;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 use layer::{Lanes, Layer, block_and_lane, count, lanes_within};
@@ -71,22 +73,24 @@ pub struct GaussianTile {
     /// What may reach each block, where a mode parts lists so.
     lists: [Vec<u32>; BLOCKS],
     per_pixel: PerPixel,
+    pruning: Pruning,
     /// A piece of a tile's list, where the draw has none.
     piece: Vec<u32>,
 }
 
-/// What the kernel does about depth; a constant, so that what isn't done costs nothing. Each does what those before it do.
+/// What the kernel does about depth; a constant, so that what isn't done costs nothing. Each from [`NO_DEPTH`] on does what
+/// those from there to it do; before it are those of [`approximation`].
 type DepthMode = u8;
 /// Nothing: it only finishes the pixels that some Gaussian reaches.
 const FIND_REACHED: DepthMode = 0;
 /// It composites.
-const NO_DEPTH: DepthMode = 1;
+const NO_DEPTH: DepthMode = 5;
 /// It leaves out what fails the test.
-const TEST_DEPTH: DepthMode = 2;
+const TEST_DEPTH: DepthMode = 6;
 /// It also finds the median.
-const FIND_MEDIAN: DepthMode = 3;
+const FIND_MEDIAN: DepthMode = 7;
 /// And what the mean is made of.
-const FIND_MEAN: DepthMode = 4;
+const FIND_MEAN: DepthMode = 8;
 
 /// What the two phases need of a Gaussian in this tile.
 #[derive(Clone, Copy, Debug, Default)]
@@ -148,6 +152,7 @@ impl Default for GaussianTile {
             chunk: [Record::default(); CHUNK],
             lists: Default::default(),
             per_pixel: PerPixel::default(),
+            pruning: Pruning::new(0.0),
             piece: Vec::new(),
         }
     }
@@ -199,7 +204,9 @@ impl GaussianTile {
             half_period: draw.half_period,
             corner,
             thresholds: Thresholds::new(draw),
+            plain_mode: mode_of(&draw.state),
         };
+        self.pruning = Pruning::new(draw.state.approximation.contribution_budget);
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
         let work = match draw.tiles.stream() {
             None => self.composite_list::<DEPTH>(level, &task, layer, runs.as_mut()),
@@ -225,8 +232,10 @@ impl GaussianTile {
         counters.add(Counter::BlockEvaluations, work.items);
         counters.add(
             Counter::BlocksBesideEllipse,
-            work.open - work.items - work.blocks_hidden,
+            work.open - work.items - work.blocks_hidden - work.blocks_left_out,
         );
+        counters.add(Counter::BlocksLeftOut, work.blocks_left_out);
+        counters.add(Counter::BlocksClosed, work.blocks_closed);
         let blocks = (work.listed - work.tiles_hidden) * BLOCKS as u64;
         counters.add(Counter::BlocksSaturated, blocks - work.open);
         counters.add(Counter::PixelContributions, work.contributions);
@@ -255,6 +264,7 @@ impl GaussianTile {
                 transmittance_floor: f32::INFINITY,
                 ..Thresholds::new(draw)
             },
+            plain_mode: NO_DEPTH,
         };
         match draw.tiles.stream() {
             None => self.composite_list::<FIND_REACHED>(level, &task, LAYER, None),
@@ -275,6 +285,9 @@ impl GaussianTile {
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
         let work = match task.mode {
+            TileMode::Fast if DEPTH == NO_DEPTH && task.plain_mode != NO_DEPTH => {
+                self.composite_approximately(level, task, layer, runs)
+            }
             TileMode::Fast => {
                 dispatch!(level, simd => self.composite::<_, DEPTH>(simd, task, layer, runs))
             }
@@ -320,6 +333,9 @@ impl GaussianTile {
         let bounded = task.skips.has(Skip::Blocks);
         let end_early = task.skips.has(Skip::Saturated);
         for (number, chunk) in task.list.chunks(CHUNK).enumerate() {
+            if prunes(DEPTH) {
+                work.blocks_closed += self.pruning.begin_chunk(layer);
+            }
             let open = if end_early {
                 layer.open_blocks()
             } else {
@@ -386,9 +402,19 @@ impl GaussianTile {
                     continue;
                 }
                 let record = &mut self.chunk[number % CHUNK];
-                let reached = record.place(simd, splat, task.corner, task.thresholds.most_fall);
-                let mut reached = if bounded { reached & open } else { open };
+                let (least, room) =
+                    record.place_least(simd, splat, task.corner, task.thresholds.most_fall);
+                let near = least.simd_le(room);
+                let mut reached = if bounded { near & open } else { open };
                 work.open += u64::from(blocks);
+                if prunes(DEPTH) {
+                    let ceiling = task.thresholds.alpha_ceiling;
+                    let opacity = splat.log2_opacity;
+                    let left_out =
+                        (self.pruning).leave_out(simd, least, opacity, ceiling, near & open);
+                    work.blocks_left_out += u64::from(left_out.to_bitmask().count_ones());
+                    reached &= !left_out;
+                }
                 if DEPTH > NO_DEPTH {
                     record.depth = splat.depth;
                     let shown = self.passing.blocks(simd, splat.depth);
@@ -437,6 +463,8 @@ struct Task<'a> {
     half_period: f64,
     corner: [u32; 2],
     thresholds: Thresholds,
+    /// What is done where neither depth nor another mode asks for more: [`NO_DEPTH`], or what is cheaper.
+    plain_mode: DepthMode,
 }
 
 impl Task<'_> {
@@ -459,6 +487,8 @@ struct Work {
     contributions: u64,
     tiles_hidden: u64,
     blocks_hidden: u64,
+    blocks_left_out: u64,
+    blocks_closed: u64,
     /// Of the hidden, those that end a list, if work is recorded.
     hidden_rest: u32,
 }
@@ -554,6 +584,20 @@ impl Record {
         corner: [u32; 2],
         most_fall: f32,
     ) -> mask32x16<S> {
+        let (least, room) = self.place_least(simd, splat, corner, most_fall);
+        least.simd_le(room)
+    }
+
+    /// As [`Record::place`]. Returns no more than the least sum of squares in each block, and the greatest that reaches a
+    /// pixel.
+    #[inline(always)]
+    fn place_least<S: Simd>(
+        &mut self,
+        simd: S,
+        splat: &Splat,
+        corner: [u32; 2],
+        most_fall: f32,
+    ) -> (f32x16<S>, f32) {
         let [a, b, c] = splat.factor;
         let from_mean = |axis: usize| f64::from(corner[axis]) - splat.mean[axis];
         let (from_x, from_y) = (from_mean(0), from_mean(1));
@@ -578,7 +622,7 @@ impl Record {
         let least_u = (u.abs() - HALF * a.abs()).max(0.0);
         let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
         let least = least_v.mul_add(least_v, least_u * least_u);
-        least.simd_le(room)
+        (least, room)
     }
 }
 

@@ -55,6 +55,8 @@ impl Work {
         self.contributions += more.contributions;
         self.tiles_hidden += more.tiles_hidden;
         self.blocks_hidden += more.blocks_hidden;
+        self.blocks_left_out += more.blocks_left_out;
+        self.blocks_closed += more.blocks_closed;
         self.hidden_rest += more.hidden_rest;
     }
 }
