@@ -125,6 +125,20 @@ pub struct RenderArguments {
     #[arg(long, value_enum, default_value_t)]
     pub precision: Precision,
 
+    /// Let the exponential err by at most this, relative to it
+    #[arg(long, value_name = "E", default_value_t = 0.0)]
+    pub exponential_error: f32,
+
+    /// Leave contributions out that change no pixel by more than this together
+    ///
+    /// In parts of the scene's range of colours, such as 0.004 for one of 255 steps.
+    #[arg(long, value_name = "B", default_value_t = 0.0)]
+    pub contribution_budget: f32,
+
+    /// Draw what is this far away or farther at half size
+    #[arg(long, value_name = "DEPTH")]
+    pub far_half: Option<f32>,
+
     /// Count also what the simulated hardware would spend: cycles, stalls, energy
     ///
     /// `gaurast simulate` tells more, of any hardware.
@@ -173,6 +187,9 @@ impl Default for RenderArguments {
             order: Order::default(),
             geometry: Geometry::default(),
             precision: Precision::default(),
+            exponential_error: 0.0,
+            contribution_budget: 0.0,
+            far_half: None,
             counters: false,
             quiet: false,
             output: vec![DEFAULT_OUTPUT.into()],
