@@ -15,11 +15,11 @@ use crate::ash_compat::setters;
 /// Without it both numbers are 0, which is the default. Both are permissions: an implementation is
 /// free to be closer. Other numbers need `gaussianApproximation`.
 ///
-/// Let r be the difference of the largest and the smallest colour among the Gaussians that are drawn
-/// and what is behind them, for each component. Together the two change no pixel's colour by more
-/// than (`exponential_error` + `contribution_budget` + t) r and its alpha by no more than the
-/// factor, where t = `transmittance_floor` / (1 - `alpha_ceiling`) counts only where the pixel is
-/// finished in one picture before it is in the other, and is less than 1 there.
+/// With r the difference of the greatest and the least colour of the Gaussians that are drawn and
+/// what is behind them, no pixel's colour changes by more than (`exponential_error` +
+/// `contribution_budget`) r, and its alpha by no more than the factor of r; but where an exponential
+/// that errs finishes a pixel before another Gaussian than an exact one, `transmittance_floor` /
+/// (1 - `alpha_ceiling`) adds to the factor.
 #[repr(C)]
 #[derive(Copy, Clone, Debug)]
 #[must_use]

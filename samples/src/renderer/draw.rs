@@ -121,11 +121,7 @@ impl Recorder<'_> {
         // buffers and camera are all set before the draw, whose vertices lie within the buffers.
         unsafe {
             raw.cmd_begin_rendering(commands, &rendering);
-            raw.cmd_bind_pipeline(
-                commands,
-                vk::PipelineBindPoint::GRAPHICS,
-                pipeline.handle(),
-            );
+            raw.cmd_bind_pipeline(commands, vk::PipelineBindPoint::GRAPHICS, pipeline.handle());
             raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
             raw.cmd_set_viewport(commands, 0, &[viewport]);
             raw.cmd_set_scissor(commands, 0, &[area]);
@@ -139,14 +135,20 @@ impl Recorder<'_> {
     fn stretch(&self, from: &Image, to: &Image) {
         use vk::{AccessFlags as Access, ImageLayout as Layout, PipelineStageFlags as Stage};
         let to_source = from
-            .barrier(Layout::COLOR_ATTACHMENT_OPTIMAL, Layout::TRANSFER_SRC_OPTIMAL)
+            .barrier(
+                Layout::COLOR_ATTACHMENT_OPTIMAL,
+                Layout::TRANSFER_SRC_OPTIMAL,
+            )
             .src_access_mask(Access::COLOR_ATTACHMENT_WRITE)
             .dst_access_mask(Access::TRANSFER_READ);
         let to_destination = to
             .barrier(Layout::UNDEFINED, Layout::TRANSFER_DST_OPTIMAL)
             .dst_access_mask(Access::TRANSFER_WRITE);
         let to_attachment = to
-            .barrier(Layout::TRANSFER_DST_OPTIMAL, Layout::COLOR_ATTACHMENT_OPTIMAL)
+            .barrier(
+                Layout::TRANSFER_DST_OPTIMAL,
+                Layout::COLOR_ATTACHMENT_OPTIMAL,
+            )
             .src_access_mask(Access::TRANSFER_WRITE)
             .dst_access_mask(Access::COLOR_ATTACHMENT_READ | Access::COLOR_ATTACHMENT_WRITE);
         self.barrier(Stage::COLOR_ATTACHMENT_OUTPUT, Stage::TRANSFER, to_source);
@@ -180,7 +182,11 @@ impl Recorder<'_> {
                 vk::Filter::LINEAR,
             );
         }
-        self.barrier(Stage::TRANSFER, Stage::COLOR_ATTACHMENT_OUTPUT, to_attachment);
+        self.barrier(
+            Stage::TRANSFER,
+            Stage::COLOR_ATTACHMENT_OUTPUT,
+            to_attachment,
+        );
     }
 
     fn barrier(

@@ -36,10 +36,10 @@ use crate::gaussian::project::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
-use approximation::{Pruning, mode_of, prunes};
+use approximation::Way;
 use by_block::TileMode;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
-use layer::{Lanes, Layer, block_and_lane, count, lanes_within};
+use layer::{ANY_LIGHT, Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
 use per_pixel::PerPixel;
 use pixels::Reaching;
@@ -73,7 +73,6 @@ pub struct GaussianTile {
     /// What may reach each block, where a mode parts lists so.
     lists: [Vec<u32>; BLOCKS],
     per_pixel: PerPixel,
-    pruning: Pruning,
     /// A piece of a tile's list, where the draw has none.
     piece: Vec<u32>,
 }
@@ -84,13 +83,13 @@ type DepthMode = u8;
 /// Nothing: it only finishes the pixels that some Gaussian reaches.
 const FIND_REACHED: DepthMode = 0;
 /// It composites.
-const NO_DEPTH: DepthMode = 5;
+const NO_DEPTH: DepthMode = 3;
 /// It leaves out what fails the test.
-const TEST_DEPTH: DepthMode = 6;
+const TEST_DEPTH: DepthMode = 4;
 /// It also finds the median.
-const FIND_MEDIAN: DepthMode = 7;
+const FIND_MEDIAN: DepthMode = 5;
 /// And what the mean is made of.
-const FIND_MEAN: DepthMode = 8;
+const FIND_MEAN: DepthMode = 6;
 
 /// What the two phases need of a Gaussian in this tile.
 #[derive(Clone, Copy, Debug, Default)]
@@ -152,7 +151,6 @@ impl Default for GaussianTile {
             chunk: [Record::default(); CHUNK],
             lists: Default::default(),
             per_pixel: PerPixel::default(),
-            pruning: Pruning::new(0.0),
             piece: Vec::new(),
         }
     }
@@ -195,18 +193,18 @@ impl GaussianTile {
             return;
         }
         let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
+        let mode = TileMode::of(draw);
         let task = Task {
             splats: &draw.splats,
-            mode: TileMode::of(draw),
+            mode,
             list,
             skips: draw.skips,
             trend: draw.depth_trend,
             half_period: draw.half_period,
             corner,
             thresholds: Thresholds::new(draw),
-            plain_mode: mode_of(&draw.state),
+            way: Way::of(&draw.state, &mode, DEPTH),
         };
-        self.pruning = Pruning::new(draw.state.approximation.contribution_budget);
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
         let work = match draw.tiles.stream() {
             None => self.composite_list::<DEPTH>(level, &task, layer, runs.as_mut()),
@@ -232,12 +230,12 @@ impl GaussianTile {
         counters.add(Counter::BlockEvaluations, work.items);
         counters.add(
             Counter::BlocksBesideEllipse,
-            work.open - work.items - work.blocks_hidden - work.blocks_left_out,
+            work.open - work.items - work.blocks_hidden,
         );
         counters.add(Counter::BlocksLeftOut, work.blocks_left_out);
-        counters.add(Counter::BlocksClosed, work.blocks_closed);
         let blocks = (work.listed - work.tiles_hidden) * BLOCKS as u64;
-        counters.add(Counter::BlocksSaturated, blocks - work.open);
+        let saturated = blocks - work.open - work.blocks_left_out;
+        counters.add(Counter::BlocksSaturated, saturated);
         counters.add(Counter::PixelContributions, work.contributions);
     }
 
@@ -264,7 +262,7 @@ impl GaussianTile {
                 transmittance_floor: f32::INFINITY,
                 ..Thresholds::new(draw)
             },
-            plain_mode: NO_DEPTH,
+            way: Way::EXACT,
         };
         match draw.tiles.stream() {
             None => self.composite_list::<FIND_REACHED>(level, &task, LAYER, None),
@@ -285,8 +283,8 @@ impl GaussianTile {
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
         let work = match task.mode {
-            TileMode::Fast if DEPTH == NO_DEPTH && task.plain_mode != NO_DEPTH => {
-                self.composite_approximately(level, task, layer, runs)
+            TileMode::Fast if DEPTH == NO_DEPTH && task.way.has_fast_powers() => {
+                self.composite_with_fast_powers(level, task, layer, runs)
             }
             TileMode::Fast => {
                 dispatch!(level, simd => self.composite::<_, DEPTH>(simd, task, layer, runs))
@@ -333,14 +331,21 @@ impl GaussianTile {
         let bounded = task.skips.has(Skip::Blocks);
         let end_early = task.skips.has(Skip::Saturated);
         for (number, chunk) in task.list.chunks(CHUNK).enumerate() {
-            if prunes(DEPTH) {
-                work.blocks_closed += self.pruning.begin_chunk(layer);
-            }
             let open = if end_early {
-                layer.open_blocks()
+                layer.open_blocks(task.way.light)
             } else {
                 ALL_BLOCKS
             };
+            if DEPTH <= NO_DEPTH && end_early && task.way.light != ANY_LIGHT {
+                let left_out = layer.open_blocks(ANY_LIGHT) & !open;
+                // If no block is open, none will be.
+                let of = if open == 0 {
+                    task.list.len() - number * CHUNK
+                } else {
+                    chunk.len()
+                };
+                work.blocks_left_out += u64::from(left_out.count_ones()) * of as u64;
+            }
             if open == 0 {
                 break;
             }
@@ -402,19 +407,9 @@ impl GaussianTile {
                     continue;
                 }
                 let record = &mut self.chunk[number % CHUNK];
-                let (least, room) =
-                    record.place_least(simd, splat, task.corner, task.thresholds.most_fall);
-                let near = least.simd_le(room);
-                let mut reached = if bounded { near & open } else { open };
+                let reached = record.place(simd, splat, task.corner, task.thresholds.most_fall);
+                let mut reached = if bounded { reached & open } else { open };
                 work.open += u64::from(blocks);
-                if prunes(DEPTH) {
-                    let ceiling = task.thresholds.alpha_ceiling;
-                    let opacity = splat.log2_opacity;
-                    let left_out =
-                        (self.pruning).leave_out(simd, least, opacity, ceiling, near & open);
-                    work.blocks_left_out += u64::from(left_out.to_bitmask().count_ones());
-                    reached &= !left_out;
-                }
                 if DEPTH > NO_DEPTH {
                     record.depth = splat.depth;
                     let shown = self.passing.blocks(simd, splat.depth);
@@ -463,8 +458,7 @@ struct Task<'a> {
     half_period: f64,
     corner: [u32; 2],
     thresholds: Thresholds,
-    /// What is done where neither depth nor another mode asks for more: [`NO_DEPTH`], or what is cheaper.
-    plain_mode: DepthMode,
+    way: Way,
 }
 
 impl Task<'_> {
@@ -488,7 +482,6 @@ struct Work {
     tiles_hidden: u64,
     blocks_hidden: u64,
     blocks_left_out: u64,
-    blocks_closed: u64,
     /// Of the hidden, those that end a list, if work is recorded.
     hidden_rest: u32,
 }
@@ -584,20 +577,6 @@ impl Record {
         corner: [u32; 2],
         most_fall: f32,
     ) -> mask32x16<S> {
-        let (least, room) = self.place_least(simd, splat, corner, most_fall);
-        least.simd_le(room)
-    }
-
-    /// As [`Record::place`]. Returns no more than the least sum of squares in each block, and the greatest that reaches a
-    /// pixel.
-    #[inline(always)]
-    fn place_least<S: Simd>(
-        &mut self,
-        simd: S,
-        splat: &Splat,
-        corner: [u32; 2],
-        most_fall: f32,
-    ) -> (f32x16<S>, f32) {
         let [a, b, c] = splat.factor;
         let from_mean = |axis: usize| f64::from(corner[axis]) - splat.mean[axis];
         let (from_x, from_y) = (from_mean(0), from_mean(1));
@@ -622,7 +601,7 @@ impl Record {
         let least_u = (u.abs() - HALF * a.abs()).max(0.0);
         let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
         let least = least_v.mul_add(least_v, least_u * least_u);
-        (least, room)
+        least.simd_le(room)
     }
 }
 

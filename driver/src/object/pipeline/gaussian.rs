@@ -27,7 +27,8 @@ use gaurast::vk::{
 };
 use simdevice::packet::draw::DrawState;
 use simdevice::packet::{
-    GaussianApproximation, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
+    GaussianApproximation, GaussianGeometry, GaussianLinearization, GaussianOrder,
+    GaussianPrecision, GaussianState,
 };
 use std::sync::Arc;
 

@@ -126,17 +126,17 @@ pub struct RenderArguments {
     pub precision: Precision,
 
     /// Let the exponential err by at most this, relative to it
-    #[arg(long, value_name = "E", default_value_t = 0.0)]
+    #[arg(long, value_name = "E", default_value_t = 0.0, value_parser = part)]
     pub exponential_error: f32,
 
     /// Leave contributions out that change no pixel by more than this together
     ///
     /// In parts of the scene's range of colours, such as 0.004 for one of 255 steps.
-    #[arg(long, value_name = "B", default_value_t = 0.0)]
+    #[arg(long, value_name = "B", default_value_t = 0.0, value_parser = part)]
     pub contribution_budget: f32,
 
     /// Draw what is this far away or farther at half size
-    #[arg(long, value_name = "DEPTH")]
+    #[arg(long, value_name = "DEPTH", value_parser = depth)]
     pub far_half: Option<f32>,
 
     /// Count also what the simulated hardware would spend: cycles, stalls, energy
@@ -235,6 +235,20 @@ impl FromStr for Size {
         };
         Ok(Self([side(width)?, side(height)?]))
     }
+}
+
+fn part(text: &str) -> Result<f32, &'static str> {
+    text.parse()
+        .ok()
+        .filter(|part| (0.0..=1.0).contains(part))
+        .ok_or("it is at least 0 and at most 1")
+}
+
+fn depth(text: &str) -> Result<f32, &'static str> {
+    text.parse()
+        .ok()
+        .filter(|depth: &f32| depth.is_finite() && *depth > 0.0)
+        .ok_or("it is more than 0")
 }
 
 fn field_of_view(text: &str) -> Result<f64, &'static str> {

@@ -21,7 +21,7 @@ pub(super) const POWER_OF_TWO: [f32; 6] = [
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Powers<const TERMS: usize> {
     /// Fitted to 2^f for f in [-1/2, 1/2] in relative error, highest power first.
-    coefficients: [f32; TERMS],
+    pub(super) coefficients: [f32; TERMS],
     /// No result's relative error is greater, rounding included.
     pub(super) error: f32,
 }

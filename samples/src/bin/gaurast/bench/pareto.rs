@@ -50,7 +50,8 @@ impl Depths {
                 let [x, y] = view.project(position)?;
                 let inside = (0.0..f64::from(view.width)).contains(&x)
                     && (0.0..f64::from(view.height)).contains(&y);
-                let along = |axis: usize| view.rotation[2][axis] * (position[axis] - view.eye[axis]);
+                let along =
+                    |axis: usize| view.rotation[2][axis] * (position[axis] - view.eye[axis]);
                 inside.then(|| (along(0) + along(1) + along(2)) as f32)
             })
             .collect();
@@ -336,9 +337,11 @@ fn measure(workload: Workload, threads: usize, runs: usize) -> Result<SceneResul
     let mut points = Vec::new();
     for (variant, worker, frames) in draws {
         let camera = smaller(view, variant.divisor);
-        workers[worker]
-            .1
-            .draw(&camera, variant.settings(&depths[runs / 2]), Some(&file.path()))?;
+        workers[worker].1.draw(
+            &camera,
+            variant.settings(&depths[runs / 2]),
+            Some(&file.path()),
+        )?;
         points.push(Point {
             wall: median(frames.iter().map(|frame| frame.wall)),
             processor: median(frames.iter().filter_map(|frame| frame.processor)),
