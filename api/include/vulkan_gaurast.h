@@ -29,6 +29,7 @@ extern "C" {
 #define VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST ((VkStructureType)1000997001)
 #define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997002)
 #define VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST ((VkStructureType)1000997003)
+#define VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST ((VkStructureType)1000997004)
 
 typedef enum VkGaussianProjectionModeGAURAST {
     VK_GAUSSIAN_PROJECTION_MODE_FIXED_FUNCTION_GAURAST = 0,
@@ -109,6 +110,7 @@ typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST {
     VkBool32           gaussianInstancing;
     VkBool32           gaussianDepthStencil;
     VkBool32           gaussianMultisample;
+    VkBool32           gaussianApproximation;
 } VkPhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
 
 typedef struct VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
@@ -167,6 +169,13 @@ typedef struct VkPipelineGaussianStateCreateInfoGAURAST {
     uint32_t                                     cameraSet;
     uint32_t                                     cameraBinding;
 } VkPipelineGaussianStateCreateInfoGAURAST;
+
+typedef struct VkPipelineGaussianApproximationStateCreateInfoGAURAST {
+    VkStructureType    sType;
+    const void*        pNext;
+    float              exponentialError;
+    float              contributionBudget;
+} VkPipelineGaussianApproximationStateCreateInfoGAURAST;
 
 typedef struct VkGaussianCameraGAURAST {
     VkStructureType                 sType;

@@ -108,6 +108,11 @@ tagged_structure!(
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
     ExtendsGraphicsPipelineCreateInfo
 );
+tagged_structure!(
+    PipelineGaussianApproximationStateCreateInfoGAURAST =
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST,
+    ExtendsGraphicsPipelineCreateInfo
+);
 tagged_structure!(GaussianCameraGAURAST = STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST);
 
 /// A loader of `device`'s functions, for [`DeviceFn::load`].

@@ -2,11 +2,13 @@
 //!
 //! Names are those of the C header without the `Vk` prefix, as in ash.
 
+mod approximation_state;
 mod camera;
 mod enums;
 mod physical_device;
 mod pipeline_state;
 
+pub use approximation_state::*;
 pub use camera::*;
 pub use enums::*;
 pub use physical_device::*;

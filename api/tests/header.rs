@@ -36,6 +36,7 @@ fn expectations() -> Vec<(String, i64)> {
         "gaussianInstancing": gaussian_instancing,
         "gaussianDepthStencil": gaussian_depth_stencil,
         "gaussianMultisample": gaussian_multisample,
+        "gaussianApproximation": gaussian_approximation,
     });
     structure!("VkPhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST",
     PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> {
@@ -83,6 +84,12 @@ fn expectations() -> Vec<(String, i64)> {
         "cameraSet": camera_set,
         "cameraBinding": camera_binding,
     });
+    structure!("VkPipelineGaussianApproximationStateCreateInfoGAURAST",
+    PipelineGaussianApproximationStateCreateInfoGAURAST<'_> {
+        "sType": s_type, "pNext": p_next,
+        "exponentialError": exponential_error,
+        "contributionBudget": contribution_budget,
+    });
     structure!("VkGaussianCameraGAURAST",
     GaussianCameraGAURAST<'_> {
         "model": model, "rotation": rotation, "eye": eye,
@@ -111,6 +118,8 @@ fn expectations() -> Vec<(String, i64)> {
         "STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO":
             PipelineGaussianStateCreateInfoGAURAST::STRUCTURE_TYPE.as_raw(),
         "STRUCTURE_TYPE_GAUSSIAN_CAMERA": GaussianCameraGAURAST::STRUCTURE_TYPE.as_raw(),
+        "STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO":
+            PipelineGaussianApproximationStateCreateInfoGAURAST::STRUCTURE_TYPE.as_raw(),
         "GAUSSIAN_LOCATION_UNUSED": GAUSSIAN_LOCATION_UNUSED_GAURAST,
         "GAUSSIAN_PROJECTION_MODE_FIXED_FUNCTION": GaussianProjectionModeGAURAST::FIXED_FUNCTION.as_raw(),
         "GAUSSIAN_PROJECTION_MODE_VERTEX_SHADER": GaussianProjectionModeGAURAST::VERTEX_SHADER.as_raw(),

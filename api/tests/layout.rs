@@ -17,7 +17,7 @@ macro_rules! assert_layout {
 
 #[test]
 fn features() {
-    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 88, 8, {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 96, 8, {
         s_type: 0,
         p_next: 8,
         gaussian_primitive_topology: 16,
@@ -38,6 +38,7 @@ fn features() {
         gaussian_instancing: 76,
         gaussian_depth_stencil: 80,
         gaussian_multisample: 84,
+        gaussian_approximation: 88,
     });
 }
 
@@ -99,6 +100,12 @@ fn pipeline_state() {
         camera_set: 120,
         camera_binding: 124,
     });
+    assert_layout!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, 24, 8, {
+        s_type: 0,
+        p_next: 8,
+        exponential_error: 16,
+        contribution_budget: 20,
+    });
 }
 
 #[test]
@@ -140,6 +147,7 @@ fn names_and_values() {
         STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST,
         STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
         STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST,
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST,
     ];
     for (offset, structure_type) in structure_types.into_iter().enumerate() {
         assert_eq!(structure_type.as_raw(), first + offset as i32);

@@ -104,6 +104,7 @@ counters! {
     TilesHidden: "raster", "tiles hidden", Count, "Pairs of a tile and a primitive that was skipped there because all of the tile's depths hide it";
     GaussianTilesHidden: "raster", "gaussian tiles hidden", Count, "Pairs of a tile and a Gaussian that was skipped there because its depth fails against all of the tile's";
     GaussianBlocksHidden: "raster", "gaussian blocks hidden", Count, "Pairs of a 4x4 block and a Gaussian that was skipped there because its depth fails against all of the block's";
+    BlocksLeftOut: "raster", "blocks left out", Count, "Pairs of an unfinished 4x4 block and a Gaussian of its tile that was left out, since all of the block's light is within the budget of contributions";
     SamplesPassed: "raster", "samples passed", Count, "Samples that passed all tests, those of Gaussian draws' fragments included";
     ComputeInvocations: "shader cores", "compute invocations", Count, "Invocations of compute programs";
     ShaderBatches: "shader cores", "batches", Count, "Batches of shader invocations run";

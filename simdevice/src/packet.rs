@@ -362,6 +362,18 @@ pub enum GaussianLinearization {
     Unscented,
 }
 
+/// What Gaussians may be drawn the cheaper for. Both are permissions: what has no use for one is exact. By default
+/// nothing may be.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GaussianApproximation {
+    /// The greatest relative error of the exponential that alpha is made of, 0 to 1. Whether alpha reaches its floor is
+    /// decided without it.
+    pub exponential_error: f32,
+    /// What the contributions that are left out at a pixel may add up to, 0 to 1: the transmittance in front of each,
+    /// times its alpha.
+    pub contribution_budget: f32,
+}
+
 /// The state of a Gaussian draw that its pipeline fixes. See the extension for each value's meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GaussianState {
@@ -385,6 +397,8 @@ pub struct GaussianState {
     pub alpha_ceiling: f32,
     /// A pixel is finished before its transmittance would fall below this.
     pub transmittance_floor: f32,
+    /// How far pixels may be from all that.
+    pub approximation: GaussianApproximation,
     /// The samples that may be covered.
     pub sample_mask: u32,
     /// Depth and stencil. Gaussians face the front.
@@ -411,6 +425,7 @@ impl Default for GaussianState {
             alpha_floor: 1.0 / 255.0,
             alpha_ceiling: 0.99,
             transmittance_floor: 1e-4,
+            approximation: GaussianApproximation::default(),
             sample_mask: u32::MAX,
             depth_stencil: draw::DepthStencil::default(),
             logic_op: None,

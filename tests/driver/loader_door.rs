@@ -11,7 +11,7 @@ use ash::vk::{self, TaggedStructure};
 use gaurast::vk::{
     GaussianCameraGAURAST, PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST,
     PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_tests::contexts::{
     Buffer, Context, DeviceScene, Message, Pass, PassObject, Pipeline, PipelineOptions, Settings,
@@ -86,12 +86,17 @@ fn manifest(folder: &Path) -> PathBuf {
 fn unregistered_structures() -> String {
     use PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features;
     use PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties;
+    use PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation;
     use PipelineGaussianStateCreateInfoGAURAST as State;
     let separator = if cfg!(windows) { ";" } else { ":" };
     [
         (Features::STRUCTURE_TYPE, size_of::<Features<'_>>()),
         (Properties::STRUCTURE_TYPE, size_of::<Properties<'_>>()),
         (State::STRUCTURE_TYPE, size_of::<State<'_>>()),
+        (
+            Approximation::STRUCTURE_TYPE,
+            size_of::<Approximation<'_>>(),
+        ),
     ]
     .map(|(structure, size)| format!("{}{separator}{size}", structure.as_raw()))
     .join(separator)

@@ -1,6 +1,7 @@
 //! Gaussian draws, from an application's calls to pixels.
 
 mod accuracy;
+mod approximations;
 mod cameras;
 mod depth_stencil;
 mod determinism;

@@ -57,6 +57,9 @@ pub struct PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'a> {
     pub gaussian_depth_stencil: Bool32,
     /// Gaussian pipelines with more than one rasterization sample.
     pub gaussian_multisample: Bool32,
+    /// [`PipelineGaussianApproximationStateCreateInfoGAURAST`](crate::vk::PipelineGaussianApproximationStateCreateInfoGAURAST)
+    /// with numbers other than 0.
+    pub gaussian_approximation: Bool32,
     /// The lifetime of the `p_next` chain.
     pub _marker: PhantomData<&'a ()>,
 }
@@ -85,6 +88,7 @@ impl Default for PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
             gaussian_instancing: Bool32::default(),
             gaussian_depth_stencil: Bool32::default(),
             gaussian_multisample: Bool32::default(),
+            gaussian_approximation: Bool32::default(),
             _marker: PhantomData,
         }
     }
@@ -110,6 +114,7 @@ impl PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> {
         gaussian_instancing: bool,
         gaussian_depth_stencil: bool,
         gaussian_multisample: bool,
+        gaussian_approximation: bool,
     }
 }
 

@@ -112,6 +112,7 @@ const SUPPORTED: &[&str] = &[
     "equirectangular_camera",
     "fisheye_camera",
     "gaussian_2d",
+    "gaussian_approximation",
     "gaussian_depth_stencil",
     "gaussian_instancing",
     "gaussian_multisample",

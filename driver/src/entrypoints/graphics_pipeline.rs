@@ -7,7 +7,9 @@ use crate::object::device::Device;
 use crate::object::pipeline::{GraphicsPipeline, GraphicsPipelineInfo, Pipeline};
 use crate::{handle, pnext, pointer};
 use ash::vk;
-use gaurast::vk::PipelineGaussianStateCreateInfoGAURAST;
+use gaurast::vk::{
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
 use std::sync::Arc;
 
 crate::entry_points! {
@@ -62,6 +64,9 @@ unsafe fn gather<'a>(
         gathered.layout = handle::get_optional(info.layout)?;
         gathered.gaussian =
             pnext::find::<PipelineGaussianStateCreateInfoGAURAST>(info.p_next).copied();
+        gathered.approximation =
+            pnext::find::<PipelineGaussianApproximationStateCreateInfoGAURAST>(info.p_next)
+                .copied();
         if let Some(state) = pointer::optional(info.p_dynamic_state) {
             gathered.dynamic = pointer::slice(state.p_dynamic_states, state.dynamic_state_count)?;
         }

@@ -35,12 +35,17 @@ fn unregistered_structures() -> String {
         GaussianCameraGAURAST as Camera,
         PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as Features,
         PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as Properties,
+        PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
         PipelineGaussianStateCreateInfoGAURAST as State,
     };
     [
         (Features::STRUCTURE_TYPE, size_of::<Features<'_>>()),
         (Properties::STRUCTURE_TYPE, size_of::<Properties<'_>>()),
         (State::STRUCTURE_TYPE, size_of::<State<'_>>()),
+        (
+            Approximation::STRUCTURE_TYPE,
+            size_of::<Approximation<'_>>(),
+        ),
         (Camera::STRUCTURE_TYPE, size_of::<Camera<'_>>()),
     ]
     .map(|(structure, size)| format!("{}:{size}", structure.as_raw()))

@@ -4,7 +4,8 @@ use crate::gpu::{Buffer, Gpu, Image};
 use ash::vk;
 use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, GaussianCameraGAURAST,
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 
 pub const WIDTH: u32 = 64;
@@ -63,6 +64,7 @@ pub struct PipelineRequest<'a> {
     pub layout: vk::PipelineLayout,
     pub primitive_restart: bool,
     pub gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'static>>,
+    pub approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'static>>,
 }
 
 impl Default for PipelineRequest<'_> {
@@ -109,6 +111,7 @@ impl Default for PipelineRequest<'_> {
             gaussian: Some(
                 PipelineGaussianStateCreateInfoGAURAST::default().attribute_locations(locations),
             ),
+            approximation: None,
         }
     }
 }
@@ -147,6 +150,7 @@ impl PipelineRequest<'_> {
             .color_attachment_formats(&self.formats)
             .depth_attachment_format(depth_format);
         let mut gaussian = self.gaussian.unwrap_or_default();
+        let mut approximation = self.approximation.unwrap_or_default();
         // SAFETY: see the crate.
         unsafe {
             let layout_info = vk::PipelineLayoutCreateInfo::default();
@@ -173,6 +177,9 @@ impl PipelineRequest<'_> {
                 .push_next(&mut rendering);
             if self.gaussian.is_some() {
                 info = info.push_next(&mut gaussian);
+            }
+            if self.approximation.is_some() {
+                info = info.push_next(&mut approximation);
             }
             let created =
                 gpu.device

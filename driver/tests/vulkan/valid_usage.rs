@@ -7,7 +7,8 @@ use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
     GaussianCameraSourceGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
     GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
-    PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use std::collections::BTreeSet;
 
@@ -28,6 +29,16 @@ fn with(change: impl FnOnce(State) -> State) -> PipelineRequest<'static> {
     PipelineRequest {
         gaussian: request.gaussian.map(change),
         ..request
+    }
+}
+
+fn allowing(exponential_error: f32, contribution_budget: f32) -> PipelineRequest<'static> {
+    let approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
+        .exponential_error(exponential_error)
+        .contribution_budget(contribution_budget);
+    PipelineRequest {
+        approximation: Some(approximation),
+        ..PipelineRequest::default()
     }
 }
 
@@ -77,6 +88,14 @@ fn pipelines() -> Vec<(&'static str, PipelineRequest<'static>)> {
         (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-value",
             with(|s| s.transmittance_floor(1.0)),
+        ),
+        (
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-exponentialError-value",
+            allowing(-0.1, 0.0),
+        ),
+        (
+            "VUID-VkPipelineGaussianApproximationStateCreateInfoGAURAST-contributionBudget-value",
+            allowing(0.0, f32::NAN),
         ),
         (
             "VUID-VkGaussianAttributeLocationsGAURAST-location",
@@ -154,6 +173,7 @@ fn modes() -> Vec<(&'static str, PipelineRequest<'static>)> {
         ),
         ("uniformBufferCamera", with(|s| s.camera_source(buffer))),
         ("mergedDraws", with(|s| s.flags(merge))),
+        ("gaussianApproximation", allowing(1e-3, 0.0)),
         (
             "gaussianInstancing",
             with(|s| s.attribute_locations(s.attribute_locations.first_model_matrix(9))),

@@ -16,6 +16,7 @@
 //! ```
 
 mod device;
+mod draw;
 mod modes;
 mod pipeline;
 pub mod quads;
@@ -33,6 +34,7 @@ use crate::output::Picture;
 use crate::scene::{MAX_SH_DEGREE, Scene, Shape};
 use crate::usage::processor_time;
 use device::{Device, Purpose};
+use draw::{Far, Recorder};
 use gaurast::gaussian_primitive_topology;
 pub use modes::{Geometry, Order, Precision};
 use pipeline::{BINDINGS, GaussianPipeline};
@@ -123,6 +125,7 @@ pub struct Renderer {
 
 /// What a draw may save on: the pipeline's state as far as pictures are the better for it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Settings {
     /// Draw colours with spherical harmonics of at most this degree.
     pub sh_degree: u32,
@@ -136,6 +139,12 @@ pub struct Settings {
     pub geometry: Geometry,
     /// The rasterizer's arithmetic; binary16 is for volumes in another order than the pixels' own.
     pub precision: Precision,
+    /// The greatest relative error of the exponential that alpha is made of.
+    pub exponential_error: f32,
+    /// What the contributions that are left out at a pixel may add up to.
+    pub contribution_budget: f32,
+    /// Gaussians of this view depth or more are drawn at half size.
+    pub far_half: Option<f32>,
 }
 
 impl Default for Settings {
@@ -148,6 +157,9 @@ impl Default for Settings {
             order: Order::Depth,
             geometry: Geometry::Volume,
             precision: Precision::Fp32,
+            exponential_error: 0.0,
+            contribution_budget: 0.0,
+            far_half: None,
         }
     }
 }
@@ -158,6 +170,8 @@ pub struct DeviceScene {
     strides: [u32; BINDINGS],
     stored_degree: u32,
     pipeline: GaussianPipeline,
+    /// How what is far is drawn, if otherwise.
+    far: Option<Far>,
     /// One for each of [`BINDINGS`].
     buffers: [Buffer; BINDINGS],
 }
@@ -178,6 +192,8 @@ pub struct Frame {
 /// Where a frame goes.
 struct Target {
     image: Image,
+    /// Half as wide and high, if anything was drawn at half size.
+    half: Option<Image>,
     readback: Buffer,
 }
 
@@ -242,7 +258,8 @@ impl Renderer {
             count: count as u32,
             strides,
             stored_degree: scene.sh_degree(),
-            pipeline: self.pipeline(strides, scene.sh_degree(), settings)?,
+            pipeline: self.pipeline(strides, scene.sh_degree(), settings, false)?,
+            far: None,
             buffers: [
                 self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
                 self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
@@ -256,7 +273,12 @@ impl Renderer {
     /// # Errors
     /// If Vulkan fails.
     pub fn set(&self, scene: &mut DeviceScene, settings: Settings) -> Result<(), RenderError> {
-        scene.pipeline = self.pipeline(scene.strides, scene.stored_degree, settings)?;
+        let pipeline = |over| self.pipeline(scene.strides, scene.stored_degree, settings, over);
+        let (whole, far) = match settings.far_half {
+            Some(depth) => (pipeline(false)?, Some(Far::new(depth, pipeline(true)?))),
+            None => (pipeline(false)?, None),
+        };
+        (scene.pipeline, scene.far) = (whole, far);
         Ok(())
     }
 
@@ -265,12 +287,13 @@ impl Renderer {
         strides: [u32; BINDINGS],
         stored_degree: u32,
         mut settings: Settings,
+        over: bool,
     ) -> Result<GaussianPipeline, RenderError> {
         settings.sh_degree = settings
             .sh_degree
             .min(stored_degree)
             .min(self.device.max_sh_degree());
-        GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT)
+        GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT, over)
     }
 
     /// A device-local vertex buffer of `bytes`, by way of a staging buffer.
@@ -334,6 +357,9 @@ impl Renderer {
             _ => Target::new(&self.device, width, height)?,
         };
         let target = self.target.insert(target);
+        if scene.far.is_some() && target.half.is_none() {
+            target.half = Some(draw::half_of(&self.device, &target.image)?);
+        }
 
         // A query is not reset in the submission that it begins in, and it spans a whole command
         // buffer, so that counters of any scope will do.
@@ -346,15 +372,12 @@ impl Renderer {
             if let Some(query) = &self.query {
                 query.begin(commands);
             }
-            let gaussian = &self.gaussian;
-            record_draw(
-                &self.device,
-                gaussian,
+            let recorder = Recorder {
+                device: &self.device,
+                gaussian: &self.gaussian,
                 commands,
-                &target.image,
-                scene,
-                camera,
-            );
+            };
+            recorder.record(target, scene, camera);
             if let Some(query) = &self.query {
                 query.end(commands);
             }
@@ -399,8 +422,11 @@ impl Target {
                 device,
                 vk::Extent2D { width, height },
                 COLOR_FORMAT,
-                vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC,
+                vk::ImageUsageFlags::COLOR_ATTACHMENT
+                    | vk::ImageUsageFlags::TRANSFER_SRC
+                    | vk::ImageUsageFlags::TRANSFER_DST,
             )?,
+            half: None,
             readback: Buffer::new(
                 device,
                 bytes,
@@ -408,66 +434,6 @@ impl Target {
                 Memory::HostCached,
             )?,
         })
-    }
-}
-
-/// Clears `image` to nothing and draws `scene` into it.
-fn record_draw(
-    device: &Device,
-    gaussian: &gaussian_primitive_topology::Device,
-    commands: vk::CommandBuffer,
-    image: &Image,
-    scene: &DeviceScene,
-    camera: &Camera,
-) {
-    let area = vk::Rect2D::default().extent(image.extent());
-    let viewport = vk::Viewport::default()
-        .width(area.extent.width as f32)
-        .height(area.extent.height as f32)
-        .max_depth(1.0);
-    let attachment = vk::RenderingAttachmentInfo::default()
-        .image_view(image.view())
-        .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
-        .load_op(vk::AttachmentLoadOp::CLEAR)
-        .store_op(vk::AttachmentStoreOp::STORE);
-    let attachments = [attachment];
-    let rendering = vk::RenderingInfo::default()
-        .render_area(area)
-        .layer_count(1)
-        .color_attachments(&attachments);
-    let to_attachment = image
-        .barrier(
-            vk::ImageLayout::UNDEFINED,
-            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-        )
-        .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE);
-    let buffers = scene.buffers.each_ref().map(Buffer::handle);
-    let raw = device.raw();
-    // SAFETY: the command buffer is recording; image, pipeline and buffers belong to the same
-    // device and live until the submission has ended; the pipeline's dynamic state, vertex
-    // buffers and camera are all set before the draw, whose vertices lie within the buffers.
-    unsafe {
-        raw.cmd_pipeline_barrier(
-            commands,
-            vk::PipelineStageFlags::TRANSFER,
-            vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
-            vk::DependencyFlags::empty(),
-            &[],
-            &[],
-            &[to_attachment],
-        );
-        raw.cmd_begin_rendering(commands, &rendering);
-        raw.cmd_bind_pipeline(
-            commands,
-            vk::PipelineBindPoint::GRAPHICS,
-            scene.pipeline.handle(),
-        );
-        raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
-        raw.cmd_set_viewport(commands, 0, &[viewport]);
-        raw.cmd_set_scissor(commands, 0, &[area]);
-        gaussian.cmd_set_gaussian_camera(commands, &camera.to_vulkan());
-        raw.cmd_draw(commands, scene.count, 1, 0, 0);
-        raw.cmd_end_rendering(commands);
     }
 }
 

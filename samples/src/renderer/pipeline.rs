@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 use gaurast::vk::{
     GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use super::device::Device;
@@ -28,12 +28,13 @@ pub(super) struct GaussianPipeline {
 
 impl GaussianPipeline {
     /// A pipeline for vertex buffers of `strides`, that draws by `settings` (with a degree that is
-    /// stored) into an attachment of `format`.
+    /// stored) into an attachment of `format`, over what it holds or in its place.
     pub(super) fn new(
         device: &Arc<Device>,
         strides: [u32; BINDINGS],
         settings: Settings,
         format: vk::Format,
+        over: bool,
     ) -> Result<Self, RenderError> {
         let raw = device.raw();
         // SAFETY: the structure is valid.
@@ -62,8 +63,13 @@ impl GaussianPipeline {
         let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
         let multisample = vk::PipelineMultisampleStateCreateInfo::default()
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        // No blending: the attachment takes (C, 1 - T) itself.
+        // Without blending the attachment takes (C, 1 - T) itself.
         let attachments = [vk::PipelineColorBlendAttachmentState::default()
+            .blend_enable(over)
+            .src_color_blend_factor(vk::BlendFactor::ONE)
+            .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
+            .src_alpha_blend_factor(vk::BlendFactor::ONE)
+            .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
             .color_write_mask(vk::ColorComponentFlags::RGBA)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
@@ -87,6 +93,9 @@ impl GaussianPipeline {
                     .opacity(3)
                     .first_spherical_harmonics(FIRST_SH),
             );
+        let mut approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
+            .exponential_error(settings.exponential_error)
+            .contribution_budget(settings.contribution_budget);
         let create_info = vk::GraphicsPipelineCreateInfo::default()
             .vertex_input_state(&vertex_input)
             .input_assembly_state(&input_assembly)
@@ -97,6 +106,7 @@ impl GaussianPipeline {
             .dynamic_state(&dynamic)
             .layout(layout)
             .push_next(&mut gaussian)
+            .push_next(&mut approximation)
             .push_next(&mut rendering);
         // SAFETY: the structures are valid and live until the call returns.
         let created = unsafe {

@@ -118,12 +118,18 @@ impl GaussianSet {
             && state.order == GaussianOrder::ViewDepth
             && state.geometry == GaussianGeometry::Volume
             && state.precision == GaussianPrecision::Float32
-            && state.transmittance_floor > 0.0
+            && least_light(state) > 0.0
             // What is tested may not take the light that it could.
             && state.depth_stencil == DepthStencil::default()
             && self.resolve.is_none()
             && !self.bounds.is_empty()
     }
+}
+
+/// What is behind less light than this is not drawn.
+fn least_light(state: &GaussianState) -> f32 {
+    let budget = state.approximation.contribution_budget;
+    state.transmittance_floor.max(budget)
 }
 
 /// The screens of chunks that may be wide enough in the picture, packed.
@@ -195,7 +201,7 @@ impl Light {
             count,
             left: host::filled(1.0, tiles),
             depth: host::filled(f32::INFINITY, tiles),
-            floor: f64::from(state.transmittance_floor) * (1.0 - MARGIN),
+            floor: f64::from(least_light(state)) * (1.0 - MARGIN),
             alphas: [
                 f64::from(state.alpha_ceiling),
                 LEAST_ALPHA.max(f64::from(state.alpha_floor) * (1.0 + MARGIN)),

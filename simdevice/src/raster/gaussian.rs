@@ -15,6 +15,7 @@
 //! A draw that tests depth leaves out, pixel by pixel, the Gaussians whose centre fails against what was stored before
 //! the draw ([`passing`]). What the tests of a whole draw do to a tile's samples is said in [`tile_draw`].
 
+mod approximation;
 mod by_block;
 mod exp2;
 mod half;
@@ -35,9 +36,10 @@ use crate::gaussian::splat::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
 use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
+use approximation::Way;
 use by_block::TileMode;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
-use layer::{Lanes, Layer, block_and_lane, count, lanes_within};
+use layer::{ANY_LIGHT, Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
 use per_pixel::PerPixel;
 use pixels::Reaching;
@@ -75,18 +77,19 @@ pub struct GaussianTile {
     piece: Vec<u32>,
 }
 
-/// What the kernel does about depth; a constant, so that what isn't done costs nothing. Each does what those before it do.
+/// What the kernel does about depth; a constant, so that what isn't done costs nothing. Each from [`NO_DEPTH`] on does what
+/// those from there to it do; before it are those of [`approximation`].
 type DepthMode = u8;
 /// Nothing: it only finishes the pixels that some Gaussian reaches.
 const FIND_REACHED: DepthMode = 0;
 /// It composites.
-const NO_DEPTH: DepthMode = 1;
+const NO_DEPTH: DepthMode = 3;
 /// It leaves out what fails the test.
-const TEST_DEPTH: DepthMode = 2;
+const TEST_DEPTH: DepthMode = 4;
 /// It also finds the median.
-const FIND_MEDIAN: DepthMode = 3;
+const FIND_MEDIAN: DepthMode = 5;
 /// And what the mean is made of.
-const FIND_MEAN: DepthMode = 4;
+const FIND_MEAN: DepthMode = 6;
 
 /// What the two phases need of a Gaussian in this tile.
 #[derive(Clone, Copy, Debug, Default)]
@@ -190,15 +193,17 @@ impl GaussianTile {
             return;
         }
         let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
+        let mode = TileMode::of(draw);
         let task = Task {
             splats: &draw.sorted.splats,
-            mode: TileMode::of(draw),
+            mode,
             list,
             skips: draw.skips,
             trend: draw.depth_trend,
             half_period: draw.half_period,
             corner,
             thresholds: Thresholds::new(draw),
+            way: Way::of(&draw.state, &mode, DEPTH),
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
         let work = match draw.sorted.tiles.stream() {
@@ -227,8 +232,10 @@ impl GaussianTile {
             Counter::BlocksBesideEllipse,
             work.open - work.items - work.blocks_hidden,
         );
+        counters.add(Counter::BlocksLeftOut, work.blocks_left_out);
         let blocks = (work.listed - work.tiles_hidden) * BLOCKS as u64;
-        counters.add(Counter::BlocksSaturated, blocks - work.open);
+        let saturated = blocks - work.open - work.blocks_left_out;
+        counters.add(Counter::BlocksSaturated, saturated);
         counters.add(Counter::PixelContributions, work.contributions);
     }
 
@@ -255,6 +262,7 @@ impl GaussianTile {
                 transmittance_floor: f32::INFINITY,
                 ..Thresholds::new(draw)
             },
+            way: Way::EXACT,
         };
         match draw.sorted.tiles.stream() {
             None => self.composite_list::<FIND_REACHED>(level, &task, LAYER, None),
@@ -275,6 +283,9 @@ impl GaussianTile {
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
         let work = match task.mode {
+            TileMode::Fast if DEPTH == NO_DEPTH && task.way.has_fast_powers() => {
+                self.composite_with_fast_powers(level, task, layer, runs)
+            }
             TileMode::Fast => {
                 dispatch!(level, simd => self.composite::<_, DEPTH>(simd, task, layer, runs))
             }
@@ -321,10 +332,20 @@ impl GaussianTile {
         let end_early = task.skips.has(Skip::Saturated);
         for (number, chunk) in task.list.chunks(CHUNK).enumerate() {
             let open = if end_early {
-                layer.open_blocks()
+                layer.open_blocks(task.way.light)
             } else {
                 ALL_BLOCKS
             };
+            if DEPTH <= NO_DEPTH && end_early && task.way.light != ANY_LIGHT {
+                let left_out = layer.open_blocks(ANY_LIGHT) & !open;
+                // If no block is open, none will be.
+                let of = if open == 0 {
+                    task.list.len() - number * CHUNK
+                } else {
+                    chunk.len()
+                };
+                work.blocks_left_out += u64::from(left_out.count_ones()) * of as u64;
+            }
             if open == 0 {
                 break;
             }
@@ -437,6 +458,7 @@ struct Task<'a> {
     half_period: f64,
     corner: [u32; 2],
     thresholds: Thresholds,
+    way: Way,
 }
 
 impl Task<'_> {
@@ -459,6 +481,7 @@ struct Work {
     contributions: u64,
     tiles_hidden: u64,
     blocks_hidden: u64,
+    blocks_left_out: u64,
     /// Of the hidden, those that end a list, if work is recorded.
     hidden_rest: u32,
 }

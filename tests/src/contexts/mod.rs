@@ -84,6 +84,7 @@ impl Context {
             .per_pixel_order(true)
             .gaussian_2d(true)
             .rasterization_float16(true)
+            .gaussian_approximation(true)
             .orthographic_camera(true)
             .fisheye_camera(true)
             .equirectangular_camera(true)

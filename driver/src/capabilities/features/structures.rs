@@ -269,5 +269,6 @@ features! {
         primitive_order, per_pixel_order, rasterization_float16, opacity_compensation, orthographic_camera,
         fisheye_camera, equirectangular_camera, unscented_projection, gaussian_2d, uniform_buffer_camera,
         merged_draws, gaussian_instancing, gaussian_depth_stencil, gaussian_multisample,
+        gaussian_approximation,
     }
 }

@@ -1,5 +1,6 @@
 //! Pipelines of the Gaussian list topology.
 
+mod approximation;
 mod feature;
 mod validate;
 
@@ -26,7 +27,8 @@ use gaurast::vk::{
 };
 use simdevice::packet::draw::DrawState;
 use simdevice::packet::{
-    GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
+    GaussianApproximation, GaussianGeometry, GaussianLinearization, GaussianOrder,
+    GaussianPrecision, GaussianState,
 };
 use std::sync::Arc;
 
@@ -54,13 +56,17 @@ impl GaussianPipeline {
         validate::stages(info, gaussian, features)?;
         validate::modes(gaussian, features)?;
         validate::values(gaussian)?;
+        let approximation = approximation::of(info, features)?;
         validate::fixed_state(info, features)?;
         let fragments = FixedState::of_gaussians(info)?;
 
         Ok(Self {
             source: source(device, info, gaussian)?,
             resolve: ResolveStage::new(device, info, gaussian, &fragments)?,
-            state: Arc::new(state(gaussian, features, fragments.lower())?),
+            state: Arc::new(GaussianState {
+                approximation,
+                ..state(gaussian, features, fragments.lower())?
+            }),
             dynamic: info.dynamic.iter().copied().filter(is_taken).collect(),
             fixed: fragments,
             viewport: fixed(
@@ -221,6 +227,7 @@ fn state(
         alpha_floor: gaussian.alpha_floor,
         alpha_ceiling: gaussian.alpha_ceiling,
         transmittance_floor: gaussian.transmittance_floor,
+        approximation: GaussianApproximation::default(),
         sample_mask: fragments.sample_mask,
         depth_stencil: fragments.depth_stencil,
         logic_op: fragments.logic_op,

@@ -22,7 +22,8 @@ use ash::vk;
 use compute::{ComputePipeline, StageInfo};
 use fixed::FixedState;
 use gaurast::vk::{
-    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaussian_stages::{ResolveStage, VertexProjection};
 use layout::PipelineLayout;
@@ -175,6 +176,8 @@ pub(crate) struct GraphicsPipelineInfo<'a> {
     pub(crate) color_formats: Vec<vk::Format>,
     /// The extension's structure.
     pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
+    /// The extension's structure of approximations.
+    pub(crate) approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'a>>,
 }
 
 crate::objects! { vk::Pipeline => Pipeline; }

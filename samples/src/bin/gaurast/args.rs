@@ -125,6 +125,20 @@ pub struct RenderArguments {
     #[arg(long, value_enum, default_value_t)]
     pub precision: Precision,
 
+    /// Let the exponential err by at most this, relative to it
+    #[arg(long, value_name = "E", default_value_t = 0.0, value_parser = part)]
+    pub exponential_error: f32,
+
+    /// Leave contributions out that change no pixel by more than this together
+    ///
+    /// In parts of the scene's range of colours, such as 0.004 for one of 255 steps.
+    #[arg(long, value_name = "B", default_value_t = 0.0, value_parser = part)]
+    pub contribution_budget: f32,
+
+    /// Draw what is this far away or farther at half size
+    #[arg(long, value_name = "DEPTH", value_parser = depth)]
+    pub far_half: Option<f32>,
+
     /// Count also what the simulated hardware would spend: cycles, stalls, energy
     ///
     /// `gaurast simulate` tells more, of any hardware.
@@ -173,6 +187,9 @@ impl Default for RenderArguments {
             order: Order::default(),
             geometry: Geometry::default(),
             precision: Precision::default(),
+            exponential_error: 0.0,
+            contribution_budget: 0.0,
+            far_half: None,
             counters: false,
             quiet: false,
             output: vec![DEFAULT_OUTPUT.into()],
@@ -218,6 +235,20 @@ impl FromStr for Size {
         };
         Ok(Self([side(width)?, side(height)?]))
     }
+}
+
+fn part(text: &str) -> Result<f32, &'static str> {
+    text.parse()
+        .ok()
+        .filter(|part| (0.0..=1.0).contains(part))
+        .ok_or("it is at least 0 and at most 1")
+}
+
+fn depth(text: &str) -> Result<f32, &'static str> {
+    text.parse()
+        .ok()
+        .filter(|depth: &f32| depth.is_finite() && *depth > 0.0)
+        .ok_or("it is more than 0")
 }
 
 fn field_of_view(text: &str) -> Result<f64, &'static str> {

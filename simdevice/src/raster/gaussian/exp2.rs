@@ -17,20 +17,56 @@ pub(super) const POWER_OF_TWO: [f32; 6] = [
     1.0,
 ];
 
+/// A polynomial for powers of two of fewer terms.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Powers<const TERMS: usize> {
+    /// Fitted to 2^f for f in [-1/2, 1/2] in relative error, highest power first.
+    pub(super) coefficients: [f32; TERMS],
+    /// No result's relative error is greater, rounding included.
+    pub(super) error: f32,
+}
+
+/// Of degree 3.
+pub(super) const CUBIC: Powers<4> = Powers {
+    coefficients: [0.055_171_67, 0.242_611_13, 0.693_260_97, 0.999_928_06],
+    error: 7.6e-5,
+};
+
+/// Of degree 2.
+pub(super) const QUADRATIC: Powers<3> = Powers {
+    coefficients: [0.238_428_94, 0.703_448, 1.000_443_1],
+    error: 1.73e-3,
+};
+
+impl<const TERMS: usize> Powers<TERMS> {
+    /// As [`exp2_of_negated`], with this polynomial.
+    #[inline(always)]
+    pub(super) fn of_negated<S: Simd>(&self, simd: S, x: f32x16<S>) -> f32x16<S> {
+        by_polynomial(simd, x, &self.coefficients)
+    }
+}
+
 /// 2 to the power of `-x`, for `x` between -126 and 126; elsewhere the result means nothing. Error: at most 1.9 ulp with
 /// fused multiply-add, 2.1 ulp without (measured).
-///
-/// `-x = n + f` with `f` in [-1/2, 1/2], and 2^f is [`POWER_OF_TWO`].
 #[inline(always)]
 pub(super) fn exp2_of_negated<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
+    by_polynomial(simd, x, &POWER_OF_TWO)
+}
+
+/// 2 to the power of `-x = n + f` with `f` in [-1/2, 1/2], by a polynomial for 2^f.
+#[inline(always)]
+fn by_polynomial<S: Simd, const TERMS: usize>(
+    simd: S,
+    x: f32x16<S>,
+    coefficients: &[f32; TERMS],
+) -> f32x16<S> {
     let constant = |value| f32x16::splat(simd, value);
     // Adding 1.5 * 2^23 rounds to an integer, which then stands in the low bits.
     let shifter = constant(12_582_912.0);
     let shifted = shifter - x;
     let f = (shifter - shifted) - x;
-    let [first, rest @ ..] = POWER_OF_TWO;
-    let mut p = constant(first);
-    for coefficient in rest {
+    let mut p = constant(coefficients[0]);
+    for &coefficient in &coefficients[1..] {
         p = p.mul_add(f, constant(coefficient));
     }
     let exponent = bits_of(shifted) << 23;

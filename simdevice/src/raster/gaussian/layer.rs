@@ -27,6 +27,25 @@ pub(super) struct Layer {
 /// What no layer leaves anything of, neither more nor less than a floor.
 const UNTOUCHED: f32 = f32::NEG_INFINITY;
 
+/// A transmittance that is compared with pixels': its bits, which as integers are in the order of what they stand for, and
+/// less than zero where a pixel is finished.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Light(i32);
+
+/// Every pixel that is not finished has more.
+pub(super) const ANY_LIGHT: Light = Light(-1);
+
+impl Light {
+    /// A transmittance; with none at all, a pixel whose own is zero is not finished yet.
+    pub(super) fn of(transmittance: f32) -> Self {
+        if transmittance > 0.0 {
+            Self(transmittance.to_bits() as i32)
+        } else {
+            ANY_LIGHT
+        }
+    }
+}
+
 /// Lanes by block.
 pub(super) type Lanes = [u32; BLOCKS];
 
@@ -104,14 +123,14 @@ impl Layer {
         ]
     }
 
-    /// Bit `block` tells that a pixel of the block is not finished.
+    /// Bit `block` tells that a pixel of the block is not finished and has more than some light.
     #[inline(always)]
-    pub(super) fn open_blocks(&self) -> u64 {
+    pub(super) fn open_blocks(&self, Light(light): Light) -> u64 {
         let mut open = 0;
         for (block, lanes) in self.transmittance.iter().enumerate() {
             let any = lanes
                 .iter()
-                .fold(false, |any, &t| any | (t.to_bits() >> 31 == 0));
+                .fold(false, |any, &t| any | (t.to_bits() as i32 > light));
             open |= u64::from(any) << block;
         }
         open

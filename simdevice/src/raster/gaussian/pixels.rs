@@ -1,6 +1,6 @@
 //! Phase 2 of the tile kernel: Gaussians through the pixels of a block, which stay in registers.
 
-use super::exp2::exp2_of_negated;
+use super::approximation::power;
 use super::layer::Layer;
 use super::passing::Passing;
 use super::{
@@ -155,7 +155,7 @@ impl Layer {
         let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
         let nothing = f32x16::splat(simd, thresholds.nothing);
         // Where alpha has fallen too far, the power means nothing.
-        let alpha = exp2_of_negated(simd, fall).min(ceiling);
+        let alpha = power::<_, DEPTH>(simd, fall).min(ceiling);
         let weight = t * reached.select(alpha, nothing);
         let rest = t - weight;
         // A finished pixel's transmittance is negative, and what is left of it fails like one below the floor.

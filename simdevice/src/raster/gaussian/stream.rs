@@ -27,7 +27,9 @@ impl GaussianTile {
         let (mut work, mut from) = (Work::default(), 0);
         let mut piece = std::mem::take(&mut self.piece);
         loop {
-            if task.skips.has(Skip::Saturated) && self.layers[layer].open_blocks() == 0 {
+            if task.skips.has(Skip::Saturated)
+                && self.layers[layer].open_blocks(task.way.light) == 0
+            {
                 break;
             }
             stream.next(tile, &mut from, most, &mut piece);
@@ -55,6 +57,7 @@ impl Work {
         self.contributions += more.contributions;
         self.tiles_hidden += more.tiles_hidden;
         self.blocks_hidden += more.blocks_hidden;
+        self.blocks_left_out += more.blocks_left_out;
         self.hidden_rest += more.hidden_rest;
     }
 }

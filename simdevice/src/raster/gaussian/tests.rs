@@ -1,9 +1,10 @@
+mod approximation;
 mod half;
 mod per_pixel;
 mod streamed;
 mod whole_draws;
 
-use super::exp2::{POWER_OF_TWO, exp2_of_negated};
+use super::exp2::{CUBIC, POWER_OF_TWO, QUADRATIC, exp2_of_negated};
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;
@@ -168,10 +169,18 @@ fn naive_sample(
 ) -> Naive {
     let mut out = Naive::default();
     let mul_add = |a: f32, b: f32, c: f32| if fused { a.mul_add(b, c) } else { a * b + c };
+    let allowed = draw.state.approximation.exponential_error;
+    let polynomial: &[f32] = if allowed >= QUADRATIC.error {
+        &QUADRATIC.coefficients
+    } else if allowed >= CUBIC.error {
+        &CUBIC.coefficients
+    } else {
+        &POWER_OF_TWO
+    };
     let power = |x: f32| {
         let n = (x + 12_582_912.0) - 12_582_912.0;
         let f = x - n;
-        let p = POWER_OF_TWO.iter().fold(0.0, |p, &c| mul_add(p, f, c));
+        let p = polynomial.iter().fold(0.0, |p, &c| mul_add(p, f, c));
         f32::from_bits(p.to_bits().wrapping_add_signed((n as i32) << 23))
     };
     if draw.state.precision == GaussianPrecision::Float16 {

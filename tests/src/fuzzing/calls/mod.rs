@@ -107,7 +107,8 @@ impl Run {
                 .unscented_projection(true)
                 .gaussian_2d(true)
                 .gaussian_depth_stencil(true)
-                .gaussian_multisample(true);
+                .gaussian_multisample(true)
+                .gaussian_approximation(true);
             let mut core = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
             let features = instance.get_physical_device_features(physical);
             let info = vk::DeviceCreateInfo::default()

@@ -45,6 +45,8 @@ pub(super) const INSTANCING: Feature = feature!("gaussian_instancing", "gaussian
 pub(super) const DEPTH_STENCIL: Feature =
     feature!("gaussian_depth_stencil", "gaussianDepthStencil");
 pub(super) const MULTISAMPLE: Feature = feature!("gaussian_multisample", "gaussianMultisample");
+pub(super) const APPROXIMATION: Feature =
+    feature!("gaussian_approximation", "gaussianApproximation");
 
 /// Refuses `what` unless its feature is enabled, which one that the device lacks never is.
 pub(super) fn require(

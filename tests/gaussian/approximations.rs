@@ -1,0 +1,199 @@
+//! What a pipeline lets the device leave inexact, against the binary64 oracle: no further off than the extension says,
+//! but off, and the same for any number of threads.
+
+use gaurast::vk::{
+    PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
+    PipelineGaussianStateCreateInfoGAURAST as State,
+};
+use gaurast_samples::scene::Scene;
+use gaurast_tests::contexts::{
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, simd_levels,
+};
+use gaurast_tests::oracle::spherical_harmonics::{coefficient_count, color};
+use gaurast_tests::oracle::{OracleState, Reference, render_bounded};
+use gaurast_tests::scenes::{self, Gaussian, SceneBuffers};
+
+/// Not whole tiles.
+const SIZE: [u32; 2] = [203, 139];
+
+/// What the contract allows without any approximation.
+const CONTRACT: f64 = 5e-6;
+
+/// A wall of faint discs, as wide as the picture, layer behind layer; bright and dark ones by turns.
+fn layers() -> SceneBuffers {
+    let discs = (0..300).map(|layer| {
+        let look = if layer % 2 == 0 { 1.5 } else { -1.5 };
+        Gaussian {
+            position: [0.0, 0.0, 3.0 + 0.01 * layer as f32],
+            scale: [3.0, 3.0, 0.01],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            opacity: 0.02 + 0.0002 * layer as f32,
+            sh: vec![[look, 0.0, -look]],
+        }
+    });
+    SceneBuffers::new(0, discs)
+}
+
+/// The generated scene of the benchmarks, before the camera of the others.
+fn benchmark() -> SceneBuffers {
+    let mut scene = SceneBuffers::from(&Scene::benchmark(1, 20_000));
+    for [_, _, z] in &mut scene.positions {
+        *z += 6.0;
+    }
+    scene
+}
+
+fn all_scenes() -> [(&'static str, SceneBuffers); 4] {
+    [
+        ("layers", layers()),
+        ("benchmark", benchmark()),
+        ("cloud", scenes::cloud(21, 3000, 1)),
+        ("awkward", scenes::awkward(22, 200, 1)),
+    ]
+}
+
+/// A picture, with the approximation's structure if that is given.
+fn draw(context: &Context, scene: &SceneBuffers, allowed: Option<[f32; 2]>) -> Vec<[f32; 4]> {
+    let [error, budget] = allowed.unwrap_or_default();
+    let approximation = Approximation::default()
+        .exponential_error(error)
+        .contribution_budget(budget);
+    let mut state = State::default();
+    if allowed.is_some() {
+        state.p_next = (&raw const approximation).cast();
+    }
+    let options = PipelineOptions {
+        state,
+        ..PipelineOptions::new(scene.degree)
+    };
+    let pipeline = Pipeline::new(context, &options);
+    let on_device = DeviceScene::new(context, scene);
+    let target = Target::new(context, options.format, SIZE);
+    context.run(|commands| {
+        commands.pass(&target, &Pass::clear([0.0; 4]), || {
+            let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
+            commands.bind(&pipeline, &on_device, &camera);
+            commands.draw([on_device.count, 1, 0, 0]);
+        });
+    });
+    assert_eq!(context.messages(), []);
+    target.read()
+}
+
+fn reference(scene: &SceneBuffers) -> Reference {
+    let camera = scenes::camera(SIZE[0], SIZE[1]);
+    render_bounded(
+        &scene.as_oracle(),
+        &camera,
+        &OracleState::from(&State::default()),
+    )
+}
+
+fn context(threads: usize) -> Context {
+    Context::embedded(&Settings {
+        threads: Some(threads),
+        ..Settings::default()
+    })
+}
+
+/// How far each pixel lies outside of the oracle's envelope, where `range` is the range of colours: of it for colours,
+/// as it is for alpha.
+fn distances(image: &[[f32; 4]], reference: &Reference, range: f64) -> Vec<f64> {
+    let distance = |(index, pixel): (usize, &[f32; 4])| {
+        let (least, greatest) = reference.envelope(index);
+        (0..4)
+            .map(|channel| {
+                let value = f64::from(pixel[channel]);
+                let off = (least[channel] - value).max(value - greatest[channel]);
+                let rounding = CONTRACT * range.max(1.0);
+                (off - rounding).max(0.0) / if channel < 3 { range } else { 1.0 }
+            })
+            .fold(0.0, f64::max)
+    };
+    image.iter().enumerate().map(distance).collect()
+}
+
+/// The greatest component of a Gaussian's colour; black is behind all, and none is less.
+fn range(scene: &SceneBuffers) -> f64 {
+    let coefficients = coefficient_count(scene.degree);
+    let eye = scenes::camera(SIZE[0], SIZE[1]).eye;
+    let colors = (scene.positions.iter()).zip(scene.sh.chunks(coefficients));
+    colors
+        .flat_map(|(position, sh)| {
+            let towards = std::array::from_fn(|axis| f64::from(position[axis]) - eye[axis]);
+            let length = f64::hypot(f64::hypot(towards[0], towards[1]), towards[2]);
+            color(scene.degree, towards.map(|axis| axis / length), sh)
+        })
+        .filter(|component| component.is_finite())
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn pictures_are_no_further_off_than_is_allowed() {
+    let context = context(2);
+    let state = State::default();
+    // Where a pixel is finished before the Gaussian that would leave less than the floor, so much light may be left.
+    let finished = f64::from(state.transmittance_floor) / (1.0 - f64::from(state.alpha_ceiling));
+    for (name, scene) in all_scenes() {
+        let (reference, range) = (reference(&scene), range(&scene));
+        let exact = draw(&context, &scene, None);
+        for allowed @ [error, budget] in [
+            [1e-4, 0.0],
+            [2e-3, 0.0],
+            [0.0, 1.0 / 255.0],
+            [0.0, 16.0 / 255.0],
+            [2e-3, 4.0 / 255.0],
+        ] {
+            let image = draw(&context, &scene, Some(allowed));
+            let name = format!("{name}, {allowed:?}");
+            assert!(image != exact, "{name}: nothing is approximated");
+            let bound = f64::from(error) + f64::from(budget);
+            let distances = distances(&image, &reference, range);
+            let worst = distances.iter().copied().fold(0.0, f64::max);
+            eprintln!("{name}: {worst:e} of {bound:e}");
+            let flipped = distances.iter().filter(|distance| **distance > bound);
+            // Only powers that err decide otherwise when a pixel is finished, and at few pixels.
+            let (flips, most) = if error > 0.0 {
+                (image.len() / 100, bound + finished)
+            } else {
+                (0, bound)
+            };
+            assert!(
+                flipped.count() <= flips,
+                "{name}: {worst:e} exceeds {bound:e}"
+            );
+            assert!(worst <= most, "{name}: {worst:e} exceeds {most:e}");
+        }
+    }
+}
+
+#[test]
+fn what_allows_nothing_is_as_without() {
+    let context = context(2);
+    for (name, scene) in all_scenes() {
+        let without = draw(&context, &scene, None);
+        assert!(draw(&context, &scene, Some([0.0; 2])) == without, "{name}");
+        // Below what the device has a cheaper way for.
+        assert!(
+            draw(&context, &scene, Some([1e-6, 0.0])) == without,
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn threads_change_nothing() {
+    let allowed = Some([2e-3, 4.0 / 255.0]);
+    let scene = scenes::cloud(21, 3000, 1);
+    for simd in simd_levels() {
+        let picture = |threads| {
+            let context = Context::embedded(&Settings {
+                simd: Some(simd),
+                threads: Some(threads),
+                ..Settings::default()
+            });
+            draw(&context, &scene, allowed)
+        };
+        assert!(picture(1) == picture(3), "{simd}");
+    }
+}
