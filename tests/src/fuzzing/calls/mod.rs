@@ -195,10 +195,7 @@ impl Run {
 
     /// What the driver said of the loss of the device.
     fn reason(&self) -> String {
-        let messages = self
-            .messages
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let messages = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
         let said = messages.iter().find(|it| it.id == "GAURAST-device-lost");
         said.map_or_else(|| "nothing was said".to_owned(), |it| it.text.clone())
     }
