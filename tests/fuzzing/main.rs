@@ -110,7 +110,10 @@ fn calls_succeed_or_fail() {
         succeeded += ended.succeeded;
         failed += ended.failed;
         submitted += ended.submitted;
-        lost += u32::from(ended.lost);
+        if let Some(reason) = ended.lost {
+            println!("{reason}");
+            lost += 1;
+        }
     });
     println!("{succeeded} succeeded, {failed} failed, {submitted} submitted, {lost} lost");
     assert!(succeeded > failed && submitted > 0);

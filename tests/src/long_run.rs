@@ -97,9 +97,9 @@ impl Scene {
 pub struct Report {
     /// Frames that were drawn.
     pub frames: usize,
-    /// Bytes of memory that the process held after a quarter of them and at the end; nothing where the system doesn't
-    /// tell.
-    pub memory: Option<[u64; 2]>,
+    /// Bytes of memory that the process held before the first of them, after each quarter and at most; nothing where the
+    /// system doesn't tell.
+    pub memory: Option<[u64; 6]>,
 }
 
 /// Draws so many frames; `progress` hears the number of each.
@@ -115,7 +115,7 @@ pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
     let first: Vec<_> = scenes.iter().map(|scene| scene.draw(&context)).collect();
     assert!(first.iter().flatten().any(|pixel| pixel[3] > 0.0));
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut early = None;
+    let mut held = vec![memory("VmRSS:")];
     for frame in 0..frames {
         let number = rng.random_range(0..SCENES);
         let drawn = scenes[number].draw(&context);
@@ -124,31 +124,28 @@ pub fn run(frames: usize, mut progress: impl FnMut(usize)) -> Report {
             .clone()
             .all(|(a, b)| a.map(f32::to_bits) == b.map(f32::to_bits));
         assert!(same, "scene {number} is another in frame {frame}");
-        if frame == frames / 4 {
-            early = resident();
+        if (1..=4).any(|quarter| frame + 1 == quarter * frames / 4) {
+            held.push(memory("VmRSS:"));
         }
         progress(frame);
     }
-    let memory = early.zip(resident());
-    if let Some((early, late)) = memory {
+    held.push(memory("VmHWM:"));
+    let held: Option<Vec<_>> = held.into_iter().collect();
+    let memory = held.and_then(|held| <[u64; 6]>::try_from(held).ok());
+    if let Some([_, early, .., late, _]) = memory {
         assert!(
             late <= early + (16 << 20),
             "memory grew from {early} to {late} bytes"
         );
     }
     assert!(context.messages().is_empty(), "nothing went wrong");
-    Report {
-        frames,
-        memory: memory.map(|(early, late)| [early, late]),
-    }
+    Report { frames, memory }
 }
 
-/// Bytes of memory that the process holds, as Linux tells.
-fn resident() -> Option<u64> {
+/// Bytes of memory that the process holds (`VmRSS:`) or has held at most (`VmHWM:`), as Linux tells.
+fn memory(what: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmRSS:"))?;
+    let line = status.lines().find_map(|line| line.strip_prefix(what))?;
     let kibibytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
     Some(kibibytes * 1024)
 }

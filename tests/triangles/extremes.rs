@@ -134,7 +134,9 @@ fn grounds_reach_from_the_eye_to_the_horizon() {
 #[test]
 fn corners_far_outside_move_no_edge() {
     let Some(gpu) = device() else { return };
-    for far in [1.0, 1.5, 63.0, 256.0, 511.9, 1e4, 3e5, 1e9, 1e12f32] {
+    for far in [
+        1.0, 1.5, 63.0, 256.0, 511.9, 1e4, 3e5, 1e9, 1e12, 1e19, 1e20, 1e30, 1e38, 3.4e38f32,
+    ] {
         let corner = |x: f32, y: f32, value| vertex([x, y, 0.5, 1.0], value);
         let halves = |value: [f32; 2]| {
             let upper = [[-far, -far], [far, far], [far, -far]];
@@ -153,6 +155,35 @@ fn corners_far_outside_move_no_edge() {
                 std::cmp::Ordering::Equal => &[1.0, 4.0],
             };
             assert!(expected.contains(value), "({x}, {y}) of {far:e}: {value}");
+        }
+    }
+}
+
+/// A triangle whose sides are ever so far outside the picture, none of them along an axis, covers all of it, and what it
+/// varies is what it is in the middle, where its corners' shares are known.
+#[test]
+fn sides_far_outside_leave_no_hole() {
+    let Some(gpu) = device() else { return };
+    for far in [4.0, 1e3, 1e9, 1e19, 1e20, 1e30, 1e38, 3.4e38f32] {
+        let corners = [[-1.0, -1.0], [1.0, -0.9], [0.1, 1.0f32]];
+        let corner = |number: usize| {
+            let [x, y] = corners[number].map(|coordinate| coordinate * far);
+            vertex([x, y, 0.5, 1.0], [1.0, 2.0, 4.0][number])
+        };
+        // The shares of the three corners in the middle, from the areas of the triangles between it and each side.
+        let area = |a: usize, b: usize| {
+            let [[ax, ay], [bx, by]] = [corners[a], corners[b]].map(|it| it.map(f64::from));
+            ax * by - ay * bx
+        };
+        let [a, b, c] = [area(1, 2), area(2, 0), area(0, 1)];
+        let expected = (a + 2.0 * b + 4.0 * c) / (a + b + c);
+        let whole = [0, 1, 2].map(corner);
+        let target = TargetOptions::of(FORMAT);
+        let image = draw(gpu, &target, &PipelineOptions::default(), &whole);
+        let slope = 8.0 / f64::from(far);
+        for value in image {
+            let error = (f64::from(value) - expected).abs();
+            assert!(error <= slope + 1e-5, "{far:e}: {value} is not {expected}");
         }
     }
 }

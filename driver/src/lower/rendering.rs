@@ -133,6 +133,22 @@ fn check_resolve(attachment: &ImageView, view: &ImageView) -> Result<(), Error> 
     ))
 }
 
+/// The packet that begins rendering, once its attachments are known to have as many samples as one another: the device
+/// would be lost over them, too late to say which command was wrong.
+fn begin(rendering: Rendering) -> Result<Packet, Error> {
+    let single = [&rendering.depth, &rendering.stencil];
+    let attachments = rendering.color.iter().chain(single).flatten();
+    let samples = attachments.map(|attachment| attachment.view.image.desc.samples);
+    let samples: Vec<_> = samples.collect();
+    if let Some(pair) = samples.windows(2).find(|pair| pair[0] != pair[1]) {
+        return Err(Error::usage(
+            "VUID-VkRenderingInfo-multisampledRenderToSingleSampled-06857",
+            format!("an attachment has {} samples, another {}", pair[0], pair[1]),
+        ));
+    }
+    Ok(Packet::BeginRendering(Box::new(rendering)))
+}
+
 /// A render pass that has begun, with what it renders to.
 #[derive(Clone)]
 pub(crate) struct BegunPass {
@@ -152,7 +168,7 @@ impl BegunPass {
     /// The packet that begins a subpass.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the pass has no such subpass or a view is missing.
+    /// [`Error::Usage`] if the pass has no such subpass, a view is missing, or views cannot be attachments of one subpass.
     pub(crate) fn subpass(&self, index: usize) -> Result<Packet, Error> {
         let Some(subpass) = self.render_pass.subpasses.get(index) else {
             return Err(Error::usage(
@@ -187,13 +203,13 @@ impl BegunPass {
                 .map(|number| self.attachment(index, number, aspect, ops, resolve))
                 .transpose()
         };
-        Ok(Packet::BeginRendering(Box::new(Rendering {
+        begin(Rendering {
             area: self.area,
             layer_count: self.layers,
             color: color.collect::<Result<_, _>>()?,
             depth: depth_stencil(Aspect::Depth, AttachmentDescription::main)?,
             stencil: depth_stencil(Aspect::Stencil, AttachmentDescription::stencil)?,
-        })))
+        })
     }
 
     /// The packets that clear what a subpass reads before anything was rendered to it.
@@ -341,7 +357,7 @@ impl DynamicRendering {
     /// The packet that begins it.
     ///
     /// # Errors
-    /// [`Error::Usage`] for operations that Vulkan does not have.
+    /// [`Error::Usage`] for operations that Vulkan does not have and for views that cannot be attachments together.
     pub(crate) fn packet(&self) -> Result<Packet, Error> {
         let optional = |attachment: &Option<DynamicAttachment>, aspect| {
             attachment
@@ -349,7 +365,7 @@ impl DynamicRendering {
                 .map(|attachment| self.attachment(attachment, aspect))
                 .transpose()
         };
-        Ok(Packet::BeginRendering(Box::new(Rendering {
+        begin(Rendering {
             area: rect(self.area),
             layer_count: self.layers,
             color: self
@@ -359,7 +375,7 @@ impl DynamicRendering {
                 .collect::<Result<_, _>>()?,
             depth: optional(&self.depth, Aspect::Depth)?,
             stencil: optional(&self.stencil, Aspect::Stencil)?,
-        })))
+        })
     }
 
     /// Between suspension and resumption attachments are in memory.

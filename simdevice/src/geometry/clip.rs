@@ -1,5 +1,6 @@
-//! Clipping in homogeneous coordinates. Where an edge meets a plane is always computed from the vertex inside to the
-//! one outside, so that polygons which share the edge agree on it bit for bit.
+//! Clipping in homogeneous coordinates. Where an edge of the primitive meets a plane is always computed from the edge's
+//! corners, in a form that gives the same whichever comes first, so that polygons which share the edge agree on it bit
+//! for bit; and from products that are exact, so that an edge whose corners are ever so far outside stays where it is.
 
 use super::viewport::{LEAST_W, Transform};
 use crate::packet::draw::MAX_CLIP_CULL_DISTANCES;
@@ -48,6 +49,9 @@ const FRUSTUM: [Plane; PLANES] = [
     Plane::Guard(3),
 ];
 
+/// A primitive's corners in clip space, as they were given: numbers of binary32.
+type Corners = [[f64; 4]; 3];
+
 /// What a primitive is clipped by.
 pub(super) struct Clipper<'a> {
     pub transform: &'a Transform,
@@ -74,7 +78,10 @@ impl Clipper<'_> {
             Plane::Near => z,
             Plane::Far => w - z,
             Plane::LeastW => w - f64::from(LEAST_W),
-            Plane::Guard(side) => self.transform.guard_distances(vertex.position)[side],
+            Plane::Guard(side) => {
+                let [across, by_w] = self.transform.guard_plane(side);
+                across * vertex.position[side / 2] + by_w * w
+            }
             Plane::User(index) => {
                 let part = |corner: usize| {
                     vertex.weights[corner] * f64::from(self.distances[corner][index])
@@ -84,44 +91,78 @@ impl Clipper<'_> {
         }
     }
 
-    /// Where the edge between two vertices, at these distances, meets the plane.
-    fn meet(
-        &self,
-        plane: Plane,
-        inside: (&ClipVertex, f64),
-        outside: (&ClipVertex, f64),
-    ) -> ClipVertex {
-        let (a, b) = (inside.0, outside.0);
-        let t = inside.1 / (inside.1 - outside.1);
-        let between = |a: f64, b: f64| a + t * (b - a);
-        let mut new = ClipVertex {
-            position: std::array::from_fn(|i| between(a.position[i], b.position[i])),
-            weights: std::array::from_fn(|i| between(a.weights[i], b.weights[i])),
-            edge: false,
-        };
+    /// Where the edge between two vertices of which only one is inside the plane meets it.
+    fn meet(&self, plane: Plane, corners: &Corners, a: &ClipVertex, b: &ClipVertex) -> ClipVertex {
+        let of_primitive = (0..3).find(|&other| a.weights[other] == 0.0 && b.weights[other] == 0.0);
+        let on_edge = of_primitive
+            .map(|other| self.meet_edge(plane, corners, [(other + 1) % 3, (other + 2) % 3]));
+        let is_finite = |it: &ClipVertex| it.position.into_iter().all(f64::is_finite);
+        let mut new = on_edge.filter(is_finite).unwrap_or_else(|| {
+            let (at_a, at_b) = (self.distance(plane, a), self.distance(plane, b));
+            let t = at_a / (at_a - at_b);
+            let between = |a: f64, b: f64| a + t * (b - a);
+            ClipVertex {
+                position: std::array::from_fn(|i| between(a.position[i], b.position[i])),
+                weights: std::array::from_fn(|i| between(a.weights[i], b.weights[i])),
+                edge: false,
+            }
+        });
         // What rounding may have moved off the plane.
         let position = &mut new.position;
         match plane {
             Plane::Near => position[2] = 0.0,
             Plane::Far => position[2] = position[3],
             Plane::LeastW => position[3] = LEAST_W.into(),
-            Plane::Guard(_) | Plane::User(_) => {}
+            Plane::Guard(side) => {
+                let axis = side / 2;
+                let [across, by_w] = self.transform.guard_plane(side);
+                if across != 0.0 {
+                    position[axis] = -by_w * position[3] / across;
+                }
+            }
+            Plane::User(_) => {}
         }
         new
     }
 
+    /// Where the edge between two corners p and q meets the plane: (p_i D(q) - q_i D(p)) / (D(q) - D(p)), with the
+    /// distance D written out, since it has the corners' magnitude and would round away where between them the plane is.
+    /// What is left are differences of products of two binary32 numbers, which are exact here.
+    fn meet_edge(&self, plane: Plane, corners: &Corners, [p, q]: [usize; 2]) -> ClipVertex {
+        let [at_p, at_q] =
+            [p, q].map(|corner| self.distance(plane, &ClipVertex::at(corners, corner)));
+        let both = at_q - at_p;
+        let (a, b) = (&corners[p], &corners[q]);
+        let crossed = |i: usize, j: usize| a[i] * b[j] - b[i] * a[j];
+        let position = |i: usize| match plane {
+            Plane::Near => crossed(i, 2),
+            Plane::Far => crossed(i, 3) - crossed(i, 2),
+            Plane::LeastW => crossed(i, 3) - f64::from(LEAST_W) * (a[i] - b[i]),
+            Plane::Guard(side) => {
+                let [across, by_w] = self.transform.guard_plane(side);
+                across * crossed(i, side / 2) + by_w * crossed(i, 3)
+            }
+            Plane::User(_) => a[i] * at_q - b[i] * at_p,
+        };
+        let mut weights = [0.0; 3];
+        weights[p] = at_q / both;
+        weights[q] = -at_p / both;
+        ClipVertex {
+            position: std::array::from_fn(|i| position(i) / both),
+            weights,
+            edge: false,
+        }
+    }
+
     /// Clips a triangle. Less than three vertices are left of one that is invisible.
     pub(super) fn triangle(&self, corners: [[f32; 4]; 3]) -> Polygon {
+        let corners = corners.map(|position| position.map(f64::from));
         let mut polygon = Polygon::default();
-        for (corner, position) in corners.into_iter().enumerate() {
-            polygon.push(ClipVertex {
-                position: position.map(f64::from),
-                weights: std::array::from_fn(|i| if i == corner { 1.0 } else { 0.0 }),
-                edge: true,
-            });
+        for corner in 0..3 {
+            polygon.push(ClipVertex::at(&corners, corner));
         }
         for plane in self.planes() {
-            polygon = self.cut(&polygon, plane);
+            polygon = self.cut(&polygon, &corners, plane);
             if polygon.len < 3 {
                 break;
             }
@@ -129,7 +170,7 @@ impl Clipper<'_> {
         polygon
     }
 
-    fn cut(&self, polygon: &Polygon, plane: Plane) -> Polygon {
+    fn cut(&self, polygon: &Polygon, corners: &Corners, plane: Plane) -> Polygon {
         let vertices = polygon.vertices();
         let distance = |vertex: &ClipVertex| self.distance(plane, vertex);
         let mut out = Polygon::default();
@@ -146,13 +187,13 @@ impl Clipper<'_> {
             if here.1 >= 0.0 {
                 out.push(*here.0);
                 if next.1 < 0.0 {
-                    let mut new = self.meet(plane, here, next);
+                    let mut new = self.meet(plane, corners, here.0, next.0);
                     // The volume's own planes leave no outline, as if nothing had been clipped.
                     new.edge = matches!(plane, Plane::User(_));
                     out.push(new);
                 }
             } else if next.1 >= 0.0 {
-                let mut new = self.meet(plane, next, here);
+                let mut new = self.meet(plane, corners, next.0, here.0);
                 new.edge = here.0.edge;
                 out.push(new);
             }
@@ -163,19 +204,16 @@ impl Clipper<'_> {
 
     /// Clips a line; `None` if nothing is left of it.
     pub(super) fn line(&self, ends: [[f32; 4]; 2]) -> Option<[ClipVertex; 2]> {
-        let end = |corner: usize| ClipVertex {
-            position: ends[corner].map(f64::from),
-            weights: std::array::from_fn(|i| if i == corner { 1.0 } else { 0.0 }),
-            edge: false,
-        };
-        let mut line = [end(0), end(1)];
+        let [a, b] = ends.map(|position| position.map(f64::from));
+        let corners = [a, b, [0.0; 4]];
+        let mut line = [0, 1].map(|end| ClipVertex::at(&corners, end));
         for plane in self.planes() {
             let [a, b] = line;
             let (at_a, at_b) = (self.distance(plane, &a), self.distance(plane, &b));
             match (at_a >= 0.0, at_b >= 0.0) {
                 (true, true) => {}
-                (true, false) => line[1] = self.meet(plane, (&a, at_a), (&b, at_b)),
-                (false, true) => line[0] = self.meet(plane, (&b, at_b), (&a, at_a)),
+                (true, false) => line[1] = self.meet(plane, &corners, &a, &b),
+                (false, true) => line[0] = self.meet(plane, &corners, &b, &a),
                 (false, false) => return None,
             }
         }
@@ -199,6 +237,15 @@ impl Polygon {
 }
 
 impl ClipVertex {
+    /// A corner of the primitive.
+    fn at(corners: &Corners, corner: usize) -> Self {
+        Self {
+            position: corners[corner],
+            weights: std::array::from_fn(|i| if i == corner { 1.0 } else { 0.0 }),
+            edge: true,
+        }
+    }
+
     /// The corner that it is, if it isn't new.
     pub(super) fn corner(&self) -> Option<usize> {
         let ones = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];

@@ -163,15 +163,16 @@ impl Transform {
         code | bit(!inside & !behind, code::GUARD)
     }
 
-    /// How far a position is inside each plane of the guard band; negative outside.
-    pub(super) fn guard_distances(&self, [x, y, _, w]: [f64; 4]) -> [f64; 4] {
-        let along = |coordinate: f64, axis: usize| {
-            let (scale, translate) = (f64::from(self.scale[axis]), f64::from(self.translate[axis]));
-            let window = scale * coordinate + translate * w;
-            [window + GUARD * w, GUARD * w - window]
-        };
-        let ([left, right], [top, bottom]) = (along(x, 0), along(y, 1));
-        [left, right, top, bottom]
+    /// A plane of the guard band (left, right, top, bottom): a position's x or y, times the first, and w, times the
+    /// second, add up to how far it is inside.
+    pub(super) fn guard_plane(&self, side: usize) -> [f64; 2] {
+        let axis = side / 2;
+        let (scale, translate) = (f64::from(self.scale[axis]), f64::from(self.translate[axis]));
+        if side.is_multiple_of(2) {
+            [scale, GUARD + translate]
+        } else {
+            [-scale, GUARD - translate]
+        }
     }
 }
 

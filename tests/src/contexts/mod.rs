@@ -32,7 +32,8 @@ pub struct Message {
     pub text: String,
 }
 
-type Messages = Mutex<Vec<Message>>;
+/// What a messenger has heard, and what hears it: its user data.
+pub(crate) type Messages = Mutex<Vec<Message>>;
 
 /// A device with one queue, on which tests draw. Cheap to clone; the last one destroys it.
 #[derive(Clone)]
@@ -213,7 +214,8 @@ fn physical_device(instance: &ash::Instance) -> vk::PhysicalDevice {
         .expect("a device that draws Gaussians")
 }
 
-fn messenger_info(messages: &Messages) -> vk::DebugUtilsMessengerCreateInfoEXT<'_> {
+/// A messenger that keeps warnings and errors in `messages`, which must outlive it.
+pub(crate) fn messenger_info(messages: &Messages) -> vk::DebugUtilsMessengerCreateInfoEXT<'_> {
     use vk::{
         DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type,
     };

@@ -109,6 +109,37 @@ fn what_is_resolved_fits_where_it_goes() {
 }
 
 #[test]
+fn attachments_have_as_many_samples_as_one_another() {
+    let with_depth = |samples| {
+        let subpass = Subpass {
+            color: vec![None, Some(0)],
+            depth_stencil: Some(1),
+            ..Subpass::default()
+        };
+        begun(vec![view(COLOR, 4), view(DEPTH, samples)], vec![subpass]).subpass(0)
+    };
+    assert!(with_depth(4).is_ok());
+    assert!(matches!(with_depth(1), Err(Error::Usage { .. })));
+    let attachment = |samples| DynamicAttachment {
+        view: view(COLOR, samples),
+        load: vk::AttachmentLoadOp::LOAD,
+        store: vk::AttachmentStoreOp::STORE,
+        clear_value: vk::ClearValue::default(),
+        resolve: None,
+    };
+    let two = |samples: [u32; 2]| {
+        let dynamic = DynamicRendering {
+            layers: 1,
+            color: samples.map(|samples| Some(attachment(samples))).to_vec(),
+            ..DynamicRendering::default()
+        };
+        dynamic.packet()
+    };
+    assert!(two([4, 4]).is_ok());
+    assert!(matches!(two([4, 1]), Err(Error::Usage { .. })));
+}
+
+#[test]
 fn attachments_that_are_read_first_are_cleared_first() {
     let subpasses = vec![
         Subpass {

@@ -6,11 +6,14 @@ mod create;
 mod record;
 mod triangles;
 
+use std::sync::PoisonError;
+
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as GaussianFeatures;
 
 use super::bytes::Bytes;
+use crate::contexts::{Messages, messenger_info};
 
 /// Calls of a run at most.
 const CALLS: usize = 120;
@@ -28,7 +31,7 @@ const FORMATS: [vk::Format; 6] = [
 const DEPTH_FORMATS: [vk::Format; 2] = [vk::Format::D32_SFLOAT, vk::Format::D24_UNORM_S8_UINT];
 
 /// How a run ended.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Ended {
     /// Calls that returned success, or nothing.
     pub succeeded: u32,
@@ -36,8 +39,8 @@ pub struct Ended {
     pub failed: u32,
     /// Submissions that were executed.
     pub submitted: u32,
-    /// Whether the device was lost.
-    pub lost: bool,
+    /// Why the device was lost, if it was.
+    pub lost: Option<String>,
 }
 
 struct Resource<T> {
@@ -62,6 +65,10 @@ struct Run {
     images: Vec<(Resource<vk::Image>, vk::ImageView)>,
     pipelines: Vec<vk::Pipeline>,
     ended: Ended,
+    /// Hears why the device is lost, in `messages`.
+    messenger: vk::DebugUtilsMessengerEXT,
+    debug_utils: ash::ext::debug_utils::Instance,
+    messages: Box<Messages>,
     /// Last: it may own the library that all others call.
     _entry: ash::Entry,
 }
@@ -74,12 +81,12 @@ pub fn run(data: &[u8]) -> Ended {
     let mut bytes = Bytes::new(data);
     let mut run = Run::new();
     for _ in 0..CALLS {
-        if bytes.is_empty() || run.ended.lost {
+        if bytes.is_empty() || run.ended.lost.is_some() {
             break;
         }
         run.call(&mut bytes);
     }
-    run.ended
+    run.ended.clone()
 }
 
 // `unsafe` here has one reason throughout: these are Vulkan calls whose handles are live and whose pointers are valid,
@@ -90,8 +97,16 @@ impl Run {
         // SAFETY: see above.
         unsafe {
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-            let info = vk::InstanceCreateInfo::default().application_info(&application);
+            let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
+            let info = vk::InstanceCreateInfo::default()
+                .application_info(&application)
+                .enabled_extension_names(&extensions);
             let instance = entry.create_instance(&info, None).expect("an instance");
+            let messages = Box::<Messages>::default();
+            let debug_utils = ash::ext::debug_utils::Instance::new(&entry, &instance);
+            let messenger = debug_utils
+                .create_debug_utils_messenger(&messenger_info(&messages), None)
+                .expect("a messenger");
             let physical = instance.enumerate_physical_devices().expect("devices")[0];
             let queues = [vk::DeviceQueueCreateInfo::default().queue_priorities(&[1.0])];
             let extensions = [gaussian_primitive_topology::NAME.as_ptr()];
@@ -152,6 +167,9 @@ impl Run {
                 images: Vec::new(),
                 pipelines: Vec::new(),
                 ended: Ended::default(),
+                messenger,
+                debug_utils,
+                messages,
                 _entry: entry,
             }
         }
@@ -166,12 +184,21 @@ impl Run {
             }
             Err(error) => {
                 self.ended.failed += 1;
-                self.ended.lost |= error == vk::Result::ERROR_DEVICE_LOST;
+                if error == vk::Result::ERROR_DEVICE_LOST && self.ended.lost.is_none() {
+                    self.ended.lost = Some(self.reason());
+                }
                 // A defect of the driver, or a handle that it doesn't know.
                 assert_ne!(error, vk::Result::ERROR_UNKNOWN);
                 None
             }
         }
+    }
+
+    /// What the driver said of the loss of the device.
+    fn reason(&self) -> String {
+        let messages = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
+        let said = messages.iter().find(|it| it.id == "GAURAST-device-lost");
+        said.map_or_else(|| "nothing was said".to_owned(), |it| it.text.clone())
     }
 
     fn call(&mut self, bytes: &mut Bytes<'_>) {
@@ -277,6 +304,8 @@ impl Drop for Run {
             self.device.destroy_pipeline_layout(self.layout, None);
             self.device.destroy_command_pool(self.pool, None);
             self.device.destroy_device(None);
+            self.debug_utils
+                .destroy_debug_utils_messenger(self.messenger, None);
             self.instance.destroy_instance(None);
         }
     }
