@@ -286,7 +286,7 @@ mod tests {
         >(2));
         names.extend(all_true::<
             PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
-        >(18));
+        >(19));
         let names: HashSet<_> = names.into_iter().collect();
         assert_eq!(names, SUPPORTED.iter().copied().collect());
     }

@@ -39,7 +39,8 @@ pub(super) const QUADRATIC: Powers<3> = Powers {
 };
 
 impl<const TERMS: usize> Powers<TERMS> {
-    /// As [`exp2_of_negated`], with this polynomial.
+    /// As [`exp2_of_negated`], with this polynomial, for `x` up to 125.9: at the end of the range it may be a little less than a
+    /// normal number. Fast kernels have no floor so low.
     #[inline(always)]
     pub(super) fn of_negated<S: Simd>(&self, simd: S, x: f32x16<S>) -> f32x16<S> {
         by_polynomial(simd, x, &self.coefficients)

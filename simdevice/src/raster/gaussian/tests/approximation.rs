@@ -3,11 +3,11 @@
 use super::exp2::{CUBIC, Powers, QUADRATIC};
 use super::*;
 
-/// The worst relative error of a polynomial's powers of two at a level, over all falls that there are.
+/// The worst relative error of a polynomial's powers of two at a level, over all falls that it is for.
 fn worst_error<const TERMS: usize>(powers: &Powers<TERMS>, level: Level) -> f64 {
     let mut worst = 0.0f64;
     let mut first = -4.0f32;
-    while first <= 126.0 {
+    while first < 125.9 {
         let falls: [f32; LANES] = std::array::from_fn(|lane| first + lane as f32 / 4096.0);
         let found = dispatch!(level, simd =>
             powers.of_negated(simd, f32x16::simd_from(simd, falls)).to_array());
