@@ -104,17 +104,16 @@ fn packets_are_executed_or_refused() {
 
 #[test]
 fn calls_succeed_or_fail() {
-    let (mut succeeded, mut failed, mut submitted, mut lost) = (0, 0, 0, 0);
+    let (mut succeeded, mut failed, mut submitted, mut lost) = (0, 0, 0, Vec::new());
     fuzz(4000, &corpus("calls"), 3000, |data| {
         let ended = calls::run(data);
         succeeded += ended.succeeded;
         failed += ended.failed;
         submitted += ended.submitted;
-        if let Some(reason) = ended.lost {
-            println!("{reason}");
-            lost += 1;
-        }
+        lost.extend(ended.lost);
     });
-    println!("{succeeded} succeeded, {failed} failed, {submitted} submitted, {lost} lost");
+    println!("{succeeded} succeeded, {failed} failed, {submitted} submitted");
     assert!(succeeded > failed && submitted > 0);
+    // What is against the rules is refused where it is recorded, with a message, and nothing here takes long.
+    assert_eq!(lost, [""; 0], "devices were lost");
 }

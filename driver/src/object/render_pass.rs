@@ -58,16 +58,17 @@ pub(crate) struct DepthStencilResolve {
 
 impl Subpass {
     /// The attachments that it uses.
-    fn attachments(&self) -> impl Iterator<Item = usize> {
+    fn attachments(&self) -> Vec<usize> {
         let lists = [&self.color, &self.resolve, &self.input];
-        let resolved = self.depth_stencil_resolve.map(|resolve| resolve.attachment);
-        let listed = lists.into_iter().flatten().copied().flatten();
-        listed.chain(self.depth_stencil).chain(resolved)
+        let mut all: Vec<_> = lists.into_iter().flatten().copied().flatten().collect();
+        all.extend(self.depth_stencil);
+        all.extend(self.depth_stencil_resolve.map(|resolve| resolve.attachment));
+        all
     }
 
     /// Whether it uses attachment number `index`.
     fn uses(&self, index: usize) -> bool {
-        self.attachments().any(|used| used == index)
+        self.attachments().contains(&index)
     }
 
     /// Whether it renders to attachment number `index`, or resolves to it.
@@ -96,7 +97,7 @@ impl RenderPass {
         let exists = |index: usize| index < attachments.len();
         let valid = subpasses
             .iter()
-            .all(|subpass| subpass.attachments().all(exists));
+            .all(|subpass| subpass.attachments().into_iter().all(exists));
         if subpasses.is_empty() || !valid {
             return Err(Error::usage(
                 "VUID-VkRenderPassCreateInfo-attachment-00834",
