@@ -134,7 +134,7 @@ fn pictures_are_no_further_off_than_is_allowed() {
     let state = State::default();
     // Where a pixel is finished before the Gaussian that would leave less than the floor, so much light may be left.
     let finished = f64::from(state.transmittance_floor) / (1.0 - f64::from(state.alpha_ceiling));
-    for (name, scene) in all_scenes() {
+    for (scene_name, scene) in all_scenes() {
         let (reference, range) = (reference(&scene), range(&scene));
         let exact = draw(&context, &scene, None);
         for allowed @ [error, budget] in [
@@ -145,8 +145,18 @@ fn pictures_are_no_further_off_than_is_allowed() {
             [2e-3, 4.0 / 255.0],
         ] {
             let image = draw(&context, &scene, Some(allowed));
-            let name = format!("{name}, {allowed:?}");
-            assert!(image != exact, "{name}: nothing is approximated");
+            let name = format!("{scene_name}, {allowed:?}");
+            // In a small picture few blocks of sparse scenes run out of light, and what is awkward may hide all behind
+            // alphas at the ceiling.
+            let must_differ = match scene_name {
+                "layers" => true,
+                "awkward" => false,
+                _ => error > 0.0,
+            };
+            assert!(
+                image != exact || !must_differ,
+                "{name}: nothing is approximated"
+            );
             let bound = f64::from(error) + f64::from(budget);
             let distances = distances(&image, &reference, range);
             let worst = distances.iter().copied().fold(0.0, f64::max);
