@@ -57,7 +57,7 @@ pub struct Skips(u32);
 
 /// A name is none of a skip's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{name} is neither all nor none nor a skip, which are {}", names())]
+#[error("{name:?} is neither all nor none nor a skip, which are {}", names())]
 pub struct UnknownSkip {
     /// The name.
     pub name: String,
@@ -100,20 +100,25 @@ impl Default for Skips {
 impl FromStr for Skips {
     type Err = UnknownSkip;
 
-    /// `all`, `none`, or names of skips separated by commas.
+    /// `all`, `none`, or names of skips, separated by commas; or `all` without some, each after a minus: `all,-blocks`.
     fn from_str(text: &str) -> Result<Self, UnknownSkip> {
-        match text {
-            "all" => return Ok(Self::ALL),
-            "none" => return Ok(Self::NONE),
-            _ => {}
-        }
-        text.split(',').try_fold(Self::NONE, |skips, name| {
+        let known = |name: &str| {
             let skip = Skip::ALL.iter().find(|skip| skip.name() == name);
-            let unknown = || UnknownSkip {
+            skip.copied().ok_or_else(|| UnknownSkip {
                 name: name.to_owned(),
-            };
-            Ok(skips.with(*skip.ok_or_else(unknown)?))
-        })
+            })
+        };
+        match text.split_once(',') {
+            None if text == "all" => Ok(Self::ALL),
+            None if text == "none" => Ok(Self::NONE),
+            Some(("all", without)) => without.split(',').try_fold(Self::ALL, |skips, name| {
+                let name = name.strip_prefix('-').unwrap_or("");
+                Ok(skips.without(known(name)?))
+            }),
+            _ => text
+                .split(',')
+                .try_fold(Self::NONE, |skips, name| Ok(skips.with(known(name)?))),
+        }
     }
 }
 
@@ -133,11 +138,21 @@ mod tests {
             assert!(!Skips::ALL.without(skip).has(skip));
             assert_eq!(skip.name().parse(), Ok(Skips::NONE.with(skip)));
         }
+        let most = Skips::ALL.without(Skip::Blocks).without(Skip::Bands);
+        assert_eq!("all,-blocks,-bands".parse(), Ok(most));
     }
 
     #[test]
     fn unknown_names_are_told() {
-        for text in ["", "blocks,", "every", "blocks,all"] {
+        for text in [
+            "",
+            "blocks,",
+            "every",
+            "blocks,all",
+            "all,blocks",
+            "all,",
+            "-blocks",
+        ] {
             let error = text.parse::<Skips>().unwrap_err();
             assert!(error.to_string().contains("empty-tiles"), "{error}");
         }
@@ -146,7 +161,7 @@ mod tests {
                 .parse::<Skips>()
                 .unwrap_err()
                 .to_string(),
-            "everything is neither all nor none nor a skip, which are chunks, hidden-chunks, unchanged, bounds, ellipse, harmonics, bands, blocks, saturated, \
+            "\"everything\" is neither all nor none nor a skip, which are chunks, hidden-chunks, unchanged, bounds, ellipse, harmonics, bands, blocks, saturated, \
              empty-tiles, overwritten-tiles, overwritten-quads, hidden-tiles, masked-quads, affine"
         );
     }

@@ -171,7 +171,7 @@ fn start(
     threads: usize,
     skips: &str,
 ) -> Result<(Workload, Worker), BenchError> {
-    let worker = Worker::with_skips(Contender::Gaurast, workload, threads, Some(skips))?;
+    let worker = Worker::with_skips(Contender::Gaurast, workload, threads, skips)?;
     let worker = worker.ok_or_else(|| BenchError::Worker("this driver is not there".to_owned()))?;
     Ok((workload.clone(), worker))
 }
@@ -204,16 +204,11 @@ fn saved_by(
     threads: usize,
     runs: usize,
 ) -> Result<Saved, BenchError> {
-    let all_but: Vec<&str> = SKIPS
-        .iter()
-        .map(|(name, _)| *name)
-        .filter(|name| *name != skip)
-        .collect();
     let counter = SKIPS.iter().find(|(name, _)| *name == skip);
     let counter = counter.map_or("", |(_, counter)| *counter);
     let mut workers = [
         start(workload, threads, "all")?,
-        start(workload, threads, &all_but.join(","))?,
+        start(workload, threads, &format!("all,-{skip}"))?,
     ];
     let frames = frames(&mut workers, runs, skip == UNCHANGED)?;
     Ok(Saved {

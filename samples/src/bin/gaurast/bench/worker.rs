@@ -110,6 +110,9 @@ pub struct Worker {
     pub ready: Ready,
 }
 
+/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same.
+const SKIPS: &str = "all,-unchanged";
+
 impl Worker {
     /// Starts a worker that shares its work among `threads`; `None` if its device is not there.
     pub fn start(
@@ -117,22 +120,22 @@ impl Worker {
         workload: &Workload,
         threads: usize,
     ) -> Result<Option<Self>, BenchError> {
-        Self::with_skips(contender, workload, threads, None)
+        let skips = std::env::var("GAURAST_SKIP");
+        let skips = skips.unwrap_or_else(|_| SKIPS.to_owned());
+        Self::with_skips(contender, workload, threads, &skips)
     }
 
-    /// As [`Worker::start`]; `skips` says what this driver leaves out, where it is not left to the environment.
+    /// As [`Worker::start`]; `skips` says what this driver leaves out.
     pub fn with_skips(
         contender: Contender,
         workload: &Workload,
         threads: usize,
-        skips: Option<&str>,
+        skips: &str,
     ) -> Result<Option<Self>, BenchError> {
         let mut command = Command::new(std::env::current_exe()?);
-        if let Some(skips) = skips {
-            command.env("GAURAST_SKIP", skips);
-        }
         command
             .arg(COMMAND)
+            .env("GAURAST_SKIP", skips)
             .env("GAURAST_THREADS", threads.to_string())
             // The threads that rasterize; the queue has one more, for vertices.
             .env("LP_NUM_THREADS", threads.to_string())
