@@ -2,12 +2,12 @@
 
 use super::*;
 
+/// What changes packets before they are drawn again.
+type Edit = Box<dyn FnMut(&mut [Packet])>;
+
 /// Draws `packets` as they are again and again, with a change before each pass but the first; says in which passes sets were
 /// drawn as they had been. Every picture is that of a device without skips.
-fn reused(
-    packets: &mut [Packet],
-    mut changes: Vec<Box<dyn FnMut(&mut [Packet]) + '_>>,
-) -> Vec<u64> {
+fn reused(packets: &mut [Packet], mut changes: Vec<Edit>) -> Vec<u64> {
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
     let device = Arc::new(Device::new(&single()).unwrap());
     let mut processor = CommandProcessor::new(device);
@@ -33,11 +33,11 @@ fn reused(
     reused
 }
 
-fn nothing() -> Box<dyn FnMut(&mut [Packet])> {
+fn nothing() -> Edit {
     Box::new(|_| {})
 }
 
-fn of_begin(mut change: impl FnMut(&mut GaussianBegin) + 'static) -> Box<dyn FnMut(&mut [Packet])> {
+fn of_begin(mut change: impl FnMut(&mut GaussianBegin) + 'static) -> Edit {
     Box::new(move |packets| {
         if let Packet::GaussianBegin(begin) = &mut packets[0] {
             change(begin);
@@ -45,9 +45,7 @@ fn of_begin(mut change: impl FnMut(&mut GaussianBegin) + 'static) -> Box<dyn FnM
     })
 }
 
-fn of_append(
-    mut change: impl FnMut(&mut GaussianAppend) + 'static,
-) -> Box<dyn FnMut(&mut [Packet])> {
+fn of_append(mut change: impl FnMut(&mut GaussianAppend) + 'static) -> Edit {
     Box::new(move |packets| {
         if let Packet::GaussianAppend(append) = &mut packets[1] {
             change(append);
