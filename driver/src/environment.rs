@@ -168,7 +168,7 @@ mod tests {
         assert!(
             error
                 .to_string()
-                .contains("GAURAST_SKIP=blocks,much: much is"),
+                .contains("GAURAST_SKIP=blocks,much: \"much\" is"),
             "{error}"
         );
         assert!(simulated_timestamps("simulated").unwrap());
