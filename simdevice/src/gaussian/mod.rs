@@ -9,6 +9,7 @@
 pub(crate) mod cache;
 mod chunks;
 pub(crate) mod depth;
+mod emit;
 mod fetch;
 pub(crate) mod footprint;
 mod frustum;

@@ -26,6 +26,8 @@ pub(super) struct Key {
     bounds: Rect,
     /// The depth attachment's format, if centres have depths.
     depth: Option<Format>,
+    /// Whether a fragment program makes the colours, which what is hidden depends on.
+    is_resolved: bool,
 }
 
 #[derive(Debug)]
@@ -74,6 +76,7 @@ impl Key {
             viewport: begin.viewport,
             bounds: set.bounds,
             depth: set.depth.as_ref().map(|_| set.depth_format),
+            is_resolved: set.resolve.is_some(),
         })
     }
 
@@ -81,7 +84,10 @@ impl Key {
         let all = |a: &[Stream], b: &[Stream]| {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.is_same(b))
         };
-        let view = |key: &Self| (key.camera, key.viewport, key.bounds, key.depth);
+        let view = |key: &Self| {
+            let depths = (key.depth, key.is_resolved);
+            (key.camera, key.viewport, key.bounds, depths)
+        };
         let chunks = || self.chunks.iter().zip(&other.chunks);
         self.ranges == other.ranges
             && view(self) == view(other)

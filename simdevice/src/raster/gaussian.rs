@@ -18,6 +18,7 @@
 mod approximation;
 mod by_block;
 mod exp2;
+mod grid;
 mod half;
 mod layer;
 mod passing;
@@ -29,7 +30,6 @@ pub(crate) mod tile_draw;
 mod wide_sums;
 
 use super::DepthCode;
-use super::tile::place;
 use crate::counters::{Counter, Counters};
 use crate::gaussian::depth::Trend;
 use crate::gaussian::splat::Splat;
@@ -39,6 +39,7 @@ use crate::trace::{self, Run, TileWork};
 use approximation::Way;
 use by_block::TileMode;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
+use grid::{BLOCK_X, BLOCK_Y, HALF};
 use layer::{ANY_LIGHT, Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
 use per_pixel::PerPixel;
@@ -519,52 +520,6 @@ fn hidden_run<S: Simd>(
         run.hidden_blocks += hidden_blocks(simd, task.splat(primitive), task, open);
     }
     run
-}
-
-/// Half of the distance between a block's first and last pixel centres.
-const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;
-/// The offset of each lane's pixel from the middle of its block.
-const LANE_X: [f32; LANES] = grid(true);
-const LANE_Y: [f32; LANES] = grid(false);
-const LANE_X_64: [f64; LANES] = widened(LANE_X);
-const LANE_Y_64: [f64; LANES] = widened(LANE_Y);
-/// The offset of the middle of each block from its tile's corner.
-const BLOCK_X: [f64; BLOCKS] = middles(true);
-const BLOCK_Y: [f64; BLOCKS] = middles(false);
-
-/// The column or row of each lane's pixel, from the block's middle.
-const fn grid(column: bool) -> [f32; LANES] {
-    let mut out = [0.0; LANES];
-    let mut pixel = 0;
-    while pixel < LANES {
-        let (x, y) = (pixel % BLOCK, pixel / BLOCK);
-        out[place(x, y) % LANES] = (if column { x } else { y }) as f32 - HALF;
-        pixel += 1;
-    }
-    out
-}
-
-/// The same numbers in binary64.
-const fn widened(lanes: [f32; LANES]) -> [f64; LANES] {
-    let mut out = [0.0; LANES];
-    let mut lane = 0;
-    while lane < LANES {
-        out[lane] = lanes[lane] as f64;
-        lane += 1;
-    }
-    out
-}
-
-/// The middle, in x or y, of each block of a tile.
-const fn middles(column: bool) -> [f64; BLOCKS] {
-    let mut out = [0.0; BLOCKS];
-    let mut block = 0;
-    while block < BLOCKS {
-        let at = if column { block % 4 } else { block / 4 };
-        out[block] = (BLOCK * at) as f64 + BLOCK as f64 / 2.0;
-        block += 1;
-    }
-    out
 }
 
 impl Record {

@@ -103,6 +103,46 @@ fn every_change_is_seen() {
     assert_eq!(reused(&mut few(), changes), expected);
 }
 
+#[test]
+fn what_a_program_resolves_is_a_set_of_its_own() {
+    let device = Arc::new(Device::new(&single()).unwrap());
+    let mut processor = CommandProcessor::new(Arc::clone(&device));
+    let input = |number| {
+        Some(FragmentInput::Varying {
+            index: resolve::ACCUMULATED + number,
+            interpolation: Interpolation::Flat,
+            sampling: Sampling::Center,
+        })
+    };
+    let program = FragmentPrograms {
+        inputs: (0..4).map(input).collect(),
+        ..programs().fragment.unwrap()
+    };
+    let shader = Packet::GaussianResolveShader(Box::new(ResolveShader {
+        program: Arc::new(ResolveProgram::new(&device, &program).unwrap()),
+        bindings: Bindings::default(),
+        sample_shading: false,
+        alpha_to_coverage: false,
+        alpha_to_one: false,
+    }));
+    let packets = few();
+    let target = image(Format::R32G32B32A32Sfloat, 1, 0);
+    let clear = LoadOp::Clear(ClearValue::Float([0.0; 4]));
+    let begin = Packet::BeginRendering(Box::new(rendering(attachment(&target, clear))));
+    let reused = [false, true, true, false, false].map(|is_resolved| {
+        let before = processor.counters().clone();
+        let shader = is_resolved.then_some(&shader);
+        let all = [&begin, &packets[0]].into_iter().chain(shader);
+        for packet in all.chain(&packets[1..]).chain([&Packet::EndRendering]) {
+            processor.execute(packet).unwrap();
+        }
+        let counters = processor.counters().since(&before);
+        counters.get(Counter::SetsUnchanged)
+    });
+    // What is behind others may be left out of the one, and not of the other.
+    assert_eq!(reused, [0, 0, 1, 0, 1]);
+}
+
 /// Two instances, placed by matrices that only the device writes.
 fn placed_in_the_device() -> Vec<Packet> {
     let mut packets = few();

@@ -6,11 +6,9 @@
 //! level, and [`scalar`] says the same without vectors.
 
 use super::exp2::POWER_OF_TWO;
+use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::layer::Layer;
-use super::{
-    BLOCK_X, BLOCK_Y, CHUNK, DepthMode, FIND_MEDIAN, GaussianTile, LANE_X_64, LANE_Y_64, NO_DEPTH,
-    Task, Thresholds, Work,
-};
+use super::{CHUNK, DepthMode, FIND_MEDIAN, GaussianTile, NO_DEPTH, Task, Thresholds, Work};
 use crate::gaussian::locate;
 use crate::gaussian::splat::Splat;
 use crate::lanes::{bits_of, floats_of};

@@ -5,11 +5,9 @@
 //! the nearest [`HELD`] at a time: memory is bounded whatever a scene stacks up, and what a pass leaves out is gathered by
 //! the next, so that time stays near linear.
 
+use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::layer::Layer;
-use super::{
-    BLOCK_X, BLOCK_Y, BLOCKS, DepthMode, FIND_MEDIAN, GaussianTile, LANE_X_64, LANE_Y_64, LANES,
-    NO_DEPTH, Task, Work,
-};
+use super::{BLOCKS, DepthMode, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Work};
 use crate::gaussian::locate;
 use crate::gaussian::rays::{PixelRays, RayDepths, Rays, ordered_key};
 use crate::trace::Run;

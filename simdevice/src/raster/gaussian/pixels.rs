@@ -1,11 +1,12 @@
 //! Phase 2 of the tile kernel: Gaussians through the pixels of a block, which stay in registers.
 
 use super::approximation::power;
+use super::grid::{BLOCK_X, BLOCK_Y, LANE_X, LANE_X_64, LANE_Y, LANE_Y_64};
 use super::layer::Layer;
 use super::passing::Passing;
 use super::{
-    BLOCK_X, BLOCK_Y, BLOCKS, CHUNK, DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, LANE_X,
-    LANE_X_64, LANE_Y, LANE_Y_64, LANES, NO_DEPTH, Record, Task, Thresholds,
+    BLOCKS, CHUNK, DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, LANES, NO_DEPTH, Record, Task,
+    Thresholds,
 };
 use crate::gaussian::splat::Splat;
 use crate::lanes::{bits_of, floats_of};

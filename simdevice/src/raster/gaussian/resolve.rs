@@ -4,8 +4,9 @@
 //! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. Lanes that are not covered
 //! help with derivatives: they hold what their own pixels accumulated.
 
+use super::grid::{BLOCK_X, BLOCK_Y, LANE_X, LANE_Y};
 use super::tile_draw::{SAMPLES, Samples};
-use super::{BLOCK_X, BLOCK_Y, BLOCKS, GaussianTile, LANE_X, LANE_Y, LANES, Lanes, TILE_SIZE};
+use super::{BLOCKS, GaussianTile, LANES, Lanes, TILE_SIZE};
 use crate::bindings::Prepared;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
