@@ -10,8 +10,10 @@
 mod atomic;
 mod gather;
 pub mod host;
+mod prefetch;
 
 pub use gather::gather;
+pub use prefetch::prefetch;
 
 use bytemuck::{AnyBitPattern, NoUninit};
 use memmap2::{MmapOptions, MmapRaw};
