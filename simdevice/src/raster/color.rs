@@ -5,7 +5,7 @@ use super::blend::clamp_range;
 use super::quads::Quads;
 use super::tile::AREA;
 use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
-use crate::lanes::{as_floats, bits_of};
+use crate::lanes::{as_floats, bits_of, floats_of};
 use crate::packet::draw::LogicOp;
 use crate::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
@@ -270,19 +270,27 @@ impl ColorOutput {
         let blended = match self.equations {
             None => *source,
             Some(equations) => {
-                let mut stored = [[0f32; 16]; 4];
-                for lane in 0..16 {
-                    let texel = &words[4 * quads.texel(lane)..][..4];
-                    for (component, word) in stored.iter_mut().zip(texel) {
-                        component[lane] = f32::from_bits(*word);
+                let destination = if quads.consecutive {
+                    load_texels(simd, &words[4 * quads.first[0]..])
+                } else {
+                    let mut stored = [[0f32; 16]; 4];
+                    for lane in 0..16 {
+                        let texel = &words[4 * quads.texel(lane)..][..4];
+                        for (component, word) in stored.iter_mut().zip(texel) {
+                            component[lane] = f32::from_bits(*word);
+                        }
                     }
-                }
-                let [r, g, b, a] = stored;
-                let load = |component| f32x16::simd_from(simd, component);
-                let destination = [load(r), load(g), load(b), load(a)];
+                    let [r, g, b, a] = stored;
+                    let load = |component| f32x16::simd_from(simd, component);
+                    [load(r), load(g), load(b), load(a)]
+                };
                 self.blend(simd, equations, source, second, &destination)
             }
         };
+        if lanes == u16::MAX && self.written == u128::MAX && quads.consecutive {
+            store_texels(&blended, &mut words[4 * quads.first[0]..]);
+            return;
+        }
         let [r, g, b, a] = blended;
         let components: [[u32; 16]; 4] = [
             bits_of(r).into(),
@@ -387,6 +395,28 @@ impl ColorOutput {
             operands.evaluate(simd, alpha, 3),
         ]
     }
+}
+
+/// The components of 16 texels of four words that follow one another.
+#[inline(always)]
+fn load_texels<S: Simd>(simd: S, words: &[u32]) -> Colors<S> {
+    let load = |at: usize| floats_of(u32x16::from_slice(simd, &words[at..at + 16]));
+    let (rb, ga) = load(0).deinterleave(load(16));
+    let (rb_later, ga_later) = load(32).deinterleave(load(48));
+    let ((r, b), (g, a)) = (rb.deinterleave(rb_later), ga.deinterleave(ga_later));
+    [r, g, b, a]
+}
+
+/// Stores components as 16 texels of four words that follow one another.
+#[inline(always)]
+fn store_texels<S: Simd>([r, g, b, a]: &Colors<S>, words: &mut [u32]) {
+    let ((rb, rb_later), (ga, ga_later)) = (r.interleave(*b), g.interleave(*a));
+    let (first, second) = rb.interleave(ga);
+    let (third, fourth) = rb_later.interleave(ga_later);
+    bits_of(first).store_slice(&mut words[..16]);
+    bits_of(second).store_slice(&mut words[16..32]);
+    bits_of(third).store_slice(&mut words[32..48]);
+    bits_of(fourth).store_slice(&mut words[48..64]);
 }
 
 /// A source of 16 fragments; components that are not written are 0.

@@ -98,3 +98,44 @@ fn kernels_of_usual_equations_have_the_bits_of_the_equations() {
         }
     }
 }
+
+#[test]
+fn whole_blocks_of_wide_texels_are_what_their_lanes_are() {
+    let mut rng = ChaCha8Rng::seed_from_u64(20);
+    for equations in [None, Some((PREMULTIPLIED, STRAIGHT))] {
+        let state = BlendState {
+            equations,
+            write_mask: 0xF,
+        };
+        let format = Format::R32G32B32A32Sfloat;
+        let output = ColorOutput::new(&state, None, [0.0; 4], format).unwrap();
+        assert_eq!(output.codec, Codec::Words);
+        for (name, level) in SimdLevel::supported() {
+            let level = level.resolve().unwrap();
+            let source: [[f32; 16]; 4] =
+                std::array::from_fn(|_| std::array::from_fn(|_| rng.random_range(-0.2..1.2)));
+            // A texel before and one behind are not the block's.
+            let stored: [u32; 72] = std::array::from_fn(|_| rng.random::<f32>().to_bits());
+            let write = |lanes: &[u16], consecutive| {
+                let mut words = stored;
+                dispatch!(level, simd => {
+                    let [r, g, b, a] = source;
+                    let load = |lanes| f32x16::simd_from(simd, lanes);
+                    let source = [load(r), load(g), load(b), load(a)];
+                    let quads = Quads { first: [1, 5, 9, 13], consecutive };
+                    for &lanes in lanes {
+                        output.write(simd, &source, &source, lanes, &quads, &mut words);
+                    }
+                });
+                words
+            };
+            let lanes: Vec<u16> = (0..16).map(|lane| 1 << lane).collect();
+            assert_eq!(
+                write(&[u16::MAX], true),
+                write(&lanes, false),
+                "{name} {equations:?}"
+            );
+            assert_ne!(write(&[u16::MAX], true), stored);
+        }
+    }
+}
