@@ -1,9 +1,9 @@
 //! Gaussian mode of the tile engine: front to back through a tile's list, with early termination.
 //!
 //! Most trained Gaussians are a few pixels wide, so a tile is taken as 16 blocks of 4x4 pixels, and lists are
-//! worked off in two phases, a chunk at a time. Phase 1 tests one Gaussian against all 16 blocks in one vector,
-//! conservatively, and sets its bit in the words of those that it may reach; phase 2 ([`pixels`]) takes the blocks in
-//! turn, each with its 16 pixels in registers, through the Gaussians of its word.
+//! worked off in three phases, a chunk at a time. Phase 1 tests one Gaussian against all 16 blocks in one vector,
+//! conservatively, and sets its bit in the words of those that it may reach. Phase 2 ([`pixels`]) finds the alphas of all
+//! that are reached, and phase 3 takes the blocks in turn, each with its 16 pixels in registers, through their alphas.
 //!
 //! Exponents are formed from the block's middle: the Cholesky factor times its offset from the mean is computed in
 //! binary64 and rounded once, and from there pixels are at most 1.5 away in x and y. Needles that cross many tiles
@@ -38,12 +38,12 @@ use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
 use approximation::Way;
 use by_block::TileMode;
-use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*, u32x16};
-use grid::{BLOCK_X, BLOCK_Y, HALF};
+use fearless_simd::{Level, Simd, dispatch, f32x8, f32x16, f64x8, mask32x16, prelude::*, u32x16};
+use grid::{BLOCK_X, BLOCK_Y, HALF, LANE_X, LANE_Y};
 use layer::{ANY_LIGHT, Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
 use per_pixel::PerPixel;
-use pixels::Reaching;
+use pixels::{Alphas, Reaching};
 
 const TILE: usize = TILE_SIZE as usize;
 /// Pixels of a block, which are the lanes of a vector.
@@ -68,9 +68,8 @@ const LAYERS: usize = super::MAX_SAMPLES as usize + 1;
 pub struct GaussianTile {
     layers: [Layer; LAYERS],
     passing: Passing,
-    /// Where the chunk's Gaussians are brought together before they are looked at.
-    splats: [Splat; CHUNK],
     chunk: [Record; CHUNK],
+    alphas: Alphas,
     /// What may reach each block, where a mode parts lists so.
     lists: [Vec<u32>; BLOCKS],
     per_pixel: PerPixel,
@@ -99,8 +98,9 @@ struct Record {
     /// `u` and `v` at the middle of each block.
     u: [f32; BLOCKS],
     v: [f32; BLOCKS],
-    /// How `u` grows with x, and `v` with x and y.
-    factor: [f32; 3],
+    /// What a pixel's offset from the middle of its block adds to `u`, in columns of two rows, and to `v`.
+    across: [f32; LANES / 2],
+    along: [f32; LANES],
     log2_opacity: f32,
     color: [f32; 3],
     /// As [`Splat::depth`].
@@ -116,8 +116,6 @@ struct Thresholds {
     alpha_floor: f32,
     alpha_ceiling: f32,
     transmittance_floor: f32,
-    /// Zero, unknown to the compiler: what it knows to be zero it selects by two operations, not one.
-    nothing: f32,
     /// What numbers of depths mean.
     depth_unit: DepthCode,
 }
@@ -138,7 +136,6 @@ impl Thresholds {
             alpha_floor: state.alpha_floor,
             alpha_ceiling: state.alpha_ceiling,
             transmittance_floor: state.transmittance_floor,
-            nothing: 0.0,
         }
     }
 }
@@ -148,8 +145,8 @@ impl Default for GaussianTile {
         Self {
             layers: [Layer::EMPTY; LAYERS],
             passing: Passing::default(),
-            splats: [Splat::default(); CHUNK],
             chunk: [Record::default(); CHUNK],
+            alphas: Alphas::default(),
             lists: Default::default(),
             per_pixel: PerPixel::default(),
             piece: Vec::new(),
@@ -329,16 +326,21 @@ impl GaussianTile {
     ) -> Work {
         let mut work = Work::default();
         let layer = &mut self.layers[layer];
+        let corner = task.corner.map(f64::from);
         let bounded = task.skips.has(Skip::Blocks);
         let end_early = task.skips.has(Skip::Saturated);
+        for &primitive in task.list.iter().take(CHUNK) {
+            devmem::prefetch(task.splat(primitive));
+        }
         for (number, chunk) in task.list.chunks(CHUNK).enumerate() {
+            let next_chunk = task.list.get((number + 1) * CHUNK..).unwrap_or_default();
             let open = if end_early {
-                layer.open_blocks(task.way.light)
+                layer.open_blocks(simd, task.way.light)
             } else {
                 ALL_BLOCKS
             };
             if DEPTH <= NO_DEPTH && end_early && task.way.light != ANY_LIGHT {
-                let left_out = layer.open_blocks(ANY_LIGHT) & !open;
+                let left_out = layer.open_blocks(simd, ANY_LIGHT) & !open;
                 // If no block is open, none will be.
                 let of = if open == 0 {
                     task.list.len() - number * CHUNK
@@ -369,11 +371,12 @@ impl GaussianTile {
             let mut reaching = u32x16::splat(simd, 0);
             let items_before = work.items;
             let (hidden_before, mut hidden) = (work, 0);
-            // Before any is looked at, so that the waits for memory overlap.
-            for (splat, &primitive) in self.splats.iter_mut().zip(chunk) {
-                *splat = *task.splat(primitive);
-            }
-            for (number, splat) in self.splats.iter().enumerate().take(chunk.len()) {
+            let (mut placed, mut next) = (0, next_chunk.iter());
+            for (number, &primitive) in chunk.iter().enumerate() {
+                if let Some(&next) = next.next() {
+                    devmem::prefetch(task.splat(next));
+                }
+                let splat = task.splat(primitive);
                 if DEPTH > NO_DEPTH && self.passing.hides(splat.depth) {
                     work.tiles_hidden += 1;
                     if runs.is_some() {
@@ -386,10 +389,11 @@ impl GaussianTile {
                     let before = reaching.to_array();
                     reaching = u32x16::splat(simd, 0);
                     work.items += count_bits(&before);
+                    let (chunk, alphas) = (&self.chunk, &mut self.alphas);
                     work.contributions += layer.evaluate::<_, DEPTH>(
                         simd,
                         &before,
-                        &self.chunk,
+                        (chunk, alphas),
                         &self.passing,
                         task.thresholds,
                     );
@@ -408,9 +412,9 @@ impl GaussianTile {
                     continue;
                 }
                 let record = &mut self.chunk[number % CHUNK];
-                let reached = record.place(simd, splat, task.corner, task.thresholds.most_fall);
+                let reached = record.place(simd, splat, corner, task.thresholds.most_fall);
                 let mut reached = if bounded { reached & open } else { open };
-                work.open += u64::from(blocks);
+                placed += 1;
                 if DEPTH > NO_DEPTH {
                     record.depth = splat.depth;
                     let shown = self.passing.blocks(simd, splat.depth);
@@ -422,6 +426,7 @@ impl GaussianTile {
                 reaching |= reached.select(bit, u32x16::splat(simd, 0));
             }
             let reaching = reaching.to_array();
+            work.open += placed * u64::from(blocks);
             work.pairs += chunk.len() as u64;
             work.items += count_bits(&reaching);
             if let Some(runs) = &mut runs {
@@ -438,10 +443,11 @@ impl GaussianTile {
                     },
                 );
             }
-            let (chunk, passing) = (&self.chunk, &self.passing);
+            let (chunk, passing) = ((&self.chunk, &mut self.alphas), &self.passing);
             work.contributions +=
                 layer.evaluate::<_, DEPTH>(simd, &reaching, chunk, passing, task.thresholds);
         }
+        layer.find_covered(simd);
         work
     }
 }
@@ -493,7 +499,7 @@ fn hidden_blocks<S: Simd>(simd: S, splat: &Splat, task: &Task<'_>, open: mask32x
     let bounded = task.skips.has(Skip::Blocks) && !splat.steep;
     let reached = if bounded {
         let most_fall = task.thresholds.most_fall;
-        open & Record::default().place(simd, splat, task.corner, most_fall)
+        open & Record::default().place(simd, splat, task.corner.map(f64::from), most_fall)
     } else {
         open
     };
@@ -529,12 +535,11 @@ impl Record {
         &mut self,
         simd: S,
         splat: &Splat,
-        corner: [u32; 2],
+        corner: [f64; 2],
         most_fall: f32,
     ) -> mask32x16<S> {
         let [a, b, c] = splat.factor;
-        let from_mean = |axis: usize| f64::from(corner[axis]) - splat.mean[axis];
-        let (from_x, from_y) = (from_mean(0), from_mean(1));
+        let (from_x, from_y) = (corner[0] - splat.mean[0], corner[1] - splat.mean[1]);
         // Columns repeat in both halves of the blocks.
         let dx = f64x8::from_slice(simd, &BLOCK_X[..8]) + from_x;
         let upper = f64x8::from_slice(simd, &BLOCK_Y[..8]) + from_y;
@@ -546,7 +551,14 @@ impl Record {
         u.store_slice(&mut self.u);
         v.store_slice(&mut self.v);
         let [a, b, c] = [a as f32, b as f32, c as f32];
-        self.factor = [a, b, c];
+        let columns = f32x8::from_slice(simd, &LANE_X[..LANES / 2]);
+        (columns * a).store_slice(&mut self.across);
+        let (columns, rows) = (
+            f32x16::simd_from(simd, LANE_X),
+            f32x16::simd_from(simd, LANE_Y),
+        );
+        let along = rows.mul_add(f32x16::splat(simd, c), columns * b);
+        along.store_slice(&mut self.along);
         self.log2_opacity = splat.log2_opacity;
         self.color = splat.color;
         // How far the exponent may fall, with a margin for rounding.

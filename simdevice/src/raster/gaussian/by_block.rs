@@ -176,6 +176,7 @@ impl GaussianTile {
                 }
             }
         }
+        layer.find_covered(simd);
         work
     }
 
@@ -219,7 +220,7 @@ impl GaussianTile {
                 _ if !bounded => all,
                 Some(surfel) => mask32x16::from_bitmask(simd, surfel.blocks(task.corner)),
                 None if splat.steep => all,
-                None => record.place(simd, splat, task.corner, most_fall),
+                None => record.place(simd, splat, task.corner.map(f64::from), most_fall),
             };
             if hidden {
                 hidden_alone += reached.to_bitmask().count_ones();

@@ -5,7 +5,7 @@ use crate::gaussian::TILE_SIZE;
 use crate::packet::Rect;
 use crate::raster::DepthCode;
 use crate::raster::tile::place;
-use fearless_simd::{Simd, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 /// Accumulated colour and transmittance of a tile's pixels, or of one sample of each.
 ///
@@ -125,15 +125,24 @@ impl Layer {
 
     /// Bit `block` tells that a pixel of the block is not finished and has more than some light.
     #[inline(always)]
-    pub(super) fn open_blocks(&self, Light(light): Light) -> u64 {
+    pub(super) fn open_blocks<S: Simd>(&self, simd: S, Light(light): Light) -> u64 {
+        let light = i32x16::splat(simd, light);
         let mut open = 0;
         for (block, lanes) in self.transmittance.iter().enumerate() {
-            let any = lanes
-                .iter()
-                .fold(false, |any, &t| any | (t.to_bits() as i32 > light));
-            open |= u64::from(any) << block;
+            let lanes: i32x16<S> = f32x16::from_slice(simd, lanes).bitcast();
+            open |= u64::from(lanes.simd_gt(light).any_true()) << block;
         }
         open
+    }
+
+    /// Finds the pixels that some Gaussian contributed to, from what it left of their transmittance: no alpha is so small that
+    /// it leaves that as it was, since low floors are for wider sums.
+    #[inline(always)]
+    pub(super) fn find_covered<S: Simd>(&mut self, simd: S) {
+        for (covered, lanes) in self.covered.iter_mut().zip(&self.transmittance) {
+            let seen = f32x16::from_slice(simd, lanes).abs().simd_lt(1.0);
+            *covered |= seen.to_bitmask() as u32;
+        }
     }
 
     /// How many rows have a pixel that is not finished.

@@ -3,7 +3,7 @@
 use super::{DepthMode, GaussianTile, Run, Skip, Task, TileMode, Work};
 use crate::binning::Stream;
 use crate::gaussian::TILE_SIZE;
-use fearless_simd::Level;
+use fearless_simd::{Level, dispatch};
 
 /// Primitives of a piece. The fast kernel goes on where it was, so that pieces change no bit.
 const PIECE: usize = 1024;
@@ -28,7 +28,8 @@ impl GaussianTile {
         let mut piece = std::mem::take(&mut self.piece);
         loop {
             if task.skips.has(Skip::Saturated)
-                && self.layers[layer].open_blocks(task.way.light) == 0
+                && dispatch!(level, simd => self.layers[layer].open_blocks(simd, task.way.light))
+                    == 0
             {
                 break;
             }

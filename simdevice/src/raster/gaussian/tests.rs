@@ -207,8 +207,8 @@ fn naive_sample(
         let f = g.factor;
         let (u, v) = ((mx * f[0]) as f32, (mx * f[1] + my * f[2]) as f32);
         let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
-        let u = mul_add(dx, f[0] as f32, u);
-        let v = mul_add(dy, f[2] as f32, mul_add(dx, f[1] as f32, v));
+        let u = u + dx * f[0] as f32;
+        let v = v + mul_add(dy, f[2] as f32, dx * f[1] as f32);
         let fall = if g.steep || wide_sums::pays(state) {
             let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
             let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
