@@ -54,7 +54,7 @@ const BLOCK: usize = 4;
 const BLOCKS: usize = 16;
 /// A bit for each of them.
 const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
-/// Gaussians of a chunk: as many as phase 1 and phase 2 pass through the first-level cache, and a word has bits.
+/// Gaussians of a chunk: as many as phases pass on through the first-level cache, and a word has bits.
 const CHUNK: usize = 32;
 
 /// Powers of two are formed down to this one.
@@ -91,7 +91,7 @@ const FIND_MEDIAN: DepthMode = 5;
 /// And what the mean is made of.
 const FIND_MEAN: DepthMode = 6;
 
-/// What the two phases need of a Gaussian in this tile.
+/// What the phases need of a Gaussian in this tile.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 struct Record {

@@ -43,6 +43,8 @@ pub enum BenchError {
     Io(#[from] std::io::Error),
     #[error("a worker was not understood: {0}")]
     Json(#[from] serde_json::Error),
+    #[error("--only: no setting is called \"{0}\"")]
+    NoSuchSetting(String),
     #[error("the picture has no camera that the oracle knows")]
     NoOracle,
     #[error("the plot could not be drawn: {0}")]
@@ -64,7 +66,7 @@ pub struct BenchArguments {
 #[derive(Subcommand)]
 enum BenchCommand {
     /// Sweeps settings and peers over several scenes and draws run time against error.
-    Pareto(SweepArguments),
+    Pareto(ParetoArguments),
     /// How time and memory grow with Gaussians, pixels, overlap and the share off the screen.
     Growth(SweepArguments),
     /// What each skip saves, and what Gaussians cost that nobody sees.
@@ -133,6 +135,17 @@ struct SweepArguments {
     /// Threads to draw with, 0 for one for each processor
     #[arg(long, value_name = "N", default_value_t = 1)]
     threads: usize,
+}
+
+/// What the sweep over settings takes.
+#[derive(Args)]
+struct ParetoArguments {
+    #[command(flatten)]
+    sweep: SweepArguments,
+
+    /// Leaves out settings of other names; "as meant" compares with the peers alone
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
 }
 
 /// Runs what was asked for.

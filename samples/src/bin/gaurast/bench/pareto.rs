@@ -13,7 +13,7 @@ use super::machine::Machine;
 use super::output::{self, Rows, number};
 use super::plot::{self, Panel, Series};
 use super::worker::{Contender, Drawn, Worker};
-use super::{BenchError, CONTENDERS, Source, SweepArguments, Workload, median};
+use super::{BenchError, CONTENDERS, ParetoArguments, Source, SweepArguments, Workload, median};
 
 /// A way to draw: who, by which settings, at which part of the resolution.
 #[derive(Clone, Debug, Serialize)]
@@ -108,7 +108,8 @@ struct Results {
 }
 
 /// Runs the sweep.
-pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
+pub(super) fn run(arguments: &ParetoArguments) -> Result<(), BenchError> {
+    let (arguments, variants) = (&arguments.sweep, variants(&arguments.only)?);
     let mut results = Results {
         machine: Machine::this(),
         threads: arguments.threads,
@@ -119,7 +120,7 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
         .unwrap_or(if arguments.quick { 3 } else { 9 }) as usize;
     let _ = writeln!(stdout(), "{}", results.machine.line());
     for workload in workloads(arguments) {
-        let scene = measure(workload, arguments.threads, runs)?;
+        let scene = measure(workload, arguments.threads, runs, &variants)?;
         let _ = writeln!(
             stdout(),
             "\n{}: {} Gaussians\n{}",
@@ -172,8 +173,20 @@ fn workloads(arguments: &SweepArguments) -> Vec<Workload> {
         .collect()
 }
 
-/// Everything that is compared.
-fn variants() -> Vec<Variant> {
+/// Everything that is compared, or those of it that have one of some names.
+fn variants(only: &[String]) -> Result<Vec<Variant>, BenchError> {
+    let all = all_variants();
+    if let Some(name) = only
+        .iter()
+        .find(|&name| all.iter().all(|variant| variant.name != *name))
+    {
+        return Err(BenchError::NoSuchSetting(name.clone()));
+    }
+    let wanted = |variant: &Variant| only.is_empty() || only.contains(&variant.name);
+    Ok(all.into_iter().filter(wanted).collect())
+}
+
+fn all_variants() -> Vec<Variant> {
     let exact = Settings::default();
     let floor = |alpha: f32| Settings {
         alpha_floor: alpha / 255.0,
@@ -293,7 +306,12 @@ fn far_at_half_size() -> impl Iterator<Item = Variant> {
     })
 }
 
-fn measure(workload: Workload, threads: usize, runs: usize) -> Result<SceneResults, BenchError> {
+fn measure(
+    workload: Workload,
+    threads: usize,
+    runs: usize,
+    variants: &[Variant],
+) -> Result<SceneResults, BenchError> {
     let (judge, views, depths, gaussians) = {
         let scene = workload.scene()?;
         let views = workload.views(&scene, runs)?;
@@ -308,13 +326,13 @@ fn measure(workload: Workload, threads: usize, runs: usize) -> Result<SceneResul
             eprintln!("left out: {} (not installed)", contender.name());
         }
     }
-    let mut draws: Vec<(Variant, usize, Vec<Drawn>)> = variants()
-        .into_iter()
+    let mut draws: Vec<(Variant, usize, Vec<Drawn>)> = variants
+        .iter()
         .filter_map(|variant| {
             let worker = workers
                 .iter()
                 .position(|(contender, _)| *contender == variant.contender)?;
-            Some((variant, worker, Vec::new()))
+            Some((variant.clone(), worker, Vec::new()))
         })
         .collect();
     let smaller = |view: &Camera, divisor: u32| {
