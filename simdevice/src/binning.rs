@@ -1,16 +1,17 @@
 //! Binning: depth-sorted primitives to lists per tile.
 //!
 //! Sorting comes first, and placement is stable, so that every list is in depth order without a sort of its
-//! own. Workers take runs of the sorted sequence and write down the pairs of a tile and a primitive, apart for each band
-//! of rows of tiles; then workers take bands, count and place. What primitives reach differs in ways that no branch
-//! foresees, so that pairs are written first and are all alike later.
+//! own. Workers take runs of the sorted sequence and write down which tiles of a row each primitive reaches, apart for
+//! each band of rows of tiles; then workers take bands, count and place. What primitives reach differs in ways that no
+//! branch foresees, so that what is small is written and placed without any.
 //!
 //! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
 //! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
-use crate::gaussian::footprint::{Reach, Span, TILE_SIZE};
+use crate::gaussian::footprint::{HELD_ROWS, Reach, Span, TILE_SIZE};
 use crate::gaussian::locate;
 use crate::gaussian::splat::Projected;
+use crate::lanes::three;
 use crate::packet::Rect;
 use devmem::host;
 use rayon::prelude::*;
@@ -19,8 +20,10 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 /// The lists of some rows of tiles.
 #[derive(Debug, Default)]
 struct Band {
-    /// Where each tile's list begins, row by row, and one past the last.
+    /// Where each tile's list begins, row by row.
     starts: Vec<u32>,
+    /// Where it ends: there is room for one more behind it.
+    ends: Vec<u32>,
     primitives: Vec<u32>,
 }
 
@@ -106,24 +109,40 @@ impl Stream {
     }
 }
 
+/// What batches reach, close together.
+struct Batches<'a> {
+    reaches: Vec<&'a [Reach]>,
+    spans: Vec<&'a [Span]>,
+}
+
 /// The rows of tiles that a draw may touch.
 struct Rows {
     first: u32,
-    /// Of each row: its band, and the number that its first tile has there.
+    /// Of each row: its band, and the number that its first tile has there. One more is for all others.
     places: Vec<(u32, u32)>,
 }
 
-/// Pairs of a tile, by its number in the band, and a primitive. There is room behind them.
+/// Tiles that follow one another in a row of a band, and a primitive that reaches them: the first one's number and, from
+/// bit [`COUNT_AT`] on, how many; then the primitive.
+type Strip = [u32; 2];
+
+/// Bits of a tile's number in its band.
+const COUNT_AT: u32 = 22;
+
+/// The most tiles of a band.
+const MAX_TILES: u32 = 1 << COUNT_AT;
+
+/// The most tiles of a strip.
+const MAX_COUNT: u32 = (1 << (32 - COUNT_AT)) - 1;
+
+/// Strips of a band in the order of primitives. There is room behind them.
 #[derive(Debug, Default)]
-struct Pairs {
-    pairs: Vec<[u32; 2]>,
+struct Strips {
+    strips: Vec<Strip>,
     len: usize,
 }
 
-/// Pairs that are written together, whether they are wanted or not.
-const TOGETHER: usize = 4;
-
-/// Primitives whose reaches are brought together, and whose pairs are counted before the budget is looked at.
+/// Primitives whose reaches are fetched ahead, and whose pairs are counted before the budget is looked at.
 const GATHERED: usize = 64;
 
 /// Primitives that a worker brings into order at a time.
@@ -154,19 +173,24 @@ impl TileLists {
         let rows = tile(i64::from(bounds.y) + i64::from(bounds.height) - 1) - first_row + 1;
         let columns = tile(i64::from(bounds.x) + i64::from(bounds.width) - 1) + 1;
         let threads = threads.max(1);
-        let band_rows = rows.div_ceil(threads as u32);
+        let band_rows = rows
+            .div_ceil(threads as u32)
+            .min((MAX_TILES / columns).max(1));
         let bands = rows.div_ceil(band_rows) as usize;
         let places = |row: u32| (row / band_rows, row % band_rows * columns);
         let grid = Rows {
             first: first_row,
-            places: host::collect((0..rows).map(places)),
+            places: host::collect((0..rows).map(places).chain([(bands as u32 - 1, 0)])),
         };
         let pairs = AtomicU64::new(0);
         let allow = |more: u64| pairs.fetch_add(more, Relaxed) + more <= most_pairs;
-        let seen = &*batches;
-        let runs: Option<Vec<Vec<Pairs>>> = order
+        let seen = Batches {
+            reaches: host::collect(batches.iter().map(|batch| &*batch.reaches)),
+            spans: host::collect(batches.iter().map(|batch| &*batch.spans)),
+        };
+        let runs: Option<Vec<Vec<Strips>>> = order
             .par_chunks(order.len().div_ceil(threads))
-            .map(|run| grid.expand(seen, run, bands, allow))
+            .map(|run| grid.expand(&seen, run, bands, allow))
             .collect();
         let Some(runs) = runs else {
             return Self {
@@ -200,7 +224,7 @@ impl TileLists {
             let band = self.bands.get((row / self.band_rows) as usize)?;
             let tile = row % self.band_rows * self.columns + tile_x;
             let start = *band.starts.get(tile as usize)?;
-            let end = *band.starts.get(tile as usize + 1)?;
+            let end = *band.ends.get(tile as usize)?;
             band.primitives.get(start as usize..end as usize)
         };
         if tile_x < self.columns {
@@ -217,7 +241,8 @@ impl TileLists {
 
     /// How many pairs of tile and primitive there are.
     pub(crate) fn pairs(&self) -> u64 {
-        let pairs = |band: &Band| band.primitives.len() as u64;
+        // Each list has room for one more.
+        let pairs = |band: &Band| (band.primitives.len() - band.starts.len()) as u64;
         let streamed = self.stream.as_ref().map_or(0, |stream| stream.pairs);
         self.bands.iter().map(pairs).sum::<u64>() + streamed
     }
@@ -239,119 +264,211 @@ impl TileLists {
 
     /// Bytes of host memory that the lists take.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let bytes = |band: &Band| size_of_val(&*band.starts) + size_of_val(&*band.primitives);
+        let bytes = |band: &Band| 2 * size_of_val(&*band.starts) + size_of_val(&*band.primitives);
         let lists = self.bands.iter().map(|band| bytes(band) as u64);
         lists.sum::<u64>() + self.stream.as_ref().map_or(0, Stream::memory_bytes)
     }
 }
 
 impl Rows {
-    /// The pairs of a run of the sorted sequence, in its order, by band.
+    /// The strips of a run of the sorted sequence, in its order, by band.
     /// `None` once the budget does not `allow` for so many more.
     fn expand(
         &self,
-        batches: &[Projected],
+        batches: &Batches<'_>,
         run: &[(u32, u32)],
         bands: usize,
         allow: impl Fn(u64) -> bool,
-    ) -> Option<Vec<Pairs>> {
-        let mut pairs = host::collect((0..bands).map(|_| Pairs::default()));
-        let mut count = 0;
-        let mut push = |row: u32, span: Span, primitive: u32, count: &mut u64| {
-            let row = row.wrapping_sub(self.first) as usize;
+    ) -> Option<Vec<Strips>> {
+        let mut strips = host::collect((0..bands).map(|_| Strips::default()));
+        let others = self.places.len() - 1;
+        let strip = |(row, span): (u32, Span)| {
             // Rows without tiles may lie outside.
-            if let Some(&(band, first)) = self.places.get(row) {
-                let first = first + u32::from(span.first);
-                *count += span.len() as u64;
-                pairs[band as usize].push(first, span.len(), primitive);
-            }
+            let row = (row.wrapping_sub(self.first) as usize).min(others);
+            let (band, first) = self.places[row];
+            let first = first + u32::from(span.first);
+            (band as usize, first, span.len() as u32)
         };
-        let mut reaches = [Reach::default(); GATHERED];
+        let reach_of = |&(_, primitive): &(u32, u32)| {
+            let (batch, place) = locate(primitive);
+            &batches.reaches[batch][place]
+        };
+        let mut ahead = run.chunks(GATHERED).skip(1);
         for some in run.chunks(GATHERED) {
-            // Before any is looked at, so that the waits for memory overlap.
-            for (reach, &(_, primitive)) in reaches.iter_mut().zip(some) {
-                let (batch, place) = locate(primitive);
-                *reach = batches[batch].reaches[place];
+            // They lie anywhere, so that each would be waited for.
+            for next in ahead.next().unwrap_or_default() {
+                host::prefetch(std::slice::from_ref(reach_of(next)));
             }
-            for (reach, &(_, primitive)) in reaches.iter().zip(some) {
+            let mut count = 0;
+            for named in some {
+                let (reach, &(_, primitive)) = (reach_of(named), named);
                 if let Some(rows) = reach.held() {
-                    for (row, span) in rows {
-                        push(row, span, primitive, &mut count);
+                    let [one, two, three] = three(rows, strip);
+                    count += u64::from(one.2 + two.2 + three.2);
+                    if one.0 == three.0 && one.2.max(two.2).max(three.2) <= MAX_COUNT {
+                        let of = [(one.1, one.2), (two.1, two.2), (three.1, three.2)];
+                        strips[one.0].push_small(of, primitive);
+                        continue;
+                    }
+                    for (band, first, tiles) in [one, two, three] {
+                        strips[band].push(first, tiles, primitive);
                     }
                 } else {
-                    let others = &batches[locate(primitive).0].spans;
-                    for (row, span) in reach.spans(others) {
-                        push(row, span, primitive, &mut count);
+                    let others = batches.spans[locate(primitive).0];
+                    for (band, first, tiles) in reach.spans(others).map(strip) {
+                        count += u64::from(tiles);
+                        strips[band].push(first, tiles, primitive);
                     }
                 }
             }
-            if !allow(std::mem::take(&mut count)) {
+            if !allow(count) {
                 return None;
             }
         }
-        Some(pairs)
+        Some(strips)
     }
 }
 
-impl Pairs {
-    /// Adds a primitive and `count` tiles from `first` on.
+impl Strips {
+    /// Adds what a primitive reaches in three rows: the first tile of each and how many, at most [`MAX_COUNT`].
     #[inline(always)]
-    fn push(&mut self, first: u32, count: usize, primitive: u32) {
-        let mut rest = count;
-        let mut tile = first;
-        loop {
-            if self.pairs.len() < self.len + TOGETHER {
+    fn push_small(&mut self, rows: [(u32, u32); HELD_ROWS], primitive: u32) {
+        if self.strips.len() < self.len + HELD_ROWS {
+            self.grow();
+        }
+        let room = &mut self.strips[self.len..self.len + HELD_ROWS];
+        let mut len = 0;
+        for (first, count) in rows {
+            // What has no tiles is written over.
+            room[len] = [first | count << COUNT_AT, primitive];
+            len += usize::from(count > 0);
+        }
+        self.len += len;
+    }
+
+    /// Adds a primitive and `count` tiles from `first` on.
+    fn push(&mut self, mut first: u32, mut count: u32, primitive: u32) {
+        while count > 0 {
+            if self.len == self.strips.len() {
                 self.grow();
             }
-            let room = &mut self.pairs[self.len..self.len + TOGETHER];
-            for (pair, tile) in room.iter_mut().zip(tile..) {
-                *pair = [tile, primitive];
-            }
-            self.len += rest.min(TOGETHER);
-            if rest <= TOGETHER {
-                return;
-            }
-            rest -= TOGETHER;
-            tile += TOGETHER as u32;
+            let some = count.min(MAX_COUNT);
+            self.strips[self.len] = [first | some << COUNT_AT, primitive];
+            self.len += 1;
+            first += some;
+            count -= some;
         }
     }
 
     #[cold]
     fn grow(&mut self) {
-        let len = (2 * self.pairs.len()).max(1024);
-        host::resize(&mut self.pairs, len, [0; 2]);
+        let len = (2 * self.strips.len()).max(1024);
+        host::resize(&mut self.strips, len, [0; 2]);
     }
 
-    fn written(&self) -> &[[u32; 2]] {
-        &self.pairs[..self.len]
+    fn written(&self) -> &[Strip] {
+        &self.strips[..self.len]
     }
 }
 
 impl Band {
-    /// Counts, then places the pairs of a band of so many tiles, in their order.
-    fn place(runs: &[&[[u32; 2]]], tiles: usize) -> Self {
-        let pairs = || runs.iter().flat_map(|run| run.iter());
+    /// Counts, then places the strips of a band of so many tiles, in their order.
+    fn place(runs: &[&[Strip]], tiles: usize) -> Self {
+        let parts = |[tile, primitive]: Strip| {
+            let first = tile & ((1 << COUNT_AT) - 1);
+            (first as usize, tile >> COUNT_AT, primitive)
+        };
+        // Changes of the count from tile to tile.
         let mut starts: Vec<u32> = host::zeroed(tiles + 1);
-        pairs().for_each(|&[tile, _]| starts[tile as usize] += 1);
-        let mut total = 0;
-        for start in &mut starts {
-            total += std::mem::replace(start, total);
+        for &strip in runs.iter().copied().flatten() {
+            let (first, count, _) = parts(strip);
+            let end = first + count as usize;
+            starts[first] = starts[first].wrapping_add(1);
+            starts[end] = starts[end].wrapping_sub(1);
         }
-        let mut next = host::copied(&starts);
+        let (mut total, mut count) = (0, 0u32);
+        for start in &mut starts {
+            count = count.wrapping_add(*start);
+            *start = total;
+            // Room for one more.
+            total += count + 1;
+        }
+        let mut ends = host::copied(&starts);
         let mut primitives: Vec<u32> = host::zeroed(total as usize);
-        pairs().for_each(|&[tile, primitive]| {
-            let next = &mut next[tile as usize];
-            primitives[*next as usize] = primitive;
-            *next += 1;
-        });
-        Self { starts, primitives }
+        for &strip in runs.iter().copied().flatten() {
+            let (first, count, primitive) = parts(strip);
+            // Most have one tile or two, which no branch foresees: what is not wanted is written over.
+            let mut put = |tile: usize, wanted: bool| {
+                let end = ends[tile];
+                primitives[end as usize] = primitive;
+                ends[tile] = end + u32::from(wanted);
+            };
+            put(first, true);
+            put(first + 1, count > 1);
+            for tile in 2..count as usize {
+                put(first + tile, true);
+            }
+        }
+        Self {
+            starts,
+            ends,
+            primitives,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussian::footprint::Span;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn lists_are_what_the_spans_say(
+            // Wide enough for spans of more than one strip.
+            columns in prop_oneof![1..8u16, 1000..2100u16],
+            first_row in 0..3u16,
+            rows in 1..9u16,
+            reached in prop::collection::vec((0..9u16, prop::collection::vec((0..2100u16, 0..2100u16), 0..6)), 1..80),
+            threads in 1..5usize,
+        ) {
+            // Clipped to the tiles that there are.
+            let clip = |&(first, len): &(u16, u16)| {
+                let first = first.min(columns - 1);
+                Span { first, end: (first + len).min(columns) }
+            };
+            let mut batch = Projected::default();
+            let mut expected = vec![Vec::new(); usize::from(rows) * usize::from(columns)];
+            let mut pairs = 0;
+            for (primitive, (row, spans)) in (0..).zip(&reached) {
+                let row = (*row).min(rows - 1);
+                let spans: Vec<Span> = spans.iter().take((rows - row).into()).map(clip).collect();
+                let mut reach = Reach::new(first_row + row, spans.len() as u16, &mut batch.spans);
+                for (number, &span) in (0..).zip(&spans) {
+                    reach.set(&mut batch.spans, number, span);
+                    for column in span.first..span.end {
+                        let tile = usize::from(row + number) * usize::from(columns) + usize::from(column);
+                        expected[tile].push(primitive);
+                        pairs += 1;
+                    }
+                }
+                batch.reaches.push(reach);
+            }
+            let order: Vec<(u32, u32)> = (0..reached.len() as u32).map(|primitive| (7, primitive)).collect();
+            let bounds = Rect {
+                x: 0,
+                y: i32::from(first_row) * 16,
+                width: u32::from(columns) * 16 - 5,
+                height: u32::from(rows) * 16 - 15,
+            };
+            let lists = TileLists::build(&mut [batch], &order, bounds, threads, u64::MAX);
+            prop_assert_eq!(lists.pairs(), pairs);
+            for (tile, expected) in expected.iter().enumerate() {
+                let (x, y) = (tile % usize::from(columns), tile / usize::from(columns));
+                prop_assert_eq!(lists.list(x as u32, y as u32 + u32::from(first_row)), expected);
+            }
+        }
+    }
 
     #[test]
     fn lists_keep_the_sorted_order() {
@@ -377,10 +494,14 @@ mod tests {
         let lists = TileLists::build(&mut [batch], &order, bounds, 2, u64::MAX);
         assert_eq!(lists.list(0, 1), [2, 0]);
         assert_eq!(lists.list(1, 1), [0, 1]);
-        assert_eq!(lists.list(2, 1), []);
+        assert_eq!(lists.list(2, 1), [0; 0]);
         assert_eq!(lists.list(2, 2), [1]);
-        assert_eq!(lists.list(0, 0), [], "outside the bounds there is nothing");
-        assert_eq!(lists.list(9, 9), []);
+        assert_eq!(
+            lists.list(0, 0),
+            [0; 0],
+            "outside the bounds there is nothing"
+        );
+        assert_eq!(lists.list(9, 9), [0; 0]);
         assert_eq!(lists.pairs(), 7);
         assert!(lists.any_in(Rect {
             x: 33,

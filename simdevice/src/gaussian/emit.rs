@@ -1,12 +1,12 @@
-//! What becomes of projected Gaussians: why some are skipped after all, which tiles the others reach, their colours and keys.
+//! What becomes of projected Gaussians that reach tiles: their colours and keys.
 use super::fetch::{BATCH, COEFFICIENT_FLOATS, CoefficientReader};
-use super::footprint::{Ellipse, Reach, Span};
+use super::footprint::{Reach, Span};
 use super::panorama;
 use super::project::{LN_2, Projection, Source};
 use super::rays::{self, RayDepth};
 use super::scratch::Scratch;
 use super::sort::ordered_bits;
-use super::spherical_harmonics::{Bases, DIRECTIONS};
+use super::spherical_harmonics::{Bases, DIRECTIONS, coefficient_count};
 use super::splat::{Projected, Splat};
 use super::surfel::{Placed, Surfel};
 use crate::counters::Counter;
@@ -51,7 +51,7 @@ impl Projection {
     }
 
     /// A kept lane as a 2D Gaussian, and the tiles that it reaches, if there are any.
-    fn surfel(
+    pub(super) fn surfel(
         &self,
         at: usize,
         scratch: &Scratch,
@@ -79,72 +79,6 @@ impl Projection {
         let mean = [flat.mean[0][at], flat.mean[1][at]];
         let reach = surfel.reach(mean, (extent, self.low_pass), &self.visible, spans);
         (surfel, reach)
-    }
-
-    /// Why a kept Gaussian is skipped after all, by what does not depend on tiles and colours.
-    #[inline(always)]
-    fn why_skipped(&self, at: usize, scratch: &Scratch) -> Option<Counter> {
-        let z = scratch.depth[at] as f32;
-        let determinant = scratch.flat.determinant[at];
-        // What is not a number is nowhere.
-        if z.is_nan() || z <= self.near {
-            Some(Counter::SkippedNear)
-        } else if z >= self.far {
-            Some(Counter::SkippedFar)
-        } else if self.geometry == GaussianGeometry::Volume
-            && !(determinant > 0.0 && determinant.is_finite())
-        {
-            Some(Counter::SkippedDegenerate)
-        } else {
-            None
-        }
-    }
-
-    /// Finds the kept Gaussians that reach a tile.
-    #[inline(always)]
-    pub(super) fn find_tiles(&self, scratch: &mut Scratch, out: &mut Projected) {
-        let mut beside = self.skips.has(Skip::Ellipse).then_some(0);
-        scratch.reached.clear();
-        scratch.copies.clear();
-        let is_flat = self.geometry == GaussianGeometry::Surfel;
-        for at in 0..scratch.lanes.len().min(BATCH) {
-            if let Some(reason) = self.why_skipped(at, scratch) {
-                out.counters.add(reason, 1);
-                continue;
-            }
-            if is_flat {
-                match self.surfel(at, scratch, &mut out.spans).1 {
-                    Some(reach) => scratch.reached.push((at, reach)),
-                    None => out.counters.add(Counter::SkippedOffScreen, 1),
-                }
-                continue;
-            }
-            let flat = &*scratch.flat;
-            let ellipse = Ellipse {
-                mean: [flat.mean[0][at], flat.mean[1][at]],
-                half: [flat.half[0][at], flat.half[1][at]],
-                slope: flat.slope[at],
-                narrowing: flat.narrowing[at],
-                peak: flat.peak[at],
-            };
-            let mut reach = None;
-            // The square root of a negative extent is not a number.
-            if ellipse.half[1] >= 0.0 {
-                reach = match self.period {
-                    None => ellipse.reach(&self.visible, &mut out.spans, beside.as_mut()),
-                    Some(period) => {
-                        let (visible, copies) = (&self.visible, &mut scratch.copies);
-                        panorama::reach(at, &ellipse, period, visible, copies, out, beside.as_mut())
-                    }
-                };
-            }
-            match reach {
-                Some(reach) => scratch.reached.push((at, reach)),
-                None => out.counters.add(Counter::SkippedOffScreen, 1),
-            }
-        }
-        let beside = beside.unwrap_or_default();
-        out.counters.add(Counter::TilesBesideEllipse, beside);
     }
 
     /// The degree up to which spherical harmonics of a batch make a difference in some directions.
@@ -177,58 +111,48 @@ impl Projection {
         out: &mut Projected,
     ) {
         out.reserve(scratch.lanes.len());
-        self.find_tiles(scratch, out);
+        self.find_tiles(simd, scratch, out);
         let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
-        let mut coefficients = [[0.0; COEFFICIENT_FLOATS]; DIRECTIONS];
+        let floats = reader.floats();
+        let mut read = [0.0; COEFFICIENT_FLOATS];
         let (mut directions, mut bases) = ([[0.0; DIRECTIONS]; 3], Bases::default());
         let mut copies = &*scratch.copies;
         for group in scratch.reached.chunks(DIRECTIONS) {
-            // Reading several at a time overlaps the waits for memory.
-            for (&(at, _), coefficients) in group.iter().zip(&mut coefficients) {
-                let (lane, floats) = (scratch.lanes[at], reader.floats());
-                match source.harmonics.get(lane * floats..(lane + 1) * floats) {
-                    Some(read) if floats > 0 => coefficients[..floats].copy_from_slice(read),
-                    _ => reader.read(&source.batch, lane, coefficients),
-                }
-            }
             for (parts, lanes) in directions.iter_mut().zip(&scratch.flat.direction) {
-                for (part, &(at, _)) in parts.iter_mut().zip(group) {
+                for (part, &at) in parts.iter_mut().zip(group) {
                     *part = lanes[at % BATCH] as f32;
                 }
             }
             let degree = self.degree_in(source, &directions, out);
             bases.find(simd, degree, &directions);
-            for (number, &(at, reach)) in group.iter().enumerate() {
-                let at = at % BATCH;
-                let flat = &*scratch.flat;
-                let coefficients = &coefficients[number % DIRECTIONS];
-                let Some(color) = bases.color(simd, degree, number, coefficients) else {
-                    out.counters.add(Counter::SkippedNonFinite, 1);
-                    continue;
+            let needed = 3 * coefficient_count(degree) + 1;
+            let is_whole = floats + 1 >= needed;
+            // All colours come first: what they wait for memory overlaps then.
+            let mut colored = Colored::default();
+            for (number, &at) in group.iter().enumerate() {
+                let lane = scratch.lanes[at % BATCH];
+                let rest = source.harmonics.get(lane * floats..).unwrap_or_default();
+                let coefficients = if is_whole && rest.len() >= needed {
+                    rest
+                } else {
+                    match rest.get(..floats) {
+                        Some(last) if floats > 0 => read[..floats].copy_from_slice(last),
+                        _ => reader.read(&source.batch, lane, &mut read),
+                    }
+                    &read
                 };
-                let sequence = sequence(scratch.lanes[at]);
-                out.keys.push([self.key(at, sequence, scratch), sequence]);
-                let depth = self.center_depth(at, scratch);
-                let wide = self
-                    .period
-                    .is_some_and(|period| 2.0 * flat.half[0][at] >= period);
-                let splat = Splat::new(flat, at, color, depth);
-                out.splats.push(Splat {
-                    steep: wide || splat.steep,
-                    wide,
-                    ..splat
-                });
-                out.reaches.push(reach);
-                if self.geometry == GaussianGeometry::Surfel {
-                    let (surfel, _) = self.surfel(at, scratch, &mut Vec::new());
-                    out.surfels.push(surfel);
+                match bases.color(simd, degree, number, coefficients) {
+                    Some(color) => colored.push(at, color),
+                    None => out.counters.add(Counter::SkippedNonFinite, 1),
                 }
-                if self.order == GaussianOrder::PerPixel {
-                    out.ray_depths.push(self.ray_depth(at, scratch));
-                }
-                if let Some(period) = self.period {
-                    panorama::copy_last(at, period, &mut copies, out);
-                }
+            }
+            let Some(period) = self.period else {
+                self.append(colored.all(), scratch, &sequence, out);
+                continue;
+            };
+            for one in colored.all() {
+                self.append(std::slice::from_ref(one), scratch, &sequence, out);
+                panorama::copy_last(one.at, period, &mut copies, out);
             }
         }
         let counters = &mut out.counters;
@@ -237,5 +161,74 @@ impl Projection {
             let unread = source.batch.len - scratch.reached.len();
             counters.add(Counter::HarmonicsUnread, unread as u64);
         }
+    }
+    /// Appends kept lanes and their colours to `out`.
+    #[inline(always)]
+    fn append(
+        &self,
+        lanes: &[ColoredLane],
+        scratch: &Scratch,
+        sequence: &impl Fn(usize) -> u32,
+        out: &mut Projected,
+    ) {
+        // Iterators that know their lengths write without a look at the room that there is.
+        out.keys.extend(lanes.iter().map(|one| {
+            let sequence = sequence(scratch.lanes[one.at % BATCH]);
+            [self.key(one.at, sequence, scratch), sequence]
+        }));
+        out.splats.extend(lanes.iter().map(|one| {
+            let depth = self.center_depth(one.at, scratch);
+            let wide = self
+                .period
+                .is_some_and(|period| 2.0 * scratch.flat.half[0][one.at] >= period);
+            let splat = Splat::new(&scratch.flat, one.at, one.color, depth);
+            Splat {
+                steep: wide || splat.steep,
+                wide,
+                ..splat
+            }
+        }));
+        let reaches = lanes.iter().map(|one| scratch.reaches.get(one.at));
+        out.reaches.extend(reaches);
+        if self.geometry == GaussianGeometry::Surfel {
+            let surfels = lanes
+                .iter()
+                .map(|one| self.surfel(one.at, scratch, &mut Vec::new()).0);
+            out.surfels.extend(surfels);
+        }
+        if self.order == GaussianOrder::PerPixel {
+            let depths = lanes.iter().map(|one| self.ray_depth(one.at, scratch));
+            out.ray_depths.extend(depths);
+        }
+    }
+}
+
+/// A kept lane and its colour.
+#[derive(Clone, Copy, Debug, Default)]
+struct ColoredLane {
+    at: usize,
+    color: [f32; 3],
+}
+
+/// Those of some directions.
+#[derive(Default)]
+struct Colored {
+    lanes: [ColoredLane; DIRECTIONS],
+    len: usize,
+}
+
+impl Colored {
+    #[inline(always)]
+    fn push(&mut self, at: usize, color: [f32; 3]) {
+        self.lanes[self.len % DIRECTIONS] = ColoredLane {
+            at: at % BATCH,
+            color,
+        };
+        self.len += 1;
+    }
+
+    #[inline(always)]
+    fn all(&self) -> &[ColoredLane] {
+        &self.lanes[..self.len.min(DIRECTIONS)]
     }
 }

@@ -25,19 +25,31 @@ impl Span {
 }
 
 /// Rows of tiles that a [`Reach`] holds itself.
-const HELD_ROWS: usize = 3;
+pub(crate) const HELD_ROWS: usize = 3;
 
 /// The tiles that a Gaussian reaches: a span for each of some rows of tiles that follow one another. Small, since most
 /// reach few tiles, and all of them are read in the order of their depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Reach {
-    /// The first row.
-    row: u16,
-    /// How many rows.
-    rows: u16,
-    /// The rows' spans, if they fit; otherwise they lie among those of the batch, at the first one's index (low half,
-    /// high half).
-    held: [Span; HELD_ROWS],
+    /// The first row (low half) and how many rows.
+    rows: u32,
+    /// The rows' spans (first and end), if they fit; otherwise they lie among those of the batch, at the first one's index.
+    held: [u32; HELD_ROWS],
+}
+
+/// The number that a [`Reach`] holds for a span.
+#[inline(always)]
+fn pack(span: Span) -> u32 {
+    u32::from(span.first) | u32::from(span.end) << 16
+}
+
+/// The span of such a number.
+#[inline(always)]
+fn unpack(bits: u32) -> Span {
+    Span {
+        first: bits as u16,
+        end: (bits >> 16) as u16,
+    }
 }
 
 impl Reach {
@@ -45,65 +57,82 @@ impl Reach {
     #[inline(always)]
     pub(crate) fn new(row: u16, rows: u16, others: &mut Vec<Span>) -> Self {
         let mut reach = Self {
-            row,
-            rows,
-            held: [Span::default(); HELD_ROWS],
+            rows: u32::from(row) | u32::from(rows) << 16,
+            held: [0; HELD_ROWS],
         };
         if usize::from(rows) > HELD_ROWS {
-            let at = others.len() as u32;
-            reach.held[0] = Span {
-                first: at as u16,
-                end: (at >> 16) as u16,
-            };
+            reach.held[0] = others.len() as u32;
             let len = others.len() + usize::from(rows);
             host::resize(others, len, Span::default());
         }
         reach
     }
 
-    /// Where the spans that do not fit begin.
+    /// What it is made of: the first row and, from bit 16 on, how many rows; then the first column and one past the last
+    /// of each row, 16 bits each.
     #[inline(always)]
-    fn start(&self) -> usize {
-        let Span { first, end } = self.held[0];
-        usize::from(first) | usize::from(end) << 16
+    pub(super) fn words(&self) -> [u64; 2] {
+        let both = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
+        let [first, second, third] = self.held;
+        [both(self.rows, first), both(second, third)]
+    }
+
+    /// The one that is made of these.
+    #[inline(always)]
+    pub(super) fn from_words([first, second]: [u64; 2]) -> Self {
+        Self {
+            rows: first as u32,
+            held: [(first >> 32) as u32, second as u32, (second >> 32) as u32],
+        }
+    }
+
+    /// The first row.
+    #[inline(always)]
+    fn row(&self) -> u32 {
+        self.rows & 0xFFFF
+    }
+
+    /// How many rows it has.
+    #[inline(always)]
+    fn len(&self) -> usize {
+        (self.rows >> 16) as usize
     }
 
     /// Sets the span of row `number` of its rows.
     #[inline(always)]
     pub(crate) fn set(&mut self, others: &mut [Span], number: u16, span: Span) {
         let at = usize::from(number);
-        if usize::from(self.rows) > HELD_ROWS {
-            others[self.start() + at] = span;
+        if self.len() > HELD_ROWS {
+            others[self.held[0] as usize + at] = span;
         } else {
-            self.held[at % HELD_ROWS] = span;
+            self.held[at % HELD_ROWS] = pack(span);
         }
     }
 
     /// Its rows, each with its span, which may be empty.
     #[inline(always)]
     pub(crate) fn spans<'a>(&'a self, others: &'a [Span]) -> impl Iterator<Item = (u32, Span)> {
-        let rows = usize::from(self.rows);
-        let spans = if rows <= HELD_ROWS {
-            &self.held[..rows]
+        (self.row()..).zip((0..self.len()).map(|number| self.span(others, number)))
+    }
+
+    /// The span of row `number` of its rows.
+    #[inline(always)]
+    fn span(&self, others: &[Span], number: usize) -> Span {
+        if self.len() > HELD_ROWS {
+            others[self.held[0] as usize + number]
         } else {
-            let start = self.start();
-            &others[start..start + rows]
-        };
-        (u32::from(self.row)..).zip(spans.iter().copied())
+            unpack(self.held[number])
+        }
     }
 
     /// Whether it has a tile.
     #[inline(always)]
     pub(crate) fn covers(&self, others: &[Span], column: u32, row: u32) -> bool {
-        let number = row.wrapping_sub(u32::from(self.row)) as usize;
-        if number >= usize::from(self.rows) {
+        let number = row.wrapping_sub(self.row()) as usize;
+        if number >= self.len() {
             return false;
         }
-        let span = if usize::from(self.rows) <= HELD_ROWS {
-            self.held[number]
-        } else {
-            others[self.start() + number]
-        };
+        let span = self.span(others, number);
         (u32::from(span.first)..u32::from(span.end)).contains(&column)
     }
 
@@ -111,13 +140,14 @@ impl Reach {
     /// `None` if its spans lie elsewhere.
     #[inline(always)]
     pub(crate) fn held(&self) -> Option<[(u32, Span); HELD_ROWS]> {
-        let row = u32::from(self.row);
+        let row = self.row();
+        let [first, second, third] = self.held;
         let rows = [
-            (row, self.held[0]),
-            (row + 1, self.held[1]),
-            (row + 2, self.held[2]),
+            (row, unpack(first)),
+            (row + 1, unpack(second)),
+            (row + 2, unpack(third)),
         ];
-        (usize::from(self.rows) <= HELD_ROWS).then_some(rows)
+        (self.len() <= HELD_ROWS).then_some(rows)
     }
 }
 

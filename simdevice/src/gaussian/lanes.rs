@@ -42,6 +42,12 @@ impl Bits {
         self.0[at / 64 % WORDS] |= mask.to_bitmask() << (at % 64);
     }
 
+    /// Of the lanes from `at` on, a multiple of `len`, which divides 64: a bit for each of `len`.
+    #[inline(always)]
+    pub(super) fn group(&self, at: usize, len: usize) -> u64 {
+        self.0[at / 64 % WORDS] >> (at % 64) & (u64::MAX >> (64 - len))
+    }
+
     /// Adds `lane` if `member`.
     #[inline(always)]
     pub(super) fn set_one(&mut self, lane: usize, member: bool) {

@@ -3,7 +3,7 @@
 //! Stages, each in a module: [`fetch`] (attributes to lanes), [`project`] (3D to the rasterizer's nine numbers, with
 //! [`linearize`] for cameras that are no pinholes, [`unscented`] for those who ask for it, [`instances`] for what matrices
 //! place in the world, and [`panorama`] for pictures that repeat; [`shaded`] where a vertex program does it instead),
-//! [`depth`] (what the depth test compares), [`footprint`] (which tiles), [`spherical_harmonics`] (colour), [`sort`] (depth order); then
+//! [`depth`] (what the depth test compares), [`tiles`] and [`footprint`] (which tiles), [`spherical_harmonics`] (colour), [`sort`] (depth order); then
 //! [`binning`](crate::binning) places them in tile lists.
 
 pub(crate) mod cache;
@@ -28,6 +28,7 @@ pub mod sort;
 pub mod spherical_harmonics;
 pub(crate) mod splat;
 pub(crate) mod surfel;
+mod tiles;
 pub(crate) mod unchanged;
 mod unscented;
 

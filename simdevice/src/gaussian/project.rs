@@ -13,7 +13,7 @@ use super::instances::Matrices;
 use super::lanes::{Bits, F32_LANES, Lanes, log2};
 use super::panorama;
 use super::scratch::{Attributes, Flat, Scratch};
-use super::spherical_harmonics::Bases;
+use super::spherical_harmonics::{Bases, coefficient_count};
 use super::splat::{Projected, half_room};
 use crate::counters::{Counter, Counters};
 use crate::packet::{
@@ -21,6 +21,7 @@ use crate::packet::{
     GaussianOrder, GaussianPrecision, GaussianState, Viewport,
 };
 use crate::skips::{Skip, Skips};
+use devmem::host;
 use fearless_simd::{Simd, prelude::*};
 
 /// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
@@ -78,6 +79,20 @@ pub(super) struct Source<'a> {
     pub(super) degree: u32,
     /// What bounds those that can be seen; `None` tells nothing of them.
     pub(super) frustum: Option<&'a Frustum>,
+}
+
+impl Source<'_> {
+    /// Has the spherical harmonics of degrees 0 to `degree` of some lanes on their way while other things are computed, if
+    /// they were read already.
+    #[inline(always)]
+    fn prefetch_harmonics(&self, degree: u32, lanes: &[usize]) {
+        let floats = self.harmonics.len() / self.batch.len.max(1);
+        let used = floats.min(3 * coefficient_count(degree.min(self.degree)));
+        for lane in lanes {
+            let start = lane * floats;
+            host::prefetch(self.harmonics.get(start..start + used).unwrap_or_default());
+        }
+    }
 }
 
 impl Projection {
@@ -142,7 +157,7 @@ impl Projection {
         if let Some(matrices) = source.matrices {
             scratch.gather_matrices(matrices);
         }
-        self.flatten(simd, source.matrices.is_some(), scratch);
+        self.flatten(simd, source, scratch);
         self.emit(simd, source, scratch, sequence, out);
     }
 
@@ -257,7 +272,8 @@ impl Projection {
 
     /// Computes mean, covariance and opacity on the screen of the kept Gaussians.
     #[inline(always)]
-    fn flatten<S: Simd>(&self, simd: S, by_matrices: bool, scratch: &mut Scratch) {
+    fn flatten<S: Simd>(&self, simd: S, source: &Source<'_>, scratch: &mut Scratch) {
+        let by_matrices = source.matrices.is_some();
         if by_matrices {
             self.place_by_matrices(scratch);
         } else {
@@ -287,6 +303,8 @@ impl Projection {
             let store = |value: S::f64s, lanes: &mut Lanes| {
                 value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
             };
+            let end = scratch.lanes.len().min(at + S::f64s::LEN);
+            source.prefetch_harmonics(self.sh_degree, &scratch.lanes[at..end]);
             let [w, x] = [load(&rotation[0], at), load(&rotation[1], at)];
             let [y, z] = [load(&rotation[2], at), load(&rotation[3], at)];
             // What was binary32 can be squared in binary64, whatever its size.

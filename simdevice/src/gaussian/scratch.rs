@@ -4,6 +4,7 @@ use super::fetch::BATCH;
 use super::footprint::Reach;
 use super::instances::Placed;
 use super::lanes::{Bits, F32_LANES, Lanes, NO_LANES};
+use super::tiles::Reaches;
 
 /// Vertex attributes by lane, as they are read.
 #[derive(Clone, Debug)]
@@ -35,8 +36,10 @@ pub(crate) struct Scratch {
     /// Of covariances in the picture: xx, xy, yy and the determinant, where the unscented transform finds them.
     pub(super) moments: Box<[Lanes; 4]>,
     pub(super) flat: Box<Flat>,
-    /// Which of them reach tiles, and which tiles.
-    pub(super) reached: Vec<(usize, Reach)>,
+    /// Which of them reach tiles.
+    pub(super) reached: Vec<usize>,
+    /// Which tiles, of those that do.
+    pub(super) reaches: Box<Reaches>,
     /// The same of their copies a period beside, in the same order: which side's, 0 or 1, in the middle.
     pub(super) copies: Vec<(usize, usize, Reach)>,
 }
@@ -124,6 +127,7 @@ impl Scratch {
             moments: Box::new([NO_LANES; 4]),
             flat: Box::default(),
             reached: Vec::with_capacity(BATCH),
+            reaches: Box::default(),
             copies: Vec::new(),
         }
     }

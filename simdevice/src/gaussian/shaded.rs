@@ -148,7 +148,7 @@ impl Worker<'_> {
             .shade(job.instance, job.first, end, &mut out.counters)?;
         shading.keep(&self.shader, outputs, scratch, &mut out);
         dispatch!(level, simd => shading.flatten(simd, outputs, scratch));
-        shading.emit(outputs, scratch, job.sequence, &mut out);
+        shading.emit(level, outputs, scratch, job.sequence, &mut out);
         Ok(out)
     }
 }
@@ -290,10 +290,18 @@ impl Shading {
     }
 
     /// Finds the tiles of the kept Gaussians and appends what reaches some to `out`.
-    fn emit(&self, kept: &Outputs, scratch: &mut Scratch, sequence: u32, out: &mut Projected) {
+    fn emit(
+        &self,
+        level: Level,
+        kept: &Outputs,
+        scratch: &mut Scratch,
+        sequence: u32,
+        out: &mut Projected,
+    ) {
         out.reserve(scratch.lanes.len());
-        self.projection.find_tiles(scratch, out);
-        for &(at, reach) in &scratch.reached {
+        let projection = &self.projection;
+        dispatch!(level, simd => projection.find_tiles(simd, scratch, out));
+        for &at in &scratch.reached {
             let at = at % BATCH;
             let sequence = sequence.wrapping_add(scratch.lanes[at] as u32);
             let key = match self.order {
@@ -307,7 +315,7 @@ impl Shading {
             out.keys.push([key, sequence]);
             let splat = Splat::new(&scratch.flat, at, kept.color[at], depth);
             out.splats.push(splat);
-            out.reaches.push(reach);
+            out.reaches.push(scratch.reaches.get(at));
         }
         let drawn = out.splats.len() as u64;
         out.counters.add(Counter::GaussiansDrawn, drawn);

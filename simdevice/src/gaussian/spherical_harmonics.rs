@@ -108,14 +108,15 @@ impl Bases {
     /// The colour `max(0, 0.5 + SH)` in one of the directions, at most the greatest number; `None` if a coefficient of
     /// degrees 0 to `degree` is not finite.
     ///
-    /// `coefficients` holds red, green and blue of each coefficient in turn; what follows them is not used.
+    /// `coefficients` holds red, green and blue of each coefficient in turn, and at least one number more; what follows
+    /// them is not used.
     #[inline(always)]
     pub(super) fn color<S: Simd>(
         &self,
         simd: S,
         degree: u32,
         direction: usize,
-        coefficients: &[f32; COEFFICIENT_FLOATS],
+        coefficients: &[f32],
     ) -> Option<[f32; 3]> {
         let at = direction % DIRECTIONS;
         let sum = match degree {
@@ -125,21 +126,18 @@ impl Bases {
             3 => self.sum::<S, 16>(simd, at, coefficients),
             _ => self.sum::<S, MAX_COEFFICIENTS>(simd, at, coefficients),
         };
-        // What is not finite makes the sum so, whatever it is multiplied by; the sum may also be too large.
-        if !sum.iter().all(|value| value.is_finite()) {
+        // What is not finite makes the sum so, whatever it is multiplied by; the sum may also be too large. The fourth
+        // number is not one of the colour's.
+        if (sum - sum).simd_eq(0.0).to_bitmask() & 7 != 7 {
             return self.wide_color(degree, at, coefficients);
         }
-        Some(sum.map(|value| value.max(0.0)))
+        let color = sum.max(0.0);
+        Some([color[0], color[1], color[2]])
     }
 
     /// The same where a sum is not finite: in binary64, where no sum of numbers overflows.
     #[cold]
-    fn wide_color(
-        &self,
-        degree: u32,
-        direction: usize,
-        coefficients: &[f32; COEFFICIENT_FLOATS],
-    ) -> Option<[f32; 3]> {
+    fn wide_color(&self, degree: u32, direction: usize, coefficients: &[f32]) -> Option<[f32; 3]> {
         let count = coefficient_count(degree).min(MAX_COEFFICIENTS);
         if !coefficients[..3 * count].iter().all(|k| k.is_finite()) {
             return None;
@@ -159,8 +157,9 @@ impl Bases {
         &self,
         simd: S,
         at: usize,
-        coefficients: &[f32; COEFFICIENT_FLOATS],
-    ) -> [f32; 3] {
+        coefficients: &[f32],
+    ) -> f32x4<S> {
+        let coefficients = &coefficients[..3 * COUNT + 1];
         // Two sums halve the wait for one another; the largest terms, the constant one and 0.5, are added last.
         let (mut even, mut odd) = (f32x4::splat(simd, 0.0), f32x4::splat(simd, 0.0));
         let mut k = 1;
@@ -171,8 +170,7 @@ impl Bases {
             }
             k += 2;
         }
-        let sum = self.term(simd, at, coefficients, 0, even + odd) + 0.5;
-        [sum[0], sum[1], sum[2]]
+        self.term(simd, at, coefficients, 0, even + odd) + 0.5
     }
 
     /// `sum` and coefficient `k` times its function. A vector holds the coefficient's three components and the next one's
@@ -182,7 +180,7 @@ impl Bases {
         &self,
         simd: S,
         at: usize,
-        coefficients: &[f32; COEFFICIENT_FLOATS],
+        coefficients: &[f32],
         k: usize,
         sum: f32x4<S>,
     ) -> f32x4<S> {

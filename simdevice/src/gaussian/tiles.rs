@@ -1,0 +1,471 @@
+//! Which of a batch's kept Gaussians reach tiles, and which tiles: for several at once where they are small, which most
+//! are, and one at a time for the others.
+
+use super::fetch::BATCH;
+use super::footprint::{Ellipse, HELD_ROWS, Reach, TILE_SIZE, Visible};
+use super::lanes::{Bits, Lanes};
+use super::panorama;
+use super::project::Projection;
+use super::scratch::{Flat, Scratch};
+use super::splat::Projected;
+use crate::counters::{Counter, Counters};
+use crate::packet::GaussianGeometry;
+use crate::skips::Skip;
+use fearless_simd::{Simd, prelude::*};
+
+/// The reach of each lane, as the two words of [`Reach::words`].
+pub(super) struct Reaches([[u64; BATCH + 8]; 2]);
+
+impl Default for Reaches {
+    fn default() -> Self {
+        Self([[0; BATCH + 8]; 2])
+    }
+}
+
+impl Reaches {
+    /// A lane's.
+    #[inline(always)]
+    pub(super) fn get(&self, at: usize) -> Reach {
+        Reach::from_words([self.0[0][at], self.0[1][at]])
+    }
+
+    fn set(&mut self, at: usize, reach: &Reach) {
+        let [first, second] = reach.words();
+        self.0[0][at] = first;
+        self.0[1][at] = second;
+    }
+}
+
+/// Added to a whole number below 2^52, this makes its bits the lowest ones.
+const POINT: f64 = (1u64 << 52) as f64;
+
+/// Where numbers are no greater, no square of them overflows.
+const MODERATE: f64 = 1e100;
+
+/// What can be told of several lanes at once.
+struct Found {
+    /// Those that reach tiles; [`Reaches`] holds which.
+    reached: Bits,
+    /// Those of which nothing is told.
+    left: Bits,
+}
+
+/// The least and the greatest pixel along an axis, and their tiles.
+struct Range<S: Simd> {
+    low: S::f64s,
+    high: S::f64s,
+    first: S::f64s,
+    last: S::f64s,
+    /// Whether there are pixels.
+    any: S::mask64s,
+}
+
+impl<S: Simd> Range<S> {
+    /// As [`centres`](super::footprint), of the whole numbers `first..=last`, in the same steps.
+    #[inline(always)]
+    fn new(low: S::f64s, high: S::f64s, [first, last]: [S::f64s; 2]) -> Self {
+        let low = (low - 0.5).ceil().max(first);
+        let high = (high - 0.5).floor().min(last);
+        let per_pixel = 1.0 / f64::from(TILE_SIZE);
+        Self {
+            low,
+            high,
+            first: (low * per_pixel).floor(),
+            last: (high * per_pixel).floor(),
+            any: low.simd_le(high),
+        }
+    }
+
+    /// How many tiles it has.
+    #[inline(always)]
+    fn tiles(&self) -> S::f64s {
+        self.last - self.first + 1.0
+    }
+
+    /// The bits of a span of its tiles.
+    #[inline(always)]
+    fn span(&self) -> S::f64s {
+        self.first + (self.last + 1.0) * 65536.0
+    }
+}
+
+/// The greatest binary64 number that rounds to a binary32 number of at most `value`.
+fn last_rounded_to(value: f32) -> f64 {
+    if value == f32::INFINITY {
+        return f64::INFINITY;
+    }
+    // What overflows is half a unit or more beyond the greatest number.
+    let wide = |value: f32| {
+        if value.is_infinite() {
+            2f64.powi(128).copysign(value.into())
+        } else {
+            f64::from(value)
+        }
+    };
+    let middle = 0.5 * (wide(value) + wide(value.next_up()));
+    if middle as f32 <= value {
+        middle
+    } else {
+        middle.next_down()
+    }
+}
+
+impl Projection {
+    /// Finds the kept Gaussians that reach a tile.
+    #[inline(always)]
+    pub(super) fn find_tiles<S: Simd>(&self, simd: S, scratch: &mut Scratch, out: &mut Projected) {
+        let by_lanes = self.skips.has(Skip::Ellipse)
+            && self.period.is_none()
+            && self.geometry == GaussianGeometry::Volume;
+        self.find_tiles_by(simd, by_lanes, scratch, out);
+    }
+
+    /// The same; if not `by_lanes`, one at a time.
+    #[inline(always)]
+    fn find_tiles_by<S: Simd>(
+        &self,
+        simd: S,
+        by_lanes: bool,
+        scratch: &mut Scratch,
+        out: &mut Projected,
+    ) {
+        let drawn = self.find_drawn(simd, scratch, &mut out.counters);
+        let mut beside = 0;
+        let Found { mut reached, left } = if by_lanes {
+            self.reach_in_lanes(simd, &drawn, scratch, &mut beside)
+        } else {
+            Found {
+                reached: Bits::default(),
+                left: drawn,
+            }
+        };
+        scratch.copies.clear();
+        left.for_each(|at| {
+            if let Some(reach) = self.reach_of_one(at, scratch, out, &mut beside) {
+                scratch.reaches.set(at, &reach);
+                reached.set_one(at, true);
+            }
+        });
+        scratch.reached.clear();
+        reached.for_each(|at| scratch.reached.push(at));
+        let off_screen = drawn.without(&reached).count();
+        out.counters.add(Counter::SkippedOffScreen, off_screen);
+        out.counters.add(Counter::TilesBesideEllipse, beside);
+    }
+
+    /// Finds which lanes nothing but tiles and colours can speak against, and counts why the others are skipped.
+    #[inline(always)]
+    fn find_drawn<S: Simd>(&self, simd: S, scratch: &Scratch, counters: &mut Counters) -> Bits {
+        let len = scratch.lanes.len();
+        let number = |value: f64| S::f64s::splat(simd, value);
+        let near = number(last_rounded_to(self.near));
+        let before_far = number(last_rounded_to(self.far.next_down()));
+        let (least, greatest) = (number(0.0), number(f64::MAX));
+        let is_flat = self.geometry == GaussianGeometry::Surfel;
+        let [mut beyond_near, mut beyond_far, mut definite] = [Bits::default(); 3];
+        for at in (0..len).step_by(S::f64s::LEN) {
+            let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+            let depth = load(&scratch.depth);
+            let determinant = load(&scratch.flat.determinant);
+            // What is not a number is nowhere.
+            beyond_near.set(at, depth.simd_gt(near));
+            beyond_far.set(at, depth.simd_gt(before_far));
+            definite.set(
+                at,
+                determinant.simd_gt(least) & determinant.simd_le(greatest),
+            );
+        }
+        if is_flat {
+            definite = Bits::first(len);
+        }
+        let kept = Bits::first(len);
+        let seen = kept.and(&beyond_near);
+        counters.add(Counter::SkippedNear, kept.without(&seen).count());
+        counters.add(Counter::SkippedFar, seen.and(&beyond_far).count());
+        let seen = seen.without(&beyond_far);
+        counters.add(Counter::SkippedDegenerate, seen.without(&definite).count());
+        seen.and(&definite)
+    }
+
+    /// The tiles of the lanes of `drawn` that reach but few rows of tiles: what [`Ellipse::reach`] finds, in the same
+    /// steps. Adds what it adds to `beside`.
+    #[inline(always)]
+    fn reach_in_lanes<S: Simd>(
+        &self,
+        simd: S,
+        drawn: &Bits,
+        scratch: &mut Scratch,
+        beside: &mut u64,
+    ) -> Found {
+        let number = |value: f64| S::f64s::splat(simd, value);
+        let Visible {
+            left,
+            top,
+            right,
+            bottom,
+        } = self.visible;
+        let columns = [number(left as f64), number((right - 1) as f64)];
+        let rows = [number(top as f64), number((bottom - 1) as f64)];
+        let (zero, one, tile) = (number(0.0), number(1.0), number(TILE_SIZE.into()));
+        let mut found = Found {
+            reached: Bits::default(),
+            left: Bits::default(),
+        };
+        let mut apart = zero;
+        for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
+            let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+            let Flat {
+                mean,
+                half,
+                slope,
+                narrowing,
+                peak,
+                ..
+            } = &*scratch.flat;
+            let (x, y) = (load(&mean[0]), load(&mean[1]));
+            let (half_x, half_y) = (load(&half[0]), load(&half[1]));
+            let (slope, narrowing, peak) = (load(slope), load(narrowing), load(peak));
+            let drawn = S::mask64s::from_bitmask(simd, drawn.group(at, S::f64s::LEN));
+            // The square root of a negative extent is not a number.
+            let drawn = drawn & half_y.simd_ge(zero);
+            let size = x.abs() + y.abs() + half_x + half_y + slope.abs() + narrowing + peak.abs();
+            let moderate = size.simd_le(number(MODERATE));
+
+            let across = Range::<S>::new(x - half_x, x + half_x, columns);
+            let along = Range::<S>::new(y - half_y, y + half_y, rows);
+            let inside = drawn & moderate & across.any & along.any;
+            let (wide, tall) = (across.tiles(), along.tiles());
+            let short = tall.simd_le(number(HELD_ROWS as f64));
+            found.left.set(at, (drawn & !moderate) | (inside & !short));
+            let clipped = across.low.simd_eq(columns[0])
+                | across.high.simd_eq(columns[1])
+                | along.low.simd_eq(rows[0])
+                | along.high.simd_eq(rows[1]);
+            let single = wide.simd_eq(one) & tall.simd_eq(one) & !clipped;
+
+            let square = half_y * half_y;
+            let mut row = along.first;
+            let mut reached = zero;
+            let mut spans = [zero; HELD_ROWS];
+            for (number, span) in spans.iter_mut().enumerate() {
+                let row_top = row * tile;
+                let above = along.low.max(row_top) + 0.5 - y;
+                let below = along.high.min(row_top + (tile - 1.0)) + 0.5 - y;
+                // See [`Ellipse::sides`].
+                let to_left = (zero - peak).max(above).min(below);
+                let to_right = peak.max(above).min(below);
+                let width =
+                    |height: S::f64s| (narrowing * (square - height * height).max(zero)).sqrt();
+                let low = x + (slope * to_left - width(to_left));
+                let high = x + (slope * to_right + width(to_right));
+                let across_row = Range::<S>::new(low, high, columns);
+                let within = across_row.any & row.simd_le(along.last);
+                *span = within.select(across_row.span(), zero);
+                reached += within.select(across_row.tiles(), zero);
+                if number == 0 {
+                    *span = single.select(across.span(), *span);
+                    reached = single.select(one, reached);
+                }
+                row += 1.0;
+            }
+            let told = inside & short;
+            let any = told & reached.simd_gt(zero);
+            found.reached.set(at, any);
+            let more = (wide * tall - reached).max(zero);
+            apart += (told & !single).select(more, zero);
+
+            let head = along.first + tall * 65536.0;
+            let bits = |value: S::f64s| -> S::u64s { (value + POINT).bitcast() };
+            let point: S::u64s = number(POINT).bitcast();
+            let [first, second, third] = spans;
+            let [words, more_words] = &mut scratch.reaches.0;
+            let word = (bits(head) - point) | (bits(first) << 32);
+            word.store_slice(&mut words[at..at + S::f64s::LEN]);
+            let word = (bits(second) - point) | (bits(third) << 32);
+            word.store_slice(&mut more_words[at..at + S::f64s::LEN]);
+        }
+        for lane in 0..S::f64s::LEN {
+            *beside += apart.as_slice()[lane] as u64;
+        }
+        found
+    }
+
+    /// The tiles of a lane, if it reaches some.
+    #[inline(never)]
+    fn reach_of_one(
+        &self,
+        at: usize,
+        scratch: &mut Scratch,
+        out: &mut Projected,
+        beside: &mut u64,
+    ) -> Option<Reach> {
+        if self.geometry == GaussianGeometry::Surfel {
+            return self.surfel(at, scratch, &mut out.spans).1;
+        }
+        let flat = &*scratch.flat;
+        let ellipse = Ellipse {
+            mean: [flat.mean[0][at], flat.mean[1][at]],
+            half: [flat.half[0][at], flat.half[1][at]],
+            slope: flat.slope[at],
+            narrowing: flat.narrowing[at],
+            peak: flat.peak[at],
+        };
+        // The square root of a negative extent is not a number.
+        if ellipse.half[1].is_nan() {
+            return None;
+        }
+        let beside = self.skips.has(Skip::Ellipse).then_some(beside);
+        match self.period {
+            None => ellipse.reach(&self.visible, &mut out.spans, beside),
+            Some(period) => {
+                let (visible, copies) = (&self.visible, &mut scratch.copies);
+                panorama::reach(at, &ellipse, period, visible, copies, out, beside)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::SimdLevel;
+    use crate::packet::{Camera, GaussianState, Viewport};
+    use crate::skips::Skips;
+    use fearless_simd::dispatch;
+    use proptest::prelude::*;
+
+    /// What is found of a batch: row, first tile and one past the last of each lane that is reached, and counters.
+    #[derive(Debug, PartialEq)]
+    struct Tiles {
+        reached: Vec<(usize, Vec<(u32, u16, u16)>)>,
+        counters: Vec<u64>,
+    }
+
+    fn projection() -> Projection {
+        let visible = Visible {
+            left: 3,
+            top: 0,
+            right: 200,
+            bottom: 150,
+        };
+        let camera = Camera {
+            far_plane: 50.0,
+            ..Camera::default()
+        };
+        let viewport = Viewport {
+            x: 0.0,
+            y: 0.0,
+            width: 200.0,
+            height: 150.0,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
+        let state = GaussianState::default();
+        Projection::new(&state, &camera, &viewport, visible, None, Skips::ALL)
+    }
+
+    fn tiles<S: Simd>(simd: S, by_lanes: bool, scratch: &mut Scratch) -> Tiles {
+        let mut out = Projected::default();
+        projection().find_tiles_by(simd, by_lanes, scratch, &mut out);
+        let spans = |at: usize| {
+            let reach = scratch.reaches.get(at);
+            let spans = reach.spans(&out.spans);
+            let spans = spans.map(|(row, span)| (row, span.first, span.end));
+            spans.filter(|(_, first, end)| first < end).collect()
+        };
+        let counters = Counter::ALL.iter();
+        Tiles {
+            reached: scratch.reached.iter().map(|&at| (at, spans(at))).collect(),
+            counters: counters.map(|&counter| out.counters.get(counter)).collect(),
+        }
+    }
+
+    /// Numbers such as occur, among them those where something begins or ends, and such as should not.
+    fn place() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            8 => -30.0..230.0f64,
+            8 => (-20..500i32).prop_map(|halves| 0.5 * f64::from(halves)),
+            1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1e200), Just(1e17)],
+        ]
+    }
+
+    /// Standard deviations along both axes, in pixels, as an angle turns them.
+    fn shape() -> impl Strategy<Value = [f64; 3]> {
+        (0.05..12.0f64, 0.05..6.0f64, 0.0..3.2f64).prop_map(|(a, b, angle)| [a, b, angle])
+    }
+
+    proptest! {
+        #[test]
+        fn lanes_find_what_one_at_a_time_finds(
+            lanes in prop::collection::vec(
+                ([place(), place()], shape(), prop_oneof![9 => 0.1..40.0f64, 1 => -1.0..0.0f64], 0.1..60.0f64),
+                1..40,
+            ),
+            odd in (0..40usize, prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1.0), Just(1e120)]),
+        ) {
+            let mut scratch = Scratch::new();
+            for (at, &(mean, [p, q, angle], extent, depth)) in lanes.iter().enumerate() {
+                let (sin, cos) = angle.sin_cos();
+                let [p, q] = [p * p, q * q];
+                let [a, b, c] = [p * cos * cos + q * sin * sin, (p - q) * sin * cos, p * sin * sin + q * cos * cos];
+                let flat = &mut *scratch.flat;
+                flat.mean[0][at] = mean[0];
+                flat.mean[1][at] = mean[1];
+                flat.determinant[at] = a * c - b * b;
+                flat.half[0][at] = (a * extent).sqrt();
+                flat.half[1][at] = (c * extent).sqrt();
+                flat.slope[at] = b / c;
+                flat.narrowing[at] = flat.determinant[at] / (c * c);
+                flat.peak[at] = b * (extent / a).sqrt();
+                scratch.depth[at] = depth;
+                scratch.lanes.push(at);
+            }
+            let (at, value) = odd;
+            let flat = &mut *scratch.flat;
+            match at % 4 {
+                0 => flat.determinant[at] = value,
+                1 => flat.half[0][at] = value,
+                2 => flat.narrowing[at] = value.abs(),
+                _ => scratch.depth[at] = value,
+            }
+            for (name, level) in SimdLevel::supported() {
+                let level = level.resolve().unwrap();
+                let [one, all] = [false, true].map(|by_lanes| {
+                    dispatch!(level, simd => tiles(simd, by_lanes, &mut scratch))
+                });
+                prop_assert_eq!(one, all, "{}", name);
+            }
+        }
+
+        #[test]
+        fn depths_are_compared_as_they_are_rounded(bits in any::<u32>(), ulps in -3..3i32) {
+            let value = f32::from_bits(bits);
+            prop_assume!(!value.is_nan());
+            let last = last_rounded_to(value);
+            prop_assert!(last as f32 <= value);
+            prop_assert!(last == f64::INFINITY || last.next_up() as f32 > value, "{last:e}");
+            let near = f64::from(value) * (1.0 + f64::from(ulps) / f64::from(1 << 24));
+            prop_assert_eq!(near as f32 <= value, near <= last, "{:e} {:e}", near, last);
+        }
+    }
+
+    #[test]
+    fn the_last_number_before_infinity_is_known() {
+        for value in [
+            f32::MAX,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            f32::MIN,
+            0.0,
+            -0.0,
+            0.2,
+        ] {
+            let last = last_rounded_to(value);
+            assert!(last as f32 <= value, "{value}");
+            assert!(
+                last == f64::INFINITY || last.next_up() as f32 > value,
+                "{value}"
+            );
+        }
+    }
+}
