@@ -92,6 +92,7 @@ impl GaussianSet {
                 append,
                 instance: append.first_instance,
                 sequence: 0,
+                number: 0,
                 part: Part::Chunk(chunk),
                 frustum: Arc::clone(frustum),
             }));

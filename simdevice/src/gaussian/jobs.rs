@@ -39,6 +39,7 @@ impl GaussianSet {
         let mut jobs = Vec::new();
         // There are no more Gaussians than places in batches, so that this stays within 32 bits but at the very end.
         let mut sequence = 0u32;
+        let mut first_number = 0u32;
         for (append, chunks) in self.appends.iter().zip(chunks) {
             let opacity = chunks.as_ref().map_or(1.0, |chunks| chunks.opacity);
             let view = View::new(projection, opacity);
@@ -56,6 +57,7 @@ impl GaussianSet {
                     instance,
                     sequence,
                     part: Part::From(0),
+                    number: 0,
                     frustum: Arc::clone(&view.frustum),
                 };
                 let batches = match chunks {
@@ -64,26 +66,33 @@ impl GaussianSet {
                 };
                 host::reserve(&mut jobs, batches);
                 match chunks {
-                    None => jobs.extend((0..append.count).step_by(BATCH).map(|start| Job {
-                        part: Part::From(start),
-                        ..job.clone()
-                    })),
+                    None => {
+                        let starts = (0..append.count).step_by(BATCH).zip(first_number..);
+                        jobs.extend(starts.map(|(start, number)| Job {
+                            part: Part::From(start),
+                            number,
+                            ..job.clone()
+                        }));
+                    }
                     Some(chunks) => jobs.extend(
                         chunks
                             .chunks
                             .iter()
-                            .filter(|chunk| {
+                            .zip(first_number..)
+                            .filter(|(chunk, _)| {
                                 !view.leaves_out(chunk, counters)
                                     && !hidden
                                         .is_some_and(|hidden| hidden.leaves_out(chunk, counters))
                             })
-                            .map(|chunk| Job {
+                            .map(|(chunk, number)| Job {
                                 part: Part::Chunk(chunk),
+                                number,
                                 ..job.clone()
                             }),
                     ),
                 }
                 sequence = sequence.wrapping_add(append.count);
+                first_number += batches as u32;
             }
         }
         Ok(jobs)
@@ -157,6 +166,8 @@ pub(super) struct Job<'a> {
     /// Which Gaussian of the set the instance's first is.
     pub(super) sequence: u32,
     pub(super) part: Part<'a>,
+    /// Which of the set's batches it is, those that are left out counted, too.
+    pub(super) number: u32,
     pub(super) frustum: Arc<Frustum>,
 }
 

@@ -110,8 +110,8 @@ pub struct Worker {
     pub ready: Ready,
 }
 
-/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same.
-const SKIPS: &str = "all,-unchanged";
+/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same or nearly so.
+const SKIPS: &str = "all,-unchanged,-last-order";
 
 impl Worker {
     /// Starts a worker that shares its work among `threads`; `None` if its device is not there.
