@@ -186,7 +186,7 @@ impl Projection {
             // Reading several at a time overlaps the waits for memory.
             for (&(at, _), coefficients) in group.iter().zip(&mut coefficients) {
                 let (lane, floats) = (scratch.lanes[at], reader.floats());
-                match source.harmonics.get(lane * floats..(lane + 1) * floats) {
+                match source.harmonics.of(lane, floats) {
                     Some(read) if floats > 0 => coefficients[..floats].copy_from_slice(read),
                     _ => reader.read(&source.batch, lane, coefficients),
                 }

@@ -93,6 +93,7 @@ impl GaussianSet {
                 instance: append.first_instance,
                 sequence: 0,
                 number: 0,
+                has_harmonics: false,
                 part: Part::Chunk(chunk),
                 frustum: Arc::clone(frustum),
             }));

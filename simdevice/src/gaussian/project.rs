@@ -5,6 +5,7 @@
 //! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
+use super::chunks::Harmonics;
 use super::depth::CenterDepth;
 use super::fetch::{Batch, COEFFICIENT_FLOATS, CoefficientReader};
 use super::footprint::Visible;
@@ -72,8 +73,8 @@ pub(super) struct Source<'a> {
     pub(super) matrices: Option<&'a Matrices>,
     /// None is skipped for what its attributes are.
     pub(super) is_sound: bool,
-    /// Their spherical harmonics, if they were read already, one after the other.
-    pub(super) harmonics: &'a [f32],
+    /// Their spherical harmonics, if they were read already.
+    pub(super) harmonics: Harmonics<'a>,
     /// No coefficient of theirs of a greater degree is other than zero.
     pub(super) degree: u32,
     /// What bounds those that can be seen; `None` tells nothing of them.

@@ -4,6 +4,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod degrees;
 mod hidden;
 mod last_order;
 mod unchanged;
