@@ -297,7 +297,7 @@ impl Rows {
         for some in run.chunks(GATHERED) {
             // They lie anywhere, so that each would be waited for.
             for next in ahead.next().unwrap_or_default() {
-                host::prefetch(std::slice::from_ref(reach_of(next)));
+                devmem::prefetch(std::slice::from_ref(reach_of(next)));
             }
             let mut count = 0;
             for named in some {

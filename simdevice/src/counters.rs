@@ -78,6 +78,7 @@ counters! {
     OutsideByChunks: "skips", "outside by chunks", Count, "Gaussians that were not read because the bounds of their chunk are outside the picture";
     HiddenByOthers: "skips", "hidden by others", Count, "Gaussians that were not read because others before their chunk finish all pixels that it reaches";
     SetsUnchanged: "skips", "sets unchanged", Count, "sets of Gaussians that were drawn as they had been projected, sorted and binned before";
+    OrdersRepaired: "skips", "orders repaired", Count, "sets of Gaussians whose order is that of their last picture, repaired instead of sorted anew";
     OutsideByBounds: "skips", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
     TilesBesideEllipse: "skips", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
     HarmonicsUnread: "skips", "harmonics unread", Count, "Gaussians whose spherical harmonics were not read";

@@ -37,6 +37,7 @@ skips! {
     Chunks: "chunks", OutsideByChunks, "Gaussians that are drawn again are in chunks, of which those outside the picture are not read.";
     HiddenChunks: "hidden-chunks", HiddenByOthers, "Gaussians that are drawn again are not read in chunks that others hide.";
     Unchanged: "unchanged", SetsUnchanged, "Gaussians in memory that only the device writes are not projected, sorted and binned again while neither they nor the view change.";
+    LastOrder: "last-order", OrdersRepaired, "Gaussians in memory that only the device writes are not sorted where the order of their last picture needs little repair.";
     Bounds: "bounds", OutsideByBounds, "A Gaussian whose bounding sphere is off the screen is not projected further.";
     Ellipse: "ellipse", TilesBesideEllipse, "A Gaussian is listed only in tiles that its ellipse reaches, not in all of its box.";
     Harmonics: "harmonics", HarmonicsUnread, "Spherical harmonics are read only for Gaussians that reach a tile.";
@@ -161,7 +162,7 @@ mod tests {
                 .parse::<Skips>()
                 .unwrap_err()
                 .to_string(),
-            "\"everything\" is neither all nor none nor a skip, which are chunks, hidden-chunks, unchanged, bounds, ellipse, harmonics, bands, blocks, saturated, \
+            "\"everything\" is neither all nor none nor a skip, which are chunks, hidden-chunks, unchanged, last-order, bounds, ellipse, harmonics, bands, blocks, saturated, \
              empty-tiles, overwritten-tiles, overwritten-quads, hidden-tiles, masked-quads, affine"
         );
     }

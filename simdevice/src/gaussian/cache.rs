@@ -118,6 +118,16 @@ impl Entry {
         what(self) == what(other) && streams.all(|(a, b)| a.is_same(b))
     }
 
+    /// Whether its chunks hold all that those of `other` would: the same Gaussians, and at least the same of their spherical
+    /// harmonics.
+    fn covers(&self, other: &Self) -> bool {
+        let mut streams = self.streams.iter().zip(&other.streams);
+        let what = |entry: &Self| (entry.first, entry.count, entry.is_flat);
+        what(self) == what(other)
+            && self.streams.len() >= other.streams.len()
+            && streams.all(|(a, b)| a.is_same(b))
+    }
+
     /// Bytes that its chunks take.
     fn memory_bytes(&self) -> u64 {
         match self.chunks.strong_count() {
@@ -164,8 +174,9 @@ impl ChunkCache {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The chunks of what `append` draws, as 2D Gaussians if `is_flat`, if it has any; `build` makes them, with spherical harmonics or without. All
-    /// chunks together take at most `budget` bytes.
+    /// The chunks of what `append` draws, as 2D Gaussians if `is_flat`, if it has any; `build` makes them, with spherical
+    /// harmonics or without. Draws of the same Gaussians by lower degrees share them. All chunks together take at most
+    /// `budget` bytes.
     pub(super) fn get(
         &self,
         append: &GaussianAppend,
@@ -191,17 +202,27 @@ impl ChunkCache {
                 }
                 current
             });
-            let mut all = entries.entries.iter_mut();
-            let Some(seen) = all.find(|entry| entry.is_same(&drawn)) else {
+            for entry in entries.entries.iter_mut() {
+                if entry.covers(&drawn)
+                    && let Some(chunks) = entry.chunks.upgrade()
+                {
+                    entry.used = drawn.used;
+                    return Some(chunks);
+                }
+            }
+            if !entries.entries.iter().any(|entry| entry.is_same(&drawn)) {
                 entries.entries.push(drawn);
                 entries.make_room(0, budget);
                 return None;
-            };
-            seen.used = drawn.used;
-            if let Some(chunks) = seen.chunks.upgrade() {
-                return Some(chunks);
             }
-            entries.entries.retain(|entry| !entry.is_same(&drawn));
+            // What is made now is for the draws of those, too.
+            entries.entries.retain(|entry| {
+                let is_covered = drawn.covers(entry);
+                if is_covered {
+                    entry.release();
+                }
+                !is_covered
+            });
             entries.make_room(drawn.bytes, budget);
         }
         let chunks = Arc::new(build(with_harmonics));

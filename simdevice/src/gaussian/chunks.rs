@@ -3,6 +3,7 @@
 //!
 //! They are derived from memory that only the device can write, and never change an image.
 
+use super::cache::Stream;
 use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader, Fetcher};
 use super::scratch::Attributes;
 use super::{sort, spherical_harmonics};
@@ -30,7 +31,7 @@ pub(super) struct Chunk {
     pub(super) numbers: Vec<u32>,
     pub(super) attributes: Attributes,
     /// Spherical harmonics, if there was room for them: as many floats for each as [`CoefficientReader::floats`] says.
-    pub(super) harmonics: Vec<f32>,
+    harmonics: Vec<f32>,
     /// No coefficient of a greater degree is other than zero.
     pub(super) degree: u32,
     pub(super) bounds: Bounds,
@@ -38,9 +39,27 @@ pub(super) struct Chunk {
     pub(super) is_sound: bool,
 }
 
+/// Spherical harmonics that were read already: those of all lanes, one after the other, or none.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Harmonics<'a> {
+    floats: &'a [f32],
+    /// How many floats a lane has, of which a draw of a lower degree takes the first.
+    stride: usize,
+}
+
+impl<'a> Harmonics<'a> {
+    /// The floats of a lane, and what follows them; none if there are none.
+    #[inline(always)]
+    pub(super) fn from(&self, lane: usize) -> &'a [f32] {
+        self.floats.get(lane * self.stride..).unwrap_or_default()
+    }
+}
+
 /// All Gaussians of a draw without indices.
 #[derive(Debug)]
 pub(super) struct Chunks {
+    /// Where the spherical harmonics in them are from, in their order.
+    harmonics: Vec<Stream>,
     pub(super) chunks: Vec<Chunk>,
     /// Those among them that hide others best: large and opaque.
     pub(super) screens: Vec<Chunk>,
@@ -87,11 +106,25 @@ impl Chunks {
         let screens = screens
             .chunks(BATCH)
             .map(|numbers| Chunk::read(append, &mut Fetcher::default(), numbers, (is_flat, false)));
+        let harmonics = &append.attributes.spherical_harmonics;
         Self {
+            harmonics: match with_harmonics {
+                true => harmonics.iter().map(Stream::new).collect(),
+                false => Vec::new(),
+            },
             opacity: opacities.fold(0.0, f32::max),
             screens: host::collect(screens),
             chunks,
         }
+    }
+}
+
+impl Chunks {
+    /// Whether the spherical harmonics of what `append` draws are in them, perhaps with those of higher degrees.
+    pub(super) fn have_harmonics_of(&self, append: &GaussianAppend) -> bool {
+        let drawn = &append.attributes.spherical_harmonics;
+        let mut both = drawn.iter().zip(&self.harmonics);
+        drawn.len() <= self.harmonics.len() && both.all(|(a, b)| Stream::new(a).is_same(b))
     }
 }
 
@@ -183,6 +216,14 @@ impl Chunk {
 }
 
 impl Chunk {
+    /// Spherical harmonics of all lanes, if it holds them.
+    pub(super) fn harmonics(&self) -> Harmonics<'_> {
+        Harmonics {
+            floats: &self.harmonics,
+            stride: self.harmonics.len() / self.numbers.len().max(1),
+        }
+    }
+
     /// A chunk of one lane of another, without harmonics.
     pub(super) fn of_one(from: &Self, lane: usize) -> Self {
         let mut chunk = Self {

@@ -131,7 +131,7 @@ impl Projection {
             let mut colored = Colored::default();
             for (number, &at) in group.iter().enumerate() {
                 let lane = scratch.lanes[at % BATCH];
-                let rest = source.harmonics.get(lane * floats..).unwrap_or_default();
+                let rest = source.harmonics.from(lane);
                 let coefficients = if is_whole && rest.len() >= needed {
                     rest
                 } else {

@@ -92,6 +92,8 @@ impl GaussianSet {
                 append,
                 instance: append.first_instance,
                 sequence: 0,
+                number: 0,
+                has_harmonics: false,
                 part: Part::Chunk(chunk),
                 frustum: Arc::clone(frustum),
             }));

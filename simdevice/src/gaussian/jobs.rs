@@ -1,6 +1,6 @@
 //! What there is to project: batches of vertices and chunks, without the chunks that no picture needs.
 
-use super::chunks::{Chunk, Chunks};
+use super::chunks::{Chunk, Chunks, Harmonics};
 use super::fetch::{BATCH, Batch, Fetcher};
 use super::frustum::{Frustum, Outside};
 use super::hidden::Hidden;
@@ -39,9 +39,11 @@ impl GaussianSet {
         let mut jobs = Vec::new();
         // There are no more Gaussians than places in batches, so that this stays within 32 bits but at the very end.
         let mut sequence = 0u32;
+        let mut first_number = 0u32;
         for (append, chunks) in self.appends.iter().zip(chunks) {
             let opacity = chunks.as_ref().map_or(1.0, |chunks| chunks.opacity);
             let view = View::new(projection, opacity);
+            let has_harmonics = chunks.as_ref().map(|all| all.have_harmonics_of(append));
             for instance in 0..append.instance_count {
                 let instance = append.first_instance.saturating_add(instance);
                 let of_instance;
@@ -56,6 +58,8 @@ impl GaussianSet {
                     instance,
                     sequence,
                     part: Part::From(0),
+                    number: 0,
+                    has_harmonics: has_harmonics.unwrap_or(false),
                     frustum: Arc::clone(&view.frustum),
                 };
                 let batches = match chunks {
@@ -64,26 +68,33 @@ impl GaussianSet {
                 };
                 host::reserve(&mut jobs, batches);
                 match chunks {
-                    None => jobs.extend((0..append.count).step_by(BATCH).map(|start| Job {
-                        part: Part::From(start),
-                        ..job.clone()
-                    })),
+                    None => {
+                        let starts = (0..append.count).step_by(BATCH).zip(first_number..);
+                        jobs.extend(starts.map(|(start, number)| Job {
+                            part: Part::From(start),
+                            number,
+                            ..job.clone()
+                        }));
+                    }
                     Some(chunks) => jobs.extend(
                         chunks
                             .chunks
                             .iter()
-                            .filter(|chunk| {
+                            .zip(first_number..)
+                            .filter(|(chunk, _)| {
                                 !view.leaves_out(chunk, counters)
                                     && !hidden
                                         .is_some_and(|hidden| hidden.leaves_out(chunk, counters))
                             })
-                            .map(|chunk| Job {
+                            .map(|(chunk, number)| Job {
                                 part: Part::Chunk(chunk),
+                                number,
                                 ..job.clone()
                             }),
                     ),
                 }
                 sequence = sequence.wrapping_add(append.count);
+                first_number += batches as u32;
             }
         }
         Ok(jobs)
@@ -157,6 +168,10 @@ pub(super) struct Job<'a> {
     /// Which Gaussian of the set the instance's first is.
     pub(super) sequence: u32,
     pub(super) part: Part<'a>,
+    /// Which of the set's batches it is, those that are left out counted, too.
+    pub(super) number: u32,
+    /// Whether the chunk holds its spherical harmonics.
+    pub(super) has_harmonics: bool,
     pub(super) frustum: Arc<Frustum>,
 }
 
@@ -190,15 +205,17 @@ impl<'a> Job<'a> {
             &**matrices
         });
         let is_faded = streams.model.opacity.is_some();
-        let (attributes, harmonics, is_sound) = match self.part {
-            Part::Chunk(chunk) if !is_faded => {
-                (&chunk.attributes, &*chunk.harmonics, chunk.is_sound)
-            }
+        let (harmonics, degree) = match self.part {
+            Part::Chunk(chunk) if self.has_harmonics => (chunk.harmonics(), chunk.degree),
+            _ => (Harmonics::default(), u32::MAX),
+        };
+        let (attributes, is_sound) = match self.part {
+            Part::Chunk(chunk) if !is_faded => (&chunk.attributes, chunk.is_sound),
             Part::Chunk(chunk) => {
                 attributes.clone_from(&chunk.attributes);
                 fetcher.fade(streams, &batch, attributes);
                 // Products need not be finite.
-                (&*attributes, &*chunk.harmonics, false)
+                (&*attributes, false)
             }
             Part::From(_) => {
                 fetcher.read_own(streams, &batch, attributes);
@@ -206,7 +223,7 @@ impl<'a> Job<'a> {
                 if is_flat {
                     attributes.scale[2][..batch.len].fill(0.0);
                 }
-                (&*attributes, &[][..], false)
+                (&*attributes, false)
             }
         };
         Source {
@@ -216,10 +233,7 @@ impl<'a> Job<'a> {
             matrices,
             is_sound,
             harmonics,
-            degree: match self.part {
-                Part::Chunk(chunk) => chunk.degree,
-                Part::From(_) => u32::MAX,
-            },
+            degree,
             frustum: None,
         }
     }

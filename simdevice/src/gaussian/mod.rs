@@ -18,6 +18,7 @@ mod instances;
 mod jobs;
 mod lanes;
 mod linearize;
+mod order;
 mod panorama;
 pub(crate) mod project;
 pub(crate) mod rays;
@@ -55,6 +56,7 @@ use frustum::Frustum;
 use instances::Matrices;
 use isa::exec::Stopped;
 use jobs::{Job, Part};
+use order::Order;
 use project::{Projection, Source};
 use rayon::prelude::*;
 use rays::{PixelRays, RayDepth, RayDepths};
@@ -63,7 +65,7 @@ use splat::{Projected, Splat};
 use std::sync::Arc;
 use std::time::Instant;
 use surfel::Surfel;
-use unchanged::Key;
+use unchanged::{Key, LastSet};
 
 /// The most batches of a set: a survivor is named by its batch and its place there, in 32 bits.
 const MAX_BATCHES: u64 = (1 << 32) / BATCH as u64;
@@ -116,6 +118,8 @@ pub(crate) struct Sorted {
     surfels: Option<Vec<Vec<Surfel>>>,
     /// By batch, as the splats, if each pixel sorts for itself.
     ray_depths: Option<Vec<Vec<RayDepth>>>,
+    /// The order, if a next picture's may be nearly the same.
+    order: Option<Arc<Order>>,
     /// What became of the set's Gaussians.
     counters: Counters,
 }
@@ -220,14 +224,22 @@ impl GaussianSet {
     ) -> Result<GaussianDraw, Unresolved> {
         let chunks = self.find_chunks(device, counters);
         let config = device.config();
-        let is_kept = config.skips.has(Skip::Unchanged) && device.recorder().is_none();
+        let skips = [Skip::Unchanged, Skip::LastOrder].map(|skip| config.skips.has(skip));
+        let is_kept = skips.contains(&true) && device.recorder().is_none();
         let key = Key::new(&self, &chunks).filter(|_| is_kept);
-        if let Some(sorted) = key.as_ref().and_then(|key| device.last_sets().find(key)) {
-            counters.add_all(&sorted.counters);
-            counters.add(Counter::SetsUnchanged, 1);
-            return Ok(self.drawn(sorted, None, device));
+        let mut last = None;
+        if let Some(key) = &key {
+            match device.last_sets().find(key, skips[0]) {
+                LastSet::Same(sorted) => {
+                    counters.add_all(&sorted.counters);
+                    counters.add(Counter::SetsUnchanged, 1);
+                    return Ok(self.drawn(sorted, None, device));
+                }
+                LastSet::Other(order) => last = order,
+            }
         }
-        let (sorted, record) = self.sort(&chunks, device, counters)?;
+        let keeps_order = key.is_some() && skips[1];
+        let (sorted, record) = self.sort(&chunks, (last, keeps_order), device, counters)?;
         let sorted = Arc::new(sorted);
         if let Some(key) = key {
             let bytes = sorted.memory_bytes();
@@ -263,16 +275,18 @@ impl GaussianSet {
         }
     }
 
-    /// Projects, sorts and bins; and begins an account of it, if anybody wants to know.
+    /// Projects, sorts and bins, with the help of the last picture's order, if it is kept; and begins an account of it, if
+    /// anybody wants to know.
     fn sort(
         &self,
         chunks: &[Option<Arc<Chunks>>],
+        (last, keeps_order): (Option<Arc<Order>>, bool),
         device: &Device,
         counters: &mut Counters,
     ) -> Result<(Sorted, Option<Arc<DrawRecord>>), Unresolved> {
         let started = Instant::now();
         let mut work = Counters::default();
-        let mut batches = self.project(device, chunks, &mut work)?;
+        let (mut batches, numbers) = self.project(device, chunks, &mut work)?;
         let fixed = batches.len();
         self.shade(device, &mut batches)?;
         let mut by_programs = Counters::default();
@@ -286,12 +300,16 @@ impl GaussianSet {
         }
         let projected = Instant::now();
         let threads = device.threads();
-        let order = device.install(|| sorted(&batches, threads));
+        let (order, is_repaired) =
+            device.install(|| order::find(&batches, &numbers, last.as_deref(), threads));
+        counters.add(Counter::OrdersRepaired, is_repaired.into());
+        drop(last);
         let sorted = Instant::now();
         // Twelve bytes a pair while lists are made: four times the budget of all lists of a pass.
         let most_pairs = device.config().bin_budget_bytes / 3;
         let tiles = device
             .install(|| TileLists::build(&mut batches, &order, self.bounds, threads, most_pairs));
+        let kept = keeps_order.then(|| Order::keep(numbers, &mut batches, order));
         let binned = Instant::now();
         let mut splats = host::with_capacity(batches.len());
         let mut surfels = host::with_capacity(batches.len());
@@ -330,6 +348,7 @@ impl GaussianSet {
             tiles,
             surfels: self.is_flat().then_some(surfels),
             ray_depths: is_per_pixel.then_some(depths),
+            order: kept.flatten().map(Arc::new),
             counters: work,
         };
         Ok((sorted, record))
@@ -379,13 +398,14 @@ impl GaussianSet {
         Ok(())
     }
 
-    /// Projects what has attributes. What is left out with its chunk is counted in `counters`.
+    /// Projects what has attributes; gives the numbers of batches, too, of all that the set has. What is left out with its
+    /// chunk is counted in `counters`.
     fn project(
         &self,
         device: &Device,
         chunks: &[Option<Arc<Chunks>>],
         counters: &mut Counters,
-    ) -> Result<Vec<Projected>, TooManyGaussians> {
+    ) -> Result<(Vec<Projected>, Vec<u32>), TooManyGaussians> {
         let begin = &self.begin;
         let skips = device.config().skips;
         let projection = Projection::new(
@@ -410,7 +430,8 @@ impl GaussianSet {
         }
         let mut batches = workers.run(&jobs);
         panorama::append_copies(&mut batches);
-        Ok(batches)
+        let numbers = host::collect(jobs.iter().map(|job| job.number));
+        Ok((batches, numbers))
     }
 }
 
@@ -484,24 +505,6 @@ struct Worker {
     scratch: Scratch,
 }
 
-/// The survivors in depth order, as key and batch number times `BATCH` plus place in the batch.
-fn sorted(batches: &[Projected], workers: usize) -> Vec<(u32, u32)> {
-    // Equal keys are in the order of batches, which chunks have changed.
-    let sequence = |&(_, name): &(u32, u32)| {
-        let (batch, place) = locate(name);
-        batches[batch].keys[place][1]
-    };
-    let settle = |pairs: &mut [(u32, u32)]| {
-        for ties in pairs.chunk_by_mut(|a, b| a.0 == b.0) {
-            if ties.len() > 1 && !ties.is_sorted_by_key(sequence) {
-                ties.sort_unstable_by_key(sequence);
-            }
-        }
-    };
-    let keys: Vec<&[[u32; 2]]> = host::collect(batches.iter().map(|batch| &batch.keys[..]));
-    sort::sort_lists(&keys, BATCH as u32, workers, settle)
-}
-
 /// The batch of a survivor's name, and its place there.
 #[inline(always)]
 pub(crate) fn locate(name: u32) -> (usize, usize) {
@@ -516,7 +519,9 @@ impl Sorted {
         let depths = depths.map(|batch| size_of_val(&**batch) as u64);
         let surfels = self.surfels.iter().flatten();
         let surfels = surfels.map(|batch| size_of_val(&**batch) as u64);
-        splats.sum::<u64>() + depths.sum::<u64>() + surfels.sum::<u64>() + self.tiles.memory_bytes()
+        let order = self.order.as_ref().map_or(0, |order| order.memory_bytes());
+        let lists = self.tiles.memory_bytes() + order;
+        splats.sum::<u64>() + depths.sum::<u64>() + surfels.sum::<u64>() + lists
     }
 }
 

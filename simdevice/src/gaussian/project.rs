@@ -5,6 +5,7 @@
 //! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
+use super::chunks::Harmonics;
 use super::depth::CenterDepth;
 use super::fetch::{Batch, COEFFICIENT_FLOATS, CoefficientReader};
 use super::footprint::Visible;
@@ -21,7 +22,6 @@ use crate::packet::{
     GaussianOrder, GaussianPrecision, GaussianState, Viewport,
 };
 use crate::skips::{Skip, Skips};
-use devmem::host;
 use fearless_simd::{Simd, prelude::*};
 
 /// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
@@ -73,8 +73,8 @@ pub(super) struct Source<'a> {
     pub(super) matrices: Option<&'a Matrices>,
     /// None is skipped for what its attributes are.
     pub(super) is_sound: bool,
-    /// Their spherical harmonics, if they were read already, one after the other.
-    pub(super) harmonics: &'a [f32],
+    /// Their spherical harmonics, if they were read already.
+    pub(super) harmonics: Harmonics<'a>,
     /// No coefficient of theirs of a greater degree is other than zero.
     pub(super) degree: u32,
     /// What bounds those that can be seen; `None` tells nothing of them.
@@ -86,11 +86,10 @@ impl Source<'_> {
     /// they were read already.
     #[inline(always)]
     fn prefetch_harmonics(&self, degree: u32, lanes: &[usize]) {
-        let floats = self.harmonics.len() / self.batch.len.max(1);
-        let used = floats.min(3 * coefficient_count(degree.min(self.degree)));
-        for lane in lanes {
-            let start = lane * floats;
-            host::prefetch(self.harmonics.get(start..start + used).unwrap_or_default());
+        let used = 3 * coefficient_count(degree.min(self.degree));
+        for &lane in lanes {
+            let floats = self.harmonics.from(lane);
+            devmem::prefetch(&floats[..used.min(floats.len())]);
         }
     }
 }

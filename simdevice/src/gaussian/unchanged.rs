@@ -6,6 +6,7 @@
 
 use super::cache::{Stream, is_device_local};
 use super::chunks::Chunks;
+use super::order::Order;
 use super::{GaussianSet, Sorted};
 use crate::format::Format;
 use crate::packet::{AttributeStream, Camera, GaussianAppend, GaussianState, Rect, Viewport};
@@ -35,6 +36,14 @@ struct Entry {
     key: Key,
     set: Weak<Sorted>,
     bytes: u64,
+}
+
+/// What there is of the last picture of a buffer.
+pub(super) enum LastSet {
+    /// The set, which is the same now.
+    Same(Arc<Sorted>),
+    /// Another, of which the order may be left, if its Gaussians have the same names.
+    Other(Option<Arc<Order>>),
 }
 
 /// The last sets of a device's buffers, the oldest first.
@@ -88,12 +97,16 @@ impl Key {
             let depths = (key.depth, key.is_resolved);
             (key.camera, key.viewport, key.bounds, depths)
         };
-        let chunks = || self.chunks.iter().zip(&other.chunks);
-        self.ranges == other.ranges
-            && view(self) == view(other)
+        view(self) == view(other)
             && self.state == other.state
             && all(&self.streams, &other.streams)
-            && chunks().all(|(a, b)| a.ptr_eq(b))
+            && self.has_same_batches(other)
+    }
+
+    /// Whether the same places in the set are in the same batches of both.
+    fn has_same_batches(&self, other: &Self) -> bool {
+        let mut chunks = self.chunks.iter().zip(&other.chunks);
+        self.ranges == other.ranges && chunks.all(|(a, b)| a.ptr_eq(b))
     }
 
     /// Whether both draw the same buffer first.
@@ -108,13 +121,14 @@ impl Entry {
         self.set.strong_count() > 0 && self.key.streams.iter().all(Stream::is_current)
     }
 
-    /// Frees the set.
-    fn release(self) {
+    /// Frees the set, but for its order.
+    fn release(self) -> Option<Arc<Order>> {
         let positions = self.key.streams.first();
         let memory = positions.and_then(Stream::memory);
-        if let Some((memory, set)) = memory.zip(self.set.upgrade()) {
-            memory.drop_derived(&(set as _));
-        }
+        let (memory, set) = memory.zip(self.set.upgrade())?;
+        let order = set.order.clone();
+        memory.drop_derived(&(set as _));
+        order
     }
 }
 
@@ -124,15 +138,26 @@ impl LastSets {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The set that was made from what has this key. Without it, what the same buffer last made is freed.
-    pub(super) fn find(&self, key: &Key) -> Option<Arc<Sorted>> {
+    /// The set that was made from what has this key, if it may be `reused`. Without it, what the same buffer last made is
+    /// freed, but for its order.
+    pub(super) fn find(&self, key: &Key, reused: bool) -> LastSet {
         let mut entries = self.lock();
         let is_old = |entry: &mut Entry| {
-            !entry.is_current() || entry.key.is_of_same_buffer(key) && !entry.key.is_same(key)
+            let is_other =
+                || entry.key.is_of_same_buffer(key) && !(reused && entry.key.is_same(key));
+            !entry.is_current() || is_other()
         };
-        entries.extract_if(.., is_old).for_each(Entry::release);
-        let found = entries.iter().find(|entry| entry.key.is_same(key))?;
-        found.set.upgrade()
+        let mut last = None;
+        for entry in entries.extract_if(.., is_old) {
+            let is_alike = entry.is_current() && entry.key.has_same_batches(key);
+            let order = entry.release().filter(|_| is_alike);
+            last = last.or(order);
+        }
+        let found = entries.iter().find(|entry| entry.key.is_same(key));
+        match found.and_then(|found| found.set.upgrade()) {
+            Some(set) => LastSet::Same(set),
+            None => LastSet::Other(last),
+        }
     }
 
     /// Keeps a set of `bytes`, in place of older ones where all together would take more than `budget`.
@@ -150,7 +175,9 @@ impl LastSets {
             held -= if goes { entry.bytes } else { 0 };
             goes
         };
-        entries.extract_if(.., goes).for_each(Entry::release);
+        for entry in entries.extract_if(.., goes) {
+            entry.release();
+        }
         memory.keep_derived(Arc::clone(set) as _);
         entries.push(Entry {
             key,

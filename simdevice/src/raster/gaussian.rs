@@ -44,6 +44,7 @@ use layer::{ANY_LIGHT, Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
 use per_pixel::PerPixel;
 use pixels::{Alphas, Reaching};
+use std::slice;
 
 const TILE: usize = TILE_SIZE as usize;
 /// Pixels of a block, which are the lanes of a vector.
@@ -330,7 +331,7 @@ impl GaussianTile {
         let bounded = task.skips.has(Skip::Blocks);
         let end_early = task.skips.has(Skip::Saturated);
         for &primitive in task.list.iter().take(CHUNK) {
-            devmem::prefetch(task.splat(primitive));
+            devmem::prefetch(slice::from_ref(task.splat(primitive)));
         }
         for (number, chunk) in task.list.chunks(CHUNK).enumerate() {
             let next_chunk = task.list.get((number + 1) * CHUNK..).unwrap_or_default();
@@ -374,7 +375,7 @@ impl GaussianTile {
             let (mut placed, mut next) = (0, next_chunk.iter());
             for (number, &primitive) in chunk.iter().enumerate() {
                 if let Some(&next) = next.next() {
-                    devmem::prefetch(task.splat(next));
+                    devmem::prefetch(slice::from_ref(task.splat(next)));
                 }
                 let splat = task.splat(primitive);
                 if DEPTH > NO_DEPTH && self.passing.hides(splat.depth) {

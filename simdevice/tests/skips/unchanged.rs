@@ -3,7 +3,7 @@
 use super::*;
 
 /// What changes packets before they are drawn again.
-type Edit = Box<dyn FnMut(&mut [Packet])>;
+pub(super) type Edit = Box<dyn FnMut(&mut [Packet])>;
 
 /// Draws `packets` as they are again and again, with a change before each pass but the first; says in which passes sets were
 /// drawn as they had been. Every picture is that of a device without skips.
@@ -37,7 +37,7 @@ fn nothing() -> Edit {
     Box::new(|_| {})
 }
 
-fn of_begin(mut change: impl FnMut(&mut GaussianBegin) + 'static) -> Edit {
+pub(super) fn of_begin(mut change: impl FnMut(&mut GaussianBegin) + 'static) -> Edit {
     Box::new(move |packets| {
         if let Packet::GaussianBegin(begin) = &mut packets[0] {
             change(begin);
@@ -45,7 +45,7 @@ fn of_begin(mut change: impl FnMut(&mut GaussianBegin) + 'static) -> Edit {
     })
 }
 
-fn of_append(mut change: impl FnMut(&mut GaussianAppend) + 'static) -> Edit {
+pub(super) fn of_append(mut change: impl FnMut(&mut GaussianAppend) + 'static) -> Edit {
     Box::new(move |packets| {
         if let Packet::GaussianAppend(append) = &mut packets[1] {
             change(append);

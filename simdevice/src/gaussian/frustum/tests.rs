@@ -3,6 +3,7 @@
 use super::*;
 use crate::device::SimdLevel;
 use crate::format::Format;
+use crate::gaussian::chunks::Harmonics;
 use crate::gaussian::fetch::{BATCH, Batch};
 use crate::gaussian::footprint::Visible;
 use crate::gaussian::project::Source;
@@ -171,7 +172,7 @@ fn what_is_outside_is_drawn_nowhere() {
                     attributes: &attributes,
                     matrices: None,
                     is_sound: false,
-                    harmonics: &[],
+                    harmonics: Harmonics::default(),
                     degree: u32::MAX,
                     frustum: None,
                 };

@@ -2,6 +2,7 @@
 
 use std::io::{Write, stdout};
 
+use gaurast_samples::camera::Camera;
 use gaurast_samples::renderer::Settings;
 use serde::Serialize;
 
@@ -11,7 +12,7 @@ use super::worker::{Contender, Drawn, Worker};
 use super::{BenchError, Extra, Source, SweepArguments, Workload, median};
 
 /// Skips of Gaussian draws, and the counter of each, as the device has them.
-const SKIPS: [(&str, &str); 10] = [
+const SKIPS: [(&str, &str); 11] = [
     ("chunks", "outside by chunks"),
     ("hidden-chunks", "hidden by others"),
     ("bounds", "outside by bounds"),
@@ -22,10 +23,47 @@ const SKIPS: [(&str, &str); 10] = [
     ("saturated", "blocks saturated"),
     ("empty-tiles", "tiles untouched"),
     (UNCHANGED, "sets unchanged"),
+    (LAST_ORDER, "orders repaired"),
 ];
 
 /// What only a still camera shows.
 const UNCHANGED: &str = "unchanged";
+
+/// What only a camera shows that does not turn.
+const LAST_ORDER: &str = "last-order";
+
+/// How a camera goes from frame to frame.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Path {
+    /// As the workload says, which is far enough for nothing of the last frame to help.
+    Own,
+    Still,
+    /// A hundredth of its distance from the origin to its right.
+    Sliding,
+}
+
+impl Path {
+    /// The one that shows a skip.
+    fn of(skip: &str) -> Self {
+        match skip {
+            UNCHANGED => Self::Still,
+            LAST_ORDER => Self::Sliding,
+            _ => Self::Own,
+        }
+    }
+
+    /// The view of a frame, of a workload's.
+    fn view(self, views: &[Camera], frame: usize) -> Camera {
+        let mut view = views[if self == Self::Own { frame } else { 0 }].clone();
+        if self == Self::Sliding {
+            let distance = view.eye.iter().map(|part| part * part).sum::<f64>().sqrt();
+            for (eye, right) in view.eye.iter_mut().zip(view.rotation[0]) {
+                *eye += 0.01 * distance * frame as f64 * right;
+            }
+        }
+        view
+    }
+}
 
 /// The pictures' size.
 const SIZE: [u32; 2] = [1280, 720];
@@ -114,9 +152,11 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
             .skips
             .extend(saved(&name, &workload, arguments.threads, runs)?);
     }
-    let name = format!("{}, still camera", base.source);
-    let saved = saved_by(UNCHANGED, &name, &base, arguments.threads, runs)?;
-    results.skips.push(saved);
+    for (skip, camera) in [(UNCHANGED, "still"), (LAST_ORDER, "sliding")] {
+        let name = format!("{}, {camera} camera", base.source);
+        let saved = saved_by(skip, &name, &base, arguments.threads, runs)?;
+        results.skips.push(saved);
+    }
     let pairs = [
         ("off the screen", with(Extra::Beside), base),
         ("behind a wall", hidden, wall),
@@ -149,7 +189,7 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
 fn frames(
     workers: &mut [(Workload, Worker)],
     runs: usize,
-    is_still: bool,
+    path: Path,
 ) -> Result<Vec<Vec<Drawn>>, BenchError> {
     let mut frames: Vec<Vec<Drawn>> = workers.iter().map(|_| Vec::new()).collect();
     let mut views = Vec::new();
@@ -157,10 +197,10 @@ fn frames(
         views.push(workload.views(&workload.scene()?, runs + 1)?);
     }
     for run in 0..=runs {
-        let view = if is_still { 0 } else { run };
         let of_workers = workers.iter_mut().zip(&views).zip(&mut frames);
         for (((_, worker), views), frames) in of_workers {
-            frames.push(worker.draw(&views[view], Settings::default(), None)?);
+            let view = path.view(views, run);
+            frames.push(worker.draw(&view, Settings::default(), None)?);
         }
     }
     Ok(frames)
@@ -191,12 +231,12 @@ fn saved(
 ) -> Result<Vec<Saved>, BenchError> {
     let names = SKIPS.iter().map(|(name, _)| *name);
     names
-        .filter(|&name| name != UNCHANGED)
+        .filter(|&name| Path::of(name) == Path::Own)
         .map(|name| saved_by(name, scene, workload, threads, runs))
         .collect()
 }
 
-/// What a skip saves; the camera moves but for the one that needs it still.
+/// What a skip saves, on the path that shows it.
 fn saved_by(
     skip: &'static str,
     scene: &str,
@@ -210,7 +250,7 @@ fn saved_by(
         start(workload, threads, "all")?,
         start(workload, threads, &format!("all,-{skip}"))?,
     ];
-    let frames = frames(&mut workers, runs, skip == UNCHANGED)?;
+    let frames = frames(&mut workers, runs, Path::of(skip))?;
     Ok(Saved {
         scene: scene.to_owned(),
         skip,
@@ -232,7 +272,7 @@ fn unseen(
         start(with, threads, "all")?,
         start(without, threads, "all")?,
     ];
-    let frames = frames(&mut workers, runs, false)?;
+    let frames = frames(&mut workers, runs, Path::Own)?;
     let chunks = frames[0].iter().map(|frame| frame.counter("chunks"));
     Ok(Unseen {
         kind,

