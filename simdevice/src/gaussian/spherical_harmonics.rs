@@ -128,7 +128,7 @@ impl Bases {
         };
         // What is not finite makes the sum so, whatever it is multiplied by; the sum may also be too large. The fourth
         // number is not one of the colour's.
-        if (sum - sum).simd_eq(0.0).to_bitmask() & 7 != 7 {
+        if (sum * 0.0).simd_eq(0.0).to_bitmask() & 7 != 7 {
             return self.wide_color(degree, at, coefficients);
         }
         let color = sum.max(0.0);

@@ -334,10 +334,13 @@ mod tests {
     use fearless_simd::dispatch;
     use proptest::prelude::*;
 
-    /// What is found of a batch: row, first tile and one past the last of each lane that is reached, and counters.
+    /// Rows, each with its first tile and one past its last.
+    type Spans = Vec<(u32, u16, u16)>;
+
+    /// What is found of a batch: the spans of each lane that is reached, and counters.
     #[derive(Debug, PartialEq)]
     struct Tiles {
-        reached: Vec<(usize, Vec<(u32, u16, u16)>)>,
+        reached: Vec<(usize, Spans)>,
         counters: Vec<u64>,
     }
 
