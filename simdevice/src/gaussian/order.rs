@@ -207,11 +207,12 @@ impl<'a> Now<'a> {
             }
             tasks.push((&old[..], keys, new.wrapping_mul(BATCH as u32), own));
         }
+        let tasks_count = tasks.len();
         let matched = tasks
             .into_par_iter()
             .with_min_len(BATCHES_PER_TASK)
             .map(|(old, new, first, own)| match_batch(old, new, first, own));
-        let mut fresh: Vec<Vec<Pair>> = Vec::new();
+        let mut fresh: Vec<Vec<Pair>> = host::with_capacity(tasks_count + batches.len());
         matched.collect_into_vec(&mut fresh);
         for (number, _) in is_known
             .iter()

@@ -70,7 +70,8 @@ pub struct GaussianTile {
     layers: [Layer; LAYERS],
     passing: Passing,
     chunk: [Record; CHUNK],
-    alphas: Alphas,
+    /// Apart, so that both are small enough never to be wanting.
+    alphas: Box<Alphas>,
     /// What may reach each block, where a mode parts lists so.
     lists: [Vec<u32>; BLOCKS],
     per_pixel: PerPixel,
@@ -147,7 +148,7 @@ impl Default for GaussianTile {
             layers: [Layer::EMPTY; LAYERS],
             passing: Passing::default(),
             chunk: [Record::default(); CHUNK],
-            alphas: Alphas::default(),
+            alphas: Box::default(),
             lists: Default::default(),
             per_pixel: PerPixel::default(),
             piece: Vec::new(),
@@ -444,7 +445,7 @@ impl GaussianTile {
                     },
                 );
             }
-            let (chunk, passing) = ((&self.chunk, &mut self.alphas), &self.passing);
+            let (chunk, passing) = ((&self.chunk, &mut *self.alphas), &self.passing);
             work.contributions +=
                 layer.evaluate::<_, DEPTH>(simd, &reaching, chunk, passing, task.thresholds);
         }
