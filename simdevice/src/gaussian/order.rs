@@ -30,12 +30,6 @@ const SAMPLE_WINDOW: usize = 3;
 /// Moves by one place that are made before they are compared with what is in order already.
 const FREE_MOVES: usize = 256;
 
-/// Keys of a batch that are compared together.
-const TOGETHER: usize = 8;
-
-/// Pairs that are brought together before they are compared.
-const GATHERED: usize = 64;
-
 /// Old batches that a worker takes at a time.
 const BATCHES_PER_TASK: usize = 64;
 
@@ -286,39 +280,20 @@ impl<'a> Now<'a> {
     fn merge_run(&self, old: &[Pair], mut fresh: &[Pair]) -> Option<Vec<Pair>> {
         let mut all: Vec<Pair> = host::with_capacity(old.len() + fresh.len());
         let mut moves = 0;
-        let mut now = [(0, 0); GATHERED];
-        // The key and the old key of the last of all; more than any key if nothing is known of that.
-        let mut last = [u64::MAX; 2];
-        let mut next = fresh.first().map_or(u64::MAX, |pair| pair.0.into());
-        for old in old.chunks(GATHERED) {
-            // Before any is looked at, so that the waits for memory overlap.
-            for (now, &(_, name)) in now.iter_mut().zip(old) {
-                *now = self.of(name);
+        for &(_, name) in old {
+            let pair = self.of(name);
+            if pair.1 == GONE {
+                continue;
             }
-            for (&pair, &(old_key, _)) in now.iter().zip(old) {
-                if pair.1 == GONE {
-                    continue;
+            while let Some((&first, after)) = fresh.split_first() {
+                if !self.is_before(first, pair) {
+                    break;
                 }
-                let keys = [pair.0, old_key].map(u64::from);
-                if keys[0] >= next {
-                    let before = fresh
-                        .iter()
-                        .take_while(|first| self.is_before(**first, pair));
-                    let (before, after) = fresh.split_at(before.count());
-                    host::extend(&mut all, before);
-                    fresh = after;
-                    next = fresh.first().map_or(u64::MAX, |pair| pair.0.into());
-                    last = [u64::MAX; 2];
-                }
-                all.push(pair);
-                // What tied in the old order is in order if it ties again.
-                if keys[0] > last[0] || keys == last {
-                    last = keys;
-                } else {
-                    let moved = self.settle_last(&mut all, &mut moves)?;
-                    last = if moved { [u64::MAX; 2] } else { keys };
-                }
+                all.push(first);
+                fresh = after;
             }
+            all.push(pair);
+            self.settle_last(&mut all, &mut moves)?;
         }
         all.extend(fresh);
         Some(all)
@@ -358,44 +333,17 @@ impl<'a> Now<'a> {
 fn match_batch(old: &[[u32; 2]], new: &[[u32; 2]], first: u32, out: &mut [Pair]) -> Vec<Pair> {
     let mut fresh = Vec::new();
     let (mut from, mut to) = (0, 0);
-    loop {
-        // Mostly, what follows is the same in both.
-        while let (Some(was), Some(is), Some(out)) = (
-            old[from..].first_chunk::<TOGETHER>(),
-            new[to..].first_chunk::<TOGETHER>(),
-            out[from..].first_chunk_mut::<TOGETHER>(),
-        ) {
-            let mut differing = 0;
-            for at in 0..TOGETHER {
-                differing |= was[at][1] ^ is[at][1];
-            }
-            if differing != 0 {
-                break;
-            }
-            let name = first.wrapping_add(to as u32);
-            for at in 0..TOGETHER {
-                out[at] = (is[at][0], name + at as u32);
-            }
-            (from, to) = (from + TOGETHER, to + TOGETHER);
-        }
-        for _ in 0..TOGETHER {
-            let (Some(was), Some(is)) = (old.get(from), new.get(to)) else {
-                break;
-            };
-            let name = first.wrapping_add(to as u32);
-            if was[1] == is[1] {
-                out[from] = (is[0], name);
-                (from, to) = (from + 1, to + 1);
-            } else if new[to..].iter().any(|is| is[1] == was[1]) {
-                host::push(&mut fresh, (is[0], name));
-                to += 1;
-            } else {
-                out[from] = (0, GONE);
-                from += 1;
-            }
-        }
-        if from == old.len() || to == new.len() {
-            break;
+    while let (Some(was), Some(is)) = (old.get(from), new.get(to)) {
+        let name = first.wrapping_add(to as u32);
+        if was[1] == is[1] {
+            out[from] = (is[0], name);
+            (from, to) = (from + 1, to + 1);
+        } else if new[to..].iter().any(|is| is[1] == was[1]) {
+            host::push(&mut fresh, (is[0], name));
+            to += 1;
+        } else {
+            out[from] = (0, GONE);
+            from += 1;
         }
     }
     out[from..].fill((0, GONE));
