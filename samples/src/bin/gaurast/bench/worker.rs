@@ -270,17 +270,15 @@ pub fn run() -> Result<(), BenchError> {
         Err(error) => return say(&mut stdout(), &Reply::Failed(error.to_string())),
     };
     usage::reset_peak_memory();
-    let mut frames = 0;
     let (mut last_size, mut last_end) = ([0; 2], Instant::now());
-    for line in lines {
+    for (number, line) in lines.enumerate() {
         let request: Request = serde_json::from_str(&line?)?;
         let size = [request.camera.width, request.camera.height];
         // A picture of another size than the last one has new memory, which one thread touches for the first time; and after a
         // pause, as when others had their turn, schedulers leave threads together on one processor for as long as a frame
         // takes. Neither is part of what a frame takes, but of the first two: the cold one, and the one that makes chunks.
         let is_new = size != last_size || last_end.elapsed() > PAUSE;
-        let warms_up = frames >= 2 && is_new;
-        frames += 1;
+        let warms_up = number >= 2 && is_new;
         let reply = match artist.answer(&request, warms_up) {
             Ok(drawn) => Reply::Drawn(drawn),
             Err(error) => Reply::Failed(error.to_string()),
