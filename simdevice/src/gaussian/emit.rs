@@ -1,4 +1,5 @@
 //! What becomes of projected Gaussians that reach tiles: their colours and keys.
+
 use super::fetch::{BATCH, COEFFICIENT_FLOATS, CoefficientReader};
 use super::footprint::{Reach, Span};
 use super::panorama;
@@ -162,6 +163,7 @@ impl Projection {
             counters.add(Counter::HarmonicsUnread, unread as u64);
         }
     }
+
     /// Appends kept lanes and their colours to `out`.
     #[inline(always)]
     fn append(

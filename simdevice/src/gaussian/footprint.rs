@@ -160,6 +160,15 @@ pub(crate) struct Visible {
     pub bottom: i64,
 }
 
+impl Visible {
+    /// The first and the last pixel along an axis.
+    #[inline(always)]
+    pub fn pixels(&self, axis: usize) -> [f64; 2] {
+        let [first, end] = [[self.left, self.right], [self.top, self.bottom]][axis];
+        [first as f64, (end - 1) as f64]
+    }
+}
+
 impl From<Rect> for Visible {
     fn from(rect: Rect) -> Self {
         Self {
@@ -235,8 +244,7 @@ impl Ellipse {
     ) -> Option<Reach> {
         let [x, y] = self.mean;
         let [half_x, half_y] = self.half;
-        let (first_x, last_x) = (visible.left as f64, (visible.right - 1) as f64);
-        let (first_y, last_y) = (visible.top as f64, (visible.bottom - 1) as f64);
+        let ([first_x, last_x], [first_y, last_y]) = (visible.pixels(0), visible.pixels(1));
         let columns = centres(x - half_x, x + half_x, first_x, last_x);
         let rows = centres(y - half_y, y + half_y, first_y, last_y);
         let (Some([left, right]), Some([top, bottom])) = (columns, rows) else {

@@ -259,14 +259,8 @@ impl Projection {
 
     /// Bounds of the visible pixels' centres along an axis, with a pixel to spare.
     pub(super) fn visible_range(&self, axis: usize) -> [f64; 2] {
-        let Visible {
-            left,
-            top,
-            right,
-            bottom,
-        } = self.visible;
-        let [first, end] = [[left, right], [top, bottom]][axis];
-        [first as f64 - 1.0, end as f64 + 1.0]
+        let [first, last] = self.visible.pixels(axis);
+        [first - 1.0, last + 2.0]
     }
 
     /// Computes mean, covariance and opacity on the screen of the kept Gaussians.

@@ -2,13 +2,14 @@
 //! are, and one at a time for the others.
 
 use super::fetch::BATCH;
-use super::footprint::{Ellipse, HELD_ROWS, Reach, TILE_SIZE, Visible};
+use super::footprint::{Ellipse, HELD_ROWS, Reach, TILE_SIZE};
 use super::lanes::{Bits, Lanes};
 use super::panorama;
 use super::project::Projection;
 use super::scratch::{Flat, Scratch};
 use super::splat::Projected;
 use crate::counters::{Counter, Counters};
+use crate::lanes::both;
 use crate::packet::GaussianGeometry;
 use crate::skips::Skip;
 use fearless_simd::{Simd, prelude::*};
@@ -198,14 +199,8 @@ impl Projection {
         beside: &mut u64,
     ) -> Found {
         let number = |value: f64| S::f64s::splat(simd, value);
-        let Visible {
-            left,
-            top,
-            right,
-            bottom,
-        } = self.visible;
-        let columns = [number(left as f64), number((right - 1) as f64)];
-        let rows = [number(top as f64), number((bottom - 1) as f64)];
+        let columns = both(self.visible.pixels(0), number);
+        let rows = both(self.visible.pixels(1), number);
         let (zero, one, tile) = (number(0.0), number(1.0), number(TILE_SIZE.into()));
         let mut found = Found {
             reached: Bits::default(),
@@ -327,6 +322,7 @@ impl Projection {
 
 #[cfg(test)]
 mod tests {
+    use super::super::footprint::Visible;
     use super::*;
     use crate::device::SimdLevel;
     use crate::packet::{Camera, GaussianState, Viewport};

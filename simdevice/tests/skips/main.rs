@@ -425,6 +425,22 @@ fn draw(skips: Skips, packets: &[Packet], load: LoadOp) -> (Vec<u8>, Counters) {
     (images, processor.counters().clone())
 }
 
+/// Draws a scene over black, in a pass of its own; gives what that counted. The picture is that of a device without skips.
+fn draw_as_without_skips(processor: &mut CommandProcessor, packets: &[Packet]) -> Counters {
+    let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
+    let before = processor.counters().clone();
+    let target = image(Format::R32G32B32A32Sfloat, 1, 0x3E);
+    let rendering = rendering(attachment(&target, over_black));
+    let begin = [Packet::BeginRendering(Box::new(rendering))];
+    for packet in begin.iter().chain(packets).chain([&Packet::EndRendering]) {
+        processor.execute(packet).unwrap();
+    }
+    // Depths are not among what is drawn here.
+    let (expected, _) = draw(Skips::NONE, packets, over_black);
+    assert!(bytes(&target) == expected[..bytes(&target).len()]);
+    processor.counters().since(&before)
+}
+
 #[test]
 fn every_skip_saves_work_and_changes_no_bit() {
     let mut saved = Counters::default();
