@@ -16,6 +16,7 @@
 //! - `GAURAST_DUMP`: what is printed to standard error for people, by name: ir (the device's programs, as pipelines are
 //!   created).
 
+use crate::capabilities::memory;
 use crate::error::Error;
 use simdevice::device::{Config, SimdLevel};
 use simdevice::skips::UnknownSkip;
@@ -23,6 +24,9 @@ use simdevice::trace::{Recorder, Trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+
+/// Gaussians in the order in which they are read fastest may take so many parts of what the heap has, beside it.
+const CHUNKS_PER_HEAP: u64 = 8;
 
 const SIMD: &str = "GAURAST_SIMD";
 const THREADS: &str = "GAURAST_THREADS";
@@ -121,7 +125,10 @@ fn config(
     timeout: Option<&str>,
     skip: Option<&str>,
 ) -> Result<Config, Error> {
-    let mut config = Config::default();
+    let mut config = Config {
+        chunk_budget_bytes: memory::heap_size() / CHUNKS_PER_HEAP,
+        ..Config::default()
+    };
     if let Some(name) = simd {
         config.simd = SimdLevel::from_name(name).ok_or_else(|| {
             let names: Vec<_> = SimdLevel::NAMES.iter().map(|(name, _)| *name).collect();

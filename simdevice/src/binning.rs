@@ -136,7 +136,7 @@ const MAX_TILES: u32 = 1 << COUNT_AT;
 const MAX_COUNT: u32 = (1 << (32 - COUNT_AT)) - 1;
 
 /// Strips of a band in the order of primitives. There is room behind them.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Strips {
     strips: Vec<Strip>,
     len: usize,
@@ -144,6 +144,9 @@ struct Strips {
 
 /// Primitives whose reaches are fetched ahead, and whose pairs are counted before the budget is looked at.
 const GATHERED: usize = 64;
+
+/// Strips that there is room for in the beginning, for each primitive: most have one or two.
+const STRIPS_PER_PRIMITIVE: usize = 2;
 
 /// Primitives that a worker brings into order at a time.
 const RUN: usize = 4096;
@@ -280,7 +283,8 @@ impl Rows {
         bands: usize,
         allow: impl Fn(u64) -> bool,
     ) -> Option<Vec<Strips>> {
-        let mut strips = host::collect((0..bands).map(|_| Strips::default()));
+        let about = run.len() * STRIPS_PER_PRIMITIVE / bands;
+        let mut strips = host::collect((0..bands).map(|_| Strips::with_room(about)));
         let others = self.places.len() - 1;
         let strip = |(row, span): (u32, Span)| {
             // Rows without tiles may lie outside.
@@ -330,6 +334,14 @@ impl Rows {
 }
 
 impl Strips {
+    /// None yet, with room for about so many.
+    fn with_room(count: usize) -> Self {
+        Self {
+            strips: host::filled([0; 2], count.max(1024)),
+            len: 0,
+        }
+    }
+
     /// Adds what a primitive reaches in three rows: the first tile of each and how many, at most [`MAX_COUNT`].
     #[inline(always)]
     fn push_small(&mut self, rows: [(u32, u32); HELD_ROWS], primitive: u32) {
@@ -362,7 +374,7 @@ impl Strips {
 
     #[cold]
     fn grow(&mut self) {
-        let len = (2 * self.strips.len()).max(1024);
+        let len = 2 * self.strips.len();
         host::resize(&mut self.strips, len, [0; 2]);
     }
 

@@ -7,6 +7,7 @@
 //!
 //! Every call here, and every allocation of device memory, is a place where [`injection`] can fail.
 
+use crate::pages;
 use bytemuck::Zeroable;
 use std::alloc::{Layout, alloc_zeroed};
 use std::any::Any;
@@ -67,6 +68,8 @@ fn grow<T>(items: &mut Vec<T>, additional: usize) {
     if injection::fails() || reserved.is_err() {
         refused::<T>(additional).unwind();
     }
+    // SAFETY: the vector's capacity is its own.
+    unsafe { pages::prefer_huge(items.as_mut_ptr().cast(), items.capacity() * size_of::<T>()) };
 }
 
 /// Adds an item.
@@ -143,6 +146,8 @@ pub fn zeroed<T: Zeroable>(count: usize) -> Vec<T> {
     if memory.is_null() {
         refused::<T>(count).unwind();
     }
+    // SAFETY: this is what was allocated.
+    unsafe { pages::prefer_huge(memory.cast(), layout.size()) };
     // SAFETY: the global allocator gave this memory for the layout of `count` values, and zeros are values of `T`
     // (`Zeroable`).
     unsafe { Vec::from_raw_parts(memory, count, count) }

@@ -10,10 +10,13 @@
 mod atomic;
 mod gather;
 pub mod host;
+mod pages;
 mod prefetch;
+mod table;
 
 pub use gather::gather;
 pub use prefetch::prefetch;
+pub use table::{can_look_up, look_up};
 
 use bytemuck::{AnyBitPattern, NoUninit};
 use memmap2::{MmapOptions, MmapRaw};
@@ -50,7 +53,7 @@ pub struct OutOfBounds {
 
 /// A range of device memory.
 ///
-/// Pages are backed when they are first touched, so that an allocation costs what is used of it.
+/// Pages are backed when they are first touched, so that an allocation costs about what is used of it.
 #[derive(Debug)]
 pub struct Allocation {
     map: MmapRaw,
@@ -108,8 +111,11 @@ impl Allocation {
             .no_reserve_swap()
             .map_anon()
             .map_err(refuse)?;
+        let map = MmapRaw::from(map);
+        // SAFETY: the mapping is new and nobody else's.
+        unsafe { pages::prefer_huge(map.as_mut_ptr(), bytes) };
         Ok(Arc::new(Self {
-            map: MmapRaw::from(map),
+            map,
             len,
             generation: AtomicU64::new(0),
             host_visible,
@@ -171,6 +177,15 @@ impl Allocation {
             std::ptr::copy_nonoverlapping(source, out.as_mut_ptr().cast::<u8>(), size_of_val(out));
         }
         Ok(())
+    }
+
+    /// Has `size` bytes from `offset` on, if they lie inside the allocation, on their way to the caches, where the
+    /// processor can be told so. It changes nothing but time.
+    #[inline(always)]
+    pub fn prefetch(&self, offset: u64, size: usize) {
+        if let Ok(start) = self.checked(offset, size) {
+            prefetch::prefetch_bytes(start, size);
+        }
     }
 
     /// Copies `data` to byte `offset` on.

@@ -1,6 +1,6 @@
 //! What becomes of projected Gaussians that reach tiles: their colours and keys.
 
-use super::fetch::{BATCH, COEFFICIENT_FLOATS, CoefficientReader};
+use super::fetch::{BATCH, COEFFICIENT_FLOATS};
 use super::footprint::{Reach, Span};
 use super::panorama;
 use super::project::{LN_2, Projection, Source};
@@ -113,7 +113,7 @@ impl Projection {
     ) {
         out.reserve(scratch.lanes.len());
         self.find_tiles(simd, scratch, out);
-        let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
+        let reader = &source.reader;
         let floats = reader.floats();
         let mut read = [0.0; COEFFICIENT_FLOATS];
         let (mut directions, mut bases) = ([[0.0; DIRECTIONS]; 3], Bases::default());

@@ -207,12 +207,7 @@ impl Fetcher {
     /// Fills the scratch with one element every returned number of bytes.
     fn read_bytes(&mut self, stream: &AttributeStream, batch: &Batch<'_>, size: usize) -> usize {
         let stride = stream.stride as usize;
-        let at = |lane| {
-            batch
-                .element(stream, lane)
-                .saturating_mul(u64::from(stream.stride))
-                .saturating_add(u64::from(stream.offset))
-        };
+        let at = |lane| at(stream, batch, lane);
         if batch.is_consecutive(stream)
             && stream.stride <= WHOLE_SPAN_STRIDE
             && stride >= size
@@ -240,6 +235,14 @@ impl Fetcher {
             self.bytes.resize(bytes, 0);
         }
     }
+}
+
+/// Where in `stream`'s buffer the element that lane `lane` reads is.
+fn at(stream: &AttributeStream, batch: &Batch<'_>, lane: usize) -> u64 {
+    batch
+        .element(stream, lane)
+        .saturating_mul(u64::from(stream.stride))
+        .saturating_add(u64::from(stream.offset))
 }
 
 /// The coefficients of all degrees up to 4.
@@ -279,14 +282,19 @@ impl<'a> CoefficientReader<'a> {
         3 * self.streams.len().min(MAX_COEFFICIENTS)
     }
 
+    /// Has the first `count` coefficients of `lane` on their way while other things are computed, if they are packed.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, batch: &Batch<'_>, lane: usize, count: usize) {
+        if let Some(stream) = self.streams.first().filter(|_| self.packed) {
+            let start = stream.buffer.offset.saturating_add(at(stream, batch, lane));
+            let count = count.min(self.streams.len());
+            stream.buffer.memory.prefetch(start, 12 * count);
+        }
+    }
+
     /// Reads the coefficients of `lane`: red, green, blue of each in turn.
     pub(super) fn read(&self, batch: &Batch<'_>, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
-        let at = |stream: &AttributeStream| {
-            batch
-                .element(stream, lane)
-                .saturating_mul(u64::from(stream.stride))
-                .saturating_add(u64::from(stream.offset))
-        };
+        let at = |stream| at(stream, batch, lane);
         let count = self.streams.len().min(MAX_COEFFICIENTS);
         let out = &mut out[..3 * count];
         if self.packed {

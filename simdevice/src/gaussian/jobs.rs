@@ -1,7 +1,7 @@
 //! What there is to project: batches of vertices and chunks, without the chunks that no picture needs.
 
 use super::chunks::{Chunk, Chunks, Harmonics};
-use super::fetch::{BATCH, Batch, Fetcher};
+use super::fetch::{BATCH, Batch, CoefficientReader, Fetcher};
 use super::frustum::{Frustum, Outside};
 use super::hidden::Hidden;
 use super::instances::{Matrices, Model};
@@ -227,7 +227,7 @@ impl<'a> Job<'a> {
             }
         };
         Source {
-            streams,
+            reader: CoefficientReader::new(&streams.spherical_harmonics),
             batch,
             attributes,
             matrices,

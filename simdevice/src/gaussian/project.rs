@@ -18,8 +18,8 @@ use super::spherical_harmonics::{Bases, coefficient_count};
 use super::splat::{Projected, half_room};
 use crate::counters::{Counter, Counters};
 use crate::packet::{
-    Camera, CameraModel, GaussianAttributes, GaussianGeometry, GaussianLinearization,
-    GaussianOrder, GaussianPrecision, GaussianState, Viewport,
+    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
+    GaussianState, Viewport,
 };
 use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, prelude::*};
@@ -65,8 +65,8 @@ pub(crate) struct Projection {
 
 /// A batch of Gaussians that were read.
 pub(super) struct Source<'a> {
-    /// Where their colours are.
-    pub(super) streams: &'a GaussianAttributes,
+    /// What reads their colours.
+    pub(super) reader: CoefficientReader<'a>,
     pub(super) batch: Batch<'a>,
     pub(super) attributes: &'a Attributes,
     /// Matrices that place them in the world, if it is not their own space.
@@ -82,14 +82,15 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// Has the spherical harmonics of degrees 0 to `degree` of some lanes on their way while other things are computed, if
-    /// they were read already.
+    /// Has the spherical harmonics of degrees 0 to `degree` of some lanes on their way while other things are computed.
     #[inline(always)]
     fn prefetch_harmonics(&self, degree: u32, lanes: &[usize]) {
-        let used = 3 * coefficient_count(degree.min(self.degree));
+        let count = coefficient_count(degree.min(self.degree));
         for &lane in lanes {
-            let floats = self.harmonics.from(lane);
-            devmem::prefetch(&floats[..used.min(floats.len())]);
+            match self.harmonics.from(lane) {
+                [] => self.reader.prefetch(&self.batch, lane, count),
+                floats => devmem::prefetch(&floats[..floats.len().min(3 * count)]),
+            }
         }
     }
 }
@@ -163,7 +164,7 @@ impl Projection {
     /// Finds which lanes have finite spherical harmonics, of all that the batch holds.
     #[inline(always)]
     fn find_colored<S: Simd>(&self, simd: S, source: &Source<'_>) -> Bits {
-        let reader = CoefficientReader::new(&source.streams.spherical_harmonics);
+        let reader = &source.reader;
         let mut coefficients = [0.0; COEFFICIENT_FLOATS];
         let anywhere = Bases::default();
         let mut colored = Bits::default();

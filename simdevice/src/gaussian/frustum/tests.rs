@@ -4,7 +4,7 @@ use super::*;
 use crate::device::SimdLevel;
 use crate::format::Format;
 use crate::gaussian::chunks::Harmonics;
-use crate::gaussian::fetch::{BATCH, Batch};
+use crate::gaussian::fetch::{BATCH, Batch, CoefficientReader};
 use crate::gaussian::footprint::Visible;
 use crate::gaussian::project::Source;
 use crate::gaussian::scratch::Scratch;
@@ -167,7 +167,7 @@ fn what_is_outside_is_drawn_nowhere() {
                 let frustum = Frustum::new(&projection, 1.0);
                 let attributes = around_edges(&mut rng, geometry == GaussianGeometry::Surfel);
                 let source = Source {
-                    streams: &append.attributes,
+                    reader: CoefficientReader::new(&append.attributes.spherical_harmonics),
                     batch: Batch::new(&append, 0, 0, BATCH),
                     attributes: &attributes,
                     matrices: None,
