@@ -113,12 +113,10 @@ impl CommandProcessor {
     fn try_execute(&mut self, packet: &Packet) -> Result<(), ExecutionError> {
         match packet {
             Packet::CopyBuffer(copy) => self.transfer(|| transfer::copy_buffer(copy)),
-            Packet::CopyBufferToImage(copy) => {
-                self.transfer(|| transfer::copy_buffer_image(copy, Direction::ToImage))
-            }
-            Packet::CopyImageToBuffer(copy) => {
-                self.transfer(|| transfer::copy_buffer_image(copy, Direction::ToBuffer))
-            }
+            Packet::CopyBufferToImage(copy) => self
+                .transfer(|| transfer::copy_buffer_image(copy, Direction::ToImage, &self.device)),
+            Packet::CopyImageToBuffer(copy) => self
+                .transfer(|| transfer::copy_buffer_image(copy, Direction::ToBuffer, &self.device)),
             Packet::CopyImage(copy) => self.transfer(|| transfer::copy_image(copy)),
             Packet::BlitImage(blit) => self.transfer(|| transfer::blit_image(blit)),
             Packet::ResolveImage(resolve) => self.transfer(|| transfer::resolve_image(resolve)),

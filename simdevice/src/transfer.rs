@@ -10,12 +10,15 @@ mod resolve;
 #[cfg(test)]
 mod tests;
 
+use crate::device::Device;
 use crate::format::MAX_TEXEL_SIZE;
 use crate::image::{Image, SubresourceLayout};
 use crate::packet::{BufferImageRegion, BufferRange, ClearImage, CopyBuffer, CopyBufferImage};
 pub use blit::blit_image;
 pub use image_copy::copy_image;
+use rayon::prelude::*;
 pub use resolve::{resolve_image, resolve_row};
+use std::sync::Arc;
 
 /// The offset into the memory of bytes `offset..offset + size` of a range, if the range has them.
 fn within(range: &BufferRange, offset: u64, size: u64) -> Option<u64> {
@@ -100,8 +103,11 @@ pub enum Direction {
     ToBuffer,
 }
 
+/// From this many bytes on workers share a copy.
+const LEAST_SHARED: u64 = 1 << 20;
+
 /// Executes a copy between a buffer and an image.
-pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction) {
+pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, device: &Device) {
     for region in &copy.regions {
         let layers = &region.subresource;
         let end = copy.image.desc.array_layers;
@@ -111,7 +117,7 @@ pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction) {
                 .image
                 .subresource(layers.aspect, layers.mip_level, first + index);
             if let Some(layout) = layout {
-                copy_layer(copy, direction, region, &layout, index);
+                copy_layer(copy, direction, (region, index), &layout, device);
             }
         }
     }
@@ -125,9 +131,9 @@ pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction) {
 fn copy_layer(
     copy: &CopyBufferImage,
     direction: Direction,
-    region: &BufferImageRegion,
+    (region, index): (&BufferImageRegion, u32),
     layout: &SubresourceLayout,
-    index: u32,
+    device: &Device,
 ) {
     let texel_size = layout.format.texel_size() as u64;
     let [width, height, depth] = region.image_extent;
@@ -157,22 +163,37 @@ fn copy_layer(
         within(&copy.buffer, offset, size)
     };
     let (image, buffer) = (&copy.image, &copy.buffer.memory);
-    for slice in 0..z.count {
-        for row in 0..y.count {
-            let at = [x.first, y.first + row, z.first + slice];
-            let copied = buffer_offset(row, slice)
-                .zip(image.row(layout, at, size))
-                .map(|(in_buffer, in_image)| match direction {
-                    Direction::ToImage => image.memory.copy_from(in_image, buffer, in_buffer, size),
-                    Direction::ToBuffer => {
-                        buffer.copy_from(in_buffer, &image.memory, in_image, size)
-                    }
-                });
-            if !matches!(copied, Some(Ok(()))) {
-                log::warn!("left out a row that lies outside the buffer: {region:?}");
-                return;
-            }
-        }
+    // Whether there was room for it.
+    let copy_row = |number: usize| {
+        let rows = y.count as usize;
+        let (slice, row) = ((number / rows) as u32, (number % rows) as u32);
+        let at = [x.first, y.first + row, z.first + slice];
+        let copied = buffer_offset(row, slice)
+            .zip(image.row(layout, at, size))
+            .map(|(in_buffer, in_image)| match direction {
+                Direction::ToImage => image.memory.copy_from(in_image, buffer, in_buffer, size),
+                Direction::ToBuffer => buffer.copy_from(in_buffer, &image.memory, in_image, size),
+            });
+        matches!(copied, Some(Ok(())))
+    };
+    let rows = y.count as usize * z.count as usize;
+    // Rows that overlap in the buffer, or an image that does, keep their order.
+    let are_apart = row_length >= width.into()
+        && image_height >= height.into()
+        && !Arc::ptr_eq(&image.memory, buffer);
+    let threads = device.threads();
+    let bytes = size.saturating_mul(rows as u64);
+    let is_whole = if are_apart && threads > 1 && bytes >= LEAST_SHARED {
+        let least = rows.div_ceil(4 * threads);
+        device.install(|| {
+            let numbers = (0..rows).into_par_iter();
+            numbers.with_min_len(least).all(copy_row)
+        })
+    } else {
+        (0..rows).all(copy_row)
+    };
+    if !is_whole {
+        log::warn!("left out rows that lie outside the buffer: {region:?}");
     }
 }
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::Format;
+use crate::device::Config;
 use crate::image::{ImageDesc, ImageKind};
 use crate::packet::{
     Aspect, BufferCopyRegion, ClearValue, CopyImage, ImageCopyRegion, SubresourceLayers,
@@ -67,6 +68,7 @@ fn texels(image: &Arc<Image>) -> Vec<u8> {
             regions: vec![region],
         },
         Direction::ToBuffer,
+        &device(1),
     );
     contents(&out)
 }
@@ -160,7 +162,7 @@ fn rows_slices_and_layers_find_their_place() {
         image: image.clone(),
         regions: vec![region],
     };
-    copy_buffer_image(&copy, Direction::ToImage);
+    copy_buffer_image(&copy, Direction::ToImage, &device(1));
     let expected = [
         [0, 0, 0, 0, 0, 2, 3, 4, 0, 7, 8, 9],
         [0, 0, 0, 0, 0, 22, 23, 24, 0, 27, 28, 29],
@@ -185,7 +187,7 @@ fn what_lies_outside_the_image_is_clipped() {
         image: image.clone(),
         regions: vec![region],
     };
-    copy_buffer_image(&copy, Direction::ToImage);
+    copy_buffer_image(&copy, Direction::ToImage, &device(1));
     assert_eq!(texels(&image), [17, 18, 19, 20, 25, 26, 27, 28, 0, 0, 0, 0]);
 }
 
@@ -217,8 +219,8 @@ fn hostile_regions_do_no_harm() {
                         image: image.clone(),
                         regions: vec![region],
                     };
-                    copy_buffer_image(&copy, Direction::ToImage);
-                    copy_buffer_image(&copy, Direction::ToBuffer);
+                    copy_buffer_image(&copy, Direction::ToImage, &device(1));
+                    copy_buffer_image(&copy, Direction::ToBuffer, &device(1));
                     let region = ImageCopyRegion {
                         source: subresource,
                         source_offset: [offset, 0, 0],
@@ -256,7 +258,7 @@ fn layers_of_one_image_become_slices_of_another() {
         image: layered.clone(),
         regions: vec![region],
     };
-    copy_buffer_image(&copy, Direction::ToImage);
+    copy_buffer_image(&copy, Direction::ToImage, &device(1));
     let region = ImageCopyRegion {
         source: color(1, 2),
         source_offset: [0; 3],
@@ -308,4 +310,54 @@ fn clears_write_the_aspect_that_they_name() {
     let mut out = [0; 3];
     image.read_row(&layout, [0, 1, 0], &mut out).unwrap();
     assert_eq!(out, [9; 3]);
+}
+
+fn device(threads: usize) -> Device {
+    let config = Config {
+        threads,
+        ..Config::default()
+    };
+    Device::new(&config).unwrap()
+}
+
+#[test]
+fn workers_copy_what_one_thread_does() {
+    const SIZE: [u32; 2] = [700, 500];
+    let image = image(ImageKind::D2, Format::R32Uint, [SIZE[0], SIZE[1], 1], 1);
+    // Rows that are apart, that follow one another, and that overlap, of which the last one counts.
+    for row_length in [SIZE[0] + 9, 0, SIZE[0] - 300] {
+        let stride = if row_length == 0 { SIZE[0] } else { row_length };
+        let texels = stride * SIZE[1] + SIZE[0];
+        let texel = |at: u32| at.wrapping_mul(0x9E37_79B9);
+        let words: Vec<u32> = (0..texels).map(texel).collect();
+        let source = buffer(bytemuck::cast_slice(&words));
+        let region = BufferImageRegion {
+            buffer_offset: 8,
+            buffer_row_length: row_length,
+            buffer_image_height: 0,
+            subresource: color(0, 1),
+            image_offset: [0; 3],
+            image_extent: [SIZE[0], SIZE[1], 1],
+        };
+        let copy = |buffer: &BufferRange, direction, threads| {
+            let copy = CopyBufferImage {
+                buffer: buffer.clone(),
+                image: image.clone(),
+                regions: vec![region],
+            };
+            copy_buffer_image(&copy, direction, &device(threads));
+        };
+        copy(&source, Direction::ToImage, 3);
+        let [alone, shared] = [1, 3].map(|threads| {
+            let out = buffer(&vec![0; 4 * texels as usize]);
+            copy(&out, Direction::ToBuffer, threads);
+            contents(&out)
+        });
+        assert!(alone == shared, "rows of {stride}");
+        for at in [0, 1, stride, stride * (SIZE[1] - 1) + SIZE[0] - 1] {
+            let at = at as usize + 2;
+            let written = &shared[4 * at..4 * at + 4];
+            assert_eq!(written, words[at].to_le_bytes(), "{at}, rows of {stride}");
+        }
+    }
 }
