@@ -331,6 +331,9 @@ impl GaussianTile {
         let corner = task.corner.map(f64::from);
         let bounded = task.skips.has(Skip::Blocks);
         let end_early = task.skips.has(Skip::Saturated);
+        for block in 0..BLOCKS {
+            layer.find_most_fall(simd, block, task.thresholds);
+        }
         for &primitive in task.list.iter().take(CHUNK) {
             devmem::prefetch(slice::from_ref(task.splat(primitive)));
         }

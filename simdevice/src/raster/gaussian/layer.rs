@@ -16,6 +16,8 @@ pub(super) struct Layer {
     pub(super) color: [[[f32; LANES]; BLOCKS]; 3],
     /// Transmittance; negative where the pixel is finished, [`UNTOUCHED`] where it is not to be touched.
     pub(super) transmittance: [[f32; LANES]; BLOCKS],
+    /// In the fast kernel, how far alphas may fall: nowhere so little where the pixel is finished.
+    pub(super) most_fall: [[f32; LANES]; BLOCKS],
     /// Bit `lane` of entry `block` tells that some Gaussian contributed.
     pub(super) covered: [u32; BLOCKS],
     /// The median depth as the attachment holds it, where covered, if the draw writes depth.
@@ -62,6 +64,7 @@ impl Layer {
     pub(super) const EMPTY: Self = Self {
         color: [[[0.0; LANES]; BLOCKS]; 3],
         transmittance: [[1.0; LANES]; BLOCKS],
+        most_fall: [[0.0; LANES]; BLOCKS],
         covered: [0; BLOCKS],
         median: [[0; LANES]; BLOCKS],
         means: [[[0.0; LANES]; BLOCKS]; 2],

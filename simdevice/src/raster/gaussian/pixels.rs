@@ -18,35 +18,43 @@ pub(super) type Reaching = [u32; BLOCKS];
 /// What a block's pixels have accumulated.
 ///
 /// Nothing here is indexed or iterated over, or it would leave the registers.
+#[derive(Clone, Copy)]
 struct Pixels<S: Simd> {
     red: f32x16<S>,
     green: f32x16<S>,
     blue: f32x16<S>,
     transmittance: f32x16<S>,
-    /// How many Gaussians each accepted.
-    accepted: i32x16<S>,
 }
+
+/// What a Gaussian does to a block's pixels.
+struct Passed<S: Simd> {
+    /// What it contributes.
+    weight: f32x16<S>,
+    /// The transmittance behind it.
+    rest: f32x16<S>,
+}
+
+/// No pixel of more transmittance than this, in units of the floor, is looked out for while a chunk's Gaussians are
+/// composited: it is seldom finished by one chunk, and where it is, that chunk is composited again.
+const FAR_FROM_FLOOR: f32 = 8.0;
 
 /// The alphas of a chunk's Gaussians in the blocks that they may reach, by block and then in the order of the list.
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub(super) struct Alphas {
     alphas: [[f32; LANES]; BLOCKS * CHUNK],
-    /// Which of the chunk each is of.
-    numbers: [u32; BLOCKS * CHUNK],
 }
 
 impl Default for Alphas {
     fn default() -> Self {
         Self {
             alphas: [[0.0; LANES]; BLOCKS * CHUNK],
-            numbers: [0; BLOCKS * CHUNK],
         }
     }
 }
 
 impl Alphas {
-    /// Finds the alphas of what is reached.
+    /// Finds the alphas of what is reached; returns how many pixels that is, of those that are not finished.
     ///
     /// They come before any is composited, since they do not depend on each other: several are on their way at a time. A
     /// function of its own, so that its constants have the registers for themselves.
@@ -55,69 +63,67 @@ impl Alphas {
         &mut self,
         simd: S,
         reaching: &Reaching,
-        chunk: &[Record; CHUNK],
+        (chunk, most_fall): (&[Record; CHUNK], &[[f32; LANES]; BLOCKS]),
         passing: &Passing,
         thresholds: Thresholds,
-    ) {
+    ) -> u64 {
         simd.vectorize(
             #[inline(always)]
             || {
-                let limits = Limits::new(simd, thresholds);
-                let mut items = self.alphas.iter_mut().zip(&mut self.numbers);
+                let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
+                let mut pixels = i32x16::splat(simd, 0);
+                let mut items = self.alphas.iter_mut();
                 // Two blocks at a time, so that half as many loops end where nobody can foresee it.
                 for (pair, words) in reaching.as_chunks::<2>().0.iter().enumerate() {
                     let mut rest = u64::from(words[0]) | u64::from(words[1]) << CHUNK;
                     while rest != 0 {
                         let bit = rest.trailing_zeros() as usize;
                         rest &= rest - 1;
-                        let (block, number) = (2 * pair + bit / CHUNK, bit % CHUNK);
+                        let (block, number) = ((2 * pair + bit / CHUNK) % BLOCKS, bit % CHUNK);
                         let g = &chunk[number];
-                        let fall = g.falls(simd, block % BLOCKS);
-                        let found = alpha::<_, DEPTH>(simd, block, fall, g.depth, passing, limits);
-                        if let Some((alpha, to)) = items.next() {
-                            found.store_slice(alpha);
-                            *to = number as u32;
+                        let fall = g.falls(simd, block);
+                        let most_fall = f32x16::from_slice(simd, &most_fall[block]);
+                        let at = (block, g.depth);
+                        let reached = reached::<_, DEPTH>(simd, at, fall, passing, most_fall);
+                        pixels -= reached.to_vector();
+                        let alpha = alpha::<_, DEPTH>(simd, reached, fall, ceiling);
+                        if let Some(to) = items.next() {
+                            alpha.store_slice(to);
                         }
                     }
                 }
+                sum(pixels)
             },
-        );
+        )
     }
 }
 
-/// What bounds alphas, in all lanes.
-#[derive(Clone, Copy)]
-struct Limits<S: Simd> {
+/// The pixels of a block where alpha has fallen no further than it may, and the depth passes.
+#[inline(always)]
+fn reached<S: Simd, const DEPTH: DepthMode>(
+    simd: S,
+    (block, depth): (usize, u32),
+    fall: f32x16<S>,
+    passing: &Passing,
     most_fall: f32x16<S>,
-    ceiling: f32x16<S>,
-}
-
-impl<S: Simd> Limits<S> {
-    #[inline(always)]
-    fn new(simd: S, thresholds: Thresholds) -> Self {
-        Self {
-            most_fall: f32x16::splat(simd, thresholds.most_fall),
-            ceiling: f32x16::splat(simd, thresholds.alpha_ceiling),
-        }
+) -> mask32x16<S> {
+    let reached = fall.simd_le(most_fall);
+    if DEPTH > NO_DEPTH {
+        reached & passing.pixels(simd, block, depth)
+    } else {
+        reached
     }
 }
 
-/// The alphas of a block's pixels where they have fallen so far; zero where that is too far, or the depth doesn't pass.
+/// The alphas of pixels where they have fallen so far; zero where nothing is reached: too far down, powers mean nothing.
 #[inline(always)]
 fn alpha<S: Simd, const DEPTH: DepthMode>(
     simd: S,
-    block: usize,
+    reached: mask32x16<S>,
     fall: f32x16<S>,
-    depth: u32,
-    passing: &Passing,
-    limits: Limits<S>,
+    ceiling: f32x16<S>,
 ) -> f32x16<S> {
-    let mut reached = fall.simd_le(limits.most_fall);
-    if DEPTH > NO_DEPTH {
-        reached &= passing.pixels(simd, block, depth);
-    }
-    // Where alpha has fallen too far, the power means nothing.
-    only(reached, power::<_, DEPTH>(simd, fall).min(limits.ceiling))
+    only(reached, power::<_, DEPTH>(simd, fall).min(ceiling))
 }
 
 /// The floats in the lanes of a mask, and zero in the others.
@@ -137,11 +143,14 @@ impl Layer {
         passing: &Passing,
         thresholds: Thresholds,
     ) -> u64 {
-        alphas.find::<_, DEPTH>(simd, reaching, chunk, passing, thresholds);
-        self.composite_all::<_, DEPTH>(simd, reaching, (chunk, alphas), thresholds)
+        let to = (chunk, &self.most_fall);
+        let reached = alphas.find::<_, DEPTH>(simd, reaching, to, passing, thresholds);
+        let refused = self.composite_all::<_, DEPTH>(simd, reaching, (chunk, alphas), thresholds);
+        reached.saturating_sub(refused)
     }
 
-    /// Composites the alphas of a chunk; returns how many pixels accepted one. A function of its own, as [`Alphas::find`].
+    /// Composites the alphas of a chunk; returns how many pixels refused one, since they are finished. A function of its own,
+    /// as [`Alphas::find`].
     #[inline(never)]
     fn composite_all<S: Simd, const DEPTH: DepthMode>(
         &mut self,
@@ -153,28 +162,108 @@ impl Layer {
         simd.vectorize(
             #[inline(always)]
             || {
-                let mut contributions = i32x16::splat(simd, 0);
-                let mut items = alphas.alphas.iter().zip(&alphas.numbers);
+                let mut refused = 0;
+                let mut rest = &alphas.alphas[..];
                 for (block, &reaching) in reaching.iter().enumerate() {
+                    let count = reaching.count_ones() as usize;
+                    let Some((alphas, others)) = rest.split_at_checked(count) else {
+                        break;
+                    };
+                    rest = others;
                     if reaching == 0 {
                         continue;
                     }
-                    let mut pixels = self.pixels(simd, block);
-                    for _ in 0..reaching.count_ones() {
-                        let Some((alpha, &number)) = items.next() else {
-                            break;
-                        };
-                        let g = &chunk[number as usize % CHUNK];
-                        let alpha = f32x16::from_slice(simd, alpha);
-                        let (to, look) = ((block, &mut pixels), (g.color, g.depth));
-                        self.composite::<_, DEPTH>(simd, to, alpha, look, thresholds);
+                    let of_block = (block, reaching, alphas);
+                    if DEPTH == FIND_REACHED
+                        || DEPTH >= FIND_MEDIAN
+                        || !self.composite_far_from_floor(simd, of_block, chunk, thresholds)
+                    {
+                        refused +=
+                            self.composite_carefully::<_, DEPTH>(simd, of_block, chunk, thresholds);
                     }
-                    contributions += pixels.accepted;
-                    self.keep(block, pixels);
                 }
-                sum(&contributions.to_array())
+                refused
             },
         )
+    }
+
+    /// Composites a block's alphas, if no pixel comes so near the floor that it is finished; else it changes nothing. Returns
+    /// whether it did.
+    #[inline(always)]
+    fn composite_far_from_floor<S: Simd>(
+        &mut self,
+        simd: S,
+        (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
+        chunk: &[Record; CHUNK],
+        thresholds: Thresholds,
+    ) -> bool {
+        let floor = thresholds.transmittance_floor;
+        let mut pixels = self.pixels(simd, block);
+        let before = pixels.transmittance;
+        // Signs tell what is finished, minus zero among it.
+        let finished = before
+            .bitcast::<i32x16<S>>()
+            .simd_lt(i32x16::splat(simd, 0));
+        let near = before.simd_lt(FAR_FROM_FLOOR * floor) & !finished;
+        if near.any_true() {
+            return false;
+        }
+        // What is finished has alphas of zero.
+        pixels.transmittance = before.max(0.0);
+        for alpha in alphas {
+            let g = &chunk[reaching.trailing_zeros() as usize % CHUNK];
+            reaching &= reaching.wrapping_sub(1);
+            let passed = pixels.pass(f32x16::from_slice(simd, alpha));
+            pixels.transmittance = passed.rest;
+            pixels.add(simd, passed.weight, g.color);
+        }
+        let went_on = pixels.transmittance.simd_ge(floor) | finished;
+        if !went_on.all_true() {
+            return false;
+        }
+        pixels.transmittance = finished.select(before, pixels.transmittance);
+        self.keep(block, pixels);
+        true
+    }
+
+    /// Composites a block's alphas; returns how many pixels refused one.
+    #[inline(always)]
+    fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
+        &mut self,
+        simd: S,
+        (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
+        chunk: &[Record; CHUNK],
+        thresholds: Thresholds,
+    ) -> u64 {
+        let mut pixels = self.pixels(simd, block);
+        let mut refused = i32x16::splat(simd, 0);
+        for alpha in alphas {
+            let g = &chunk[reaching.trailing_zeros() as usize % CHUNK];
+            reaching &= reaching.wrapping_sub(1);
+            let alpha = f32x16::from_slice(simd, alpha);
+            let (to, look) = ((block, &mut pixels), (g.color, g.depth));
+            let goes_on = self.composite::<_, DEPTH>(simd, to, alpha, look, thresholds);
+            refused -= (alpha.simd_gt(0.0) & !goes_on).to_vector();
+        }
+        self.keep(block, pixels);
+        self.find_most_fall(simd, block, thresholds);
+        sum(refused)
+    }
+
+    /// Finds how far alphas may fall at a block's pixels.
+    #[inline(always)]
+    pub(super) fn find_most_fall<S: Simd>(
+        &mut self,
+        simd: S,
+        block: usize,
+        thresholds: Thresholds,
+    ) {
+        let t = f32x16::from_slice(simd, &self.transmittance[block]);
+        let open = t.bitcast::<i32x16<S>>().simd_ge(i32x16::splat(simd, 0));
+        let most_fall = f32x16::splat(simd, thresholds.most_fall);
+        let none = f32x16::splat(simd, f32::NEG_INFINITY);
+        open.select(most_fall, none)
+            .store_slice(&mut self.most_fall[block]);
     }
 
     /// As [`Layer::evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
@@ -193,6 +282,7 @@ impl Layer {
             let look = (splat.color, splat.depth);
             contributions +=
                 self.accumulate::<_, DEPTH>(simd, block, fall, look, passing, task.thresholds);
+            self.find_most_fall(simd, block, task.thresholds);
         }
         contributions
     }
@@ -210,13 +300,14 @@ impl Layer {
         thresholds: Thresholds,
     ) -> u64 {
         let mut pixels = self.pixels(simd, block);
-        let limits = Limits::new(simd, thresholds);
-        let alpha = alpha::<_, DEPTH>(simd, block, fall, look.1, passing, limits);
+        let most_fall = f32x16::splat(simd, thresholds.most_fall);
+        let reached = reached::<_, DEPTH>(simd, (block, look.1), fall, passing, most_fall);
+        let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
+        let alpha = alpha::<_, DEPTH>(simd, reached, fall, ceiling);
         let at = (block, &mut pixels);
-        self.composite::<_, DEPTH>(simd, at, alpha, look, thresholds);
-        let accepted = pixels.accepted.to_array();
+        let goes_on = self.composite::<_, DEPTH>(simd, at, alpha, look, thresholds);
         self.keep(block, pixels);
-        sum(&accepted)
+        (goes_on & reached).to_bitmask().count_ones().into()
     }
 
     /// A block's pixels as they are, before any of a chunk.
@@ -228,7 +319,6 @@ impl Layer {
             green: f32x16::from_slice(simd, &g[block]),
             blue: f32x16::from_slice(simd, &b[block]),
             transmittance: f32x16::from_slice(simd, &self.transmittance[block]),
-            accepted: i32x16::splat(simd, 0),
         }
     }
 
@@ -244,7 +334,7 @@ impl Layer {
             .store_slice(&mut self.transmittance[block]);
     }
 
-    /// Composites a Gaussian of a colour and a depth in a block.
+    /// Composites a Gaussian of a colour and a depth in a block; returns which pixels it does not finish.
     ///
     /// What does not reach a pixel is composited with an alpha of zero, which changes nothing: to leave it out would take
     /// longer.
@@ -256,23 +346,22 @@ impl Layer {
         alpha: f32x16<S>,
         (color, depth): ([f32; 3], u32),
         thresholds: Thresholds,
-    ) {
+    ) -> mask32x16<S> {
         let t = pixels.transmittance;
         let finished = -t.abs();
         if DEPTH == FIND_REACHED {
-            pixels.transmittance = alpha.simd_gt(0.0).select(finished, t);
-            return;
+            let reached = alpha.simd_gt(0.0);
+            pixels.transmittance = reached.select(finished, t);
+            return !reached;
         }
-        let weight = t * alpha;
-        let rest = t - weight;
+        let Passed { weight, rest } = pixels.pass(alpha);
         // A finished pixel's transmittance is negative, and what is left of it fails like one below the floor.
         let goes_on = rest.simd_ge(f32x16::splat(simd, thresholds.transmittance_floor));
         pixels.transmittance = goes_on.select(rest, finished);
         let weight = only(goes_on, weight);
-        let accepted = weight.simd_gt(0.0);
         if DEPTH >= FIND_MEDIAN {
             let median = u32x16::from_slice(simd, &self.median[block]);
-            let first_half = accepted & t.simd_ge(0.5);
+            let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
             let median = first_half.select(u32x16::splat(simd, depth), median);
             median.store_slice(&mut self.median[block]);
         }
@@ -284,20 +373,37 @@ impl Layer {
             let sum = f32x16::from_slice(simd, &weights[block]) + weight;
             sum.store_slice(&mut weights[block]);
         }
-        let [red, green, blue] = color;
-        pixels.red = weight.mul_add(f32x16::splat(simd, red), pixels.red);
-        pixels.green = weight.mul_add(f32x16::splat(simd, green), pixels.green);
-        pixels.blue = weight.mul_add(f32x16::splat(simd, blue), pixels.blue);
-        pixels.accepted -= accepted.to_vector();
+        pixels.add(simd, weight, color);
+        goes_on
+    }
+}
+
+impl<S: Simd> Pixels<S> {
+    /// What a Gaussian of so much alpha does. What is left is rounded once, where processors can.
+    #[inline(always)]
+    fn pass(&self, alpha: f32x16<S>) -> Passed<S> {
+        let t = self.transmittance;
+        Passed {
+            weight: t * alpha,
+            rest: t.mul_add(-alpha, t),
+        }
+    }
+
+    /// Adds so much of a colour.
+    #[inline(always)]
+    fn add(&mut self, simd: S, weight: f32x16<S>, [red, green, blue]: [f32; 3]) {
+        self.red = weight.mul_add(f32x16::splat(simd, red), self.red);
+        self.green = weight.mul_add(f32x16::splat(simd, green), self.green);
+        self.blue = weight.mul_add(f32x16::splat(simd, blue), self.blue);
     }
 }
 
 /// The sum of counts.
-fn sum(counts: &[i32; LANES]) -> u64 {
-    counts
-        .iter()
-        .map(|&count| u64::from(count.unsigned_abs()))
-        .sum()
+#[inline(always)]
+fn sum<S: Simd>(counts: i32x16<S>) -> u64 {
+    let counts = counts.to_array();
+    let counts = counts.iter().map(|&count| u64::from(count.unsigned_abs()));
+    counts.sum()
 }
 
 impl Record {

@@ -4,7 +4,7 @@ mod per_pixel;
 mod streamed;
 mod whole_draws;
 
-use super::exp2::{CUBIC, POWER_OF_TWO, QUADRATIC, exp2_of_negated};
+use super::exp2::{CUBIC, EIGHTHS, GROWTH, POWER_OF_TWO, QUADRATIC, exp2_of_negated};
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;
@@ -35,7 +35,12 @@ fn powers_of_two_are_within_their_bound_at_every_level() {
             }
             x += 16.0 / 1024.0;
         }
-        assert!(worst <= 2.1, "{name}: {worst} ulp");
+        let bound = if devmem::can_look_up(level) {
+            1.35
+        } else {
+            2.1
+        };
+        assert!(worst <= bound, "{name}: {worst} ulp");
     }
 }
 
@@ -177,7 +182,18 @@ fn naive_sample(
     } else {
         &POWER_OF_TWO
     };
+    // Levels with fused operations look words up there.
+    let by_table = fused && cfg!(target_arch = "x86_64") && polynomial == POWER_OF_TWO;
     let power = |x: f32| {
+        if by_table {
+            let shifted = x + 1_572_864.0;
+            let f = x - (shifted - 1_572_864.0);
+            let eighths = shifted.to_bits();
+            let word = EIGHTHS[eighths as usize % EIGHTHS.len()];
+            let power = f32::from_bits(word.wrapping_add(eighths << 20));
+            let growth = GROWTH.iter().fold(0.0, |p, &c| mul_add(p, f, c));
+            return mul_add(power * f, growth, power);
+        }
         let n = (x + 12_582_912.0) - 12_582_912.0;
         let f = x - n;
         let p = polynomial.iter().fold(0.0, |p, &c| mul_add(p, f, c));
@@ -245,7 +261,8 @@ fn naive_sample(
             continue;
         }
         let weight = t * alpha;
-        if t - weight < state.transmittance_floor {
+        let rest = mul_add(t, -alpha, t);
+        if rest < state.transmittance_floor {
             break;
         }
         if t >= 0.5 {
@@ -254,7 +271,7 @@ fn naive_sample(
         for (c, color) in c.iter_mut().zip(g.color) {
             *c = mul_add(weight, color, *c);
         }
-        t -= weight;
+        t = rest;
         covered = true;
     }
     out.fragment = covered.then_some([c[0], c[1], c[2], 1.0 - t]);
