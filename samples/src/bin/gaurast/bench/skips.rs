@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use super::machine::Machine;
 use super::output::{self, Rows, number};
-use super::worker::{Contender, Drawn, Worker};
+use super::worker::{Contender, Drawn, SKIPS, Worker};
 use super::{BenchError, Extra, Source, SweepArguments, Workload, median};
 
 /// Skips of Gaussian draws, and the counter of each, as the device has them.
-const SKIPS: [(&str, &str); 11] = [
+const COUNTERS: [(&str, &str); 11] = [
     ("chunks", "outside by chunks"),
     ("hidden-chunks", "hidden by others"),
     ("bounds", "outside by bounds"),
@@ -85,9 +85,9 @@ struct Saved {
     skip: &'static str,
     /// What its counter says of a frame.
     counter: f64,
-    /// Milliseconds of a frame with all skips.
+    /// Milliseconds of a frame with all skips, but those from frame to frame, of which this one alone is on.
     with: f64,
-    /// Milliseconds of a frame with all but this one.
+    /// Milliseconds of a frame with this one off, too.
     without: f64,
 }
 
@@ -200,7 +200,10 @@ fn frames(
         let of_workers = workers.iter_mut().zip(&views).zip(&mut frames);
         for (((_, worker), views), frames) in of_workers {
             let view = path.view(views, run);
-            frames.push(worker.draw(&view, Settings::default(), None)?);
+            frames.push(match path {
+                Path::Own => worker.draw(&view, Settings::default(), None)?,
+                Path::Still | Path::Sliding => worker.draw_next(&view)?,
+            });
         }
     }
     Ok(frames)
@@ -229,7 +232,7 @@ fn saved(
     threads: usize,
     runs: usize,
 ) -> Result<Vec<Saved>, BenchError> {
-    let names = SKIPS.iter().map(|(name, _)| *name);
+    let names = COUNTERS.iter().map(|(name, _)| *name);
     names
         .filter(|&name| Path::of(name) == Path::Own)
         .map(|name| saved_by(name, scene, workload, threads, runs))
@@ -244,13 +247,19 @@ fn saved_by(
     threads: usize,
     runs: usize,
 ) -> Result<Saved, BenchError> {
-    let counter = SKIPS.iter().find(|(name, _)| *name == skip);
+    let counter = COUNTERS.iter().find(|(name, _)| *name == skip);
     let counter = counter.map_or("", |(_, counter)| *counter);
+    let path = Path::of(skip);
+    // What saves from frame to frame is on alone, where that is asked for: it would hide what others save.
+    let [with, without] = match path {
+        Path::Own => [SKIPS.to_owned(), format!("{SKIPS},-{skip}")],
+        Path::Still | Path::Sliding => [SKIPS.replace(&format!(",-{skip}"), ""), SKIPS.to_owned()],
+    };
     let mut workers = [
-        start(workload, threads, "all")?,
-        start(workload, threads, &format!("all,-{skip}"))?,
+        start(workload, threads, &with)?,
+        start(workload, threads, &without)?,
     ];
-    let frames = frames(&mut workers, runs, Path::of(skip))?;
+    let frames = frames(&mut workers, runs, path)?;
     Ok(Saved {
         scene: scene.to_owned(),
         skip,
@@ -269,8 +278,8 @@ fn unseen(
 ) -> Result<Unseen, BenchError> {
     let [with, without] = workloads;
     let mut workers = [
-        start(with, threads, "all")?,
-        start(without, threads, "all")?,
+        start(with, threads, SKIPS)?,
+        start(without, threads, SKIPS)?,
     ];
     let frames = frames(&mut workers, runs, Path::Own)?;
     let chunks = frames[0].iter().map(|frame| frame.counter("chunks"));

@@ -59,6 +59,9 @@ struct Request {
     settings: Settings,
     /// Where the picture goes, if it is wanted.
     picture: Option<PathBuf>,
+    /// Whether it may be drawn unmeasured before.
+    #[serde(default)]
+    is_independent: bool,
 }
 
 /// What it answers.
@@ -114,7 +117,7 @@ pub struct Worker {
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// What this driver leaves out in benchmarks: all but what only saves where two frames are the same or nearly so.
-const SKIPS: &str = "all,-unchanged,-last-order";
+pub const SKIPS: &str = "all,-unchanged,-last-order";
 
 impl Worker {
     /// Starts a worker that shares its work among `threads`; `None` if its device is not there.
@@ -183,12 +186,26 @@ impl Worker {
         settings: Settings,
         picture: Option<&Path>,
     ) -> Result<Drawn, BenchError> {
-        let request = Request {
+        self.request(&Request {
             camera: camera.clone(),
             settings,
             picture: picture.map(Path::to_owned),
-        };
-        match self.ask(&request)? {
+            is_independent: true,
+        })
+    }
+
+    /// Draws a frame of which the time depends on the one before: it is never drawn twice.
+    pub fn draw_next(&mut self, camera: &Camera) -> Result<Drawn, BenchError> {
+        self.request(&Request {
+            camera: camera.clone(),
+            settings: Settings::default(),
+            picture: None,
+            is_independent: false,
+        })
+    }
+
+    fn request(&mut self, request: &Request) -> Result<Drawn, BenchError> {
+        match self.ask(request)? {
             Reply::Drawn(drawn) => Ok(drawn),
             Reply::Failed(reason) => Err(BenchError::Worker(reason)),
             Reply::Ready(_) => Err(BenchError::Worker("it is ready twice".to_owned())),
@@ -278,7 +295,7 @@ pub fn run() -> Result<(), BenchError> {
         // pause, as when others had their turn, schedulers leave threads together on one processor for as long as a frame
         // takes. Neither is part of what a frame takes, but of the first two: the cold one, and the one that makes chunks.
         let is_new = size != last_size || last_end.elapsed() > PAUSE;
-        let warms_up = number >= 2 && is_new;
+        let warms_up = request.is_independent && number >= 2 && is_new;
         let reply = match artist.answer(&request, warms_up) {
             Ok(drawn) => Reply::Drawn(drawn),
             Err(error) => Reply::Failed(error.to_string()),
