@@ -10,6 +10,7 @@ use super::{
     Thresholds,
 };
 use crate::gaussian::splat::Splat;
+use crate::lanes::bits_of;
 use fearless_simd::{Simd, f32x8, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
 
 /// Which of a chunk's Gaussians may reach each block: a bit for each.
@@ -200,12 +201,10 @@ impl Layer {
         let floor = thresholds.transmittance_floor;
         let mut pixels = self.pixels(simd, block);
         let before = pixels.transmittance;
-        // Signs tell what is finished, minus zero among it.
-        let finished = before
-            .bitcast::<i32x16<S>>()
-            .simd_lt(i32x16::splat(simd, 0));
-        let near = before.simd_lt(FAR_FROM_FLOOR * floor) & !finished;
-        if near.any_true() {
+        // As whole numbers, transmittances are in the order of what they stand for, and greater than all where a pixel is
+        // finished. (Masks are not combined here: that would be calls, before which the pixels leave their registers.)
+        let near = f32x16::splat(simd, FAR_FROM_FLOOR * floor);
+        if bits_of(before).simd_lt(bits_of(near)).any_true() {
             return false;
         }
         // What is finished has alphas of zero.
@@ -217,11 +216,13 @@ impl Layer {
             pixels.transmittance = passed.rest;
             pixels.add(simd, passed.weight, g.color);
         }
-        let went_on = pixels.transmittance.simd_ge(floor) | finished;
-        if !went_on.all_true() {
+        let signs: i32x16<S> = before.bitcast();
+        let below = pixels.transmittance.simd_lt(floor).to_vector();
+        // What is finished has a sign, and is none of those.
+        if (below & (signs ^ -1)).simd_lt(0).any_true() {
             return false;
         }
-        pixels.transmittance = finished.select(before, pixels.transmittance);
+        pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
         self.keep(block, pixels);
         true
     }
@@ -243,7 +244,8 @@ impl Layer {
             let alpha = f32x16::from_slice(simd, alpha);
             let (to, look) = ((block, &mut pixels), (g.color, g.depth));
             let goes_on = self.composite::<_, DEPTH>(simd, to, alpha, look, thresholds);
-            refused -= (alpha.simd_gt(0.0) & !goes_on).to_vector();
+            let reached = alpha.simd_gt(0.0).to_vector();
+            refused += (reached & goes_on.to_vector()) - reached;
         }
         self.keep(block, pixels);
         self.find_most_fall(simd, block, thresholds);
@@ -307,7 +309,8 @@ impl Layer {
         let at = (block, &mut pixels);
         let goes_on = self.composite::<_, DEPTH>(simd, at, alpha, look, thresholds);
         self.keep(block, pixels);
-        (goes_on & reached).to_bitmask().count_ones().into()
+        let accepted = goes_on.to_bitmask() & reached.to_bitmask();
+        accepted.count_ones().into()
     }
 
     /// A block's pixels as they are, before any of a chunk.
