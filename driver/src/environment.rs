@@ -25,8 +25,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Gaussians in the order in which they are read fastest may take so many parts of what the heap has, beside it.
-const CHUNKS_PER_HEAP: u64 = 8;
+/// The heap's size is so many times what chunks of Gaussians may take of host memory beside it.
+const HEAP_PER_CHUNK_BUDGET: u64 = 8;
 
 const SIMD: &str = "GAURAST_SIMD";
 const THREADS: &str = "GAURAST_THREADS";
@@ -126,7 +126,7 @@ fn config(
     skip: Option<&str>,
 ) -> Result<Config, Error> {
     let mut config = Config {
-        chunk_budget_bytes: memory::heap_size() / CHUNKS_PER_HEAP,
+        chunk_budget_bytes: memory::heap_size() / HEAP_PER_CHUNK_BUDGET,
         ..Config::default()
     };
     if let Some(name) = simd {

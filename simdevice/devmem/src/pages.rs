@@ -3,7 +3,8 @@
 /// Ranges from this many bytes on have huge pages, where the host has some: they are backed in fewer steps, and what is read
 /// all over a large one would look up a page's address nearly each time else. Of smaller ones too much would be backed that is
 /// never used.
-pub(crate) const LEAST_HUGE: usize = 8 << 20;
+#[cfg(target_os = "linux")]
+const LEAST_HUGE: usize = 8 << 20;
 
 /// What the host may back at once on all common processors.
 #[cfg(target_os = "linux")]

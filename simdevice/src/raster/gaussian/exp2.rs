@@ -78,8 +78,8 @@ pub(super) const EIGHTHS: [u32; 8] = [
 )]
 pub(super) const GROWTH: [f32; 3] = [0.055_496_22, 0.240_257_65, 0.693_147_24];
 
-/// 2 to the power of `-x = n + j / 8 + f` with `f` in [-1/16, 1/16]. What waits for what is shorter than by polynomial alone,
-/// and that is what bounds a kernel of which only few steps fit into what a processor looks ahead.
+/// 2 to the power of `-x = n + j / 8 + f` with `f` in [-1/16, 1/16]. It takes as many instructions as the long
+/// polynomial, but fewer that wait for one another.
 #[inline(always)]
 fn by_table<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     let constant = |value| f32x16::splat(simd, value);

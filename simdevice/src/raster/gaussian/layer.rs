@@ -16,7 +16,7 @@ pub(super) struct Layer {
     pub(super) color: [[[f32; LANES]; BLOCKS]; 3],
     /// Transmittance; negative where the pixel is finished, [`UNTOUCHED`] where it is not to be touched.
     pub(super) transmittance: [[f32; LANES]; BLOCKS],
-    /// In the fast kernel, how far alphas may fall: nowhere so little where the pixel is finished.
+    /// In the fast kernel, how far alphas may fall at each pixel; where it is finished, none falls so little.
     pub(super) most_fall: [[f32; LANES]; BLOCKS],
     /// Bit `lane` of entry `block` tells that some Gaussian contributed.
     pub(super) covered: [u32; BLOCKS],
