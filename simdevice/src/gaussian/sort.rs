@@ -1,8 +1,11 @@
-//! The depth sort: a stable radix sort on exactly the bits that differ. Several workers each take a range of the keys:
-//! they pick those out of all, in order, and sort them.
+//! The depth sort: a stable radix sort on exactly the bits that differ. What is more than a cache holds is parted by ranges of
+//! keys first, each of which is sorted for itself; workers share both steps.
 
 use devmem::host;
 use rayon::prelude::*;
+
+/// A key and what goes with it.
+type Pair = (u32, u32);
 
 /// Maps a binary32 number to an integer that orders alike (negative zero before zero).
 pub(super) fn ordered_bits(value: f32) -> u32 {
@@ -25,54 +28,95 @@ pub(super) fn value_of(bits: u32) -> f32 {
 
 /// The most bits of a digit: a first-level cache holds a line for each of its values.
 const MAX_DIGIT_BITS: u32 = 9;
+const DIGITS: usize = 1 << MAX_DIGIT_BITS;
 
-/// Bits of a key by which the ranges of workers are told apart.
-const RANGE_BITS: u32 = 12;
+/// Pairs of a part, about: it stays in a cache, and its keys differ in few bits.
+const PART: usize = 1 << 11;
 
-/// From how many pairs on it pays to share the work.
+/// From how many pairs on it pays to make parts.
 const MANY: usize = 1 << 14;
 
+/// The most parts: as many as their numbers have values.
+const MAX_PARTS: usize = 1 << 8;
+
+/// Keys that are looked at to tell how the others are distributed.
+const SAMPLES: usize = 1 << 11;
+
+/// Intervals of keys of which each belongs to one part.
+const INTERVALS: usize = 1 << 12;
+
+/// Groups of lists that a worker parts: more than one, since some workers are slower than others.
+const GROUPS_PER_WORKER: usize = 4;
+
 /// Sorts `(key, payload)` pairs by ascending key; equal keys keep their order.
-pub fn sort_by_key(pairs: &mut Vec<(u32, u32)>) {
-    let mut other: Vec<(u32, u32)> = host::zeroed(pairs.len());
-    if sort_between(pairs, &mut other) {
-        std::mem::swap(pairs, &mut other);
-    }
+pub fn sort_by_key(pairs: &mut Vec<Pair>) {
+    let mut sorted = host::zeroed(pairs.len());
+    sort_into(&[pairs], &mut Vec::new(), &mut sorted);
+    *pairs = sorted;
 }
 
-/// The bits that are set in all keys, and in any.
-fn common_bits(keys: impl Iterator<Item = u32>) -> (u32, u32) {
-    keys.fold((u32::MAX, 0), |(all, any), key| (all & key, any | key))
+/// Where the keys of pairs differ.
+struct Digits {
+    least: u32,
+    /// The lowest bit that differs.
+    first: u32,
+    /// How many there are from it on, in what keys have more than the least.
+    width: u32,
 }
 
-/// The lowest bit that differs, and how many there are from it to the highest; none differ if that is none.
-fn span(differing: u32) -> (u32, u32) {
-    if differing == 0 {
-        return (0, 0);
-    }
-    let first = differing.trailing_zeros();
-    (first, u32::BITS - differing.leading_zeros() - first)
-}
-
-/// Sorts pairs, of which both slices hold as many; true if they end in the second.
-fn sort_between(pairs: &mut [(u32, u32)], other: &mut [(u32, u32)]) -> bool {
-    let (all, any) = common_bits(pairs.iter().map(|pair| pair.0));
-    if pairs.is_empty() || all == any {
-        return false;
-    }
-    let differing = all ^ any;
-    let (first, width) = span(differing);
-    let bits = width.div_ceil(width.div_ceil(MAX_DIGIT_BITS));
-    let (mut from, mut to) = (pairs, other);
-    let mut is_second = false;
-    for shift in (first..first + width).step_by(bits as usize) {
-        if (differing >> shift) & ((1 << bits) - 1) != 0 {
-            scatter(from, to, shift, bits);
-            std::mem::swap(&mut from, &mut to);
-            is_second = !is_second;
+impl Digits {
+    /// `None` if all keys are the same.
+    fn of(slices: &[&[Pair]]) -> Option<Self> {
+        let (mut least, mut greatest, mut all, mut any) = (u32::MAX, 0, u32::MAX, 0);
+        for slice in slices {
+            for &(key, _) in *slice {
+                (least, greatest) = (least.min(key), greatest.max(key));
+                (all, any) = (all & key, any | key);
+            }
         }
+        let range = greatest.checked_sub(least).filter(|&range| range > 0)?;
+        let first = (all ^ any).trailing_zeros();
+        Some(Self {
+            least,
+            first,
+            width: u32::BITS - range.leading_zeros() - first,
+        })
     }
-    is_second
+}
+
+/// Sorts the pairs of all slices, one after the other, into `sorted`, which has as many; `other` is scratch.
+fn sort_into(slices: &[&[Pair]], other: &mut Vec<Pair>, sorted: &mut [Pair]) {
+    let Some(digits) = Digits::of(slices) else {
+        let mut rest = sorted;
+        for slice in slices {
+            let (own, after) = rest.split_at_mut(slice.len());
+            own.copy_from_slice(slice);
+            rest = after;
+        }
+        return;
+    };
+    let passes = digits.width.div_ceil(MAX_DIGIT_BITS);
+    let bits = digits.width.div_ceil(passes);
+    if passes > 1 && other.len() < sorted.len() {
+        host::resize(other, sorted.len(), (0, 0));
+    }
+    // The last pass ends in `sorted`.
+    let mut is_other = passes.is_multiple_of(2);
+    let to = if is_other {
+        &mut other[..]
+    } else {
+        &mut *sorted
+    };
+    scatter(slices, to, &digits, digits.first, bits);
+    for pass in 1..passes {
+        let shift = digits.first + pass * bits;
+        if is_other {
+            scatter(&[&other[..sorted.len()]], sorted, &digits, shift, bits);
+        } else {
+            scatter(&[sorted], other, &digits, shift, bits);
+        }
+        is_other = !is_other;
+    }
 }
 
 /// Sorts what lists hold: each item's first number is its key, and its payload is its place in its list plus `stride`
@@ -81,121 +125,167 @@ pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
     lists: &[L],
     stride: u32,
     workers: usize,
-    settle: impl Fn(&mut [(u32, u32)]) + Sync,
-) -> Vec<(u32, u32)> {
+    settle: impl Fn(&mut [Pair]) + Sync,
+) -> Vec<Pair> {
     let count = lists.iter().map(|list| list.as_ref().len()).sum();
-    if workers == 1 || count < MANY {
+    if count < MANY {
         let mut pairs = host::with_capacity(count);
-        for_pairs(lists, stride, |pair| pairs.push(pair));
+        for_pairs(lists, 0, stride, |pair| pairs.push(pair));
         sort_by_key(&mut pairs);
         settle(&mut pairs);
         return pairs;
     }
-    let mut pairs: Vec<(u32, u32)> = host::zeroed(count);
-    let ranges = Ranges::new(lists, workers);
+    let parts = Parts::new(lists, count);
+    let in_group = lists.len().div_ceil(GROUPS_PER_WORKER * workers.max(1));
+    let groups: Vec<Group> = lists
+        .par_chunks(in_group)
+        .enumerate()
+        .map(|(number, lists)| Group::new(&parts, lists, number * in_group, stride))
+        .collect();
+    let mut pairs: Vec<Pair> = host::zeroed(count);
     let mut rest = &mut pairs[..];
-    let mut parts = Vec::new();
-    for (digits, count) in ranges.parts {
-        let (part, after) = rest.split_at_mut(count);
+    let mut tasks = Vec::with_capacity(parts.count);
+    for part in 0..parts.count {
+        let slices: Vec<&[Pair]> = groups.iter().map(|group| group.part(part)).collect();
+        let len = slices.iter().map(|slice| slice.len()).sum();
+        let (sorted, after) = rest.split_at_mut(len);
         rest = after;
-        parts.push((digits, part));
+        tasks.push((slices, sorted));
     }
-    parts.into_par_iter().for_each(|(digits, sorted)| {
-        // What is not kept is written, too, and written over.
-        let mut picked: Vec<(u32, u32)> = host::zeroed(sorted.len() + 1);
-        let mut kept = 0;
-        for_pairs(lists, stride, |pair| {
-            picked[kept] = pair;
-            kept += usize::from(digits.contains(&(pair.0 >> ranges.shift)));
+    tasks
+        .into_par_iter()
+        .for_each_init(Vec::new, |other, (slices, sorted)| {
+            sort_into(&slices, other, sorted);
+            settle(sorted);
         });
-        let picked = &mut picked[..sorted.len()];
-        if !sort_between(picked, sorted) {
-            sorted.copy_from_slice(picked);
-        }
-        settle(sorted);
-    });
     pairs
 }
 
-/// Calls `each` with all keys and payloads, in order.
+/// Calls `each` with all keys and payloads, in order; the first list has number `first`.
 #[inline(always)]
-fn for_pairs<L: AsRef<[[u32; 2]]>>(lists: &[L], stride: u32, mut each: impl FnMut((u32, u32))) {
+fn for_pairs<L: AsRef<[[u32; 2]]>>(
+    lists: &[L],
+    first: usize,
+    stride: u32,
+    mut each: impl FnMut(Pair),
+) {
     for (number, list) in lists.iter().enumerate() {
-        let first = number as u32 * stride;
+        let first = (first + number) as u32 * stride;
         for (&[key, _], place) in list.as_ref().iter().zip(first..) {
             each((key, place));
         }
     }
 }
 
-/// How keys are shared among workers.
-struct Ranges {
-    /// The lowest bit that tells.
+/// Ranges of keys that have about as many pairs each, as far as a sample tells.
+struct Parts {
+    count: usize,
+    /// The part of each interval; parts ascend.
+    of: [u8; INTERVALS],
+    /// Where intervals begin, and how wide they are: two to this power. What is below belongs to the first one, and what
+    /// is above to the last.
+    least: u32,
     shift: u32,
-    /// For each worker: its keys without the bits below, and how many there are.
-    parts: Vec<(std::ops::RangeInclusive<u32>, usize)>,
 }
 
-impl Ranges {
-    fn new<L: AsRef<[[u32; 2]]> + Sync>(lists: &[L], workers: usize) -> Self {
-        let bits_of = |list: &L| common_bits(list.as_ref().iter().map(|item| item[0]));
-        let (all, any) = lists.par_iter().map(bits_of).reduce(
-            || (u32::MAX, 0),
-            |(all, any), (more_all, more_any)| (all & more_all, any | more_any),
-        );
-        let (first, width) = span(all ^ any);
-        let shift = first + width.saturating_sub(RANGE_BITS);
-        // The bits above those that differ are the same everywhere.
-        let lowest = (all >> shift) & !((1u32 << RANGE_BITS) - 1);
-        let of_list = |mut counts: Vec<u32>, list: &L| {
-            for item in list.as_ref() {
-                let digit = (item[0] >> shift) & ((1 << RANGE_BITS) - 1);
-                counts[digit as usize] += 1;
-            }
-            counts
+impl Parts {
+    /// Of lists that are not all empty, with so many pairs together.
+    fn new<L: AsRef<[[u32; 2]]>>(lists: &[L], count: usize) -> Self {
+        let items = lists.iter().flat_map(|list| list.as_ref());
+        let some = items.step_by(count.div_ceil(SAMPLES));
+        let mut sample: Vec<u32> = some.map(|item| item[0]).collect();
+        sample.sort_unstable();
+        let least = sample.first().copied().unwrap_or_default();
+        let greatest = sample.last().copied().unwrap_or_default();
+        let width = u32::BITS - (greatest - least).leading_zeros();
+        let mut parts = Self {
+            count: (count / PART).clamp(1, MAX_PARTS),
+            of: [0; INTERVALS],
+            least,
+            shift: width.saturating_sub(INTERVALS.trailing_zeros()),
         };
-        let none = || host::zeroed(1 << RANGE_BITS);
-        let counts = lists
-            .par_iter()
-            .fold(none, of_list)
-            .reduce(none, |mut a, b| {
-                a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-                a
-            });
-        let total: usize = counts.iter().map(|&count| count as usize).sum();
-        let mut parts = Vec::new();
-        let (mut from, mut inside, mut before) = (0u32, 0usize, 0usize);
-        for (digit, &count) in counts.iter().enumerate() {
-            inside += count as usize;
-            let is_last = digit + 1 == counts.len();
-            // As near to the next worker's share as a digit's end can be.
-            let share = total * (parts.len() + 1) / workers;
-            if is_last || parts.len() + 1 < workers && before + inside >= share {
-                let digit = digit as u32;
-                parts.push((lowest + from..=lowest + digit, inside));
-                (from, before, inside) = (digit + 1, before + inside, 0);
-            }
+        let mut below = 0;
+        for interval in 0..INTERVALS {
+            let is_below = |key: &u32| parts.interval(*key) < interval;
+            below += sample[below..]
+                .iter()
+                .take_while(|key| is_below(key))
+                .count();
+            let part = below * parts.count / sample.len().max(1);
+            parts.of[interval] = part.min(parts.count - 1) as u8;
         }
-        Self { shift, parts }
+        parts
+    }
+
+    #[inline(always)]
+    fn interval(&self, key: u32) -> usize {
+        let from_least = key.saturating_sub(self.least) >> self.shift;
+        (from_least as usize).min(INTERVALS - 1)
+    }
+
+    /// The part that a key belongs to.
+    #[inline(always)]
+    fn of(&self, key: u32) -> usize {
+        self.of[self.interval(key)].into()
+    }
+}
+
+/// The pairs of some lists by part, each in the lists' order.
+struct Group {
+    pairs: Vec<Pair>,
+    /// Where each part ends.
+    ends: Box<[u32; MAX_PARTS]>,
+}
+
+impl Group {
+    /// Of lists of which the first has number `first`.
+    fn new<L: AsRef<[[u32; 2]]>>(parts: &Parts, lists: &[L], first: usize, stride: u32) -> Self {
+        let mut ends = Box::new([0; MAX_PARTS]);
+        for item in lists.iter().flat_map(|list| list.as_ref()) {
+            ends[parts.of(item[0]) % MAX_PARTS] += 1;
+        }
+        start_after_each_other(&mut *ends);
+        let count = lists.iter().map(|list| list.as_ref().len()).sum();
+        let mut pairs: Vec<Pair> = host::zeroed(count);
+        for_pairs(lists, first, stride, |pair| {
+            let end = &mut ends[parts.of(pair.0) % MAX_PARTS];
+            pairs[*end as usize] = pair;
+            *end += 1;
+        });
+        Self { pairs, ends }
+    }
+
+    fn part(&self, part: usize) -> &[Pair] {
+        let start = part.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.pairs[start as usize..self.ends[part] as usize]
+    }
+}
+
+/// Makes counts the places where what was counted starts.
+fn start_after_each_other(counts: &mut [u32]) {
+    let mut start = 0;
+    for count in counts {
+        start += std::mem::replace(count, start);
     }
 }
 
 /// One counting-sort pass over the digit of so many bits at `shift`.
-fn scatter(from: &[(u32, u32)], to: &mut [(u32, u32)], shift: u32, bits: u32) {
-    let mask = (1usize << bits.min(MAX_DIGIT_BITS)) - 1;
-    let digit = |key: u32| (key >> shift) as usize & mask;
-    let mut next = [0u32; 1 << MAX_DIGIT_BITS];
-    for &(key, _) in from {
-        next[digit(key)] += 1;
+fn scatter(from: &[&[Pair]], to: &mut [Pair], digits: &Digits, shift: u32, bits: u32) {
+    let (least, mask) = (digits.least, (1u32 << bits) - 1);
+    let digit = |key: u32| (((key - least) >> shift) & mask) as usize % DIGITS;
+    let mut next = [0u32; DIGITS];
+    for slice in from {
+        for &(key, _) in *slice {
+            next[digit(key)] += 1;
+        }
     }
-    let mut start = 0;
-    for slot in &mut next {
-        start += std::mem::replace(slot, start);
-    }
-    for &pair in from {
-        let slot = &mut next[digit(pair.0)];
-        to[*slot as usize] = pair;
-        *slot += 1;
+    start_after_each_other(&mut next);
+    for slice in from {
+        for &pair in *slice {
+            let slot = &mut next[digit(pair.0)];
+            to[*slot as usize] = pair;
+            *slot += 1;
+        }
     }
 }
 
@@ -249,7 +339,7 @@ mod tests {
                 lists.push(list);
             }
             let mut expected = Vec::new();
-            for_pairs(&lists, 4096, |pair| expected.push(pair));
+            for_pairs(&lists, 0, 4096, |pair| expected.push(pair));
             expected.sort_by_key(|pair| pair.0);
             let seen = std::sync::atomic::AtomicUsize::new(0);
             let found = sort_lists(&lists, 4096, workers, |part| {
