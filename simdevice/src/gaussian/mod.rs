@@ -62,7 +62,7 @@ use rayon::prelude::*;
 use rays::{PixelRays, RayDepth, RayDepths};
 use scratch::{Attributes, Scratch};
 use splat::{Projected, Splat};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use surfel::Surfel;
 use unchanged::{Key, LastSet};
@@ -70,8 +70,11 @@ use unchanged::{Key, LastSet};
 /// The most batches of a set: a survivor is named by its batch and its place there, in 32 bits.
 const MAX_BATCHES: u64 = (1 << 32) / BATCH as u64;
 
-/// Batches that a worker takes at a time, so that its scratch is made rarely.
-const BATCHES_PER_TASK: usize = 16;
+/// The most batches that a worker takes at a time: the last ones are waited for.
+const BATCHES_PER_TASK: usize = 4;
+
+/// The least batches that a worker takes where little is done for each.
+const LEAST_BATCHES: usize = 64;
 
 /// A set of Gaussians that are sorted and drawn together.
 #[derive(Debug)]
@@ -239,7 +242,9 @@ impl GaussianSet {
             }
         }
         let keeps_order = key.is_some() && skips[1];
-        let (sorted, record) = self.sort(&chunks, (last, keeps_order), device, counters)?;
+        // All of it by workers: for each way from this thread to them and back, threads fall asleep and are woken.
+        let (sorted, record) =
+            device.install(|| self.sort(&chunks, (last, keeps_order), device, counters))?;
         let sorted = Arc::new(sorted);
         if let Some(key) = key {
             let bytes = sorted.memory_bytes();
@@ -289,36 +294,34 @@ impl GaussianSet {
         let (mut batches, numbers) = self.project(device, chunks, &mut work)?;
         let fixed = batches.len();
         self.shade(device, &mut batches)?;
-        let mut by_programs = Counters::default();
-        for (number, batch) in batches.iter().enumerate() {
-            let sum = if number < fixed {
-                &mut work
-            } else {
-                &mut by_programs
-            };
-            sum.add_all(&batch.counters);
-        }
+        work.add_all(&counted(&batches[..fixed]));
+        let by_programs = counted(&batches[fixed..]);
         let projected = Instant::now();
         let threads = device.threads();
-        let (order, is_repaired) =
-            device.install(|| order::find(&batches, &numbers, last.as_deref(), threads));
+        let (order, is_repaired) = order::find(&batches, &numbers, last.as_deref(), threads);
         counters.add(Counter::OrdersRepaired, is_repaired.into());
         drop(last);
         let sorted = Instant::now();
         // Twelve bytes a pair while lists are made: four times the budget of all lists of a pass.
         let most_pairs = device.config().bin_budget_bytes / 3;
-        let tiles = device
-            .install(|| TileLists::build(&mut batches, &order, self.bounds, threads, most_pairs));
+        let tiles = TileLists::build(&mut batches, &order, self.bounds, threads, most_pairs);
         let kept = keeps_order.then(|| Order::keep(numbers, &mut batches, order));
         let binned = Instant::now();
         let mut splats = host::with_capacity(batches.len());
-        let mut surfels = host::with_capacity(batches.len());
-        let mut depths = host::with_capacity(batches.len());
-        for batch in batches {
-            splats.push(batch.splats);
-            surfels.push(batch.surfels);
-            depths.push(batch.ray_depths);
-        }
+        let mut others = host::with_capacity(batches.len());
+        // What else there is of batches goes here; with many, that takes a while.
+        batches
+            .into_par_iter()
+            .with_min_len(LEAST_BATCHES)
+            .map(|batch| (batch.splats, (batch.surfels, batch.ray_depths)))
+            .unzip_into_vecs(&mut splats, &mut others);
+        let is_per_pixel = self.begin.state.order == GaussianOrder::PerPixel;
+        let surfels = others
+            .iter_mut()
+            .map(|others| std::mem::take(&mut others.0));
+        let surfels = self.is_flat().then(|| host::collect(surfels));
+        let depths = others.into_iter().map(|others| others.1);
+        let ray_depths = is_per_pixel.then(|| host::collect(depths));
         let record = device.recorder().map(|_| {
             let degree = self.begin.state.sh_degree;
             let (pairs, bounds) = (tiles.pairs(), self.bounds);
@@ -342,12 +345,11 @@ impl GaussianSet {
         counters.add(Counter::PreprocessTime, nanoseconds(started, projected));
         counters.add(Counter::SortTime, nanoseconds(projected, sorted));
         counters.add(Counter::BinningTime, nanoseconds(sorted, binned));
-        let is_per_pixel = self.begin.state.order == GaussianOrder::PerPixel;
         let sorted = Sorted {
             splats,
             tiles,
-            surfels: self.is_flat().then_some(surfels),
-            ray_depths: is_per_pixel.then_some(depths),
+            surfels,
+            ray_depths,
             order: kept.flatten().map(Arc::new),
             counters: work,
         };
@@ -435,6 +437,19 @@ impl GaussianSet {
     }
 }
 
+/// What all batches counted.
+fn counted(batches: &[Projected]) -> Counters {
+    let add = |mut sum: Counters, more: &Counters| {
+        sum.add_all(more);
+        sum
+    };
+    batches
+        .par_iter()
+        .with_min_len(LEAST_BATCHES)
+        .fold(Counters::default, |sum, batch| add(sum, &batch.counters))
+        .reduce(Counters::default, |sum, more| add(sum, &more))
+}
+
 /// What projects jobs.
 struct Workers<'a> {
     device: &'a Device,
@@ -445,24 +460,31 @@ struct Workers<'a> {
 impl Workers<'_> {
     /// Does all jobs.
     fn run(&self, jobs: &[Job<'_>]) -> Vec<Projected> {
-        let mut batches = host::collect(jobs.iter().map(|_| Projected::default()));
-        self.device.install(|| {
-            jobs.par_iter()
-                .zip(&mut batches)
-                .with_min_len(BATCHES_PER_TASK)
-                .for_each_init(Worker::new, |worker, (job, out)| self.job(worker, job, out));
-        });
+        // Each thread makes its scratch once; a lock that nobody else asks for costs next to nothing.
+        let workers = (0..rayon::current_num_threads()).map(|_| Mutex::new(None));
+        let workers: Vec<Mutex<Option<Worker>>> = workers.collect();
+        let one = |job| {
+            let own = rayon::current_thread_index().unwrap_or(0) % workers.len();
+            let mut worker = workers[own].lock().unwrap_or_else(PoisonError::into_inner);
+            self.job(worker.get_or_insert_with(Worker::new), job)
+        };
+        let mut batches = host::with_capacity(jobs.len());
+        jobs.par_iter()
+            .with_max_len(BATCHES_PER_TASK)
+            .map(one)
+            .collect_into_vec(&mut batches);
         batches
     }
 
     /// Does a job.
-    fn job(&self, worker: &mut Worker, job: &Job<'_>, out: &mut Projected) {
+    fn job(&self, worker: &mut Worker, job: &Job<'_>) -> Projected {
         let Worker {
             fetcher,
             attributes,
             matrices,
             scratch,
         } = worker;
+        let mut out = Projected::default();
         let projection = self.projection;
         let source = job.read(fetcher, attributes, matrices, self.is_flat);
         // A frustum is for opacities that it was told of.
@@ -492,7 +514,8 @@ impl Workers<'_> {
             Part::From(start) => job.sequence + start + lane as u32,
             Part::Chunk(chunk) => job.sequence + chunk.numbers[lane],
         };
-        dispatch!(self.device.level(), simd => projection.run(simd, &source, scratch, sequence, out));
+        dispatch!(self.device.level(), simd => projection.run(simd, &source, scratch, sequence, &mut out));
+        out
     }
 }
 

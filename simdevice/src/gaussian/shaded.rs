@@ -1,6 +1,7 @@
 //! Gaussians that a vertex program projects: it writes centre, covariance, opacity, colour and perhaps the depth key of
 //! each, and what follows is as with fixed-function projection.
 
+use super::GaussianSet;
 use super::depth::CenterDepth;
 use super::fetch::BATCH;
 use super::footprint::Visible;
@@ -9,7 +10,6 @@ use super::project::Projection;
 use super::scratch::Scratch;
 use super::sort::ordered_bits;
 use super::splat::{Projected, Splat};
-use super::{BATCHES_PER_TASK, GaussianSet};
 use crate::counters::Counter;
 use crate::device::Device;
 use crate::geometry::points::PointShader;
@@ -20,6 +20,9 @@ use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use isa::exec::Stopped;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// Batches that a worker takes at a time, so that its shader is made rarely.
+const BATCHES_PER_TASK: usize = 16;
 
 /// How what the program writes becomes a Gaussian on the screen.
 struct Shading {

@@ -56,8 +56,9 @@ const STEEP_LOG2_OPACITY: f64 = 4.0;
 const STEEP_FACTOR: f64 = 8.0;
 
 /// Whether a Gaussian's exponents must be formed in binary64. It depends on the Gaussian alone.
-fn is_steep(factor: [f64; 3], log2_opacity: f64) -> bool {
-    let largest = factor.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+#[inline(always)]
+fn is_steep([a, b, c]: [f64; 3], log2_opacity: f64) -> bool {
+    let largest = a.abs().max(b.abs()).max(c.abs());
     largest > STEEP_FACTOR || log2_opacity > STEEP_LOG2_OPACITY
 }
 
