@@ -1,7 +1,7 @@
 //! Gaussian mode of the tile engine: front to back through a tile's list, with early termination.
 //!
 //! Most trained Gaussians are a few pixels wide, so a tile is taken as 16 blocks of 4x4 pixels, and lists are
-//! worked off in three phases, a chunk at a time. Phase 1 tests one Gaussian against all 16 blocks in one vector,
+//! worked off in three phases, a chunk at a time. Phase 1 ([`chunk`]) tests one Gaussian against all 16 blocks in one vector,
 //! conservatively, and sets its bit in the words of those that it may reach. Phase 2 ([`pixels`]) finds the alphas of all
 //! that are reached, and phase 3 takes the blocks in turn, each with its 16 pixels in registers, through their alphas.
 //!
@@ -17,6 +17,7 @@
 
 mod approximation;
 mod by_block;
+mod chunk;
 mod exp2;
 mod grid;
 mod half;
@@ -38,12 +39,12 @@ use crate::skips::{Skip, Skips};
 use crate::trace::{self, Run, TileWork};
 use approximation::Way;
 use by_block::TileMode;
-use fearless_simd::{Level, Simd, dispatch, f32x8, f32x16, f64x8, mask32x16, prelude::*, u32x16};
-use grid::{BLOCK_X, BLOCK_Y, HALF, LANE_X, LANE_Y};
+use chunk::{Chunk, Reaching, hidden_blocks};
+use fearless_simd::{Level, Simd, dispatch, mask32x16, prelude::*};
 use layer::{ANY_LIGHT, Lanes, Layer, block_and_lane, count, lanes_within};
 use passing::Passing;
 use per_pixel::PerPixel;
-use pixels::{Alphas, Reaching};
+use pixels::Alphas;
 use std::slice;
 
 const TILE: usize = TILE_SIZE as usize;
@@ -69,7 +70,7 @@ const LAYERS: usize = super::MAX_SAMPLES as usize + 1;
 pub struct GaussianTile {
     layers: [Layer; LAYERS],
     passing: Passing,
-    chunk: [Record; CHUNK],
+    chunk: Chunk,
     /// Apart, so that both are small enough never to be wanting.
     alphas: Box<Alphas>,
     /// What may reach each block, where a mode parts lists so.
@@ -92,22 +93,6 @@ const TEST_DEPTH: DepthMode = 4;
 const FIND_MEDIAN: DepthMode = 5;
 /// And what the mean is made of.
 const FIND_MEAN: DepthMode = 6;
-
-/// What the phases need of a Gaussian in this tile.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(64))]
-struct Record {
-    /// `u` and `v` at the middle of each block.
-    u: [f32; BLOCKS],
-    v: [f32; BLOCKS],
-    /// What a pixel's offset from the middle of its block adds to `u`, in columns of two rows, and to `v`.
-    across: [f32; LANES / 2],
-    along: [f32; LANES],
-    log2_opacity: f32,
-    color: [f32; 3],
-    /// As [`Splat::depth`].
-    depth: u32,
-}
 
 /// The constants of a draw.
 #[derive(Clone, Copy, Debug)]
@@ -147,7 +132,7 @@ impl Default for GaussianTile {
         Self {
             layers: [Layer::EMPTY; LAYERS],
             passing: Passing::default(),
-            chunk: [Record::default(); CHUNK],
+            chunk: Chunk::default(),
             alphas: Box::default(),
             lists: Default::default(),
             per_pixel: PerPixel::default(),
@@ -328,14 +313,12 @@ impl GaussianTile {
     ) -> Work {
         let mut work = Work::default();
         let layer = &mut self.layers[layer];
-        let corner = task.corner.map(f64::from);
-        let bounded = task.skips.has(Skip::Blocks);
         let end_early = task.skips.has(Skip::Saturated);
         for block in 0..BLOCKS {
             layer.find_most_fall(simd, block, task.thresholds);
         }
-        for &primitive in task.list.iter().take(CHUNK) {
-            devmem::prefetch(slice::from_ref(task.splat(primitive)));
+        for primitive in task.list.iter().take(CHUNK) {
+            task.prefetch(Some(primitive));
         }
         for (number, chunk) in task.list.chunks(CHUNK).enumerate() {
             let next_chunk = task.list.get((number + 1) * CHUNK..).unwrap_or_default();
@@ -359,7 +342,6 @@ impl GaussianTile {
             }
             let blocks = open.count_ones() as u8;
             let rows = if runs.is_some() { layer.open_rows() } else { 0 };
-            let open = mask32x16::from_bitmask(simd, open);
             if DEPTH > NO_DEPTH
                 && self
                     .passing
@@ -369,69 +351,48 @@ impl GaussianTile {
                 work.tiles_hidden += rest.len() as u64;
                 if let Some(runs) = &mut runs {
                     work.hidden_rest = rest.len() as u32;
+                    let open = mask32x16::from_bitmask(simd, open);
                     trace::push_run(runs, hidden_run(simd, task, rest, (open, rows, blocks)));
                 }
                 break;
             }
-            let mut reaching = u32x16::splat(simd, 0);
-            let items_before = work.items;
-            let (hidden_before, mut hidden) = (work, 0);
-            let (mut placed, mut next) = (0, next_chunk.iter());
-            for (number, &primitive) in chunk.iter().enumerate() {
-                if let Some(&next) = next.next() {
-                    devmem::prefetch(slice::from_ref(task.splat(next)));
-                }
+            let (items_before, hidden_before) = (work.items, work);
+            let (mut blocks_of_hidden, mut from) = (0, 0);
+            let reaching = loop {
+                let placed = self.chunk.place::<_, DEPTH>(
+                    simd,
+                    task,
+                    (chunk, from, next_chunk),
+                    (open, &self.passing),
+                    runs.is_some(),
+                );
+                work.open += placed.count * u64::from(blocks);
+                work.tiles_hidden += placed.tiles_hidden;
+                work.blocks_hidden += placed.blocks_hidden;
+                blocks_of_hidden += placed.blocks_of_hidden;
+                let Some(&primitive) = chunk.get(placed.end) else {
+                    break placed.reaching;
+                };
+                // It is steep; what is before it is composited first.
+                work.items += count_bits(&placed.reaching);
+                let to = (&self.chunk, &mut *self.alphas);
+                let (passing, thresholds) = (&self.passing, task.thresholds);
+                work.contributions +=
+                    layer.evaluate::<_, DEPTH>(simd, &placed.reaching, to, passing, thresholds);
                 let splat = task.splat(primitive);
-                if DEPTH > NO_DEPTH && self.passing.hides(splat.depth) {
-                    work.tiles_hidden += 1;
-                    if runs.is_some() {
-                        hidden += hidden_blocks(simd, splat, task, open);
-                    }
-                    continue;
-                }
-                if splat.steep {
-                    // What is before it is composited first.
-                    let before = reaching.to_array();
-                    reaching = u32x16::splat(simd, 0);
-                    work.items += count_bits(&before);
-                    let (chunk, alphas) = (&self.chunk, &mut self.alphas);
-                    work.contributions += layer.evaluate::<_, DEPTH>(
-                        simd,
-                        &before,
-                        (chunk, alphas),
-                        &self.passing,
-                        task.thresholds,
-                    );
-                    let shown = if DEPTH <= NO_DEPTH {
-                        open
-                    } else {
-                        open & self.passing.blocks(simd, splat.depth)
-                    };
-                    let (open, shown) = (u64::from(blocks), shown.to_bitmask());
-                    let exact = u64::from(shown.count_ones());
-                    work.open += open;
-                    work.blocks_hidden += open - exact;
-                    work.items += exact;
-                    work.contributions +=
-                        layer.evaluate_steep::<_, DEPTH>(simd, splat, shown, &self.passing, task);
-                    continue;
-                }
-                let record = &mut self.chunk[number % CHUNK];
-                let reached = record.place(simd, splat, corner, task.thresholds.most_fall);
-                let mut reached = if bounded { reached & open } else { open };
-                placed += 1;
-                if DEPTH > NO_DEPTH {
-                    record.depth = splat.depth;
-                    let shown = self.passing.blocks(simd, splat.depth);
-                    let hidden = (reached & !shown).to_bitmask();
-                    work.blocks_hidden += u64::from(hidden.count_ones());
-                    reached &= shown;
-                }
-                let bit = u32x16::splat(simd, 1 << (number % CHUNK));
-                reaching |= reached.select(bit, u32x16::splat(simd, 0));
-            }
-            let reaching = reaching.to_array();
-            work.open += placed * u64::from(blocks);
+                let shown = if DEPTH <= NO_DEPTH {
+                    open
+                } else {
+                    open & passing.blocks(simd, splat.depth).to_bitmask()
+                };
+                let (open, exact) = (u64::from(blocks), u64::from(shown.count_ones()));
+                work.open += open;
+                work.blocks_hidden += open - exact;
+                work.items += exact;
+                work.contributions +=
+                    layer.evaluate_steep::<_, DEPTH>(simd, splat, shown, passing, task);
+                from = placed.end + 1;
+            };
             work.pairs += chunk.len() as u64;
             work.items += count_bits(&reaching);
             if let Some(runs) = &mut runs {
@@ -443,7 +404,7 @@ impl GaussianTile {
                         blocks,
                         reached: (work.items - items_before) as u32,
                         hidden: (work.tiles_hidden - hidden_before.tiles_hidden) as u32,
-                        hidden_blocks: hidden
+                        hidden_blocks: blocks_of_hidden
                             + (work.blocks_hidden - hidden_before.blocks_hidden) as u32,
                     },
                 );
@@ -479,6 +440,14 @@ impl Task<'_> {
         let (batch, place) = locate(primitive);
         &self.splats[batch][place]
     }
+
+    /// Has a primitive's splat on its way.
+    #[inline(always)]
+    fn prefetch(&self, primitive: Option<&u32>) {
+        if let Some(&primitive) = primitive {
+            devmem::prefetch(slice::from_ref(self.splat(primitive)));
+        }
+    }
 }
 
 /// What compositing a tile took.
@@ -496,19 +465,6 @@ struct Work {
     blocks_left_out: u64,
     /// Of the hidden, those that end a list, if work is recorded.
     hidden_rest: u32,
-}
-
-/// Of the `open` blocks of a tile, those that a Gaussian would be evaluated in if depths did not hide it.
-#[inline(always)]
-fn hidden_blocks<S: Simd>(simd: S, splat: &Splat, task: &Task<'_>, open: mask32x16<S>) -> u32 {
-    let bounded = task.skips.has(Skip::Blocks) && !splat.steep;
-    let reached = if bounded {
-        let most_fall = task.thresholds.most_fall;
-        open & Record::default().place(simd, splat, task.corner.map(f64::from), most_fall)
-    } else {
-        open
-    };
-    reached.to_bitmask().count_ones()
 }
 
 /// What a trace tells of the Gaussians at a list's end that depths hide in all of the tile, of which `open` blocks and
@@ -531,50 +487,6 @@ fn hidden_run<S: Simd>(
         run.hidden_blocks += hidden_blocks(simd, task.splat(primitive), task, open);
     }
     run
-}
-
-impl Record {
-    /// Phase 1: makes this the record of `splat` in the tile at `corner`. Returns which blocks it may reach.
-    #[inline(always)]
-    fn place<S: Simd>(
-        &mut self,
-        simd: S,
-        splat: &Splat,
-        corner: [f64; 2],
-        most_fall: f32,
-    ) -> mask32x16<S> {
-        let [a, b, c] = splat.factor;
-        let (from_x, from_y) = (corner[0] - splat.mean[0], corner[1] - splat.mean[1]);
-        // Columns repeat in both halves of the blocks.
-        let dx = f64x8::from_slice(simd, &BLOCK_X[..8]) + from_x;
-        let upper = f64x8::from_slice(simd, &BLOCK_Y[..8]) + from_y;
-        let lower = f64x8::from_slice(simd, &BLOCK_Y[8..]) + from_y;
-        let u = dx * a;
-        let sheared = dx * b;
-        let u: f32x16<S> = u.narrow(u);
-        let v: f32x16<S> = (sheared + upper * c).narrow(sheared + lower * c);
-        u.store_slice(&mut self.u);
-        v.store_slice(&mut self.v);
-        let [a, b, c] = [a as f32, b as f32, c as f32];
-        let columns = f32x8::from_slice(simd, &LANE_X[..LANES / 2]);
-        (columns * a).store_slice(&mut self.across);
-        let (columns, rows) = (
-            f32x16::simd_from(simd, LANE_X),
-            f32x16::simd_from(simd, LANE_Y),
-        );
-        let along = rows.mul_add(f32x16::splat(simd, c), columns * b);
-        along.store_slice(&mut self.along);
-        self.log2_opacity = splat.log2_opacity;
-        self.color = splat.color;
-        // How far the exponent may fall, with a margin for rounding.
-        let room = splat.log2_opacity + most_fall;
-        let room = room + 1e-3 + 1e-5 * room.abs();
-        // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
-        let least_u = (u.abs() - HALF * a.abs()).max(0.0);
-        let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
-        let least = least_v.mul_add(least_v, least_u * least_u);
-        least.simd_le(room)
-    }
 }
 
 /// How many pairs of a block and a Gaussian there are.

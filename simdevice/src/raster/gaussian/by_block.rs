@@ -1,10 +1,10 @@
 //! Draws whose modes the kernel has no fast path for: a tile's list is parted by blocks first, and exponents are formed in
 //! binary64 at every pixel.
 
+use super::chunk::Record;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::{
-    BLOCKS, CHUNK, DepthMode, GaussianTile, NO_DEPTH, Record, Task, Work, pixels::falls_64,
-    wide_sums,
+    BLOCKS, CHUNK, DepthMode, GaussianTile, NO_DEPTH, Task, Work, pixels::falls_64, wide_sums,
 };
 use crate::gaussian::rays::RayDepths;
 use crate::gaussian::splat::{Splat, half_room};

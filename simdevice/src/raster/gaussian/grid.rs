@@ -10,6 +10,13 @@ pub(super) const LANE_X: [f32; LANES] = grid(true);
 pub(super) const LANE_Y: [f32; LANES] = grid(false);
 pub(super) const LANE_X_64: [f64; LANES] = widened(LANE_X);
 pub(super) const LANE_Y_64: [f64; LANES] = widened(LANE_Y);
+/// Blocks in a row of them, and rows.
+pub(super) const BLOCKS_ACROSS: usize = 4;
+/// The offsets of the middles of columns of blocks from their tile's corner, and of rows.
+pub(super) const BLOCK_COLUMNS: [f64; BLOCKS_ACROSS] =
+    [BLOCK_X[0], BLOCK_X[1], BLOCK_X[2], BLOCK_X[3]];
+pub(super) const BLOCK_ROWS: [f64; BLOCKS_ACROSS] =
+    [BLOCK_Y[0], BLOCK_Y[4], BLOCK_Y[8], BLOCK_Y[12]];
 /// The offset of the middle of each block from its tile's corner.
 pub(super) const BLOCK_X: [f64; BLOCKS] = middles(true);
 pub(super) const BLOCK_Y: [f64; BLOCKS] = middles(false);
@@ -42,7 +49,11 @@ const fn middles(column: bool) -> [f64; BLOCKS] {
     let mut out = [0.0; BLOCKS];
     let mut block = 0;
     while block < BLOCKS {
-        let at = if column { block % 4 } else { block / 4 };
+        let at = if column {
+            block % BLOCKS_ACROSS
+        } else {
+            block / BLOCKS_ACROSS
+        };
         out[block] = (BLOCK * at) as f64 + BLOCK as f64 / 2.0;
         block += 1;
     }

@@ -2,19 +2,17 @@
 //! registers.
 
 use super::approximation::power;
-use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
+use super::chunk::{Chunk, Reaching, Record};
+use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS_ACROSS, LANE_X_64, LANE_Y_64};
 use super::layer::Layer;
 use super::passing::Passing;
 use super::{
-    BLOCKS, CHUNK, DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, LANES, NO_DEPTH, Record, Task,
+    BLOCKS, CHUNK, DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, LANES, NO_DEPTH, Task,
     Thresholds,
 };
 use crate::gaussian::splat::Splat;
 use crate::lanes::bits_of;
 use fearless_simd::{Simd, f32x8, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
-
-/// Which of a chunk's Gaussians may reach each block: a bit for each.
-pub(super) type Reaching = [u32; BLOCKS];
 
 /// What a block's pixels have accumulated.
 ///
@@ -64,7 +62,7 @@ impl Alphas {
         &mut self,
         simd: S,
         reaching: &Reaching,
-        (chunk, most_fall): (&[Record; CHUNK], &[[f32; LANES]; BLOCKS]),
+        (chunk, most_fall): (&Chunk, &[[f32; LANES]; BLOCKS]),
         passing: &Passing,
         thresholds: Thresholds,
     ) -> u64 {
@@ -81,10 +79,9 @@ impl Alphas {
                         let bit = rest.trailing_zeros() as usize;
                         rest &= rest - 1;
                         let (block, number) = ((2 * pair + bit / CHUNK) % BLOCKS, bit % CHUNK);
-                        let g = &chunk[number];
-                        let fall = g.falls(simd, block);
+                        let fall = chunk.records[number].falls(simd, block);
                         let most_fall = f32x16::from_slice(simd, &most_fall[block]);
-                        let at = (block, g.depth);
+                        let at = (block, chunk.looks[number].depth);
                         let reached = reached::<_, DEPTH>(simd, at, fall, passing, most_fall);
                         pixels -= reached.to_vector();
                         let alpha = alpha::<_, DEPTH>(simd, reached, fall, ceiling);
@@ -140,7 +137,7 @@ impl Layer {
         &mut self,
         simd: S,
         reaching: &Reaching,
-        (chunk, alphas): (&[Record; CHUNK], &mut Alphas),
+        (chunk, alphas): (&Chunk, &mut Alphas),
         passing: &Passing,
         thresholds: Thresholds,
     ) -> u64 {
@@ -157,7 +154,7 @@ impl Layer {
         &mut self,
         simd: S,
         reaching: &Reaching,
-        (chunk, alphas): (&[Record; CHUNK], &Alphas),
+        (chunk, alphas): (&Chunk, &Alphas),
         thresholds: Thresholds,
     ) -> u64 {
         simd.vectorize(
@@ -195,7 +192,7 @@ impl Layer {
         &mut self,
         simd: S,
         (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
-        chunk: &[Record; CHUNK],
+        chunk: &Chunk,
         thresholds: Thresholds,
     ) -> bool {
         let floor = thresholds.transmittance_floor;
@@ -210,11 +207,11 @@ impl Layer {
         // What is finished has alphas of zero.
         pixels.transmittance = before.max(0.0);
         for alpha in alphas {
-            let g = &chunk[reaching.trailing_zeros() as usize % CHUNK];
+            let look = &chunk.looks[reaching.trailing_zeros() as usize % CHUNK];
             reaching &= reaching.wrapping_sub(1);
             let passed = pixels.pass(f32x16::from_slice(simd, alpha));
             pixels.transmittance = passed.rest;
-            pixels.add(simd, passed.weight, g.color);
+            pixels.add(simd, passed.weight, look.color);
         }
         let signs: i32x16<S> = before.bitcast();
         let below = pixels.transmittance.simd_lt(floor).to_vector();
@@ -233,16 +230,16 @@ impl Layer {
         &mut self,
         simd: S,
         (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
-        chunk: &[Record; CHUNK],
+        chunk: &Chunk,
         thresholds: Thresholds,
     ) -> u64 {
         let mut pixels = self.pixels(simd, block);
         let mut refused = i32x16::splat(simd, 0);
         for alpha in alphas {
-            let g = &chunk[reaching.trailing_zeros() as usize % CHUNK];
+            let look = &chunk.looks[reaching.trailing_zeros() as usize % CHUNK];
             reaching &= reaching.wrapping_sub(1);
             let alpha = f32x16::from_slice(simd, alpha);
-            let (to, look) = ((block, &mut pixels), (g.color, g.depth));
+            let (to, look) = ((block, &mut pixels), (look.color, look.depth));
             let goes_on = self.composite::<_, DEPTH>(simd, to, alpha, look, thresholds);
             let reached = alpha.simd_gt(0.0).to_vector();
             refused += (reached & goes_on.to_vector()) - reached;
@@ -413,10 +410,8 @@ impl Record {
     /// How far alpha has fallen at a block's pixels: minus its base-2 logarithm.
     #[inline(always)]
     fn falls<S: Simd>(&self, simd: S, block: usize) -> f32x16<S> {
-        // Rows of a block share what columns add.
-        let u = f32x8::from_slice(simd, &self.across) + self.u[block];
+        let from_u = f32x8::from_slice(simd, &self.from_u[block % BLOCKS_ACROSS]);
         let v = f32x16::from_slice(simd, &self.along) + self.v[block];
-        let from_u = u.mul_sub(u, f32x8::splat(simd, self.log2_opacity));
         v.mul_add(v, from_u.combine(from_u))
     }
 }

@@ -11,6 +11,7 @@ use crate::format::Format;
 use crate::gaussian::GaussianSet;
 use crate::packet::*;
 use devmem::Allocation;
+use fearless_simd::f32x16;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;

@@ -1,0 +1,187 @@
+//! Phase 1 of the tile kernel: what the others need of a chunk's Gaussians in a tile, and which blocks each may reach.
+
+use super::grid::{BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS_ACROSS, HALF, LANE_X, LANE_Y};
+use super::passing::Passing;
+use super::{BLOCKS, CHUNK, DepthMode, LANES, NO_DEPTH, Task};
+use crate::gaussian::splat::Splat;
+use crate::skips::Skip;
+use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
+
+/// What rounding may do to exponents, relative to them.
+const ROOM_FACTOR: f32 = 1.0 + 1e-5;
+
+/// Which of a chunk's Gaussians may reach each block: a bit for each.
+pub(super) type Reaching = [u32; BLOCKS];
+
+/// A chunk's Gaussians in a tile.
+#[derive(Debug, Default)]
+pub(super) struct Chunk {
+    pub(super) records: [Record; CHUNK],
+    pub(super) looks: [Look; CHUNK],
+}
+
+/// What it takes to find alphas.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(64))]
+pub(super) struct Record {
+    /// By column of blocks, `u^2` less the logarithm of the opacity at the pixels of two rows: both pairs of a block's rows
+    /// have the same.
+    pub(super) from_u: [[f32; LANES / 2]; BLOCKS_ACROSS],
+    /// `v` at the middle of each block.
+    pub(super) v: [f32; BLOCKS],
+    /// What a pixel's offset from the middle of its block adds to that.
+    pub(super) along: [f32; LANES],
+}
+
+/// What it takes to composite.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Look {
+    pub(super) color: [f32; 3],
+    /// As [`Splat::depth`].
+    pub(super) depth: u32,
+}
+
+/// What became of a chunk's Gaussians, up to a steep one.
+#[derive(Debug, Default)]
+pub(super) struct Placed {
+    pub(super) reaching: Reaching,
+    /// How many there are.
+    pub(super) count: u64,
+    /// The chunk's first that is steep from where they begin, or its end.
+    pub(super) end: usize,
+    /// Those that depths hide in all of the tile.
+    pub(super) tiles_hidden: u64,
+    /// Blocks in which depths hide the others.
+    pub(super) blocks_hidden: u64,
+    /// Blocks that those hidden in all of the tile would reach, if work is recorded.
+    pub(super) blocks_of_hidden: u32,
+}
+
+impl Chunk {
+    /// Places the Gaussians of a tile's chunk from number `from` on, before one that is steep, and has as many of the next chunk
+    /// on their way. `open` are the blocks that are not finished.
+    #[inline(never)]
+    pub(super) fn place<S: Simd, const DEPTH: DepthMode>(
+        &mut self,
+        simd: S,
+        task: &Task<'_>,
+        (chunk, from, next_chunk): (&[u32], usize, &[u32]),
+        (open, passing): (u64, &Passing),
+        is_recorded: bool,
+    ) -> Placed {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut placed = Placed::default();
+                let corner = task.corner.map(f64::from);
+                let most_fall = task.thresholds.most_fall;
+                let bounded = task.skips.has(Skip::Blocks);
+                // Masks are not combined here: that would be calls.
+                let open_mask = mask32x16::from_bitmask(simd, open);
+                let open = open_mask.to_vector();
+                let mut reaching = i32x16::splat(simd, 0);
+                let mut number = from;
+                while let Some(&primitive) = chunk.get(number) {
+                    task.prefetch(next_chunk.get(number));
+                    let splat = task.splat(primitive);
+                    if splat.steep {
+                        break;
+                    }
+                    let at = number % CHUNK;
+                    number += 1;
+                    if DEPTH > NO_DEPTH && passing.hides(splat.depth) {
+                        placed.tiles_hidden += 1;
+                        if is_recorded {
+                            placed.blocks_of_hidden += hidden_blocks(simd, splat, task, open_mask);
+                        }
+                        continue;
+                    }
+                    let reached = self.records[at].place(simd, splat, corner, most_fall);
+                    self.looks[at] = Look {
+                        color: splat.color,
+                        depth: splat.depth,
+                    };
+                    placed.count += 1;
+                    let mut reached = if bounded {
+                        reached.to_vector() & open
+                    } else {
+                        open
+                    };
+                    if DEPTH > NO_DEPTH {
+                        let shown = passing.blocks(simd, splat.depth).to_vector();
+                        let hidden = (reached & (shown ^ -1)).simd_lt(0).to_bitmask();
+                        placed.blocks_hidden += u64::from(hidden.count_ones());
+                        reached &= shown;
+                    }
+                    reaching |= reached & (1 << at);
+                }
+                placed.end = number;
+                placed.reaching = reaching.bitcast::<u32x16<S>>().to_array();
+                placed
+            },
+        )
+    }
+}
+
+impl Record {
+    /// Makes this the record of `splat` in the tile at `corner`. Returns which blocks it may reach.
+    #[inline(always)]
+    pub(super) fn place<S: Simd>(
+        &mut self,
+        simd: S,
+        splat: &Splat,
+        corner: [f64; 2],
+        most_fall: f32,
+    ) -> mask32x16<S> {
+        let [a, b, c] = splat.factor;
+        let (from_x, from_y) = (corner[0] - splat.mean[0], corner[1] - splat.mean[1]);
+        // In each column of blocks, and each row.
+        let dx = f64x4::simd_from(simd, BLOCK_COLUMNS) + from_x;
+        let dy = f64x4::simd_from(simd, BLOCK_ROWS) + from_y;
+        let (u, sheared, sunk) = (dx * a, dx * b, dy * c);
+        let row = |row: usize| sheared + f64x4::splat(simd, sunk[row]);
+        let u: f32x8<S> = u.narrow(u);
+        let upper: f32x8<S> = row(0).narrow(row(1));
+        let lower: f32x8<S> = row(2).narrow(row(3));
+        let v = upper.combine(lower);
+        v.store_slice(&mut self.v);
+        let [a, b, c] = [a as f32, b as f32, c as f32];
+        let columns = f32x8::from_slice(simd, &LANE_X[..LANES / 2]);
+        let across = columns * a;
+        let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
+        for (column, from_u) in self.from_u.iter_mut().enumerate() {
+            let u = across + u[column];
+            u.mul_sub(u, log2_opacity).store_slice(from_u);
+        }
+        let sheared = columns * b;
+        let rows = f32x16::simd_from(simd, LANE_Y);
+        let along = rows.mul_add(f32x16::splat(simd, c), sheared.combine(sheared));
+        along.store_slice(&mut self.along);
+        // How far the exponent may fall, with a margin for rounding.
+        let room = log2_opacity.mul_add(ROOM_FACTOR, most_fall * ROOM_FACTOR + 1e-3);
+        // The least |u| and |v| over a block's centres, each for itself: together they bound u^2 + v^2.
+        let least_u = (u.abs() - HALF * a.abs()).max(0.0);
+        let least_v = (v.abs() - HALF * (b.abs() + c.abs())).max(0.0);
+        let least_u = least_u * least_u;
+        let least = least_v.mul_add(least_v, least_u.combine(least_u));
+        least.simd_le(room.combine(room))
+    }
+}
+
+/// Of the `open` blocks of a tile, those that a Gaussian would be evaluated in if depths did not hide it.
+#[inline(always)]
+pub(super) fn hidden_blocks<S: Simd>(
+    simd: S,
+    splat: &Splat,
+    task: &Task<'_>,
+    open: mask32x16<S>,
+) -> u32 {
+    let bounded = task.skips.has(Skip::Blocks) && !splat.steep;
+    let reached = if bounded {
+        let most_fall = task.thresholds.most_fall;
+        open & Record::default().place(simd, splat, task.corner.map(f64::from), most_fall)
+    } else {
+        open
+    };
+    reached.to_bitmask().count_ones()
+}
