@@ -460,7 +460,8 @@ struct Workers<'a> {
 impl Workers<'_> {
     /// Does all jobs.
     fn run(&self, jobs: &[Job<'_>]) -> Vec<Projected> {
-        // Each thread makes its scratch once; a lock that nobody else asks for costs next to nothing.
+        // Each thread makes its scratch once. Nobody else asks for its lock, and no job waits for others, so that none is
+        // begun within another.
         let workers = (0..rayon::current_num_threads()).map(|_| Mutex::new(None));
         let workers: Vec<Mutex<Option<Worker>>> = workers.collect();
         let one = |job| {

@@ -84,18 +84,19 @@ impl Chunk {
                 while let Some(&primitive) = chunk.get(number) {
                     task.prefetch(next_chunk.get(number));
                     let splat = task.splat(primitive);
-                    if splat.steep {
-                        break;
-                    }
-                    let at = number % CHUNK;
-                    number += 1;
                     if DEPTH > NO_DEPTH && passing.hides(splat.depth) {
+                        number += 1;
                         placed.tiles_hidden += 1;
                         if is_recorded {
                             placed.blocks_of_hidden += hidden_blocks(simd, splat, task, open_mask);
                         }
                         continue;
                     }
+                    if splat.steep {
+                        break;
+                    }
+                    let at = number % CHUNK;
+                    number += 1;
                     let reached = self.records[at].place(simd, splat, corner, most_fall);
                     self.looks[at] = Look {
                         color: splat.color,

@@ -424,15 +424,16 @@ fn random_tests_agree_with_the_twin_at_every_level() {
 
 /// The counters of a draw in a tile whose stored depths are the same everywhere, and its work.
 fn hidden(coefficients: [f32; 2], compare: CompareOp, stored: f32) -> Counters {
-    hidden_work(coefficients, compare, [stored; 256], None)
+    hidden_work(coefficients, compare, [stored; 256], None, |_| {})
 }
 
-/// As [`hidden`], of any stored depths, for whoever records.
+/// As [`hidden`], of any stored depths, for whoever records, of a draw that is changed before.
 fn hidden_work(
     coefficients: [f32; 2],
     compare: CompareOp,
     stored: [f32; 256],
     recorder: Option<Arc<Recorder>>,
+    change: impl Fn(&mut GaussianDraw),
 ) -> Counters {
     let device = Device::new(&Config {
         recorder,
@@ -454,7 +455,7 @@ fn hidden_work(
         },
         ..defaults()
     };
-    let draw = draw_with_depth(
+    let mut draw = draw_with_depth(
         3,
         300,
         state,
@@ -462,6 +463,7 @@ fn hidden_work(
         WHOLE,
         Some((Format::D32Sfloat, coefficients)),
     );
+    change(&mut draw);
     if let Some((recorder, record)) = device.recorder().zip(draw.record.as_ref()) {
         recorder.add_draw(0, record);
     }
@@ -501,13 +503,36 @@ fn what_is_behind_a_whole_tile_is_not_even_fetched() {
 }
 
 #[test]
+fn steep_gaussians_behind_a_whole_tile_are_not_fetched_either() {
+    // The nearer ones fail, so that no list's end is hidden at once.
+    let hidden = |change: fn(&mut GaussianDraw)| {
+        let counters = hidden_work(FORWARD, CompareOp::Greater, [0.3; 256], None, change);
+        counters.get(Counter::GaussianTilesHidden)
+    };
+    let steep = hidden(|draw| {
+        let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
+        for splat in sorted.splats.iter_mut().flatten() {
+            splat.steep = true;
+        }
+    });
+    assert!(steep > 0);
+    assert_eq!(steep, hidden(|_| {}));
+}
+
+#[test]
 fn the_trace_tells_what_depths_hide() {
     let tile_of = |coefficients, compare, stored: [f32; 256]| {
         let recorder = Arc::new(Recorder::default());
-        let counters = hidden_work(coefficients, compare, stored, Some(Arc::clone(&recorder)));
+        let counters = hidden_work(
+            coefficients,
+            compare,
+            stored,
+            Some(Arc::clone(&recorder)),
+            |_| {},
+        );
         assert_eq!(
             counters,
-            hidden_work(coefficients, compare, stored, None),
+            hidden_work(coefficients, compare, stored, None, |_| {}),
             "recording changes no counter"
         );
         let tile = recorder.trace().frames[0].draws[0].tiles[0].clone();
