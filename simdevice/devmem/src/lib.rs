@@ -16,7 +16,7 @@ mod table;
 
 pub use gather::gather;
 pub use prefetch::prefetch;
-pub use table::{can_look_up, look_up};
+pub use table::{look_up, places};
 
 use bytemuck::{AnyBitPattern, NoUninit};
 use memmap2::{MmapOptions, MmapRaw};

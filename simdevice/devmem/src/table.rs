@@ -1,51 +1,77 @@
-//! Words from a small table that a register holds.
+//! Words from a small table that registers hold.
 
 use fearless_simd::{Level, Simd, prelude::*, u32x8, u32x16};
 
-/// Places of a table.
-const PLACES: usize = 8;
-
-/// Whether processors of a level look words up by an instruction.
+/// How many words a table may have for processors of a level to look them up by one instruction, if they can.
 #[inline(always)]
-pub fn can_look_up(level: Level) -> bool {
+pub fn places(level: Level) -> Option<usize> {
     #[cfg(target_arch = "x86_64")]
-    return level.as_avx2().is_some();
+    return match level.as_avx512() {
+        Some(_) => Some(32),
+        None => level.as_avx2().map(|_| 8),
+    };
     #[cfg(not(target_arch = "x86_64"))]
     {
         let _ = level;
-        false
+        None
     }
 }
 
-/// The words of a table at these places, modulo its length. It is quick where [`can_look_up`] says so.
+/// The words of a table at these places, modulo its length. It is quick where the length is what [`places`] says.
 #[inline(always)]
-pub fn look_up<S: Simd>(simd: S, table: &[u32; PLACES], places: u32x16<S>) -> u32x16<S> {
-    let (low, high) = places.split();
-    look_up_half(simd, table, low).combine(look_up_half(simd, table, high))
-}
-
-#[inline(always)]
-fn look_up_half<S: Simd>(simd: S, table: &[u32; PLACES], places: u32x8<S>) -> u32x8<S> {
-    let places: [u32; PLACES] = places.into();
+pub fn look_up<S: Simd, const PLACES: usize>(
+    simd: S,
+    table: &[u32; PLACES],
+    places: u32x16<S>,
+) -> u32x16<S> {
     #[cfg(target_arch = "x86_64")]
-    if let Some(avx2) = simd.level().as_avx2() {
-        let table = u32x8::simd_from(avx2, *table);
-        let places = u32x8::simd_from(avx2, places);
-        let found = u32x8::simd_from(avx2, permute(avx2, table.into(), places.into()));
-        return u32x8::simd_from(simd, <[u32; PLACES]>::from(found));
+    match (table.as_chunks::<16>().0, table.as_chunks::<8>().0) {
+        ([low, high], _) => {
+            if let Some(avx512) = simd.level().as_avx512() {
+                let vector = |words: [u32; 16]| u32x16::simd_from(avx512, words);
+                let of = vector(places.into());
+                let found =
+                    permute_32(avx512, vector(*low).into(), of.into(), vector(*high).into());
+                return u32x16::simd_from(
+                    simd,
+                    <[u32; 16]>::from(u32x16::simd_from(avx512, found)),
+                );
+            }
+        }
+        (_, [words]) => {
+            if let Some(avx2) = simd.level().as_avx2() {
+                let half = |places: u32x8<S>| {
+                    let places = u32x8::simd_from(avx2, <[u32; 8]>::from(places));
+                    let table = u32x8::simd_from(avx2, *words);
+                    let found = permute_8(avx2, table.into(), places.into());
+                    u32x8::simd_from(simd, <[u32; 8]>::from(u32x8::simd_from(avx2, found)))
+                };
+                let (low, high) = places.split();
+                return half(low).combine(half(high));
+            }
+        }
+        _ => {}
     }
-    let found = places.map(|place| table[place as usize % PLACES]);
-    u32x8::simd_from(simd, found)
+    let places: [u32; 16] = places.into();
+    u32x16::simd_from(simd, places.map(|place| table[place as usize % PLACES]))
 }
 
 #[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::{__m256i, _mm256_permutevar8x32_epi32};
+use std::arch::x86_64::{__m256i, __m512i, _mm256_permutevar8x32_epi32, _mm512_permutex2var_epi32};
 
 #[cfg(target_arch = "x86_64")]
 fearless_simd::kernel!(
     #[inline]
-    fn permute(avx2: Avx2, table: __m256i, places: __m256i) -> __m256i {
+    fn permute_8(avx2: Avx2, table: __m256i, places: __m256i) -> __m256i {
         _mm256_permutevar8x32_epi32(table, places)
+    }
+);
+
+#[cfg(target_arch = "x86_64")]
+fearless_simd::kernel!(
+    #[inline]
+    fn permute_32(avx512: Avx512, low: __m512i, places: __m512i, high: __m512i) -> __m512i {
+        _mm512_permutex2var_epi32(low, places, high)
     }
 );
 
@@ -56,14 +82,19 @@ mod tests {
 
     #[test]
     fn places_count_modulo_the_length() {
-        let table = [10, 11, 12, 13, 14, 15, 16, 17];
+        agrees(std::array::from_fn::<u32, 8, _>(|place| 10 + place as u32));
+        agrees(std::array::from_fn::<u32, 32, _>(|place| 7 * place as u32));
+        agrees([1, 2, 3]);
+    }
+
+    fn agrees<const PLACES: usize>(table: [u32; PLACES]) {
         let places = std::array::from_fn(|lane| 0xABCD_EF00 + 3 * lane as u32);
-        let expected = places.map(|place| table[place as usize % 8]);
+        let expected = places.map(|place| table[place as usize % PLACES]);
         for level in [Level::new(), Level::baseline()] {
             let found: [u32; 16] = dispatch!(level, simd => {
                 look_up(simd, &table, u32x16::simd_from(simd, places)).into()
             });
-            assert_eq!(found, expected, "{level:?}");
+            assert_eq!(found, expected, "{PLACES} words, {level:?}");
         }
     }
 }

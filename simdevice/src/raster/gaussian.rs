@@ -22,6 +22,7 @@ mod exp2;
 mod grid;
 mod half;
 mod layer;
+mod masks;
 mod passing;
 mod per_pixel;
 mod pixels;

@@ -5,6 +5,7 @@ use super::approximation::power;
 use super::chunk::{Chunk, Reaching, Record};
 use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS_ACROSS, LANE_X_64, LANE_Y_64};
 use super::layer::Layer;
+use super::masks::{Tally, only};
 use super::passing::Passing;
 use super::{
     BLOCKS, CHUNK, DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, LANES, NO_DEPTH, Task,
@@ -70,7 +71,7 @@ impl Alphas {
             #[inline(always)]
             || {
                 let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
-                let mut pixels = i32x16::splat(simd, 0);
+                let mut pixels = Tally::new(simd);
                 let mut items = self.alphas.iter_mut();
                 // Two blocks at a time, so that half as many loops end where nobody can foresee it.
                 for (pair, words) in reaching.as_chunks::<2>().0.iter().enumerate() {
@@ -83,14 +84,14 @@ impl Alphas {
                         let most_fall = f32x16::from_slice(simd, &most_fall[block]);
                         let at = (block, chunk.looks[number].depth);
                         let reached = reached::<_, DEPTH>(simd, at, fall, passing, most_fall);
-                        pixels -= reached.to_vector();
+                        pixels.add(reached);
                         let alpha = alpha::<_, DEPTH>(simd, reached, fall, ceiling);
                         if let Some(to) = items.next() {
                             alpha.store_slice(to);
                         }
                     }
                 }
-                sum(pixels)
+                pixels.total()
             },
         )
     }
@@ -121,13 +122,7 @@ fn alpha<S: Simd, const DEPTH: DepthMode>(
     fall: f32x16<S>,
     ceiling: f32x16<S>,
 ) -> f32x16<S> {
-    only(reached, power::<_, DEPTH>(simd, fall).min(ceiling))
-}
-
-/// The floats in the lanes of a mask, and zero in the others.
-#[inline(always)]
-fn only<S: Simd>(mask: mask32x16<S>, floats: f32x16<S>) -> f32x16<S> {
-    (floats.bitcast::<i32x16<S>>() & mask.to_vector()).bitcast()
+    only(simd, reached, power::<_, DEPTH>(simd, fall).min(ceiling))
 }
 
 impl Layer {
@@ -234,19 +229,18 @@ impl Layer {
         thresholds: Thresholds,
     ) -> u64 {
         let mut pixels = self.pixels(simd, block);
-        let mut refused = i32x16::splat(simd, 0);
+        let mut refused = Tally::new(simd);
         for alpha in alphas {
             let look = &chunk.looks[reaching.trailing_zeros() as usize % CHUNK];
             reaching &= reaching.wrapping_sub(1);
             let alpha = f32x16::from_slice(simd, alpha);
             let (to, look) = ((block, &mut pixels), (look.color, look.depth));
             let goes_on = self.composite::<_, DEPTH>(simd, to, alpha, look, thresholds);
-            let reached = alpha.simd_gt(0.0).to_vector();
-            refused += (reached & goes_on.to_vector()) - reached;
+            refused.add_without(alpha.simd_gt(0.0), goes_on);
         }
         self.keep(block, pixels);
         self.find_most_fall(simd, block, thresholds);
-        sum(refused)
+        refused.total()
     }
 
     /// Finds how far alphas may fall at a block's pixels.
@@ -358,7 +352,7 @@ impl Layer {
         // A finished pixel's transmittance is negative, and what is left of it fails like one below the floor.
         let goes_on = rest.simd_ge(f32x16::splat(simd, thresholds.transmittance_floor));
         pixels.transmittance = goes_on.select(rest, finished);
-        let weight = only(goes_on, weight);
+        let weight = only(simd, goes_on, weight);
         if DEPTH >= FIND_MEDIAN {
             let median = u32x16::from_slice(simd, &self.median[block]);
             let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
@@ -396,14 +390,6 @@ impl<S: Simd> Pixels<S> {
         self.green = weight.mul_add(f32x16::splat(simd, green), self.green);
         self.blue = weight.mul_add(f32x16::splat(simd, blue), self.blue);
     }
-}
-
-/// The sum of counts.
-#[inline(always)]
-fn sum<S: Simd>(counts: i32x16<S>) -> u64 {
-    let counts = counts.to_array();
-    let counts = counts.iter().map(|&count| u64::from(count.unsigned_abs()));
-    counts.sum()
 }
 
 impl Record {

@@ -4,7 +4,9 @@ mod per_pixel;
 mod streamed;
 mod whole_draws;
 
-use super::exp2::{CUBIC, EIGHTHS, GROWTH, POWER_OF_TWO, QUADRATIC, exp2_of_negated};
+use super::exp2::{
+    CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
+};
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;
@@ -36,10 +38,10 @@ fn powers_of_two_are_within_their_bound_at_every_level() {
             }
             x += 16.0 / 1024.0;
         }
-        let bound = if devmem::can_look_up(level) {
-            1.35
-        } else {
-            2.1
+        let bound = match devmem::places(level) {
+            Some(32) => 1.95,
+            Some(_) => 1.35,
+            None => 2.1,
         };
         assert!(worst <= bound, "{name}: {worst} ulp");
     }
@@ -151,9 +153,9 @@ fn naive_pixel(
     tile: [u32; 2],
     x: usize,
     y: usize,
-    fused: bool,
+    level: Level,
 ) -> Option<[f32; 4]> {
-    naive_sample(draw, tile, [x, y], fused, |_| true).fragment
+    naive_sample(draw, tile, [x, y], level, |_| true).fragment
 }
 
 /// What a twin's sample is.
@@ -165,15 +167,30 @@ struct Naive {
     median: u32,
 }
 
+/// 2 to the power of `x`, by a table.
+fn by_table<const PLACES: usize, const TERMS: usize>(x: f32, table: &Table<PLACES, TERMS>) -> f32 {
+    let shifter = 12_582_912.0 / PLACES as f32;
+    let shifted = x + shifter;
+    let f = x - (shifted - shifter);
+    let parts = shifted.to_bits();
+    let word = table.words[parts as usize % PLACES];
+    let power = f32::from_bits(word.wrapping_add(parts << (23 - PLACES.ilog2())));
+    let growth = (table.growth.iter()).fold(0.0f32, |p, &c| p.mul_add(f, c));
+    (power * f).mul_add(growth, power)
+}
+
 /// As [`naive_pixel`], of the Gaussians whose depth passes.
 fn naive_sample(
     draw: &GaussianDraw,
     tile: [u32; 2],
     [x, y]: [usize; 2],
-    fused: bool,
+    level: Level,
     passes: impl Fn(u32) -> bool,
 ) -> Naive {
     let mut out = Naive::default();
+    let places = devmem::places(level);
+    // Levels that look words up fuse operations.
+    let fused = places.is_some();
     let mul_add = |a: f32, b: f32, c: f32| if fused { a.mul_add(b, c) } else { a * b + c };
     let allowed = draw.state.approximation.exponential_error;
     let polynomial: &[f32] = if allowed >= QUADRATIC.error {
@@ -183,17 +200,12 @@ fn naive_sample(
     } else {
         &POWER_OF_TWO
     };
-    // Levels with fused operations look words up there.
-    let by_table = fused && cfg!(target_arch = "x86_64") && polynomial == POWER_OF_TWO;
+    let exact = polynomial == POWER_OF_TWO;
     let power = |x: f32| {
-        if by_table {
-            let shifted = x + 1_572_864.0;
-            let f = x - (shifted - 1_572_864.0);
-            let eighths = shifted.to_bits();
-            let word = EIGHTHS[eighths as usize % EIGHTHS.len()];
-            let power = f32::from_bits(word.wrapping_add(eighths << 20));
-            let growth = GROWTH.iter().fold(0.0, |p, &c| mul_add(p, f, c));
-            return mul_add(power * f, growth, power);
+        match places {
+            Some(32) if exact => return by_table(x, &THIRTY_SECONDS),
+            Some(_) if exact => return by_table(x, &EIGHTHS),
+            _ => {}
         }
         let n = (x + 12_582_912.0) - 12_582_912.0;
         let f = x - n;
@@ -299,7 +311,6 @@ fn check_changed(
             ..Config::default()
         })
         .unwrap();
-        let fused = matches!(simd, SimdLevel::Avx2 | SimdLevel::Avx512);
         let mut draw = draw(seed, count, state.clone(), &device, bounds);
         change(&mut draw);
         let mut tile = Box::new(GaussianTile::default());
@@ -321,7 +332,7 @@ fn check_changed(
                     height: 1,
                 };
                 let inside = !inside.intersect(bounds).is_empty();
-                let expected = naive_pixel(&draw, at, x, y, fused).filter(|_| inside);
+                let expected = naive_pixel(&draw, at, x, y, device.level()).filter(|_| inside);
                 let got = tile.pixel(x, y).filter(|_| any);
                 assert_eq!(got, expected, "{name}, seed {seed}, pixel {pixel:?}");
                 covered += u32::from(got.is_some());

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::judge::{Error, Judge, PictureFile};
 use super::machine::Machine;
 use super::output::{self, Rows, mebibytes, number};
-use super::roofline::Roofline;
+use super::roofline::{Roofline, evaluations};
 use super::worker::{Contender, Drawn, Ready, Worker};
 use super::{BenchError, CONTENDERS, FramesArguments, Source, Workload, median};
 
@@ -168,9 +168,10 @@ fn show(results: &Results) -> std::io::Result<()> {
     writeln!(out, "{}", results.machine.line())?;
     writeln!(
         out,
-        "tile kernel in L1, one thread: {:.1} M pairs/s (one block each), {:.0} M pixel evaluations/s",
+        "one thread: tile kernel in L1 {:.1} M pairs/s (one block each), {:.0} M pixel evaluations/s; {:.1} GFLOP/s fused",
         results.roofline.pairs * 1e-6,
-        results.roofline.pixels * 1e-6
+        results.roofline.pixels * 1e-6,
+        results.roofline.operations * 1e-9
     )?;
     for scene in &results.scenes {
         let [width, height] = scene.workload.size;
@@ -179,13 +180,14 @@ fn show(results: &Results) -> std::io::Result<()> {
             "\n{}: {} Gaussians, {width}x{height}; medians, ms",
             scene.scene, scene.gaussians
         )?;
-        writeln!(out, "{}", summary(scene, results.roofline).table())?;
+        writeln!(out, "{}", summary(scene).table())?;
         writeln!(out, "{}", stages(scene).table())?;
+        writeln!(out, "{}", rasterization(scene, results.roofline).table())?;
     }
     Ok(())
 }
 
-fn summary(scene: &SceneResults, roofline: Roofline) -> Rows {
+fn summary(scene: &SceneResults) -> Rows {
     let mut rows = Rows::new(&[
         "contender",
         "threads",
@@ -199,7 +201,6 @@ fn summary(scene: &SceneResults, roofline: Roofline) -> Rows {
         "PSNR",
         "FLIP",
         "peak MiB",
-        "of L1 roof",
     ]);
     for series in &scene.series {
         // Beside this driver's Gaussians on as many threads.
@@ -216,10 +217,6 @@ fn summary(scene: &SceneResults, roofline: Roofline) -> Rows {
                 .as_ref()
                 .map_or("-".to_owned(), |error| number(figure(error)))
         };
-        let share = (series.contender == Contender::Gaurast).then(|| {
-            let frames = series.frames.iter();
-            100.0 * median(frames.map(|frame| roofline.share(frame, series.threads)))
-        });
         rows.rows.push(vec![
             series.contender.name().to_owned(),
             series.threads.to_string(),
@@ -233,7 +230,6 @@ fn summary(scene: &SceneResults, roofline: Roofline) -> Rows {
             error(&|error| error.psnr),
             error(&|error| error.flip),
             mebibytes(series.memory()),
-            share.map_or("-".to_owned(), |share| format!("{share:.0} %")),
         ]);
     }
     rows
@@ -256,6 +252,40 @@ fn stages(scene: &SceneResults) -> Rows {
                 )),
             ]);
         }
+    }
+    rows
+}
+
+/// What this driver's rasterization does: evaluations of a Gaussian at a pixel, those that contribute (useful), how many of
+/// these there are in a second of rasterization, and what share of the roofs that is.
+fn rasterization(scene: &SceneResults, roofline: Roofline) -> Rows {
+    let mut rows = Rows::new(&[
+        "threads",
+        "tile pairs M",
+        "evaluated M",
+        "useful M",
+        "useful M/s",
+        "evaluated/useful",
+        "of L1 roof",
+        "of FMA peak",
+    ]);
+    let own = (scene.series.iter()).filter(|series| series.contender == Contender::Gaurast);
+    for series in own {
+        let of = |figure: &dyn Fn(&Drawn) -> f64| median(series.frames.iter().map(figure));
+        let useful = |frame: &Drawn| frame.counter("pixel contributions");
+        let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+        rows.rows.push(vec![
+            series.threads.to_string(),
+            number(of(&|frame| frame.counter("tile pairs evaluated") * 1e-6)),
+            number(of(&|frame| evaluations(frame) * 1e-6)),
+            number(of(&|frame| useful(frame) * 1e-6)),
+            number(of(&|frame| useful(frame) * 1e-3 / frame.counter("raster"))),
+            number(of(&|frame| evaluations(frame) / useful(frame))),
+            percent(of(&|frame| roofline.share(frame, series.threads))),
+            percent(of(&|frame| {
+                roofline.share_of_operations(frame, series.threads)
+            })),
+        ]);
     }
     rows
 }

@@ -12,9 +12,6 @@ use super::BenchError;
 /// Seed of everything that is generated.
 const SEED: u64 = 1;
 
-/// Gaussians of [`Source::Tile`]: with what the kernel needs of them, they stay in a first-level cache.
-pub const TILE_GAUSSIANS: usize = 512;
-
 /// Where Gaussians and cameras come from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Source {
@@ -44,6 +41,8 @@ pub enum Source {
     Tile {
         /// Whether they cover all of it.
         whole: bool,
+        /// The number of Gaussians.
+        count: usize,
     },
     /// A wall around the benchmark's middle, which nothing shines through.
     Wall,
@@ -101,7 +100,7 @@ impl Workload {
                 Scene::captured(SEED, *count, &self.source.cameras(self.size)?)
             }
             Source::File { path } => Scene::load(path)?,
-            Source::Tile { whole } => tile(*whole),
+            Source::Tile { whole, count } => tile(*whole, *count),
             Source::Wall => wall(),
         };
         let mut scene = scene.scaled(self.scale).partly_away(self.away);
@@ -189,8 +188,8 @@ impl fmt::Display for Source {
             }
             Self::File { path } => write!(f, "{}", stem(path)),
             Self::Wall => write!(f, "wall"),
-            Self::Tile { whole: true } => write!(f, "tile, covered"),
-            Self::Tile { whole: false } => write!(f, "tile, dust"),
+            Self::Tile { whole: true, .. } => write!(f, "tile, covered"),
+            Self::Tile { whole: false, .. } => write!(f, "tile, dust"),
         }
     }
 }
@@ -223,9 +222,9 @@ fn distance_to(scene: &Scene, camera: &Camera) -> f64 {
 }
 
 /// Gaussians of one tile, too faint to saturate it.
-fn tile(whole: bool) -> Scene {
-    let mut scene = Scene::with_capacity(0, TILE_GAUSSIANS);
-    for index in 0..TILE_GAUSSIANS {
+fn tile(whole: bool, count: usize) -> Scene {
+    let mut scene = Scene::with_capacity(0, count);
+    for index in 0..count {
         let cell = |i: usize| (i % 16) as f32 - 7.5;
         let (scale, opacity) = if whole { (40.0, 0.009) } else { (0.01, 0.05) };
         let shape = Shape {

@@ -218,7 +218,7 @@ impl Scene {
     }
 
     /// Each sample for itself.
-    fn naive(&self, draw: &GaussianDraw, fused: bool) -> Picture {
+    fn naive(&self, draw: &GaussianDraw, level: Level) -> Picture {
         let mut picture = self.before.clone();
         let state = &self.state;
         let blender = Blender::new(&state.blend[0], state.blend_constants, self.color);
@@ -258,7 +258,7 @@ impl Scene {
             });
             let tile = [x / 16, y / 16];
             let inside = [x % 16, y % 16].map(|at| at as usize);
-            let found = naive_sample(draw, tile, inside, fused, |depth| {
+            let found = naive_sample(draw, tile, inside, level, |depth| {
                 stencil_passes
                     && tests
                         .depth
@@ -399,8 +399,7 @@ fn random_tests_agree_with_the_twin_at_every_level() {
                 ..Config::default()
             })
             .unwrap();
-            let fused = matches!(simd, SimdLevel::Avx2 | SimdLevel::Avx512);
-            let expected = scene.naive(&scene.draw(&device), fused);
+            let expected = scene.naive(&scene.draw(&device), device.level());
             let found = scene.render(&device);
             for at in 0..expected.depth.len() {
                 let of = |p: &Picture| (p.color[at], p.depth[at], p.stencil[at]);
