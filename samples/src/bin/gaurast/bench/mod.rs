@@ -146,6 +146,16 @@ struct ParetoArguments {
     /// Leaves out settings of other names; "as meant" compares with the peers alone
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
+
+    /// Leaves out a contender: "quads on gaurast", say, which takes most of the time
+    #[arg(long, value_name = "NAME", value_parser = contender)]
+    without: Vec<Contender>,
+}
+
+/// The contender of a name.
+fn contender(name: &str) -> Result<Contender, String> {
+    let found = CONTENDERS.into_iter().find(|one| one.name() == name);
+    found.ok_or_else(|| format!("it is one of {:?}", CONTENDERS.map(Contender::name)))
 }
 
 /// Runs what was asked for.

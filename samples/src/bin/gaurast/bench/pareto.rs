@@ -109,7 +109,7 @@ struct Results {
 
 /// Runs the sweep.
 pub(super) fn run(arguments: &ParetoArguments) -> Result<(), BenchError> {
-    let (arguments, variants) = (&arguments.sweep, variants(&arguments.only)?);
+    let (arguments, variants) = (&arguments.sweep, variants(arguments)?);
     let mut results = Results {
         machine: Machine::this(),
         threads: arguments.threads,
@@ -173,8 +173,9 @@ fn workloads(arguments: &SweepArguments) -> Vec<Workload> {
         .collect()
 }
 
-/// Everything that is compared, or those of it that have one of some names.
-fn variants(only: &[String]) -> Result<Vec<Variant>, BenchError> {
+/// Everything that is compared, or what was asked for of it.
+fn variants(arguments: &ParetoArguments) -> Result<Vec<Variant>, BenchError> {
+    let (only, without) = (&arguments.only, &arguments.without);
     let all = all_variants();
     if let Some(name) = only
         .iter()
@@ -182,7 +183,9 @@ fn variants(only: &[String]) -> Result<Vec<Variant>, BenchError> {
     {
         return Err(BenchError::NoSuchSetting(name.clone()));
     }
-    let wanted = |variant: &Variant| only.is_empty() || only.contains(&variant.name);
+    let wanted = |variant: &Variant| {
+        (only.is_empty() || only.contains(&variant.name)) && !without.contains(&variant.contender)
+    };
     Ok(all.into_iter().filter(wanted).collect())
 }
 
@@ -319,7 +322,10 @@ fn measure(
         (Judge::new(&scene), views, depths, scene.len())
     };
     let mut workers = Vec::new();
-    for contender in CONTENDERS {
+    let contenders = CONTENDERS
+        .into_iter()
+        .filter(|&contender| variants.iter().any(|one| one.contender == contender));
+    for contender in contenders {
         if let Some(worker) = Worker::start(contender, &workload, threads)? {
             workers.push((contender, worker));
         } else {
