@@ -11,13 +11,12 @@ use gaurast_samples::renderer::Settings;
 
 use super::BenchError;
 use super::worker::{Contender, Drawn, Worker};
-use super::workload::{Source, Workload};
+use super::workload::{Source, TILE_GAUSSIANS, Workload};
 
-/// Gaussians of a tile: with what the kernel needs of them, they stay in a first-level cache. The rates are those of what
-/// the larger has more, so that what a frame takes beside its Gaussians does not count.
-const TILE_GAUSSIANS: [usize; 2] = [64, 512];
+/// Tiles of a frame. Rates are those of what the larger has more, so that what a frame takes beside does not count.
+const TILES: [usize; 2] = [4, 20];
 
-/// Frames of a tile; the fastest counts.
+/// Frames; the fastest counts.
 const FRAMES: usize = 300;
 
 /// Pixels of a block that is evaluated at once.
@@ -42,10 +41,10 @@ pub struct Roofline {
 impl Roofline {
     /// Measures tiles of one thread.
     pub fn measure() -> Result<Self, BenchError> {
-        let [few, many] = TILE_GAUSSIANS;
+        let [few, many] = TILES;
         let rate = |whole| -> Result<f64, BenchError> {
             let time = fastest(whole, many)? - fastest(whole, few)?;
-            Ok((many - few) as f64 / time.max(1e-9))
+            Ok(((many - few) * TILE_GAUSSIANS) as f64 / time.max(1e-9))
         };
         Ok(Self {
             pairs: rate(false)?,
@@ -115,9 +114,9 @@ fn multiply_and_add<S: Simd>(simd: S) -> f64 {
     )
 }
 
-/// The least seconds that a tile of `count` Gaussians took.
-fn fastest(whole: bool, count: usize) -> Result<f64, BenchError> {
-    let workload = Workload::new(Source::Tile { whole, count }, [16, 16]);
+/// The least seconds that some tiles took.
+fn fastest(whole: bool, tiles: usize) -> Result<f64, BenchError> {
+    let workload = Workload::new(Source::Tiles { whole, tiles }, [16 * tiles as u32, 16]);
     let views = workload.views(&workload.scene()?, 1)?;
     let mut worker = Worker::start(Contender::Gaurast, &workload, 1)?
         .ok_or(BenchError::Worker("it is not there".to_owned()))?;

@@ -12,6 +12,9 @@ use super::BenchError;
 /// Seed of everything that is generated.
 const SEED: u64 = 1;
 
+/// Gaussians that reach a tile of [`Source::Tiles`]: with what the kernel needs of them, they stay in a first-level cache.
+pub const TILE_GAUSSIANS: usize = 512;
+
 /// Where Gaussians and cameras come from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Source {
@@ -37,12 +40,12 @@ pub enum Source {
         /// The scene file.
         path: PathBuf,
     },
-    /// One tile full of Gaussians that cover all of it, or a pixel of it each.
-    Tile {
-        /// Whether they cover all of it.
+    /// Tiles full of Gaussians that cover all of them, or a block of one each.
+    Tiles {
+        /// Whether they cover all of them.
         whole: bool,
-        /// The number of Gaussians.
-        count: usize,
+        /// The number of tiles, side by side.
+        tiles: usize,
     },
     /// A wall around the benchmark's middle, which nothing shines through.
     Wall,
@@ -100,7 +103,10 @@ impl Workload {
                 Scene::captured(SEED, *count, &self.source.cameras(self.size)?)
             }
             Source::File { path } => Scene::load(path)?,
-            Source::Tile { whole, count } => tile(*whole, *count),
+            Source::Tiles {
+                whole,
+                tiles: count,
+            } => tiles(*whole, *count),
             Source::Wall => wall(),
         };
         let mut scene = scene.scaled(self.scale).partly_away(self.away);
@@ -146,7 +152,7 @@ impl Workload {
                 });
                 around(camera, pivot)
             }
-            Source::Tile { .. } => vec![tile_camera(); count],
+            Source::Tiles { .. } => vec![tiles_camera(self.size); count],
         })
     }
 }
@@ -188,8 +194,8 @@ impl fmt::Display for Source {
             }
             Self::File { path } => write!(f, "{}", stem(path)),
             Self::Wall => write!(f, "wall"),
-            Self::Tile { whole: true, .. } => write!(f, "tile, covered"),
-            Self::Tile { whole: false, .. } => write!(f, "tile, dust"),
+            Self::Tiles { whole: true, .. } => write!(f, "tiles, covered"),
+            Self::Tiles { whole: false, .. } => write!(f, "tiles, dust"),
         }
     }
 }
@@ -221,19 +227,28 @@ fn distance_to(scene: &Scene, camera: &Camera) -> f64 {
     depths.get(depths.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Gaussians of one tile, too faint to saturate it.
-fn tile(whole: bool, count: usize) -> Scene {
-    let mut scene = Scene::with_capacity(0, count);
-    for index in 0..count {
-        let cell = |i: usize| (i % 16) as f32 - 7.5;
-        let (scale, opacity) = if whole { (40.0, 0.009) } else { (0.01, 0.05) };
+/// Tiles in a row, each with as many Gaussians, too faint to saturate it.
+fn tiles(whole: bool, tiles: usize) -> Scene {
+    let copies = if whole { 1 } else { tiles };
+    let mut scene = Scene::with_capacity(0, TILE_GAUSSIANS * copies);
+    for index in 0..TILE_GAUSSIANS {
+        // In the middle of a block, so that dust reaches no other.
+        let block = |i: usize| (4 * (i % 4)) as f32 - 6.0;
+        let (scale, opacity) = if whole {
+            (40.0 * tiles as f32, 0.009)
+        } else {
+            (0.01, 0.05)
+        };
         let shape = Shape {
             scale: [scale; 3],
             rotation: [1.0, 0.0, 0.0, 0.0],
             opacity,
         };
         let depth = 100.0 + 0.001 * index as f32;
-        scene.push([cell(index), cell(index / 16), depth], shape, &[[0.5; 3]]);
+        for tile in 0..copies {
+            let x = block(index) + (16 * tile) as f32;
+            scene.push([x, block(index / 4), depth], shape, &[[0.5; 3]]);
+        }
     }
     scene
 }
@@ -267,14 +282,14 @@ fn wall() -> Scene {
 }
 
 /// A pixel a unit at a distance of 100.
-fn tile_camera() -> Camera {
+fn tiles_camera([width, height]: [u32; 2]) -> Camera {
     Camera {
         model: Model::Pinhole,
         rotation: [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
         eye: [0.0; 3],
         focal: [100.0; 2],
         principal: [8.0; 2],
-        width: 16,
-        height: 16,
+        width,
+        height,
     }
 }
