@@ -5,6 +5,7 @@ mod growth;
 mod judge;
 mod machine;
 mod output;
+mod pair;
 mod pareto;
 mod plot;
 mod roofline;

@@ -3,13 +3,13 @@
 use std::io::{Write, stdout};
 
 use gaurast_samples::camera::Camera;
-use gaurast_samples::renderer::Settings;
 use serde::Serialize;
 
 use super::machine::Machine;
 use super::output::{self, Rows, number};
-use super::worker::{Contender, Drawn, SKIPS, Worker};
-use super::{BenchError, Extra, Source, SweepArguments, Workload, median};
+use super::pair::{Draws, Pair, time};
+use super::worker::SKIPS;
+use super::{BenchError, Extra, Source, SweepArguments, Workload};
 
 /// Skips of Gaussian draws, and the counter of each, as the device has them.
 const COUNTERS: [(&str, &str); 11] = [
@@ -52,16 +52,27 @@ impl Path {
         }
     }
 
-    /// The view of a frame, of a workload's.
-    fn view(self, views: &[Camera], frame: usize) -> Camera {
-        let mut view = views[if self == Self::Own { frame } else { 0 }].clone();
-        if self == Self::Sliding {
-            let distance = view.eye.iter().map(|part| part * part).sum::<f64>().sqrt();
-            for (eye, right) in view.eye.iter_mut().zip(view.rotation[0]) {
-                *eye += 0.01 * distance * frame as f64 * right;
+    /// The views of so many frames.
+    fn views(self, workload: &Workload, frames: usize) -> Result<Vec<Camera>, BenchError> {
+        let own = workload.views(&workload.scene()?, frames)?;
+        let view = |frame: usize| {
+            let mut view = own[if self == Self::Own { frame } else { 0 }].clone();
+            if self == Self::Sliding {
+                let distance = view.eye.iter().map(|part| part * part).sum::<f64>().sqrt();
+                for (eye, right) in view.eye.iter_mut().zip(view.rotation[0]) {
+                    *eye += 0.01 * distance * frame as f64 * right;
+                }
             }
+            view
+        };
+        Ok((0..frames).map(view).collect())
+    }
+
+    fn draws(self) -> Draws {
+        match self {
+            Self::Own => Draws::Again(DRAWS),
+            Self::Still | Self::Sliding => Draws::Once,
         }
-        view
     }
 }
 
@@ -89,6 +100,8 @@ struct Saved {
     with: f64,
     /// Milliseconds of a frame with this one off, too.
     without: f64,
+    /// Percent of the latter that it saves: the lower quartile of views, the median and the upper quartile.
+    share: [f64; 3],
 }
 
 /// What Gaussians cost that nobody sees.
@@ -100,16 +113,23 @@ struct Unseen {
     /// Milliseconds of a frame with them, and without.
     with: f64,
     without: f64,
+    /// Nanoseconds of each in a frame: the lower quartile of views, the median and the upper quartile.
+    each: [f64; 3],
+    /// Of these, what preprocessing takes, which varies less than a frame.
+    to_preprocess: [f64; 3],
     /// Milliseconds to build chunks, once.
     chunks: f64,
 }
 
-impl Unseen {
-    /// Nanoseconds of each in a frame.
-    fn each(&self) -> f64 {
-        (self.with - self.without) * 1e6 / self.count as f64
-    }
-}
+/// How many times as many Gaussians are unseen as there are in the scene: what one costs is far less than what a frame's time
+/// varies by.
+const UNSEEN: usize = 10;
+
+/// How many times as many views their cost is found from as what a skip saves.
+const UNSEEN_RUNS: usize = 2;
+
+/// How often views are drawn.
+const DRAWS: usize = 3;
 
 /// Runs the comparison.
 pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
@@ -130,7 +150,7 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
         ..base.clone()
     };
     let wall = Workload::new(Source::Wall, SIZE);
-    let hidden = Workload {
+    let behind = |count| Workload {
         extra: Some(Extra::Behind { count }),
         ..wall.clone()
     };
@@ -143,9 +163,9 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
         (format!("{}, plain colours", base.source), plain),
         (
             format!("{}, as many beside the screen", base.source),
-            with(Extra::Beside),
+            with(Extra::Beside { count }),
         ),
-        (format!("{count} behind a wall"), hidden.clone()),
+        (format!("{count} behind a wall"), behind(count)),
     ];
     for (name, workload) in scenes {
         results
@@ -157,9 +177,11 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
         let saved = saved_by(skip, &name, &base, arguments.threads, runs)?;
         results.skips.push(saved);
     }
+    let (count, runs) = (UNSEEN * count, UNSEEN_RUNS * runs);
+    let beside = with(Extra::Beside { count });
     let pairs = [
-        ("off the screen", with(Extra::Beside), base),
-        ("behind a wall", hidden, wall),
+        ("off the screen", beside, base),
+        ("behind a wall", behind(count), wall.clone()),
     ];
     for (kind, with, without) in pairs {
         let unseen = unseen(kind, count, [&with, &without], arguments.threads, runs)?;
@@ -173,56 +195,15 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
         unseen_rows(&results).table()
     );
     let folder = &arguments.output;
-    let about = format!(
-        "{line}; {} threads, medians of {} frames; processor time",
-        results.threads, results.runs
-    );
-    output::write(&folder.join("skips.csv"), &skip_rows(&results).csv(&about))?;
-    output::write(
-        &folder.join("unseen.csv"),
-        &unseen_rows(&results).csv(&about),
-    )?;
+    let about = |views: usize| {
+        let threads = results.threads;
+        format!("{line}; {threads} threads, medians of {views} views; processor time")
+    };
+    let skips = skip_rows(&results).csv(&about(results.runs));
+    output::write(&folder.join("skips.csv"), &skips)?;
+    let unseen = unseen_rows(&results).csv(&about(runs));
+    output::write(&folder.join("unseen.csv"), &unseen)?;
     output::write_json(&folder.join("skips.json"), &results)
-}
-
-/// Frames of workers that take turns; the first, cold frame of each comes first.
-fn frames(
-    workers: &mut [(Workload, Worker)],
-    runs: usize,
-    path: Path,
-) -> Result<Vec<Vec<Drawn>>, BenchError> {
-    let mut frames: Vec<Vec<Drawn>> = workers.iter().map(|_| Vec::new()).collect();
-    let mut views = Vec::new();
-    for (workload, _) in workers.iter() {
-        views.push(workload.views(&workload.scene()?, runs + 1)?);
-    }
-    for run in 0..=runs {
-        let of_workers = workers.iter_mut().zip(&views).zip(&mut frames);
-        for (((_, worker), views), frames) in of_workers {
-            let view = path.view(views, run);
-            frames.push(match path {
-                Path::Own => worker.draw(&view, Settings::default(), None)?,
-                Path::Still | Path::Sliding => worker.draw_next(&view)?,
-            });
-        }
-    }
-    Ok(frames)
-}
-
-fn start(
-    workload: &Workload,
-    threads: usize,
-    skips: &str,
-) -> Result<(Workload, Worker), BenchError> {
-    let worker = Worker::with_skips(Contender::Gaurast, workload, threads, skips)?;
-    let worker = worker.ok_or_else(|| BenchError::Worker("this driver is not there".to_owned()))?;
-    Ok((workload.clone(), worker))
-}
-
-/// Processor time of a warm frame, or its wall time where the system does not tell.
-fn time(frames: &[Drawn]) -> f64 {
-    let warm = frames.iter().skip(1);
-    median(warm.map(|frame| frame.processor.unwrap_or(frame.wall)))
 }
 
 /// What each skip saves while the camera moves.
@@ -255,17 +236,22 @@ fn saved_by(
         Path::Own => [SKIPS.to_owned(), format!("{SKIPS},-{skip}")],
         Path::Still | Path::Sliding => [SKIPS.replace(&format!(",-{skip}"), ""), SKIPS.to_owned()],
     };
-    let mut workers = [
-        start(workload, threads, &with)?,
-        start(workload, threads, &without)?,
-    ];
-    let frames = frames(&mut workers, runs, path)?;
+    let setups = [(workload, &*with), (workload, &*without)];
+    let pair = Pair::draw(
+        setups,
+        threads,
+        &path.views(workload, runs + 1)?,
+        path.draws(),
+    )?;
+    let [with, without] = pair.medians(time);
+    let [counted, _] = pair.medians(|frame| frame.counter(counter));
     Ok(Saved {
         scene: scene.to_owned(),
         skip,
-        counter: median(frames[0][1..].iter().map(|frame| frame.counter(counter))),
-        with: time(&frames[0]),
-        without: time(&frames[1]),
+        counter: counted,
+        with,
+        without,
+        share: pair.quartiles(time, |with, without| 100.0 * (1.0 - with / without)),
     })
 }
 
@@ -276,20 +262,28 @@ fn unseen(
     threads: usize,
     runs: usize,
 ) -> Result<Unseen, BenchError> {
-    let [with, without] = workloads;
-    let mut workers = [
-        start(with, threads, SKIPS)?,
-        start(without, threads, SKIPS)?,
-    ];
-    let frames = frames(&mut workers, runs, Path::Own)?;
-    let chunks = frames[0].iter().map(|frame| frame.counter("chunks"));
+    let views = Path::Own.views(workloads[1], runs + 1)?;
+    let setups = workloads.map(|workload| (workload, SKIPS));
+    let pair = Pair::draw(setups, threads, &views, Draws::Again(DRAWS))?;
+    let each = |with: f64, without: f64| (with - without) * 1e6 / count as f64;
+    let [with, without] = pair.medians(time);
     Ok(Unseen {
         kind,
         count,
-        with: time(&frames[0]),
-        without: time(&frames[1]),
-        chunks: chunks.fold(0.0, f64::max),
+        with,
+        without,
+        each: pair.quartiles(time, each),
+        to_preprocess: pair.quartiles(|frame| frame.counter("preprocess"), each),
+        chunks: pair.most(|frame| frame.counter("chunks")),
     })
+}
+
+fn middle([_, median, _]: [f64; 3]) -> String {
+    format!("{median:.2}")
+}
+
+fn spread([lower, _, upper]: [f64; 3]) -> String {
+    format!("{lower:.2} to {upper:.2}")
 }
 
 fn skip_rows(results: &Results) -> Rows {
@@ -300,6 +294,7 @@ fn skip_rows(results: &Results) -> Rows {
         "ms with",
         "ms without",
         "saved %",
+        "quartiles",
     ]);
     for saved in &results.skips {
         rows.rows.push(vec![
@@ -308,7 +303,8 @@ fn skip_rows(results: &Results) -> Rows {
             number(saved.counter),
             number(saved.with),
             number(saved.without),
-            format!("{:.1}", 100.0 * (1.0 - saved.with / saved.without)),
+            middle(saved.share),
+            spread(saved.share),
         ]);
     }
     rows
@@ -321,6 +317,9 @@ fn unseen_rows(results: &Results) -> Rows {
         "ms with",
         "ms without",
         "ns each",
+        "quartiles",
+        "to preprocess",
+        "their quartiles",
         "ms for chunks, once",
     ]);
     for unseen in &results.unseen {
@@ -329,7 +328,10 @@ fn unseen_rows(results: &Results) -> Rows {
             unseen.count.to_string(),
             number(unseen.with),
             number(unseen.without),
-            number(unseen.each()),
+            middle(unseen.each),
+            spread(unseen.each),
+            middle(unseen.to_preprocess),
+            spread(unseen.to_preprocess),
             number(unseen.chunks),
         ]);
     }

@@ -54,8 +54,11 @@ pub enum Source {
 /// Gaussians that are added, and that nobody sees.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Extra {
-    /// The scene again, beside the screen.
-    Beside,
+    /// A benchmark scene beside the screen.
+    Beside {
+        /// The number of Gaussians.
+        count: usize,
+    },
     /// A smaller benchmark scene behind the wall.
     Behind {
         /// The number of Gaussians.
@@ -115,7 +118,9 @@ impl Workload {
         }
         let unseen = match self.extra {
             None => return Ok(scene),
-            Some(Extra::Beside) => scene.clone().moved(|[x, y, z]| [x, y + 30.0, z]),
+            Some(Extra::Beside { count }) => {
+                Scene::benchmark(SEED, count).moved(|[x, y, z]| [x, y + 30.0, z])
+            }
             Some(Extra::Behind { count }) => {
                 Scene::benchmark(SEED, count).moved(|position| position.map(|at| 0.5 * at))
             }

@@ -1,0 +1,149 @@
+//! Two workers that draw the same views in turns. What differs between them is told view by view, by the quickest of several
+//! draws: what else the machine does only ever adds, and views differ by more than what is asked for. It is told twice, by
+//! processes that are started in one order and in the other: by what memory they are given, the first of two that do the same
+//! may take a tenth longer for all their lives.
+
+use gaurast_samples::camera::Camera;
+use gaurast_samples::renderer::Settings;
+
+use super::worker::{Contender, Drawn, Worker};
+use super::{BenchError, Workload, median};
+
+/// How views are drawn.
+#[derive(Clone, Copy, Debug)]
+pub enum Draws {
+    /// So many times each.
+    Again(usize),
+    /// Once each, since the time of a frame depends on the one before.
+    Once,
+}
+
+/// What both workers drew.
+pub struct Pair {
+    /// By worker, view, round and draw.
+    draws: [Vec<[Vec<Drawn>; 2]>; 2],
+}
+
+impl Pair {
+    /// Draws `views` by two workers, each with a workload and with what the driver leaves out. The first view is only there to
+    /// warm up.
+    pub fn draw(
+        setups: [(&Workload, &str); 2],
+        threads: usize,
+        views: &[Camera],
+        how: Draws,
+    ) -> Result<Self, BenchError> {
+        let start = |(workload, skips): (&Workload, &str)| {
+            Worker::with_skips(Contender::Gaurast, workload, threads, skips)?
+                .ok_or_else(|| BenchError::Worker("this driver is not there".to_owned()))
+        };
+        let mut draws = [0, 1].map(|_| vec![[Vec::new(), Vec::new()]; views.len()]);
+        for round in 0..2 {
+            let (first, second) = (start(setups[round])?, start(setups[1 - round])?);
+            let mut workers = [first, second];
+            if round == 1 {
+                workers.swap(0, 1);
+            }
+            for (at, view) in views.iter().enumerate() {
+                for (worker, draws) in workers.iter_mut().zip(&mut draws) {
+                    draws[at][round] = match how {
+                        Draws::Again(times) => (0..times)
+                            .map(|_| worker.draw(view, Settings::default(), None))
+                            .collect::<Result<_, _>>()?,
+                        Draws::Once => vec![worker.draw_next(view)?],
+                    };
+                }
+            }
+        }
+        Ok(Self { draws })
+    }
+
+    /// What the quickest draws of a worker's views took, by `of`: the mean of both rounds.
+    fn least(&self, worker: usize, of: impl Fn(&Drawn) -> f64) -> impl Iterator<Item = f64> {
+        let least = move |draws: &Vec<Drawn>| draws.iter().map(&of).fold(f64::INFINITY, f64::min);
+        let views = self.draws[worker].iter().skip(1);
+        views.map(move |[one, other]| f64::midpoint(least(one), least(other)))
+    }
+
+    /// The median over views of each worker's quickest draws.
+    pub fn medians(&self, of: impl Fn(&Drawn) -> f64) -> [f64; 2] {
+        [0, 1].map(|worker| median(self.least(worker, &of)))
+    }
+
+    /// Lower quartile, median and upper quartile over views of what `compare` makes of both workers' quickest draws.
+    pub fn quartiles(
+        &self,
+        of: impl Fn(&Drawn) -> f64,
+        compare: impl Fn(f64, f64) -> f64,
+    ) -> [f64; 3] {
+        let pairs = self.least(0, &of).zip(self.least(1, &of));
+        quartiles(pairs.map(|(first, second)| compare(first, second)))
+    }
+
+    /// The most that any draw of the first worker took, those to warm up among them.
+    pub fn most(&self, of: impl Fn(&Drawn) -> f64) -> f64 {
+        let draws = self.draws[0].iter().flatten().flatten();
+        draws.map(of).fold(0.0, f64::max)
+    }
+}
+
+/// A frame's processor time, or its wall time where the system does not tell.
+pub fn time(frame: &Drawn) -> f64 {
+    frame.processor.unwrap_or(frame.wall)
+}
+
+/// Lower quartile, median and upper quartile.
+fn quartiles(values: impl Iterator<Item = f64>) -> [f64; 3] {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let at = |quarters| values.len().saturating_sub(1) * quarters / 4;
+    [1, 2, 3].map(|quarters| values.get(at(quarters)).copied().unwrap_or(f64::NAN))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawn(wall: f64) -> Drawn {
+        Drawn {
+            wall,
+            processor: None,
+            counters: Vec::new(),
+            stages: Vec::new(),
+            memory: None,
+        }
+    }
+
+    #[test]
+    fn quartiles_of_values() {
+        let values = [5.0, 1.0, 4.0, 2.0, 3.0];
+        assert_eq!(quartiles(values.into_iter()), [2.0, 3.0, 4.0]);
+        assert_eq!(quartiles([7.0].into_iter()), [7.0; 3]);
+        assert!(quartiles([].into_iter())[1].is_nan());
+    }
+
+    #[test]
+    fn views_are_compared_by_their_quickest_draws() {
+        let view = |one: [f64; 2], other: f64| [one.map(drawn).to_vec(), vec![drawn(other)]];
+        let pair = Pair {
+            draws: [
+                vec![
+                    view([90., 80.], 95.),
+                    view([12., 10.], 12.),
+                    view([20., 29.], 20.),
+                    view([31., 30.], 34.),
+                ],
+                vec![
+                    view([70., 60.], 99.),
+                    view([10., 18.], 12.),
+                    view([21., 25.], 23.),
+                    view([33., 99.], 33.),
+                ],
+            ],
+        };
+        // 11, 20 and 32 beside 11, 22 and 33; the first view warms up.
+        assert_eq!(pair.medians(time), [20.0, 22.0]);
+        assert_eq!(pair.quartiles(time, |a, b| b - a), [0.0, 1.0, 1.0]);
+        assert_eq!(pair.most(time), 95.0);
+    }
+}
