@@ -1,7 +1,7 @@
 //! Two workers that draw the same views in turns. What differs between them is told view by view, by the quickest of several
 //! draws: what else the machine does only ever adds, and views differ by more than what is asked for. It is told twice, by
-//! processes that are started in one order and in the other: by what memory they are given, the first of two that do the same
-//! may take a tenth longer for all their lives.
+//! processes that are started in one order and in the other: of two that do the same, the first has been seen to take up to a
+//! tenth longer for as long as both live.
 
 use gaurast_samples::camera::Camera;
 use gaurast_samples::renderer::Settings;
@@ -39,8 +39,7 @@ impl Pair {
         };
         let mut draws = [0, 1].map(|_| vec![[Vec::new(), Vec::new()]; views.len()]);
         for round in 0..2 {
-            let (first, second) = (start(setups[round])?, start(setups[1 - round])?);
-            let mut workers = [first, second];
+            let mut workers = [start(setups[round])?, start(setups[1 - round])?];
             if round == 1 {
                 workers.swap(0, 1);
             }

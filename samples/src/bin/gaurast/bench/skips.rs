@@ -68,6 +68,7 @@ impl Path {
         Ok((0..frames).map(view).collect())
     }
 
+    /// How its views are drawn.
     fn draws(self) -> Draws {
         match self {
             Self::Own => Draws::Again(DRAWS),
@@ -123,12 +124,12 @@ struct Unseen {
 
 /// How many times as many Gaussians are unseen as there are in the scene: what one costs is far less than what a frame's time
 /// varies by.
-const UNSEEN: usize = 10;
+const UNSEEN_PER_SEEN: usize = 10;
 
 /// How many times as many views their cost is found from as what a skip saves.
-const UNSEEN_RUNS: usize = 2;
+const UNSEEN_VIEWS_PER_RUN: usize = 2;
 
-/// How often views are drawn.
+/// How often a view is drawn, if that changes nothing.
 const DRAWS: usize = 3;
 
 /// Runs the comparison.
@@ -177,7 +178,7 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
         let saved = saved_by(skip, &name, &base, arguments.threads, runs)?;
         results.skips.push(saved);
     }
-    let (count, runs) = (UNSEEN * count, UNSEEN_RUNS * runs);
+    let (count, runs) = (UNSEEN_PER_SEEN * count, UNSEEN_VIEWS_PER_RUN * runs);
     let beside = with(Extra::Beside { count });
     let pairs = [
         ("off the screen", beside, base),
