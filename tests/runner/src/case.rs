@@ -1,0 +1,151 @@
+//! A running test: its variant, its real data, its process.
+
+use std::process::Command;
+
+use crate::need::{Ignored, Missing, Need, ignore};
+
+/// One of the forms that a test runs in: its name stands behind the test's.
+#[derive(Clone, Debug)]
+pub struct Variant {
+    /// The variant's name.
+    pub name: String,
+    /// The things that this variant can't do without, beside the test's own.
+    pub needs: Vec<Need>,
+}
+
+impl Variant {
+    /// A variant that needs nothing.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            needs: Vec::new(),
+        }
+    }
+}
+
+/// A variant for each SIMD level, by the names that `GAURAST_SIMD` takes. What the processor lacks is ignored, in view.
+pub fn simd_levels() -> Vec<Variant> {
+    crate::SIMD_LEVELS
+        .map(|level| Variant {
+            name: level.to_owned(),
+            needs: vec![Need::SimdLevel(level)],
+        })
+        .into()
+}
+
+/// Variants that share a test's work by [`Case::shard`].
+pub fn shards(count: usize) -> Vec<Variant> {
+    (1..=count)
+        .map(|index| Variant::new(format!("{index} of {count}")))
+        .collect()
+}
+
+/// A part of a test's work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// The part's number, from 0.
+    pub index: usize,
+    /// The number of parts.
+    pub count: usize,
+}
+
+impl Shard {
+    /// Reports whether the `item`th piece of work is this part's.
+    pub fn has(self, item: usize) -> bool {
+        item % self.count == self.index
+    }
+
+    /// This part's share of `total` pieces of work, in a row: the first one and their number.
+    pub fn range(self, total: u64) -> std::ops::Range<u64> {
+        let at = |index: usize| total * index as u64 / self.count as u64;
+        at(self.index)..at(self.index + 1)
+    }
+}
+
+/// A running test.
+#[derive(Debug)]
+pub struct Case {
+    pub(crate) name: String,
+    pub(crate) variant: Option<String>,
+}
+
+/// Set for a test's own process: the name of the test.
+const ALONE: &str = "GAURAST_TEST_ALONE";
+/// Begins the line by which a test's own process says that the test is ignored, and for want of what.
+const IGNORED: &str = "gaurast-runner: ignored: ";
+
+impl Case {
+    /// The test's name, as the runner prints it.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The name of the variant.
+    ///
+    /// # Panics
+    /// If the test has no variants.
+    pub fn variant(&self) -> &str {
+        self.variant.as_deref().expect("a test with variants")
+    }
+
+    /// The part of the work, for a test with variants of [`shards`].
+    ///
+    /// # Panics
+    /// If the test has other variants, or none.
+    pub fn shard(&self) -> Shard {
+        let (index, count) = self.variant().split_once(" of ").expect("a shard");
+        let number = |text: &str| text.parse::<usize>().expect("a shard's number");
+        Shard {
+            index: number(index) - 1,
+            count: number(count),
+        }
+    }
+
+    /// Reports whether this process is the test's own.
+    pub fn is_alone(&self) -> bool {
+        std::env::var_os(ALONE).is_some_and(|name| name == *self.name)
+    }
+
+    /// Runs this test again in a process of its own, which `set_up` may give an environment. Ends the test as ignored if
+    /// it is ignored there.
+    ///
+    /// # Panics
+    /// If the test fails there, with what the process printed.
+    pub fn run_alone(&self, set_up: impl FnOnce(&mut Command)) {
+        let mut command = Command::new(std::env::current_exe().expect("the test's own path"));
+        command
+            .args(["--exact", &self.name, "--test-threads", "1"])
+            .env(ALONE, &self.name)
+            .env_remove(crate::report::REPORT);
+        set_up(&mut command);
+        let output = command.output().expect("the test starts itself");
+        let text =
+            String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        assert!(
+            output.status.success(),
+            "in a process of its own ({}):\n{text}",
+            output.status
+        );
+        if let Some(line) = text.lines().find_map(|line| line.strip_prefix(IGNORED)) {
+            let (missing, reason) = line.split_once(' ').expect("what is missing, and why");
+            ignore(Missing::from_name(missing), reason);
+        }
+        assert!(text.contains(" 1 passed"), "the test did not run:\n{text}");
+    }
+
+    /// Tells the process that waits for this one that the test is ignored.
+    pub(crate) fn say_ignored(&self, ignored: &Ignored) {
+        if self.is_alone() {
+            println!("\n{IGNORED}{:?} {}", ignored.missing, ignored.reason);
+        }
+    }
+}
+
+impl Missing {
+    fn from_name(name: &str) -> Self {
+        [Self::Program, Self::Data, Self::Capability]
+            .into_iter()
+            .find(|missing| format!("{missing:?}") == name)
+            .expect("the name that this program wrote")
+    }
+}

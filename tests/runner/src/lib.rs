@@ -1,0 +1,204 @@
+//! The runner of the project's tests.
+//!
+//! It looks and answers like Rust's own, on top of `libtest-mimic`, and knows more of a test: what it needs of the
+//! machine, so that one that can't run is *ignored*, with the reason, and never passes empty; variants that it runs in;
+//! and a process of its own.
+//!
+//! An executable of tests has `harness = false` and this `main`:
+//!
+//! ```no_run
+//! fn main() -> std::process::ExitCode {
+//!     gaurast_runner::main()
+//! }
+//!
+//! #[gaurast_runner::test(needs = [gaurast_runner::Need::Program("glslangValidator")])]
+//! fn shaders_compile() {}
+//!
+//! #[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+//! fn every_level_draws_the_same(case: &gaurast_runner::Case) {
+//!     assert!(gaurast_runner::SIMD_LEVELS.contains(&case.variant()));
+//! }
+//! ```
+//!
+//! The environment says what must be there:
+//!
+//! | variable | meaning |
+//! |---|---|
+//! | `GAURAST_TEST_DATA` | the folder of real data: splat files, meshes, cameras |
+//! | `GAURAST_TEST_REQUIRE` | `programs`: a missing program or system file is a failure; `all`: missing data, too |
+//! | `GAURAST_TEST_LONG` | `1`: tests that have a small sample run whole |
+//! | `GAURAST_TEST_REPORT` | a file that seconds of tests and reasons of ignored ones are appended to |
+
+mod case;
+mod need;
+mod report;
+
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Instant;
+
+use libtest_mimic::{Arguments, Completion, Failed, Trial};
+
+pub use case::{Case, Shard, Variant, shards, simd_levels};
+pub use gaurast_runner_macros::test;
+#[doc(hidden)]
+pub use inventory;
+use need::Ignored;
+pub use need::{
+    Missing, Need, SIMD_LEVELS, data, data_folder, has_simd_level, ignore, is_long,
+    lavapipe_manifest, require,
+};
+use report::Report;
+
+/// A test, as its attribute registers it.
+#[derive(Debug)]
+pub struct Test {
+    /// The path of the test's module.
+    pub module: &'static str,
+    /// The name of the test's function.
+    pub name: &'static str,
+    /// Makes the list of things that the test can't do without.
+    pub needs: fn() -> Vec<Need>,
+    /// Makes the list of variants that the test runs in.
+    pub each: Option<fn() -> Vec<Variant>>,
+    /// The test runs in a process of its own.
+    pub alone: bool,
+    /// The test.
+    pub run: fn(&Case),
+}
+
+inventory::collect!(Test);
+
+/// The missing things that are failures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Requirement {
+    None,
+    Programs,
+    All,
+}
+
+impl Requirement {
+    /// Reads `GAURAST_TEST_REQUIRE`.
+    fn from_environment() -> Result<Self, String> {
+        match std::env::var("GAURAST_TEST_REQUIRE").as_deref() {
+            Err(std::env::VarError::NotPresent) | Ok("") => Ok(Self::None),
+            Ok("programs") => Ok(Self::Programs),
+            Ok("all") => Ok(Self::All),
+            Ok(other) => Err(format!(
+                "GAURAST_TEST_REQUIRE is `programs` or `all`, not `{other}`"
+            )),
+            Err(error) => Err(format!("GAURAST_TEST_REQUIRE: {error}")),
+        }
+    }
+
+    fn forbids(self, missing: Missing) -> bool {
+        match missing {
+            Missing::Program => self != Self::None,
+            Missing::Data => self == Self::All,
+            Missing::Capability => false,
+        }
+    }
+}
+
+/// Runs the executable's tests as the command line says, which is that of Rust's own runner.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let requirement = match Requirement::from_environment() {
+        Ok(requirement) => requirement,
+        Err(message) => {
+            eprintln!("{message}");
+            return ExitCode::FAILURE;
+        }
+    };
+    let mut tests: Vec<&Test> = inventory::iter::<Test>.into_iter().collect();
+    // Tests with a process of their own take longest: they begin first, so that none is left for last.
+    tests.sort_by_key(|test| (!test.alone, test.module, test.name));
+    let report = Arc::new(Report::default());
+    let mut trials = Vec::new();
+    for test in tests {
+        let module = test.module.split_once("::").map(|(_, module)| module);
+        let path = module
+            .into_iter()
+            .chain([test.name])
+            .collect::<Vec<_>>()
+            .join("::");
+        let variants = match test.each {
+            Some(each) => each().into_iter().map(Some).collect(),
+            None => vec![None],
+        };
+        for variant in variants {
+            let name = match &variant {
+                Some(variant) => format!("{path} [{}]", variant.name),
+                None => path.clone(),
+            };
+            let mut needs = (test.needs)();
+            needs.extend(variant.iter().flat_map(|variant| &variant.needs));
+            let case = Case {
+                name,
+                variant: variant.map(|variant| variant.name),
+            };
+            trials.push(trial(test, case, needs, requirement, &arguments, &report));
+        }
+    }
+    let conclusion = libtest_mimic::run(&arguments, trials);
+    if !arguments.list {
+        report.tell();
+    }
+    conclusion.exit_code()
+}
+
+/// Makes a trial of a test's variant.
+fn trial(
+    test: &'static Test,
+    case: Case,
+    needs: Vec<Need>,
+    requirement: Requirement,
+    arguments: &Arguments,
+    report: &Arc<Report>,
+) -> Trial {
+    let missing = move || needs.iter().find_map(|need| need.missing());
+    // Programs that list tests first, and run them one by one, see here what will be ignored.
+    let is_ignored =
+        arguments.list && missing().is_some_and(|ignored| !requirement.forbids(ignored.missing));
+    let report = Arc::clone(report);
+    Trial::ignorable_test(case.name.clone(), move || {
+        let ignored = match missing() {
+            Some(ignored) => ignored,
+            None => {
+                let start = Instant::now();
+                let outcome = run(test, &case);
+                report.add_time(&case.name, start.elapsed());
+                match outcome {
+                    Ok(()) => return Ok(Completion::Completed),
+                    Err(ignored) => ignored,
+                }
+            }
+        };
+        if requirement.forbids(ignored.missing) {
+            return Err(Failed::from(format!(
+                "{}, and GAURAST_TEST_REQUIRE asks for it",
+                ignored.reason
+            )));
+        }
+        case.say_ignored(&ignored);
+        report.add_ignored(&ignored.reason);
+        Ok(Completion::ignored_with(ignored.reason))
+    })
+    .with_ignored_flag(is_ignored)
+}
+
+/// Runs a test, and tells if it ended itself as ignored.
+fn run(test: &Test, case: &Case) -> Result<(), Ignored> {
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        if test.alone && !case.is_alone() {
+            case.run_alone(|_| {});
+        } else {
+            (test.run)(case);
+        }
+    }));
+    outcome.or_else(|payload| match payload.downcast::<Ignored>() {
+        Ok(ignored) => Err(*ignored),
+        Err(panic) => resume_unwind(panic),
+    })
+}

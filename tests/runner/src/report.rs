@@ -1,0 +1,65 @@
+//! What a run tells beside its results: the slowest tests, and the reasons of those that were ignored.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+/// A file to which each executable appends its rows (seconds or `ignored`, a tab, the test's name or the reason), so that
+/// a script can tell of all of them together.
+pub(crate) const REPORT: &str = "GAURAST_TEST_REPORT";
+
+/// How many of the slowest tests are told.
+const SLOWEST: usize = 20;
+
+/// The times and reasons of a run.
+#[derive(Debug, Default)]
+pub(crate) struct Report {
+    times: Mutex<Vec<(Duration, String)>>,
+    ignored: Mutex<BTreeMap<String, usize>>,
+}
+
+impl Report {
+    pub fn add_time(&self, name: &str, time: Duration) {
+        lock(&self.times).push((time, name.to_owned()));
+    }
+
+    pub fn add_ignored(&self, reason: &str) {
+        *lock(&self.ignored).entry(reason.to_owned()).or_default() += 1;
+    }
+
+    /// Prints the reasons, and the tests that took a second or more; appends all to the report's file.
+    pub fn tell(&self) {
+        let mut times = std::mem::take(&mut *lock(&self.times));
+        times.sort_by(|a, b| b.cmp(a));
+        let ignored = lock(&self.ignored);
+        for (reason, count) in &*ignored {
+            println!("ignored: {count} ({reason})");
+        }
+        if let Some(path) = std::env::var_os(REPORT) {
+            let rows: String = times
+                .iter()
+                .map(|(time, name)| format!("{:.2}\t{name}\n", time.as_secs_f64()))
+                .chain(ignored.iter().flat_map(|(reason, &count)| {
+                    std::iter::repeat_n(format!("ignored\t{reason}\n"), count)
+                }))
+                .collect();
+            let file = std::fs::OpenOptions::new()
+                .create(true)
+                .append(true)
+                .open(&path);
+            if let Err(error) = file.and_then(|mut file| file.write_all(rows.as_bytes())) {
+                eprintln!("{}: {error}", path.display());
+            }
+            return;
+        }
+        let slow = times.iter().take(SLOWEST);
+        for (time, name) in slow.take_while(|(time, _)| time.as_secs() >= 1) {
+            println!("{:8.2} s  {name}", time.as_secs_f64());
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
