@@ -1,7 +1,7 @@
 //! The GauRast driver: a software Vulkan driver that draws with a simulated device.
 //!
-//! There are two doors to it. [`entry`] gives an [`ash::Entry`] over the driver linked into this process; and the
-//! crate as a shared library is a driver for the Vulkan loader. Both lead to one table of commands.
+//! There are two doors to it. [`entry`] gives an [`ash::Entry`] over the driver linked into this process; and
+//! `driver/icd` exports [`loader`] as a shared library for the Vulkan loader. Both lead to one table of commands.
 //!
 //! The driver keeps Vulkan's objects and lowers recorded commands to [`simdevice`] packets. It never computes a
 //! pixel.
@@ -15,7 +15,7 @@ mod environment;
 mod error;
 mod float_control;
 mod handle;
-mod icd;
+pub mod loader;
 mod lower;
 mod object;
 mod pnext;

@@ -3,7 +3,7 @@
 ** the process. The same as examples/hello_gaussians.rs:
 **
 **     cc -std=c11 -I api/include samples/c/hello_gaussians.c -lvulkan -o hello_gaussians
-**     VK_DRIVER_FILES=driver/gaurast_icd.json ./hello_gaussians   (after cargo build --release)
+**     VK_DRIVER_FILES=driver/icd/gaurast_icd.json ./hello_gaussians   (after cargo build --release)
 */
 #include <stdio.h>
 #include <stdlib.h>

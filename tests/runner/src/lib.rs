@@ -30,6 +30,7 @@
 //! | `GAURAST_TEST_REPORT` | a file that seconds of tests and reasons of ignored ones are appended to |
 
 mod case;
+mod library;
 mod need;
 mod report;
 
@@ -44,6 +45,7 @@ pub use case::{Case, Shard, Variant, shards, simd_levels};
 pub use gaurast_runner_macros::test;
 #[doc(hidden)]
 pub use inventory;
+pub use library::built_library;
 use need::Ignored;
 pub use need::{
     Missing, Need, SIMD_LEVELS, data, data_folder, has_simd_level, ignore, is_long,

@@ -1,21 +1,13 @@
-//! The loader's door: the three symbols that `libvulkan_gaurast.so` exports for the Vulkan loader.
+//! `libvulkan_gaurast.so`: the three symbols by which the Vulkan loader finds the driver, and a logger.
 //!
-//! See the loader's "Architecture of the Vulkan Loader Interfaces" for what each must do.
+//! The loader's "Architecture of the Vulkan Loader Interfaces" says what each symbol must do. `GAURAST_LOG` says what is
+//! logged.
 
-use crate::dispatch;
-use crate::entry_points;
-use crate::entrypoints::instance::get_instance_proc_addr;
-use crate::error::Error;
-use crate::{handle, pointer};
-use ash::vk;
 use std::ffi::{CStr, c_char};
 use std::mem::transmute;
 
-/// The newest version of the loader's interface that the driver knows.
-const NEWEST_INTERFACE: u32 = 7;
-
-/// The oldest that it accepts: from 2 on, versions are negotiated.
-const OLDEST_INTERFACE: u32 = 2;
+use ash::vk;
+use driver::loader;
 
 /// Agrees with the loader on a version of their interface.
 ///
@@ -30,7 +22,7 @@ pub unsafe extern "system" fn vk_icdNegotiateLoaderICDInterfaceVersion(
     let environment = env_logger::Env::new().filter_or("GAURAST_LOG", "warn");
     let _ = env_logger::Builder::from_env(environment).try_init();
     // SAFETY: the caller's promise.
-    unsafe { negotiate_loader_icd_interface_version(version) }
+    unsafe { loader::negotiate_interface_version(version) }
 }
 
 /// `vkGetInstanceProcAddr` for the loader, which also finds the functions of this interface.
@@ -43,10 +35,14 @@ pub unsafe extern "system" fn vk_icdGetInstanceProcAddr(
     instance: vk::Instance,
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
+    let interface = if name.is_null() {
+        None
+    } else {
+        // SAFETY: the caller's promise.
+        interface_function(unsafe { CStr::from_ptr(name) })
+    };
     // SAFETY: the caller's promise.
-    let interface = unsafe { pointer::string(name) }.and_then(interface_function);
-    // SAFETY: the caller's promise.
-    interface.or_else(|| unsafe { get_instance_proc_addr(instance, name) })
+    interface.or_else(|| unsafe { loader::get_instance_proc_addr(instance, name) })
 }
 
 /// Finds commands whose first parameter is a physical device, so that the loader passes on those that it doesn't know.
@@ -60,7 +56,7 @@ pub unsafe extern "system" fn vk_icdGetPhysicalDeviceProcAddr(
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the caller's promise.
-    unsafe { get_physical_device_proc_addr(instance, name) }
+    unsafe { loader::get_physical_device_proc_addr(instance, name) }
 }
 
 /// The functions of this interface by name; since version 7 they may be looked up instead of being exported.
@@ -82,26 +78,5 @@ fn interface_function(name: &CStr) -> vk::PFN_vkVoidFunction {
             }
             _ => None,
         }
-    }
-}
-
-entry_points! {
-    fn negotiate_loader_icd_interface_version(version: *mut u32) -> vk::Result {
-        let version = pointer::output_structure(version)?;
-        *version = NEWEST_INTERFACE.min(*version);
-        Ok(if *version < OLDEST_INTERFACE {
-            vk::Result::ERROR_INCOMPATIBLE_DRIVER
-        } else {
-            vk::Result::SUCCESS
-        })
-    }
-
-    fn get_physical_device_proc_addr(
-        instance: vk::Instance,
-        name: *const c_char,
-    ) -> vk::PFN_vkVoidFunction {
-        let name = pointer::string(name).ok_or(Error::NullPointer { what: "name" })?;
-        let instance = handle::get(instance)?;
-        Ok(dispatch::physical_device_command(name, &instance.enabled()))
     }
 }

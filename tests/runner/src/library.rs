@@ -1,0 +1,50 @@
+//! Shared libraries of the workspace that tests load.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Mutex;
+
+/// Has cargo build a package's shared library in the profile of this executable, and returns the library's path.
+///
+/// Cargo builds no shared library for the sake of a test, and can't be told to.
+///
+/// # Panics
+/// If the build fails, with what it printed.
+pub fn built_library(package: &str, file: &str) -> PathBuf {
+    static ONE_BUILD: Mutex<()> = Mutex::new(());
+    let test = std::env::current_exe().expect("the test's own path");
+    let folder = test
+        .ancestors()
+        .find(|folder| folder.ends_with("deps"))
+        .and_then(Path::parent)
+        .expect("cargo keeps tests in a profile's folder `deps`");
+    let profile = match folder.file_name().and_then(|name| name.to_str()) {
+        Some("debug") => "dev",
+        Some(profile) => profile,
+        None => panic!("{} has no name", folder.display()),
+    };
+    let library = folder.join(file);
+    let _one = ONE_BUILD.lock();
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(cargo)
+        .args([
+            "build",
+            "--quiet",
+            "--package",
+            package,
+            "--profile",
+            profile,
+        ])
+        .arg("--target-dir")
+        .arg(folder.parent().expect("the target folder"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .expect("cargo runs");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success(),
+        "cargo build -p {package}: {message}"
+    );
+    assert!(library.exists(), "there is no {}", library.display());
+    library
+}
