@@ -1,7 +1,7 @@
 //! The environment variables that choose how devices work. They are read here and nowhere else, when a device is
 //! created.
 //!
-//! - `GAURAST_SIMD`: the SIMD level, by name: best (the default), sse2, sse4.2, avx2 or avx512.
+//! - `GAURAST_SIMD`: the SIMD level, by name: best (the default), sse2, avx2 or avx512.
 //! - `GAURAST_THREADS`: how many worker threads a device has; 0 (the default) means one per processor.
 //! - `GAURAST_TIMEOUT_MS`: how many milliseconds one batch of shader invocations may take before the device is lost; a
 //!   loop without end is stopped so. A batch is a workgroup, or some 64 vertices or fragments.

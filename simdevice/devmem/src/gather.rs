@@ -22,7 +22,8 @@ pub fn gather<S: Simd>(simd: S, words: &[AtomicU32], places: u32x8<S>) -> u32x8<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fearless_simd::{Level, dispatch};
+    use crate::dispatch;
+    use fearless_simd::Level;
 
     fn at(words: &[AtomicU32], places: [u32; 8]) -> [u32; 8] {
         dispatch!(Level::new(), simd => {

@@ -10,10 +10,13 @@
 mod atomic;
 mod gather;
 pub mod host;
+pub mod level;
 mod pages;
 mod prefetch;
 mod table;
 
+#[doc(hidden)]
+pub use fearless_simd;
 pub use gather::gather;
 pub use prefetch::prefetch;
 pub use table::{look_up, places};

@@ -78,7 +78,7 @@ fearless_simd::kernel!(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fearless_simd::dispatch;
+    use crate::dispatch;
 
     #[test]
     fn places_count_modulo_the_length() {

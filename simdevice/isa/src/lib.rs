@@ -61,7 +61,6 @@ mod forward;
 mod hoist;
 mod homes;
 pub mod ir;
-pub mod level;
 pub mod op;
 mod optimize;
 pub mod resources;
@@ -69,6 +68,8 @@ mod select;
 mod uniformity;
 pub mod validate;
 mod visit;
+
+pub use devmem::level;
 
 #[cfg(test)]
 mod tests;

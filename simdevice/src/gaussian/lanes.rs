@@ -118,7 +118,7 @@ pub(super) fn log2<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
 mod tests {
     use super::*;
     use crate::device::SimdLevel;
-    use fearless_simd::dispatch;
+    use devmem::dispatch;
 
     #[test]
     fn the_logarithm_is_exact_enough_at_every_level() {

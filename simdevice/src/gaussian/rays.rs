@@ -210,7 +210,7 @@ impl PixelRays {
 mod tests {
     use super::*;
     use crate::device::SimdLevel;
-    use fearless_simd::dispatch;
+    use devmem::dispatch;
     use proptest::prelude::*;
 
     const TURNED: [f64; 9] = [0.36, 0.48, -0.8, -0.8, 0.6, 0.0, 0.48, 0.64, 0.6];

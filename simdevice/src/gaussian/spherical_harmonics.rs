@@ -193,7 +193,8 @@ impl Bases {
 mod tests {
     use super::*;
 
-    use fearless_simd::{Level, dispatch};
+    use devmem::dispatch;
+    use fearless_simd::Level;
 
     fn bases(degree: u32, direction: [f32; 3]) -> Bases {
         let mut bases = Bases::default();

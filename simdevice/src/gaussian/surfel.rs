@@ -251,7 +251,7 @@ impl Surfel {
 mod tests {
     use super::*;
     use crate::device::SimdLevel;
-    use fearless_simd::dispatch;
+    use devmem::dispatch;
     use proptest::prelude::*;
 
     const VISIBLE: Visible = Visible {

@@ -327,7 +327,7 @@ mod tests {
     use crate::device::SimdLevel;
     use crate::packet::{Camera, GaussianState, Viewport};
     use crate::skips::Skips;
-    use fearless_simd::dispatch;
+    use devmem::dispatch;
     use proptest::prelude::*;
 
     /// Rows, each with its first tile and one past its last.

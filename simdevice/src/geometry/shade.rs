@@ -5,8 +5,9 @@ use super::fetch::Fetcher;
 use super::pipeline::{LANES, Lease, VertexOutputs};
 use super::viewport::{Projected, Projections, Transform, code};
 use crate::packet::draw::MAX_CLIP_CULL_DISTANCES;
+use devmem::dispatch;
 use devmem::host;
-use fearless_simd::{Level, dispatch};
+use fearless_simd::Level;
 use isa::exec::{Chunk, LaneMask, Machine, Stopped, Watchdog};
 use isa::resources::Resources;
 

@@ -13,8 +13,9 @@ use crate::format::{Format, MAX_TEXEL_SIZE};
 use crate::packet::{Rect, ResolveMode};
 use crate::texture::unorm8_fraction;
 use crate::transfer::resolve_row;
+use devmem::dispatch;
 use devmem::host;
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd::{Level, Simd, f32x16, prelude::*, u32x16};
 
 /// The most samples of a pixel.
 const MAX_SAMPLES: usize = 4;

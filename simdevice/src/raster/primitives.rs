@@ -19,7 +19,8 @@ use crate::lanes::both;
 use crate::packet::Rect;
 use crate::skips::Skip;
 use crate::trace::MacroTileWork;
-use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
+use devmem::dispatch;
+use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
 

@@ -539,7 +539,7 @@ impl Texels for Float32x4 {
 mod tests {
     use super::*;
     use crate::device::SimdLevel;
-    use fearless_simd::dispatch;
+    use devmem::dispatch;
 
     /// Texels 0.. of these words, as a packing and as their format decodes them.
     fn agree<T: Texels>(format: Format, words: &[u32]) {

@@ -1,6 +1,7 @@
 //! The image unit: what a program's image and sampler slots are bound to.
 
-use fearless_simd::{Level, dispatch};
+use devmem::dispatch;
+use fearless_simd::Level;
 
 use super::sampler::Sampler;
 use super::surface::Surface;

@@ -112,7 +112,7 @@ impl Need {
 }
 
 /// The SIMD levels of the device, by the names that `GAURAST_SIMD` takes, the simplest first.
-pub const SIMD_LEVELS: [&str; 4] = ["sse2", "sse4.2", "avx2", "avx512"];
+pub const SIMD_LEVELS: [&str; 3] = ["sse2", "avx2", "avx512"];
 
 /// Reports whether the processor has a SIMD level.
 pub fn has_simd_level(level: &str) -> bool {
@@ -120,7 +120,6 @@ pub fn has_simd_level(level: &str) -> bool {
     // The features that the levels are named after stand for all that each needs.
     match level {
         "sse2" => true,
-        "sse4.2" => std::arch::is_x86_feature_detected!("sse4.2"),
         "avx2" => std::arch::is_x86_feature_detected!("avx2"),
         "avx512" => std::arch::is_x86_feature_detected!("avx512vbmi2"),
         _ => false,

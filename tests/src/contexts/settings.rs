@@ -23,7 +23,6 @@ pub fn simd_levels() -> Vec<&'static str> {
     {
         // The features that the levels are named after stand for all that each needs.
         let tests = [
-            ("sse4.2", std::arch::is_x86_feature_detected!("sse4.2")),
             ("avx2", std::arch::is_x86_feature_detected!("avx2")),
             ("avx512", std::arch::is_x86_feature_detected!("avx512vbmi2")),
         ];

@@ -3,7 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
-use fearless_simd::{Level, Simd, dispatch};
+use devmem::dispatch;
+use fearless_simd::{Level, Simd};
 
 use super::super::op::Op;
 use super::batch::Batch;

@@ -16,7 +16,7 @@ use crate::packet::{
 };
 use crate::skips::Skips;
 use devmem::Allocation;
-use fearless_simd::dispatch;
+use devmem::dispatch;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

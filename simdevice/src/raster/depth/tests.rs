@@ -1,5 +1,5 @@
 use super::*;
-use fearless_simd::dispatch;
+use devmem::dispatch;
 use isa::level::SimdLevel;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -12,7 +12,8 @@ use super::layer::{ANY_LIGHT, Light};
 use super::{DepthMode, GaussianTile, NO_DEPTH, Task, TileMode, Work};
 use crate::packet::{GaussianApproximation, GaussianState};
 use crate::trace::Run;
-use fearless_simd::{Level, Simd, dispatch, f32x16};
+use devmem::dispatch;
+use fearless_simd::{Level, Simd, f32x16};
 
 /// It composites with powers of two of a cubic.
 pub(super) const FAST_POWERS: DepthMode = 1;

@@ -13,8 +13,9 @@ use crate::gaussian::{GaussianDraw, locate};
 use crate::packet::GaussianPrecision;
 use crate::skips::Skip;
 use crate::trace::{self, Run};
+use devmem::dispatch;
 use devmem::host;
-use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, prelude::*};
+use fearless_simd::{Level, Simd, f32x16, f64x8, mask32x16, prelude::*};
 
 /// How a tile is composited; chosen once for a draw.
 #[derive(Clone, Copy, Debug)]

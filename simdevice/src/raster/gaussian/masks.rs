@@ -74,7 +74,7 @@ impl<S: Simd> Tally<S> {
 mod tests {
     use super::*;
     use crate::device::SimdLevel;
-    use fearless_simd::dispatch;
+    use devmem::dispatch;
 
     #[test]
     fn lanes_are_counted_at_every_level() {

@@ -3,7 +3,8 @@
 use super::{DepthMode, GaussianTile, Run, Skip, Task, TileMode, Work};
 use crate::binning::Stream;
 use crate::gaussian::TILE_SIZE;
-use fearless_simd::{Level, dispatch};
+use devmem::dispatch;
+use fearless_simd::Level;
 
 /// Primitives of a piece. The fast kernel goes on where it was, so that pieces change no bit.
 const PIECE: usize = 1024;

@@ -21,7 +21,8 @@ use crate::raster::depth::{Tests, apply, compare};
 use crate::raster::primitives::{Buffers, Targets};
 use crate::raster::quads::Quads;
 use crate::raster::tile::{AREA, Target, Tile};
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use devmem::dispatch;
+use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use isa::exec::Stopped;
 use std::sync::atomic::AtomicBool;
 

@@ -4,7 +4,8 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use devmem::dispatch;
+use fearless_simd::{Level, Simd, prelude::*};
 use serde::Serialize;
 
 use gaurast_samples::renderer::Settings;
