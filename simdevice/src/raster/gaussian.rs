@@ -107,10 +107,12 @@ struct Thresholds {
     transmittance_floor: f32,
     /// What numbers of depths mean.
     depth_unit: DepthCode,
+    /// The mode, for code that is the same for all of them: where time matters it is a constant.
+    depth_mode: DepthMode,
 }
 
 impl Thresholds {
-    fn new(draw: &GaussianDraw) -> Self {
+    fn new(draw: &GaussianDraw, depth_mode: DepthMode) -> Self {
         let state = &draw.state;
         // Where there is no floor, less than the least normal number is nothing. No alpha reaches a floor above the
         // ceiling.
@@ -121,6 +123,7 @@ impl Thresholds {
         };
         Self {
             depth_unit: draw.depth_unit,
+            depth_mode,
             most_fall,
             alpha_floor: state.alpha_floor,
             alpha_ceiling: state.alpha_ceiling,
@@ -189,7 +192,7 @@ impl GaussianTile {
             trend: draw.depth_trend,
             half_period: draw.half_period,
             corner,
-            thresholds: Thresholds::new(draw),
+            thresholds: Thresholds::new(draw, DEPTH),
             way: Way::of(&draw.state, &mode, DEPTH),
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
@@ -247,7 +250,7 @@ impl GaussianTile {
             // The first Gaussian that reaches a pixel finishes it.
             thresholds: Thresholds {
                 transmittance_floor: f32::INFINITY,
-                ..Thresholds::new(draw)
+                ..Thresholds::new(draw, FIND_REACHED)
             },
             way: Way::EXACT,
         };
@@ -276,7 +279,7 @@ impl GaussianTile {
             TileMode::Fast => {
                 dispatch!(level, simd => self.composite::<_, DEPTH>(simd, task, layer, runs))
             }
-            _ => self.composite_by_block::<DEPTH>(level, task, layer, runs),
+            _ => self.composite_by_block(level, task, layer, runs),
         };
         Work {
             listed: task.list.len() as u64,

@@ -65,8 +65,8 @@ impl Way {
 
 /// 2 to the power of `-fall`, as a mode has it.
 #[inline(always)]
-pub(super) fn power<S: Simd, const MODE: DepthMode>(simd: S, fall: f32x16<S>) -> f32x16<S> {
-    match MODE {
+pub(super) fn power<S: Simd>(simd: S, mode: DepthMode, fall: f32x16<S>) -> f32x16<S> {
+    match mode {
         FAST_POWERS => CUBIC.of_negated(simd, fall),
         FASTER_POWERS => QUADRATIC.of_negated(simd, fall),
         _ => exp2_of_negated(simd, fall),

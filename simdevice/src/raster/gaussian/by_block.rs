@@ -3,9 +3,7 @@
 
 use super::chunk::Record;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
-use super::{
-    BLOCKS, CHUNK, DepthMode, GaussianTile, NO_DEPTH, Task, Work, pixels::falls_64, wide_sums,
-};
+use super::{BLOCKS, CHUNK, GaussianTile, NO_DEPTH, Task, Work, pixels::falls_64, wide_sums};
 use crate::gaussian::rays::RayDepths;
 use crate::gaussian::splat::{Splat, half_room};
 use crate::gaussian::surfel::Surfel;
@@ -121,7 +119,7 @@ impl Task<'_> {
 
 impl GaussianTile {
     /// Composites a tile in another mode than the fast one.
-    pub(super) fn composite_by_block<const DEPTH: DepthMode>(
+    pub(super) fn composite_by_block(
         &mut self,
         level: Level,
         task: &Task<'_>,
@@ -130,31 +128,31 @@ impl GaussianTile {
     ) -> Work {
         match task.mode {
             TileMode::Half => dispatch!(level, simd =>
-                self.composite_half::<_, DEPTH>(simd, task, layer, runs)),
+                self.composite_half(simd, task, layer, runs)),
             TileMode::Exact {
                 depths: Some(depths),
                 ..
             } => dispatch!(level, simd =>
-                self.composite_per_pixel::<_, DEPTH>(simd, task, depths, layer, runs)),
+                self.composite_per_pixel(simd, task, depths, layer, runs)),
             TileMode::Exact {
                 wide_sums: true, ..
             } => dispatch!(level, simd =>
-                self.composite_wide::<_, DEPTH>(simd, task, layer, runs)),
+                self.composite_wide(simd, task, layer, runs)),
             TileMode::Fast | TileMode::Exact { .. } => dispatch!(level, simd =>
-                self.composite_in_order::<_, DEPTH>(simd, task, layer, runs)),
+                self.composite_in_order(simd, task, layer, runs)),
         }
     }
 
     /// Composites a tile in the order of its list.
     #[inline(always)]
-    fn composite_in_order<S: Simd, const DEPTH: DepthMode>(
+    fn composite_in_order<S: Simd>(
         &mut self,
         simd: S,
         task: &Task<'_>,
         layer: usize,
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
-        let mut work = self.part::<_, DEPTH>(simd, task, layer, runs);
+        let mut work = self.part(simd, task, layer, runs);
         let layer = &mut self.layers[layer];
         for (block, list) in self.lists.iter().enumerate() {
             for chunk in list.chunks(CHUNK) {
@@ -166,14 +164,8 @@ impl GaussianTile {
                     let splat = &task.splats[batch][place];
                     let fall = task.falls(simd, (batch, place), block);
                     let look = (splat.color, splat.depth);
-                    work.contributions += layer.accumulate::<_, DEPTH>(
-                        simd,
-                        block,
-                        fall,
-                        look,
-                        &self.passing,
-                        task.thresholds,
-                    );
+                    work.contributions +=
+                        layer.accumulate(simd, block, fall, look, &self.passing, task.thresholds);
                 }
             }
         }
@@ -183,7 +175,7 @@ impl GaussianTile {
 
     /// Parts a tile's list by blocks: what may reach each, in the order of the list.
     #[inline(always)]
-    pub(super) fn part<S: Simd, const DEPTH: DepthMode>(
+    pub(super) fn part<S: Simd>(
         &mut self,
         simd: S,
         task: &Task<'_>,
@@ -196,6 +188,7 @@ impl GaussianTile {
         };
         let all = mask32x16::splat(simd, true);
         let bounded = task.skips.has(Skip::Blocks);
+        let tests_depth = task.thresholds.depth_mode > NO_DEPTH;
         for list in &mut self.lists {
             list.clear();
         }
@@ -204,7 +197,7 @@ impl GaussianTile {
         for &primitive in task.list {
             let (batch, place) = locate(primitive);
             let splat = &task.splats[batch][place];
-            let hidden = DEPTH > NO_DEPTH && self.passing.hides(splat.depth);
+            let hidden = tests_depth && self.passing.hides(splat.depth);
             if hidden {
                 work.tiles_hidden += 1;
                 if !recorded {
@@ -227,7 +220,7 @@ impl GaussianTile {
                 hidden_alone += reached.to_bitmask().count_ones();
                 continue;
             }
-            if DEPTH > NO_DEPTH {
+            if tests_depth {
                 let shown = self.passing.blocks(simd, splat.depth);
                 work.blocks_hidden += u64::from((reached & !shown).to_bitmask().count_ones());
                 reached &= shown;

@@ -8,7 +8,7 @@
 use super::exp2::POWER_OF_TWO;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::layer::Layer;
-use super::{CHUNK, DepthMode, FIND_MEDIAN, GaussianTile, NO_DEPTH, Task, Thresholds, Work};
+use super::{CHUNK, FIND_MEDIAN, GaussianTile, NO_DEPTH, Task, Thresholds, Work};
 use crate::gaussian::locate;
 use crate::gaussian::splat::Splat;
 use crate::lanes::{bits_of, floats_of};
@@ -64,14 +64,14 @@ impl Thresholds {
 impl GaussianTile {
     /// Composites a tile in binary16.
     #[inline(always)]
-    pub(super) fn composite_half<S: Simd, const DEPTH: DepthMode>(
+    pub(super) fn composite_half<S: Simd>(
         &mut self,
         simd: S,
         task: &Task<'_>,
         layer: usize,
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
-        let mut work = self.part::<_, DEPTH>(simd, task, layer, runs);
+        let mut work = self.part(simd, task, layer, runs);
         let layer = &mut self.layers[layer];
         let thresholds = task.thresholds.rounded();
         for (block, list) in self.lists.iter().enumerate() {
@@ -85,12 +85,12 @@ impl GaussianTile {
                     let rounded = Splat16::new(splat);
                     let d = offsets(simd, splat, task.corner, block);
                     let alpha = alpha(simd, &rounded, d, thresholds.alpha_ceiling);
-                    let shown = if DEPTH <= NO_DEPTH {
+                    let shown = if thresholds.depth_mode <= NO_DEPTH {
                         mask32x16::splat(simd, true)
                     } else {
                         self.passing.pixels(simd, block, splat.depth)
                     };
-                    work.contributions += layer.accumulate_half::<_, DEPTH>(
+                    work.contributions += layer.accumulate_half(
                         simd,
                         block,
                         alpha,
@@ -132,7 +132,7 @@ fn alpha<S: Simd>(simd: S, g: &Splat16, [dx, dy]: [f32x16<S>; 2], ceiling: f32) 
 impl Layer {
     /// Composites a Gaussian of a colour and a depth in a block, where it is `shown`; returns how many pixels accepted it.
     #[inline(always)]
-    fn accumulate_half<S: Simd, const DEPTH: DepthMode>(
+    fn accumulate_half<S: Simd>(
         &mut self,
         simd: S,
         block: usize,
@@ -148,7 +148,7 @@ impl Layer {
         let reached = alpha.simd_ge(thresholds.alpha_floor) & t.simd_ge(zero) & shown;
         let accepted = reached & rest.simd_ge(thresholds.transmittance_floor);
         let finished = reached & rest.simd_lt(thresholds.transmittance_floor);
-        if DEPTH >= FIND_MEDIAN {
+        if thresholds.depth_mode >= FIND_MEDIAN {
             let median = u32x16::from_slice(simd, &self.median[block]);
             let first_half = accepted & t.simd_ge(0.5);
             let median = first_half.select(u32x16::splat(simd, depth), median);

@@ -7,7 +7,7 @@
 
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::layer::Layer;
-use super::{BLOCKS, DepthMode, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Work};
+use super::{BLOCKS, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Work};
 use crate::gaussian::locate;
 use crate::gaussian::rays::{PixelRays, RayDepths, Rays, ordered_key};
 use crate::trace::Run;
@@ -120,7 +120,7 @@ pub(super) struct PerPixel {
 impl GaussianTile {
     /// Composites a tile in the per-pixel order.
     #[inline(always)]
-    pub(super) fn composite_per_pixel<S: Simd, const DEPTH: DepthMode>(
+    pub(super) fn composite_per_pixel<S: Simd>(
         &mut self,
         simd: S,
         task: &Task<'_>,
@@ -128,20 +128,19 @@ impl GaussianTile {
         layer: usize,
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
-        let mut work = self.part::<_, DEPTH>(simd, task, layer, runs);
+        let mut work = self.part(simd, task, layer, runs);
         for block in 0..BLOCKS {
             if self.lists[block].is_empty() {
                 continue;
             }
-            work.contributions +=
-                self.composite_block::<_, DEPTH>(simd, task, depths, (layer, block));
+            work.contributions += self.composite_block(simd, task, depths, (layer, block));
         }
         work
     }
 
     /// Composites a block of a layer; returns how many Gaussians its pixels accepted.
     #[inline(always)]
-    fn composite_block<S: Simd, const DEPTH: DepthMode>(
+    fn composite_block<S: Simd>(
         &mut self,
         simd: S,
         task: &Task<'_>,
@@ -164,7 +163,7 @@ impl GaussianTile {
                 let ceiling = f32x16::splat(simd, task.thresholds.alpha_ceiling);
                 let alpha = super::exp2::exp2_of_negated(simd, fall).min(ceiling);
                 let mut reached = fall.simd_le(task.thresholds.most_fall);
-                if DEPTH > NO_DEPTH {
+                if task.thresholds.depth_mode > NO_DEPTH {
                     reached &= self.passing.pixels(simd, block, splat.depth);
                 }
                 let mut reached = reached.to_bitmask() as u32 & open;
@@ -193,7 +192,7 @@ impl GaussianTile {
                     continue;
                 }
                 let names = &self.lists[block];
-                contributions += composite_pixel::<DEPTH>(sum, pixel, names, task);
+                contributions += composite_pixel(sum, pixel, names, task);
                 if sum.finished || !pixel.advance() {
                     open &= !(1 << lane);
                 }
@@ -205,12 +204,7 @@ impl GaussianTile {
 }
 
 /// Composites what a pixel gathered, front to back; returns how many it accepted.
-fn composite_pixel<const DEPTH: DepthMode>(
-    sum: &mut Sum,
-    pixel: &mut Gathered,
-    names: &[u32],
-    task: &Task<'_>,
-) -> u64 {
+fn composite_pixel(sum: &mut Sum, pixel: &mut Gathered, names: &[u32], task: &Task<'_>) -> u64 {
     let floor = f64::from(task.thresholds.transmittance_floor);
     let mut accepted = 0;
     for contribution in pixel.sorted() {
@@ -226,7 +220,7 @@ fn composite_pixel<const DEPTH: DepthMode>(
         for (sum, color) in sum.color.iter_mut().zip(splat.color) {
             *sum += weight * f64::from(color);
         }
-        if DEPTH >= FIND_MEDIAN && sum.transmittance >= 0.5 {
+        if task.thresholds.depth_mode >= FIND_MEDIAN && sum.transmittance >= 0.5 {
             sum.median = splat.depth;
         }
         sum.transmittance = rest;

@@ -83,9 +83,9 @@ impl Alphas {
                         let fall = chunk.records[number].falls(simd, block);
                         let most_fall = f32x16::from_slice(simd, &most_fall[block]);
                         let at = (block, chunk.looks[number].depth);
-                        let reached = reached::<_, DEPTH>(simd, at, fall, passing, most_fall);
+                        let reached = reached(simd, DEPTH, at, fall, passing, most_fall);
                         pixels.add(reached);
-                        let alpha = alpha::<_, DEPTH>(simd, reached, fall, ceiling);
+                        let alpha = alpha(simd, DEPTH, reached, fall, ceiling);
                         if let Some(to) = items.next() {
                             alpha.store_slice(to);
                         }
@@ -99,15 +99,16 @@ impl Alphas {
 
 /// The pixels of a block where alpha has fallen no further than it may, and the depth passes.
 #[inline(always)]
-fn reached<S: Simd, const DEPTH: DepthMode>(
+fn reached<S: Simd>(
     simd: S,
+    mode: DepthMode,
     (block, depth): (usize, u32),
     fall: f32x16<S>,
     passing: &Passing,
     most_fall: f32x16<S>,
 ) -> mask32x16<S> {
     let reached = fall.simd_le(most_fall);
-    if DEPTH > NO_DEPTH {
+    if mode > NO_DEPTH {
         reached & passing.pixels(simd, block, depth)
     } else {
         reached
@@ -116,13 +117,14 @@ fn reached<S: Simd, const DEPTH: DepthMode>(
 
 /// The alphas of pixels where they have fallen so far; zero where nothing is reached: too far down, powers mean nothing.
 #[inline(always)]
-fn alpha<S: Simd, const DEPTH: DepthMode>(
+fn alpha<S: Simd>(
     simd: S,
+    mode: DepthMode,
     reached: mask32x16<S>,
     fall: f32x16<S>,
     ceiling: f32x16<S>,
 ) -> f32x16<S> {
-    only(simd, reached, power::<_, DEPTH>(simd, fall).min(ceiling))
+    only(simd, reached, power(simd, mode, fall).min(ceiling))
 }
 
 impl Layer {
@@ -228,6 +230,10 @@ impl Layer {
         chunk: &Chunk,
         thresholds: Thresholds,
     ) -> u64 {
+        let thresholds = Thresholds {
+            depth_mode: DEPTH,
+            ..thresholds
+        };
         let mut pixels = self.pixels(simd, block);
         let mut refused = Tally::new(simd);
         for alpha in alphas {
@@ -235,7 +241,7 @@ impl Layer {
             reaching &= reaching.wrapping_sub(1);
             let alpha = f32x16::from_slice(simd, alpha);
             let (to, look) = ((block, &mut pixels), (look.color, look.depth));
-            let goes_on = self.composite::<_, DEPTH>(simd, to, alpha, look, thresholds);
+            let goes_on = self.composite(simd, to, alpha, look, thresholds);
             refused.add_without(alpha.simd_gt(0.0), goes_on);
         }
         self.keep(block, pixels);
@@ -269,13 +275,16 @@ impl Layer {
         passing: &Passing,
         task: &Task<'_>,
     ) -> u64 {
+        let thresholds = Thresholds {
+            depth_mode: DEPTH,
+            ..task.thresholds
+        };
         let mut contributions = 0;
         for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
             let fall = falls_64(simd, splat, task, block);
             let look = (splat.color, splat.depth);
-            contributions +=
-                self.accumulate::<_, DEPTH>(simd, block, fall, look, passing, task.thresholds);
-            self.find_most_fall(simd, block, task.thresholds);
+            contributions += self.accumulate(simd, block, fall, look, passing, thresholds);
+            self.find_most_fall(simd, block, thresholds);
         }
         contributions
     }
@@ -283,7 +292,7 @@ impl Layer {
     /// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `-fall`; returns
     /// how many pixels accepted it.
     #[inline(always)]
-    pub(super) fn accumulate<S: Simd, const DEPTH: DepthMode>(
+    pub(super) fn accumulate<S: Simd>(
         &mut self,
         simd: S,
         block: usize,
@@ -294,11 +303,12 @@ impl Layer {
     ) -> u64 {
         let mut pixels = self.pixels(simd, block);
         let most_fall = f32x16::splat(simd, thresholds.most_fall);
-        let reached = reached::<_, DEPTH>(simd, (block, look.1), fall, passing, most_fall);
+        let mode = thresholds.depth_mode;
+        let reached = reached(simd, mode, (block, look.1), fall, passing, most_fall);
         let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
-        let alpha = alpha::<_, DEPTH>(simd, reached, fall, ceiling);
+        let alpha = alpha(simd, mode, reached, fall, ceiling);
         let at = (block, &mut pixels);
-        let goes_on = self.composite::<_, DEPTH>(simd, at, alpha, look, thresholds);
+        let goes_on = self.composite(simd, at, alpha, look, thresholds);
         self.keep(block, pixels);
         let accepted = goes_on.to_bitmask() & reached.to_bitmask();
         accepted.count_ones().into()
@@ -333,7 +343,7 @@ impl Layer {
     /// What does not reach a pixel is composited with an alpha of zero, which changes nothing: to leave it out would take
     /// longer.
     #[inline(always)]
-    fn composite<S: Simd, const DEPTH: DepthMode>(
+    fn composite<S: Simd>(
         &mut self,
         simd: S,
         (block, pixels): (usize, &mut Pixels<S>),
@@ -343,7 +353,7 @@ impl Layer {
     ) -> mask32x16<S> {
         let t = pixels.transmittance;
         let finished = -t.abs();
-        if DEPTH == FIND_REACHED {
+        if thresholds.depth_mode == FIND_REACHED {
             let reached = alpha.simd_gt(0.0);
             pixels.transmittance = reached.select(finished, t);
             return !reached;
@@ -353,13 +363,13 @@ impl Layer {
         let goes_on = rest.simd_ge(f32x16::splat(simd, thresholds.transmittance_floor));
         pixels.transmittance = goes_on.select(rest, finished);
         let weight = only(simd, goes_on, weight);
-        if DEPTH >= FIND_MEDIAN {
+        if thresholds.depth_mode >= FIND_MEDIAN {
             let median = u32x16::from_slice(simd, &self.median[block]);
             let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
             let median = first_half.select(u32x16::splat(simd, depth), median);
             median.store_slice(&mut self.median[block]);
         }
-        if DEPTH == FIND_MEAN {
+        if thresholds.depth_mode == FIND_MEAN {
             let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
             let [depths, weights] = &mut self.means;
             let sum = f32x16::from_slice(simd, &depths[block]);

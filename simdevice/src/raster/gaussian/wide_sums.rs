@@ -8,8 +8,8 @@ use super::exp2::exp2_of_negated;
 use super::layer::Layer;
 use super::passing::Passing;
 use super::{
-    BLOCKS, CHUNK, DepthMode, FIND_MEAN, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task,
-    Thresholds, Work, locate,
+    BLOCKS, CHUNK, FIND_MEAN, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Thresholds, Work,
+    locate,
 };
 use crate::packet::GaussianState;
 use crate::skips::Skip;
@@ -101,14 +101,14 @@ impl Sums {
 impl GaussianTile {
     /// Composites a tile in the order of its list.
     #[inline(always)]
-    pub(super) fn composite_wide<S: Simd, const DEPTH: DepthMode>(
+    pub(super) fn composite_wide<S: Simd>(
         &mut self,
         simd: S,
         task: &Task<'_>,
         layer: usize,
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
-        let mut work = self.part::<_, DEPTH>(simd, task, layer, runs);
+        let mut work = self.part(simd, task, layer, runs);
         let layer = &mut self.layers[layer];
         for block in 0..BLOCKS {
             let mut sums = Sums::load(layer, block);
@@ -121,7 +121,7 @@ impl GaussianTile {
                     let splat = &task.splats[batch][place];
                     let fall = task.falls(simd, (batch, place), block);
                     let look = (splat.color, splat.depth);
-                    work.contributions += layer.accumulate_wide::<_, DEPTH>(
+                    work.contributions += layer.accumulate_wide(
                         simd,
                         (block, &mut sums),
                         fall,
@@ -140,7 +140,7 @@ impl GaussianTile {
 impl Layer {
     /// As [`Layer::accumulate`], to sums that are kept elsewhere.
     #[inline(always)]
-    fn accumulate_wide<S: Simd, const DEPTH: DepthMode>(
+    fn accumulate_wide<S: Simd>(
         &mut self,
         simd: S,
         (block, sums): (usize, &mut Sums),
@@ -152,7 +152,7 @@ impl Layer {
         let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
         let alpha = exp2_of_negated(simd, fall).min(ceiling);
         let mut reached = fall.simd_le(f32x16::splat(simd, thresholds.most_fall));
-        if DEPTH > NO_DEPTH {
+        if thresholds.depth_mode > NO_DEPTH {
             reached &= passing.pixels(simd, block, depth);
         }
         // What has fallen too far has no meaning, and may be anything.
@@ -160,14 +160,14 @@ impl Layer {
         let before = sums.transmittance;
         let floor = thresholds.transmittance_floor;
         let (weight, accepted) = sums.add(simd, alpha, color, reached.to_bitmask(), floor);
-        if DEPTH >= FIND_MEDIAN {
+        if thresholds.depth_mode >= FIND_MEDIAN {
             for (lane, (median, t)) in self.median[block].iter_mut().zip(before).enumerate() {
                 if accepted >> lane & 1 == 1 && t >= 0.5 {
                     *median = depth;
                 }
             }
         }
-        if DEPTH == FIND_MEAN {
+        if thresholds.depth_mode == FIND_MEAN {
             let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
             let [depths, weights] = &mut self.means;
             let sum = f32x16::from_slice(simd, &depths[block]);
