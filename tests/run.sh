@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # Runs every check of the project, installing what it needs where that is missing, and saying so.
 #
-# The tests themselves skip aloud where something is absent; this script makes sure that little is.
+# Prints the seconds of each step, the slowest tests, and what was ignored and why. A test that can't run is ignored;
+# GAURAST_TEST_REQUIRE=programs makes that a failure where a program or a system file is missing, GAURAST_TEST_REQUIRE=all
+# where real data (GAURAST_TEST_DATA) are missing too. GAURAST_TEST_LONG=1 runs whole what otherwise is a small sample.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -27,23 +29,50 @@ if [ ${#missing[@]} -gt 0 ]; then
         apt-get update -qq
         apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
     else
-        echo "missing, and the tests that need them will be skipped: ${missing[*]}" >&2
+        echo "missing, and the tests that need them will be ignored: ${missing[*]}" >&2
     fi
 fi
 
-step() {
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+export GAURAST_TEST_REPORT="$work/report"
+touch "$GAURAST_TEST_REPORT"
+
+# Tells of all steps so far; also where one failed.
+tell() {
     echo
-    echo "== $*"
-    "$@"
+    echo "== the slowest tests, in seconds"
+    grep -v '^ignored' "$GAURAST_TEST_REPORT" | sort -rn | head -n 20 || true
+    echo
+    echo "== ignored tests, by reason"
+    sed -n 's/^ignored\t//p' "$GAURAST_TEST_REPORT" | sort | uniq -c | sort -rn
+    echo
+    echo "== seconds by step"
+    cat "$work/steps"
 }
-step cargo fmt --all --check
-step cargo clippy --workspace --all-targets --quiet -- -D warnings
+step() { # step NAME COMMAND...
+    local name=$1 start=$SECONDS
+    shift
+    echo
+    echo "== $name: $*"
+    if ! "$@"; then
+        printf '%6d  %s (failed)\n' $((SECONDS - start)) "$name" >>"$work/steps"
+        tell
+        exit 1
+    fi
+    printf '%6d  %s\n' $((SECONDS - start)) "$name" >>"$work/steps"
+}
+
 # With optimisation, since the oracle compares whole images, and with debug assertions and overflow checks.
-step cargo test --workspace --profile checked --quiet
-# What a frame costs, in instructions: times would depend on the machine.
-step tests/instructions/check.sh "${CARGO_TARGET_DIR:-target}/checked/gaurast"
-# The main job once more in a debug build, where overflow and bad pointers abort.
-picture=$(mktemp -d)
-trap 'rm -rf "$picture"' EXIT
-step cargo run --quiet -- render --size 160x90 --quiet -o "$picture/debug.png"
+tests=(--workspace --profile checked --lib --bins --tests)
+step format cargo fmt --all --check
+step clippy cargo clippy --workspace --all-targets --profile checked --quiet -- -D warnings
+step "build tests" cargo test "${tests[@]}" --quiet --no-run
+step tests cargo test "${tests[@]}" --quiet
+step "documentation tests" cargo test --workspace --profile checked --doc --quiet
+# What frames cost, in instructions: times would depend on the machine.
+step "build release" cargo build --release --quiet -p gaurast-bench
+step counts cargo run --release --quiet -p gaurast-bench -- counts
+printf '%6d  %s\n' $SECONDS all >>"$work/steps"
+tell
 echo "all checks passed"
