@@ -6,4 +6,5 @@ pub mod file;
 pub mod output;
 pub mod renderer;
 pub mod scene;
+pub mod size;
 pub mod usage;

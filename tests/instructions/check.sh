@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Counts the instructions of one frame and holds them against the figure stored beside this script, since a count does
-# not depend on what else the machine does. `check.sh PROGRAM` checks the `gaurast` program; `check.sh PROGRAM --store`
+# not depend on what else the machine does. `check.sh PROGRAM` checks the `gaurast-bench` program; `check.sh PROGRAM --store`
 # stores its count. The figure is that of the profile that tests/run.sh builds.
 #
 # The frame is the third of frames.jsonl, at the AVX2 level on one thread, since the second one makes the chunks: its
@@ -22,7 +22,7 @@ count() { # count LINES: the instructions of a worker that is told that many lin
     local said
     said=$(head -n "$1" "$folder/frames.jsonl" |
         GAURAST_SIMD=avx2 GAURAST_THREADS=1 valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" \
-            bench-worker 2>&1 >/dev/null) || {
+            worker 2>&1 >/dev/null) || {
         echo "the worker failed: $said" >&2
         return 1
     }

@@ -40,7 +40,7 @@ impl Drop for Instance {
 
 /// What a device is wanted for.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Purpose<'a> {
+pub enum Purpose<'a> {
     /// The Gaussian primitive topology.
     Gaussians,
     /// Triangles alone, on the first device whose name holds this text.
@@ -48,7 +48,7 @@ pub(super) enum Purpose<'a> {
 }
 
 /// A logical device, its queue, and what is known about it.
-pub(super) struct Device {
+pub struct Device {
     raw: ash::Device,
     queue: vk::Queue,
     /// Absent if the device doesn't count.
@@ -72,7 +72,10 @@ struct PhysicalDevice {
 
 impl Device {
     /// The first device of `entry` that serves the purpose.
-    pub(super) fn new(entry: ash::Entry, purpose: Purpose<'_>) -> Result<Self, RenderError> {
+    ///
+    /// # Errors
+    /// If there is none, or Vulkan fails.
+    pub fn new(entry: ash::Entry, purpose: Purpose<'_>) -> Result<Self, RenderError> {
         let instance = Instance::new(entry)?;
         let physical = PhysicalDevice::choose(&instance.raw, purpose)?;
 
@@ -128,15 +131,18 @@ impl Device {
         })
     }
 
-    pub(super) fn raw(&self) -> &ash::Device {
+    /// The device's functions.
+    pub fn raw(&self) -> &ash::Device {
         &self.raw
     }
 
-    pub(super) fn queue(&self) -> vk::Queue {
+    /// The one queue.
+    pub fn queue(&self) -> vk::Queue {
         self.queue
     }
 
-    pub(super) fn queue_family(&self) -> u32 {
+    /// The queue's family.
+    pub fn queue_family(&self) -> u32 {
         self.physical.queue_family
     }
 
@@ -151,7 +157,8 @@ impl Device {
         self.performance.as_ref()
     }
 
-    pub(super) fn name(&self) -> &str {
+    /// The device's name.
+    pub fn name(&self) -> &str {
         &self.physical.name
     }
 

@@ -15,13 +15,12 @@
 //! # }
 //! ```
 
-mod device;
+pub mod device;
 mod draw;
 mod modes;
 mod pipeline;
-pub mod quads;
 mod query;
-mod resource;
+pub mod resource;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -47,7 +46,7 @@ use serde::{Deserialize, Serialize};
 const STAGING: u64 = 64 << 20;
 
 /// The colour attachment's format: what a draw leaves is kept as it is.
-const COLOR_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+pub const COLOR_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 
 /// Why rendering failed.
 #[derive(Debug, Error)]
@@ -74,12 +73,6 @@ pub enum RenderError {
         /// The devices there are.
         found: String,
     },
-    /// The Vulkan loader is not there.
-    #[error("there is no Vulkan loader: {0}")]
-    NoLoader(String),
-    /// Threads could not be started.
-    #[error("cannot start threads: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
     /// No memory type will do.
     #[error("the device has no {0} memory for a resource")]
     NoMemory(&'static str),
@@ -104,7 +97,11 @@ pub enum RenderError {
 }
 
 /// Names the call that a Vulkan error came from.
-trait During<T> {
+pub trait During<T> {
+    /// The value, or the error with the name of the `call` that it came from.
+    ///
+    /// # Errors
+    /// If the call failed.
     fn during(self, call: &'static str) -> Result<T, RenderError>;
 }
 
@@ -190,11 +187,13 @@ pub struct Frame {
 }
 
 /// Where a frame goes.
-struct Target {
-    image: Image,
+pub struct Target {
+    /// The colour attachment.
+    pub image: Image,
     /// Half as wide and high, if anything was drawn at half size.
     half: Option<Image>,
-    readback: Buffer,
+    /// Room for the pixels in memory of the host.
+    pub readback: Buffer,
 }
 
 impl Renderer {
@@ -405,8 +404,11 @@ impl Renderer {
     }
 }
 
-/// Whether the device can draw a picture of this size.
-fn check_size(device: &Device, width: u32, height: u32) -> Result<(), RenderError> {
+/// Checks that the device can draw a picture of this size.
+///
+/// # Errors
+/// [`RenderError::Size`] if it cannot.
+pub fn check_size(device: &Device, width: u32, height: u32) -> Result<(), RenderError> {
     let max = device.max_size();
     if !(1..=max).contains(&width) || !(1..=max).contains(&height) {
         return Err(RenderError::Size { width, height, max });
@@ -415,7 +417,11 @@ fn check_size(device: &Device, width: u32, height: u32) -> Result<(), RenderErro
 }
 
 impl Target {
-    fn new(device: &Arc<Device>, width: u32, height: u32) -> Result<Self, RenderError> {
+    /// A target of [`COLOR_FORMAT`].
+    ///
+    /// # Errors
+    /// If there is no memory for it, or Vulkan fails.
+    pub fn new(device: &Arc<Device>, width: u32, height: u32) -> Result<Self, RenderError> {
         let bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
         Ok(Self {
             image: Image::new(
@@ -438,7 +444,7 @@ impl Target {
 }
 
 /// Copies the drawn picture to the buffer that the host reads.
-fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target) {
+pub fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target) {
     let image = &target.image;
     let to_source = image
         .barrier(

@@ -11,7 +11,7 @@ use super::{During, RenderError};
 
 /// Which memory a resource lives in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Memory {
+pub enum Memory {
     /// The device's own, not host-visible if there is such a type.
     Device,
     /// Coherent with the host, for writing.
@@ -60,7 +60,7 @@ impl Memory {
 }
 
 /// A buffer with its memory.
-pub(super) struct Buffer {
+pub struct Buffer {
     handle: vk::Buffer,
     memory: vk::DeviceMemory,
     size: u64,
@@ -69,7 +69,10 @@ pub(super) struct Buffer {
 
 impl Buffer {
     /// A buffer of `size` bytes, not zero.
-    pub(super) fn new(
+    ///
+    /// # Errors
+    /// If there is no memory for it, or Vulkan fails.
+    pub fn new(
         device: &Arc<Device>,
         size: u64,
         usage: vk::BufferUsageFlags,
@@ -94,13 +97,20 @@ impl Buffer {
         Ok(buffer)
     }
 
-    pub(super) fn handle(&self) -> vk::Buffer {
+    /// The buffer's handle.
+    pub fn handle(&self) -> vk::Buffer {
         self.handle
     }
 
     /// Copies `bytes` to the beginning of the buffer, which must be in host memory and unused by
     /// the device.
-    pub(super) fn write(&self, bytes: &[u8]) -> Result<(), RenderError> {
+    ///
+    /// # Errors
+    /// If the memory cannot be mapped.
+    ///
+    /// # Panics
+    /// If the buffer is smaller.
+    pub fn write(&self, bytes: &[u8]) -> Result<(), RenderError> {
         assert!(
             bytes.len() as u64 <= self.size,
             "the buffer holds the bytes"
@@ -112,7 +122,13 @@ impl Buffer {
     }
 
     /// Copies the beginning of the buffer, which must be in host memory and unused by the device.
-    pub(super) fn read<T: Pod>(&self, values: &mut [T]) -> Result<(), RenderError> {
+    ///
+    /// # Errors
+    /// If the memory cannot be mapped.
+    ///
+    /// # Panics
+    /// If the buffer is smaller.
+    pub fn read<T: Pod>(&self, values: &mut [T]) -> Result<(), RenderError> {
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(values);
         assert!(
             bytes.len() as u64 <= self.size,
@@ -126,7 +142,13 @@ impl Buffer {
 
     /// Lets `fill` write the first `count` elements of the buffer, which must be in host memory and
     /// unused by the device.
-    pub(super) fn fill<T: Pod>(
+    ///
+    /// # Errors
+    /// If the memory cannot be mapped.
+    ///
+    /// # Panics
+    /// If the buffer is smaller.
+    pub fn fill<T: Pod>(
         &self,
         count: usize,
         fill: impl FnOnce(&mut [MaybeUninit<T>]),
@@ -143,7 +165,8 @@ impl Buffer {
         })
     }
 
-    pub(super) fn size(&self) -> u64 {
+    /// The size in bytes.
+    pub fn size(&self) -> u64 {
         self.size
     }
 
@@ -174,7 +197,7 @@ impl Drop for Buffer {
 }
 
 /// A two-dimensional colour image with its memory and a view of it.
-pub(super) struct Image {
+pub struct Image {
     handle: vk::Image,
     memory: vk::DeviceMemory,
     view: vk::ImageView,
@@ -183,7 +206,11 @@ pub(super) struct Image {
 }
 
 impl Image {
-    pub(super) fn new(
+    /// An image of one level and one layer.
+    ///
+    /// # Errors
+    /// If there is no memory for it, or Vulkan fails.
+    pub fn new(
         device: &Arc<Device>,
         extent: vk::Extent2D,
         format: vk::Format,
@@ -233,20 +260,23 @@ impl Image {
         layer_count: 1,
     };
 
-    pub(super) fn handle(&self) -> vk::Image {
+    /// The image's handle.
+    pub fn handle(&self) -> vk::Image {
         self.handle
     }
 
-    pub(super) fn view(&self) -> vk::ImageView {
+    /// The view of the whole image.
+    pub fn view(&self) -> vk::ImageView {
         self.view
     }
 
-    pub(super) fn extent(&self) -> vk::Extent2D {
+    /// Width and height in pixels.
+    pub fn extent(&self) -> vk::Extent2D {
         self.extent
     }
 
     /// A barrier that changes the layout, still without accesses.
-    pub(super) fn barrier(
+    pub fn barrier(
         &self,
         from: vk::ImageLayout,
         to: vk::ImageLayout,
@@ -276,7 +306,7 @@ impl Drop for Image {
 
 /// `N` command buffers that are recorded anew for every use, and the fence that their submissions
 /// are waited for with.
-pub(super) struct CommandBuffers<const N: usize> {
+pub struct CommandBuffers<const N: usize> {
     pool: vk::CommandPool,
     fence: vk::Fence,
     handles: Vec<vk::CommandBuffer>,
@@ -284,7 +314,11 @@ pub(super) struct CommandBuffers<const N: usize> {
 }
 
 impl<const N: usize> CommandBuffers<N> {
-    pub(super) fn new(device: &Arc<Device>) -> Result<Self, RenderError> {
+    /// Command buffers, nothing recorded.
+    ///
+    /// # Errors
+    /// If Vulkan fails.
+    pub fn new(device: &Arc<Device>) -> Result<Self, RenderError> {
         let raw = device.raw();
         let create_info = vk::CommandPoolCreateInfo::default()
             .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER)
@@ -311,7 +345,10 @@ impl<const N: usize> CommandBuffers<N> {
     }
 
     /// Records command buffer `index`.
-    pub(super) fn record(
+    ///
+    /// # Errors
+    /// If Vulkan fails.
+    pub fn record(
         &self,
         index: usize,
         record: impl FnOnce(&ash::Device, vk::CommandBuffer),
@@ -327,7 +364,10 @@ impl<const N: usize> CommandBuffers<N> {
     }
 
     /// Submits command buffers in the order of `indices`, and waits for their end.
-    pub(super) fn submit_and_wait(&mut self, indices: &[usize]) -> Result<(), RenderError> {
+    ///
+    /// # Errors
+    /// If Vulkan fails.
+    pub fn submit_and_wait(&mut self, indices: &[usize]) -> Result<(), RenderError> {
         let raw = self.device.raw();
         let handles: Vec<_> = indices.iter().map(|index| self.handles[*index]).collect();
         let submit = vk::SubmitInfo::default().command_buffers(&handles);

@@ -6,12 +6,9 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gaurast_samples::renderer::{Geometry, Order, Precision};
 use gaurast_samples::scene::{self, MAX_SH_DEGREE};
+use gaurast_samples::size::Size;
 
-use crate::bench::BenchArguments;
 use crate::simulate::SimulateArguments;
-
-/// The greatest width and height of a picture.
-const MAX_SIDE: u32 = 16_384;
 
 /// Renders scenes of 3D Gaussians on a software Vulkan device with a Gaussian primitive topology.
 ///
@@ -30,11 +27,6 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Tells what the simulated hardware would have spent on a scene: time, energy, area
     Simulate(Box<SimulateArguments>),
-    /// Measures run time and error, beside quads on lavapipe and on this driver
-    Bench(Box<BenchArguments>),
-    /// Draws for `bench`, which starts it
-    #[command(hide = true)]
-    BenchWorker,
 }
 
 impl Default for Command {
@@ -216,27 +208,6 @@ impl FromStr for Triple {
     }
 }
 
-/// A picture's width and height.
-#[derive(Clone, Copy, Debug)]
-pub struct Size(pub [u32; 2]);
-
-impl FromStr for Size {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let (width, height) = text
-            .split_once(['x', 'X'])
-            .ok_or("a width and a height are needed, such as 1280x720")?;
-        let side = |word: &str| {
-            word.parse()
-                .ok()
-                .filter(|side| (1..=MAX_SIDE).contains(side))
-                .ok_or(format!("each side is 1 to {MAX_SIDE} pixels"))
-        };
-        Ok(Self([side(width)?, side(height)?]))
-    }
-}
-
 fn part(text: &str) -> Result<f32, &'static str> {
     text.parse()
         .ok()
@@ -283,11 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_and_triples() {
-        assert_eq!("640x480".parse::<Size>().map(|s| s.0), Ok([640, 480]));
-        for bad in ["640", "0x1", "1x", "16385x1", "-1x1", "1x99999999999"] {
-            assert!(bad.parse::<Size>().is_err(), "{bad}");
-        }
+    fn triples() {
         assert_eq!(
             "1,-2.5, 3e2".parse::<Triple>().map(|t| t.0),
             Ok([1., -2.5, 300.])

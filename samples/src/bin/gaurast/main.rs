@@ -1,7 +1,6 @@
 //! `gaurast`: pictures of 3D Gaussian scenes, headless, on a simulated Gaussian rasterizer.
 
 mod args;
-mod bench;
 mod progress;
 mod render;
 mod report;
@@ -26,8 +25,6 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match arguments.command.unwrap_or_default() {
         Command::Render(arguments) => render::run(&arguments).map_err(|error| error.to_string()),
-        Command::Bench(arguments) => bench::run(&arguments).map_err(|error| error.to_string()),
-        Command::BenchWorker => bench::worker::run().map_err(|error| error.to_string()),
         Command::Simulate(arguments) => {
             simulate::run(&arguments).map_err(|error| error.to_string())
         }

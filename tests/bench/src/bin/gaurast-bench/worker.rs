@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use gaurast_bench::quads::QuadRenderer;
 use gaurast_samples::camera::Camera;
-use gaurast_samples::renderer::quads::QuadRenderer;
 use gaurast_samples::renderer::{DeviceScene, Frame, Renderer, Settings};
 use gaurast_samples::scene::Scene;
 use gaurast_samples::usage;
@@ -17,7 +17,7 @@ use super::BenchError;
 use super::workload::Workload;
 
 /// The hidden command that makes a process a worker.
-pub const COMMAND: &str = "bench-worker";
+const COMMAND: &str = "worker";
 
 /// lavapipe's manifest, where distributions put it.
 const LAVAPIPE_FOLDERS: [&str; 3] = ["/usr/share", "/etc", "/usr/local/share"];

@@ -1,4 +1,4 @@
-//! `gaurast bench growth`: how time and memory grow.
+//! `gaurast-bench growth`: how time and memory grow.
 
 use std::io::{Write, stdout};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `gaurast bench`: whole frames of every contender, in turns.
+//! `gaurast-bench frames`: whole frames of every contender, in turns.
 
 use std::io::{Write, stdout};
 

@@ -1,9 +1,9 @@
 //! Quads on any device show what the Gaussian topology draws.
 
+use gaurast_bench::quads::{QuadError, QuadRenderer};
 use gaurast_oracle::compare::Statistics;
 use gaurast_samples::camera::Camera;
 use gaurast_samples::output::Picture;
-use gaurast_samples::renderer::quads::QuadRenderer;
 use gaurast_samples::renderer::{RenderError, Renderer};
 use gaurast_samples::scene::Scene;
 
@@ -55,13 +55,15 @@ fn quads_on_this_driver_show_what_gaussians_are() {
 fn quads_on_lavapipe_show_what_gaussians_are() {
     match QuadRenderer::through_the_loader("llvmpipe", 1) {
         Ok(mut quads) => compare(&mut quads),
-        Err(error @ (RenderError::NoLoader(_) | RenderError::NoSuchDevice { .. })) => {
+        Err(
+            error @ (QuadError::NoLoader(_) | QuadError::Render(RenderError::NoSuchDevice { .. })),
+        ) => {
             eprintln!("skipped: {error}");
         }
-        Err(RenderError::Vulkan {
+        Err(QuadError::Render(RenderError::Vulkan {
             call: "vkCreateInstance",
             result,
-        }) => eprintln!("skipped: the loader has no driver ({result})"),
+        })) => eprintln!("skipped: the loader has no driver ({result})"),
         Err(error) => panic!("{error}"),
     }
 }

@@ -3,9 +3,9 @@
 //! `quad_splats [DEVICE [SCENE]]` writes quad_splats.png by the loader's first device whose name holds DEVICE (such as
 //! llvmpipe), or by this driver without one. `gaurast render` draws the same picture as it is meant.
 
+use gaurast_bench::quads::QuadRenderer;
 use gaurast_samples::camera::Camera;
 use gaurast_samples::output;
-use gaurast_samples::renderer::quads::QuadRenderer;
 use gaurast_samples::scene::{DEFAULT_COUNT, Scene};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

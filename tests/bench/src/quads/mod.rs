@@ -1,5 +1,5 @@
 //! Gaussians as blended quads: how a Vulkan application draws them on a device that has only triangles, a software one
-//! for example. It is what [`Renderer`](super::Renderer) is measured against.
+//! for example. It is what [`Renderer`](gaurast_samples::renderer::Renderer) is measured against.
 //!
 //! Each frame, the processor projects the Gaussians that may be seen, sorts them by depth and writes them to a buffer;
 //! the device draws an oriented quad for each, as far as its alpha reaches the floor, from the back to the front.
@@ -15,14 +15,15 @@ use std::time::{Duration, Instant};
 use ash::vk;
 use rayon::prelude::*;
 
-use super::device::{Device, Purpose};
-use super::query::Counter;
-use super::resource::{Buffer, CommandBuffers, Memory};
-use super::{Frame, RenderError, Target, record_copy};
-use crate::camera::Camera;
-use crate::output::Picture;
-use crate::scene::Scene;
-use crate::usage::processor_time;
+use gaurast_samples::camera::Camera;
+use gaurast_samples::output::Picture;
+use gaurast_samples::renderer::device::{Device, Purpose};
+use gaurast_samples::renderer::resource::{Buffer, CommandBuffers, Memory};
+use gaurast_samples::renderer::{Counter, Frame, RenderError, Target, check_size, record_copy};
+use gaurast_samples::scene::Scene;
+use gaurast_samples::usage::processor_time;
+use thiserror::Error;
+
 use pipeline::{Push, QuadPipeline};
 use project::{Projection, Splat};
 
@@ -32,6 +33,20 @@ const CHUNK: usize = 4096;
 /// Corners of a quad, and the indices of its two triangles.
 const CORNERS: u32 = 4;
 const QUAD: [u32; 6] = [0, 1, 2, 2, 1, 3];
+
+/// Why quads could not be drawn.
+#[derive(Debug, Error)]
+pub enum QuadError {
+    /// The device failed, or there is none.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The Vulkan loader is not there.
+    #[error("there is no Vulkan loader: {0}")]
+    NoLoader(String),
+    /// Threads could not be started.
+    #[error("cannot start threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
 
 /// Draws scenes with quads on any Vulkan 1.3 device.
 pub struct QuadRenderer {
@@ -56,7 +71,7 @@ impl QuadRenderer {
     ///
     /// # Errors
     /// If there is no such device, or Vulkan fails.
-    pub fn new(entry: ash::Entry, device_name: &str, threads: usize) -> Result<Self, RenderError> {
+    pub fn new(entry: ash::Entry, device_name: &str, threads: usize) -> Result<Self, QuadError> {
         let device = Arc::new(Device::new(entry, Purpose::Triangles(device_name))?);
         Ok(Self {
             pool: rayon::ThreadPoolBuilder::new()
@@ -75,10 +90,10 @@ impl QuadRenderer {
     ///
     /// # Errors
     /// If there is no loader, no such device, or Vulkan fails.
-    pub fn through_the_loader(device_name: &str, threads: usize) -> Result<Self, RenderError> {
+    pub fn through_the_loader(device_name: &str, threads: usize) -> Result<Self, QuadError> {
         // SAFETY: the system's loader is sound.
         let entry = unsafe { ash::Entry::load() }
-            .map_err(|error| RenderError::NoLoader(error.to_string()))?;
+            .map_err(|error| QuadError::NoLoader(error.to_string()))?;
         Self::new(entry, device_name, threads)
     }
 
@@ -100,16 +115,40 @@ impl QuadRenderer {
         camera: &Camera,
         sh_degree: u32,
         alpha_floor: f32,
-    ) -> Result<Frame, RenderError> {
+    ) -> Result<Frame, QuadError> {
+        let start = processor_time();
+        let mut prepared = self.prepare(scene, camera, sh_degree, alpha_floor)?;
+        prepared.draw()?;
+        let processor = start.and_then(|start| Some(processor_time()? - start));
+        let picture = prepared.picture()?;
+        let Steps { sum, counters, .. } = prepared.steps;
+        Ok(Frame {
+            picture,
+            time: sum,
+            processor_time: processor,
+            counters,
+        })
+    }
+
+    /// Does what the processor has to do for [`QuadRenderer::render`]: the quads lie in the buffers, in their order.
+    ///
+    /// # Errors
+    /// As [`QuadRenderer::render`].
+    pub fn prepare(
+        &mut self,
+        scene: &Scene,
+        camera: &Camera,
+        sh_degree: u32,
+        alpha_floor: f32,
+    ) -> Result<Prepared<'_>, QuadError> {
         let (width, height) = (camera.width, camera.height);
-        super::check_size(&self.device, width, height)?;
+        check_size(&self.device, width, height)?;
         let target = match self.target.take() {
             Some(target) if target.image.extent() == vk::Extent2D { width, height } => target,
             _ => Target::new(&self.device, width, height)?,
         };
         let target = self.target.insert(target);
 
-        let start = processor_time();
         let mut steps = Steps::start();
         let projection = Projection::new(camera, sh_degree, alpha_floor);
         let splats = self.pool.install(|| project_all(&projection, scene));
@@ -149,35 +188,65 @@ impl QuadRenderer {
             });
         })?;
         steps.end("write");
+        Ok(Prepared {
+            count: pairs.len() as u32,
+            push: [2.0 / width as f32, 2.0 / height as f32, alpha_floor],
+            steps,
+            target,
+            buffers,
+            pipeline: &self.pipeline,
+            commands: &mut self.commands,
+            device: &self.device,
+        })
+    }
+}
 
-        let push = [2.0 / width as f32, 2.0 / height as f32, alpha_floor];
-        let count = pairs.len() as u32;
+/// Quads in their buffers, which can be drawn again and again.
+pub struct Prepared<'a> {
+    count: u32,
+    push: Push,
+    steps: Steps,
+    target: &'a Target,
+    buffers: &'a Buffers,
+    pipeline: &'a QuadPipeline,
+    commands: &'a mut CommandBuffers<1>,
+    device: &'a Device,
+}
+
+impl Prepared<'_> {
+    /// Draws the quads and copies the picture to the host.
+    ///
+    /// # Errors
+    /// If Vulkan fails.
+    pub fn draw(&mut self) -> Result<(), QuadError> {
         self.commands.record(0, |_, commands| {
             record_draw(
-                &self.device,
-                &self.pipeline,
+                self.device,
+                self.pipeline,
                 commands,
-                target,
-                buffers,
-                (count, push),
+                self.target,
+                self.buffers,
+                (self.count, self.push),
             );
-            record_copy(&self.device, commands, target);
+            record_copy(self.device, commands, self.target);
         })?;
         self.commands.submit_and_wait(&[0])?;
-        steps.end("draw");
-        let processor = start.and_then(|start| Some(processor_time()? - start));
+        self.steps.end("draw");
+        Ok(())
+    }
 
+    /// The picture that was drawn last.
+    ///
+    /// # Errors
+    /// If Vulkan fails.
+    pub fn picture(&self) -> Result<Picture, QuadError> {
+        let vk::Extent2D { width, height } = self.target.image.extent();
         let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
-        target.readback.read(&mut pixels)?;
-        Ok(Frame {
-            picture: Picture {
-                width,
-                height,
-                pixels,
-            },
-            time: steps.sum,
-            processor_time: processor,
-            counters: steps.counters,
+        self.target.readback.read(&mut pixels)?;
+        Ok(Picture {
+            width,
+            height,
+            pixels,
         })
     }
 }

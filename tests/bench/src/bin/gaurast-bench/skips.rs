@@ -1,4 +1,4 @@
-//! `gaurast bench skips`: what each skip saves, and what Gaussians cost that nobody sees.
+//! `gaurast-bench skips`: what each skip saves, and what Gaussians cost that nobody sees.
 
 use std::io::{Write, stdout};
 

@@ -1,4 +1,4 @@
-//! `gaurast bench`: run time against error, beside what a machine without a GPU offers otherwise.
+//! `gaurast-bench`: run time against error, beside what a machine without a GPU offers otherwise.
 
 mod frames;
 mod growth;
@@ -10,18 +10,20 @@ mod pareto;
 mod plot;
 mod roofline;
 mod skips;
-pub mod worker;
+mod worker;
 mod workload;
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Parser, Subcommand};
+use gaurast_bench::quads::QuadError;
 use gaurast_samples::camera::{CameraError, CameraFileError};
 use gaurast_samples::renderer::RenderError;
 use gaurast_samples::scene::SceneError;
+use gaurast_samples::size::Size;
 use thiserror::Error;
 
-use crate::args::Size;
 use worker::Contender;
 use workload::{Extra, Source, Workload};
 
@@ -38,6 +40,8 @@ pub enum BenchError {
     NoCamera(PathBuf),
     #[error(transparent)]
     Render(#[from] RenderError),
+    #[error(transparent)]
+    Quads(#[from] QuadError),
     #[error("a worker failed: {0}")]
     Worker(String),
     #[error("a worker could not be spoken to: {0}")]
@@ -54,24 +58,32 @@ pub enum BenchError {
     Image(#[from] image::ImageError),
 }
 
-#[derive(Args)]
-#[command(args_conflicts_with_subcommands = true)]
-pub struct BenchArguments {
+/// Measures run time and error of this driver's Gaussians, beside quads on lavapipe and on this driver.
+///
+/// Without a command, `gaurast-bench` does what `gaurast-bench frames` does.
+#[derive(Parser)]
+#[command(version, max_term_width = 100, args_conflicts_with_subcommands = true)]
+struct Arguments {
     #[command(subcommand)]
-    command: Option<BenchCommand>,
+    command: Option<Command>,
 
     #[command(flatten)]
     frames: FramesArguments,
 }
 
 #[derive(Subcommand)]
-enum BenchCommand {
+enum Command {
+    /// Draws whole frames and tells their stages.
+    Frames(FramesArguments),
     /// Sweeps settings and peers over several scenes and draws run time against error.
     Pareto(ParetoArguments),
     /// How time and memory grow with Gaussians, pixels, overlap and the share off the screen.
     Growth(SweepArguments),
     /// What each skip saves, and what Gaussians cost that nobody sees.
     Skips(SweepArguments),
+    /// Draws for the other commands, which start it.
+    #[command(hide = true)]
+    Worker,
 }
 
 /// What whole frames cost.
@@ -125,10 +137,6 @@ struct SweepArguments {
     )]
     output: PathBuf,
 
-    /// A folder with cameras/*.json and splats/*; what is not there is generated or left out
-    #[arg(long, value_name = "FOLDER", default_value = "../shared/data")]
-    data: PathBuf,
-
     /// Measured frames of each point
     #[arg(long, value_name = "N")]
     runs: Option<u32>,
@@ -143,6 +151,12 @@ struct SweepArguments {
 struct ParetoArguments {
     #[command(flatten)]
     sweep: SweepArguments,
+
+    /// A folder with cameras/*.json and splats/* [default: GAURAST_TEST_DATA of the environment]
+    ///
+    /// Cameras that are not there are replaced by an orbit, and scenes that are not there are left out.
+    #[arg(long, value_name = "FOLDER")]
+    data: Option<PathBuf>,
 
     /// Leaves out settings of other names; "as meant" compares with the peers alone
     #[arg(long, value_name = "NAME")]
@@ -159,13 +173,26 @@ fn contender(name: &str) -> Result<Contender, String> {
     found.ok_or_else(|| format!("it is one of {:?}", CONTENDERS.map(Contender::name)))
 }
 
-/// Runs what was asked for.
-pub fn run(arguments: &BenchArguments) -> Result<(), BenchError> {
-    match &arguments.command {
-        Some(BenchCommand::Pareto(arguments)) => pareto::run(arguments),
-        Some(BenchCommand::Growth(arguments)) => growth::run(arguments),
-        Some(BenchCommand::Skips(arguments)) => skips::run(arguments),
-        None => frames::run(&arguments.frames),
+fn main() -> ExitCode {
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
+    let arguments = Arguments::parse();
+    let command = (arguments.command).unwrap_or(Command::Frames(arguments.frames));
+    match run(&command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("gaurast-bench: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: &Command) -> Result<(), BenchError> {
+    match command {
+        Command::Frames(arguments) => frames::run(arguments),
+        Command::Pareto(arguments) => pareto::run(arguments),
+        Command::Growth(arguments) => growth::run(arguments),
+        Command::Skips(arguments) => skips::run(arguments),
+        Command::Worker => worker::run(),
     }
 }
 
@@ -189,7 +216,14 @@ fn median(values: impl IntoIterator<Item = f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use clap::CommandFactory;
+
     use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
 
     #[test]
     fn medians() {

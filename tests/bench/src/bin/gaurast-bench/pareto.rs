@@ -1,7 +1,7 @@
-//! `gaurast bench pareto`: run time against error over settings, peers and scenes.
+//! `gaurast-bench pareto`: run time against error over settings, peers and scenes.
 
 use std::io::{Write, stdout};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use gaurast_samples::camera::Camera;
 use gaurast_samples::renderer::{Precision, Settings};
@@ -109,7 +109,9 @@ struct Results {
 
 /// Runs the sweep.
 pub(super) fn run(arguments: &ParetoArguments) -> Result<(), BenchError> {
-    let (arguments, variants) = (&arguments.sweep, variants(arguments)?);
+    let variants = variants(arguments)?;
+    let data = (arguments.data.clone()).or_else(|| std::env::var_os(DATA).map(PathBuf::from));
+    let arguments = &arguments.sweep;
     let mut results = Results {
         machine: Machine::this(),
         threads: arguments.threads,
@@ -119,7 +121,7 @@ pub(super) fn run(arguments: &ParetoArguments) -> Result<(), BenchError> {
         .runs
         .unwrap_or(if arguments.quick { 3 } else { 9 }) as usize;
     let _ = writeln!(stdout(), "{}", results.machine.line());
-    for workload in workloads(arguments) {
+    for workload in workloads(arguments, data.as_deref()) {
         let scene = measure(workload, arguments.threads, runs, &variants)?;
         let _ = writeln!(
             stdout(),
@@ -135,17 +137,37 @@ pub(super) fn run(arguments: &ParetoArguments) -> Result<(), BenchError> {
     Ok(())
 }
 
-/// The scenes, the smallest first.
-fn workloads(arguments: &SweepArguments) -> Vec<Workload> {
+/// The environment variable of the folder of test data.
+const DATA: &str = "GAURAST_TEST_DATA";
+
+/// The path of a file of test data, or `None` after a line that says so and what is done `instead`.
+fn present(data: Option<&Path>, name: &str, instead: &str) -> Option<PathBuf> {
+    let Some(data) = data else {
+        eprintln!("{name}: {instead}, since neither --data nor {DATA} is given");
+        return None;
+    };
+    let path = data.join(name);
+    if !path.exists() {
+        eprintln!("{name}: {instead}, since {} is not there", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+/// The scenes, the smallest first, with the files in the folder `data`.
+fn workloads(arguments: &SweepArguments, data: Option<&Path>) -> Vec<Workload> {
     let size = if arguments.quick {
         [640, 360]
     } else {
         [1280, 720]
     };
-    let present = |path: String| Some(arguments.data.join(path)).filter(|path| path.exists());
     let captured = |count, name: &str| Source::Captured {
         count,
-        cameras: present(format!("cameras/{name}.json")),
+        cameras: present(
+            data,
+            &format!("cameras/{name}.json"),
+            "an orbit takes its place",
+        ),
     };
     let mut sources = vec![
         captured(10_000, "room"),
@@ -157,7 +179,7 @@ fn workloads(arguments: &SweepArguments) -> Vec<Workload> {
     let files = ["skull.ply", "playbot-125k.ply", "guitar.compressed.ply"];
     for path in files
         .into_iter()
-        .filter_map(|name| present(format!("splats/{name}")))
+        .filter_map(|name| present(data, &format!("splats/{name}"), "left out"))
     {
         sources.insert(2, Source::File { path });
         if arguments.quick {
