@@ -29,6 +29,8 @@ pub enum Obstacle {
     NoValgrind,
     #[error("this processor has no AVX2")]
     NoAvx2,
+    #[error("there is no Vulkan loader")]
+    NoLoader,
 }
 
 /// The first obstacle to counting, if there is one.
@@ -41,6 +43,13 @@ pub(super) fn obstacle() -> Option<Obstacle> {
         return Some(Obstacle::NoValgrind);
     }
     (!pictures::is_there(LEVEL)).then_some(Obstacle::NoAvx2)
+}
+
+/// The first obstacle to counting through the Vulkan loader, if there is one.
+pub(super) fn obstacle_to_the_loader() -> Option<Obstacle> {
+    // SAFETY: the system's loader is sound.
+    let loader = unsafe { ash::Entry::load() };
+    obstacle().or_else(|| loader.is_err().then_some(Obstacle::NoLoader))
 }
 
 /// Holds the instructions of every workload's frame against the stored ones, or stores them. Each is counted `runs` times;

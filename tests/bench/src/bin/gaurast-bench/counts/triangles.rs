@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use super::objects::{Objects, begin_image};
 
 /// Triangles of [`Triangles::small`].
-const SMALL: usize = 20_000;
+const SMALL: usize = 15_000;
 
 /// Width and height of the texture's first level.
 const TEXTURE: u32 = 256;

@@ -19,7 +19,7 @@ use super::{CountsError, WorkerArguments};
 const SIZE: [u32; 2] = [640, 360];
 
 /// Gaussians of the scenes.
-const GAUSSIANS: usize = 30_000;
+const GAUSSIANS: usize = 20_000;
 
 /// Quads, each of which is two triangles of many pixels.
 const QUADS: usize = 3000;
