@@ -5,8 +5,8 @@ use std::error::Error;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+use gaurast_bench::quads::QuadRenderer;
 use gaurast_samples::camera::{Camera, Model};
-use gaurast_samples::renderer::quads::QuadRenderer;
 use gaurast_samples::scene::{Scene, Shape};
 use gaurast_tests::contexts::{Context, Settings, simd_levels};
 use gaurast_tests::oracle::{
@@ -43,7 +43,7 @@ left to the implementation.
 
 *Quads* is how a Vulkan application without
 the extension draws Gaussians, an oriented quad each, sorted and projected on the processor in binary32, blended by
-lavapipe (`gaurast_samples::renderer::quads`). It knows the view-depth order, pinhole cameras with a near plane of 0.2, a
+lavapipe (`gaurast_bench::quads`). It knows the view-depth order, pinhole cameras with a near plane of 0.2, a
 low-pass variance of 0.3 and an alpha ceiling of 0.99 only: where a scene asks for something else, it has nothing to say (-). Its pixels never
 finish early, which is worth at most 1e-4 where the transmittance floor is 1e-4. *NaN* is a picture with a pixel that is
 no number; *fails* is no picture at all.

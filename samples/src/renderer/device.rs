@@ -177,7 +177,7 @@ impl Device {
 
     /// The first memory type allowed by `type_bits` that has the properties of one of `wishes`,
     /// tried in order: those that it must have and those that it must not.
-    pub(super) fn memory_type(
+    pub fn memory_type(
         &self,
         type_bits: u32,
         wishes: &[(vk::MemoryPropertyFlags, vk::MemoryPropertyFlags)],

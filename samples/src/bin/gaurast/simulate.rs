@@ -9,6 +9,7 @@ use std::process::Command;
 
 use clap::{Args, ValueEnum};
 use gaurast_samples::file;
+use gaurast_samples::size::Size;
 use thiserror::Error;
 use timing::config::{Config, ConfigError, DEFAULT_PRESET};
 use timing::schedule;
@@ -17,7 +18,6 @@ use timing::what_if::{WhatIf, what_ifs};
 use timing::work::{TRACE_VERSION, Trace};
 use timing::{FrameWork, fast, paper, stepped};
 
-use crate::args::Size;
 use crate::simulate_plot as plot;
 use crate::simulate_report as report;
 

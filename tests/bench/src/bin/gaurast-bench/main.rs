@@ -1,5 +1,6 @@
 //! `gaurast-bench`: run time against error, beside what a machine without a GPU offers otherwise.
 
+mod counts;
 mod frames;
 mod growth;
 mod judge;
@@ -24,12 +25,13 @@ use gaurast_samples::scene::SceneError;
 use gaurast_samples::size::Size;
 use thiserror::Error;
 
+use counts::{CountsArguments, CountsError, WorkerArguments};
 use worker::Contender;
 use workload::{Extra, Source, Workload};
 
 /// Why there are no figures. Displayed as one sentence.
 #[derive(Debug, Error)]
-pub enum BenchError {
+pub(crate) enum BenchError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     #[error(transparent)]
@@ -42,6 +44,8 @@ pub enum BenchError {
     Render(#[from] RenderError),
     #[error(transparent)]
     Quads(#[from] QuadError),
+    #[error(transparent)]
+    Counts(#[from] CountsError),
     #[error("a worker failed: {0}")]
     Worker(String),
     #[error("a worker could not be spoken to: {0}")]
@@ -81,9 +85,14 @@ enum Command {
     Growth(SweepArguments),
     /// What each skip saves, and what Gaussians cost that nobody sees.
     Skips(SweepArguments),
+    /// Holds instructions, hashes of pictures and sizes of functions against stored ones.
+    Counts(CountsArguments),
     /// Draws for the other commands, which start it.
     #[command(hide = true)]
     Worker,
+    /// Draws for `counts`, which starts it.
+    #[command(hide = true)]
+    CountsWorker(WorkerArguments),
 }
 
 /// What whole frames cost.
@@ -192,7 +201,9 @@ fn run(command: &Command) -> Result<(), BenchError> {
         Command::Pareto(arguments) => pareto::run(arguments),
         Command::Growth(arguments) => growth::run(arguments),
         Command::Skips(arguments) => skips::run(arguments),
+        Command::Counts(arguments) => Ok(counts::run(arguments)?),
         Command::Worker => worker::run(),
+        Command::CountsWorker(arguments) => Ok(counts::work(arguments)?),
     }
 }
 

@@ -1,0 +1,171 @@
+//! Instructions of a frame, counted by Callgrind: a figure that does not depend on what else the machine does.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use clap::ValueEnum;
+use thiserror::Error;
+
+use super::pictures;
+use super::stored::{Table, percent};
+use super::workload::Workload;
+use super::{CountsError, Report, WORKER};
+use crate::output::Rows;
+use crate::worker::SKIPS;
+
+/// Percent by which a count may differ from the stored one.
+const TOLERANCE: f64 = 1.0;
+
+/// The frame that is counted: the first one is cold, and the second one makes chunks of Gaussians.
+const FRAMES: u32 = 3;
+
+/// The SIMD level, the highest that Valgrind knows.
+const LEVEL: &str = "avx2";
+
+/// Why instructions cannot be counted here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum Obstacle {
+    #[error("valgrind is not there")]
+    NoValgrind,
+    #[error("this processor has no AVX2")]
+    NoAvx2,
+    #[error("there is no Vulkan loader")]
+    NoLoader,
+}
+
+/// The first obstacle to counting, if there is one.
+pub(super) fn obstacle() -> Option<Obstacle> {
+    let valgrind = Command::new("valgrind")
+        .arg("--version")
+        .stdout(Stdio::null())
+        .status();
+    if !valgrind.is_ok_and(|status| status.success()) {
+        return Some(Obstacle::NoValgrind);
+    }
+    (!pictures::is_there(LEVEL)).then_some(Obstacle::NoAvx2)
+}
+
+/// The first obstacle to counting through the Vulkan loader, if there is one.
+pub(super) fn obstacle_to_the_loader() -> Option<Obstacle> {
+    // SAFETY: the system's loader is sound.
+    let loader = unsafe { ash::Entry::load() };
+    obstacle().or_else(|| loader.is_err().then_some(Obstacle::NoLoader))
+}
+
+/// Holds the instructions of every workload's frame against the stored ones, or stores them. Each is counted `runs` times;
+/// the median counts.
+pub(super) fn check(report: &mut Report, runs: u32, store: bool) -> Result<(), CountsError> {
+    let mut table = Table::load(
+        "instructions.csv",
+        "Instructions of a warm frame at AVX2 on one thread, release profile; the spread of runs in percent. Written by gaurast-bench counts --store.",
+        &["workload", "instructions", "spread"],
+        1,
+    )?;
+    let mut rows = Rows::new(&["workload", "instructions", "stored", "change", "spread"]);
+    for workload in Workload::value_variants() {
+        let mut counts = (0..runs)
+            .map(|_| count(*workload, None))
+            .collect::<Result<Vec<_>, _>>()?;
+        counts.sort_unstable();
+        let (count, name) = (counts[counts.len() / 2], workload.name());
+        let spread = match runs {
+            1 => "-".to_owned(),
+            _ => format!("{:.4}", percent(counts[counts.len() - 1], counts[0])),
+        };
+        let stored: Option<u64> = (table.get(&[&name])).and_then(|cells| cells[0].parse().ok());
+        let change = stored.map(|stored| percent(count, stored));
+        rows.rows.push(vec![
+            name.clone(),
+            count.to_string(),
+            stored.map_or("-".to_owned(), |stored| stored.to_string()),
+            change.map_or("-".to_owned(), |change| format!("{change:+.2} %")),
+            spread.clone(),
+        ]);
+        if store {
+            table.set(&[&name], &[&count.to_string(), &spread]);
+            continue;
+        }
+        match change {
+            None => report.fail(format!("{name}: no count is stored")),
+            Some(change) if change > TOLERANCE => report.fail(format!(
+                "{name}: {change:.2} % more instructions than stored: find out why, or store the new count"
+            )),
+            Some(change) if change < -TOLERANCE => report.fail(format!(
+                "{name}: {:.2} % fewer instructions than stored: store the new count, so that it stays so",
+                -change
+            )),
+            Some(_) => {}
+        }
+    }
+    println!("{}", rows.table());
+    if store {
+        table.store()?;
+    }
+    Ok(())
+}
+
+/// Holds the instructions of a Gaussian frame through the Vulkan loader against those of the embedded driver. `manifest` is
+/// the driver's, in JSON.
+pub(super) fn compare_doors(report: &mut Report, manifest: &Path) -> Result<(), CountsError> {
+    let workload = Workload::GaussiansSynthetic;
+    let embedded = count(workload, None)?;
+    let loaded = count(workload, Some(manifest))?;
+    let ratio = loaded as f64 / embedded as f64;
+    println!("embedded {embedded}, through the loader {loaded} instructions: ratio {ratio:.4}");
+    if (100.0 * (ratio - 1.0)).abs() > TOLERANCE {
+        report.fail(format!(
+            "through the loader, a frame takes {ratio:.4} times the instructions of the embedded driver's"
+        ));
+    }
+    Ok(())
+}
+
+/// The instructions of a workload's last frame, embedded or through the loader with the driver of a manifest: those of a
+/// process that draws it less those of one that does not. Everything before is the same in both.
+fn count(workload: Workload, manifest: Option<&Path>) -> Result<u64, CountsError> {
+    let all = process(workload, FRAMES, manifest)?;
+    Ok(all.saturating_sub(process(workload, FRAMES - 1, manifest)?))
+}
+
+/// The instructions of a process that draws so many frames of a workload.
+fn process(workload: Workload, frames: u32, manifest: Option<&Path>) -> Result<u64, CountsError> {
+    let mut command = Command::new("valgrind");
+    command
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(std::env::current_exe()?)
+        .args([WORKER, "--frames", &frames.to_string(), &workload.name()])
+        .env("GAURAST_SIMD", LEVEL)
+        .env("GAURAST_THREADS", "1")
+        .env("GAURAST_SKIP", SKIPS);
+    if let Some(manifest) = manifest {
+        let manifest = manifest.canonicalize()?;
+        command
+            .arg("--through-the-loader")
+            .env("VK_DRIVER_FILES", &manifest)
+            .env("VK_ICD_FILENAMES", &manifest);
+    }
+    let output = command.output()?;
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    if !output.status.success() {
+        return Err(CountsError::Worker(said));
+    }
+    collected(&said).ok_or(CountsError::Worker(said))
+}
+
+/// The instructions that Callgrind says it collected.
+fn collected(said: &str) -> Option<u64> {
+    let count = |line: &str| line.split_once("Collected : ")?.1.trim().parse().ok();
+    said.lines().find_map(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn callgrinds_count_is_found() {
+        let said = "==7== Events    : Ir\n==7== Collected : 1234\n==7== \n";
+        assert_eq!(collected(said), Some(1234));
+        assert_eq!(collected("==7== Events    : Ir\n"), None);
+    }
+}

@@ -1,0 +1,164 @@
+//! `gaurast-bench counts`: figures that do not depend on what else the machine does, held against stored ones.
+
+mod compute;
+mod instructions;
+mod objects;
+mod pictures;
+mod sizes;
+mod stored;
+mod triangles;
+mod workload;
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use gaurast_bench::quads::QuadError;
+use gaurast_samples::renderer::RenderError;
+use thiserror::Error;
+
+use instructions::Obstacle;
+use workload::Workload;
+
+/// The hidden command that makes a process a worker.
+const WORKER: &str = "counts-worker";
+
+/// Which programs and files a test may not lack: nothing, `programs`, `data` or `all`.
+const REQUIRE: &str = "GAURAST_TEST_REQUIRE";
+
+/// Why the counts could not be made, or are not as stored. Displayed as one sentence.
+#[derive(Debug, Error)]
+pub enum CountsError {
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error(transparent)]
+    Quads(#[from] QuadError),
+    #[error("there is no Vulkan loader: {0}")]
+    NoLoader(String),
+    #[error("a worker could not be started or its files not be read: {0}")]
+    Io(#[from] std::io::Error),
+    #[error("a worker failed: {0}")]
+    Worker(String),
+    #[error("the stored row \"{0}\" has too few or too many cells")]
+    Stored(String),
+    #[error("the program's symbols cannot be read: {0}")]
+    Object(#[from] object::Error),
+    #[error("the program's debug information cannot be read: {0}")]
+    Dwarf(#[from] gimli::Error),
+    #[error("the program has no symbols: build it without stripping")]
+    Stripped,
+    #[error(
+        "the stored counts are those of the release profile, and this program has debug assertions"
+    )]
+    Profile,
+    #[error("{0}")]
+    Required(Obstacle),
+    #[error("{0} of the counts are not as stored")]
+    Differs(usize),
+}
+
+/// What the counts take.
+#[derive(Args)]
+pub struct CountsArguments {
+    /// Stores the counts instead of holding them against the stored ones
+    #[arg(long)]
+    store: bool,
+
+    /// How often instructions are counted; the median counts, and the spread is told
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
+    runs: u32,
+
+    /// Makes these counts only
+    #[arg(long, value_name = "COUNT", value_enum)]
+    only: Vec<Part>,
+
+    /// Compares a frame's instructions through the Vulkan loader, by the driver of this manifest, with the embedded driver's
+    #[arg(long, value_name = "ICD.json", conflicts_with_all = ["store", "only"])]
+    loader: Option<PathBuf>,
+}
+
+/// A kind of counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// Instructions of a frame
+    Instructions,
+    /// Hashes of pictures
+    Pictures,
+    /// Bytes of the device's functions
+    Sizes,
+}
+
+/// What a worker is told.
+#[derive(Args)]
+pub struct WorkerArguments {
+    /// What is drawn
+    #[arg(value_enum, required = true)]
+    workloads: Vec<Workload>,
+
+    /// Frames of each
+    #[arg(long)]
+    frames: u32,
+
+    /// Draws on the loader's first device instead of the embedded one
+    #[arg(long)]
+    through_the_loader: bool,
+}
+
+/// What is not as it should be.
+#[derive(Default)]
+struct Report {
+    failures: usize,
+}
+
+impl Report {
+    /// Tells a failure.
+    fn fail(&mut self, text: String) {
+        println!("FAILED: {text}");
+        self.failures += 1;
+    }
+}
+
+/// Makes the counts, and holds them against the stored ones.
+pub fn run(arguments: &CountsArguments) -> Result<(), CountsError> {
+    if cfg!(debug_assertions) {
+        return Err(CountsError::Profile);
+    }
+    let mut report = Report::default();
+    let is_wanted = |part| arguments.only.is_empty() || arguments.only.contains(&part);
+    if let Some(manifest) = &arguments.loader {
+        if can_count(instructions::obstacle_to_the_loader())? {
+            instructions::compare_doors(&mut report, manifest)?;
+        }
+    } else {
+        if is_wanted(Part::Sizes) {
+            sizes::check(&mut report, arguments.store)?;
+        }
+        if is_wanted(Part::Pictures) {
+            pictures::check(&mut report, arguments.store)?;
+        }
+        if is_wanted(Part::Instructions) && can_count(instructions::obstacle())? {
+            instructions::check(&mut report, arguments.runs, arguments.store)?;
+        }
+    }
+    match report.failures {
+        0 => Ok(()),
+        failures => Err(CountsError::Differs(failures)),
+    }
+}
+
+/// Says whether instructions can be counted where there is this obstacle, and why not.
+fn can_count(obstacle: Option<Obstacle>) -> Result<bool, CountsError> {
+    let Some(reason) = obstacle else {
+        return Ok(true);
+    };
+    let required = std::env::var(REQUIRE).unwrap_or_default();
+    if ["programs", "all"].contains(&required.as_str()) && reason != Obstacle::NoAvx2 {
+        return Err(CountsError::Required(reason));
+    }
+    println!("ignored: instructions are not counted, since {reason}");
+    Ok(false)
+}
+
+/// Draws for the counts.
+pub fn work(arguments: &WorkerArguments) -> Result<(), CountsError> {
+    workload::run(arguments)
+}

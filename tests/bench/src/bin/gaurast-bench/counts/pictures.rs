@@ -1,0 +1,95 @@
+//! Hashes of the workloads' pictures at every SIMD level, on one thread and on two.
+
+use std::collections::BTreeMap;
+use std::process::Command;
+
+use clap::ValueEnum;
+
+use super::stored::Table;
+use super::workload::Workload;
+use super::{CountsError, Report, WORKER};
+use crate::worker::SKIPS;
+
+/// The SIMD levels of `GAURAST_SIMD`.
+const LEVELS: [&str; 4] = ["sse2", "sse4.2", "avx2", "avx512"];
+
+/// Whether this processor has a level.
+pub(super) fn is_there(level: &str) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    // The features that the levels are named after stand for all that each needs.
+    return match level {
+        "sse4.2" => std::arch::is_x86_feature_detected!("sse4.2"),
+        "avx2" => std::arch::is_x86_feature_detected!("avx2"),
+        "avx512" => std::arch::is_x86_feature_detected!("avx512vbmi2"),
+        _ => true,
+    };
+    #[cfg(not(target_arch = "x86_64"))]
+    return level == "sse2";
+}
+
+/// Holds the hash of every workload's picture at every level against the stored ones, or stores them. One thread and two
+/// must draw the same.
+pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError> {
+    let mut table = Table::load(
+        "pictures.csv",
+        "FNV-1a hashes of the pictures at each SIMD level, on any number of threads. Written by gaurast-bench counts --store.",
+        &["workload", "level", "hash"],
+        2,
+    )?;
+    let mut equal = 0;
+    for level in LEVELS {
+        if !is_there(level) {
+            println!("pictures at {level} are not checked: this processor has no {level}");
+            continue;
+        }
+        let (one, two) = (hashes(level, 1)?, hashes(level, 2)?);
+        for (name, hash) in &one {
+            if two.get(name) != Some(hash) {
+                report.fail(format!(
+                    "{name} at {level}: two threads draw another picture than one"
+                ));
+            }
+            let stored = table.get(&[name, level]).map(|cells| cells[0].clone());
+            if store {
+                table.set(&[name, level], &[hash]);
+            } else if stored.as_ref() == Some(hash) {
+                equal += 1;
+            } else {
+                let stored = stored.as_deref().unwrap_or("no hash");
+                report.fail(format!(
+                    "{name} at {level}: the picture is {hash}, and {stored} is stored"
+                ));
+            }
+        }
+    }
+    if store {
+        table.store()?;
+    } else {
+        println!("pictures: {equal} are the stored ones");
+    }
+    Ok(())
+}
+
+/// The hash of every workload's picture, by name.
+fn hashes(level: &str, threads: usize) -> Result<BTreeMap<String, String>, CountsError> {
+    let workloads = Workload::value_variants().iter().map(|one| one.name());
+    let output = Command::new(std::env::current_exe()?)
+        .args([WORKER, "--frames", "2"])
+        .args(workloads)
+        .env("GAURAST_SIMD", level)
+        .env("GAURAST_THREADS", threads.to_string())
+        .env("GAURAST_SKIP", SKIPS)
+        .output()?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        return Err(CountsError::Worker(said));
+    }
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let words = |line: &str| {
+        let (name, hash) = line.split_once(' ')?;
+        Some((name.to_owned(), hash.to_owned()))
+    };
+    said.lines()
+        .map(|line| words(line).ok_or_else(|| CountsError::Worker(line.to_owned())))
+        .collect()
+}

@@ -1,0 +1,151 @@
+//! The workloads that are counted, and the process that draws them.
+//!
+//! Scenes are generated. Those of triangles and of bodies take additions and multiplications alone; those of Gaussians
+//! take logarithms, exponentials and cosines in binary64 from the system's mathematical library, whose last bits may differ
+//! between machines. They are rounded to binary32 afterwards, so that about one scene in two hundred would show it.
+
+use ash::Entry;
+use clap::ValueEnum;
+use gaurast_bench::quads::QuadRenderer;
+use gaurast_samples::camera::Camera;
+use gaurast_samples::renderer::Renderer;
+use gaurast_samples::scene::Scene;
+
+use super::compute::Bodies;
+use super::triangles::Triangles;
+use super::{CountsError, WorkerArguments};
+
+/// The pictures' size in pixels.
+const SIZE: [u32; 2] = [640, 360];
+
+/// Gaussians of the scenes.
+const GAUSSIANS: usize = 20_000;
+
+/// Quads, each of which is two triangles of many pixels.
+const QUADS: usize = 3000;
+
+/// The alpha below which a quad ends.
+const ALPHA_FLOOR: f32 = 1.0 / 255.0;
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Workload {
+    /// The synthetic scene that performance is measured on
+    GaussiansSynthetic,
+    /// A scene as training leaves it
+    GaussiansCaptured,
+    /// Triangles of about four pixels, with depth
+    SmallTriangles,
+    /// A floor with a filtered texture of several levels
+    TexturedTriangles,
+    /// A smaller synthetic scene as sorted, blended quads
+    BlendedQuads,
+    /// A dispatch with workgroup memory
+    Compute,
+}
+
+impl Workload {
+    /// The name, as in the stored tables.
+    pub(super) fn name(self) -> String {
+        self.to_possible_value()
+            .map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// Draws `frames` frames on the first device of `entry`, all alike, and returns the hash of the last one's pixels.
+    fn draw(self, entry: Entry, frames: u32) -> Result<u64, CountsError> {
+        match self {
+            Self::GaussiansSynthetic => {
+                let scene = Scene::benchmark(1, GAUSSIANS);
+                gaussians(entry, frames, &scene, &Camera::benchmark(SIZE))
+            }
+            Self::GaussiansCaptured => {
+                let cameras = Camera::orbit(8, SIZE);
+                let scene = Scene::captured(1, GAUSSIANS, &cameras);
+                gaussians(entry, frames, &scene, &cameras[0])
+            }
+            Self::SmallTriangles => triangles(Triangles::small(entry, SIZE)?, frames),
+            Self::TexturedTriangles => triangles(Triangles::textured(entry, SIZE)?, frames),
+            Self::BlendedQuads => quads(entry, frames),
+            Self::Compute => {
+                let mut bodies = Bodies::new(entry)?;
+                for _ in 0..frames {
+                    bodies.run()?;
+                }
+                Ok(hash(bytemuck::cast_slice(&bodies.result()?)))
+            }
+        }
+    }
+}
+
+fn gaussians(
+    entry: Entry,
+    frames: u32,
+    scene: &Scene,
+    camera: &Camera,
+) -> Result<u64, CountsError> {
+    let mut renderer = Renderer::new(entry)?;
+    let scene = renderer.upload(scene, None)?;
+    let mut pixels = Vec::new();
+    for _ in 0..frames {
+        pixels = renderer.render(&scene, camera)?.picture.pixels;
+    }
+    Ok(hash(bytemuck::cast_slice(&pixels)))
+}
+
+fn triangles(mut triangles: Triangles, frames: u32) -> Result<u64, CountsError> {
+    for _ in 0..frames {
+        triangles.draw()?;
+    }
+    Ok(hash(bytemuck::cast_slice(&triangles.picture()?)))
+}
+
+fn quads(entry: Entry, frames: u32) -> Result<u64, CountsError> {
+    let scene = Scene::benchmark(1, QUADS);
+    let mut renderer = QuadRenderer::new(entry, "", 1)?;
+    let mut prepared = renderer.prepare(&scene, &Camera::benchmark(SIZE), 3, ALPHA_FLOOR)?;
+    for _ in 0..frames {
+        prepared.draw()?;
+    }
+    Ok(hash(bytemuck::cast_slice(&prepared.picture()?.pixels)))
+}
+
+/// FNV-1a of 64 bits.
+fn hash(bytes: &[u8]) -> u64 {
+    let step = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, step)
+}
+
+/// Draws what it is told to, and prints a line for each workload: its name and the hash of its last picture.
+pub(super) fn run(arguments: &WorkerArguments) -> Result<(), CountsError> {
+    for workload in &arguments.workloads {
+        let entry = if arguments.through_the_loader {
+            // SAFETY: the system's loader is sound.
+            unsafe { Entry::load() }.map_err(|error| CountsError::NoLoader(error.to_string()))?
+        } else {
+            vulkan_gaurast::entry()
+        };
+        let hash = workload.draw(entry, arguments.frames)?;
+        println!("{} {hash:016x}", workload.name());
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hashes_are_those_of_fnv_1a() {
+        assert_eq!(hash(b""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(hash(b"foobar"), 0x8594_4171_f739_67e8);
+    }
+
+    #[test]
+    fn every_workload_draws_the_same_again() {
+        for workload in Workload::value_variants() {
+            let draw = |frames| workload.draw(vulkan_gaurast::entry(), frames);
+            let (once, twice) = (draw(1).expect("drawn"), draw(2).expect("drawn"));
+            assert_eq!(once, twice, "{workload:?}");
+        }
+    }
+}
