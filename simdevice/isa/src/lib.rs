@@ -72,3 +72,8 @@ mod visit;
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}
