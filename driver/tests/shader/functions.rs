@@ -1,9 +1,8 @@
 //! Functions of GLSL.std.450 against f64 or exact models, within the precision that Vulkan asks for.
 
-#[path = "common/mod.rs"]
-mod common;
-
-use common::{Dispatch, OPTIONS, Random, buffer, contents, float_contents, translated, words_of};
+use crate::common::{
+    Dispatch, OPTIONS, Random, buffer, contents, float_contents, translated, words_of,
+};
 use vulkan_gaurast::shader::{Module, Shader, Specialization, Stage, translate};
 
 /// How far a result may be from the model's.
@@ -228,7 +227,7 @@ fn check_floats(shader: &Shader, inputs: &[f32]) {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn float_functions() {
     let mut random = Random(31);
     let mut inputs: Vec<f32> = (0..192).map(|_| 8.0 * (random.unit() - 0.5)).collect();
@@ -380,7 +379,7 @@ const INTEGERS: &[(&str, Exactly)] = &[
     }),
 ];
 
-#[test]
+#[gaurast_runner::test]
 fn integer_functions() {
     let mut random = Random(37);
     let mut inputs: Vec<u32> = (0..128)

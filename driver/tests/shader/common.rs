@@ -1,5 +1,4 @@
 //! Runs translated shaders on the shader cores.
-#![allow(dead_code, reason = "each test uses a part")]
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,7 +14,7 @@ use vulkan_gaurast::shader::{
     BuiltIn, InputSource, Module, Options, Shader, Specialization, Stage, translate,
 };
 
-/// Where the shaders are.
+/// The folder of the shaders.
 pub fn folder() -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "tests", "shaders"]
         .iter()
@@ -58,13 +57,9 @@ pub const OPTIONS: Options = Options {
     unsized_descriptors: 1,
 };
 
-/// Whether this test runs what spirv-opt made of the shaders.
-const OPTIMIZED: bool = matches!(env!("CARGO_CRATE_NAME").as_bytes(), b"shader_optimized");
-
 /// Translates a kept shader.
 pub fn translated(name: &str, specialization: &Specialization) -> Shader {
-    let binary = format!("{name}{}", if OPTIMIZED { ".opt" } else { "" });
-    let module = Module::parse(&words_of(&binary)).unwrap();
+    let module = Module::parse(&words_of(name)).unwrap();
     translate(&module, "main", stage_of(name), specialization, &OPTIONS)
         .unwrap_or_else(|error| panic!("{name}: {error}"))
 }
@@ -87,14 +82,14 @@ pub fn floats(data: &[f32]) -> BufferRange {
     buffer(&bits)
 }
 
-/// What a buffer holds.
+/// A buffer's contents, as words.
 pub fn contents(range: &BufferRange) -> Vec<u32> {
     let mut data = vec![0; (range.size / 4) as usize];
     range.memory.read(range.offset, &mut data).unwrap();
     data
 }
 
-/// What a buffer holds, as floats.
+/// A buffer's contents, as floats.
 pub fn float_contents(range: &BufferRange) -> Vec<f32> {
     contents(range).into_iter().map(f32::from_bits).collect()
 }
@@ -121,7 +116,7 @@ impl<'a> Dispatch<'a> {
         }
     }
 
-    /// Runs all workgroups, at every SIMD level's kernels that `level` picks.
+    /// Runs all workgroups, at the processor's best SIMD level.
     pub fn run(&self) -> Result<(), Stopped> {
         let invocations = self.shader.interface.workgroup_size.iter().product::<u32>() as usize;
         let options = ExecOptions {

@@ -1,10 +1,27 @@
-//! Kept compute shaders run on the shader cores and give what the host computes.
+//! Kept compute shaders run on the shader cores and give what the host computes: as they were compiled, and as spirv-opt
+//! rewrote them (phis in place of variables, merged and unrolled blocks).
 
-#[path = "common/mod.rs"]
-mod common;
+use crate::common::{self, Dispatch, Random, buffer, contents, float_contents, floats};
+use gaurast_runner::{Case, Variant};
+use vulkan_gaurast::shader::{Shader, Specialization};
 
-use common::{Dispatch, Random, buffer, contents, float_contents, floats, translated};
-use vulkan_gaurast::shader::Specialization;
+/// The variant that runs what spirv-opt made of a shader.
+const OPTIMIZED: &str = "optimized";
+
+/// A variant for each binary of a shader.
+fn binaries() -> Vec<Variant> {
+    ["compiled", OPTIMIZED].map(Variant::new).into()
+}
+
+/// Translates the variant's binary of a shader.
+fn translated(case: &Case, name: &str, specialization: &Specialization) -> Shader {
+    let suffix = if case.variant() == OPTIMIZED {
+        ".opt"
+    } else {
+        ""
+    };
+    common::translated(&format!("{name}{suffix}"), specialization)
+}
 
 fn bytes(words: &[u32]) -> Vec<u8> {
     words.iter().flat_map(|word| word.to_le_bytes()).collect()
@@ -21,9 +38,9 @@ fn close(found: &[f32], expected: &[f32], tolerance: f32) {
     }
 }
 
-#[test]
-fn mandelbrot() {
-    let shader = translated("mandelbrot.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn mandelbrot(case: &Case) {
+    let shader = translated(case, "mandelbrot.comp", &Specialization::default());
     let (width, height, limit) = (40_u32, 22_u32, 60_u32);
     let counts = buffer(&vec![u32::MAX; (width * height) as usize]);
     Dispatch {
@@ -51,14 +68,14 @@ fn mandelbrot() {
     assert_eq!(contents(&counts), expected);
 }
 
-#[test]
-fn matrix_product_with_a_specialized_tile() {
+#[gaurast_runner::test(each = binaries())]
+fn matrix_product_with_a_specialized_tile(case: &Case) {
     for (tile, groups) in [(None, 4), (Some(16_u32), 2)] {
         let mut specialization = Specialization::default();
         if let Some(tile) = tile {
             specialization.set(1, &tile.to_le_bytes());
         }
-        let shader = translated("matrix_product.comp", &specialization);
+        let shader = translated(case, "matrix_product.comp", &specialization);
         let n = 32;
         assert_eq!(shader.interface.workgroup_size[0], tile.unwrap_or(8));
         let mut random = Random(7);
@@ -83,9 +100,9 @@ fn matrix_product_with_a_specialized_tile() {
     }
 }
 
-#[test]
-fn prefix_sum() {
-    let shader = translated("prefix_sum.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn prefix_sum(case: &Case) {
+    let shader = translated(case, "prefix_sum.comp", &Specialization::default());
     let mut random = Random(3);
     let values: Vec<u32> = (0..512).map(|_| random.next() % 1000).collect();
     let (sums, totals) = (buffer(&values), buffer(&[0; 2]));
@@ -109,9 +126,9 @@ fn prefix_sum() {
     assert_eq!(contents(&totals), expected_totals);
 }
 
-#[test]
-fn n_body() {
-    let shader = translated("n_body.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn n_body(case: &Case) {
+    let shader = translated(case, "n_body.comp", &Specialization::default());
     let count = 100;
     let mut random = Random(11);
     let bodies: Vec<f32> = (0..8 * count).map(|_| random.unit() - 0.5).collect();
@@ -149,11 +166,11 @@ fn n_body() {
     close(&float_contents(&after), &expected, 1e-4);
 }
 
-#[test]
-fn blur() {
+#[gaurast_runner::test(each = binaries())]
+fn blur(case: &Case) {
     let mut specialization = Specialization::default();
     specialization.set(0, &3_i32.to_le_bytes());
-    let shader = translated("blur.comp", &specialization);
+    let shader = translated(case, "blur.comp", &specialization);
     let (width, height, radius) = (13_i32, 9_i32, 3_i32);
     let mut random = Random(5);
     let image: Vec<f32> = (0..4 * width * height).map(|_| random.unit()).collect();
@@ -186,9 +203,9 @@ fn blur() {
     close(&float_contents(&target), &expected, 1e-5);
 }
 
-#[test]
-fn radix_sort() {
-    let shader = translated("radix_sort.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn radix_sort(case: &Case) {
+    let shader = translated(case, "radix_sort.comp", &Specialization::default());
     let mut random = Random(17);
     let keys: Vec<u32> = (0..512).map(|_| random.next()).collect();
     let sorted = buffer(&keys);
@@ -281,9 +298,9 @@ mod control {
     }
 }
 
-#[test]
-fn control_flow() {
-    let shader = translated("control_flow.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn control_flow(case: &Case) {
+    let shader = translated(case, "control_flow.comp", &Specialization::default());
     let mut random = Random(23);
     let mut inputs: Vec<u32> = (0..256).collect();
     inputs.extend((0..256).map(|_| random.next() >> 1));
@@ -306,9 +323,9 @@ fn control_flow() {
     }
 }
 
-#[test]
-fn dynamic_indices_and_layouts() {
-    let shader = translated("dynamic_index.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn dynamic_indices_and_layouts(case: &Case) {
+    let shader = translated(case, "dynamic_index.comp", &Specialization::default());
     let keys: Vec<u32> = (0..32).map(|i| i * 7 % 23).collect();
     let (index, results) = (buffer(&keys), floats(&[0.0; 320]));
     // rows: a row-major mat3x2, two rows of three with a stride of 16 bytes; columns: two mat2 of stride 16; v.
@@ -393,9 +410,9 @@ fn dynamic_indices_and_layouts() {
     }
 }
 
-#[test]
-fn atomics() {
-    let shader = translated("atomics.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn atomics(case: &Case) {
+    let shader = translated(case, "atomics.comp", &Specialization::default());
     let cells = buffer(&[0; 20]);
     Dispatch {
         buffers: &[((0, 0, 0), &cells)],
@@ -411,9 +428,9 @@ fn atomics() {
     assert_eq!(found[16..], [(-20_i32).cast_unsigned(), 107, 0, 63]);
 }
 
-#[test]
-fn subgroups() {
-    let shader = translated("subgroup.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn subgroups(case: &Case) {
+    let shader = translated(case, "subgroup.comp", &Specialization::default());
     let results = buffer(&[0; 24 * 64]);
     Dispatch {
         buffers: &[((0, 0, 0), &results)],
@@ -456,9 +473,9 @@ fn subgroups() {
     }
 }
 
-#[test]
-fn descriptor_arrays_and_runtime_lengths() {
-    let shader = translated("descriptor_arrays.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn descriptor_arrays_and_runtime_lengths(case: &Case) {
+    let shader = translated(case, "descriptor_arrays.comp", &Specialization::default());
     let arrays: Vec<_> = (0..4)
         .map(|n| buffer(&vec![n + 1; 3 + n as usize]))
         .collect();
@@ -481,9 +498,9 @@ fn descriptor_arrays_and_runtime_lengths() {
     }
 }
 
-#[test]
-fn wide_and_narrow_types() {
-    let shader = translated("wide.comp", &Specialization::default());
+#[gaurast_runner::test(each = binaries())]
+fn wide_and_narrow_types(case: &Case) {
+    let shader = translated(case, "wide.comp", &Specialization::default());
     let mut random = Random(99);
     let mut bytes = Vec::new();
     let d: Vec<f64> = (0..16).map(|i| f64::from(i) * 1.7).collect();
@@ -538,8 +555,8 @@ fn wide_and_narrow_types() {
     }
 }
 
-#[test]
-fn device_addresses() {
+#[gaurast_runner::test(each = binaries())]
+fn device_addresses(case: &Case) {
     struct OneBuffer(simdevice::packet::BufferRange);
     impl simdevice::isa::resources::GlobalMemory for OneBuffer {
         fn find(&self, address: u64) -> Option<(&simdevice::packet::BufferRange, u64)> {
@@ -549,7 +566,7 @@ fn device_addresses() {
                 .then_some((&self.0, begin))
         }
     }
-    let shader = translated("addresses.comp", &Specialization::default());
+    let shader = translated(case, "addresses.comp", &Specialization::default());
     // A circle of nodes, each a value and the address of the next, 16 bytes apart.
     let address = |node: u32| -> u64 { (1 << 40) + 16 * u64::from(node % 5) };
     let nodes: Vec<u32> = (0..5)

@@ -1,11 +1,10 @@
 //! Mutated modules: whatever their words are, they are translated or refused, without a panic and in bounded time.
 
-mod common;
-
 use std::time::{Duration, Instant};
 
-use common::{OPTIONS, Random, all_shaders, stage_of, words_of};
+use crate::common::{OPTIONS, Random, all_shaders, stage_of, words_of};
 use fearless_simd::Level;
+use gaurast_runner::{Case, shards};
 use simdevice::isa::exec::{Executable, Options as ExecOptions};
 use vulkan_gaurast::shader::{Module, Specialization, translate};
 
@@ -78,13 +77,16 @@ fn mutate(random: &mut Random, original: &[u32]) -> Vec<u32> {
     words
 }
 
-#[test]
-fn mutated_modules_never_panic() {
-    let mut random = Random(0x5eed);
-    let begin = Instant::now();
+#[gaurast_runner::test(each = shards(4), alone)]
+fn mutated_modules_never_panic(case: &Case) {
+    let shard = case.shard();
     let mut slowest = Duration::ZERO;
     let (mut runs, mut survivors) = (0, 0);
-    for name in all_shaders() {
+    for (index, name) in all_shaders().into_iter().enumerate() {
+        if !shard.has(index) {
+            continue;
+        }
+        let mut random = Random(0x5eed + index as u64);
         let original = words_of(&name);
         for _ in 0..400 {
             let words = mutate(&mut random, &original);
@@ -94,13 +96,9 @@ fn mutated_modules_never_panic() {
             runs += 1;
         }
     }
-    eprintln!(
-        "{runs} modules in {:?}, {survivors} still translate, the slowest took {slowest:?}",
-        begin.elapsed()
-    );
     assert!(
         survivors > runs / 20,
-        "mutations should leave some modules valid"
+        "mutations should leave some modules valid: {survivors} of {runs}"
     );
     assert!(
         slowest < Duration::from_secs(5),
@@ -108,9 +106,13 @@ fn mutated_modules_never_panic() {
     );
 }
 
-#[test]
-fn modules_cut_off_anywhere_are_refused() {
-    for name in all_shaders() {
+#[gaurast_runner::test(each = shards(4), alone)]
+fn modules_cut_off_anywhere_are_refused(case: &Case) {
+    let shard = case.shard();
+    for (index, name) in all_shaders().into_iter().enumerate() {
+        if !shard.has(index) {
+            continue;
+        }
         let words = words_of(&name);
         for length in 0..words.len() {
             assert!(

@@ -1,8 +1,6 @@
 //! Modules built to be too much: nesting, recursion, calls and sizes are refused with a reason, on a small stack.
 
-mod common;
-
-use common::OPTIONS;
+use crate::common::OPTIONS;
 use rspirv::binary::Assemble;
 use rspirv::dr::Builder;
 use rspirv::spirv::{
@@ -72,7 +70,7 @@ fn attempt(words: Vec<u32>) -> Result<Shader, Error> {
     translation.unwrap().join().unwrap()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn nesting_is_bounded() {
     let nested = |depth| {
         module(|b, types| {
@@ -88,7 +86,7 @@ fn nesting_is_bounded() {
     assert!(refused.contains("nested too deeply"), "{refused}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn nesting_adds_up_over_calls() {
     let words = module(|b, types| {
         let mut callee = None;
@@ -109,7 +107,7 @@ fn nesting_adds_up_over_calls() {
     assert!(refused.contains("nested too deeply"), "{refused}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn recursion_is_refused() {
     let words = module(|b, types| {
         let main = begin(b, types);
@@ -122,7 +120,7 @@ fn recursion_is_refused() {
     assert!(refused.contains("calls itself"), "{refused}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn calls_that_multiply_are_refused() {
     // Thirty functions that each call the one before four times: 4^30 calls, which nobody would see the end of.
     let words = module(|b, types| {

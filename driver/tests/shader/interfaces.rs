@@ -1,11 +1,9 @@
 //! What translated shaders say of themselves: inputs, outputs, descriptors, push constants; and how that compares with
 //! layouts and with spirv-reflect.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{folder, translated, words_of};
+use crate::common::{folder, translated, words_of};
 use fearless_simd::Level;
 use simdevice::isa::exec::{Executable, LaneMask, Machine, Options as ExecOptions, Watchdog};
 use simdevice::isa::resources::{Resources, words};
@@ -40,7 +38,7 @@ fn location(location: u32, component: u32) -> OutputTarget {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_vertex_shader_reads_only_what_it_uses() {
     let found = interface("triangle.vert");
     assert_eq!(locations_read(&found), [(0, FLOAT), (1, FLOAT)]);
@@ -57,7 +55,7 @@ fn a_vertex_shader_reads_only_what_it_uses() {
     assert_eq!(written, expected);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn matrices_arrays_and_blocks_take_consecutive_locations() {
     let found = interface("block.vert");
     let read: Vec<u32> = locations_read(&found)
@@ -90,7 +88,7 @@ fn matrices_arrays_and_blocks_take_consecutive_locations() {
     assert!(written.contains(&distance(1)) && !written.contains(&distance(0)));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
     let found = interface("textured.frag");
     let of = |at: u32| {
@@ -146,7 +144,7 @@ fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
     assert!(samplings.contains(&Sampling::Centroid) && samplings.contains(&Sampling::Center));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn descriptors_have_their_kinds_and_bind_points() {
     use DescriptorKind::*;
     let found = interface("images.comp");
@@ -176,7 +174,7 @@ fn descriptors_have_their_kinds_and_bind_points() {
     assert_eq!(found.descriptors[1].size, 4);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn disagreements_with_the_layout_are_told() {
     let found = interface("descriptor_arrays.comp");
     let binding = |set, binding, kind, count| LayoutBinding {
@@ -224,7 +222,7 @@ fn disagreements_with_the_layout_are_told() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn push_constants_attributes_and_stages_are_compared() {
     let vertex = interface("triangle.vert");
     let range = |offset, size| PushConstantRange {
@@ -254,7 +252,7 @@ fn push_constants_attributes_and_stages_are_compared() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn spirv_reflect_sees_the_same_entry_point() {
     use spirv_reflect::types::ReflectShaderStageFlags as Flags;
     let name = "block.vert";
@@ -266,7 +264,7 @@ fn spirv_reflect_sees_the_same_entry_point() {
     assert_eq!(theirs.get_shader_stage(), Flags::VERTEX);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_vertex_shader_transforms() {
     let shader = translated("triangle.vert", &Specialization::default());
     let options = ExecOptions {
