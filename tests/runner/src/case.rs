@@ -114,12 +114,8 @@ impl Case {
         std::env::var_os(ALONE).is_some_and(|name| name == *self.name)
     }
 
-    /// Runs this test again in a process of its own, in the environment that this process began with, to which `set_up`
-    /// may add. Ends the test as ignored if it is ignored there.
-    ///
-    /// # Panics
-    /// If the test fails there, with what the process printed.
-    pub fn run_alone(&self, set_up: impl FnOnce(&mut Command)) {
+    /// A command that runs this test again in a process of its own, in the environment that this process began with.
+    pub fn command(&self) -> Command {
         let mut command = Command::new(std::env::current_exe().expect("the test's own path"));
         command
             .args(["--exact", &self.name, "--test-threads", "1"])
@@ -127,6 +123,16 @@ impl Case {
             .envs(first_environment().iter().cloned())
             .env(ALONE, &self.name)
             .env_remove(crate::report::REPORT);
+        command
+    }
+
+    /// Runs this test again by [`Self::command`], to whose environment `set_up` may add. Ends the test as ignored if it is
+    /// ignored there.
+    ///
+    /// # Panics
+    /// If the test fails there, with what the process printed.
+    pub fn run_alone(&self, set_up: impl FnOnce(&mut Command)) {
+        let mut command = self.command();
         set_up(&mut command);
         let output = command.output().expect("the test starts itself");
         let text =
