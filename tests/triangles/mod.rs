@@ -1,8 +1,7 @@
 //! Triangles, held against lavapipe's.
 
 mod coverage;
-mod devices;
-mod doors;
+pub mod devices;
 mod extremes;
 mod interpolation;
 mod sweep;

@@ -15,3 +15,7 @@ mod recorded_work;
 mod reference;
 mod shaded;
 mod what_ifs;
+
+/// Trained scenes of the real data.
+const SKULL: &str = "splats/skull.ply";
+const PLAYBOT: &str = "splats/playbot-125k.ply";
