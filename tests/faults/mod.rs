@@ -10,6 +10,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use gaurast_runner::Case;
 use scenarios::{Opened, Scenario, Use};
 use simdevice::host::injection;
 
@@ -22,6 +23,8 @@ const RESULTS: [&str; 3] = [
     "ERROR_OUT_OF_DEVICE_MEMORY",
     "ERROR_DEVICE_LOST",
 ];
+const HOST_MEMORY: usize = 0;
+const DEVICE_MEMORY: usize = 1;
 const LOST: usize = 2;
 
 /// Allocations of a scenario that are failed one by one; beyond them ever fewer.
@@ -93,8 +96,8 @@ fn fail_each(scenario: &Scenario) -> Ended {
     ended
 }
 
-#[test]
-fn every_allocation_may_fail() {
+#[gaurast_runner::test(each = scenarios::variants(), alone)]
+fn every_allocation_may_fail(case: &Case) {
     std::panic::set_hook(Box::new(|info| {
         let message = info.to_string();
         if !RESULTS.iter().any(|name| message.contains(name)) {
@@ -102,24 +105,38 @@ fn every_allocation_may_fail() {
         }
         lock(&PANICS).push(message);
     }));
-    let results = "host memory, device memory, device lost, none the worse";
-    println!("faults by result: {results}");
-    let mut all = [0; RESULTS.len() + 1];
-    for scenario in scenarios::all() {
-        let Ended { failed, succeeded } = fail_each(&scenario);
-        println!("{}: {failed:?} {succeeded}", scenario.name);
-        assert!(failed.iter().sum::<u32>() > 0, "{}", scenario.name);
-        for (all, one) in all.iter_mut().zip(failed.into_iter().chain([succeeded])) {
-            *all += one;
-        }
-    }
+    let mut scenarios = scenarios::all().into_iter();
+    let scenario = scenarios.find(|scenario| scenario.name == case.variant());
+    let scenario = scenario.expect("a scenario");
+    let ended = fail_each(&scenario);
     let _ = std::panic::take_hook();
-    println!("{} faults: {all:?}", all.iter().sum::<u32>());
-    assert!(all[..RESULTS.len()].iter().all(|&count| count > 0));
+    for &result in scenario.results {
+        assert!(
+            ended.failed[result] > 0,
+            "no {}: {ended:?}",
+            RESULTS[result]
+        );
+    }
+}
+
+/// Scenarios are to end in every result, each in one at least.
+#[gaurast_runner::test]
+fn every_result_is_asked_for() {
+    let scenarios = scenarios::all();
+    assert!(
+        scenarios
+            .iter()
+            .all(|scenario| !scenario.results.is_empty())
+    );
+    let asked: BTreeSet<_> = scenarios
+        .iter()
+        .flat_map(|scenario| scenario.results)
+        .collect();
+    assert_eq!(asked.len(), RESULTS.len());
 }
 
 /// The table of `ALLOCATIONS.md` names the files that allocate through `devmem::host`, and no others.
-#[test]
+#[gaurast_runner::test]
 fn every_place_is_listed() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let table =
@@ -148,7 +165,7 @@ fn every_place_is_listed() {
     assert_eq!(listed, found);
 }
 
-/// Whether a source file allocates through `devmem::host`, its tests aside.
+/// Reports whether a source file allocates through `devmem::host`, its tests aside.
 fn allocates(text: &str) -> bool {
     const FUNCTIONS: [&str; 10] = [
         "reserve",

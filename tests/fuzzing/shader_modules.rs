@@ -1,29 +1,16 @@
 //! Modules whose bytes and instructions are changed at random go through pipeline creation and a dispatch: each is
 //! refused, runs, or loses its device in time; nothing panics, and nothing outside the bound ranges is written.
-//!
-//! `GAURAST_FUZZ_RUNS` says how many. The numbers of a failure's message make it happen again alone:
-//! `GAURAST_FUZZ_RUNS=1 GAURAST_FUZZ_FIRST=n`.
 
+use std::path::Path;
+
+use gaurast_runner::{Case, shards};
 use gaurast_tests::fuzzing::{Harness, Layout, Outcome, mutate};
 use gaurast_tests::programs::structured;
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::path::Path;
-use std::sync::Mutex;
 
-/// Runs where nothing else is asked for.
-const RUNS: u64 = 3000;
-
-/// What panicked, in whatever thread: the driver catches panics, so that an application never sees them.
-static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
-
-fn number(variable: &str, otherwise: u64) -> u64 {
-    match std::env::var(variable) {
-        Ok(text) => text.parse().expect("a number"),
-        Err(_) => otherwise,
-    }
-}
+use super::{are_many, panics, runs, watch_panics};
 
 /// The kept compute shaders that use buffers alone, and some of random control flow.
 fn seeds() -> Vec<(String, Vec<u32>, Layout)> {
@@ -72,28 +59,28 @@ fn found() -> Vec<(String, Vec<u32>)> {
     paths.iter().map(read).collect()
 }
 
-#[test]
-fn mutated_modules_never_panic_and_never_write_elsewhere() {
-    // SAFETY: no other thread runs yet that reads the environment: this is the process's only test.
-    unsafe { std::env::set_var("GAURAST_TIMEOUT_MS", "20") };
-    std::panic::set_hook(Box::new(|info| {
-        eprintln!("{info}\n{}", std::backtrace::Backtrace::force_capture());
-        PANICS.lock().unwrap().push(info.to_string());
-    }));
+#[gaurast_runner::test(each = shards(4))]
+fn mutated_modules_never_panic_and_never_write_elsewhere(case: &Case) {
+    if !case.is_alone() {
+        // Loops without end are many.
+        return case.run_alone(|command| {
+            command.env("GAURAST_TIMEOUT_MS", "20");
+        });
+    }
+    watch_panics();
     let seeds = seeds();
     assert!(seeds.len() > 20, "there should be shaders to begin with");
-    let (runs, first) = (
-        number("GAURAST_FUZZ_RUNS", RUNS),
-        number("GAURAST_FUZZ_FIRST", 0),
-    );
     let mut harness = Harness::new();
-    for (name, words) in found() {
-        harness.run(&words, &Layout::of(&words).unwrap_or_default());
-        let panics = std::mem::take(&mut *PANICS.lock().unwrap());
-        assert!(panics.is_empty(), "{name}: {panics:?}");
+    for (number, (name, words)) in found().into_iter().enumerate() {
+        if case.shard().has(number) {
+            harness.run(&words, &Layout::of(&words).unwrap_or_default());
+            let panics = panics();
+            assert!(panics.is_empty(), "{name}: {panics:?}");
+        }
     }
+    let runs = runs(case, 3000);
     let mut counts = [0u64; 3];
-    for run in first..first + runs {
+    for run in runs.clone() {
         let mut random = ChaCha8Rng::seed_from_u64(run);
         let (name, words, layout) = seeds.choose(&mut random).unwrap();
         let other = &seeds[random.random_range(0..seeds.len())].1;
@@ -103,16 +90,12 @@ fn mutated_modules_never_panic_and_never_write_elsewhere() {
             Outcome::Ran => 1,
             Outcome::Lost => 2,
         }] += 1;
-        let panics = std::mem::take(&mut *PANICS.lock().unwrap());
+        let panics = panics();
         assert!(panics.is_empty(), "run {run}, of {name}: {panics:?}");
-        if (run + 1) % 10_000 == 0 {
-            eprintln!("{} runs: {counts:?}", run + 1 - first);
-        }
     }
     let [refused, ran, lost] = counts;
-    eprintln!("{runs} modules: {refused} refused, {ran} ran, {lost} lost their device");
     assert!(
-        runs < 100 || ran > runs / 20,
-        "mutations should leave some modules valid"
+        !are_many(&runs) || ran > (refused + ran + lost) / 20,
+        "mutations should leave some modules valid: {refused} refused, {ran} ran, {lost} lost their device"
     );
 }
