@@ -6,12 +6,13 @@ mod support;
 
 use std::path::Path;
 
+use gaurast_runner::{Case, Need, Variant};
 use gaurast_samples::scene::{Reason, Scene, SceneError};
 use proptest::prelude::*;
 
 use support::*;
 
-#[test]
+#[gaurast_runner::test]
 fn splat_values() {
     let mut file = Vec::new();
     for value in [1.0_f32, -2.0, 3.0, 0.1, 0.2, 0.3] {
@@ -39,44 +40,48 @@ fn splat_values() {
     assert!(matches!(refusal("a.splat", &[]).1, Reason::Empty));
 }
 
-#[test]
-fn real_scenes_are_read() {
-    for (name, count, degree) in [
-        ("skull.ply", 94_936, 3),
-        ("playbot-125k.ply", 125_000, 2),
-        ("plant.splat", 14_007, 0),
-        ("guitar.compressed.ply", 90_854, 0),
-        ("yashica-t4-top8192.ply", 8192, 3),
-        ("yashica-t4-top8192.spz", 8192, 3),
-        ("leica-sofort-top8192.ply", 8192, 3),
-        ("leica-sofort-top8192.spz", 8192, 3),
-    ] {
-        let Some(path) = data(&format!("splats/{name}")) else {
-            return;
-        };
-        let start = std::time::Instant::now();
-        let scene = Scene::load(&path).expect(name);
-        let seconds = start.elapsed().as_secs_f64();
-        eprintln!(
-            "{name}: {:.2} million Gaussians per second",
-            count as f64 * 1e-6 / seconds
-        );
-        assert_eq!((scene.len(), scene.sh_degree()), (count, degree), "{name}");
-        let sane = scene
-            .positions()
-            .iter()
-            .zip(scene.shapes())
-            .filter(|(p, s)| {
-                p.iter().all(|c| c.abs() < 1e3)
-                    && s.scale.iter().all(|c| (0.0..1e2).contains(c))
-                    && (0.0..=1.0).contains(&s.opacity)
-                    && s.rotation.iter().any(|c| c.abs() > 1e-3)
-            });
-        assert!(sane.count() > count * 99 / 100, "{name}");
-    }
+/// Real scenes with their numbers of Gaussians and degrees of spherical harmonics.
+const REAL_SCENES: [(&str, usize, u32); 8] = [
+    ("splats/skull.ply", 94_936, 3),
+    ("splats/playbot-125k.ply", 125_000, 2),
+    ("splats/plant.splat", 14_007, 0),
+    ("splats/guitar.compressed.ply", 90_854, 0),
+    ("splats/yashica-t4-top8192.ply", 8192, 3),
+    ("splats/yashica-t4-top8192.spz", 8192, 3),
+    ("splats/leica-sofort-top8192.ply", 8192, 3),
+    ("splats/leica-sofort-top8192.spz", 8192, 3),
+];
+
+fn real_scenes() -> Vec<Variant> {
+    let variant = |(file, ..): (&'static str, usize, u32)| Variant {
+        name: file.to_owned(),
+        needs: vec![Need::Data(file)],
+    };
+    REAL_SCENES.map(variant).into()
 }
 
-#[test]
+#[gaurast_runner::test(each = real_scenes())]
+fn real_scenes_are_read(case: &Case) {
+    let (file, count, degree) = REAL_SCENES
+        .into_iter()
+        .find(|(file, ..)| *file == case.variant())
+        .expect("a scene");
+    let scene = Scene::load(&gaurast_runner::data(file)).expect("a good file");
+    assert_eq!((scene.len(), scene.sh_degree()), (count, degree));
+    let sane = scene
+        .positions()
+        .iter()
+        .zip(scene.shapes())
+        .filter(|(p, s)| {
+            p.iter().all(|c| c.abs() < 1e3)
+                && s.scale.iter().all(|c| (0.0..1e2).contains(c))
+                && (0.0..=1.0).contains(&s.opacity)
+                && s.rotation.iter().any(|c| c.abs() > 1e-3)
+        });
+    assert!(sane.count() > count * 99 / 100);
+}
+
+#[gaurast_runner::test]
 fn formats_that_are_not_read_and_unknown_ones_are_named() {
     let not_read = |name: &str, bytes: &[u8]| match read(name, bytes) {
         Err(SceneError::NotReadYet { format, .. }) => format,
@@ -114,7 +119,7 @@ fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_truncation_of_a_good_file_is_refused() {
     for (name, file) in good_files() {
         let whole = read(name, &file).expect("a good file");
@@ -143,7 +148,7 @@ proptest! {
     })]
 
     /// No flip of bytes makes a reader panic, or hold more than the file could.
-    #[test]
+    #[gaurast_runner::test]
     fn flipped_bytes_never_panic(
         which in 0_usize..6,
         flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::{data, render};
+use super::render;
 
 /// Files that are drawn.
 const GOOD: &[&str] = &[
@@ -63,11 +63,9 @@ const MALFORMED: &[(&str, &str)] = &[
 /// What the command says of a file of a format that it has no reader for.
 const NOT_READ: &[(&str, &str)] = &[(".sog", "SOG files are not read yet")];
 
-#[test]
+#[gaurast_runner::test]
 fn good_files_are_drawn() {
-    let Some(fixtures) = data("fixtures") else {
-        return;
-    };
+    let fixtures = gaurast_runner::data("fixtures");
     for name in GOOD {
         let folder = tempfile::tempdir().expect("a folder");
         let scene = fixtures.join(name);
@@ -88,11 +86,9 @@ fn good_files_are_drawn() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_other_file_is_refused_in_one_sentence_and_leaves_nothing() {
-    let Some(fixtures) = data("fixtures") else {
-        return;
-    };
+    let fixtures = gaurast_runner::data("fixtures");
     let files: BTreeSet<String> = fixtures
         .read_dir()
         .expect("readable")

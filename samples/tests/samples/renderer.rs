@@ -18,7 +18,7 @@ fn counted(frame: &Frame, name: &str) -> f64 {
     counter.unwrap_or_else(|| panic!("no counter {name}")).value
 }
 
-#[test]
+#[gaurast_runner::test]
 fn frames_of_any_size_and_order_are_the_same_pictures() {
     let mut renderer = renderer();
     let garden = Scene::generate(5, 4000);
@@ -47,7 +47,7 @@ fn frames_of_any_size_and_order_are_the_same_pictures() {
 }
 
 /// Three coefficients that only differ where their degree is drawn.
-#[test]
+#[gaurast_runner::test]
 fn the_degree_drawn_is_the_least_of_those_asked_for() {
     let mut renderer = renderer();
     let shape = Shape {
@@ -88,7 +88,7 @@ fn the_degree_drawn_is_the_least_of_those_asked_for() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn skipped_gaussians_are_counted_and_poison_nothing() {
     let mut renderer = renderer();
     let good = Shape {
@@ -155,7 +155,7 @@ fn skipped_gaussians_are_counted_and_poison_nothing() {
     assert!((centre[3] - 0.5).abs() < 5e-6, "{centre:?}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn an_empty_scene_is_an_empty_picture() {
     let mut renderer = renderer();
     let uploaded = renderer.upload(&Scene::default(), None).expect("uploaded");
@@ -165,7 +165,7 @@ fn an_empty_scene_is_an_empty_picture() {
     assert!(frame.picture.pixels.iter().all(|pixel| *pixel == [0.0; 4]));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn sizes_beyond_the_device_are_errors() {
     let mut renderer = renderer();
     let uploaded = renderer.upload(&Scene::default(), None).expect("uploaded");

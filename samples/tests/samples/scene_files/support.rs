@@ -1,7 +1,7 @@
 //! Files made in memory, and what tests say about them.
 
 use std::io::{Cursor, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -16,18 +16,6 @@ pub const SH_C0: f32 = 0.282_094_8;
 pub const TURN: [f32; 15] = [
     -1., -1., 1., -1., 1., 1., -1., 1., -1., 1., -1., -1., 1., -1., 1.,
 ];
-
-/// The file `name` of the test data, unless there is none here.
-pub fn data(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../shared/data")
-        .join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("skipped: {name} is not here");
-    None
-}
 
 pub fn read(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
     Scene::read(Path::new(name), &mut Cursor::new(bytes), bytes.len() as u64)

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use gaurast_samples::camera;
 use glam::{DMat3, DVec2, DVec3};
 use serde_json::Value;
 
-use crate::{data, render};
+use super::render;
 
 /// A camera as its file defines it, worked out here from the file's text alone.
 struct Expected {
@@ -128,17 +129,15 @@ fn inria(text: &str, view: usize, size: [u32; 2]) -> Expected {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn inria_cameras_are_exactly_those_of_the_file() {
-    for (name, view) in [
-        ("garden", 3),
-        ("garden", 0),
-        ("bicycle", 100),
-        ("room", 310),
+    for (file, view) in [
+        ("cameras/garden.json", 3),
+        ("cameras/garden.json", 0),
+        ("cameras/bicycle.json", 100),
+        ("cameras/room.json", 310),
     ] {
-        let Some(path) = data(&format!("cameras/{name}.json")) else {
-            return;
-        };
+        let path = gaurast_runner::data(file);
         let text = std::fs::read_to_string(&path).expect("text");
         for size in [[1296, 840], [500, 500]] {
             let camera = inria(&text, view, size);
@@ -153,7 +152,20 @@ fn inria_cameras_are_exactly_those_of_the_file() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
+fn real_camera_paths_are_read() {
+    for (file, count) in [
+        ("cameras/bicycle.json", 194),
+        ("cameras/garden.json", 185),
+        ("cameras/room.json", 311),
+        ("cameras/bonsai.json", 292),
+    ] {
+        let views = camera::load(&gaurast_runner::data(file), [1, 1]).expect(file);
+        assert_eq!(views.len(), count, "{file}");
+    }
+}
+
+#[gaurast_runner::test]
 fn nerfstudio_cameras_are_exactly_those_of_the_file() {
     // Any rotation; in OpenGL's frame a camera's columns are right, up and back.
     let to_world = glam::DQuat::from_xyzw(0.3, -0.5, 0.7, 0.2).normalize();

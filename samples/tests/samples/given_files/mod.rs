@@ -5,7 +5,7 @@ mod cameras;
 mod fixtures;
 
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 /// Runs `gaurast render` with `arguments` in `folder`.
@@ -17,16 +17,4 @@ fn render<A: AsRef<OsStr>>(folder: &Path, arguments: impl IntoIterator<Item = A>
         .env_remove("RUST_LOG")
         .output()
         .expect("the command starts")
-}
-
-/// The file or folder `name` of the test data, unless there is none here.
-fn data(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../shared/data")
-        .join(name);
-    if let Ok(path) = path.canonicalize() {
-        return Some(path);
-    }
-    eprintln!("skipped: {name} is not here");
-    None
 }

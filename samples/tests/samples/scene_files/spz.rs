@@ -1,10 +1,11 @@
 //! SPZ files.
 
+use gaurast_runner::data;
 use gaurast_samples::scene::{Place, Reason, Scene, SceneError};
 
-use crate::support::*;
+use super::support::*;
 
-#[test]
+#[gaurast_runner::test]
 fn malformed_spz_is_refused_with_place_and_reason() {
     let body = [7; 19];
     let good = |flags| [spz_header(2, 1, 0, flags), body.to_vec()].concat();
@@ -47,7 +48,7 @@ fn malformed_spz_is_refused_with_place_and_reason() {
     ));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn malformed_spz_fixtures_are_refused() {
     let refused: &[(&str, IsReason)] = &[
         ("bad-fhcrc-v2", |r| matches!(r, Reason::Gzip(_))),
@@ -65,10 +66,9 @@ fn malformed_spz_fixtures_are_refused() {
             matches!(r, Reason::Version { found: 0, .. })
         }),
     ];
+    let fixtures = data("fixtures");
     for (name, is_reason) in refused {
-        let Some(path) = data(&format!("fixtures/{name}.spz")) else {
-            return;
-        };
+        let path = fixtures.join(format!("{name}.spz"));
         let error = Scene::load(&path).expect_err(name);
         let SceneError::Malformed { reason, .. } = &error else {
             panic!("{name}: {error}");
@@ -79,11 +79,9 @@ fn malformed_spz_fixtures_are_refused() {
 }
 
 /// The fixture's four Gaussians sit on the format's grid; these are the formulas that made it.
-#[test]
+#[gaurast_runner::test]
 fn spz_fixture_holds_the_values_that_made_it() {
-    let Some(path) = data("fixtures/equiv-degree3-exact-v2.spz") else {
-        return;
-    };
+    let path = data("fixtures/equiv-degree3-exact-v2.spz");
     let scene = Scene::load(&path).expect("a good file");
     assert_eq!((scene.len(), scene.sh_degree()), (4, 3));
     let rotations: [[f32; 4]; 4] = [
@@ -132,7 +130,7 @@ fn spz_fixture_holds_the_values_that_made_it() {
 }
 
 /// One Gaussian stored as a PLY file and as SPZ of each version is the same Gaussian.
-#[test]
+#[gaurast_runner::test]
 fn spz_and_ply_of_one_gaussian_agree() {
     let rest: Vec<u8> = (0..45).map(|i| 60 + 3 * i).collect();
     let (colour, scales, opacity) = ([40, 128, 210], [144, 160, 176], 200);
@@ -186,8 +184,9 @@ fn spz_and_ply_of_one_gaussian_agree() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn good_spz_fixtures_are_read() {
+    let fixtures = data("fixtures");
     for (name, count, degree) in [
         ("minimal-v1", 1, 0),
         ("minimal-v3", 1, 0),
@@ -197,16 +196,14 @@ fn good_spz_fixtures_are_read() {
         ("degree3-v2", 1, 3),
         ("decode-degree4-v2", 1, 4),
     ] {
-        let Some(path) = data(&format!("fixtures/{name}.spz")) else {
-            return;
-        };
+        let path = fixtures.join(format!("{name}.spz"));
         let scene = Scene::load(&path).expect(name);
         assert_eq!((scene.len(), scene.sh_degree()), (count, degree), "{name}");
     }
 }
 
 /// Inside the gzip stream of an SPZ file, where a flip outside would only break its sum.
-#[test]
+#[gaurast_runner::test]
 fn every_header_byte_of_spz_may_be_anything() {
     let good = [spz_header(2, 1, 1, 0), vec![7; 28]].concat();
     for position in 0..16 {

@@ -1,10 +1,11 @@
 //! PLY files of both layouts.
 
+use gaurast_runner::data;
 use gaurast_samples::scene::{Place, Reason, Scene, SceneError};
 
-use crate::support::*;
+use super::support::*;
 
-#[test]
+#[gaurast_runner::test]
 fn ply_values_in_every_encoding_degree_and_order() {
     for degree in 0..=4 {
         let (properties, rows) = distinct(degree, 3);
@@ -47,7 +48,7 @@ fn ply_values_in_every_encoding_degree_and_order() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn ply_keeps_non_finite_values_and_passes_over_other_elements() {
     let (properties, mut rows) = distinct(0, 2);
     rows[0][0] = f32::NAN;
@@ -71,7 +72,7 @@ fn ply_keeps_non_finite_values_and_passes_over_other_elements() {
     assert_eq!(scene.positions()[1][..], rows[1][..3]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn malformed_ply_is_refused_with_place_and_reason() {
     let (properties, rows) = distinct(1, 2);
     let good = ply(Encoding::Little, &properties, &rows);
@@ -148,7 +149,7 @@ fn malformed_ply_is_refused_with_place_and_reason() {
     ));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn malformed_ply_fixtures_are_refused() {
     let refused: &[(&str, Place, IsReason)] = &[
         ("list-property", property("opacity"), |r| {
@@ -169,10 +170,9 @@ fn malformed_ply_fixtures_are_refused() {
             matches!(r, Reason::Empty)
         }),
     ];
+    let fixtures = data("fixtures");
     for (name, expected, is_reason) in refused {
-        let Some(path) = data(&format!("fixtures/{name}.ply")) else {
-            return;
-        };
+        let path = fixtures.join(format!("{name}.ply"));
         let error = Scene::load(&path).expect_err(name);
         let SceneError::Malformed { place, reason, .. } = &error else {
             panic!("{name}: {error}");
@@ -184,12 +184,11 @@ fn malformed_ply_fixtures_are_refused() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn good_ply_fixtures_hold_their_values() {
-    let Some(path) = data("fixtures/degree-2-sh.ply") else {
-        return;
-    };
-    let scene = Scene::load(&path).expect("a good file");
+    let fixtures = data("fixtures");
+    let load = |name: &str| Scene::load(&fixtures.join(name)).expect(name);
+    let scene = load("degree-2-sh.ply");
     assert_eq!((scene.len(), scene.sh_degree()), (1, 2));
     assert_eq!(scene.shapes()[0].opacity, 0.5);
     assert_eq!(scene.shapes()[0].scale, [1.0, 2.0, 0.5]);
@@ -199,18 +198,14 @@ fn good_ply_fixtures_hold_their_values() {
         assert_eq!(scene.sh()[k], [k_f, 100.0 + k_f, 200.0 + k_f]);
     }
     // Not errors here: degree 4 is held, and what overflows is the device's to skip.
-    let degree = |name: &str| {
-        let path = data(&format!("fixtures/{name}.ply"))?;
-        Some(Scene::load(&path).expect(name))
-    };
-    assert_eq!(degree("degree-4-sh").map(|s| s.sh_degree()), Some(4));
-    let overflow = degree("overflow-scale").expect("beside the others");
+    assert_eq!(load("degree-4-sh.ply").sh_degree(), 4);
+    let overflow = load("overflow-scale.ply");
     assert_eq!(overflow.shapes()[0].scale[0], f32::INFINITY);
-    assert_eq!(degree("three-gaussian-binary-le").map(|s| s.len()), Some(3));
-    assert_eq!(degree("one-gaussian-binary-le").map(|s| s.len()), Some(1));
+    assert_eq!(load("three-gaussian-binary-le.ply").len(), 3);
+    assert_eq!(load("one-gaussian-binary-le.ply").len(), 1);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn compressed_ply_values() {
     let scene = read("a.compressed.ply", &compressed_ply(true, true)).expect("a good file");
     assert_eq!((scene.len(), scene.sh_degree()), (2, 1));

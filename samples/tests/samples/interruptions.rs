@@ -1,6 +1,5 @@
 //! `gaurast` where the system fails it: interrupted, without room, with nobody to read. What was there before stays,
 //! nothing is left half-written, and there is one sentence.
-#![cfg(target_os = "linux")]
 
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
@@ -47,7 +46,7 @@ fn interrupt(child: &Child) {
     assert!(kill.expect("there is kill").success());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn an_interrupted_render_leaves_the_picture_that_was_there() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.exr");
@@ -81,13 +80,9 @@ fn an_interrupted_render_leaves_the_picture_that_was_there() {
     assert!(interrupted > 0);
 }
 
-#[test]
+#[gaurast_runner::test(needs = [gaurast_runner::Need::File("/dev/full")])]
 fn a_full_disk_is_one_sentence() {
     let folder = tempfile::tempdir().expect("a folder");
-    if !Path::new("/dev/full").exists() {
-        eprintln!("skipped: there is no /dev/full");
-        return;
-    }
     std::os::unix::fs::symlink("/dev/full", folder.path().join("a.png")).expect("a link");
     let arguments = [
         "render", "-q", "--size", "64x48", "-o", "b.png", "-o", "a.png",
@@ -98,7 +93,7 @@ fn a_full_disk_is_one_sentence() {
     assert_eq!(files(&folder), 2);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_limit_of_file_sizes_is_one_sentence_and_keeps_what_was_there() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.exr");
@@ -116,7 +111,7 @@ fn a_limit_of_file_sizes_is_one_sentence_and_keeps_what_was_there() {
     assert_eq!(files(&folder), 1);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_closed_pipe_is_one_sentence_and_the_picture_is_there() {
     let folder = tempfile::tempdir().expect("a folder");
     let closed = |arguments: &[&str]| {
