@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 use gaurast::vk::{GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST};
 use gaurast_tests::compare::{Limits, verdict};
 use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, simd_levels,
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
+use gaurast_tests::for_levels::levels;
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use plotters::prelude::*;
@@ -248,7 +249,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args()
         .nth(1)
         .map_or_else(PathBuf::new, PathBuf::from);
-    let all = simd_levels();
+    let all = levels();
     let levels = [all[0], all[all.len() - 1]];
     let contexts = levels.map(|simd| {
         Context::embedded(&Settings {

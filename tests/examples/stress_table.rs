@@ -8,7 +8,8 @@ use std::path::PathBuf;
 use gaurast_bench::quads::QuadRenderer;
 use gaurast_samples::camera::{Camera, Model};
 use gaurast_samples::scene::{Scene, Shape};
-use gaurast_tests::contexts::{Context, Settings, simd_levels};
+use gaurast_tests::contexts::{Context, Settings};
+use gaurast_tests::for_levels::levels;
 use gaurast_tests::oracle::{
     OracleCamera, OracleState, Reference, render_binary16, render_bounded,
 };
@@ -134,7 +135,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("stress/TABLE.md"),
         PathBuf::from,
     );
-    let levels = simd_levels();
+    let levels = levels();
     let context = |simd: &&'static str| {
         Context::embedded(&Settings {
             simd: Some(simd),

@@ -2,21 +2,23 @@
 //! size, the host's allocator itself fails here, once in each of many processes, while the driver executes.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::process::Command;
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering::Relaxed};
 
 use ash::vk;
+use gaurast_runner::{Case, Variant};
 use gaurast_tests::contexts::{Context, Settings};
 use gaurast_tests::triangles::{
     Buffer, Gpu, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
 
-use crate::scenarios;
+use super::scenarios;
 
 /// Bytes from which on an allocation may fail. Less is of a size that no application chooses.
 const LARGE: usize = 64 << 10;
 /// Says to a process of this test which allocation fails in it.
 const VARIABLE: &str = "GAURAST_TEST_FAIL";
+/// Printed by such a process if it had no such allocation.
+const NONE: &str = "none failed";
 
 struct Failing;
 
@@ -108,14 +110,9 @@ fn draw_triangles(gpu: &Gpu, count: usize) {
     arm(false);
 }
 
-/// Fails an allocation while large draws are executed; whoever started the process sees how it ends.
-#[test]
-fn child() {
-    let Ok(which) = std::env::var(VARIABLE) else {
-        return;
-    };
-    let (scenario, n) = which.split_once(' ').expect("a scenario and a number");
-    LEFT.store(n.parse().expect("a number"), Relaxed);
+/// Fails the `n`th allocation while large draws of a scenario are executed; whoever started the process sees how it ends.
+fn fail_one(scenario: &str, n: i64) {
+    LEFT.store(n, Relaxed);
     let settings = Settings {
         threads: Some(2),
         ..Settings::default()
@@ -134,46 +131,48 @@ fn child() {
             draw_triangles(&gpu, 40_000);
         }
     }
-    let left = LEFT.load(Relaxed);
-    println!(
-        "{}",
-        if left >= 0 {
-            "none failed"
-        } else {
-            "one failed"
-        }
-    );
+    if LEFT.load(Relaxed) >= 0 {
+        println!("{NONE}");
+    }
 }
 
-#[test]
-fn no_large_allocation_aborts() {
-    if std::env::var_os(VARIABLE).is_some() {
-        return;
+fn drawn() -> Vec<Variant> {
+    vec![
+        Variant::new("gaussians"),
+        Variant {
+            needs: vec![scenarios::GLSLANG],
+            ..Variant::new("triangles")
+        },
+    ]
+}
+
+#[gaurast_runner::test(each = drawn())]
+fn no_large_allocation_aborts(case: &Case) {
+    if case.is_alone() {
+        let n = std::env::var(VARIABLE).expect("an allocation");
+        return fail_one(case.variant(), n.parse().expect("a number"));
     }
-    for scenario in ["gaussians", "triangles"] {
-        let (mut n, mut lost) = (0, 0);
-        loop {
-            let output = Command::new(std::env::current_exe().expect("this test"))
-                .args(["abort::child", "--exact", "--nocapture"])
-                .env(VARIABLE, format!("{scenario} {n}"))
-                .output()
-                .expect("it starts");
-            let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-            let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
-            if stdout.contains("none failed") {
-                break;
-            }
-            // It may have done without; else it was told.
-            let told = stderr.contains("ERROR_DEVICE_LOST") || stderr.contains("OUT_OF");
-            assert!(
-                output.status.code().is_some() && (output.status.success() || told),
-                "{scenario}, allocation {n}: {:?}\n{stderr}",
-                output.status
-            );
-            lost += u32::from(told);
-            n += 1 + n / 8;
+    let (mut n, mut lost) = (0, 0);
+    loop {
+        let output = case
+            .command()
+            .env(VARIABLE, n.to_string())
+            .output()
+            .expect("it starts");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        let (stdout, stderr) = (text(&output.stdout), text(&output.stderr));
+        if stdout.contains(NONE) {
+            break;
         }
-        println!("{scenario}: {n} large allocations, {lost} told");
-        assert!(lost > 0, "{scenario}");
+        // It may have done without; else it was told.
+        let told = stderr.contains("ERROR_DEVICE_LOST") || stderr.contains("OUT_OF");
+        assert!(
+            output.status.code().is_some() && (output.status.success() || told),
+            "allocation {n}: {:?}\n{stderr}",
+            output.status
+        );
+        lost += u32::from(told);
+        n += 1 + n / 8;
     }
+    assert!(lost > 0, "of {n} large allocations none was told");
 }

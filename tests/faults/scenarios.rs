@@ -4,12 +4,18 @@ use gaurast::vk::{
     GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST,
     GaussianOrderGAURAST, GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaurast_runner::{Need, Variant};
 use gaurast_tests::contexts::{
     Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
 use gaurast_tests::kernels;
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use gaurast_tests::triangles::{Gpu, scenes};
+
+use super::{DEVICE_MEMORY, HOST_MEMORY, LOST};
+
+/// The compiler of the triangles' shaders.
+pub const GLSLANG: Need = Need::Program("glslangValidator");
 
 /// Uses a device: returns what it made, or panics with the result of the call that failed.
 pub type Use = Box<dyn Fn() -> Vec<u8>>;
@@ -26,6 +32,8 @@ pub enum Opened {
 pub struct Scenario {
     pub name: String,
     pub device: Opened,
+    /// The results that some runs end in, by their places in [`RESULTS`](super::RESULTS). Others may be, too.
+    pub results: &'static [usize],
     pub open: Box<dyn Fn() -> Use>,
 }
 
@@ -81,10 +89,24 @@ pub fn all() -> Vec<Scenario> {
     all
 }
 
+/// A variant for each scenario.
+pub fn variants() -> Vec<Variant> {
+    let variant = |scenario: Scenario| Variant {
+        needs: if TRIANGLES.contains(&&*scenario.name) {
+            vec![GLSLANG]
+        } else {
+            Vec::new()
+        },
+        name: scenario.name,
+    };
+    all().into_iter().map(variant).collect()
+}
+
 fn scenario(name: &str, open: impl Fn() -> Use + 'static) -> Scenario {
     Scenario {
         name: name.to_owned(),
         device: Opened::Before,
+        results: &[HOST_MEMORY, DEVICE_MEMORY, LOST],
         open: Box::new(open),
     }
 }

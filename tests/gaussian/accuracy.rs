@@ -1,84 +1,79 @@
 //! Gaussian draws through the driver against the binary64 oracle, at every SIMD level, with one
 //! worker thread and with two: the accuracy contract.
-//!
-//! `--nocapture` shows a line of figures for every picture.
 
-use std::time::Instant;
+use std::sync::Arc;
 
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST,
     GaussianLinearizationGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaurast_runner::{Case, Need, data, simd_levels};
 use gaurast_samples::camera::{Camera, DEFAULT_FOV};
 use gaurast_samples::scene::Scene;
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, simd_levels,
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
-use gaurast_tests::data::require_data;
+use gaurast_tests::for_levels::ForLevels;
 use gaurast_tests::oracle::{OracleCamera, OracleState, Reference, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 use glam::DVec3;
 
+use super::{PLAYBOT, SKULL};
+
+const PLANT: &str = "splats/plant.splat";
+
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
-/// One device for each SIMD level and each of one and two threads.
-pub(crate) struct Devices(Vec<(&'static str, [Context; 2])>);
+/// Devices of a SIMD level: with one thread, and with two.
+pub(crate) struct Devices<'a> {
+    level: &'a str,
+    contexts: [Context; 2],
+}
 
-impl Devices {
-    pub(crate) fn new() -> Self {
-        let devices = |simd| {
-            [1, 2].map(|threads| {
-                Context::embedded(&Settings {
-                    simd: Some(simd),
-                    threads: Some(threads),
-                    ..Settings::default()
-                })
+impl<'a> Devices<'a> {
+    pub(crate) fn new(level: &'a str) -> Self {
+        let contexts = [1, 2].map(|threads| {
+            Context::embedded(&Settings {
+                simd: Some(level),
+                threads: Some(threads),
+                ..Settings::default()
             })
-        };
-        let levels = simd_levels().into_iter();
-        Self(levels.map(|level| (level, devices(level))).collect())
+        });
+        Self { level, contexts }
     }
 
-    /// Draws `scene` in `state` from each of `views` on every device and judges the pictures.
+    /// Draws `scene` in `state` from each of `views` on both devices and judges the pictures. Levels share the oracle's,
+    /// which `name` and a view's name tell apart.
     pub(crate) fn judge(&self, name: &str, scene: &SceneBuffers, state: State, views: &[View]) {
-        let references: Vec<Reference> = views
-            .iter()
-            .map(|view| {
-                let start = Instant::now();
-                let camera = OracleCamera::new(&view.camera, view.size).expect("a pinhole");
-                let reference =
-                    render_bounded(&scene.as_oracle(), &camera, &OracleState::from(&state));
-                let seconds = start.elapsed().as_secs_f64();
-                eprintln!("{name}, {}: oracle, {seconds:.1} s", view.name);
-                let covered = reference
-                    .nominal
-                    .iter()
-                    .filter(|rgba| rgba[3] > 0.1)
-                    .count();
-                let least = reference.nominal.len() / 20;
-                let is_made_up = view.limits == Limits::ENVELOPE_ONLY;
-                assert!(
-                    is_made_up || covered > least,
-                    "{name}: hardly anything is seen"
-                );
-                reference
-            })
-            .collect();
-        for (level, contexts) in &self.0 {
-            let [images, same] = contexts
-                .each_ref()
-                .map(|context| draw(context, scene, state, views));
-            for (((view, reference), (image, time)), (same, _)) in
-                views.iter().zip(&references).zip(images).zip(same)
-            {
-                let name = format!("{name}, {}, {level}", view.name);
-                assert!(image == same, "{name}: two threads give another picture");
-                let verdict = assert_contract(&name, &image, reference, view.limits);
-                eprintln!("{name}: {:.0} ms, {verdict}", 1e3 * time);
-            }
+        let [images, same] = self
+            .contexts
+            .each_ref()
+            .map(|context| draw(context, scene, state, views));
+        for ((view, image), same) in views.iter().zip(images).zip(same) {
+            let reference = reference(name, scene, state, view);
+            let name = format!("{name}, {}, {}", view.name, self.level);
+            assert!(image == same, "{name}: two threads give another picture");
+            assert_contract(&name, &image, &reference, view.limits);
         }
     }
+}
+
+/// The oracle's picture.
+fn reference(name: &str, scene: &SceneBuffers, state: State, view: &View) -> Arc<Reference> {
+    static REFERENCES: ForLevels<Reference> = ForLevels::new();
+    REFERENCES.get(&format!("{name}, {}", view.name), || {
+        let camera = OracleCamera::new(&view.camera, view.size).expect("a model that it has");
+        let reference = render_bounded(&scene.as_oracle(), &camera, &OracleState::from(&state));
+        let nominal = reference.nominal.iter();
+        let covered = nominal.filter(|rgba| rgba[3] > 0.1).count();
+        let is_made_up = view.limits == Limits::ENVELOPE_ONLY;
+        assert!(
+            is_made_up || covered > reference.nominal.len() / 20,
+            "{name}: hardly anything is seen"
+        );
+        reference
+    })
 }
 
 /// Where a scene is seen from, and how its picture is judged.
@@ -89,13 +84,13 @@ pub(crate) struct View {
     pub(crate) limits: Limits,
 }
 
-/// Pictures of `scene`, each with the seconds that it took.
+/// Pictures of `scene`.
 fn draw(
     context: &Context,
     scene: &SceneBuffers,
     state: State,
     views: &[View],
-) -> Vec<(Vec<[f32; 4]>, f64)> {
+) -> Vec<Vec<[f32; 4]>> {
     let options = PipelineOptions {
         state,
         // The device draws degree 3 at most; the oracle is asked for no more.
@@ -105,14 +100,13 @@ fn draw(
     let on_device = DeviceScene::new(context, scene);
     let draw = |view: &View| {
         let target = Target::new(context, options.format, view.size);
-        let start = Instant::now();
         context.run(|commands| {
             commands.pass(&target, &Pass::clear([0.0; 4]), || {
                 commands.bind(&pipeline, &on_device, &view.camera);
                 commands.draw([on_device.count, 1, 0, 0]);
             });
         });
-        (target.read(), start.elapsed().as_secs_f64())
+        target.read()
     };
     let images = views.iter().map(draw).collect();
     assert_eq!(context.messages(), []);
@@ -157,9 +151,9 @@ pub(crate) fn generated_view(limits: Limits) -> View {
     }
 }
 
-#[test]
-fn generated_scenes_keep_the_contract_in_every_state() {
-    let devices = Devices::new();
+#[gaurast_runner::test(each = simd_levels())]
+fn generated_scenes_keep_the_contract_in_every_state(case: &Case) {
+    let devices = Devices::new(case.variant());
     for (seed, degree) in [(1, 0), (2, 1), (3, 2), (4, 3), (5, 4)] {
         let scene = scenes::cloud(seed, 3000, degree);
         for (name, state) in states() {
@@ -219,9 +213,9 @@ fn other_cameras() -> Vec<View> {
     ]
 }
 
-#[test]
-fn every_camera_and_every_order_keep_the_contract() {
-    let devices = Devices::new();
+#[gaurast_runner::test(each = simd_levels())]
+fn every_camera_and_every_order_keep_the_contract(case: &Case) {
+    let devices = Devices::new(case.variant());
     let scene = scenes::cloud(11, 3000, 2);
     let orders = [
         ("by view depth", GaussianOrderGAURAST::VIEW_DEPTH),
@@ -241,9 +235,9 @@ fn every_camera_and_every_order_keep_the_contract() {
     }
 }
 
-#[test]
-fn unscented_projection_keeps_the_contract_through_every_camera() {
-    let devices = Devices::new();
+#[gaurast_runner::test(each = simd_levels())]
+fn unscented_projection_keeps_the_contract_through_every_camera(case: &Case) {
+    let devices = Devices::new(case.variant());
     let state = State::default().linearization(GaussianLinearizationGAURAST::UNSCENTED);
     let compensated = state.antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED);
     let mut scene = scenes::cloud(13, 2000, 1);
@@ -262,7 +256,7 @@ fn unscented_projection_keeps_the_contract_through_every_camera() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn orders_give_different_pictures() {
     let context = Context::embedded(&Settings::default());
     let scene = scenes::cloud(12, 3000, 0);
@@ -274,7 +268,7 @@ fn orders_give_different_pictures() {
             State::default().order(order),
             std::slice::from_ref(&view),
         );
-        drawn.remove(0).0
+        drawn.remove(0)
     };
     let by_depth = picture(GaussianOrderGAURAST::VIEW_DEPTH);
     assert!(by_depth != picture(GaussianOrderGAURAST::RADIAL_DISTANCE));
@@ -283,9 +277,9 @@ fn orders_give_different_pictures() {
     assert!(by_depth != by_pixel && by_pixel != picture(GaussianOrderGAURAST::RADIAL_DISTANCE));
 }
 
-#[test]
-fn awkward_scenes_stay_within_the_envelope_in_every_state() {
-    let devices = Devices::new();
+#[gaurast_runner::test(each = simd_levels())]
+fn awkward_scenes_stay_within_the_envelope_in_every_state(case: &Case) {
+    let devices = Devices::new(case.variant());
     // Few at a time: a huge opaque one hides the others.
     for seed in 100..160 {
         let scene = scenes::awkward(seed, 10 + 2 * (seed % 20) as usize, (seed % 4) as u32);
@@ -353,26 +347,24 @@ fn bulk(scene: &Scene) -> (DVec3, f64) {
 }
 
 /// Judges the pictures of a file.
-fn file_keeps_the_contract(name: &str) {
-    let Some(path) = require_data(&format!("splats/{name}")) else {
-        return;
-    };
-    let scene = Scene::load(&path).expect("a scene");
+fn file_keeps_the_contract(case: &Case, name: &'static str) {
+    let scene = Scene::load(&data(name)).expect("a scene");
     let views = views(&scene);
-    Devices::new().judge(name, &SceneBuffers::from(&scene), State::default(), &views);
+    let scene = SceneBuffers::from(&scene);
+    Devices::new(case.variant()).judge(name, &scene, State::default(), &views);
 }
 
-#[test]
-fn skull_keeps_the_contract() {
-    file_keeps_the_contract("skull.ply");
+#[gaurast_runner::test(needs = [Need::Data(SKULL)], each = simd_levels())]
+fn skull_keeps_the_contract(case: &Case) {
+    file_keeps_the_contract(case, SKULL);
 }
 
-#[test]
-fn playbot_keeps_the_contract() {
-    file_keeps_the_contract("playbot-125k.ply");
+#[gaurast_runner::test(needs = [Need::Data(PLAYBOT)], each = simd_levels())]
+fn playbot_keeps_the_contract(case: &Case) {
+    file_keeps_the_contract(case, PLAYBOT);
 }
 
-#[test]
-fn plant_keeps_the_contract() {
-    file_keeps_the_contract("plant.splat");
+#[gaurast_runner::test(needs = [Need::Data(PLANT)], each = simd_levels())]
+fn plant_keeps_the_contract(case: &Case) {
+    file_keeps_the_contract(case, PLANT);
 }

@@ -5,9 +5,10 @@ use gaurast::vk::{
     PipelineGaussianApproximationStateCreateInfoGAURAST as Approximation,
     PipelineGaussianStateCreateInfoGAURAST as State,
 };
+use gaurast_runner::{Case, simd_levels};
 use gaurast_samples::scene::Scene;
 use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, simd_levels,
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
 use gaurast_tests::oracle::spherical_harmonics::{coefficient_count, color};
 use gaurast_tests::oracle::{OracleState, Reference, render_bounded};
@@ -128,7 +129,7 @@ fn range(scene: &SceneBuffers) -> f64 {
         .fold(0.0, f64::max)
 }
 
-#[test]
+#[gaurast_runner::test]
 fn pictures_are_no_further_off_than_is_allowed() {
     let context = context(2);
     let state = State::default();
@@ -160,7 +161,6 @@ fn pictures_are_no_further_off_than_is_allowed() {
             let bound = f64::from(error) + f64::from(budget);
             let distances = distances(&image, &reference, range);
             let worst = distances.iter().copied().fold(0.0, f64::max);
-            eprintln!("{name}: {worst:e} of {bound:e}");
             let flipped = distances.iter().filter(|distance| **distance > bound);
             // Only powers that err decide otherwise when a pixel is finished, and at few pixels.
             let (flips, most) = if error > 0.0 {
@@ -177,7 +177,7 @@ fn pictures_are_no_further_off_than_is_allowed() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_allows_nothing_is_as_without() {
     let context = context(2);
     for (name, scene) in all_scenes() {
@@ -191,19 +191,17 @@ fn what_allows_nothing_is_as_without() {
     }
 }
 
-#[test]
-fn threads_change_nothing() {
+#[gaurast_runner::test(each = simd_levels())]
+fn threads_change_nothing(case: &Case) {
     let allowed = Some([2e-3, 4.0 / 255.0]);
     let scene = scenes::cloud(21, 3000, 1);
-    for simd in simd_levels() {
-        let picture = |threads| {
-            let context = Context::embedded(&Settings {
-                simd: Some(simd),
-                threads: Some(threads),
-                ..Settings::default()
-            });
-            draw(&context, &scene, allowed)
-        };
-        assert!(picture(1) == picture(3), "{simd}");
-    }
+    let picture = |threads| {
+        let context = Context::embedded(&Settings {
+            simd: Some(case.variant()),
+            threads: Some(threads),
+            ..Settings::default()
+        });
+        draw(&context, &scene, allowed)
+    };
+    assert!(picture(1) == picture(3));
 }

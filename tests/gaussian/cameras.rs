@@ -1,9 +1,10 @@
 //! Panoramas: what their seam does to nothing.
 
 use gaurast::vk::{GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST};
+use gaurast_runner::{Case, simd_levels};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, simd_levels,
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
@@ -52,7 +53,7 @@ fn difference(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
     components.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_panorama_that_turns_shows_the_same_further_to_the_left() {
     let context = Context::embedded(&Settings::default());
     let mut scene = scenes::cloud(21, 2000, 1);
@@ -82,7 +83,7 @@ fn a_panorama_that_turns_shows_the_same_further_to_the_left() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_straddles_the_seam_is_seen_on_both_sides() {
     let context = Context::embedded(&Settings::default());
     // Straight behind the camera, above the horizon.
@@ -106,13 +107,11 @@ fn what_straddles_the_seam_is_seen_on_both_sides() {
     assert_eq!(alpha(width / 2, row), 0.0);
 }
 
-#[test]
-fn a_gaussian_over_a_pole_is_no_denser_than_elsewhere() {
-    let contexts = simd_levels().into_iter().map(|simd| {
-        Context::embedded(&Settings {
-            simd: Some(simd),
-            ..Settings::default()
-        })
+#[gaurast_runner::test(each = simd_levels())]
+fn a_gaussian_over_a_pole_is_no_denser_than_elsewhere(case: &Case) {
+    let context = Context::embedded(&Settings {
+        simd: Some(case.variant()),
+        ..Settings::default()
     });
     let above = [[0.2, -2.1, 5.0], [0.25, 1.4, 4.98], [1.2, 0.4, 5.1]];
     let scene = SceneBuffers {
@@ -126,12 +125,10 @@ fn a_gaussian_over_a_pole_is_no_denser_than_elsewhere() {
     let (camera, state) = (panorama(1), State::default());
     let oracle = OracleCamera::new(&camera, SIZE).expect("a panorama");
     let expected = render_bounded(&scene.as_oracle(), &oracle, &OracleState::from(&state));
-    for context in contexts {
-        let picture = draw(&context, &scene, state, &camera, SIZE);
-        assert_contract("poles", &picture, &expected, Limits::ENVELOPE_ONLY);
-        let [width, _] = SIZE.map(|side| side as usize);
-        // It holds the pole, hence all longitudes, once each.
-        let top = &picture[..width];
-        assert!(top.iter().all(|pixel| (0.49..0.500_01).contains(&pixel[3])));
-    }
+    let picture = draw(&context, &scene, state, &camera, SIZE);
+    assert_contract("poles", &picture, &expected, Limits::ENVELOPE_ONLY);
+    let [width, _] = SIZE.map(|side| side as usize);
+    // It holds the pole, hence all longitudes, once each.
+    let top = &picture[..width];
+    assert!(top.iter().all(|pixel| (0.49..0.500_01).contains(&pixel[3])));
 }

@@ -3,10 +3,11 @@
 
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
+use gaurast_runner::{Case, simd_levels};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{
     Buffer, Commands, Context, DeviceScene, Pass, PassObject, Pipeline, PipelineOptions, Settings,
-    Target, over, simd_levels,
+    Target, over,
 };
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
@@ -139,27 +140,25 @@ fn distance(a: [f32; 4], b: [f64; 4]) -> f64 {
     channels.fold(0.0, f64::max)
 }
 
-#[test]
-fn threads_change_nothing() {
+#[gaurast_runner::test(each = simd_levels())]
+fn threads_change_nothing(case: &Case) {
     let scene = scene();
-    for simd in simd_levels() {
-        let draw = |threads| {
-            let settings = Settings {
-                simd: Some(simd),
-                threads: Some(threads),
-                ..Settings::default()
-            };
-            Bench::with(&scene, &settings, &PipelineOptions::new(scene.degree)).whole()
+    let draw = |threads| {
+        let settings = Settings {
+            simd: Some(case.variant()),
+            threads: Some(threads),
+            ..Settings::default()
         };
-        let one = draw(1);
-        for threads in [2, 3, 8] {
-            assert_same(&one, &draw(threads));
-        }
-        assert!(one.iter().filter(|rgba| rgba[3] > 0.5).count() > one.len() / 10);
+        Bench::with(&scene, &settings, &PipelineOptions::new(scene.degree)).whole()
+    };
+    let one = draw(1);
+    for threads in [2, 3, 8] {
+        assert_same(&one, &draw(threads));
     }
+    assert!(one.iter().filter(|rgba| rgba[3] > 0.5).count() > one.len() / 10);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn drawing_again_changes_nothing() {
     let bench = Bench::new(&scene());
     let first = bench.whole();
@@ -168,7 +167,7 @@ fn drawing_again_changes_nothing() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn indices_that_name_every_gaussian_are_a_draw_without_indices() {
     let bench = Bench::new(&scene());
     let indices: Vec<u32> = (0..bench.scene.count).collect();
@@ -180,7 +179,7 @@ fn indices_that_name_every_gaussian_are_a_draw_without_indices() {
     assert_same(&bench.whole(), &indexed);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_order_of_indices_matters_for_ties_only() {
     // All depths differ: sorting undoes any order of the indices.
     let mut scene = scenes::cloud(23, 2000, 0);
@@ -217,7 +216,7 @@ fn the_order_of_indices_matters_for_ties_only() {
     assert_ne!(bench.whole(), indexed);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_part_of_the_buffers_is_a_scene_of_its_own() {
     let scene = scene();
     let bench = Bench::new(&scene);
@@ -250,7 +249,7 @@ fn a_part_of_the_buffers_is_a_scene_of_its_own() {
     assert_same(&expected, &with_indirect);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn instances_draw_every_gaussian_again() {
     // Each instance is the whole scene, and ties go by instance first.
     let scene = scene();
@@ -261,7 +260,7 @@ fn instances_draw_every_gaussian_again() {
     assert_same(&expected, &drawn);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn attributes_advance_by_instance() {
     // Two Gaussians' positions, scales and rotations, three instances' opacities and colours.
     let shapes = scenes::cloud(24, 300, 0);
@@ -286,7 +285,7 @@ fn attributes_advance_by_instance() {
     assert_same(&Bench::new(&expected).whole(), &drawn);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn empty_draws_draw_nothing() {
     let bench = Bench::new(&scene());
     let background = [0.25, 0.5, 0.75, 1.0];
@@ -297,7 +296,7 @@ fn empty_draws_draw_nothing() {
     assert_same(&vec![background; drawn.len()], &drawn);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_is_not_covered_keeps_its_colour_even_where_draws_replace() {
     let scene = scenes::cloud(31, 12, 0);
     let bench = Bench::new(&scene);
@@ -321,7 +320,7 @@ fn what_is_not_covered_keeps_its_colour_even_where_draws_replace() {
     assert!(kept > 0 && replaced > 0, "{kept} kept, {replaced} replaced");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_viewport_says_where_the_camera_s_picture_is() {
     let scene = scene();
     let bench = Bench::new(&scene);
@@ -369,7 +368,7 @@ fn the_viewport_says_where_the_camera_s_picture_is() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_scissor_cuts_and_changes_nothing_else() {
     let bench = Bench::new(&scene());
     let whole = bench.whole();
@@ -391,7 +390,7 @@ fn the_scissor_cuts_and_changes_nothing_else() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_render_area_cuts_and_changes_nothing_else() {
     let bench = Bench::new(&scene());
     let whole = bench.whole();
@@ -430,7 +429,7 @@ fn inside(image: &[[f32; 4]], rect: vk::Rect2D, outside: [f32; 4]) -> Vec<[f32; 
     image.iter().enumerate().map(pixel).collect()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn blending_composites_over_the_background() {
     let scene = scene();
     let alone = Bench::new(&scene).whole();
@@ -457,7 +456,7 @@ fn composite(front: [f64; 4], behind: [f64; 4]) -> [f64; 4] {
     std::array::from_fn(|c| front[c] + (1.0 - front[3]) * behind[c])
 }
 
-#[test]
+#[gaurast_runner::test]
 fn draws_of_a_pass_are_composited_in_their_order() {
     // Each draw is sorted within itself: a later one is over an earlier one at any depth.
     let scene = scenes::cloud(26, 3000, 1);
@@ -516,7 +515,7 @@ fn draws_of_a_pass_are_composited_in_their_order() {
     assert_same(&drawn, &passes);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_render_pass_object_is_dynamic_rendering() {
     let scene = scene();
     let dynamic = Bench::new(&scene);
@@ -553,7 +552,7 @@ fn a_render_pass_object_is_dynamic_rendering() {
     assert_eq!(context.messages(), []);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn formats_differ_by_their_quantisation_alone() {
     let scene = scene();
     let exact = Bench::new(&scene).whole();

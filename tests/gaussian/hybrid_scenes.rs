@@ -5,11 +5,11 @@ use std::path::Path;
 
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
+use gaurast_runner::{Need, data};
 use gaurast_samples::camera::{Camera, DEFAULT_FOV};
 use gaurast_samples::scene::Scene;
 use gaurast_tests::compare::{Limits, assert_contract, for_people};
 use gaurast_tests::contexts::Settings;
-use gaurast_tests::data::require_data;
 use gaurast_tests::hybrid::{
     GaussianOptions, GaussianPipeline, GaussianScene, Held, ToClip, depth_format, held,
 };
@@ -20,6 +20,9 @@ use gaurast_tests::triangles::{
     Buffer, Gpu, Output, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
 };
 use glam::{DMat3, DVec3, Vec3};
+
+use super::PLAYBOT;
+use crate::GLSLANG;
 
 const SIZE: [u32; 2] = [320, 240];
 
@@ -184,11 +187,10 @@ impl Hybrid {
                 (false, false) => hidden += 1,
             }
         }
-        let verdict = assert_contract(name, &after.color, &composite, Limits::ENVELOPE_ONLY);
-        eprintln!("{name}: {verdict}; {shown} samples of the pane shown, {hidden} hidden");
+        assert_contract(name, &after.color, &composite, Limits::ENVELOPE_ONLY);
         assert!(
             shown > 500 && hidden > 500,
-            "the pane goes through the scene"
+            "the pane goes through the scene: {shown} samples of it are shown, {hidden} hidden"
         );
         // The head is before some Gaussians and behind others.
         let is_head = |at: &usize| head.color[*at][3] == 1.0;
@@ -210,8 +212,10 @@ fn turn(point: DVec3) -> DVec3 {
     DVec3::new(point.x, -point.y, -point.z)
 }
 
-pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Option<Hybrid> {
-    require_data("meshes/african_head/african_head.obj")?;
+/// What a head in the garden needs.
+pub(super) const GARDEN: [Need; 2] = [GLSLANG, Need::Data(Model::AFRICAN_HEAD)];
+
+pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Hybrid {
     let model = Model::african_head().expect("its files");
     let camera = Camera::of_generated(None, SIZE).expect("a camera");
     let (near, far) = (0.5f32, 60.0f32);
@@ -232,7 +236,7 @@ pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Opt
         DVec3::new(1.9, 0.9, -1.4),
         DVec3::new(-2.6, 0.9, 3.0),
     ];
-    Some(Hybrid {
+    Hybrid {
         name,
         scene: SceneBuffers::from(&Scene::generate(1, 40_000)),
         camera,
@@ -240,7 +244,7 @@ pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Opt
         pane: pane(pane_corners.map(turn), &to_clip),
         target: target(depth, samples),
         compare: vk::CompareOp::LESS,
-    })
+    }
 }
 
 fn target(depth: vk::Format, samples: u32) -> TargetOptions {
@@ -253,27 +257,28 @@ fn target(depth: vk::Format, samples: u32) -> TargetOptions {
     }
 }
 
-#[test]
+#[gaurast_runner::test(needs = GARDEN)]
 fn a_head_stands_in_the_garden() {
-    if let Some(hybrid) = garden("head in the garden", vk::Format::D32_SFLOAT, 1) {
-        hybrid.judge();
-    }
+    garden("head in the garden", vk::Format::D32_SFLOAT, 1).judge();
 }
 
-#[test]
+#[gaurast_runner::test(needs = GARDEN)]
 fn a_head_stands_in_the_garden_with_four_samples() {
     let format = vk::Format::X8_D24_UNORM_PACK32;
-    if let Some(hybrid) = garden("head in the garden with four samples", format, 4) {
-        hybrid.judge();
-    }
+    garden("head in the garden with four samples", format, 4).judge();
 }
 
+/// What a head inside a trained scene needs.
+pub(super) const WITH_PLAYBOT: [Need; 3] = [
+    GLSLANG,
+    Need::Data(Model::AFRICAN_HEAD),
+    Need::Data(PLAYBOT),
+];
+
 /// A head inside a trained scene, with reversed depth.
-pub(super) fn playbot() -> Option<Hybrid> {
-    require_data("meshes/african_head/african_head.obj")?;
-    let path = require_data("splats/playbot-125k.ply")?;
+pub(super) fn playbot() -> Hybrid {
     let model = Model::african_head().expect("its files");
-    let scene = Scene::load(&path).expect("a scene");
+    let scene = Scene::load(&data(PLAYBOT)).expect("a scene");
     let (near, far) = (0.1f32, 200.0f32);
     let camera = Camera::framing(&scene, DEFAULT_FOV, SIZE)
         .to_vulkan()
@@ -290,7 +295,7 @@ pub(super) fn playbot() -> Option<Hybrid> {
         DVec3::new(1.2, 0.1, 1.2),
         DVec3::new(-1.2, 0.1, -1.2),
     ];
-    Some(Hybrid {
+    Hybrid {
         name: "head in playbot",
         scene: SceneBuffers::from(&scene),
         camera,
@@ -298,14 +303,12 @@ pub(super) fn playbot() -> Option<Hybrid> {
         pane: pane(pane_corners.map(from_view), &to_clip),
         target: target(vk::Format::D32_SFLOAT, 1),
         compare: vk::CompareOp::GREATER,
-    })
+    }
 }
 
-#[test]
+#[gaurast_runner::test(needs = WITH_PLAYBOT)]
 fn a_head_is_inside_a_trained_scene_with_reversed_depth() {
-    if let Some(hybrid) = playbot() {
-        hybrid.judge();
-    }
+    playbot().judge();
 }
 
 /// The middle of the Gaussians along the camera's axis, and the distance within which half of them are.

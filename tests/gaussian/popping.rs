@@ -3,24 +3,24 @@
 //! A camera that only turns moves every point by the same law whatever its depth, so that Gaussians
 //! should never overtake each other. What a step's new order changes is measured without any
 //! warping of pictures: the next view is drawn in its own order and in that of the view before.
-//!
-//! `--nocapture` shows the figures.
 
 use gaurast::vk::{
     GaussianCameraGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaurast_runner::{Need, data};
 use gaurast_samples::camera::{Camera, DEFAULT_FOV};
 use gaurast_samples::scene::Scene;
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{
     Buffer, Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
-use gaurast_tests::data::require_data;
 use gaurast_tests::oracle::project::project;
 use gaurast_tests::oracle::rays::rounded;
 use gaurast_tests::oracle::{OracleCamera, OracleOrder, OracleState, render_bounded};
 use gaurast_tests::scenes::{self, SceneBuffers};
 use glam::{DMat3, DVec3};
+
+use super::SKULL;
 
 type Picture = Vec<[f32; 4]>;
 
@@ -113,13 +113,8 @@ impl Bench {
         target.read()
     }
 
-    /// The greatest change of a channel, and the share of pixels that change by a level of 8 bits, of any
-    /// step's picture by its new order.
-    fn popping(
-        &self,
-        camera: &GaussianCameraGAURAST<'static>,
-        order: GaussianOrderGAURAST,
-    ) -> (f32, f64) {
+    /// The greatest change of a channel of any step's picture by its new order.
+    fn popping(&self, camera: &GaussianCameraGAURAST<'static>, order: GaussianOrderGAURAST) -> f32 {
         let sorted = Self::pipeline(&self.context, &self.scene, order);
         let names = |camera: &GaussianCameraGAURAST| {
             let keys = keys(&self.scene, camera, order);
@@ -127,7 +122,7 @@ impl Bench {
             names.sort_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]));
             names
         };
-        let (mut greatest, mut share) = (0.0f32, 0.0f64);
+        let mut greatest = 0.0f32;
         let mut before = names(camera);
         for step in 1..=STEPS {
             let camera = turned(camera, step);
@@ -142,35 +137,32 @@ impl Bench {
                 let channels = a.iter().zip(b).map(|(a, b)| (a - b).abs());
                 channels.fold(0.0, f32::max)
             };
-            let changes: Vec<f32> = own.iter().zip(&old).map(change).collect();
-            greatest = changes.iter().fold(greatest, |a, &b| a.max(b));
-            let visible = changes.iter().filter(|change| **change > 1.0 / 255.0);
-            share = share.max(visible.count() as f64 / changes.len() as f64);
+            greatest = own.iter().zip(&old).map(change).fold(greatest, f32::max);
             before = now;
         }
-        (greatest, share)
+        greatest
     }
 }
 
-fn compare(name: &str, scene: SceneBuffers, camera: GaussianCameraGAURAST<'static>) {
+/// Depth along the axis changes as the camera turns, by which pixels change as much as `by_depth` says; distance from the
+/// eye does not.
+fn compare(
+    scene: SceneBuffers,
+    camera: GaussianCameraGAURAST<'static>,
+    by_depth: std::ops::Range<f32>,
+) {
     let bench = Bench::new(scene);
     let orders = [
-        ("view depth", GaussianOrderGAURAST::VIEW_DEPTH),
-        ("radial distance", GaussianOrderGAURAST::RADIAL_DISTANCE),
-        ("place in the draw", GaussianOrderGAURAST::PRIMITIVE),
+        GaussianOrderGAURAST::VIEW_DEPTH,
+        GaussianOrderGAURAST::RADIAL_DISTANCE,
+        GaussianOrderGAURAST::PRIMITIVE,
     ];
-    let [depth, distance, place] = orders.map(|(order_name, order)| {
-        let (greatest, share) = bench.popping(&camera, order);
-        let percent = 100.0 * share;
-        println!("{name}, by {order_name}: {greatest:.4} at most, {percent:.3} % of pixels by more than 1/255");
-        greatest
-    });
-    // Depth along the axis changes as the camera turns, distance from the eye does not.
-    assert!(depth > 0.0, "nothing pops");
+    let [depth, distance, place] = orders.map(|order| bench.popping(&camera, order));
+    assert!(by_depth.contains(&depth), "{depth}");
     assert_eq!([distance, place], [0.0; 2]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn turning_pops_by_view_depth_and_not_by_distance() {
     let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
     let mut cloud = scenes::cloud(70, 4000, 1);
@@ -178,7 +170,7 @@ fn turning_pops_by_view_depth_and_not_by_distance() {
     for scale in cloud.scales.as_flattened_mut() {
         *scale *= 6.0;
     }
-    compare("a cloud", cloud, camera);
+    compare(cloud, camera, 0.01..1.0);
 }
 
 /// Which pixels of a picture are looked at one by one, in x and y, and after how many steps.
@@ -270,32 +262,23 @@ fn popping_of_rays(
     greatest
 }
 
-fn rays_pop_not(
-    name: &str,
-    scene: &SceneBuffers,
-    camera: &GaussianCameraGAURAST<'static>,
-    sampling: Sampling,
-) {
+fn rays_pop_not(scene: &SceneBuffers, camera: &GaussianCameraGAURAST<'static>, sampling: Sampling) {
     let of = |by_axis| popping_of_rays(scene, camera, sampling, by_axis);
     let [by_axis, by_ray] = [true, false].map(of);
-    let stride = sampling.stride;
-    println!(
-        "{name}, every {stride}th pixel, by view depth: {by_axis:.4}, pixel by pixel: {by_ray:.1e}"
-    );
     // Far more than rounding.
     assert!(by_axis > 1e-4, "nothing pops");
     // The sums themselves are rounded.
     assert!(by_ray < 1e-12, "{by_ray}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn turning_pops_nowhere_where_each_pixel_sorts_for_itself() {
     let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
     let mut cloud = scenes::cloud(70, 4000, 1);
     for scale in cloud.scales.as_flattened_mut() {
         *scale *= 6.0;
     }
-    rays_pop_not("a cloud", &cloud, &camera, EVERY_FIFTH);
+    rays_pop_not(&cloud, &camera, EVERY_FIFTH);
 
     // These are the orders that the device draws in.
     let bench = Bench::new(cloud);
@@ -308,16 +291,12 @@ fn turning_pops_nowhere_where_each_pixel_sorts_for_itself() {
     };
     let view = OracleCamera::new(&camera, SIZE).expect("a camera of the oracle");
     let reference = render_bounded(&bench.scene.as_oracle(), &view, &state);
-    let verdict = assert_contract("a cloud", &picture, &reference, Limits::ENVELOPE_ONLY);
-    println!("{verdict}");
+    assert_contract("a cloud", &picture, &reference, Limits::ENVELOPE_ONLY);
 }
 
-#[test]
+#[gaurast_runner::test(needs = [Need::Data(SKULL)])]
 fn skull_pops_by_view_depth_alone() {
-    let Some(path) = require_data("splats/skull.ply") else {
-        return;
-    };
-    let scene = Scene::load(&path).expect("a scene");
+    let scene = Scene::load(&data(SKULL)).expect("a scene");
     let camera = Camera::framing(&scene, DEFAULT_FOV, SIZE).to_vulkan();
     let scene = SceneBuffers::from(&scene);
     // Tens of thousands of Gaussians at every pixel that is looked at.
@@ -325,6 +304,7 @@ fn skull_pops_by_view_depth_alone() {
         stride: 25,
         steps: 2,
     };
-    rays_pop_not("skull", &scene, &camera, sampling);
-    compare("skull", scene, camera);
+    rays_pop_not(&scene, &camera, sampling);
+    // By up to 0.072, as `ARCHITECTURE.md` says.
+    compare(scene, camera, 0.071..0.073);
 }

@@ -5,10 +5,11 @@ use gaurast::vk::{
     GaussianCameraGAURAST, GaussianCameraModelGAURAST, GaussianGeometryGAURAST,
     GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaurast_runner::{Case, simd_levels};
 use gaurast_tests::compare::Limits;
 use gaurast_tests::scenes;
 
-use crate::accuracy::{Devices, SIZE, View, generated_view};
+use super::accuracy::{Devices, SIZE, View, generated_view};
 
 type State = PipelineGaussianStateCreateInfoGAURAST<'static>;
 
@@ -44,9 +45,9 @@ fn view(name: &str, camera: GaussianCameraGAURAST<'static>) -> View {
     }
 }
 
-#[test]
-fn modes_keep_the_contract() {
-    let devices = Devices::new();
+#[gaurast_runner::test(each = simd_levels())]
+fn modes_keep_the_contract(case: &Case) {
+    let devices = Devices::new(case.variant());
     let pinhole = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
     let parallel = pinhole
         .model(GaussianCameraModelGAURAST::ORTHOGRAPHIC)
@@ -67,9 +68,9 @@ fn modes_keep_the_contract() {
     }
 }
 
-#[test]
-fn awkward_scenes_stay_within_the_envelope() {
-    let devices = Devices::new();
+#[gaurast_runner::test(each = simd_levels())]
+fn awkward_scenes_stay_within_the_envelope(case: &Case) {
+    let devices = Devices::new(case.variant());
     for seed in 200..215 {
         let scene = scenes::awkward(seed, 10 + 2 * (seed % 20) as usize, (seed % 2) as u32);
         for (name, state) in states() {
@@ -80,8 +81,8 @@ fn awkward_scenes_stay_within_the_envelope() {
     }
 }
 
-#[test]
-fn ten_thousand_layers_on_a_pixel_are_sorted() {
+#[gaurast_runner::test(each = simd_levels())]
+fn ten_thousand_layers_on_a_pixel_are_sorted(case: &Case) {
     // Faint ones, in no order, so that none ends a pixel.
     let mut scene = scenes::cloud(32, 10_000, 0);
     for (index, position) in scene.positions.iter_mut().enumerate() {
@@ -94,5 +95,5 @@ fn ten_thousand_layers_on_a_pixel_are_sorted() {
         .order(GaussianOrderGAURAST::PER_PIXEL)
         .transmittance_floor(0.0);
     let view = generated_view(Limits::ENVELOPE_ONLY);
-    Devices::new().judge("10,000 layers", &scene, state, &[view]);
+    Devices::new(case.variant()).judge("10,000 layers", &scene, state, &[view]);
 }

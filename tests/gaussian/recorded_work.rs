@@ -1,47 +1,52 @@
 //! Both models of the rasterizer's timing over what devices recorded: hybrids of triangles and Gaussians, and random
 //! interleavings.
 
+use ash::vk;
+use gaurast_runner::{Case, Need, Variant};
 use gaurast_tests::contexts::Settings;
 use gaurast_tests::recorded::{Agreement, read};
 use gaurast_tests::triangles::Gpu;
 
-use crate::hybrid_scenes::{What, garden, playbot};
-use crate::interleavings;
+use super::hybrid_scenes::{GARDEN, WITH_PLAYBOT, What, garden, playbot};
+use super::interleavings;
 
-#[test]
-fn models_of_the_rasterizer_agree_on_hybrids() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let hybrids = [
-        garden("head in the garden", ash::vk::Format::D32_SFLOAT, 1),
-        garden(
-            "head in the garden, four samples",
-            ash::vk::Format::D16_UNORM,
-            4,
-        ),
-        playbot(),
-    ];
-    let mut agreement = Agreement::default();
-    let mut drawn = 0;
-    for hybrid in hybrids.into_iter().flatten() {
-        let path = folder.path().join(format!("{drawn}.json"));
-        let gpu = Gpu::embedded(&Settings {
-            trace: Some(&path),
-            ..Settings::default()
-        });
-        hybrid.draw(&gpu.expect("a device"), What::Everything);
-        let trace = read(&path);
-        let hides = (trace.frames.iter().flat_map(|frame| &frame.draws))
-            .any(|draw| draw.tiles.iter().any(|tile| tile.hidden_rest > 0));
-        assert!(hides, "{}: the head hides Gaussians", hybrid.name);
-        agreement.add(hybrid.name, &trace);
-        drawn += 1;
-    }
-    if drawn > 0 {
-        agreement.judge(drawn);
-    }
+/// A variant for each hybrid, by name.
+fn hybrids() -> Vec<Variant> {
+    let variant = |name, needs: &[Need]| Variant {
+        needs: needs.to_vec(),
+        ..Variant::new(name)
+    };
+    vec![
+        variant("garden", &GARDEN),
+        variant("garden, four samples", &GARDEN),
+        variant("playbot", &WITH_PLAYBOT),
+    ]
 }
 
-#[test]
+#[gaurast_runner::test(each = hybrids())]
+fn models_of_the_rasterizer_agree_on_hybrids(case: &Case) {
+    let hybrid = match case.variant() {
+        "garden" => garden("head in the garden", vk::Format::D32_SFLOAT, 1),
+        "playbot" => playbot(),
+        _ => garden("head in the garden, four samples", vk::Format::D16_UNORM, 4),
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("trace.json");
+    let gpu = Gpu::embedded(&Settings {
+        trace: Some(&path),
+        ..Settings::default()
+    });
+    hybrid.draw(&gpu.expect("a device"), What::Everything);
+    let trace = read(&path);
+    let hides = (trace.frames.iter().flat_map(|frame| &frame.draws))
+        .any(|draw| draw.tiles.iter().any(|tile| tile.hidden_rest > 0));
+    assert!(hides, "the head hides Gaussians");
+    let mut agreement = Agreement::default();
+    agreement.add(hybrid.name, &trace);
+    agreement.judge(6);
+}
+
+#[gaurast_runner::test]
 fn models_of_the_rasterizer_agree_on_interleavings() {
     let mut agreement = Agreement::default();
     for seed in 0..60 {

@@ -4,10 +4,12 @@ use std::path::Path;
 
 use gaurast_tests::what_ifs::markdown;
 
+use crate::GLSLANG;
+
 const HOW: &str =
     "run `cargo run --release -p gaurast-tests --example what_ifs > simdevice/timing/WHAT_IF.md`";
 
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn the_document_is_up_to_date() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../simdevice/timing/WHAT_IF.md");
     let stored = std::fs::read_to_string(path).expect("the document");

@@ -1,6 +1,9 @@
 //! Real kernels give what the host computes, on this driver and on lavapipe.
 
+use gaurast_runner::Need;
 use gaurast_tests::kernels::{Context, Size, all};
+
+use super::lavapipe;
 
 fn check(context: &Context) {
     for kernel in all(Size::Small) {
@@ -23,15 +26,12 @@ fn check(context: &Context) {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn kernels_give_what_the_host_computes() {
     check(&Context::gaurast().unwrap());
 }
 
-#[test]
+#[gaurast_runner::test(needs = [Need::Lavapipe])]
 fn kernels_give_the_same_on_lavapipe() {
-    match Context::lavapipe().unwrap() {
-        Some(lavapipe) => check(&lavapipe),
-        None => eprintln!("skipped: the Vulkan loader does not know lavapipe"),
-    }
+    check(&lavapipe());
 }

@@ -1,5 +1,6 @@
 //! Programs of random control flow give what a scalar interpreter says, on this driver and on lavapipe.
 
+use gaurast_runner::Need;
 use gaurast_tests::kernels::{Context, Kernel};
 use gaurast_tests::programs::structured::{INVOCATIONS, Program, assemble, generate, run};
 use rand::{Rng, SeedableRng};
@@ -7,6 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::process::Command;
+
+use super::lavapipe;
 
 /// Programs of a shader.
 const PROGRAMS: u64 = 20;
@@ -78,7 +81,7 @@ fn differences(
 }
 
 /// Runs as many seeds; those that are wrong must be those that the list names, each with a reason. Without a list none
-/// may be. The list of another driver was made with one version of it on one processor: a few more are told, and no more
+/// may be. The list of another driver was made with one version of it on one processor: a few more may be, and no more
 /// than that.
 fn check(context: &Context, seeds: u64, list: &str, rewrite: impl Fn(Vec<u32>) -> Vec<u32> + Copy) {
     let listed: Vec<u64> = list
@@ -95,16 +98,15 @@ fn check(context: &Context, seeds: u64, list: &str, rewrite: impl Fn(Vec<u32>) -
         .step_by(PROGRAMS as usize)
         .flat_map(|first| differences(context, first..(first + PROGRAMS).min(seeds), rewrite))
         .collect();
-    eprintln!("{}: {seeds} programs, {} wrong", context.name, wrong.len());
     let unlisted: Vec<_> = wrong
         .iter()
         .filter(|(seed, _)| !listed.contains(seed))
         .collect();
-    eprintln!("{}, not listed: {unlisted:#?}", context.name);
     assert!(
         unlisted.len() <= 2 * listed.len(),
-        "{}: {wrong:#?}",
-        context.name
+        "{}: of {seeds} programs {} are wrong, and of these the list lacks {unlisted:#?}",
+        context.name,
+        wrong.len()
     );
 }
 
@@ -119,18 +121,13 @@ fn system(program: &str, arguments: &[&str], words: &[u32]) -> Vec<u8> {
     output.stdout
 }
 
-#[test]
+#[gaurast_runner::test]
 fn random_programs_give_what_the_interpreter_says() {
     check(&Context::gaurast().unwrap(), SEEDS, "", |words| words);
 }
 
-#[test]
+#[gaurast_runner::test(needs = [Need::Program("spirv-opt"), Need::Program("spirv-val")])]
 fn optimized_programs_give_the_same() {
-    let exists = |program| Command::new(program).arg("--version").output().is_ok();
-    if !exists("spirv-opt") || !exists("spirv-val") {
-        eprintln!("skipped: there is no spirv-opt or no spirv-val");
-        return;
-    }
     let context = Context::gaurast().unwrap();
     check(&context, SEEDS / 10, "", |words| {
         system("spirv-val", &["--target-env", "vulkan1.2"], &words);
@@ -138,15 +135,12 @@ fn optimized_programs_give_the_same() {
     });
 }
 
-#[test]
+#[gaurast_runner::test(needs = [Need::Lavapipe])]
 fn random_programs_give_the_same_on_lavapipe() {
-    match Context::lavapipe().unwrap() {
-        Some(lavapipe) => check(
-            &lavapipe,
-            SAMPLE,
-            include_str!("../expected_failures/lavapipe_structured.txt"),
-            |words| words,
-        ),
-        None => eprintln!("skipped: the Vulkan loader does not know lavapipe"),
-    }
+    check(
+        &lavapipe(),
+        SAMPLE,
+        include_str!("../expected_failures/lavapipe_structured.txt"),
+        |words| words,
+    );
 }

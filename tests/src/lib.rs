@@ -1,10 +1,9 @@
 //! What the project's tests share: the reference renderer, generated scenes, image comparison,
-//! devices to draw on, compute kernels, programs made up at random, scenes of triangles, and the
-//! place of test data.
+//! devices to draw on, compute kernels, programs made up at random, and scenes of triangles.
 
 pub mod compare;
 pub mod contexts;
-pub mod data;
+pub mod for_levels;
 pub mod fuzzing;
 pub mod hybrid;
 pub mod kernels;

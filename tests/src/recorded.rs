@@ -44,8 +44,6 @@ pub fn read(path: &Path) -> Trace {
 pub struct Agreement {
     /// Relative differences of cycles, and what of.
     errors: Vec<(f64, String)>,
-    /// Frames that had Gaussians which depths hid.
-    hiding: usize,
 }
 
 impl Agreement {
@@ -55,8 +53,6 @@ impl Agreement {
     /// If the models don't agree on what was done.
     pub fn add(&mut self, name: &str, trace: &Trace) {
         for (number, frame) in trace.frames.iter().enumerate() {
-            let mut tiles = frame.draws.iter().flat_map(|draw| &draw.tiles);
-            self.hiding += usize::from(tiles.any(|tile| tile.hidden() > 0));
             for (preset, settings) in MACHINES {
                 let settings: Vec<_> = settings.iter().map(|&setting| setting.into()).collect();
                 let machine = Config::preset(preset, &settings).expect("a machine");
@@ -89,13 +85,6 @@ impl Agreement {
         let (worst, name) = worst.expect("traces of something");
         let mean =
             self.errors.iter().map(|(error, _)| error).sum::<f64>() / self.errors.len() as f64;
-        println!(
-            "{} runs, {} frames with hidden Gaussians: mean {:.4} %, largest {:.4} % ({name})",
-            self.errors.len(),
-            self.hiding,
-            100.0 * mean,
-            100.0 * worst
-        );
         assert!(self.errors.len() >= least, "{} runs", self.errors.len());
         assert!(*worst <= 0.02, "{name}: {worst}");
         assert!(mean <= 0.005, "mean {mean}");

@@ -11,7 +11,7 @@ use simdevice::timing::Config;
 use simdevice::timing::what_if::{WhatIf, each_alone, what_ifs};
 use simdevice::timing::work::FrameWork;
 
-use crate::contexts::{Settings, simd_levels};
+use crate::contexts::Settings;
 use crate::hybrid::{GaussianOptions, GaussianPipeline, GaussianScene, ToClip};
 use crate::recorded::read;
 use crate::scenes::SceneBuffers;
@@ -154,7 +154,7 @@ fn work(with_colonnade: bool) -> (FrameWork, Output) {
         std::process::id()
     ));
     let gpu = Gpu::embedded(&Settings {
-        simd: simd_levels().first().copied(),
+        simd: Some(gaurast_runner::SIMD_LEVELS[0]),
         trace: Some(&path),
         ..Settings::default()
     });

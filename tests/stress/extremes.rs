@@ -60,7 +60,7 @@ fn draw(
 
 /// More primitives than binary32 has integers: those that are seen come last in each instance, at one depth, so that
 /// their order is that of their numbers.
-#[test]
+#[gaurast_runner::test]
 fn more_than_2_to_the_24_primitives_keep_their_order() {
     const UNSEEN: usize = 32_766;
     const INSTANCES: u32 = 513;
@@ -91,7 +91,7 @@ fn more_than_2_to_the_24_primitives_keep_their_order() {
 
 /// Lists of all tiles would have 3.3e8 entries, beyond what is kept of them: tiles find theirs in the sorted sequence.
 /// `cargo run -p gaurast-tests --example screen_fillers` draws a million at 8192x8192.
-#[test]
+#[gaurast_runner::test]
 fn thousands_that_fill_a_large_screen_take_bounded_memory() {
     const COUNT: usize = 20_000;
     let size = [2048, 2048];
@@ -119,7 +119,7 @@ fn thousands_that_fill_a_large_screen_take_bounded_memory() {
 
 /// A target of half floats takes colours beyond its greatest, alone and over each other, and never holds what is no
 /// number.
-#[test]
+#[gaurast_runner::test]
 fn half_float_targets_overflow_to_infinity_at_most() {
     let size = [48, 40];
     let color = [4e5, 1e38, -2e5];
@@ -146,7 +146,7 @@ fn half_float_targets_overflow_to_infinity_at_most() {
 
 /// Colours whose sums overflow, behind what lets nothing through and at alphas that underflow: infinity times nothing would be
 /// no number.
-#[test]
+#[gaurast_runner::test]
 fn colors_beyond_every_number_leave_numbers() {
     const MOST: f32 = f32::MAX;
     let size = [48, 40];
@@ -210,7 +210,7 @@ fn colors_beyond_every_number_leave_numbers() {
 /// What an application sets in its own threads' control registers does not reach the device's: denormals of a target stay
 /// what they are.
 #[cfg(target_arch = "x86_64")]
-#[test]
+#[gaurast_runner::test]
 fn flushing_to_zero_changes_nothing() {
     /// Denormals that are results become zero; those that are operands, too.
     const FLUSH: u32 = 1 << 15 | 1 << 6;

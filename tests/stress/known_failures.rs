@@ -4,9 +4,10 @@
 use gaurast::vk::{
     GaussianAntialiasingGAURAST, GaussianCameraGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaurast_runner::{Case, simd_levels};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, simd_levels,
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
@@ -35,60 +36,52 @@ fn ordinary() -> Gaussian {
     }
 }
 
-/// Draws at every SIMD level, and holds each picture against the oracle; returns the last one.
-fn checked(name: &str, gaussians: &[Gaussian], camera: &Camera, state: &State) -> Image {
+/// Draws at the case's SIMD level, and holds the picture against the oracle.
+fn checked(case: &Case, gaussians: &[Gaussian], camera: &Camera, state: &State) -> Image {
     let scene = SceneBuffers::new(0, gaussians.iter().cloned());
     let view = OracleCamera::new(camera, SIZE).expect("a camera");
     let reference = render_bounded(&scene.as_oracle(), &view, &OracleState::from(state));
-    let draw = |simd: &'static str| {
-        let context = Context::embedded(&Settings {
-            simd: Some(simd),
-            threads: Some(2),
-            ..Settings::default()
-        });
-        let options = PipelineOptions {
-            state: *state,
-            ..PipelineOptions::new(0)
-        };
-        let pipeline = Pipeline::new(&context, &options);
-        let on_device = DeviceScene::new(&context, &scene);
-        let target = Target::new(&context, options.format, SIZE);
-        context.run(|commands| {
-            commands.pass(&target, &Pass::clear([0.0; 4]), || {
-                commands.bind(&pipeline, &on_device, camera);
-                commands.draw([on_device.count, 1, 0, 0]);
-            });
-        });
-        let image: Image = target.read();
-        assert_contract(
-            &format!("{name}, {simd}"),
-            &image,
-            &reference,
-            Limits::ENVELOPE_ONLY,
-        );
-        image
+    let context = Context::embedded(&Settings {
+        simd: Some(case.variant()),
+        threads: Some(2),
+        ..Settings::default()
+    });
+    let options = PipelineOptions {
+        state: *state,
+        ..PipelineOptions::new(0)
     };
-    let images: Vec<_> = simd_levels().into_iter().map(draw).collect();
-    images.into_iter().next_back().expect("a level")
+    let pipeline = Pipeline::new(&context, &options);
+    let on_device = DeviceScene::new(&context, &scene);
+    let target = Target::new(&context, options.format, SIZE);
+    context.run(|commands| {
+        commands.pass(&target, &Pass::clear([0.0; 4]), || {
+            commands.bind(&pipeline, &on_device, camera);
+            commands.draw([on_device.count, 1, 0, 0]);
+        });
+    });
+    let image: Image = target.read();
+    let name = case.name().replace("::", " ");
+    assert_contract(&name, &image, &reference, Limits::ENVELOPE_ONLY);
+    image
 }
 
 /// Checks that a Gaussian shows nowhere, and spoils nothing of another.
-fn assert_invisible(name: &str, what: Gaussian) {
+fn assert_invisible(case: &Case, what: Gaussian) {
     let state = State::default();
-    let alone = checked(name, &[ordinary()], &camera(), &state);
+    let alone = checked(case, &[ordinary()], &camera(), &state);
     assert!(alone.iter().any(|rgba| rgba[3] > 0.5));
-    let both = checked(name, &[what, ordinary()], &camera(), &state);
-    assert!(alone == both, "{name}");
+    let both = checked(case, &[what, ordinary()], &camera(), &state);
+    assert!(alone == both);
 }
 
 /// A file's logarithm of a scale may be any number, its exponential infinite, and the radius infinity less infinity.
-#[test]
-fn an_infinite_scale_is_no_radius_of_nan() {
+#[gaurast_runner::test(each = simd_levels())]
+fn an_infinite_scale_is_no_radius_of_nan(case: &Case) {
     let scale = 100.0f32.exp();
     let (xx, xy, yy) = (scale * scale, scale * scale, scale * scale);
     assert!((xx * yy - xy * xy).is_nan(), "the usual determinant");
     assert_invisible(
-        "infinite scale",
+        case,
         Gaussian {
             scale: [scale, 0.3, 0.2],
             ..ordinary()
@@ -97,13 +90,13 @@ fn an_infinite_scale_is_no_radius_of_nan() {
 }
 
 /// Where alpha falls to its floor is at a deviation times the root of `2 ln(opacity / floor)`.
-#[test]
-fn an_opacity_below_the_floor_enters_no_logarithm() {
+#[gaurast_runner::test(each = simd_levels())]
+fn an_opacity_below_the_floor_enters_no_logarithm(case: &Case) {
     for opacity in [1.0 / 256.0, 1e-30, 0.0] {
         let radius = (2.0 * (255.0f32 * opacity).ln()).sqrt();
         assert!(radius.is_nan(), "the usual radius");
         assert_invisible(
-            "faint",
+            case,
             Gaussian {
                 opacity,
                 ..ordinary()
@@ -113,8 +106,8 @@ fn an_opacity_below_the_floor_enters_no_logarithm() {
 }
 
 /// The covariance of a sphere has the eigenvector (xy, lambda - xx), which is zero.
-#[test]
-fn a_sphere_has_axes_too() {
+#[gaurast_runner::test(each = simd_levels())]
+fn a_sphere_has_axes_too(case: &Case) {
     let sphere = Gaussian {
         position: [0.0, 0.0, 4.0],
         scale: [0.5; 3],
@@ -128,7 +121,7 @@ fn a_sphere_has_axes_too() {
     );
     assert_eq!(xx, yy);
     assert!((xy / xy.hypot(lambda - xx)).is_nan(), "the usual axis");
-    let image = checked("a sphere", &[sphere], &camera(), &State::default());
+    let image = checked(case, &[sphere], &camera(), &State::default());
     // It is round.
     let at = |x: usize, y: usize| image[y * SIZE[0] as usize + x][3];
     for by in 1..20 {
@@ -137,11 +130,11 @@ fn a_sphere_has_axes_too() {
 }
 
 /// Perspective divides by a depth of zero.
-#[test]
-fn a_gaussian_at_the_camera_divides_by_nothing() {
+#[gaurast_runner::test(each = simd_levels())]
+fn a_gaussian_at_the_camera_divides_by_nothing(case: &Case) {
     for z in [0.0, -0.0, 1e-45, 0.2] {
         assert_invisible(
-            "at the camera",
+            case,
             Gaussian {
                 position: [0.0, 0.0, z],
                 ..ordinary()
@@ -152,8 +145,8 @@ fn a_gaussian_at_the_camera_divides_by_nothing() {
 
 /// What opacity is compensated by is the ratio of two determinants, of which the first is the small difference of two
 /// large products.
-#[test]
-fn the_ratio_of_determinants_keeps_its_digits() {
+#[gaurast_runner::test(each = simd_levels())]
+fn the_ratio_of_determinants_keeps_its_digits(case: &Case) {
     // Along a diagonal, a deviation of 2500 pixels; across it and in depth 1/4.
     let (long, thin) = (200.0f32, 0.02f32);
     let half_turn = std::f32::consts::FRAC_PI_8;
@@ -170,15 +163,15 @@ fn the_ratio_of_determinants_keeps_its_digits() {
     assert!((usual / exact - 1.0).abs() > 0.1, "{usual} {exact}");
     let compensated =
         State::default().antialiasing(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED);
-    let image = checked("a ratio", &[needle], &camera(), &compensated);
+    let image = checked(case, &[needle], &camera(), &compensated);
     let greatest = image.iter().fold(0.0f32, |most, rgba| most.max(rgba[3]));
     assert!((0.2..0.8).contains(&greatest), "{greatest}");
 }
 
 /// Far beside the picture and near the eye's plane, perspective's derivative grows without bound: streaks fan over the
 /// picture unless it is clamped, about the principal point, wherever that is.
-#[test]
-fn what_is_far_beside_the_picture_casts_no_fan() {
+#[gaurast_runner::test(each = simd_levels())]
+fn what_is_far_beside_the_picture_casts_no_fan(case: &Case) {
     let beside = |side: f32| Gaussian {
         position: [side * 6.0, 0.1, 0.3],
         scale: [0.05; 3],
@@ -198,15 +191,15 @@ fn what_is_far_beside_the_picture_casts_no_fan() {
     for principal in [[32.0, 24.0], [2.0, 40.0]] {
         let camera = camera().principal_point(principal);
         let state = State::default();
-        let alone = checked("a fan", &[ordinary()], &camera, &state);
-        let all = checked("a fan", &gaussians, &camera, &state);
+        let alone = checked(case, &[ordinary()], &camera, &state);
+        let all = checked(case, &gaussians, &camera, &state);
         assert!(alone == all, "nothing of them is seen");
     }
 }
 
 /// Keys of fewer bits than a depth has put neighbours into the order of the draw.
-#[test]
-fn depths_a_bit_apart_are_in_order() {
+#[gaurast_runner::test(each = simd_levels())]
+fn depths_a_bit_apart_are_in_order(case: &Case) {
     let depth = |steps: u32| f32::from_bits(4.0f32.to_bits() + steps);
     let key = |z: f32| (z * 1000.0) as u32;
     assert_eq!(key(depth(0)), key(depth(1)), "the usual key");
@@ -218,14 +211,14 @@ fn depths_a_bit_apart_are_in_order() {
     };
     let (red, blue) = ([1.5, -1.7, -1.7], [-1.7, -1.7, 1.5]);
     let gaussians = [of_color(1, red), of_color(0, blue)];
-    let image = checked("a bit apart", &gaussians, &camera(), &State::default());
+    let image = checked(case, &gaussians, &camera(), &State::default());
     let [r, _, b, _] = image[24 * SIZE[0] as usize + 32];
     assert!(b > 10.0 * r && r > 0.0, "blue is in front: {r} {b}");
 }
 
 /// Exponentials that are made by shifting bits wrap around where the exponent has no room for the number.
-#[test]
-fn exponentials_have_a_range() {
+#[gaurast_runner::test(each = simd_levels())]
+fn exponentials_have_a_range(case: &Case) {
     /// 2^x by Schraudolph's way.
     fn usual(x: f32) -> f32 {
         f32::from_bits(((x + 127.0) * (1 << 23) as f32) as i64 as u32)
@@ -240,7 +233,7 @@ fn exponentials_have_a_range() {
         .low_pass_variance(0.0)
         .alpha_floor(0.0)
         .transmittance_floor(0.0);
-    let image = checked("exponentials", &[point], &camera(), &state);
+    let image = checked(case, &[point], &camera(), &state);
     let far = &image[..10 * SIZE[0] as usize];
     assert!(far.iter().all(|rgba| *rgba == [0.0; 4]));
 }

@@ -5,11 +5,13 @@ use gaurast::vk::{
     GaussianCameraGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
     PipelineGaussianStateCreateFlagsGAURAST,
 };
+use gaurast_runner::{Case, Variant, simd_levels};
 use gaurast_tests::contexts::{
-    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over, simd_levels,
+    Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target, over,
 };
 use gaurast_tests::scenes::{Gaussian, SceneBuffers};
 use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -105,7 +107,7 @@ proptest! {
     #![proptest_config(cases())]
 
     /// The order of the draw matters for ties only.
-    #[test]
+    #[gaurast_runner::test]
     fn order_does_not_matter(seed: u64, count in 1..150usize) {
         let context = Context::embedded(&Settings::default());
         let mut gaussians = scene(seed, count);
@@ -115,7 +117,7 @@ proptest! {
     }
 
     /// Where scene and camera are together does not matter, to the last bit where no coordinate is rounded.
-    #[test]
+    #[gaurast_runner::test]
     fn place_does_not_matter(seed: u64, count in 1..150usize, offset in prop::array::uniform3(-4096..4096i32)) {
         let context = Context::embedded(&Settings::default());
         let mut gaussians = scene(seed, count);
@@ -131,7 +133,7 @@ proptest! {
     }
 
     /// A mirrored scene gives the mirrored picture, to rounding.
-    #[test]
+    #[gaurast_runner::test]
     fn mirrors_agree(seed: u64, count in 1..60usize) {
         let context = Context::embedded(&Settings::default());
         let mut gaussians = scene(seed, count);
@@ -151,7 +153,7 @@ proptest! {
 
     /// A draw cut in two by depth, the near part blended over the far one, is the whole draw, where
     /// no transmittance ends a pixel.
-    #[test]
+    #[gaurast_runner::test]
     fn a_draw_may_be_cut_by_depth(seed: u64, count in 2..150usize, share in 0.0..1.0f64) {
         let context = Context::embedded(&Settings::default());
         let mut gaussians = scene(seed, count);
@@ -168,7 +170,7 @@ proptest! {
 
     /// With a floor, each part begins with a transmittance of 1, so the far part may show by as much
     /// as the floor over the least that a layer can let through.
-    #[test]
+    #[gaurast_runner::test]
     fn a_cut_shows_no_more_than_the_floor(seed: u64, count in 2..150usize, share in 0.0..1.0f64) {
         let context = Context::embedded(&Settings::default());
         let mut gaussians = scene(seed, count);
@@ -185,7 +187,7 @@ proptest! {
     }
 
     /// How many threads draw changes no bit.
-    #[test]
+    #[gaurast_runner::test]
     fn threads_do_not_matter(seed: u64, count in 1..150usize, threads in 2..9usize) {
         let picture = |threads| {
             let settings = Settings { threads: Some(threads), ..Settings::default() };
@@ -194,22 +196,8 @@ proptest! {
         prop_assert!(picture(1) == picture(threads));
     }
 
-    /// SIMD levels differ by rounding alone.
-    #[test]
-    fn levels_agree(seed: u64, count in 1..100usize) {
-        let scene = scene(seed, count);
-        let pictures: Vec<_> = simd_levels().into_iter().map(|level| {
-            let settings = Settings { simd: Some(level), ..Settings::default() };
-            draw(&Context::embedded(&settings), &[&scene], &without_floors(), &camera())
-        }).collect();
-        for other in &pictures {
-            let distance = distance(&pictures[0], other);
-            prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
-        }
-    }
-
     /// Where tiles cut a picture doesn't matter: it is the same wherever the viewport is in a larger target.
-    #[test]
+    #[gaurast_runner::test]
     fn tiles_do_not_matter(seed: u64, count in 1..100usize, corner in prop::array::uniform2(0..70u32)) {
         let context = Context::embedded(&Settings::default());
         let options = without_floors();
@@ -242,7 +230,7 @@ proptest! {
     }
 
     /// Draws that make one sorted set are one draw, to the bit.
-    #[test]
+    #[gaurast_runner::test]
     fn draws_may_be_merged(seed: u64, count in 1..150u32, cuts in prop::array::uniform2(0.0..1.0f64)) {
         let context = Context::embedded(&Settings::default());
         let mut options = PipelineOptions::new(0);
@@ -267,7 +255,7 @@ proptest! {
     }
 
     /// Colours are finite and not negative, alpha lies in [0, 1], in both precisions, with floors and without.
-    #[test]
+    #[gaurast_runner::test]
     fn pictures_are_sane(seed: u64, count in 1..60usize, binary16: bool, floors: bool, per_pixel: bool) {
         let context = Context::embedded(&Settings::default());
         let scene = gaurast_tests::scenes::awkward(seed, count, 1);
@@ -295,4 +283,31 @@ proptest! {
             prop_assert!(pixel[3] <= 1.0, "{pixel:?}");
         }
     }
+}
+
+/// The SIMD levels but the simplest.
+fn other_levels() -> Vec<Variant> {
+    simd_levels().split_off(1)
+}
+
+/// A SIMD level differs from the simplest by rounding alone.
+#[gaurast_runner::test(each = other_levels())]
+fn levels_agree(case: &Case) {
+    let levels = [gaurast_runner::SIMD_LEVELS[0], case.variant()];
+    let property = |(seed, count)| {
+        let scene = scene(seed, count);
+        let [simplest, other] = levels.map(|level| {
+            let settings = Settings {
+                simd: Some(level),
+                ..Settings::default()
+            };
+            let context = Context::embedded(&settings);
+            draw(&context, &[&scene], &without_floors(), &camera())
+        });
+        let distance = distance(&simplest, &other);
+        prop_assert!(distance <= TWO_PICTURES, "{distance:e}");
+        Ok(())
+    };
+    let held = TestRunner::new(cases()).run(&(any::<u64>(), 1..100usize), property);
+    held.unwrap_or_else(|error| panic!("{error}"));
 }

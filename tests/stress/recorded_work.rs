@@ -3,10 +3,10 @@
 use gaurast_tests::contexts::{Context, Settings};
 use gaurast_tests::recorded::{Agreement, read};
 
-use crate::scenes::all;
-use crate::verdicts::draw;
+use super::scenes::all;
+use super::verdicts::draw;
 
-#[test]
+#[gaurast_runner::test]
 fn models_of_the_rasterizer_agree_on_stress_scenes() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut agreement = Agreement::default();

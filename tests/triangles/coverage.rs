@@ -1,5 +1,6 @@
 //! Which samples triangles cover: a million of all kinds, clipped ones, and meshes.
 
+use gaurast_runner::{Case, Need, Variant, shards};
 use gaurast_tests::triangles::checksum::{Checksums, first_difference, numbers};
 use gaurast_tests::triangles::edges::{Position, is_near, lines, to_clip};
 use gaurast_tests::triangles::{Gpu, shapes};
@@ -7,7 +8,8 @@ use rand::Rng;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
-use crate::devices::{lavapipe, own};
+use super::devices::{lavapipe, own};
+use crate::GLSLANG;
 
 type Triangle = [[f32; 4]; 3];
 
@@ -135,32 +137,30 @@ fn assert_equal(ours: &Gpu, theirs: &Gpu, triangles: &[Triangle], samples: u32) 
     panic!("{different} samples differ; {}", first.unwrap_or_default());
 }
 
-fn million(samples: u32) {
-    let Some(lavapipe) = lavapipe() else {
-        return;
-    };
-    // In parts, since that keeps memory and the search for a culprit small.
-    for part in 0..4 {
-        let triangles = unclipped(200 + part, 250_000);
-        assert_equal(own(), lavapipe, &triangles, samples);
-    }
+/// A quarter of a million triangles: in parts, memory and the search for a culprit stay small.
+fn quarter_of_a_million(case: &Case, samples: u32) {
+    let triangles = unclipped(200 + case.shard().index as u64, 250_000);
+    assert_equal(own(), lavapipe(), &triangles, samples);
 }
 
-#[test]
-fn a_million_triangles_cover_the_same_pixels() {
-    million(1);
+#[gaurast_runner::test(needs = [GLSLANG, Need::Lavapipe], each = shards(4))]
+fn a_million_triangles_cover_the_same_pixels(case: &Case) {
+    quarter_of_a_million(case, 1);
 }
 
-#[test]
-fn a_million_triangles_cover_the_same_samples() {
-    million(4);
+#[gaurast_runner::test(needs = [GLSLANG, Need::Lavapipe], each = shards(4))]
+fn a_million_triangles_cover_the_same_samples(case: &Case) {
+    quarter_of_a_million(case, 4);
 }
 
 /// Pixels of the square target for clipped triangles.
 const SMALL: u32 = 256;
 
+/// Makes a corner of a triangle that some planes cut.
+type Plane = fn(&mut ChaCha8Rng) -> Position;
+
 /// Triangles that some planes cut, in units of 1/64.
-fn clipped(seed: u64, count: usize, plane: fn(&mut ChaCha8Rng) -> Position) -> Vec<[Position; 3]> {
+fn clipped(seed: u64, count: usize, plane: Plane) -> Vec<[Position; 3]> {
     let mut rng = shapes::rng(seed);
     (0..count)
         .map(|_| [0; 3].map(|_| plane(&mut rng)))
@@ -241,10 +241,26 @@ fn is_sum(numbers: &[[f32; 4]], sum: [f32; 4]) -> bool {
     })
 }
 
-fn check_clipped(name: &str, seed: u64, plane: fn(&mut ChaCha8Rng) -> Position) {
-    let Some(lavapipe) = lavapipe() else {
-        return;
-    };
+/// Planes of the view volume that triangles are clipped at: a name, a seed, and what makes corners.
+const PLANES: [(&str, u64, Plane); 6] = [
+    ("left and right", 210, left_and_right),
+    ("top and bottom", 211, top_and_bottom),
+    ("near", 212, near_plane),
+    ("far", 213, far_plane),
+    ("behind the eye", 214, behind_the_eye),
+    ("all", 215, all_planes),
+];
+
+fn planes() -> Vec<Variant> {
+    PLANES.map(|(name, ..)| Variant::new(name)).into()
+}
+
+#[gaurast_runner::test(needs = [GLSLANG, Need::Lavapipe], each = planes())]
+fn clipped_triangles_cover_the_same_samples_but_at_edges(case: &Case) {
+    let planes = PLANES
+        .into_iter()
+        .find(|(name, ..)| *name == case.variant());
+    let (_, seed, plane) = planes.expect("planes");
     for samples in [1, 4] {
         let positions = clipped(seed, 1000, plane);
         let triangles: Vec<_> = positions
@@ -252,7 +268,7 @@ fn check_clipped(name: &str, seed: u64, plane: fn(&mut ChaCha8Rng) -> Position) 
             .map(|corners| corners.map(to_clip))
             .collect();
         let draw = |gpu| Checksums::new(gpu, &triangles, [SMALL; 2], samples).draw(0..1000);
-        let (ours, theirs) = (draw(own()), draw(lavapipe));
+        let (ours, theirs) = (draw(own()), draw(lavapipe()));
         assert!(
             theirs[0].iter().any(|sums| sums[0] > 0.0),
             "nothing is drawn"
@@ -274,7 +290,6 @@ fn check_clipped(name: &str, seed: u64, plane: fn(&mut ChaCha8Rng) -> Position) 
                 }
             }
         }
-        eprintln!("{name}, {samples} samples: {different} samples differ");
         assert!(
             unexplained.is_empty(),
             "{samples} samples: {} of {different} differing samples are not within 1/256 of a pixel \
@@ -283,24 +298,6 @@ fn check_clipped(name: &str, seed: u64, plane: fn(&mut ChaCha8Rng) -> Position) 
             unexplained[0]
         );
     }
-}
-
-macro_rules! clipped {
-    ($($name:ident: $seed:literal, $plane:ident;)+) => {
-        $(#[test]
-        fn $name() {
-            check_clipped(stringify!($name), $seed, $plane);
-        })+
-    };
-}
-
-clipped! {
-    clipped_at_the_left_and_right: 210, left_and_right;
-    clipped_at_the_top_and_bottom: 211, top_and_bottom;
-    clipped_at_the_near_plane: 212, near_plane;
-    clipped_at_the_far_plane: 213, far_plane;
-    clipped_behind_the_eye: 214, behind_the_eye;
-    clipped_at_all_planes: 215, all_planes;
 }
 
 /// A grid over the whole target whose inner corners are moved, by too little to make a cell concave,
@@ -392,10 +389,21 @@ fn assert_watertight(gpu: &Gpu, name: &str, triangles: &[Triangle]) {
     }
 }
 
-#[test]
-fn meshes_are_watertight() {
-    let Some(lavapipe) = lavapipe() else {
-        return;
+fn drivers() -> Vec<Variant> {
+    vec![
+        Variant::new("this driver"),
+        Variant {
+            needs: vec![Need::Lavapipe],
+            ..Variant::new("lavapipe")
+        },
+    ]
+}
+
+#[gaurast_runner::test(needs = [GLSLANG], each = drivers())]
+fn meshes_are_watertight(case: &Case) {
+    let gpu = match case.variant() {
+        "lavapipe" => lavapipe(),
+        _ => own(),
     };
     let meshes = [
         ("coarse grid", moved_grid(220, 7)),
@@ -404,7 +412,6 @@ fn meshes_are_watertight() {
         ("star", star(223, 300)),
     ];
     for (name, triangles) in &meshes {
-        assert_watertight(lavapipe, name, triangles);
-        assert_watertight(own(), name, triangles);
+        assert_watertight(gpu, name, triangles);
     }
 }

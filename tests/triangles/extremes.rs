@@ -4,24 +4,16 @@
 use ash::vk;
 use gaurast_tests::triangles::{
     Bindings, Buffer, Gpu, Image, ImageOptions, Pass, Pipeline, PipelineOptions, Resource, Sampler,
-    Target, TargetOptions, Vertex, blend, depth_test, shader, shapes,
+    Target, TargetOptions, Vertex, blend, depth_test, shapes,
 };
 
-use crate::devices::own;
+use super::devices::own;
+use crate::GLSLANG;
 
 /// Pixels of the square target.
 const SIZE: usize = 128;
 /// What a fragment shader writes that wants one number.
 const FORMAT: vk::Format = vk::Format::R32_SFLOAT;
-
-/// This driver's device, or `None` and a printed reason.
-fn device() -> Option<&'static Gpu> {
-    if !shader::can_compile() {
-        eprintln!("skipped: there is no glslangValidator here");
-        return None;
-    }
-    Some(own())
-}
 
 /// Draws vertices in order over zeros; the first component of each pixel.
 fn draw(
@@ -88,9 +80,9 @@ fn additive() -> PipelineOptions<'static> {
 
 /// A ground that begins near the eye's plane, at it or behind it, and ends far away. Its distance is exact to what a 256th of a
 /// pixel is worth, to which corners are rounded, and to binary32's rounding of the distance.
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn grounds_reach_from_the_eye_to_the_horizon() {
-    let Some(gpu) = device() else { return };
+    let gpu = own();
     for (near, far) in [
         (0.5f32, 1e6f32),
         (1e-6, 1e6),
@@ -131,9 +123,9 @@ fn grounds_reach_from_the_eye_to_the_horizon() {
 
 /// Two halves of a square whose corners are ever further outside, beyond every guard band, cover each pixel once and the
 /// right side of their edge.
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn corners_far_outside_move_no_edge() {
-    let Some(gpu) = device() else { return };
+    let gpu = own();
     for far in [
         1.0, 1.5, 63.0, 256.0, 511.9, 1e4, 3e5, 1e9, 1e12, 1e19, 1e20, 1e30, 1e38, 3.4e38f32,
     ] {
@@ -161,9 +153,9 @@ fn corners_far_outside_move_no_edge() {
 
 /// A triangle whose sides are ever so far outside the picture, none of them along an axis, covers all of it, and what it
 /// varies is what it is in the middle, where its corners' shares are known.
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn sides_far_outside_leave_no_hole() {
-    let Some(gpu) = device() else { return };
+    let gpu = own();
     for far in [4.0, 1e3, 1e9, 1e19, 1e20, 1e30, 1e38, 3.4e38f32] {
         let corners = [[-1.0, -1.0], [1.0, -0.9], [0.1, 1.0f32]];
         let corner = |number: usize| {
@@ -189,9 +181,9 @@ fn sides_far_outside_leave_no_hole() {
 }
 
 /// Of planes whose depths are neighbours in the attachment's format, the nearer one is in front, whichever comes first.
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn depths_a_step_apart_are_told_apart() {
-    let Some(gpu) = device() else { return };
+    let gpu = own();
     let of_bits = |bits: u32, code: u32| (f64::from(code) / f64::from((1u32 << bits) - 1)) as f32;
     // What binary32 has between two codes of 24 bits is enough below a half.
     let mut cases = Vec::new();
@@ -211,9 +203,7 @@ fn depths_a_step_apart_are_told_apart() {
     }
     for (format, [near, far]) in cases {
         let needed = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
-        if !gpu.format_features(format).contains(needed) {
-            continue;
-        }
+        assert!(gpu.format_features(format).contains(needed), "{format:?}");
         let target = TargetOptions {
             depth: Some(format),
             ..TargetOptions::of(FORMAT)
@@ -233,9 +223,9 @@ fn depths_a_step_apart_are_told_apart() {
 
 /// Thousands of triangles in one slanted plane have the same depths, to the bit: all of them pass, the first one, or the
 /// last one, as the comparison says.
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn layers_in_one_plane_have_one_depth() {
-    let Some(gpu) = device() else { return };
+    let gpu = own();
     const LAYERS: usize = 5000;
     let corners = [
         [-0.9, -0.8, 0.1, 1.0],
@@ -293,10 +283,10 @@ fn texel(mode: vk::SamplerAddressMode, index: i64) -> Option<i64> {
 
 /// Coordinates at, beside and far beyond the edges of texels, in every mode, by both filters: weights that are exact in
 /// sixteenths leave nothing to rounding.
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn textures_are_exact_at_the_edges_of_their_modes() {
     use vk::SamplerAddressMode as Mode;
-    let Some(gpu) = device() else { return };
+    let gpu = own();
     let value = |index: i64| (index * 29 + 7) as f64 / 255.0;
     let texels: Vec<[u8; 4]> = (0..TEXELS).map(|i| [(i * 29 + 7) as u8; 4]).collect();
     let options = ImageOptions::new(

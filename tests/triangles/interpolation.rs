@@ -2,14 +2,16 @@
 //! the measure.
 
 use ash::vk;
+use gaurast_runner::Need;
 use gaurast_tests::triangles::{
     Buffer, Gpu, Image, Pass, Pipeline, PipelineOptions, Target, TargetOptions, Vertex, depth_test,
-    fetch_sample, shader, shapes,
+    fetch_sample, shapes,
 };
 
 use rand::Rng;
 
-use crate::devices::{lavapipe, own};
+use super::devices::{lavapipe, own};
+use crate::GLSLANG;
 
 /// Corners at whole pixels of 128, so that no rounding moves them, with strong perspective.
 const PIXELS: [[f64; 2]; 3] = [[4.0, 9.0], [124.0, 17.0], [33.0, 120.0]];
@@ -102,22 +104,14 @@ fn draw(gpu: &Gpu, samples: u32, qualifier: &str) -> Vec<Vec<f32>> {
         .collect()
 }
 
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn perspective_is_exact_at_pixel_centres() {
-    if !shader::can_compile() {
-        eprintln!("skipped: there is no glslangValidator here");
-        return;
-    }
     let error = greatest_error(&draw(own(), 1, "")[0], [0.5; 2]);
     assert!(error <= 2e-6, "{error:e}");
 }
 
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn perspective_is_exact_at_samples() {
-    if !shader::can_compile() {
-        eprintln!("skipped: there is no glslangValidator here");
-        return;
-    }
     for (values, place) in draw(own(), 4, "sample").iter().zip(PLACES) {
         let error = greatest_error(values, place);
         assert!(error <= 2e-6, "{place:?}: {error:e}");
@@ -125,12 +119,8 @@ fn perspective_is_exact_at_samples() {
 }
 
 /// Along a line a value changes with the projection onto it, whatever the sample's distance from it.
-#[test]
+#[gaurast_runner::test(needs = [GLSLANG])]
 fn lines_are_exact_at_samples() {
-    if !shader::can_compile() {
-        eprintln!("skipped: there is no glslangValidator here");
-        return;
-    }
     let gpu = own();
     let options = TargetOptions {
         samples: 4,
@@ -273,22 +263,26 @@ fn greatest_error_of_slivers(gpu: &Gpu, slivers: &[Sliver]) -> (f64, usize) {
     (greatest, pixels)
 }
 
-/// The steeper a plane, the more of its depth is lost where it is evaluated carelessly: it is here
-/// that pictures differ from lavapipe's.
-#[test]
-fn depths_of_slivers_are_exact() {
-    if !shader::can_compile() {
-        eprintln!("skipped: there is no glslangValidator here");
-        return;
-    }
+fn slivers() -> Vec<Sliver> {
     let mut rng = shapes::rng(11);
-    let slivers: Vec<_> = (0..3000).map(|_| Sliver::random(&mut rng)).collect();
-    let (error, pixels) = greatest_error_of_slivers(own(), &slivers);
-    println!("own: {error:e} over {pixels} pixels");
-    if let Some(lavapipe) = lavapipe() {
-        let (error, pixels) = greatest_error_of_slivers(lavapipe, &slivers);
-        println!("lavapipe: {error:e} over {pixels} pixels");
-    }
+    (0..3000).map(|_| Sliver::random(&mut rng)).collect()
+}
+
+/// The greatest error of a depth that this driver may make.
+const SLIVERS: f64 = 4e-6;
+
+/// The steeper a plane, the more of its depth is lost where it is evaluated carelessly.
+#[gaurast_runner::test(needs = [GLSLANG])]
+fn depths_of_slivers_are_exact() {
+    let (error, pixels) = greatest_error_of_slivers(own(), &slivers());
     assert!(pixels > 3000, "only {pixels} pixels are covered");
-    assert!(error <= 4e-6, "{error:e}");
+    assert!(error <= SLIVERS, "{error:e}");
+}
+
+/// It is here that pictures differ from lavapipe's, as `expected_failures/triangles.txt` says: lavapipe is further off.
+#[gaurast_runner::test(needs = [GLSLANG, Need::Lavapipe])]
+fn depths_of_slivers_are_less_exact_on_lavapipe() {
+    let (error, pixels) = greatest_error_of_slivers(lavapipe(), &slivers());
+    assert!(pixels > 3000, "only {pixels} pixels are covered");
+    assert!(error > SLIVERS, "{error:e}");
 }

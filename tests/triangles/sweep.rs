@@ -1,17 +1,19 @@
-//! Every scene on both devices.
+//! Every scene on this driver by both doors, and on lavapipe.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
+use gaurast_runner::{Case, Missing, Need, Variant, ignore, require};
 use gaurast_tests::compare::{Difference, differences, for_people, write_differences};
-use gaurast_tests::for_each_scene;
+use gaurast_tests::triangles::models::Model;
 use gaurast_tests::triangles::{Expected, Gpu, Output, Scene, scenes};
 
-use crate::devices::{lavapipe, own};
+use super::devices::{lavapipe, loaded, own};
+use crate::GLSLANG;
 
 /// Draws a scene, and says in words why it can't be.
-pub fn try_draw(scene: &Scene, gpu: &Gpu) -> Result<Output, String> {
+fn try_draw(scene: &Scene, gpu: &Gpu) -> Result<Output, String> {
     match catch_unwind(AssertUnwindSafe(|| (scene.draw)(gpu))) {
         Ok(Ok(output)) => Ok(output),
         Ok(Err(missing)) => Err(missing.to_string()),
@@ -25,29 +27,56 @@ fn words(panic: &dyn Any) -> String {
         .unwrap_or_else(|| "a panic".to_owned())
 }
 
-fn check(name: &str) {
-    let Some(lavapipe) = lavapipe() else {
-        return;
+/// A variant for each scene.
+fn each_scene() -> Vec<Variant> {
+    let data = |name| match name {
+        "african_head" | "african_head_of_four_samples" => Some(Model::AFRICAN_HEAD),
+        "duck" => Some(Model::DUCK),
+        "bunny" => Some(Model::BUNNY),
+        _ => None,
     };
-    let scene = scenes::find(name).expect("a scene");
-    let theirs = match (scene.draw)(lavapipe) {
+    let variant = |scene: &Scene| Variant {
+        name: scene.name.to_owned(),
+        needs: data(scene.name).map(Need::Data).into_iter().collect(),
+    };
+    scenes::ALL.iter().map(variant).collect()
+}
+
+/// This driver draws the same bits by both doors, and what lavapipe draws but for the exceptions.
+#[gaurast_runner::test(needs = [GLSLANG, Need::VulkanLoader], each = each_scene())]
+fn drivers_agree(case: &Case) {
+    let scene = scenes::find(case.variant()).expect("a scene");
+    let ours = try_draw(scene, own());
+    assert_same(&ours, &try_draw(scene, loaded()));
+    require(Need::Lavapipe);
+    let theirs = match (scene.draw)(lavapipe()) {
         Ok(theirs) => theirs,
-        Err(missing) => {
-            eprintln!("skipped: lavapipe: {missing}");
-            return;
-        }
+        Err(missing) => ignore(Missing::Capability, format!("lavapipe: {missing}")),
     };
     assert!(theirs.shows_something(), "the scene is blank on lavapipe");
-    let ours = try_draw(scene, own());
-    show(name, &ours, &theirs);
-    let verdict = judge(name, ours, &theirs);
-    match (verdict, Expected::read().unsupported(name)) {
-        (Ok(()), None) => {}
-        (Err(reason), Some(listed)) => eprintln!("not supported yet: {listed} ({reason})"),
+    show(scene.name, &ours, &theirs);
+    let verdict = judge(scene.name, ours, &theirs);
+    match (verdict, Expected::read().unsupported(scene.name)) {
+        (Ok(()), None) | (Err(_), Some(_)) => {}
         (Ok(()), Some(listed)) => {
             panic!("it is drawn right: take it off the list of what is not supported ({listed})")
         }
         (Err(reason), None) => panic!("{reason}"),
+    }
+}
+
+/// Both doors draw the same bits, or fail both.
+fn assert_same(embedded: &Result<Output, String>, loaded: &Result<Output, String>) {
+    let (embedded, loaded) = match (embedded, loaded) {
+        (Ok(embedded), Ok(loaded)) => (embedded, loaded),
+        (Err(_), Err(_)) => return,
+        (Err(reason), Ok(_)) => panic!("embedded: {reason}"),
+        (Ok(_), Err(reason)) => panic!("loaded: {reason}"),
+    };
+    assert_eq!(embedded.pictures.len(), loaded.pictures.len());
+    for (embedded, loaded) in embedded.pictures.iter().zip(&loaded.pictures) {
+        let is_same = embedded.bytes == loaded.bytes;
+        assert!(is_same, "{} differs between the doors", embedded.name);
     }
 }
 
@@ -73,19 +102,8 @@ fn judge(name: &str, ours: Result<Output, String>, theirs: &Output) -> Result<()
     let found = differences(&ours, theirs);
     let expected = Expected::read();
     let is_excused = |difference: &Difference| {
-        let is = (expected.exceptions(name)).any(|exception| exception.excuses(difference));
-        if is {
-            println!("excused: {name} | {difference}");
-        }
-        is
+        (expected.exceptions(name)).any(|exception| exception.excuses(difference))
     };
-    let stale = expected
-        .exceptions(name)
-        .find(|exception| !(found.iter()).any(|difference| exception.covers(&difference.picture)));
-    // What lavapipe rounds depends on its processor, too.
-    if let Some(exception) = stale {
-        eprintln!("nothing differs here: {exception:?}");
-    }
     let inexcusable: Vec<_> = (found.into_iter())
         .filter(|difference| !is_excused(difference))
         .collect();
@@ -101,19 +119,7 @@ fn judge(name: &str, ours: Result<Output, String>, theirs: &Output) -> Result<()
     Err(format!("{}\n{pictures}", lines.join("\n")))
 }
 
-macro_rules! tests {
-    ($($module:ident: $($name:ident),+;)+) => {
-        $(mod $module {
-            $(#[test]
-            fn $name() {
-                super::check(stringify!($name));
-            })+
-        })+
-    };
-}
-for_each_scene!(tests);
-
-#[test]
+#[gaurast_runner::test]
 fn every_listed_name_is_that_of_a_scene() {
     let expected = Expected::read();
     let unknown: Vec<_> = expected

@@ -359,23 +359,4 @@ mod tests {
             assert!(read(&INRIA[..cut]).is_err());
         }
     }
-
-    #[test]
-    fn real_camera_paths_are_read() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/cameras");
-        let folder = Path::new(folder);
-        if !folder.exists() {
-            eprintln!("skipped: the real camera paths are not here");
-            return;
-        }
-        for (name, count) in [
-            ("bicycle", 194),
-            ("garden", 185),
-            ("room", 311),
-            ("bonsai", 292),
-        ] {
-            let views = load(&folder.join(format!("{name}.json")), [1, 1]).expect(name);
-            assert_eq!(views.len(), count, "{name}");
-        }
-    }
 }

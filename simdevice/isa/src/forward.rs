@@ -72,7 +72,7 @@ mod tests {
         program.outputs[0].reg != output
     }
 
-    #[test]
+    #[gaurast_runner::test]
     fn what_every_lane_assigns_once_is_forwarded() {
         let once = |b: &mut Builder, input, output| b.assign(output, input);
         assert!(is_forwarded(Rate::Varying, once));

@@ -73,3 +73,8 @@ pub use devmem::level;
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}

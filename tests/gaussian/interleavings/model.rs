@@ -217,10 +217,9 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Holds a picture against it. Returns the greatest distance in limits, and how many pixels are unknown and have
-    /// several outcomes.
-    pub fn judge(&self, seed: u64, picture: &Picture) -> (f64, usize, usize) {
-        let (mut worst, mut unknown, mut open) = (0.0f64, 0, 0);
+    /// Holds a picture against it. Returns how many pixels are unknown, and how many have several outcomes.
+    pub fn judge(&self, seed: u64, picture: &Picture) -> (usize, usize) {
+        let (mut unknown, mut open) = (0, 0);
         for (at, pixel) in self.pixels.iter().enumerate() {
             if pixel.is_unknown {
                 unknown += 1;
@@ -232,7 +231,6 @@ impl<'a> Model<'a> {
                 let outside = (pixel.least[channel] - value).max(value - pixel.greatest[channel]);
                 // What was copied as it is has no slack.
                 let limit = pixel.slack.max(1e-12);
-                worst = worst.max(outside / limit);
                 assert!(
                     outside <= limit,
                     "interleaving {seed}, pixel {at}, channel {channel}: {value} is {outside:e} from {pixel:?}"
@@ -245,6 +243,6 @@ impl<'a> Model<'a> {
                 pixel.depths
             );
         }
-        (worst, unknown, open)
+        (unknown, open)
     }
 }

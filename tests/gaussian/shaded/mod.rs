@@ -6,6 +6,7 @@ mod resolved;
 
 use device::buffer;
 use device::{Case, SIZE, UPRIGHT, device, draw, whole};
+use gaurast_runner::simd_levels;
 use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, project, render_shaded};
 use gaurast_tests::oracle::{OracleOrder, OracleState, SkipReason};
 use rand::{Rng, SeedableRng};
@@ -16,6 +17,13 @@ use simdevice::packet::IndexStream;
 use simdevice::packet::draw::{CompareOp, Draw};
 use simdevice::{Config, Device};
 use std::sync::Arc;
+
+/// The SIMD level that a test's variant names.
+fn level(case: &gaurast_runner::Case) -> SimdLevel {
+    let mut levels = SimdLevel::supported().into_iter();
+    let level = levels.find(|(name, _)| *name == case.variant());
+    level.expect("a level that the processor has").1
+}
 
 /// Gaussians of any shape, on the screen and beside it, with some depths that are equal.
 fn cloud(seed: u64, count: usize) -> Vec<OracleOutputs> {
@@ -106,19 +114,17 @@ fn skipped() -> Vec<(OracleOutputs, SkipReason)> {
     ]
 }
 
-#[test]
-fn pictures_keep_the_contract_at_every_level() {
+#[gaurast_runner::test(each = simd_levels())]
+fn pictures_keep_the_contract_at_a_level(case: &gaurast_runner::Case) {
     let outputs = cloud(31, 3000);
-    for (name, level) in SimdLevel::supported() {
-        let device = device(level);
-        let drawn = whole(&device, &outputs).check(&format!("shaded_{name}"), &device);
-        let invocations = drawn.counters.get(Counter::VertexInvocations);
-        assert_eq!(invocations, 3000, "{name}");
-        assert_eq!(drawn.counters.get(Counter::GaussiansRead), 3000, "{name}");
-    }
+    let device = device(level(case));
+    let name = format!("shaded_{}", case.variant());
+    let drawn = whole(&device, &outputs).check(&name, &device);
+    assert_eq!(drawn.counters.get(Counter::VertexInvocations), 3000);
+    assert_eq!(drawn.counters.get(Counter::GaussiansRead), 3000);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn modes_keep_the_contract() {
     let outputs = cloud(32, 800);
     let device = device(SimdLevel::Best);
@@ -181,7 +187,7 @@ fn modes_keep_the_contract() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_cannot_be_drawn_is_skipped_and_counted() {
     let device = device(SimdLevel::Best);
     let mut outputs = cloud(33, 300);
@@ -208,7 +214,7 @@ fn what_cannot_be_drawn_is_skipped_and_counted() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn draws_indices_and_instances_make_one_sorted_set() {
     let device = device(SimdLevel::Best);
     let outputs = cloud(34, 700);
@@ -255,7 +261,7 @@ fn draws_indices_and_instances_make_one_sorted_set() {
     case.check("shaded_instances", &device);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn centres_are_tested_for_depth_and_the_median_is_stored() {
     let device = device(SimdLevel::Best);
     let outputs = cloud(35, 1200);
@@ -286,7 +292,7 @@ fn centres_are_tested_for_depth_and_the_median_is_stored() {
     assert!(count > 1000, "{count}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn neither_threads_nor_flushes_change_a_bit() {
     let outputs = cloud(36, 5000);
     let one = device(SimdLevel::Best);
@@ -304,7 +310,7 @@ fn neither_threads_nor_flushes_change_a_bit() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn extreme_values_keep_the_contract() {
     let device = device(SimdLevel::Best);
     let mut outputs = cloud(37, 200);

@@ -1,7 +1,8 @@
 //! Resolve shaders: what they read is what the reference says of each pixel, and what they write goes where it should.
 
-use super::cloud;
 use super::device::{Case, REPLACE, SIZE, UPRIGHT, append, device, triangle, whole};
+use super::{cloud, level};
+use gaurast_runner::simd_levels;
 use gaurast_tests::oracle::resolve::{Resolved, resolve_scene, resolve_shaded};
 use gaurast_tests::oracle::{OracleDepthFormat, OracleState, OracleTests};
 use gaurast_tests::scenes;
@@ -117,33 +118,27 @@ fn check(name: &str, ways: &[Vec<Resolved>], color: &[[f32; 4]], shown: &[[f32; 
     covered
 }
 
-#[test]
-fn what_is_read_is_what_was_accumulated_at_every_level() {
+#[gaurast_runner::test(each = simd_levels())]
+fn what_is_read_is_what_was_accumulated_at_a_level(test: &gaurast_runner::Case) {
     let outputs = cloud(41, 2000);
     let state = OracleState::default();
     let ways = resolve_shaded(&outputs, SIZE, &UPRIGHT, &state);
-    for (name, level) in SimdLevel::supported() {
-        let device = device(level);
-        let case = Case {
-            resolve: Some(passing_on(&device, &everything())),
-            blend: vec![REPLACE; 2],
-            clear: [-1.0; 4],
-            ..whole(&device, &outputs)
-        };
-        let drawn = case.run(&device);
-        let covered = check(name, &ways, &drawn.color, &drawn.others[0]);
-        assert!(covered > 8000, "{name}: {covered}");
-        let shaded = drawn.counters.get(Counter::FragmentInvocations);
-        assert_eq!(shaded, covered as u64, "{name}");
-        assert_eq!(
-            drawn.counters.get(Counter::SamplesPassed),
-            covered as u64,
-            "{name}"
-        );
-    }
+    let device = device(level(test));
+    let case = Case {
+        resolve: Some(passing_on(&device, &everything())),
+        blend: vec![REPLACE; 2],
+        clear: [-1.0; 4],
+        ..whole(&device, &outputs)
+    };
+    let drawn = case.run(&device);
+    let covered = check(test.variant(), &ways, &drawn.color, &drawn.others[0]);
+    assert!(covered > 8000, "{covered}");
+    let shaded = drawn.counters.get(Counter::FragmentInvocations);
+    assert_eq!(shaded, covered as u64);
+    assert_eq!(drawn.counters.get(Counter::SamplesPassed), covered as u64);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depths_are_rounded_to_the_attachment_and_tested() {
     let outputs = cloud(42, 1500);
     let device = device(SimdLevel::Best);
@@ -186,7 +181,7 @@ fn depths_are_rounded_to_the_attachment_and_tested() {
     assert!(fragments.all(is_held));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_a_program_writes_is_blended() {
     let outputs = cloud(43, 1000);
     let device = device(SimdLevel::Best);
@@ -247,7 +242,7 @@ fn what_a_program_writes_is_blended() {
     assert!(kept > 1000, "{kept}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn samples_share_invocations_unless_each_is_shaded() {
     let outputs = cloud(44, 500);
     let device = device(SimdLevel::Best);
@@ -282,7 +277,7 @@ fn samples_share_invocations_unless_each_is_shaded() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn samples_that_differ_are_shaded_for_themselves() {
     let outputs = cloud(45, 800);
     let device = device(SimdLevel::Best);
@@ -314,7 +309,7 @@ fn samples_that_differ_are_shaded_for_themselves() {
     assert!(4 * invocations(&shared) > samples + 400, "{samples}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn fixed_function_projection_is_resolved_in_the_depths_of_its_camera() {
     let scene = scenes::cloud(46, 2500, 0);
     let camera = scenes::camera(SIZE[0], SIZE[1]);

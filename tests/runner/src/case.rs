@@ -1,6 +1,8 @@
 //! A running test: its variant, its real data, its process.
 
+use std::ffi::OsString;
 use std::process::Command;
+use std::sync::OnceLock;
 
 use crate::need::{Ignored, Missing, Need, ignore};
 
@@ -62,6 +64,12 @@ impl Shard {
     }
 }
 
+/// The environment as it is at the first call. Tests that run beside another may change it for a while.
+pub(crate) fn first_environment() -> &'static [(OsString, OsString)] {
+    static FIRST: OnceLock<Vec<(OsString, OsString)>> = OnceLock::new();
+    FIRST.get_or_init(|| std::env::vars_os().collect())
+}
+
 /// A running test.
 #[derive(Debug)]
 pub struct Case {
@@ -106,17 +114,25 @@ impl Case {
         std::env::var_os(ALONE).is_some_and(|name| name == *self.name)
     }
 
-    /// Runs this test again in a process of its own, which `set_up` may give an environment. Ends the test as ignored if
-    /// it is ignored there.
+    /// A command that runs this test again in a process of its own, in the environment that this process began with.
+    pub fn command(&self) -> Command {
+        let mut command = Command::new(std::env::current_exe().expect("the test's own path"));
+        command
+            .args(["--exact", &self.name, "--test-threads", "1"])
+            .env_clear()
+            .envs(first_environment().iter().cloned())
+            .env(ALONE, &self.name)
+            .env_remove(crate::report::REPORT);
+        command
+    }
+
+    /// Runs this test again by [`Self::command`], to whose environment `set_up` may add. Ends the test as ignored if it is
+    /// ignored there.
     ///
     /// # Panics
     /// If the test fails there, with what the process printed.
     pub fn run_alone(&self, set_up: impl FnOnce(&mut Command)) {
-        let mut command = Command::new(std::env::current_exe().expect("the test's own path"));
-        command
-            .args(["--exact", &self.name, "--test-threads", "1"])
-            .env(ALONE, &self.name)
-            .env_remove(crate::report::REPORT);
+        let mut command = self.command();
         set_up(&mut command);
         let output = command.output().expect("the test starts itself");
         let text =

@@ -105,6 +105,7 @@ impl Requirement {
 
 /// Runs the executable's tests as the command line says, which is that of Rust's own runner.
 pub fn main() -> ExitCode {
+    case::first_environment();
     let arguments = Arguments::from_args();
     let requirement = match Requirement::from_environment() {
         Ok(requirement) => requirement,

@@ -112,6 +112,21 @@ fn a_test_alone_fails_as_any_other(case: &Case) {
 }
 
 #[test]
+fn a_test_alone_sees_nothing_of_what_others_do_to_the_environment(case: &Case) {
+    const CHANGED: &str = "GAURAST_RUNNER_CHANGED";
+    if case.is_alone() {
+        assert_eq!(std::env::var_os(CHANGED), None);
+        assert_eq!(std::env::var("GAURAST_RUNNER_GIVEN").as_deref(), Ok("1"));
+        return;
+    }
+    // SAFETY: all that runs beside it reads the environment through the standard library.
+    unsafe { std::env::set_var(CHANGED, "1") };
+    case.run_alone(|command| {
+        command.env("GAURAST_RUNNER_GIVEN", "1");
+    });
+}
+
+#[test]
 fn a_requirement_is_one_that_exists(case: &Case) {
     let (output, _) = observe(case, "everything", &[]);
     assert!(!output.status.success());

@@ -2,7 +2,6 @@
 
 use super::reduction;
 use ash::vk::SubgroupFeatureFlags as Flags;
-use gaurast_tests::kernels::Context;
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Lane, Model, Row};
@@ -57,25 +56,28 @@ pub fn where_true(
     body.asm.emit(Op::Load, id, &[variable])
 }
 
-pub fn rows(context: &Context) -> Vec<Row> {
-    let has = |flags| context.subgroup_operations.contains(flags);
-    let mut rows = Vec::new();
-    let mut add = |flags: Flags, more: fn() -> Vec<Row>| {
-        if has(flags) {
-            rows.extend(more());
-        } else {
-            eprintln!("skipped on {}: subgroups without {flags:?}", context.name);
-        }
-    };
-    add(Flags::BASIC, basic);
-    add(Flags::VOTE, votes);
-    add(Flags::BALLOT, ballots);
-    add(Flags::SHUFFLE, shuffles);
-    add(Flags::SHUFFLE_RELATIVE, relative_shuffles);
-    add(Flags::ARITHMETIC, reduction::arithmetic);
-    add(Flags::CLUSTERED, reduction::clustered);
-    add(Flags::QUAD, quads);
-    rows
+/// A group of instructions, which a driver has all of or none: the name, Vulkan's flag, and the rows.
+pub type Group = (&'static str, Flags, fn() -> Vec<Row>);
+
+/// All groups.
+pub const GROUPS: [Group; 8] = [
+    ("basic", Flags::BASIC, basic),
+    ("vote", Flags::VOTE, votes),
+    ("ballot", Flags::BALLOT, ballots),
+    ("shuffle", Flags::SHUFFLE, shuffles),
+    (
+        "relative shuffle",
+        Flags::SHUFFLE_RELATIVE,
+        relative_shuffles,
+    ),
+    ("arithmetic", Flags::ARITHMETIC, reduction::arithmetic),
+    ("clustered", Flags::CLUSTERED, reduction::clustered),
+    ("quad", Flags::QUAD, quads),
+];
+
+/// The rows of all groups.
+pub fn rows() -> Vec<Row> {
+    GROUPS.iter().flat_map(|(.., rows)| rows()).collect()
 }
 
 pub const BOOL: Ty = Ty::scalar(Kind::Bool);

@@ -14,7 +14,7 @@ mod settings;
 pub use gaussian::{DeviceScene, Instance, Pipeline, PipelineOptions, over, replace};
 pub use pass::{Commands, Pass, PassObject};
 pub use resource::{Buffer, Target};
-pub use settings::{Settings, simd_levels, with_settings};
+pub use settings::{Settings, with_settings};
 
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex, PoisonError};

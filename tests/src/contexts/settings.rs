@@ -9,32 +9,16 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Settings<'a> {
     /// The SIMD level by name, `GAURAST_SIMD`; as it is by default.
-    pub simd: Option<&'static str>,
+    pub simd: Option<&'a str>,
     /// Worker threads, `GAURAST_THREADS`; as it is by default.
     pub threads: Option<usize>,
     /// Where its work is written when it is gone, `GAURAST_TRACE`.
     pub trace: Option<&'a Path>,
 }
 
-/// The names of the SIMD levels that this processor has, the simplest first.
-pub fn simd_levels() -> Vec<&'static str> {
-    let mut levels = vec!["sse2"];
-    #[cfg(target_arch = "x86_64")]
-    {
-        // The features that the levels are named after stand for all that each needs.
-        let tests = [
-            ("avx2", std::arch::is_x86_feature_detected!("avx2")),
-            ("avx512", std::arch::is_x86_feature_detected!("avx512vbmi2")),
-        ];
-        levels.extend(tests.iter().filter(|(_, has)| *has).map(|(name, _)| *name));
-    }
-    levels
-}
-
 /// Calls `create`, which creates devices, while the environment says `settings`.
 ///
-/// Calls wait for each other. What creates devices by other ways at the same time may get these
-/// settings, too.
+/// Calls wait for each other, so that devices which are opened through this get no others' settings.
 pub fn with_settings<R>(settings: &Settings, create: impl FnOnce() -> R) -> R {
     static LOCK: Mutex<()> = Mutex::new(());
     let _lock = LOCK.lock().unwrap_or_else(PoisonError::into_inner);
@@ -60,7 +44,8 @@ impl Variable {
     fn set(name: &'static str, value: &OsStr) -> Self {
         let before = std::env::var_os(name);
         // SAFETY: the standard library guards the environment against its own readers and writers,
-        // and the embedded driver, the only other code that reads it meanwhile, uses those.
+        // of which the embedded driver is one. The Vulkan loader and lavapipe, which aren't, read it
+        // when they are opened, and that waits for `with_settings`.
         unsafe { std::env::set_var(name, value) };
         Self { name, before }
     }

@@ -1,6 +1,7 @@
 //! A Vulkan device that runs kernels: this driver's, or lavapipe's through the loader.
 
 use super::Kernel;
+use crate::contexts::{Settings, with_settings};
 use ash::vk;
 
 /// A device with one queue.
@@ -41,7 +42,9 @@ impl Context {
     /// [`Refused`] if the device cannot be opened.
     pub fn gaurast() -> Result<Self, Refused> {
         let is_any = |_: vk::DriverId| true;
-        let found = Self::open(vulkan_gaurast::entry(), is_any)?;
+        let found = with_settings(&Settings::default(), || {
+            Self::open(vulkan_gaurast::entry(), is_any)
+        })?;
         found.ok_or_else(|| refused("list a device")(vk::Result::ERROR_UNKNOWN))
     }
 
@@ -54,7 +57,8 @@ impl Context {
         let Ok(entry) = (unsafe { ash::Entry::load() }) else {
             return Ok(None);
         };
-        Self::open(entry, |id| id == vk::DriverId::MESA_LLVMPIPE)
+        let is_lavapipe = |id| id == vk::DriverId::MESA_LLVMPIPE;
+        with_settings(&Settings::default(), || Self::open(entry, is_lavapipe))
     }
 
     fn open(

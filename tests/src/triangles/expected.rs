@@ -1,7 +1,7 @@
 //! What is expected to differ, and what this driver cannot do yet: two checked-in lists.
 //!
 //! A scene that is listed as missing and is drawn right fails, so that the list says no more than is
-//! true; an exception that nothing needs is told.
+//! true. An exception may be one that nothing needs here, since what lavapipe rounds depends on its processor.
 
 use std::path::Path;
 

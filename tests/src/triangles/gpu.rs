@@ -64,7 +64,7 @@ impl Gpu {
     /// [`OpenError`], for example where there is no loader.
     pub fn loaded() -> Result<Self, OpenError> {
         let is_own = |id: vk::DriverId| id != vk::DriverId::MESA_LLVMPIPE;
-        Self::open(loader()?, "this driver", is_own)
+        Self::through_the_loader("this driver", is_own)
     }
 
     /// lavapipe, through the loader, sampling textures as accurately as it can if the process asks
@@ -74,7 +74,19 @@ impl Gpu {
     /// [`OpenError`], for example where there is no loader, or it does not know lavapipe.
     pub fn lavapipe() -> Result<Self, OpenError> {
         let is_lavapipe = |id| id == vk::DriverId::MESA_LLVMPIPE;
-        Self::open(loader()?, "lavapipe", is_lavapipe)
+        Self::through_the_loader("lavapipe", is_lavapipe)
+    }
+
+    fn through_the_loader(
+        wanted: &'static str,
+        is_wanted: impl Fn(vk::DriverId) -> bool,
+    ) -> Result<Self, OpenError> {
+        with_settings(&Settings::default(), || {
+            // SAFETY: the loader is the system's own.
+            let entry = unsafe { ash::Entry::load() };
+            let entry = entry.map_err(|error| OpenError::NoLoader(error.to_string()))?;
+            Self::open(entry, wanted, is_wanted)
+        })
     }
 
     fn open(
@@ -204,11 +216,6 @@ impl Gpu {
     fn queue(&self) -> MutexGuard<'_, vk::Queue> {
         self.0.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-fn loader() -> Result<ash::Entry, OpenError> {
-    // SAFETY: the loader is the system's own.
-    unsafe { ash::Entry::load() }.map_err(|error| OpenError::NoLoader(error.to_string()))
 }
 
 /// The first device whose driver is wanted, with its name and version.

@@ -1,7 +1,7 @@
 //! Real models: their triangles, textures, and how they are lit and looked at.
 
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ash::vk;
 use glam::{Mat4, Vec2, Vec3, Vec4};
@@ -13,7 +13,6 @@ use super::{
     Bindings, Buffer, Commands, Gpu, Image, ImageOptions, Missing, Pipeline, PipelineOptions,
     Resource, Sampler, Target, attribute, binding, depth_test,
 };
-use crate::data::data_dir;
 
 /// A corner of a model's triangle.
 #[repr(C)]
@@ -52,26 +51,41 @@ fn missing(path: &Path) -> impl Fn(String) -> Missing {
     move |error| Missing(format!("{path}: {error}"))
 }
 
+/// The path of a file of the real data.
+fn in_data(name: &str) -> Result<PathBuf, Missing> {
+    let folder = gaurast_runner::data_folder();
+    let folder =
+        folder.ok_or_else(|| Missing("GAURAST_TEST_DATA, which names their folder".into()));
+    Ok(folder?.join(name))
+}
+
 fn grey() -> RgbaImage {
     RgbaImage::from_pixel(1, 1, image::Rgba([190, 180, 170, 255]))
 }
 
 impl Model {
+    /// The head's file within the real data.
+    pub const AFRICAN_HEAD: &str = "meshes/african_head/african_head.obj";
+    /// The duck's.
+    pub const DUCK: &str = "meshes/Duck.glb";
+    /// The bunny's.
+    pub const BUNNY: &str = "meshes/bunny.ply";
+
     /// The head with its eyes: three OBJ files with TGA textures.
     ///
     /// # Errors
     /// [`Missing`] if a file is not there.
     pub fn african_head() -> Result<Self, Missing> {
-        let folder = data_dir().join("meshes/african_head");
+        let head = in_data(Self::AFRICAN_HEAD)?;
         let texture = |name: String| {
-            let path = folder.join(name);
+            let path = head.with_file_name(name);
             let image = image::open(&path);
             let image = image.map_err(|error| missing(&path)(error.to_string()));
             Ok::<_, Missing>(image?.into_rgba8())
         };
         let names = ["african_head", "african_head_eye_inner"];
         let parts = names.map(|name| {
-            let (corners, indices) = read_obj(&folder.join(format!("{name}.obj")))?;
+            let (corners, indices) = read_obj(&head.with_file_name(format!("{name}.obj")))?;
             Ok(Part {
                 corners,
                 indices,
@@ -89,7 +103,7 @@ impl Model {
     /// # Errors
     /// [`Missing`] if it is not there.
     pub fn duck() -> Result<Self, Missing> {
-        let path = data_dir().join("meshes/Duck.glb");
+        let path = in_data(Self::DUCK)?;
         let missing = missing(&path);
         let gltf = gltf::Gltf::open(&path).map_err(|error| missing(error.to_string()))?;
         let blob = gltf.blob.as_deref().unwrap_or_default();
@@ -136,7 +150,7 @@ impl Model {
     /// # Errors
     /// [`Missing`] if it is not there.
     pub fn bunny() -> Result<Self, Missing> {
-        let path = data_dir().join("meshes/bunny.ply");
+        let path = in_data(Self::BUNNY)?;
         let missing = missing(&path);
         let file = std::fs::File::open(&path).map_err(|error| missing(error.to_string()))?;
         let ply = Parser::<DefaultElement>::new().read_ply(&mut BufReader::new(file));

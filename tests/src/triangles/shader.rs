@@ -28,17 +28,6 @@ impl Stage {
     }
 }
 
-/// Whether `glslangValidator` is there.
-pub fn can_compile() -> bool {
-    static FOUND: LazyLock<bool> = LazyLock::new(|| {
-        Command::new("glslangValidator")
-            .arg("--version")
-            .output()
-            .is_ok_and(|output| output.status.success())
-    });
-    *FOUND
-}
-
 /// The SPIR-V of GLSL `source`, to which `#version 450` is added in front.
 ///
 /// # Panics

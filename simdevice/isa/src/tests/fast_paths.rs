@@ -7,7 +7,9 @@ use crate::op::Op;
 use crate::resources::{Resources, words};
 use devmem::{Allocation, BufferRange};
 
-use super::{Random, levels, machine, run};
+use gaurast_runner::Case;
+
+use super::{Random, level, machine, run};
 
 const LANES: usize = 256;
 const ACTIVE: usize = 250;
@@ -81,8 +83,9 @@ fn word_at(address: u32, offset: u32, element: u32) -> Option<usize> {
     (at.is_multiple_of(4) && at + 4 <= 4 * u64::from(WORDS)).then_some(at as usize / 4)
 }
 
-#[test]
-fn words_are_loaded_alike_in_bulk_and_one_by_one() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn words_are_loaded_alike_in_bulk_and_one_by_one(case: &Case) {
+    let (name, level) = level(case);
     let data: Vec<u32> = (0..WORDS).map(|index| index.wrapping_mul(0x9e37)).collect();
     let buffers = [Some(buffer(&data))];
     let resources = Resources {
@@ -105,32 +108,31 @@ fn words_are_loaded_alike_in_bulk_and_one_by_one() {
         }
         b.end();
         let program = b.finish().expect("a valid program");
-        for (name, level) in levels() {
-            let mut machine = machine(&program, level, LANES);
-            for _ in 0..20 {
-                let (at, part) = (addresses(&mut random, elements), participants(&mut random));
-                for lane in 0..LANES {
-                    machine.set_input(0, lane, at[lane]);
-                    machine.set_input(1, lane, if part[lane] { u32::MAX } else { 0 });
-                }
-                run(&mut machine, ACTIVE, &resources);
-                for lane in 0..ACTIVE {
-                    for element in 0..elements {
-                        let word = word_at(at[lane], offset, element).filter(|_| part[lane]);
-                        assert_eq!(
-                            machine.output(element, lane),
-                            word.map_or(0, |word| data[word]),
-                            "element {element} of lane {lane} at {name}"
-                        );
-                    }
+        let mut machine = machine(&program, level, LANES);
+        for _ in 0..20 {
+            let (at, part) = (addresses(&mut random, elements), participants(&mut random));
+            for lane in 0..LANES {
+                machine.set_input(0, lane, at[lane]);
+                machine.set_input(1, lane, if part[lane] { u32::MAX } else { 0 });
+            }
+            run(&mut machine, ACTIVE, &resources);
+            for lane in 0..ACTIVE {
+                for element in 0..elements {
+                    let word = word_at(at[lane], offset, element).filter(|_| part[lane]);
+                    assert_eq!(
+                        machine.output(element, lane),
+                        word.map_or(0, |word| data[word]),
+                        "element {element} of lane {lane} at {name}"
+                    );
                 }
             }
         }
     }
 }
 
-#[test]
-fn words_are_stored_alike_in_bulk_and_one_by_one() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn words_are_stored_alike_in_bulk_and_one_by_one(case: &Case) {
+    let (name, level) = level(case);
     let mut random = Random(2);
     for (elements, offset) in [(1, 0), (2, 4), (4, 0), (6, 8)] {
         let mut b = Builder::new();
@@ -148,43 +150,42 @@ fn words_are_stored_alike_in_bulk_and_one_by_one() {
         b.store(to, Format::B32, &values);
         b.end();
         let program = b.finish().expect("a valid program");
-        for (name, level) in levels() {
-            let mut machine = machine(&program, level, LANES);
-            for _ in 0..20 {
-                let range = buffer(&vec![0; WORDS as usize]);
-                let buffers = [Some(range.clone())];
-                let resources = Resources {
-                    buffers: &buffers,
-                    ..Resources::default()
-                };
-                let (at, part) = (addresses(&mut random, elements), participants(&mut random));
-                let mut allowed = vec![vec![]; WORDS as usize];
-                for lane in 0..LANES {
-                    machine.set_input(0, lane, at[lane]);
-                    machine.set_input(1, lane, if part[lane] { u32::MAX } else { 0 });
-                    machine.set_input(2, lane, 1 + lane as u32);
-                    for element in (0..elements).filter(|_| part[lane] && lane < ACTIVE) {
-                        if let Some(word) = word_at(at[lane], offset, element) {
-                            allowed[word].push((element << 16) + 1 + lane as u32);
-                        }
+        let mut machine = machine(&program, level, LANES);
+        for _ in 0..20 {
+            let range = buffer(&vec![0; WORDS as usize]);
+            let buffers = [Some(range.clone())];
+            let resources = Resources {
+                buffers: &buffers,
+                ..Resources::default()
+            };
+            let (at, part) = (addresses(&mut random, elements), participants(&mut random));
+            let mut allowed = vec![vec![]; WORDS as usize];
+            for lane in 0..LANES {
+                machine.set_input(0, lane, at[lane]);
+                machine.set_input(1, lane, if part[lane] { u32::MAX } else { 0 });
+                machine.set_input(2, lane, 1 + lane as u32);
+                for element in (0..elements).filter(|_| part[lane] && lane < ACTIVE) {
+                    if let Some(word) = word_at(at[lane], offset, element) {
+                        allowed[word].push((element << 16) + 1 + lane as u32);
                     }
                 }
-                run(&mut machine, ACTIVE, &resources);
-                for (word, found) in contents(&range).into_iter().enumerate() {
-                    let allowed = &allowed[word];
-                    // Where lanes collide, one of them wins.
-                    assert!(
-                        allowed.contains(&found) || allowed.is_empty() && found == 0,
-                        "word {word} at {name}: {found:#x} of {allowed:x?}"
-                    );
-                }
+            }
+            run(&mut machine, ACTIVE, &resources);
+            for (word, found) in contents(&range).into_iter().enumerate() {
+                let allowed = &allowed[word];
+                // Where lanes collide, one of them wins.
+                assert!(
+                    allowed.contains(&found) || allowed.is_empty() && found == 0,
+                    "word {word} at {name}: {found:#x} of {allowed:x?}"
+                );
             }
         }
     }
 }
 
-#[test]
-fn workgroup_and_buffer_atomics_agree() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn workgroup_and_buffer_atomics_agree(case: &Case) {
+    let (name, level) = level(case);
     let mut random = Random(3);
     for op in [
         AtomicOp::IAdd,
@@ -205,24 +206,22 @@ fn workgroup_and_buffer_atomics_agree() {
             b.assign(out, old);
         }
         let program = b.finish().expect("a valid program");
-        for (name, level) in levels() {
-            let buffers = [Some(buffer(&[0; 64]))];
-            let resources = Resources {
-                buffers: &buffers,
-                ..Resources::default()
-            };
-            let mut machine = machine(&program, level, LANES);
-            for lane in 0..LANES {
-                // Some are beyond the end, or misaligned.
-                let at = random.below(270) as u32;
-                machine.set_input(0, lane, if lane > 99 { at & !3 } else { at });
-                machine.set_input(1, lane, (random.below(1000) as f32).to_bits());
-            }
-            run(&mut machine, ACTIVE, &resources);
-            for lane in 0..ACTIVE {
-                let (got, twin) = (machine.output(0, lane), machine.output(1, lane));
-                assert_eq!(got, twin, "{op:?} of lane {lane} at {name}");
-            }
+        let buffers = [Some(buffer(&[0; 64]))];
+        let resources = Resources {
+            buffers: &buffers,
+            ..Resources::default()
+        };
+        let mut machine = machine(&program, level, LANES);
+        for lane in 0..LANES {
+            // Some are beyond the end, or misaligned.
+            let at = random.below(270) as u32;
+            machine.set_input(0, lane, if lane > 99 { at & !3 } else { at });
+            machine.set_input(1, lane, (random.below(1000) as f32).to_bits());
+        }
+        run(&mut machine, ACTIVE, &resources);
+        for lane in 0..ACTIVE {
+            let (got, twin) = (machine.output(0, lane), machine.output(1, lane));
+            assert_eq!(got, twin, "{op:?} of lane {lane} at {name}");
         }
     }
 }
@@ -264,66 +263,63 @@ fn table(hidden: bool) -> Program {
     b.finish().expect("a valid program")
 }
 
-#[test]
-fn constant_tables_read_as_private_memory() {
-    for (name, level) in levels() {
-        let [mut plain, mut twin] =
-            [false, true].map(|hidden| machine(&table(hidden), level, LANES));
-        for uniform in [0, 4, 20, 36, 40, 41, 400, u32::MAX - 3] {
-            for machine in [&mut plain, &mut twin] {
-                machine.fill_input(0, uniform);
-                for lane in 0..LANES {
-                    machine.set_input(1, lane, 4 * (lane as u32 % 11) + u32::from(lane % 17 == 3));
-                }
-                run(machine, ACTIVE, &Resources::default());
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn constant_tables_read_as_private_memory(case: &Case) {
+    let (name, level) = level(case);
+    let [mut plain, mut twin] = [false, true].map(|hidden| machine(&table(hidden), level, LANES));
+    for uniform in [0, 4, 20, 36, 40, 41, 400, u32::MAX - 3] {
+        for machine in [&mut plain, &mut twin] {
+            machine.fill_input(0, uniform);
+            for lane in 0..LANES {
+                machine.set_input(1, lane, 4 * (lane as u32 % 11) + u32::from(lane % 17 == 3));
             }
-            for lane in 0..ACTIVE {
-                for slot in 0..4 {
-                    assert_eq!(
-                        plain.output(slot, lane),
-                        twin.output(slot, lane),
-                        "value {slot} of lane {lane} at {name}"
-                    );
-                }
-            }
-            assert_eq!(plain.output(2, 0), 100);
-            assert_eq!(plain.output(3, 0), 101);
+            run(machine, ACTIVE, &Resources::default());
         }
+        for lane in 0..ACTIVE {
+            for slot in 0..4 {
+                assert_eq!(
+                    plain.output(slot, lane),
+                    twin.output(slot, lane),
+                    "value {slot} of lane {lane} at {name}"
+                );
+            }
+        }
+        assert_eq!(plain.output(2, 0), 100);
+        assert_eq!(plain.output(3, 0), 101);
     }
 }
 
 /// Runs a program with an input for each lane and compares its output 0.
-fn compare(program: &Program, limit: u32, expected: impl Fn(u32) -> u32) {
+fn compare(case: &Case, program: &Program, limit: u32, expected: impl Fn(u32) -> u32) {
+    let (name, level) = level(case);
     let mut random = Random(4);
-    for (name, level) in levels() {
-        let mut machine = machine(program, level, LANES);
-        for sparse in [1, 40] {
-            let inputs: Vec<u32> = (0..LANES)
-                .map(|_| {
-                    if random.once_in(sparse) {
-                        random.below(limit as usize) as u32
-                    } else {
-                        0
-                    }
-                })
-                .collect();
-            for (lane, input) in inputs.iter().enumerate() {
-                machine.set_input(0, lane, *input);
-            }
-            run(&mut machine, ACTIVE, &Resources::default());
-            for (lane, input) in inputs.iter().take(ACTIVE).enumerate() {
-                assert_eq!(
-                    machine.output(0, lane),
-                    expected(*input),
-                    "lane {lane} with {input} at {name}"
-                );
-            }
+    let mut machine = machine(program, level, LANES);
+    for sparse in [1, 40] {
+        let inputs: Vec<u32> = (0..LANES)
+            .map(|_| {
+                if random.once_in(sparse) {
+                    random.below(limit as usize) as u32
+                } else {
+                    0
+                }
+            })
+            .collect();
+        for (lane, input) in inputs.iter().enumerate() {
+            machine.set_input(0, lane, *input);
+        }
+        run(&mut machine, ACTIVE, &Resources::default());
+        for (lane, input) in inputs.iter().take(ACTIVE).enumerate() {
+            assert_eq!(
+                machine.output(0, lane),
+                expected(*input),
+                "lane {lane} with {input} at {name}"
+            );
         }
     }
 }
 
-#[test]
-fn lanes_leave_a_loop_with_their_own_count() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn lanes_leave_a_loop_with_their_own_count(case: &Case) {
     // The counter is the same in all lanes that are still there, and read afterwards by those that left.
     let mut b = Builder::new();
     let wanted = b.input(0, Type::B32, Rate::Varying);
@@ -349,13 +345,13 @@ fn lanes_leave_a_loop_with_their_own_count() {
     let both = b.compute(Op::IAdd, &[scaled, sum]);
     b.assign(out, both);
     let program = b.finish().expect("a valid program");
-    compare(&program, 30, |wanted| {
+    compare(case, &program, 30, |wanted| {
         1000 * wanted + (0..wanted).sum::<u32>()
     });
 }
 
-#[test]
-fn lanes_come_back_to_the_count_that_they_left() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn lanes_come_back_to_the_count_that_they_left(case: &Case) {
     // The inner loop's counter is set before the outer loop alone: a lane that leaves the inner loop early finds its own
     // count when it comes back.
     let mut b = Builder::new();
@@ -389,7 +385,7 @@ fn lanes_come_back_to_the_count_that_they_left() {
     b.end();
     b.assign(out, sum);
     let program = b.finish().expect("a valid program");
-    compare(&program, 9, |step| {
+    compare(case, &program, 9, |step| {
         let (mut count, mut sum) = (0, 0);
         for round in 0..5 {
             loop {
@@ -404,8 +400,8 @@ fn lanes_come_back_to_the_count_that_they_left() {
     });
 }
 
-#[test]
-fn lanes_that_continue_early_miss_what_the_others_count() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn lanes_that_continue_early_miss_what_the_others_count(case: &Case) {
     let mut b = Builder::new();
     let which = b.input(0, Type::B32, Rate::Varying);
     let out = b.output(0, Type::B32);
@@ -432,11 +428,11 @@ fn lanes_that_continue_early_miss_what_the_others_count() {
     b.end();
     b.assign(out, count);
     let program = b.finish().expect("a valid program");
-    compare(&program, 256, u32::count_ones);
+    compare(case, &program, 256, u32::count_ones);
 }
 
-#[test]
-fn short_branches_assign_what_their_lanes_chose() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn short_branches_assign_what_their_lanes_chose(case: &Case) {
     let mut b = Builder::new();
     let x = b.input(0, Type::B32, Rate::Varying);
     let out = b.output(0, Type::B32);
@@ -462,15 +458,16 @@ fn short_branches_assign_what_their_lanes_chose() {
     let both = b.compute(Op::IAdd, &[scaled, c]);
     b.assign(out, both);
     let program = b.finish().expect("a valid program");
-    compare(&program, 20, |x| {
+    compare(case, &program, 20, |x| {
         let a = if x < 10 { x + 3 } else { 10 };
         let c = if x >= 10 { 10 * x } else { 3 };
         1000 * a + if x < 3 { x } else { c }
     });
 }
 
-#[test]
-fn push_constants_are_loaded_once_and_right() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn push_constants_are_loaded_once_and_right(case: &Case) {
+    let (name, level) = level(case);
     let mut b = Builder::new();
     let x = b.input(0, Type::B32, Rate::Varying);
     let (zero, one) = (b.u32(0), b.u32(1));
@@ -508,14 +505,12 @@ fn push_constants_are_loaded_once_and_right() {
         push_constants: &pushed,
         ..Resources::default()
     };
-    for (name, level) in levels() {
-        let mut machine = machine(&program, level, LANES);
-        (0..LANES).for_each(|lane| machine.set_input(0, lane, lane as u32));
-        run(&mut machine, ACTIVE, &resources);
-        for lane in 0..ACTIVE {
-            let sum = 5 * (7 * lane as u32 + 5);
-            let got = [0, 1].map(|slot| machine.output(slot, lane));
-            assert_eq!(got, [sum, 0], "lane {lane} at {name}");
-        }
+    let mut machine = machine(&program, level, LANES);
+    (0..LANES).for_each(|lane| machine.set_input(0, lane, lane as u32));
+    run(&mut machine, ACTIVE, &resources);
+    for lane in 0..ACTIVE {
+        let sum = 5 * (7 * lane as u32 + 5);
+        let got = [0, 1].map(|slot| machine.output(slot, lane));
+        assert_eq!(got, [sum, 0], "lane {lane} at {name}");
     }
 }

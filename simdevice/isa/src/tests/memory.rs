@@ -15,7 +15,9 @@ use crate::resources::{
 use devmem::Allocation;
 use devmem::BufferRange;
 
-use super::{levels, machine, run};
+use gaurast_runner::Case;
+
+use super::{level, machine, run};
 
 const LANES: usize = 64;
 
@@ -55,8 +57,9 @@ fn loader(format: Format, count: usize, offset: u32) -> Program {
     b.finish().expect("a valid program")
 }
 
-#[test]
-fn loads_read_what_is_there_and_zero_beyond() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn loads_read_what_is_there_and_zero_beyond(case: &Case) {
+    let (name, level) = level(case);
     let data: Vec<u32> = (0..300)
         .map(|index: u32| index.wrapping_mul(0x0101_0101))
         .collect();
@@ -86,41 +89,38 @@ fn loads_read_what_is_there_and_zero_beyond() {
     ] {
         for (count, offset) in [(1, 0), (2, 4), (3, 0), (1, u32::MAX)] {
             let program = loader(format, count, offset);
-            for (name, level) in levels() {
-                let mut machine = machine(&program, level, LANES);
-                for pattern in patterns {
-                    (0..LANES).for_each(|lane| machine.set_input(0, lane, pattern(lane)));
-                    run(&mut machine, LANES, &resources);
-                    for lane in 0..LANES {
-                        for element in 0..count {
-                            let size = u64::from(format.bytes());
-                            let start = u64::from(pattern(lane))
-                                + u64::from(offset)
-                                + element as u64 * size;
-                            let valid = start + size <= 1000 && start.is_multiple_of(size.min(4));
-                            let mut raw = [0; 8];
-                            if valid {
-                                let from = start as usize;
-                                raw[..size as usize]
-                                    .copy_from_slice(&bytes[from..from + size as usize]);
-                            }
-                            let expected = match format {
-                                Format::S8 => u64::from(i32::from(raw[0] as i8).cast_unsigned()),
-                                Format::S16 => u64::from(
-                                    i32::from(i16::from_le_bytes([raw[0], raw[1]])).cast_unsigned(),
-                                ),
-                                _ => u64::from_le_bytes(raw),
-                            };
-                            let got = if format == Format::B64 {
-                                machine.output64(element as u32, lane)
-                            } else {
-                                u64::from(machine.output(element as u32, lane))
-                            };
-                            assert_eq!(
-                                got, expected,
-                                "{format:?} at {start} in lane {lane} at {name}"
-                            );
+            let mut machine = machine(&program, level, LANES);
+            for pattern in patterns {
+                (0..LANES).for_each(|lane| machine.set_input(0, lane, pattern(lane)));
+                run(&mut machine, LANES, &resources);
+                for lane in 0..LANES {
+                    for element in 0..count {
+                        let size = u64::from(format.bytes());
+                        let start =
+                            u64::from(pattern(lane)) + u64::from(offset) + element as u64 * size;
+                        let valid = start + size <= 1000 && start.is_multiple_of(size.min(4));
+                        let mut raw = [0; 8];
+                        if valid {
+                            let from = start as usize;
+                            raw[..size as usize]
+                                .copy_from_slice(&bytes[from..from + size as usize]);
                         }
+                        let expected = match format {
+                            Format::S8 => u64::from(i32::from(raw[0] as i8).cast_unsigned()),
+                            Format::S16 => u64::from(
+                                i32::from(i16::from_le_bytes([raw[0], raw[1]])).cast_unsigned(),
+                            ),
+                            _ => u64::from_le_bytes(raw),
+                        };
+                        let got = if format == Format::B64 {
+                            machine.output64(element as u32, lane)
+                        } else {
+                            u64::from(machine.output(element as u32, lane))
+                        };
+                        assert_eq!(
+                            got, expected,
+                            "{format:?} at {start} in lane {lane} at {name}"
+                        );
                     }
                 }
             }
@@ -128,8 +128,9 @@ fn loads_read_what_is_there_and_zero_beyond() {
     }
 }
 
-#[test]
-fn stores_touch_only_their_bytes_and_vanish_beyond() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn stores_touch_only_their_bytes_and_vanish_beyond(case: &Case) {
+    let (name, level) = level(case);
     let mut b = Builder::new();
     let address = b.input(0, Type::B32, Rate::Varying);
     let value = b.input(1, Type::B32, Rate::Varying);
@@ -138,47 +139,46 @@ fn stores_touch_only_their_bytes_and_vanish_beyond() {
     b.store(at(2, address, 0), Format::B32, &[value]);
     b.store(at(3, address, 0), Format::B32, &[value]);
     let program = b.finish().expect("a valid program");
-    for (name, level) in levels() {
-        let buffers: Vec<Option<BufferRange>> = (0..3)
-            .map(|_| Some(buffer(16, 40, &[u32::MAX; 20])))
-            .collect();
-        let mut machine = machine(&program, level, LANES);
-        for lane in 0..LANES {
-            // The last lanes aim beyond the range, and beyond all memory.
-            let target = if lane < 60 {
-                4 * lane as u32
-            } else {
-                u32::MAX - lane as u32
-            };
-            machine.set_input(0, lane, target);
-            machine.set_input(1, lane, 0x0100 + lane as u32);
-        }
-        let resources = Resources {
-            buffers: &buffers,
-            ..Resources::default()
+    let buffers: Vec<Option<BufferRange>> = (0..3)
+        .map(|_| Some(buffer(16, 40, &[u32::MAX; 20])))
+        .collect();
+    let mut machine = machine(&program, level, LANES);
+    for lane in 0..LANES {
+        // The last lanes aim beyond the range, and beyond all memory.
+        let target = if lane < 60 {
+            4 * lane as u32
+        } else {
+            u32::MAX - lane as u32
         };
-        run(&mut machine, 3, &resources);
-        run(&mut machine, LANES, &resources);
-        let [narrow, short, word] =
-            [0, 1, 2].map(|slot| contents(buffers[slot].as_ref().expect("bound"), 12));
-        assert_eq!(
-            narrow[..3],
-            [0xffff_ff00, 0xffff_ff01, 0xffff_ff02],
-            "{name}"
-        );
-        assert_eq!(short[1], 0x0101_0101, "{name}");
-        assert_eq!(word[..3], [0x100, 0x101, 0x102], "{name}");
-        assert_eq!(word[9], 0x109, "{name}");
-        assert_eq!(
-            [narrow[10], short[10], word[10]],
-            [u32::MAX; 3],
-            "beyond the range at {name}"
-        );
+        machine.set_input(0, lane, target);
+        machine.set_input(1, lane, 0x0100 + lane as u32);
     }
+    let resources = Resources {
+        buffers: &buffers,
+        ..Resources::default()
+    };
+    run(&mut machine, 3, &resources);
+    run(&mut machine, LANES, &resources);
+    let [narrow, short, word] =
+        [0, 1, 2].map(|slot| contents(buffers[slot].as_ref().expect("bound"), 12));
+    assert_eq!(
+        narrow[..3],
+        [0xffff_ff00, 0xffff_ff01, 0xffff_ff02],
+        "{name}"
+    );
+    assert_eq!(short[1], 0x0101_0101, "{name}");
+    assert_eq!(word[..3], [0x100, 0x101, 0x102], "{name}");
+    assert_eq!(word[9], 0x109, "{name}");
+    assert_eq!(
+        [narrow[10], short[10], word[10]],
+        [u32::MAX; 3],
+        "beyond the range at {name}"
+    );
 }
 
-#[test]
-fn helpers_and_inactive_lanes_write_nothing() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn helpers_and_inactive_lanes_write_nothing(case: &Case) {
+    let (name, level) = level(case);
     let mut b = Builder::new();
     let lane = b.lane_index();
     let (two, one) = (b.u32(2), b.u32(1));
@@ -192,47 +192,46 @@ fn helpers_and_inactive_lanes_write_nothing() {
     let order = b.output(1, Type::B32);
     b.assign(order, old);
     let program = b.finish().expect("a valid program");
-    for (name, level) in levels() {
-        let buffers = [Some(buffer(0, 256, &[])), Some(buffer(0, 4, &[]))];
-        let resources = Resources {
-            buffers: &buffers,
-            ..Resources::default()
-        };
-        let mut machine = machine(&program, level, LANES);
-        let mut helpers = LaneMask::none();
-        helpers.set(3, true);
-        machine
-            .run(
-                &LaneMask::first(20),
-                &helpers,
-                &resources,
-                Watchdog::default(),
-            )
-            .expect("it ends");
-        let written = contents(buffers[0].as_ref().expect("bound"), LANES);
-        for (lane, written) in written.into_iter().enumerate() {
-            assert_eq!(
-                written == 1,
-                lane < 20 && lane != 3,
-                "lane {lane} at {name}"
-            );
-            assert_eq!(
-                machine.output(0, lane) != 0,
-                lane == 3,
-                "lane {lane} at {name}"
-            );
-        }
-        assert_eq!(contents(buffers[1].as_ref().expect("bound"), 1), [19]);
+    let buffers = [Some(buffer(0, 256, &[])), Some(buffer(0, 4, &[]))];
+    let resources = Resources {
+        buffers: &buffers,
+        ..Resources::default()
+    };
+    let mut machine = machine(&program, level, LANES);
+    let mut helpers = LaneMask::none();
+    helpers.set(3, true);
+    machine
+        .run(
+            &LaneMask::first(20),
+            &helpers,
+            &resources,
+            Watchdog::default(),
+        )
+        .expect("it ends");
+    let written = contents(buffers[0].as_ref().expect("bound"), LANES);
+    for (lane, written) in written.into_iter().enumerate() {
         assert_eq!(
-            [machine.output(1, 2), machine.output(1, 4)],
-            [2, 3],
-            "atomics go in order of lanes"
+            written == 1,
+            lane < 20 && lane != 3,
+            "lane {lane} at {name}"
+        );
+        assert_eq!(
+            machine.output(0, lane) != 0,
+            lane == 3,
+            "lane {lane} at {name}"
         );
     }
+    assert_eq!(contents(buffers[1].as_ref().expect("bound"), 1), [19]);
+    assert_eq!(
+        [machine.output(1, 2), machine.output(1, 4)],
+        [2, 3],
+        "atomics go in order of lanes"
+    );
 }
 
-#[test]
-fn atomics_give_the_old_value_and_change_memory() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn atomics_give_the_old_value_and_change_memory(case: &Case) {
+    let (_, level) = level(case);
     let ops = [
         (AtomicOp::IAdd, 5u32, 7u32, 12u32),
         (AtomicOp::SMin, 5, 0xffff_fff0, 0xffff_fff0),
@@ -266,28 +265,27 @@ fn atomics_give_the_old_value_and_change_memory() {
             }
             let program = b.finish().expect("a valid program");
             let buffers = [Some(buffer(0, 16, &[]))];
-            for (_, level) in levels() {
-                let mut machine = machine(&program, level, 16);
-                run(
-                    &mut machine,
-                    1,
-                    &Resources {
-                        buffers: &buffers,
-                        ..Resources::default()
-                    },
-                );
-                assert_eq!(
-                    [machine.output(0, 0), machine.output(1, 0)],
-                    [before, after],
-                    "{op:?}"
-                );
-            }
+            let mut machine = machine(&program, level, 16);
+            run(
+                &mut machine,
+                1,
+                &Resources {
+                    buffers: &buffers,
+                    ..Resources::default()
+                },
+            );
+            assert_eq!(
+                [machine.output(0, 0), machine.output(1, 0)],
+                [before, after],
+                "{op:?}"
+            );
         }
     }
 }
 
-#[test]
-fn wide_atomics_and_compare_exchange() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn wide_atomics_and_compare_exchange(case: &Case) {
+    let (_, level) = level(case);
     let mut b = Builder::new();
     let lane = b.lane_index();
     let wide = b.compute(Op::UToU64, &[lane]);
@@ -317,28 +315,27 @@ fn wide_atomics_and_compare_exchange() {
     let out = b.output(1, Type::B32);
     b.assign(out, seen);
     let program = b.finish().expect("a valid program");
-    for (_, level) in levels() {
-        let buffers = [Some(buffer(0, 16, &[]))];
-        let mut machine = machine(&program, level, 16);
-        run(
-            &mut machine,
-            4,
-            &Resources {
-                buffers: &buffers,
-                ..Resources::default()
-            },
-        );
-        assert_eq!(machine.output64(0, 3), 3 * (1 << 40) + 3);
-        assert_eq!([0, 1, 2].map(|lane| machine.output(1, lane)), [0, 1, 1]);
-        assert_eq!(
-            contents(buffers[0].as_ref().expect("bound"), 4),
-            [1, 0, 6, 4 << 8]
-        );
-    }
+    let buffers = [Some(buffer(0, 16, &[]))];
+    let mut machine = machine(&program, level, 16);
+    run(
+        &mut machine,
+        4,
+        &Resources {
+            buffers: &buffers,
+            ..Resources::default()
+        },
+    );
+    assert_eq!(machine.output64(0, 3), 3 * (1 << 40) + 3);
+    assert_eq!([0, 1, 2].map(|lane| machine.output(1, lane)), [0, 1, 1]);
+    assert_eq!(
+        contents(buffers[0].as_ref().expect("bound"), 4),
+        [1, 0, 6, 4 << 8]
+    );
 }
 
-#[test]
-fn workgroup_memory_is_shared_between_lanes_and_starts_as_zero() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn workgroup_memory_is_shared_between_lanes_and_starts_as_zero(case: &Case) {
+    let (_, level) = level(case);
     let mut b = Builder::new();
     let base = b.allocate_shared(4 * LANES as u32, 4);
     let lane = b.lane_index();
@@ -359,18 +356,16 @@ fn workgroup_memory_is_shared_between_lanes_and_starts_as_zero() {
     let out = b.output(0, Type::B32);
     b.assign(out, sum);
     let program = b.finish().expect("a valid program");
-    for (_, level) in levels() {
-        let mut machine = machine(&program, level, LANES);
-        for _ in 0..2 {
-            run(&mut machine, LANES, &Resources::default());
-            (0..LANES)
-                .for_each(|lane| assert_eq!(machine.output(0, lane) as usize, LANES - 1 - lane));
-        }
+    let mut machine = machine(&program, level, LANES);
+    for _ in 0..2 {
+        run(&mut machine, LANES, &Resources::default());
+        (0..LANES).for_each(|lane| assert_eq!(machine.output(0, lane) as usize, LANES - 1 - lane));
     }
 }
 
-#[test]
-fn push_constants_and_descriptor_arrays() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn push_constants_and_descriptor_arrays(case: &Case) {
+    let (_, level) = level(case);
     let mut b = Builder::new();
     let index = b.input(0, Type::B32, Rate::Varying);
     let array = Binding {
@@ -416,21 +411,19 @@ fn push_constants_and_descriptor_arrays() {
         push_constants: &push,
         ..Resources::default()
     };
-    for (_, level) in levels() {
-        let mut machine = machine(&program, level, 16);
-        (0..16).for_each(|lane| machine.set_input(0, lane, lane as u32));
-        run(&mut machine, 16, &resources);
-        // Bind point 3 is empty; what lies beyond the array is not reached.
-        assert_eq!(
-            [0, 1, 2, 3, 15].map(|lane| machine.output(0, lane)),
-            [10, 20, 0, 0, 0]
-        );
-        assert_eq!(
-            [0, 1, 2, 3, 15].map(|lane| machine.output(1, lane)),
-            [4, 8, 0, 0, 0]
-        );
-        assert_eq!([machine.output(2, 5), machine.output(3, 5)], [2, 3]);
-    }
+    let mut machine = machine(&program, level, 16);
+    (0..16).for_each(|lane| machine.set_input(0, lane, lane as u32));
+    run(&mut machine, 16, &resources);
+    // Bind point 3 is empty; what lies beyond the array is not reached.
+    assert_eq!(
+        [0, 1, 2, 3, 15].map(|lane| machine.output(0, lane)),
+        [10, 20, 0, 0, 0]
+    );
+    assert_eq!(
+        [0, 1, 2, 3, 15].map(|lane| machine.output(1, lane)),
+        [4, 8, 0, 0, 0]
+    );
+    assert_eq!([machine.output(2, 5), machine.output(3, 5)], [2, 3]);
 }
 
 struct OneRange(BufferRange);
@@ -444,8 +437,9 @@ impl GlobalMemory for OneRange {
     }
 }
 
-#[test]
-fn device_addresses_reach_their_buffer_and_nothing_else() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn device_addresses_reach_their_buffer_and_nothing_else(case: &Case) {
+    let (_, level) = level(case);
     let mut b = Builder::new();
     let address = b.input(0, Type::B64, Rate::Varying);
     let global = Address {
@@ -459,26 +453,24 @@ fn device_addresses_reach_their_buffer_and_nothing_else() {
     b.store(global, Format::B32, &[value]);
     let program = b.finish().expect("a valid program");
     let memory = OneRange(buffer(0, 16, &[1, 2, 3, 4]));
-    for (_, level) in levels() {
-        let mut machine = machine(&program, level, 16);
-        let addresses = [1 << 40, (1 << 40) + 8, (1 << 40) + 12, 0, u64::MAX];
-        addresses
-            .iter()
-            .enumerate()
-            .for_each(|(lane, address)| machine.set_input64(0, lane, *address));
-        run(
-            &mut machine,
-            5,
-            &Resources {
-                global: &memory,
-                ..Resources::default()
-            },
-        );
-        assert_eq!(
-            [0, 1, 2, 3, 4].map(|lane| machine.output(0, lane)),
-            [2, 4, 0, 0, 0]
-        );
-    }
+    let mut machine = machine(&program, level, 16);
+    let addresses = [1 << 40, (1 << 40) + 8, (1 << 40) + 12, 0, u64::MAX];
+    addresses
+        .iter()
+        .enumerate()
+        .for_each(|(lane, address)| machine.set_input64(0, lane, *address));
+    run(
+        &mut machine,
+        5,
+        &Resources {
+            global: &memory,
+            ..Resources::default()
+        },
+    );
+    assert_eq!(
+        [0, 1, 2, 3, 4].map(|lane| machine.output(0, lane)),
+        [2, 4, 0, 0, 0]
+    );
 }
 
 /// Records which lanes wrote which image, and reads back the coordinates.
@@ -533,8 +525,9 @@ impl ImageUnit for Recorder {
     }
 }
 
-#[test]
-fn image_instructions_ask_once_for_each_image() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn image_instructions_ask_once_for_each_image(case: &Case) {
+    let (_, level) = level(case);
     let mut b = Builder::new();
     let index = b.input(0, Type::B32, Rate::Varying);
     let lane = b.lane_index();
@@ -570,25 +563,23 @@ fn image_instructions_ask_once_for_each_image() {
         b.assign(out, value);
     }
     let program = b.finish().expect("a valid program");
-    for (_, level) in levels() {
-        let recorder = Arc::new(Recorder(Mutex::new(Vec::new())));
-        let mut machine = machine(&program, level, 16);
-        (0..16).for_each(|lane| machine.set_input(0, lane, u32::from(lane % 4 == 3)));
-        run(
-            &mut machine,
-            10,
-            &Resources {
-                images: &*recorder,
-                ..Resources::default()
-            },
-        );
-        assert_eq!(
-            *recorder.0.lock().expect("not poisoned"),
-            [(7, 0b11_0111_0111), (8, 0b00_1000_1000)]
-        );
-        assert_eq!(
-            [0, 1, 2, 3].map(|slot| machine.output(slot, 7)),
-            [7, 1, 8, 0b1000_1000]
-        );
-    }
+    let recorder = Arc::new(Recorder(Mutex::new(Vec::new())));
+    let mut machine = machine(&program, level, 16);
+    (0..16).for_each(|lane| machine.set_input(0, lane, u32::from(lane % 4 == 3)));
+    run(
+        &mut machine,
+        10,
+        &Resources {
+            images: &*recorder,
+            ..Resources::default()
+        },
+    );
+    assert_eq!(
+        *recorder.0.lock().expect("not poisoned"),
+        [(7, 0b11_0111_0111), (8, 0b00_1000_1000)]
+    );
+    assert_eq!(
+        [0, 1, 2, 3].map(|slot| machine.output(slot, 7)),
+        [7, 1, 8, 0b1000_1000]
+    );
 }

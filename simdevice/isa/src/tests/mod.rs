@@ -12,18 +12,18 @@ mod validation;
 use std::sync::Arc;
 
 use fearless_simd::Level;
+use gaurast_runner::Case;
 
 use super::exec::{Executable, LaneMask, Machine, Options, Watchdog};
 use super::ir::Program;
 use super::resources::Resources;
 use crate::level::SimdLevel;
 
-/// The SIMD levels of this processor, by name.
-fn levels() -> Vec<(&'static str, Level)> {
-    SimdLevel::supported()
-        .into_iter()
-        .filter_map(|(name, level)| Some((name, level.resolve()?)))
-        .collect()
+/// The SIMD level of a test's variant, and its name.
+fn level(case: &Case) -> (&str, Level) {
+    let name = case.variant();
+    let level = SimdLevel::from_name(name).and_then(SimdLevel::resolve);
+    (name, level.expect("a level of this processor"))
 }
 
 /// Whether a level's multiply-add rounds once.

@@ -6,7 +6,9 @@ use crate::op::{Kind, Op};
 use crate::resources::Resources;
 
 use super::reference::{apply, bool_bits};
-use super::{Random, fuses, levels, machine, run};
+use gaurast_runner::Case;
+
+use super::{Random, fuses, level, machine, run};
 
 const LANES: usize = 64;
 
@@ -162,7 +164,8 @@ fn is_approximate(op: Op) -> bool {
 
 /// Tests an operation on `cases` with `rates` of its operands: a case has one operand for each, uniform ones are the same in
 /// all lanes.
-fn check(op: Op, rates: &[Rate], cases: &[Vec<u64>]) {
+fn check(case: &Case, op: Op, rates: &[Rate], cases: &[Vec<u64>]) {
+    let (name, level) = level(case);
     let signature = op.signature();
     let mut b = Builder::new();
     let src: Vec<Reg> = signature
@@ -176,46 +179,44 @@ fn check(op: Op, rates: &[Rate], cases: &[Vec<u64>]) {
     let out = b.output(0, signature.result);
     b.assign(out, result);
     let program = b.finish().expect("a valid program");
-    for (name, level) in levels() {
-        let mut machine = machine(&program, level, LANES);
-        for batch in cases.chunks(LANES) {
-            let operand = |lane: usize, index: usize| {
-                let case = if rates[index] == Rate::Uniform {
-                    0
-                } else {
-                    lane % batch.len()
-                };
-                batch[case][index]
+    let mut machine = machine(&program, level, LANES);
+    for batch in cases.chunks(LANES) {
+        let operand = |lane: usize, index: usize| {
+            let case = if rates[index] == Rate::Uniform {
+                0
+            } else {
+                lane % batch.len()
             };
-            for (index, ty) in signature.operands.iter().enumerate() {
-                for lane in 0..LANES {
-                    if *ty == Type::B64 {
-                        machine.set_input64(index as u32, lane, operand(lane, index));
-                    } else {
-                        machine.set_input(index as u32, lane, operand(lane, index) as u32);
-                    }
+            batch[case][index]
+        };
+        for (index, ty) in signature.operands.iter().enumerate() {
+            for lane in 0..LANES {
+                if *ty == Type::B64 {
+                    machine.set_input64(index as u32, lane, operand(lane, index));
+                } else {
+                    machine.set_input(index as u32, lane, operand(lane, index) as u32);
                 }
             }
-            run(&mut machine, LANES, &Resources::default());
-            for lane in 0..LANES {
-                let operands: Vec<u64> = (0..src.len()).map(|index| operand(lane, index)).collect();
-                let expected = apply(op, &operands, fuses(name));
-                let got = match signature.result {
-                    Type::B64 => machine.output64(0, lane),
-                    _ => u64::from(machine.output(0, lane)),
-                };
-                assert!(
-                    same(op, got, expected),
-                    "{} of {operands:x?} at {name}, {rates:?}: {got:#x}, not {expected:#x}",
-                    op.name()
-                );
-            }
+        }
+        run(&mut machine, LANES, &Resources::default());
+        for lane in 0..LANES {
+            let operands: Vec<u64> = (0..src.len()).map(|index| operand(lane, index)).collect();
+            let expected = apply(op, &operands, fuses(name));
+            let got = match signature.result {
+                Type::B64 => machine.output64(0, lane),
+                _ => u64::from(machine.output(0, lane)),
+            };
+            assert!(
+                same(op, got, expected),
+                "{} of {operands:x?} at {name}, {rates:?}: {got:#x}, not {expected:#x}",
+                op.name()
+            );
         }
     }
 }
 
-#[test]
-fn exact_operations_equal_the_scalar_interpreter() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn exact_operations_equal_the_scalar_interpreter(case: &Case) {
     let mut random = Random(1);
     for op in Op::ALL.iter().copied().filter(|op| !is_approximate(*op)) {
         let operands = op.signature().operands;
@@ -229,7 +230,7 @@ fn exact_operations_equal_the_scalar_interpreter() {
                 case
             })
             .collect();
-        check(op, &vec![Rate::Varying; operands.len()], &pairs);
+        check(case, op, &vec![Rate::Varying; operands.len()], &pairs);
         for pattern in 1..1 << operands.len() {
             let rates: Vec<Rate> = (0..operands.len())
                 .map(|index| {
@@ -240,30 +241,31 @@ fn exact_operations_equal_the_scalar_interpreter() {
                     }
                 })
                 .collect();
-            check(op, &rates, &pairs[..pairs.len().min(2 * LANES)]);
+            check(case, op, &rates, &pairs[..pairs.len().min(2 * LANES)]);
         }
     }
 }
 
-#[test]
-fn bitfields_take_any_offset_and_count() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn bitfields_take_any_offset_and_count(case: &Case) {
     let mut cases = Vec::new();
     for offset in [0, 1, 7, 16, 31, 32, 40, u64::from(u32::MAX)] {
         for count in [0, 1, 8, 16, 31, 32, 33, u64::from(u32::MAX)] {
             cases.push(vec![0xdead_beef, 0x1234_5678, offset, count]);
         }
     }
-    check(Op::BitfieldInsert, &[Rate::Varying; 4], &cases);
+    check(case, Op::BitfieldInsert, &[Rate::Varying; 4], &cases);
     let cases: Vec<Vec<u64>> = cases
         .into_iter()
         .map(|case| vec![case[0], case[2], case[3]])
         .collect();
-    check(Op::BitfieldUExtract, &[Rate::Varying; 3], &cases);
-    check(Op::BitfieldSExtract, &[Rate::Varying; 3], &cases);
+    check(case, Op::BitfieldUExtract, &[Rate::Varying; 3], &cases);
+    check(case, Op::BitfieldSExtract, &[Rate::Varying; 3], &cases);
 }
 
-#[test]
-fn folding_gives_what_running_gives() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn folding_gives_what_running_gives(case: &Case) {
+    let (name, level) = level(case);
     let mut random = Random(2);
     for op in Op::ALL.iter().copied().filter(|op| !is_approximate(*op)) {
         let operands: Vec<u64> = op
@@ -272,20 +274,18 @@ fn folding_gives_what_running_gives() {
             .iter()
             .map(|ty| random.pick(&table(*ty)))
             .collect();
-        for (name, level) in levels() {
-            let as_bool = |bits: u64| u64::from(bits != 0);
-            let folded = crate::exec::evaluate(level, op, &operands);
-            let expected = apply(op, &operands, fuses(name));
-            let expected = if op.signature().result == Type::Bool {
-                as_bool(expected)
-            } else {
-                expected
-            };
-            assert!(
-                same(op, folded, expected),
-                "{} of {operands:x?} at {name}",
-                op.name()
-            );
-        }
+        let as_bool = |bits: u64| u64::from(bits != 0);
+        let folded = crate::exec::evaluate(level, op, &operands);
+        let expected = apply(op, &operands, fuses(name));
+        let expected = if op.signature().result == Type::Bool {
+            as_bool(expected)
+        } else {
+            expected
+        };
+        assert!(
+            same(op, folded, expected),
+            "{} of {operands:x?} at {name}",
+            op.name()
+        );
     }
 }

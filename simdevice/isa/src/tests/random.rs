@@ -12,7 +12,9 @@ use crate::op::Op;
 use crate::resources::Resources;
 
 use super::reference::Lane;
-use super::{Random, fuses, levels, machine, run};
+use gaurast_runner::Case;
+
+use super::{Random, fuses, level, machine, run};
 
 const LANES: usize = 80;
 /// A partial batch: the last lanes are not active.
@@ -423,7 +425,8 @@ fn set_inputs(machine: &mut Machine, seed: u64) {
     machine.fill_input(0, inputs(seed, 0)[0] as u32);
 }
 
-fn check(seed: u64, budget: usize) {
+fn check(case: &Case, seed: u64, budget: usize) {
+    let (name, level) = level(case);
     let as_written = Grower::new(seed, budget)
         .finish()
         .finish_as_written()
@@ -434,43 +437,35 @@ fn check(seed: u64, budget: usize) {
         .unwrap_or_else(|problem| panic!("seed {seed}: {problem}"));
     // Two batches, so that nothing may hang on what an earlier batch left behind.
     let rounds = [seed, seed + 1];
-    let [separate, fused] =
-        [false, true].map(|fused| rounds.map(|seed| expected(&as_written, seed, fused)));
-    for (name, level) in levels() {
-        let mut machine = machine(&program, level, LANES);
-        for (round, seed) in rounds.into_iter().enumerate() {
-            set_inputs(&mut machine, seed);
-            run(&mut machine, ACTIVE, &Resources::default());
-            let killed: LaneMask = machine.killed();
-            let wanted = if fuses(name) {
-                &fused[round]
-            } else {
-                &separate[round]
-            };
-            for (lane, (outputs, was_killed)) in wanted.iter().enumerate() {
-                for (output, expected) in as_written.outputs.iter().zip(outputs) {
-                    let got = machine.output(output.slot, lane);
-                    assert!(
-                        equal(got, *expected as u32),
-                        "seed {seed}, lane {lane}, output {} at {name}: {got:#x}, not {expected:#x}\n{program}",
-                        output.slot
-                    );
-                }
-                assert_eq!(
-                    killed.contains(lane),
-                    *was_killed,
-                    "seed {seed}, lane {lane} at {name}"
+    let wanted = rounds.map(|seed| expected(&as_written, seed, fuses(name)));
+    let mut machine = machine(&program, level, LANES);
+    for (round, seed) in rounds.into_iter().enumerate() {
+        set_inputs(&mut machine, seed);
+        run(&mut machine, ACTIVE, &Resources::default());
+        let killed: LaneMask = machine.killed();
+        for (lane, (outputs, was_killed)) in wanted[round].iter().enumerate() {
+            for (output, expected) in as_written.outputs.iter().zip(outputs) {
+                let got = machine.output(output.slot, lane);
+                assert!(
+                    equal(got, *expected as u32),
+                    "seed {seed}, lane {lane}, output {} at {name}: {got:#x}, not {expected:#x}\n{program}",
+                    output.slot
                 );
             }
+            assert_eq!(
+                killed.contains(lane),
+                *was_killed,
+                "seed {seed}, lane {lane} at {name}"
+            );
         }
     }
 }
 
-#[test]
-fn random_programs_equal_the_scalar_interpreter() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn random_programs_equal_the_scalar_interpreter(case: &Case) {
     // Short programs first: they are easier to read when they fail.
     for seed in 0..2500 {
-        check(seed, 4 + seed as usize / 25);
+        check(case, seed, 4 + seed as usize / 25);
     }
 }
 
@@ -500,7 +495,7 @@ fn mutate(block: &mut Block, registers: usize, random: &mut Random) {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn broken_programs_are_refused_or_run_without_harm() {
     let (mut refused, mut ended) = (0, 0);
     let watchdog = Watchdog {

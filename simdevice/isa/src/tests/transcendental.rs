@@ -5,7 +5,9 @@ use crate::ir::{Program, Rate, Type};
 use crate::op::Op;
 use crate::resources::Resources;
 
-use super::{Random, levels, machine, run};
+use gaurast_runner::Case;
+
+use super::{Random, level, machine, run};
 
 const LANES: usize = 1024;
 
@@ -20,21 +22,24 @@ fn program(op: Op) -> Program {
     b.finish().expect("a valid program")
 }
 
-/// Runs a function on arguments (pairs; the second is ignored if it takes one), at every level. Calls `check(level, x, y,
-/// result)`.
-fn for_each_result(op: Op, arguments: &[(f32, f32)], mut check: impl FnMut(&str, f32, f32, f32)) {
+/// Runs a function on arguments (pairs; the second is ignored if it takes one). Calls `check(x, y, result)`.
+fn for_each_result(
+    case: &Case,
+    op: Op,
+    arguments: &[(f32, f32)],
+    mut check: impl FnMut(f32, f32, f32),
+) {
+    let (_, level) = level(case);
     let program = program(op);
-    for (name, level) in levels() {
-        let mut machine = machine(&program, level, LANES);
-        for batch in arguments.chunks(LANES) {
-            for (lane, (x, y)) in batch.iter().enumerate() {
-                machine.set_input(0, lane, x.to_bits());
-                machine.set_input(1, lane, y.to_bits());
-            }
-            run(&mut machine, LANES, &Resources::default());
-            for (lane, (x, y)) in batch.iter().enumerate() {
-                check(name, *x, *y, f32::from_bits(machine.output(0, lane)));
-            }
+    let mut machine = machine(&program, level, LANES);
+    for batch in arguments.chunks(LANES) {
+        for (lane, (x, y)) in batch.iter().enumerate() {
+            machine.set_input(0, lane, x.to_bits());
+            machine.set_input(1, lane, y.to_bits());
+        }
+        run(&mut machine, LANES, &Resources::default());
+        for (lane, (x, y)) in batch.iter().enumerate() {
+            check(*x, *y, f32::from_bits(machine.output(0, lane)));
         }
     }
 }
@@ -57,15 +62,17 @@ fn samples(low: f32, high: f32) -> Vec<(f32, f32)> {
 
 /// Asserts that the error is at most `bound(x, exact)`, an absolute number; infinities and NaN must agree.
 fn check_error(
+    case: &Case,
     op: Op,
     arguments: &[(f32, f32)],
     exact: fn(f64, f64) -> f64,
     bound: impl Fn(f64, f64) -> f64,
 ) {
-    for_each_result(op, arguments, |name, x, y, got| {
+    let level = case.variant();
+    for_each_result(case, op, arguments, |x, y, got| {
         let expected = exact(f64::from(x), f64::from(y));
         let case = format!(
-            "{}({x:e}, {y:e}) at {name}: {got:e}, not {expected:e}",
+            "{}({x:e}, {y:e}) at {level}: {got:e}, not {expected:e}",
             op.name()
         );
         if expected.is_nan() {
@@ -98,22 +105,34 @@ fn ulps(count: f64) -> impl Fn(f64, f64) -> f64 {
     move |_, expected| count * ulp(expected)
 }
 
-#[test]
-fn exponentials_and_logarithms() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn exponentials_and_logarithms(case: &Case) {
     let all = samples(0.0, f32::MAX);
-    check_error(Op::FExp, &all, |x, _| x.exp(), ulps(2.0));
-    check_error(Op::FExp2, &all, |x, _| x.exp2(), ulps(2.0));
-    check_error(Op::FLog, &all, |x, _| x.ln(), ulps(2.0));
-    check_error(Op::FLog2, &all, |x, _| x.log2(), ulps(3.0));
+    check_error(case, Op::FExp, &all, |x, _| x.exp(), ulps(2.0));
+    check_error(case, Op::FExp2, &all, |x, _| x.exp2(), ulps(2.0));
+    check_error(case, Op::FLog, &all, |x, _| x.ln(), ulps(2.0));
+    check_error(case, Op::FLog2, &all, |x, _| x.log2(), ulps(3.0));
     let near_one = samples(0.5, 2.0);
-    check_error(Op::FLog, &near_one, |x, _| x.ln(), ulps(2.0));
-    check_error(Op::FLog2, &near_one, |x, _| x.log2(), ulps(3.0));
-    check_error(Op::FExp, &samples(1e-3, 100.0), |x, _| x.exp(), ulps(2.0));
-    check_error(Op::FExp2, &samples(1e-3, 150.0), |x, _| x.exp2(), ulps(2.0));
+    check_error(case, Op::FLog, &near_one, |x, _| x.ln(), ulps(2.0));
+    check_error(case, Op::FLog2, &near_one, |x, _| x.log2(), ulps(3.0));
+    check_error(
+        case,
+        Op::FExp,
+        &samples(1e-3, 100.0),
+        |x, _| x.exp(),
+        ulps(2.0),
+    );
+    check_error(
+        case,
+        Op::FExp2,
+        &samples(1e-3, 150.0),
+        |x, _| x.exp2(),
+        ulps(2.0),
+    );
 }
 
-#[test]
-fn powers() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn powers(case: &Case) {
     let mut random = Random(3);
     let mut arguments: Vec<(f32, f32)> = (0..40_000)
         .map(|_| {
@@ -131,6 +150,7 @@ fn powers() {
     ]);
     // As exp2(y log2(x)): 3 ULP of the logarithm, scaled by y, and 3 + 2|y log2(x)| ULP of the exponential.
     check_error(
+        case,
         Op::FPow,
         &arguments,
         |x, y| x.powf(y),
@@ -139,26 +159,32 @@ fn powers() {
             (3.0 + 4.0 * exponent) * ulp(expected)
         },
     );
-    for_each_result(Op::FPow, &[(-2.0, 2.0), (-1.0, 0.5)], |_, _, _, got| {
+    for_each_result(case, Op::FPow, &[(-2.0, 2.0), (-1.0, 0.5)], |_, _, got| {
         assert!(got.is_nan());
     });
 }
 
-#[test]
-fn trigonometric_functions() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn trigonometric_functions(case: &Case) {
     let turns = samples(1e-6, std::f32::consts::PI);
     let absolute = |_: f64, expected: f64| 2.0 * ulp(expected).max(2f64.powi(-24));
-    check_error(Op::FSin, &turns, |x, _| x.sin(), absolute);
-    check_error(Op::FCos, &turns, |x, _| x.cos(), absolute);
+    check_error(case, Op::FSin, &turns, |x, _| x.sin(), absolute);
+    check_error(case, Op::FCos, &turns, |x, _| x.cos(), absolute);
     let far = samples(1.0, 8000.0);
     let far_absolute = |x: f64, expected: f64| absolute(x, expected) + x.abs() * 2f64.powi(-38);
-    check_error(Op::FSin, &far, |x, _| x.sin(), far_absolute);
-    check_error(Op::FCos, &far, |x, _| x.cos(), far_absolute);
+    check_error(case, Op::FSin, &far, |x, _| x.sin(), far_absolute);
+    check_error(case, Op::FCos, &far, |x, _| x.cos(), far_absolute);
     let huge = samples(8200.0, f32::MAX);
-    check_error(Op::FSin, &huge, |x, _| x.sin(), absolute);
-    check_error(Op::FCos, &huge, |x, _| x.cos(), absolute);
-    check_error(Op::FTan, &huge, |x, _| x.tan(), ulps(2.0));
-    check_error(Op::FTan, &samples(1e-6, 1.5), |x, _| x.tan(), ulps(4.0));
+    check_error(case, Op::FSin, &huge, |x, _| x.sin(), absolute);
+    check_error(case, Op::FCos, &huge, |x, _| x.cos(), absolute);
+    check_error(case, Op::FTan, &huge, |x, _| x.tan(), ulps(2.0));
+    check_error(
+        case,
+        Op::FTan,
+        &samples(1e-6, 1.5),
+        |x, _| x.tan(),
+        ulps(4.0),
+    );
     let specials = [
         (0.0, 0.0),
         (-0.0, 0.0),
@@ -166,7 +192,7 @@ fn trigonometric_functions() {
         (f32::NAN, 0.0),
     ];
     for op in [Op::FSin, Op::FCos, Op::FTan] {
-        for_each_result(op, &specials, |_, x, _, got| {
+        for_each_result(case, op, &specials, |x, _, got| {
             assert_eq!(got.is_nan(), !x.is_finite(), "{} of {x}", op.name());
             assert!(
                 op == Op::FCos || x != 0.0 || got.to_bits() == x.to_bits(),
@@ -177,26 +203,29 @@ fn trigonometric_functions() {
     }
 }
 
-#[test]
-fn inverse_trigonometric_functions() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn inverse_trigonometric_functions(case: &Case) {
     let unit = samples(1e-6, 1.0);
-    check_error(Op::FAsin, &unit, |x, _| x.asin(), ulps(4.0));
+    check_error(case, Op::FAsin, &unit, |x, _| x.asin(), ulps(4.0));
     check_error(
+        case,
         Op::FAcos,
         &unit,
         |x, _| x.acos(),
         |_, expected| 4.0 * ulp(expected.max(0.1)),
     );
     check_error(
+        case,
         Op::FAtan,
         &samples(1e-6, f32::MAX),
         |x, _| x.atan(),
         ulps(4.0),
     );
     for_each_result(
+        case,
         Op::FAsin,
         &[(1.5, 0.0), (-2.0, 0.0), (f32::NAN, 0.0)],
-        |_, _, _, got| assert!(got.is_nan()),
+        |_, _, got| assert!(got.is_nan()),
     );
     let mut random = Random(4);
     let mut points: Vec<(f32, f32)> = (0..40_000)
@@ -216,32 +245,48 @@ fn inverse_trigonometric_functions() {
             .iter()
             .flat_map(|y| corners.iter().map(|x| (*y, *x))),
     );
-    check_error(Op::FAtan2, &points, f64::atan2, ulps(4.0));
+    check_error(case, Op::FAtan2, &points, f64::atan2, ulps(4.0));
 }
 
-#[test]
-fn hyperbolic_functions() {
-    check_error(Op::FSinh, &samples(1e-6, 100.0), |x, _| x.sinh(), ulps(4.0));
-    check_error(Op::FCosh, &samples(1e-6, 100.0), |x, _| x.cosh(), ulps(4.0));
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn hyperbolic_functions(case: &Case) {
     check_error(
+        case,
+        Op::FSinh,
+        &samples(1e-6, 100.0),
+        |x, _| x.sinh(),
+        ulps(4.0),
+    );
+    check_error(
+        case,
+        Op::FCosh,
+        &samples(1e-6, 100.0),
+        |x, _| x.cosh(),
+        ulps(4.0),
+    );
+    check_error(
+        case,
         Op::FTanh,
         &samples(1e-6, f32::MAX),
         |x, _| x.tanh(),
         ulps(4.0),
     );
     check_error(
+        case,
         Op::FAsinh,
         &samples(1e-6, f32::MAX),
         |x, _| x.asinh(),
         ulps(4.0),
     );
     check_error(
+        case,
         Op::FAcosh,
         &samples(1.0, f32::MAX),
         |x, _| x.acosh(),
         ulps(4.0),
     );
     check_error(
+        case,
         Op::FAtanh,
         &samples(1e-6, 0.999_999),
         |x, _| x.atanh(),
@@ -249,16 +294,17 @@ fn hyperbolic_functions() {
     );
 }
 
-#[test]
-fn inverse_square_roots() {
+#[gaurast_runner::test(each = gaurast_runner::simd_levels())]
+fn inverse_square_roots(case: &Case) {
     let bound = |_: f64, expected: f64| 2.0 * ulp(expected);
     check_error(
+        case,
         Op::FInverseSqrt,
         &samples(f32::MIN_POSITIVE, f32::MAX),
         |x, _| 1.0 / x.sqrt(),
         bound,
     );
-    for_each_result(Op::FInverseSqrt, &[(0.0, 0.0)], |_, _, _, got| {
+    for_each_result(case, Op::FInverseSqrt, &[(0.0, 0.0)], |_, _, got| {
         assert_eq!(got, f32::INFINITY);
     });
 }

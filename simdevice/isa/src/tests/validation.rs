@@ -12,7 +12,7 @@ use crate::ir::{Address, Format, Label, Rate, Reg, Space, Statement, Type};
 use crate::op::Op;
 use crate::resources::Resources;
 
-#[test]
+#[gaurast_runner::test]
 fn misuse_of_the_builder_is_an_error() {
     let misuses: [fn(&mut Builder); 8] = [
         |b| b.end(),
@@ -37,7 +37,7 @@ fn misuse_of_the_builder_is_an_error() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn wrong_operands_are_errors() {
     let wrongs: [fn(&mut Builder); 12] = [
         |b| {
@@ -119,7 +119,7 @@ fn wrong_operands_are_errors() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn options_out_of_range_are_errors() {
     let program = Builder::new().finish().expect("an empty program is valid");
     for (lanes, subgroup_size) in [
@@ -152,7 +152,7 @@ fn endless() -> Machine {
     ))
 }
 
-#[test]
+#[gaurast_runner::test]
 fn an_endless_loop_is_stopped() {
     let limit = Duration::from_millis(20);
     let watchdog = Watchdog {
@@ -168,7 +168,7 @@ fn an_endless_loop_is_stopped() {
     assert_eq!(stopped, Err(Stopped::TimedOut { limit }));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_cancelled_batch_stops() {
     let cancel = AtomicBool::new(true);
     let watchdog = Watchdog {
@@ -184,7 +184,7 @@ fn a_cancelled_batch_stops() {
     assert_eq!(stopped, Err(Stopped::Cancelled));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_batch_without_lanes_does_nothing() {
     let done = endless().run(
         &LaneMask::none(),
@@ -195,7 +195,7 @@ fn a_batch_without_lanes_does_nothing() {
     assert_eq!(done, Ok(()));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn nothing_is_kept_that_nobody_reads() {
     let mut b = Builder::new();
     let x = b.input(0, Type::B32, Rate::Varying);
@@ -229,7 +229,7 @@ fn nothing_is_kept_that_nobody_reads() {
     assert_eq!(work.occupancy(), 0.75);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn contraction_fuses_products_unless_their_factors_have_changed() {
     let fused = |change: bool, op: Op, product_first: bool| {
         let mut b = Builder::new();

@@ -11,14 +11,13 @@ use super::{CountsError, Report, WORKER};
 use crate::worker::SKIPS;
 
 /// The SIMD levels of `GAURAST_SIMD`.
-const LEVELS: [&str; 4] = ["sse2", "sse4.2", "avx2", "avx512"];
+const LEVELS: [&str; 3] = ["sse2", "avx2", "avx512"];
 
 /// Whether this processor has a level.
 pub(super) fn is_there(level: &str) -> bool {
     #[cfg(target_arch = "x86_64")]
     // The features that the levels are named after stand for all that each needs.
     return match level {
-        "sse4.2" => std::arch::is_x86_feature_detected!("sse4.2"),
         "avx2" => std::arch::is_x86_feature_detected!("avx2"),
         "avx512" => std::arch::is_x86_feature_detected!("avx512vbmi2"),
         _ => true,

@@ -24,7 +24,6 @@ const CRATES: [&str; 2] = ["simdevice", "isa"];
 /// Names of the levels' types, and what the levels are called.
 const LEVELS: [(&str, &str); 4] = [
     ("::Sse2", "sse2"),
-    ("::Sse4_2", "sse4.2"),
     ("::Avx2", "avx2"),
     ("::Avx512", "avx512"),
 ];

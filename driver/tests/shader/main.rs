@@ -1,0 +1,13 @@
+//! The translation of SPIR-V to programs of the shader cores, and what those compute.
+
+mod common;
+mod execution;
+mod functions;
+mod fuzz;
+mod interfaces;
+mod limits;
+mod translation;
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}

@@ -1,0 +1,137 @@
+//! `gaurast` where the system fails it: interrupted, without room, with nobody to read. What was there before stays,
+//! nothing is left half-written, and there is one sentence.
+
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+use tempfile::TempDir;
+
+const SIGINT: i32 = 2;
+
+fn gaurast(folder: &TempDir, arguments: &[&str]) -> Command {
+    let mut command = Command::new("env");
+    command
+        // Whoever runs the tests in the background has interrupts ignored, and so would what they start.
+        .args(["--default-signal=INT", env!("CARGO_BIN_EXE_gaurast")])
+        .args(arguments)
+        .current_dir(folder)
+        .env_remove("RUST_LOG")
+        .stdin(Stdio::null());
+    command
+}
+
+fn files(folder: &TempDir) -> usize {
+    std::fs::read_dir(folder).expect("readable").count()
+}
+
+fn read(path: &Path) -> Vec<u8> {
+    std::fs::read(path).expect("readable")
+}
+
+/// The run failed with exit code 1 and one line that begins with `message`.
+#[track_caller]
+fn failed(output: &Output, message: &str) {
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert_eq!(stderr.lines().count(), 1, "{stderr}");
+    assert!(stderr.starts_with(message), "{stderr} is not {message}");
+}
+
+fn interrupt(child: &Child) {
+    let kill = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(kill.expect("there is kill").success());
+}
+
+#[gaurast_runner::test]
+fn an_interrupted_render_leaves_the_picture_that_was_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.exr");
+    let old: &[u8] = b"an earlier picture";
+    let mut interrupted = 0;
+    for step in 0..12 {
+        std::fs::write(&path, old).expect("written");
+        let arguments = ["render", "-q", "--size", "1500x1000", "-o", "a.exr"];
+        let mut child = gaurast(&folder, &arguments).spawn().expect("it starts");
+        // Wherever that meets it, from its first step to its last.
+        std::thread::sleep(Duration::from_millis(step * 90));
+        if child.try_wait().expect("its status").is_none() {
+            interrupt(&child);
+        }
+        let status = child.wait().expect("its status");
+        if status.success() {
+            image::open(&path).expect("a whole picture");
+        } else {
+            assert_eq!(status.signal(), Some(SIGINT), "{status}");
+            interrupted += 1;
+            let found = read(&path);
+            // It may have been interrupted after its last step.
+            assert!(
+                found == old || image::open(&path).is_ok(),
+                "{} bytes",
+                found.len()
+            );
+        }
+        assert_eq!(files(&folder), 1, "nothing is left beside it");
+    }
+    assert!(interrupted > 0);
+}
+
+#[gaurast_runner::test(needs = [gaurast_runner::Need::File("/dev/full")])]
+fn a_full_disk_is_one_sentence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::os::unix::fs::symlink("/dev/full", folder.path().join("a.png")).expect("a link");
+    let arguments = [
+        "render", "-q", "--size", "64x48", "-o", "b.png", "-o", "a.png",
+    ];
+    let output = gaurast(&folder, &arguments).output().expect("it starts");
+    failed(&output, "gaurast: a.png: No space left on device");
+    image::open(folder.path().join("b.png")).expect("the one before is whole");
+    assert_eq!(files(&folder), 2);
+}
+
+#[gaurast_runner::test]
+fn a_limit_of_file_sizes_is_one_sentence_and_keeps_what_was_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.exr");
+    std::fs::write(&path, "an earlier picture").expect("written");
+    let command = env!("CARGO_BIN_EXE_gaurast");
+    // In units of half a kibibyte, or one: the picture has three mebibytes.
+    let line = format!("ulimit -f 64; exec '{command}' render -q --size 500x400 -o a.exr");
+    let output = Command::new("sh")
+        .args(["-c", &line])
+        .current_dir(&folder)
+        .output()
+        .expect("there is a shell");
+    failed(&output, "gaurast: a.exr: File too large");
+    assert_eq!(read(&path), b"an earlier picture");
+    assert_eq!(files(&folder), 1);
+}
+
+#[gaurast_runner::test]
+fn a_closed_pipe_is_one_sentence_and_the_picture_is_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let closed = |arguments: &[&str]| {
+        let mut child = gaurast(&folder, arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("it starts");
+        drop(child.stdout.take());
+        child.wait_with_output().expect("it ends")
+    };
+    let output = closed(&["render", "--size", "64x48", "-o", "a.png"]);
+    failed(
+        &output,
+        "gaurast: the pictures are written, but not the report: Broken pipe",
+    );
+    image::open(folder.path().join("a.png")).expect("a picture");
+    failed(
+        &closed(&["simulate", "--paper"]),
+        "gaurast: output: Broken pipe",
+    );
+    assert_eq!(files(&folder), 1);
+}

@@ -1,0 +1,13 @@
+//! The `gaurast` command, the renderer, scene files, and the C sample.
+
+mod c_program;
+mod command_line;
+mod given_files;
+#[cfg(target_os = "linux")]
+mod interruptions;
+mod renderer;
+mod scene_files;
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}

@@ -1,0 +1,76 @@
+//! The command line, as a user meets it.
+
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+fn bench(folder: &TempDir, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_gaurast-bench"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the program runs")
+}
+
+/// Benchmarks a small scene; the files are left in `folder`. Returns the table, the numbers as JSON, and the number of
+/// frames of each contender that the CSV file has.
+fn benchmark(folder: &TempDir) -> (String, serde_json::Value, impl Fn(&str) -> usize) {
+    let arguments = [
+        "frames",
+        "--count",
+        "300",
+        "--size",
+        "40x30",
+        "--runs",
+        "2",
+        "--threads",
+        "1",
+        "--csv",
+        "frames.csv",
+        "--json",
+        "frames.json",
+    ];
+    let output = bench(folder, &arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("written");
+    let json = serde_json::from_str(&read("frames.json")).expect("JSON");
+    let csv = read("frames.csv");
+    let frames = move |contender: &str| {
+        let cell = format!(",{contender},");
+        csv.lines().filter(|row| row.contains(&cell)).count()
+    };
+    (text, json, frames)
+}
+
+#[gaurast_runner::test]
+fn frames_are_benchmarked_and_held_against_the_oracle() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (text, json, frames) = benchmark(&folder);
+    for part in ["synthetic 300", "quads on gaurast", "raster", "project"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    // The first, and two more.
+    assert_eq!(["gaurast", "quads on gaurast"].map(frames), [3, 3]);
+    let series = json["scenes"][0]["series"].as_array().expect("series");
+    let error = |contender: &str| {
+        let of = series
+            .iter()
+            .find(|series| series["contender"] == contender);
+        of.expect("measured")["error"].clone()
+    };
+    let max = error("Gaurast")["max"].as_f64().expect("a number");
+    // A Gaussian that counts or not at the floor of alpha makes this much.
+    assert!(max < 2.0 / 255.0, "{max}");
+    let psnr = error("QuadsOnGaurast")["psnr"].as_f64().expect("a number");
+    assert!(psnr > 40.0, "{psnr}");
+}
+
+#[gaurast_runner::test(needs = [gaurast_runner::Need::Lavapipe])]
+fn lavapipe_is_benchmarked_where_it_is_installed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (text, _, frames) = benchmark(&folder);
+    assert!(text.contains("quads on lavapipe"), "{text}");
+    assert_eq!(frames("quads on lavapipe"), 3);
+}

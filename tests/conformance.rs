@@ -1,0 +1,17 @@
+//! What the driver does, held against the binary64 oracle, exact models, and other drivers.
+
+mod driver;
+mod gaussian;
+mod loader;
+mod shader;
+mod stress;
+mod triangles;
+
+/// The compiler of the shaders that are written in GLSL.
+const GLSLANG: gaurast_runner::Need = gaurast_runner::Need::Program("glslangValidator");
+
+fn main() -> std::process::ExitCode {
+    // SAFETY: no other thread runs yet.
+    unsafe { triangles::devices::set_environment() };
+    gaurast_runner::main()
+}

@@ -1,0 +1,156 @@
+//! Deterministic runs of the fuzz targets (see `tests/fuzz`): scene files, Vulkan calls, packets and shader modules from
+//! bytes that are random, or seeds that are changed at random. Nothing panics, in whatever thread.
+//!
+//! `GAURAST_FUZZ_RUNS` says how many of each; the numbers of a failure's message make it happen again alone:
+//! `GAURAST_FUZZ_RUNS=1 GAURAST_FUZZ_FIRST=n`. Panics are the process's, and runs are shared by several processes.
+
+mod shader_modules;
+
+use std::ops::Range;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use gaurast_runner::{Case, shards};
+use gaurast_tests::fuzzing::packets::Player;
+use gaurast_tests::fuzzing::{calls, loaders, mutate_bytes};
+use rand::seq::IndexedRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// What panicked, in whatever thread: the driver catches panics, so that an application never sees them.
+static PANICS: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+/// Keeps all panics of this process from now on, and prints them with where they come from.
+fn watch_panics() {
+    std::panic::set_hook(Box::new(|info| {
+        eprintln!("{info}\n{}", std::backtrace::Backtrace::force_capture());
+        let mut panics = PANICS.lock().unwrap_or_else(PoisonError::into_inner);
+        panics.push(info.to_string());
+    }));
+}
+
+/// The panics since the last call.
+fn panics() -> Vec<String> {
+    std::mem::take(&mut *PANICS.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// The numbers of the runs that are a shard's, of as many as `GAURAST_FUZZ_RUNS` says, or `usual`.
+fn runs(case: &Case, usual: u64) -> Range<u64> {
+    let number = |variable, otherwise| match std::env::var(variable) {
+        Ok(text) => text.parse().expect("a number"),
+        Err(_) => otherwise,
+    };
+    let first: u64 = number("GAURAST_FUZZ_FIRST", 0);
+    let Range { start, end } = case.shard().range(number("GAURAST_FUZZ_RUNS", usual));
+    first + start..first + end
+}
+
+/// Reports whether so many runs are enough for all outcomes.
+fn are_many(runs: &Range<u64>) -> bool {
+    runs.end - runs.start >= 100
+}
+
+/// The files that fuzzing of a target begins with.
+fn corpus(name: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("fuzz/corpus")
+        .join(name);
+    let mut paths: Vec<_> = std::fs::read_dir(folder)
+        .expect("a corpus")
+        .map(|entry| entry.expect("an entry").path())
+        .collect();
+    paths.sort();
+    paths
+        .iter()
+        .map(|path| std::fs::read(path).expect("readable"))
+        .collect()
+}
+
+/// Runs a target on a shard's seeds, then on changed ones and on random bytes of up to `longest`.
+fn fuzz(
+    case: &Case,
+    runs: Range<u64>,
+    seeds: &[Vec<u8>],
+    longest: usize,
+    mut target: impl FnMut(&[u8]),
+) {
+    watch_panics();
+    for (number, seed) in seeds.iter().enumerate() {
+        if case.shard().has(number) {
+            target(seed);
+            let panics = panics();
+            assert!(panics.is_empty(), "seed {number}: {panics:?}");
+        }
+    }
+    for run in runs {
+        let mut random = ChaCha8Rng::seed_from_u64(run);
+        let data = if seeds.is_empty() || random.random_bool(0.3) {
+            let len = random.random_range(0..longest);
+            (0..len).map(|_| random.random()).collect()
+        } else {
+            let pick = |random: &mut ChaCha8Rng| seeds.choose(random).expect("some").clone();
+            let (seed, other) = (pick(&mut random), pick(&mut random));
+            mutate_bytes(&mut random, &seed, &other)
+        };
+        // A panic of this thread is no less one.
+        let ran = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| target(&data)));
+        let panics = panics();
+        assert!(ran.is_ok() && panics.is_empty(), "run {run}: {panics:?}");
+    }
+}
+
+#[gaurast_runner::test(each = shards(4), alone)]
+fn scene_files_are_read_or_refused(case: &Case) {
+    let runs = runs(case, 20_000);
+    let (mut read, mut refused) = (0, 0);
+    let seeds = [loaders::seeds(), corpus("scene_files")].concat();
+    fuzz(
+        case,
+        runs.clone(),
+        &seeds,
+        300,
+        |data| match loaders::load(data) {
+            Some(_) => read += 1,
+            None => refused += 1,
+        },
+    );
+    assert!(
+        !are_many(&runs) || read > refused / 50 && refused > 0,
+        "{read} read, {refused} refused"
+    );
+}
+
+#[gaurast_runner::test(each = shards(4), alone)]
+fn packets_are_executed_or_refused(case: &Case) {
+    let runs = runs(case, 4000);
+    let player = Player::new();
+    let (mut executed, mut refused) = (0, 0);
+    fuzz(case, runs.clone(), &corpus("packets"), 2000, |data| {
+        let fared = player.run(data);
+        executed += fared.executed;
+        refused += fared.refused;
+    });
+    assert!(
+        !are_many(&runs) || executed > refused / 4 && refused > 0,
+        "{executed} executed, {refused} refused"
+    );
+}
+
+#[gaurast_runner::test(each = shards(4), alone)]
+fn calls_succeed_or_fail(case: &Case) {
+    let runs = runs(case, 4000);
+    let (mut succeeded, mut failed, mut submitted, mut lost) = (0, 0, 0, Vec::new());
+    fuzz(case, runs.clone(), &corpus("calls"), 3000, |data| {
+        let ended = calls::run(data);
+        succeeded += ended.succeeded;
+        failed += ended.failed;
+        submitted += ended.submitted;
+        lost.extend(ended.lost);
+    });
+    assert!(
+        !are_many(&runs) || succeeded > failed && submitted > 0,
+        "{succeeded} succeeded, {failed} failed, {submitted} submitted"
+    );
+    // What is against the rules is refused where it is recorded, with a message, and nothing here takes long.
+    assert_eq!(lost, [""; 0], "devices were lost");
+}

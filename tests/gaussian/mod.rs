@@ -1,0 +1,21 @@
+//! Gaussian draws, from an application's calls to pixels.
+
+mod accuracy;
+mod approximations;
+mod cameras;
+mod depth_stencil;
+mod determinism;
+mod given_scenes;
+mod hybrid_scenes;
+mod instances;
+mod interleavings;
+mod popping;
+mod rasterization_modes;
+mod recorded_work;
+mod reference;
+mod shaded;
+mod what_ifs;
+
+/// Trained scenes of the real data.
+const SKULL: &str = "splats/skull.ply";
+const PLAYBOT: &str = "splats/playbot-125k.ply";

@@ -1,5 +1,0 @@
-//! Shader cores as a Vulkan application sees them.
-
-mod instructions;
-mod kernels;
-mod structured;
