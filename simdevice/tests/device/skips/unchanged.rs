@@ -47,7 +47,7 @@ fn few() -> Vec<Packet> {
     gaussians_in(false, 41, 300, OVER)
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_has_not_changed_is_drawn_as_it_was() {
     assert_eq!(reused(&mut few(), vec![nothing(), nothing()]), [0, 1, 1]);
     // Chunks are made for the second picture, and tell more of what is left out.
@@ -57,13 +57,13 @@ fn what_has_not_changed_is_drawn_as_it_was() {
     assert_eq!(reused(&mut placed_in_the_device(), vec![nothing()]), [0, 1]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_the_host_may_write_is_read_again() {
     let mut packets = gaussians_in(true, 43, 300, OVER);
     assert_eq!(reused(&mut packets, vec![nothing(), nothing()]), [0, 0, 0]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_change_is_seen() {
     let state = |change: fn(&mut GaussianState)| {
         of_begin(move |begin| change(Arc::make_mut(&mut begin.state)))
@@ -92,7 +92,7 @@ fn every_change_is_seen() {
     assert_eq!(reused(&mut few(), changes), expected);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_a_program_resolves_is_a_set_of_its_own() {
     let device = Arc::new(Device::new(&single()).unwrap());
     let mut processor = CommandProcessor::new(Arc::clone(&device));

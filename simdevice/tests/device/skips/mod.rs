@@ -2,14 +2,12 @@
 //!
 //! Every scene is drawn twice to a target, since some of what is saved is prepared by the first time.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod degrees;
 mod hidden;
 mod last_order;
 mod unchanged;
 
-use common::*;
+use crate::common::*;
 use simdevice::bindings::Bindings;
 use simdevice::counters::{Counter, Counters};
 use simdevice::geometry::DrawPipeline;
@@ -301,7 +299,7 @@ fn bounded_modes() -> Vec<(&'static str, Vec<Packet>)> {
 /// Makes a set's state or camera another mode's.
 type Change = fn(&mut GaussianBegin);
 
-#[test]
+#[gaurast_runner::test]
 fn every_mode_has_bounds_that_change_no_bit() {
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
     for (mode, packets) in bounded_modes() {
@@ -441,7 +439,7 @@ fn draw_as_without_skips(processor: &mut CommandProcessor, packets: &[Packet]) -
     processor.counters().since(&before)
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_skip_saves_work_and_changes_no_bit() {
     let mut saved = Counters::default();
     for (scene, packets, load) in scenes() {
@@ -464,7 +462,7 @@ fn every_skip_saves_work_and_changes_no_bit() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn without_skips_everything_is_worked_on() {
     for (scene, packets, load) in scenes() {
         let (_, counters) = draw(Skips::NONE, &packets, load);
@@ -518,7 +516,7 @@ fn chunks_built(passes: &[Counters]) -> Vec<u64> {
     built.collect()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn chunks_are_made_once() {
     let passes = draw_again(&single(), |_, _| {});
     assert_eq!(chunks_built(&passes), [0, 79, 0, 0]);
@@ -532,7 +530,7 @@ fn chunks_are_made_once() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn chunks_are_made_anew_when_the_memory_was_written() {
     let far = [0.0f32, 0.0, 1e3];
     let passes = draw_again(&single(), |pass, memory| {
@@ -544,7 +542,7 @@ fn chunks_are_made_anew_when_the_memory_was_written() {
     assert_eq!(chunks_built(&passes), [0, 79, 0, 79]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn chunks_stay_within_their_budget() {
     let config = Config {
         chunk_budget_bytes: 100_000,

@@ -60,7 +60,7 @@ fn dispatch(program: &Arc<ComputeProgram>, memory: &Arc<Allocation>, count: [u32
     }))
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_workgroup_runs_and_its_work_is_counted() {
     let device = device();
     let inputs = vec![Some(ComputeInput::WorkgroupId(0))];
@@ -99,7 +99,7 @@ fn every_workgroup_runs_and_its_work_is_counted() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_program_without_end_is_stopped() {
     let device = device();
     let mut endless = Program::default();

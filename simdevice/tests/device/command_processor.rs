@@ -1,8 +1,6 @@
 //! The command processor's states: what is out of place is an error, and leaves it usable.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use simdevice::command_processor::ExecutionError;
 use simdevice::packet::*;
 use simdevice::query::{QueryKind, QueryPool, QueryResult, host_time};
@@ -31,7 +29,7 @@ fn fill() -> Packet {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_needs_a_pass_is_refused_outside_of_one() {
     let mut processor = processor();
     let [begin, append, resolve] = &gaussians(1, 3, OVER)[..] else {
@@ -48,7 +46,7 @@ fn what_needs_a_pass_is_refused_outside_of_one() {
     assert_eq!(processor.execute(&fill()), Ok(()));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_does_not_belong_in_a_pass_is_refused_there() {
     let mut processor = processor();
     assert_eq!(processor.execute(&pass()), Ok(()));
@@ -60,7 +58,7 @@ fn what_does_not_belong_in_a_pass_is_refused_there() {
     assert_eq!(processor.execute(&fill()), Ok(()));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn sets_of_gaussians_do_not_nest_or_outlive_the_pass() {
     let mut processor = processor();
     let [begin, append, resolve] = &gaussians(1, 3, OVER)[..] else {
@@ -91,7 +89,7 @@ fn sets_of_gaussians_do_not_nest_or_outlive_the_pass() {
     processor.execute(&pass()).unwrap();
 }
 
-#[test]
+#[gaurast_runner::test]
 fn attachments_that_cannot_be_rendered_to_begin_no_pass() {
     let mut processor = processor();
     let mut view = image(Format::R8Unorm, 1, 0);
@@ -104,7 +102,7 @@ fn attachments_that_cannot_be_rendered_to_begin_no_pass() {
     assert!(!processor.in_pass());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn timestamps_ascend() {
     let mut processor = processor();
     let pool = Arc::new(QueryPool::new(QueryKind::Timestamp, 2));
@@ -132,7 +130,7 @@ fn timestamps_ascend() {
     assert!(pool.result(1).is_some());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn updates_arrive() {
     let mut processor = processor();
     let view = image(Format::R8Unorm, 1, 0);

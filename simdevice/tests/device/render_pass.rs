@@ -1,8 +1,6 @@
 //! Render passes: the image depends on the draws alone, not on how the device goes about them.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use simdevice::counters::{Counter, Counters};
 use simdevice::device::FlushPolicy;
 use simdevice::packet::*;
@@ -154,7 +152,7 @@ const FORMATS: [Format; 6] = [
 ];
 const CLEAR: LoadOp = LoadOp::Clear(ClearValue::Float([0.1, 0.2, 0.3, 1.0]));
 
-#[test]
+#[gaurast_runner::test]
 fn flushing_never_changes_a_bit() {
     for format in FORMATS {
         for load in [LoadOp::Load, CLEAR] {
@@ -183,7 +181,7 @@ fn flushing_never_changes_a_bit() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_size_of_a_macro_tile_never_changes_a_bit() {
     for format in FORMATS {
         for load in [LoadOp::Load, CLEAR] {
@@ -200,7 +198,7 @@ fn the_size_of_a_macro_tile_never_changes_a_bit() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_number_of_threads_never_changes_a_bit_or_a_count() {
     let work = |counters: &Counters| {
         [
@@ -240,7 +238,7 @@ fn fragments(draw: &[Packet]) -> Vec<Option<[f32; 4]>> {
         .collect()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn attachments_are_quantised_after_every_draw() {
     let draws = [(1, 60), (2, 80), (5, 70)];
     for format in [
@@ -282,7 +280,7 @@ fn attachments_are_quantised_after_every_draw() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_clear_at_the_beginning_fills_the_area_and_nothing_else() {
     let view = image(Format::R8G8B8A8Unorm, 1, 0x11);
     let mut pass = rendering(attachment(&view, CLEAR));
@@ -302,7 +300,7 @@ fn a_clear_at_the_beginning_fills_the_area_and_nothing_else() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_no_draw_touches_keeps_its_bytes() {
     // A signalling NaN and the second code of -1 would not survive a conversion.
     for (format, byte) in [
@@ -342,7 +340,7 @@ fn what_no_draw_touches_keeps_its_bytes() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn only_what_is_to_be_stored_is_stored_at_the_end() {
     for store in [StoreOp::DontCare, StoreOp::None] {
         for load in [CLEAR, LoadOp::Load, LoadOp::DontCare] {
@@ -356,7 +354,7 @@ fn only_what_is_to_be_stored_is_stored_at_the_end() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn clears_reach_the_layers_and_attachments_that_they_name() {
     let color = image(Format::R8G8B8A8Uint, 3, 1);
     let depth = image(Format::D32SfloatS8Uint, 3, 0);
@@ -403,7 +401,7 @@ fn clears_reach_the_layers_and_attachments_that_they_name() {
     assert_eq!(stencil.to_bits(), 0, "the pass has no stencil attachment");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn integer_attachments_take_no_colour_and_masked_ones_none_either() {
     for (format, blend) in [
         (Format::R8G8B8A8Uint, OVER),
@@ -423,7 +421,7 @@ fn integer_attachments_take_no_colour_and_masked_ones_none_either() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn hostile_areas_and_rectangles_do_no_harm() {
     let extremes = [i32::MIN, -1, 0, 149, i32::MAX];
     let sizes = [0, 1, u32::MAX];
@@ -448,7 +446,7 @@ fn hostile_areas_and_rectangles_do_no_harm() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_query_inside_a_pass_counts_what_was_drawn_in_it() {
     let view = image(Format::R8G8B8A8Unorm, 1, 0);
     let pool = Arc::new(QueryPool::new(QueryKind::Performance, 1));

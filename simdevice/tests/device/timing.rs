@@ -1,13 +1,8 @@
 //! The trace of work and what models make of it: nothing of it changes an image, the trace agrees with the counters,
 //! both models of the rasterizer with each other, and timelines are what viewers of traces can read.
 
-#[allow(dead_code, reason = "not every test needs all of it")]
-mod common;
-#[path = "common/scenes.rs"]
-mod scenes;
-
-use common::{HEIGHT, WIDTH};
-use scenes::{KINDS, Kind, draw, draw_on, recording};
+use crate::common::{HEIGHT, WIDTH};
+use crate::scenes::{KINDS, Kind, draw, draw_on, recording};
 use simdevice::counters::{Counter, Counters};
 use simdevice::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::skips::{Skip, Skips};
@@ -52,7 +47,7 @@ fn sum(trace: &Trace, mode: Mode, of: impl Fn(&TileWork) -> u64) -> u64 {
     draws.flat_map(|draw| &draw.tiles).map(of).sum()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn nobody_sees_in_the_image_that_work_is_recorded() {
     for (kind, name) in KINDS {
         let plain = draw(kind, &Config::default(), NOTHING);
@@ -73,7 +68,7 @@ fn nobody_sees_in_the_image_that_work_is_recorded() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_trace_of_triangles_agrees_with_the_counters() {
     // The trace tells of hardware that shades what is overwritten later.
     let config = Config {
@@ -133,7 +128,7 @@ fn the_trace_of_triangles_agrees_with_the_counters() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn programs_that_project_and_resolve_gaussians_are_charged_for_what_they_did() {
     let counters = counted(Kind::Shaded, QueryKind::Performance, &Config::default());
     let trace = trace(Kind::Shaded);
@@ -170,7 +165,7 @@ fn programs_that_project_and_resolve_gaussians_are_charged_for_what_they_did() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn dispatches_are_in_the_trace() {
     let counters = counted(Kind::Dispatches, QueryKind::Performance, &Config::default());
     let alone = trace(Kind::Dispatches);
@@ -186,7 +181,7 @@ fn dispatches_are_in_the_trace() {
     assert!(result.stages.compute > 0.0 && result.raster.cycles == 0.0 && result.fps.is_finite());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn both_models_agree_on_every_kind_of_scene() {
     for (kind, name) in KINDS {
         for frame in &trace(kind).frames {
@@ -215,7 +210,7 @@ fn both_models_agree_on_every_kind_of_scene() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn mode_switches_cost_what_the_configuration_says() {
     let mixed = trace(Kind::Mixed);
     let frame = &mixed.frames[0];
@@ -238,7 +233,7 @@ fn mode_switches_cost_what_the_configuration_says() {
     assert_eq!(triangles.switches, 0.0);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn timelines_are_well_formed_and_engines_do_one_thing_at_a_time() {
     for (kind, name) in KINDS {
         let trace = trace(kind);
@@ -285,7 +280,7 @@ fn timelines_are_well_formed_and_engines_do_one_thing_at_a_time() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_query_counts_what_the_model_says_of_the_trace() {
     let mut hardware = Hardware::preset("paper-15x16", &[]).unwrap();
     hardware.schedule.collaborative = false;
@@ -351,7 +346,7 @@ fn counted_on(device: &Arc<Device>, kind: Kind) -> Counters {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn queries_of_several_queues_count_what_is_their_own() {
     for config in [Config::default(), recording().0] {
         let device = Arc::new(Device::new(&config).unwrap());
@@ -378,7 +373,7 @@ fn queries_of_several_queues_count_what_is_their_own() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn timestamps_may_count_the_models_nanoseconds() {
     let config = Config {
         simulated_timestamps: true,

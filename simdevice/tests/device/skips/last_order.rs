@@ -58,7 +58,7 @@ fn repaired(config: &Config, packets: &mut [Packet], changes: Vec<Edit>) -> Vec<
     pictures[2..].to_vec()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn cameras_that_slide_and_roll_keep_the_order() {
     for threads in [1, 2, 3] {
         let config = Config {
@@ -84,7 +84,7 @@ fn cameras_that_slide_and_roll_keep_the_order() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn other_orders_are_repaired_too() {
     let by =
         |order| -> Edit { of_begin(move |begin| Arc::make_mut(&mut begin.state).order = order) };
@@ -103,7 +103,7 @@ fn other_orders_are_repaired_too() {
     assert_eq!(found, [0, 1, 0, 0, 1, 1, 1]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_has_other_places_is_sorted() {
     let slide = || moved([0.01, 0.0, 0.0]);
     let mut packets = gaussians_in(false, 54, 5000, OVER);
@@ -128,7 +128,7 @@ fn what_has_other_places_is_sorted() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn it_needs_no_other_skip() {
     let packets = gaussians_in(false, 56, 3000, OVER);
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));

@@ -24,7 +24,7 @@ pub fn walled(seed: u64, right: f32, opacity: f32) -> Vec<Packet> {
     packets
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_is_hidden_changes_no_bit() {
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
     let changes: [(&str, Change, bool); 8] = [
@@ -100,7 +100,6 @@ fn what_is_hidden_changes_no_bit() {
             let read = |counters: &Counters| counters.get(Counter::GaussiansRead);
             assert_eq!(read(&counters), read(&without), "{name}, {right}");
         }
-        println!("{name}: {hidden} hidden");
         assert_eq!(hidden > 0, hides, "{name}: {hidden}");
     }
 }

@@ -36,21 +36,21 @@ const AMPLE: u64 = 10 << 20;
 /// Room for those of degree 0, but not for all.
 const SCARCE: u64 = 400_000;
 
-#[test]
+#[gaurast_runner::test]
 fn lower_degrees_take_what_higher_ones_have() {
     let degrees = [2, 2, 1, 0, 2, 1];
     let expected = [false, true, false, false, false, false];
     assert_eq!(built(AMPLE, &degrees), expected);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn higher_degrees_replace_what_lower_ones_have() {
     let degrees = [0, 0, 2, 2, 0, 1, 2];
     let expected = [false, true, false, true, false, false, false];
     assert_eq!(built(AMPLE, &degrees), expected);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_has_no_room_for_coefficients_takes_the_rest() {
     let degrees = [0, 0, 2, 2, 0, 2];
     let expected = [false, true, false, false, false, false];
