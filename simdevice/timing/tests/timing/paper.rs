@@ -1,6 +1,6 @@
 //! PAPER.md is generated, complete and up to date.
 
-#[test]
+#[gaurast_runner::test]
 fn the_report_in_the_repository_is_up_to_date() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/PAPER.md");
     let stored = std::fs::read_to_string(path).unwrap();
@@ -16,7 +16,7 @@ fn the_report_in_the_repository_is_up_to_date() {
     assert_eq!(stored.lines().count(), generated.lines().count());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_number_of_the_papers_evaluation_has_a_row() {
     let rows: Vec<_> = timing::paper::report()
         .into_iter()

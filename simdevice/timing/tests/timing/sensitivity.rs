@@ -1,6 +1,6 @@
 //! SENSITIVITY.md and its plots are generated and up to date.
 
-#[path = "../examples/sensitivity/plot.rs"]
+#[path = "../../examples/sensitivity/plot.rs"]
 mod plot;
 
 use timing::sensitivity;
@@ -12,7 +12,7 @@ fn stored(file: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{path}: {error}; {HOW}"))
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_document_and_its_plots_are_up_to_date() {
     let generated = sensitivity::markdown().unwrap();
     let document = stored("SENSITIVITY.md");
@@ -27,7 +27,7 @@ fn the_document_and_its_plots_are_up_to_date() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_paper_is_on_every_curve_and_more_is_never_slower() {
     for sweep in sensitivity::sweeps(&sensitivity::frame()).unwrap() {
         assert!(
