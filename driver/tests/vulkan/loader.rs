@@ -1,21 +1,14 @@
-//! The driver through the Vulkan loader, as programs that know nothing of it would use it. These tests start
-//! themselves again with `VK_DRIVER_FILES` set, because the loader reads the environment. They are skipped, aloud, on
-//! machines without a loader.
+//! The driver through the Vulkan loader, as programs that know nothing of it would use it.
 
-#[path = "support/loader.rs"]
-mod loader;
-mod support;
-
+use crate::context::Context;
+use crate::system_loader::{library, manifest, through_the_loader};
 use ash::vk;
-use loader::{library, manifest, through_the_loader};
+use gaurast_runner::{Case, Need, Variant};
 use std::process::Command;
-use support::Context;
 
-const VALIDATION: &str = "VK_LAYER_KHRONOS_validation";
-
-#[test]
-fn a_device_is_created_and_destroyed() {
-    through_the_loader("a_device_is_created_and_destroyed", |entry| {
+#[gaurast_runner::test(needs = [Need::VulkanLoader])]
+fn a_device_is_created_and_destroyed(case: &Case) {
+    through_the_loader(case, |entry| {
         let context = Context::new(entry, &[ash::ext::debug_utils::NAME]);
         // SAFETY: the physical device is the instance's.
         let properties = unsafe {
@@ -46,9 +39,9 @@ fn a_device_is_created_and_destroyed() {
 }
 
 /// The library is unloaded with the last instance, when no thread may be left in it.
-#[test]
-fn the_library_is_loaded_and_unloaded_many_times() {
-    through_the_loader("the_library_is_loaded_and_unloaded_many_times", |entry| {
+#[gaurast_runner::test(needs = [Need::VulkanLoader])]
+fn the_library_is_loaded_and_unloaded_many_times(case: &Case) {
+    through_the_loader(case, |entry| {
         for _ in 0..20 {
             let context = Context::new(entry.clone(), &[]);
             let device = context
@@ -61,9 +54,9 @@ fn the_library_is_loaded_and_unloaded_many_times() {
 }
 
 /// Physical-device commands of extensions that the loader may not know reach the driver.
-#[test]
-fn counters_are_enumerated() {
-    through_the_loader("counters_are_enumerated", |entry| {
+#[gaurast_runner::test(needs = [Need::VulkanLoader])]
+fn counters_are_enumerated(case: &Case) {
+    through_the_loader(case, |entry| {
         let context = Context::new(entry, &[]);
         let performance =
             ash::khr::performance_query::Instance::new(&context.entry, &context.instance);
@@ -78,47 +71,52 @@ fn counters_are_enumerated() {
     });
 }
 
+const VALIDATION: &str = "VK_LAYER_KHRONOS_validation";
+
+/// A variant without layers and one under the validation layer.
+fn layers() -> Vec<Variant> {
+    let validated = Variant {
+        name: VALIDATION.to_owned(),
+        needs: vec![Need::ValidationLayer],
+    };
+    vec![Variant::new("no layer"), validated]
+}
+
 /// `vulkaninfo` asks for everything that a physical device can be asked for.
-#[test]
-fn vulkaninfo_lists_the_device() {
+#[gaurast_runner::test(needs = [Need::Program("vulkaninfo"), Need::VulkanLoader], each = layers())]
+fn vulkaninfo_lists_the_device(case: &Case) {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    for layer in ["", VALIDATION] {
-        let output = Command::new("vulkaninfo")
-            .env("VK_DRIVER_FILES", manifest(directory.path()))
-            .env("VK_ICD_FILENAMES", manifest(directory.path()))
-            .env("VK_INSTANCE_LAYERS", layer)
-            .env_remove("DISPLAY")
-            .output();
-        let Ok(output) = output else {
-            eprintln!("skipped: vulkaninfo is not installed");
-            return;
-        };
-        let text = String::from_utf8_lossy(&output.stdout);
-        let errors = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{text}{errors}");
-        assert!(text.contains("GauRast simulated device"), "{text}");
-        assert!(
-            text.contains("VK_GAURAST_gaussian_primitive_topology"),
-            "{text}"
-        );
-        assert!(
-            !errors.contains("vulkan_gaurast"),
-            "the driver complains: {errors}"
-        );
-    }
+    let manifest = manifest(directory.path());
+    let layer = Some(VALIDATION).filter(|&layer| layer == case.variant());
+    let output = Command::new("vulkaninfo")
+        .env("VK_DRIVER_FILES", &manifest)
+        .env("VK_ICD_FILENAMES", &manifest)
+        .env("VK_INSTANCE_LAYERS", layer.unwrap_or_default())
+        .env_remove("DISPLAY")
+        .output()
+        .expect("vulkaninfo runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{text}{errors}");
+    assert!(text.contains("GauRast simulated device"), "{text}");
+    assert!(
+        text.contains("VK_GAURAST_gaussian_primitive_topology"),
+        "{text}"
+    );
+    assert!(
+        !errors.contains("vulkan_gaurast"),
+        "the driver complains: {errors}"
+    );
 }
 
 /// The shared library exports what the loader needs and no Vulkan command.
-#[test]
+#[gaurast_runner::test(needs = [Need::Program("nm")])]
 fn only_the_loaders_symbols_are_exported() {
-    let Ok(output) = Command::new("nm")
+    let output = Command::new("nm")
         .args(["--dynamic", "--defined-only", "--format=just-symbols"])
         .arg(library())
         .output()
-    else {
-        eprintln!("skipped: nm is not installed");
-        return;
-    };
+        .expect("nm runs");
     assert!(output.status.success());
     let text = String::from_utf8_lossy(&output.stdout);
     let mut symbols: Vec<_> = text.lines().filter(|name| name.starts_with("vk")).collect();

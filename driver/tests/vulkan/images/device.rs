@@ -1,6 +1,7 @@
 //! A Vulkan device with images: this driver's, or lavapipe's through the loader.
 
 use ash::vk;
+use gaurast_runner::{Case, Missing, ignore};
 use simdevice::Format;
 use simdevice::packet::Aspect;
 
@@ -26,7 +27,7 @@ pub struct Buffer {
     size: u64,
 }
 
-/// What an image is.
+/// The creation parameters of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     pub format: vk::Format,
@@ -109,16 +110,11 @@ impl Device {
         Self::open(vulkan_gaurast::entry(), |_| true).expect("the embedded device")
     }
 
-    /// lavapipe; says so where it is absent.
-    pub fn lavapipe() -> Option<Self> {
+    /// Lavapipe, through the loader.
+    pub fn lavapipe() -> Self {
         // SAFETY: the loader is the system's own.
-        let found = unsafe { ash::Entry::load() }
-            .ok()
-            .and_then(|entry| Self::open(entry, |id| id == vk::DriverId::MESA_LLVMPIPE));
-        if found.is_none() {
-            eprintln!("skipped: there is no lavapipe here");
-        }
-        found
+        let entry = unsafe { ash::Entry::load() }.expect("the system's loader");
+        Self::open(entry, |id| id == vk::DriverId::MESA_LLVMPIPE).expect("lavapipe's device")
     }
 
     fn open(entry: ash::Entry, is_wanted: impl Fn(vk::DriverId) -> bool) -> Option<Self> {
@@ -174,7 +170,7 @@ impl Device {
         }
     }
 
-    /// What images of optimal tiling can do.
+    /// The features of images of optimal tiling.
     pub fn features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         // SAFETY: see the crate.
         let properties = unsafe {
@@ -184,7 +180,7 @@ impl Device {
         properties.optimal_tiling_features
     }
 
-    /// What buffers can do.
+    /// The features of texel and vertex buffers.
     pub fn buffer_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         // SAFETY: see the crate.
         let properties = unsafe {
@@ -270,7 +266,7 @@ impl Device {
         }
     }
 
-    /// What a buffer holds.
+    /// A buffer's bytes.
     pub fn read(&self, buffer: Buffer) -> Vec<u8> {
         let mut bytes = vec![0; buffer.size as usize];
         let flags = vk::MemoryMapFlags::empty();
@@ -427,6 +423,42 @@ impl Device {
     }
 }
 
+/// The formats that both devices are capable of something with, and those that ours alone is.
+pub struct Formats {
+    pub of_both: Vec<vk::Format>,
+    pub of_ours_alone: Vec<vk::Format>,
+}
+
+/// Finds the formats up to `last` with which devices are capable of something, as `is_capable` says.
+pub fn formats(
+    ours: &Device,
+    theirs: &Device,
+    last: vk::Format,
+    is_capable: impl Fn(&Device, vk::Format) -> bool,
+) -> Formats {
+    let all = (1..=last.as_raw()).map(vk::Format::from_raw);
+    let (of_both, of_ours_alone) = all
+        .filter(|&format| is_capable(ours, format))
+        .partition(|&format| is_capable(theirs, format));
+    Formats {
+        of_both,
+        of_ours_alone,
+    }
+}
+
+/// Ends the test as ignored if some of lavapipe's `operations` lack formats beside those that are known to be missing,
+/// so that less was compared than should be.
+pub fn expect_lacking(operations: &str, lacking: &[vk::Format], known: &[vk::Format]) {
+    let new: Vec<_> = lacking
+        .iter()
+        .filter(|format| !known.contains(format))
+        .collect();
+    if !new.is_empty() {
+        let reason = format!("lavapipe's {operations} lack {new:?}");
+        ignore(Missing::Capability, reason);
+    }
+}
+
 impl Drop for Device {
     fn drop(&mut self) {
         // SAFETY: see the crate.
@@ -438,29 +470,18 @@ impl Drop for Device {
     }
 }
 
-/// Set for the process that runs a test's inside.
-const INSIDE: &str = "GAURAST_TEST_INSIDE_EXACT";
-
-/// Runs a test's inside, this device beside lavapipe, in a process of its own where lavapipe filters in binary32 and
-/// takes no short cuts.
-pub fn exactly(test: &str, inside: impl FnOnce(&Device, &Device)) {
-    if std::env::var_os(INSIDE).is_some() {
-        if let Some(theirs) = Device::lavapipe() {
-            inside(&Device::gaurast(), &theirs);
-        }
-        return;
+/// Runs `inside` on this device and lavapipe, in a process of its own where lavapipe filters in binary32 and takes no
+/// short cuts. The test needs lavapipe.
+pub fn exactly(case: &Case, inside: impl FnOnce(&Device, &Device)) {
+    if case.is_alone() {
+        return inside(&Device::gaurast(), &Device::lavapipe());
     }
     let exact = "no_aos_sampling,no_quad_lod,no_brilinear,no_rho_approx";
-    let output = std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", test, "--nocapture"])
-        .env(INSIDE, "1")
-        .env("GALLIVM_PERF", exact)
-        .output()
-        .unwrap();
-    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{text}");
-    assert!(text.contains("1 passed"), "{text}");
-    for line in text.lines().filter(|line| line.starts_with("skipped:")) {
-        eprintln!("{line}");
-    }
+    let manifest = gaurast_runner::lavapipe_manifest().expect("the test needs lavapipe");
+    case.run_alone(|command| {
+        command
+            .env("GALLIVM_PERF", exact)
+            .env("VK_DRIVER_FILES", &manifest)
+            .env("VK_ICD_FILENAMES", &manifest);
+    });
 }

@@ -1,6 +1,4 @@
-//! What the driver's tests share: an instance, its device, and what messengers heard.
-
-#![allow(dead_code, reason = "each test uses a part of it")]
+//! An instance, its device, and what messengers heard.
 
 use ash::vk;
 use std::ffi::{CStr, c_void};
@@ -94,7 +92,7 @@ impl Heard {
             .user_data(std::ptr::from_ref(self).cast_mut().cast())
     }
 
-    /// What was heard since the last call.
+    /// Takes the messages heard since the last call.
     pub fn take(&self) -> Vec<(String, String)> {
         std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }

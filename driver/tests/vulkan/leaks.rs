@@ -1,11 +1,9 @@
 //! Destroying everything leaves nothing. Alone in its process, because it counts the process's handles.
 
-mod support;
-
+use crate::context::{Context, Heard};
 use ash::vk;
-use support::{Context, Heard};
 
-#[test]
+#[gaurast_runner::test(alone)]
 fn nothing_is_left_when_everything_is_destroyed() {
     assert_eq!(vulkan_gaurast::live_handles(), 0);
     let heard = Heard::default();

@@ -4,16 +4,19 @@
 //! weights, hence which texel is nearest where a centre lies on an edge between texels, and whether filters reach beyond
 //! the source's region into the rest of the image. Regions here avoid the first; both implementations do the second.
 
-use crate::device::{Device, GENERAL, Image, Shape, aspect_flags, device_format, exactly};
-use crate::texels::{Noise, distance};
+use super::device::{
+    Device, GENERAL, Image, Shape, aspect_flags, device_format, exactly, expect_lacking, formats,
+};
+use super::texels::{Noise, distance};
 use ash::vk;
+use gaurast_runner::{Case, Missing, Need, Variant, ignore, shards};
 use simdevice::Format;
 use simdevice::format::Numeric;
 use simdevice::packet::Aspect;
 
-/// What is blitted.
+/// A blit between two images.
 #[derive(Clone, Debug)]
-struct Case {
+struct Blit {
     from: Shape,
     to: Shape,
     filter: vk::Filter,
@@ -43,12 +46,12 @@ fn region(aspect: Aspect, from: [[i32; 3]; 2], to: [[i32; 3]; 2]) -> vk::ImageBl
     }
 }
 
-/// What a blit leaves in its target, aspect by aspect.
-fn blitted(device: &Device, case: &Case) -> Vec<Vec<u8>> {
+/// Blits, and returns the target's texels, aspect by aspect.
+fn blitted(device: &Device, blit: &Blit) -> Vec<Vec<u8>> {
     let none = vk::ImageUsageFlags::empty();
-    let images: [Image; 2] = [case.from, case.to].map(|shape| device.image(shape, none));
+    let images: [Image; 2] = [blit.from, blit.to].map(|shape| device.image(shape, none));
     for (seed, image) in (1..).zip(&images) {
-        for &aspect in &case.aspects {
+        for &aspect in &blit.aspects {
             let plane = image.shape.plane(aspect);
             let texels = Noise::new(seed).texels(plane, image.shape.texels());
             device.upload(image, aspect, &texels);
@@ -64,12 +67,12 @@ fn blitted(device: &Device, case: &Case) -> Vec<Vec<u8>> {
                 GENERAL,
                 to.image,
                 GENERAL,
-                &case.regions,
-                case.filter,
+                &blit.regions,
+                blit.filter,
             );
         }
     });
-    let contents = case.aspects.iter();
+    let contents = blit.aspects.iter();
     let contents = contents
         .map(|&aspect| device.download(&to, aspect))
         .collect();
@@ -79,12 +82,12 @@ fn blitted(device: &Device, case: &Case) -> Vec<Vec<u8>> {
     contents
 }
 
-/// How far the two devices' targets are apart at most, in codes of an aspect's format.
-fn compare(ours: &Device, theirs: &Device, case: &Case, unit: f64) -> f64 {
-    let (a, b) = (blitted(ours, case), blitted(theirs, case));
+/// The largest distance between the two devices' targets, in codes of an aspect's format.
+fn compare(ours: &Device, theirs: &Device, blit: &Blit, unit: f64) -> f64 {
+    let (a, b) = (blitted(ours, blit), blitted(theirs, blit));
     let mut largest = 0.0f64;
-    for ((a, b), &aspect) in a.iter().zip(&b).zip(&case.aspects) {
-        let plane = case.to.plane(aspect);
+    for ((a, b), &aspect) in a.iter().zip(&b).zip(&blit.aspects) {
+        let plane = blit.to.plane(aspect);
         let texels = |bytes: &[u8]| -> Vec<Vec<u8>> {
             let texels = bytes.chunks_exact(plane.texel_size());
             texels.map(<[u8]>::to_vec).collect()
@@ -101,17 +104,17 @@ fn compare(ours: &Device, theirs: &Device, case: &Case, unit: f64) -> f64 {
 struct Findings(Vec<String>);
 
 impl Findings {
-    fn check(&mut self, ours: &Device, theirs: &Device, case: &Case, unit: f64) {
-        let found = compare(ours, theirs, case, unit);
+    fn check(&mut self, ours: &Device, theirs: &Device, blit: &Blit, unit: f64) {
+        let found = compare(ours, theirs, blit, unit);
         if found > 1.0 {
             self.0.push(format!(
                 "{:?} {:?} to {:?} {:?}, {:?}: {found} apart, {:?}",
-                case.from.format,
-                case.from.extent,
-                case.to.format,
-                case.to.extent,
-                case.filter,
-                case.regions
+                blit.from.format,
+                blit.from.extent,
+                blit.to.format,
+                blit.to.extent,
+                blit.filter,
+                blit.regions
             ));
         }
     }
@@ -123,9 +126,9 @@ impl Findings {
 
 const FILTERS: [vk::Filter; 2] = [vk::Filter::NEAREST, vk::Filter::LINEAR];
 
-#[test]
-fn regions_are_scaled_and_mirrored() {
-    exactly("blits::regions_are_scaled_and_mirrored", |ours, theirs| {
+#[gaurast_runner::test(needs = [Need::Lavapipe])]
+fn regions_are_scaled_and_mirrored(case: &Case) {
+    exactly(case, |ours, theirs| {
         let format = vk::Format::R8G8B8A8_UNORM;
         // From and to along one axis of 13 and 17 texels. An odd number of texels has no centre on an edge between them.
         let spans: [([i32; 2], [i32; 2]); 7] = [
@@ -156,7 +159,7 @@ fn regions_are_scaled_and_mirrored() {
                     };
                     let flat =
                         |axis: usize, span: [i32; 2]| if axis < used { span } else { [0, 1] };
-                    let case = Case {
+                    let blit = Blit {
                         from: shape(13),
                         to: shape(17),
                         filter,
@@ -167,7 +170,7 @@ fn regions_are_scaled_and_mirrored() {
                         )],
                         aspects: vec![Aspect::Color],
                     };
-                    findings.check(ours, theirs, &case, 1.0);
+                    findings.check(ours, theirs, &blit, 1.0);
                 }
             }
         }
@@ -175,9 +178,9 @@ fn regions_are_scaled_and_mirrored() {
     });
 }
 
-#[test]
-fn mip_chains_are_made_of_layers() {
-    exactly("blits::mip_chains_are_made_of_layers", |ours, theirs| {
+#[gaurast_runner::test(needs = [Need::Lavapipe])]
+fn mip_chains_are_made_of_layers(case: &Case) {
+    exactly(case, |ours, theirs| {
         let mut findings = Findings::default();
         for format in [vk::Format::R8G8B8A8_SRGB, vk::Format::B8G8R8A8_UNORM] {
             let shape = Shape {
@@ -192,7 +195,7 @@ fn mip_chains_are_made_of_layers() {
                     let [width, height, _] = shape.level_extent(level);
                     [width as i32, height as i32, 1]
                 };
-                let case = Case {
+                let blit = Blit {
                     from: shape,
                     to: shape,
                     filter,
@@ -204,14 +207,14 @@ fn mip_chains_are_made_of_layers() {
                     }],
                     aspects: vec![Aspect::Color],
                 };
-                findings.check(ours, theirs, &case, 1.0);
+                findings.check(ours, theirs, &blit, 1.0);
             }
         }
         findings.done();
     });
 }
 
-/// What converts to each other.
+/// The class of formats that convert to each other.
 fn class(format: Format) -> u32 {
     match format.numeric() {
         Numeric::Uint => 0,
@@ -220,22 +223,58 @@ fn class(format: Format) -> u32 {
     }
 }
 
-/// The colour formats that both devices blit from, or to.
-fn formats(ours: &Device, theirs: &Device, feature: vk::FormatFeatureFlags) -> Vec<vk::Format> {
-    (1..=vk::Format::E5B9G9R9_UFLOAT_PACK32.as_raw())
-        .map(vk::Format::from_raw)
-        .filter(|&format| {
-            ours.features(format).contains(feature) && theirs.features(format).contains(feature)
-        })
-        .collect()
-}
+/// The formats that lavapipe is known not to blit from (Mesa 22.3).
+const NO_SOURCES: &[vk::Format] = &[
+    vk::Format::R4G4_UNORM_PACK8,
+    vk::Format::R4G4B4A4_UNORM_PACK16,
+    vk::Format::B5G6R5_UNORM_PACK16,
+    vk::Format::R8_SRGB,
+    vk::Format::R8G8_SRGB,
+    vk::Format::R8G8B8_UNORM,
+    vk::Format::R8G8B8_SNORM,
+    vk::Format::R8G8B8_UINT,
+    vk::Format::R8G8B8_SINT,
+    vk::Format::R8G8B8_SRGB,
+    vk::Format::B8G8R8_UNORM,
+    vk::Format::B8G8R8_SNORM,
+    vk::Format::B8G8R8_UINT,
+    vk::Format::B8G8R8_SINT,
+    vk::Format::B8G8R8_SRGB,
+    vk::Format::A2R10G10B10_UNORM_PACK32,
+    vk::Format::A2R10G10B10_SNORM_PACK32,
+    vk::Format::A2R10G10B10_SINT_PACK32,
+    vk::Format::A2B10G10R10_SNORM_PACK32,
+    vk::Format::A2B10G10R10_SINT_PACK32,
+    vk::Format::R16G16B16_UNORM,
+    vk::Format::R16G16B16_SNORM,
+    vk::Format::R16G16B16_UINT,
+    vk::Format::R16G16B16_SINT,
+    vk::Format::R16G16B16_SFLOAT,
+    vk::Format::R32G32B32_UINT,
+    vk::Format::R32G32B32_SINT,
+    vk::Format::R32G32B32_SFLOAT,
+];
 
-#[test]
-fn formats_are_converted() {
-    exactly("blits::formats_are_converted", |ours, theirs| {
-        let sources = formats(ours, theirs, vk::FormatFeatureFlags::BLIT_SRC);
-        let targets = formats(ours, theirs, vk::FormatFeatureFlags::BLIT_DST);
-        assert!(sources.len() > 50 && targets.len() > 30);
+/// The formats that lavapipe is known to blit from, but not to (Mesa 22.3).
+const SOURCES_ONLY: &[vk::Format] = &[
+    vk::Format::B10G11R11_UFLOAT_PACK32,
+    vk::Format::E5B9G9R9_UFLOAT_PACK32,
+];
+
+#[gaurast_runner::test(needs = [Need::Lavapipe], each = shards(4))]
+fn formats_are_converted(case: &Case) {
+    exactly(case, |ours, theirs| {
+        let last = vk::Format::E5B9G9R9_UFLOAT_PACK32;
+        let [sources, targets] = [
+            vk::FormatFeatureFlags::BLIT_SRC,
+            vk::FormatFeatureFlags::BLIT_DST,
+        ]
+        .map(|feature| {
+            formats(ours, theirs, last, |device, format| {
+                device.features(format).contains(feature)
+            })
+        });
+        assert!(sources.of_both.len() > 50 && targets.of_both.len() > 30);
         let hubs = [
             vk::Format::R32G32B32A32_UINT,
             vk::Format::R32G32B32A32_SINT,
@@ -245,10 +284,19 @@ fn formats_are_converted() {
             vk::Format::R8G8B8A8_UNORM,
             vk::Format::R8G8B8A8_SRGB,
         ];
-        let from_all = sources.iter().flat_map(|&from| hubs.map(|to| (from, to)));
-        let to_all = targets.iter().flat_map(|&to| hubs.map(|from| (from, to)));
+        let from_all = sources
+            .of_both
+            .iter()
+            .flat_map(|&from| hubs.map(|to| (from, to)));
+        let to_all = targets
+            .of_both
+            .iter()
+            .flat_map(|&to| hubs.map(|from| (from, to)));
         let mut findings = Findings::default();
-        for (from, to) in from_all.chain(to_all) {
+        for (index, (from, to)) in from_all.chain(to_all).enumerate() {
+            if !case.shard().has(index) {
+                continue;
+            }
             let [from_class, to_class] = [from, to].map(|format| class(device_format(format)));
             if from_class != to_class {
                 continue;
@@ -272,7 +320,7 @@ fn formats_are_converted() {
                 _ => 2.0 / 1024.0,
             };
             for &filter in filters {
-                let case = Case {
+                let blit = Blit {
                     from: Shape::flat(from, 5, 3),
                     to: Shape::flat(to, 7, 9),
                     filter,
@@ -283,49 +331,65 @@ fn formats_are_converted() {
                     )],
                     aspects: vec![Aspect::Color],
                 };
-                findings.check(ours, theirs, &case, unit);
+                findings.check(ours, theirs, &blit, unit);
             }
         }
         findings.done();
+        expect_lacking("sources of blits", &sources.of_ours_alone, NO_SOURCES);
+        let no_targets = [NO_SOURCES, SOURCES_ONLY].concat();
+        expect_lacking("targets of blits", &targets.of_ours_alone, &no_targets);
     });
 }
 
-#[test]
-fn depth_and_stencil_are_scaled() {
-    exactly("blits::depth_and_stencil_are_scaled", |ours, theirs| {
+const DEPTH_AND_STENCIL: [vk::Format; 6] = [
+    vk::Format::D16_UNORM,
+    vk::Format::X8_D24_UNORM_PACK32,
+    vk::Format::D32_SFLOAT,
+    vk::Format::S8_UINT,
+    vk::Format::D24_UNORM_S8_UINT,
+    vk::Format::D32_SFLOAT_S8_UINT,
+];
+
+/// A variant for each format of depth or stencil.
+fn depth_and_stencil() -> Vec<Variant> {
+    DEPTH_AND_STENCIL
+        .map(|format| Variant::new(format!("{format:?}")))
+        .into()
+}
+
+#[gaurast_runner::test(needs = [Need::Lavapipe], each = depth_and_stencil())]
+fn depth_and_stencil_are_scaled(case: &Case) {
+    let format = DEPTH_AND_STENCIL
+        .into_iter()
+        .find(|format| format!("{format:?}") == case.variant())
+        .unwrap();
+    exactly(case, |ours, theirs| {
         let blits = vk::FormatFeatureFlags::BLIT_SRC | vk::FormatFeatureFlags::BLIT_DST;
-        let mut findings = Findings::default();
-        for format in [
-            vk::Format::D16_UNORM,
-            vk::Format::X8_D24_UNORM_PACK32,
-            vk::Format::D32_SFLOAT,
-            vk::Format::S8_UINT,
-            vk::Format::D24_UNORM_S8_UINT,
-            vk::Format::D32_SFLOAT_S8_UINT,
-        ] {
-            assert!(ours.features(format).contains(blits));
-            if !theirs.features(format).contains(blits) {
-                eprintln!("skipped: lavapipe does not blit {format:?}");
-                continue;
-            }
-            let aspects = device_format(format).aspects().to_vec();
-            let mut both = region(Aspect::Color, [[0; 3], [9, 7, 1]], [[12, 0, 0], [0, 12, 1]]);
-            let mask = aspects
-                .iter()
-                .fold(vk::ImageAspectFlags::empty(), |all, &aspect| {
-                    all | aspect_flags(aspect)
-                });
-            both.src_subresource.aspect_mask = mask;
-            both.dst_subresource.aspect_mask = mask;
-            let case = Case {
-                from: Shape::flat(format, 9, 7),
-                to: Shape::flat(format, 12, 12),
-                filter: vk::Filter::NEAREST,
-                regions: vec![both],
-                aspects,
-            };
-            findings.check(ours, theirs, &case, 1e-9);
+        assert!(ours.features(format).contains(blits));
+        if !theirs.features(format).contains(blits) {
+            ignore(
+                Missing::Capability,
+                format!("lavapipe does not blit {format:?}"),
+            );
         }
+        let aspects = device_format(format).aspects().to_vec();
+        let mut both = region(Aspect::Color, [[0; 3], [9, 7, 1]], [[12, 0, 0], [0, 12, 1]]);
+        let mask = aspects
+            .iter()
+            .fold(vk::ImageAspectFlags::empty(), |all, &aspect| {
+                all | aspect_flags(aspect)
+            });
+        both.src_subresource.aspect_mask = mask;
+        both.dst_subresource.aspect_mask = mask;
+        let blit = Blit {
+            from: Shape::flat(format, 9, 7),
+            to: Shape::flat(format, 12, 12),
+            filter: vk::Filter::NEAREST,
+            regions: vec![both],
+            aspects,
+        };
+        let mut findings = Findings::default();
+        findings.check(ours, theirs, &blit, 1e-9);
         findings.done();
     });
 }

@@ -1,7 +1,6 @@
 //! The driver through its embedded door.
 
-mod support;
-
+use crate::context::{Context, Heard};
 use ash::vk;
 use gaurast::gaussian_primitive_topology;
 use gaurast::vk::{
@@ -9,9 +8,8 @@ use gaurast::vk::{
     PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST,
 };
 use std::ffi::CStr;
-use support::{Context, Heard};
 
-#[test]
+#[gaurast_runner::test]
 fn a_device_is_created_used_and_destroyed() {
     let context = Context::embedded(&[]);
     let mut gaussian = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
@@ -36,7 +34,7 @@ fn a_device_is_created_used_and_destroyed() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_device_says_what_it_is() {
     let context = Context::embedded(&[]);
     // SAFETY: the instance is live.
@@ -79,7 +77,7 @@ fn the_device_says_what_it_is() {
     assert_eq!(gaussian.max_spherical_harmonics_degree, 4);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn memory_can_be_hidden_from_the_host_or_shared_with_it() {
     let context = Context::embedded(&[]);
     // SAFETY: the physical device is the instance's.
@@ -101,7 +99,7 @@ fn memory_can_be_hidden_from_the_host_or_shared_with_it() {
     assert!(memory.memory_heaps_as_slice()[0].size >= 1 << 30);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_is_not_there_is_refused() {
     let heard = Heard::default();
     let context = Context::embedded(&[ash::ext::debug_utils::NAME]);
@@ -148,7 +146,7 @@ fn what_is_not_there_is_refused() {
     assert!(error.is_some() && messages.is_empty());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn an_instance_refuses_what_it_lacks_and_says_so() {
     let entry = vulkan_gaurast::entry();
     let heard = Heard::default();
@@ -174,7 +172,7 @@ fn an_instance_refuses_what_it_lacks_and_says_so() {
     assert_eq!(error, Some(vk::Result::ERROR_LAYER_NOT_PRESENT));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn applications_may_send_messages() {
     let heard = Heard::default();
     let context = Context::embedded(&[ash::ext::debug_utils::NAME]);
@@ -197,7 +195,7 @@ fn applications_may_send_messages() {
     assert_eq!(heard.take(), [("test".to_owned(), "hello".to_owned())]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn device_commands_appear_with_their_extension() {
     let context = Context::embedded(&[]);
     let found = |device: &ash::Device, name: &CStr| {
@@ -228,7 +226,7 @@ fn device_commands_appear_with_their_extension() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn enumeration_may_be_cut_short() {
     let context = Context::embedded(&[]);
     let enumerate = context
@@ -254,7 +252,7 @@ fn enumeration_may_be_cut_short() {
     assert_eq!(extensions[1].extension_name_as_c_str().unwrap(), c"");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn counters_are_enumerated_with_their_descriptions() {
     let context = Context::embedded(&[]);
     let performance = ash::khr::performance_query::Instance::new(&context.entry, &context.instance);
@@ -303,7 +301,7 @@ fn device_with_core_features(context: &Context) -> ash::Device {
     context.device(&[], &mut features).unwrap()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn timelines_are_signalled_by_host_and_queue() {
     let context = Context::embedded(&[]);
     let device = device_with_core_features(&context);
@@ -351,7 +349,7 @@ fn timelines_are_signalled_by_host_and_queue() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn private_data_is_kept_per_object_and_slot() {
     let context = Context::embedded(&[]);
     let device = device_with_core_features(&context);
@@ -374,8 +372,8 @@ fn private_data_is_kept_per_object_and_slot() {
     }
 }
 
-/// What isn't there yet fails with a message; it neither aborts nor does something else.
-#[test]
+/// A command that isn't there yet fails with a message; it neither aborts nor does something else.
+#[gaurast_runner::test]
 fn core_commands_that_do_not_work_yet_fail() {
     let heard = Heard::default();
     let context = Context::embedded(&[ash::ext::debug_utils::NAME]);

@@ -1,26 +1,22 @@
-//! The watchdog: a kernel that never ends loses its device, and nothing else. The time limit comes from the
-//! environment of the whole process, so that this test has one of its own.
-//!
-//! `unsafe` here has one reason throughout: these are Vulkan calls that follow Vulkan's valid usage.
+//! The watchdog: a kernel that never ends loses its device, and nothing else. The time limit comes from the environment,
+//! so that the test has a process of its own.
 
-#![allow(dead_code, reason = "it shares a part of the driver's tests")]
-
-#[path = "vulkan/gpu.rs"]
-mod gpu;
-#[path = "vulkan/kernel.rs"]
-mod kernel;
-
+use crate::gpu::Gpu;
+use crate::kernel::{Binding, Kernel};
+use crate::spirv;
 use ash::vk;
-use gpu::Gpu;
-use kernel::{Binding, Kernel};
+use gaurast_runner::Case;
 use std::time::{Duration, Instant};
 
 const BINDINGS: &[Binding] = &[(0, vk::DescriptorType::STORAGE_BUFFER, 1)];
 
-#[test]
-fn a_kernel_without_end_loses_its_device_alone() {
-    // SAFETY: no other thread runs yet that reads the environment: this is the process's only test.
-    unsafe { std::env::set_var("GAURAST_TIMEOUT_MS", "200") };
+#[gaurast_runner::test]
+fn a_kernel_without_end_loses_its_device_alone(case: &Case) {
+    if !case.is_alone() {
+        return case.run_alone(|command| {
+            command.env("GAURAST_TIMEOUT_MS", "200");
+        });
+    }
     let doomed = Gpu::new();
     let survivor = Gpu::new();
     let fence = lose(&doomed);

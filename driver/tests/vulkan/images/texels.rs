@@ -49,7 +49,7 @@ impl Noise {
     }
 }
 
-/// How far apart two texels of a format are: in codes, or for floating-point formats in units of `unit`. Integers that
+/// The distance between two texels of a format: in codes, or for floating-point formats in units of `unit`. Integers that
 /// differ are infinitely apart, bits that mean nothing are not looked at.
 pub fn distance(format: Format, a: &[u8], b: &[u8], unit: f64) -> f64 {
     let worst = |distances: [f64; 4]| distances.into_iter().fold(0.0, f64::max);

@@ -1,9 +1,9 @@
 //! A compute pipeline with one descriptor set.
 
-use crate::device::{Buffer, Device, GENERAL};
+use super::device::{Buffer, Device, GENERAL};
 use ash::vk;
 
-/// What a binding holds.
+/// A resource to bind.
 #[derive(Clone, Copy)]
 pub enum Bound {
     /// An image with a sampler.
