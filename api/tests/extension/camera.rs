@@ -105,7 +105,7 @@ fn assert_near(value: f32, expected: f32) {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn perspective() {
     let projection = vulkan::perspective(0.9, 16.0 / 9.0, 0.1, 100.0);
     let camera = from(look_at(), projection).unwrap();
@@ -121,14 +121,14 @@ fn perspective() {
     assert_agrees(&camera, look_at(), projection, VIEWPORT, -1.0);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn perspective_with_y_up_is_the_same_picture_upside_down() {
     let projection = directx::perspective(0.9, 16.0 / 9.0, 0.1, 100.0);
     let camera = from(look_at(), projection).unwrap();
     assert_agrees(&camera, look_at(), projection, VIEWPORT, -1.0);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn negative_viewport_height_turns_the_picture_over() {
     let projection = directx::frustum(-0.05, 0.08, -0.03, 0.06, 0.1, 100.0);
     let viewport = [VIEWPORT[0], -VIEWPORT[1]];
@@ -148,7 +148,7 @@ fn negative_viewport_height_turns_the_picture_over() {
     assert_eq!(camera.principal_point, flipped.principal_point);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn off_centre() {
     let projection = vulkan::frustum(-0.05, 0.08, -0.03, 0.06, 0.1, 100.0);
     let camera = from(look_at(), projection).unwrap();
@@ -157,7 +157,7 @@ fn off_centre() {
     assert_agrees(&camera, look_at(), projection, VIEWPORT, -1.0);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn reverse_depth_and_infinite_far_planes() {
     let finite_reverse = directx::perspective(0.9, 16.0 / 9.0, 100.0, 0.1);
     let infinite = directx::perspective_infinite(0.9, 16.0 / 9.0, 0.1);
@@ -178,7 +178,7 @@ fn reverse_depth_and_infinite_far_planes() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn orthographic() {
     for (near, far) in [(0.1, 100.0), (-10.0, 30.0)] {
         let projection = vulkan::orthographic(-4.0, 3.0, -2.0, 2.5, near, far);
@@ -191,7 +191,7 @@ fn orthographic() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn forward_z_views() {
     let view = look_at_lh(EYE, TARGET, DVec3::Y);
     for projection in [
@@ -209,7 +209,7 @@ fn forward_z_views() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_eye_keeps_double_precision() {
     let eye = DVec3::new(1.0e7 + 0.125, -3.0e6, 5.0e6 + 0.0625);
     let view = look_at_rh(eye, eye + DVec3::new(1.0, 0.3, -0.5), DVec3::Y);
@@ -217,7 +217,7 @@ fn the_eye_keeps_double_precision() {
     assert!((DVec3::from_array(camera.eye) - eye).length() < 1e-7);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn single_precision_matrices_are_accepted() {
     let view = glam::camera::rh::view::look_at_mat4(Vec3::new(3.0, -2.0, 5.0), Vec3::ZERO, Vec3::Y);
     let projection = glam::camera::rh::proj::vulkan::perspective(0.9, 16.0 / 9.0, 0.1, 100.0);
@@ -236,7 +236,7 @@ fn single_precision_matrices_are_accepted() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_panorama_fills_its_viewport() {
     let axes = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let camera = GaussianCameraGAURAST::panorama(&axes, [1.0, 2.0, 3.0], [512.0, 256.0]).unwrap();
@@ -254,7 +254,7 @@ fn a_panorama_fills_its_viewport() {
     assert_eq!(error(&[[2.0; 3]; 3], [8.0; 2]), CameraError::NotRigid);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_pose_sees_its_axes() {
     let rotation = DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(-0.2);
     let rows = rotation.transpose().to_cols_array_2d();
@@ -269,7 +269,7 @@ fn a_pose_sees_its_axes() {
     assert!((z - 2.0).abs() < 1e-6);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depth_ranges_agree_with_projections() {
     let rotation = DMat3::IDENTITY.to_cols_array_2d();
     let pose = GaussianCameraGAURAST::from_pose(&rotation, [0.0; 3], [1.0; 2], [0.0; 2]).unwrap();
@@ -304,7 +304,7 @@ fn depth_ranges_agree_with_projections() {
     assert!(orthographic.depth_range(1.0, f32::INFINITY).is_err());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn unusable_inputs_are_errors() {
     let projection = directx::perspective(0.9, 1.0, 0.1, 100.0);
     let error = |view, projection| from(view, projection).unwrap_err();
@@ -340,7 +340,7 @@ fn unusable_inputs_are_errors() {
     assert_eq!(pose.unwrap_err(), CameraError::NotRigid);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn uniform_data_holds_the_same_camera() {
     let camera = from(look_at(), directx::perspective(0.9, 1.0, 0.1, 100.0)).unwrap();
     let data = GaussianCameraDataGAURAST::from(&camera);

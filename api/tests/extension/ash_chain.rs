@@ -18,7 +18,7 @@ fn next<'a, T: TaggedStructure>(p_next: *const c_void) -> &'a T {
     unsafe { &*p_next.cast::<T>() }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn features_chain_to_query_and_device_creation() {
     let mut asked = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default();
     let query = vk::PhysicalDeviceFeatures2::default().push_next(&mut asked);
@@ -40,7 +40,7 @@ fn features_chain_to_query_and_device_creation() {
     let _: &vk::PhysicalDeviceVulkan12Features<'_> = next(found.p_next);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn properties_chain_to_the_query() {
     let mut asked = PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST::default();
     let query = vk::PhysicalDeviceProperties2::default().push_next(&mut asked);
@@ -48,7 +48,7 @@ fn properties_chain_to_the_query() {
     assert_eq!(found.max_gaussians_per_draw, 0);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn pipeline_state_chains_with_the_defaults_of_3dgs() {
     let mut state = PipelineGaussianStateCreateInfoGAURAST::default()
         .spherical_harmonics_degree(3)
@@ -102,7 +102,7 @@ unsafe extern "system" fn get_device_proc_addr(
     })
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_command_is_loaded_and_called() {
     let load = |name: &CStr| {
         if name == c"vkGetDeviceProcAddr" {

@@ -15,7 +15,7 @@ macro_rules! assert_layout {
     };
 }
 
-#[test]
+#[gaurast_runner::test]
 fn features() {
     assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 96, 8, {
         s_type: 0,
@@ -42,7 +42,7 @@ fn features() {
     });
 }
 
-#[test]
+#[gaurast_runner::test]
 fn properties() {
     assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, 56, 8, {
         s_type: 0,
@@ -57,7 +57,7 @@ fn properties() {
     });
 }
 
-#[test]
+#[gaurast_runner::test]
 fn pipeline_state() {
     assert_layout!(GaussianAttributeLocationsGAURAST, 28, 4, {
         position: 0,
@@ -108,7 +108,7 @@ fn pipeline_state() {
     });
 }
 
-#[test]
+#[gaurast_runner::test]
 fn camera() {
     assert_layout!(GaussianCameraGAURAST<'_>, 112, 8, {
         s_type: 0,
@@ -135,7 +135,7 @@ fn camera() {
     });
 }
 
-#[test]
+#[gaurast_runner::test]
 fn names_and_values() {
     assert_eq!(NAME.to_str(), Ok("VK_GAURAST_gaussian_primitive_topology"));
     assert_eq!(SPEC_VERSION, 1);
@@ -155,7 +155,7 @@ fn names_and_values() {
     assert_eq!(GAUSSIAN_LOCATION_UNUSED_GAURAST, u32::MAX);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn enum_values() {
     assert_eq!(GaussianProjectionModeGAURAST::VERTEX_SHADER.as_raw(), 1);
     assert_eq!(GaussianGeometryGAURAST::GAUSSIAN_2D.as_raw(), 1);
@@ -175,7 +175,7 @@ fn enum_values() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn debug_prints_names_and_unknown_numbers() {
     assert_eq!(
         format!("{:?}", GaussianOrderGAURAST::PER_PIXEL),
