@@ -1,4 +1,4 @@
-//! What the driver does, held against the binary64 oracle, exact models, and other drivers.
+//! Tests that hold what the driver does against the binary64 oracle, exact models, and other drivers.
 
 mod driver;
 mod gaussian;

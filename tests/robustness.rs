@@ -1,4 +1,4 @@
-//! What the driver does where something is wrong: input that nobody would write, memory that is wanting, and long runs.
+//! Tests of what happens where something is wrong: input that nobody would write, memory that is wanting, and long runs.
 
 mod faults;
 mod fuzzing;

@@ -212,7 +212,7 @@ fn turn(point: DVec3) -> DVec3 {
     DVec3::new(point.x, -point.y, -point.z)
 }
 
-/// What a head in the garden needs.
+/// The needs of a head in the garden.
 pub(super) const GARDEN: [Need; 2] = [GLSLANG, Need::Data(Model::AFRICAN_HEAD)];
 
 pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Hybrid {
@@ -268,7 +268,7 @@ fn a_head_stands_in_the_garden_with_four_samples() {
     garden("head in the garden with four samples", format, 4).judge();
 }
 
-/// What a head inside a trained scene needs.
+/// The needs of a head inside a trained scene.
 pub(super) const WITH_PLAYBOT: [Need; 3] = [
     GLSLANG,
     Need::Data(Model::AFRICAN_HEAD),

@@ -1,4 +1,4 @@
-//! What tests compute once for all SIMD levels, such as the oracle's pictures.
+//! Values that tests compute once for all SIMD levels, such as the oracle's pictures.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};

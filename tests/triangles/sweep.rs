@@ -96,7 +96,7 @@ fn show(name: &str, ours: &Result<Output, String>, theirs: &Output) {
     }
 }
 
-/// Whether what this driver drew is what lavapipe drew, but for the exceptions.
+/// Compares what this driver drew with what lavapipe drew; the error names what no exception excuses.
 fn judge(name: &str, ours: Result<Output, String>, theirs: &Output) -> Result<(), String> {
     let ours = ours?;
     let found = differences(&ours, theirs);

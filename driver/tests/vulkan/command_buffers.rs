@@ -15,7 +15,7 @@ fn fill(gpu: &Gpu, buffer: vk::Buffer, word: u32) -> vk::CommandBuffer {
     .unwrap()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_recording_is_submitted_again_and_again() {
     let gpu = Gpu::new();
     let buffer = gpu.buffer(4, MAPPABLE);
@@ -31,7 +31,7 @@ fn a_recording_is_submitted_again_and_again() {
     gpu.free_buffer(buffer);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn command_buffers_are_reset_alone_or_with_their_pool() {
     let gpu = Gpu::new();
     let device = &gpu.device;
@@ -64,7 +64,7 @@ fn command_buffers_are_reset_alone_or_with_their_pool() {
     gpu.free_buffer(buffer);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_pool_without_single_resets_refuses_them() {
     let gpu = Gpu::new();
     let device = &gpu.device;
@@ -87,7 +87,7 @@ fn a_pool_without_single_resets_refuses_them() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn commands_outside_of_recordings_are_refused() {
     let gpu = Gpu::new();
     let buffer = gpu.buffer(4, MAPPABLE);
@@ -98,7 +98,7 @@ fn commands_outside_of_recordings_are_refused() {
     gpu.free_buffer(buffer);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn commands_that_are_refused_fail_the_recording() {
     let gpu = Gpu::new();
     let buffer = gpu.buffer(4, MAPPABLE);
@@ -117,7 +117,7 @@ fn commands_that_are_refused_fail_the_recording() {
     gpu.free_buffer(buffer);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_pass_that_does_not_end_fails_the_recording() {
     let gpu = Gpu::new();
     let image = gpu.image(vk::Format::R8G8B8A8_UNORM, 4, 4);
@@ -137,7 +137,7 @@ fn a_pass_that_does_not_end_fails_the_recording() {
     gpu.free_image(image);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn secondaries_draw_inside_the_primarys_pass() {
     const RED: [f32; 3] = [0.9, 0.2, 0.1];
     let scene = Scene::new(

@@ -12,7 +12,7 @@ fn free(gpu: &Gpu, buffers: &[Buffer]) {
     buffers.iter().for_each(|&buffer| gpu.free_buffer(buffer));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn push_constants_reach_the_kernel_piece_by_piece() {
     let gpu = Gpu::new();
     let bindings: &[_] = &[(0, STORAGE, 1), (1, STORAGE, 1)];
@@ -39,7 +39,7 @@ fn push_constants_reach_the_kernel_piece_by_piece() {
     free(&gpu, &buffers);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn arrays_of_descriptors_are_indexed_at_run_time() {
     let gpu = Gpu::new();
     let sets: &[&[_]] = &[&[(0, STORAGE, 4)], &[(0, UNIFORM, 2), (3, STORAGE, 1)]];
@@ -63,7 +63,7 @@ fn arrays_of_descriptors_are_indexed_at_run_time() {
     free(&gpu, &[numbers, target]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn dynamic_offsets_go_to_their_descriptors_in_order() {
     let gpu = Gpu::new();
     let dynamic = vk::DescriptorType::STORAGE_BUFFER_DYNAMIC;
@@ -113,7 +113,7 @@ fn dynamic_offsets_go_to_their_descriptors_in_order() {
     free(&gpu, &[source, target]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn specialization_constants_change_the_kernel() {
     let gpu = Gpu::new();
     let bindings: &[_] = &[(0, STORAGE, 1)];
@@ -174,7 +174,7 @@ fn noted(gpu: &Gpu, target: Buffer, count: [u32; 3]) -> Vec<[u32; 3]> {
     ids
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_workgroup_runs_once_and_knows_its_place() {
     let gpu = Gpu::new();
     let kernel = Kernel::new(&gpu, &spirv!("groups.comp"), &[&[(0, STORAGE, 1)]]);
@@ -216,7 +216,7 @@ fn every_workgroup_runs_once_and_knows_its_place() {
     free(&gpu, &[target, parameters]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn shared_memory_is_ordered_by_barriers() {
     let gpu = Gpu::new();
     let kernel = Kernel::new(&gpu, &spirv!("shared.comp"), &[&[(0, STORAGE, 1)]]);
@@ -236,7 +236,7 @@ fn shared_memory_is_ordered_by_barriers() {
     gpu.free_buffer(data);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn atomics_lose_nothing() {
     let gpu = Gpu::new();
     let kernel = Kernel::new(&gpu, &spirv!("atomic_words.comp"), &[&[(0, STORAGE, 1)]]);
@@ -256,7 +256,7 @@ fn atomics_lose_nothing() {
     gpu.free_buffer(data);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_is_out_of_range_reads_zero_and_takes_nothing() {
     let gpu = Gpu::new();
     let bindings: &[_] = &[(0, STORAGE, 1), (1, UNIFORM, 1), (2, STORAGE, 1)];
@@ -299,7 +299,7 @@ fn what_is_out_of_range_reads_zero_and_takes_nothing() {
     free(&gpu, &[data, target]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn subgroups_know_each_other() {
     let gpu = Gpu::new();
     let kernel = Kernel::new(&gpu, &spirv!("subgroups.comp"), &[&[(0, STORAGE, 1)]]);

@@ -9,7 +9,7 @@ const STORAGE: vk::DescriptorType = vk::DescriptorType::STORAGE_BUFFER;
 const UNIFORM: vk::DescriptorType = vk::DescriptorType::UNIFORM_BUFFER;
 const NO_FLAGS: vk::DescriptorSetLayoutCreateFlags = vk::DescriptorSetLayoutCreateFlags::empty();
 
-#[test]
+#[gaurast_runner::test]
 fn pools_give_what_they_have() {
     let gpu = Gpu::new();
     let one = set_layout(&gpu, &[(0, STORAGE, 1)], NO_FLAGS);
@@ -54,7 +54,7 @@ fn pools_give_what_they_have() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn descriptors_are_copied_between_sets() {
     let gpu = Gpu::new();
     let bindings: &[_] = &[(0, STORAGE, 1), (1, STORAGE, 1)];
@@ -120,7 +120,7 @@ fn template_entries() -> [vk::DescriptorUpdateTemplateEntry; 2] {
     ]
 }
 
-#[test]
+#[gaurast_runner::test]
 fn templates_update_sets() {
     let gpu = Gpu::new();
     let bindings: &[_] = &[(0, STORAGE, 1), (1, STORAGE, 1)];
@@ -160,7 +160,7 @@ fn templates_update_sets() {
     gpu.free_buffer(target);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn descriptors_are_pushed() {
     let gpu = Gpu::new();
     let bindings: &[_] = &[(0, STORAGE, 1), (1, STORAGE, 1)];
@@ -227,7 +227,7 @@ fn descriptors_are_pushed() {
     gpu.free_buffer(source);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn sets_are_read_when_commands_execute() {
     let gpu = Gpu::new();
     let bindings: &[_] = &[(0, STORAGE, 1), (1, STORAGE, 1)];
@@ -247,7 +247,7 @@ fn sets_are_read_when_commands_execute() {
     buffers.iter().for_each(|&buffer| gpu.free_buffer(buffer));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn updates_that_do_not_fit_change_nothing() {
     let gpu = Gpu::new();
     let bindings: &[_] = &[(0, STORAGE, 1), (1, STORAGE, 1)];
@@ -267,7 +267,7 @@ fn updates_that_do_not_fit_change_nothing() {
     gpu.free_buffer(buffer);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn pipelines_that_do_not_fit_their_layout_are_refused() {
     let gpu = Gpu::new();
     let words = spirv!("descriptors.comp");
@@ -305,7 +305,7 @@ fn pipelines_that_do_not_fit_their_layout_are_refused() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn shaders_that_cannot_run_are_refused_with_the_instruction() {
     let gpu = Gpu::new();
     let layouts = [set_layout(

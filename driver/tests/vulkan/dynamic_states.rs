@@ -353,7 +353,7 @@ fn draw(canvas: &Canvas, case: &Case, request: &Request, set: Option<bool>) -> V
     pixels
 }
 
-#[test]
+#[gaurast_runner::test]
 fn dynamic_state_is_what_static_state_is() {
     let canvas = Canvas::with_depth();
     for case in cases() {
@@ -379,7 +379,7 @@ fn dynamic_state_is_what_static_state_is() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn viewports_and_scissors_come_with_their_count() {
     let canvas = Canvas::new();
     let request = Request {
@@ -422,7 +422,7 @@ fn viewports_and_scissors_come_with_their_count() {
     assert_ne!(crate::scene::at(&pixels, (7, 12)), RED);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn strides_come_with_vertex_buffers() {
     let canvas = Canvas::new();
     let mut request = Request::default().with_dynamic(S::VERTEX_INPUT_BINDING_STRIDE);

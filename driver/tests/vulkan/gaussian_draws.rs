@@ -12,7 +12,7 @@ fn scene(splats: &[Splat]) -> Scene {
     Scene::new(splats, &PipelineRequest::default())
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_gaussian_is_brightest_at_its_mean() {
     let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, RED)]);
     let pixels = scene.draw([0.0; 4], |device, commands| {
@@ -29,7 +29,7 @@ fn a_gaussian_is_brightest_at_its_mean() {
     assert_eq!(scene.gpu.take_messages(), Vec::<String>::new());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn alpha_becomes_coverage_without_a_fragment_stage() {
     let splats = [
         splat([0.0, 0.0, 9.0], 0.3, 0.9, BLUE),
@@ -63,7 +63,7 @@ fn alpha_becomes_coverage_without_a_fragment_stage() {
     assert!(covered > 20 && left > 20, "{covered} {left}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn gaussians_are_sorted_and_blended_over_the_background() {
     let splats = [
         splat([0.0, 0.0, 9.0], 0.1, 0.6, BLUE),
@@ -85,7 +85,7 @@ fn gaussians_are_sorted_and_blended_over_the_background() {
     assert_eq!(at(&pixels, (0, 0)), clear);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn blend_constants_may_be_dynamic() {
     let blend = over()
         .src_color_blend_factor(vk::BlendFactor::CONSTANT_COLOR)
@@ -108,7 +108,7 @@ fn blend_constants_may_be_dynamic() {
     assert_close(at(&pixels, CENTER), expected);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_negative_viewport_height_draws_the_same_picture() {
     let scene = scene(&[splat([0.1, 0.4, 5.0], 0.1, 0.8, RED)]);
     let draw = |y: f32, height: f32| {
@@ -133,7 +133,7 @@ fn a_negative_viewport_height_draws_the_same_picture() {
     assert!(upright == draw(48.0, -48.0));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_scissor_cuts_and_does_not_move() {
     let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, RED)]);
     let draw = |scissor: Option<vk::Rect2D>| {
@@ -164,7 +164,7 @@ fn the_scissor_cuts_and_does_not_move() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn an_index_buffer_picks_gaussians() {
     let scene = scene(&[
         splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
@@ -182,7 +182,7 @@ fn an_index_buffer_picks_gaussians() {
     scene.gpu.free_buffer(indices);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn instances_move_gaussians_by_attributes_of_their_own() {
     // The position advances by instance, everything else by vertex.
     let mut request = PipelineRequest::default();
@@ -209,7 +209,7 @@ fn instances_move_gaussians_by_attributes_of_their_own() {
     scene.gpu.free_buffer(positions);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn indirect_draws_read_their_numbers_when_they_execute() {
     let scene = scene(&[
         splat([0.0, 0.0, 5.0], 0.1, 0.5, RED),
@@ -244,7 +244,7 @@ fn indirect_draws_read_their_numbers_when_they_execute() {
     scene.gpu.free_buffer(indices);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_number_of_indirect_draws_may_lie_in_a_buffer() {
     let scene = scene(&[
         splat([-1.0, 0.0, 5.0], 0.02, 0.5, RED),
@@ -270,7 +270,7 @@ fn the_number_of_indirect_draws_may_lie_in_a_buffer() {
     scene.gpu.free_buffer(numbers);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_draw_without_a_camera_draws_nothing_and_says_so() {
     let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, RED)]);
     scene.gpu.run(|device, commands| {
@@ -292,7 +292,7 @@ fn a_draw_without_a_camera_draws_nothing_and_says_so() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_camera_that_is_none_fails_the_recording() {
     let scene = scene(&[splat([0.0, 0.0, 5.0], 0.1, 0.8, RED)]);
     let camera = crate::scene::camera().near_plane(-1.0);

@@ -45,7 +45,7 @@ fn halves(scene: &Scene, between: impl FnOnce(&ash::Device, vk::CommandBuffer)) 
     })
 }
 
-#[test]
+#[gaurast_runner::test]
 fn merged_draws_are_one_sorted_set() {
     let scene = Scene::new(&interleaved(), &merging());
     let whole = scene.draw([0.0; 4], |device, commands| {
@@ -70,7 +70,7 @@ fn merged_draws_are_one_sorted_set() {
     assert_eq!(scene.gpu.take_messages(), Vec::<String>::new());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn anything_else_between_draws_ends_the_set() {
     let scene = Scene::new(&interleaved(), &merging());
     let apart = Scene::new(
@@ -174,7 +174,7 @@ impl CameraSet {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_camera_may_come_from_a_uniform_buffer() {
     let gpu = crate::gpu::Gpu::new();
     let camera_set = CameraSet::new(&gpu, 3);

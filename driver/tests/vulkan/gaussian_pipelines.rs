@@ -38,7 +38,7 @@ fn assert_refused(gpu: &Gpu, request: &PipelineRequest, error: vk::Result, word:
     assert!(message.contains("vkCreateGraphicsPipelines"), "{message:?}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_pipeline_without_the_structure_is_refused() {
     let gpu = Gpu::new();
     let request = PipelineRequest {
@@ -49,7 +49,7 @@ fn a_pipeline_without_the_structure_is_refused() {
     assert_refused(&gpu, &request, error, "must chain");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn values_outside_their_ranges_are_refused() {
     let gpu = Gpu::new();
     let bad = [
@@ -96,7 +96,7 @@ fn values_outside_their_ranges_are_refused() {
     create(&gpu, &limits).unwrap();
 }
 
-#[test]
+#[gaurast_runner::test]
 fn modes_that_are_not_built_are_refused_by_their_feature() {
     let gpu = Gpu::new();
     let bad = [
@@ -152,7 +152,7 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
     create(&gpu, &tested).unwrap();
 }
 
-#[test]
+#[gaurast_runner::test]
 fn attributes_must_be_in_the_vertex_input_state() {
     let gpu = Gpu::new();
     let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
@@ -178,7 +178,7 @@ fn attributes_must_be_in_the_vertex_input_state() {
     assert_refused(&gpu, &degree1, error, "coefficient 1");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn fixed_function_projection_has_no_vertex_stage() {
     let gpu = Gpu::new();
     // SAFETY: see the crate.
@@ -208,7 +208,7 @@ fn fixed_function_projection_has_no_vertex_stage() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn blend_state_and_attachments_correspond() {
     let gpu = Gpu::new();
     let request = PipelineRequest {
@@ -224,7 +224,7 @@ fn blend_state_and_attachments_correspond() {
     assert_refused(&gpu, &request, error, "viewport");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn compute_pipelines_without_a_shader_are_refused_with_null_handles() {
     let gpu = Gpu::new();
     let infos = [vk::ComputePipelineCreateInfo::default(); 2];
@@ -238,7 +238,7 @@ fn compute_pipelines_without_a_shader_are_refused_with_null_handles() {
     assert_eq!(pipelines, [vk::Pipeline::null(); 2]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_pipeline_cache_is_empty_and_says_whose_it_is() {
     let gpu = Gpu::new();
     // SAFETY: see the crate.

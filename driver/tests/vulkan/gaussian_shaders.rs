@@ -306,7 +306,7 @@ fn draw_all(device: &ash::Device, commands: vk::CommandBuffer) {
     unsafe { device.cmd_draw(commands, COUNT, 1, 0, 0) };
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_vertex_shader_may_do_what_the_device_does() {
     let stage = Stage::new();
     stage.compare("default", |state| state, draw_all);
@@ -328,7 +328,7 @@ fn a_vertex_shader_may_do_what_the_device_does() {
     stage.compare("by w", w, draw_all);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn vertices_are_named_as_for_other_shaders() {
     let stage = Stage::new();
     let gpu = &stage.canvas.gpu;
@@ -356,7 +356,7 @@ fn vertices_are_named_as_for_other_shaders() {
     gpu.free_buffer(numbers);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_a_shader_is_bound_to_may_change_within_a_set() {
     let stage = Stage::new();
     let merging = || {
@@ -468,7 +468,7 @@ fn toned([r, g, b, a]: [f32; 4]) -> [f32; 4] {
     [r, g, b, a]
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_resolve_shader_maps_tones_after_either_projection() {
     let stage = Stage::new();
     for shaded in [false, true] {
@@ -486,7 +486,7 @@ fn a_resolve_shader_maps_tones_after_either_projection() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_resolve_shader_discards_and_differs_from_pixel_to_pixel() {
     let stage = Stage::new();
     let tint = [2.0f32, 3.0, 5.0, 1.0];
@@ -516,7 +516,7 @@ fn a_resolve_shader_discards_and_differs_from_pixel_to_pixel() {
     assert!(covered > 700, "{covered}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_stage_is_needed() {
     let canvas = Canvas::new();
     let error = request(true).create(&canvas.gpu).expect_err("no stage");

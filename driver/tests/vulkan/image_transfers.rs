@@ -67,7 +67,7 @@ fn extent(width: u32, height: u32, depth: u32) -> vk::Extent3D {
 const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
 const BLUE: [f32; 4] = [0.0, 0.0, 1.0, 1.0];
 
-#[test]
+#[gaurast_runner::test]
 fn samples_are_cleared_copied_and_resolved() {
     let gpu = Gpu::new();
     let many = [(); 2].map(|()| image_of(&gpu, sampled_four_times(6, 4)));
@@ -127,7 +127,7 @@ fn samples_are_cleared_copied_and_resolved() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn memory_holds_every_sample() {
     let gpu = Gpu::new();
     let size = |samples| {
@@ -153,7 +153,7 @@ fn memory_holds_every_sample() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn blits_scale_through_both_entry_points() {
     let gpu = Gpu::new();
     let source = gpu.image(FORMAT, 2, 1);
@@ -223,7 +223,7 @@ fn blits_scale_through_both_entry_points() {
     gpu.free_buffer(texels);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn one_region_copies_depth_and_stencil() {
     let gpu = Gpu::new();
     let make = || {
@@ -304,7 +304,7 @@ fn one_region_copies_depth_and_stencil() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn slices_become_layers_of_another_format() {
     let gpu = Gpu::new();
     let solid = vk::ImageCreateInfo {
@@ -360,7 +360,7 @@ fn slices_become_layers_of_another_format() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn images_that_do_not_fit_each_other_fail_the_recording() {
     let gpu = Gpu::new();
     let one = gpu.image(FORMAT, 4, 4);

@@ -40,7 +40,7 @@ fn picture(gpu: &Gpu) -> Image {
     image
 }
 
-#[test]
+#[gaurast_runner::test]
 fn kernels_read_and_write_images() {
     let gpu = Gpu::new();
     let kernel = Kernel::new(&gpu, &spirv!("image_bindings.comp"), &[BINDINGS]);

@@ -1,4 +1,4 @@
-//! The driver as an application sees it: `ash` over the embedded door.
+//! The driver as an application sees it: `ash` over the embedded door and through the loader.
 //!
 //! `unsafe` here has one reason throughout: these are Vulkan calls, and each test follows Vulkan's valid usage or
 //! breaks it in the one way that it is about, which the driver must survive.
@@ -6,17 +6,20 @@
 mod canvas;
 mod command_buffers;
 mod compute;
+mod context;
 mod descriptors;
 mod dynamic_states;
+mod embedded;
 mod gaussian_draws;
 mod gaussian_modes;
 mod gaussian_pipelines;
 mod gaussian_shaders;
 mod gpu;
 mod image_transfers;
+mod images;
 mod images_in_shaders;
 mod kernel;
-#[path = "../support/loader.rs"]
+mod leaks;
 mod loader;
 mod memory;
 mod polygon_attachments;
@@ -29,6 +32,12 @@ mod render_passes;
 mod scene;
 mod subpasses;
 mod synchronization;
+mod system_loader;
 mod transfers;
 mod valid_usage;
 mod validation;
+mod watchdog;
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}

@@ -5,7 +5,7 @@ use ash::vk;
 
 const NO_FLAGS: vk::MemoryMapFlags = vk::MemoryMapFlags::empty();
 
-#[test]
+#[gaurast_runner::test]
 fn mapped_memory_keeps_what_is_written() {
     let gpu = Gpu::new();
     let memory = gpu.allocate(1000, MAPPABLE);
@@ -35,7 +35,7 @@ fn mapped_memory_keeps_what_is_written() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn device_only_memory_is_not_mapped() {
     let gpu = Gpu::new();
     let memory = gpu.allocate(1000, DEVICE_ONLY);
@@ -49,7 +49,7 @@ fn device_only_memory_is_not_mapped() {
     assert!(gpu.take_messages().concat().contains("not host-visible"));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_heap_is_finite() {
     let gpu = Gpu::new();
     let allocate = |size| {
@@ -70,7 +70,7 @@ fn the_heap_is_finite() {
     unsafe { gpu.device.free_memory(memory, None) };
 }
 
-#[test]
+#[gaurast_runner::test]
 fn resources_outlive_the_memory_object_that_they_are_bound_to() {
     let gpu = Gpu::new();
     let source = gpu.buffer_of(&[1u32, 2, 3, 4]);
@@ -88,7 +88,7 @@ fn resources_outlive_the_memory_object_that_they_are_bound_to() {
     gpu.free_buffer(target);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn binding_is_checked() {
     let gpu = Gpu::new();
     let info = vk::BufferCreateInfo::default()
@@ -112,7 +112,7 @@ fn binding_is_checked() {
     assert_eq!(gpu.take_messages().len(), 3);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn requirements_are_the_same_however_they_are_asked_for() {
     let gpu = Gpu::new();
     let info = vk::ImageCreateInfo::default()
@@ -177,7 +177,7 @@ fn dedicated_is_not_asked_for() -> (vk::Bool32, vk::Bool32) {
     )
 }
 
-#[test]
+#[gaurast_runner::test]
 fn images_beyond_the_limits_are_refused() {
     let gpu = Gpu::new();
     let good = vk::ImageCreateInfo::default()

@@ -8,7 +8,7 @@ use crate::scene::{FORMAT, HEIGHT, WIDTH, assert_close, at, replace};
 use crate::spirv;
 use ash::vk;
 
-#[test]
+#[gaurast_runner::test]
 fn two_attachments_are_written_and_masked() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -37,7 +37,7 @@ fn two_attachments_are_written_and_masked() {
     made.destroy(gpu);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn two_sources_are_blended() {
     let canvas = Canvas::new();
     let mut request = Request::default().with_fragment(spirv!("two_sources.frag"));
@@ -57,7 +57,7 @@ fn two_sources_are_blended() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_logic_operation_works_on_bits() {
     let canvas = Canvas::of(vk::Format::R8G8B8A8_UNORM);
     let request = Request {
@@ -88,7 +88,7 @@ fn a_logic_operation_works_on_bits() {
     made.destroy(&canvas.gpu);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depth_decides_what_is_seen() {
     let canvas = Canvas::with_depth();
     let request = Request {
@@ -111,7 +111,7 @@ fn depth_decides_what_is_seen() {
     assert_eq!(at(&pixels, (30, 46)), GREEN);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn several_samples_make_smooth_edges() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -155,7 +155,7 @@ fn several_samples_make_smooth_edges() {
     made.destroy(gpu);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn demoted_invocations_write_nothing_and_help() {
     let canvas = Canvas::new();
     let request = Request::default().with_fragment(spirv!("demoted.frag"));
@@ -190,7 +190,7 @@ fn resolved(canvas: &Canvas, request: &Request, color: [f32; 4]) -> [f32; 4] {
     pixels[0]
 }
 
-#[test]
+#[gaurast_runner::test]
 fn samples_are_shaded_masked_and_covered() {
     let canvas = Canvas::new();
     let four = vk::PipelineMultisampleStateCreateInfo::default()

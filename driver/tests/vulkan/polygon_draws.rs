@@ -9,7 +9,7 @@ use crate::scene::{HEIGHT, WIDTH, assert_close, at};
 use crate::spirv;
 use ash::vk;
 
-#[test]
+#[gaurast_runner::test]
 fn a_triangle_covers_what_it_covers() {
     let canvas = Canvas::new();
     let vertices = [
@@ -32,7 +32,7 @@ fn a_triangle_covers_what_it_covers() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn colours_are_interpolated() {
     let canvas = Canvas::new();
     let color = |x: f32, y: f32| [x, y, 0.5, 1.0];
@@ -49,7 +49,7 @@ fn colours_are_interpolated() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn indices_choose_vertices() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -110,7 +110,7 @@ fn cell(pixels: &[[f32; 4]], x: u32, y: u32) -> [f32; 4] {
     at(pixels, (x * WIDTH / 4 + 8, y * HEIGHT / 4 + 6))
 }
 
-#[test]
+#[gaurast_runner::test]
 fn instances_are_numbered_and_have_attributes() {
     let canvas = Canvas::new();
     let places = [[0u8, 0], [1, 0], [2, 1], [3, 3]];
@@ -133,7 +133,7 @@ fn instances_are_numbered_and_have_attributes() {
     assert_eq!(cell(&pixels, 2, 1), CLEAR);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn indirect_draws_are_numbered() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -183,7 +183,7 @@ fn indirect_draws_are_numbered() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_provoking_vertex_is_chosen() {
     let canvas = Canvas::new();
     let mut vertices = everything(RED);
@@ -200,7 +200,7 @@ fn the_provoking_vertex_is_chosen() {
     );
 }
 
-#[test]
+#[gaurast_runner::test]
 fn points_have_the_size_that_the_shader_says() {
     let canvas = Canvas::new();
     let request = Request {
@@ -214,7 +214,7 @@ fn points_have_the_size_that_the_shader_says() {
     assert_eq!(at(&pixels, (WIDTH / 2 + 1, HEIGHT / 2 + 1)), RED);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn primitives_go_to_their_viewport_and_layer() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -269,7 +269,7 @@ fn primitives_go_to_their_viewport_and_layer() {
     made.destroy(gpu);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_draw_without_what_its_pipeline_needs_draws_nothing_and_says_so() {
     let canvas = Canvas::new();
     let request = Request::default().with_dynamic(vk::DynamicState::CULL_MODE);
@@ -289,7 +289,7 @@ fn a_draw_without_what_its_pipeline_needs_draws_nothing_and_says_so() {
     assert!(told.contains("binding 3"), "{told}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn polygons_may_be_drawn_as_lines_or_points() {
     let canvas = Canvas::new();
     let drawn = |mode| {
@@ -309,7 +309,7 @@ fn polygons_may_be_drawn_as_lines_or_points() {
     assert!(fill > 300 && (60..120).contains(&line), "{fill} {line}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depth_is_clipped_or_clamped() {
     let canvas = Canvas::with_depth();
     let mut request = Request {
@@ -325,7 +325,7 @@ fn depth_is_clipped_or_clamped() {
     assert_eq!(count(&canvas.draw_vertices(&request, &deep), RED), PIXELS);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn shaders_clip_and_cull() {
     let canvas = Canvas::new();
     let mut request = Request::default();

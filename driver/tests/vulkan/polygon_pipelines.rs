@@ -24,7 +24,7 @@ fn assert_refused(gpu: &Gpu, request: &Request, error: vk::Result, word: &str) {
     assert!(message.contains("vkCreateGraphicsPipelines"), "{message:?}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_topology_without_adjacency_has_pipelines() {
     let gpu = Gpu::new();
     use vk::PrimitiveTopology as T;
@@ -66,7 +66,7 @@ fn every_topology_without_adjacency_has_pipelines() {
     assert!(gpu.take_messages().is_empty());
 }
 
-#[test]
+#[gaurast_runner::test]
 fn stages_are_those_that_the_device_has() {
     let gpu = Gpu::new();
     let mut request = Request::default();
@@ -88,7 +88,7 @@ fn stages_are_those_that_the_device_has() {
     assert_refused(&gpu, &request, invalid, "no vertex entry point");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn stages_and_layout_correspond() {
     let gpu = Gpu::new();
     let request = Request {
@@ -105,7 +105,7 @@ fn stages_and_layout_correspond() {
     assert_refused(&gpu, &request, USAGE, "push constants 16 to 80");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_fragment_input_that_nobody_writes_is_warned_of() {
     let gpu = Gpu::new();
     let request = Request {
@@ -133,7 +133,7 @@ fn a_fragment_input_that_nobody_writes_is_warned_of() {
     assert!(messages.contains("reads as 0"), "{messages:?}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn attributes_are_of_the_kinds_that_the_shader_reads() {
     let gpu = Gpu::new();
     let mut missing = Request::default();
@@ -157,7 +157,7 @@ fn attributes_are_of_the_kinds_that_the_shader_reads() {
     assert_made(&gpu, &cells);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn values_of_64_bits_do_not_pass_between_stages() {
     let gpu = Gpu::new();
     let request = Request {
@@ -167,7 +167,7 @@ fn values_of_64_bits_do_not_pass_between_stages() {
     assert_refused(&gpu, &request, LACKING, "64 bits");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn state_that_is_ignored_may_be_anything() {
     let gpu = Gpu::new();
     let nonsense = vk::CompareOp::from_raw(77);
@@ -199,7 +199,7 @@ fn state_that_is_ignored_may_be_anything() {
     assert_refused(&gpu, &request, USAGE, "viewport");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn counts_correspond() {
     let gpu = Gpu::new();
     let request = Request {
@@ -228,7 +228,7 @@ fn counts_correspond() {
     assert_made(&gpu, &request);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn state_that_the_device_lacks_is_refused() {
     let gpu = Gpu::new();
     let request = Request {

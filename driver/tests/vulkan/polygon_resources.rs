@@ -6,7 +6,7 @@ use crate::scene::{FORMAT, HEIGHT, WIDTH, assert_close, at};
 use crate::spirv;
 use ash::vk;
 
-#[test]
+#[gaurast_runner::test]
 fn push_constants_move_vertices() {
     let canvas = Canvas::new();
     let vertices = everything(RED);
@@ -29,7 +29,7 @@ fn push_constants_move_vertices() {
     assert_eq!(at(&pixels, (WIDTH / 2, 20)), RED);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn textures_uniforms_and_specialization_constants_reach_the_fragment_stage() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -67,7 +67,7 @@ fn textures_uniforms_and_specialization_constants_reach_the_fragment_stage() {
     assert!(told.contains("location 7"), "{told}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn both_stages_store() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -97,7 +97,7 @@ fn both_stages_store() {
     gpu.free_buffer(counts);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn queries_count_samples_and_invocations() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -159,7 +159,7 @@ fn queries_count_samples_and_invocations() {
     assert_eq!(statistics, [[6, 2, 6, 2, PIXELS as u64, 0]]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_secondary_command_buffer_draws_in_its_primarys_pass() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;

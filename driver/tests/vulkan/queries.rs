@@ -5,7 +5,7 @@ use crate::scene::{PipelineRequest, Scene, splat};
 use ash::vk;
 use simdevice::counters::Counter;
 
-#[test]
+#[gaurast_runner::test]
 fn counters_are_read_in_the_order_that_the_pool_chose() {
     let splats = [
         splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3]),
@@ -65,7 +65,7 @@ fn counters_are_read_in_the_order_that_the_pool_chose() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn occlusion_queries_count_the_fragments_of_gaussian_draws() {
     let splats = [
         splat([0.0, 0.0, 5.0], 0.1, 0.8, [0.5; 3]),
@@ -108,7 +108,7 @@ fn occlusion_queries_count_the_fragments_of_gaussian_draws() {
     assert_eq!(hidden, (shown.0, 0));
 }
 
-#[test]
+#[gaurast_runner::test]
 fn timestamps_ascend_and_are_copied_with_their_availability() {
     let gpu = Gpu::new();
     let device = &gpu.device;
@@ -142,7 +142,7 @@ fn timestamps_ascend_and_are_copied_with_their_availability() {
     gpu.free_buffer(buffer);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_cannot_be_measured_is_refused() {
     let gpu = Gpu::new();
     let feedback = vk::QueryPoolCreateInfo::default()

@@ -75,7 +75,7 @@ fn framebuffer(gpu: &Gpu, pass: vk::RenderPass, images: &[Image]) -> vk::Framebu
     unsafe { gpu.device.create_framebuffer(&info, None).unwrap() }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_pass_clears_and_stores() {
     let gpu = Gpu::new();
     let image = gpu.image(FORMAT, 4, 2);
@@ -113,7 +113,7 @@ fn a_pass_clears_and_stores() {
     gpu.free_image(image);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn subpasses_follow_each_other() {
     let gpu = Gpu::new();
     let images = [gpu.image(FORMAT, 4, 2), gpu.image(FORMAT, 4, 2)];
@@ -178,7 +178,7 @@ fn subpasses_follow_each_other() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn passes_load_what_is_there_within_their_area() {
     let gpu = Gpu::new();
     let image = gpu.image(FORMAT, 4, 2);
@@ -233,7 +233,7 @@ fn passes_load_what_is_there_within_their_area() {
     gpu.free_image(image);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn what_a_subpass_only_reads_is_cleared_for_it() {
     let gpu = Gpu::new();
     let images = [gpu.image(FORMAT, 4, 2), gpu.image(FORMAT, 4, 2)];
@@ -268,7 +268,7 @@ fn what_a_subpass_only_reads_is_cleared_for_it() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn slices_of_solid_images_are_rendered_to() {
     let gpu = Gpu::new();
     let out = gpu.image(FORMAT, 4, 2);

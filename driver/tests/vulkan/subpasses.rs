@@ -166,7 +166,7 @@ fn half(color: [f32; 4]) -> [Vertex; 3] {
     [corner(-1.0, -1.0), corner(1.0, -1.0), corner(-1.0, 1.0)]
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_subpass_reads_what_an_earlier_one_left() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -245,7 +245,7 @@ fn finish(canvas: &Canvas, pass: vk::RenderPass, made: [Made; 2], set: Set, imag
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn samples_are_resolved_and_read_one_by_one() {
     let canvas = Canvas::new();
     let gpu = &canvas.gpu;
@@ -321,7 +321,7 @@ fn samples_are_resolved_and_read_one_by_one() {
     finish(&canvas, pass, made, set, &images);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depth_and_stencil_are_resolved() {
     let gpu = Gpu::new();
     let format = vk::Format::D32_SFLOAT_S8_UINT;

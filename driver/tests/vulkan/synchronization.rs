@@ -4,7 +4,7 @@ use crate::gpu::{Gpu, MAPPABLE};
 use ash::vk;
 use std::time::{Duration, Instant};
 
-#[test]
+#[gaurast_runner::test]
 fn fences_tell_when_a_submission_is_done() {
     let gpu = Gpu::new();
     let device = &gpu.device;
@@ -38,7 +38,7 @@ fn fences_tell_when_a_submission_is_done() {
     gpu.free_buffer(buffer);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_wait_is_for_any_fence_or_for_all() {
     let gpu = Gpu::new();
     let device = &gpu.device;
@@ -61,7 +61,7 @@ fn a_wait_is_for_any_fence_or_for_all() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn binary_semaphores_order_submissions() {
     let gpu = Gpu::new();
     let device = &gpu.device;
@@ -100,7 +100,7 @@ fn binary_semaphores_order_submissions() {
     gpu.free_buffer(buffer);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn the_host_signals_a_timeline_that_a_queue_waits_for() {
     let gpu = Gpu::new();
     let device = &gpu.device;
@@ -145,7 +145,7 @@ fn the_host_signals_a_timeline_that_a_queue_waits_for() {
     }
 }
 
-#[test]
+#[gaurast_runner::test]
 fn queues_and_hosts_set_events() {
     let gpu = Gpu::new();
     let device = &gpu.device;

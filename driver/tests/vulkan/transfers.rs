@@ -5,7 +5,7 @@ use ash::vk;
 
 const GENERAL: vk::ImageLayout = vk::ImageLayout::GENERAL;
 
-#[test]
+#[gaurast_runner::test]
 fn buffers_are_filled_updated_and_copied() {
     let gpu = Gpu::new();
     let source = gpu.buffer(32, MAPPABLE);
@@ -44,7 +44,7 @@ fn buffers_are_filled_updated_and_copied() {
     gpu.free_buffer(target);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn images_are_cleared_and_copied_there_and_back() {
     let gpu = Gpu::new();
     let first = gpu.image(vk::Format::R8G8B8A8_UNORM, 7, 5);
@@ -113,7 +113,7 @@ fn images_are_cleared_and_copied_there_and_back() {
     gpu.free_buffer(texels);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn depth_images_are_cleared() {
     let gpu = Gpu::new();
     let image = gpu.image(vk::Format::D32_SFLOAT, 4, 4);
@@ -147,7 +147,7 @@ fn depth_images_are_cleared() {
     gpu.free_buffer(buffer);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_copy_outside_its_buffer_fails_the_recording() {
     let gpu = Gpu::new();
     let source = gpu.buffer(16, MAPPABLE);
@@ -173,7 +173,7 @@ fn a_copy_outside_its_buffer_fails_the_recording() {
     gpu.free_buffer(target);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn subresources_that_an_image_lacks_fail_the_recording() {
     let gpu = Gpu::new();
     let image = gpu.image(vk::Format::R8G8B8A8_UNORM, 4, 4);

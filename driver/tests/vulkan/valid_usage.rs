@@ -241,7 +241,7 @@ fn refused(gpu: &Gpu, request: &PipelineRequest, result: vk::Result, what: &str)
     gpu.take_messages().concat()
 }
 
-#[test]
+#[gaurast_runner::test]
 fn every_statement_is_reported_by_its_id() {
     let mut tested = BTreeSet::new();
     let mut heard = |id: &'static str, messages: String| {
@@ -349,7 +349,7 @@ fn without_the_topology() -> String {
     refused(&gpu, &PipelineRequest::default(), result, "the topology")
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_camera_whose_feature_is_not_enabled_draws_nothing_and_says_so() {
     let scene = Scene::on(
         Gpu::without_modes(),

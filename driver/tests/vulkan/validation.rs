@@ -1,14 +1,15 @@
 //! A Gaussian draw through the loader, under the validation layer.
 
 use crate::gpu::Gpu;
-use crate::loader::through_the_loader;
 use crate::scene::{CENTER, PipelineRequest, Scene, assert_close, at, premultiplied, splat};
+use crate::system_loader::through_the_loader;
+use gaurast_runner::{Case, Need};
 use std::collections::BTreeSet;
 use std::ffi::CStr;
 
 const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// What the layer, which does not know the extension, says of a right use of it.
+/// The messages of the layer, which does not know the extension, about a right use of it.
 const EXPECTED: &[&str] = &[
     // The device extension is unknown.
     "VUID_Undefined",
@@ -21,40 +22,28 @@ const EXPECTED: &[&str] = &[
     "VUID-VkGraphicsPipelineCreateInfo-stageCount-06604",
 ];
 
-#[test]
-fn a_draw_is_as_it_is_without_the_layer() {
-    through_the_loader(
-        "validation::a_draw_is_as_it_is_without_the_layer",
-        |entry| {
+#[gaurast_runner::test(needs = [Need::ValidationLayer])]
+fn a_draw_is_as_it_is_without_the_layer(case: &Case) {
+    through_the_loader(case, |entry| {
+        let color = [0.9, 0.2, 0.1];
+        let splats = [splat([0.0, 0.0, 5.0], 0.1, 0.8, color)];
+        let gpu = Gpu::of(entry, &[LAYER]);
+        let scene = Scene::on(gpu, &splats, &PipelineRequest::default());
+        let pixels = scene.draw([0.0; 4], |device, commands| {
             // SAFETY: see the crate.
-            let layers = unsafe { entry.enumerate_instance_layer_properties() }.unwrap();
-            if !layers
-                .iter()
-                .any(|layer| layer.layer_name_as_c_str() == Ok(LAYER))
-            {
-                eprintln!("skipped: there is no validation layer here");
-                return;
-            }
-            let color = [0.9, 0.2, 0.1];
-            let splats = [splat([0.0, 0.0, 5.0], 0.1, 0.8, color)];
-            let gpu = Gpu::of(entry, &[LAYER]);
-            let scene = Scene::on(gpu, &splats, &PipelineRequest::default());
-            let pixels = scene.draw([0.0; 4], |device, commands| {
-                // SAFETY: see the crate.
-                unsafe { device.cmd_draw(commands, 1, 1, 0, 0) };
-            });
-            assert_close(at(&pixels, CENTER), premultiplied(color, 0.8));
-            let messages = scene.gpu.take_messages();
-            let ids: BTreeSet<_> = messages.iter().map(|message| id(message)).collect();
-            let unexpected: Vec<_> = messages
-                .iter()
-                .filter(|message| !EXPECTED.contains(&id(message)))
-                .collect();
-            assert!(unexpected.is_empty(), "{unexpected:#?}");
-            let layer_was_there = "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter";
-            assert!(ids.contains(layer_was_there), "{ids:?}");
-        },
-    );
+            unsafe { device.cmd_draw(commands, 1, 1, 0, 0) };
+        });
+        assert_close(at(&pixels, CENTER), premultiplied(color, 0.8));
+        let messages = scene.gpu.take_messages();
+        let ids: BTreeSet<_> = messages.iter().map(|message| id(message)).collect();
+        let unexpected: Vec<_> = messages
+            .iter()
+            .filter(|message| !EXPECTED.contains(&id(message)))
+            .collect();
+        assert!(unexpected.is_empty(), "{unexpected:#?}");
+        let layer_was_there = "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-parameter";
+        assert!(ids.contains(layer_was_there), "{ids:?}");
+    });
 }
 
 /// The id in a message of the layer: "Validation Error: [ ID ] ...".

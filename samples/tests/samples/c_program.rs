@@ -62,8 +62,13 @@ fn the_c_program_draws_what_the_rust_program_draws() {
             .env("VK_ICD_FILENAMES", &manifest)
             .env_remove("VK_INSTANCE_LAYERS"),
     );
-    // Cargo builds it for tests, unless it is told which ones.
-    succeed(Command::new(build_folder().join("examples/hello_gaussians")).current_dir(&folder));
+    let sample = build_folder().join("examples/hello_gaussians");
+    assert!(
+        sample.exists(),
+        "there is no {}: `cargo test` builds the samples, unless it is told which tests to build",
+        sample.display()
+    );
+    succeed(Command::new(sample).current_dir(&folder));
 
     let expected = image::open(folder.path().join("hello_gaussians.png"));
     let expected = expected.expect("the Rust program's picture").to_rgb8();

@@ -153,7 +153,7 @@ fn check_all(context: &Context, rows: &[Row], list: &str) {
     );
 }
 
-/// Where lavapipe lies outside the specification.
+/// The rows where lavapipe lies outside the specification.
 const LAVAPIPE: &str = include_str!("../../expected_failures/lavapipe_instructions.txt");
 
 /// Opcodes of the groups of instructions that are tried here.

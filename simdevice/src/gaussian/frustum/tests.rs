@@ -210,12 +210,9 @@ fn what_is_outside_is_drawn_nowhere() {
                     );
                 }
             }
-            println!(
-                "{geometry:?} {precision:?} {linearization:?} {model:?}: {drawn} drawn, {beside} and {beside_chunks} beside"
-            );
             assert!(
                 drawn > 500 && beside > 1000 && beside_chunks > 1000,
-                "{drawn} {beside} {beside_chunks}"
+                "{geometry:?} {precision:?} {linearization:?} {model:?}: {drawn} drawn, {beside} and {beside_chunks} beside"
             );
         }
     }

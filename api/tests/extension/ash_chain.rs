@@ -1,0 +1,125 @@
+//! The extension's structures chain to ash's own, and its command is loaded and called as ash's are.
+
+use std::ffi::{CStr, c_char, c_void};
+use std::sync::Mutex;
+
+use ash::vk::{self, Handle, TaggedStructure};
+use gaurast::gaussian_primitive_topology;
+use gaurast::vk::*;
+
+/// The structure of type `T` that follows `p_next` directly.
+fn next<'a, T: TaggedStructure>(p_next: *const c_void) -> &'a T {
+    let base = p_next.cast::<vk::BaseInStructure<'_>>();
+    assert!(!base.is_null());
+    // SAFETY: the tests keep what they chain alive, and every chained structure starts as
+    // `BaseInStructure` does.
+    assert_eq!(unsafe { (*base).s_type }, T::STRUCTURE_TYPE);
+    // SAFETY: the structure type says that it is a `T`.
+    unsafe { &*p_next.cast::<T>() }
+}
+
+#[gaurast_runner::test]
+fn features_chain_to_query_and_device_creation() {
+    let mut asked = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default();
+    let query = vk::PhysicalDeviceFeatures2::default().push_next(&mut asked);
+    let found: &PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> = next(query.p_next);
+    assert_eq!(found.gaussian_primitive_topology, vk::FALSE);
+
+    let mut enabled = PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST::default()
+        .gaussian_primitive_topology(true)
+        .merged_draws(true);
+    let mut core = vk::PhysicalDeviceVulkan12Features::default();
+    let create_info = vk::DeviceCreateInfo::default()
+        .push_next(&mut core)
+        .push_next(&mut enabled);
+    let found: &PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_> =
+        next(create_info.p_next);
+    assert_eq!(found.gaussian_primitive_topology, vk::TRUE);
+    assert_eq!(found.merged_draws, vk::TRUE);
+    assert_eq!(found.gaussian_2d, vk::FALSE);
+    let _: &vk::PhysicalDeviceVulkan12Features<'_> = next(found.p_next);
+}
+
+#[gaurast_runner::test]
+fn properties_chain_to_the_query() {
+    let mut asked = PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST::default();
+    let query = vk::PhysicalDeviceProperties2::default().push_next(&mut asked);
+    let found: &PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> = next(query.p_next);
+    assert_eq!(found.max_gaussians_per_draw, 0);
+}
+
+#[gaurast_runner::test]
+fn pipeline_state_chains_with_the_defaults_of_3dgs() {
+    let mut state = PipelineGaussianStateCreateInfoGAURAST::default()
+        .spherical_harmonics_degree(3)
+        .attribute_locations(GaussianAttributeLocationsGAURAST::default().position(7));
+    let create_info = vk::GraphicsPipelineCreateInfo::default().push_next(&mut state);
+    let found: &PipelineGaussianStateCreateInfoGAURAST<'_> = next(create_info.p_next);
+    assert_eq!(found.spherical_harmonics_degree, 3);
+    assert_eq!(found.attribute_locations.position, 7);
+    assert_eq!(
+        found.attribute_locations.opacity,
+        GAUSSIAN_LOCATION_UNUSED_GAURAST
+    );
+    assert_eq!(
+        found.projection_mode,
+        GaussianProjectionModeGAURAST::FIXED_FUNCTION
+    );
+    assert_eq!(found.order, GaussianOrderGAURAST::VIEW_DEPTH);
+    assert_eq!(found.low_pass_variance, 0.3);
+    assert_eq!(found.alpha_floor, 1.0 / 255.0);
+    assert_eq!(found.alpha_ceiling, 0.99);
+    assert_eq!(found.transmittance_floor, 1e-4);
+}
+
+/// What the recording function below was called with: command buffer and the camera's eye.
+static CALLED: Mutex<Option<(u64, [f64; 3])>> = Mutex::new(None);
+
+unsafe extern "system" fn record_camera(
+    command_buffer: vk::CommandBuffer,
+    p_camera: *const GaussianCameraGAURAST<'_>,
+) {
+    // SAFETY: the test passes a live camera.
+    let camera = unsafe { &*p_camera };
+    assert_eq!(camera.s_type, STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST);
+    *CALLED.lock().unwrap() = Some((command_buffer.as_raw(), camera.eye));
+}
+
+unsafe extern "system" fn get_device_proc_addr(
+    _device: vk::Device,
+    name: *const c_char,
+) -> vk::PFN_vkVoidFunction {
+    // SAFETY: ash passes a terminated string.
+    if unsafe { CStr::from_ptr(name) } != c"vkCmdSetGaussianCameraGAURAST" {
+        return None;
+    }
+    let function: PFN_vkCmdSetGaussianCameraGAURAST = record_camera;
+    // SAFETY: one function pointer type to another; the caller casts it back.
+    Some(unsafe {
+        std::mem::transmute::<PFN_vkCmdSetGaussianCameraGAURAST, unsafe extern "system" fn()>(
+            function,
+        )
+    })
+}
+
+#[gaurast_runner::test]
+fn the_command_is_loaded_and_called() {
+    let load = |name: &CStr| {
+        if name == c"vkGetDeviceProcAddr" {
+            get_device_proc_addr as *const c_void
+        } else {
+            std::ptr::null()
+        }
+    };
+    // SAFETY: only `vkGetDeviceProcAddr` is called, which is there.
+    let instance = unsafe { ash::Instance::load_with(load, vk::Instance::from_raw(1)) };
+    // SAFETY: none of the device's core functions is called.
+    let device = unsafe { ash::Device::load_with(|_| std::ptr::null(), vk::Device::from_raw(2)) };
+    let functions = gaussian_primitive_topology::Device::new(&instance, &device);
+    assert_eq!(functions.device(), vk::Device::from_raw(2));
+
+    let camera = GaussianCameraGAURAST::default().eye([1.0, 2.0, 3.0]);
+    // SAFETY: the recording function accepts any handle.
+    unsafe { functions.cmd_set_gaussian_camera(vk::CommandBuffer::from_raw(3), &camera) };
+    assert_eq!(CALLED.lock().unwrap().take(), Some((3, [1.0, 2.0, 3.0])));
+}

@@ -1,0 +1,187 @@
+//! Structures have the layout of their C declarations, and enums the values of the extension's
+//! block. The numbers are written out, because C programs and layers depend on them.
+
+use std::mem::{align_of, offset_of, size_of};
+
+use gaurast::gaussian_primitive_topology::{EXTENSION_NUMBER, NAME, SPEC_VERSION};
+use gaurast::vk::*;
+
+/// Checks a structure's size, alignment and the offset of each field.
+macro_rules! assert_layout {
+    ($name:ty, $size:literal, $align:literal, { $($field:ident: $offset:literal,)* }) => {
+        assert_eq!(size_of::<$name>(), $size, "size of {}", stringify!($name));
+        assert_eq!(align_of::<$name>(), $align, "alignment of {}", stringify!($name));
+        $(assert_eq!(offset_of!($name, $field), $offset, "offset of {}", stringify!($field));)*
+    };
+}
+
+#[gaurast_runner::test]
+fn features() {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>, 96, 8, {
+        s_type: 0,
+        p_next: 8,
+        gaussian_primitive_topology: 16,
+        vertex_shader_projection: 20,
+        resolve_fragment_shader: 24,
+        radial_distance_order: 28,
+        primitive_order: 32,
+        per_pixel_order: 36,
+        rasterization_float16: 40,
+        opacity_compensation: 44,
+        orthographic_camera: 48,
+        fisheye_camera: 52,
+        equirectangular_camera: 56,
+        unscented_projection: 60,
+        gaussian_2d: 64,
+        uniform_buffer_camera: 68,
+        merged_draws: 72,
+        gaussian_instancing: 76,
+        gaussian_depth_stencil: 80,
+        gaussian_multisample: 84,
+        gaussian_approximation: 88,
+    });
+}
+
+#[gaurast_runner::test]
+fn properties() {
+    assert_layout!(PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_>, 56, 8, {
+        s_type: 0,
+        p_next: 8,
+        tile_size: 16,
+        rasterizer_module_count: 24,
+        processing_element_count: 28,
+        max_spherical_harmonics_degree: 32,
+        gaussian_sample_counts: 36,
+        max_gaussians_per_draw: 40,
+        max_gaussians_per_set: 48,
+    });
+}
+
+#[gaurast_runner::test]
+fn pipeline_state() {
+    assert_layout!(GaussianAttributeLocationsGAURAST, 28, 4, {
+        position: 0,
+        scale: 4,
+        rotation: 8,
+        opacity: 12,
+        first_spherical_harmonics: 16,
+        first_model_matrix: 20,
+        model_opacity: 24,
+    });
+    assert_layout!(GaussianVertexOutputLocationsGAURAST, 16, 4, {
+        covariance: 0,
+        opacity: 4,
+        color: 8,
+        depth_key: 12,
+    });
+    assert_layout!(GaussianResolveInputLocationsGAURAST, 8, 4, {
+        accumulated_color: 0,
+        depth: 4,
+    });
+    assert_layout!(PipelineGaussianStateCreateInfoGAURAST<'_>, 128, 8, {
+        s_type: 0,
+        p_next: 8,
+        flags: 16,
+        projection_mode: 20,
+        geometry: 24,
+        linearization: 28,
+        spherical_harmonics_degree: 32,
+        attribute_locations: 36,
+        vertex_output_locations: 64,
+        resolve_input_locations: 80,
+        order: 88,
+        precision: 92,
+        antialiasing: 96,
+        low_pass_variance: 100,
+        alpha_floor: 104,
+        alpha_ceiling: 108,
+        transmittance_floor: 112,
+        camera_source: 116,
+        camera_set: 120,
+        camera_binding: 124,
+    });
+    assert_layout!(PipelineGaussianApproximationStateCreateInfoGAURAST<'_>, 24, 8, {
+        s_type: 0,
+        p_next: 8,
+        exponential_error: 16,
+        contribution_budget: 20,
+    });
+}
+
+#[gaurast_runner::test]
+fn camera() {
+    assert_layout!(GaussianCameraGAURAST<'_>, 112, 8, {
+        s_type: 0,
+        p_next: 8,
+        model: 16,
+        rotation: 20,
+        eye: 56,
+        focal_length: 80,
+        principal_point: 88,
+        near_plane: 96,
+        far_plane: 100,
+        depth_coefficients: 104,
+    });
+    assert_layout!(GaussianCameraDataGAURAST, 112, 8, {
+        eye: 0,
+        model: 24,
+        reserved: 28,
+        rotation: 32,
+        focal_length: 80,
+        principal_point: 88,
+        depth_coefficients: 96,
+        near_plane: 104,
+        far_plane: 108,
+    });
+}
+
+#[gaurast_runner::test]
+fn names_and_values() {
+    assert_eq!(NAME.to_str(), Ok("VK_GAURAST_gaussian_primitive_topology"));
+    assert_eq!(SPEC_VERSION, 1);
+    let first = 1_000_000_000 + (EXTENSION_NUMBER as i32 - 1) * 1000;
+    assert_eq!(first, 1_000_997_000);
+    assert_eq!(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST.as_raw(), first);
+    let structure_types = [
+        STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_FEATURES_GAURAST,
+        STRUCTURE_TYPE_PHYSICAL_DEVICE_GAUSSIAN_PRIMITIVE_TOPOLOGY_PROPERTIES_GAURAST,
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
+        STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST,
+        STRUCTURE_TYPE_PIPELINE_GAUSSIAN_APPROXIMATION_STATE_CREATE_INFO_GAURAST,
+    ];
+    for (offset, structure_type) in structure_types.into_iter().enumerate() {
+        assert_eq!(structure_type.as_raw(), first + offset as i32);
+    }
+    assert_eq!(GAUSSIAN_LOCATION_UNUSED_GAURAST, u32::MAX);
+}
+
+#[gaurast_runner::test]
+fn enum_values() {
+    assert_eq!(GaussianProjectionModeGAURAST::VERTEX_SHADER.as_raw(), 1);
+    assert_eq!(GaussianGeometryGAURAST::GAUSSIAN_2D.as_raw(), 1);
+    assert_eq!(GaussianLinearizationGAURAST::UNSCENTED.as_raw(), 1);
+    assert_eq!(GaussianOrderGAURAST::RADIAL_DISTANCE.as_raw(), 1);
+    assert_eq!(GaussianOrderGAURAST::PRIMITIVE.as_raw(), 2);
+    assert_eq!(GaussianOrderGAURAST::PER_PIXEL.as_raw(), 3);
+    assert_eq!(GaussianPrecisionGAURAST::FLOAT16.as_raw(), 1);
+    assert_eq!(GaussianAntialiasingGAURAST::OPACITY_COMPENSATED.as_raw(), 1);
+    assert_eq!(GaussianCameraSourceGAURAST::UNIFORM_BUFFER.as_raw(), 1);
+    assert_eq!(GaussianCameraModelGAURAST::ORTHOGRAPHIC.as_raw(), 1);
+    assert_eq!(GaussianCameraModelGAURAST::FISHEYE.as_raw(), 2);
+    assert_eq!(GaussianCameraModelGAURAST::EQUIRECTANGULAR.as_raw(), 3);
+    assert_eq!(
+        PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS.as_raw(),
+        1
+    );
+}
+
+#[gaurast_runner::test]
+fn debug_prints_names_and_unknown_numbers() {
+    assert_eq!(
+        format!("{:?}", GaussianOrderGAURAST::PER_PIXEL),
+        "PER_PIXEL"
+    );
+    assert_eq!(format!("{:?}", GaussianOrderGAURAST::from_raw(77)), "77");
+    let flags = PipelineGaussianStateCreateFlagsGAURAST::from_raw(0b101);
+    assert_eq!(format!("{flags:?}"), "MERGE_DRAWS | 100");
+}

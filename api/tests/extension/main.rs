@@ -1,0 +1,10 @@
+//! The extension's structures, its C header, its place beside ash and its camera helpers.
+
+mod ash_chain;
+mod camera;
+mod header;
+mod layout;
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}

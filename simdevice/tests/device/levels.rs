@@ -1,0 +1,26 @@
+//! SIMD levels, one by one: those that the processor lacks are ignored in view.
+
+use crate::scenes::{KINDS, draw};
+use gaurast_runner::{Case, simd_levels};
+use simdevice::Config;
+use simdevice::device::SimdLevel;
+
+#[gaurast_runner::test(each = simd_levels())]
+fn every_level_draws_what_the_simplest_draws(case: &Case) {
+    let level = SimdLevel::from_name(case.variant()).unwrap();
+    // The kernels' own tests go over these.
+    assert!(SimdLevel::supported().contains(&(case.variant(), level)));
+    for (kind, name) in KINDS {
+        let [simplest, drawn] = [SimdLevel::Baseline, level].map(|simd| {
+            let config = Config {
+                simd,
+                ..Config::default()
+            };
+            draw(kind, &config, [&[], &[]])
+        });
+        // Levels that multiply and add in one step round once: a value may fall to its other neighbour.
+        let differ = |(a, b): (&u8, &u8)| a.abs_diff(*b);
+        let most = simplest.iter().zip(&drawn).map(differ).max();
+        assert!(most <= Some(1), "{name}: {most:?}");
+    }
+}

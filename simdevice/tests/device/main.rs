@@ -1,0 +1,16 @@
+//! The device as those see it that give it packets: pictures, errors, counters, and what the model says that it costs.
+
+mod command_processor;
+#[path = "../common/mod.rs"]
+mod common;
+mod compute;
+mod levels;
+mod render_pass;
+#[path = "../common/scenes.rs"]
+mod scenes;
+mod skips;
+mod timing;
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}
