@@ -2,7 +2,7 @@
 //!
 //! Scenes are generated. Those of triangles and of bodies take additions and multiplications alone; those of Gaussians
 //! take logarithms, exponentials and cosines in binary64 from the system's mathematical library, whose last bits may differ
-//! between machines. They are rounded to binary32 afterwards, so that about one scene in two hundred would show it.
+//! between machines. They are rounded to binary32 afterwards, so that such a difference seldom remains.
 
 use ash::Entry;
 use clap::ValueEnum;
