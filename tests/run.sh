@@ -71,8 +71,8 @@ step "build tests" cargo test "${tests[@]}" --quiet --no-run
 step tests cargo test "${tests[@]}" --quiet
 step "documentation tests" cargo test --workspace --profile checked --doc --quiet
 # What frames cost, in instructions: times would depend on the machine.
-step "build release" cargo build --release --quiet -p gaurast-bench
-step counts cargo run --release --quiet -p gaurast-bench -- counts
+step "build benchmarks" cargo build --profile profiling --quiet -p gaurast-bench
+step counts cargo run --profile profiling --quiet -p gaurast-bench -- counts
 printf '%6d  %s\n' $SECONDS all >>"$work/steps"
 tell
 echo "all checks passed"

@@ -77,6 +77,13 @@ macro_rules! lanes {
 }
 pub(super) use lanes;
 
+/// `a` where it is `chosen` and `b` elsewhere, but where one of both is not a number, the other: also where it is a signalling
+/// one, which AVX-512's own minimum and maximum make quiet and return.
+#[inline(always)]
+fn number_or_other<S: Simd>(chosen: mask32x16<S>, a: F<S>, b: F<S>) -> F<S> {
+    b.simd_eq(b).select(chosen.select(a, b), a)
+}
+
 /// The kernel of an operation.
 pub fn kernel<S: Simd>(op: Op) -> Kernel<S> {
     match op {
@@ -108,8 +115,8 @@ pub fn kernel<S: Simd>(op: Op) -> Kernel<S> {
         Op::FDiv => float!(|a, b| a / b),
         Op::FNeg => float!(|a| -a),
         Op::FAbs => float!(|a| a.abs()),
-        Op::FMin => float!(|a, b| a.min_precise(b)),
-        Op::FMax => float!(|a, b| a.max_precise(b)),
+        Op::FMin => float!(|a, b| number_or_other(a.simd_lt(b), a, b)),
+        Op::FMax => float!(|a, b| number_or_other(a.simd_gt(b), a, b)),
         Op::FSqrt => float!(|a| a.sqrt()),
         Op::FEq => float_test!(|a, b| a.simd_eq(b)),
         Op::FNe => word!(|a, b| !from_mask(a.bitcast::<F<S>>().simd_eq(b.bitcast::<F<S>>()))),

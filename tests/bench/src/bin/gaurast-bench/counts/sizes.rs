@@ -22,7 +22,7 @@ const LEAST: u64 = 4096;
 const CRATES: [&str; 2] = ["simdevice", "isa"];
 
 /// Names of the levels' types, and what the levels are called.
-const LEVELS: [(&str, &str); 4] = [
+const LEVELS: [(&str, &str); 3] = [
     ("::Sse2", "sse2"),
     ("::Avx2", "avx2"),
     ("::Avx512", "avx512"),
