@@ -67,7 +67,10 @@ step() { # step NAME COMMAND...
 tests=(--workspace --profile checked --lib --bins --tests)
 step format cargo fmt --all --check
 step clippy cargo clippy --workspace --all-targets --profile checked --quiet -- -D warnings
-step "build tests" cargo test "${tests[@]}" --quiet --no-run
+# As cargo test would, and with them what tests start or load: the loader's library, a sample.
+step "build tests" cargo build "${tests[@]}" --example hello_gaussians --quiet
+GAURAST_TEST_LIBRARIES=$(realpath "${CARGO_TARGET_DIR:-target}/checked")
+export GAURAST_TEST_LIBRARIES
 step tests cargo test "${tests[@]}" --quiet
 step "documentation tests" cargo test --workspace --profile checked --doc --quiet
 # What frames cost, in instructions: times would depend on the machine.

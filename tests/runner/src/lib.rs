@@ -27,6 +27,7 @@
 //! | `GAURAST_TEST_DATA` | the folder of real data: splat files, meshes, cameras |
 //! | `GAURAST_TEST_REQUIRE` | `programs`: a missing program or system file is a failure; `all`: missing data, too |
 //! | `GAURAST_TEST_LONG` | `1`: tests that have a small sample run whole |
+//! | `GAURAST_TEST_LIBRARIES` | the folder of shared libraries that were built with the tests |
 //! | `GAURAST_TEST_REPORT` | a file that seconds of tests and reasons of ignored ones are appended to |
 
 mod case;

@@ -4,14 +4,27 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 
-/// Has cargo build a package's shared library in the profile of this executable, and returns the library's path.
+/// A folder of shared libraries that were built with the tests.
+const LIBRARIES: &str = "GAURAST_TEST_LIBRARIES";
+
+/// The path of a package's shared library in the profile of this executable.
 ///
-/// Cargo builds no shared library for the sake of a test, and can't be told to.
+/// Cargo builds no shared library for the sake of a test. It is that of the folder which `GAURAST_TEST_LIBRARIES` names,
+/// where whoever runs the tests built it with them; else this has cargo build it.
 ///
 /// # Panics
 /// If the build fails, with what it printed.
 pub fn built_library(package: &str, file: &str) -> PathBuf {
     static ONE_BUILD: Mutex<()> = Mutex::new(());
+    if let Some(built) = std::env::var_os(LIBRARIES) {
+        let library = Path::new(&built).join(file);
+        assert!(
+            library.exists(),
+            "{LIBRARIES}: there is no {}",
+            library.display()
+        );
+        return library;
+    }
     let test = std::env::current_exe().expect("the test's own path");
     let folder = test
         .ancestors()

@@ -2,7 +2,7 @@
 
 use std::process::{Command, ExitCode, Output};
 
-use gaurast_runner::{Case, Missing, Need, Variant, ignore, shards, test};
+use gaurast_runner::{Case, Missing, Need, Variant, ignore, shards};
 
 /// Set for the process that a test starts to look at.
 const OBSERVED: &str = "GAURAST_RUNNER_OBSERVED";
@@ -52,7 +52,7 @@ fn assert_ignored(case: &Case, reason: &str, allowed: &[&str], forbidden: &[&str
     }
 }
 
-#[test(needs = if_observed(Need::Program("no-such-program")))]
+#[gaurast_runner::test(needs = if_observed(Need::Program("no-such-program")))]
 fn a_missing_program_is_ignored_unless_it_is_required(case: &Case) {
     assert!(!is_observed(), "the test ran");
     let reason = "there is no no-such-program";
@@ -63,13 +63,13 @@ fn a_missing_program_is_ignored_unless_it_is_required(case: &Case) {
     assert!(!listed.contains(case.name()), "{listed}");
 }
 
-#[test(needs = if_observed(Need::File("/no/such/file")))]
+#[gaurast_runner::test(needs = if_observed(Need::File("/no/such/file")))]
 fn a_missing_file_is_ignored_unless_it_is_required(case: &Case) {
     assert!(!is_observed(), "the test ran");
     assert_ignored(case, "there is no /no/such/file", &[], &["programs", "all"]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn missing_data_are_ignored_unless_all_is_required(case: &Case) {
     if is_observed() {
         gaurast_runner::data("no/such/file.ply");
@@ -79,14 +79,14 @@ fn missing_data_are_ignored_unless_all_is_required(case: &Case) {
     assert_ignored(case, reason, &["programs"], &["all"]);
 }
 
-#[test(needs = if_observed(Need::SimdLevel("no-such-level")))]
+#[gaurast_runner::test(needs = if_observed(Need::SimdLevel("no-such-level")))]
 fn a_missing_capability_is_never_a_failure(case: &Case) {
     assert!(!is_observed(), "the test ran");
     let reason = "this processor has no no-such-level";
     assert_ignored(case, reason, &["programs", "all"], &[]);
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_test_may_find_out_late_that_it_cannot_run(case: &Case) {
     if is_observed() {
         ignore(Missing::Capability, "no such feature");
@@ -94,7 +94,7 @@ fn a_test_may_find_out_late_that_it_cannot_run(case: &Case) {
     assert_ignored(case, "no such feature", &["programs", "all"], &[]);
 }
 
-#[test(alone)]
+#[gaurast_runner::test(alone)]
 fn a_test_alone_is_ignored_as_any_other(case: &Case) {
     assert!(case.is_alone());
     if is_observed() {
@@ -103,7 +103,7 @@ fn a_test_alone_is_ignored_as_any_other(case: &Case) {
     assert_ignored(case, "no such program", &[], &["programs", "all"]);
 }
 
-#[test(alone)]
+#[gaurast_runner::test(alone)]
 fn a_test_alone_fails_as_any_other(case: &Case) {
     assert!(!is_observed(), "on purpose");
     let (output, text) = observe(case, "", &[]);
@@ -111,7 +111,7 @@ fn a_test_alone_fails_as_any_other(case: &Case) {
     assert!(text.contains("on purpose"), "{text}");
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_test_alone_sees_nothing_of_what_others_do_to_the_environment(case: &Case) {
     const CHANGED: &str = "GAURAST_RUNNER_CHANGED";
     if case.is_alone() {
@@ -126,7 +126,7 @@ fn a_test_alone_sees_nothing_of_what_others_do_to_the_environment(case: &Case) {
     });
 }
 
-#[test]
+#[gaurast_runner::test]
 fn a_requirement_is_one_that_exists(case: &Case) {
     let (output, _) = observe(case, "everything", &[]);
     assert!(!output.status.success());
@@ -134,13 +134,13 @@ fn a_requirement_is_one_that_exists(case: &Case) {
     assert!(message.contains("not `everything`"), "{message}");
 }
 
-#[test(each = vec![Variant::new("this one")])]
+#[gaurast_runner::test(each = vec![Variant::new("this one")])]
 fn a_variant_stands_behind_the_name(case: &Case) {
     assert_eq!(case.variant(), "this one");
     assert_eq!(case.name(), "a_variant_stands_behind_the_name [this one]");
 }
 
-#[test(each = shards(3))]
+#[gaurast_runner::test(each = shards(3))]
 fn shards_share_the_work(case: &Case) {
     let shard = case.shard();
     assert_eq!(shard.count, 3);

@@ -6,6 +6,7 @@
 //! cycle must leave it.
 
 mod graph;
+mod harness;
 mod source;
 
 use std::collections::BTreeSet;

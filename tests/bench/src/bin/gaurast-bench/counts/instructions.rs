@@ -57,7 +57,7 @@ pub(super) fn obstacle_to_the_loader() -> Option<Obstacle> {
 pub(super) fn check(report: &mut Report, runs: u32, store: bool) -> Result<(), CountsError> {
     let mut table = Table::load(
         "instructions.csv",
-        "Instructions of a warm frame at AVX2 on one thread, release profile; the spread of runs in percent. Written by gaurast-bench counts --store.",
+        "Instructions of a warm frame at AVX2 on one thread, profiling profile; the spread of runs in percent. Written by gaurast-bench counts --store.",
         &["workload", "instructions", "spread"],
         1,
     )?;

@@ -47,7 +47,7 @@ pub enum CountsError {
     #[error("the program has no symbols: build it without stripping")]
     Stripped,
     #[error(
-        "the stored counts are those of the release profile, and this program has debug assertions"
+        "the stored counts are those of the profiling profile, and this program has debug assertions"
     )]
     Profile,
     #[error("{0}")]

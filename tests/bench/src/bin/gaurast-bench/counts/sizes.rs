@@ -39,7 +39,7 @@ struct Sum {
 pub(super) fn check(report: &mut Report, store: bool) -> Result<(), CountsError> {
     let mut table = Table::load(
         "sizes.csv",
-        "Functions of a module at a SIMD level and their bytes in the program, release profile. Written by gaurast-bench counts --store.",
+        "Functions of a module at a SIMD level and their bytes in the program, profiling profile. Written by gaurast-bench counts --store.",
         &["module", "level", "functions", "bytes"],
         2,
     )?;

@@ -1,0 +1,70 @@
+//! Tests of targets with `harness = false` are registered with the runner: rustc drops a bare `#[test]` there, without a
+//! word.
+
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+/// The files below a folder that end in `.rs`, but for other packages' and `left_out`.
+fn sources(folder: &Path, left_out: &[PathBuf], found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            let is_other = path.join("Cargo.toml").exists() || path.ends_with("target");
+            if !is_other && !left_out.contains(&path) {
+                sources(&path, left_out, found);
+            }
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// The files of a package's targets that have no harness.
+fn without_harness(folder: &Path, manifest: &Table) -> Vec<PathBuf> {
+    let has_none = |target: &Value| target.get("harness").and_then(Value::as_bool) == Some(false);
+    let library = folder.join("src");
+    let mut found = Vec::new();
+    if manifest.get("lib").is_some_and(has_none) {
+        sources(&library, &[], &mut found);
+    }
+    let tests = manifest.get("test").and_then(Value::as_array);
+    for test in tests.into_iter().flatten().filter(|test| has_none(test)) {
+        let text = |key: &str| test.get(key).and_then(Value::as_str);
+        let name = text("name").expect("a name");
+        let root = match text("path") {
+            Some(path) => folder.join(path),
+            None => folder.join("tests").join(name).join("main.rs"),
+        };
+        let parent = root.parent().expect("a folder");
+        if root.exists() {
+            sources(parent, &[library.clone()], &mut found);
+        } else {
+            found.push(folder.join("tests").join(format!("{name}.rs")));
+        }
+    }
+    found
+}
+
+#[gaurast_runner::test]
+fn no_test_is_dropped() {
+    let root = super::root();
+    let read = |path: &Path| -> Table {
+        let text = std::fs::read_to_string(path).expect("a manifest");
+        toml::from_str(&text).expect("TOML")
+    };
+    let members = read(&root.join("Cargo.toml"))["workspace"]["members"].clone();
+    let mut files = 0;
+    for member in members.as_array().expect("members") {
+        let folder = root.join(member.as_str().expect("a path"));
+        for file in without_harness(&folder, &read(&folder.join("Cargo.toml"))) {
+            files += 1;
+            let text = std::fs::read_to_string(&file).expect("a source file");
+            let bare = text.lines().position(|line| line.trim() == "#[test]");
+            if let Some(line) = bare {
+                panic!("{}:{}: a bare #[test]", file.display(), line + 1);
+            }
+        }
+    }
+    assert!(files > 100, "{files} files");
+}
