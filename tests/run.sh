@@ -71,7 +71,7 @@ step clippy cargo clippy --workspace --all-targets --profile checked --quiet -- 
 step "build tests" cargo build "${tests[@]}" --example hello_gaussians --quiet
 GAURAST_TEST_LIBRARIES=$(realpath "${CARGO_TARGET_DIR:-target}/checked")
 export GAURAST_TEST_LIBRARIES
-step tests cargo test "${tests[@]}" --quiet
+step tests cargo test "${tests[@]}" --quiet --no-fail-fast
 step "documentation tests" cargo test --workspace --profile checked --doc --quiet
 # What frames cost, in instructions: times would depend on the machine.
 step "build benchmarks" cargo build --profile profiling --quiet -p gaurast-bench
