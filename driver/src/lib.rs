@@ -20,6 +20,8 @@ mod lower;
 mod object;
 mod pnext;
 mod pointer;
+#[cfg(test)]
+mod registry;
 pub mod shader;
 
 pub use embed::entry;

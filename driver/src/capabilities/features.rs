@@ -1,6 +1,6 @@
 //! Features: one list of those that work, and the structures in which Vulkan asks for them.
 
-mod structures;
+pub(crate) mod structures;
 
 use crate::error::Error;
 use crate::pnext;
@@ -228,6 +228,14 @@ fn require_extension(
         )),
         _ => Ok(()),
     }
+}
+
+/// The extension without which a structure's features can't be enabled.
+#[cfg(test)]
+pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr> {
+    EXTENSIONS
+        .iter()
+        .find_map(|(s_type, name)| (*s_type == structure).then_some(*name))
 }
 
 /// What is supported, as the core structure.

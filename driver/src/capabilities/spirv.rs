@@ -98,6 +98,15 @@ fn requirement(capability: Capability) -> Requirement {
     })
 }
 
+/// The features of which a capability needs one; none if it needs none.
+#[cfg(test)]
+pub(crate) fn needed(capability: Capability) -> &'static [&'static str] {
+    match requirement(capability) {
+        Requirement::Nothing => &[],
+        Requirement::OneOf(features) => features,
+    }
+}
+
 /// Refuses a module that declares a capability without its feature.
 ///
 /// # Errors

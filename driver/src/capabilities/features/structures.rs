@@ -33,14 +33,14 @@ macro_rules! features {
 macro_rules! chained {
     ($($type:ty,)*) => {
         /// Writes what is supported, if the structure is one of features.
-        pub(super) fn fill_structure(mut structure: pnext::Output<'_>) {
+        pub(crate) fn fill_structure(mut structure: pnext::Output<'_>) {
             $(if let Some(features) = structure.cast::<$type>() {
                 features.fill();
             })*
         }
 
         /// What is requested, if the structure is one of features.
-        pub(super) fn requested_in(structure: &vk::BaseInStructure<'_>) -> Option<Vec<&'static str>> {
+        pub(crate) fn requested_in(structure: &vk::BaseInStructure<'_>) -> Option<Vec<&'static str>> {
             $(if let Some(features) = pnext::cast::<$type>(structure) {
                 return Some(features.requested());
             })*
