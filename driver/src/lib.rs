@@ -20,7 +20,6 @@ mod lower;
 mod object;
 mod pnext;
 mod pointer;
-#[cfg(test)]
 mod registry;
 pub mod shader;
 

@@ -1,21 +1,21 @@
 //! The physical device's properties and limits.
 //!
-//! Limits are at least what Vulkan requires.
+//! Limits are at least what Vulkan requires. [`Properties`] has a field for each property of the core version and of the
+//! extensions that are listed: each is stated here, and nowhere else.
 
 use crate::capabilities::extensions::{API_VERSION, fill_string};
 use crate::capabilities::memory;
 use crate::object::pipeline::gaussian;
-use crate::pnext;
+use crate::registry::properties::Properties;
 use ash::vk;
-use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST;
 use simdevice::geometry;
-use std::ffi::{CStr, c_void};
+use std::ffi::{CStr, c_char};
+use std::sync::LazyLock;
 
 const DEVICE_NAME: &CStr = c"GauRast simulated device";
 const DRIVER_NAME: &CStr = c"GauRast";
 
 /// The driver's version, in text.
-#[cfg(test)]
 const DRIVER_INFO: &CStr =
     match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
         Ok(text) => text,
@@ -114,391 +114,15 @@ fn uuid(name: &[u8; 13], version: [u8; 3]) -> [u8; vk::UUID_SIZE] {
     uuid
 }
 
-/// `VkPhysicalDeviceProperties`.
-pub(crate) fn properties() -> vk::PhysicalDeviceProperties {
+/// The device's properties and limits.
+pub(crate) fn properties() -> &'static Properties {
+    static PROPERTIES: LazyLock<Properties> = LazyLock::new(find_properties);
+    &PROPERTIES
+}
+
+fn find_properties() -> Properties {
     let [major, minor, patch] = driver_version().map(u32::from);
-    let mut properties = vk::PhysicalDeviceProperties::default()
-        .api_version(API_VERSION)
-        .driver_version(vk::make_api_version(0, major, minor, patch))
-        .vendor_id(VENDOR_ID)
-        .device_id(DEVICE_ID)
-        .device_type(vk::PhysicalDeviceType::CPU)
-        .pipeline_cache_uuid(uuid(b"GauRast cache", driver_version()))
-        .limits(limits());
-    fill_string(&mut properties.device_name, DEVICE_NAME);
-    properties
-}
-
-fn limits() -> vk::PhysicalDeviceLimits {
-    vk::PhysicalDeviceLimits {
-        max_image_dimension1_d: MAX_IMAGE_DIMENSION,
-        max_image_dimension2_d: MAX_IMAGE_DIMENSION,
-        max_image_dimension3_d: MAX_IMAGE_DIMENSION_3D,
-        max_image_dimension_cube: MAX_IMAGE_DIMENSION,
-        max_image_array_layers: MAX_LAYERS,
-        max_texel_buffer_elements: 1 << 16,
-        max_uniform_buffer_range: 1 << 16,
-        max_storage_buffer_range: u32::MAX,
-        max_push_constants_size: MAX_PUSH_CONSTANTS_SIZE,
-        max_memory_allocation_count: u32::MAX,
-        max_sampler_allocation_count: 1 << 16,
-        buffer_image_granularity: 1,
-        max_bound_descriptor_sets: 8,
-        max_per_stage_descriptor_samplers: DESCRIPTORS,
-        max_per_stage_descriptor_uniform_buffers: DESCRIPTORS,
-        max_per_stage_descriptor_storage_buffers: DESCRIPTORS,
-        max_per_stage_descriptor_sampled_images: DESCRIPTORS,
-        max_per_stage_descriptor_storage_images: DESCRIPTORS,
-        max_per_stage_descriptor_input_attachments: DESCRIPTORS,
-        max_per_stage_resources: DESCRIPTORS,
-        max_descriptor_set_samplers: DESCRIPTORS,
-        max_descriptor_set_uniform_buffers: DESCRIPTORS,
-        max_descriptor_set_uniform_buffers_dynamic: DYNAMIC_DESCRIPTORS,
-        max_descriptor_set_storage_buffers: DESCRIPTORS,
-        max_descriptor_set_storage_buffers_dynamic: DYNAMIC_DESCRIPTORS,
-        max_descriptor_set_sampled_images: DESCRIPTORS,
-        max_descriptor_set_storage_images: DESCRIPTORS,
-        max_descriptor_set_input_attachments: DESCRIPTORS,
-        max_vertex_input_attributes: MAX_VERTEX_INPUTS,
-        max_vertex_input_bindings: MAX_VERTEX_INPUTS,
-        max_vertex_input_attribute_offset: 65535,
-        max_vertex_input_binding_stride: 65536,
-        max_vertex_output_components: 64,
-        max_fragment_input_components: 64,
-        max_fragment_output_attachments: MAX_COLOR_ATTACHMENTS,
-        max_fragment_combined_output_resources: DESCRIPTORS,
-        max_compute_shared_memory_size: MAX_SHARED_BYTES,
-        max_compute_work_group_count: [u32::MAX; 3],
-        max_compute_work_group_invocations: MAX_WORKGROUP_INVOCATIONS,
-        max_compute_work_group_size: MAX_WORKGROUP_SIZE,
-        sub_pixel_precision_bits: 8,
-        sub_texel_precision_bits: 8,
-        mipmap_precision_bits: 8,
-        max_draw_indexed_index_value: u32::MAX,
-        max_draw_indirect_count: u32::MAX,
-        max_sampler_lod_bias: MAX_SAMPLER_LOD_BIAS,
-        max_sampler_anisotropy: 1.0,
-        max_viewports: simdevice::packet::draw::MAX_VIEWPORTS as u32,
-        max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],
-        viewport_bounds_range: [
-            -2.0 * MAX_IMAGE_DIMENSION as f32,
-            2.0 * MAX_IMAGE_DIMENSION as f32 - 1.0,
-        ],
-        viewport_sub_pixel_bits: 8,
-        min_memory_map_alignment: memory::ALIGNMENT as usize,
-        min_texel_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
-        min_uniform_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
-        min_storage_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
-        min_texel_offset: -8,
-        max_texel_offset: 7,
-        min_texel_gather_offset: -8,
-        max_texel_gather_offset: 7,
-        max_framebuffer_width: MAX_IMAGE_DIMENSION,
-        max_framebuffer_height: MAX_IMAGE_DIMENSION,
-        max_framebuffer_layers: MAX_LAYERS,
-        framebuffer_color_sample_counts: SAMPLE_COUNTS,
-        framebuffer_depth_sample_counts: SAMPLE_COUNTS,
-        framebuffer_stencil_sample_counts: SAMPLE_COUNTS,
-        framebuffer_no_attachments_sample_counts: SAMPLE_COUNTS,
-        max_color_attachments: MAX_COLOR_ATTACHMENTS,
-        sampled_image_color_sample_counts: SAMPLE_COUNTS,
-        sampled_image_integer_sample_counts: SAMPLE_COUNTS,
-        sampled_image_depth_sample_counts: SAMPLE_COUNTS,
-        sampled_image_stencil_sample_counts: SAMPLE_COUNTS,
-        storage_image_sample_counts: vk::SampleCountFlags::TYPE_1,
-        max_sample_mask_words: 1,
-        timestamp_compute_and_graphics: vk::TRUE,
-        timestamp_period: 1.0,
-        discrete_queue_priorities: 2,
-        point_size_range: [1.0, geometry::MAX_POINT_SIZE],
-        line_width_range: [1.0, geometry::MAX_LINE_WIDTH],
-        point_size_granularity: SIZE_GRANULARITY,
-        line_width_granularity: SIZE_GRANULARITY,
-        strict_lines: vk::TRUE,
-        standard_sample_locations: vk::TRUE,
-        min_interpolation_offset: -0.5,
-        // The greatest offset is less than half a pixel by one step of its precision.
-        max_interpolation_offset: 0.5 - 1.0 / 16.0,
-        sub_pixel_interpolation_offset_bits: 4,
-        max_fragment_dual_src_attachments: 1,
-        max_clip_distances: MAX_CLIP_CULL_DISTANCES,
-        max_cull_distances: MAX_CLIP_CULL_DISTANCES,
-        max_combined_clip_and_cull_distances: MAX_CLIP_CULL_DISTANCES,
-        optimal_buffer_copy_offset_alignment: 1,
-        optimal_buffer_copy_row_pitch_alignment: 1,
-        non_coherent_atom_size: 1,
-        // No tessellation, geometry shaders or sparse memory.
-        ..Default::default()
-    }
-}
-
-fn vulkan11() -> vk::PhysicalDeviceVulkan11Properties<'static> {
-    vk::PhysicalDeviceVulkan11Properties {
-        device_uuid: uuid(b"GauRastDevice", [0; 3]),
-        driver_uuid: uuid(b"GauRastDriver", driver_version()),
-        subgroup_size: SUBGROUP_SIZE,
-        subgroup_supported_stages: vk::ShaderStageFlags::COMPUTE,
-        subgroup_supported_operations: vk::SubgroupFeatureFlags::BASIC
-            | vk::SubgroupFeatureFlags::VOTE
-            | vk::SubgroupFeatureFlags::ARITHMETIC
-            | vk::SubgroupFeatureFlags::BALLOT
-            | vk::SubgroupFeatureFlags::SHUFFLE
-            | vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE
-            | vk::SubgroupFeatureFlags::CLUSTERED
-            | vk::SubgroupFeatureFlags::QUAD,
-        point_clipping_behavior: vk::PointClippingBehavior::ALL_CLIP_PLANES,
-        max_per_set_descriptors: MAX_PER_SET_DESCRIPTORS,
-        max_memory_allocation_size: memory::heap_size(),
-        ..Default::default()
-    }
-}
-
-fn vulkan12() -> vk::PhysicalDeviceVulkan12Properties<'static> {
-    let mut properties = vk::PhysicalDeviceVulkan12Properties {
-        // No driver id is registered for this driver, and it claims no conformance.
-        driver_id: vk::DriverId::from_raw(0),
-        conformance_version: vk::ConformanceVersion::default(),
-        max_timeline_semaphore_value_difference: u64::MAX,
-        denorm_behavior_independence: vk::ShaderFloatControlsIndependence::ALL,
-        rounding_mode_independence: vk::ShaderFloatControlsIndependence::ALL,
-        shader_signed_zero_inf_nan_preserve_float16: vk::TRUE,
-        shader_signed_zero_inf_nan_preserve_float32: vk::TRUE,
-        shader_signed_zero_inf_nan_preserve_float64: vk::TRUE,
-        shader_denorm_preserve_float16: vk::TRUE,
-        shader_denorm_preserve_float32: vk::TRUE,
-        shader_denorm_preserve_float64: vk::TRUE,
-        shader_rounding_mode_rte_float16: vk::TRUE,
-        shader_rounding_mode_rte_float32: vk::TRUE,
-        shader_rounding_mode_rte_float64: vk::TRUE,
-        shader_uniform_buffer_array_non_uniform_indexing_native: vk::TRUE,
-        shader_sampled_image_array_non_uniform_indexing_native: vk::TRUE,
-        shader_storage_buffer_array_non_uniform_indexing_native: vk::TRUE,
-        shader_storage_image_array_non_uniform_indexing_native: vk::TRUE,
-        framebuffer_integer_color_sample_counts: SAMPLE_COUNTS,
-        supported_depth_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
-            | vk::ResolveModeFlags::AVERAGE
-            | vk::ResolveModeFlags::MIN
-            | vk::ResolveModeFlags::MAX,
-        supported_stencil_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
-            | vk::ResolveModeFlags::MIN
-            | vk::ResolveModeFlags::MAX,
-        independent_resolve_none: vk::TRUE,
-        independent_resolve: vk::TRUE,
-        ..Default::default()
-    };
-    fill_string(&mut properties.driver_name, DRIVER_NAME);
-    let version = concat!(env!("CARGO_PKG_VERSION"), "\0");
-    fill_string(
-        &mut properties.driver_info,
-        CStr::from_bytes_until_nul(version.as_bytes()).unwrap_or_default(),
-    );
-    properties
-}
-
-fn vulkan13() -> vk::PhysicalDeviceVulkan13Properties<'static> {
-    vk::PhysicalDeviceVulkan13Properties {
-        min_subgroup_size: *SUBGROUP_SIZES.start(),
-        max_subgroup_size: *SUBGROUP_SIZES.end(),
-        max_compute_workgroup_subgroups: MAX_WORKGROUP_INVOCATIONS / *SUBGROUP_SIZES.start(),
-        required_subgroup_size_stages: vk::ShaderStageFlags::COMPUTE,
-        storage_texel_buffer_offset_alignment_bytes: MIN_BUFFER_OFFSET_ALIGNMENT,
-        uniform_texel_buffer_offset_alignment_bytes: MIN_BUFFER_OFFSET_ALIGNMENT,
-        max_buffer_size: memory::heap_size(),
-        ..Default::default()
-    }
-}
-
-fn gaussian() -> PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'static> {
-    PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
-        tile_size: vk::Extent2D {
-            width: 16,
-            height: 16,
-        },
-        rasterizer_module_count: RASTERIZER_MODULES,
-        processing_element_count: PROCESSING_ELEMENTS,
-        max_spherical_harmonics_degree: gaussian::MAX_SPHERICAL_HARMONICS_DEGREE,
-        gaussian_sample_counts: SAMPLE_COUNTS,
-        max_gaussians_per_draw: MAX_GAUSSIANS,
-        max_gaussians_per_set: MAX_GAUSSIANS,
-        ..Default::default()
-    }
-}
-
-/// Fills in every structure of an output chain that holds properties known here.
-///
-/// # Safety
-/// As [`pnext::for_each_output`].
-pub(crate) unsafe fn fill_chain(first: *mut c_void) {
-    // SAFETY: the caller's promise.
-    unsafe { pnext::for_each_output(first, fill_structure) };
-}
-
-macro_rules! properties {
-    (
-        whole { $($whole:ty = $all:ident;)* }
-        parts { $($part:ty $(= $source:ident)? { $($field:ident $(: $value:expr)?,)* })* }
-    ) => {
-        /// Writes the properties, if the structure is one of properties. The chain stays as it is.
-        pub(crate) fn fill_structure(mut structure: pnext::Output<'_>) {
-            $(if let Some(out) = structure.cast::<$whole>() {
-                let next = out.p_next;
-                *out = $all();
-                out.p_next = next;
-            })*
-            $(if let Some(out) = structure.cast::<$part>() {
-                $(let all = $source();)?
-                $(out.$field = properties!(@value all $field $(: $value)?);)*
-            })*
-        }
-    };
-    (@value $all:ident $field:ident) => { $all.$field };
-    (@value $all:ident $field:ident: $value:expr) => { $value };
-}
-
-properties! {
-    whole {
-    vk::PhysicalDeviceVulkan11Properties<'_> = vulkan11;
-    vk::PhysicalDeviceVulkan12Properties<'_> = vulkan12;
-    vk::PhysicalDeviceVulkan13Properties<'_> = vulkan13;
-    PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> = gaussian;
-    }
-    parts {
-    vk::PhysicalDevicePushDescriptorPropertiesKHR<'_> {
-        max_push_descriptors: MAX_PUSH_DESCRIPTORS,
-    }
-    vk::PhysicalDeviceProvokingVertexPropertiesEXT<'_> {
-        provoking_vertex_mode_per_pipeline: vk::TRUE,
-        transform_feedback_preserves_triangle_fan_provoking_vertex: vk::FALSE,
-    }
-    vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT<'_> {
-        max_vertex_attrib_divisor: u32::MAX,
-    }
-    vk::PhysicalDevicePerformanceQueryPropertiesKHR<'_> {
-        allow_command_buffer_query_copies: vk::FALSE,
-    }
-    vk::PhysicalDeviceSubgroupProperties<'_> {
-        subgroup_size: vulkan11().subgroup_size,
-        supported_stages: vulkan11().subgroup_supported_stages,
-        supported_operations: vulkan11().subgroup_supported_operations,
-        quad_operations_in_all_stages: vulkan11().subgroup_quad_operations_in_all_stages,
-    }
-    vk::PhysicalDeviceDriverProperties<'_> = vulkan12 {
-        driver_id, driver_name, driver_info, conformance_version,
-    }
-    vk::PhysicalDeviceIDProperties<'_> = vulkan11 {
-        device_uuid, driver_uuid, device_luid, device_node_mask, device_luid_valid,
-    }
-    vk::PhysicalDeviceMultiviewProperties<'_> = vulkan11 {
-        max_multiview_view_count, max_multiview_instance_index,
-    }
-    vk::PhysicalDevicePointClippingProperties<'_> = vulkan11 {
-        point_clipping_behavior,
-    }
-    vk::PhysicalDeviceProtectedMemoryProperties<'_> = vulkan11 {
-        protected_no_fault,
-    }
-    vk::PhysicalDeviceSamplerFilterMinmaxProperties<'_> = vulkan12 {
-        filter_minmax_single_component_formats, filter_minmax_image_component_mapping,
-    }
-    vk::PhysicalDeviceInlineUniformBlockProperties<'_> = vulkan13 {
-        max_inline_uniform_block_size, max_per_stage_descriptor_inline_uniform_blocks,
-        max_per_stage_descriptor_update_after_bind_inline_uniform_blocks, max_descriptor_set_inline_uniform_blocks,
-        max_descriptor_set_update_after_bind_inline_uniform_blocks,
-    }
-    vk::PhysicalDeviceMaintenance3Properties<'_> = vulkan11 {
-        max_per_set_descriptors, max_memory_allocation_size,
-    }
-    vk::PhysicalDeviceMaintenance4Properties<'_> = vulkan13 {
-        max_buffer_size,
-    }
-    vk::PhysicalDeviceFloatControlsProperties<'_> = vulkan12 {
-        denorm_behavior_independence, rounding_mode_independence, shader_signed_zero_inf_nan_preserve_float16,
-        shader_signed_zero_inf_nan_preserve_float32, shader_signed_zero_inf_nan_preserve_float64,
-        shader_denorm_preserve_float16, shader_denorm_preserve_float32, shader_denorm_preserve_float64,
-        shader_denorm_flush_to_zero_float16, shader_denorm_flush_to_zero_float32,
-        shader_denorm_flush_to_zero_float64, shader_rounding_mode_rte_float16, shader_rounding_mode_rte_float32,
-        shader_rounding_mode_rte_float64, shader_rounding_mode_rtz_float16, shader_rounding_mode_rtz_float32,
-        shader_rounding_mode_rtz_float64,
-    }
-    vk::PhysicalDeviceDescriptorIndexingProperties<'_> = vulkan12 {
-        max_update_after_bind_descriptors_in_all_pools, shader_uniform_buffer_array_non_uniform_indexing_native,
-        shader_sampled_image_array_non_uniform_indexing_native,
-        shader_storage_buffer_array_non_uniform_indexing_native,
-        shader_storage_image_array_non_uniform_indexing_native,
-        shader_input_attachment_array_non_uniform_indexing_native, robust_buffer_access_update_after_bind,
-        quad_divergent_implicit_lod, max_per_stage_descriptor_update_after_bind_samplers,
-        max_per_stage_descriptor_update_after_bind_uniform_buffers,
-        max_per_stage_descriptor_update_after_bind_storage_buffers,
-        max_per_stage_descriptor_update_after_bind_sampled_images,
-        max_per_stage_descriptor_update_after_bind_storage_images,
-        max_per_stage_descriptor_update_after_bind_input_attachments, max_per_stage_update_after_bind_resources,
-        max_descriptor_set_update_after_bind_samplers, max_descriptor_set_update_after_bind_uniform_buffers,
-        max_descriptor_set_update_after_bind_uniform_buffers_dynamic,
-        max_descriptor_set_update_after_bind_storage_buffers,
-        max_descriptor_set_update_after_bind_storage_buffers_dynamic,
-        max_descriptor_set_update_after_bind_sampled_images, max_descriptor_set_update_after_bind_storage_images,
-        max_descriptor_set_update_after_bind_input_attachments,
-    }
-    vk::PhysicalDeviceTimelineSemaphoreProperties<'_> = vulkan12 {
-        max_timeline_semaphore_value_difference,
-    }
-    vk::PhysicalDeviceDepthStencilResolveProperties<'_> = vulkan12 {
-        supported_depth_resolve_modes, supported_stencil_resolve_modes, independent_resolve_none,
-        independent_resolve,
-    }
-    vk::PhysicalDeviceTexelBufferAlignmentProperties<'_> = vulkan13 {
-        storage_texel_buffer_offset_alignment_bytes, storage_texel_buffer_offset_single_texel_alignment,
-        uniform_texel_buffer_offset_alignment_bytes, uniform_texel_buffer_offset_single_texel_alignment,
-    }
-    vk::PhysicalDeviceSubgroupSizeControlProperties<'_> = vulkan13 {
-        min_subgroup_size, max_subgroup_size, max_compute_workgroup_subgroups, required_subgroup_size_stages,
-    }
-    vk::PhysicalDeviceShaderIntegerDotProductProperties<'_> = vulkan13 {
-        integer_dot_product8_bit_unsigned_accelerated, integer_dot_product8_bit_signed_accelerated,
-        integer_dot_product8_bit_mixed_signedness_accelerated,
-        integer_dot_product4x8_bit_packed_unsigned_accelerated,
-        integer_dot_product4x8_bit_packed_signed_accelerated,
-        integer_dot_product4x8_bit_packed_mixed_signedness_accelerated,
-        integer_dot_product16_bit_unsigned_accelerated, integer_dot_product16_bit_signed_accelerated,
-        integer_dot_product16_bit_mixed_signedness_accelerated, integer_dot_product32_bit_unsigned_accelerated,
-        integer_dot_product32_bit_signed_accelerated, integer_dot_product32_bit_mixed_signedness_accelerated,
-        integer_dot_product64_bit_unsigned_accelerated, integer_dot_product64_bit_signed_accelerated,
-        integer_dot_product64_bit_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating8_bit_signed_accelerated,
-        integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated,
-        integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating16_bit_signed_accelerated,
-        integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating32_bit_signed_accelerated,
-        integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating64_bit_signed_accelerated,
-        integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated,
-    }
-    }
-}
-
-#[cfg(test)]
-pub(crate) mod generated {
-    use super::*;
-    use crate::registry::properties::Properties;
-    use std::ffi::c_char;
-    use std::sync::LazyLock;
-
-    /// The device's properties and limits.
-    pub(crate) fn properties() -> &'static Properties {
-        static PROPERTIES: LazyLock<Properties> = LazyLock::new(find_properties);
-        &PROPERTIES
-    }
-
-    fn find_properties() -> Properties {
-        let [major, minor, patch] = driver_version().map(u32::from);
-        Properties {
+    Properties {
         api_version: API_VERSION,
         driver_version: vk::make_api_version(0, major, minor, patch),
         vendor_id: VENDOR_ID,
@@ -570,7 +194,10 @@ pub(crate) mod generated {
         max_sampler_anisotropy: 1.0,
         max_viewports: simdevice::packet::draw::MAX_VIEWPORTS as u32,
         max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],
-        viewport_bounds_range: [ -2.0 * MAX_IMAGE_DIMENSION as f32, 2.0 * MAX_IMAGE_DIMENSION as f32 - 1.0, ],
+        viewport_bounds_range: [
+            -2.0 * MAX_IMAGE_DIMENSION as f32,
+            2.0 * MAX_IMAGE_DIMENSION as f32 - 1.0,
+        ],
         viewport_sub_pixel_bits: 8,
         min_memory_map_alignment: memory::ALIGNMENT as usize,
         min_texel_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
@@ -625,7 +252,14 @@ pub(crate) mod generated {
         device_luid_valid: false,
         subgroup_size: SUBGROUP_SIZE,
         subgroup_supported_stages: vk::ShaderStageFlags::COMPUTE,
-        subgroup_supported_operations: vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::VOTE | vk::SubgroupFeatureFlags::ARITHMETIC | vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::SHUFFLE | vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE | vk::SubgroupFeatureFlags::CLUSTERED | vk::SubgroupFeatureFlags::QUAD,
+        subgroup_supported_operations: vk::SubgroupFeatureFlags::BASIC
+            | vk::SubgroupFeatureFlags::VOTE
+            | vk::SubgroupFeatureFlags::ARITHMETIC
+            | vk::SubgroupFeatureFlags::BALLOT
+            | vk::SubgroupFeatureFlags::SHUFFLE
+            | vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE
+            | vk::SubgroupFeatureFlags::CLUSTERED
+            | vk::SubgroupFeatureFlags::QUAD,
         subgroup_quad_operations_in_all_stages: false,
         point_clipping_behavior: vk::PointClippingBehavior::ALL_CLIP_PLANES,
         max_multiview_view_count: 0,
@@ -679,8 +313,13 @@ pub(crate) mod generated {
         max_descriptor_set_update_after_bind_sampled_images: 0,
         max_descriptor_set_update_after_bind_storage_images: 0,
         max_descriptor_set_update_after_bind_input_attachments: 0,
-        supported_depth_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO | vk::ResolveModeFlags::AVERAGE | vk::ResolveModeFlags::MIN | vk::ResolveModeFlags::MAX,
-        supported_stencil_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO | vk::ResolveModeFlags::MIN | vk::ResolveModeFlags::MAX,
+        supported_depth_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
+            | vk::ResolveModeFlags::AVERAGE
+            | vk::ResolveModeFlags::MIN
+            | vk::ResolveModeFlags::MAX,
+        supported_stencil_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
+            | vk::ResolveModeFlags::MIN
+            | vk::ResolveModeFlags::MAX,
         independent_resolve_none: true,
         independent_resolve: true,
         filter_minmax_single_component_formats: false,
@@ -718,7 +357,8 @@ pub(crate) mod generated {
         integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated: false,
         integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated: false,
         integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated: false,
-        integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated: false,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated:
+            false,
         integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated: false,
         integer_dot_product_accumulating_saturating16_bit_signed_accelerated: false,
         integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated: false,
@@ -736,7 +376,10 @@ pub(crate) mod generated {
         provoking_vertex_mode_per_pipeline: true,
         transform_feedback_preserves_triangle_fan_provoking_vertex: false,
         max_vertex_attrib_divisor: u32::MAX,
-        tile_size: vk::Extent2D { width: 16, height: 16, },
+        tile_size: vk::Extent2D {
+            width: 16,
+            height: 16,
+        },
         rasterizer_module_count: RASTERIZER_MODULES,
         processing_element_count: PROCESSING_ELEMENTS,
         max_spherical_harmonics_degree: gaussian::MAX_SPHERICAL_HARMONICS_DEGREE,
@@ -746,12 +389,11 @@ pub(crate) mod generated {
         allow_command_buffer_query_copies: false,
         max_push_descriptors: MAX_PUSH_DESCRIPTORS,
     }
-    }
+}
 
-    /// A string as Vulkan's structures hold it, cut off where it doesn't fit.
-    fn fixed_string<const N: usize>(text: &CStr) -> [c_char; N] {
-        let mut array = [0; N];
-        fill_string(&mut array, text);
-        array
-    }
+/// A string as Vulkan's structures hold it, cut off where it doesn't fit.
+fn fixed_string<const N: usize>(text: &CStr) -> [c_char; N] {
+    let mut array = [0; N];
+    fill_string(&mut array, text);
+    array
 }

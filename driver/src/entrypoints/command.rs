@@ -363,7 +363,7 @@ unsafe fn bind_vertex_buffers(
     sizes: &[vk::DeviceSize],
     strides: &[vk::DeviceSize],
 ) -> Result<(), Error> {
-    let bindings = limits::properties().limits.max_vertex_input_bindings;
+    let bindings = limits::properties().max_vertex_input_bindings;
     if u64::from(first) + buffers.len() as u64 > u64::from(bindings) {
         return Err(Error::usage(
             "VUID-vkCmdBindVertexBuffers-firstBinding-00625",
@@ -389,7 +389,7 @@ unsafe fn bind_vertex_buffers(
 
 /// Fails for viewports and scissors beyond those that the device has.
 fn require_viewports(first: u32, count: u32) -> Result<(), Error> {
-    let available = limits::properties().limits.max_viewports;
+    let available = limits::properties().max_viewports;
     if u64::from(first) + u64::from(count) <= u64::from(available) {
         return Ok(());
     }

@@ -1,7 +1,7 @@
 //! Logical devices and their queues.
 
 use crate::capabilities::extensions;
-use crate::capabilities::features::EnabledFeatures;
+use crate::capabilities::features;
 use crate::capabilities::queues;
 use crate::dispatch;
 use crate::entry_points;
@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::handle;
 use crate::object::device::Device;
 use crate::pointer;
+use crate::registry;
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
@@ -51,8 +52,8 @@ entry_points! {
         let physical_device = handle::get(physical_device)?;
         let info = pointer::input(info)?;
         let names = pointer::strings(info.pp_enabled_extension_names, info.enabled_extension_count)?;
-        let extensions = extensions::resolve(extensions::DEVICE, &names)?;
-        let features = EnabledFeatures::requested(info, &extensions)?;
+        let extensions = extensions::resolve(registry::extensions::DEVICE, &names)?;
+        let features = features::requested(info, &extensions)?;
         let created = Device::new(
             physical_device.require_instance()?,
             extensions,

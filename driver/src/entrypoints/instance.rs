@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::handle;
 use crate::object::debug_messenger::DebugMessenger;
 use crate::object::instance::Instance;
+use crate::registry;
 use crate::{pnext, pointer};
 use ash::vk;
 use std::ffi::{CStr, c_char};
@@ -46,7 +47,7 @@ entry_points! {
         properties: *mut vk::ExtensionProperties,
     ) -> vk::Result {
         match pointer::string(layer) {
-            None => pointer::enumerate(count, properties, &extensions::properties(extensions::INSTANCE)),
+            None => pointer::enumerate(count, properties, &extensions::properties(registry::extensions::INSTANCE)),
             Some(layer) => Err(Error::LayerNotPresent(layer.to_string_lossy().into_owned())),
         }
     }

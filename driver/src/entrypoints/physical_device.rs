@@ -1,9 +1,10 @@
 //! Physical devices: what they can do. The answers are in [`capabilities`](crate::capabilities).
 
 use crate::capabilities::formats::{self, ImageQuery};
-use crate::capabilities::{counters, extensions, features, limits, memory, queues};
+use crate::capabilities::{counters, extensions, limits, memory, queues};
 use crate::entry_points;
 use crate::error::Error;
+use crate::registry::{self, features::SUPPORTED};
 use crate::{pnext, pointer};
 use ash::vk;
 use std::ffi::c_char;
@@ -13,7 +14,7 @@ entry_points! {
         _physical_device: vk::PhysicalDevice,
         properties: *mut vk::PhysicalDeviceProperties,
     ) {
-        pointer::output(properties, limits::properties())
+        pointer::output(properties, limits::properties().core())
     }
 
     fn get_physical_device_properties2(
@@ -21,8 +22,8 @@ entry_points! {
         properties: *mut vk::PhysicalDeviceProperties2<'_>,
     ) {
         let properties = pointer::output_structure(properties)?;
-        properties.properties = limits::properties();
-        limits::fill_chain(properties.p_next);
+        properties.properties = limits::properties().core();
+        pnext::for_each_output(properties.p_next, |out| limits::properties().write(out));
         Ok(())
     }
 
@@ -30,7 +31,7 @@ entry_points! {
         _physical_device: vk::PhysicalDevice,
         features: *mut vk::PhysicalDeviceFeatures,
     ) {
-        pointer::output(features, features::core())
+        pointer::output(features, SUPPORTED.core())
     }
 
     fn get_physical_device_features2(
@@ -38,8 +39,8 @@ entry_points! {
         features: *mut vk::PhysicalDeviceFeatures2<'_>,
     ) {
         let features = pointer::output_structure(features)?;
-        features.features = features::core();
-        features::fill_chain(features.p_next);
+        features.features = SUPPORTED.core();
+        pnext::for_each_output(features.p_next, |out| SUPPORTED.write(out));
         Ok(())
     }
 
@@ -173,7 +174,7 @@ entry_points! {
         properties: *mut vk::ExtensionProperties,
     ) -> vk::Result {
         match pointer::string(layer) {
-            None => pointer::enumerate(count, properties, &extensions::properties(extensions::DEVICE)),
+            None => pointer::enumerate(count, properties, &extensions::properties(registry::extensions::DEVICE)),
             Some(layer) => Err(Error::LayerNotPresent(layer.to_string_lossy().into_owned())),
         }
     }

@@ -161,13 +161,13 @@ impl CommandBuffer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capabilities::features::EnabledFeatures;
+    use crate::registry::features::Features;
 
     #[test]
     fn a_panic_while_recording_fails_the_recording() {
         let instance = Instance::new(vk::API_VERSION_1_3, &[]).unwrap();
         let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
-        let features = EnabledFeatures::default();
+        let features = Features::NONE;
         let device = Device::new(instance, Vec::new(), features, simulated, 0).unwrap();
         let buffer = CommandBuffer {
             device,

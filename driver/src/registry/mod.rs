@@ -4,6 +4,3 @@ pub(crate) mod extensions;
 pub(crate) mod features;
 pub(crate) mod properties;
 pub(crate) mod spirv;
-
-#[cfg(test)]
-mod tests;
