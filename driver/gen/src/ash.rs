@@ -35,6 +35,8 @@ pub struct Member {
 /// The type of a command's function.
 #[derive(Debug)]
 pub struct Function {
+    /// The type's name, with its path.
+    pub ty: String,
     /// Its parameters.
     pub parameters: Vec<Member>,
     /// What it returns.
@@ -88,8 +90,13 @@ impl Declarations {
                 if let (Some(command), syn::Type::BareFn(function)) =
                     (name.strip_prefix("PFN_"), *item.ty)
                 {
-                    self.functions
-                        .insert(command.to_owned(), signature(function));
+                    let path = if name.ends_with("GAURAST") {
+                        "gaurast::vk"
+                    } else {
+                        "vk"
+                    };
+                    let function = signature(format!("{path}::{name}"), function);
+                    self.functions.insert(command.to_owned(), function);
                 }
             }
             _ => {}
@@ -153,8 +160,9 @@ fn member(field: syn::Field) -> Option<Member> {
     })
 }
 
-fn signature(function: syn::TypeBareFn) -> Function {
+fn signature(ty: String, function: syn::TypeBareFn) -> Function {
     Function {
+        ty,
         parameters: function
             .inputs
             .into_iter()

@@ -1,14 +1,15 @@
 //! Writes the driver's Rust from the Vulkan registry.
 //!
 //! What the registry says isn't copied by hand: this reads `vk.xml`, the fragment of the driver's own extension, and
-//! `driver/support.toml`, which says what of it the driver supports, and writes the files of `driver/src/registry`. They
+//! `driver/support.toml`, which says what of it the driver supports, and writes the files of `driver/src/registry` and
+//! the dispatch table. They
 //! are checked in, so that building the driver needs neither this crate nor `vk.xml`, which `driver/gen/fetch.sh` gets.
 //! What the things are called in Rust it learns from the sources of ash and of `api/`.
 
-#![expect(dead_code, reason = "commands are read, and not yet written")]
-
 mod ash;
 mod chains;
+mod commands;
+mod entry_points;
 mod error;
 mod extensions;
 mod features;
@@ -55,6 +56,15 @@ pub fn generate(root: &Path, vk_xml: &Path) -> Result<Vec<File>, Error> {
         File {
             path: "driver/src/registry/properties.rs",
             text: properties::write(&registry, &declarations, &support)?,
+        },
+        File {
+            path: "driver/src/dispatch/commands.rs",
+            text: commands::write(
+                &registry,
+                &declarations,
+                &support,
+                &entry_points::find(root)?,
+            )?,
         },
         File {
             path: "driver/src/registry/spirv.rs",

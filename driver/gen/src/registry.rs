@@ -48,8 +48,6 @@ pub struct Structure {
 pub struct Member {
     /// Its name.
     pub name: String,
-    /// The type that its declaration names.
-    pub ty: String,
 }
 
 /// A command.
@@ -68,8 +66,6 @@ pub struct Parameter {
     pub ty: String,
     /// The parameter that counts its elements, or an expression; `None` where it is no array.
     pub len: Option<String>,
-    /// It may be null, or zero.
-    pub optional: bool,
 }
 
 /// A core version, as its major and minor number.
@@ -289,17 +285,14 @@ fn member(member: TypeMember) -> Option<Member> {
     if !is_of_vulkan(definition.api.as_deref()) {
         return None;
     }
-    let mut name = None;
-    let mut ty = None;
-    for markup in definition.markup {
-        match markup {
-            TypeMemberMarkup::Name(text) => name = Some(text),
-            TypeMemberMarkup::Type(text) => ty = Some(text),
-            _ => {}
-        }
-    }
-    let (name, ty) = (name?, ty?);
-    (name != "sType" && name != "pNext").then_some(Member { name, ty })
+    let name = definition
+        .markup
+        .into_iter()
+        .find_map(|markup| match markup {
+            TypeMemberMarkup::Name(text) => Some(text),
+            _ => None,
+        })?;
+    (name != "sType" && name != "pNext").then_some(Member { name })
 }
 
 fn command_definition(definition: CommandDefinition) -> (String, Command) {
@@ -311,9 +304,6 @@ fn command_definition(definition: CommandDefinition) -> (String, Command) {
             name: parameter.definition.name,
             ty: parameter.definition.type_name.unwrap_or_default(),
             len: parameter.len,
-            optional: parameter
-                .optional
-                .is_some_and(|optional| optional.starts_with("true")),
         })
         .collect();
     (definition.proto.name, Command { parameters })

@@ -17,7 +17,7 @@ use std::sync::Arc;
 ///
 /// # Safety
 /// The handle is live.
-pub(super) unsafe fn record(
+pub(crate) unsafe fn record(
     command_buffer: vk::CommandBuffer,
     record: impl FnOnce(&mut Recorder) -> Result<(), Error>,
 ) -> Result<(), Error> {
@@ -26,6 +26,7 @@ pub(super) unsafe fn record(
 }
 
 crate::entry_points! {
+    #[doc(alias = "vkCmdBindPipeline")]
     fn cmd_bind_pipeline(
         command_buffer: vk::CommandBuffer,
         pipeline_bind_point: vk::PipelineBindPoint,
@@ -51,6 +52,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdSetGaussianCameraGAURAST")]
     fn cmd_set_gaussian_camera_gaurast(
         command_buffer: vk::CommandBuffer,
         p_camera: *const GaussianCameraGAURAST<'_>,
@@ -62,6 +64,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdBindVertexBuffers")]
     fn cmd_bind_vertex_buffers(
         command_buffer: vk::CommandBuffer,
         first_binding: u32,
@@ -76,6 +79,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdBindVertexBuffers2")]
     fn cmd_bind_vertex_buffers2(
         command_buffer: vk::CommandBuffer,
         first_binding: u32,
@@ -96,6 +100,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdBindIndexBuffer")]
     fn cmd_bind_index_buffer(
         command_buffer: vk::CommandBuffer,
         buffer: vk::Buffer,
@@ -117,6 +122,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdSetViewport")]
     fn cmd_set_viewport(
         command_buffer: vk::CommandBuffer,
         first_viewport: u32,
@@ -126,6 +132,7 @@ crate::entry_points! {
         set_viewports(command_buffer, first_viewport, viewport_count, viewports, false)
     }
 
+    #[doc(alias = "vkCmdSetViewportWithCount")]
     fn cmd_set_viewport_with_count(
         command_buffer: vk::CommandBuffer,
         viewport_count: u32,
@@ -134,6 +141,7 @@ crate::entry_points! {
         set_viewports(command_buffer, 0, viewport_count, viewports, true)
     }
 
+    #[doc(alias = "vkCmdSetScissor")]
     fn cmd_set_scissor(
         command_buffer: vk::CommandBuffer,
         first_scissor: u32,
@@ -143,6 +151,7 @@ crate::entry_points! {
         set_scissors(command_buffer, first_scissor, scissor_count, scissors, false)
     }
 
+    #[doc(alias = "vkCmdSetScissorWithCount")]
     fn cmd_set_scissor_with_count(
         command_buffer: vk::CommandBuffer,
         scissor_count: u32,
@@ -151,6 +160,7 @@ crate::entry_points! {
         set_scissors(command_buffer, 0, scissor_count, scissors, true)
     }
 
+    #[doc(alias = "vkCmdDraw")]
     fn cmd_draw(
         command_buffer: vk::CommandBuffer,
         vertex_count: u32,
@@ -171,6 +181,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdDrawIndexed")]
     fn cmd_draw_indexed(
         command_buffer: vk::CommandBuffer,
         index_count: u32,
@@ -192,6 +203,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdDrawIndirect")]
     fn cmd_draw_indirect(
         command_buffer: vk::CommandBuffer,
         buffer: vk::Buffer,
@@ -203,6 +215,7 @@ crate::entry_points! {
         draw_indirect(command_buffer, parameters, None, draw_count, stride, false)
     }
 
+    #[doc(alias = "vkCmdDrawIndexedIndirect")]
     fn cmd_draw_indexed_indirect(
         command_buffer: vk::CommandBuffer,
         buffer: vk::Buffer,
@@ -214,6 +227,7 @@ crate::entry_points! {
         draw_indirect(command_buffer, parameters, None, draw_count, stride, true)
     }
 
+    #[doc(alias = "vkCmdDrawIndirectCount")]
     fn cmd_draw_indirect_count(
         command_buffer: vk::CommandBuffer,
         buffer: vk::Buffer,
@@ -228,6 +242,7 @@ crate::entry_points! {
         draw_indirect(command_buffer, parameters, count, max_draw_count, stride, false)
     }
 
+    #[doc(alias = "vkCmdDrawIndexedIndirectCount")]
     fn cmd_draw_indexed_indirect_count(
         command_buffer: vk::CommandBuffer,
         buffer: vk::Buffer,
@@ -242,6 +257,7 @@ crate::entry_points! {
         draw_indirect(command_buffer, parameters, count, max_draw_count, stride, true)
     }
 
+    #[doc(alias = "vkCmdExecuteCommands")]
     fn cmd_execute_commands(
         command_buffer: vk::CommandBuffer,
         command_buffer_count: u32,
@@ -271,6 +287,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdPipelineBarrier")]
     fn cmd_pipeline_barrier(
         command_buffer: vk::CommandBuffer,
         _src_stage_mask: vk::PipelineStageFlags,
@@ -286,6 +303,7 @@ crate::entry_points! {
         barrier(command_buffer)
     }
 
+    #[doc(alias = "vkCmdPipelineBarrier2")]
     fn cmd_pipeline_barrier2(
         command_buffer: vk::CommandBuffer,
         _dependency_info: *const vk::DependencyInfo<'_>,
@@ -293,6 +311,7 @@ crate::entry_points! {
         barrier(command_buffer)
     }
 
+    #[doc(alias = "vkCmdSetEvent")]
     fn cmd_set_event(
         command_buffer: vk::CommandBuffer,
         event: vk::Event,
@@ -301,6 +320,7 @@ crate::entry_points! {
         set_event(command_buffer, event, true)
     }
 
+    #[doc(alias = "vkCmdSetEvent2")]
     fn cmd_set_event2(
         command_buffer: vk::CommandBuffer,
         event: vk::Event,
@@ -309,6 +329,7 @@ crate::entry_points! {
         set_event(command_buffer, event, true)
     }
 
+    #[doc(alias = "vkCmdResetEvent")]
     fn cmd_reset_event(
         command_buffer: vk::CommandBuffer,
         event: vk::Event,
@@ -317,6 +338,7 @@ crate::entry_points! {
         set_event(command_buffer, event, false)
     }
 
+    #[doc(alias = "vkCmdResetEvent2")]
     fn cmd_reset_event2(
         command_buffer: vk::CommandBuffer,
         event: vk::Event,
@@ -325,6 +347,7 @@ crate::entry_points! {
         set_event(command_buffer, event, false)
     }
 
+    #[doc(alias = "vkCmdWaitEvents")]
     fn cmd_wait_events(
         command_buffer: vk::CommandBuffer,
         event_count: u32,
@@ -341,6 +364,7 @@ crate::entry_points! {
         wait_events(command_buffer, event_count, events)
     }
 
+    #[doc(alias = "vkCmdWaitEvents2")]
     fn cmd_wait_events2(
         command_buffer: vk::CommandBuffer,
         event_count: u32,

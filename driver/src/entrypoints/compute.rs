@@ -13,6 +13,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCmdBindDescriptorSets")]
     fn cmd_bind_descriptor_sets(
         command_buffer: vk::CommandBuffer,
         pipeline_bind_point: vk::PipelineBindPoint,
@@ -63,6 +64,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdPushConstants")]
     fn cmd_push_constants(
         command_buffer: vk::CommandBuffer,
         layout: vk::PipelineLayout,
@@ -89,6 +91,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdPushDescriptorSetKHR")]
     fn cmd_push_descriptor_set_khr(
         command_buffer: vk::CommandBuffer,
         pipeline_bind_point: vk::PipelineBindPoint,
@@ -111,6 +114,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdPushDescriptorSetWithTemplateKHR")]
     fn cmd_push_descriptor_set_with_template_khr(
         command_buffer: vk::CommandBuffer,
         descriptor_update_template: vk::DescriptorUpdateTemplate,
@@ -138,6 +142,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdDispatch")]
     fn cmd_dispatch(
         command_buffer: vk::CommandBuffer,
         group_count_x: u32,
@@ -147,6 +152,7 @@ crate::entry_points! {
         dispatch(command_buffer, [0; 3], [group_count_x, group_count_y, group_count_z])
     }
 
+    #[doc(alias = "vkCmdDispatchBase")]
     fn cmd_dispatch_base(
         command_buffer: vk::CommandBuffer,
         base_group_x: u32,
@@ -160,6 +166,7 @@ crate::entry_points! {
         dispatch(command_buffer, base, [group_count_x, group_count_y, group_count_z])
     }
 
+    #[doc(alias = "vkCmdDispatchIndirect")]
     fn cmd_dispatch_indirect(
         command_buffer: vk::CommandBuffer,
         buffer: vk::Buffer,

@@ -10,6 +10,7 @@ use ash::vk;
 use std::ffi::c_char;
 
 entry_points! {
+    #[doc(alias = "vkGetPhysicalDeviceProperties")]
     fn get_physical_device_properties(
         _physical_device: vk::PhysicalDevice,
         properties: *mut vk::PhysicalDeviceProperties,
@@ -17,6 +18,7 @@ entry_points! {
         pointer::output(properties, limits::properties().core())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceProperties2")]
     fn get_physical_device_properties2(
         _physical_device: vk::PhysicalDevice,
         properties: *mut vk::PhysicalDeviceProperties2<'_>,
@@ -27,6 +29,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceFeatures")]
     fn get_physical_device_features(
         _physical_device: vk::PhysicalDevice,
         features: *mut vk::PhysicalDeviceFeatures,
@@ -34,6 +37,7 @@ entry_points! {
         pointer::output(features, SUPPORTED.core())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceFeatures2")]
     fn get_physical_device_features2(
         _physical_device: vk::PhysicalDevice,
         features: *mut vk::PhysicalDeviceFeatures2<'_>,
@@ -44,6 +48,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceFormatProperties")]
     fn get_physical_device_format_properties(
         _physical_device: vk::PhysicalDevice,
         format: vk::Format,
@@ -52,6 +57,7 @@ entry_points! {
         pointer::output(properties, formats::properties(format))
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceFormatProperties2")]
     fn get_physical_device_format_properties2(
         _physical_device: vk::PhysicalDevice,
         format: vk::Format,
@@ -71,6 +77,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceImageFormatProperties")]
     fn get_physical_device_image_format_properties(
         _physical_device: vk::PhysicalDevice,
         format: vk::Format,
@@ -84,6 +91,7 @@ entry_points! {
         image_format_answer(query, pointer::output_structure(properties)?)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceImageFormatProperties2")]
     fn get_physical_device_image_format_properties2(
         _physical_device: vk::PhysicalDevice,
         info: *const vk::PhysicalDeviceImageFormatInfo2<'_>,
@@ -111,6 +119,7 @@ entry_points! {
         image_format_answer(query, &mut properties.image_format_properties)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceSparseImageFormatProperties")]
     fn get_physical_device_sparse_image_format_properties(
         _physical_device: vk::PhysicalDevice,
         _format: vk::Format,
@@ -124,6 +133,7 @@ entry_points! {
         pointer::enumerate(count, properties, &[]).map(drop)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceSparseImageFormatProperties2")]
     fn get_physical_device_sparse_image_format_properties2(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::PhysicalDeviceSparseImageFormatInfo2<'_>,
@@ -133,6 +143,7 @@ entry_points! {
         pointer::enumerate_structures(count, properties, 0, |_, _| ()).map(drop)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceQueueFamilyProperties")]
     fn get_physical_device_queue_family_properties(
         _physical_device: vk::PhysicalDevice,
         count: *mut u32,
@@ -141,6 +152,7 @@ entry_points! {
         pointer::enumerate(count, properties, &[queues::properties()]).map(drop)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceQueueFamilyProperties2")]
     fn get_physical_device_queue_family_properties2(
         _physical_device: vk::PhysicalDevice,
         count: *mut u32,
@@ -152,6 +164,7 @@ entry_points! {
         .map(drop)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceMemoryProperties")]
     fn get_physical_device_memory_properties(
         _physical_device: vk::PhysicalDevice,
         properties: *mut vk::PhysicalDeviceMemoryProperties,
@@ -159,6 +172,7 @@ entry_points! {
         pointer::output(properties, memory::properties())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceMemoryProperties2")]
     fn get_physical_device_memory_properties2(
         _physical_device: vk::PhysicalDevice,
         properties: *mut vk::PhysicalDeviceMemoryProperties2<'_>,
@@ -167,6 +181,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkEnumerateDeviceExtensionProperties")]
     fn enumerate_device_extension_properties(
         _physical_device: vk::PhysicalDevice,
         layer: *const c_char,
@@ -179,6 +194,7 @@ entry_points! {
         }
     }
 
+    #[doc(alias = "vkEnumerateDeviceLayerProperties")]
     fn enumerate_device_layer_properties(
         _physical_device: vk::PhysicalDevice,
         count: *mut u32,
@@ -187,6 +203,7 @@ entry_points! {
         pointer::enumerate(count, properties, &[])
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceExternalBufferProperties")]
     fn get_physical_device_external_buffer_properties(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::PhysicalDeviceExternalBufferInfo<'_>,
@@ -196,6 +213,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceExternalFenceProperties")]
     fn get_physical_device_external_fence_properties(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::PhysicalDeviceExternalFenceInfo<'_>,
@@ -208,6 +226,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceExternalSemaphoreProperties")]
     fn get_physical_device_external_semaphore_properties(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::PhysicalDeviceExternalSemaphoreInfo<'_>,
@@ -220,6 +239,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceToolProperties")]
     fn get_physical_device_tool_properties(
         _physical_device: vk::PhysicalDevice,
         count: *mut u32,
@@ -228,6 +248,7 @@ entry_points! {
         pointer::enumerate_structures(count, properties, 0, |_, _| ())
     }
 
+    #[doc(alias = "vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR")]
     fn enumerate_physical_device_queue_family_performance_query_counters_khr(
         _physical_device: vk::PhysicalDevice,
         family: u32,
@@ -243,6 +264,7 @@ entry_points! {
         pointer::enumerate_structures(count, counters, available, counters::fill)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR")]
     fn get_physical_device_queue_family_performance_query_passes_khr(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::QueryPoolPerformanceCreateInfoKHR<'_>,

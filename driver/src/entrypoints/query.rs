@@ -18,6 +18,7 @@ use std::time::Duration;
 const POLL: Duration = Duration::from_millis(20);
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateQueryPool")]
     fn create_query_pool(
         _device: vk::Device,
         create_info: *const vk::QueryPoolCreateInfo<'_>,
@@ -28,14 +29,7 @@ crate::entry_points! {
         pointer::output(query_pool, handle::create(Arc::new(object)))
     }
 
-    fn destroy_query_pool(
-        _device: vk::Device,
-        query_pool: vk::QueryPool,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(query_pool).map(drop)
-    }
-
+    #[doc(alias = "vkResetQueryPool")]
     fn reset_query_pool(
         _device: vk::Device,
         query_pool: vk::QueryPool,
@@ -46,6 +40,7 @@ crate::entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetQueryPoolResults")]
     fn get_query_pool_results(
         device: vk::Device,
         query_pool: vk::QueryPool,
@@ -78,6 +73,7 @@ crate::entry_points! {
         Ok(if all_available { vk::Result::SUCCESS } else { vk::Result::NOT_READY })
     }
 
+    #[doc(alias = "vkCmdBeginQuery")]
     fn cmd_begin_query(
         command_buffer: vk::CommandBuffer,
         query_pool: vk::QueryPool,
@@ -92,6 +88,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdEndQuery")]
     fn cmd_end_query(command_buffer: vk::CommandBuffer, query_pool: vk::QueryPool, query: u32) {
         record(command_buffer, |recorder| {
             let pool = handle::get(query_pool)?;
@@ -101,6 +98,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdResetQueryPool")]
     fn cmd_reset_query_pool(
         command_buffer: vk::CommandBuffer,
         query_pool: vk::QueryPool,
@@ -120,6 +118,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdWriteTimestamp")]
     fn cmd_write_timestamp(
         command_buffer: vk::CommandBuffer,
         _pipeline_stage: vk::PipelineStageFlags,
@@ -129,6 +128,7 @@ crate::entry_points! {
         write_timestamp(command_buffer, query_pool, query)
     }
 
+    #[doc(alias = "vkCmdWriteTimestamp2")]
     fn cmd_write_timestamp2(
         command_buffer: vk::CommandBuffer,
         _stage: vk::PipelineStageFlags2,
@@ -138,6 +138,7 @@ crate::entry_points! {
         write_timestamp(command_buffer, query_pool, query)
     }
 
+    #[doc(alias = "vkCmdCopyQueryPoolResults")]
     fn cmd_copy_query_pool_results(
         command_buffer: vk::CommandBuffer,
         query_pool: vk::QueryPool,

@@ -9,6 +9,7 @@ use simdevice::packet::Rect;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCmdBeginRenderPass")]
     fn cmd_begin_render_pass(
         command_buffer: vk::CommandBuffer,
         render_pass_begin: *const vk::RenderPassBeginInfo<'_>,
@@ -19,6 +20,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdBeginRenderPass2")]
     fn cmd_begin_render_pass2(
         command_buffer: vk::CommandBuffer,
         render_pass_begin: *const vk::RenderPassBeginInfo<'_>,
@@ -29,10 +31,12 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdNextSubpass")]
     fn cmd_next_subpass(command_buffer: vk::CommandBuffer, _contents: vk::SubpassContents) {
         record(command_buffer, |recorder| recorder.next_subpass())
     }
 
+    #[doc(alias = "vkCmdNextSubpass2")]
     fn cmd_next_subpass2(
         command_buffer: vk::CommandBuffer,
         _subpass_begin_info: *const vk::SubpassBeginInfo<'_>,
@@ -41,10 +45,12 @@ crate::entry_points! {
         record(command_buffer, |recorder| recorder.next_subpass())
     }
 
+    #[doc(alias = "vkCmdEndRenderPass")]
     fn cmd_end_render_pass(command_buffer: vk::CommandBuffer) {
         record(command_buffer, |recorder| recorder.end_render_pass())
     }
 
+    #[doc(alias = "vkCmdEndRenderPass2")]
     fn cmd_end_render_pass2(
         command_buffer: vk::CommandBuffer,
         _subpass_end_info: *const vk::SubpassEndInfo<'_>,
@@ -52,6 +58,7 @@ crate::entry_points! {
         record(command_buffer, |recorder| recorder.end_render_pass())
     }
 
+    #[doc(alias = "vkCmdBeginRendering")]
     fn cmd_begin_rendering(
         command_buffer: vk::CommandBuffer,
         rendering_info: *const vk::RenderingInfo<'_>,
@@ -62,6 +69,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdEndRendering")]
     fn cmd_end_rendering(command_buffer: vk::CommandBuffer) {
         record(command_buffer, |recorder| recorder.end_rendering())
     }

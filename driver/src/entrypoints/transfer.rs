@@ -14,6 +14,7 @@ use std::ffi::c_void;
 const MAX_UPDATE: u64 = 65_536;
 
 crate::entry_points! {
+    #[doc(alias = "vkCmdCopyBuffer")]
     fn cmd_copy_buffer(
         command_buffer: vk::CommandBuffer,
         src_buffer: vk::Buffer,
@@ -27,6 +28,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdCopyBuffer2")]
     fn cmd_copy_buffer2(
         command_buffer: vk::CommandBuffer,
         copy_buffer_info: *const vk::CopyBufferInfo2<'_>,
@@ -38,6 +40,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdCopyImage")]
     fn cmd_copy_image(
         command_buffer: vk::CommandBuffer,
         src_image: vk::Image,
@@ -53,6 +56,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdCopyImage2")]
     fn cmd_copy_image2(
         command_buffer: vk::CommandBuffer,
         copy_image_info: *const vk::CopyImageInfo2<'_>,
@@ -64,6 +68,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdBlitImage")]
     fn cmd_blit_image(
         command_buffer: vk::CommandBuffer,
         src_image: vk::Image,
@@ -80,6 +85,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdBlitImage2")]
     fn cmd_blit_image2(
         command_buffer: vk::CommandBuffer,
         blit_image_info: *const vk::BlitImageInfo2<'_>,
@@ -91,6 +97,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdResolveImage")]
     fn cmd_resolve_image(
         command_buffer: vk::CommandBuffer,
         src_image: vk::Image,
@@ -106,6 +113,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdResolveImage2")]
     fn cmd_resolve_image2(
         command_buffer: vk::CommandBuffer,
         resolve_image_info: *const vk::ResolveImageInfo2<'_>,
@@ -117,6 +125,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdCopyBufferToImage")]
     fn cmd_copy_buffer_to_image(
         command_buffer: vk::CommandBuffer,
         src_buffer: vk::Buffer,
@@ -132,6 +141,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdCopyBufferToImage2")]
     fn cmd_copy_buffer_to_image2(
         command_buffer: vk::CommandBuffer,
         copy_buffer_to_image_info: *const vk::CopyBufferToImageInfo2<'_>,
@@ -144,6 +154,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdCopyImageToBuffer")]
     fn cmd_copy_image_to_buffer(
         command_buffer: vk::CommandBuffer,
         src_image: vk::Image,
@@ -159,6 +170,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdCopyImageToBuffer2")]
     fn cmd_copy_image_to_buffer2(
         command_buffer: vk::CommandBuffer,
         copy_image_to_buffer_info: *const vk::CopyImageToBufferInfo2<'_>,
@@ -171,6 +183,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdFillBuffer")]
     fn cmd_fill_buffer(
         command_buffer: vk::CommandBuffer,
         dst_buffer: vk::Buffer,
@@ -187,6 +200,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdUpdateBuffer")]
     fn cmd_update_buffer(
         command_buffer: vk::CommandBuffer,
         dst_buffer: vk::Buffer,
@@ -209,6 +223,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdClearColorImage")]
     fn cmd_clear_color_image(
         command_buffer: vk::CommandBuffer,
         image: vk::Image,
@@ -226,6 +241,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdClearDepthStencilImage")]
     fn cmd_clear_depth_stencil_image(
         command_buffer: vk::CommandBuffer,
         image: vk::Image,
@@ -244,6 +260,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCmdClearAttachments")]
     fn cmd_clear_attachments(
         command_buffer: vk::CommandBuffer,
         attachment_count: u32,

@@ -121,11 +121,6 @@ impl CommandBuffer {
         self.resets_single
     }
 
-    /// Makes `vkEndCommandBuffer` fail with the first error that a recorded command met.
-    pub(crate) fn fail(&self, error: Error) {
-        self.recorder().fail(error);
-    }
-
     /// Ends recording.
     ///
     /// # Errors
