@@ -181,9 +181,11 @@ fn signature(ty: String, function: syn::TypeBareFn) -> Function {
     }
 }
 
-/// A type's text, with paths.
+/// A type's text, with paths and without the names of lifetimes.
 pub(crate) fn type_text(ty: &syn::Type) -> String {
-    with_paths(ty.to_token_stream()).to_string()
+    with_paths(ty.to_token_stream())
+        .to_string()
+        .replace("'a", "'_")
 }
 
 fn with_paths(tokens: TokenStream) -> TokenStream {
@@ -206,11 +208,7 @@ fn with_paths(tokens: TokenStream) -> TokenStream {
             // The name of a module: the path is given anew.
             tokens.next_if(is_colon);
         } else {
-            text.extend(
-                with_path(&name.to_string())
-                    .parse::<TokenStream>()
-                    .into_iter(),
-            );
+            text.extend(with_path(&name.to_string()).parse::<TokenStream>());
         }
     }
     text

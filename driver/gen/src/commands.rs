@@ -4,7 +4,8 @@
 //! in the form that it declares: the command's own type; a handle as the object (`&Buffer`, `&Arc<Buffer>`,
 //! `Option<&Buffer>`); a pointer as what it points at (`&T`, `&mut T`, `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`); a
 //! `VkBool32` as a `bool`; and a command buffer as its `recorder`. An output pointer that it doesn't take is written with
-//! what it returns: a value, an `Arc` of an object, or a list.
+//! what it returns: a value, an `Arc` of an object, or a list. Of commands that have a second version, which takes a structure
+//! of the first one's parameters, the second is enough.
 
 use crate::ash::{Declarations, Function, Member};
 use crate::entry_points::EntryPoint;
@@ -82,6 +83,7 @@ pub(crate) fn write(
         &format!(
             "#![allow(non_snake_case, reason = \"Vulkan's names\")]
             #![allow(clippy::too_many_arguments, reason = \"Vulkan's signatures\")]
+            #![allow(clippy::semicolon_if_nothing_returned, reason = \"functions return what their guards do\")]
 
             use super::Gate::{{Core, DeviceExtension, InstanceExtension}};
             use super::{{Command, Scope, table}};
@@ -194,7 +196,10 @@ impl Writer<'_> {
         let mut used = BTreeSet::from([function.parameters[0].name.clone()]);
         let body = match entry_point {
             Some(entry_point) => call(name, definition, function, entry_point, &mut used)?,
-            None => self.without_function(name, function, &mut used)?,
+            None => match self.by_second_version(name, definition, function, &mut used)? {
+                Some(body) => body,
+                None => self.without_function(name, function, &mut used)?,
+            },
         };
         let mut parameters = String::new();
         for parameter in &function.parameters {
@@ -214,6 +219,82 @@ impl Writer<'_> {
 
             "
         ))
+    }
+
+    /// The body of a command whose parameters are the members of the structure that its second version takes.
+    fn by_second_version(
+        &self,
+        name: &str,
+        definition: &registry::Command,
+        function: &Function,
+        used: &mut BTreeSet<String>,
+    ) -> Result<Option<String>, Error> {
+        let second = format!("{name}2");
+        let (Some(entry_point), Some(taken)) = (
+            self.entry_points.get(&second),
+            self.registry.commands.get(&second),
+        ) else {
+            return Ok(None);
+        };
+        let [_, info] = &taken.parameters[..] else {
+            return Ok(None);
+        };
+        let structure = self.declarations.structure(self.registry, &info.ty)?;
+        let mut lists = String::new();
+        let mut members = String::new();
+        for member in &structure.members {
+            let Some(index) = function
+                .parameters
+                .iter()
+                .position(|p| p.name == member.name)
+            else {
+                return Ok(None);
+            };
+            let parameter = &function.parameters[index];
+            used.insert(parameter.name.clone());
+            let name = &member.name;
+            if plain(&parameter.ty) == plain(&member.ty) {
+                let _ = writeln!(members, "{name},");
+                continue;
+            }
+            let (Some(element), Some(count)) = (
+                member.ty.strip_prefix("* const "),
+                count_of(definition, function, index),
+            ) else {
+                return Ok(None);
+            };
+            let list = without_prefix(name);
+            let converted = self
+                .declarations
+                .structure(self.registry, &format!("Vk{}", plain(element)))?
+                .members
+                .iter()
+                .map(|member| format!("{0}: of.{0},", member.name))
+                .collect::<String>();
+            let element = element.trim_end_matches("< '_ >");
+            let _ = writeln!(
+                lists,
+                "let {list} = pointer::slice({name}, {count})?.iter().map(|of| {element} {{
+                    {converted} ..Default::default()
+                }});
+                let {list} = simdevice::host::collect({list});",
+                count = count.name,
+            );
+            let _ = writeln!(members, "{name}: {list}.as_ptr(),");
+        }
+        Ok(Some(format!(
+            "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {{
+                record({first}, |recorder| {{
+                    {lists}
+                    let info = {ty} {{ {members} ..Default::default() }};
+                    entrypoints::{path}(recorder, &info)
+                }})
+            }}",
+            first = function.parameters[0].name,
+            ty = structure.ty.trim_end_matches("<'_>"),
+            path = entry_point.path,
+        )))
     }
 
     /// The body of a command that the driver has no function of.
@@ -309,7 +390,9 @@ fn call(
         let index = function
             .parameters
             .iter()
-            .position(|declared| without_prefix(&declared.name) == parameter.name)
+            .position(|declared| {
+                without_prefix(&declared.name) == parameter.name.trim_start_matches('_')
+            })
             .ok_or_else(|| {
                 wrong(format!(
                     "{name} has no parameter {}, but {}",
@@ -392,14 +475,22 @@ fn convert(wanted: &str, declared: &Member, count: Option<&Member>) -> Option<(S
     {
         format!("pointer::input({name})?")
     } else if let Some(element) = wanted.strip_prefix("&[") {
-        let slice = format!("pointer::slice({name}, {})?", count?.name);
-        if element.starts_with("Arc<") {
+        let count = &count?.name;
+        let slice = format!("pointer::slice({name}, {count})?");
+        if element == "u8]" && raw == "*constc_void" {
+            format!("pointer::slice({name}.cast::<u8>(), {count})?")
+        } else if element.starts_with("Arc<") {
             format!("&handle::get_all({slice})?")
         } else if raw == format!("*const{}", element.trim_end_matches(']')) {
             slice
         } else {
             return None;
         }
+    } else if let Some(element) = wanted.strip_prefix("Option<&[")
+        && raw == format!("*const{}", element.trim_end_matches("]>"))
+    {
+        let count = &count?.name;
+        format!("(!{name}.is_null()).then(|| pointer::slice({name}, {count})).transpose()?")
     } else if wanted == "&CStr" && raw == "*constc_char" {
         format!("pointer::string({name}).ok_or(Error::NullPointer {{ what: \"{name}\" }})?")
     } else if wanted == "Option<&CStr>" && raw == "*constc_char" {

@@ -7,11 +7,16 @@ use crate::support::Support;
 
 pub(crate) fn write(registry: &Registry, support: &Support) -> Result<String, Error> {
     let rows = |is_of_instance: bool| -> String {
-        support
+        let mut extensions: Vec<_> = support
             .extension
             .keys()
             .filter_map(|name| registry.extension(name))
             .filter(|extension| extension.is_of_instance == is_of_instance)
+            .collect();
+        // The driver's own come first.
+        extensions.sort_by_key(|extension| !extension.name.starts_with("VK_GAURAST"));
+        extensions
+            .into_iter()
             .map(|extension| format!("(c\"{}\", {}),\n", extension.name, extension.spec_version))
             .collect()
     };

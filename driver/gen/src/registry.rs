@@ -187,11 +187,11 @@ impl Registry {
                 vk_parse::Command::Alias { name, alias } => {
                     self.command_aliases.insert(name, alias);
                 }
-                vk_parse::Command::Definition(definition) => {
-                    if is_of_vulkan(definition.api.as_deref()) {
-                        let (name, command) = command_definition(definition);
-                        self.commands.insert(name, command);
-                    }
+                vk_parse::Command::Definition(definition)
+                    if is_of_vulkan(definition.api.as_deref()) =>
+                {
+                    let (name, command) = command_definition(definition);
+                    self.commands.insert(name, command);
                 }
                 _ => {}
             }

@@ -5,6 +5,10 @@
 
 #![allow(non_snake_case, reason = "Vulkan's names")]
 #![allow(clippy::too_many_arguments, reason = "Vulkan's signatures")]
+#![allow(
+    clippy::semicolon_if_nothing_returned,
+    reason = "functions return what their guards do"
+)]
 
 use super::Gate::{Core, DeviceExtension, InstanceExtension};
 use super::{Command, Scope, table};
@@ -82,18 +86,18 @@ table! {
         vkBeginCommandBuffer: vk::PFN_vkBeginCommandBuffer = entrypoints::command_buffer::begin_command_buffer;
         vkEndCommandBuffer: vk::PFN_vkEndCommandBuffer = entrypoints::command_buffer::end_command_buffer;
         vkResetCommandBuffer: vk::PFN_vkResetCommandBuffer = entrypoints::command_buffer::reset_command_buffer;
-        vkCmdCopyBuffer: vk::PFN_vkCmdCopyBuffer = entrypoints::transfer::cmd_copy_buffer;
-        vkCmdCopyImage: vk::PFN_vkCmdCopyImage = entrypoints::transfer::cmd_copy_image;
-        vkCmdCopyBufferToImage: vk::PFN_vkCmdCopyBufferToImage = entrypoints::transfer::cmd_copy_buffer_to_image;
-        vkCmdCopyImageToBuffer: vk::PFN_vkCmdCopyImageToBuffer = entrypoints::transfer::cmd_copy_image_to_buffer;
-        vkCmdUpdateBuffer: vk::PFN_vkCmdUpdateBuffer = entrypoints::transfer::cmd_update_buffer;
-        vkCmdFillBuffer: vk::PFN_vkCmdFillBuffer = entrypoints::transfer::cmd_fill_buffer;
-        vkCmdPipelineBarrier: vk::PFN_vkCmdPipelineBarrier = entrypoints::command::cmd_pipeline_barrier;
-        vkCmdBeginQuery: vk::PFN_vkCmdBeginQuery = entrypoints::query::cmd_begin_query;
-        vkCmdEndQuery: vk::PFN_vkCmdEndQuery = entrypoints::query::cmd_end_query;
-        vkCmdResetQueryPool: vk::PFN_vkCmdResetQueryPool = entrypoints::query::cmd_reset_query_pool;
-        vkCmdWriteTimestamp: vk::PFN_vkCmdWriteTimestamp = entrypoints::query::cmd_write_timestamp;
-        vkCmdCopyQueryPoolResults: vk::PFN_vkCmdCopyQueryPoolResults = entrypoints::query::cmd_copy_query_pool_results;
+        vkCmdCopyBuffer: vk::PFN_vkCmdCopyBuffer = vkCmdCopyBuffer;
+        vkCmdCopyImage: vk::PFN_vkCmdCopyImage = vkCmdCopyImage;
+        vkCmdCopyBufferToImage: vk::PFN_vkCmdCopyBufferToImage = vkCmdCopyBufferToImage;
+        vkCmdCopyImageToBuffer: vk::PFN_vkCmdCopyImageToBuffer = vkCmdCopyImageToBuffer;
+        vkCmdUpdateBuffer: vk::PFN_vkCmdUpdateBuffer = vkCmdUpdateBuffer;
+        vkCmdFillBuffer: vk::PFN_vkCmdFillBuffer = vkCmdFillBuffer;
+        vkCmdPipelineBarrier: vk::PFN_vkCmdPipelineBarrier = vkCmdPipelineBarrier;
+        vkCmdBeginQuery: vk::PFN_vkCmdBeginQuery = vkCmdBeginQuery;
+        vkCmdEndQuery: vk::PFN_vkCmdEndQuery = vkCmdEndQuery;
+        vkCmdResetQueryPool: vk::PFN_vkCmdResetQueryPool = vkCmdResetQueryPool;
+        vkCmdWriteTimestamp: vk::PFN_vkCmdWriteTimestamp = vkCmdWriteTimestamp;
+        vkCmdCopyQueryPoolResults: vk::PFN_vkCmdCopyQueryPoolResults = vkCmdCopyQueryPoolResults;
         vkCmdExecuteCommands: vk::PFN_vkCmdExecuteCommands = entrypoints::command::cmd_execute_commands;
         vkCreateEvent: vk::PFN_vkCreateEvent = entrypoints::sync::create_event;
         vkDestroyEvent: vk::PFN_vkDestroyEvent = vkDestroyEvent;
@@ -122,23 +126,23 @@ table! {
         vkAllocateDescriptorSets: vk::PFN_vkAllocateDescriptorSets = entrypoints::descriptor::allocate_descriptor_sets;
         vkFreeDescriptorSets: vk::PFN_vkFreeDescriptorSets = entrypoints::descriptor::free_descriptor_sets;
         vkUpdateDescriptorSets: vk::PFN_vkUpdateDescriptorSets = entrypoints::descriptor_update::update_descriptor_sets;
-        vkCmdBindPipeline: vk::PFN_vkCmdBindPipeline = entrypoints::command::cmd_bind_pipeline;
-        vkCmdBindDescriptorSets: vk::PFN_vkCmdBindDescriptorSets = entrypoints::compute::cmd_bind_descriptor_sets;
-        vkCmdClearColorImage: vk::PFN_vkCmdClearColorImage = entrypoints::transfer::cmd_clear_color_image;
-        vkCmdDispatch: vk::PFN_vkCmdDispatch = entrypoints::compute::cmd_dispatch;
-        vkCmdDispatchIndirect: vk::PFN_vkCmdDispatchIndirect = entrypoints::compute::cmd_dispatch_indirect;
-        vkCmdSetEvent: vk::PFN_vkCmdSetEvent = entrypoints::command::cmd_set_event;
-        vkCmdResetEvent: vk::PFN_vkCmdResetEvent = entrypoints::command::cmd_reset_event;
-        vkCmdWaitEvents: vk::PFN_vkCmdWaitEvents = entrypoints::command::cmd_wait_events;
-        vkCmdPushConstants: vk::PFN_vkCmdPushConstants = entrypoints::compute::cmd_push_constants;
+        vkCmdBindPipeline: vk::PFN_vkCmdBindPipeline = vkCmdBindPipeline;
+        vkCmdBindDescriptorSets: vk::PFN_vkCmdBindDescriptorSets = vkCmdBindDescriptorSets;
+        vkCmdClearColorImage: vk::PFN_vkCmdClearColorImage = vkCmdClearColorImage;
+        vkCmdDispatch: vk::PFN_vkCmdDispatch = vkCmdDispatch;
+        vkCmdDispatchIndirect: vk::PFN_vkCmdDispatchIndirect = vkCmdDispatchIndirect;
+        vkCmdSetEvent: vk::PFN_vkCmdSetEvent = vkCmdSetEvent;
+        vkCmdResetEvent: vk::PFN_vkCmdResetEvent = vkCmdResetEvent;
+        vkCmdWaitEvents: vk::PFN_vkCmdWaitEvents = vkCmdWaitEvents;
+        vkCmdPushConstants: vk::PFN_vkCmdPushConstants = vkCmdPushConstants;
         vkCreateGraphicsPipelines: vk::PFN_vkCreateGraphicsPipelines = entrypoints::graphics_pipeline::create_graphics_pipelines;
         vkCreateFramebuffer: vk::PFN_vkCreateFramebuffer = entrypoints::render_pass::create_framebuffer;
         vkDestroyFramebuffer: vk::PFN_vkDestroyFramebuffer = vkDestroyFramebuffer;
         vkCreateRenderPass: vk::PFN_vkCreateRenderPass = entrypoints::render_pass::create_render_pass;
         vkDestroyRenderPass: vk::PFN_vkDestroyRenderPass = vkDestroyRenderPass;
         vkGetRenderAreaGranularity: vk::PFN_vkGetRenderAreaGranularity = entrypoints::render_pass::get_render_area_granularity;
-        vkCmdSetViewport: vk::PFN_vkCmdSetViewport = entrypoints::command::cmd_set_viewport;
-        vkCmdSetScissor: vk::PFN_vkCmdSetScissor = entrypoints::command::cmd_set_scissor;
+        vkCmdSetViewport: vk::PFN_vkCmdSetViewport = vkCmdSetViewport;
+        vkCmdSetScissor: vk::PFN_vkCmdSetScissor = vkCmdSetScissor;
         vkCmdSetLineWidth: vk::PFN_vkCmdSetLineWidth = vkCmdSetLineWidth;
         vkCmdSetDepthBias: vk::PFN_vkCmdSetDepthBias = vkCmdSetDepthBias;
         vkCmdSetBlendConstants: vk::PFN_vkCmdSetBlendConstants = vkCmdSetBlendConstants;
@@ -146,19 +150,19 @@ table! {
         vkCmdSetStencilCompareMask: vk::PFN_vkCmdSetStencilCompareMask = vkCmdSetStencilCompareMask;
         vkCmdSetStencilWriteMask: vk::PFN_vkCmdSetStencilWriteMask = vkCmdSetStencilWriteMask;
         vkCmdSetStencilReference: vk::PFN_vkCmdSetStencilReference = vkCmdSetStencilReference;
-        vkCmdBindIndexBuffer: vk::PFN_vkCmdBindIndexBuffer = entrypoints::command::cmd_bind_index_buffer;
-        vkCmdBindVertexBuffers: vk::PFN_vkCmdBindVertexBuffers = entrypoints::command::cmd_bind_vertex_buffers;
-        vkCmdDraw: vk::PFN_vkCmdDraw = entrypoints::command::cmd_draw;
-        vkCmdDrawIndexed: vk::PFN_vkCmdDrawIndexed = entrypoints::command::cmd_draw_indexed;
-        vkCmdDrawIndirect: vk::PFN_vkCmdDrawIndirect = entrypoints::command::cmd_draw_indirect;
-        vkCmdDrawIndexedIndirect: vk::PFN_vkCmdDrawIndexedIndirect = entrypoints::command::cmd_draw_indexed_indirect;
-        vkCmdBlitImage: vk::PFN_vkCmdBlitImage = entrypoints::transfer::cmd_blit_image;
-        vkCmdClearDepthStencilImage: vk::PFN_vkCmdClearDepthStencilImage = entrypoints::transfer::cmd_clear_depth_stencil_image;
-        vkCmdClearAttachments: vk::PFN_vkCmdClearAttachments = entrypoints::transfer::cmd_clear_attachments;
-        vkCmdResolveImage: vk::PFN_vkCmdResolveImage = entrypoints::transfer::cmd_resolve_image;
-        vkCmdBeginRenderPass: vk::PFN_vkCmdBeginRenderPass = entrypoints::rendering::cmd_begin_render_pass;
-        vkCmdNextSubpass: vk::PFN_vkCmdNextSubpass = entrypoints::rendering::cmd_next_subpass;
-        vkCmdEndRenderPass: vk::PFN_vkCmdEndRenderPass = entrypoints::rendering::cmd_end_render_pass;
+        vkCmdBindIndexBuffer: vk::PFN_vkCmdBindIndexBuffer = vkCmdBindIndexBuffer;
+        vkCmdBindVertexBuffers: vk::PFN_vkCmdBindVertexBuffers = vkCmdBindVertexBuffers;
+        vkCmdDraw: vk::PFN_vkCmdDraw = vkCmdDraw;
+        vkCmdDrawIndexed: vk::PFN_vkCmdDrawIndexed = vkCmdDrawIndexed;
+        vkCmdDrawIndirect: vk::PFN_vkCmdDrawIndirect = vkCmdDrawIndirect;
+        vkCmdDrawIndexedIndirect: vk::PFN_vkCmdDrawIndexedIndirect = vkCmdDrawIndexedIndirect;
+        vkCmdBlitImage: vk::PFN_vkCmdBlitImage = vkCmdBlitImage;
+        vkCmdClearDepthStencilImage: vk::PFN_vkCmdClearDepthStencilImage = vkCmdClearDepthStencilImage;
+        vkCmdClearAttachments: vk::PFN_vkCmdClearAttachments = vkCmdClearAttachments;
+        vkCmdResolveImage: vk::PFN_vkCmdResolveImage = vkCmdResolveImage;
+        vkCmdBeginRenderPass: vk::PFN_vkCmdBeginRenderPass = vkCmdBeginRenderPass;
+        vkCmdNextSubpass: vk::PFN_vkCmdNextSubpass = vkCmdNextSubpass;
+        vkCmdEndRenderPass: vk::PFN_vkCmdEndRenderPass = vkCmdEndRenderPass;
     }
     Global, Core(vk::API_VERSION_1_1) => {
         vkEnumerateInstanceVersion: vk::PFN_vkEnumerateInstanceVersion = entrypoints::instance::enumerate_instance_version;
@@ -173,7 +177,7 @@ table! {
         vkGetImageSparseMemoryRequirements2: vk::PFN_vkGetImageSparseMemoryRequirements2 = entrypoints::image::get_image_sparse_memory_requirements2;
         vkTrimCommandPool: vk::PFN_vkTrimCommandPool = vkTrimCommandPool;
         vkGetDeviceQueue2: vk::PFN_vkGetDeviceQueue2 = entrypoints::device::get_device_queue2;
-        vkCmdDispatchBase: vk::PFN_vkCmdDispatchBase = entrypoints::compute::cmd_dispatch_base;
+        vkCmdDispatchBase: vk::PFN_vkCmdDispatchBase = vkCmdDispatchBase;
         vkCreateDescriptorUpdateTemplate: vk::PFN_vkCreateDescriptorUpdateTemplate = entrypoints::descriptor_update::create_descriptor_update_template;
         vkDestroyDescriptorUpdateTemplate: vk::PFN_vkDestroyDescriptorUpdateTemplate = vkDestroyDescriptorUpdateTemplate;
         vkUpdateDescriptorSetWithTemplate: vk::PFN_vkUpdateDescriptorSetWithTemplate = entrypoints::descriptor_update::update_descriptor_set_with_template;
@@ -204,12 +208,12 @@ table! {
         vkGetBufferDeviceAddress: vk::PFN_vkGetBufferDeviceAddress = vkGetBufferDeviceAddress;
         vkGetBufferOpaqueCaptureAddress: vk::PFN_vkGetBufferOpaqueCaptureAddress = vkGetBufferOpaqueCaptureAddress;
         vkGetDeviceMemoryOpaqueCaptureAddress: vk::PFN_vkGetDeviceMemoryOpaqueCaptureAddress = vkGetDeviceMemoryOpaqueCaptureAddress;
-        vkCmdDrawIndirectCount: vk::PFN_vkCmdDrawIndirectCount = entrypoints::command::cmd_draw_indirect_count;
-        vkCmdDrawIndexedIndirectCount: vk::PFN_vkCmdDrawIndexedIndirectCount = entrypoints::command::cmd_draw_indexed_indirect_count;
+        vkCmdDrawIndirectCount: vk::PFN_vkCmdDrawIndirectCount = vkCmdDrawIndirectCount;
+        vkCmdDrawIndexedIndirectCount: vk::PFN_vkCmdDrawIndexedIndirectCount = vkCmdDrawIndexedIndirectCount;
         vkCreateRenderPass2: vk::PFN_vkCreateRenderPass2 = entrypoints::render_pass::create_render_pass2;
-        vkCmdBeginRenderPass2: vk::PFN_vkCmdBeginRenderPass2 = entrypoints::rendering::cmd_begin_render_pass2;
-        vkCmdNextSubpass2: vk::PFN_vkCmdNextSubpass2 = entrypoints::rendering::cmd_next_subpass2;
-        vkCmdEndRenderPass2: vk::PFN_vkCmdEndRenderPass2 = entrypoints::rendering::cmd_end_render_pass2;
+        vkCmdBeginRenderPass2: vk::PFN_vkCmdBeginRenderPass2 = vkCmdBeginRenderPass2;
+        vkCmdNextSubpass2: vk::PFN_vkCmdNextSubpass2 = vkCmdNextSubpass2;
+        vkCmdEndRenderPass2: vk::PFN_vkCmdEndRenderPass2 = vkCmdEndRenderPass2;
     }
     PhysicalDevice, Core(vk::API_VERSION_1_3) => {
         vkGetPhysicalDeviceToolProperties: vk::PFN_vkGetPhysicalDeviceToolProperties = entrypoints::physical_device::get_physical_device_tool_properties;
@@ -219,29 +223,29 @@ table! {
         vkDestroyPrivateDataSlot: vk::PFN_vkDestroyPrivateDataSlot = vkDestroyPrivateDataSlot;
         vkSetPrivateData: vk::PFN_vkSetPrivateData = entrypoints::private_data::set_private_data;
         vkGetPrivateData: vk::PFN_vkGetPrivateData = entrypoints::private_data::get_private_data;
-        vkCmdPipelineBarrier2: vk::PFN_vkCmdPipelineBarrier2 = entrypoints::command::cmd_pipeline_barrier2;
-        vkCmdWriteTimestamp2: vk::PFN_vkCmdWriteTimestamp2 = entrypoints::query::cmd_write_timestamp2;
+        vkCmdPipelineBarrier2: vk::PFN_vkCmdPipelineBarrier2 = vkCmdPipelineBarrier2;
+        vkCmdWriteTimestamp2: vk::PFN_vkCmdWriteTimestamp2 = vkCmdWriteTimestamp2;
         vkQueueSubmit2: vk::PFN_vkQueueSubmit2 = entrypoints::queue::queue_submit2;
-        vkCmdCopyBuffer2: vk::PFN_vkCmdCopyBuffer2 = entrypoints::transfer::cmd_copy_buffer2;
-        vkCmdCopyImage2: vk::PFN_vkCmdCopyImage2 = entrypoints::transfer::cmd_copy_image2;
-        vkCmdCopyBufferToImage2: vk::PFN_vkCmdCopyBufferToImage2 = entrypoints::transfer::cmd_copy_buffer_to_image2;
-        vkCmdCopyImageToBuffer2: vk::PFN_vkCmdCopyImageToBuffer2 = entrypoints::transfer::cmd_copy_image_to_buffer2;
+        vkCmdCopyBuffer2: vk::PFN_vkCmdCopyBuffer2 = vkCmdCopyBuffer2;
+        vkCmdCopyImage2: vk::PFN_vkCmdCopyImage2 = vkCmdCopyImage2;
+        vkCmdCopyBufferToImage2: vk::PFN_vkCmdCopyBufferToImage2 = vkCmdCopyBufferToImage2;
+        vkCmdCopyImageToBuffer2: vk::PFN_vkCmdCopyImageToBuffer2 = vkCmdCopyImageToBuffer2;
         vkGetDeviceBufferMemoryRequirements: vk::PFN_vkGetDeviceBufferMemoryRequirements = entrypoints::buffer::get_device_buffer_memory_requirements;
         vkGetDeviceImageMemoryRequirements: vk::PFN_vkGetDeviceImageMemoryRequirements = entrypoints::image::get_device_image_memory_requirements;
         vkGetDeviceImageSparseMemoryRequirements: vk::PFN_vkGetDeviceImageSparseMemoryRequirements = entrypoints::image::get_device_image_sparse_memory_requirements;
-        vkCmdSetEvent2: vk::PFN_vkCmdSetEvent2 = entrypoints::command::cmd_set_event2;
-        vkCmdResetEvent2: vk::PFN_vkCmdResetEvent2 = entrypoints::command::cmd_reset_event2;
-        vkCmdWaitEvents2: vk::PFN_vkCmdWaitEvents2 = entrypoints::command::cmd_wait_events2;
-        vkCmdBlitImage2: vk::PFN_vkCmdBlitImage2 = entrypoints::transfer::cmd_blit_image2;
-        vkCmdResolveImage2: vk::PFN_vkCmdResolveImage2 = entrypoints::transfer::cmd_resolve_image2;
-        vkCmdBeginRendering: vk::PFN_vkCmdBeginRendering = entrypoints::rendering::cmd_begin_rendering;
-        vkCmdEndRendering: vk::PFN_vkCmdEndRendering = entrypoints::rendering::cmd_end_rendering;
+        vkCmdSetEvent2: vk::PFN_vkCmdSetEvent2 = vkCmdSetEvent2;
+        vkCmdResetEvent2: vk::PFN_vkCmdResetEvent2 = vkCmdResetEvent2;
+        vkCmdWaitEvents2: vk::PFN_vkCmdWaitEvents2 = vkCmdWaitEvents2;
+        vkCmdBlitImage2: vk::PFN_vkCmdBlitImage2 = vkCmdBlitImage2;
+        vkCmdResolveImage2: vk::PFN_vkCmdResolveImage2 = vkCmdResolveImage2;
+        vkCmdBeginRendering: vk::PFN_vkCmdBeginRendering = vkCmdBeginRendering;
+        vkCmdEndRendering: vk::PFN_vkCmdEndRendering = vkCmdEndRendering;
         vkCmdSetCullMode: vk::PFN_vkCmdSetCullMode = vkCmdSetCullMode;
         vkCmdSetFrontFace: vk::PFN_vkCmdSetFrontFace = vkCmdSetFrontFace;
         vkCmdSetPrimitiveTopology: vk::PFN_vkCmdSetPrimitiveTopology = vkCmdSetPrimitiveTopology;
-        vkCmdSetViewportWithCount: vk::PFN_vkCmdSetViewportWithCount = entrypoints::command::cmd_set_viewport_with_count;
-        vkCmdSetScissorWithCount: vk::PFN_vkCmdSetScissorWithCount = entrypoints::command::cmd_set_scissor_with_count;
-        vkCmdBindVertexBuffers2: vk::PFN_vkCmdBindVertexBuffers2 = entrypoints::command::cmd_bind_vertex_buffers2;
+        vkCmdSetViewportWithCount: vk::PFN_vkCmdSetViewportWithCount = vkCmdSetViewportWithCount;
+        vkCmdSetScissorWithCount: vk::PFN_vkCmdSetScissorWithCount = vkCmdSetScissorWithCount;
+        vkCmdBindVertexBuffers2: vk::PFN_vkCmdBindVertexBuffers2 = vkCmdBindVertexBuffers2;
         vkCmdSetDepthTestEnable: vk::PFN_vkCmdSetDepthTestEnable = vkCmdSetDepthTestEnable;
         vkCmdSetDepthWriteEnable: vk::PFN_vkCmdSetDepthWriteEnable = vkCmdSetDepthWriteEnable;
         vkCmdSetDepthCompareOp: vk::PFN_vkCmdSetDepthCompareOp = vkCmdSetDepthCompareOp;
@@ -268,11 +272,11 @@ table! {
         vkSubmitDebugUtilsMessageEXT: vk::PFN_vkSubmitDebugUtilsMessageEXT = entrypoints::debug_utils::submit_debug_utils_message_ext;
     }
     Device, DeviceExtension(c"VK_GAURAST_gaussian_primitive_topology") => {
-        vkCmdSetGaussianCameraGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCameraGAURAST = entrypoints::command::cmd_set_gaussian_camera_gaurast;
+        vkCmdSetGaussianCameraGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCameraGAURAST = vkCmdSetGaussianCameraGAURAST;
     }
     Device, DeviceExtension(c"VK_KHR_dynamic_rendering") => {
-        vkCmdBeginRenderingKHR: vk::PFN_vkCmdBeginRendering = entrypoints::rendering::cmd_begin_rendering;
-        vkCmdEndRenderingKHR: vk::PFN_vkCmdEndRendering = entrypoints::rendering::cmd_end_rendering;
+        vkCmdBeginRenderingKHR: vk::PFN_vkCmdBeginRendering = vkCmdBeginRendering;
+        vkCmdEndRenderingKHR: vk::PFN_vkCmdEndRendering = vkCmdEndRendering;
     }
     PhysicalDevice, InstanceExtension(c"VK_KHR_get_physical_device_properties2") => {
         vkGetPhysicalDeviceFeatures2KHR: vk::PFN_vkGetPhysicalDeviceFeatures2 = entrypoints::physical_device::get_physical_device_features2;
@@ -292,15 +296,15 @@ table! {
         vkReleaseProfilingLockKHR: vk::PFN_vkReleaseProfilingLockKHR = vkReleaseProfilingLockKHR;
     }
     Device, DeviceExtension(c"VK_KHR_push_descriptor") => {
-        vkCmdPushDescriptorSetKHR: vk::PFN_vkCmdPushDescriptorSetKHR = entrypoints::compute::cmd_push_descriptor_set_khr;
-        vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR = entrypoints::compute::cmd_push_descriptor_set_with_template_khr;
+        vkCmdPushDescriptorSetKHR: vk::PFN_vkCmdPushDescriptorSetKHR = vkCmdPushDescriptorSetKHR;
+        vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR = vkCmdPushDescriptorSetWithTemplateKHR;
     }
     Device, DeviceExtension(c"VK_KHR_synchronization2") => {
-        vkCmdSetEvent2KHR: vk::PFN_vkCmdSetEvent2 = entrypoints::command::cmd_set_event2;
-        vkCmdResetEvent2KHR: vk::PFN_vkCmdResetEvent2 = entrypoints::command::cmd_reset_event2;
-        vkCmdWaitEvents2KHR: vk::PFN_vkCmdWaitEvents2 = entrypoints::command::cmd_wait_events2;
-        vkCmdPipelineBarrier2KHR: vk::PFN_vkCmdPipelineBarrier2 = entrypoints::command::cmd_pipeline_barrier2;
-        vkCmdWriteTimestamp2KHR: vk::PFN_vkCmdWriteTimestamp2 = entrypoints::query::cmd_write_timestamp2;
+        vkCmdSetEvent2KHR: vk::PFN_vkCmdSetEvent2 = vkCmdSetEvent2;
+        vkCmdResetEvent2KHR: vk::PFN_vkCmdResetEvent2 = vkCmdResetEvent2;
+        vkCmdWaitEvents2KHR: vk::PFN_vkCmdWaitEvents2 = vkCmdWaitEvents2;
+        vkCmdPipelineBarrier2KHR: vk::PFN_vkCmdPipelineBarrier2 = vkCmdPipelineBarrier2;
+        vkCmdWriteTimestamp2KHR: vk::PFN_vkCmdWriteTimestamp2 = vkCmdWriteTimestamp2;
         vkQueueSubmit2KHR: vk::PFN_vkQueueSubmit2 = entrypoints::queue::queue_submit2;
     }
 }
@@ -405,6 +409,325 @@ unsafe extern "system" fn vkDestroyImageView(
     })
 }
 
+unsafe extern "system" fn vkCmdCopyBuffer(
+    command_buffer: vk::CommandBuffer,
+    src_buffer: vk::Buffer,
+    dst_buffer: vk::Buffer,
+    region_count: u32,
+    p_regions: *const vk::BufferCopy,
+) {
+    guard(command_buffer, "vkCmdCopyBuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                let regions =
+                    pointer::slice(p_regions, region_count)?
+                        .iter()
+                        .map(|of| vk::BufferCopy2 {
+                            src_offset: of.src_offset,
+                            dst_offset: of.dst_offset,
+                            size: of.size,
+                            ..Default::default()
+                        });
+                let regions = simdevice::host::collect(regions);
+
+                let info = vk::CopyBufferInfo2 {
+                    src_buffer,
+                    dst_buffer,
+                    region_count,
+                    p_regions: regions.as_ptr(),
+                    ..Default::default()
+                };
+                entrypoints::transfer::cmd_copy_buffer2(recorder, &info)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdCopyImage(
+    command_buffer: vk::CommandBuffer,
+    src_image: vk::Image,
+    src_image_layout: vk::ImageLayout,
+    dst_image: vk::Image,
+    dst_image_layout: vk::ImageLayout,
+    region_count: u32,
+    p_regions: *const vk::ImageCopy,
+) {
+    guard(command_buffer, "vkCmdCopyImage", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                let regions =
+                    pointer::slice(p_regions, region_count)?
+                        .iter()
+                        .map(|of| vk::ImageCopy2 {
+                            src_subresource: of.src_subresource,
+                            src_offset: of.src_offset,
+                            dst_subresource: of.dst_subresource,
+                            dst_offset: of.dst_offset,
+                            extent: of.extent,
+                            ..Default::default()
+                        });
+                let regions = simdevice::host::collect(regions);
+
+                let info = vk::CopyImageInfo2 {
+                    src_image,
+                    src_image_layout,
+                    dst_image,
+                    dst_image_layout,
+                    region_count,
+                    p_regions: regions.as_ptr(),
+                    ..Default::default()
+                };
+                entrypoints::transfer::cmd_copy_image2(recorder, &info)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdCopyBufferToImage(
+    command_buffer: vk::CommandBuffer,
+    src_buffer: vk::Buffer,
+    dst_image: vk::Image,
+    dst_image_layout: vk::ImageLayout,
+    region_count: u32,
+    p_regions: *const vk::BufferImageCopy,
+) {
+    guard(command_buffer, "vkCmdCopyBufferToImage", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                let regions = pointer::slice(p_regions, region_count)?.iter().map(|of| {
+                    vk::BufferImageCopy2 {
+                        buffer_offset: of.buffer_offset,
+                        buffer_row_length: of.buffer_row_length,
+                        buffer_image_height: of.buffer_image_height,
+                        image_subresource: of.image_subresource,
+                        image_offset: of.image_offset,
+                        image_extent: of.image_extent,
+                        ..Default::default()
+                    }
+                });
+                let regions = simdevice::host::collect(regions);
+
+                let info = vk::CopyBufferToImageInfo2 {
+                    src_buffer,
+                    dst_image,
+                    dst_image_layout,
+                    region_count,
+                    p_regions: regions.as_ptr(),
+                    ..Default::default()
+                };
+                entrypoints::transfer::cmd_copy_buffer_to_image2(recorder, &info)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdCopyImageToBuffer(
+    command_buffer: vk::CommandBuffer,
+    src_image: vk::Image,
+    src_image_layout: vk::ImageLayout,
+    dst_buffer: vk::Buffer,
+    region_count: u32,
+    p_regions: *const vk::BufferImageCopy,
+) {
+    guard(command_buffer, "vkCmdCopyImageToBuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                let regions = pointer::slice(p_regions, region_count)?.iter().map(|of| {
+                    vk::BufferImageCopy2 {
+                        buffer_offset: of.buffer_offset,
+                        buffer_row_length: of.buffer_row_length,
+                        buffer_image_height: of.buffer_image_height,
+                        image_subresource: of.image_subresource,
+                        image_offset: of.image_offset,
+                        image_extent: of.image_extent,
+                        ..Default::default()
+                    }
+                });
+                let regions = simdevice::host::collect(regions);
+
+                let info = vk::CopyImageToBufferInfo2 {
+                    src_image,
+                    src_image_layout,
+                    dst_buffer,
+                    region_count,
+                    p_regions: regions.as_ptr(),
+                    ..Default::default()
+                };
+                entrypoints::transfer::cmd_copy_image_to_buffer2(recorder, &info)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdUpdateBuffer(
+    command_buffer: vk::CommandBuffer,
+    dst_buffer: vk::Buffer,
+    dst_offset: vk::DeviceSize,
+    data_size: vk::DeviceSize,
+    p_data: *const std::ffi::c_void,
+) {
+    guard(command_buffer, "vkCmdUpdateBuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_update_buffer(
+                    recorder,
+                    handle::get(dst_buffer)?,
+                    dst_offset,
+                    data_size,
+                    p_data,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdFillBuffer(
+    command_buffer: vk::CommandBuffer,
+    dst_buffer: vk::Buffer,
+    dst_offset: vk::DeviceSize,
+    size: vk::DeviceSize,
+    data: u32,
+) {
+    guard(command_buffer, "vkCmdFillBuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_fill_buffer(
+                    recorder,
+                    handle::get(dst_buffer)?,
+                    dst_offset,
+                    size,
+                    data,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdPipelineBarrier(
+    command_buffer: vk::CommandBuffer,
+    _: vk::PipelineStageFlags,
+    _: vk::PipelineStageFlags,
+    _: vk::DependencyFlags,
+    _: u32,
+    _: *const vk::MemoryBarrier<'_>,
+    _: u32,
+    _: *const vk::BufferMemoryBarrier<'_>,
+    _: u32,
+    _: *const vk::ImageMemoryBarrier<'_>,
+) {
+    guard(command_buffer, "vkCmdPipelineBarrier", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_pipeline_barrier(recorder)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBeginQuery(
+    command_buffer: vk::CommandBuffer,
+    query_pool: vk::QueryPool,
+    query: u32,
+    _: vk::QueryControlFlags,
+) {
+    guard(command_buffer, "vkCmdBeginQuery", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::query::cmd_begin_query(recorder, handle::get(query_pool)?, query)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdEndQuery(
+    command_buffer: vk::CommandBuffer,
+    query_pool: vk::QueryPool,
+    query: u32,
+) {
+    guard(command_buffer, "vkCmdEndQuery", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::query::cmd_end_query(recorder, handle::get(query_pool)?, query)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdResetQueryPool(
+    command_buffer: vk::CommandBuffer,
+    query_pool: vk::QueryPool,
+    first_query: u32,
+    query_count: u32,
+) {
+    guard(command_buffer, "vkCmdResetQueryPool", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::query::cmd_reset_query_pool(
+                    recorder,
+                    handle::get(query_pool)?,
+                    first_query,
+                    query_count,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdWriteTimestamp(
+    command_buffer: vk::CommandBuffer,
+    _: vk::PipelineStageFlags,
+    query_pool: vk::QueryPool,
+    query: u32,
+) {
+    guard(command_buffer, "vkCmdWriteTimestamp", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::query::cmd_write_timestamp(recorder, handle::get(query_pool)?, query)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdCopyQueryPoolResults(
+    command_buffer: vk::CommandBuffer,
+    query_pool: vk::QueryPool,
+    first_query: u32,
+    query_count: u32,
+    dst_buffer: vk::Buffer,
+    dst_offset: vk::DeviceSize,
+    stride: vk::DeviceSize,
+    flags: vk::QueryResultFlags,
+) {
+    guard(command_buffer, "vkCmdCopyQueryPoolResults", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::query::cmd_copy_query_pool_results(
+                    recorder,
+                    handle::get(query_pool)?,
+                    first_query,
+                    query_count,
+                    handle::get(dst_buffer)?,
+                    dst_offset,
+                    stride,
+                    flags,
+                )
+            })
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyEvent(
     device: vk::Device,
     event: vk::Event,
@@ -493,6 +816,190 @@ unsafe extern "system" fn vkDestroyDescriptorSetLayout(
     })
 }
 
+unsafe extern "system" fn vkCmdBindPipeline(
+    command_buffer: vk::CommandBuffer,
+    pipeline_bind_point: vk::PipelineBindPoint,
+    pipeline: vk::Pipeline,
+) {
+    guard(command_buffer, "vkCmdBindPipeline", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_bind_pipeline(
+                    recorder,
+                    pipeline_bind_point,
+                    handle::get(pipeline)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBindDescriptorSets(
+    command_buffer: vk::CommandBuffer,
+    pipeline_bind_point: vk::PipelineBindPoint,
+    layout: vk::PipelineLayout,
+    first_set: u32,
+    descriptor_set_count: u32,
+    p_descriptor_sets: *const vk::DescriptorSet,
+    dynamic_offset_count: u32,
+    p_dynamic_offsets: *const u32,
+) {
+    guard(command_buffer, "vkCmdBindDescriptorSets", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::compute::cmd_bind_descriptor_sets(
+                    recorder,
+                    pipeline_bind_point,
+                    handle::get(layout)?,
+                    first_set,
+                    &handle::get_all(pointer::slice(p_descriptor_sets, descriptor_set_count)?)?,
+                    pointer::slice(p_dynamic_offsets, dynamic_offset_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdClearColorImage(
+    command_buffer: vk::CommandBuffer,
+    image: vk::Image,
+    _: vk::ImageLayout,
+    p_color: *const vk::ClearColorValue,
+    range_count: u32,
+    p_ranges: *const vk::ImageSubresourceRange,
+) {
+    guard(command_buffer, "vkCmdClearColorImage", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_clear_color_image(
+                    recorder,
+                    handle::get(image)?,
+                    pointer::input(p_color)?,
+                    pointer::slice(p_ranges, range_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDispatch(
+    command_buffer: vk::CommandBuffer,
+    group_count_x: u32,
+    group_count_y: u32,
+    group_count_z: u32,
+) {
+    guard(command_buffer, "vkCmdDispatch", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::compute::cmd_dispatch(
+                    recorder,
+                    group_count_x,
+                    group_count_y,
+                    group_count_z,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDispatchIndirect(
+    command_buffer: vk::CommandBuffer,
+    buffer: vk::Buffer,
+    offset: vk::DeviceSize,
+) {
+    guard(command_buffer, "vkCmdDispatchIndirect", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::compute::cmd_dispatch_indirect(recorder, handle::get(buffer)?, offset)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetEvent(
+    command_buffer: vk::CommandBuffer,
+    event: vk::Event,
+    _: vk::PipelineStageFlags,
+) {
+    guard(command_buffer, "vkCmdSetEvent", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_set_event(recorder, handle::get(event)?)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdResetEvent(
+    command_buffer: vk::CommandBuffer,
+    event: vk::Event,
+    _: vk::PipelineStageFlags,
+) {
+    guard(command_buffer, "vkCmdResetEvent", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_reset_event(recorder, handle::get(event)?)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdWaitEvents(
+    command_buffer: vk::CommandBuffer,
+    event_count: u32,
+    p_events: *const vk::Event,
+    _: vk::PipelineStageFlags,
+    _: vk::PipelineStageFlags,
+    _: u32,
+    _: *const vk::MemoryBarrier<'_>,
+    _: u32,
+    _: *const vk::BufferMemoryBarrier<'_>,
+    _: u32,
+    _: *const vk::ImageMemoryBarrier<'_>,
+) {
+    guard(command_buffer, "vkCmdWaitEvents", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_wait_events(
+                    recorder,
+                    &handle::get_all(pointer::slice(p_events, event_count)?)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdPushConstants(
+    command_buffer: vk::CommandBuffer,
+    layout: vk::PipelineLayout,
+    _: vk::ShaderStageFlags,
+    offset: u32,
+    size: u32,
+    p_values: *const std::ffi::c_void,
+) {
+    guard(command_buffer, "vkCmdPushConstants", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::compute::cmd_push_constants(
+                    recorder,
+                    handle::get(layout)?,
+                    offset,
+                    pointer::slice(p_values.cast::<u8>(), size)?,
+                )
+            })
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyFramebuffer(
     device: vk::Device,
     framebuffer: vk::Framebuffer,
@@ -512,6 +1019,46 @@ unsafe extern "system" fn vkDestroyRenderPass(
     guard(device, "vkDestroyRenderPass", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(render_pass) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkCmdSetViewport(
+    command_buffer: vk::CommandBuffer,
+    first_viewport: u32,
+    viewport_count: u32,
+    p_viewports: *const vk::Viewport,
+) {
+    guard(command_buffer, "vkCmdSetViewport", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_set_viewport(
+                    recorder,
+                    first_viewport,
+                    pointer::slice(p_viewports, viewport_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetScissor(
+    command_buffer: vk::CommandBuffer,
+    first_scissor: u32,
+    scissor_count: u32,
+    p_scissors: *const vk::Rect2D,
+) {
+    guard(command_buffer, "vkCmdSetScissor", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_set_scissor(
+                    recorder,
+                    first_scissor,
+                    pointer::slice(p_scissors, scissor_count)?,
+                )
+            })
+        }
     })
 }
 
@@ -636,6 +1183,313 @@ unsafe extern "system" fn vkCmdSetStencilReference(
     })
 }
 
+unsafe extern "system" fn vkCmdBindIndexBuffer(
+    command_buffer: vk::CommandBuffer,
+    buffer: vk::Buffer,
+    offset: vk::DeviceSize,
+    index_type: vk::IndexType,
+) {
+    guard(command_buffer, "vkCmdBindIndexBuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_bind_index_buffer(
+                    recorder,
+                    handle::get(buffer)?,
+                    offset,
+                    index_type,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBindVertexBuffers(
+    command_buffer: vk::CommandBuffer,
+    first_binding: u32,
+    binding_count: u32,
+    p_buffers: *const vk::Buffer,
+    p_offsets: *const vk::DeviceSize,
+) {
+    guard(command_buffer, "vkCmdBindVertexBuffers", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_bind_vertex_buffers(
+                    recorder,
+                    first_binding,
+                    &handle::get_all(pointer::slice(p_buffers, binding_count)?)?,
+                    pointer::slice(p_offsets, binding_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDraw(
+    command_buffer: vk::CommandBuffer,
+    vertex_count: u32,
+    instance_count: u32,
+    first_vertex: u32,
+    first_instance: u32,
+) {
+    guard(command_buffer, "vkCmdDraw", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_draw(
+                    recorder,
+                    vertex_count,
+                    instance_count,
+                    first_vertex,
+                    first_instance,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDrawIndexed(
+    command_buffer: vk::CommandBuffer,
+    index_count: u32,
+    instance_count: u32,
+    first_index: u32,
+    vertex_offset: i32,
+    first_instance: u32,
+) {
+    guard(command_buffer, "vkCmdDrawIndexed", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_draw_indexed(
+                    recorder,
+                    index_count,
+                    instance_count,
+                    first_index,
+                    vertex_offset,
+                    first_instance,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDrawIndirect(
+    command_buffer: vk::CommandBuffer,
+    buffer: vk::Buffer,
+    offset: vk::DeviceSize,
+    draw_count: u32,
+    stride: u32,
+) {
+    guard(command_buffer, "vkCmdDrawIndirect", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_draw_indirect(
+                    recorder,
+                    handle::get(buffer)?,
+                    offset,
+                    draw_count,
+                    stride,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDrawIndexedIndirect(
+    command_buffer: vk::CommandBuffer,
+    buffer: vk::Buffer,
+    offset: vk::DeviceSize,
+    draw_count: u32,
+    stride: u32,
+) {
+    guard(command_buffer, "vkCmdDrawIndexedIndirect", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_draw_indexed_indirect(
+                    recorder,
+                    handle::get(buffer)?,
+                    offset,
+                    draw_count,
+                    stride,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBlitImage(
+    command_buffer: vk::CommandBuffer,
+    src_image: vk::Image,
+    src_image_layout: vk::ImageLayout,
+    dst_image: vk::Image,
+    dst_image_layout: vk::ImageLayout,
+    region_count: u32,
+    p_regions: *const vk::ImageBlit,
+    filter: vk::Filter,
+) {
+    guard(command_buffer, "vkCmdBlitImage", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                let regions =
+                    pointer::slice(p_regions, region_count)?
+                        .iter()
+                        .map(|of| vk::ImageBlit2 {
+                            src_subresource: of.src_subresource,
+                            src_offsets: of.src_offsets,
+                            dst_subresource: of.dst_subresource,
+                            dst_offsets: of.dst_offsets,
+                            ..Default::default()
+                        });
+                let regions = simdevice::host::collect(regions);
+
+                let info = vk::BlitImageInfo2 {
+                    src_image,
+                    src_image_layout,
+                    dst_image,
+                    dst_image_layout,
+                    region_count,
+                    p_regions: regions.as_ptr(),
+                    filter,
+                    ..Default::default()
+                };
+                entrypoints::transfer::cmd_blit_image2(recorder, &info)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdClearDepthStencilImage(
+    command_buffer: vk::CommandBuffer,
+    image: vk::Image,
+    _: vk::ImageLayout,
+    p_depth_stencil: *const vk::ClearDepthStencilValue,
+    range_count: u32,
+    p_ranges: *const vk::ImageSubresourceRange,
+) {
+    guard(command_buffer, "vkCmdClearDepthStencilImage", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_clear_depth_stencil_image(
+                    recorder,
+                    handle::get(image)?,
+                    pointer::input(p_depth_stencil)?,
+                    pointer::slice(p_ranges, range_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdClearAttachments(
+    command_buffer: vk::CommandBuffer,
+    attachment_count: u32,
+    p_attachments: *const vk::ClearAttachment,
+    rect_count: u32,
+    p_rects: *const vk::ClearRect,
+) {
+    guard(command_buffer, "vkCmdClearAttachments", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_clear_attachments(
+                    recorder,
+                    pointer::slice(p_attachments, attachment_count)?,
+                    pointer::slice(p_rects, rect_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdResolveImage(
+    command_buffer: vk::CommandBuffer,
+    src_image: vk::Image,
+    src_image_layout: vk::ImageLayout,
+    dst_image: vk::Image,
+    dst_image_layout: vk::ImageLayout,
+    region_count: u32,
+    p_regions: *const vk::ImageResolve,
+) {
+    guard(command_buffer, "vkCmdResolveImage", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                let regions =
+                    pointer::slice(p_regions, region_count)?
+                        .iter()
+                        .map(|of| vk::ImageResolve2 {
+                            src_subresource: of.src_subresource,
+                            src_offset: of.src_offset,
+                            dst_subresource: of.dst_subresource,
+                            dst_offset: of.dst_offset,
+                            extent: of.extent,
+                            ..Default::default()
+                        });
+                let regions = simdevice::host::collect(regions);
+
+                let info = vk::ResolveImageInfo2 {
+                    src_image,
+                    src_image_layout,
+                    dst_image,
+                    dst_image_layout,
+                    region_count,
+                    p_regions: regions.as_ptr(),
+                    ..Default::default()
+                };
+                entrypoints::transfer::cmd_resolve_image2(recorder, &info)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBeginRenderPass(
+    command_buffer: vk::CommandBuffer,
+    p_render_pass_begin: *const vk::RenderPassBeginInfo<'_>,
+    _: vk::SubpassContents,
+) {
+    guard(command_buffer, "vkCmdBeginRenderPass", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::rendering::cmd_begin_render_pass(
+                    recorder,
+                    pointer::input(p_render_pass_begin)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdNextSubpass(
+    command_buffer: vk::CommandBuffer,
+    _: vk::SubpassContents,
+) {
+    guard(command_buffer, "vkCmdNextSubpass", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::rendering::cmd_next_subpass(recorder)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdEndRenderPass(command_buffer: vk::CommandBuffer) {
+    guard(command_buffer, "vkCmdEndRenderPass", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::rendering::cmd_end_render_pass(recorder)
+            })
+        }
+    })
+}
+
 unsafe extern "system" fn vkCmdSetDeviceMask(command_buffer: vk::CommandBuffer, _: u32) {
     guard(command_buffer, "vkCmdSetDeviceMask", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
@@ -653,6 +1507,33 @@ unsafe extern "system" fn vkTrimCommandPool(
     _: vk::CommandPoolTrimFlags,
 ) {
     guard(device, "vkTrimCommandPool", || Ok(()))
+}
+
+unsafe extern "system" fn vkCmdDispatchBase(
+    command_buffer: vk::CommandBuffer,
+    base_group_x: u32,
+    base_group_y: u32,
+    base_group_z: u32,
+    group_count_x: u32,
+    group_count_y: u32,
+    group_count_z: u32,
+) {
+    guard(command_buffer, "vkCmdDispatchBase", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::compute::cmd_dispatch_base(
+                    recorder,
+                    base_group_x,
+                    base_group_y,
+                    base_group_z,
+                    group_count_x,
+                    group_count_y,
+                    group_count_z,
+                )
+            })
+        }
+    })
 }
 
 unsafe extern "system" fn vkDestroyDescriptorUpdateTemplate(
@@ -724,6 +1605,107 @@ unsafe extern "system" fn vkGetDeviceMemoryOpaqueCaptureAddress(
     })
 }
 
+unsafe extern "system" fn vkCmdDrawIndirectCount(
+    command_buffer: vk::CommandBuffer,
+    buffer: vk::Buffer,
+    offset: vk::DeviceSize,
+    count_buffer: vk::Buffer,
+    count_buffer_offset: vk::DeviceSize,
+    max_draw_count: u32,
+    stride: u32,
+) {
+    guard(command_buffer, "vkCmdDrawIndirectCount", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_draw_indirect_count(
+                    recorder,
+                    handle::get(buffer)?,
+                    offset,
+                    handle::get(count_buffer)?,
+                    count_buffer_offset,
+                    max_draw_count,
+                    stride,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdDrawIndexedIndirectCount(
+    command_buffer: vk::CommandBuffer,
+    buffer: vk::Buffer,
+    offset: vk::DeviceSize,
+    count_buffer: vk::Buffer,
+    count_buffer_offset: vk::DeviceSize,
+    max_draw_count: u32,
+    stride: u32,
+) {
+    guard(command_buffer, "vkCmdDrawIndexedIndirectCount", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_draw_indexed_indirect_count(
+                    recorder,
+                    handle::get(buffer)?,
+                    offset,
+                    handle::get(count_buffer)?,
+                    count_buffer_offset,
+                    max_draw_count,
+                    stride,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBeginRenderPass2(
+    command_buffer: vk::CommandBuffer,
+    p_render_pass_begin: *const vk::RenderPassBeginInfo<'_>,
+    _: *const vk::SubpassBeginInfo<'_>,
+) {
+    guard(command_buffer, "vkCmdBeginRenderPass2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::rendering::cmd_begin_render_pass(
+                    recorder,
+                    pointer::input(p_render_pass_begin)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdNextSubpass2(
+    command_buffer: vk::CommandBuffer,
+    _: *const vk::SubpassBeginInfo<'_>,
+    _: *const vk::SubpassEndInfo<'_>,
+) {
+    guard(command_buffer, "vkCmdNextSubpass2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::rendering::cmd_next_subpass(recorder)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdEndRenderPass2(
+    command_buffer: vk::CommandBuffer,
+    _: *const vk::SubpassEndInfo<'_>,
+) {
+    guard(command_buffer, "vkCmdEndRenderPass2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::rendering::cmd_end_render_pass(recorder)
+            })
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyPrivateDataSlot(
     device: vk::Device,
     private_data_slot: vk::PrivateDataSlot,
@@ -732,6 +1714,209 @@ unsafe extern "system" fn vkDestroyPrivateDataSlot(
     guard(device, "vkDestroyPrivateDataSlot", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(private_data_slot) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkCmdPipelineBarrier2(
+    command_buffer: vk::CommandBuffer,
+    _: *const vk::DependencyInfo<'_>,
+) {
+    guard(command_buffer, "vkCmdPipelineBarrier2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_pipeline_barrier(recorder)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdWriteTimestamp2(
+    command_buffer: vk::CommandBuffer,
+    _: vk::PipelineStageFlags2,
+    query_pool: vk::QueryPool,
+    query: u32,
+) {
+    guard(command_buffer, "vkCmdWriteTimestamp2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::query::cmd_write_timestamp(recorder, handle::get(query_pool)?, query)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdCopyBuffer2(
+    command_buffer: vk::CommandBuffer,
+    p_copy_buffer_info: *const vk::CopyBufferInfo2<'_>,
+) {
+    guard(command_buffer, "vkCmdCopyBuffer2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_copy_buffer2(
+                    recorder,
+                    pointer::input(p_copy_buffer_info)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdCopyImage2(
+    command_buffer: vk::CommandBuffer,
+    p_copy_image_info: *const vk::CopyImageInfo2<'_>,
+) {
+    guard(command_buffer, "vkCmdCopyImage2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_copy_image2(recorder, pointer::input(p_copy_image_info)?)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdCopyBufferToImage2(
+    command_buffer: vk::CommandBuffer,
+    p_copy_buffer_to_image_info: *const vk::CopyBufferToImageInfo2<'_>,
+) {
+    guard(command_buffer, "vkCmdCopyBufferToImage2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_copy_buffer_to_image2(
+                    recorder,
+                    pointer::input(p_copy_buffer_to_image_info)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdCopyImageToBuffer2(
+    command_buffer: vk::CommandBuffer,
+    p_copy_image_to_buffer_info: *const vk::CopyImageToBufferInfo2<'_>,
+) {
+    guard(command_buffer, "vkCmdCopyImageToBuffer2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_copy_image_to_buffer2(
+                    recorder,
+                    pointer::input(p_copy_image_to_buffer_info)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetEvent2(
+    command_buffer: vk::CommandBuffer,
+    event: vk::Event,
+    _: *const vk::DependencyInfo<'_>,
+) {
+    guard(command_buffer, "vkCmdSetEvent2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_set_event(recorder, handle::get(event)?)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdResetEvent2(
+    command_buffer: vk::CommandBuffer,
+    event: vk::Event,
+    _: vk::PipelineStageFlags2,
+) {
+    guard(command_buffer, "vkCmdResetEvent2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_reset_event(recorder, handle::get(event)?)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdWaitEvents2(
+    command_buffer: vk::CommandBuffer,
+    event_count: u32,
+    p_events: *const vk::Event,
+    _: *const vk::DependencyInfo<'_>,
+) {
+    guard(command_buffer, "vkCmdWaitEvents2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_wait_events(
+                    recorder,
+                    &handle::get_all(pointer::slice(p_events, event_count)?)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBlitImage2(
+    command_buffer: vk::CommandBuffer,
+    p_blit_image_info: *const vk::BlitImageInfo2<'_>,
+) {
+    guard(command_buffer, "vkCmdBlitImage2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_blit_image2(recorder, pointer::input(p_blit_image_info)?)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdResolveImage2(
+    command_buffer: vk::CommandBuffer,
+    p_resolve_image_info: *const vk::ResolveImageInfo2<'_>,
+) {
+    guard(command_buffer, "vkCmdResolveImage2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::transfer::cmd_resolve_image2(
+                    recorder,
+                    pointer::input(p_resolve_image_info)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBeginRendering(
+    command_buffer: vk::CommandBuffer,
+    p_rendering_info: *const vk::RenderingInfo<'_>,
+) {
+    guard(command_buffer, "vkCmdBeginRendering", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::rendering::cmd_begin_rendering(
+                    recorder,
+                    pointer::input(p_rendering_info)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdEndRendering(command_buffer: vk::CommandBuffer) {
+    guard(command_buffer, "vkCmdEndRendering", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::rendering::cmd_end_rendering(recorder)
+            })
+        }
     })
 }
 
@@ -772,6 +1957,72 @@ unsafe extern "system" fn vkCmdSetPrimitiveTopology(
         unsafe {
             record(command_buffer, |recorder| {
                 entrypoints::dynamic_state::cmd_set_primitive_topology(recorder, primitive_topology)
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetViewportWithCount(
+    command_buffer: vk::CommandBuffer,
+    viewport_count: u32,
+    p_viewports: *const vk::Viewport,
+) {
+    guard(command_buffer, "vkCmdSetViewportWithCount", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_set_viewport_with_count(
+                    recorder,
+                    pointer::slice(p_viewports, viewport_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetScissorWithCount(
+    command_buffer: vk::CommandBuffer,
+    scissor_count: u32,
+    p_scissors: *const vk::Rect2D,
+) {
+    guard(command_buffer, "vkCmdSetScissorWithCount", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_set_scissor_with_count(
+                    recorder,
+                    pointer::slice(p_scissors, scissor_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdBindVertexBuffers2(
+    command_buffer: vk::CommandBuffer,
+    first_binding: u32,
+    binding_count: u32,
+    p_buffers: *const vk::Buffer,
+    p_offsets: *const vk::DeviceSize,
+    p_sizes: *const vk::DeviceSize,
+    p_strides: *const vk::DeviceSize,
+) {
+    guard(command_buffer, "vkCmdBindVertexBuffers2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_bind_vertex_buffers2(
+                    recorder,
+                    first_binding,
+                    &handle::get_all(pointer::slice(p_buffers, binding_count)?)?,
+                    pointer::slice(p_offsets, binding_count)?,
+                    (!p_sizes.is_null())
+                        .then(|| pointer::slice(p_sizes, binding_count))
+                        .transpose()?,
+                    (!p_strides.is_null())
+                        .then(|| pointer::slice(p_strides, binding_count))
+                        .transpose()?,
+                )
             })
         }
     })
@@ -985,6 +2236,74 @@ unsafe extern "system" fn vkCmdInsertDebugUtilsLabelEXT(
     guard(command_buffer, "vkCmdInsertDebugUtilsLabelEXT", || Ok(()))
 }
 
+unsafe extern "system" fn vkCmdSetGaussianCameraGAURAST(
+    command_buffer: vk::CommandBuffer,
+    p_camera: *const gaurast::vk::GaussianCameraGAURAST<'_>,
+) {
+    guard(command_buffer, "vkCmdSetGaussianCameraGAURAST", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::command::cmd_set_gaussian_camera_gaurast(
+                    recorder,
+                    pointer::input(p_camera)?,
+                )
+            })
+        }
+    })
+}
+
 unsafe extern "system" fn vkReleaseProfilingLockKHR(device: vk::Device) {
     guard(device, "vkReleaseProfilingLockKHR", || Ok(()))
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSetKHR(
+    command_buffer: vk::CommandBuffer,
+    pipeline_bind_point: vk::PipelineBindPoint,
+    layout: vk::PipelineLayout,
+    set: u32,
+    descriptor_write_count: u32,
+    p_descriptor_writes: *const vk::WriteDescriptorSet<'_>,
+) {
+    guard(command_buffer, "vkCmdPushDescriptorSetKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            record(command_buffer, |recorder| {
+                entrypoints::compute::cmd_push_descriptor_set_khr(
+                    recorder,
+                    pipeline_bind_point,
+                    handle::get(layout)?,
+                    set,
+                    pointer::slice(p_descriptor_writes, descriptor_write_count)?,
+                )
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
+    command_buffer: vk::CommandBuffer,
+    descriptor_update_template: vk::DescriptorUpdateTemplate,
+    layout: vk::PipelineLayout,
+    set: u32,
+    p_data: *const std::ffi::c_void,
+) {
+    guard(
+        command_buffer,
+        "vkCmdPushDescriptorSetWithTemplateKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(command_buffer, |recorder| {
+                    entrypoints::compute::cmd_push_descriptor_set_with_template_khr(
+                        recorder,
+                        handle::get(descriptor_update_template)?,
+                        handle::get(layout)?,
+                        set,
+                        p_data,
+                    )
+                })
+            }
+        },
+    )
 }

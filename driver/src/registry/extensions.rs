@@ -16,10 +16,10 @@ pub(crate) const INSTANCE: &[Extension] = &[
 
 /// The device extensions.
 pub(crate) const DEVICE: &[Extension] = &[
+    (c"VK_GAURAST_gaussian_primitive_topology", 1),
     (c"VK_EXT_index_type_uint8", 1),
     (c"VK_EXT_provoking_vertex", 1),
     (c"VK_EXT_vertex_attribute_divisor", 3),
-    (c"VK_GAURAST_gaussian_primitive_topology", 1),
     (c"VK_KHR_dynamic_rendering", 1),
     (c"VK_KHR_performance_query", 1),
     (c"VK_KHR_push_descriptor", 2),
