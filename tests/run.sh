@@ -38,6 +38,11 @@ trap 'rm -rf "$work"' EXIT
 export GAURAST_TEST_REPORT="$work/report"
 touch "$GAURAST_TEST_REPORT"
 
+# The Vulkan registry, which the driver's generated files are compared with.
+if [ -z "${GAURAST_VK_XML:-}" ] && driver/gen/fetch.sh "$work" 2>/dev/null; then
+    export GAURAST_VK_XML="$work/vk.xml"
+fi
+
 # Tells of all steps so far; also where one failed.
 tell() {
     echo

@@ -20,6 +20,7 @@ mod lower;
 mod object;
 mod pnext;
 mod pointer;
+mod registry;
 pub mod shader;
 
 pub use embed::entry;

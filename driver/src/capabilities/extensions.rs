@@ -6,64 +6,13 @@
 //! dynamic rendering and synchronization2, which do work, behind chains of extensions that don't.
 
 use crate::error::Error;
+use crate::registry::extensions::{DEVICE, Extension};
 use ash::vk;
-use gaurast::gaussian_primitive_topology;
 use std::ffi::CStr;
 use std::sync::LazyLock;
 
 /// The version of the instance and of its device.
 pub(crate) const API_VERSION: u32 = vk::HEADER_VERSION_COMPLETE;
-
-/// An extension's name and the version of its specification.
-pub(crate) type Extension = (&'static CStr, u32);
-
-/// The instance extensions.
-pub(crate) const INSTANCE: &[Extension] = &[
-    (
-        ash::ext::debug_utils::NAME,
-        ash::ext::debug_utils::SPEC_VERSION,
-    ),
-    (
-        ash::khr::get_physical_device_properties2::NAME,
-        ash::khr::get_physical_device_properties2::SPEC_VERSION,
-    ),
-];
-
-/// The device extensions.
-pub(crate) const DEVICE: &[Extension] = &[
-    (
-        gaussian_primitive_topology::NAME,
-        gaussian_primitive_topology::SPEC_VERSION,
-    ),
-    (
-        ash::khr::dynamic_rendering::NAME,
-        ash::khr::dynamic_rendering::SPEC_VERSION,
-    ),
-    (
-        ash::ext::index_type_uint8::NAME,
-        ash::ext::index_type_uint8::SPEC_VERSION,
-    ),
-    (
-        ash::khr::performance_query::NAME,
-        ash::khr::performance_query::SPEC_VERSION,
-    ),
-    (
-        ash::ext::provoking_vertex::NAME,
-        ash::ext::provoking_vertex::SPEC_VERSION,
-    ),
-    (
-        ash::khr::push_descriptor::NAME,
-        ash::khr::push_descriptor::SPEC_VERSION,
-    ),
-    (
-        ash::khr::synchronization2::NAME,
-        ash::khr::synchronization2::SPEC_VERSION,
-    ),
-    (
-        ash::ext::vertex_attribute_divisor::NAME,
-        ash::ext::vertex_attribute_divisor::SPEC_VERSION,
-    ),
-];
 
 /// The names of all device extensions.
 pub(crate) fn device_names() -> &'static [&'static CStr] {

@@ -1,18 +1,26 @@
 //! The physical device's properties and limits.
 //!
-//! Limits are at least what Vulkan requires.
+//! Limits are at least what Vulkan requires. [`Properties`] has a field for each property of the core version and of the
+//! extensions that are listed: each is stated here, and nowhere else.
 
 use crate::capabilities::extensions::{API_VERSION, fill_string};
 use crate::capabilities::memory;
 use crate::object::pipeline::gaussian;
-use crate::pnext;
+use crate::registry::properties::Properties;
 use ash::vk;
-use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST;
 use simdevice::geometry;
-use std::ffi::{CStr, c_void};
+use std::ffi::{CStr, c_char};
+use std::sync::LazyLock;
 
 const DEVICE_NAME: &CStr = c"GauRast simulated device";
 const DRIVER_NAME: &CStr = c"GauRast";
+
+/// The driver's version, in text.
+const DRIVER_INFO: &CStr =
+    match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+        Ok(text) => text,
+        Err(_) => c"",
+    };
 
 /// No vendor id is registered for this driver.
 const VENDOR_ID: u32 = 0;
@@ -106,23 +114,22 @@ fn uuid(name: &[u8; 13], version: [u8; 3]) -> [u8; vk::UUID_SIZE] {
     uuid
 }
 
-/// `VkPhysicalDeviceProperties`.
-pub(crate) fn properties() -> vk::PhysicalDeviceProperties {
-    let [major, minor, patch] = driver_version().map(u32::from);
-    let mut properties = vk::PhysicalDeviceProperties::default()
-        .api_version(API_VERSION)
-        .driver_version(vk::make_api_version(0, major, minor, patch))
-        .vendor_id(VENDOR_ID)
-        .device_id(DEVICE_ID)
-        .device_type(vk::PhysicalDeviceType::CPU)
-        .pipeline_cache_uuid(uuid(b"GauRast cache", driver_version()))
-        .limits(limits());
-    fill_string(&mut properties.device_name, DEVICE_NAME);
-    properties
+/// The device's properties and limits.
+pub(crate) fn properties() -> &'static Properties {
+    static PROPERTIES: LazyLock<Properties> = LazyLock::new(find_properties);
+    &PROPERTIES
 }
 
-fn limits() -> vk::PhysicalDeviceLimits {
-    vk::PhysicalDeviceLimits {
+fn find_properties() -> Properties {
+    let [major, minor, patch] = driver_version().map(u32::from);
+    Properties {
+        api_version: API_VERSION,
+        driver_version: vk::make_api_version(0, major, minor, patch),
+        vendor_id: VENDOR_ID,
+        device_id: DEVICE_ID,
+        device_type: vk::PhysicalDeviceType::CPU,
+        device_name: fixed_string(DEVICE_NAME),
+        pipeline_cache_uuid: uuid(b"GauRast cache", driver_version()),
         max_image_dimension1_d: MAX_IMAGE_DIMENSION,
         max_image_dimension2_d: MAX_IMAGE_DIMENSION,
         max_image_dimension3_d: MAX_IMAGE_DIMENSION_3D,
@@ -135,6 +142,7 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_memory_allocation_count: u32::MAX,
         max_sampler_allocation_count: 1 << 16,
         buffer_image_granularity: 1,
+        sparse_address_space_size: 0,
         max_bound_descriptor_sets: 8,
         max_per_stage_descriptor_samplers: DESCRIPTORS,
         max_per_stage_descriptor_uniform_buffers: DESCRIPTORS,
@@ -156,8 +164,22 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_vertex_input_attribute_offset: 65535,
         max_vertex_input_binding_stride: 65536,
         max_vertex_output_components: 64,
+        max_tessellation_generation_level: 0,
+        max_tessellation_patch_size: 0,
+        max_tessellation_control_per_vertex_input_components: 0,
+        max_tessellation_control_per_vertex_output_components: 0,
+        max_tessellation_control_per_patch_output_components: 0,
+        max_tessellation_control_total_output_components: 0,
+        max_tessellation_evaluation_input_components: 0,
+        max_tessellation_evaluation_output_components: 0,
+        max_geometry_shader_invocations: 0,
+        max_geometry_input_components: 0,
+        max_geometry_output_components: 0,
+        max_geometry_output_vertices: 0,
+        max_geometry_total_output_components: 0,
         max_fragment_input_components: 64,
         max_fragment_output_attachments: MAX_COLOR_ATTACHMENTS,
+        max_fragment_dual_src_attachments: 1,
         max_fragment_combined_output_resources: DESCRIPTORS,
         max_compute_shared_memory_size: MAX_SHARED_BYTES,
         max_compute_work_group_count: [u32::MAX; 3],
@@ -185,6 +207,10 @@ fn limits() -> vk::PhysicalDeviceLimits {
         max_texel_offset: 7,
         min_texel_gather_offset: -8,
         max_texel_gather_offset: 7,
+        min_interpolation_offset: -0.5,
+        // The greatest offset is less than half a pixel by one step of its precision.
+        max_interpolation_offset: 0.5 - 1.0 / 16.0,
+        sub_pixel_interpolation_offset_bits: 4,
         max_framebuffer_width: MAX_IMAGE_DIMENSION,
         max_framebuffer_height: MAX_IMAGE_DIMENSION,
         max_framebuffer_layers: MAX_LAYERS,
@@ -199,35 +225,31 @@ fn limits() -> vk::PhysicalDeviceLimits {
         sampled_image_stencil_sample_counts: SAMPLE_COUNTS,
         storage_image_sample_counts: vk::SampleCountFlags::TYPE_1,
         max_sample_mask_words: 1,
-        timestamp_compute_and_graphics: vk::TRUE,
+        timestamp_compute_and_graphics: true,
         timestamp_period: 1.0,
+        max_clip_distances: MAX_CLIP_CULL_DISTANCES,
+        max_cull_distances: MAX_CLIP_CULL_DISTANCES,
+        max_combined_clip_and_cull_distances: MAX_CLIP_CULL_DISTANCES,
         discrete_queue_priorities: 2,
         point_size_range: [1.0, geometry::MAX_POINT_SIZE],
         line_width_range: [1.0, geometry::MAX_LINE_WIDTH],
         point_size_granularity: SIZE_GRANULARITY,
         line_width_granularity: SIZE_GRANULARITY,
-        strict_lines: vk::TRUE,
-        standard_sample_locations: vk::TRUE,
-        min_interpolation_offset: -0.5,
-        // The greatest offset is less than half a pixel by one step of its precision.
-        max_interpolation_offset: 0.5 - 1.0 / 16.0,
-        sub_pixel_interpolation_offset_bits: 4,
-        max_fragment_dual_src_attachments: 1,
-        max_clip_distances: MAX_CLIP_CULL_DISTANCES,
-        max_cull_distances: MAX_CLIP_CULL_DISTANCES,
-        max_combined_clip_and_cull_distances: MAX_CLIP_CULL_DISTANCES,
+        strict_lines: true,
+        standard_sample_locations: true,
         optimal_buffer_copy_offset_alignment: 1,
         optimal_buffer_copy_row_pitch_alignment: 1,
         non_coherent_atom_size: 1,
-        // No tessellation, geometry shaders or sparse memory.
-        ..Default::default()
-    }
-}
-
-fn vulkan11() -> vk::PhysicalDeviceVulkan11Properties<'static> {
-    vk::PhysicalDeviceVulkan11Properties {
+        residency_standard2_d_block_shape: false,
+        residency_standard2_d_multisample_block_shape: false,
+        residency_standard3_d_block_shape: false,
+        residency_aligned_mip_size: false,
+        residency_non_resident_strict: false,
         device_uuid: uuid(b"GauRastDevice", [0; 3]),
         driver_uuid: uuid(b"GauRastDriver", driver_version()),
+        device_luid: [0; vk::LUID_SIZE],
+        device_node_mask: 0,
+        device_luid_valid: false,
         subgroup_size: SUBGROUP_SIZE,
         subgroup_supported_stages: vk::ShaderStageFlags::COMPUTE,
         subgroup_supported_operations: vk::SubgroupFeatureFlags::BASIC
@@ -238,35 +260,59 @@ fn vulkan11() -> vk::PhysicalDeviceVulkan11Properties<'static> {
             | vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE
             | vk::SubgroupFeatureFlags::CLUSTERED
             | vk::SubgroupFeatureFlags::QUAD,
+        subgroup_quad_operations_in_all_stages: false,
         point_clipping_behavior: vk::PointClippingBehavior::ALL_CLIP_PLANES,
+        max_multiview_view_count: 0,
+        max_multiview_instance_index: 0,
+        protected_no_fault: false,
         max_per_set_descriptors: MAX_PER_SET_DESCRIPTORS,
         max_memory_allocation_size: memory::heap_size(),
-        ..Default::default()
-    }
-}
-
-fn vulkan12() -> vk::PhysicalDeviceVulkan12Properties<'static> {
-    let mut properties = vk::PhysicalDeviceVulkan12Properties {
         // No driver id is registered for this driver, and it claims no conformance.
         driver_id: vk::DriverId::from_raw(0),
+        driver_name: fixed_string(DRIVER_NAME),
+        driver_info: fixed_string(DRIVER_INFO),
         conformance_version: vk::ConformanceVersion::default(),
-        max_timeline_semaphore_value_difference: u64::MAX,
         denorm_behavior_independence: vk::ShaderFloatControlsIndependence::ALL,
         rounding_mode_independence: vk::ShaderFloatControlsIndependence::ALL,
-        shader_signed_zero_inf_nan_preserve_float16: vk::TRUE,
-        shader_signed_zero_inf_nan_preserve_float32: vk::TRUE,
-        shader_signed_zero_inf_nan_preserve_float64: vk::TRUE,
-        shader_denorm_preserve_float16: vk::TRUE,
-        shader_denorm_preserve_float32: vk::TRUE,
-        shader_denorm_preserve_float64: vk::TRUE,
-        shader_rounding_mode_rte_float16: vk::TRUE,
-        shader_rounding_mode_rte_float32: vk::TRUE,
-        shader_rounding_mode_rte_float64: vk::TRUE,
-        shader_uniform_buffer_array_non_uniform_indexing_native: vk::TRUE,
-        shader_sampled_image_array_non_uniform_indexing_native: vk::TRUE,
-        shader_storage_buffer_array_non_uniform_indexing_native: vk::TRUE,
-        shader_storage_image_array_non_uniform_indexing_native: vk::TRUE,
-        framebuffer_integer_color_sample_counts: SAMPLE_COUNTS,
+        shader_signed_zero_inf_nan_preserve_float16: true,
+        shader_signed_zero_inf_nan_preserve_float32: true,
+        shader_signed_zero_inf_nan_preserve_float64: true,
+        shader_denorm_preserve_float16: true,
+        shader_denorm_preserve_float32: true,
+        shader_denorm_preserve_float64: true,
+        shader_denorm_flush_to_zero_float16: false,
+        shader_denorm_flush_to_zero_float32: false,
+        shader_denorm_flush_to_zero_float64: false,
+        shader_rounding_mode_rte_float16: true,
+        shader_rounding_mode_rte_float32: true,
+        shader_rounding_mode_rte_float64: true,
+        shader_rounding_mode_rtz_float16: false,
+        shader_rounding_mode_rtz_float32: false,
+        shader_rounding_mode_rtz_float64: false,
+        // No descriptor is updated after its set was bound.
+        max_update_after_bind_descriptors_in_all_pools: 0,
+        shader_uniform_buffer_array_non_uniform_indexing_native: true,
+        shader_sampled_image_array_non_uniform_indexing_native: true,
+        shader_storage_buffer_array_non_uniform_indexing_native: true,
+        shader_storage_image_array_non_uniform_indexing_native: true,
+        shader_input_attachment_array_non_uniform_indexing_native: false,
+        robust_buffer_access_update_after_bind: false,
+        quad_divergent_implicit_lod: false,
+        max_per_stage_descriptor_update_after_bind_samplers: 0,
+        max_per_stage_descriptor_update_after_bind_uniform_buffers: 0,
+        max_per_stage_descriptor_update_after_bind_storage_buffers: 0,
+        max_per_stage_descriptor_update_after_bind_sampled_images: 0,
+        max_per_stage_descriptor_update_after_bind_storage_images: 0,
+        max_per_stage_descriptor_update_after_bind_input_attachments: 0,
+        max_per_stage_update_after_bind_resources: 0,
+        max_descriptor_set_update_after_bind_samplers: 0,
+        max_descriptor_set_update_after_bind_uniform_buffers: 0,
+        max_descriptor_set_update_after_bind_uniform_buffers_dynamic: 0,
+        max_descriptor_set_update_after_bind_storage_buffers: 0,
+        max_descriptor_set_update_after_bind_storage_buffers_dynamic: 0,
+        max_descriptor_set_update_after_bind_sampled_images: 0,
+        max_descriptor_set_update_after_bind_storage_images: 0,
+        max_descriptor_set_update_after_bind_input_attachments: 0,
         supported_depth_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
             | vk::ResolveModeFlags::AVERAGE
             | vk::ResolveModeFlags::MIN
@@ -274,34 +320,62 @@ fn vulkan12() -> vk::PhysicalDeviceVulkan12Properties<'static> {
         supported_stencil_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
             | vk::ResolveModeFlags::MIN
             | vk::ResolveModeFlags::MAX,
-        independent_resolve_none: vk::TRUE,
-        independent_resolve: vk::TRUE,
-        ..Default::default()
-    };
-    fill_string(&mut properties.driver_name, DRIVER_NAME);
-    let version = concat!(env!("CARGO_PKG_VERSION"), "\0");
-    fill_string(
-        &mut properties.driver_info,
-        CStr::from_bytes_until_nul(version.as_bytes()).unwrap_or_default(),
-    );
-    properties
-}
-
-fn vulkan13() -> vk::PhysicalDeviceVulkan13Properties<'static> {
-    vk::PhysicalDeviceVulkan13Properties {
+        independent_resolve_none: true,
+        independent_resolve: true,
+        filter_minmax_single_component_formats: false,
+        filter_minmax_image_component_mapping: false,
+        max_timeline_semaphore_value_difference: u64::MAX,
+        framebuffer_integer_color_sample_counts: SAMPLE_COUNTS,
         min_subgroup_size: *SUBGROUP_SIZES.start(),
         max_subgroup_size: *SUBGROUP_SIZES.end(),
         max_compute_workgroup_subgroups: MAX_WORKGROUP_INVOCATIONS / *SUBGROUP_SIZES.start(),
         required_subgroup_size_stages: vk::ShaderStageFlags::COMPUTE,
+        max_inline_uniform_block_size: 0,
+        max_per_stage_descriptor_inline_uniform_blocks: 0,
+        max_per_stage_descriptor_update_after_bind_inline_uniform_blocks: 0,
+        max_descriptor_set_inline_uniform_blocks: 0,
+        max_descriptor_set_update_after_bind_inline_uniform_blocks: 0,
+        max_inline_uniform_total_size: 0,
+        // No instruction is a dot product of integers.
+        integer_dot_product8_bit_unsigned_accelerated: false,
+        integer_dot_product8_bit_signed_accelerated: false,
+        integer_dot_product8_bit_mixed_signedness_accelerated: false,
+        integer_dot_product4x8_bit_packed_unsigned_accelerated: false,
+        integer_dot_product4x8_bit_packed_signed_accelerated: false,
+        integer_dot_product4x8_bit_packed_mixed_signedness_accelerated: false,
+        integer_dot_product16_bit_unsigned_accelerated: false,
+        integer_dot_product16_bit_signed_accelerated: false,
+        integer_dot_product16_bit_mixed_signedness_accelerated: false,
+        integer_dot_product32_bit_unsigned_accelerated: false,
+        integer_dot_product32_bit_signed_accelerated: false,
+        integer_dot_product32_bit_mixed_signedness_accelerated: false,
+        integer_dot_product64_bit_unsigned_accelerated: false,
+        integer_dot_product64_bit_signed_accelerated: false,
+        integer_dot_product64_bit_mixed_signedness_accelerated: false,
+        integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating8_bit_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated: false,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated:
+            false,
+        integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating16_bit_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated: false,
+        integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating32_bit_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated: false,
+        integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating64_bit_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated: false,
         storage_texel_buffer_offset_alignment_bytes: MIN_BUFFER_OFFSET_ALIGNMENT,
+        storage_texel_buffer_offset_single_texel_alignment: false,
         uniform_texel_buffer_offset_alignment_bytes: MIN_BUFFER_OFFSET_ALIGNMENT,
+        uniform_texel_buffer_offset_single_texel_alignment: false,
         max_buffer_size: memory::heap_size(),
-        ..Default::default()
-    }
-}
-
-fn gaussian() -> PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'static> {
-    PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST {
+        provoking_vertex_mode_per_pipeline: true,
+        transform_feedback_preserves_triangle_fan_provoking_vertex: false,
+        max_vertex_attrib_divisor: u32::MAX,
         tile_size: vk::Extent2D {
             width: 16,
             height: 16,
@@ -312,165 +386,14 @@ fn gaussian() -> PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'stati
         gaussian_sample_counts: SAMPLE_COUNTS,
         max_gaussians_per_draw: MAX_GAUSSIANS,
         max_gaussians_per_set: MAX_GAUSSIANS,
-        ..Default::default()
-    }
-}
-
-/// Fills in every structure of an output chain that holds properties known here.
-///
-/// # Safety
-/// As [`pnext::for_each_output`].
-pub(crate) unsafe fn fill_chain(first: *mut c_void) {
-    // SAFETY: the caller's promise.
-    unsafe { pnext::for_each_output(first, fill_structure) };
-}
-
-macro_rules! properties {
-    (
-        whole { $($whole:ty = $all:ident;)* }
-        parts { $($part:ty $(= $source:ident)? { $($field:ident $(: $value:expr)?,)* })* }
-    ) => {
-        /// Writes the properties, if the structure is one of properties. The chain stays as it is.
-        fn fill_structure(mut structure: pnext::Output<'_>) {
-            $(if let Some(out) = structure.cast::<$whole>() {
-                let next = out.p_next;
-                *out = $all();
-                out.p_next = next;
-            })*
-            $(if let Some(out) = structure.cast::<$part>() {
-                $(let all = $source();)?
-                $(out.$field = properties!(@value all $field $(: $value)?);)*
-            })*
-        }
-    };
-    (@value $all:ident $field:ident) => { $all.$field };
-    (@value $all:ident $field:ident: $value:expr) => { $value };
-}
-
-properties! {
-    whole {
-    vk::PhysicalDeviceVulkan11Properties<'_> = vulkan11;
-    vk::PhysicalDeviceVulkan12Properties<'_> = vulkan12;
-    vk::PhysicalDeviceVulkan13Properties<'_> = vulkan13;
-    PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST<'_> = gaussian;
-    }
-    parts {
-    vk::PhysicalDevicePushDescriptorPropertiesKHR<'_> {
+        allow_command_buffer_query_copies: false,
         max_push_descriptors: MAX_PUSH_DESCRIPTORS,
     }
-    vk::PhysicalDeviceProvokingVertexPropertiesEXT<'_> {
-        provoking_vertex_mode_per_pipeline: vk::TRUE,
-        transform_feedback_preserves_triangle_fan_provoking_vertex: vk::FALSE,
-    }
-    vk::PhysicalDeviceVertexAttributeDivisorPropertiesEXT<'_> {
-        max_vertex_attrib_divisor: u32::MAX,
-    }
-    vk::PhysicalDevicePerformanceQueryPropertiesKHR<'_> {
-        allow_command_buffer_query_copies: vk::FALSE,
-    }
-    vk::PhysicalDeviceSubgroupProperties<'_> {
-        subgroup_size: vulkan11().subgroup_size,
-        supported_stages: vulkan11().subgroup_supported_stages,
-        supported_operations: vulkan11().subgroup_supported_operations,
-        quad_operations_in_all_stages: vulkan11().subgroup_quad_operations_in_all_stages,
-    }
-    vk::PhysicalDeviceDriverProperties<'_> = vulkan12 {
-        driver_id, driver_name, driver_info, conformance_version,
-    }
-    vk::PhysicalDeviceIDProperties<'_> = vulkan11 {
-        device_uuid, driver_uuid, device_luid, device_node_mask, device_luid_valid,
-    }
-    vk::PhysicalDeviceMultiviewProperties<'_> = vulkan11 {
-        max_multiview_view_count, max_multiview_instance_index,
-    }
-    vk::PhysicalDevicePointClippingProperties<'_> = vulkan11 {
-        point_clipping_behavior,
-    }
-    vk::PhysicalDeviceProtectedMemoryProperties<'_> = vulkan11 {
-        protected_no_fault,
-    }
-    vk::PhysicalDeviceSamplerFilterMinmaxProperties<'_> = vulkan12 {
-        filter_minmax_single_component_formats, filter_minmax_image_component_mapping,
-    }
-    vk::PhysicalDeviceInlineUniformBlockProperties<'_> = vulkan13 {
-        max_inline_uniform_block_size, max_per_stage_descriptor_inline_uniform_blocks,
-        max_per_stage_descriptor_update_after_bind_inline_uniform_blocks, max_descriptor_set_inline_uniform_blocks,
-        max_descriptor_set_update_after_bind_inline_uniform_blocks,
-    }
-    vk::PhysicalDeviceMaintenance3Properties<'_> = vulkan11 {
-        max_per_set_descriptors, max_memory_allocation_size,
-    }
-    vk::PhysicalDeviceMaintenance4Properties<'_> = vulkan13 {
-        max_buffer_size,
-    }
-    vk::PhysicalDeviceFloatControlsProperties<'_> = vulkan12 {
-        denorm_behavior_independence, rounding_mode_independence, shader_signed_zero_inf_nan_preserve_float16,
-        shader_signed_zero_inf_nan_preserve_float32, shader_signed_zero_inf_nan_preserve_float64,
-        shader_denorm_preserve_float16, shader_denorm_preserve_float32, shader_denorm_preserve_float64,
-        shader_denorm_flush_to_zero_float16, shader_denorm_flush_to_zero_float32,
-        shader_denorm_flush_to_zero_float64, shader_rounding_mode_rte_float16, shader_rounding_mode_rte_float32,
-        shader_rounding_mode_rte_float64, shader_rounding_mode_rtz_float16, shader_rounding_mode_rtz_float32,
-        shader_rounding_mode_rtz_float64,
-    }
-    vk::PhysicalDeviceDescriptorIndexingProperties<'_> = vulkan12 {
-        max_update_after_bind_descriptors_in_all_pools, shader_uniform_buffer_array_non_uniform_indexing_native,
-        shader_sampled_image_array_non_uniform_indexing_native,
-        shader_storage_buffer_array_non_uniform_indexing_native,
-        shader_storage_image_array_non_uniform_indexing_native,
-        shader_input_attachment_array_non_uniform_indexing_native, robust_buffer_access_update_after_bind,
-        quad_divergent_implicit_lod, max_per_stage_descriptor_update_after_bind_samplers,
-        max_per_stage_descriptor_update_after_bind_uniform_buffers,
-        max_per_stage_descriptor_update_after_bind_storage_buffers,
-        max_per_stage_descriptor_update_after_bind_sampled_images,
-        max_per_stage_descriptor_update_after_bind_storage_images,
-        max_per_stage_descriptor_update_after_bind_input_attachments, max_per_stage_update_after_bind_resources,
-        max_descriptor_set_update_after_bind_samplers, max_descriptor_set_update_after_bind_uniform_buffers,
-        max_descriptor_set_update_after_bind_uniform_buffers_dynamic,
-        max_descriptor_set_update_after_bind_storage_buffers,
-        max_descriptor_set_update_after_bind_storage_buffers_dynamic,
-        max_descriptor_set_update_after_bind_sampled_images, max_descriptor_set_update_after_bind_storage_images,
-        max_descriptor_set_update_after_bind_input_attachments,
-    }
-    vk::PhysicalDeviceTimelineSemaphoreProperties<'_> = vulkan12 {
-        max_timeline_semaphore_value_difference,
-    }
-    vk::PhysicalDeviceDepthStencilResolveProperties<'_> = vulkan12 {
-        supported_depth_resolve_modes, supported_stencil_resolve_modes, independent_resolve_none,
-        independent_resolve,
-    }
-    vk::PhysicalDeviceTexelBufferAlignmentProperties<'_> = vulkan13 {
-        storage_texel_buffer_offset_alignment_bytes, storage_texel_buffer_offset_single_texel_alignment,
-        uniform_texel_buffer_offset_alignment_bytes, uniform_texel_buffer_offset_single_texel_alignment,
-    }
-    vk::PhysicalDeviceSubgroupSizeControlProperties<'_> = vulkan13 {
-        min_subgroup_size, max_subgroup_size, max_compute_workgroup_subgroups, required_subgroup_size_stages,
-    }
-    vk::PhysicalDeviceShaderIntegerDotProductProperties<'_> = vulkan13 {
-        integer_dot_product8_bit_unsigned_accelerated, integer_dot_product8_bit_signed_accelerated,
-        integer_dot_product8_bit_mixed_signedness_accelerated,
-        integer_dot_product4x8_bit_packed_unsigned_accelerated,
-        integer_dot_product4x8_bit_packed_signed_accelerated,
-        integer_dot_product4x8_bit_packed_mixed_signedness_accelerated,
-        integer_dot_product16_bit_unsigned_accelerated, integer_dot_product16_bit_signed_accelerated,
-        integer_dot_product16_bit_mixed_signedness_accelerated, integer_dot_product32_bit_unsigned_accelerated,
-        integer_dot_product32_bit_signed_accelerated, integer_dot_product32_bit_mixed_signedness_accelerated,
-        integer_dot_product64_bit_unsigned_accelerated, integer_dot_product64_bit_signed_accelerated,
-        integer_dot_product64_bit_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating8_bit_signed_accelerated,
-        integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated,
-        integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating16_bit_signed_accelerated,
-        integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating32_bit_signed_accelerated,
-        integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated,
-        integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated,
-        integer_dot_product_accumulating_saturating64_bit_signed_accelerated,
-        integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated,
-    }
-    }
+}
+
+/// A string as Vulkan's structures hold it, cut off where it doesn't fit.
+fn fixed_string<const N: usize>(text: &CStr) -> [c_char; N] {
+    let mut array = [0; N];
+    fill_string(&mut array, text);
+    array
 }

@@ -1,130 +1,66 @@
-//! SPIR-V's capabilities: a module may declare those whose features its device has enabled.
+//! SPIR-V's capabilities: a module may declare those that its device has enabled.
 
-use super::features::{EnabledFeatures, is_supported};
+use crate::capabilities::limits;
 use crate::error::Error;
+use crate::registry::features::{Features, SUPPORTED};
+use crate::registry::spirv::{Enable, enables};
 use rspirv::spirv::{Capability, Op};
 
-/// What a capability takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Requirement {
-    /// Nothing, in Vulkan 1.3.
-    Nothing,
-    /// That one of these features is enabled.
-    OneOf(&'static [&'static str]),
-}
-
-/// What Vulkan's table of capabilities says of one. Those that the translator does not know are its own to refuse.
-fn requirement(capability: Capability) -> Requirement {
-    use Capability as C;
-    Requirement::OneOf(match capability {
-        C::Float16 => &["shader_float16"],
-        C::Float64 => &["shader_float64"],
-        C::Int64 => &["shader_int64"],
-        C::Int64Atomics => &["shader_buffer_int64_atomics", "shader_shared_int64_atomics"],
-        C::Int16 => &["shader_int16"],
-        C::Int8 => &["shader_int8"],
-        C::ImageGatherExtended => &["shader_image_gather_extended"],
-        C::StorageImageMultisample | C::ImageMSArray => &["shader_storage_image_multisample"],
-        C::UniformBufferArrayDynamicIndexing => &["shader_uniform_buffer_array_dynamic_indexing"],
-        C::SampledImageArrayDynamicIndexing => &["shader_sampled_image_array_dynamic_indexing"],
-        C::StorageBufferArrayDynamicIndexing => &["shader_storage_buffer_array_dynamic_indexing"],
-        C::StorageImageArrayDynamicIndexing => &["shader_storage_image_array_dynamic_indexing"],
-        C::ClipDistance => &["shader_clip_distance"],
-        C::CullDistance => &["shader_cull_distance"],
-        C::ImageCubeArray | C::SampledCubeArray => &["image_cube_array"],
-        C::SampleRateShading | C::InterpolationFunction => &["sample_rate_shading"],
-        C::MinLod => &["shader_resource_min_lod"],
-        C::StorageImageExtendedFormats => &["shader_storage_image_extended_formats"],
-        C::StorageImageReadWithoutFormat => &["shader_storage_image_read_without_format"],
-        C::StorageImageWriteWithoutFormat => &["shader_storage_image_write_without_format"],
-        C::MultiViewport => &["multi_viewport"],
-        C::ShaderLayer => &["shader_output_layer"],
-        C::ShaderViewportIndex => &["shader_output_viewport_index"],
-        C::ShaderViewportIndexLayerEXT => &["shader_output_viewport_index", "shader_output_layer"],
-        C::DrawParameters => &["shader_draw_parameters"],
-        C::StorageBuffer16BitAccess => &["storage_buffer16_bit_access"],
-        C::UniformAndStorageBuffer16BitAccess => &["uniform_and_storage_buffer16_bit_access"],
-        C::StoragePushConstant16 => &["storage_push_constant16"],
-        C::StorageInputOutput16 => &["storage_input_output16"],
-        C::StorageBuffer8BitAccess => &["storage_buffer8_bit_access"],
-        C::UniformAndStorageBuffer8BitAccess => &["uniform_and_storage_buffer8_bit_access"],
-        C::StoragePushConstant8 => &["storage_push_constant8"],
-        C::RuntimeDescriptorArray => &["runtime_descriptor_array"],
-        C::InputAttachmentArrayDynamicIndexing => {
-            &["shader_input_attachment_array_dynamic_indexing"]
-        }
-        C::UniformTexelBufferArrayDynamicIndexing => {
-            &["shader_uniform_texel_buffer_array_dynamic_indexing"]
-        }
-        C::StorageTexelBufferArrayDynamicIndexing => {
-            &["shader_storage_texel_buffer_array_dynamic_indexing"]
-        }
-        C::UniformBufferArrayNonUniformIndexing => {
-            &["shader_uniform_buffer_array_non_uniform_indexing"]
-        }
-        C::SampledImageArrayNonUniformIndexing => {
-            &["shader_sampled_image_array_non_uniform_indexing"]
-        }
-        C::StorageBufferArrayNonUniformIndexing => {
-            &["shader_storage_buffer_array_non_uniform_indexing"]
-        }
-        C::StorageImageArrayNonUniformIndexing => {
-            &["shader_storage_image_array_non_uniform_indexing"]
-        }
-        C::InputAttachmentArrayNonUniformIndexing => {
-            &["shader_input_attachment_array_non_uniform_indexing"]
-        }
-        C::UniformTexelBufferArrayNonUniformIndexing => {
-            &["shader_uniform_texel_buffer_array_non_uniform_indexing"]
-        }
-        C::StorageTexelBufferArrayNonUniformIndexing => {
-            &["shader_storage_texel_buffer_array_non_uniform_indexing"]
-        }
-        C::PhysicalStorageBufferAddresses => &["buffer_device_address"],
-        C::VulkanMemoryModel => &["vulkan_memory_model"],
-        C::VulkanMemoryModelDeviceScope => &["vulkan_memory_model_device_scope"],
-        C::DemoteToHelperInvocation => &["shader_demote_to_helper_invocation"],
-        C::AtomicFloat32AddEXT => &[
-            "shader_buffer_float32_atomic_add",
-            "shader_shared_float32_atomic_add",
-            "shader_image_float32_atomic_add",
-        ],
-        C::AtomicFloat32MinMaxEXT => &[
-            "shader_buffer_float32_atomic_min_max",
-            "shader_shared_float32_atomic_min_max",
-            "shader_image_float32_atomic_min_max",
-        ],
-        _ => return Requirement::Nothing,
-    })
-}
-
-/// Refuses a module that declares a capability without its feature.
+/// Refuses a module that declares a capability that isn't enabled. Capabilities that the translator doesn't know are its
+/// own to refuse.
 ///
 /// # Errors
-/// [`Error::FeatureNotEnabled`] names the capability and the feature.
-pub(crate) fn check(words: &[u32], features: &EnabledFeatures) -> Result<(), Error> {
-    for capability in declared(words) {
-        let Requirement::OneOf(needed) = requirement(capability) else {
-            continue;
-        };
-        if needed.iter().any(|feature| features.has(feature)) {
-            continue;
-        }
-        let has = needed.iter().any(|feature| is_supported(feature));
-        let what = if has {
-            "which is not enabled"
-        } else {
-            "which this device does not support"
-        };
-        return Err(Error::FeatureNotEnabled {
-            vuid: "VUID-VkShaderModuleCreateInfo-pCode-08740",
-            message: format!(
-                "the shader module declares the capability {capability:?}, which needs the feature {}, {what}",
-                needed.join(" or ")
-            ),
-        });
+/// [`Error::FeatureNotEnabled`] names the capability and what would enable it.
+pub(crate) fn check(words: &[u32], features: &Features) -> Result<(), Error> {
+    match declared(words)
+        .filter(|&capability| crate::shader::is_supported(capability))
+        .find(|&capability| !is_enabled(capability, features))
+    {
+        None => Ok(()),
+        Some(capability) => Err(not_enabled(capability)),
     }
-    Ok(())
+}
+
+/// Tells if one of the things that enable a capability is there.
+fn is_enabled(capability: Capability, features: &Features) -> bool {
+    let enables = enables(capability);
+    enables.is_empty()
+        || enables.iter().any(|enable| match enable {
+            Enable::Feature(_, is_enabled) => is_enabled(features),
+            Enable::Property(_, is_there) => is_there(limits::properties()),
+            Enable::Absent(_) => false,
+        })
+}
+
+fn not_enabled(capability: Capability) -> Error {
+    // What the device doesn't know is of interest only where nothing else would do.
+    let known: Vec<_> = enables(capability)
+        .iter()
+        .filter_map(|enable| match enable {
+            Enable::Feature(name, _) | Enable::Property(name, _) => Some(*name),
+            Enable::Absent(_) => None,
+        })
+        .collect();
+    let absent: Vec<_> = enables(capability)
+        .iter()
+        .filter_map(|enable| match enable {
+            Enable::Absent(name) => Some(*name),
+            _ => None,
+        })
+        .collect();
+    let needed = if known.is_empty() { absent } else { known };
+    let what = if is_enabled(capability, &SUPPORTED) {
+        "which is not enabled"
+    } else {
+        "which this device does not support"
+    };
+    Error::FeatureNotEnabled {
+        vuid: "VUID-VkShaderModuleCreateInfo-pCode-08740",
+        message: format!(
+            "the shader module declares the capability {capability:?}, which needs the feature {}, {what}",
+            needed.join(" or ")
+        ),
+    }
 }
 
 /// The capabilities that a module declares. They come first in it; what is malformed is left to those who translate it.
@@ -158,7 +94,11 @@ mod tests {
 
     #[test]
     fn capabilities_need_their_features() {
-        let enabled = EnabledFeatures::of(&["shader_int64", "shader_output_layer"]);
+        let enabled = Features {
+            shader_int64: true,
+            shader_output_layer: true,
+            ..Features::NONE
+        };
         let check = |capability| check(&module(&[Capability::Shader, capability]), &enabled);
         assert!(check(Capability::Int64).is_ok());
         assert!(check(Capability::ShaderViewportIndexLayerEXT).is_ok());
@@ -181,10 +121,7 @@ mod tests {
         let cannot: Vec<_> = (0..0x2000)
             .filter_map(Capability::from_u32)
             .filter(|&capability| crate::shader::is_supported(capability))
-            .filter(|&capability| match requirement(capability) {
-                Requirement::Nothing => false,
-                Requirement::OneOf(needed) => !needed.iter().any(|name| is_supported(name)),
-            })
+            .filter(|&capability| !is_enabled(capability, &SUPPORTED))
             .collect();
         use Capability as C;
         let expected = [
@@ -206,7 +143,7 @@ mod tests {
     #[test]
     fn what_is_malformed_declares_nothing() {
         for words in [&[][..], &[0x0723_0203], &[0; 6], &module(&[])[..6]] {
-            assert!(check(words, &EnabledFeatures::default()).is_ok());
+            assert!(check(words, &Features::NONE).is_ok());
         }
     }
 }

@@ -1,12 +1,13 @@
-//! The dispatch table: every command's name, function, scope and gate, and the three ways to look one up.
+//! The dispatch table: every command's name, function, scope and gate, and the ways to look one up. The table itself and
+//! the functions that Vulkan calls are generated; see `driver/gen`.
 
-mod table;
+mod commands;
 
+use self::commands::COMMANDS;
 use ash::vk;
 use std::collections::HashMap;
 use std::ffi::CStr;
 use std::sync::LazyLock;
-use table::COMMANDS;
 
 /// What a command's first parameter is, which decides who may look it up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +39,27 @@ struct Command {
     scope: Scope,
     gate: Gate,
 }
+
+/// The table, by scope and gate: `Device, Core(vk::API_VERSION_1_0) => { vkCmdDraw: vk::PFN_vkCmdDraw = vkCmdDraw; }`.
+/// Functions are checked against their types.
+macro_rules! table {
+    ($($scope:ident, $gate:expr => {
+        $($name:ident: $type:path = $function:path;)*
+    })*) => {
+        /// Every command of the driver.
+        pub(super) static COMMANDS: &[Command] = &[$($(Command {
+            name: stringify!($name),
+            function: {
+                let function: $type = $function;
+                // SAFETY: function pointers have one size, and callers of a void function cast it back first.
+                unsafe { std::mem::transmute::<$type, unsafe extern "system" fn()>(function) }
+            },
+            scope: Scope::$scope,
+            gate: $gate,
+        },)*)*];
+    };
+}
+use table;
 
 /// What has been enabled where a command is looked up.
 pub(crate) struct Enabled<'a> {

@@ -8,6 +8,7 @@ use ash::vk;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateBuffer")]
     fn create_buffer(
         _device: vk::Device,
         create_info: *const vk::BufferCreateInfo<'_>,
@@ -18,14 +19,7 @@ crate::entry_points! {
         pointer::output(buffer, handle::create(Arc::new(object)))
     }
 
-    fn destroy_buffer(
-        _device: vk::Device,
-        buffer: vk::Buffer,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(buffer).map(drop)
-    }
-
+    #[doc(alias = "vkGetBufferMemoryRequirements")]
     fn get_buffer_memory_requirements(
         _device: vk::Device,
         buffer: vk::Buffer,
@@ -35,6 +29,7 @@ crate::entry_points! {
         pointer::output(memory_requirements, requirements)
     }
 
+    #[doc(alias = "vkGetBufferMemoryRequirements2")]
     fn get_buffer_memory_requirements2(
         _device: vk::Device,
         info: *const vk::BufferMemoryRequirementsInfo2<'_>,
@@ -44,6 +39,7 @@ crate::entry_points! {
         fill_requirements(memory_requirements, buffer.requirements(ALL_TYPE_BITS))
     }
 
+    #[doc(alias = "vkGetDeviceBufferMemoryRequirements")]
     fn get_device_buffer_memory_requirements(
         _device: vk::Device,
         info: *const vk::DeviceBufferMemoryRequirements<'_>,

@@ -9,6 +9,7 @@ use ash::vk;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateBufferView")]
     fn create_buffer_view(
         _device: vk::Device,
         create_info: *const vk::BufferViewCreateInfo<'_>,
@@ -31,13 +32,5 @@ crate::entry_points! {
             format,
         };
         pointer::output(view, handle::create(Arc::new(object)))
-    }
-
-    fn destroy_buffer_view(
-        _device: vk::Device,
-        buffer_view: vk::BufferView,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(buffer_view).map(drop)
     }
 }

@@ -4,8 +4,9 @@ use crate::capabilities::limits;
 use crate::command::record::{Command, Draw, DrawIndirect, IndexBuffer, VertexBuffer};
 use crate::command::recorder::Recorder;
 use crate::error::Error;
-use crate::lower::camera::camera;
-use crate::lower::rendering;
+use crate::lower::{camera, rendering};
+use crate::object::buffer::Buffer;
+use crate::object::event::Event;
 use crate::object::pipeline::{self, Pipeline};
 use crate::{handle, pointer};
 use ash::vk;
@@ -17,7 +18,7 @@ use std::sync::Arc;
 ///
 /// # Safety
 /// The handle is live.
-pub(super) unsafe fn record(
+pub(crate) unsafe fn record(
     command_buffer: vk::CommandBuffer,
     record: impl FnOnce(&mut Recorder) -> Result<(), Error>,
 ) -> Result<(), Error> {
@@ -26,222 +27,7 @@ pub(super) unsafe fn record(
 }
 
 crate::entry_points! {
-    fn cmd_bind_pipeline(
-        command_buffer: vk::CommandBuffer,
-        pipeline_bind_point: vk::PipelineBindPoint,
-        pipeline: vk::Pipeline,
-    ) {
-        record(command_buffer, |recorder| {
-            let command = match (&**handle::get(pipeline)?, pipeline_bind_point) {
-                (Pipeline::Graphics(pipeline), vk::PipelineBindPoint::GRAPHICS) => {
-                    Command::BindPipeline(Arc::clone(pipeline))
-                }
-                (Pipeline::Compute(pipeline), vk::PipelineBindPoint::COMPUTE) => {
-                    Command::BindComputePipeline(Arc::clone(pipeline))
-                }
-                (_, other) => {
-                    return Err(Error::usage(
-                        "VUID-vkCmdBindPipeline-pipelineBindPoint-00779",
-                        format!("a pipeline is bound at {other:?}, which is not its bind point"),
-                    ));
-                }
-            };
-            recorder.push(command);
-            Ok(())
-        })
-    }
-
-    fn cmd_set_gaussian_camera_gaurast(
-        command_buffer: vk::CommandBuffer,
-        p_camera: *const GaussianCameraGAURAST<'_>,
-    ) {
-        record(command_buffer, |recorder| {
-            let camera = camera(pointer::input(p_camera)?)?;
-            recorder.push(Command::SetCamera(Box::new(camera)));
-            Ok(())
-        })
-    }
-
-    fn cmd_bind_vertex_buffers(
-        command_buffer: vk::CommandBuffer,
-        first_binding: u32,
-        binding_count: u32,
-        buffers: *const vk::Buffer,
-        offsets: *const vk::DeviceSize,
-    ) {
-        record(command_buffer, |recorder| {
-            let buffers = pointer::slice(buffers, binding_count)?;
-            let offsets = pointer::slice(offsets, binding_count)?;
-            bind_vertex_buffers(recorder, first_binding, buffers, offsets, &[], &[])
-        })
-    }
-
-    fn cmd_bind_vertex_buffers2(
-        command_buffer: vk::CommandBuffer,
-        first_binding: u32,
-        binding_count: u32,
-        buffers: *const vk::Buffer,
-        offsets: *const vk::DeviceSize,
-        sizes: *const vk::DeviceSize,
-        strides: *const vk::DeviceSize,
-    ) {
-        record(command_buffer, |recorder| {
-            let optional = |values: *const vk::DeviceSize| {
-                pointer::slice(values, if values.is_null() { 0 } else { binding_count })
-            };
-            let buffers = pointer::slice(buffers, binding_count)?;
-            let offsets = pointer::slice(offsets, binding_count)?;
-            let (sizes, strides) = (optional(sizes)?, optional(strides)?);
-            bind_vertex_buffers(recorder, first_binding, buffers, offsets, sizes, strides)
-        })
-    }
-
-    fn cmd_bind_index_buffer(
-        command_buffer: vk::CommandBuffer,
-        buffer: vk::Buffer,
-        offset: vk::DeviceSize,
-        index_type: vk::IndexType,
-    ) {
-        record(command_buffer, |recorder| {
-            let index_size = match index_type {
-                vk::IndexType::UINT8_KHR => 1,
-                vk::IndexType::UINT16 => 2,
-                vk::IndexType::UINT32 => 4,
-                other => {
-                    return Err(Error::FeatureNotPresent(format!("index type {other:?}")));
-                }
-            };
-            let range = handle::get(buffer)?.range(offset, None)?;
-            recorder.push(Command::BindIndexBuffer(IndexBuffer { range, index_size }));
-            Ok(())
-        })
-    }
-
-    fn cmd_set_viewport(
-        command_buffer: vk::CommandBuffer,
-        first_viewport: u32,
-        viewport_count: u32,
-        viewports: *const vk::Viewport,
-    ) {
-        set_viewports(command_buffer, first_viewport, viewport_count, viewports, false)
-    }
-
-    fn cmd_set_viewport_with_count(
-        command_buffer: vk::CommandBuffer,
-        viewport_count: u32,
-        viewports: *const vk::Viewport,
-    ) {
-        set_viewports(command_buffer, 0, viewport_count, viewports, true)
-    }
-
-    fn cmd_set_scissor(
-        command_buffer: vk::CommandBuffer,
-        first_scissor: u32,
-        scissor_count: u32,
-        scissors: *const vk::Rect2D,
-    ) {
-        set_scissors(command_buffer, first_scissor, scissor_count, scissors, false)
-    }
-
-    fn cmd_set_scissor_with_count(
-        command_buffer: vk::CommandBuffer,
-        scissor_count: u32,
-        scissors: *const vk::Rect2D,
-    ) {
-        set_scissors(command_buffer, 0, scissor_count, scissors, true)
-    }
-
-    fn cmd_draw(
-        command_buffer: vk::CommandBuffer,
-        vertex_count: u32,
-        instance_count: u32,
-        first_vertex: u32,
-        first_instance: u32,
-    ) {
-        record(command_buffer, |recorder| {
-            recorder.require_pass()?;
-            recorder.push(Command::Draw(Draw {
-                vertex_offset: None,
-                first: first_vertex,
-                count: vertex_count,
-                first_instance,
-                instance_count,
-            }));
-            Ok(())
-        })
-    }
-
-    fn cmd_draw_indexed(
-        command_buffer: vk::CommandBuffer,
-        index_count: u32,
-        instance_count: u32,
-        first_index: u32,
-        vertex_offset: i32,
-        first_instance: u32,
-    ) {
-        record(command_buffer, |recorder| {
-            recorder.require_pass()?;
-            recorder.push(Command::Draw(Draw {
-                vertex_offset: Some(vertex_offset),
-                first: first_index,
-                count: index_count,
-                first_instance,
-                instance_count,
-            }));
-            Ok(())
-        })
-    }
-
-    fn cmd_draw_indirect(
-        command_buffer: vk::CommandBuffer,
-        buffer: vk::Buffer,
-        offset: vk::DeviceSize,
-        draw_count: u32,
-        stride: u32,
-    ) {
-        let parameters = (buffer, offset);
-        draw_indirect(command_buffer, parameters, None, draw_count, stride, false)
-    }
-
-    fn cmd_draw_indexed_indirect(
-        command_buffer: vk::CommandBuffer,
-        buffer: vk::Buffer,
-        offset: vk::DeviceSize,
-        draw_count: u32,
-        stride: u32,
-    ) {
-        let parameters = (buffer, offset);
-        draw_indirect(command_buffer, parameters, None, draw_count, stride, true)
-    }
-
-    fn cmd_draw_indirect_count(
-        command_buffer: vk::CommandBuffer,
-        buffer: vk::Buffer,
-        offset: vk::DeviceSize,
-        count_buffer: vk::Buffer,
-        count_buffer_offset: vk::DeviceSize,
-        max_draw_count: u32,
-        stride: u32,
-    ) {
-        let parameters = (buffer, offset);
-        let count = Some((count_buffer, count_buffer_offset));
-        draw_indirect(command_buffer, parameters, count, max_draw_count, stride, false)
-    }
-
-    fn cmd_draw_indexed_indirect_count(
-        command_buffer: vk::CommandBuffer,
-        buffer: vk::Buffer,
-        offset: vk::DeviceSize,
-        count_buffer: vk::Buffer,
-        count_buffer_offset: vk::DeviceSize,
-        max_draw_count: u32,
-        stride: u32,
-    ) {
-        let parameters = (buffer, offset);
-        let count = Some((count_buffer, count_buffer_offset));
-        draw_indirect(command_buffer, parameters, count, max_draw_count, stride, true)
-    }
-
+    #[doc(alias = "vkCmdExecuteCommands")]
     fn cmd_execute_commands(
         command_buffer: vk::CommandBuffer,
         command_buffer_count: u32,
@@ -270,100 +56,262 @@ crate::entry_points! {
             Ok(())
         })
     }
+}
 
-    fn cmd_pipeline_barrier(
-        command_buffer: vk::CommandBuffer,
-        _src_stage_mask: vk::PipelineStageFlags,
-        _dst_stage_mask: vk::PipelineStageFlags,
-        _dependency_flags: vk::DependencyFlags,
-        _memory_barrier_count: u32,
-        _memory_barriers: *const vk::MemoryBarrier<'_>,
-        _buffer_memory_barrier_count: u32,
-        _buffer_memory_barriers: *const vk::BufferMemoryBarrier<'_>,
-        _image_memory_barrier_count: u32,
-        _image_memory_barriers: *const vk::ImageMemoryBarrier<'_>,
-    ) {
-        barrier(command_buffer)
-    }
+#[doc(alias = "vkCmdBindPipeline")]
+pub(crate) fn cmd_bind_pipeline(
+    recorder: &mut Recorder,
+    pipeline_bind_point: vk::PipelineBindPoint,
+    pipeline: &Pipeline,
+) -> Result<(), Error> {
+    let command = match (pipeline, pipeline_bind_point) {
+        (Pipeline::Graphics(pipeline), vk::PipelineBindPoint::GRAPHICS) => {
+            Command::BindPipeline(Arc::clone(pipeline))
+        }
+        (Pipeline::Compute(pipeline), vk::PipelineBindPoint::COMPUTE) => {
+            Command::BindComputePipeline(Arc::clone(pipeline))
+        }
+        (_, other) => {
+            return Err(Error::usage(
+                "VUID-vkCmdBindPipeline-pipelineBindPoint-00779",
+                format!("a pipeline is bound at {other:?}, which is not its bind point"),
+            ));
+        }
+    };
+    recorder.push(command);
+    Ok(())
+}
 
-    fn cmd_pipeline_barrier2(
-        command_buffer: vk::CommandBuffer,
-        _dependency_info: *const vk::DependencyInfo<'_>,
-    ) {
-        barrier(command_buffer)
-    }
+#[doc(alias = "vkCmdSetGaussianCameraGAURAST")]
+pub(crate) fn cmd_set_gaussian_camera_gaurast(
+    recorder: &mut Recorder,
+    camera: &GaussianCameraGAURAST<'_>,
+) -> Result<(), Error> {
+    let camera = camera::camera(camera)?;
+    recorder.push(Command::SetCamera(Box::new(camera)));
+    Ok(())
+}
 
-    fn cmd_set_event(
-        command_buffer: vk::CommandBuffer,
-        event: vk::Event,
-        _stage_mask: vk::PipelineStageFlags,
-    ) {
-        set_event(command_buffer, event, true)
-    }
+#[doc(alias = "vkCmdBindVertexBuffers")]
+pub(crate) fn cmd_bind_vertex_buffers(
+    recorder: &mut Recorder,
+    first_binding: u32,
+    buffers: &[Arc<Buffer>],
+    offsets: &[vk::DeviceSize],
+) -> Result<(), Error> {
+    bind_vertex_buffers(recorder, first_binding, buffers, offsets, &[], &[])
+}
 
-    fn cmd_set_event2(
-        command_buffer: vk::CommandBuffer,
-        event: vk::Event,
-        _dependency_info: *const vk::DependencyInfo<'_>,
-    ) {
-        set_event(command_buffer, event, true)
-    }
+#[doc(alias = "vkCmdBindVertexBuffers2")]
+pub(crate) fn cmd_bind_vertex_buffers2(
+    recorder: &mut Recorder,
+    first_binding: u32,
+    buffers: &[Arc<Buffer>],
+    offsets: &[vk::DeviceSize],
+    sizes: Option<&[vk::DeviceSize]>,
+    strides: Option<&[vk::DeviceSize]>,
+) -> Result<(), Error> {
+    let (sizes, strides) = (sizes.unwrap_or_default(), strides.unwrap_or_default());
+    bind_vertex_buffers(recorder, first_binding, buffers, offsets, sizes, strides)
+}
 
-    fn cmd_reset_event(
-        command_buffer: vk::CommandBuffer,
-        event: vk::Event,
-        _stage_mask: vk::PipelineStageFlags,
-    ) {
-        set_event(command_buffer, event, false)
-    }
+#[doc(alias = "vkCmdBindIndexBuffer")]
+pub(crate) fn cmd_bind_index_buffer(
+    recorder: &mut Recorder,
+    buffer: &Arc<Buffer>,
+    offset: vk::DeviceSize,
+    index_type: vk::IndexType,
+) -> Result<(), Error> {
+    let index_size = match index_type {
+        vk::IndexType::UINT8_KHR => 1,
+        vk::IndexType::UINT16 => 2,
+        vk::IndexType::UINT32 => 4,
+        other => {
+            return Err(Error::FeatureNotPresent(format!("index type {other:?}")));
+        }
+    };
+    let range = buffer.range(offset, None)?;
+    recorder.push(Command::BindIndexBuffer(IndexBuffer { range, index_size }));
+    Ok(())
+}
 
-    fn cmd_reset_event2(
-        command_buffer: vk::CommandBuffer,
-        event: vk::Event,
-        _stage_mask: vk::PipelineStageFlags2,
-    ) {
-        set_event(command_buffer, event, false)
-    }
+#[doc(alias = "vkCmdSetViewport")]
+pub(crate) fn cmd_set_viewport(
+    recorder: &mut Recorder,
+    first_viewport: u32,
+    viewports: &[vk::Viewport],
+) -> Result<(), Error> {
+    set_viewports(recorder, first_viewport, viewports, false)
+}
 
-    fn cmd_wait_events(
-        command_buffer: vk::CommandBuffer,
-        event_count: u32,
-        events: *const vk::Event,
-        _src_stage_mask: vk::PipelineStageFlags,
-        _dst_stage_mask: vk::PipelineStageFlags,
-        _memory_barrier_count: u32,
-        _memory_barriers: *const vk::MemoryBarrier<'_>,
-        _buffer_memory_barrier_count: u32,
-        _buffer_memory_barriers: *const vk::BufferMemoryBarrier<'_>,
-        _image_memory_barrier_count: u32,
-        _image_memory_barriers: *const vk::ImageMemoryBarrier<'_>,
-    ) {
-        wait_events(command_buffer, event_count, events)
-    }
+#[doc(alias = "vkCmdSetViewportWithCount")]
+pub(crate) fn cmd_set_viewport_with_count(
+    recorder: &mut Recorder,
+    viewports: &[vk::Viewport],
+) -> Result<(), Error> {
+    set_viewports(recorder, 0, viewports, true)
+}
 
-    fn cmd_wait_events2(
-        command_buffer: vk::CommandBuffer,
-        event_count: u32,
-        events: *const vk::Event,
-        _dependency_infos: *const vk::DependencyInfo<'_>,
-    ) {
-        wait_events(command_buffer, event_count, events)
-    }
+#[doc(alias = "vkCmdSetScissor")]
+pub(crate) fn cmd_set_scissor(
+    recorder: &mut Recorder,
+    first_scissor: u32,
+    scissors: &[vk::Rect2D],
+) -> Result<(), Error> {
+    set_scissors(recorder, first_scissor, scissors, false)
+}
+
+#[doc(alias = "vkCmdSetScissorWithCount")]
+pub(crate) fn cmd_set_scissor_with_count(
+    recorder: &mut Recorder,
+    scissors: &[vk::Rect2D],
+) -> Result<(), Error> {
+    set_scissors(recorder, 0, scissors, true)
+}
+
+#[doc(alias = "vkCmdDraw")]
+pub(crate) fn cmd_draw(
+    recorder: &mut Recorder,
+    vertex_count: u32,
+    instance_count: u32,
+    first_vertex: u32,
+    first_instance: u32,
+) -> Result<(), Error> {
+    recorder.require_pass()?;
+    recorder.push(Command::Draw(Draw {
+        vertex_offset: None,
+        first: first_vertex,
+        count: vertex_count,
+        first_instance,
+        instance_count,
+    }));
+    Ok(())
+}
+
+#[doc(alias = "vkCmdDrawIndexed")]
+pub(crate) fn cmd_draw_indexed(
+    recorder: &mut Recorder,
+    index_count: u32,
+    instance_count: u32,
+    first_index: u32,
+    vertex_offset: i32,
+    first_instance: u32,
+) -> Result<(), Error> {
+    recorder.require_pass()?;
+    recorder.push(Command::Draw(Draw {
+        vertex_offset: Some(vertex_offset),
+        first: first_index,
+        count: index_count,
+        first_instance,
+        instance_count,
+    }));
+    Ok(())
+}
+
+#[doc(alias = "vkCmdDrawIndirect")]
+pub(crate) fn cmd_draw_indirect(
+    recorder: &mut Recorder,
+    buffer: &Buffer,
+    offset: vk::DeviceSize,
+    draw_count: u32,
+    stride: u32,
+) -> Result<(), Error> {
+    let parameters = (buffer, offset);
+    draw_indirect(recorder, parameters, None, draw_count, stride, false)
+}
+
+#[doc(alias = "vkCmdDrawIndexedIndirect")]
+pub(crate) fn cmd_draw_indexed_indirect(
+    recorder: &mut Recorder,
+    buffer: &Buffer,
+    offset: vk::DeviceSize,
+    draw_count: u32,
+    stride: u32,
+) -> Result<(), Error> {
+    let parameters = (buffer, offset);
+    draw_indirect(recorder, parameters, None, draw_count, stride, true)
+}
+
+#[doc(alias = "vkCmdDrawIndirectCount")]
+pub(crate) fn cmd_draw_indirect_count(
+    recorder: &mut Recorder,
+    buffer: &Buffer,
+    offset: vk::DeviceSize,
+    count_buffer: &Buffer,
+    count_buffer_offset: vk::DeviceSize,
+    max_draw_count: u32,
+    stride: u32,
+) -> Result<(), Error> {
+    let parameters = (buffer, offset);
+    draw_indirect(
+        recorder,
+        parameters,
+        Some((count_buffer, count_buffer_offset)),
+        max_draw_count,
+        stride,
+        false,
+    )
+}
+
+#[doc(alias = "vkCmdDrawIndexedIndirectCount")]
+pub(crate) fn cmd_draw_indexed_indirect_count(
+    recorder: &mut Recorder,
+    buffer: &Buffer,
+    offset: vk::DeviceSize,
+    count_buffer: &Buffer,
+    count_buffer_offset: vk::DeviceSize,
+    max_draw_count: u32,
+    stride: u32,
+) -> Result<(), Error> {
+    let parameters = (buffer, offset);
+    draw_indirect(
+        recorder,
+        parameters,
+        Some((count_buffer, count_buffer_offset)),
+        max_draw_count,
+        stride,
+        true,
+    )
+}
+
+/// A barrier makes everything before it visible to everything after it, whatever it names.
+#[doc(alias = "vkCmdPipelineBarrier")]
+#[doc(alias = "vkCmdPipelineBarrier2")]
+pub(crate) fn cmd_pipeline_barrier(recorder: &mut Recorder) -> Result<(), Error> {
+    recorder.packet(Packet::Barrier);
+    Ok(())
+}
+
+#[doc(alias = "vkCmdSetEvent")]
+#[doc(alias = "vkCmdSetEvent2")]
+pub(crate) fn cmd_set_event(recorder: &mut Recorder, event: &Arc<Event>) -> Result<(), Error> {
+    set_event(recorder, event, true)
+}
+
+#[doc(alias = "vkCmdResetEvent")]
+#[doc(alias = "vkCmdResetEvent2")]
+pub(crate) fn cmd_reset_event(recorder: &mut Recorder, event: &Arc<Event>) -> Result<(), Error> {
+    set_event(recorder, event, false)
+}
+
+#[doc(alias = "vkCmdWaitEvents")]
+#[doc(alias = "vkCmdWaitEvents2")]
+pub(crate) fn cmd_wait_events(recorder: &mut Recorder, events: &[Arc<Event>]) -> Result<(), Error> {
+    recorder.push(Command::WaitEvents(events.to_vec()));
+    recorder.packet(Packet::Barrier);
+    Ok(())
 }
 
 /// Records vertex buffers; `sizes` and `strides` are empty or have one for each.
-///
-/// # Safety
-/// The handles are live.
-unsafe fn bind_vertex_buffers(
+fn bind_vertex_buffers(
     recorder: &mut Recorder,
     first: u32,
-    buffers: &[vk::Buffer],
+    buffers: &[Arc<Buffer>],
     offsets: &[vk::DeviceSize],
     sizes: &[vk::DeviceSize],
     strides: &[vk::DeviceSize],
 ) -> Result<(), Error> {
-    let bindings = limits::properties().limits.max_vertex_input_bindings;
+    let bindings = limits::properties().max_vertex_input_bindings;
     if u64::from(first) + buffers.len() as u64 > u64::from(bindings) {
         return Err(Error::usage(
             "VUID-vkCmdBindVertexBuffers-firstBinding-00625",
@@ -371,10 +319,8 @@ unsafe fn bind_vertex_buffers(
         ));
     }
     let mut bound = simdevice::host::with_capacity(buffers.len());
-    for (index, (&buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
+    for (index, (buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
         let size = sizes.get(index).copied().unwrap_or(vk::WHOLE_SIZE);
-        // SAFETY: the caller's promise.
-        let buffer = unsafe { handle::get(buffer)? };
         bound.push(VertexBuffer {
             range: buffer.range(offset, (size != vk::WHOLE_SIZE).then_some(size))?,
             stride: strides.get(index).map(|&stride| stride as u32),
@@ -389,7 +335,7 @@ unsafe fn bind_vertex_buffers(
 
 /// Fails for viewports and scissors beyond those that the device has.
 fn require_viewports(first: u32, count: u32) -> Result<(), Error> {
-    let available = limits::properties().limits.max_viewports;
+    let available = limits::properties().max_viewports;
     if u64::from(first) + u64::from(count) <= u64::from(available) {
         return Ok(());
     }
@@ -400,143 +346,68 @@ fn require_viewports(first: u32, count: u32) -> Result<(), Error> {
 }
 
 /// Records viewports.
-///
-/// # Safety
-/// The handle is live and the pointer is valid for the count.
-unsafe fn set_viewports(
-    command_buffer: vk::CommandBuffer,
+fn set_viewports(
+    recorder: &mut Recorder,
     first: u32,
-    count: u32,
-    viewports: *const vk::Viewport,
+    viewports: &[vk::Viewport],
     with_count: bool,
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            require_viewports(first, count)?;
-            let viewports = pointer::slice(viewports, count)?;
-            recorder.push(Command::SetViewports {
-                first,
-                viewports: viewports.iter().copied().map(pipeline::viewport).collect(),
-                with_count,
-            });
-            Ok(())
-        })
-    }
+    require_viewports(first, viewports.len() as u32)?;
+    recorder.push(Command::SetViewports {
+        first,
+        viewports: viewports.iter().copied().map(pipeline::viewport).collect(),
+        with_count,
+    });
+    Ok(())
 }
 
 /// Records scissors.
-///
-/// # Safety
-/// The handle is live and the pointer is valid for the count.
-unsafe fn set_scissors(
-    command_buffer: vk::CommandBuffer,
+fn set_scissors(
+    recorder: &mut Recorder,
     first: u32,
-    count: u32,
-    scissors: *const vk::Rect2D,
+    scissors: &[vk::Rect2D],
     with_count: bool,
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            require_viewports(first, count)?;
-            let scissors = pointer::slice(scissors, count)?;
-            recorder.push(Command::SetScissors {
-                first,
-                scissors: scissors.iter().copied().map(rendering::rect).collect(),
-                with_count,
-            });
-            Ok(())
-        })
-    }
+    require_viewports(first, scissors.len() as u32)?;
+    recorder.push(Command::SetScissors {
+        first,
+        scissors: scissors.iter().copied().map(rendering::rect).collect(),
+        with_count,
+    });
+    Ok(())
 }
 
 /// A buffer and an offset in it.
-type Place = (vk::Buffer, vk::DeviceSize);
+type Place<'a> = (&'a Buffer, vk::DeviceSize);
 
 /// Records draws whose numbers lie in a buffer.
-///
-/// # Safety
-/// The handles are live.
-unsafe fn draw_indirect(
-    command_buffer: vk::CommandBuffer,
-    (buffer, offset): Place,
-    count: Option<Place>,
+fn draw_indirect(
+    recorder: &mut Recorder,
+    (buffer, offset): Place<'_>,
+    count: Option<Place<'_>>,
     draw_count: u32,
     stride: u32,
     indexed: bool,
 ) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            recorder.require_pass()?;
-            let parameters = handle::get(buffer)?.range(offset, None)?;
-            let count = match count {
-                Some((buffer, offset)) => Some(handle::get(buffer)?.range(offset, Some(4))?),
-                None => None,
-            };
-            recorder.push(Command::DrawIndirect(DrawIndirect {
-                parameters,
-                draw_count,
-                count,
-                stride,
-                indexed,
-            }));
-            Ok(())
-        })
-    }
-}
-
-/// Records a barrier. It makes everything before it visible to everything after it, whatever it names.
-///
-/// # Safety
-/// The handle is live.
-unsafe fn barrier(command_buffer: vk::CommandBuffer) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            recorder.packet(Packet::Barrier);
-            Ok(())
-        })
-    }
+    recorder.require_pass()?;
+    let parameters = buffer.range(offset, None)?;
+    let count = match count {
+        Some((buffer, offset)) => Some(buffer.range(offset, Some(4))?),
+        None => None,
+    };
+    recorder.push(Command::DrawIndirect(DrawIndirect {
+        parameters,
+        draw_count,
+        count,
+        stride,
+        indexed,
+    }));
+    Ok(())
 }
 
 /// Records the setting or resetting of an event.
-///
-/// # Safety
-/// The handles are live.
-unsafe fn set_event(
-    command_buffer: vk::CommandBuffer,
-    event: vk::Event,
-    value: bool,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            recorder.require_outside_pass()?;
-            let event = Arc::clone(handle::get(event)?);
-            recorder.push(Command::SetEvent(event, value));
-            Ok(())
-        })
-    }
-}
-
-/// Records a wait for events.
-///
-/// # Safety
-/// The handles are live and the pointer is valid for the count.
-unsafe fn wait_events(
-    command_buffer: vk::CommandBuffer,
-    count: u32,
-    events: *const vk::Event,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            let events = handle::get_all(pointer::slice(events, count)?)?;
-            recorder.push(Command::WaitEvents(events));
-            recorder.packet(Packet::Barrier);
-            Ok(())
-        })
-    }
+fn set_event(recorder: &mut Recorder, event: &Arc<Event>, value: bool) -> Result<(), Error> {
+    recorder.require_outside_pass()?;
+    recorder.push(Command::SetEvent(Arc::clone(event), value));
+    Ok(())
 }

@@ -10,6 +10,7 @@ use simdevice::Format;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateCommandPool")]
     fn create_command_pool(
         device: vk::Device,
         create_info: *const vk::CommandPoolCreateInfo<'_>,
@@ -21,6 +22,7 @@ crate::entry_points! {
         pointer::output(command_pool, handle::create(Arc::new(object)))
     }
 
+    #[doc(alias = "vkDestroyCommandPool")]
     fn destroy_command_pool(
         _device: vk::Device,
         command_pool: vk::CommandPool,
@@ -32,6 +34,7 @@ crate::entry_points! {
         }
     }
 
+    #[doc(alias = "vkResetCommandPool")]
     fn reset_command_pool(
         _device: vk::Device,
         command_pool: vk::CommandPool,
@@ -41,14 +44,7 @@ crate::entry_points! {
     }
 
     /// There is no memory to give back.
-    fn trim_command_pool(
-        _device: vk::Device,
-        _command_pool: vk::CommandPool,
-        _flags: vk::CommandPoolTrimFlags,
-    ) {
-        Ok(())
-    }
-
+    #[doc(alias = "vkAllocateCommandBuffers")]
     fn allocate_command_buffers(
         _device: vk::Device,
         allocate_info: *const vk::CommandBufferAllocateInfo<'_>,
@@ -62,6 +58,7 @@ crate::entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkFreeCommandBuffers")]
     fn free_command_buffers(
         _device: vk::Device,
         command_pool: vk::CommandPool,
@@ -72,6 +69,7 @@ crate::entry_points! {
         handle::get(command_pool)?.free(buffers)
     }
 
+    #[doc(alias = "vkBeginCommandBuffer")]
     fn begin_command_buffer(
         command_buffer: vk::CommandBuffer,
         begin_info: *const vk::CommandBufferBeginInfo<'_>,
@@ -99,10 +97,12 @@ crate::entry_points! {
         recorder.begin(usage)
     }
 
+    #[doc(alias = "vkEndCommandBuffer")]
     fn end_command_buffer(command_buffer: vk::CommandBuffer) -> vk::Result {
         handle::get(command_buffer)?.end()
     }
 
+    #[doc(alias = "vkResetCommandBuffer")]
     fn reset_command_buffer(
         command_buffer: vk::CommandBuffer,
         _flags: vk::CommandBufferResetFlags,

@@ -12,6 +12,7 @@ use ash::vk;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateComputePipelines")]
     fn create_compute_pipelines(
         device: vk::Device,
         _pipeline_cache: vk::PipelineCache,

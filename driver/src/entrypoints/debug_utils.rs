@@ -8,6 +8,7 @@ use ash::vk;
 use std::sync::Arc;
 
 entry_points! {
+    #[doc(alias = "vkCreateDebugUtilsMessengerEXT")]
     fn create_debug_utils_messenger_ext(
         instance: vk::Instance,
         info: *const vk::DebugUtilsMessengerCreateInfoEXT<'_>,
@@ -20,6 +21,7 @@ entry_points! {
         pointer::output(messenger, handle::create(created))
     }
 
+    #[doc(alias = "vkDestroyDebugUtilsMessengerEXT")]
     fn destroy_debug_utils_messenger_ext(
         instance: vk::Instance,
         messenger: vk::DebugUtilsMessengerEXT,
@@ -32,6 +34,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkSubmitDebugUtilsMessageEXT")]
     fn submit_debug_utils_message_ext(
         instance: vk::Instance,
         severity: vk::DebugUtilsMessageSeverityFlagsEXT,
@@ -42,56 +45,6 @@ entry_points! {
         for messenger in handle::get(instance)?.messengers() {
             messenger.submit(severity, types, data);
         }
-        Ok(())
-    }
-
-    fn set_debug_utils_object_name_ext(
-        _device: vk::Device,
-        _info: *const vk::DebugUtilsObjectNameInfoEXT<'_>,
-    ) -> vk::Result {
-        Ok(())
-    }
-
-    fn set_debug_utils_object_tag_ext(
-        _device: vk::Device,
-        _info: *const vk::DebugUtilsObjectTagInfoEXT<'_>,
-    ) -> vk::Result {
-        Ok(())
-    }
-
-    fn queue_begin_debug_utils_label_ext(
-        _queue: vk::Queue,
-        _label: *const vk::DebugUtilsLabelEXT<'_>,
-    ) {
-        Ok(())
-    }
-
-    fn queue_end_debug_utils_label_ext(_queue: vk::Queue) {
-        Ok(())
-    }
-
-    fn queue_insert_debug_utils_label_ext(
-        _queue: vk::Queue,
-        _label: *const vk::DebugUtilsLabelEXT<'_>,
-    ) {
-        Ok(())
-    }
-
-    fn cmd_begin_debug_utils_label_ext(
-        _command_buffer: vk::CommandBuffer,
-        _label: *const vk::DebugUtilsLabelEXT<'_>,
-    ) {
-        Ok(())
-    }
-
-    fn cmd_end_debug_utils_label_ext(_command_buffer: vk::CommandBuffer) {
-        Ok(())
-    }
-
-    fn cmd_insert_debug_utils_label_ext(
-        _command_buffer: vk::CommandBuffer,
-        _label: *const vk::DebugUtilsLabelEXT<'_>,
-    ) {
         Ok(())
     }
 }

@@ -9,6 +9,7 @@ use ash::vk;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateDescriptorSetLayout")]
     fn create_descriptor_set_layout(
         _device: vk::Device,
         create_info: *const vk::DescriptorSetLayoutCreateInfo<'_>,
@@ -19,14 +20,7 @@ crate::entry_points! {
         pointer::output(set_layout, handle::create(Arc::new(layout)))
     }
 
-    fn destroy_descriptor_set_layout(
-        _device: vk::Device,
-        set_layout: vk::DescriptorSetLayout,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(set_layout).map(drop)
-    }
-
+    #[doc(alias = "vkGetDescriptorSetLayoutSupport")]
     fn get_descriptor_set_layout_support(
         _device: vk::Device,
         create_info: *const vk::DescriptorSetLayoutCreateInfo<'_>,
@@ -47,6 +41,7 @@ crate::entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkCreateDescriptorPool")]
     fn create_descriptor_pool(
         _device: vk::Device,
         create_info: *const vk::DescriptorPoolCreateInfo<'_>,
@@ -62,6 +57,7 @@ crate::entry_points! {
         pointer::output(descriptor_pool, handle::create(Arc::new(pool)))
     }
 
+    #[doc(alias = "vkDestroyDescriptorPool")]
     fn destroy_descriptor_pool(
         _device: vk::Device,
         descriptor_pool: vk::DescriptorPool,
@@ -73,6 +69,7 @@ crate::entry_points! {
         }
     }
 
+    #[doc(alias = "vkResetDescriptorPool")]
     fn reset_descriptor_pool(
         _device: vk::Device,
         descriptor_pool: vk::DescriptorPool,
@@ -81,6 +78,7 @@ crate::entry_points! {
         handle::get(descriptor_pool)?.reset()
     }
 
+    #[doc(alias = "vkAllocateDescriptorSets")]
     fn allocate_descriptor_sets(
         _device: vk::Device,
         allocate_info: *const vk::DescriptorSetAllocateInfo<'_>,
@@ -106,6 +104,7 @@ crate::entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkFreeDescriptorSets")]
     fn free_descriptor_sets(
         _device: vk::Device,
         descriptor_pool: vk::DescriptorPool,

@@ -13,6 +13,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkUpdateDescriptorSets")]
     fn update_descriptor_sets(
         device: vk::Device,
         descriptor_write_count: u32,
@@ -37,6 +38,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCreateDescriptorUpdateTemplate")]
     fn create_descriptor_update_template(
         _device: vk::Device,
         create_info: *const vk::DescriptorUpdateTemplateCreateInfo<'_>,
@@ -56,14 +58,7 @@ crate::entry_points! {
         pointer::output(descriptor_update_template, handle::create(Arc::new(template)))
     }
 
-    fn destroy_descriptor_update_template(
-        _device: vk::Device,
-        descriptor_update_template: vk::DescriptorUpdateTemplate,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(descriptor_update_template).map(drop)
-    }
-
+    #[doc(alias = "vkUpdateDescriptorSetWithTemplate")]
     fn update_descriptor_set_with_template(
         device: vk::Device,
         descriptor_set: vk::DescriptorSet,

@@ -1,7 +1,7 @@
 //! Logical devices and their queues.
 
 use crate::capabilities::extensions;
-use crate::capabilities::features::EnabledFeatures;
+use crate::capabilities::features;
 use crate::capabilities::queues;
 use crate::dispatch;
 use crate::entry_points;
@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::handle;
 use crate::object::device::Device;
 use crate::pointer;
+use crate::registry;
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
@@ -42,6 +43,7 @@ unsafe fn queue_count(info: &vk::DeviceCreateInfo<'_>) -> Result<u32, Error> {
 }
 
 entry_points! {
+    #[doc(alias = "vkCreateDevice")]
     fn create_device(
         physical_device: vk::PhysicalDevice,
         info: *const vk::DeviceCreateInfo<'_>,
@@ -51,8 +53,8 @@ entry_points! {
         let physical_device = handle::get(physical_device)?;
         let info = pointer::input(info)?;
         let names = pointer::strings(info.pp_enabled_extension_names, info.enabled_extension_count)?;
-        let extensions = extensions::resolve(extensions::DEVICE, &names)?;
-        let features = EnabledFeatures::requested(info, &extensions)?;
+        let extensions = extensions::resolve(registry::extensions::DEVICE, &names)?;
+        let features = features::requested(info, &extensions)?;
         let created = Device::new(
             physical_device.require_instance()?,
             extensions,
@@ -63,6 +65,7 @@ entry_points! {
         pointer::output(device, handle::create(created))
     }
 
+    #[doc(alias = "vkDestroyDevice")]
     fn destroy_device(
         device: vk::Device,
         _allocator: *const vk::AllocationCallbacks<'_>,
@@ -73,12 +76,14 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetDeviceProcAddr")]
     fn get_device_proc_addr(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
         let device = handle::get(device)?;
         let name: &CStr = pointer::string(name).ok_or(Error::NullPointer { what: "name" })?;
         Ok(dispatch::device_command(name, &device.enabled()))
     }
 
+    #[doc(alias = "vkGetDeviceQueue")]
     fn get_device_queue(
         device: vk::Device,
         family: u32,
@@ -89,6 +94,7 @@ entry_points! {
         pointer::output(queue, found.unwrap_or_default())
     }
 
+    #[doc(alias = "vkGetDeviceQueue2")]
     fn get_device_queue2(
         device: vk::Device,
         info: *const vk::DeviceQueueInfo2<'_>,
@@ -101,6 +107,7 @@ entry_points! {
         pointer::output(queue, found.unwrap_or_default())
     }
 
+    #[doc(alias = "vkGetDeviceGroupPeerMemoryFeatures")]
     fn get_device_group_peer_memory_features(
         _device: vk::Device,
         _heap: u32,
@@ -112,15 +119,12 @@ entry_points! {
         pointer::output(features, vk::PeerMemoryFeatureFlags::empty())
     }
 
+    #[doc(alias = "vkAcquireProfilingLockKHR")]
     fn acquire_profiling_lock_khr(
         device: vk::Device,
         _info: *const vk::AcquireProfilingLockInfoKHR<'_>,
     ) -> vk::Result {
         // Counters are always on and nobody else has them, so there is nothing to wait for.
         handle::get(device).map(|_| ())
-    }
-
-    fn release_profiling_lock_khr(_device: vk::Device) {
-        Ok(())
     }
 }

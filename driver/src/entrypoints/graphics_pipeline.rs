@@ -13,6 +13,7 @@ use gaurast::vk::{
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateGraphicsPipelines")]
     fn create_graphics_pipelines(
         device: vk::Device,
         _pipeline_cache: vk::PipelineCache,

@@ -12,6 +12,7 @@ use simdevice::image::{ImageDesc, ImageKind};
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateImage")]
     fn create_image(
         _device: vk::Device,
         create_info: *const vk::ImageCreateInfo<'_>,
@@ -22,14 +23,7 @@ crate::entry_points! {
         pointer::output(image, handle::create(Arc::new(object)))
     }
 
-    fn destroy_image(
-        _device: vk::Device,
-        image: vk::Image,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(image).map(drop)
-    }
-
+    #[doc(alias = "vkGetImageMemoryRequirements")]
     fn get_image_memory_requirements(
         _device: vk::Device,
         image: vk::Image,
@@ -39,6 +33,7 @@ crate::entry_points! {
         pointer::output(memory_requirements, requirements)
     }
 
+    #[doc(alias = "vkGetImageMemoryRequirements2")]
     fn get_image_memory_requirements2(
         _device: vk::Device,
         info: *const vk::ImageMemoryRequirementsInfo2<'_>,
@@ -48,6 +43,7 @@ crate::entry_points! {
         fill_requirements(memory_requirements, image.requirements(ALL_TYPE_BITS))
     }
 
+    #[doc(alias = "vkGetDeviceImageMemoryRequirements")]
     fn get_device_image_memory_requirements(
         _device: vk::Device,
         info: *const vk::DeviceImageMemoryRequirements<'_>,
@@ -59,6 +55,7 @@ crate::entry_points! {
     }
 
     /// No image is sparse.
+    #[doc(alias = "vkGetImageSparseMemoryRequirements")]
     fn get_image_sparse_memory_requirements(
         _device: vk::Device,
         _image: vk::Image,
@@ -69,6 +66,7 @@ crate::entry_points! {
     }
 
     /// No image is sparse.
+    #[doc(alias = "vkGetImageSparseMemoryRequirements2")]
     fn get_image_sparse_memory_requirements2(
         _device: vk::Device,
         _info: *const vk::ImageSparseMemoryRequirementsInfo2<'_>,
@@ -79,6 +77,7 @@ crate::entry_points! {
     }
 
     /// No image is sparse.
+    #[doc(alias = "vkGetDeviceImageSparseMemoryRequirements")]
     fn get_device_image_sparse_memory_requirements(
         _device: vk::Device,
         _info: *const vk::DeviceImageMemoryRequirements<'_>,
@@ -88,6 +87,7 @@ crate::entry_points! {
         pointer::output(sparse_memory_requirement_count, 0)
     }
 
+    #[doc(alias = "vkGetImageSubresourceLayout")]
     fn get_image_subresource_layout(
         _device: vk::Device,
         image: vk::Image,
@@ -115,6 +115,7 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkCreateImageView")]
     fn create_image_view(
         _device: vk::Device,
         create_info: *const vk::ImageViewCreateInfo<'_>,
@@ -135,14 +136,6 @@ crate::entry_points! {
             &info.subresource_range,
         )?;
         pointer::output(view, handle::create(Arc::new(object)))
-    }
-
-    fn destroy_image_view(
-        _device: vk::Device,
-        image_view: vk::ImageView,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(image_view).map(drop)
     }
 }
 

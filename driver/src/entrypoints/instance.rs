@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::handle;
 use crate::object::debug_messenger::DebugMessenger;
 use crate::object::instance::Instance;
+use crate::registry;
 use crate::{pnext, pointer};
 use ash::vk;
 use std::ffi::{CStr, c_char};
@@ -36,21 +37,24 @@ unsafe fn new_instance(info: &vk::InstanceCreateInfo<'_>) -> Result<Arc<Instance
 }
 
 entry_points! {
+    #[doc(alias = "vkEnumerateInstanceVersion")]
     fn enumerate_instance_version(version: *mut u32) -> vk::Result {
         pointer::output(version, extensions::API_VERSION)
     }
 
+    #[doc(alias = "vkEnumerateInstanceExtensionProperties")]
     fn enumerate_instance_extension_properties(
         layer: *const c_char,
         count: *mut u32,
         properties: *mut vk::ExtensionProperties,
     ) -> vk::Result {
         match pointer::string(layer) {
-            None => pointer::enumerate(count, properties, &extensions::properties(extensions::INSTANCE)),
+            None => pointer::enumerate(count, properties, &extensions::properties(registry::extensions::INSTANCE)),
             Some(layer) => Err(Error::LayerNotPresent(layer.to_string_lossy().into_owned())),
         }
     }
 
+    #[doc(alias = "vkEnumerateInstanceLayerProperties")]
     fn enumerate_instance_layer_properties(
         count: *mut u32,
         properties: *mut vk::LayerProperties,
@@ -58,6 +62,7 @@ entry_points! {
         pointer::enumerate(count, properties, &[])
     }
 
+    #[doc(alias = "vkCreateInstance")]
     fn create_instance(
         info: *const vk::InstanceCreateInfo<'_>,
         _allocator: *const vk::AllocationCallbacks<'_>,
@@ -78,13 +83,7 @@ entry_points! {
         }
     }
 
-    fn destroy_instance(
-        instance: vk::Instance,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(instance).map(drop)
-    }
-
+    #[doc(alias = "vkEnumeratePhysicalDevices")]
     fn enumerate_physical_devices(
         instance: vk::Instance,
         count: *mut u32,
@@ -94,6 +93,7 @@ entry_points! {
         pointer::enumerate(count, physical_devices, &[instance.physical_device()])
     }
 
+    #[doc(alias = "vkEnumeratePhysicalDeviceGroups")]
     fn enumerate_physical_device_groups(
         instance: vk::Instance,
         count: *mut u32,
@@ -107,6 +107,7 @@ entry_points! {
         })
     }
 
+    #[doc(alias = "vkGetInstanceProcAddr")]
     fn get_instance_proc_addr(
         instance: vk::Instance,
         name: *const c_char,

@@ -8,6 +8,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkAllocateMemory")]
     fn allocate_memory(
         device: vk::Device,
         allocate_info: *const vk::MemoryAllocateInfo<'_>,
@@ -30,14 +31,7 @@ crate::entry_points! {
         pointer::output(memory, handle::create(Arc::new(object)))
     }
 
-    fn free_memory(
-        _device: vk::Device,
-        memory: vk::DeviceMemory,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(memory).map(drop)
-    }
-
+    #[doc(alias = "vkMapMemory")]
     fn map_memory(
         _device: vk::Device,
         memory: vk::DeviceMemory,
@@ -51,12 +45,14 @@ crate::entry_points! {
         pointer::output(data, address.cast())
     }
 
+    #[doc(alias = "vkUnmapMemory")]
     fn unmap_memory(_device: vk::Device, memory: vk::DeviceMemory) {
         handle::get(memory)?.unmap();
         Ok(())
     }
 
     /// All host-visible memory is coherent.
+    #[doc(alias = "vkFlushMappedMemoryRanges")]
     fn flush_mapped_memory_ranges(
         _device: vk::Device,
         memory_range_count: u32,
@@ -66,6 +62,7 @@ crate::entry_points! {
     }
 
     /// All host-visible memory is coherent.
+    #[doc(alias = "vkInvalidateMappedMemoryRanges")]
     fn invalidate_mapped_memory_ranges(
         _device: vk::Device,
         memory_range_count: u32,
@@ -75,6 +72,7 @@ crate::entry_points! {
     }
 
     /// No memory type is lazily allocated, so what is committed is all of it.
+    #[doc(alias = "vkGetDeviceMemoryCommitment")]
     fn get_device_memory_commitment(
         _device: vk::Device,
         memory: vk::DeviceMemory,
@@ -84,6 +82,7 @@ crate::entry_points! {
         pointer::output(committed_memory_in_bytes, size)
     }
 
+    #[doc(alias = "vkBindBufferMemory")]
     fn bind_buffer_memory(
         _device: vk::Device,
         buffer: vk::Buffer,
@@ -93,6 +92,7 @@ crate::entry_points! {
         bind_buffer(buffer, memory, memory_offset)
     }
 
+    #[doc(alias = "vkBindBufferMemory2")]
     fn bind_buffer_memory2(
         _device: vk::Device,
         bind_info_count: u32,
@@ -103,6 +103,7 @@ crate::entry_points! {
             .try_for_each(|info| bind_buffer(info.buffer, info.memory, info.memory_offset))
     }
 
+    #[doc(alias = "vkBindImageMemory")]
     fn bind_image_memory(
         _device: vk::Device,
         image: vk::Image,
@@ -112,6 +113,7 @@ crate::entry_points! {
         bind_image(image, memory, memory_offset)
     }
 
+    #[doc(alias = "vkBindImageMemory2")]
     fn bind_image_memory2(
         _device: vk::Device,
         bind_info_count: u32,

@@ -2,10 +2,11 @@
 //! parameters and one call into an object.
 //!
 //! Conventions:
-//! - an entry point is declared in [`entry_points!`](crate::entry_points) and named as ash names it
-//!   (`vkCreateBuffer` is `create_buffer`); its parameters are exactly those of ash's `PFN_` type, which the dispatch
-//!   table checks;
-//! - its body is one unsafe block that yields `Result<T, Error>`: `Ok(())` is `VK_SUCCESS`, another success code is
+//! - the function of a command has `#[doc(alias = "vkCreateBuffer")]`, by which `driver/gen` and people find it, and is named
+//!   as ash names it (`create_buffer`);
+//! - most take the command's own parameters, and are declared in [`entry_points!`](crate::entry_points); a plain function takes
+//!   what it wants in the form that it wants, and `dispatch/commands.rs` converts, guards and, for `vkCmd*`, records;
+//! - the body of a declared one is one unsafe block that yields `Result<T, Error>`: `Ok(())` is `VK_SUCCESS`, another success code is
 //!   `Ok(vk::Result)`, and an error is logged, sent to the instance's debug messengers and returned as
 //!   [`Error::result`];
 //! - handles become references through [`handle`](crate::handle), pointers through [`pointer`](crate::pointer), and
@@ -38,7 +39,6 @@ pub(crate) mod rendering;
 pub(crate) mod sampler;
 pub(crate) mod sync;
 pub(crate) mod transfer;
-pub(crate) mod unsupported;
 
 use crate::error::Error;
 use crate::float_control::FloatControl;
@@ -180,7 +180,11 @@ pub(crate) fn guard<C: Caller, R: Return, T: Outcome<R>>(
 
 /// Logs an error and tells the instance's messengers.
 fn report(instance: Option<&Instance>, function: &str, error: &Error) {
-    let function = vulkan_name(function);
+    let function = if function.starts_with("vk") {
+        function.to_owned()
+    } else {
+        vulkan_name(function)
+    };
     log::error!("{function}: {error} [{}]", error.message_id());
     if let Some(instance) = instance {
         instance.report_error(&function, error);

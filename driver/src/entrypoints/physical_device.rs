@@ -1,48 +1,54 @@
 //! Physical devices: what they can do. The answers are in [`capabilities`](crate::capabilities).
 
 use crate::capabilities::formats::{self, ImageQuery};
-use crate::capabilities::{counters, extensions, features, limits, memory, queues};
+use crate::capabilities::{counters, extensions, limits, memory, queues};
 use crate::entry_points;
 use crate::error::Error;
+use crate::registry::{self, features::SUPPORTED};
 use crate::{pnext, pointer};
 use ash::vk;
 use std::ffi::c_char;
 
 entry_points! {
+    #[doc(alias = "vkGetPhysicalDeviceProperties")]
     fn get_physical_device_properties(
         _physical_device: vk::PhysicalDevice,
         properties: *mut vk::PhysicalDeviceProperties,
     ) {
-        pointer::output(properties, limits::properties())
+        pointer::output(properties, limits::properties().core())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceProperties2")]
     fn get_physical_device_properties2(
         _physical_device: vk::PhysicalDevice,
         properties: *mut vk::PhysicalDeviceProperties2<'_>,
     ) {
         let properties = pointer::output_structure(properties)?;
-        properties.properties = limits::properties();
-        limits::fill_chain(properties.p_next);
+        properties.properties = limits::properties().core();
+        pnext::for_each_output(properties.p_next, |out| limits::properties().write(out));
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceFeatures")]
     fn get_physical_device_features(
         _physical_device: vk::PhysicalDevice,
         features: *mut vk::PhysicalDeviceFeatures,
     ) {
-        pointer::output(features, features::core())
+        pointer::output(features, SUPPORTED.core())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceFeatures2")]
     fn get_physical_device_features2(
         _physical_device: vk::PhysicalDevice,
         features: *mut vk::PhysicalDeviceFeatures2<'_>,
     ) {
         let features = pointer::output_structure(features)?;
-        features.features = features::core();
-        features::fill_chain(features.p_next);
+        features.features = SUPPORTED.core();
+        pnext::for_each_output(features.p_next, |out| SUPPORTED.write(out));
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceFormatProperties")]
     fn get_physical_device_format_properties(
         _physical_device: vk::PhysicalDevice,
         format: vk::Format,
@@ -51,6 +57,7 @@ entry_points! {
         pointer::output(properties, formats::properties(format))
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceFormatProperties2")]
     fn get_physical_device_format_properties2(
         _physical_device: vk::PhysicalDevice,
         format: vk::Format,
@@ -70,6 +77,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceImageFormatProperties")]
     fn get_physical_device_image_format_properties(
         _physical_device: vk::PhysicalDevice,
         format: vk::Format,
@@ -83,6 +91,7 @@ entry_points! {
         image_format_answer(query, pointer::output_structure(properties)?)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceImageFormatProperties2")]
     fn get_physical_device_image_format_properties2(
         _physical_device: vk::PhysicalDevice,
         info: *const vk::PhysicalDeviceImageFormatInfo2<'_>,
@@ -110,6 +119,7 @@ entry_points! {
         image_format_answer(query, &mut properties.image_format_properties)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceSparseImageFormatProperties")]
     fn get_physical_device_sparse_image_format_properties(
         _physical_device: vk::PhysicalDevice,
         _format: vk::Format,
@@ -123,6 +133,7 @@ entry_points! {
         pointer::enumerate(count, properties, &[]).map(drop)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceSparseImageFormatProperties2")]
     fn get_physical_device_sparse_image_format_properties2(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::PhysicalDeviceSparseImageFormatInfo2<'_>,
@@ -132,6 +143,7 @@ entry_points! {
         pointer::enumerate_structures(count, properties, 0, |_, _| ()).map(drop)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceQueueFamilyProperties")]
     fn get_physical_device_queue_family_properties(
         _physical_device: vk::PhysicalDevice,
         count: *mut u32,
@@ -140,6 +152,7 @@ entry_points! {
         pointer::enumerate(count, properties, &[queues::properties()]).map(drop)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceQueueFamilyProperties2")]
     fn get_physical_device_queue_family_properties2(
         _physical_device: vk::PhysicalDevice,
         count: *mut u32,
@@ -151,6 +164,7 @@ entry_points! {
         .map(drop)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceMemoryProperties")]
     fn get_physical_device_memory_properties(
         _physical_device: vk::PhysicalDevice,
         properties: *mut vk::PhysicalDeviceMemoryProperties,
@@ -158,6 +172,7 @@ entry_points! {
         pointer::output(properties, memory::properties())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceMemoryProperties2")]
     fn get_physical_device_memory_properties2(
         _physical_device: vk::PhysicalDevice,
         properties: *mut vk::PhysicalDeviceMemoryProperties2<'_>,
@@ -166,6 +181,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkEnumerateDeviceExtensionProperties")]
     fn enumerate_device_extension_properties(
         _physical_device: vk::PhysicalDevice,
         layer: *const c_char,
@@ -173,11 +189,12 @@ entry_points! {
         properties: *mut vk::ExtensionProperties,
     ) -> vk::Result {
         match pointer::string(layer) {
-            None => pointer::enumerate(count, properties, &extensions::properties(extensions::DEVICE)),
+            None => pointer::enumerate(count, properties, &extensions::properties(registry::extensions::DEVICE)),
             Some(layer) => Err(Error::LayerNotPresent(layer.to_string_lossy().into_owned())),
         }
     }
 
+    #[doc(alias = "vkEnumerateDeviceLayerProperties")]
     fn enumerate_device_layer_properties(
         _physical_device: vk::PhysicalDevice,
         count: *mut u32,
@@ -186,6 +203,7 @@ entry_points! {
         pointer::enumerate(count, properties, &[])
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceExternalBufferProperties")]
     fn get_physical_device_external_buffer_properties(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::PhysicalDeviceExternalBufferInfo<'_>,
@@ -195,6 +213,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceExternalFenceProperties")]
     fn get_physical_device_external_fence_properties(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::PhysicalDeviceExternalFenceInfo<'_>,
@@ -207,6 +226,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceExternalSemaphoreProperties")]
     fn get_physical_device_external_semaphore_properties(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::PhysicalDeviceExternalSemaphoreInfo<'_>,
@@ -219,6 +239,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceToolProperties")]
     fn get_physical_device_tool_properties(
         _physical_device: vk::PhysicalDevice,
         count: *mut u32,
@@ -227,6 +248,7 @@ entry_points! {
         pointer::enumerate_structures(count, properties, 0, |_, _| ())
     }
 
+    #[doc(alias = "vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR")]
     fn enumerate_physical_device_queue_family_performance_query_counters_khr(
         _physical_device: vk::PhysicalDevice,
         family: u32,
@@ -242,6 +264,7 @@ entry_points! {
         pointer::enumerate_structures(count, counters, available, counters::fill)
     }
 
+    #[doc(alias = "vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR")]
     fn get_physical_device_queue_family_performance_query_passes_khr(
         _physical_device: vk::PhysicalDevice,
         _info: *const vk::QueryPoolPerformanceCreateInfoKHR<'_>,

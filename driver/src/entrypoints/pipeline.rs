@@ -11,14 +11,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 
 crate::entry_points! {
-    fn destroy_pipeline(
-        _device: vk::Device,
-        pipeline: vk::Pipeline,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(pipeline).map(drop)
-    }
-
+    #[doc(alias = "vkCreatePipelineLayout")]
     fn create_pipeline_layout(
         _device: vk::Device,
         create_info: *const vk::PipelineLayoutCreateInfo<'_>,
@@ -37,14 +30,7 @@ crate::entry_points! {
         pointer::output(pipeline_layout, handle::create(Arc::new(layout)))
     }
 
-    fn destroy_pipeline_layout(
-        _device: vk::Device,
-        pipeline_layout: vk::PipelineLayout,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(pipeline_layout).map(drop)
-    }
-
+    #[doc(alias = "vkCreateShaderModule")]
     fn create_shader_module(
         device: vk::Device,
         create_info: *const vk::ShaderModuleCreateInfo<'_>,
@@ -57,14 +43,7 @@ crate::entry_points! {
         pointer::output(shader_module, handle::create(Arc::new(object)))
     }
 
-    fn destroy_shader_module(
-        _device: vk::Device,
-        shader_module: vk::ShaderModule,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(shader_module).map(drop)
-    }
-
+    #[doc(alias = "vkCreatePipelineCache")]
     fn create_pipeline_cache(
         _device: vk::Device,
         create_info: *const vk::PipelineCacheCreateInfo<'_>,
@@ -75,14 +54,7 @@ crate::entry_points! {
         pointer::output(pipeline_cache, handle::create(Arc::new(PipelineCache)))
     }
 
-    fn destroy_pipeline_cache(
-        _device: vk::Device,
-        pipeline_cache: vk::PipelineCache,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(pipeline_cache).map(drop)
-    }
-
+    #[doc(alias = "vkGetPipelineCacheData")]
     fn get_pipeline_cache_data(
         _device: vk::Device,
         _pipeline_cache: vk::PipelineCache,
@@ -104,6 +76,7 @@ crate::entry_points! {
         Ok(vk::Result::SUCCESS)
     }
 
+    #[doc(alias = "vkMergePipelineCaches")]
     fn merge_pipeline_caches(
         _device: vk::Device,
         _dst_cache: vk::PipelineCache,

@@ -7,6 +7,7 @@ use ash::vk;
 use std::sync::Arc;
 
 entry_points! {
+    #[doc(alias = "vkCreatePrivateDataSlot")]
     fn create_private_data_slot(
         _device: vk::Device,
         _info: *const vk::PrivateDataSlotCreateInfo<'_>,
@@ -16,14 +17,7 @@ entry_points! {
         pointer::output(slot, handle::create(Arc::new(PrivateDataSlot::default())))
     }
 
-    fn destroy_private_data_slot(
-        _device: vk::Device,
-        slot: vk::PrivateDataSlot,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(slot).map(drop)
-    }
-
+    #[doc(alias = "vkSetPrivateData")]
     fn set_private_data(
         _device: vk::Device,
         object_type: vk::ObjectType,
@@ -35,6 +29,7 @@ entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetPrivateData")]
     fn get_private_data(
         _device: vk::Device,
         object_type: vk::ObjectType,

@@ -1,8 +1,9 @@
 //! Query pools, and the commands that use them.
 
-use super::command::record;
 use crate::command::record::{Command, CopyQueryResults};
+use crate::command::recorder::Recorder;
 use crate::error::Error;
+use crate::object::buffer::Buffer;
 use crate::object::query_pool::{Contents, QueryPool};
 use crate::object::signals::Signals;
 use crate::{handle, pnext, pointer};
@@ -18,6 +19,7 @@ use std::time::Duration;
 const POLL: Duration = Duration::from_millis(20);
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateQueryPool")]
     fn create_query_pool(
         _device: vk::Device,
         create_info: *const vk::QueryPoolCreateInfo<'_>,
@@ -28,14 +30,7 @@ crate::entry_points! {
         pointer::output(query_pool, handle::create(Arc::new(object)))
     }
 
-    fn destroy_query_pool(
-        _device: vk::Device,
-        query_pool: vk::QueryPool,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(query_pool).map(drop)
-    }
-
+    #[doc(alias = "vkResetQueryPool")]
     fn reset_query_pool(
         _device: vk::Device,
         query_pool: vk::QueryPool,
@@ -46,6 +41,7 @@ crate::entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkGetQueryPoolResults")]
     fn get_query_pool_results(
         device: vk::Device,
         query_pool: vk::QueryPool,
@@ -77,92 +73,91 @@ crate::entry_points! {
         }
         Ok(if all_available { vk::Result::SUCCESS } else { vk::Result::NOT_READY })
     }
+}
 
-    fn cmd_begin_query(
-        command_buffer: vk::CommandBuffer,
-        query_pool: vk::QueryPool,
-        query: u32,
-        _flags: vk::QueryControlFlags,
-    ) {
-        record(command_buffer, |recorder| {
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, query, 1)?;
-            recorder.packet(Packet::BeginQuery { pool: Arc::clone(&pool.queries), index: query });
-            Ok(())
-        })
-    }
+#[doc(alias = "vkCmdBeginQuery")]
+pub(crate) fn cmd_begin_query(
+    recorder: &mut Recorder,
+    query_pool: &Arc<QueryPool>,
+    query: u32,
+) -> Result<(), Error> {
+    require_queries(query_pool, query, 1)?;
+    recorder.packet(Packet::BeginQuery {
+        pool: Arc::clone(&query_pool.queries),
+        index: query,
+    });
+    Ok(())
+}
 
-    fn cmd_end_query(command_buffer: vk::CommandBuffer, query_pool: vk::QueryPool, query: u32) {
-        record(command_buffer, |recorder| {
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, query, 1)?;
-            recorder.packet(Packet::EndQuery { pool: Arc::clone(&pool.queries), index: query });
-            Ok(())
-        })
-    }
+#[doc(alias = "vkCmdEndQuery")]
+pub(crate) fn cmd_end_query(
+    recorder: &mut Recorder,
+    query_pool: &Arc<QueryPool>,
+    query: u32,
+) -> Result<(), Error> {
+    require_queries(query_pool, query, 1)?;
+    recorder.packet(Packet::EndQuery {
+        pool: Arc::clone(&query_pool.queries),
+        index: query,
+    });
+    Ok(())
+}
 
-    fn cmd_reset_query_pool(
-        command_buffer: vk::CommandBuffer,
-        query_pool: vk::QueryPool,
-        first_query: u32,
-        query_count: u32,
-    ) {
-        record(command_buffer, |recorder| {
-            recorder.require_outside_pass()?;
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, first_query, query_count)?;
-            recorder.packet(Packet::ResetQueries {
-                pool: Arc::clone(&pool.queries),
-                first: first_query,
-                count: query_count,
-            });
-            Ok(())
-        })
-    }
+#[doc(alias = "vkCmdResetQueryPool")]
+pub(crate) fn cmd_reset_query_pool(
+    recorder: &mut Recorder,
+    query_pool: &Arc<QueryPool>,
+    first_query: u32,
+    query_count: u32,
+) -> Result<(), Error> {
+    recorder.require_outside_pass()?;
+    require_queries(query_pool, first_query, query_count)?;
+    recorder.packet(Packet::ResetQueries {
+        pool: Arc::clone(&query_pool.queries),
+        first: first_query,
+        count: query_count,
+    });
+    Ok(())
+}
 
-    fn cmd_write_timestamp(
-        command_buffer: vk::CommandBuffer,
-        _pipeline_stage: vk::PipelineStageFlags,
-        query_pool: vk::QueryPool,
-        query: u32,
-    ) {
-        write_timestamp(command_buffer, query_pool, query)
-    }
+#[doc(alias = "vkCmdWriteTimestamp")]
+#[doc(alias = "vkCmdWriteTimestamp2")]
+pub(crate) fn cmd_write_timestamp(
+    recorder: &mut Recorder,
+    query_pool: &QueryPool,
+    query: u32,
+) -> Result<(), Error> {
+    require_queries(query_pool, query, 1)?;
+    recorder.packet(Packet::WriteTimestamp {
+        pool: Arc::clone(&query_pool.queries),
+        index: query,
+    });
+    Ok(())
+}
 
-    fn cmd_write_timestamp2(
-        command_buffer: vk::CommandBuffer,
-        _stage: vk::PipelineStageFlags2,
-        query_pool: vk::QueryPool,
-        query: u32,
-    ) {
-        write_timestamp(command_buffer, query_pool, query)
-    }
-
-    fn cmd_copy_query_pool_results(
-        command_buffer: vk::CommandBuffer,
-        query_pool: vk::QueryPool,
-        first_query: u32,
-        query_count: u32,
-        dst_buffer: vk::Buffer,
-        dst_offset: vk::DeviceSize,
-        stride: vk::DeviceSize,
-        flags: vk::QueryResultFlags,
-    ) {
-        record(command_buffer, |recorder| {
-            recorder.require_outside_pass()?;
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, first_query, query_count)?;
-            recorder.push(Command::CopyQueryResults(CopyQueryResults {
-                pool: Arc::clone(pool),
-                first: first_query,
-                count: query_count,
-                target: handle::get(dst_buffer)?.range(dst_offset, None)?,
-                stride,
-                flags,
-            }));
-            Ok(())
-        })
-    }
+#[doc(alias = "vkCmdCopyQueryPoolResults")]
+#[expect(clippy::too_many_arguments, reason = "Vulkan's signature")]
+pub(crate) fn cmd_copy_query_pool_results(
+    recorder: &mut Recorder,
+    query_pool: &Arc<QueryPool>,
+    first_query: u32,
+    query_count: u32,
+    dst_buffer: &Arc<Buffer>,
+    dst_offset: vk::DeviceSize,
+    stride: vk::DeviceSize,
+    flags: vk::QueryResultFlags,
+) -> Result<(), Error> {
+    recorder.require_outside_pass()?;
+    require_queries(query_pool, first_query, query_count)?;
+    recorder.push(Command::CopyQueryResults(CopyQueryResults {
+        pool: Arc::clone(query_pool),
+        first: first_query,
+        count: query_count,
+        target: dst_buffer.range(dst_offset, None)?,
+        stride,
+        flags,
+    }));
+    Ok(())
 }
 
 /// A query's result, after a wait where that is asked for.
@@ -237,27 +232,4 @@ unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Erro
         }
     };
     Ok(QueryPool::new(contents, info.query_count))
-}
-
-/// Records a timestamp.
-///
-/// # Safety
-/// The handles are live.
-unsafe fn write_timestamp(
-    command_buffer: vk::CommandBuffer,
-    query_pool: vk::QueryPool,
-    query: u32,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        record(command_buffer, |recorder| {
-            let pool = handle::get(query_pool)?;
-            require_queries(pool, query, 1)?;
-            recorder.packet(Packet::WriteTimestamp {
-                pool: Arc::clone(&pool.queries),
-                index: query,
-            });
-            Ok(())
-        })
-    }
 }

@@ -10,6 +10,7 @@ use ash::vk;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkQueueSubmit")]
     fn queue_submit(
         queue: vk::Queue,
         submit_count: u32,
@@ -25,6 +26,7 @@ crate::entry_points! {
         enqueue(queue, batches, fence)
     }
 
+    #[doc(alias = "vkQueueSubmit2")]
     fn queue_submit2(
         queue: vk::Queue,
         submit_count: u32,
@@ -40,10 +42,12 @@ crate::entry_points! {
         enqueue(queue, batches, fence)
     }
 
+    #[doc(alias = "vkQueueWaitIdle")]
     fn queue_wait_idle(queue: vk::Queue) -> vk::Result {
         handle::get(queue)?.wait_idle()
     }
 
+    #[doc(alias = "vkDeviceWaitIdle")]
     fn device_wait_idle(device: vk::Device) -> vk::Result {
         let device: &Arc<Device> = handle::get(device)?;
         device.queues().iter().try_for_each(|&queue| handle::get(queue)?.wait_idle())

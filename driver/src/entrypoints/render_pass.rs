@@ -10,6 +10,7 @@ use ash::vk;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateRenderPass")]
     fn create_render_pass(
         _device: vk::Device,
         create_info: *const vk::RenderPassCreateInfo<'_>,
@@ -38,6 +39,7 @@ crate::entry_points! {
         pointer::output(render_pass, handle::create(Arc::new(object)))
     }
 
+    #[doc(alias = "vkCreateRenderPass2")]
     fn create_render_pass2(
         _device: vk::Device,
         create_info: *const vk::RenderPassCreateInfo2<'_>,
@@ -62,15 +64,8 @@ crate::entry_points! {
         pointer::output(render_pass, handle::create(Arc::new(object)))
     }
 
-    fn destroy_render_pass(
-        _device: vk::Device,
-        render_pass: vk::RenderPass,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(render_pass).map(drop)
-    }
-
     /// Any area is as good as any other.
+    #[doc(alias = "vkGetRenderAreaGranularity")]
     fn get_render_area_granularity(
         _device: vk::Device,
         _render_pass: vk::RenderPass,
@@ -79,6 +74,7 @@ crate::entry_points! {
         pointer::output(granularity, vk::Extent2D { width: 1, height: 1 })
     }
 
+    #[doc(alias = "vkCreateFramebuffer")]
     fn create_framebuffer(
         _device: vk::Device,
         create_info: *const vk::FramebufferCreateInfo<'_>,
@@ -97,14 +93,6 @@ crate::entry_points! {
             layers: info.layers,
         };
         pointer::output(framebuffer, handle::create(Arc::new(object)))
-    }
-
-    fn destroy_framebuffer(
-        _device: vk::Device,
-        framebuffer: vk::Framebuffer,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(framebuffer).map(drop)
     }
 }
 

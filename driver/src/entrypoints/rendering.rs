@@ -1,6 +1,6 @@
 //! Commands that begin and end render passes and dynamic rendering.
 
-use super::command::record;
+use crate::command::recorder::Recorder;
 use crate::error::Error;
 use crate::lower::rendering::{self, BegunPass, DynamicAttachment, DynamicRendering, rect};
 use crate::{handle, pnext, pointer};
@@ -8,63 +8,45 @@ use ash::vk;
 use simdevice::packet::Rect;
 use std::sync::Arc;
 
-crate::entry_points! {
-    fn cmd_begin_render_pass(
-        command_buffer: vk::CommandBuffer,
-        render_pass_begin: *const vk::RenderPassBeginInfo<'_>,
-        _contents: vk::SubpassContents,
-    ) {
-        record(command_buffer, |recorder| {
-            recorder.begin_render_pass(begun_pass(pointer::input(render_pass_begin)?)?)
-        })
-    }
+/// # Safety
+/// The info, its chain and its handles are valid.
+#[doc(alias = "vkCmdBeginRenderPass")]
+#[doc(alias = "vkCmdBeginRenderPass2")]
+pub(crate) unsafe fn cmd_begin_render_pass(
+    recorder: &mut Recorder,
+    render_pass_begin: &vk::RenderPassBeginInfo<'_>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    recorder.begin_render_pass(unsafe { begun_pass(render_pass_begin)? })
+}
 
-    fn cmd_begin_render_pass2(
-        command_buffer: vk::CommandBuffer,
-        render_pass_begin: *const vk::RenderPassBeginInfo<'_>,
-        _subpass_begin_info: *const vk::SubpassBeginInfo<'_>,
-    ) {
-        record(command_buffer, |recorder| {
-            recorder.begin_render_pass(begun_pass(pointer::input(render_pass_begin)?)?)
-        })
-    }
+#[doc(alias = "vkCmdNextSubpass")]
+#[doc(alias = "vkCmdNextSubpass2")]
+pub(crate) fn cmd_next_subpass(recorder: &mut Recorder) -> Result<(), Error> {
+    recorder.next_subpass()
+}
 
-    fn cmd_next_subpass(command_buffer: vk::CommandBuffer, _contents: vk::SubpassContents) {
-        record(command_buffer, |recorder| recorder.next_subpass())
-    }
+#[doc(alias = "vkCmdEndRenderPass")]
+#[doc(alias = "vkCmdEndRenderPass2")]
+pub(crate) fn cmd_end_render_pass(recorder: &mut Recorder) -> Result<(), Error> {
+    recorder.end_render_pass()
+}
 
-    fn cmd_next_subpass2(
-        command_buffer: vk::CommandBuffer,
-        _subpass_begin_info: *const vk::SubpassBeginInfo<'_>,
-        _subpass_end_info: *const vk::SubpassEndInfo<'_>,
-    ) {
-        record(command_buffer, |recorder| recorder.next_subpass())
-    }
+/// # Safety
+/// The info and its handles are valid.
+#[doc(alias = "vkCmdBeginRendering")]
+pub(crate) unsafe fn cmd_begin_rendering(
+    recorder: &mut Recorder,
+    rendering_info: &vk::RenderingInfo<'_>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let rendering = unsafe { dynamic_rendering(rendering_info)? };
+    recorder.begin_rendering(rendering.packet()?)
+}
 
-    fn cmd_end_render_pass(command_buffer: vk::CommandBuffer) {
-        record(command_buffer, |recorder| recorder.end_render_pass())
-    }
-
-    fn cmd_end_render_pass2(
-        command_buffer: vk::CommandBuffer,
-        _subpass_end_info: *const vk::SubpassEndInfo<'_>,
-    ) {
-        record(command_buffer, |recorder| recorder.end_render_pass())
-    }
-
-    fn cmd_begin_rendering(
-        command_buffer: vk::CommandBuffer,
-        rendering_info: *const vk::RenderingInfo<'_>,
-    ) {
-        record(command_buffer, |recorder| {
-            let rendering = dynamic_rendering(pointer::input(rendering_info)?)?;
-            recorder.begin_rendering(rendering.packet()?)
-        })
-    }
-
-    fn cmd_end_rendering(command_buffer: vk::CommandBuffer) {
-        record(command_buffer, |recorder| recorder.end_rendering())
-    }
+#[doc(alias = "vkCmdEndRendering")]
+pub(crate) fn cmd_end_rendering(recorder: &mut Recorder) -> Result<(), Error> {
+    recorder.end_rendering()
 }
 
 /// The render pass that a begin info begins.

@@ -6,6 +6,7 @@ use ash::vk;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateSampler")]
     fn create_sampler(
         _device: vk::Device,
         create_info: *const vk::SamplerCreateInfo<'_>,
@@ -14,13 +15,5 @@ crate::entry_points! {
     ) -> vk::Result {
         let object = Sampler::new(pointer::input(create_info)?)?;
         pointer::output(sampler, handle::create(Arc::new(object)))
-    }
-
-    fn destroy_sampler(
-        _device: vk::Device,
-        sampler: vk::Sampler,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(sampler).map(drop)
     }
 }

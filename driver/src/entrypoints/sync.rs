@@ -10,6 +10,7 @@ use ash::vk;
 use std::sync::Arc;
 
 crate::entry_points! {
+    #[doc(alias = "vkCreateFence")]
     fn create_fence(
         device: vk::Device,
         create_info: *const vk::FenceCreateInfo<'_>,
@@ -22,20 +23,14 @@ crate::entry_points! {
         pointer::output(fence, handle::create(Arc::new(object)))
     }
 
-    fn destroy_fence(
-        _device: vk::Device,
-        fence: vk::Fence,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(fence).map(drop)
-    }
-
+    #[doc(alias = "vkResetFences")]
     fn reset_fences(_device: vk::Device, fence_count: u32, fences: *const vk::Fence) -> vk::Result {
         let fences = handle::get_all(pointer::slice(fences, fence_count)?)?;
         fences.iter().for_each(|fence| fence.reset());
         Ok(())
     }
 
+    #[doc(alias = "vkGetFenceStatus")]
     fn get_fence_status(device: vk::Device, fence: vk::Fence) -> vk::Result {
         if handle::get(fence)?.is_signaled() {
             return Ok(vk::Result::SUCCESS);
@@ -44,6 +39,7 @@ crate::entry_points! {
         Ok(vk::Result::NOT_READY)
     }
 
+    #[doc(alias = "vkWaitForFences")]
     fn wait_for_fences(
         device: vk::Device,
         fence_count: u32,
@@ -60,6 +56,7 @@ crate::entry_points! {
         outcome(waited, || signals.check())
     }
 
+    #[doc(alias = "vkCreateSemaphore")]
     fn create_semaphore(
         device: vk::Device,
         create_info: *const vk::SemaphoreCreateInfo<'_>,
@@ -82,14 +79,7 @@ crate::entry_points! {
         pointer::output(semaphore, handle::create(Arc::new(object)))
     }
 
-    fn destroy_semaphore(
-        _device: vk::Device,
-        semaphore: vk::Semaphore,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(semaphore).map(drop)
-    }
-
+    #[doc(alias = "vkGetSemaphoreCounterValue")]
     fn get_semaphore_counter_value(
         device: vk::Device,
         semaphore: vk::Semaphore,
@@ -99,6 +89,7 @@ crate::entry_points! {
         pointer::output(value, timeline_value(handle::get(semaphore)?)?)
     }
 
+    #[doc(alias = "vkWaitSemaphores")]
     fn wait_semaphores(
         device: vk::Device,
         wait_info: *const vk::SemaphoreWaitInfo<'_>,
@@ -119,6 +110,7 @@ crate::entry_points! {
         outcome(waited, || signals.check())
     }
 
+    #[doc(alias = "vkSignalSemaphore")]
     fn signal_semaphore(
         _device: vk::Device,
         signal_info: *const vk::SemaphoreSignalInfo<'_>,
@@ -130,6 +122,7 @@ crate::entry_points! {
         Ok(())
     }
 
+    #[doc(alias = "vkCreateEvent")]
     fn create_event(
         device: vk::Device,
         create_info: *const vk::EventCreateInfo<'_>,
@@ -141,14 +134,7 @@ crate::entry_points! {
         pointer::output(event, handle::create(Arc::new(object)))
     }
 
-    fn destroy_event(
-        _device: vk::Device,
-        event: vk::Event,
-        _allocator: *const vk::AllocationCallbacks<'_>,
-    ) {
-        handle::destroy(event).map(drop)
-    }
-
+    #[doc(alias = "vkGetEventStatus")]
     fn get_event_status(device: vk::Device, event: vk::Event) -> vk::Result {
         handle::get(device)?.signals().check()?;
         Ok(if handle::get(event)?.is_set() {
@@ -158,11 +144,13 @@ crate::entry_points! {
         })
     }
 
+    #[doc(alias = "vkSetEvent")]
     fn set_event(_device: vk::Device, event: vk::Event) -> vk::Result {
         handle::get(event)?.set(true);
         Ok(())
     }
 
+    #[doc(alias = "vkResetEvent")]
     fn reset_event(_device: vk::Device, event: vk::Event) -> vk::Result {
         handle::get(event)?.set(false);
         Ok(())

@@ -1,7 +1,7 @@
 //! The camera of Gaussian draws.
 
-use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
+use crate::registry::features::Features;
 use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
 use simdevice::packet::{BufferRange, Camera, CameraModel};
 
@@ -15,11 +15,11 @@ pub(crate) struct CameraModels {
 
 impl CameraModels {
     /// Those of a device.
-    pub(crate) fn of(features: &EnabledFeatures) -> Self {
+    pub(crate) fn of(features: &Features) -> Self {
         Self {
-            orthographic: features.has("orthographic_camera"),
-            fisheye: features.has("fisheye_camera"),
-            equirectangular: features.has("equirectangular_camera"),
+            orthographic: features.orthographic_camera,
+            fisheye: features.fisheye_camera,
+            equirectangular: features.equirectangular_camera,
         }
     }
 

@@ -121,11 +121,6 @@ impl CommandBuffer {
         self.resets_single
     }
 
-    /// Makes `vkEndCommandBuffer` fail with the first error that a recorded command met.
-    pub(crate) fn fail(&self, error: Error) {
-        self.recorder().fail(error);
-    }
-
     /// Ends recording.
     ///
     /// # Errors
@@ -161,13 +156,13 @@ impl CommandBuffer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capabilities::features::EnabledFeatures;
+    use crate::registry::features::Features;
 
     #[test]
     fn a_panic_while_recording_fails_the_recording() {
         let instance = Instance::new(vk::API_VERSION_1_3, &[]).unwrap();
         let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
-        let features = EnabledFeatures::default();
+        let features = Features::NONE;
         let device = Device::new(instance, Vec::new(), features, simulated, 0).unwrap();
         let buffer = CommandBuffer {
             device,

@@ -1,6 +1,5 @@
 //! Logical devices.
 
-use crate::capabilities::features::EnabledFeatures;
 use crate::capabilities::memory;
 use crate::dispatch::Enabled;
 use crate::environment::{self, Dump};
@@ -10,6 +9,7 @@ use crate::object::instance::Instance;
 use crate::object::memory::Heap;
 use crate::object::queue::Queue;
 use crate::object::signals::Signals;
+use crate::registry::features::Features;
 use ash::vk;
 use simdevice::CommandProcessor;
 use std::ffi::CStr;
@@ -19,7 +19,7 @@ use std::sync::{Arc, OnceLock};
 pub(crate) struct Device {
     instance: Arc<Instance>,
     extensions: Vec<&'static CStr>,
-    features: EnabledFeatures,
+    features: Features,
     simulated: Arc<simdevice::Device>,
     dump: Dump,
     signals: Arc<Signals>,
@@ -43,7 +43,7 @@ impl Device {
     pub(crate) fn new(
         instance: Arc<Instance>,
         extensions: Vec<&'static CStr>,
-        features: EnabledFeatures,
+        features: Features,
         simulated: simdevice::Device,
         queue_count: u32,
     ) -> Result<Arc<Self>, Error> {
@@ -73,7 +73,7 @@ impl Device {
     }
 
     /// The features that the application enabled.
-    pub(crate) fn features(&self) -> &EnabledFeatures {
+    pub(crate) fn features(&self) -> &Features {
         &self.features
     }
 

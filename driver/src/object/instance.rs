@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::handle;
 use crate::object::debug_messenger::DebugMessenger;
 use crate::object::physical_device::PhysicalDevice;
+use crate::registry;
 use ash::vk;
 use std::ffi::CStr;
 use std::sync::{Arc, PoisonError, RwLock, Weak};
@@ -33,7 +34,7 @@ impl Instance {
     /// # Errors
     /// [`Error::ExtensionNotPresent`].
     pub(crate) fn new(api_version: u32, extensions: &[&CStr]) -> Result<Arc<Self>, Error> {
-        let extensions = extensions::resolve(extensions::INSTANCE, extensions)?;
+        let extensions = extensions::resolve(registry::extensions::INSTANCE, extensions)?;
         let api_version = match api_version {
             0 => vk::API_VERSION_1_0,
             version => version.min(extensions::API_VERSION),

@@ -1,8 +1,8 @@
 //! Shader modules: SPIR-V, kept as words until a pipeline is made of it.
 
-use crate::capabilities::features::EnabledFeatures;
 use crate::capabilities::spirv;
 use crate::error::Error;
+use crate::registry::features::Features;
 use crate::shader::{self, Module, Options, Shader, Specialization, Stage};
 use simdevice::host;
 
@@ -24,7 +24,7 @@ impl ShaderModule {
     /// # Errors
     /// [`Error::Usage`] if it isn't SPIR-V in the host's byte order; [`Error::FeatureNotEnabled`] if it declares a capability
     /// whose feature isn't enabled.
-    pub(crate) fn new(words: &[u32], features: &EnabledFeatures) -> Result<Self, Error> {
+    pub(crate) fn new(words: &[u32], features: &Features) -> Result<Self, Error> {
         if words.first() != Some(&MAGIC) {
             return Err(Error::usage(
                 "VUID-VkShaderModuleCreateInfo-pCode-08738",

@@ -10,6 +10,8 @@ pub enum Need {
     Program(&'static str),
     /// A file of the system, by its absolute path.
     File(&'static str),
+    /// A file that an environment variable names.
+    FileOf(&'static str),
     /// The Vulkan loader, a shared library.
     VulkanLoader,
     /// Lavapipe, Mesa's software Vulkan driver, by its manifest, and the loader that finds it.
@@ -85,6 +87,9 @@ impl Need {
             Self::File(path) if !Path::new(path).exists() => {
                 (Missing::Program, format!("there is no {path}"))
             }
+            Self::FileOf(variable) if !std::env::var_os(variable).is_some_and(is_file) => {
+                (Missing::Program, format!("{variable} names no file"))
+            }
             Self::VulkanLoader if !has_vulkan_loader() => {
                 (Missing::Program, "there is no Vulkan loader".to_owned())
             }
@@ -109,6 +114,10 @@ impl Need {
         };
         Some(Ignored { missing, reason })
     }
+}
+
+fn is_file(path: std::ffi::OsString) -> bool {
+    Path::new(&path).is_file()
 }
 
 /// The SIMD levels of the device, by the names that `GAURAST_SIMD` takes, the simplest first.

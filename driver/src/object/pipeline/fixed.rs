@@ -3,16 +3,23 @@
 
 use super::setting::{self, Setting, Settings};
 use super::{GraphicsPipelineInfo, blend, convert, viewport};
-use crate::capabilities::features;
 use crate::capabilities::limits;
 use crate::error::Error;
 use crate::lower::rendering;
+use crate::registry::features::SUPPORTED;
 use ash::vk;
 use simdevice::packet::BlendFactor;
 use simdevice::packet::draw::{
     CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, PolygonMode, StencilFace, StencilOp,
     Topology,
 };
+
+/// A feature of the device: if it works, and its name.
+macro_rules! supported {
+    ($feature:ident) => {
+        (SUPPORTED.$feature, stringify!($feature))
+    };
+}
 
 /// The state of a pipeline, or of a draw.
 #[derive(Clone, Debug)]
@@ -79,20 +86,24 @@ impl FixedState {
         let needs = [
             (
                 polygon_mode != PolygonMode::Fill,
-                "fill_mode_non_solid",
+                supported!(fill_mode_non_solid),
                 "a polygon mode but FILL",
             ),
             (
                 raster.depth_clamp_enable != vk::FALSE,
-                "depth_clamp",
+                supported!(depth_clamp),
                 "depthClampEnable",
             ),
             (
                 raster.depth_bias_enable != vk::FALSE && raster.depth_bias_clamp != 0.0,
-                "depth_bias_clamp",
+                supported!(depth_bias_clamp),
                 "depthBiasClamp",
             ),
-            (info.line_width() != 1.0, "wide_lines", "a line width but 1"),
+            (
+                info.line_width() != 1.0,
+                supported!(wide_lines),
+                "a line width but 1",
+            ),
         ];
         require_all(&needs)?;
         let is_list = matches!(
@@ -165,7 +176,7 @@ impl FixedState {
             info.is_dynamic(S::SCISSOR_WITH_COUNT),
         ];
         for (count, dynamic) in counts.into_iter().zip(dynamic) {
-            if count > limits::properties().limits.max_viewports {
+            if count > limits::properties().max_viewports {
                 return Err(Error::usage(
                     "VUID-VkPipelineViewportStateCreateInfo-viewportCount-01218",
                     format!("{count} viewports or scissors are more than maxViewports"),
@@ -210,9 +221,7 @@ impl FixedState {
     fn set_samples(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
         let multisample = &info.multisample;
         let samples = multisample.rasterization_samples;
-        let supported = limits::properties()
-            .limits
-            .framebuffer_no_attachments_sample_counts;
+        let supported = limits::properties().framebuffer_no_attachments_sample_counts;
         let count = samples.as_raw();
         if !count.is_power_of_two() || !supported.contains(samples) {
             return Err(Error::FeatureNotPresent(format!(
@@ -222,12 +231,12 @@ impl FixedState {
         let needs = [
             (
                 multisample.sample_shading_enable != vk::FALSE,
-                "sample_rate_shading",
+                supported!(sample_rate_shading),
                 "sampleShadingEnable",
             ),
             (
                 multisample.alpha_to_one_enable != vk::FALSE,
-                "alpha_to_one",
+                supported!(alpha_to_one),
                 "alphaToOneEnable",
             ),
         ];
@@ -248,7 +257,11 @@ impl FixedState {
             return Ok(());
         };
         let bounds_test = state.depth_bounds_test_enable != vk::FALSE;
-        require_all(&[(bounds_test, "depth_bounds", "depthBoundsTestEnable")])?;
+        require_all(&[(
+            bounds_test,
+            supported!(depth_bounds),
+            "depthBoundsTestEnable",
+        )])?;
         self.depth_test = state.depth_test_enable != vk::FALSE;
         self.depth_write = state.depth_write_enable != vk::FALSE;
         self.depth_bounds_test = bounds_test;
@@ -281,7 +294,7 @@ impl FixedState {
 
     fn set_blend(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
         if let Some(op) = info.logic_op {
-            require_all(&[(true, "logic_op", "logicOpEnable")])?;
+            require_all(&[(true, supported!(logic_op), "logicOpEnable")])?;
             self.draw.logic_op = Some(convert::logic_op(op)?);
         }
         self.draw.blend = blend::blend_states(info)?;
@@ -441,14 +454,14 @@ pub(crate) fn class(topology: Topology) -> Class {
 }
 
 /// Fails for the first need whose feature the device lacks.
-fn require_all(needs: &[(bool, &str, &str)]) -> Result<(), Error> {
-    let lacks = |needed: bool, feature: &str| needed && !features::is_supported(feature);
+fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
+    let lacks = |needed: bool, is_supported: bool| needed && !is_supported;
     match needs
         .iter()
-        .find(|(needed, feature, _)| lacks(*needed, feature))
+        .find(|(needed, (is_supported, _), _)| lacks(*needed, *is_supported))
     {
         None => Ok(()),
-        Some((_, feature, what)) => Err(Error::FeatureNotPresent(format!(
+        Some((_, (_, feature), what)) => Err(Error::FeatureNotPresent(format!(
             "{what} (feature {feature})"
         ))),
     }

@@ -11,12 +11,12 @@ use super::{
     CameraSource, GaussianAttributeSources, GaussianPipeline, GaussianSource, GraphicsPipelineInfo,
     viewport,
 };
-use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
 use crate::lower::camera::CameraModels;
 use crate::lower::rendering;
 use crate::object::descriptor::layout::Binding;
 use crate::object::device::Device;
+use crate::registry::features::Features;
 use ash::vk;
 use feature::*;
 use gaurast::vk::{
@@ -167,7 +167,7 @@ fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, 
 
 fn state(
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &EnabledFeatures,
+    features: &Features,
     fragments: DrawState,
 ) -> Result<GaussianState, Error> {
     let opacity_compensated = match gaussian.antialiasing {
@@ -240,7 +240,7 @@ fn state(
 fn camera_source(
     info: &GraphicsPipelineInfo,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &EnabledFeatures,
+    features: &Features,
 ) -> Result<CameraSource, Error> {
     match gaussian.camera_source {
         _ if is_shaded(gaussian) => return Ok(CameraSource::None),

@@ -1,9 +1,9 @@
 //! What a pipeline lets the device leave inexact.
 
 use super::feature::{APPROXIMATION, require};
-use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
 use crate::object::pipeline::GraphicsPipelineInfo;
+use crate::registry::features::Features;
 use simdevice::packet::GaussianApproximation;
 
 const STRUCTURE: &str = "VkPipelineGaussianApproximationStateCreateInfoGAURAST";
@@ -11,7 +11,7 @@ const STRUCTURE: &str = "VkPipelineGaussianApproximationStateCreateInfoGAURAST";
 /// Validates and converts the chain's structure of approximations, if it has one.
 pub(super) fn of(
     info: &GraphicsPipelineInfo,
-    features: &EnabledFeatures,
+    features: &Features,
 ) -> Result<GaussianApproximation, Error> {
     let Some(given) = &info.approximation else {
         return Ok(GaussianApproximation::default());

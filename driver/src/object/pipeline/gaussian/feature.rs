@@ -1,16 +1,16 @@
 //! The extension's features, and what is said where one is missing.
 
 use super::STRUCTURE;
-use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
+use crate::registry::features::Features;
 
-/// A feature bit of the extension: its name here, its name there, and the id of the rule that asks for it.
-pub(super) type Feature = (&'static str, &'static str, &'static str);
+/// A feature bit of the extension: its value, its name, and the id of the rule that asks for it.
+pub(super) type Feature = (fn(&Features) -> bool, &'static str, &'static str);
 
 macro_rules! feature {
-    ($field:literal, $name:literal) => {
+    ($field:ident, $name:literal) => {
         (
-            $field,
+            |features| features.$field,
             $name,
             concat!(
                 "VUID-VkPipelineGaussianStateCreateInfoGAURAST-",
@@ -22,39 +22,33 @@ macro_rules! feature {
 }
 
 pub(super) const TOPOLOGY: Feature =
-    feature!("gaussian_primitive_topology", "gaussianPrimitiveTopology");
+    feature!(gaussian_primitive_topology, "gaussianPrimitiveTopology");
 pub(super) const VERTEX_SHADER_PROJECTION: Feature =
-    feature!("vertex_shader_projection", "vertexShaderProjection");
+    feature!(vertex_shader_projection, "vertexShaderProjection");
 pub(super) const RESOLVE_FRAGMENT_SHADER: Feature =
-    feature!("resolve_fragment_shader", "resolveFragmentShader");
+    feature!(resolve_fragment_shader, "resolveFragmentShader");
 pub(super) const RADIAL_DISTANCE_ORDER: Feature =
-    feature!("radial_distance_order", "radialDistanceOrder");
-pub(super) const PRIMITIVE_ORDER: Feature = feature!("primitive_order", "primitiveOrder");
-pub(super) const PER_PIXEL_ORDER: Feature = feature!("per_pixel_order", "perPixelOrder");
+    feature!(radial_distance_order, "radialDistanceOrder");
+pub(super) const PRIMITIVE_ORDER: Feature = feature!(primitive_order, "primitiveOrder");
+pub(super) const PER_PIXEL_ORDER: Feature = feature!(per_pixel_order, "perPixelOrder");
 pub(super) const RASTERIZATION_FLOAT16: Feature =
-    feature!("rasterization_float16", "rasterizationFloat16");
+    feature!(rasterization_float16, "rasterizationFloat16");
 pub(super) const OPACITY_COMPENSATION: Feature =
-    feature!("opacity_compensation", "opacityCompensation");
+    feature!(opacity_compensation, "opacityCompensation");
 pub(super) const UNSCENTED_PROJECTION: Feature =
-    feature!("unscented_projection", "unscentedProjection");
-pub(super) const GAUSSIAN_2D: Feature = feature!("gaussian_2d", "gaussian2D");
+    feature!(unscented_projection, "unscentedProjection");
+pub(super) const GAUSSIAN_2D: Feature = feature!(gaussian_2d, "gaussian2D");
 pub(super) const UNIFORM_BUFFER_CAMERA: Feature =
-    feature!("uniform_buffer_camera", "uniformBufferCamera");
-pub(super) const MERGED_DRAWS: Feature = feature!("merged_draws", "mergedDraws");
-pub(super) const INSTANCING: Feature = feature!("gaussian_instancing", "gaussianInstancing");
-pub(super) const DEPTH_STENCIL: Feature =
-    feature!("gaussian_depth_stencil", "gaussianDepthStencil");
-pub(super) const MULTISAMPLE: Feature = feature!("gaussian_multisample", "gaussianMultisample");
-pub(super) const APPROXIMATION: Feature =
-    feature!("gaussian_approximation", "gaussianApproximation");
+    feature!(uniform_buffer_camera, "uniformBufferCamera");
+pub(super) const MERGED_DRAWS: Feature = feature!(merged_draws, "mergedDraws");
+pub(super) const INSTANCING: Feature = feature!(gaussian_instancing, "gaussianInstancing");
+pub(super) const DEPTH_STENCIL: Feature = feature!(gaussian_depth_stencil, "gaussianDepthStencil");
+pub(super) const MULTISAMPLE: Feature = feature!(gaussian_multisample, "gaussianMultisample");
+pub(super) const APPROXIMATION: Feature = feature!(gaussian_approximation, "gaussianApproximation");
 
 /// Refuses `what` unless its feature is enabled, which one that the device lacks never is.
-pub(super) fn require(
-    features: &EnabledFeatures,
-    feature: Feature,
-    what: &str,
-) -> Result<(), Error> {
-    if features.has(feature.0) {
+pub(super) fn require(features: &Features, feature: Feature, what: &str) -> Result<(), Error> {
+    if feature.0(features) {
         return Ok(());
     }
     Err(not_enabled(feature, what))

@@ -5,9 +5,9 @@ use super::{
     GraphicsPipelineInfo, MAX_SPHERICAL_HARMONICS_DEGREE, STRUCTURE, has_fragment_stage, is_shaded,
     is_taken,
 };
-use crate::capabilities::features::EnabledFeatures;
 use crate::error::Error;
 use crate::object::pipeline::blend;
+use crate::registry::features::Features;
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianGeometryGAURAST,
@@ -69,7 +69,7 @@ pub(super) fn combinations(
 pub(super) fn stages(
     info: &GraphicsPipelineInfo,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &EnabledFeatures,
+    features: &Features,
 ) -> Result<(), Error> {
     match gaussian.projection_mode {
         GaussianProjectionModeGAURAST::FIXED_FUNCTION => {}
@@ -129,7 +129,7 @@ pub(super) fn stages(
 /// What fixed-function projection alone is told.
 fn projection(
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &EnabledFeatures,
+    features: &Features,
 ) -> Result<(), Error> {
     match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_3D => {}
@@ -150,7 +150,7 @@ fn projection(
 
 pub(super) fn modes(
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
-    features: &EnabledFeatures,
+    features: &Features,
 ) -> Result<(), Error> {
     if !is_shaded(gaussian) {
         projection(gaussian, features)?;
@@ -235,10 +235,7 @@ pub(super) fn values(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resul
 }
 
 /// Refuses what a Gaussian pipeline cannot do yet in the ordinary fixed-function state.
-pub(super) fn fixed_state(
-    info: &GraphicsPipelineInfo,
-    features: &EnabledFeatures,
-) -> Result<(), Error> {
+pub(super) fn fixed_state(info: &GraphicsPipelineInfo, features: &Features) -> Result<(), Error> {
     use vk::DynamicState as S;
     let depth_stencil = info.depth_stencil.unwrap_or_default();
     let tests = [

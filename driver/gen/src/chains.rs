@@ -1,0 +1,95 @@
+//! The structures in which Vulkan asks for features or for properties.
+
+use crate::ash::{self, Declarations};
+use crate::error::Error;
+use crate::registry::{self, Registry};
+use crate::support::Support;
+use std::collections::HashSet;
+
+/// A structure of a chain.
+#[derive(Debug)]
+pub(crate) struct Chained<'a> {
+    /// Its name in the registry.
+    pub(crate) name: &'a str,
+    /// What the registry says of it.
+    pub(crate) structure: &'a registry::Structure,
+    /// Its declaration, whose members are in the same order.
+    pub(crate) declared: &'a ash::Structure,
+    /// The extension that brings it, unless the core version does.
+    pub(crate) extension: Option<&'a str>,
+}
+
+impl<'a> Chained<'a> {
+    /// A structure of the registry's.
+    pub(crate) fn new(
+        registry: &'a Registry,
+        declarations: &'a Declarations,
+        name: &'a str,
+        extension: Option<&'a str>,
+    ) -> Result<Self, Error> {
+        let name = registry.type_name(name);
+        let structure = registry
+            .structures
+            .get(name)
+            .ok_or_else(|| Error::Support(format!("the registry has no structure {name}")))?;
+        let declared = declarations.structure(registry, name)?;
+        if structure.members.len() != declared.members.len() {
+            return Err(Error::Undeclared(format!("{name} with all its members")));
+        }
+        Ok(Self {
+            name,
+            structure,
+            declared,
+            extension,
+        })
+    }
+
+    /// The structures that extend `base`: those of the core version, first those that hold all of a version's, then
+    /// those of listed extensions.
+    pub(crate) fn all(
+        registry: &'a Registry,
+        declarations: &'a Declarations,
+        support: &'a Support,
+        base: &str,
+    ) -> Result<Vec<Self>, Error> {
+        let newest = support.version()?;
+        let core = registry
+            .versions
+            .iter()
+            .filter(|requirement| requirement.by <= newest)
+            .flat_map(|requirement| requirement.types.iter().map(|name| (name, None)));
+        let listed = support.extension.keys().flat_map(|extension| {
+            registry
+                .extension(extension)
+                .into_iter()
+                .flat_map(|found| &found.requirements)
+                .filter(|requirement| support.meets(requirement.depends.as_deref()))
+                .flat_map(|requirement| &requirement.types)
+                .map(|name| (name, Some(extension.as_str())))
+        });
+        let mut seen = HashSet::new();
+        let mut chained = Vec::new();
+        for (name, extension) in core.chain(listed) {
+            let last = registry.type_name(name);
+            let extends = registry
+                .structures
+                .get(last)
+                .is_some_and(|structure| structure.extends.iter().any(|name| name == base));
+            if extends && seen.insert(last) {
+                chained.push(Self::new(registry, declarations, name, extension)?);
+            }
+        }
+        chained.sort_by_key(|chained| {
+            (
+                chained.extension.is_some(),
+                !chained.name.starts_with("VkPhysicalDeviceVulkan1"),
+            )
+        });
+        Ok(chained)
+    }
+
+    /// Pairs of a member's name and type in the registry and its declaration.
+    pub(crate) fn members(&self) -> impl Iterator<Item = (&'a registry::Member, &'a ash::Member)> {
+        self.structure.members.iter().zip(&self.declared.members)
+    }
+}

@@ -1,0 +1,553 @@
+//! Writes `dispatch/commands.rs`: the functions that Vulkan calls, around the driver's own, and the table of them.
+//!
+//! A function of the driver's takes those of its command's parameters that it wants, by their names without `p_`, and each
+//! in the form that it declares: the command's own type; a handle as the object (`&Buffer`, `&Arc<Buffer>`,
+//! `Option<&Buffer>`); a pointer as what it points at (`&T`, `&mut T`, `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`); a
+//! `VkBool32` as a `bool`; and a command buffer as its `recorder`. An output pointer that it doesn't take is written with
+//! what it returns: a value, an `Arc` of an object, or a list. Of commands that have a second version, which takes a structure
+//! of the first one's parameters, the second is enough.
+
+use crate::ash::{Declarations, Function, Member};
+use crate::entry_points::EntryPoint;
+use crate::error::Error;
+use crate::registry::{self, Registry};
+use crate::rust;
+use crate::support::Support;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+/// A name under which a command is found.
+struct Row<'a> {
+    name: &'a str,
+    gate: String,
+}
+
+/// The parts of the file.
+#[derive(Default)]
+struct Output {
+    functions: String,
+    /// The names of the functions.
+    defined: BTreeSet<String>,
+    /// Scope and gate, and the rows of the table that have them.
+    blocks: Vec<(String, Vec<String>)>,
+}
+
+impl Output {
+    /// The table, laid out, which rustfmt doesn't do within a macro.
+    fn table(&self) -> String {
+        let mut text = "table! {\n".to_owned();
+        for (block, lines) in &self.blocks {
+            let _ = writeln!(text, "    {block} => {{");
+            for line in lines {
+                let _ = writeln!(text, "        {line}");
+            }
+            text.push_str("    }\n");
+        }
+        text + "}\n"
+    }
+}
+
+struct Writer<'a> {
+    registry: &'a Registry,
+    declarations: &'a Declarations,
+    support: &'a Support,
+    entry_points: &'a BTreeMap<String, EntryPoint>,
+}
+
+pub(crate) fn write(
+    registry: &Registry,
+    declarations: &Declarations,
+    support: &Support,
+    entry_points: &BTreeMap<String, EntryPoint>,
+) -> Result<String, Error> {
+    let writer = Writer {
+        registry,
+        declarations,
+        support,
+        entry_points,
+    };
+    let rows = rows(registry, support)?;
+    for command in entry_points.keys() {
+        if !rows.iter().any(|row| row.name == command) {
+            return Err(Error::EntryPoint(format!(
+                "{command} is no command of the core version or of a listed extension"
+            )));
+        }
+    }
+    let mut output = Output::default();
+    for row in &rows {
+        writer.add(&mut output, row)?;
+    }
+    rust::file(
+        "//! The commands: the functions that Vulkan calls, and the table of them.",
+        &format!(
+            "#![allow(non_snake_case, reason = \"Vulkan's names\")]
+            #![allow(clippy::too_many_arguments, reason = \"Vulkan's signatures\")]
+            #![allow(clippy::semicolon_if_nothing_returned, reason = \"functions return what their guards do\")]
+
+            use super::Gate::{{Core, DeviceExtension, InstanceExtension}};
+            use super::{{Command, Scope, table}};
+            use crate::entrypoints::command::record;
+            use crate::entrypoints::{{self, guard}};
+            use crate::error::Error;
+            use crate::{{handle, pointer}};
+            use ash::vk;
+
+{}
+            {}",
+            output.table(),
+            output.functions
+        ),
+    )
+}
+
+/// All names of commands: those of the core version, and those of listed extensions.
+fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>, Error> {
+    let newest = support.version()?;
+    let mut rows: Vec<Row<'a>> = Vec::new();
+    let mut seen = BTreeSet::new();
+    for requirement in registry.versions.iter().filter(|r| r.by <= newest) {
+        let (major, minor) = requirement.by;
+        for name in &requirement.commands {
+            if seen.insert(name) {
+                rows.push(Row {
+                    name,
+                    gate: format!("Core(vk::API_VERSION_{major}_{minor})"),
+                });
+            }
+        }
+    }
+    for extension in support
+        .extension
+        .keys()
+        .filter_map(|name| registry.extension(name))
+    {
+        let kind = if extension.is_of_instance {
+            "InstanceExtension"
+        } else {
+            "DeviceExtension"
+        };
+        for requirement in &extension.requirements {
+            if !support.meets(requirement.depends.as_deref()) {
+                continue;
+            }
+            for name in &requirement.commands {
+                if seen.insert(name) {
+                    rows.push(Row {
+                        name,
+                        gate: format!("{kind}(c\"{}\")", extension.name),
+                    });
+                }
+            }
+        }
+    }
+    Ok(rows)
+}
+
+impl Writer<'_> {
+    /// Adds a command's row, and its function unless another of its names did.
+    fn add(&self, output: &mut Output, row: &Row<'_>) -> Result<(), Error> {
+        let names = self.registry.command_names(row.name);
+        let definition =
+            self.registry.commands.get(names[0]).ok_or_else(|| {
+                Error::Support(format!("the registry has no command {}", row.name))
+            })?;
+        let function = self.declarations.function(self.registry, row.name)?;
+        let entry_point = names.iter().find_map(|name| self.entry_points.get(*name));
+        let implementation = match entry_point {
+            Some(entry_point) if entry_point.is_complete => {
+                format!("entrypoints::{}", entry_point.path)
+            }
+            _ => {
+                // The first of the names that is there.
+                let name = output
+                    .defined
+                    .iter()
+                    .find(|defined| names.contains(&defined.as_str()))
+                    .cloned();
+                match name {
+                    Some(name) => name,
+                    None => {
+                        let text = self.function(row.name, definition, function, entry_point)?;
+                        output.functions.push_str(&text);
+                        output.defined.insert(row.name.to_owned());
+                        row.name.to_owned()
+                    }
+                }
+            }
+        };
+        let block = format!("{}, {}", scope(row.name, definition), row.gate);
+        let line = format!("{}: {} = {implementation};", row.name, function.ty);
+        match output.blocks.iter_mut().find(|(known, _)| *known == block) {
+            Some((_, lines)) => lines.push(line),
+            None => output.blocks.push((block, vec![line])),
+        }
+        Ok(())
+    }
+
+    /// The function of a command.
+    fn function(
+        &self,
+        name: &str,
+        definition: &registry::Command,
+        function: &Function,
+        entry_point: Option<&EntryPoint>,
+    ) -> Result<String, Error> {
+        let mut used = BTreeSet::from([function.parameters[0].name.clone()]);
+        let body = match entry_point {
+            Some(entry_point) => call(name, definition, function, entry_point, &mut used)?,
+            None => match self.by_second_version(name, definition, function, &mut used)? {
+                Some(body) => body,
+                None => self.without_function(name, function, &mut used)?,
+            },
+        };
+        let mut parameters = String::new();
+        for parameter in &function.parameters {
+            let is_used = used.contains(&parameter.name);
+            let shown = if is_used { &parameter.name } else { "_" };
+            let _ = write!(parameters, "{shown}: {}, ", parameter.ty);
+        }
+        let output = function
+            .output
+            .as_ref()
+            .map_or_else(String::new, |output| format!("-> {output}"));
+        let first = &function.parameters[0].name;
+        Ok(format!(
+            "unsafe extern \"system\" fn {name}({parameters}) {output} {{
+                guard({first}, \"{name}\", || {{ {body} }})
+            }}
+
+            "
+        ))
+    }
+
+    /// The body of a command whose parameters are the members of the structure that its second version takes.
+    fn by_second_version(
+        &self,
+        name: &str,
+        definition: &registry::Command,
+        function: &Function,
+        used: &mut BTreeSet<String>,
+    ) -> Result<Option<String>, Error> {
+        let second = format!("{name}2");
+        let (Some(entry_point), Some(taken)) = (
+            self.entry_points.get(&second),
+            self.registry.commands.get(&second),
+        ) else {
+            return Ok(None);
+        };
+        let [_, info] = &taken.parameters[..] else {
+            return Ok(None);
+        };
+        let structure = self.declarations.structure(self.registry, &info.ty)?;
+        let mut lists = String::new();
+        let mut members = String::new();
+        for member in &structure.members {
+            let Some(index) = function
+                .parameters
+                .iter()
+                .position(|p| p.name == member.name)
+            else {
+                return Ok(None);
+            };
+            let parameter = &function.parameters[index];
+            used.insert(parameter.name.clone());
+            let name = &member.name;
+            if plain(&parameter.ty) == plain(&member.ty) {
+                let _ = writeln!(members, "{name},");
+                continue;
+            }
+            let (Some(element), Some(count)) = (
+                member.ty.strip_prefix("* const "),
+                count_of(definition, function, index),
+            ) else {
+                return Ok(None);
+            };
+            let list = without_prefix(name);
+            let converted = self
+                .declarations
+                .structure(self.registry, &format!("Vk{}", plain(element)))?
+                .members
+                .iter()
+                .map(|member| format!("{0}: of.{0},", member.name))
+                .collect::<String>();
+            let element = element.trim_end_matches("< '_ >");
+            let _ = writeln!(
+                lists,
+                "let {list} = pointer::slice({name}, {count})?.iter().map(|of| {element} {{
+                    {converted} ..Default::default()
+                }});
+                let {list} = simdevice::host::collect({list});",
+                count = count.name,
+            );
+            let _ = writeln!(members, "{name}: {list}.as_ptr(),");
+        }
+        Ok(Some(format!(
+            "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {{
+                record({first}, |recorder| {{
+                    {lists}
+                    let info = {ty} {{ {members} ..Default::default() }};
+                    entrypoints::{path}(recorder, &info)
+                }})
+            }}",
+            first = function.parameters[0].name,
+            ty = structure.ty.trim_end_matches("<'_>"),
+            path = entry_point.path,
+        )))
+    }
+
+    /// The body of a command that the driver has no function of.
+    fn without_function(
+        &self,
+        name: &str,
+        function: &Function,
+        used: &mut BTreeSet<String>,
+    ) -> Result<String, Error> {
+        let output = function.output.as_deref().unwrap_or("()");
+        if self.support.commands.no_op.contains_key(name) {
+            return Ok("Ok(())".to_owned());
+        }
+        if self.support.commands.refused.contains_key(name) {
+            let refusal = format!("Error::Unsupported {{ command: \"{name}\".to_owned() }}");
+            let first = &function.parameters[0];
+            return Ok(if first.ty == "vk :: CommandBuffer" {
+                format!(
+                    "// SAFETY: the application follows Vulkan's valid usage: the handle is live.
+                    unsafe {{ record({}, |_| Err({refusal})) }}",
+                    first.name
+                )
+            } else {
+                format!("Err::<{output}, _>({refusal})")
+            });
+        }
+        let last = function
+            .parameters
+            .iter()
+            .rev()
+            .find(|parameter| !parameter.ty.contains("AllocationCallbacks"));
+        if let (Some(handle), true) = (
+            last,
+            name.starts_with("vkDestroy") || name == "vkFreeMemory",
+        ) {
+            used.insert(handle.name.clone());
+            return Ok(format!(
+                "// SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
+                unsafe {{ handle::destroy({}) }}.map(drop)",
+                handle.name
+            ));
+        }
+        Err(Error::EntryPoint(format!(
+            "{name} has no function (with #[doc(alias = \"{name}\")]), and support.toml neither refuses it nor says that \
+             it does nothing"
+        )))
+    }
+}
+
+/// What decides who may look a command up.
+fn scope(name: &str, definition: &registry::Command) -> &'static str {
+    if name == "vkGetInstanceProcAddr" {
+        return "Global";
+    }
+    match definition.parameters.first().map(|first| first.ty.as_str()) {
+        Some("VkInstance") => "Instance",
+        Some("VkPhysicalDevice") => "PhysicalDevice",
+        Some("VkDevice" | "VkQueue" | "VkCommandBuffer") => "Device",
+        _ => "Global",
+    }
+}
+
+/// A type without spaces, paths and lifetimes, to compare and to take apart.
+fn plain(ty: &str) -> String {
+    let text: String = ty.split_whitespace().collect();
+    text.replace("std::ffi::", "")
+        .replace("gaurast::vk::", "")
+        .replace("vk::", "")
+        .replace("<'_>", "")
+        .replace("'_", "")
+        // The length of an array.
+        .replace("usize]", "]")
+}
+
+/// The body of a command that calls the driver's function of it.
+fn call(
+    name: &str,
+    definition: &registry::Command,
+    function: &Function,
+    entry_point: &EntryPoint,
+    used: &mut BTreeSet<String>,
+) -> Result<String, Error> {
+    let wrong = |text: String| Error::EntryPoint(format!("{}: {text}", entry_point.path));
+    let mut is_unsafe = entry_point.is_unsafe;
+    let mut arguments = Vec::new();
+    let mut records = false;
+    for parameter in &entry_point.parameters {
+        if matches!(parameter.name.as_str(), "recorder" | "_recorder") {
+            records = true;
+            arguments.push("recorder".to_owned());
+            continue;
+        }
+        let index = function
+            .parameters
+            .iter()
+            .position(|declared| {
+                without_prefix(&declared.name) == parameter.name.trim_start_matches('_')
+            })
+            .ok_or_else(|| {
+                wrong(format!(
+                    "{name} has no parameter {}, but {}",
+                    parameter.name,
+                    list_names(&function.parameters)
+                ))
+            })?;
+        let declared = &function.parameters[index];
+        let count = count_of(definition, function, index);
+        let (argument, converts) = convert(&parameter.ty, declared, count).ok_or_else(|| {
+            wrong(format!(
+                "{} of type {} is not made of {}",
+                parameter.name, parameter.ty, declared.ty
+            ))
+        })?;
+        is_unsafe |= converts;
+        used.insert(declared.name.clone());
+        if let (Some(count), true) = (count, argument.contains("pointer::slice")) {
+            used.insert(count.name.clone());
+        }
+        arguments.push(argument);
+    }
+    let call = format!(
+        "entrypoints::{}({})",
+        entry_point.path,
+        arguments.join(", ")
+    );
+    let body = if records {
+        is_unsafe = true;
+        format!("record({}, |recorder| {call})", function.parameters[0].name)
+    } else {
+        let (body, writes) = write_output(&entry_point.output, function, used, call)
+            .ok_or_else(|| wrong(format!("nothing takes a {}", entry_point.output)))?;
+        is_unsafe |= writes;
+        body
+    };
+    Ok(if is_unsafe {
+        format!(
+            "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {{ {body} }}"
+        )
+    } else {
+        body
+    })
+}
+
+fn without_prefix(name: &str) -> &str {
+    name.strip_prefix("pp_")
+        .or_else(|| name.strip_prefix("p_"))
+        .unwrap_or(name)
+}
+
+fn list_names(parameters: &[Member]) -> String {
+    let names: Vec<&str> = parameters.iter().map(|p| without_prefix(&p.name)).collect();
+    names.join(", ")
+}
+
+/// The parameter that counts the elements of another.
+fn count_of<'a>(
+    definition: &registry::Command,
+    function: &'a Function,
+    index: usize,
+) -> Option<&'a Member> {
+    let len = definition.parameters.get(index)?.len.as_deref()?;
+    let index = definition.parameters.iter().position(|p| p.name == len)?;
+    function.parameters.get(index)
+}
+
+/// A parameter in the form that a function wants; and if that is unsafe.
+fn convert(wanted: &str, declared: &Member, count: Option<&Member>) -> Option<(String, bool)> {
+    let (wanted, raw, name) = (plain(wanted), plain(&declared.ty), &declared.name);
+    if wanted == raw {
+        return Some((name.clone(), false));
+    }
+    if wanted == "bool" && raw == "Bool32" {
+        return Some((format!("{name} != vk::FALSE"), false));
+    }
+    let conversion = if let Some(pointee) = wanted.strip_prefix('&')
+        && raw == format!("*const{pointee}")
+    {
+        format!("pointer::input({name})?")
+    } else if let Some(element) = wanted.strip_prefix("&[") {
+        let count = &count?.name;
+        let slice = format!("pointer::slice({name}, {count})?");
+        if element == "u8]" && raw == "*constc_void" {
+            format!("pointer::slice({name}.cast::<u8>(), {count})?")
+        } else if element.starts_with("Arc<") {
+            format!("&handle::get_all({slice})?")
+        } else if raw == format!("*const{}", element.trim_end_matches(']')) {
+            slice
+        } else {
+            return None;
+        }
+    } else if let Some(element) = wanted.strip_prefix("Option<&[")
+        && raw == format!("*const{}", element.trim_end_matches("]>"))
+    {
+        let count = &count?.name;
+        format!("(!{name}.is_null()).then(|| pointer::slice({name}, {count})).transpose()?")
+    } else if wanted == "&CStr" && raw == "*constc_char" {
+        format!("pointer::string({name}).ok_or(Error::NullPointer {{ what: \"{name}\" }})?")
+    } else if wanted == "Option<&CStr>" && raw == "*constc_char" {
+        format!("pointer::string({name})")
+    } else if let Some(pointee) = wanted.strip_prefix("&mut")
+        && raw == format!("*mut{pointee}")
+    {
+        format!("pointer::output_structure({name})?")
+    } else if let Some(pointee) = wanted.strip_prefix("Option<&")
+        && raw == format!("*const{}", pointee.trim_end_matches('>'))
+    {
+        format!("pointer::optional({name})")
+    } else if raw.starts_with('*') {
+        return None;
+    } else if wanted.starts_with("Option<&") {
+        format!("handle::get_optional({name})?")
+    } else if wanted.starts_with('&') {
+        format!("handle::get({name})?")
+    } else {
+        return None;
+    };
+    Some((conversion, true))
+}
+
+/// A call whose result goes where the command's output does; and if that is unsafe.
+fn write_output(
+    output: &str,
+    function: &Function,
+    used: &mut BTreeSet<String>,
+    call: String,
+) -> Option<(String, bool)> {
+    let output = plain(output);
+    let returned = function.output.as_deref().map(plain);
+    if output == "()" || output == "Result" || Some(&output) == returned.as_ref() {
+        return Some((call, false));
+    }
+    let place = function.parameters.last()?;
+    let raw = plain(&place.ty);
+    let pointee = raw.strip_prefix("*mut")?;
+    used.insert(place.name.clone());
+    let name = &place.name;
+    if output == pointee {
+        return Some((format!("pointer::output({name}, {call}?)"), true));
+    }
+    if output.starts_with("Arc<") {
+        return Some((
+            format!("pointer::output({name}, handle::create({call}?))"),
+            true,
+        ));
+    }
+    if output == format!("Vec<{pointee}>") || output.starts_with(&format!("[{pointee};")) {
+        let count = &function.parameters.iter().rev().nth(1)?.name;
+        used.insert(count.clone());
+        return Some((
+            format!("pointer::enumerate({count}, {name}, &{call}?)"),
+            true,
+        ));
+    }
+    None
+}

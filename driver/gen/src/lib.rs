@@ -1,0 +1,79 @@
+//! Writes the driver's Rust from the Vulkan registry.
+//!
+//! What the registry says isn't copied by hand: this reads `vk.xml`, the fragment of the driver's own extension, and
+//! `driver/support.toml`, which says what of it the driver supports, and writes the files of `driver/src/registry` and
+//! the dispatch table. They
+//! are checked in, so that building the driver needs neither this crate nor `vk.xml`, which `driver/gen/fetch.sh` gets.
+//! What the things are called in Rust it learns from the sources of ash and of `api/`.
+
+mod ash;
+mod chains;
+mod commands;
+mod entry_points;
+mod error;
+mod extensions;
+mod features;
+mod properties;
+mod registry;
+mod rust;
+mod spirv;
+mod support;
+
+pub use error::Error;
+
+use crate::ash::Declarations;
+use crate::registry::Registry;
+use crate::support::Support;
+use std::path::Path;
+
+/// A generated file.
+#[derive(Debug)]
+pub struct File {
+    /// Its path from the root of the repository.
+    pub path: &'static str,
+    /// Its contents.
+    pub text: String,
+}
+
+/// Generates all files from a registry, for the repository that has its root at `root`.
+///
+/// # Errors
+/// Each [`Error`] names what has to be changed, the registry's file, `driver/support.toml`, or the driver.
+pub fn generate(root: &Path, vk_xml: &Path) -> Result<Vec<File>, Error> {
+    let registry = Registry::read(vk_xml, &root.join("api/spec/vk_gaurast.xml"))?;
+    let support = Support::read(&root.join("driver/support.toml"))?;
+    support.check(&registry)?;
+    let declarations = Declarations::read(root)?;
+    Ok(vec![
+        File {
+            path: "driver/src/registry/extensions.rs",
+            text: extensions::write(&registry, &support)?,
+        },
+        File {
+            path: "driver/src/registry/features.rs",
+            text: features::write(&registry, &declarations, &support)?,
+        },
+        File {
+            path: "driver/src/registry/properties.rs",
+            text: properties::write(&registry, &declarations, &support)?,
+        },
+        File {
+            path: "driver/src/dispatch/commands.rs",
+            text: commands::write(
+                &registry,
+                &declarations,
+                &support,
+                &entry_points::find(root)?,
+            )?,
+        },
+        File {
+            path: "driver/src/registry/spirv.rs",
+            text: spirv::write(&registry, &declarations, &support)?,
+        },
+    ])
+}
+
+/// The root of the repository that this crate was built in.
+pub fn repository() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}

@@ -1,0 +1,167 @@
+//! Writes `registry/spirv.rs`.
+
+use crate::ash::Declarations;
+use crate::chains::Chained;
+use crate::error::Error;
+use crate::registry::Registry;
+use crate::support::Support;
+use crate::{features, properties, rust};
+use rspirv::spirv::Capability;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::str::FromStr;
+use vk_parse::Enable;
+
+/// What of the driver a capability may be enabled by.
+struct Known<'a> {
+    registry: &'a Registry,
+    declarations: &'a Declarations,
+    support: &'a Support,
+    features: Vec<Chained<'a>>,
+    properties: Vec<Chained<'a>>,
+}
+
+pub(crate) fn write(
+    registry: &Registry,
+    declarations: &Declarations,
+    support: &Support,
+) -> Result<String, Error> {
+    let known = Known {
+        registry,
+        declarations,
+        support,
+        features: features::structures(registry, declarations, support)?,
+        properties: properties::structures(registry, declarations, support)?,
+    };
+    let mut arms = String::new();
+    // Some names are other names of the same capability.
+    let mut seen = BTreeSet::new();
+    for (name, enables) in &registry.capabilities {
+        let Ok(capability) = Capability::from_str(name) else {
+            continue;
+        };
+        if !seen.insert(capability as u32) {
+            continue;
+        }
+        let mut rows = Vec::new();
+        for enable in enables {
+            match known.enable(enable)? {
+                Some(row) => rows.push(row),
+                // The core version or a listed extension is enough.
+                None => {
+                    rows.clear();
+                    break;
+                }
+            }
+        }
+        let mut distinct = BTreeSet::new();
+        rows.retain(|row| distinct.insert(row.clone()));
+        if !rows.is_empty() && !support.spirv.accepted.contains(name) {
+            let _ = writeln!(
+                arms,
+                "Capability::{capability:?} => &[{}],",
+                rows.join(", ")
+            );
+        }
+    }
+    rust::file(
+        "//! SPIR-V's capabilities, and what enables each.",
+        &format!(
+            "use crate::registry::features::Features;
+            use crate::registry::properties::Properties;
+            use ash::vk;
+            use rspirv::spirv::Capability;
+
+            /// A thing that enables a capability.
+            #[derive(Clone, Copy, Debug)]
+            pub(crate) enum Enable {{
+                /// A feature, by its name in Rust.
+                Feature(&'static str, fn(&Features) -> bool),
+                /// A value of a property, by the property's name in Rust.
+                Property(&'static str, fn(&Properties) -> bool),
+                /// A feature, property, extension or version that this driver doesn't have.
+                Absent(&'static str),
+            }}
+
+            /// The things of which one enables a capability. There are none where the core version, or an extension
+            /// that is listed, is enough; nor for capabilities that Vulkan doesn't know.
+            pub(crate) fn enables(capability: Capability) -> &'static [Enable] {{
+                match capability {{ {arms} _ => &[] }}
+            }}
+            "
+        ),
+    )
+}
+
+impl Known<'_> {
+    /// A row of what enables a capability; `None` where nothing is needed.
+    fn enable(&self, enable: &Enable) -> Result<Option<String>, Error> {
+        Ok(match enable {
+            Enable::Version(name) if self.support.has(name) => None,
+            Enable::Extension(name) if self.support.has(name) => None,
+            Enable::Version(name) | Enable::Extension(name) => Some(absent(name)),
+            Enable::Feature(feature) => Some(self.feature(feature)),
+            Enable::Property(property) => Some(self.property(property)?),
+            _ => Some(absent("something else")),
+        })
+    }
+
+    fn feature(&self, enable: &vk_parse::FeatureEnable) -> String {
+        let structure = self.registry.type_name(&enable.struct_);
+        let field = self
+            .features
+            .iter()
+            .find(|chained| chained.name == structure)
+            .and_then(|chained| member(chained, &enable.feature));
+        match field {
+            Some(field) => format!("Enable::Feature(\"{field}\", |f| f.{field})"),
+            None => absent(
+                Chained::new(self.registry, self.declarations, structure, None)
+                    .ok()
+                    .and_then(|chained| member(&chained, &enable.feature))
+                    .unwrap_or(&enable.feature),
+            ),
+        }
+    }
+
+    fn property(&self, enable: &vk_parse::PropertyEnable) -> Result<String, Error> {
+        let structure = self.registry.type_name(&enable.property);
+        let Some(chained) = self.properties.iter().find(|c| c.name == structure) else {
+            return Ok(absent(&enable.member));
+        };
+        let Some(field) = member(chained, &enable.member) else {
+            return Err(Error::Support(format!(
+                "{structure} has no member {}",
+                enable.member
+            )));
+        };
+        let field = properties::field(structure, field);
+        let condition = match enable.value.as_str() {
+            "VK_TRUE" => format!("p.{field}"),
+            value => {
+                let bit = value
+                    .strip_prefix("VK_SUBGROUP_FEATURE_")
+                    .and_then(|value| value.split("_BIT").next())
+                    .ok_or_else(|| Error::Support(format!("{value} is no bit known here")))?;
+                if value.ends_with("_BIT") {
+                    format!("p.{field}.contains(vk::SubgroupFeatureFlags::{bit})")
+                } else {
+                    return Ok(absent(&enable.member));
+                }
+            }
+        };
+        Ok(format!("Enable::Property(\"{field}\", |p| {condition})"))
+    }
+}
+
+fn absent(name: &str) -> String {
+    format!("Enable::Absent(\"{name}\")")
+}
+
+/// The Rust name of a structure's member.
+fn member<'a>(chained: &Chained<'a>, name: &str) -> Option<&'a str> {
+    chained
+        .members()
+        .find(|(member, _)| member.name == name)
+        .map(|(_, declared)| declared.name.as_str())
+}
