@@ -22,6 +22,7 @@ need vulkan-validationlayers /usr/share/vulkan/explicit_layer.d/VkLayer_khronos_
 need glslang-tools glslangValidator
 need spirv-tools spirv-val
 need valgrind valgrind
+if ! python3 -m pip --version >/dev/null 2>&1; then missing+=(python3-pip); fi
 if [ ${#missing[@]} -gt 0 ]; then
     if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
         echo "installing: ${missing[*]}"
@@ -39,8 +40,13 @@ export GAURAST_TEST_REPORT="$work/report"
 touch "$GAURAST_TEST_REPORT"
 
 # The Vulkan registry, which the driver's generated files are compared with.
-if [ -z "${GAURAST_VK_XML:-}" ] && driver/gen/fetch.sh "$work" 2>/dev/null; then
-    export GAURAST_VK_XML="$work/vk.xml"
+if [ -z "${GAURAST_VK_XML:-}" ]; then
+    echo "fetching vk.xml"
+    if driver/gen/fetch.sh "$work"; then
+        export GAURAST_VK_XML="$work/vk.xml"
+    else
+        echo "there is no vk.xml, and the test that needs it will be ignored" >&2
+    fi
 fi
 
 # Tells of all steps so far; also where one failed.
