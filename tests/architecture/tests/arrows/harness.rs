@@ -38,7 +38,7 @@ fn without_harness(folder: &Path, manifest: &Table) -> Vec<PathBuf> {
         };
         let parent = root.parent().expect("a folder");
         if root.exists() {
-            sources(parent, &[library.clone()], &mut found);
+            sources(parent, std::slice::from_ref(&library), &mut found);
         } else {
             found.push(folder.join("tests").join(format!("{name}.rs")));
         }
