@@ -1,4 +1,4 @@
-//! What ash, and gaurast beside it, declare: the Rust names and types of the registry's things.
+//! Declarations of ash, and of gaurast beside it: the Rust names and types of the registry's things.
 
 use crate::error::Error;
 use crate::registry::{self, Registry};
@@ -39,7 +39,7 @@ pub struct Function {
     pub ty: String,
     /// Its parameters.
     pub parameters: Vec<Member>,
-    /// What it returns.
+    /// The type that it returns.
     pub output: Option<String>,
 }
 

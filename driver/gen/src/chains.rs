@@ -11,7 +11,7 @@ use std::collections::HashSet;
 pub(crate) struct Chained<'a> {
     /// Its name in the registry.
     pub(crate) name: &'a str,
-    /// What the registry says of it.
+    /// The registry's words of it.
     pub(crate) structure: &'a registry::Structure,
     /// Its declaration, whose members are in the same order.
     pub(crate) declared: &'a ash::Structure,

@@ -344,7 +344,7 @@ impl Writer<'_> {
     }
 }
 
-/// What decides who may look a command up.
+/// The condition under which a command may be looked up.
 fn scope(name: &str, definition: &registry::Command) -> &'static str {
     if name == "vkGetInstanceProcAddr" {
         return "Global";

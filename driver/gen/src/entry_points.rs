@@ -21,7 +21,7 @@ pub(crate) struct EntryPoint {
     pub(crate) is_unsafe: bool,
     /// Its parameters.
     pub(crate) parameters: Vec<Member>,
-    /// What it returns, without the error.
+    /// The type that it returns, without the error.
     pub(crate) output: String,
 }
 

@@ -18,7 +18,7 @@ pub enum Error {
     Program {
         /// The program's name.
         program: &'static str,
-        /// What it said.
+        /// Its message.
         reason: String,
     },
     /// The registry is of another version.
@@ -36,7 +36,7 @@ pub enum Error {
     Registry {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         reason: String,
     },
     /// Rust that can't be parsed.
@@ -44,7 +44,7 @@ pub enum Error {
     Rust {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The fault.
         source: syn::Error,
     },
     /// A `support.toml` that can't be parsed.

@@ -26,9 +26,9 @@ pub struct Registry {
     pub commands: HashMap<String, Command>,
     /// The names of commands by other names of theirs.
     command_aliases: HashMap<String, String>,
-    /// What core versions require, in the registry's order.
+    /// The requirements of core versions, in the registry's order.
     pub versions: Vec<Requirement<Version>>,
-    /// What extensions require, in the registry's order.
+    /// The requirements of extensions, in the registry's order.
     pub extensions: Vec<Extension>,
     /// SPIR-V's capabilities and what enables each.
     pub capabilities: Vec<(String, Vec<vk_parse::Enable>)>,
@@ -71,7 +71,7 @@ pub struct Parameter {
 /// A core version, as its major and minor number.
 pub type Version = (u32, u32);
 
-/// What a core version or an extension requires, under a condition.
+/// A requirement of a core version or an extension, under a condition.
 #[derive(Debug)]
 pub struct Requirement<T> {
     /// Who requires it.
@@ -99,7 +99,7 @@ pub struct Extension {
     pub promoted_to: Option<String>,
     /// The condition under which it may be supported.
     pub depends: Option<String>,
-    /// What it requires.
+    /// The things that it requires.
     pub requirements: Vec<Requirement<()>>,
 }
 

@@ -12,7 +12,7 @@ use std::fmt::Write;
 use std::str::FromStr;
 use vk_parse::Enable;
 
-/// What of the driver a capability may be enabled by.
+/// The part of the driver that a capability may be enabled by.
 struct Known<'a> {
     registry: &'a Registry,
     declarations: &'a Declarations,

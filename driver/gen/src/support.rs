@@ -1,4 +1,4 @@
-//! What the driver supports: `driver/support.toml`.
+//! The things that the driver supports: `driver/support.toml`.
 
 use crate::error::Error;
 use crate::registry::{self, Registry, Version};
@@ -10,7 +10,7 @@ use std::path::Path;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
-    /// What the core version brings.
+    /// The things that the core version brings.
     pub core: Core,
     /// The extensions that are listed.
     pub extension: BTreeMap<String, Listed>,
@@ -22,7 +22,7 @@ pub struct Support {
     pub absent: BTreeMap<String, String>,
 }
 
-/// What the core version brings.
+/// The things that the core version brings.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Core {
@@ -38,7 +38,7 @@ pub struct Core {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Spirv {
-    /// Those that work although the extension that brings them isn't listed.
+    /// Capabilities that work although the extension that brings them isn't listed.
     pub accepted: Vec<String>,
 }
 
@@ -46,9 +46,9 @@ pub struct Spirv {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Commands {
-    /// Those that fail, and why.
+    /// Commands that fail, and why.
     pub refused: BTreeMap<String, String>,
-    /// Those that rightly do nothing, and why.
+    /// Commands that rightly do nothing, and why.
     pub no_op: BTreeMap<String, String>,
 }
 

@@ -1,4 +1,4 @@
-//! What a test needs of the machine, and what happens where it is missing.
+//! Needs of a test: programs, files, data, capabilities; and the end of a test where one is missing.
 
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};

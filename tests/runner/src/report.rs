@@ -1,4 +1,4 @@
-//! What a run tells beside its results: the slowest tests, and the reasons of those that were ignored.
+//! The report of a run beside its results: the slowest tests, and the reasons of those that were ignored.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -9,7 +9,7 @@ use std::time::Duration;
 /// a script can tell of all of them together.
 pub(crate) const REPORT: &str = "GAURAST_TEST_REPORT";
 
-/// How many of the slowest tests are told.
+/// The number of slowest tests that are told.
 const SLOWEST: usize = 20;
 
 /// The times and reasons of a run.

@@ -22,7 +22,7 @@ use workload::Workload;
 /// The hidden command that makes a process a worker.
 const WORKER: &str = "counts-worker";
 
-/// Which programs and files a test may not lack: nothing, `programs`, `data` or `all`.
+/// The variable that makes a missing program a failure: `programs` or `all`.
 const REQUIRE: &str = "GAURAST_TEST_REQUIRE";
 
 /// Why the counts could not be made, or are not as stored. Displayed as one sentence.
@@ -56,7 +56,7 @@ pub enum CountsError {
     Differs(usize),
 }
 
-/// What the counts take.
+/// Arguments of the counts.
 #[derive(Args)]
 pub struct CountsArguments {
     /// Stores the counts instead of holding them against the stored ones
@@ -87,10 +87,10 @@ enum Part {
     Sizes,
 }
 
-/// What a worker is told.
+/// Arguments of a worker.
 #[derive(Args)]
 pub struct WorkerArguments {
-    /// What is drawn
+    /// The workload
     #[arg(value_enum, required = true)]
     workloads: Vec<Workload>,
 
@@ -103,7 +103,7 @@ pub struct WorkerArguments {
     through_the_loader: bool,
 }
 
-/// What is not as it should be.
+/// The failures of a check.
 #[derive(Default)]
 struct Report {
     failures: usize,

@@ -13,7 +13,7 @@ use crate::worker::SKIPS;
 /// The SIMD levels of `GAURAST_SIMD`.
 const LEVELS: [&str; 3] = ["sse2", "avx2", "avx512"];
 
-/// Whether this processor has a level.
+/// Reports whether this processor has a level.
 pub(super) fn is_there(level: &str) -> bool {
     #[cfg(target_arch = "x86_64")]
     // The features that the levels are named after stand for all that each needs.

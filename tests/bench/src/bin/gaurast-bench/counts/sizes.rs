@@ -28,7 +28,7 @@ const LEVELS: [(&str, &str); 3] = [
     ("::Avx512", "avx512"),
 ];
 
-/// What functions of a module at a level take.
+/// The size of a module's functions at a level.
 #[derive(Clone, Copy, Default)]
 struct Sum {
     functions: u64,

@@ -27,7 +27,7 @@ const QUADS: usize = 3000;
 /// The alpha below which a quad ends.
 const ALPHA_FLOOR: f32 = 1.0 / 255.0;
 
-/// What is drawn.
+/// The work that is counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Workload {
     /// The synthetic scene that performance is measured on
