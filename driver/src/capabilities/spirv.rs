@@ -4,7 +4,7 @@ use crate::capabilities::limits;
 use crate::error::Error;
 use crate::registry::features::{Features, SUPPORTED};
 use crate::registry::spirv::{Enable, enables};
-use rspirv::spirv::{Capability, Op};
+use spirv::{Capability, Op};
 
 /// Refuses a module that declares a capability that isn't enabled. Capabilities that the translator doesn't know are its
 /// own to refuse.

@@ -1,11 +1,10 @@
 //! Arithmetic on constants, for `OpSpecConstantOp`.
 
 use half::f16;
-use rspirv::spirv::Op;
+use spirv::Op;
 
 use super::error::{Outcome, malformed, unsupported};
 use super::globals::{Constant, Globals};
-use super::module::SpecOp;
 use super::types::Scalar;
 
 /// The register form of a constant's bits in memory.
@@ -60,13 +59,16 @@ struct Number {
     signed: i64,
 }
 
-/// The value of an operation on constants.
-pub(super) fn evaluate(globals: &Globals, ty: u32, operation: &SpecOp) -> Outcome<Vec<u64>> {
-    let Some(op) = Op::from_u32(operation.opcode) else {
-        return malformed(format!("there is no operation {}", operation.opcode));
+/// The value of an operation on constants: `words` are its opcode and its operands.
+pub(super) fn evaluate(globals: &Globals, ty: u32, words: &[u32]) -> Outcome<Vec<u64>> {
+    let Some((opcode, operands)) = words.split_first() else {
+        return malformed("there is no operation");
+    };
+    let Some(op) = Op::from_u32(*opcode) else {
+        return malformed(format!("there is no operation {opcode}"));
     };
     let operand = |index: usize| -> Outcome<&Constant> {
-        let id = operation.operands.get(index).copied().unwrap_or(0);
+        let id = operands.get(index).copied().unwrap_or(0);
         match globals.constants.get(&id) {
             Some(constant) => Ok(constant),
             None => malformed(format!("operand {index} isn't a constant")),
@@ -75,21 +77,15 @@ pub(super) fn evaluate(globals: &Globals, ty: u32, operation: &SpecOp) -> Outcom
     match op {
         Op::CompositeExtract => {
             let whole = operand(0)?;
-            let (part, start) = path(
-                globals,
-                whole.ty,
-                operation.operands.get(1..).unwrap_or_default(),
-            )?;
+            let indices = operands.get(1..).unwrap_or_default();
+            let (part, start) = path(globals, whole.ty, indices)?;
             let count = globals.types.scalars(part)? as usize;
             return Ok(whole.bits[start..start + count].to_vec());
         }
         Op::CompositeInsert => {
             let (object, whole) = (operand(0)?, operand(1)?);
-            let (part, start) = path(
-                globals,
-                whole.ty,
-                operation.operands.get(2..).unwrap_or_default(),
-            )?;
+            let indices = operands.get(2..).unwrap_or_default();
+            let (part, start) = path(globals, whole.ty, indices)?;
             let count = globals.types.scalars(part)? as usize;
             if object.bits.len() != count {
                 return malformed("the object doesn't fit its place");
@@ -104,14 +100,8 @@ pub(super) fn evaluate(globals: &Globals, ty: u32, operation: &SpecOp) -> Outcom
                 let both = a.bits.iter().chain(b.bits.iter());
                 both.copied().nth(*index as usize).unwrap_or(0)
             };
-            return Ok(operation
-                .operands
-                .get(2..)
-                .unwrap_or_default()
-                .iter()
-                .take(4)
-                .map(pick)
-                .collect());
+            let indices = operands.get(2..).unwrap_or_default();
+            return Ok(indices.iter().take(4).map(pick).collect());
         }
         Op::Select => {
             let (condition, a, b) = (operand(0)?, operand(1)?, operand(2)?);
@@ -133,7 +123,7 @@ pub(super) fn evaluate(globals: &Globals, ty: u32, operation: &SpecOp) -> Outcom
     let (result, count) = globals.types.vector(ty)?;
     let first = operand(0)?;
     let (from, _) = globals.types.vector(first.ty)?;
-    let second = match operation.operands.len() {
+    let second = match operands.len() {
         1 => first,
         _ => operand(1)?,
     };

@@ -1,7 +1,7 @@
 //! Why a shader can't be used: the instruction and the reason.
 
-use rspirv::{dr, spirv};
 use simdevice::isa::validate::InvalidProgram;
+use spirv::Op;
 use thiserror::Error;
 
 use super::Stage;
@@ -10,23 +10,9 @@ use super::Stage;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// The instruction's name.
-    pub opcode: spirv::Op,
+    pub opcode: Op,
     /// The id that it defines, or, if it defines none, the first id that it names.
     pub id: Option<u32>,
-}
-
-impl Place {
-    /// The place of an instruction.
-    pub(super) fn of(instruction: &dr::Instruction) -> Self {
-        let named = instruction
-            .operands
-            .iter()
-            .find_map(dr::Operand::id_ref_any);
-        Self {
-            opcode: instruction.class.opcode,
-            id: instruction.result_id.or(named),
-        }
-    }
 }
 
 impl std::fmt::Display for Place {
@@ -127,8 +113,8 @@ pub(super) fn unsupported<T>(reason: impl Into<String>) -> Outcome<T> {
 
 impl Fault {
     /// Says which instruction it was, unless that is known already.
-    pub(super) fn at(self, instruction: &dr::Instruction) -> Error {
-        let place = Place::of(instruction);
+    pub(super) fn at(self, place: impl Into<Place>) -> Error {
+        let place = place.into();
         match self {
             Self::Malformed(reason) => Error::Malformed { place, reason },
             Self::Unsupported(reason) => Error::Unsupported { place, reason },
@@ -140,25 +126,5 @@ impl Fault {
 impl From<Error> for Fault {
     fn from(error: Error) -> Self {
         Self::Placed(error)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn errors_name_the_instruction() {
-        let instruction = dr::Instruction::new(
-            spirv::Op::FAdd,
-            Some(1),
-            Some(12),
-            vec![dr::Operand::IdRef(7)],
-        );
-        let error = Fault::Malformed("operand %7 isn't defined".into()).at(&instruction);
-        assert_eq!(
-            error.to_string(),
-            "malformed SPIR-V: OpFAdd %12: operand %7 isn't defined"
-        );
     }
 }

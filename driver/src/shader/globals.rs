@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use rspirv::dr::{Instruction, Operand};
-use rspirv::spirv::{Decoration, Op, StorageClass};
+use spirv::{Decoration, Dim, ImageFormat, Op, StorageClass};
 
 use super::constant;
 use super::error::{Error, Outcome, malformed, unsupported};
-use super::module::{Module, Operands};
+use super::instruction::{Instruction, Operand};
+use super::module::Module;
 use super::types::{ImageType, Member, Scalar, Type, Types};
 
 /// The most scalars of all constants together.
@@ -72,7 +72,7 @@ impl Globals {
     /// Reads them, in order.
     pub fn new(module: &Module, specialization: &Specialization) -> Result<Self, Error> {
         let mut globals = Self::default();
-        for instruction in &module.data.types_global_values {
+        for instruction in &module.sections.globals {
             globals
                 .instruction(module, specialization, instruction)
                 .map_err(|fault| fault.at(instruction))?;
@@ -112,9 +112,9 @@ impl Globals {
         specialization: &Specialization,
         it: &Instruction,
     ) -> Outcome<()> {
-        if it.class.opcode == Op::Variable {
+        if it.opcode == Op::Variable {
             let (class, pointee) = self.types.pointer(it.ty()?)?;
-            let initializer = it.operands.get(1).and_then(Operand::id_ref_any);
+            let initializer = it.id(1).ok();
             let variable = GlobalVariable {
                 class,
                 pointee,
@@ -123,25 +123,22 @@ impl Globals {
             self.variables.insert(it.result()?, variable);
             return Ok(());
         }
-        if it.class.opcode == Op::TypeForwardPointer {
-            return match it.operands.get(1) {
-                Some(Operand::StorageClass(class)) => self.types.forward(it.id(0)?, *class),
-                _ => malformed("there is no storage class"),
+        if it.opcode == Op::TypeForwardPointer {
+            return match it.enumerant(1, StorageClass::from_u32) {
+                Some(class) => self.types.forward(it.id(0)?, class),
+                None => malformed("there is no storage class"),
             };
         }
-        if it.class.opcode.is_type() {
+        if it.opcode.is_type() {
             let ty = self.read_type(module, it)?;
             return self.types.declare(it.result()?, ty);
-        }
-        if matches!(it.class.opcode, Op::Line | Op::NoLine) {
-            return Ok(());
         }
         self.constant(module, specialization, it)
     }
 
     fn read_type(&self, module: &Module, it: &Instruction) -> Outcome<Type> {
         let stride = |id| module.literal(id, Decoration::ArrayStride);
-        Ok(match it.class.opcode {
+        Ok(match it.opcode {
             Op::TypeVoid => Type::Void,
             Op::TypeBool => Type::Scalar(Scalar::Bool),
             Op::TypeInt => {
@@ -190,12 +187,12 @@ impl Globals {
                 stride: stride(it.result()?),
             },
             Op::TypeStruct => Type::Struct(self.members(module, it)?),
-            Op::TypePointer => match it.operands.first() {
-                Some(Operand::StorageClass(class)) => Type::Pointer {
-                    class: *class,
+            Op::TypePointer => match it.enumerant(0, StorageClass::from_u32) {
+                Some(class) => Type::Pointer {
+                    class,
                     pointee: it.id(1)?,
                 },
-                _ => return malformed("there is no storage class"),
+                None => return malformed("there is no storage class"),
             },
             Op::TypeImage => Type::Image(image_type(it)?),
             Op::TypeSampler => Type::Sampler,
@@ -238,7 +235,7 @@ impl Globals {
             Some(spec_id) => specialization.bits(spec_id, bytes),
             None => Ok(None),
         };
-        let opcode = it.class.opcode;
+        let opcode = it.opcode;
         let bits = match opcode {
             Op::ConstantTrue => vec![1],
             Op::ConstantFalse => vec![0],
@@ -249,8 +246,8 @@ impl Globals {
             Op::Constant | Op::SpecConstant => {
                 let (scalar, _) = self.types.vector(ty)?;
                 let literal = match it.operands.first() {
-                    Some(Operand::LiteralBit32(bits)) => u64::from(*bits),
-                    Some(Operand::LiteralBit64(bits)) => *bits,
+                    Some(Operand::Literal(bits)) => u64::from(*bits),
+                    Some(Operand::Literal64(bits)) => *bits,
                     _ => return malformed("there is no value"),
                 };
                 let bytes = match scalar {
@@ -278,13 +275,8 @@ impl Globals {
                 bits
             }
             Op::ConstantNull => vec![0; self.types.scalars(ty)? as usize],
-            Op::Undef => match module.spec_ops.get(&id) {
-                Some(operation) => {
-                    let bits = constant::evaluate(self, ty, operation)?;
-                    return self.define(id, ty, bits);
-                }
-                None => vec![0; self.types.scalars(ty)? as usize],
-            },
+            Op::Undef => vec![0; self.types.scalars(ty)? as usize],
+            Op::SpecConstantOp => constant::evaluate(self, ty, &it.numbers(0))?,
             _ => return unsupported("this instruction outside a function"),
         };
         self.define(id, ty, bits)
@@ -292,24 +284,18 @@ impl Globals {
 }
 
 fn image_type(it: &Instruction) -> Outcome<ImageType> {
-    match it.operands.as_slice() {
-        [
-            Operand::IdRef(sampled_type),
-            Operand::Dim(dim),
-            Operand::LiteralBit32(_depth),
-            Operand::LiteralBit32(arrayed),
-            Operand::LiteralBit32(multisampled),
-            Operand::LiteralBit32(sampled),
-            Operand::ImageFormat(format),
-            ..,
-        ] => Ok(ImageType {
-            sampled_type: *sampled_type,
-            dim: *dim,
-            arrayed: *arrayed != 0,
-            multisampled: *multisampled != 0,
-            sampled: *sampled,
-            format: *format,
-        }),
-        _ => malformed("the image type isn't complete"),
-    }
+    let (Some(dim), Some(format)) = (
+        it.enumerant(1, Dim::from_u32),
+        it.enumerant(6, ImageFormat::from_u32),
+    ) else {
+        return malformed("the image type isn't complete");
+    };
+    Ok(ImageType {
+        sampled_type: it.id(0)?,
+        dim,
+        arrayed: it.number(3)? != 0,
+        multisampled: it.number(4)? != 0,
+        sampled: it.number(5)?,
+        format,
+    })
 }

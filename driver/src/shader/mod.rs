@@ -7,8 +7,11 @@
 //! in bounded time and memory, never a panic.
 
 mod constant;
+mod decoder;
 mod error;
 mod globals;
+mod grammar;
+mod instruction;
 mod interface;
 mod module;
 pub mod reflect;

@@ -1,39 +1,17 @@
-//! A SPIR-V module in rspirv's data representation, decoded so that hostile input can't make the decoder panic.
-//!
-//! rspirv trusts two things that this module therefore checks or rewrites first:
-//!
-//! - An instruction's word count may lead beyond the end of the binary, where decoding a string would index out of
-//!   range. All word counts are walked through before rspirv sees the words.
-//! - `OpSpecConstantOp` is decoded recursively, with each operand of the inner instruction once, so shuffles and
-//!   composite extractions of more than one index would be refused. These instructions are kept aside as words, and
-//!   rspirv sees an `OpUndef` with the same type and id in their place.
-//!
-//! Its loader also has no place for `OpExecutionModeId` and for extended instructions outside functions (debug
-//! information); [`Loader`] takes these out of its way.
+//! A SPIR-V module: its instructions by section and function, and its decorations by id.
 
 use std::collections::HashMap;
 
-use rspirv::binary::{Consumer, ParseAction, parse_words};
-use rspirv::dr::{self, Instruction, Operand};
-use rspirv::spirv::{self, BuiltIn, Decoration, Op};
+use spirv::{BuiltIn, Decoration, ExecutionModel, Op};
 
-use super::error::{Error, Fault};
+use super::decoder::{HEADER_WORDS, decode};
+use super::error::Error;
+use super::instruction::{Instruction, Operand};
 
 /// The most words of a module.
 const MAX_WORDS: usize = 1 << 20;
 /// The most decorations after groups are expanded.
 const MAX_DECORATIONS: usize = 1 << 20;
-/// The words before the first instruction.
-const HEADER_WORDS: usize = 5;
-
-/// An `OpSpecConstantOp`.
-#[derive(Clone, Debug)]
-pub(super) struct SpecOp {
-    /// The operation, as a number.
-    pub opcode: u32,
-    /// Its operands: ids and literals.
-    pub operands: Vec<u32>,
-}
 
 /// A decoration and its parameters.
 #[derive(Clone, Debug)]
@@ -53,13 +31,159 @@ pub(super) enum ExtendedSet {
     Unknown,
 }
 
+/// A basic block: its last instruction is its terminator.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    pub label: Option<u32>,
+    pub instructions: Vec<Instruction>,
+}
+
+/// A function.
+#[derive(Clone, Debug)]
+pub(super) struct Function {
+    pub definition: Instruction,
+    pub parameters: Vec<Instruction>,
+    pub blocks: Vec<Block>,
+}
+
+/// The instructions of a module, those that matter, by what they are.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sections {
+    pub capabilities: Vec<Instruction>,
+    pub imports: Vec<Instruction>,
+    pub memory_model: Option<Instruction>,
+    pub entry_points: Vec<Instruction>,
+    pub execution_modes: Vec<Instruction>,
+    pub names: Vec<Instruction>,
+    pub annotations: Vec<Instruction>,
+    /// Types, constants and variables outside functions.
+    pub globals: Vec<Instruction>,
+    pub functions: Vec<Function>,
+}
+
+/// Puts instructions where they belong.
+#[derive(Default)]
+struct Loader {
+    sections: Sections,
+    function: Option<Function>,
+    block: Option<Block>,
+}
+
+impl Loader {
+    fn add(&mut self, it: Instruction) -> Result<(), Error> {
+        let sections = &mut self.sections;
+        match it.opcode {
+            Op::Capability => sections.capabilities.push(it),
+            Op::ExtInstImport => sections.imports.push(it),
+            Op::MemoryModel => sections.memory_model = Some(it),
+            Op::EntryPoint => sections.entry_points.push(it),
+            Op::ExecutionMode | Op::ExecutionModeId => sections.execution_modes.push(it),
+            Op::Name => sections.names.push(it),
+            Op::Extension
+            | Op::String
+            | Op::SourceExtension
+            | Op::Source
+            | Op::SourceContinued
+            | Op::MemberName
+            | Op::ModuleProcessed
+            | Op::Line
+            | Op::NoLine => {}
+            // Debug information.
+            Op::ExtInst if self.function.is_none() => {}
+            op if op.is_annotation() => sections.annotations.push(it),
+            op if op.is_type() || op.is_constant() => sections.globals.push(it),
+            Op::Variable | Op::Undef if self.function.is_none() => sections.globals.push(it),
+            Op::Function => {
+                let function = Function {
+                    definition: it,
+                    parameters: Vec::new(),
+                    blocks: Vec::new(),
+                };
+                if self.function.replace(function).is_some() {
+                    return invalid("a function begins within another");
+                }
+            }
+            Op::FunctionParameter => match &mut self.function {
+                Some(function) => function.parameters.push(it),
+                None => return invalid("a parameter outside functions"),
+            },
+            Op::Label => {
+                let block = Block {
+                    label: it.result_id,
+                    instructions: Vec::new(),
+                };
+                if self.function.is_none() {
+                    return invalid("a block outside functions");
+                }
+                if self.block.replace(block).is_some() {
+                    return invalid("a block begins within another");
+                }
+            }
+            Op::FunctionEnd => self.end_function()?,
+            op => {
+                let Some(block) = &mut self.block else {
+                    return invalid(format!("Op{op:?} outside blocks"));
+                };
+                block.instructions.push(it);
+                if is_terminator(op)
+                    && let (Some(function), Some(block)) = (&mut self.function, self.block.take())
+                {
+                    function.blocks.push(block);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn end_function(&mut self) -> Result<(), Error> {
+        if self.block.is_some() {
+            return invalid("a block without a terminator");
+        }
+        match self.function.take() {
+            Some(function) => self.sections.functions.push(function),
+            None => return invalid("a function ends that didn't begin"),
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<Sections, Error> {
+        match self.function {
+            Some(_) => invalid("a function without an end"),
+            None => Ok(self.sections),
+        }
+    }
+}
+
+/// Tells if an operation ends a block.
+fn is_terminator(op: Op) -> bool {
+    matches!(
+        op,
+        Op::Branch
+            | Op::BranchConditional
+            | Op::Switch
+            | Op::Return
+            | Op::ReturnValue
+            | Op::Kill
+            | Op::TerminateInvocation
+            | Op::TerminateRayKHR
+            | Op::IgnoreIntersectionKHR
+            | Op::EmitMeshTasksEXT
+            | Op::Unreachable
+    )
+}
+
+fn invalid<T>(reason: impl Into<String>) -> Result<T, Error> {
+    Err(Error::Binary {
+        reason: reason.into(),
+    })
+}
+
 /// A shader module: decoded, indexed, but not yet checked beyond that.
 #[derive(Debug)]
 pub struct Module {
-    pub(super) data: dr::Module,
-    pub(super) spec_ops: HashMap<u32, SpecOp>,
+    pub(super) sections: Sections,
     pub(super) extended_sets: HashMap<u32, ExtendedSet>,
-    /// Indices into `data.functions` by id.
+    /// Indices into the sections' functions by id.
     pub(super) functions: HashMap<u32, usize>,
     decorations: HashMap<u32, Vec<Decorated>>,
     member_decorations: HashMap<(u32, u32), Vec<Decorated>>,
@@ -74,28 +198,21 @@ impl Module {
     /// [`Error::Binary`] or [`Error::TooLarge`].
     pub fn parse(words: &[u32]) -> Result<Self, Error> {
         let version = check_header(words)?;
-        let (words, spec_ops) = set_spec_ops_aside(words)?;
         let mut loader = Loader::default();
-        parse_words(&words, &mut loader).map_err(|state| Error::Binary {
-            reason: state.to_string(),
-        })?;
-        let mut data = loader.loader.module();
-        data.execution_modes.append(&mut loader.mode_ids);
+        decode(words, |it| loader.add(it))?;
+        let sections = loader.finish()?;
+        let functions = sections.functions.iter().enumerate();
         let mut module = Self {
-            spec_ops,
-            extended_sets: extended_sets(&data),
-            functions: HashMap::new(),
+            extended_sets: extended_sets(&sections),
+            functions: functions
+                .filter_map(|(index, function)| Some((function.definition.result_id?, index)))
+                .collect(),
             decorations: HashMap::new(),
             member_decorations: HashMap::new(),
-            names: names(&data),
+            names: names(&sections),
             version,
-            data,
+            sections,
         };
-        for (index, function) in module.data.functions.iter().enumerate() {
-            if let Some(id) = function.def.as_ref().and_then(|def| def.result_id) {
-                module.functions.insert(id, index);
-            }
-        }
         module.index_decorations()?;
         Ok(module)
     }
@@ -111,18 +228,13 @@ impl Module {
     }
 
     /// Names and execution models of all entry points.
-    pub fn entry_points(&self) -> Vec<(String, spirv::ExecutionModel)> {
-        self.data
+    pub fn entry_points(&self) -> Vec<(String, ExecutionModel)> {
+        self.sections
             .entry_points
             .iter()
-            .filter_map(|entry| match entry.operands.as_slice() {
-                [
-                    Operand::ExecutionModel(model),
-                    _,
-                    Operand::LiteralString(name),
-                    ..,
-                ] => Some((name.clone(), *model)),
-                _ => None,
+            .filter_map(|entry| {
+                let model = entry.enumerant(0, ExecutionModel::from_u32)?;
+                Some((entry.string(2)?.to_owned(), model))
             })
             .collect()
     }
@@ -167,38 +279,38 @@ impl Module {
     }
 
     fn index_decorations(&mut self) -> Result<(), Error> {
-        let annotations = std::mem::take(&mut self.data.annotations);
+        let annotations = std::mem::take(&mut self.sections.annotations);
         let mut count = 0;
         for annotation in &annotations {
             let operands = annotation.operands.as_slice();
-            match annotation.class.opcode {
+            match annotation.opcode {
                 Op::Decorate | Op::DecorateId => {
-                    if let [
-                        Operand::IdRef(id),
-                        Operand::Decoration(decoration),
-                        rest @ ..,
-                    ] = operands
+                    if let ([Operand::Id(id), _, parameters @ ..], Some(decoration)) =
+                        (operands, annotation.enumerant(1, Decoration::from_u32))
                     {
                         count += 1;
                         self.decorations.entry(*id).or_default().push(Decorated {
-                            decoration: *decoration,
-                            parameters: rest.to_vec(),
+                            decoration,
+                            parameters: parameters.to_vec(),
                         });
                     }
                 }
                 Op::MemberDecorate => {
-                    if let [
-                        Operand::IdRef(id),
-                        Operand::LiteralBit32(member),
-                        Operand::Decoration(decoration),
-                        rest @ ..,
-                    ] = operands
+                    if let (
+                        [
+                            Operand::Id(id),
+                            Operand::Literal(member),
+                            _,
+                            parameters @ ..,
+                        ],
+                        Some(decoration),
+                    ) = (operands, annotation.enumerant(2, Decoration::from_u32))
                     {
                         count += 1;
                         let entry = self.member_decorations.entry((*id, *member)).or_default();
                         entry.push(Decorated {
-                            decoration: *decoration,
-                            parameters: rest.to_vec(),
+                            decoration,
+                            parameters: parameters.to_vec(),
                         });
                     }
                 }
@@ -215,18 +327,18 @@ impl Module {
                 });
             }
         }
-        self.data.annotations = annotations;
+        self.sections.annotations = annotations;
         Ok(())
     }
 
     /// Decorates each target as the group is; returns how many decorations that were, stopping at `limit`.
     fn apply_group(&mut self, operands: &[Operand], limit: usize) -> usize {
-        let Some(group) = operands.first().and_then(Operand::id_ref_any) else {
+        let Some(group) = operands.first().and_then(Operand::id) else {
             return 0;
         };
         let group = self.decorations.get(&group).cloned().unwrap_or_default();
         let mut applied = 0;
-        for target in operands[1..].iter().filter_map(Operand::id_ref_any) {
+        for target in operands[1..].iter().filter_map(Operand::id) {
             applied += group.len();
             if applied >= limit {
                 return limit;
@@ -238,13 +350,13 @@ impl Module {
     }
 
     fn apply_member_group(&mut self, operands: &[Operand], limit: usize) -> usize {
-        let Some(group) = operands.first().and_then(Operand::id_ref_any) else {
+        let Some(group) = operands.first().and_then(Operand::id) else {
             return 0;
         };
         let group = self.decorations.get(&group).cloned().unwrap_or_default();
         let mut applied = 0;
         for pair in operands[1..].chunks_exact(2) {
-            if let [Operand::IdRef(id), Operand::LiteralBit32(member)] = pair {
+            if let [Operand::Id(id), Operand::Literal(member)] = pair {
                 applied += group.len();
                 if applied >= limit {
                     return limit;
@@ -257,91 +369,51 @@ impl Module {
     }
 }
 
-/// rspirv's loader, spared what it has no place for.
-#[derive(Default)]
-struct Loader {
-    loader: dr::Loader,
-    mode_ids: Vec<Instruction>,
-    in_function: bool,
-}
-
-impl Consumer for Loader {
-    fn initialize(&mut self) -> ParseAction {
-        self.loader.initialize()
-    }
-
-    fn finalize(&mut self) -> ParseAction {
-        self.loader.finalize()
-    }
-
-    fn consume_header(&mut self, header: dr::ModuleHeader) -> ParseAction {
-        self.loader.consume_header(header)
-    }
-
-    fn consume_instruction(&mut self, it: Instruction) -> ParseAction {
-        match it.class.opcode {
-            Op::ExecutionModeId => {
-                self.mode_ids.push(it);
-                return ParseAction::Continue;
-            }
-            Op::ExtInst if !self.in_function => return ParseAction::Continue,
-            Op::Function => self.in_function = true,
-            Op::FunctionEnd => self.in_function = false,
-            _ => {}
-        }
-        self.loader.consume_instruction(it)
-    }
-}
-
 fn literal(all: &[Decorated], decoration: Decoration) -> Option<u32> {
     let found = all.iter().find(|one| one.decoration == decoration)?;
     match found.parameters.first()? {
-        Operand::LiteralBit32(value) => Some(*value),
+        Operand::Literal(value) => Some(*value),
         _ => None,
     }
 }
 
 fn built_in(all: &[Decorated]) -> Option<BuiltIn> {
-    all.iter().find_map(|one| match one.parameters.first() {
-        Some(Operand::BuiltIn(built_in)) => Some(*built_in),
+    let mut found = all
+        .iter()
+        .filter(|one| one.decoration == Decoration::BuiltIn);
+    match found.next()?.parameters.first()? {
+        Operand::Enumerant(value) => BuiltIn::from_u32(*value),
         _ => None,
-    })
+    }
 }
 
-fn extended_sets(data: &dr::Module) -> HashMap<u32, ExtendedSet> {
-    let set = |import: &Instruction| match import.operands.first() {
-        Some(Operand::LiteralString(name)) if name == "GLSL.std.450" => ExtendedSet::Glsl,
-        Some(Operand::LiteralString(name))
-            if name.starts_with("NonSemantic.") || name == "OpenCL.DebugInfo.100" =>
-        {
+fn extended_sets(sections: &Sections) -> HashMap<u32, ExtendedSet> {
+    let set = |import: &Instruction| match import.string(0) {
+        Some("GLSL.std.450") => ExtendedSet::Glsl,
+        Some(name) if name.starts_with("NonSemantic.") || name == "OpenCL.DebugInfo.100" => {
             ExtendedSet::NonSemantic
         }
         _ => ExtendedSet::Unknown,
     };
-    data.ext_inst_imports
+    sections
+        .imports
         .iter()
         .filter_map(|import| Some((import.result_id?, set(import))))
         .collect()
 }
 
-fn names(data: &dr::Module) -> HashMap<u32, String> {
-    data.debug_names
+fn names(sections: &Sections) -> HashMap<u32, String> {
+    sections
+        .names
         .iter()
-        .filter_map(|name| match name.operands.as_slice() {
-            [Operand::IdRef(id), Operand::LiteralString(name)] if !name.is_empty() => {
-                Some((*id, name.clone()))
-            }
-            _ => None,
+        .filter_map(|it| {
+            let name = it.string(1).filter(|name| !name.is_empty())?;
+            Some((it.id(0).ok()?, name.to_owned()))
         })
         .collect()
 }
 
 fn check_header(words: &[u32]) -> Result<(u8, u8), Error> {
-    let wrong = |reason: &str| {
-        Err(Error::Binary {
-            reason: reason.into(),
-        })
-    };
     if words.len() > MAX_WORDS {
         return Err(Error::TooLarge {
             what: "words of a module",
@@ -349,109 +421,19 @@ fn check_header(words: &[u32]) -> Result<(u8, u8), Error> {
         });
     }
     let [magic, version, ..] = words else {
-        return wrong("there is no header");
+        return invalid("there is no header");
     };
     if words.len() < HEADER_WORDS {
-        return wrong("the header is cut off");
+        return invalid("the header is cut off");
     }
     if *magic != spirv::MAGIC_NUMBER {
-        return wrong("the magic number is wrong");
+        return invalid("the magic number is wrong");
     }
     let (major, minor) = ((version >> 16) as u8, (version >> 8) as u8);
     if version & 0xff00_00ff != 0 || major != 1 || minor > 6 {
-        return wrong("only versions 1.0 to 1.6 are supported");
+        return invalid("only versions 1.0 to 1.6 are supported");
     }
     Ok((major, minor))
-}
-
-/// Checks that instructions fill the words exactly, and replaces `OpSpecConstantOp`.
-fn set_spec_ops_aside(words: &[u32]) -> Result<(Vec<u32>, HashMap<u32, SpecOp>), Error> {
-    let mut kept = words[..HEADER_WORDS].to_vec();
-    let mut spec_ops = HashMap::new();
-    let mut rest = &words[HEADER_WORDS..];
-    while let Some(first) = rest.first() {
-        let (count, opcode) = ((first >> 16) as usize, first & 0xffff);
-        if count == 0 || count > rest.len() {
-            return Err(Error::Binary {
-                reason: format!(
-                    "the instruction at word {} has a word count of {count}",
-                    words.len() - rest.len()
-                ),
-            });
-        }
-        let (instruction, after) = rest.split_at(count);
-        match instruction {
-            [_, ty, id, inner, operands @ ..] if opcode == Op::SpecConstantOp as u32 => {
-                spec_ops.insert(
-                    *id,
-                    SpecOp {
-                        opcode: *inner,
-                        operands: operands.to_vec(),
-                    },
-                );
-                kept.extend([3 << 16 | Op::Undef as u32, *ty, *id]);
-            }
-            _ => kept.extend_from_slice(instruction),
-        }
-        rest = after;
-    }
-    Ok((kept, spec_ops))
-}
-
-/// Operands of an instruction by position, checked.
-pub(super) trait Operands {
-    /// The id at a position.
-    fn id(&self, index: usize) -> Result<u32, Fault>;
-    /// The literal at a position.
-    fn number(&self, index: usize) -> Result<u32, Fault>;
-    /// All literals from a position on.
-    fn numbers(&self, from: usize) -> Vec<u32>;
-    /// All ids from a position on.
-    fn ids(&self, from: usize) -> Vec<u32>;
-    /// The result's type.
-    fn ty(&self) -> Result<u32, Fault>;
-    /// The result.
-    fn result(&self) -> Result<u32, Fault>;
-}
-
-impl Operands for Instruction {
-    fn id(&self, index: usize) -> Result<u32, Fault> {
-        self.operands
-            .get(index)
-            .and_then(Operand::id_ref_any)
-            .ok_or_else(|| Fault::Malformed(format!("operand {index} isn't an id")))
-    }
-
-    fn number(&self, index: usize) -> Result<u32, Fault> {
-        match self.operands.get(index) {
-            Some(Operand::LiteralBit32(value) | Operand::LiteralExtInstInteger(value)) => {
-                Ok(*value)
-            }
-            _ => Err(Fault::Malformed(format!("operand {index} isn't a number"))),
-        }
-    }
-
-    fn numbers(&self, from: usize) -> Vec<u32> {
-        (from..self.operands.len())
-            .map_while(|index| self.number(index).ok())
-            .collect()
-    }
-
-    fn ids(&self, from: usize) -> Vec<u32> {
-        (from..self.operands.len())
-            .map_while(|index| self.id(index).ok())
-            .collect()
-    }
-
-    fn ty(&self) -> Result<u32, Fault> {
-        self.result_type
-            .ok_or_else(|| Fault::Malformed("there is no result type".into()))
-    }
-
-    fn result(&self) -> Result<u32, Fault> {
-        self.result_id
-            .ok_or_else(|| Fault::Malformed("there is no result".into()))
-    }
 }
 
 #[cfg(test)]
@@ -473,7 +455,7 @@ mod tests {
     }
 
     #[test]
-    fn specialization_operations_are_set_aside() {
+    fn operations_on_constants_keep_all_words() {
         let mut words = vec![spirv::MAGIC_NUMBER, 0x0001_0300, 0, 8, 0];
         words.extend([
             7 << 16 | Op::SpecConstantOp as u32,
@@ -485,7 +467,8 @@ mod tests {
             1,
         ]);
         let module = Module::parse(&words).unwrap();
-        assert_eq!(module.spec_ops[&2].operands, [3, 0, 1]);
+        let it = &module.sections.globals[0];
+        assert_eq!(it.numbers(0), [Op::CompositeExtract as u32, 3, 0, 1]);
         assert_eq!(module.version(), (1, 3));
     }
 }

@@ -3,8 +3,8 @@
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-use rspirv::spirv::{self, BuiltIn, StorageClass};
 use simdevice::isa::ir;
+use spirv::{BuiltIn, StorageClass};
 
 use super::error::{Outcome, malformed, unsupported};
 

@@ -1,12 +1,11 @@
 //! Pointers and access chains.
 
-use rspirv::dr::Instruction;
-use rspirv::spirv::{Op, StorageClass};
 use simdevice::isa::ir::{Address, Binding, Format, Reg, Space};
 use simdevice::isa::op::Op as Ir;
+use spirv::{Op, StorageClass};
 
 use super::super::error::{Outcome, malformed, unsupported};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
 use super::super::types::{ImageType, Scalar, Type};
 use super::{Translator, Value};
 
@@ -133,10 +132,7 @@ impl Translator<'_> {
 
     /// `OpAccessChain` and its relatives.
     pub fn access_chain(&mut self, it: &Instruction) -> Outcome<()> {
-        let by_element = matches!(
-            it.class.opcode,
-            Op::PtrAccessChain | Op::InBoundsPtrAccessChain
-        );
+        let by_element = matches!(it.opcode, Op::PtrAccessChain | Op::InBoundsPtrAccessChain);
         let mut pointer = self.pointer(it.id(0)?)?;
         if by_element {
             let element = self.index(it.id(1)?)?;
@@ -169,9 +165,7 @@ impl Translator<'_> {
 
     /// A pointer moved by whole elements of the array that it points into.
     fn next_element(&mut self, pointer: Pointer, ty: u32, element: Index) -> Outcome<Pointer> {
-        let stride = self
-            .module
-            .literal(ty, rspirv::spirv::Decoration::ArrayStride);
+        let stride = self.module.literal(ty, spirv::Decoration::ArrayStride);
         match (pointer, stride) {
             (Pointer::Memory(place), Some(stride)) => {
                 Ok(Pointer::Memory(self.moved(place, element, stride)?))

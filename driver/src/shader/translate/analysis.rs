@@ -4,12 +4,12 @@
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-use rspirv::dr::{Function, Instruction};
-use rspirv::spirv::Op;
+use spirv::Op;
 
 use super::super::error::{Error, Fault, Outcome, malformed, unsupported};
 use super::super::globals::Globals;
-use super::super::module::{Module, Operands};
+use super::super::instruction::Instruction;
+use super::super::module::{Function, Module};
 use super::super::types::Type;
 use super::structure::{Tree, structure};
 
@@ -60,10 +60,8 @@ impl Analysis {
         index: usize,
         callers: &mut Vec<usize>,
     ) -> Result<(), Error> {
-        let function = &module.data.functions[index];
-        let Some(definition) = &function.def else {
-            return Ok(());
-        };
+        let function = &module.sections.functions[index];
+        let definition = &function.definition;
         if callers.contains(&index) {
             return Err(Fault::Malformed("the function calls itself".into()).at(definition));
         }
@@ -78,7 +76,7 @@ impl Analysis {
         }
         callers.push(index);
         let instructions = || function.blocks.iter().flat_map(|block| &block.instructions);
-        for call in instructions().filter(|it| it.class.opcode == Op::FunctionCall) {
+        for call in instructions().filter(|it| it.opcode == Op::FunctionCall) {
             let callee = call.id(0).map_err(|fault| fault.at(call))?;
             match module.functions.get(&callee) {
                 Some(callee) => self.visit(module, globals, *callee, callers)?,
@@ -117,7 +115,7 @@ impl Analysis {
         if let (Some(id), Some(ty)) = (it.result_id, it.result_type) {
             self.pointer_types.insert(id, ty);
         }
-        match it.class.opcode {
+        match it.opcode {
             Op::Variable => {
                 let id = it.result()?;
                 self.roots.insert(id, id);
@@ -145,7 +143,7 @@ impl Analysis {
                 let Some(callee) = module.functions.get(&it.id(0)?) else {
                     return malformed("there is no such function");
                 };
-                let parameters = &module.data.functions[*callee].parameters;
+                let parameters = &module.sections.functions[*callee].parameters;
                 for (parameter, argument) in parameters.iter().zip(it.ids(1)) {
                     if let (Some(parameter), Some(root)) =
                         (parameter.result_id, self.roots.get(&argument))
@@ -203,7 +201,7 @@ impl Analysis {
         into: &mut Vec<u32>,
     ) -> Outcome<()> {
         let root = |id: u32| self.roots.get(&id).copied();
-        match it.class.opcode {
+        match it.opcode {
             Op::Store | Op::CopyMemory => into.extend(root(it.id(0)?)),
             // Modf and Frexp store through a pointer.
             Op::ExtInst => into.extend(it.ids(2).into_iter().filter_map(root)),
@@ -214,7 +212,7 @@ impl Analysis {
                 let Some(tree) = self.trees.get(callee) else {
                     return unsupported("a call to a function that isn't translated");
                 };
-                let parameters = &module.data.functions[*callee].parameters;
+                let parameters = &module.sections.functions[*callee].parameters;
                 let arguments = it.ids(1);
                 for stored in tree.modified.iter() {
                     let position = parameters

@@ -1,12 +1,11 @@
 //! Arithmetic, comparisons, logic and bits, component by component.
 
-use rspirv::dr::Instruction;
-use rspirv::spirv::{Decoration, Op};
 use simdevice::isa::ir::{Axis, Reg};
 use simdevice::isa::op::Op as Ir;
+use spirv::{Decoration, Op};
 
 use super::super::error::{Outcome, malformed, unsupported};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
 
@@ -220,7 +219,7 @@ impl Translator<'_> {
             exchange,
             negate,
         };
-        match it.class.opcode {
+        match it.opcode {
             Op::IAdd => self.wrapping(it, Ir::IAdd, Ir::IAdd64),
             Op::ISub => self.wrapping(it, Ir::ISub, Ir::ISub64),
             Op::IMul => self.wrapping(it, Ir::IMul, Ir::IMul64),
@@ -306,7 +305,7 @@ impl Translator<'_> {
 
     fn logic(&mut self, it: &Instruction) -> Outcome<()> {
         let mut two = |op| self.binary(it, |this, _, a, b| this.op(op, &[a, b]));
-        match it.class.opcode {
+        match it.opcode {
             Op::LogicalOr => two(Ir::BOr),
             Op::LogicalAnd => two(Ir::BAnd),
             Op::LogicalNotEqual => two(Ir::BXor),
@@ -347,7 +346,7 @@ impl Translator<'_> {
         if !matches!(scalar, Scalar::Int { width: 32, .. }) || a.len() != b.len() {
             return unsupported("this on anything but two vectors of 32-bit integers");
         }
-        let (low, high) = match it.class.opcode {
+        let (low, high) = match it.opcode {
             Op::IAddCarry => (Ir::IAdd, Ir::UAddCarry),
             Op::ISubBorrow => (Ir::ISub, Ir::USubBorrow),
             Op::UMulExtended => (Ir::IMul, Ir::UMulHi),
@@ -362,7 +361,7 @@ impl Translator<'_> {
 
     fn shift(&mut self, it: &Instruction) -> Outcome<()> {
         let (result, _) = self.globals.types.vector(it.ty()?)?;
-        let opcode = it.class.opcode;
+        let opcode = it.opcode;
         self.binary(it, |this, [scalar, by], a, b| {
             let by = if by.is_wide() {
                 this.op(Ir::Low32, &[b])
@@ -387,7 +386,7 @@ impl Translator<'_> {
 
     fn bits(&mut self, it: &Instruction) -> Outcome<()> {
         let (scalar, a) = self.vector(it.id(0)?)?;
-        let opcode = it.class.opcode;
+        let opcode = it.opcode;
         if opcode == Op::Not {
             return self.unary(it, |this, scalar, a| {
                 let reg = this.op(sized(scalar, Ir::Not, Ir::Not64), &[a]);

@@ -1,14 +1,13 @@
 //! Atomic operations on buffers, workgroup memory, device addresses and texels.
 
-use rspirv::dr::Instruction;
-use rspirv::spirv::Op;
 use simdevice::isa::ir::{
     AtomicOp, Format, ImageAtomic, ImageRead, ImageWrite, Reg, Space, Statement,
 };
 use simdevice::isa::op::Op as Ir;
+use spirv::Op;
 
 use super::super::error::{Outcome, malformed, unsupported};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
 use super::access::Pointer;
@@ -19,7 +18,7 @@ impl Translator<'_> {
     /// Atomic instructions.
     pub fn atomic(&mut self, it: &Instruction) -> Outcome<()> {
         let pointer = self.pointer(it.id(0)?)?;
-        match it.class.opcode {
+        match it.opcode {
             Op::AtomicLoad => match &pointer {
                 Pointer::Texel { .. } => {
                     let reg = self.load_texel(&pointer)?;
@@ -51,7 +50,7 @@ impl Translator<'_> {
             false => this.u32(1),
         };
         let mut comparator = None;
-        let (op, value) = match it.class.opcode {
+        let (op, value) = match it.opcode {
             Op::AtomicIIncrement => (AtomicOp::IAdd, one(self)),
             Op::AtomicIDecrement => {
                 let one = one(self);

@@ -2,9 +2,9 @@
 
 use std::rc::Rc;
 
-use rspirv::spirv::{BuiltIn as Spirv, Decoration};
 use simdevice::isa::ir::{Rate, Reg};
 use simdevice::isa::op::Op as Ir;
+use spirv::{BuiltIn as Spirv, Decoration};
 
 use super::super::error::{Outcome, malformed, unsupported};
 use super::super::interface::{

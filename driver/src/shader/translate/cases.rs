@@ -2,10 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use rspirv::dr::{Instruction, Operand};
-
 use super::super::error::{Outcome, malformed, unsupported};
-use super::super::module::Operands;
+use super::super::instruction::{Instruction, Operand};
 use super::structure::Walker;
 
 /// The most blocks looked at while ordering the cases of switches.
@@ -38,7 +36,7 @@ impl Walker<'_> {
         let mut found = Vec::new();
         for pair in terminator.operands.get(2..).unwrap_or_default().chunks(2) {
             match pair {
-                [Operand::LiteralBit32(value), Operand::IdRef(label)] => {
+                [Operand::Literal(value), Operand::Id(label)] => {
                     if !values.insert(*value) {
                         return malformed(format!("two cases for {value}"));
                     }
@@ -109,7 +107,7 @@ impl Walker<'_> {
                 return unsupported("too many blocks in switches");
             }
             let terminator = self.terminator(block)?.clone();
-            for label in terminator.operands.iter().filter_map(Operand::id_ref_any) {
+            for label in terminator.operands.iter().filter_map(Operand::id) {
                 let Some(next) = self.index.get(&label).copied() else {
                     continue;
                 };

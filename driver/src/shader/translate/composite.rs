@@ -2,19 +2,18 @@
 
 use std::rc::Rc;
 
-use rspirv::dr::Instruction;
-use rspirv::spirv::Op;
 use simdevice::isa::ir::Reg;
 use simdevice::isa::op::Op as Ir;
+use spirv::Op;
 
 use super::super::error::{Outcome, malformed};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
 use super::Translator;
 
 impl Translator<'_> {
     /// Composite instructions.
     pub fn composite(&mut self, it: &Instruction) -> Outcome<()> {
-        match it.class.opcode {
+        match it.opcode {
             Op::CompositeConstruct => {
                 let limit = self.globals.types.scalars(it.ty()?)? as usize;
                 self.spend(limit)?;

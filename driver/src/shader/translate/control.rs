@@ -7,12 +7,12 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use rspirv::dr::{Block, Instruction};
-use rspirv::spirv::Op;
 use simdevice::isa::ir::{Label, MAX_NESTING, Reg};
+use spirv::Op;
 
 use super::super::error::{Error, Fault, Outcome, malformed, unsupported};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
+use super::super::module::Block;
 use super::structure::{Case, Construct, Edge, Join, Jump, Node, Tree};
 use super::{Translator, Value};
 
@@ -48,16 +48,13 @@ type Saved = Vec<(usize, Vec<Option<Reg>>)>;
 impl<'a> Translator<'a> {
     /// Translates the entry point's function and assigns the outputs at its end.
     pub fn run(&mut self, function: usize) -> Result<(), Error> {
-        let definition = self.module.data.functions[function].def.as_ref();
-        let place = |fault: Fault| match (definition, fault) {
-            (Some(definition), fault) => fault.at(definition),
-            (None, Fault::Placed(error)) => error,
-            (None, Fault::Malformed(reason) | Fault::Unsupported(reason)) => {
-                Error::Binary { reason }
-            }
-        };
+        let definition = &self.module.sections.functions[function].definition;
+        let place = |fault: Fault| fault.at(definition);
         self.global_variables()?;
-        if !self.module.data.functions[function].parameters.is_empty() {
+        if !self.module.sections.functions[function]
+            .parameters
+            .is_empty()
+        {
             return Err(place(Fault::Malformed(
                 "the entry point has parameters".into(),
             )));
@@ -71,7 +68,7 @@ impl<'a> Translator<'a> {
         let Some(function) = self.module.functions.get(&it.id(0)?).copied() else {
             return malformed("there is no such function");
         };
-        let parameters = &self.module.data.functions[function].parameters;
+        let parameters = &self.module.sections.functions[function].parameters;
         let arguments = it.ids(1);
         if parameters.len() != arguments.len() {
             return malformed("the number of arguments is wrong");
@@ -138,14 +135,14 @@ impl<'a> Translator<'a> {
 
     /// Whether a variable that a function stores to exists outside it.
     fn outlives(&self, function: usize, root: u32) -> bool {
-        let parameters = &self.module.data.functions[function].parameters;
+        let parameters = &self.module.sections.functions[function].parameters;
         self.globals.variables.contains_key(&root)
             || parameters.iter().any(|it| it.result_id == Some(root))
     }
 
     fn block(&self, index: usize) -> Outcome<&'a Block> {
         let function = self.calls.last().map_or(0, |call| call.function);
-        match self.module.data.functions[function].blocks.get(index) {
+        match self.module.sections.functions[function].blocks.get(index) {
             Some(block) => Ok(block),
             None => malformed("there is no such block"),
         }
@@ -214,10 +211,7 @@ impl<'a> Translator<'a> {
             return malformed("a block is empty");
         };
         for it in body {
-            if !matches!(
-                it.class.opcode,
-                Op::Phi | Op::LoopMerge | Op::SelectionMerge
-            ) {
+            if !matches!(it.opcode, Op::Phi | Op::LoopMerge | Op::SelectionMerge) {
                 self.instruction(it).map_err(|fault| fault.at(it))?;
                 self.spend(0).map_err(|fault| fault.at(it))?;
             }
@@ -228,14 +222,14 @@ impl<'a> Translator<'a> {
     /// The end of an invocation or a function.
     fn exit(&mut self, index: usize) -> Outcome<()> {
         let terminator = self.terminator(index)?;
-        match terminator.class.opcode {
+        match terminator.opcode {
             Op::Kill | Op::TerminateInvocation => {
                 self.interface.discards = true;
                 self.builder.kill();
             }
             Op::Return | Op::ReturnValue => {
                 let mut pairs = Vec::new();
-                if terminator.class.opcode == Op::ReturnValue {
+                if terminator.opcode == Op::ReturnValue {
                     let regs = self
                         .regs(terminator.id(0)?)
                         .map_err(|fault| fault.at(terminator))?;
@@ -400,9 +394,9 @@ impl<'a> Translator<'a> {
 
     /// Makes variables of the IR for a function's phis.
     fn declare_phis(&mut self, function: usize) -> Outcome<()> {
-        let blocks = &self.module.data.functions[function].blocks;
+        let blocks = &self.module.sections.functions[function].blocks;
         for it in blocks.iter().flat_map(|block| &block.instructions) {
-            if it.class.opcode != Op::Phi {
+            if it.opcode != Op::Phi {
                 continue;
             }
             let scalars = self
@@ -423,17 +417,11 @@ impl<'a> Translator<'a> {
 
     /// The assignments that an edge makes to the phis of its target.
     fn phi_pairs(&mut self, edge: &Edge) -> Outcome<Vec<(Reg, Reg)>> {
-        let from = self
-            .block(edge.from)?
-            .label
-            .as_ref()
-            .and_then(|label| label.result_id);
+        let from = self.block(edge.from)?.label;
         let mut pairs = Vec::new();
         for it in &self.block(edge.to)?.instructions {
-            match it.class.opcode {
-                Op::Phi => {}
-                Op::Line | Op::NoLine => continue,
-                _ => break,
+            if it.opcode != Op::Phi {
+                break;
             }
             let ids = it.ids(0);
             let source = ids.chunks_exact(2).find(|pair| Some(pair[1]) == from);

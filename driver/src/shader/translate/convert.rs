@@ -1,19 +1,18 @@
 //! Conversions between types.
 
-use rspirv::dr::Instruction;
-use rspirv::spirv::Op;
 use simdevice::isa::ir::Reg;
 use simdevice::isa::op::Op as Ir;
+use spirv::Op;
 
 use super::super::error::{Outcome, malformed, unsupported};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
 
 impl Translator<'_> {
     /// Conversions, `OpBitcast`, and between addresses and integers.
     pub fn conversion(&mut self, it: &Instruction) -> Outcome<()> {
-        let opcode = it.class.opcode;
+        let opcode = it.opcode;
         if matches!(opcode, Op::Bitcast | Op::ConvertPtrToU | Op::ConvertUToPtr) {
             return self.bitcast(it);
         }

@@ -1,13 +1,12 @@
 //! The extended instructions of GLSL.std.450.
 
-use rspirv::dr::Instruction;
-use rspirv::spirv::GlslStd450Op as G;
 use simdevice::isa::ir::{Axis, Reg};
 use simdevice::isa::op::Op as Ir;
+use spirv::GlslStd450Op as G;
 
 use super::super::error::{Outcome, malformed, unsupported};
+use super::super::instruction::Instruction;
 use super::super::interface::Sampling;
-use super::super::module::Operands;
 use super::super::types::Scalar;
 use super::Translator;
 use super::arithmetic::sized;

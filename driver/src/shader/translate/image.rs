@@ -1,15 +1,14 @@
 //! Images and samplers.
 
-use rspirv::dr::{Instruction, Operand};
-use rspirv::spirv::{Dim, ImageOperands, Op};
 use simdevice::isa::ir::{
     Binding, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg, Sample, Statement, Type,
 };
 use simdevice::isa::op::Op as Ir;
+use spirv::{Dim, ImageOperands, Op};
 
 use super::super::error::{Outcome, malformed, unsupported};
+use super::super::instruction::Instruction;
 use super::super::interface::Stage;
-use super::super::module::Operands;
 use super::super::types::ImageType;
 use super::access::Pointer;
 use super::resource::shape;
@@ -68,7 +67,7 @@ fn kind(op: Op) -> Kind {
 impl Translator<'_> {
     /// Image instructions.
     pub fn image(&mut self, it: &Instruction) -> Outcome<()> {
-        match it.class.opcode {
+        match it.opcode {
             Op::SampledImage => {
                 let (image, image_type) = self.image_operand(it.id(0)?)?;
                 let Value::Sampler(sampler) = self.value(it.id(1)?)? else {
@@ -103,7 +102,7 @@ impl Translator<'_> {
     /// Reads the optional operands from a position on.
     fn extras(&mut self, it: &Instruction, from: usize) -> Outcome<Extras> {
         let mut extras = Extras::default();
-        let Some(Operand::ImageOperands(mask)) = it.operands.get(from) else {
+        let Some(mask) = it.enumerant(from, ImageOperands::from_bits) else {
             return Ok(extras);
         };
         let mut next = from + 1;
@@ -338,7 +337,7 @@ impl Translator<'_> {
     fn query_image(&mut self, it: &Instruction) -> Outcome<()> {
         let (image, image_type) = self.image_operand(it.id(0)?)?;
         let shape = shape(&image_type)?;
-        let query = match it.class.opcode {
+        let query = match it.opcode {
             Op::ImageQuerySizeLod => ImageQuery::Size {
                 level: Some(self.reg(it.id(1)?)?),
             },

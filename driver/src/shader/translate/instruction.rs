@@ -1,19 +1,19 @@
 //! Which instruction is translated where.
 
-use rspirv::dr::Instruction;
-use rspirv::spirv::{Op, StorageClass};
 use simdevice::isa::ir::Axis;
+use spirv::{Op, StorageClass};
 
 use super::super::error::{Outcome, unsupported};
-use super::super::module::{ExtendedSet, Operands};
+use super::super::instruction::Instruction;
+use super::super::module::ExtendedSet;
 use super::access::Pointer;
-use super::{Translator, Value, is_debug};
+use super::{Translator, Value};
 
 impl Translator<'_> {
     /// Translates an instruction within a block that is neither a phi nor a terminator.
     pub fn instruction(&mut self, it: &Instruction) -> Outcome<()> {
-        match it.class.opcode {
-            op if is_debug(op) => Ok(()),
+        match it.opcode {
+            Op::Nop => Ok(()),
             Op::Undef => {
                 let scalars = self.globals.types.flatten(it.ty()?)?;
                 self.spend(scalars.len())?;

@@ -1,12 +1,11 @@
 //! Products of vectors and matrices, determinants and inverses.
 
-use rspirv::dr::Instruction;
-use rspirv::spirv::{Decoration, Op};
 use simdevice::isa::ir::Reg;
 use simdevice::isa::op::Op as Ir;
+use spirv::{Decoration, Op};
 
 use super::super::error::{Outcome, malformed};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
 use super::arithmetic::sized;
@@ -17,7 +16,7 @@ impl Translator<'_> {
     pub fn linear_algebra(&mut self, it: &Instruction) -> Outcome<()> {
         let contract = !self.module.has(it.result()?, Decoration::NoContraction);
         let (first, second) = (it.id(0)?, it.id(1)?);
-        let regs = match it.class.opcode {
+        let regs = match it.opcode {
             Op::Dot => {
                 let (scalar, a) = self.vector(first)?;
                 let b = self.regs(second)?;

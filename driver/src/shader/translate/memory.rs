@@ -2,12 +2,11 @@
 
 use std::rc::Rc;
 
-use rspirv::dr::Instruction;
 use simdevice::isa::ir::{Format, Reg};
 use simdevice::isa::op::Op as Ir;
 
 use super::super::error::{Outcome, malformed};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
 use super::super::types::{Scalar, Type};
 use super::access::{Layout, Place, Pointer, scalar_bytes, scalar_format};
 use super::{Translator, Value};

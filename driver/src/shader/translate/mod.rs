@@ -32,16 +32,16 @@ mod variable;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use rspirv::dr::{Instruction, Operand};
-use rspirv::spirv::{self, Capability, ExecutionMode, ExecutionModel, Op};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{self, Binding, Reg};
 use simdevice::isa::op::Op as Ir;
+use spirv::{AddressingModel, Capability, ExecutionMode, ExecutionModel, MemoryModel};
 
 use super::error::{Error, Fault, Outcome, malformed, unsupported};
 use super::globals::{Globals, Specialization};
+use super::instruction::Instruction;
 use super::interface::{DepthMode, Interface, Shader, Stage};
-use super::module::{Module, Operands};
+use super::module::Module;
 use super::types::{ImageType, Scalar};
 use analysis::Analysis;
 
@@ -353,7 +353,7 @@ impl Translator<'_> {
 
     /// Reads the entry point's execution modes.
     fn modes(&mut self, entry: u32) -> Result<(), Error> {
-        for it in &self.module.data.execution_modes {
+        for it in &self.module.sections.execution_modes {
             if it.id(0).ok() == Some(entry) {
                 self.mode(it).map_err(|fault| fault.at(it))?;
             }
@@ -373,7 +373,7 @@ impl Translator<'_> {
     }
 
     fn mode(&mut self, it: &Instruction) -> Outcome<()> {
-        let Some(Operand::ExecutionMode(mode)) = it.operands.get(1) else {
+        let Some(mode) = it.enumerant(1, ExecutionMode::from_u32) else {
             return malformed("there is no mode");
         };
         match mode {
@@ -441,52 +441,38 @@ fn find_entry(module: &Module, name: &str, stage: Stage) -> Result<u32, Error> {
         Stage::Fragment => ExecutionModel::Fragment,
         Stage::Compute => ExecutionModel::GLCompute,
     };
-    module
-        .data
-        .entry_points
-        .iter()
-        .find_map(|entry| match entry.operands.as_slice() {
-            [
-                Operand::ExecutionModel(found),
-                Operand::IdRef(function),
-                Operand::LiteralString(found_name),
-                ..,
-            ] if *found == model && found_name == name => Some(*function),
-            _ => None,
+    let mut entries = module.sections.entry_points.iter();
+    entries
+        .find(|it| {
+            it.enumerant(0, ExecutionModel::from_u32) == Some(model) && it.string(2) == Some(name)
         })
+        .and_then(|it| it.id(1).ok())
         .ok_or_else(|| no_entry(name, stage))
 }
 
 /// Refuses modules that declare what isn't supported.
 fn check_capabilities(module: &Module) -> Result<(), Error> {
-    for it in &module.data.capabilities {
-        if let Some(Operand::Capability(capability)) = it.operands.first()
-            && !is_supported(*capability)
+    for it in &module.sections.capabilities {
+        if let Some(capability) = it.enumerant(0, Capability::from_u32)
+            && !is_supported(capability)
         {
             let fault = Fault::Unsupported(format!("capability {capability:?}"));
             return Err(fault.at(it));
         }
     }
-    let model = module.data.memory_model.as_ref();
+    let model = module.sections.memory_model.as_ref();
     let Some(model) = model else {
         return Err(Error::Binary {
             reason: "there is no memory model".into(),
         });
     };
-    match model.operands.as_slice() {
-        [
-            Operand::AddressingModel(addressing),
-            Operand::MemoryModel(memory),
-        ] if matches!(
-            addressing,
-            spirv::AddressingModel::Logical | spirv::AddressingModel::PhysicalStorageBuffer64
-        ) && matches!(
-            memory,
-            spirv::MemoryModel::GLSL450 | spirv::MemoryModel::Vulkan
-        ) =>
-        {
-            Ok(())
-        }
+    let addressing = model.enumerant(0, AddressingModel::from_u32);
+    let memory = model.enumerant(1, MemoryModel::from_u32);
+    match (addressing, memory) {
+        (
+            Some(AddressingModel::Logical | AddressingModel::PhysicalStorageBuffer64),
+            Some(MemoryModel::GLSL450 | MemoryModel::Vulkan),
+        ) => Ok(()),
         _ => Err(Fault::Unsupported("this memory model".into()).at(model)),
     }
 }
@@ -573,9 +559,4 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::AtomicFloat32AddEXT
             | C::AtomicFloat32MinMaxEXT
     )
-}
-
-/// The opcodes that only describe, within a function.
-fn is_debug(op: Op) -> bool {
-    matches!(op, Op::Nop | Op::Line | Op::NoLine)
 }

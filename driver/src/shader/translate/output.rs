@@ -1,6 +1,6 @@
 //! What the program leaves in its outputs.
 
-use rspirv::spirv::{BuiltIn as Spirv, StorageClass};
+use spirv::{BuiltIn as Spirv, StorageClass};
 
 use super::super::error::{Outcome, malformed, unsupported};
 use super::super::interface::{BuiltIn, Output, OutputTarget};

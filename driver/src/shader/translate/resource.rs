@@ -1,7 +1,7 @@
 //! Variables outside functions: buffers, images, workgroup memory, push constants.
 
-use rspirv::spirv::{Decoration, Dim, ImageFormat, StorageClass};
 use simdevice::isa::ir::{Binding, Dimension, ImageShape, MAX_MEMORY_BYTES, Space};
+use spirv::{Decoration, Dim, ImageFormat, StorageClass};
 
 use super::super::error::{Error, Fault, Outcome, malformed, unsupported};
 use super::super::globals::GlobalVariable;
@@ -30,7 +30,7 @@ impl Translator<'_> {
                 other => other.map(|_| ()),
             };
             if let Err(fault) = made {
-                let mut declarations = self.module.data.types_global_values.iter();
+                let mut declarations = self.module.sections.globals.iter();
                 return Err(
                     match (declarations.find(|it| it.result_id == Some(id)), fault) {
                         (Some(declaration), fault) => fault.at(declaration),

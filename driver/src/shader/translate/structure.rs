@@ -7,12 +7,12 @@
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-use rspirv::dr::{Function, Instruction};
-use rspirv::spirv::Op;
 use simdevice::isa::ir::MAX_NESTING;
+use spirv::Op;
 
 use super::super::error::{Outcome, malformed, unsupported};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
+use super::super::module::Function;
 use super::cases::Target;
 
 /// A construct that can be left by a break: an index, unique in the function.
@@ -121,7 +121,7 @@ pub fn structure(function: &Function, stores: &[Vec<u32>]) -> Outcome<Tree> {
         depth: 0,
     };
     for (index, block) in function.blocks.iter().enumerate() {
-        if let Some(id) = block.label.as_ref().and_then(|label| label.result_id) {
+        if let Some(id) = block.label {
             walker.index.insert(id, index);
         }
     }
@@ -225,7 +225,7 @@ impl Walker<'_> {
         let instructions = &self.function.blocks[block].instructions;
         let before_last = instructions.len().checked_sub(2)?;
         let found = &instructions[before_last];
-        matches!(found.class.opcode, Op::LoopMerge | Op::SelectionMerge).then_some(found)
+        matches!(found.opcode, Op::LoopMerge | Op::SelectionMerge).then_some(found)
     }
 
     /// Walks from a block to the end of the list that it belongs to.
@@ -239,9 +239,7 @@ impl Walker<'_> {
             if std::mem::replace(&mut self.visited[block], true) {
                 return malformed("the control flow isn't structured: a block is reached twice");
             }
-            let merge = self
-                .merge(block)
-                .filter(|it| it.class.opcode == Op::LoopMerge);
+            let merge = self.merge(block).filter(|it| it.opcode == Op::LoopMerge);
             at = match merge {
                 Some(it) => {
                     let (merge, continues) = (self.block_of(it.id(0)?)?, self.block_of(it.id(1)?)?);
@@ -261,7 +259,7 @@ impl Walker<'_> {
             modified.extend(stores);
         }
         let terminator = self.terminator(block)?.clone();
-        match terminator.class.opcode {
+        match terminator.opcode {
             Op::Branch => {
                 let target = self.block_of(terminator.id(0)?)?;
                 self.follow(block, target, nodes)
@@ -375,9 +373,7 @@ impl Walker<'_> {
 
     fn selection_merge(&self, block: usize) -> Outcome<Option<usize>> {
         match self.merge(block) {
-            Some(it) if it.class.opcode == Op::SelectionMerge => {
-                Ok(Some(self.block_of(it.id(0)?)?))
-            }
+            Some(it) if it.opcode == Op::SelectionMerge => Ok(Some(self.block_of(it.id(0)?)?)),
             _ => Ok(None),
         }
     }

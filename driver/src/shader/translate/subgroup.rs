@@ -1,12 +1,11 @@
 //! Operations across the lanes of a subgroup.
 
-use rspirv::dr::{Instruction, Operand};
-use rspirv::spirv::{GroupOperation, Op};
 use simdevice::isa::ir::{Reg, SubgroupOp, is_reducible};
 use simdevice::isa::op::Op as Ir;
+use spirv::{GroupOperation, Op};
 
 use super::super::error::{Outcome, malformed, unsupported};
-use super::super::module::Operands;
+use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
 use super::arithmetic::sized;
@@ -15,7 +14,7 @@ impl Translator<'_> {
     /// `OpGroupNonUniform*` and the older `OpSubgroup*KHR`.
     pub fn subgroup(&mut self, it: &Instruction) -> Outcome<()> {
         self.interface.uses_subgroups = true;
-        let opcode = it.class.opcode;
+        let opcode = it.opcode;
         // The newer instructions name a scope first.
         let khr = matches!(
             opcode,
@@ -165,7 +164,7 @@ impl Translator<'_> {
     }
 
     fn ballot_count(&mut self, it: &Instruction) -> Outcome<()> {
-        let Some(Operand::GroupOperation(group)) = it.operands.get(1) else {
+        let Some(group) = it.enumerant(1, GroupOperation::from_u32) else {
             return malformed("there is no group operation");
         };
         let words = self.ballot_of_subgroup(it, 2)?;
@@ -173,8 +172,8 @@ impl Translator<'_> {
         for (index, word) in (0..).zip(words) {
             let mask = match group {
                 GroupOperation::Reduce => None,
-                GroupOperation::InclusiveScan => Some(rspirv::spirv::BuiltIn::SubgroupLeMask),
-                GroupOperation::ExclusiveScan => Some(rspirv::spirv::BuiltIn::SubgroupLtMask),
+                GroupOperation::InclusiveScan => Some(spirv::BuiltIn::SubgroupLeMask),
+                GroupOperation::ExclusiveScan => Some(spirv::BuiltIn::SubgroupLtMask),
                 _ => return unsupported("this group operation"),
             };
             let word = match mask {
@@ -191,7 +190,7 @@ impl Translator<'_> {
     }
 
     fn ballot_find(&mut self, it: &Instruction) -> Outcome<()> {
-        let lowest = it.class.opcode == Op::GroupNonUniformBallotFindLSB;
+        let lowest = it.opcode == Op::GroupNonUniformBallotFindLSB;
         let words = self.ballot_of_subgroup(it, 1)?;
         let zero = self.u32(0);
         let mut found = self.u32(u32::MAX);
@@ -211,12 +210,11 @@ impl Translator<'_> {
     /// Reductions and scans.
     fn group_arithmetic(&mut self, it: &Instruction) -> Outcome<()> {
         let (scalar, regs) = self.vector(it.id(2)?)?;
-        let Some(op) = group_op(it.class.opcode, scalar).filter(|op| is_reducible(*op)) else {
-            return unsupported(format!("Op{:?}", it.class.opcode));
+        let Some(op) = group_op(it.opcode, scalar).filter(|op| is_reducible(*op)) else {
+            return unsupported(format!("Op{:?}", it.opcode));
         };
-        let group = match it.operands.get(1) {
-            Some(Operand::GroupOperation(group)) => group,
-            _ => return malformed("there is no group operation"),
+        let Some(group) = it.enumerant(1, GroupOperation::from_u32) else {
+            return malformed("there is no group operation");
         };
         let operation = match group {
             GroupOperation::Reduce => SubgroupOp::Reduce {

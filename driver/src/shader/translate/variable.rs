@@ -2,9 +2,9 @@
 
 use std::rc::Rc;
 
-use rspirv::spirv::StorageClass;
 use simdevice::isa::ir::Reg;
 use simdevice::isa::op::Op as Ir;
+use spirv::StorageClass;
 
 use super::super::error::{Outcome, malformed};
 use super::super::types::Scalar;
