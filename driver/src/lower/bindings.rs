@@ -4,7 +4,7 @@ use crate::command::bound::{BoundSet, BoundSets};
 use crate::object::descriptor::Descriptor;
 use crate::object::descriptor::layout::Binding;
 use crate::object::image::ImageView;
-use crate::shader::{self, DescriptorKind};
+use gaurast_spirv::{self as shader, DescriptorKind};
 use simdevice::Allocation;
 use simdevice::bindings::Bindings;
 use simdevice::host;

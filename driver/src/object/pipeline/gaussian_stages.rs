@@ -7,13 +7,11 @@ use super::link::{self, Effects, Place, Varyings};
 use super::{AttributeSource, GraphicsPipelineInfo, blend, polygon};
 use crate::error::Error;
 use crate::object::device::Device;
-use crate::shader::{
-    BuiltIn, Descriptor, InputSource, Interface, Numeric, OutputTarget, Stage, reflect,
-};
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use gaurast_spirv::{BuiltIn, Descriptor, InputSource, Interface, Numeric, OutputTarget, Stage};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::draw::{
@@ -53,7 +51,7 @@ impl VertexProjection {
         // Nothing of a vertex stage depends on samples.
         let vertex = polygon::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
         let places = places(state, &vertex.interface)?;
-        let locations = reflect::locations_read(&vertex.interface);
+        let locations = vertex.interface.locations_read();
         let attributes = polygon::attributes(info, &locations)?;
         polygon::check_attributes(&vertex.interface, &locations, &attributes)?;
         let descriptors = vertex.interface.descriptors.clone();

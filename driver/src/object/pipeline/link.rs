@@ -4,7 +4,7 @@
 //! taken off the vertex program, so that the device drops what computes them. What is read and never written is zero.
 
 use crate::error::Error;
-use crate::shader::{
+use gaurast_spirv::{
     BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Numeric, Output,
     OutputTarget, Sampling, Shader,
 };
@@ -352,7 +352,7 @@ fn fragment_output(output: &Output, effects: Effects<'_>) -> Option<FragmentOutp
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shader::Stage;
+    use gaurast_spirv::Stage;
     use simdevice::isa::builder::Builder;
     use simdevice::isa::ir::{Rate, Type};
 

@@ -4,13 +4,14 @@ use super::compute::StageInfo;
 use super::fixed::{self, Class, FixedState};
 use super::layout::PipelineLayout;
 use super::link::{self, Effects};
+use super::reflect;
 use super::vertex_input::{self, AttributeSource};
 use super::{GraphicsPipelineInfo, blend};
 use crate::capabilities::limits;
 use crate::error::Error;
 use crate::object::device::Device;
-use crate::shader::{Descriptor, Interface, Numeric, Options, Shader, Stage, reflect};
 use ash::vk;
+use gaurast_spirv::{Descriptor, Interface, Numeric, Options, Shader, Stage};
 use simdevice::format;
 use simdevice::packet::draw::{DrawPipeline, DrawState, PolygonMode};
 use std::sync::Arc;
@@ -70,7 +71,7 @@ impl PolygonPipeline {
             .fragment
             .map(|stage| translate(device, layout, stage, Stage::Fragment, samples))
             .transpose()?;
-        let locations = reflect::locations_read(&vertex.interface);
+        let locations = vertex.interface.locations_read();
         let attributes = attributes(info, &locations)?;
         check_attributes(&vertex.interface, &locations, &attributes)?;
         if let Some(fragment) = &fragment {

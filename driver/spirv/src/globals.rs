@@ -1,0 +1,301 @@
+//! The types, constants and variables of a module, with specialization constants given their values.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use spirv::{Decoration, Dim, ImageFormat, Op, StorageClass};
+
+use super::constant;
+use super::error::{Error, Outcome, malformed, unsupported};
+use super::instruction::{Instruction, Operand};
+use super::module::Module;
+use super::types::{ImageType, Member, Scalar, Type, Types};
+
+/// The most scalars of all constants together.
+const MAX_CONSTANT_SCALARS: usize = 1 << 20;
+
+/// Values for specialization constants.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Specialization {
+    values: HashMap<u32, Vec<u8>>,
+}
+
+impl Specialization {
+    /// Gives the constant with this `SpecId` a value: the bytes of its type; four for a boolean.
+    pub fn set(&mut self, id: u32, bytes: &[u8]) {
+        self.values.insert(id, bytes.to_vec());
+    }
+
+    /// The bits given to a constant that takes some bytes; None if it keeps its default.
+    fn bits(&self, id: u32, expected: usize) -> Result<Option<u64>, Error> {
+        let Some(bytes) = self.values.get(&id) else {
+            return Ok(None);
+        };
+        if bytes.len() != expected {
+            return Err(Error::Specialization {
+                id,
+                expected,
+                given: bytes.len(),
+            });
+        }
+        let mut bits = [0; 8];
+        bits[..expected].copy_from_slice(bytes);
+        Ok(Some(u64::from_le_bytes(bits)))
+    }
+}
+
+/// A constant: a bit pattern for each scalar, as registers hold them.
+#[derive(Clone, Debug)]
+pub(crate) struct Constant {
+    pub ty: u32,
+    pub bits: Rc<[u64]>,
+}
+
+/// A variable outside functions.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GlobalVariable {
+    pub class: StorageClass,
+    pub pointee: u32,
+    pub initializer: Option<u32>,
+}
+
+/// What stands before the functions of a module.
+#[derive(Debug, Default)]
+pub(crate) struct Globals {
+    pub types: Types,
+    pub constants: HashMap<u32, Constant>,
+    pub variables: HashMap<u32, GlobalVariable>,
+    scalars: usize,
+}
+
+impl Globals {
+    /// Reads them, in order.
+    pub fn new(module: &Module, specialization: &Specialization) -> Result<Self, Error> {
+        let mut globals = Self::default();
+        for instruction in &module.sections.globals {
+            globals
+                .instruction(module, specialization, instruction)
+                .map_err(|fault| fault.at(instruction))?;
+        }
+        Ok(globals)
+    }
+
+    /// The value of a constant that is one unsigned number.
+    pub fn constant_u32(&self, id: u32) -> Option<u32> {
+        match &*self.constants.get(&id)?.bits {
+            [bits] => Some(*bits as u32),
+            _ => None,
+        }
+    }
+
+    /// Adds a constant.
+    pub fn define(&mut self, id: u32, ty: u32, bits: Vec<u64>) -> Outcome<()> {
+        if bits.len() != self.types.scalars(ty)? as usize {
+            return malformed("the constant doesn't have as many parts as its type");
+        }
+        self.scalars += bits.len();
+        if self.scalars > MAX_CONSTANT_SCALARS {
+            return Err(Error::TooLarge {
+                what: "scalars of constants",
+                limit: MAX_CONSTANT_SCALARS as u64,
+            }
+            .into());
+        }
+        let bits = bits.into();
+        self.constants.insert(id, Constant { ty, bits });
+        Ok(())
+    }
+
+    fn instruction(
+        &mut self,
+        module: &Module,
+        specialization: &Specialization,
+        it: &Instruction,
+    ) -> Outcome<()> {
+        if it.opcode == Op::Variable {
+            let (class, pointee) = self.types.pointer(it.ty()?)?;
+            let initializer = it.id(1).ok();
+            let variable = GlobalVariable {
+                class,
+                pointee,
+                initializer,
+            };
+            self.variables.insert(it.result()?, variable);
+            return Ok(());
+        }
+        if it.opcode == Op::TypeForwardPointer {
+            return match it.enumerant(1, StorageClass::from_u32) {
+                Some(class) => self.types.forward(it.id(0)?, class),
+                None => malformed("there is no storage class"),
+            };
+        }
+        if it.opcode.is_type() {
+            let ty = self.read_type(module, it)?;
+            return self.types.declare(it.result()?, ty);
+        }
+        self.constant(module, specialization, it)
+    }
+
+    fn read_type(&self, module: &Module, it: &Instruction) -> Outcome<Type> {
+        let stride = |id| module.literal(id, Decoration::ArrayStride);
+        Ok(match it.opcode {
+            Op::TypeVoid => Type::Void,
+            Op::TypeBool => Type::Scalar(Scalar::Bool),
+            Op::TypeInt => {
+                let (width, signed) = (it.number(0)?, it.number(1)? != 0);
+                if !matches!(width, 8 | 16 | 32 | 64) {
+                    return unsupported(format!("integers of {width} bits"));
+                }
+                Type::Scalar(Scalar::Int { width, signed })
+            }
+            Op::TypeFloat => {
+                let width = it.number(0)?;
+                if !matches!(width, 16 | 32 | 64) || it.operands.len() > 1 {
+                    return unsupported("this kind of float");
+                }
+                Type::Scalar(Scalar::Float { width })
+            }
+            Op::TypeVector => {
+                let (element, count) = (it.id(0)?, it.number(1)?);
+                if !matches!(self.types.get(element)?, Type::Scalar(_)) || !(2..=4).contains(&count)
+                {
+                    return malformed("vectors have two to four scalars");
+                }
+                Type::Vector { element, count }
+            }
+            Op::TypeMatrix => {
+                let (column, count) = (it.id(0)?, it.number(1)?);
+                let Type::Vector { element, .. } = self.types.get(column)? else {
+                    return malformed("columns of a matrix are vectors");
+                };
+                let (scalar, _) = self.types.vector(*element)?;
+                if !matches!(scalar, Scalar::Float { .. }) || !(2..=4).contains(&count) {
+                    return malformed("matrices have two to four columns of floats");
+                }
+                Type::Matrix { column, count }
+            }
+            Op::TypeArray => Type::Array {
+                element: it.id(0)?,
+                count: match self.constant_u32(it.id(1)?) {
+                    Some(count) if count > 0 => count,
+                    _ => return malformed("the length isn't a positive constant"),
+                },
+                stride: stride(it.result()?),
+            },
+            Op::TypeRuntimeArray => Type::RuntimeArray {
+                element: it.id(0)?,
+                stride: stride(it.result()?),
+            },
+            Op::TypeStruct => Type::Struct(self.members(module, it)?),
+            Op::TypePointer => match it.enumerant(0, StorageClass::from_u32) {
+                Some(class) => Type::Pointer {
+                    class,
+                    pointee: it.id(1)?,
+                },
+                None => return malformed("there is no storage class"),
+            },
+            Op::TypeImage => Type::Image(image_type(it)?),
+            Op::TypeSampler => Type::Sampler,
+            Op::TypeSampledImage => Type::SampledImage { image: it.id(0)? },
+            Op::TypeFunction => Type::Function,
+            _ => return unsupported("this type"),
+        })
+    }
+
+    fn members(&self, module: &Module, it: &Instruction) -> Outcome<Rc<[Member]>> {
+        let id = it.result()?;
+        let mut start = Some(0_u32);
+        let mut members = Vec::with_capacity(it.operands.len());
+        for (index, ty) in it.ids(0).into_iter().enumerate() {
+            let index = index as u32;
+            members.push(Member {
+                ty,
+                start: start.unwrap_or(0),
+                offset: module.member_literal(id, index, Decoration::Offset),
+                matrix_stride: module.member_literal(id, index, Decoration::MatrixStride),
+                row_major: module.member_has(id, index, Decoration::RowMajor),
+                built_in: module.member_built_in(id, index),
+            });
+            start = start
+                .zip(self.types.scalars(ty).ok())
+                .and_then(|(start, scalars)| start.checked_add(scalars));
+        }
+        Ok(members.into())
+    }
+
+    fn constant(
+        &mut self,
+        module: &Module,
+        specialization: &Specialization,
+        it: &Instruction,
+    ) -> Outcome<()> {
+        let (id, ty) = (it.result()?, it.ty()?);
+        let spec_id = module.literal(id, Decoration::SpecId);
+        let given = |bytes| match spec_id {
+            Some(spec_id) => specialization.bits(spec_id, bytes),
+            None => Ok(None),
+        };
+        let opcode = it.opcode;
+        let bits = match opcode {
+            Op::ConstantTrue => vec![1],
+            Op::ConstantFalse => vec![0],
+            Op::SpecConstantTrue | Op::SpecConstantFalse => {
+                let default = u64::from(opcode == Op::SpecConstantTrue);
+                vec![given(4)?.map_or(default, |bits| u64::from(bits != 0))]
+            }
+            Op::Constant | Op::SpecConstant => {
+                let (scalar, _) = self.types.vector(ty)?;
+                let literal = match it.operands.first() {
+                    Some(Operand::Literal(bits)) => u64::from(*bits),
+                    Some(Operand::Literal64(bits)) => *bits,
+                    _ => return malformed("there is no value"),
+                };
+                let bytes = match scalar {
+                    Scalar::Int { width, .. } | Scalar::Float { width } => width as usize / 8,
+                    _ => return malformed("this constant is neither an integer nor a float"),
+                };
+                let bits = match opcode {
+                    Op::SpecConstant => given(bytes)?.unwrap_or(literal),
+                    _ => literal,
+                };
+                vec![constant::from_memory(scalar, bits)]
+            }
+            Op::ConstantComposite | Op::SpecConstantComposite => {
+                let mut bits = Vec::new();
+                let limit = self.types.scalars(ty)? as usize;
+                for part in it.ids(0) {
+                    let Some(part) = self.constants.get(&part) else {
+                        return malformed(format!("%{part} isn't a constant"));
+                    };
+                    bits.extend_from_slice(&part.bits);
+                    if bits.len() > limit {
+                        return malformed("the constant has more parts than its type");
+                    }
+                }
+                bits
+            }
+            Op::ConstantNull => vec![0; self.types.scalars(ty)? as usize],
+            Op::Undef => vec![0; self.types.scalars(ty)? as usize],
+            Op::SpecConstantOp => constant::evaluate(self, ty, &it.numbers(0))?,
+            _ => return unsupported("this instruction outside a function"),
+        };
+        self.define(id, ty, bits)
+    }
+}
+
+fn image_type(it: &Instruction) -> Outcome<ImageType> {
+    let (Some(dim), Some(format)) = (
+        it.enumerant(1, Dim::from_u32),
+        it.enumerant(6, ImageFormat::from_u32),
+    ) else {
+        return malformed("the image type isn't complete");
+    };
+    Ok(ImageType {
+        sampled_type: it.id(0)?,
+        dim,
+        arrayed: it.number(3)? != 0,
+        multisampled: it.number(4)? != 0,
+        sampled: it.number(5)?,
+        format,
+    })
+}
