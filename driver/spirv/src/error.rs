@@ -8,14 +8,14 @@ use super::Stage;
 
 /// Where in a module a problem was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct InstructionRef {
     /// The instruction's name.
     pub opcode: Op,
     /// The id that it defines, or, if it defines none, the first id that it names.
     pub id: Option<u32>,
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for InstructionRef {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Op{:?}", self.opcode)?;
         match self.id {
@@ -38,7 +38,7 @@ pub enum Error {
     #[error("malformed SPIR-V: {place}: {reason}")]
     Malformed {
         /// The instruction.
-        place: Place,
+        place: InstructionRef,
         /// What is wrong.
         reason: String,
     },
@@ -46,7 +46,7 @@ pub enum Error {
     #[error("unsupported SPIR-V: {place}: {reason}")]
     Unsupported {
         /// The instruction.
-        place: Place,
+        place: InstructionRef,
         /// What it asks for.
         reason: String,
     },
@@ -89,42 +89,41 @@ pub enum Error {
 
 /// A problem whose place isn't known yet.
 #[derive(Clone, Debug)]
-pub(crate) enum Fault {
+pub(crate) enum Diagnostic {
     /// See [`Error::Malformed`].
     Malformed(String),
     /// See [`Error::Unsupported`].
     Unsupported(String),
     /// A complete error.
-    Placed(Error),
+    Located(Error),
 }
 
 /// The result of translating a part of a shader.
-pub(crate) type Outcome<T> = Result<T, Fault>;
+pub(crate) type Result<T, E = Diagnostic> = std::result::Result<T, E>;
 
-/// A fault: SPIR-V's rules are broken.
-pub(crate) fn malformed<T>(reason: impl Into<String>) -> Outcome<T> {
-    Err(Fault::Malformed(reason.into()))
+/// A diagnostic: SPIR-V's rules are broken.
+pub(crate) fn malformed<T>(reason: impl Into<String>) -> Result<T> {
+    Err(Diagnostic::Malformed(reason.into()))
 }
 
-/// A fault: this driver can't do it.
-pub(crate) fn unsupported<T>(reason: impl Into<String>) -> Outcome<T> {
-    Err(Fault::Unsupported(reason.into()))
+/// A diagnostic: this driver can't do it.
+pub(crate) fn unsupported<T>(reason: impl Into<String>) -> Result<T> {
+    Err(Diagnostic::Unsupported(reason.into()))
 }
 
-impl Fault {
+impl Diagnostic {
     /// Says which instruction it was, unless that is known already.
-    pub(crate) fn at(self, place: impl Into<Place>) -> Error {
-        let place = place.into();
+    pub(crate) fn locate(self, place: InstructionRef) -> Error {
         match self {
             Self::Malformed(reason) => Error::Malformed { place, reason },
             Self::Unsupported(reason) => Error::Unsupported { place, reason },
-            Self::Placed(error) => error,
+            Self::Located(error) => error,
         }
     }
 }
 
-impl From<Error> for Fault {
+impl From<Error> for Diagnostic {
     fn from(error: Error) -> Self {
-        Self::Placed(error)
+        Self::Located(error)
     }
 }

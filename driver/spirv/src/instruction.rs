@@ -2,7 +2,7 @@
 
 use spirv::Op;
 
-use super::error::{Outcome, Place, malformed};
+use super::error::{InstructionRef, Result, malformed};
 
 /// An operand: what its words are, by the grammar.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub(crate) struct Instruction {
 
 impl Instruction {
     /// The id at a position.
-    pub fn id(&self, index: usize) -> Outcome<u32> {
+    pub fn id(&self, index: usize) -> Result<u32> {
         match self.operands.get(index).and_then(Operand::id) {
             Some(id) => Ok(id),
             None => malformed(format!("operand {index} isn't an id")),
@@ -49,7 +49,7 @@ impl Instruction {
     }
 
     /// The literal at a position.
-    pub fn number(&self, index: usize) -> Outcome<u32> {
+    pub fn number(&self, index: usize) -> Result<u32> {
         match self.operands.get(index) {
             Some(Operand::Literal(value)) => Ok(*value),
             _ => malformed(format!("operand {index} isn't a number")),
@@ -86,7 +86,7 @@ impl Instruction {
     }
 
     /// The result's type.
-    pub fn ty(&self) -> Outcome<u32> {
+    pub fn ty(&self) -> Result<u32> {
         match self.result_type {
             Some(ty) => Ok(ty),
             None => malformed("there is no result type"),
@@ -94,21 +94,19 @@ impl Instruction {
     }
 
     /// The result.
-    pub fn result(&self) -> Outcome<u32> {
+    pub fn result(&self) -> Result<u32> {
         match self.result_id {
             Some(id) => Ok(id),
             None => malformed("there is no result"),
         }
     }
-}
 
-impl From<&Instruction> for Place {
-    fn from(it: &Instruction) -> Self {
-        Self {
-            opcode: it.opcode,
-            id: it
-                .result_id
-                .or_else(|| it.operands.iter().find_map(Operand::id)),
+    /// The instruction as errors name it.
+    pub fn reference(&self) -> InstructionRef {
+        let named = || self.operands.iter().find_map(Operand::id);
+        InstructionRef {
+            opcode: self.opcode,
+            id: self.result_id.or_else(named),
         }
     }
 }
@@ -125,9 +123,9 @@ mod tests {
             result_id: Some(12),
             operands: vec![Operand::Id(7)],
         };
-        let fault = malformed::<()>("operand %7 isn't defined").unwrap_err();
+        let diagnostic = malformed::<()>("operand %7 isn't defined").unwrap_err();
         assert_eq!(
-            fault.at(&instruction).to_string(),
+            diagnostic.locate(instruction.reference()).to_string(),
             "malformed SPIR-V: OpFAdd %12: operand %7 isn't defined"
         );
     }

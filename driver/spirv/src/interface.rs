@@ -27,7 +27,7 @@ impl std::fmt::Display for Stage {
 
 /// The numeric type of a scalar at the interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Numeric {
+pub enum ScalarType {
     /// A float of 16 (in a register: 32), 32 or 64 bits.
     Float {
         /// Bits.
@@ -127,7 +127,7 @@ pub struct Input {
     /// Where it comes from.
     pub source: InputSource,
     /// Its type.
-    pub numeric: Numeric,
+    pub numeric: ScalarType,
 }
 
 /// Where an output goes.
@@ -157,7 +157,7 @@ pub struct Output {
     /// Where it goes.
     pub target: OutputTarget,
     /// Its type.
-    pub numeric: Numeric,
+    pub numeric: ScalarType,
 }
 
 /// What kind of descriptor a variable takes.
@@ -181,7 +181,7 @@ pub struct ImageUse {
     /// Its kind.
     pub shape: ImageShape,
     /// What its texels are read as.
-    pub numeric: Numeric,
+    pub numeric: ScalarType,
 }
 
 /// A descriptor, or an array of them, that the program uses.
@@ -195,7 +195,7 @@ pub struct Descriptor {
     pub kind: DescriptorKind,
     /// The array's length, or 1.
     pub count: u32,
-    /// The program's bind point of the first; the others follow. Bind points are unique over all kinds; a combined
+    /// The program's resource slot of the first; the others follow. Resource slots are unique over all kinds; a combined
     /// image sampler uses the same for both.
     pub slot: u32,
     /// Buffers: the least size in bytes that covers all members but a runtime array.
@@ -215,9 +215,9 @@ pub struct Descriptor {
 pub enum DepthMode {
     /// It writes none.
     #[default]
-    Fixed,
+    NotWritten,
     /// Any.
-    Any,
+    Replacing,
     /// At least the fixed one.
     Greater,
     /// At most the fixed one.
@@ -257,8 +257,8 @@ pub struct Interface {
 
 impl Interface {
     /// The locations that the program reads, in order, each with the type of its first scalar.
-    pub fn locations_read(&self) -> Vec<(u32, Numeric)> {
-        let mut found: Vec<(u32, u32, Numeric)> = self
+    pub fn locations_read(&self) -> Vec<(u32, ScalarType)> {
+        let mut found: Vec<(u32, u32, ScalarType)> = self
             .inputs
             .iter()
             .filter_map(|input| match input.source {
@@ -284,6 +284,6 @@ impl Interface {
 pub struct Shader {
     /// The program.
     pub program: Program,
-    /// What its slots and bind points mean.
+    /// What its slots and resource slots mean.
     pub interface: Interface,
 }

@@ -7,7 +7,6 @@
 //! The words of a module may be anything: what is malformed or unsupported is an [`Error`] that names the instruction,
 //! in bounded time and memory, never a panic.
 
-mod constant;
 mod decoder;
 mod error;
 mod globals;
@@ -18,11 +17,11 @@ mod module;
 mod translate;
 mod types;
 
-pub use error::{Error, Place};
+pub use error::{Error, InstructionRef};
 pub use globals::Specialization;
 pub use interface::{
     BuiltIn, DepthMode, Descriptor, DescriptorKind, ImageUse, Input, InputSource, Interface,
-    Interpolation, Numeric, Output, OutputTarget, Sampling, Shader, Stage,
+    Interpolation, Output, OutputTarget, Sampling, ScalarType, Shader, Stage,
 };
 pub use module::Module;
 pub use translate::{Options, is_supported, translate};

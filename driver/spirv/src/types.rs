@@ -6,7 +6,7 @@ use std::rc::Rc;
 use isa::ir;
 use spirv::{BuiltIn, StorageClass};
 
-use super::error::{Outcome, malformed, unsupported};
+use super::error::{Result, malformed, unsupported};
 
 /// The most scalars that a value may have.
 pub(crate) const MAX_SCALARS: u32 = 1 << 14;
@@ -68,7 +68,7 @@ impl Scalar {
     }
 
     /// How it lies in workgroup and private memory, where narrow scalars take a word.
-    pub fn natural_format(self) -> ir::Format {
+    pub fn tight_format(self) -> ir::Format {
         if self.is_wide() {
             ir::Format::B64
         } else {
@@ -156,7 +156,7 @@ pub(crate) struct Types {
 
 impl Types {
     /// Announces a pointer type whose pointee isn't declared yet.
-    pub fn forward(&mut self, id: u32, class: StorageClass) -> Outcome<()> {
+    pub fn forward(&mut self, id: u32, class: StorageClass) -> Result<()> {
         if class != StorageClass::PhysicalStorageBuffer {
             return unsupported(format!("a forward pointer of storage class {class:?}"));
         }
@@ -165,7 +165,7 @@ impl Types {
     }
 
     /// Declares a type whose parts are declared already.
-    pub fn declare(&mut self, id: u32, ty: Type) -> Outcome<()> {
+    pub fn declare(&mut self, id: u32, ty: Type) -> Result<()> {
         // Sizes of types are kept, so what they were made of must not change.
         let announced = matches!(
             ty,
@@ -220,7 +220,7 @@ impl Types {
     }
 
     /// A type by id.
-    pub fn get(&self, id: u32) -> Outcome<&Type> {
+    pub fn get(&self, id: u32) -> Result<&Type> {
         match self.entries.get(&id) {
             Some(entry) => Ok(&entry.ty),
             None => malformed(format!("type %{id} isn't defined")),
@@ -228,7 +228,7 @@ impl Types {
     }
 
     /// How many scalars a value of a type has.
-    pub fn scalars(&self, id: u32) -> Outcome<u32> {
+    pub fn scalars(&self, id: u32) -> Result<u32> {
         match self.entries.get(&id).map(|entry| entry.scalars) {
             Some(Some(scalars)) => Ok(scalars),
             Some(None) => unsupported(format!("%{id} is too large, or no type, for a value")),
@@ -242,13 +242,13 @@ impl Types {
     }
 
     /// The scalars of a value, in order.
-    pub fn flatten(&self, id: u32) -> Outcome<Vec<Scalar>> {
+    pub fn flatten(&self, id: u32) -> Result<Vec<Scalar>> {
         let mut scalars = Vec::with_capacity(self.scalars(id)? as usize);
         self.flatten_into(id, &mut scalars)?;
         Ok(scalars)
     }
 
-    fn flatten_into(&self, id: u32, into: &mut Vec<Scalar>) -> Outcome<()> {
+    fn flatten_into(&self, id: u32, into: &mut Vec<Scalar>) -> Result<()> {
         match self.get(id)? {
             Type::Scalar(scalar) => into.push(*scalar),
             Type::Pointer { .. } => into.push(Scalar::Address),
@@ -278,7 +278,7 @@ impl Types {
     }
 
     /// The scalar of a scalar or vector type, and how many there are.
-    pub fn vector(&self, id: u32) -> Outcome<(Scalar, u32)> {
+    pub fn vector(&self, id: u32) -> Result<(Scalar, u32)> {
         match self.get(id)? {
             Type::Scalar(scalar) => Ok((*scalar, 1)),
             Type::Vector { element, count } => Ok((self.vector(*element)?.0, *count)),
@@ -291,7 +291,7 @@ impl Types {
     }
 
     /// The columns and rows of a matrix type, its column type and its scalar.
-    pub fn matrix(&self, id: u32) -> Outcome<(u32, u32, u32, Scalar)> {
+    pub fn matrix(&self, id: u32) -> Result<(u32, u32, u32, Scalar)> {
         match self.get(id)? {
             Type::Matrix { column, count } => {
                 let (scalar, rows) = self.vector(*column)?;
@@ -302,7 +302,7 @@ impl Types {
     }
 
     /// What a composite type is made of: the part's type and the scalars before it. None beyond its end.
-    pub fn part(&self, id: u32, index: u32) -> Outcome<(u32, u32)> {
+    pub fn part(&self, id: u32, index: u32) -> Result<(u32, u32)> {
         let (element, count) = match self.get(id)? {
             Type::Vector { element, count }
             | Type::Matrix {
@@ -329,7 +329,7 @@ impl Types {
     }
 
     /// The class and the pointee of a pointer type.
-    pub fn pointer(&self, id: u32) -> Outcome<(StorageClass, u32)> {
+    pub fn pointer(&self, id: u32) -> Result<(StorageClass, u32)> {
         match self.get(id)? {
             Type::Pointer { class, pointee } => Ok((*class, *pointee)),
             _ => malformed(format!("%{id} isn't a pointer")),
@@ -337,22 +337,22 @@ impl Types {
     }
 
     /// Bytes of a type in workgroup and private memory.
-    pub fn natural_size(&self, id: u32) -> Outcome<u64> {
+    pub fn tight_size(&self, id: u32) -> Result<u64> {
         Ok(match self.get(id)? {
-            Type::Scalar(scalar) => u64::from(scalar.natural_format().bytes()),
+            Type::Scalar(scalar) => u64::from(scalar.tight_format().bytes()),
             Type::Pointer { .. } => 8,
             Type::Vector { element, count }
             | Type::Matrix {
                 column: element,
                 count,
             }
-            | Type::Array { element, count, .. } => self
-                .natural_size(*element)?
-                .saturating_mul(u64::from(*count)),
+            | Type::Array { element, count, .. } => {
+                self.tight_size(*element)?.saturating_mul(u64::from(*count))
+            }
             Type::Struct(members) => {
                 let mut size = 0_u64;
                 for member in members.iter() {
-                    size = size.saturating_add(self.natural_size(member.ty)?);
+                    size = size.saturating_add(self.tight_size(member.ty)?);
                 }
                 size
             }
@@ -361,7 +361,7 @@ impl Types {
     }
 
     /// Bytes that a type with an explicit layout spans, without trailing padding; a runtime array counts for nothing.
-    pub fn explicit_size(&self, id: u32) -> Outcome<u64> {
+    pub fn explicit_size(&self, id: u32) -> Result<u64> {
         Ok(match self.get(id)? {
             Type::Scalar(scalar) => u64::from(scalar.format().bytes()),
             Type::Pointer { .. } => 8,
@@ -390,7 +390,7 @@ impl Types {
     }
 
     /// Bytes of a member, with matrices by their stride, also in arrays.
-    fn member_size(&self, member: &Member) -> Outcome<u64> {
+    fn member_size(&self, member: &Member) -> Result<u64> {
         let mut ty = member.ty;
         let mut before = 0_u64;
         while let Type::Array {

@@ -4,14 +4,14 @@ use isa::ir::{Address, Binding, Format, Reg, Space};
 use isa::op::Op as Ir;
 use spirv::{Op, StorageClass};
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::instruction::Instruction;
 use super::super::types::{ImageType, Scalar, Type};
 use super::{Translator, Value};
 
 /// A move within a variable that is known at run time only.
 #[derive(Clone, Copy, Debug)]
-pub struct Step {
+pub struct DynamicIndex {
     pub index: Reg,
     /// Elements that it may pick.
     pub count: u32,
@@ -21,7 +21,7 @@ pub struct Step {
 
 /// How what a pointer into memory points to is laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layout {
+pub struct MemoryLayout {
     /// By decorations; otherwise scalars lie close together, each in a word or two.
     pub explicit: bool,
     /// The stride of matrices, and whether it is from row to row.
@@ -32,15 +32,15 @@ pub struct Layout {
 
 /// A place in memory.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct MemoryRef {
     pub space: Space,
     pub base: Option<Reg>,
     pub offset: u32,
-    pub layout: Layout,
+    pub layout: MemoryLayout,
     pub ty: u32,
 }
 
-impl Place {
+impl MemoryRef {
     /// The address some bytes further on.
     pub fn at(&self, bytes: u32) -> Address {
         Address {
@@ -55,13 +55,13 @@ impl Place {
 #[derive(Clone, Debug)]
 pub enum Pointer {
     /// A part of a variable held in registers.
-    Slot {
+    PromotedVariable {
         slot: usize,
         start: usize,
-        steps: Vec<Step>,
+        steps: Vec<DynamicIndex>,
         ty: u32,
     },
-    Memory(Place),
+    Memory(MemoryRef),
     /// A descriptor, or an array of them.
     Resource {
         binding: Binding,
@@ -79,7 +79,7 @@ pub enum Pointer {
 
 impl Pointer {
     /// The place in memory, if it is one with a device address.
-    pub fn address(&self) -> Option<&Place> {
+    pub fn address(&self) -> Option<&MemoryRef> {
         match self {
             Self::Memory(place) if place.space == Space::Global => Some(place),
             _ => None,
@@ -96,14 +96,14 @@ enum Index {
 
 impl Translator<'_> {
     /// The pointer that an id stands for.
-    pub fn pointer(&mut self, id: u32) -> Outcome<Pointer> {
+    pub fn pointer(&mut self, id: u32) -> Result<Pointer> {
         match self.value(id)? {
             Value::Pointer(pointer) => Ok((*pointer).clone()),
             Value::Regs(regs) => {
                 let (class, pointee) = self.globals.types.pointer(self.type_of(id)?)?;
                 match (class, &*regs) {
                     (StorageClass::PhysicalStorageBuffer, [address]) => {
-                        Ok(Pointer::Memory(Place {
+                        Ok(Pointer::Memory(MemoryRef {
                             space: Space::Global,
                             base: Some(*address),
                             offset: 0,
@@ -119,7 +119,7 @@ impl Translator<'_> {
     }
 
     /// The 64-bit address of a place.
-    pub fn pointer_to_address(&mut self, place: &Place) -> Outcome<Reg> {
+    pub fn pointer_to_address(&mut self, place: &MemoryRef) -> Result<Reg> {
         let Some(base) = place.base else {
             return malformed("the pointer has no address");
         };
@@ -131,7 +131,7 @@ impl Translator<'_> {
     }
 
     /// `OpAccessChain` and its relatives.
-    pub fn access_chain(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn access_chain(&mut self, it: &Instruction) -> Result<()> {
         let by_element = matches!(it.opcode, Op::PtrAccessChain | Op::InBoundsPtrAccessChain);
         let mut pointer = self.pointer(it.id(0)?)?;
         if by_element {
@@ -145,7 +145,7 @@ impl Translator<'_> {
         self.define_as(it, Value::Pointer(pointer.into()))
     }
 
-    fn index(&mut self, id: u32) -> Outcome<Index> {
+    fn index(&mut self, id: u32) -> Result<Index> {
         if let Some(index) = self.globals.constant_u32(id) {
             return Ok(Index::Constant(index));
         }
@@ -164,7 +164,7 @@ impl Translator<'_> {
     }
 
     /// A pointer moved by whole elements of the array that it points into.
-    fn next_element(&mut self, pointer: Pointer, ty: u32, element: Index) -> Outcome<Pointer> {
+    fn next_element(&mut self, pointer: Pointer, ty: u32, element: Index) -> Result<Pointer> {
         let stride = self.module.literal(ty, spirv::Decoration::ArrayStride);
         match (pointer, stride) {
             (Pointer::Memory(place), Some(stride)) => {
@@ -174,9 +174,9 @@ impl Translator<'_> {
         }
     }
 
-    fn pointer_to_part(&mut self, pointer: Pointer, index: Index) -> Outcome<Pointer> {
+    fn pointer_to_part(&mut self, pointer: Pointer, index: Index) -> Result<Pointer> {
         match pointer {
-            Pointer::Slot {
+            Pointer::PromotedVariable {
                 slot,
                 start,
                 mut steps,
@@ -190,7 +190,7 @@ impl Translator<'_> {
                     Index::Dynamic { reg, .. } => {
                         let (part, count) = self.elements(ty)?;
                         let scalars = self.globals.types.scalars(part)?;
-                        steps.push(Step {
+                        steps.push(DynamicIndex {
                             index: reg,
                             count,
                             scalars,
@@ -198,7 +198,7 @@ impl Translator<'_> {
                         (part, start)
                     }
                 };
-                Ok(Pointer::Slot {
+                Ok(Pointer::PromotedVariable {
                     slot,
                     start,
                     steps,
@@ -217,7 +217,7 @@ impl Translator<'_> {
     }
 
     /// The element type and the length of what a run-time index may go into.
-    fn elements(&self, ty: u32) -> Outcome<(u32, u32)> {
+    fn elements(&self, ty: u32) -> Result<(u32, u32)> {
         match self.globals.types.get(ty)? {
             Type::Vector { element, count }
             | Type::Matrix {
@@ -229,7 +229,7 @@ impl Translator<'_> {
         }
     }
 
-    fn place_of_part(&mut self, mut place: Place, index: Index) -> Outcome<Place> {
+    fn place_of_part(&mut self, mut place: MemoryRef, index: Index) -> Result<MemoryRef> {
         let types = &self.globals.types;
         match types.get(place.ty)? {
             Type::Struct(members) => {
@@ -250,7 +250,7 @@ impl Translator<'_> {
                 } else {
                     let mut before = 0_u64;
                     for earlier in &members[..number as usize] {
-                        before += types.natural_size(earlier.ty)?;
+                        before += types.tight_size(earlier.ty)?;
                     }
                     u32::try_from(before).unwrap_or(u32::MAX)
                 };
@@ -269,7 +269,7 @@ impl Translator<'_> {
                         None => return malformed("the array has no stride"),
                     }
                 } else {
-                    u32::try_from(types.natural_size(element)?).unwrap_or(u32::MAX)
+                    u32::try_from(types.tight_size(element)?).unwrap_or(u32::MAX)
                 };
                 place.ty = element;
                 self.moved(place, index, stride)
@@ -280,10 +280,10 @@ impl Translator<'_> {
                 place.ty = column;
                 let bytes = scalar_bytes(scalar, place.layout);
                 let stride = match place.layout {
-                    Layout {
+                    MemoryLayout {
                         explicit: false, ..
                     } => bytes * rows,
-                    Layout {
+                    MemoryLayout {
                         matrix: Some((stride, row_major)),
                         ..
                     } => {
@@ -307,7 +307,7 @@ impl Translator<'_> {
     }
 
     /// A place moved by `index * stride` bytes.
-    fn moved(&mut self, mut place: Place, index: Index, stride: u32) -> Outcome<Place> {
+    fn moved(&mut self, mut place: MemoryRef, index: Index, stride: u32) -> Result<MemoryRef> {
         match index {
             Index::Constant(index) if place.space != Space::Global || index < 1 << 31 => {
                 let bytes = u64::from(index) * u64::from(stride) + u64::from(place.offset);
@@ -340,7 +340,7 @@ impl Translator<'_> {
     }
 
     /// The element type and length of an array of descriptors.
-    pub fn descriptors(&self, ty: u32) -> Outcome<(u32, u32)> {
+    pub fn descriptors(&self, ty: u32) -> Result<(u32, u32)> {
         match self.globals.types.get(ty)? {
             Type::Array { element, count, .. } => Ok((*element, *count)),
             Type::RuntimeArray { element, .. } => Ok((*element, self.options.unsized_descriptors)),
@@ -349,7 +349,7 @@ impl Translator<'_> {
     }
 
     /// How many descriptors a type takes.
-    pub fn descriptor_count(&self, mut ty: u32) -> Outcome<u32> {
+    pub fn descriptor_count(&self, mut ty: u32) -> Result<u32> {
         let mut count = 1_u32;
         while let Type::Array { .. } | Type::RuntimeArray { .. } = self.globals.types.get(ty)? {
             let (element, length) = self.descriptors(ty)?;
@@ -363,7 +363,7 @@ impl Translator<'_> {
     }
 
     /// One element, of `each` descriptors, of an array of descriptors.
-    fn pick_descriptor(&mut self, array: Binding, index: Index, each: u32) -> Outcome<Binding> {
+    fn pick_descriptor(&mut self, array: Binding, index: Index, each: u32) -> Result<Binding> {
         let index = match index {
             Index::Constant(index) if array.index.is_none() => {
                 let first = u64::from(index) * u64::from(each);
@@ -391,9 +391,9 @@ impl Translator<'_> {
     }
 
     /// The pointer to a descriptor of some type.
-    pub fn resource(&mut self, binding: Binding, class: StorageClass, ty: u32) -> Outcome<Pointer> {
+    pub fn resource(&mut self, binding: Binding, class: StorageClass, ty: u32) -> Result<Pointer> {
         Ok(match self.globals.types.get(ty)? {
-            Type::Struct(_) => Pointer::Memory(Place {
+            Type::Struct(_) => Pointer::Memory(MemoryRef {
                 space: Space::Buffer(binding),
                 base: None,
                 offset: 0,
@@ -405,10 +405,10 @@ impl Translator<'_> {
     }
 
     /// `OpArrayLength`.
-    pub fn array_length(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn array_length(&mut self, it: &Instruction) -> Result<()> {
         let pointer = self.pointer(it.id(0)?)?;
         let member = it.number(1)?;
-        let Pointer::Memory(Place {
+        let Pointer::Memory(MemoryRef {
             space: Space::Buffer(buffer),
             offset: 0,
             base: None,
@@ -440,28 +440,28 @@ impl Translator<'_> {
 }
 
 /// Bytes of a scalar in memory.
-pub fn scalar_bytes(scalar: Scalar, layout: Layout) -> u32 {
+pub fn scalar_bytes(scalar: Scalar, layout: MemoryLayout) -> u32 {
     scalar_format(scalar, layout).bytes()
 }
 
 /// The format of a scalar in memory.
-pub fn scalar_format(scalar: Scalar, layout: Layout) -> Format {
+pub fn scalar_format(scalar: Scalar, layout: MemoryLayout) -> Format {
     if layout.explicit {
         scalar.format()
     } else {
-        scalar.natural_format()
+        scalar.tight_format()
     }
 }
 
 /// The layout of memory that the application sees, outside matrices.
-pub const EXPLICIT: Layout = Layout {
+pub const EXPLICIT: MemoryLayout = MemoryLayout {
     explicit: true,
     matrix: None,
     component_stride: None,
 };
 
 /// The layout of workgroup and private memory.
-pub const NATURAL: Layout = Layout {
+pub const TIGHT: MemoryLayout = MemoryLayout {
     explicit: false,
     matrix: None,
     component_stride: None,

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use spirv::Op;
 
-use super::super::error::{Error, Fault, Outcome, malformed, unsupported};
+use super::super::error::{Diagnostic, Error, Result, malformed, unsupported};
 use super::super::globals::Globals;
 use super::super::instruction::Instruction;
 use super::super::module::{Function, Module};
@@ -63,26 +63,35 @@ impl Analysis {
         let function = &module.sections.functions[index];
         let definition = &function.definition;
         if callers.contains(&index) {
-            return Err(Fault::Malformed("the function calls itself".into()).at(definition));
+            return Err(Diagnostic::Malformed("the function calls itself".into())
+                .locate(definition.reference()));
         }
         if callers.len() >= MAX_CALL_DEPTH {
-            return Err(Fault::Unsupported("calls are nested too deeply".into()).at(definition));
+            return Err(
+                Diagnostic::Unsupported("calls are nested too deeply".into())
+                    .locate(definition.reference()),
+            );
         }
         if self.trees.contains_key(&index) {
             return Ok(());
         }
         if function.parameters.len() > MAX_PARAMETERS {
-            return Err(Fault::Malformed("there are too many parameters".into()).at(definition));
+            return Err(
+                Diagnostic::Malformed("there are too many parameters".into())
+                    .locate(definition.reference()),
+            );
         }
         callers.push(index);
         let instructions = || function.blocks.iter().flat_map(|block| &block.instructions);
         for call in instructions().filter(|it| it.opcode == Op::FunctionCall) {
-            let callee = call.id(0).map_err(|fault| fault.at(call))?;
+            let callee = call
+                .id(0)
+                .map_err(|diagnostic| diagnostic.locate(call.reference()))?;
             match module.functions.get(&callee) {
                 Some(callee) => self.visit(module, globals, *callee, callers)?,
                 None => {
-                    let fault = Fault::Malformed(format!("%{callee} isn't a function"));
-                    return Err(fault.at(call));
+                    let diagnostic = Diagnostic::Malformed(format!("%{callee} isn't a function"));
+                    return Err(diagnostic.locate(call.reference()));
                 }
             }
         }
@@ -95,16 +104,16 @@ impl Analysis {
         }
         for it in instructions() {
             self.instruction(module, globals, it)
-                .map_err(|fault| fault.at(it))?;
+                .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
         }
         let tree = self
             .structure(module, globals, function)
-            .map_err(|fault| fault.at(definition))?;
+            .map_err(|diagnostic| diagnostic.locate(definition.reference()))?;
         self.trees.insert(index, Rc::new(tree));
         Ok(())
     }
 
-    fn instruction(&mut self, module: &Module, globals: &Globals, it: &Instruction) -> Outcome<()> {
+    fn instruction(&mut self, module: &Module, globals: &Globals, it: &Instruction) -> Result<()> {
         for index in 0..it.operands.len() {
             if let Ok(id) = it.id(index)
                 && globals.variables.contains_key(&id)
@@ -178,7 +187,7 @@ impl Analysis {
         }
     }
 
-    fn structure(&self, module: &Module, globals: &Globals, function: &Function) -> Outcome<Tree> {
+    fn structure(&self, module: &Module, globals: &Globals, function: &Function) -> Result<Tree> {
         let mut stores = Vec::with_capacity(function.blocks.len());
         for block in &function.blocks {
             let mut stored = Vec::new();
@@ -199,7 +208,7 @@ impl Analysis {
         globals: &Globals,
         it: &Instruction,
         into: &mut Vec<u32>,
-    ) -> Outcome<()> {
+    ) -> Result<()> {
         let root = |id: u32| self.roots.get(&id).copied();
         match it.opcode {
             Op::Store | Op::CopyMemory => into.extend(root(it.id(0)?)),

@@ -4,13 +4,13 @@ use isa::ir::{Axis, Reg};
 use isa::op::Op as Ir;
 use spirv::{Decoration, Op};
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
 
 /// The 32-bit or the 64-bit form of an operation.
-pub fn sized(scalar: Scalar, narrow: Ir, wide: Ir) -> Ir {
+pub fn op_for_width(scalar: Scalar, narrow: Ir, wide: Ir) -> Ir {
     if scalar.is_wide() { wide } else { narrow }
 }
 
@@ -24,7 +24,7 @@ struct Comparison {
 
 impl Translator<'_> {
     /// Brings a result to its type's range: narrow integers wrap, halves are rounded.
-    pub fn normalize(&mut self, scalar: Scalar, reg: Reg) -> Reg {
+    pub fn wrap_to_width(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Int {
                 width: 8,
@@ -49,7 +49,7 @@ impl Translator<'_> {
     }
 
     /// An integer operand, extended by its sign whatever its type's signedness is.
-    pub fn as_signed(&mut self, scalar: Scalar, reg: Reg) -> Reg {
+    pub fn sign_extend(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Int {
                 width: 8,
@@ -64,7 +64,7 @@ impl Translator<'_> {
     }
 
     /// An integer operand, extended by zeros.
-    pub fn as_unsigned(&mut self, scalar: Scalar, reg: Reg) -> Reg {
+    pub fn zero_extend(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Int {
                 width: width @ (8 | 16),
@@ -79,7 +79,7 @@ impl Translator<'_> {
         &mut self,
         it: &Instruction,
         mut each: impl FnMut(&mut Self, Scalar, Reg) -> Reg,
-    ) -> Outcome<()> {
+    ) -> Result<()> {
         let (scalar, a) = self.vector(it.id(0)?)?;
         let regs = a.iter().map(|a| each(self, scalar, *a)).collect();
         self.define(it, regs)
@@ -90,7 +90,7 @@ impl Translator<'_> {
         &mut self,
         it: &Instruction,
         mut each: impl FnMut(&mut Self, [Scalar; 2], Reg, Reg) -> Reg,
-    ) -> Outcome<()> {
+    ) -> Result<()> {
         let (scalar_a, a) = self.vector(it.id(0)?)?;
         let (scalar_b, b) = self.vector(it.id(1)?)?;
         if a.len() != b.len() {
@@ -103,36 +103,36 @@ impl Translator<'_> {
     }
 
     /// An integer or bit operation whose result wraps to its type.
-    fn wrapping(&mut self, it: &Instruction, narrow: Ir, wide: Ir) -> Outcome<()> {
+    fn wrapping(&mut self, it: &Instruction, narrow: Ir, wide: Ir) -> Result<()> {
         let (result, _) = self.globals.types.vector(it.ty()?)?;
         self.binary(it, |this, _, a, b| {
-            let reg = this.op(sized(result, narrow, wide), &[a, b]);
-            this.normalize(result, reg)
+            let reg = this.op(op_for_width(result, narrow, wide), &[a, b]);
+            this.wrap_to_width(result, reg)
         })
     }
 
-    fn signed(&mut self, it: &Instruction, narrow: Ir, wide: Ir) -> Outcome<()> {
+    fn signed(&mut self, it: &Instruction, narrow: Ir, wide: Ir) -> Result<()> {
         let (result, _) = self.globals.types.vector(it.ty()?)?;
         self.binary(it, |this, [scalar_a, scalar_b], a, b| {
-            let (a, b) = (this.as_signed(scalar_a, a), this.as_signed(scalar_b, b));
-            let reg = this.op(sized(result, narrow, wide), &[a, b]);
-            this.normalize(result, reg)
+            let (a, b) = (this.sign_extend(scalar_a, a), this.sign_extend(scalar_b, b));
+            let reg = this.op(op_for_width(result, narrow, wide), &[a, b]);
+            this.wrap_to_width(result, reg)
         })
     }
 
-    fn unsigned(&mut self, it: &Instruction, narrow: Ir, wide: Ir) -> Outcome<()> {
+    fn unsigned(&mut self, it: &Instruction, narrow: Ir, wide: Ir) -> Result<()> {
         let (result, _) = self.globals.types.vector(it.ty()?)?;
         self.binary(it, |this, [scalar_a, scalar_b], a, b| {
-            let (a, b) = (this.as_unsigned(scalar_a, a), this.as_unsigned(scalar_b, b));
-            let reg = this.op(sized(result, narrow, wide), &[a, b]);
-            this.normalize(result, reg)
+            let (a, b) = (this.zero_extend(scalar_a, a), this.zero_extend(scalar_b, b));
+            let reg = this.op(op_for_width(result, narrow, wide), &[a, b]);
+            this.wrap_to_width(result, reg)
         })
     }
 
-    fn float_op(&mut self, it: &Instruction, narrow: Ir, wide: Ir) -> Outcome<()> {
+    fn float_op(&mut self, it: &Instruction, narrow: Ir, wide: Ir) -> Result<()> {
         self.binary(it, |this, [scalar, _], a, b| {
-            let reg = this.op(sized(scalar, narrow, wide), &[a, b]);
-            this.normalize(scalar, reg)
+            let reg = this.op(op_for_width(scalar, narrow, wide), &[a, b]);
+            this.wrap_to_width(scalar, reg)
         })
     }
 
@@ -142,33 +142,35 @@ impl Translator<'_> {
     }
 
     /// `a * b`, to be fused with an addition later if that is allowed.
-    fn multiply(&mut self, it: &Instruction) -> Outcome<()> {
+    fn multiply(&mut self, it: &Instruction) -> Result<()> {
         let contract = self.may_contract(it);
         self.binary(it, |this, [scalar, _], a, b| {
-            let product = this.op(sized(scalar, Ir::FMul, Ir::FMul64), &[a, b]);
+            let product = this.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[a, b]);
             if contract && scalar != (Scalar::Float { width: 16 }) {
                 this.products.insert(product, (a, b));
             }
-            this.normalize(scalar, product)
+            this.wrap_to_width(scalar, product)
         })
     }
 
     /// `a + b`, fused if one is a product.
-    fn add(&mut self, it: &Instruction) -> Outcome<()> {
+    fn add(&mut self, it: &Instruction) -> Result<()> {
         let contract = self.may_contract(it);
         self.binary(it, |this, [scalar, _], a, b| {
             let find = |reg, other| Some((*this.products.get(&reg)?, other));
             let fused = find(a, b).or_else(|| find(b, a)).filter(|_| contract);
             let sum = match fused {
-                Some(((x, y), z)) => this.op(sized(scalar, Ir::FFma, Ir::FFma64), &[x, y, z]),
-                None => this.op(sized(scalar, Ir::FAdd, Ir::FAdd64), &[a, b]),
+                Some(((x, y), z)) => {
+                    this.op(op_for_width(scalar, Ir::FFma, Ir::FFma64), &[x, y, z])
+                }
+                None => this.op(op_for_width(scalar, Ir::FAdd, Ir::FAdd64), &[a, b]),
             };
-            this.normalize(scalar, sum)
+            this.wrap_to_width(scalar, sum)
         })
     }
 
     /// The derivative along an axis, or the sum of absolute values along both.
-    pub fn derivative(&mut self, it: &Instruction, axes: &[Axis], fine: bool) -> Outcome<()> {
+    pub fn derivative(&mut self, it: &Instruction, axes: &[Axis], fine: bool) -> Result<()> {
         self.unary(it, |this, scalar, a| {
             let along = |this: &mut Self, axis| this.builder.derivative(a, axis, fine);
             let reg = match axes {
@@ -179,23 +181,23 @@ impl Translator<'_> {
                     this.op(Ir::FAdd, &[x, y])
                 }
             };
-            this.normalize(scalar, reg)
+            this.wrap_to_width(scalar, reg)
         })
     }
 
-    fn compare_integers(&mut self, it: &Instruction, how: &Comparison) -> Outcome<()> {
+    fn compare_integers(&mut self, it: &Instruction, how: &Comparison) -> Result<()> {
         let signed = matches!(how.narrow, Ir::SLt | Ir::SLe);
         self.binary(it, |this, [scalar_a, scalar_b], a, b| {
             let (a, b) = if signed {
-                (this.as_signed(scalar_a, a), this.as_signed(scalar_b, b))
+                (this.sign_extend(scalar_a, a), this.sign_extend(scalar_b, b))
             } else {
-                (this.as_unsigned(scalar_a, a), this.as_unsigned(scalar_b, b))
+                (this.zero_extend(scalar_a, a), this.zero_extend(scalar_b, b))
             };
             this.compare(scalar_a, how, a, b)
         })
     }
 
-    fn compare_floats(&mut self, it: &Instruction, how: &Comparison) -> Outcome<()> {
+    fn compare_floats(&mut self, it: &Instruction, how: &Comparison) -> Result<()> {
         self.binary(it, |this, [scalar, _], a, b| {
             this.compare(scalar, how, a, b)
         })
@@ -203,7 +205,7 @@ impl Translator<'_> {
 
     fn compare(&mut self, scalar: Scalar, how: &Comparison, a: Reg, b: Reg) -> Reg {
         let (a, b) = if how.exchange { (b, a) } else { (a, b) };
-        let reg = self.op(sized(scalar, how.narrow, how.wide), &[a, b]);
+        let reg = self.op(op_for_width(scalar, how.narrow, how.wide), &[a, b]);
         if how.negate {
             self.op(Ir::BNot, &[reg])
         } else {
@@ -212,7 +214,7 @@ impl Translator<'_> {
     }
 
     /// Everything that works component by component.
-    pub fn arithmetic(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn arithmetic(&mut self, it: &Instruction) -> Result<()> {
         let how = |narrow, wide, exchange, negate| Comparison {
             narrow,
             wide,
@@ -235,11 +237,11 @@ impl Translator<'_> {
             Op::FRem => self.float_op(it, Ir::FRem, Ir::FRem64),
             Op::FMod => self.float_op(it, Ir::FMod, Ir::FMod64),
             Op::SNegate => self.unary(it, |this, scalar, a| {
-                let reg = this.op(sized(scalar, Ir::INeg, Ir::INeg64), &[a]);
-                this.normalize(scalar, reg)
+                let reg = this.op(op_for_width(scalar, Ir::INeg, Ir::INeg64), &[a]);
+                this.wrap_to_width(scalar, reg)
             }),
             Op::FNegate => self.unary(it, |this, scalar, a| {
-                this.op(sized(scalar, Ir::FNeg, Ir::FNeg64), &[a])
+                this.op(op_for_width(scalar, Ir::FNeg, Ir::FNeg64), &[a])
             }),
             Op::IAddCarry | Op::ISubBorrow | Op::UMulExtended | Op::SMulExtended => {
                 self.extended_arithmetic(it)
@@ -294,16 +296,16 @@ impl Translator<'_> {
                 self.compare_floats(it, &how(Ir::FLt, Ir::FLt64, false, true))
             }
             Op::IsNan => self.unary(it, |this, scalar, a| {
-                this.op(sized(scalar, Ir::FIsNan, Ir::FIsNan64), &[a])
+                this.op(op_for_width(scalar, Ir::FIsNan, Ir::FIsNan64), &[a])
             }),
             Op::IsInf => self.unary(it, |this, scalar, a| {
-                this.op(sized(scalar, Ir::FIsInf, Ir::FIsInf64), &[a])
+                this.op(op_for_width(scalar, Ir::FIsInf, Ir::FIsInf64), &[a])
             }),
             _ => self.logic(it),
         }
     }
 
-    fn logic(&mut self, it: &Instruction) -> Outcome<()> {
+    fn logic(&mut self, it: &Instruction) -> Result<()> {
         let mut two = |op| self.binary(it, |this, _, a, b| this.op(op, &[a, b]));
         match it.opcode {
             Op::LogicalOr => two(Ir::BOr),
@@ -322,7 +324,7 @@ impl Translator<'_> {
                 if a.len() != b.len() || (conditions.len() != 1 && conditions.len() != a.len()) {
                     return malformed("the operands differ in size");
                 }
-                self.spend(a.len())?;
+                self.charge_budget(a.len())?;
                 let condition = |index: usize| conditions[index % conditions.len()];
                 let regs = (0..a.len())
                     .map(|index| self.select(condition(index), a[index], b[index]))
@@ -333,14 +335,14 @@ impl Translator<'_> {
         }
     }
 
-    fn fold_bools(&mut self, it: &Instruction, op: Ir) -> Outcome<()> {
+    fn fold_bools(&mut self, it: &Instruction, op: Ir) -> Result<()> {
         let regs = self.regs(it.id(0)?)?;
         let folded = regs.iter().copied().reduce(|a, b| self.op(op, &[a, b]));
         self.define(it, folded.into_iter().collect())
     }
 
     /// Operations with two results: the low half, then the carry or the high half.
-    fn extended_arithmetic(&mut self, it: &Instruction) -> Outcome<()> {
+    fn extended_arithmetic(&mut self, it: &Instruction) -> Result<()> {
         let (scalar, a) = self.vector(it.id(0)?)?;
         let (_, b) = self.vector(it.id(1)?)?;
         if !matches!(scalar, Scalar::Int { width: 32, .. }) || a.len() != b.len() {
@@ -359,7 +361,7 @@ impl Translator<'_> {
         self.define(it, regs)
     }
 
-    fn shift(&mut self, it: &Instruction) -> Outcome<()> {
+    fn shift(&mut self, it: &Instruction) -> Result<()> {
         let (result, _) = self.globals.types.vector(it.ty()?)?;
         let opcode = it.opcode;
         self.binary(it, |this, [scalar, by], a, b| {
@@ -369,28 +371,28 @@ impl Translator<'_> {
                 b
             };
             let (op, a) = match opcode {
-                Op::ShiftLeftLogical => (sized(scalar, Ir::Shl, Ir::Shl64), a),
+                Op::ShiftLeftLogical => (op_for_width(scalar, Ir::Shl, Ir::Shl64), a),
                 Op::ShiftRightLogical => (
-                    sized(scalar, Ir::UShr, Ir::UShr64),
-                    this.as_unsigned(scalar, a),
+                    op_for_width(scalar, Ir::UShr, Ir::UShr64),
+                    this.zero_extend(scalar, a),
                 ),
                 _ => (
-                    sized(scalar, Ir::SShr, Ir::SShr64),
-                    this.as_signed(scalar, a),
+                    op_for_width(scalar, Ir::SShr, Ir::SShr64),
+                    this.sign_extend(scalar, a),
                 ),
             };
             let reg = this.op(op, &[a, by]);
-            this.normalize(result, reg)
+            this.wrap_to_width(result, reg)
         })
     }
 
-    fn bits(&mut self, it: &Instruction) -> Outcome<()> {
+    fn bits(&mut self, it: &Instruction) -> Result<()> {
         let (scalar, a) = self.vector(it.id(0)?)?;
         let opcode = it.opcode;
         if opcode == Op::Not {
             return self.unary(it, |this, scalar, a| {
-                let reg = this.op(sized(scalar, Ir::Not, Ir::Not64), &[a]);
-                this.normalize(scalar, reg)
+                let reg = this.op(op_for_width(scalar, Ir::Not, Ir::Not64), &[a]);
+                this.wrap_to_width(scalar, reg)
             });
         }
         if !matches!(scalar, Scalar::Int { width: 32, .. }) {

@@ -4,14 +4,14 @@ use std::collections::{HashMap, VecDeque};
 
 use isa::ir::Reg;
 
-use super::super::error::Outcome;
+use super::super::error::Result;
 use super::Translator;
 
 impl Translator<'_> {
     /// Assignments at once: every source is read before any destination is written.
-    pub fn assign(&mut self, mut pairs: Vec<(Reg, Reg)>) -> Outcome<()> {
+    pub fn assign(&mut self, mut pairs: Vec<(Reg, Reg)>) -> Result<()> {
         pairs.retain(|(dst, src)| dst != src);
-        self.spend(pairs.len())?;
+        self.charge_budget(pairs.len())?;
         let mut readers: HashMap<Reg, Vec<usize>> = HashMap::new();
         for (index, (_, src)) in pairs.iter().enumerate() {
             readers.entry(*src).or_default().push(index);

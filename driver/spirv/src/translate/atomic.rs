@@ -4,17 +4,17 @@ use isa::ir::{AtomicOp, Format, ImageAtomic, ImageRead, ImageWrite, Reg, Space, 
 use isa::op::Op as Ir;
 use spirv::Op;
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
 use super::access::Pointer;
-use super::arithmetic::sized;
+use super::arithmetic::op_for_width;
 use super::resource::shape;
 
 impl Translator<'_> {
     /// Atomic instructions.
-    pub fn atomic(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn atomic(&mut self, it: &Instruction) -> Result<()> {
         let pointer = self.pointer(it.id(0)?)?;
         match it.opcode {
             Op::AtomicLoad => match &pointer {
@@ -38,7 +38,7 @@ impl Translator<'_> {
         }
     }
 
-    fn read_modify_write(&mut self, it: &Instruction, pointer: &Pointer) -> Outcome<()> {
+    fn read_modify_write(&mut self, it: &Instruction, pointer: &Pointer) -> Result<()> {
         let (scalar, count) = self.globals.types.vector(it.ty()?)?;
         if count != 1 {
             return malformed("the result isn't a scalar");
@@ -54,14 +54,14 @@ impl Translator<'_> {
                 let one = one(self);
                 (
                     AtomicOp::IAdd,
-                    self.op(sized(scalar, Ir::INeg, Ir::INeg64), &[one]),
+                    self.op(op_for_width(scalar, Ir::INeg, Ir::INeg64), &[one]),
                 )
             }
             Op::AtomicISub => {
                 let value = self.reg(it.id(3)?)?;
                 (
                     AtomicOp::IAdd,
-                    self.op(sized(scalar, Ir::INeg, Ir::INeg64), &[value]),
+                    self.op(op_for_width(scalar, Ir::INeg, Ir::INeg64), &[value]),
                 )
             }
             Op::AtomicCompareExchange => {
@@ -85,7 +85,7 @@ impl Translator<'_> {
         scalar: Scalar,
         value: Reg,
         comparator: Option<Reg>,
-    ) -> Outcome<Reg> {
+    ) -> Result<Reg> {
         match pointer {
             Pointer::Memory(place)
                 if !matches!(place.space, Space::Private | Space::PushConstants) =>
@@ -124,7 +124,7 @@ impl Translator<'_> {
         }
     }
 
-    fn load_texel(&mut self, pointer: &Pointer) -> Outcome<Reg> {
+    fn load_texel(&mut self, pointer: &Pointer) -> Result<Reg> {
         let Pointer::Texel {
             image,
             image_type,
@@ -147,7 +147,7 @@ impl Translator<'_> {
         Ok(dst)
     }
 
-    fn store_texel(&mut self, pointer: &Pointer, value: Reg) -> Outcome<()> {
+    fn store_texel(&mut self, pointer: &Pointer, value: Reg) -> Result<()> {
         let Pointer::Texel {
             image,
             image_type,
@@ -171,7 +171,7 @@ impl Translator<'_> {
     }
 }
 
-fn atomic_op(op: Op) -> Outcome<AtomicOp> {
+fn atomic_op(op: Op) -> Result<AtomicOp> {
     Ok(match op {
         Op::AtomicExchange => AtomicOp::Exchange,
         Op::AtomicIAdd => AtomicOp::IAdd,

@@ -6,9 +6,9 @@ use isa::ir::{Rate, Reg};
 use isa::op::Op as Ir;
 use spirv::{BuiltIn as Spirv, Decoration};
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::interface::{
-    BuiltIn, Input, InputSource, Interpolation, Numeric, Sampling, Stage,
+    BuiltIn, Input, InputSource, Interpolation, Sampling, ScalarType, Stage,
 };
 use super::super::types::{Member, Scalar, Type};
 use super::Translator;
@@ -23,7 +23,7 @@ const MAX_BUILT_IN_SCALARS: u32 = 64;
 
 /// Where a scalar of an input or output comes from or goes.
 #[derive(Clone, Copy, Debug)]
-pub enum Origin {
+pub enum IoLocation {
     Location {
         location: u32,
         component: u32,
@@ -49,16 +49,16 @@ struct Cursor {
 
 impl Translator<'_> {
     /// Where each scalar of an input or output variable belongs.
-    pub fn origins(&mut self, variable: u32) -> Outcome<Rc<[Origin]>> {
-        if let Some(origins) = self.origins.get(&variable) {
-            return Ok(origins.clone());
+    pub fn io_locations(&mut self, variable: u32) -> Result<Rc<[IoLocation]>> {
+        if let Some(io_locations) = self.io_locations.get(&variable) {
+            return Ok(io_locations.clone());
         }
-        let origins = self.find_origins(variable)?;
-        self.origins.insert(variable, origins.clone());
-        Ok(origins)
+        let io_locations = self.find_io_locations(variable)?;
+        self.io_locations.insert(variable, io_locations.clone());
+        Ok(io_locations)
     }
 
-    fn find_origins(&self, variable: u32) -> Outcome<Rc<[Origin]>> {
+    fn find_io_locations(&self, variable: u32) -> Result<Rc<[IoLocation]>> {
         let Some(global) = self.globals.variables.get(&variable) else {
             return malformed(format!("%{variable} isn't an input or output"));
         };
@@ -67,7 +67,7 @@ impl Translator<'_> {
             if scalars > MAX_BUILT_IN_SCALARS {
                 return unsupported("a built-in of this many elements");
             }
-            let one = |component| Origin::BuiltIn {
+            let one = |component| IoLocation::BuiltIn {
                 built_in,
                 component,
             };
@@ -82,13 +82,13 @@ impl Translator<'_> {
             sampling: sampling(has),
             index: number(Decoration::Index).unwrap_or(0),
         };
-        let mut origins = Vec::with_capacity(scalars as usize);
-        self.place(global.pointee, &mut cursor, &mut origins)?;
-        Ok(origins.into())
+        let mut io_locations = Vec::with_capacity(scalars as usize);
+        self.place(global.pointee, &mut cursor, &mut io_locations)?;
+        Ok(io_locations.into())
     }
 
     /// Gives each scalar of a type its location and component.
-    fn place(&self, ty: u32, cursor: &mut Cursor, into: &mut Vec<Origin>) -> Outcome<()> {
+    fn place(&self, ty: u32, cursor: &mut Cursor, into: &mut Vec<IoLocation>) -> Result<()> {
         match self.globals.types.get(ty)? {
             Type::Scalar(_) | Type::Vector { .. } => {
                 let (scalar, count) = self.globals.types.vector(ty)?;
@@ -102,7 +102,7 @@ impl Translator<'_> {
                 }
                 for index in 0..count {
                     let at = cursor.component + each * index;
-                    into.push(Origin::Location {
+                    into.push(IoLocation::Location {
                         location: location + at / 4,
                         component: at % 4,
                         interpolation: if flat {
@@ -144,11 +144,11 @@ impl Translator<'_> {
         member: &Member,
         outer: Cursor,
         next: &mut Option<u32>,
-        into: &mut Vec<Origin>,
-    ) -> Outcome<()> {
+        into: &mut Vec<IoLocation>,
+    ) -> Result<()> {
         if let Some(built_in) = member.built_in {
             let scalars = self.globals.types.scalars(member.ty)?;
-            into.extend((0..scalars).map(|component| Origin::BuiltIn {
+            into.extend((0..scalars).map(|component| IoLocation::BuiltIn {
                 built_in,
                 component,
             }));
@@ -175,15 +175,15 @@ impl Translator<'_> {
     }
 
     /// The register of an input, made when it is first read.
-    fn input(&mut self, source: InputSource, scalar: Numeric, rate: Rate) -> Reg {
+    fn input(&mut self, source: InputSource, scalar: ScalarType, rate: Rate) -> Reg {
         if let Some(reg) = self.inputs.get(&source) {
             return *reg;
         }
         let ty = match scalar {
-            Numeric::Bool => isa::ir::Type::Bool,
-            Numeric::Float { width: 64 }
-            | Numeric::Int { width: 64 }
-            | Numeric::Uint { width: 64 } => isa::ir::Type::B64,
+            ScalarType::Bool => isa::ir::Type::Bool,
+            ScalarType::Float { width: 64 }
+            | ScalarType::Int { width: 64 }
+            | ScalarType::Uint { width: 64 } => isa::ir::Type::B64,
             _ => isa::ir::Type::B32,
         };
         let reg = self
@@ -197,7 +197,7 @@ impl Translator<'_> {
         reg
     }
 
-    fn built_in_input(&mut self, built_in: BuiltIn, component: u32, scalar: Numeric) -> Reg {
+    fn built_in_input(&mut self, built_in: BuiltIn, component: u32, scalar: ScalarType) -> Reg {
         let rate = match built_in {
             BuiltIn::BaseVertex
             | BuiltIn::BaseInstance
@@ -215,26 +215,30 @@ impl Translator<'_> {
     }
 
     /// A component of the fragment's position.
-    pub fn frag_coord(&mut self, component: u32) -> Outcome<Reg> {
+    pub fn frag_coord(&mut self, component: u32) -> Result<Reg> {
         if self.interface.stage != Stage::Fragment {
             return malformed("there are no fragments in this stage");
         }
-        Ok(self.built_in_input(BuiltIn::FragCoord, component, Numeric::Float { width: 32 }))
+        Ok(self.built_in_input(
+            BuiltIn::FragCoord,
+            component,
+            ScalarType::Float { width: 32 },
+        ))
     }
 
     /// Computes the scalars of an input that aren't simply given. That is done before anything else, so that they exist
     /// wherever they are read.
-    pub fn compute_inputs(&mut self, variable: u32) -> Outcome<()> {
+    pub fn compute_inputs(&mut self, variable: u32) -> Result<()> {
         let Some(slot) = self.slot_of_root(variable) else {
             return Ok(());
         };
-        let origins = self.origins(variable)?;
-        if origins
+        let io_locations = self.io_locations(variable)?;
+        if io_locations
             .iter()
-            .any(|origin| matches!(origin, Origin::BuiltIn { .. }))
+            .any(|io_location| matches!(io_location, IoLocation::BuiltIn { .. }))
         {
-            for index in 0..origins.len() {
-                if let Origin::BuiltIn { built_in, .. } = origins[index]
+            for index in 0..io_locations.len() {
+                if let IoLocation::BuiltIn { built_in, .. } = io_locations[index]
                     && is_computed(built_in)
                 {
                     self.read_scalar(slot, index)?;
@@ -245,10 +249,10 @@ impl Translator<'_> {
     }
 
     /// The register of a scalar of an input variable.
-    pub fn input_scalar(&mut self, variable: u32, index: usize, scalar: Scalar) -> Outcome<Reg> {
-        let origins = self.origins(variable)?;
-        match origins.get(index) {
-            Some(Origin::Location {
+    pub fn input_scalar(&mut self, variable: u32, index: usize, scalar: Scalar) -> Result<Reg> {
+        let io_locations = self.io_locations(variable)?;
+        match io_locations.get(index) {
+            Some(IoLocation::Location {
                 location,
                 component,
                 interpolation,
@@ -264,7 +268,7 @@ impl Translator<'_> {
                 };
                 Ok(self.input(source, numeric(scalar), Rate::Varying))
             }
-            Some(Origin::BuiltIn {
+            Some(IoLocation::BuiltIn {
                 built_in,
                 component,
             }) => {
@@ -279,20 +283,20 @@ impl Translator<'_> {
     }
 
     /// Reads what a pointer into an input points to, taken elsewhere in the pixel.
-    pub fn read_input(&mut self, pointer: &Pointer, sampling: Sampling) -> Outcome<Vec<Reg>> {
+    pub fn read_input(&mut self, pointer: &Pointer, sampling: Sampling) -> Result<Vec<Reg>> {
         let Some((variable, start, ty)) = self.interpolant(pointer) else {
             return unsupported("interpolation of what isn't an input");
         };
         let scalars = self.globals.types.flatten(ty)?;
-        let origins = self.origins(variable)?;
+        let io_locations = self.io_locations(variable)?;
         let mut regs = Vec::with_capacity(scalars.len());
         for (offset, scalar) in scalars.into_iter().enumerate() {
-            let Some(Origin::Location {
+            let Some(IoLocation::Location {
                 location,
                 component,
                 interpolation,
                 ..
-            }) = origins.get(start + offset)
+            }) = io_locations.get(start + offset)
             else {
                 return unsupported("interpolation of a built-in");
             };
@@ -309,7 +313,7 @@ impl Translator<'_> {
 
     /// The input variable that a pointer leads into, the scalar where, and the type of what it points to.
     fn interpolant(&self, pointer: &Pointer) -> Option<(u32, usize, u32)> {
-        let Pointer::Slot {
+        let Pointer::PromotedVariable {
             slot,
             start,
             steps,
@@ -324,9 +328,9 @@ impl Translator<'_> {
 
     fn interpolation_of(&mut self, pointer: &Pointer) -> Option<Interpolation> {
         let (variable, start, _) = self.interpolant(pointer)?;
-        match self.origins(variable).ok()?.get(start)? {
-            Origin::Location { interpolation, .. } => Some(*interpolation),
-            Origin::BuiltIn { .. } => None,
+        match self.io_locations(variable).ok()?.get(start)? {
+            IoLocation::Location { interpolation, .. } => Some(*interpolation),
+            IoLocation::BuiltIn { .. } => None,
         }
     }
 
@@ -340,7 +344,7 @@ impl Translator<'_> {
         self.interpolation_of(pointer) == Some(Interpolation::Linear)
     }
 
-    fn built_in(&mut self, built_in: Spirv, component: u32, scalar: Scalar) -> Outcome<Reg> {
+    fn built_in(&mut self, built_in: Spirv, component: u32, scalar: Scalar) -> Result<Reg> {
         let given = match built_in {
             Spirv::VertexIndex => BuiltIn::VertexIndex,
             Spirv::InstanceIndex => BuiltIn::InstanceIndex,
@@ -371,7 +375,7 @@ impl Translator<'_> {
         Ok(self.built_in_input(given, component, numeric(scalar)))
     }
 
-    fn computed_built_in(&mut self, built_in: Spirv, component: u32) -> Outcome<Reg> {
+    fn computed_built_in(&mut self, built_in: Spirv, component: u32) -> Result<Reg> {
         let [x, y, z] = self.interface.workgroup_size;
         let invocations = x * y * z;
         let size = self.options.subgroup_size;
@@ -384,7 +388,7 @@ impl Translator<'_> {
                 let group = self.built_in_input(
                     BuiltIn::WorkgroupId,
                     component,
-                    Numeric::Uint { width: 32 },
+                    ScalarType::Uint { width: 32 },
                 );
                 let each = self.u32([x, y, z][axis]);
                 let first = self.op(Ir::IMul, &[group, each]);

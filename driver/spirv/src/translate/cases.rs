@@ -2,9 +2,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::instruction::{Instruction, Operand};
-use super::structure::Walker;
+use super::structure::Structurizer;
 
 /// The most blocks looked at while ordering the cases of switches.
 const MAX_STEPS: usize = 1 << 22;
@@ -17,9 +17,9 @@ pub struct Target {
     pub default: bool,
 }
 
-impl Walker<'_> {
+impl Structurizer<'_> {
     /// The targets of a switch, each once.
-    pub fn switch_targets(&self, terminator: &Instruction) -> Outcome<Vec<Target>> {
+    pub fn switch_targets(&self, terminator: &Instruction) -> Result<Vec<Target>> {
         let mut targets: Vec<Target> = Vec::new();
         let mut by_block = HashMap::new();
         let mut values = HashSet::new();
@@ -54,7 +54,7 @@ impl Walker<'_> {
 
     /// The cases in an order in which each that falls through is followed by the one that it falls into; with each,
     /// whether it does.
-    pub fn order_cases(&mut self, merge: usize, cases: &[Target]) -> Outcome<Vec<(usize, bool)>> {
+    pub fn order_cases(&mut self, merge: usize, cases: &[Target]) -> Result<Vec<(usize, bool)>> {
         let which: HashMap<usize, usize> = cases
             .iter()
             .enumerate()
@@ -97,7 +97,7 @@ impl Walker<'_> {
         start: usize,
         merge: usize,
         which: &HashMap<usize, usize>,
-    ) -> Outcome<HashSet<usize>> {
+    ) -> Result<HashSet<usize>> {
         let mut found = HashSet::new();
         let mut seen = HashSet::from([start]);
         let mut waiting = vec![start];

@@ -6,17 +6,17 @@ use isa::ir::Reg;
 use isa::op::Op as Ir;
 use spirv::Op;
 
-use super::super::error::{Outcome, malformed};
+use super::super::error::{Result, malformed};
 use super::super::instruction::Instruction;
 use super::Translator;
 
 impl Translator<'_> {
     /// Composite instructions.
-    pub fn composite(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn composite(&mut self, it: &Instruction) -> Result<()> {
         match it.opcode {
             Op::CompositeConstruct => {
                 let limit = self.globals.types.scalars(it.ty()?)? as usize;
-                self.spend(limit)?;
+                self.charge_budget(limit)?;
                 let mut regs = Vec::with_capacity(limit);
                 for part in it.ids(0) {
                     regs.extend_from_slice(&self.regs(part)?);
@@ -29,7 +29,7 @@ impl Translator<'_> {
             Op::CompositeExtract => {
                 let whole = self.regs(it.id(0)?)?;
                 let (start, count) = self.part(self.type_of(it.id(0)?)?, &it.numbers(1))?;
-                self.spend(count)?;
+                self.charge_budget(count)?;
                 self.define(it, whole[start..start + count].to_vec())
             }
             Op::CompositeInsert => {
@@ -38,14 +38,14 @@ impl Translator<'_> {
                 if object.len() != count {
                     return malformed("the object doesn't fit its place");
                 }
-                self.spend(whole.len())?;
+                self.charge_budget(whole.len())?;
                 let mut regs = whole.to_vec();
                 regs[start..start + count].copy_from_slice(&object);
                 self.define(it, regs)
             }
             Op::CopyLogical => {
                 let regs = self.regs(it.id(0)?)?;
-                self.spend(regs.len())?;
+                self.charge_budget(regs.len())?;
                 self.define(it, regs.to_vec())
             }
             Op::VectorShuffle => {
@@ -67,7 +67,7 @@ impl Translator<'_> {
                 let Some((first, rest)) = vector.split_first() else {
                     return malformed("the operand has no components");
                 };
-                self.spend(2 * rest.len())?;
+                self.charge_budget(2 * rest.len())?;
                 let mut found = *first;
                 for (element, reg) in (1..).zip(rest) {
                     let element = self.u32(element);
@@ -79,7 +79,7 @@ impl Translator<'_> {
             Op::VectorInsertDynamic => {
                 let vector = self.regs(it.id(0)?)?;
                 let (object, index) = (self.reg(it.id(1)?)?, self.reg(it.id(2)?)?);
-                self.spend(2 * vector.len())?;
+                self.charge_budget(2 * vector.len())?;
                 let mut regs = Vec::with_capacity(vector.len());
                 for (element, reg) in (0..).zip(vector.iter()) {
                     let element = self.u32(element);
@@ -97,7 +97,7 @@ impl Translator<'_> {
     }
 
     /// Where a path of indices leads: the scalars before the part and those in it.
-    fn part(&self, mut ty: u32, indices: &[u32]) -> Outcome<(usize, usize)> {
+    fn part(&self, mut ty: u32, indices: &[u32]) -> Result<(usize, usize)> {
         let mut start = 0;
         for index in indices {
             let (part, before) = self.globals.types.part(ty, *index)?;
@@ -108,7 +108,7 @@ impl Translator<'_> {
     }
 
     /// A matrix operand.
-    pub fn matrix(&mut self, id: u32) -> Outcome<Matrix> {
+    pub fn matrix(&mut self, id: u32) -> Result<Matrix> {
         let (columns, rows, _, _) = self.globals.types.matrix(self.type_of(id)?)?;
         Ok(Matrix {
             columns: columns as usize,

@@ -1,6 +1,6 @@
 //! Walks a function's tree: constructs, the places where control flow comes together, phis and calls.
 //!
-//! At a [join](super::structure::Join) that several edges reach, each variable that the construct stores to gets
+//! At a [join](super::structure::MergePoint) that several edges reach, each variable that the construct stores to gets
 //! variables of the IR, which every edge assigns; so do phis. If only one edge reaches it, what the edge brought is
 //! what the variables are.
 
@@ -10,10 +10,10 @@ use std::rc::Rc;
 use isa::ir::{Label, MAX_NESTING, Reg};
 use spirv::Op;
 
-use super::super::error::{Error, Fault, Outcome, malformed, unsupported};
+use super::super::error::{Diagnostic, Error, Result, malformed, unsupported};
 use super::super::instruction::Instruction;
 use super::super::module::Block;
-use super::structure::{Case, Construct, Edge, Join, Jump, Node, Tree};
+use super::structure::{Case, Construct, Edge, Jump, MergePoint, Node, Tree};
 use super::{Translator, Value};
 
 /// What inlining a function counts for, even if it is empty: nested calls multiply.
@@ -23,12 +23,12 @@ const CALL_COST: usize = 16;
 pub struct Call {
     function: usize,
     tree: Rc<Tree>,
-    joins: HashMap<Join, Meeting>,
+    joins: HashMap<MergePoint, MergeVariables>,
     labels: HashMap<Construct, Label>,
     /// The scope that early returns leave.
     scope: Option<Label>,
     /// Where returns meet: variables, and the value returned.
-    returns: Meeting,
+    returns: MergeVariables,
     result: Option<Rc<[Reg]>>,
     /// Variables of the IR for the value, if several blocks return.
     result_variables: Option<Rc<[Reg]>>,
@@ -36,7 +36,7 @@ pub struct Call {
 
 /// A join while its construct is open.
 #[derive(Clone, Default)]
-struct Meeting {
+struct MergeVariables {
     /// The variables concerned, each with the registers that the edges assign, or that the one edge brought.
     slots: Vec<(usize, Rc<[Option<Reg>]>)>,
     assigns: bool,
@@ -49,13 +49,13 @@ impl<'a> Translator<'a> {
     /// Translates the entry point's function and assigns the outputs at its end.
     pub fn run(&mut self, function: usize) -> Result<(), Error> {
         let definition = &self.module.sections.functions[function].definition;
-        let place = |fault: Fault| fault.at(definition);
+        let place = |diagnostic: Diagnostic| diagnostic.locate(definition.reference());
         self.global_variables()?;
         if !self.module.sections.functions[function]
             .parameters
             .is_empty()
         {
-            return Err(place(Fault::Malformed(
+            return Err(place(Diagnostic::Malformed(
                 "the entry point has parameters".into(),
             )));
         }
@@ -64,7 +64,7 @@ impl<'a> Translator<'a> {
     }
 
     /// `OpFunctionCall`.
-    pub fn call(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn call(&mut self, it: &Instruction) -> Result<()> {
         let Some(function) = self.module.functions.get(&it.id(0)?).copied() else {
             return malformed("there is no such function");
         };
@@ -82,7 +82,7 @@ impl<'a> Translator<'a> {
                     return malformed("an argument doesn't fit its parameter");
                 }
                 Value::Pointer(pointer) => {
-                    if let super::access::Pointer::Slot { slot, .. } = **pointer {
+                    if let super::access::Pointer::PromotedVariable { slot, .. } = **pointer {
                         self.slot_of.insert(id, slot);
                     }
                 }
@@ -98,11 +98,11 @@ impl<'a> Translator<'a> {
     }
 
     /// Translates a function's body here; returns what it returns.
-    fn inline(&mut self, function: usize) -> Outcome<Option<Rc<[Reg]>>> {
+    fn inline(&mut self, function: usize) -> Result<Option<Rc<[Reg]>>> {
         let Some(tree) = self.analysis.tree(function) else {
             return malformed("the function isn't structured");
         };
-        self.spend(CALL_COST)?;
+        self.charge_budget(CALL_COST)?;
         self.declare_phis(function)?;
         let modified: Vec<u32> = tree
             .modified
@@ -140,7 +140,7 @@ impl<'a> Translator<'a> {
             || parameters.iter().any(|it| it.result_id == Some(root))
     }
 
-    fn block(&self, index: usize) -> Outcome<&'a Block> {
+    fn block(&self, index: usize) -> Result<&'a Block> {
         let function = self.calls.last().map_or(0, |call| call.function);
         match self.module.sections.functions[function].blocks.get(index) {
             Some(block) => Ok(block),
@@ -148,21 +148,21 @@ impl<'a> Translator<'a> {
         }
     }
 
-    fn terminator(&self, index: usize) -> Outcome<&'a Instruction> {
+    fn terminator(&self, index: usize) -> Result<&'a Instruction> {
         match self.block(index)?.instructions.last() {
             Some(last) => Ok(last),
             None => malformed("a block is empty"),
         }
     }
 
-    fn call_mut(&mut self) -> Outcome<&mut Call> {
+    fn call_mut(&mut self) -> Result<&mut Call> {
         match self.calls.last_mut() {
             Some(call) => Ok(call),
             None => malformed("an instruction outside functions"),
         }
     }
 
-    fn nodes(&mut self, nodes: &[Node]) -> Outcome<()> {
+    fn nodes(&mut self, nodes: &[Node]) -> Result<()> {
         // Constructs of inlined functions add up.
         if self.depth >= MAX_NESTING {
             return unsupported("constructs are nested too deeply");
@@ -173,7 +173,7 @@ impl<'a> Translator<'a> {
         done
     }
 
-    fn node(&mut self, node: &Node) -> Outcome<()> {
+    fn node(&mut self, node: &Node) -> Result<()> {
         match node {
             Node::Block(index) => self.instructions(*index),
             Node::Edge(edge) => self.edge(edge),
@@ -187,7 +187,9 @@ impl<'a> Translator<'a> {
                 modified,
             } => {
                 let placed = self.terminator(*block)?;
-                let condition = self.reg(*condition).map_err(|fault| fault.at(placed))?;
+                let condition = self
+                    .reg(*condition)
+                    .map_err(|diagnostic| diagnostic.locate(placed.reference()))?;
                 self.branch(condition, then, otherwise, *join, modified)
             }
             Node::Switch {
@@ -199,28 +201,32 @@ impl<'a> Translator<'a> {
                 modified,
             } => {
                 let placed = self.terminator(*block)?;
-                let selector = self.reg(*selector).map_err(|fault| fault.at(placed))?;
+                let selector = self
+                    .reg(*selector)
+                    .map_err(|diagnostic| diagnostic.locate(placed.reference()))?;
                 self.switch(selector, *construct, cases, *join, modified)
             }
             Node::Loop { .. } => self.repeat(node),
         }
     }
 
-    fn instructions(&mut self, index: usize) -> Outcome<()> {
+    fn instructions(&mut self, index: usize) -> Result<()> {
         let Some((_, body)) = self.block(index)?.instructions.split_last() else {
             return malformed("a block is empty");
         };
         for it in body {
             if !matches!(it.opcode, Op::Phi | Op::LoopMerge | Op::SelectionMerge) {
-                self.instruction(it).map_err(|fault| fault.at(it))?;
-                self.spend(0).map_err(|fault| fault.at(it))?;
+                self.instruction(it)
+                    .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+                self.charge_budget(0)
+                    .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
             }
         }
         Ok(())
     }
 
     /// The end of an invocation or a function.
-    fn exit(&mut self, index: usize) -> Outcome<()> {
+    fn exit(&mut self, index: usize) -> Result<()> {
         let terminator = self.terminator(index)?;
         match terminator.opcode {
             Op::Kill | Op::TerminateInvocation => {
@@ -232,7 +238,7 @@ impl<'a> Translator<'a> {
                 if terminator.opcode == Op::ReturnValue {
                     let regs = self
                         .regs(terminator.id(0)?)
-                        .map_err(|fault| fault.at(terminator))?;
+                        .map_err(|diagnostic| diagnostic.locate(terminator.reference()))?;
                     self.return_value(regs, &mut pairs)?;
                 }
                 let mut returns = std::mem::take(&mut self.call_mut()?.returns);
@@ -249,7 +255,7 @@ impl<'a> Translator<'a> {
         Ok(())
     }
 
-    fn return_value(&mut self, regs: Rc<[Reg]>, pairs: &mut Vec<(Reg, Reg)>) -> Outcome<()> {
+    fn return_value(&mut self, regs: Rc<[Reg]>, pairs: &mut Vec<(Reg, Reg)>) -> Result<()> {
         if self.call_mut()?.tree.returns <= 1 {
             self.call_mut()?.result = Some(regs);
             return Ok(());
@@ -279,9 +285,9 @@ impl<'a> Translator<'a> {
         condition: Reg,
         then: &[Node],
         otherwise: &[Node],
-        join: Option<Join>,
+        join: Option<MergePoint>,
         modified: &[u32],
-    ) -> Outcome<()> {
+    ) -> Result<()> {
         self.open_join(join, modified)?;
         match self.known(condition) {
             // Specialization may decide a branch.
@@ -308,9 +314,9 @@ impl<'a> Translator<'a> {
         selector: Reg,
         construct: Construct,
         cases: &[Case],
-        join: Option<Join>,
+        join: Option<MergePoint>,
         modified: &[u32],
-    ) -> Outcome<()> {
+    ) -> Result<()> {
         self.open_join(join, modified)?;
         for case in cases {
             if let Some((join, edge)) = &case.entry {
@@ -337,7 +343,7 @@ impl<'a> Translator<'a> {
         self.close_join(join)
     }
 
-    fn repeat(&mut self, node: &Node) -> Outcome<()> {
+    fn repeat(&mut self, node: &Node) -> Result<()> {
         let Node::Loop {
             construct,
             body,
@@ -371,7 +377,7 @@ impl<'a> Translator<'a> {
     }
 
     /// A branch: assigns phis and variables, then leaves if it must.
-    fn edge(&mut self, edge: &Edge) -> Outcome<()> {
+    fn edge(&mut self, edge: &Edge) -> Result<()> {
         let pairs = self.phi_pairs(edge)?;
         match edge.join {
             Some(join) => self.arrive_at(join, pairs)?,
@@ -393,7 +399,7 @@ impl<'a> Translator<'a> {
     }
 
     /// Makes variables of the IR for a function's phis.
-    fn declare_phis(&mut self, function: usize) -> Outcome<()> {
+    fn declare_phis(&mut self, function: usize) -> Result<()> {
         let blocks = &self.module.sections.functions[function].blocks;
         for it in blocks.iter().flat_map(|block| &block.instructions) {
             if it.opcode != Op::Phi {
@@ -403,8 +409,8 @@ impl<'a> Translator<'a> {
                 .globals
                 .types
                 .flatten(it.ty()?)
-                .map_err(|fault| fault.at(it))?;
-            self.spend(scalars.len())?;
+                .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+            self.charge_budget(scalars.len())?;
             let regs: Rc<[Reg]> = scalars
                 .iter()
                 .map(|scalar| self.builder.variable(scalar.register()))
@@ -416,7 +422,7 @@ impl<'a> Translator<'a> {
     }
 
     /// The assignments that an edge makes to the phis of its target.
-    fn phi_pairs(&mut self, edge: &Edge) -> Outcome<Vec<(Reg, Reg)>> {
+    fn phi_pairs(&mut self, edge: &Edge) -> Result<Vec<(Reg, Reg)>> {
         let from = self.block(edge.from)?.label;
         let mut pairs = Vec::new();
         for it in &self.block(edge.to)?.instructions {
@@ -426,16 +432,18 @@ impl<'a> Translator<'a> {
             let ids = it.ids(0);
             let source = ids.chunks_exact(2).find(|pair| Some(pair[1]) == from);
             let Some(source) = source.map(|pair| pair[0]) else {
-                let fault = Fault::Malformed("a predecessor is missing".into());
-                return Err(fault.at(it).into());
+                let diagnostic = Diagnostic::Malformed("a predecessor is missing".into());
+                return Err(diagnostic.locate(it.reference()).into());
             };
-            let regs = self.regs(source).map_err(|fault| fault.at(it))?;
+            let regs = self
+                .regs(source)
+                .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
             let Some(variables) = self.phis.get(&it.result()?) else {
                 return malformed("a phi isn't declared");
             };
             if variables.len() != regs.len() {
-                let fault = Fault::Malformed(format!("%{source} is of another type"));
-                return Err(fault.at(it).into());
+                let diagnostic = Diagnostic::Malformed(format!("%{source} is of another type"));
+                return Err(diagnostic.locate(it.reference()).into());
             }
             pairs.extend(variables.iter().copied().zip(regs.iter().copied()));
         }
@@ -452,8 +460,8 @@ impl<'a> Translator<'a> {
         slots
     }
 
-    fn open(&mut self, modified: &[u32], edges: usize) -> Outcome<Meeting> {
-        let mut meeting = Meeting {
+    fn open(&mut self, modified: &[u32], edges: usize) -> Result<MergeVariables> {
+        let mut meeting = MergeVariables {
             slots: Vec::new(),
             assigns: edges > 1,
         };
@@ -462,7 +470,7 @@ impl<'a> Translator<'a> {
         }
         for slot in self.slots_of(modified) {
             let scalars = self.slots[slot].scalars.clone();
-            self.spend(scalars.len())?;
+            self.charge_budget(scalars.len())?;
             let regs = scalars
                 .iter()
                 .map(|scalar| {
@@ -475,7 +483,7 @@ impl<'a> Translator<'a> {
         Ok(meeting)
     }
 
-    fn open_join(&mut self, join: Option<Join>, modified: &[u32]) -> Outcome<()> {
+    fn open_join(&mut self, join: Option<MergePoint>, modified: &[u32]) -> Result<()> {
         if let Some(join) = join {
             let edges = self.call_mut()?.tree.edges[join];
             let meeting = self.open(modified, edges)?;
@@ -485,7 +493,7 @@ impl<'a> Translator<'a> {
     }
 
     /// An edge reaches a join: assigns its variables (and these pairs) at once.
-    fn arrive(&mut self, meeting: &mut Meeting, pairs: &mut Vec<(Reg, Reg)>) -> Outcome<()> {
+    fn arrive(&mut self, meeting: &mut MergeVariables, pairs: &mut Vec<(Reg, Reg)>) -> Result<()> {
         for (slot, regs) in &mut meeting.slots {
             if meeting.assigns {
                 for (index, variable) in regs.iter().enumerate() {
@@ -499,7 +507,7 @@ impl<'a> Translator<'a> {
         Ok(())
     }
 
-    fn arrive_at(&mut self, join: Join, mut pairs: Vec<(Reg, Reg)>) -> Outcome<()> {
+    fn arrive_at(&mut self, join: MergePoint, mut pairs: Vec<(Reg, Reg)>) -> Result<()> {
         let Some(mut meeting) = self.call_mut()?.joins.remove(&join) else {
             return malformed("a branch to a construct that isn't open");
         };
@@ -509,13 +517,13 @@ impl<'a> Translator<'a> {
     }
 
     /// From here on, variables are what the edges to the join made them.
-    fn close(&mut self, meeting: &Meeting) {
+    fn close(&mut self, meeting: &MergeVariables) {
         for (slot, regs) in &meeting.slots {
             self.slots[*slot].now = regs.to_vec();
         }
     }
 
-    fn close_join(&mut self, join: Option<Join>) -> Outcome<()> {
+    fn close_join(&mut self, join: Option<MergePoint>) -> Result<()> {
         if let Some(join) = join
             && let Some(meeting) = self.call_mut()?.joins.get(&join).cloned()
         {
@@ -524,10 +532,10 @@ impl<'a> Translator<'a> {
         Ok(())
     }
 
-    fn save(&mut self, modified: &[u32]) -> Outcome<Saved> {
+    fn save(&mut self, modified: &[u32]) -> Result<Saved> {
         let slots = self.slots_of(modified);
         let count = slots.iter().map(|slot| self.slots[*slot].now.len()).sum();
-        self.spend(count)?;
+        self.charge_budget(count)?;
         Ok(slots
             .into_iter()
             .map(|slot| (slot, self.slots[slot].now.clone()))

@@ -4,14 +4,14 @@ use isa::ir::Reg;
 use isa::op::Op as Ir;
 use spirv::Op;
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
 
 impl Translator<'_> {
     /// Conversions, `OpBitcast`, and between addresses and integers.
-    pub fn conversion(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn conversion(&mut self, it: &Instruction) -> Result<()> {
         let opcode = it.opcode;
         if matches!(opcode, Op::Bitcast | Op::ConvertPtrToU | Op::ConvertUToPtr) {
             return self.bitcast(it);
@@ -21,11 +21,11 @@ impl Translator<'_> {
         let regs = regs
             .iter()
             .map(|reg| self.convert(opcode, from, to, *reg))
-            .collect::<Outcome<_>>()?;
+            .collect::<Result<_>>()?;
         self.define(it, regs)
     }
 
-    fn convert(&mut self, opcode: Op, from: Scalar, to: Scalar, reg: Reg) -> Outcome<Reg> {
+    fn convert(&mut self, opcode: Op, from: Scalar, to: Scalar, reg: Reg) -> Result<Reg> {
         let wide = (from.is_wide(), to.is_wide());
         Ok(match opcode {
             Op::ConvertFToU | Op::ConvertFToS => {
@@ -41,14 +41,14 @@ impl Translator<'_> {
                     (false, (true, true)) => Ir::F64ToU64,
                 };
                 let reg = self.op(op, &[reg]);
-                self.normalize(to, reg)
+                self.wrap_to_width(to, reg)
             }
             Op::ConvertSToF | Op::ConvertUToF => {
                 let signed = opcode == Op::ConvertSToF;
                 let reg = if signed {
-                    self.as_signed(from, reg)
+                    self.sign_extend(from, reg)
                 } else {
-                    self.as_unsigned(from, reg)
+                    self.zero_extend(from, reg)
                 };
                 let op = match (signed, wide) {
                     (true, (false, false)) => Ir::SToF,
@@ -61,23 +61,23 @@ impl Translator<'_> {
                     (false, (true, true)) => Ir::U64ToF64,
                 };
                 let reg = self.op(op, &[reg]);
-                self.normalize(to, reg)
+                self.wrap_to_width(to, reg)
             }
             Op::UConvert | Op::SConvert => {
                 let signed = opcode == Op::SConvert;
                 let reg = if signed {
-                    self.as_signed(from, reg)
+                    self.sign_extend(from, reg)
                 } else {
-                    self.as_unsigned(from, reg)
+                    self.zero_extend(from, reg)
                 };
                 match wide {
                     (false, true) if signed => self.op(Ir::SToS64, &[reg]),
                     (false, true) => self.op(Ir::UToU64, &[reg]),
                     (true, false) => {
                         let low = self.op(Ir::Low32, &[reg]);
-                        self.normalize(to, low)
+                        self.wrap_to_width(to, low)
                     }
-                    (false, false) => self.normalize(to, reg),
+                    (false, false) => self.wrap_to_width(to, reg),
                     (true, true) => reg,
                 }
             }
@@ -85,10 +85,10 @@ impl Translator<'_> {
                 (false, true) => self.op(Ir::FToF64, &[reg]),
                 (true, false) if to == (Scalar::Float { width: 16 }) => {
                     let odd = self.round_to_odd(reg);
-                    self.normalize(to, odd)
+                    self.wrap_to_width(to, odd)
                 }
                 (true, false) => self.op(Ir::F64ToF, &[reg]),
-                (false, false) => self.normalize(to, reg),
+                (false, false) => self.wrap_to_width(to, reg),
                 (true, true) => reg,
             },
             Op::QuantizeToF16 => self.quantize(reg),
@@ -123,7 +123,7 @@ impl Translator<'_> {
     }
 
     /// Reads the same bits as another type; what has fewer components has wider ones.
-    fn bitcast(&mut self, it: &Instruction) -> Outcome<()> {
+    fn bitcast(&mut self, it: &Instruction) -> Result<()> {
         let from = match self.globals.types.vector(self.type_of(it.id(0)?)?) {
             Ok((scalar, _)) => scalar,
             Err(_) => return unsupported("this pointer"),
@@ -154,14 +154,14 @@ impl Translator<'_> {
     fn raw_bits(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Float { width: 16 } => self.op(Ir::FToF16, &[reg]),
-            _ => self.as_unsigned(scalar, reg),
+            _ => self.zero_extend(scalar, reg),
         }
     }
 
     fn typed_bits(&mut self, scalar: Scalar, reg: Reg) -> Reg {
         match scalar {
             Scalar::Float { width: 16 } => self.op(Ir::F16ToF, &[reg]),
-            _ => self.normalize(scalar, reg),
+            _ => self.wrap_to_width(scalar, reg),
         }
     }
 

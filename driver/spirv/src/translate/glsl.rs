@@ -4,12 +4,12 @@ use isa::ir::{Axis, Reg};
 use isa::op::Op as Ir;
 use spirv::GlslStd450Op as G;
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::instruction::Instruction;
 use super::super::interface::Sampling;
 use super::super::types::Scalar;
 use super::Translator;
-use super::arithmetic::sized;
+use super::arithmetic::op_for_width;
 
 /// Offsets of the samples from the pixel's centre, in 1/16 pixel: the standard positions of 1, 2, 4, 8 and 16 samples.
 fn sample_offsets(samples: u32) -> &'static [[i8; 2]] {
@@ -50,7 +50,7 @@ fn sample_offsets(samples: u32) -> &'static [[i8; 2]] {
 
 impl Translator<'_> {
     /// `OpExtInst` of GLSL.std.450.
-    pub fn glsl(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn glsl(&mut self, it: &Instruction) -> Result<()> {
         let Some(op) = G::from_u32(it.number(1)?) else {
             return malformed(format!("GLSL.std.450 has no instruction {}", it.number(1)?));
         };
@@ -62,7 +62,7 @@ impl Translator<'_> {
     }
 
     /// The operands of an extended instruction: scalar type of the first, and each one's registers, all of one size.
-    fn operands(&mut self, it: &Instruction, count: usize) -> Outcome<(Scalar, Vec<Vec<Reg>>)> {
+    fn operands(&mut self, it: &Instruction, count: usize) -> Result<(Scalar, Vec<Vec<Reg>>)> {
         let mut scalar = None;
         let mut all: Vec<Vec<Reg>> = Vec::with_capacity(count);
         for index in 0..count {
@@ -85,24 +85,24 @@ impl Translator<'_> {
         it: &Instruction,
         count: usize,
         mut function: impl FnMut(&mut Self, Scalar, &[Reg]) -> Reg,
-    ) -> Outcome<Option<Vec<Reg>>> {
+    ) -> Result<Option<Vec<Reg>>> {
         let (scalar, operands) = self.operands(it, count)?;
         let regs = (0..operands[0].len())
             .map(|component| {
                 let src: Vec<Reg> = operands.iter().map(|regs| regs[component]).collect();
                 let reg = function(self, scalar, &src);
-                self.normalize(scalar, reg)
+                self.wrap_to_width(scalar, reg)
             })
             .collect();
         Ok(Some(regs))
     }
 
     /// Functions that work component by component; None for the others.
-    fn glsl_elementwise(&mut self, it: &Instruction, op: G) -> Outcome<Option<Vec<Reg>>> {
+    fn glsl_elementwise(&mut self, it: &Instruction, op: G) -> Result<Option<Vec<Reg>>> {
         let mut simple = |narrow: Ir, wide: Ir| {
             let count = narrow.signature().operands.len();
             self.each(it, count, |this, scalar, src| {
-                this.op(sized(scalar, narrow, wide), src)
+                this.op(op_for_width(scalar, narrow, wide), src)
             })
         };
         match op {
@@ -141,12 +141,12 @@ impl Translator<'_> {
             G::Radians => self.scaled(it, std::f64::consts::PI / 180.0),
             G::Degrees => self.scaled(it, 180.0 / std::f64::consts::PI),
             G::FClamp | G::NClamp => self.each(it, 3, |this, scalar, src| {
-                let low = this.op(sized(scalar, Ir::FMax, Ir::FMax64), &src[..2]);
-                this.op(sized(scalar, Ir::FMin, Ir::FMin64), &[low, src[2]])
+                let low = this.op(op_for_width(scalar, Ir::FMax, Ir::FMax64), &src[..2]);
+                this.op(op_for_width(scalar, Ir::FMin, Ir::FMin64), &[low, src[2]])
             }),
             G::FMix => self.each(it, 3, |this, scalar, src| this.mix(scalar, src)),
             G::Step => self.each(it, 2, |this, scalar, src| {
-                let below = this.op(sized(scalar, Ir::FLt, Ir::FLt64), &[src[1], src[0]]);
+                let below = this.op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[src[1], src[0]]);
                 let (one, zero) = (this.float(scalar, 1.0), this.float(scalar, 0.0));
                 this.select(below, zero, one)
             }),
@@ -155,7 +155,7 @@ impl Translator<'_> {
         }
     }
 
-    fn glsl_integers(&mut self, it: &Instruction, op: G) -> Outcome<Option<Vec<Reg>>> {
+    fn glsl_integers(&mut self, it: &Instruction, op: G) -> Result<Option<Vec<Reg>>> {
         let (narrow, wide, signed) = match op {
             G::SAbs => (Ir::SAbs, Ir::SAbs64, true),
             G::SSign => (Ir::SSign, Ir::SSign64, true),
@@ -197,15 +197,15 @@ impl Translator<'_> {
         let count = narrow.signature().operands.len();
         self.each(it, count, |this, scalar, src| {
             let src = this.extended_as(scalar, src, signed);
-            this.op(sized(scalar, narrow, wide), &src)
+            this.op(op_for_width(scalar, narrow, wide), &src)
         })
     }
 
     fn extended_as(&mut self, scalar: Scalar, src: &[Reg], signed: bool) -> Vec<Reg> {
         src.iter()
             .map(|reg| match signed {
-                true => self.as_signed(scalar, *reg),
-                false => self.as_unsigned(scalar, *reg),
+                true => self.sign_extend(scalar, *reg),
+                false => self.zero_extend(scalar, *reg),
             })
             .collect()
     }
@@ -228,7 +228,7 @@ impl Translator<'_> {
         }
     }
 
-    fn scaled(&mut self, it: &Instruction, factor: f64) -> Outcome<Option<Vec<Reg>>> {
+    fn scaled(&mut self, it: &Instruction, factor: f64) -> Result<Option<Vec<Reg>>> {
         self.each(it, 1, |this, scalar, src| {
             let factor = this.float(scalar, factor);
             this.mul(scalar, src[0], factor)
@@ -240,7 +240,10 @@ impl Translator<'_> {
         let one = self.float(scalar, 1.0);
         let rest = self.minus(scalar, one, src[2]);
         let near = self.mul(scalar, src[0], rest);
-        self.op(sized(scalar, Ir::FFma, Ir::FFma64), &[src[1], src[2], near])
+        self.op(
+            op_for_width(scalar, Ir::FFma, Ir::FFma64),
+            &[src[1], src[2], near],
+        )
     }
 
     fn smooth_step(&mut self, scalar: Scalar, src: &[Reg]) -> Reg {
@@ -251,8 +254,8 @@ impl Translator<'_> {
             self.minus(scalar, src[1], src[0]),
         );
         let t = self.over(scalar, top, span);
-        let t = self.op(sized(scalar, Ir::FMax, Ir::FMax64), &[t, zero]);
-        let t = self.op(sized(scalar, Ir::FMin, Ir::FMin64), &[t, one]);
+        let t = self.op(op_for_width(scalar, Ir::FMax, Ir::FMax64), &[t, zero]);
+        let t = self.op(op_for_width(scalar, Ir::FMin, Ir::FMin64), &[t, one]);
         let twice = self.mul(scalar, two, t);
         let slope = self.minus(scalar, three, twice);
         let square = self.mul(scalar, t, t);
@@ -260,7 +263,7 @@ impl Translator<'_> {
     }
 
     /// Functions that don't work component by component.
-    fn glsl_other(&mut self, it: &Instruction, op: G) -> Outcome<()> {
+    fn glsl_other(&mut self, it: &Instruction, op: G) -> Result<()> {
         match op {
             G::Modf | G::ModfStruct | G::Frexp | G::FrexpStruct => self.split_float(it, op),
             G::Ldexp => {
@@ -271,9 +274,9 @@ impl Translator<'_> {
                 }
                 let mut regs = Vec::with_capacity(a.len());
                 for (a, b) in a.iter().zip(b.iter()) {
-                    let b = self.as_signed(exponent, *b);
-                    let reg = self.op(sized(scalar, Ir::FLdexp, Ir::FLdexp64), &[*a, b]);
-                    regs.push(self.normalize(scalar, reg));
+                    let b = self.sign_extend(exponent, *b);
+                    let reg = self.op(op_for_width(scalar, Ir::FLdexp, Ir::FLdexp64), &[*a, b]);
+                    regs.push(self.wrap_to_width(scalar, reg));
                 }
                 self.define(it, regs)
             }
@@ -313,23 +316,24 @@ impl Translator<'_> {
         }
     }
 
-    fn split_float(&mut self, it: &Instruction, op: G) -> Outcome<()> {
+    fn split_float(&mut self, it: &Instruction, op: G) -> Result<()> {
         let (scalar, x) = self.vector(it.id(2)?)?;
         let (mut first, mut second) = (Vec::new(), Vec::new());
         for x in x.iter() {
             if matches!(op, G::Modf | G::ModfStruct) {
-                let whole = self.op(sized(scalar, Ir::FTrunc, Ir::FTrunc64), &[*x]);
+                let whole = self.op(op_for_width(scalar, Ir::FTrunc, Ir::FTrunc64), &[*x]);
                 let fraction = self.minus(scalar, *x, whole);
                 // An infinity has no fraction; zero has the sign of x.
-                let infinite = self.op(sized(scalar, Ir::FIsInf, Ir::FIsInf64), &[*x]);
+                let infinite = self.op(op_for_width(scalar, Ir::FIsInf, Ir::FIsInf64), &[*x]);
                 let zero = self.float(scalar, 0.0);
                 first.push(self.select(infinite, zero, fraction));
                 second.push(whole);
             } else {
-                let significand = sized(scalar, Ir::FFrexpSignificand, Ir::FFrexpSignificand64);
+                let significand =
+                    op_for_width(scalar, Ir::FFrexpSignificand, Ir::FFrexpSignificand64);
                 first.push(self.op(significand, &[*x]));
                 second.push(self.op(
-                    sized(scalar, Ir::FFrexpExponent, Ir::FFrexpExponent64),
+                    op_for_width(scalar, Ir::FFrexpExponent, Ir::FFrexpExponent64),
                     &[*x],
                 ));
             }
@@ -343,15 +347,15 @@ impl Translator<'_> {
         self.define(it, first)
     }
 
-    fn length(&mut self, scalar: Scalar, x: &[Reg]) -> Outcome<Reg> {
+    fn length(&mut self, scalar: Scalar, x: &[Reg]) -> Result<Reg> {
         if let [one] = x {
-            return Ok(self.op(sized(scalar, Ir::FAbs, Ir::FAbs64), &[*one]));
+            return Ok(self.op(op_for_width(scalar, Ir::FAbs, Ir::FAbs64), &[*one]));
         }
         let square = self.dot(scalar, x, x, true)?;
-        Ok(self.op(sized(scalar, Ir::FSqrt, Ir::FSqrt64), &[square]))
+        Ok(self.op(op_for_width(scalar, Ir::FSqrt, Ir::FSqrt64), &[square]))
     }
 
-    fn geometric(&mut self, it: &Instruction, op: G) -> Outcome<()> {
+    fn geometric(&mut self, it: &Instruction, op: G) -> Result<()> {
         let count = match op {
             G::Length | G::Normalize => 1,
             G::FaceForward => 3,
@@ -385,10 +389,10 @@ impl Translator<'_> {
             G::FaceForward => {
                 let along = self.dot(scalar, &operands[2], &operands[1], true)?;
                 let zero = self.float(scalar, 0.0);
-                let facing = self.op(sized(scalar, Ir::FLt, Ir::FLt64), &[along, zero]);
+                let facing = self.op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[along, zero]);
                 x.iter()
                     .map(|x| {
-                        let away = self.op(sized(scalar, Ir::FNeg, Ir::FNeg64), &[*x]);
+                        let away = self.op(op_for_width(scalar, Ir::FNeg, Ir::FNeg64), &[*x]);
                         self.select(facing, *x, away)
                     })
                     .collect()
@@ -409,7 +413,7 @@ impl Translator<'_> {
         };
         let regs = regs
             .into_iter()
-            .map(|reg| self.normalize(scalar, reg))
+            .map(|reg| self.wrap_to_width(scalar, reg))
             .collect();
         self.define(it, regs)
     }
@@ -420,7 +424,7 @@ impl Translator<'_> {
         scalar: Scalar,
         i: &[Reg],
         n: &[Reg],
-    ) -> Outcome<Vec<Reg>> {
+    ) -> Result<Vec<Reg>> {
         let eta = self.reg(it.id(4)?)?;
         let (zero, one) = (self.float(scalar, 0.0), self.float(scalar, 1.0));
         let along = self.dot(scalar, n, i, true)?;
@@ -428,8 +432,8 @@ impl Translator<'_> {
         let rest = self.minus(scalar, one, along_2);
         let rest = self.mul(scalar, eta_2, rest);
         let k = self.minus(scalar, one, rest);
-        let total = self.op(sized(scalar, Ir::FLt, Ir::FLt64), &[k, zero]);
-        let root = self.op(sized(scalar, Ir::FSqrt, Ir::FSqrt64), &[k]);
+        let total = self.op(op_for_width(scalar, Ir::FLt, Ir::FLt64), &[k, zero]);
+        let root = self.op(op_for_width(scalar, Ir::FSqrt, Ir::FSqrt64), &[k]);
         let forward = self.mul(scalar, eta, along);
         let factor = self.plus(scalar, forward, root);
         Ok(i.iter()
@@ -442,7 +446,7 @@ impl Translator<'_> {
             .collect())
     }
 
-    fn pack(&mut self, it: &Instruction, op: G) -> Outcome<()> {
+    fn pack(&mut self, it: &Instruction, op: G) -> Result<()> {
         let x = self.regs(it.id(2)?)?;
         if op == G::PackDouble2x32 {
             let [low, high] = *x else {
@@ -485,7 +489,7 @@ impl Translator<'_> {
         self.define(it, word.into_iter().collect())
     }
 
-    fn unpack(&mut self, it: &Instruction, op: G) -> Outcome<()> {
+    fn unpack(&mut self, it: &Instruction, op: G) -> Result<()> {
         let x = self.reg(it.id(2)?)?;
         if op == G::UnpackDouble2x32 {
             let halves = [Ir::Low32, Ir::High32].map(|half| self.op(half, &[x]));
@@ -527,7 +531,7 @@ impl Translator<'_> {
 
     /// Interpolation elsewhere in the pixel. At a centroid it is an input of its own; at a sample or an offset it
     /// follows from the derivatives of the attribute divided by w, which are constant over the primitive.
-    fn interpolate(&mut self, it: &Instruction, op: G) -> Outcome<()> {
+    fn interpolate(&mut self, it: &Instruction, op: G) -> Result<()> {
         let pointer = self.pointer(it.id(2)?)?;
         if op == G::InterpolateAtCentroid {
             let regs = self.read_input(&pointer, Sampling::Centroid)?;

@@ -4,9 +4,9 @@ use isa::ir::{
     Binding, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg, Sample, Statement, Type,
 };
 use isa::op::Op as Ir;
-use spirv::{Dim, ImageOperands, Op};
+use spirv::{Dim, ImageOperands as ImageOperandMask, Op};
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::instruction::Instruction;
 use super::super::interface::Stage;
 use super::super::types::ImageType;
@@ -16,7 +16,7 @@ use super::{Translator, Value};
 
 /// The optional operands of an image instruction.
 #[derive(Clone, Debug, Default)]
-struct Extras {
+struct ImageOperands {
     bias: Option<Reg>,
     lod: Option<Reg>,
     gradient: Option<(Vec<Reg>, Vec<Reg>)>,
@@ -27,17 +27,17 @@ struct Extras {
     minimum: Option<Reg>,
 }
 
-/// What kind of sample an instruction takes.
-struct Kind {
+/// What sample_op of sample an instruction takes.
+struct SampleOp {
     explicit: bool,
     compare: bool,
     projective: bool,
     gather: bool,
 }
 
-fn kind(op: Op) -> Kind {
+fn sample_op(op: Op) -> SampleOp {
     use Op::*;
-    Kind {
+    SampleOp {
         explicit: matches!(
             op,
             ImageSampleExplicitLod
@@ -66,7 +66,7 @@ fn kind(op: Op) -> Kind {
 
 impl Translator<'_> {
     /// Image instructions.
-    pub fn image(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn image(&mut self, it: &Instruction) -> Result<()> {
         match it.opcode {
             Op::SampledImage => {
                 let (image, image_type) = self.image_operand(it.id(0)?)?;
@@ -87,12 +87,12 @@ impl Translator<'_> {
             | Op::ImageQueryLod
             | Op::ImageQueryLevels
             | Op::ImageQuerySamples => self.query_image(it),
-            op => self.sample(it, &kind(op)),
+            op => self.sample(it, &sample_op(op)),
         }
     }
 
     /// The image of an operand that is one, with or without a sampler.
-    fn image_operand(&mut self, id: u32) -> Outcome<(Binding, ImageType)> {
+    fn image_operand(&mut self, id: u32) -> Result<(Binding, ImageType)> {
         match self.value(id)? {
             Value::Image(binding, ty) | Value::SampledImage(binding, ty, _) => Ok((binding, ty)),
             _ => malformed(format!("%{id} isn't an image")),
@@ -100,10 +100,10 @@ impl Translator<'_> {
     }
 
     /// Reads the optional operands from a position on.
-    fn extras(&mut self, it: &Instruction, from: usize) -> Outcome<Extras> {
-        let mut extras = Extras::default();
-        let Some(mask) = it.enumerant(from, ImageOperands::from_bits) else {
-            return Ok(extras);
+    fn image_operands(&mut self, it: &Instruction, from: usize) -> Result<ImageOperands> {
+        let mut image_operands = ImageOperands::default();
+        let Some(mask) = it.enumerant(from, ImageOperandMask::from_bits) else {
+            return Ok(image_operands);
         };
         let mut next = from + 1;
         let mut take = |this: &mut Self| {
@@ -115,35 +115,35 @@ impl Translator<'_> {
             _ => malformed("an image operand isn't a scalar"),
         };
         let has = |operand| mask.contains(operand);
-        if has(ImageOperands::BIAS) {
-            extras.bias = Some(one(&take(self)?)?);
+        if has(ImageOperandMask::BIAS) {
+            image_operands.bias = Some(one(&take(self)?)?);
         }
-        if has(ImageOperands::LOD) {
-            extras.lod = Some(one(&take(self)?)?);
+        if has(ImageOperandMask::LOD) {
+            image_operands.lod = Some(one(&take(self)?)?);
         }
-        if has(ImageOperands::GRAD) {
-            extras.gradient = Some((take(self)?.to_vec(), take(self)?.to_vec()));
+        if has(ImageOperandMask::GRAD) {
+            image_operands.gradient = Some((take(self)?.to_vec(), take(self)?.to_vec()));
         }
-        if has(ImageOperands::CONST_OFFSET) {
-            extras.offset = take(self)?.to_vec();
+        if has(ImageOperandMask::CONST_OFFSET) {
+            image_operands.offset = take(self)?.to_vec();
         }
-        if has(ImageOperands::OFFSET) {
-            extras.offset = take(self)?.to_vec();
+        if has(ImageOperandMask::OFFSET) {
+            image_operands.offset = take(self)?.to_vec();
         }
-        if has(ImageOperands::CONST_OFFSETS) {
-            extras.offsets = take(self)?.to_vec();
+        if has(ImageOperandMask::CONST_OFFSETS) {
+            image_operands.offsets = take(self)?.to_vec();
         }
-        if has(ImageOperands::SAMPLE) {
-            extras.sample = Some(one(&take(self)?)?);
+        if has(ImageOperandMask::SAMPLE) {
+            image_operands.sample = Some(one(&take(self)?)?);
         }
-        if has(ImageOperands::MIN_LOD) {
-            extras.minimum = Some(one(&take(self)?)?);
+        if has(ImageOperandMask::MIN_LOD) {
+            image_operands.minimum = Some(one(&take(self)?)?);
         }
-        Ok(extras)
+        Ok(image_operands)
     }
 
     /// The first registers of a coordinate, as many as the shape needs.
-    fn coordinate(&mut self, id: u32, count: usize) -> Outcome<Vec<Reg>> {
+    fn coordinate(&mut self, id: u32, count: usize) -> Result<Vec<Reg>> {
         match self.regs(id)?.get(..count) {
             Some(regs) => Ok(regs.to_vec()),
             None => malformed("the coordinate has too few components"),
@@ -155,43 +155,44 @@ impl Translator<'_> {
     }
 
     /// Defines the result of a read or sample, rounded if its type is.
-    fn define_texel(&mut self, it: &Instruction, regs: impl Iterator<Item = Reg>) -> Outcome<()> {
+    fn define_texel(&mut self, it: &Instruction, regs: impl Iterator<Item = Reg>) -> Result<()> {
         let (scalar, count) = self.globals.types.vector(it.ty()?)?;
         let regs = regs
             .take(count as usize)
-            .map(|reg| self.normalize(scalar, reg));
+            .map(|reg| self.wrap_to_width(scalar, reg));
         let regs = regs.collect();
         self.define(it, regs)
     }
 
-    fn sample(&mut self, it: &Instruction, kind: &Kind) -> Outcome<()> {
+    fn sample(&mut self, it: &Instruction, sample_op: &SampleOp) -> Result<()> {
         let Value::SampledImage(image, image_type, sampler) = self.value(it.id(0)?)? else {
             return malformed("the first operand isn't a sampled image");
         };
         let shape = shape(&image_type)?;
         let count = shape.coordinates();
-        let mut coordinate = self.coordinate(it.id(1)?, count + usize::from(kind.projective))?;
+        let mut coordinate =
+            self.coordinate(it.id(1)?, count + usize::from(sample_op.projective))?;
         let mut compare = None;
         let mut component = 0;
         let mut next = 2;
-        if kind.compare {
+        if sample_op.compare {
             compare = Some(self.reg(it.id(next)?)?);
             next += 1;
-        } else if kind.gather {
+        } else if sample_op.gather {
             component = self.literal(it.id(next)?)?;
             next += 1;
         }
-        let extras = self.extras(it, next)?;
-        if kind.projective
+        let image_operands = self.image_operands(it, next)?;
+        if sample_op.projective
             && let Some(divisor) = coordinate.pop()
         {
             for reg in coordinate.iter_mut().chain(&mut compare) {
                 *reg = self.op(Ir::FDiv, &[*reg, divisor]);
             }
         }
-        let lod = self.lod(kind, &extras, shape)?;
+        let lod = self.lod(sample_op, &image_operands, shape)?;
         let gather = match u8::try_from(component) {
-            Ok(component @ 0..4) => kind.gather.then_some(component),
+            Ok(component @ 0..4) => sample_op.gather.then_some(component),
             _ => return malformed("there is no such component"),
         };
         let axes = shape.dimension.coordinates();
@@ -208,10 +209,10 @@ impl Translator<'_> {
                 gather,
             }))
         };
-        if kind.gather && !extras.offsets.is_empty() {
+        if sample_op.gather && !image_operands.offsets.is_empty() {
             // With four offsets, each result is the last texel of a gather of its own.
             let mut regs = Vec::with_capacity(4);
-            for offset in extras.offsets.chunks_exact(2).take(4) {
+            for offset in image_operands.offsets.chunks_exact(2).take(4) {
                 let dst = self.builder.value(Type::B32);
                 self.builder
                     .statement(make([None, None, None, Some(dst)], offset.to_vec()));
@@ -219,51 +220,64 @@ impl Translator<'_> {
             }
             return self.define_texel(it, regs.into_iter());
         }
-        let offset = extras.offset.get(..axes).unwrap_or_default().to_vec();
-        let dst = self.texels(if kind.compare && !kind.gather { 1 } else { 4 });
+        let offset = image_operands
+            .offset
+            .get(..axes)
+            .unwrap_or_default()
+            .to_vec();
+        let dst = self.texels(if sample_op.compare && !sample_op.gather {
+            1
+        } else {
+            4
+        });
         self.builder.statement(make(dst, offset));
         self.define_texel(it, dst.into_iter().flatten())
     }
 
-    fn lod(&mut self, kind: &Kind, extras: &Extras, shape: ImageShape) -> Outcome<Lod> {
+    fn lod(
+        &mut self,
+        sample_op: &SampleOp,
+        image_operands: &ImageOperands,
+        shape: ImageShape,
+    ) -> Result<Lod> {
         let axes = shape.dimension.coordinates();
-        if let Some((dx, dy)) = &extras.gradient {
+        if let Some((dx, dy)) = &image_operands.gradient {
             let (Some(dx), Some(dy)) = (dx.get(..axes), dy.get(..axes)) else {
                 return malformed("the gradient has too few components");
             };
             return Ok(Lod::Gradient {
                 dx: dx.to_vec(),
                 dy: dy.to_vec(),
-                minimum: extras.minimum,
+                minimum: image_operands.minimum,
             });
         }
-        if kind.explicit {
-            return match extras.lod {
+        if sample_op.explicit {
+            return match image_operands.lod {
                 Some(lod) => Ok(Lod::Explicit(lod)),
                 None => malformed("there is no level of detail"),
             };
         }
-        if kind.gather || self.interface.stage != Stage::Fragment {
+        if sample_op.gather || self.interface.stage != Stage::Fragment {
             // Without quads there are no derivatives.
-            let level = extras.bias.filter(|_| !kind.gather);
+            let level = image_operands.bias.filter(|_| !sample_op.gather);
             let zero = self.f32(0.0);
             return Ok(Lod::Explicit(level.unwrap_or(zero)));
         }
         Ok(Lod::Implicit {
-            bias: extras.bias,
-            minimum: extras.minimum,
+            bias: image_operands.bias,
+            minimum: image_operands.minimum,
         })
     }
 
-    fn read_image(&mut self, it: &Instruction) -> Outcome<()> {
+    fn read_image(&mut self, it: &Instruction) -> Result<()> {
         let (image, image_type) = self.image_operand(it.id(0)?)?;
         let shape = shape(&image_type)?;
         let mut coordinate = self.coordinate(it.id(1)?, shape.coordinates())?;
         if image_type.dim == Dim::DimSubpassData {
             coordinate = self.pixel(&coordinate)?;
         }
-        let extras = self.extras(it, 2)?;
-        if let Some(offset) = extras.offset.get(..shape.dimension.coordinates()) {
+        let image_operands = self.image_operands(it, 2)?;
+        if let Some(offset) = image_operands.offset.get(..shape.dimension.coordinates()) {
             for (reg, offset) in coordinate.iter_mut().zip(offset) {
                 *reg = self.op(Ir::IAdd, &[*reg, *offset]);
             }
@@ -275,14 +289,14 @@ impl Translator<'_> {
                 image,
                 shape,
                 coordinate,
-                level: extras.lod,
-                sample: extras.sample,
+                level: image_operands.lod,
+                sample: image_operands.sample,
             })));
         self.define_texel(it, dst.into_iter().flatten())
     }
 
     /// The pixel being shaded, moved by an offset: where an input attachment is read.
-    fn pixel(&mut self, offset: &[Reg]) -> Outcome<Vec<Reg>> {
+    fn pixel(&mut self, offset: &[Reg]) -> Result<Vec<Reg>> {
         let mut coordinate = Vec::with_capacity(offset.len());
         for (axis, offset) in (0..2).zip(offset) {
             let position = self.frag_coord(axis)?;
@@ -293,7 +307,7 @@ impl Translator<'_> {
         Ok(coordinate)
     }
 
-    fn write_image(&mut self, it: &Instruction) -> Outcome<()> {
+    fn write_image(&mut self, it: &Instruction) -> Result<()> {
         let (image, image_type) = self.image_operand(it.id(0)?)?;
         let shape = shape(&image_type)?;
         let coordinate = self.coordinate(it.id(1)?, shape.coordinates())?;
@@ -302,20 +316,20 @@ impl Translator<'_> {
             return unsupported("texels of 64-bit components");
         }
         let zero = self.u32(0);
-        let extras = self.extras(it, 3)?;
+        let image_operands = self.image_operands(it, 3)?;
         self.note_binding_write(image);
         self.builder
             .statement(Statement::ImageWrite(Box::new(ImageWrite {
                 image,
                 shape,
                 coordinate,
-                sample: extras.sample,
+                sample: image_operands.sample,
                 texel: std::array::from_fn(|index| regs.get(index).copied().unwrap_or(zero)),
             })));
         Ok(())
     }
 
-    fn texel_pointer(&mut self, it: &Instruction) -> Outcome<()> {
+    fn texel_pointer(&mut self, it: &Instruction) -> Result<()> {
         let Pointer::Resource { binding, ty, .. } = self.pointer(it.id(0)?)? else {
             return malformed("the first operand isn't a pointer to an image");
         };
@@ -334,7 +348,7 @@ impl Translator<'_> {
         self.define_as(it, Value::Pointer(pointer.into()))
     }
 
-    fn query_image(&mut self, it: &Instruction) -> Outcome<()> {
+    fn query_image(&mut self, it: &Instruction) -> Result<()> {
         let (image, image_type) = self.image_operand(it.id(0)?)?;
         let shape = shape(&image_type)?;
         let query = match it.opcode {

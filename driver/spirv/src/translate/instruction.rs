@@ -3,7 +3,7 @@
 use isa::ir::Axis;
 use spirv::{Op, StorageClass};
 
-use super::super::error::{Outcome, unsupported};
+use super::super::error::{Result, unsupported};
 use super::super::instruction::Instruction;
 use super::super::module::ExtendedSet;
 use super::access::Pointer;
@@ -11,12 +11,12 @@ use super::{Translator, Value};
 
 impl Translator<'_> {
     /// Translates an instruction within a block that is neither a phi nor a terminator.
-    pub fn instruction(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn instruction(&mut self, it: &Instruction) -> Result<()> {
         match it.opcode {
             Op::Nop => Ok(()),
             Op::Undef => {
                 let scalars = self.globals.types.flatten(it.ty()?)?;
-                self.spend(scalars.len())?;
+                self.charge_budget(scalars.len())?;
                 let zeros = scalars
                     .iter()
                     .map(|it| self.constant(it.register(), 0))
@@ -112,7 +112,7 @@ impl Translator<'_> {
         }
     }
 
-    fn local_variable(&mut self, it: &Instruction) -> Outcome<()> {
+    fn local_variable(&mut self, it: &Instruction) -> Result<()> {
         let id = it.result()?;
         let (class, pointee) = self.globals.types.pointer(it.ty()?)?;
         if class != StorageClass::Function {
@@ -126,7 +126,7 @@ impl Translator<'_> {
         } else {
             let slot = self.new_slot(pointee, None)?;
             self.slot_of.insert(id, slot);
-            Pointer::Slot {
+            Pointer::PromotedVariable {
                 slot,
                 start: 0,
                 steps: Vec::new(),
@@ -140,7 +140,7 @@ impl Translator<'_> {
         self.define_as(it, Value::Pointer(pointer.into()))
     }
 
-    fn extended(&mut self, it: &Instruction) -> Outcome<()> {
+    fn extended(&mut self, it: &Instruction) -> Result<()> {
         match self.module.extended_sets.get(&it.id(0)?) {
             Some(ExtendedSet::Glsl) => self.glsl(it),
             Some(ExtendedSet::NonSemantic) => Ok(()),

@@ -4,16 +4,16 @@ use isa::ir::Reg;
 use isa::op::Op as Ir;
 use spirv::{Decoration, Op};
 
-use super::super::error::{Outcome, malformed};
+use super::super::error::{Result, malformed};
 use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
-use super::arithmetic::sized;
+use super::arithmetic::op_for_width;
 use super::composite::Matrix;
 
 impl Translator<'_> {
     /// `OpDot` and products with matrices.
-    pub fn linear_algebra(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn linear_algebra(&mut self, it: &Instruction) -> Result<()> {
         let contract = !self.module.has(it.result()?, Decoration::NoContraction);
         let (first, second) = (it.id(0)?, it.id(1)?);
         let regs = match it.opcode {
@@ -40,14 +40,14 @@ impl Translator<'_> {
                 let scalar = self.result_scalar(it)?;
                 (0..matrix.rows)
                     .map(|row| self.dot(scalar, &matrix.row(row), &vector, contract))
-                    .collect::<Outcome<_>>()?
+                    .collect::<Result<_>>()?
             }
             Op::VectorTimesMatrix => {
                 let (vector, matrix) = (self.regs(first)?, self.matrix(second)?);
                 let scalar = self.result_scalar(it)?;
                 (0..matrix.columns)
                     .map(|column| self.dot(scalar, &vector, matrix.column(column), contract))
-                    .collect::<Outcome<_>>()?
+                    .collect::<Result<_>>()?
             }
             Op::MatrixTimesMatrix => {
                 let (a, b) = (self.matrix(first)?, self.matrix(second)?);
@@ -64,7 +64,7 @@ impl Translator<'_> {
                 let (a, b) = (self.regs(first)?, self.regs(second)?);
                 let scalar = self.result_scalar(it)?;
                 let mut regs = Vec::with_capacity(a.len() * b.len());
-                self.spend(a.len() * b.len())?;
+                self.charge_budget(a.len() * b.len())?;
                 for b in b.iter() {
                     regs.extend(a.iter().map(|a| self.mul(scalar, *a, *b)));
                 }
@@ -75,7 +75,7 @@ impl Translator<'_> {
     }
 
     /// The scalar of a result that is a scalar, vector or matrix.
-    fn result_scalar(&self, it: &Instruction) -> Outcome<Scalar> {
+    fn result_scalar(&self, it: &Instruction) -> Result<Scalar> {
         let ty = it.ty()?;
         match self.globals.types.matrix(ty) {
             Ok((_, _, _, scalar)) => Ok(scalar),
@@ -85,43 +85,43 @@ impl Translator<'_> {
 
     /// `a * b` on floats.
     pub fn mul(&mut self, scalar: Scalar, a: Reg, b: Reg) -> Reg {
-        let reg = self.op(sized(scalar, Ir::FMul, Ir::FMul64), &[a, b]);
-        self.normalize(scalar, reg)
+        let reg = self.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[a, b]);
+        self.wrap_to_width(scalar, reg)
     }
 
     /// `a + b` on floats.
     pub fn plus(&mut self, scalar: Scalar, a: Reg, b: Reg) -> Reg {
-        let reg = self.op(sized(scalar, Ir::FAdd, Ir::FAdd64), &[a, b]);
-        self.normalize(scalar, reg)
+        let reg = self.op(op_for_width(scalar, Ir::FAdd, Ir::FAdd64), &[a, b]);
+        self.wrap_to_width(scalar, reg)
     }
 
     /// `a - b` on floats.
     pub fn minus(&mut self, scalar: Scalar, a: Reg, b: Reg) -> Reg {
-        let reg = self.op(sized(scalar, Ir::FSub, Ir::FSub64), &[a, b]);
-        self.normalize(scalar, reg)
+        let reg = self.op(op_for_width(scalar, Ir::FSub, Ir::FSub64), &[a, b]);
+        self.wrap_to_width(scalar, reg)
     }
 
     /// `a / b` on floats.
     pub fn over(&mut self, scalar: Scalar, a: Reg, b: Reg) -> Reg {
-        let reg = self.op(sized(scalar, Ir::FDiv, Ir::FDiv64), &[a, b]);
-        self.normalize(scalar, reg)
+        let reg = self.op(op_for_width(scalar, Ir::FDiv, Ir::FDiv64), &[a, b]);
+        self.wrap_to_width(scalar, reg)
     }
 
     /// The sum of products; halves are rounded once, at the end.
-    pub fn dot(&mut self, scalar: Scalar, a: &[Reg], b: &[Reg], contract: bool) -> Outcome<Reg> {
+    pub fn dot(&mut self, scalar: Scalar, a: &[Reg], b: &[Reg], contract: bool) -> Result<Reg> {
         if a.len() != b.len() || a.is_empty() {
             return malformed("the operands differ in size");
         }
-        let mut sum = self.op(sized(scalar, Ir::FMul, Ir::FMul64), &[a[0], b[0]]);
+        let mut sum = self.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[a[0], b[0]]);
         for (a, b) in a.iter().zip(b).skip(1) {
             sum = if contract {
-                self.op(sized(scalar, Ir::FFma, Ir::FFma64), &[*a, *b, sum])
+                self.op(op_for_width(scalar, Ir::FFma, Ir::FFma64), &[*a, *b, sum])
             } else {
-                let product = self.op(sized(scalar, Ir::FMul, Ir::FMul64), &[*a, *b]);
-                self.op(sized(scalar, Ir::FAdd, Ir::FAdd64), &[sum, product])
+                let product = self.op(op_for_width(scalar, Ir::FMul, Ir::FMul64), &[*a, *b]);
+                self.op(op_for_width(scalar, Ir::FAdd, Ir::FAdd64), &[sum, product])
             };
         }
-        Ok(self.normalize(scalar, sum))
+        Ok(self.wrap_to_width(scalar, sum))
     }
 
     /// `a * b - c * d`.
@@ -137,7 +137,7 @@ impl Translator<'_> {
         matrix: &Matrix,
         rows: &[usize],
         columns: &[usize],
-    ) -> Outcome<Reg> {
+    ) -> Result<Reg> {
         match (rows, columns) {
             ([row], [column]) => Ok(matrix.at(*row, *column)),
             ([r0, r1], [c0, c1]) => {
@@ -167,14 +167,14 @@ impl Translator<'_> {
     }
 
     /// The determinant of a square matrix.
-    pub fn determinant(&mut self, scalar: Scalar, matrix: &Matrix) -> Outcome<Reg> {
+    pub fn determinant(&mut self, scalar: Scalar, matrix: &Matrix) -> Result<Reg> {
         let all: Vec<usize> = (0..matrix.rows).collect();
         let columns: Vec<usize> = (0..matrix.columns).collect();
         self.minor(scalar, matrix, &all, &columns)
     }
 
     /// The inverse of a square matrix: its adjugate divided by its determinant.
-    pub fn inverse(&mut self, scalar: Scalar, matrix: &Matrix) -> Outcome<Vec<Reg>> {
+    pub fn inverse(&mut self, scalar: Scalar, matrix: &Matrix) -> Result<Vec<Reg>> {
         let size = matrix.rows;
         if size != matrix.columns {
             return malformed("the matrix isn't square");
@@ -189,7 +189,7 @@ impl Translator<'_> {
                 let minor = self.minor(scalar, matrix, &all(column), &all(row))?;
                 let odd = (row + column) % 2 == 1;
                 adjugate.push(if odd {
-                    self.op(sized(scalar, Ir::FNeg, Ir::FNeg64), &[minor])
+                    self.op(op_for_width(scalar, Ir::FNeg, Ir::FNeg64), &[minor])
                 } else {
                     minor
                 });

@@ -5,17 +5,17 @@ use std::rc::Rc;
 use isa::ir::{Format, Reg};
 use isa::op::Op as Ir;
 
-use super::super::error::{Outcome, malformed};
+use super::super::error::{Result, malformed};
 use super::super::instruction::Instruction;
 use super::super::types::{Scalar, Type};
-use super::access::{Layout, Place, Pointer, scalar_bytes, scalar_format};
+use super::access::{MemoryLayout, MemoryRef, Pointer, scalar_bytes, scalar_format};
 use super::{Translator, Value};
 
 /// The most elements of one load or store of the IR.
 const MAX_ELEMENTS: usize = 16;
 
 /// Scalars that lie next to each other: their first byte, format, and their places in the value.
-struct Run {
+struct ContiguousAccess {
     offset: u32,
     format: Format,
     places: Vec<usize>,
@@ -23,7 +23,7 @@ struct Run {
 
 impl Translator<'_> {
     /// `OpLoad`.
-    pub fn load(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn load(&mut self, it: &Instruction) -> Result<()> {
         let pointer = self.pointer(it.id(0)?)?;
         if let Pointer::Resource { binding, ty, .. } = pointer {
             let value = match self.globals.types.get(ty)? {
@@ -42,23 +42,23 @@ impl Translator<'_> {
     }
 
     /// `OpStore`.
-    pub fn store(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn store(&mut self, it: &Instruction) -> Result<()> {
         let pointer = self.pointer(it.id(0)?)?;
         let regs = self.regs(it.id(1)?)?;
         self.store_to(&pointer, &regs)
     }
 
     /// `OpCopyMemory`.
-    pub fn copy_memory(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn copy_memory(&mut self, it: &Instruction) -> Result<()> {
         let (target, source) = (self.pointer(it.id(0)?)?, self.pointer(it.id(1)?)?);
         let regs = self.load_from(&source)?;
         self.store_to(&target, &regs)
     }
 
     /// The value that a pointer points to.
-    pub fn load_from(&mut self, pointer: &Pointer) -> Outcome<Vec<Reg>> {
+    pub fn load_from(&mut self, pointer: &Pointer) -> Result<Vec<Reg>> {
         match pointer {
-            Pointer::Slot {
+            Pointer::PromotedVariable {
                 slot,
                 start,
                 steps,
@@ -73,9 +73,9 @@ impl Translator<'_> {
     }
 
     /// Replaces what a pointer points to.
-    pub fn store_to(&mut self, pointer: &Pointer, regs: &[Reg]) -> Outcome<()> {
+    pub fn store_to(&mut self, pointer: &Pointer, regs: &[Reg]) -> Result<()> {
         match pointer {
-            Pointer::Slot {
+            Pointer::PromotedVariable {
                 slot,
                 start,
                 steps,
@@ -91,9 +91,9 @@ impl Translator<'_> {
         }
     }
 
-    fn load_place(&mut self, place: &Place) -> Outcome<Vec<Reg>> {
+    fn load_place(&mut self, place: &MemoryRef) -> Result<Vec<Reg>> {
         let scalars: Rc<[Scalar]> = self.globals.types.flatten(place.ty)?.into();
-        self.spend(scalars.len())?;
+        self.charge_budget(scalars.len())?;
         let mut loaded = vec![None; scalars.len()];
         for run in self.runs(place, &scalars)? {
             let regs = self
@@ -109,12 +109,12 @@ impl Translator<'_> {
         }
     }
 
-    fn store_place(&mut self, place: &Place, regs: &[Reg]) -> Outcome<()> {
+    fn store_place(&mut self, place: &MemoryRef, regs: &[Reg]) -> Result<()> {
         let scalars: Rc<[Scalar]> = self.globals.types.flatten(place.ty)?.into();
         if scalars.len() != regs.len() {
             return malformed("the object doesn't fit the pointer");
         }
-        self.spend(scalars.len())?;
+        self.charge_budget(scalars.len())?;
         self.note_write(place);
         for run in self.runs(place, &scalars)? {
             let src: Vec<Reg> = run
@@ -128,7 +128,7 @@ impl Translator<'_> {
     }
 
     /// The scalars of a value in memory, in runs of adjacent ones.
-    fn runs(&self, place: &Place, scalars: &[Scalar]) -> Outcome<Vec<Run>> {
+    fn runs(&self, place: &MemoryRef, scalars: &[Scalar]) -> Result<Vec<ContiguousAccess>> {
         let mut offsets = Vec::with_capacity(scalars.len());
         self.offsets(place.ty, place.layout, 0, &mut offsets)?;
         if offsets.len() != scalars.len() {
@@ -136,7 +136,7 @@ impl Translator<'_> {
         }
         let mut order: Vec<usize> = (0..offsets.len()).collect();
         order.sort_by_key(|index| offsets[*index]);
-        let mut runs: Vec<Run> = Vec::new();
+        let mut runs: Vec<ContiguousAccess> = Vec::new();
         for index in order {
             let format = scalar_format(scalars[index], place.layout);
             let offset = offsets[index];
@@ -151,7 +151,7 @@ impl Translator<'_> {
                 {
                     run.places.push(index);
                 }
-                _ => runs.push(Run {
+                _ => runs.push(ContiguousAccess {
                     offset,
                     format,
                     places: vec![index],
@@ -162,7 +162,13 @@ impl Translator<'_> {
     }
 
     /// The byte offsets of a type's scalars.
-    fn offsets(&self, ty: u32, layout: Layout, start: u32, into: &mut Vec<u32>) -> Outcome<()> {
+    fn offsets(
+        &self,
+        ty: u32,
+        layout: MemoryLayout,
+        start: u32,
+        into: &mut Vec<u32>,
+    ) -> Result<()> {
         let types = &self.globals.types;
         let at = |index: u32, stride: u32| start.saturating_add(index.saturating_mul(stride));
         match types.get(ty)? {
@@ -177,20 +183,20 @@ impl Translator<'_> {
                 let (scalar, rows) = types.vector(*column)?;
                 let bytes = scalar_bytes(scalar, layout);
                 let (column_stride, component_stride) = match layout {
-                    Layout {
+                    MemoryLayout {
                         explicit: false, ..
                     } => (bytes * rows, None),
-                    Layout {
+                    MemoryLayout {
                         matrix: Some((stride, true)),
                         ..
                     } => (bytes, Some(stride)),
-                    Layout {
+                    MemoryLayout {
                         matrix: Some((stride, false)),
                         ..
                     } => (stride, None),
                     _ => return malformed("the matrix has no stride"),
                 };
-                let layout = Layout {
+                let layout = MemoryLayout {
                     component_stride,
                     ..layout
                 };
@@ -209,7 +215,7 @@ impl Translator<'_> {
                         None => return malformed("the array has no stride"),
                     }
                 } else {
-                    u32::try_from(types.natural_size(*element)?).unwrap_or(u32::MAX)
+                    u32::try_from(types.tight_size(*element)?).unwrap_or(u32::MAX)
                 };
                 for index in 0..*count {
                     self.offsets(*element, layout, at(index, stride), into)?;
@@ -226,14 +232,14 @@ impl Translator<'_> {
                     } else {
                         natural
                     };
-                    let inner = Layout {
+                    let inner = MemoryLayout {
                         matrix: member
                             .matrix_stride
                             .map(|stride| (stride, member.row_major)),
                         ..layout
                     };
                     self.offsets(member.ty, inner, start.saturating_add(offset), into)?;
-                    let size = types.natural_size(member.ty).unwrap_or(0);
+                    let size = types.tight_size(member.ty).unwrap_or(0);
                     natural = natural.saturating_add(u32::try_from(size).unwrap_or(u32::MAX));
                 }
             }
@@ -243,7 +249,7 @@ impl Translator<'_> {
     }
 
     /// A scalar's register from what was loaded.
-    fn loaded_scalar(&mut self, scalar: Scalar, layout: Layout, loaded: Reg) -> Reg {
+    fn loaded_scalar(&mut self, scalar: Scalar, layout: MemoryLayout, loaded: Reg) -> Reg {
         match scalar {
             Scalar::Bool => {
                 let zero = self.u32(0);
@@ -255,7 +261,7 @@ impl Translator<'_> {
     }
 
     /// What to store for a scalar.
-    fn stored_scalar(&mut self, scalar: Scalar, layout: Layout, reg: Reg) -> Reg {
+    fn stored_scalar(&mut self, scalar: Scalar, layout: MemoryLayout, reg: Reg) -> Reg {
         match scalar {
             Scalar::Bool => {
                 let (one, zero) = (self.u32(1), self.u32(0));

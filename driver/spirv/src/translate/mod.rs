@@ -37,7 +37,7 @@ use isa::ir::{self, Binding, Reg};
 use isa::op::Op as Ir;
 use spirv::{AddressingModel, Capability, ExecutionMode, ExecutionModel, MemoryModel};
 
-use super::error::{Error, Fault, Outcome, malformed, unsupported};
+use super::error::{Diagnostic, Error, Result, malformed, unsupported};
 use super::globals::{Globals, Specialization};
 use super::instruction::Instruction;
 use super::interface::{DepthMode, Interface, Shader, Stage};
@@ -135,8 +135,8 @@ fn translate_here(
         phis: HashMap::new(),
         calls: Vec::new(),
         inputs: HashMap::new(),
-        origins: HashMap::new(),
-        bind_points: 0,
+        io_locations: HashMap::new(),
+        next_resource_slot: 0,
         depth: 0,
         statements: 0,
     };
@@ -167,7 +167,7 @@ struct Translator<'a> {
     /// Types of the ids in `values`.
     types: HashMap<u32, u32>,
     /// Variables held in registers.
-    slots: Vec<variable::Slot>,
+    slots: Vec<variable::PromotedVariable>,
     slot_of: HashMap<u32, usize>,
     /// Bits of the registers that hold constants.
     constants: HashMap<Reg, u64>,
@@ -179,8 +179,8 @@ struct Translator<'a> {
     calls: Vec<control::Call>,
     inputs: HashMap<super::interface::InputSource, Reg>,
     /// Where the scalars of inputs and outputs belong.
-    origins: HashMap<u32, Rc<[built_in::Origin]>>,
-    bind_points: u32,
+    io_locations: HashMap<u32, Rc<[built_in::IoLocation]>>,
+    next_resource_slot: u32,
     /// Lists of nodes around the one being translated.
     depth: usize,
     statements: u64,
@@ -188,10 +188,10 @@ struct Translator<'a> {
 
 impl Translator<'_> {
     /// Counts instructions about to be made.
-    fn spend(&mut self, count: usize) -> Outcome<()> {
+    fn charge_budget(&mut self, count: usize) -> Result<()> {
         self.statements += count as u64;
         if self.statements > MAX_STATEMENTS {
-            return Err(Fault::Placed(Error::TooLarge {
+            return Err(Diagnostic::Located(Error::TooLarge {
                 what: "instructions of a translated shader",
                 limit: MAX_STATEMENTS,
             }));
@@ -257,7 +257,7 @@ impl Translator<'_> {
     }
 
     /// The type of an id.
-    fn type_of(&self, id: u32) -> Outcome<u32> {
+    fn type_of(&self, id: u32) -> Result<u32> {
         let constant = || self.globals.constants.get(&id).map(|constant| constant.ty);
         match self.types.get(&id).copied().or_else(constant) {
             Some(ty) => Ok(ty),
@@ -266,13 +266,13 @@ impl Translator<'_> {
     }
 
     /// What an id stands for.
-    fn value(&mut self, id: u32) -> Outcome<Value> {
+    fn value(&mut self, id: u32) -> Result<Value> {
         if let Some(value) = self.values.get(&id) {
             return Ok(value.clone());
         }
         if let Some(constant) = self.globals.constants.get(&id) {
             let scalars = self.globals.types.flatten(constant.ty)?;
-            self.spend(scalars.len())?;
+            self.charge_budget(scalars.len())?;
             let bits = constant.bits.clone();
             let regs: Rc<[Reg]> = scalars
                 .iter()
@@ -290,7 +290,7 @@ impl Translator<'_> {
     }
 
     /// The registers of a value; a device address counts as one.
-    fn regs(&mut self, id: u32) -> Outcome<Rc<[Reg]>> {
+    fn regs(&mut self, id: u32) -> Result<Rc<[Reg]>> {
         match self.value(id)? {
             Value::Regs(regs) => Ok(regs),
             Value::Pointer(pointer) => match pointer.address() {
@@ -305,7 +305,7 @@ impl Translator<'_> {
     }
 
     /// The register of a scalar.
-    fn reg(&mut self, id: u32) -> Outcome<Reg> {
+    fn reg(&mut self, id: u32) -> Result<Reg> {
         match *self.regs(id)? {
             [reg] => Ok(reg),
             _ => malformed(format!("%{id} isn't a scalar")),
@@ -313,13 +313,13 @@ impl Translator<'_> {
     }
 
     /// The scalar type of a scalar or vector, and its registers.
-    fn vector(&mut self, id: u32) -> Outcome<(Scalar, Rc<[Reg]>)> {
+    fn vector(&mut self, id: u32) -> Result<(Scalar, Rc<[Reg]>)> {
         let (scalar, _) = self.globals.types.vector(self.type_of(id)?)?;
         Ok((scalar, self.regs(id)?))
     }
 
     /// A constant 32-bit operand.
-    fn literal(&self, id: u32) -> Outcome<u32> {
+    fn literal(&self, id: u32) -> Result<u32> {
         match self.globals.constant_u32(id) {
             Some(value) => Ok(value),
             None => unsupported(format!("%{id} isn't a constant")),
@@ -327,9 +327,9 @@ impl Translator<'_> {
     }
 
     /// Gives an instruction's result its registers, which must fit its type.
-    fn define(&mut self, it: &Instruction, regs: Vec<Reg>) -> Outcome<()> {
+    fn define(&mut self, it: &Instruction, regs: Vec<Reg>) -> Result<()> {
         let (id, ty) = (it.result()?, it.ty()?);
-        self.spend(regs.len())?;
+        self.charge_budget(regs.len())?;
         let scalars = self.globals.types.flatten(ty)?;
         let fits = scalars.len() == regs.len()
             && scalars
@@ -344,7 +344,7 @@ impl Translator<'_> {
         Ok(())
     }
 
-    fn define_as(&mut self, it: &Instruction, value: Value) -> Outcome<()> {
+    fn define_as(&mut self, it: &Instruction, value: Value) -> Result<()> {
         let id = it.result()?;
         self.values.insert(id, value);
         self.types.insert(id, it.ty()?);
@@ -355,7 +355,8 @@ impl Translator<'_> {
     fn modes(&mut self, entry: u32) -> Result<(), Error> {
         for it in &self.module.sections.execution_modes {
             if it.id(0).ok() == Some(entry) {
-                self.mode(it).map_err(|fault| fault.at(it))?;
+                self.mode(it)
+                    .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
             }
         }
         if self.interface.stage == Stage::Compute {
@@ -372,7 +373,7 @@ impl Translator<'_> {
         Ok(())
     }
 
-    fn mode(&mut self, it: &Instruction) -> Outcome<()> {
+    fn mode(&mut self, it: &Instruction) -> Result<()> {
         let Some(mode) = it.enumerant(1, ExecutionMode::from_u32) else {
             return malformed("there is no mode");
         };
@@ -388,13 +389,15 @@ impl Translator<'_> {
                 ];
             }
             ExecutionMode::EarlyFragmentTests => self.interface.early_fragment_tests = true,
-            ExecutionMode::DepthReplacing if self.interface.depth == DepthMode::Fixed => {
-                self.interface.depth = DepthMode::Any;
+            ExecutionMode::DepthReplacing if self.interface.depth == DepthMode::NotWritten => {
+                self.interface.depth = DepthMode::Replacing;
             }
             ExecutionMode::DepthGreater => self.interface.depth = DepthMode::Greater,
             ExecutionMode::DepthLess => self.interface.depth = DepthMode::Less,
             ExecutionMode::DepthUnchanged => self.interface.depth = DepthMode::Unchanged,
-            ExecutionMode::OriginLowerLeft => return unsupported("an origin at the lower left"),
+            ExecutionMode::OriginLowerLeft => {
+                return unsupported("an io_location at the lower left");
+            }
             _ => {}
         }
         Ok(())
@@ -419,7 +422,7 @@ fn empty_interface(stage: Stage) -> Interface {
         push_constants: None,
         workgroup_size: [1; 3],
         early_fragment_tests: false,
-        depth: DepthMode::Fixed,
+        depth: DepthMode::NotWritten,
         discards: false,
         per_sample: false,
         has_side_effects: false,
@@ -456,8 +459,8 @@ fn check_capabilities(module: &Module) -> Result<(), Error> {
         if let Some(capability) = it.enumerant(0, Capability::from_u32)
             && !is_supported(capability)
         {
-            let fault = Fault::Unsupported(format!("capability {capability:?}"));
-            return Err(fault.at(it));
+            let diagnostic = Diagnostic::Unsupported(format!("capability {capability:?}"));
+            return Err(diagnostic.locate(it.reference()));
         }
     }
     let model = module.sections.memory_model.as_ref();
@@ -473,7 +476,7 @@ fn check_capabilities(module: &Module) -> Result<(), Error> {
             Some(AddressingModel::Logical | AddressingModel::PhysicalStorageBuffer64),
             Some(MemoryModel::GLSL450 | MemoryModel::Vulkan),
         ) => Ok(()),
-        _ => Err(Fault::Unsupported("this memory model".into()).at(model)),
+        _ => Err(Diagnostic::Unsupported("this memory model".into()).locate(model.reference())),
     }
 }
 

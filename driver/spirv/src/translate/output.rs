@@ -2,15 +2,15 @@
 
 use spirv::{BuiltIn as Spirv, StorageClass};
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::interface::{BuiltIn, Output, OutputTarget};
 use super::Translator;
-use super::built_in::Origin;
+use super::built_in::IoLocation;
 use super::resource::numeric;
 
 impl Translator<'_> {
     /// Assigns what was stored to the output variables.
-    pub fn assign_outputs(&mut self) -> Outcome<()> {
+    pub fn assign_outputs(&mut self) -> Result<()> {
         let mut outputs: Vec<u32> = self.analysis.used.iter().copied().collect();
         outputs.retain(|id| {
             let class = self.globals.variables.get(id).map(|it| it.class);
@@ -21,13 +21,13 @@ impl Translator<'_> {
             let Some(slot) = self.slot_of_root(variable) else {
                 continue;
             };
-            let origins = self.origins(variable)?;
-            for (index, origin) in origins.iter().enumerate() {
+            let io_locations = self.io_locations(variable)?;
+            for (index, io_location) in io_locations.iter().enumerate() {
                 if !self.slots[slot].written[index] {
                     continue;
                 }
                 let scalar = self.slots[slot].scalars[index];
-                let target = output_target(*origin)?;
+                let target = output_target(*io_location)?;
                 if self.interface.outputs.iter().any(|it| it.target == target) {
                     return malformed(format!("two outputs at {target:?}"));
                 }
@@ -46,9 +46,9 @@ impl Translator<'_> {
     }
 }
 
-fn output_target(origin: Origin) -> Outcome<OutputTarget> {
-    Ok(match origin {
-        Origin::Location {
+fn output_target(io_location: IoLocation) -> Result<OutputTarget> {
+    Ok(match io_location {
+        IoLocation::Location {
             location,
             component,
             index,
@@ -58,7 +58,7 @@ fn output_target(origin: Origin) -> Outcome<OutputTarget> {
             component,
             index,
         },
-        Origin::BuiltIn {
+        IoLocation::BuiltIn {
             built_in,
             component,
         } => OutputTarget::BuiltIn {

@@ -3,18 +3,18 @@
 use isa::ir::{Binding, Dimension, ImageShape, MAX_MEMORY_BYTES, Space};
 use spirv::{Decoration, Dim, ImageFormat, StorageClass};
 
-use super::super::error::{Error, Fault, Outcome, malformed, unsupported};
+use super::super::error::{Diagnostic, Error, Result, malformed, unsupported};
 use super::super::globals::GlobalVariable;
-use super::super::interface::{Descriptor, DescriptorKind, ImageUse, Numeric};
+use super::super::interface::{Descriptor, DescriptorKind, ImageUse, ScalarType};
 use super::super::types::{ImageType, Scalar, Type};
-use super::access::{EXPLICIT, NATURAL, Place, Pointer};
+use super::access::{EXPLICIT, MemoryRef, Pointer, TIGHT};
 use super::{Translator, Value};
 
 /// The most descriptors that a shader may be bound to.
 const MAX_DESCRIPTORS: u32 = 1 << 20;
 
 impl Translator<'_> {
-    /// Makes all variables outside functions that are used, bind points in order of set and binding.
+    /// Makes all variables outside functions that are used, resource slots in order of set and binding.
     pub fn global_variables(&mut self) -> Result<(), Error> {
         let mut used: Vec<u32> = self.analysis.used.iter().copied().collect();
         let number = |id, decoration| self.module.literal(id, decoration).unwrap_or(0);
@@ -29,13 +29,15 @@ impl Translator<'_> {
                 }
                 other => other.map(|_| ()),
             };
-            if let Err(fault) = made {
+            if let Err(diagnostic) = made {
                 let mut declarations = self.module.sections.globals.iter();
                 return Err(
-                    match (declarations.find(|it| it.result_id == Some(id)), fault) {
-                        (Some(declaration), fault) => fault.at(declaration),
-                        (None, Fault::Placed(error)) => error,
-                        (None, Fault::Malformed(reason) | Fault::Unsupported(reason)) => {
+                    match (declarations.find(|it| it.result_id == Some(id)), diagnostic) {
+                        (Some(declaration), diagnostic) => {
+                            diagnostic.locate(declaration.reference())
+                        }
+                        (None, Diagnostic::Located(error)) => error,
+                        (None, Diagnostic::Malformed(reason) | Diagnostic::Unsupported(reason)) => {
                             Error::Binary { reason }
                         }
                     },
@@ -46,7 +48,7 @@ impl Translator<'_> {
     }
 
     /// The pointer to a variable outside functions.
-    pub fn global_variable(&mut self, id: u32) -> Outcome<Value> {
+    pub fn global_variable(&mut self, id: u32) -> Result<Value> {
         let Some(variable) = self.globals.variables.get(&id).copied() else {
             return malformed(format!("%{id} isn't a variable"));
         };
@@ -59,7 +61,7 @@ impl Translator<'_> {
                 let input = (class == StorageClass::Input).then_some(id);
                 let slot = self.new_slot(pointee, input)?;
                 self.slot_of.insert(id, slot);
-                Pointer::Slot {
+                Pointer::PromotedVariable {
                     slot,
                     start: 0,
                     steps: Vec::new(),
@@ -67,17 +69,17 @@ impl Translator<'_> {
                 }
             }
             StorageClass::Workgroup => {
-                let bytes = self.natural_bytes(pointee)?;
+                let bytes = self.tight_bytes(pointee)?;
                 let offset = self.builder.allocate_shared(bytes, 8);
-                Pointer::Memory(Place {
+                Pointer::Memory(MemoryRef {
                     space: Space::Shared,
                     base: None,
                     offset,
-                    layout: NATURAL,
+                    layout: TIGHT,
                     ty: pointee,
                 })
             }
-            StorageClass::PushConstant => Pointer::Memory(Place {
+            StorageClass::PushConstant => Pointer::Memory(MemoryRef {
                 space: Space::PushConstants,
                 base: None,
                 offset: 0,
@@ -103,40 +105,40 @@ impl Translator<'_> {
     }
 
     /// A variable in private memory; each variable once, however often its function is inlined.
-    pub fn private_variable(&mut self, id: u32, pointee: u32) -> Outcome<Pointer> {
+    pub fn private_variable(&mut self, id: u32, pointee: u32) -> Result<Pointer> {
         if let Some(Value::Pointer(pointer)) = self.values.get(&id)
             && let Pointer::Memory(_) = **pointer
         {
             return Ok((**pointer).clone());
         }
-        let bytes = self.natural_bytes(pointee)?;
+        let bytes = self.tight_bytes(pointee)?;
         let offset = self.builder.allocate_private(bytes);
-        Ok(Pointer::Memory(Place {
+        Ok(Pointer::Memory(MemoryRef {
             space: Space::Private,
             base: None,
             offset,
-            layout: NATURAL,
+            layout: TIGHT,
             ty: pointee,
         }))
     }
 
-    fn natural_bytes(&self, ty: u32) -> Outcome<u32> {
-        let size = self.globals.types.natural_size(ty)?;
+    fn tight_bytes(&self, ty: u32) -> Result<u32> {
+        let size = self.globals.types.tight_size(ty)?;
         match u32::try_from(size) {
             Ok(bytes) if bytes <= MAX_MEMORY_BYTES => Ok(bytes),
-            _ => Err(Fault::Placed(Error::TooLarge {
+            _ => Err(Diagnostic::Located(Error::TooLarge {
                 what: "bytes of workgroup or private memory",
                 limit: MAX_MEMORY_BYTES.into(),
             })),
         }
     }
 
-    /// Gives a descriptor variable its bind points.
-    fn descriptor(&mut self, id: u32, variable: GlobalVariable) -> Outcome<Binding> {
+    /// Gives a descriptor variable its resource slots.
+    fn descriptor(&mut self, id: u32, variable: GlobalVariable) -> Result<Binding> {
         let count = self.descriptor_count(variable.pointee)?;
-        let slot = self.bind_points;
+        let slot = self.next_resource_slot;
         match slot.checked_add(count) {
-            Some(end) if end <= MAX_DESCRIPTORS => self.bind_points = end,
+            Some(end) if end <= MAX_DESCRIPTORS => self.next_resource_slot = end,
             _ => return unsupported("too many descriptors"),
         }
         let mut ty = variable.pointee;
@@ -188,7 +190,7 @@ impl Translator<'_> {
         &self,
         class: StorageClass,
         ty: u32,
-    ) -> Outcome<(DescriptorKind, Option<ImageUse>)> {
+    ) -> Result<(DescriptorKind, Option<ImageUse>)> {
         use DescriptorKind as Kind;
         let buffer_block = self.module.has(ty, Decoration::BufferBlock);
         Ok(match (self.globals.types.get(ty)?, class) {
@@ -217,7 +219,7 @@ impl Translator<'_> {
         })
     }
 
-    fn image_use(&self, image: &ImageType) -> Outcome<ImageUse> {
+    fn image_use(&self, image: &ImageType) -> Result<ImageUse> {
         let (scalar, _) = self.globals.types.vector(image.sampled_type)?;
         if scalar.is_wide() {
             return unsupported("images of 64-bit components");
@@ -229,7 +231,7 @@ impl Translator<'_> {
     }
 
     /// Notes that a place may be written.
-    pub fn note_write(&mut self, place: &Place) {
+    pub fn note_write(&mut self, place: &MemoryRef) {
         match place.space {
             Space::Buffer(binding) => self.note_binding_write(binding),
             Space::Global => self.interface.has_side_effects = true,
@@ -274,7 +276,7 @@ impl Translator<'_> {
 }
 
 /// The IR's name for an image's kind.
-pub fn shape(image: &ImageType) -> Outcome<ImageShape> {
+pub fn shape(image: &ImageType) -> Result<ImageShape> {
     let storage_cube = image.dim == Dim::DimCube && image.sampled == 2;
     let dimension = match image.dim {
         Dim::Dim1D => Dimension::D1,
@@ -296,15 +298,15 @@ pub fn shape(image: &ImageType) -> Outcome<ImageShape> {
 }
 
 /// The type of a scalar at the interface.
-pub fn numeric(scalar: Scalar) -> Numeric {
+pub fn numeric(scalar: Scalar) -> ScalarType {
     match scalar {
-        Scalar::Bool => Numeric::Bool,
+        Scalar::Bool => ScalarType::Bool,
         Scalar::Int {
             width,
             signed: true,
-        } => Numeric::Int { width },
-        Scalar::Int { width, .. } => Numeric::Uint { width },
-        Scalar::Float { width } => Numeric::Float { width },
-        Scalar::Address => Numeric::Uint { width: 64 },
+        } => ScalarType::Int { width },
+        Scalar::Int { width, .. } => ScalarType::Uint { width },
+        Scalar::Float { width } => ScalarType::Float { width },
+        Scalar::Address => ScalarType::Uint { width: 64 },
     }
 }

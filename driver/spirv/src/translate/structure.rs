@@ -10,7 +10,7 @@ use std::rc::Rc;
 use isa::ir::MAX_NESTING;
 use spirv::Op;
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::instruction::Instruction;
 use super::super::module::Function;
 use super::cases::Target;
@@ -19,7 +19,7 @@ use super::cases::Target;
 pub type Construct = usize;
 
 /// A place where control flow comes together: an index into [`Tree::edges`].
-pub type Join = usize;
+pub type MergePoint = usize;
 
 /// How an edge leaves its list of nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +38,7 @@ pub struct Edge {
     pub from: usize,
     pub to: usize,
     pub jump: Jump,
-    pub join: Option<Join>,
+    pub join: Option<MergePoint>,
 }
 
 /// A case of a switch.
@@ -49,7 +49,7 @@ pub struct Case {
     pub body: Vec<Node>,
     pub fallthrough: bool,
     /// If the case before falls through to this one: where they meet, and the edge from the switch itself.
-    pub entry: Option<(Join, Edge)>,
+    pub entry: Option<(MergePoint, Edge)>,
 }
 
 /// A node of the tree.
@@ -63,7 +63,7 @@ pub enum Node {
         condition: u32,
         then: Vec<Node>,
         otherwise: Vec<Node>,
-        join: Option<Join>,
+        join: Option<MergePoint>,
         modified: Rc<[u32]>,
     },
     Switch {
@@ -71,7 +71,7 @@ pub enum Node {
         selector: u32,
         construct: Construct,
         cases: Vec<Case>,
-        join: Option<Join>,
+        join: Option<MergePoint>,
         modified: Rc<[u32]>,
     },
     Loop {
@@ -79,11 +79,11 @@ pub enum Node {
         body: Vec<Node>,
         continuing: Vec<Node>,
         /// Where the entry and the back edge meet.
-        header: Join,
+        header: MergePoint,
         /// Where `continue`s meet; none if the loop's header is its continue target.
-        continues: Option<Join>,
+        continues: Option<MergePoint>,
         /// Where breaks meet.
-        merge: Join,
+        merge: MergePoint,
         modified: Rc<[u32]>,
     },
     /// A terminator that ends the invocation or the function.
@@ -94,7 +94,7 @@ pub enum Node {
 #[derive(Clone, Debug)]
 pub struct Tree {
     pub nodes: Vec<Node>,
-    /// For each [`Join`], the number of edges that lead to it.
+    /// For each [`MergePoint`], the number of edges that lead to it.
     pub edges: Vec<usize>,
     /// How many blocks return.
     pub returns: usize,
@@ -105,8 +105,8 @@ pub struct Tree {
 }
 
 /// Builds the tree of a function. `stores` names, for each block, the variables that it stores to.
-pub fn structure(function: &Function, stores: &[Vec<u32>]) -> Outcome<Tree> {
-    let mut walker = Walker {
+pub fn structure(function: &Function, stores: &[Vec<u32>]) -> Result<Tree> {
+    let mut structurizer = Structurizer {
         function,
         stores,
         index: HashMap::new(),
@@ -122,20 +122,20 @@ pub fn structure(function: &Function, stores: &[Vec<u32>]) -> Outcome<Tree> {
     };
     for (index, block) in function.blocks.iter().enumerate() {
         if let Some(id) = block.label {
-            walker.index.insert(id, index);
+            structurizer.index.insert(id, index);
         }
     }
     if function.blocks.is_empty() {
         return malformed("the function has no body");
     }
     let mut nodes = Vec::new();
-    walker.region(0, &mut nodes)?;
+    structurizer.region(0, &mut nodes)?;
     Ok(Tree {
         nodes,
-        modified: walker.end_modified(),
-        edges: walker.edges,
-        returns: walker.returns,
-        early_return: walker.early_return,
+        modified: structurizer.end_modified(),
+        edges: structurizer.edges,
+        returns: structurizer.returns,
+        early_return: structurizer.early_return,
     })
 }
 
@@ -143,27 +143,27 @@ pub fn structure(function: &Function, stores: &[Vec<u32>]) -> Outcome<Tree> {
 enum Frame {
     Selection {
         merge: usize,
-        join: Join,
+        join: MergePoint,
     },
     Case {
         construct: Construct,
-        merge: Option<(usize, Join)>,
-        next: Option<(usize, Join)>,
+        merge: Option<(usize, MergePoint)>,
+        next: Option<(usize, MergePoint)>,
     },
     LoopBody {
         construct: Construct,
-        merge: Option<(usize, Join)>,
-        continues: (usize, Join),
+        merge: Option<(usize, MergePoint)>,
+        continues: (usize, MergePoint),
     },
     LoopContinuing {
         construct: Construct,
-        merge: Option<(usize, Join)>,
-        header: (usize, Join),
+        merge: Option<(usize, MergePoint)>,
+        header: (usize, MergePoint),
     },
 }
 
 /// Walks a function's blocks.
-pub struct Walker<'a> {
+pub struct Structurizer<'a> {
     function: &'a Function,
     stores: &'a [Vec<u32>],
     /// Blocks by the ids of their labels.
@@ -181,8 +181,8 @@ pub struct Walker<'a> {
     depth: usize,
 }
 
-impl Walker<'_> {
-    fn join(&mut self) -> Join {
+impl Structurizer<'_> {
+    fn join(&mut self) -> MergePoint {
         self.edges.push(0);
         self.edges.len() - 1
     }
@@ -206,14 +206,14 @@ impl Walker<'_> {
         sorted.into()
     }
 
-    pub fn block_of(&self, label: u32) -> Outcome<usize> {
+    pub fn block_of(&self, label: u32) -> Result<usize> {
         match self.index.get(&label) {
             Some(index) => Ok(*index),
             None => malformed(format!("%{label} isn't a block of this function")),
         }
     }
 
-    pub fn terminator(&self, block: usize) -> Outcome<&Instruction> {
+    pub fn terminator(&self, block: usize) -> Result<&Instruction> {
         match self.function.blocks[block].instructions.last() {
             Some(last) => Ok(last),
             None => malformed("a block is empty"),
@@ -229,7 +229,7 @@ impl Walker<'_> {
     }
 
     /// Walks from a block to the end of the list that it belongs to.
-    fn region(&mut self, start: usize, nodes: &mut Vec<Node>) -> Outcome<()> {
+    fn region(&mut self, start: usize, nodes: &mut Vec<Node>) -> Result<()> {
         self.depth += 1;
         if self.depth > MAX_NESTING {
             return unsupported("constructs are nested too deeply");
@@ -253,7 +253,7 @@ impl Walker<'_> {
     }
 
     /// A block and its terminator. Returns the block that the same list goes on with.
-    fn straight(&mut self, block: usize, nodes: &mut Vec<Node>) -> Outcome<Option<usize>> {
+    fn straight(&mut self, block: usize, nodes: &mut Vec<Node>) -> Result<Option<usize>> {
         nodes.push(Node::Block(block));
         if let (Some(modified), Some(stores)) = (self.modified.last_mut(), self.stores.get(block)) {
             modified.extend(stores);
@@ -288,7 +288,7 @@ impl Walker<'_> {
     }
 
     /// The join at the end of the innermost construct, if that is where a block is.
-    fn natural(&self, to: usize) -> Option<Join> {
+    fn natural(&self, to: usize) -> Option<MergePoint> {
         let (block, join) = match self.frames.last()? {
             Frame::Selection { merge, join } => (*merge, *join),
             Frame::Case {
@@ -305,8 +305,8 @@ impl Walker<'_> {
     }
 
     /// The jump that reaches a block from anywhere within the constructs around.
-    fn jump(&self, to: usize) -> Option<(Jump, Join)> {
-        let leave = |merge: &Option<(usize, Join)>, construct: Construct| match merge {
+    fn jump(&self, to: usize) -> Option<(Jump, MergePoint)> {
+        let leave = |merge: &Option<(usize, MergePoint)>, construct: Construct| match merge {
             Some((block, join)) if *block == to => Some((Jump::Break(construct), *join)),
             _ => None,
         };
@@ -334,7 +334,7 @@ impl Walker<'_> {
         self.natural(block).is_some() || self.jump(block).is_some()
     }
 
-    fn edge(&mut self, from: usize, to: usize, (jump, join): (Jump, Join)) -> Node {
+    fn edge(&mut self, from: usize, to: usize, (jump, join): (Jump, MergePoint)) -> Node {
         self.edges[join] += 1;
         let join = Some(join);
         Node::Edge(Edge {
@@ -346,7 +346,7 @@ impl Walker<'_> {
     }
 
     /// A branch at the end of a list.
-    fn follow(&mut self, from: usize, to: usize, nodes: &mut Vec<Node>) -> Outcome<Option<usize>> {
+    fn follow(&mut self, from: usize, to: usize, nodes: &mut Vec<Node>) -> Result<Option<usize>> {
         let end = self.natural(to).map(|join| (Jump::None, join));
         if let Some(leaving) = end.or_else(|| self.jump(to)) {
             let edge = self.edge(from, to, leaving);
@@ -363,7 +363,7 @@ impl Walker<'_> {
     }
 
     /// The list of nodes that a branch leads to.
-    fn arm(&mut self, from: usize, to: usize) -> Outcome<Vec<Node>> {
+    fn arm(&mut self, from: usize, to: usize) -> Result<Vec<Node>> {
         let mut nodes = Vec::new();
         if let Some(next) = self.follow(from, to, &mut nodes)? {
             self.region(next, &mut nodes)?;
@@ -371,7 +371,7 @@ impl Walker<'_> {
         Ok(nodes)
     }
 
-    fn selection_merge(&self, block: usize) -> Outcome<Option<usize>> {
+    fn selection_merge(&self, block: usize) -> Result<Option<usize>> {
         match self.merge(block) {
             Some(it) if it.opcode == Op::SelectionMerge => Ok(Some(self.block_of(it.id(0)?)?)),
             _ => Ok(None),
@@ -385,7 +385,7 @@ impl Walker<'_> {
         then: usize,
         otherwise: usize,
         nodes: &mut Vec<Node>,
-    ) -> Outcome<Option<usize>> {
+    ) -> Result<Option<usize>> {
         let Some(merge) = self.selection_merge(block)? else {
             return self.conditional_exit(block, condition, then, otherwise, nodes);
         };
@@ -419,7 +419,7 @@ impl Walker<'_> {
         then: usize,
         otherwise: usize,
         nodes: &mut Vec<Node>,
-    ) -> Outcome<Option<usize>> {
+    ) -> Result<Option<usize>> {
         let node = |then, otherwise, modified| Node::If {
             block,
             condition,
@@ -457,7 +457,7 @@ impl Walker<'_> {
         merge: usize,
         continues: usize,
         nodes: &mut Vec<Node>,
-    ) -> Outcome<Option<usize>> {
+    ) -> Result<Option<usize>> {
         let construct = self.construct();
         let (header, merge_join) = (self.join(), self.join());
         self.edges[header] += 1;
@@ -502,7 +502,7 @@ impl Walker<'_> {
         block: usize,
         terminator: &Instruction,
         nodes: &mut Vec<Node>,
-    ) -> Outcome<Option<usize>> {
+    ) -> Result<Option<usize>> {
         let Some(merge) = self.selection_merge(block)? else {
             return malformed("there is no merge block");
         };

@@ -4,15 +4,15 @@ use isa::ir::{Reg, SubgroupOp, is_reducible};
 use isa::op::Op as Ir;
 use spirv::{GroupOperation, Op};
 
-use super::super::error::{Outcome, malformed, unsupported};
+use super::super::error::{Result, malformed, unsupported};
 use super::super::instruction::Instruction;
 use super::super::types::Scalar;
 use super::Translator;
-use super::arithmetic::sized;
+use super::arithmetic::op_for_width;
 
 impl Translator<'_> {
     /// `OpGroupNonUniform*` and the older `OpSubgroup*KHR`.
-    pub fn subgroup(&mut self, it: &Instruction) -> Outcome<()> {
+    pub fn subgroup(&mut self, it: &Instruction) -> Result<()> {
         self.interface.uses_subgroups = true;
         let opcode = it.opcode;
         // The newer instructions name a scope first.
@@ -103,7 +103,7 @@ impl Translator<'_> {
         }
     }
 
-    fn vote(&mut self, it: &Instruction, op: SubgroupOp, operand: usize) -> Outcome<()> {
+    fn vote(&mut self, it: &Instruction, op: SubgroupOp, operand: usize) -> Result<()> {
         let value = self.reg(it.id(operand)?)?;
         let reg = self.builder.subgroup(op, Some(value), None);
         self.define(it, vec![reg])
@@ -115,7 +115,7 @@ impl Translator<'_> {
         op: SubgroupOp,
         value: usize,
         index: Option<usize>,
-    ) -> Outcome<()> {
+    ) -> Result<()> {
         let regs = self.regs(it.id(value)?)?;
         let index = match index {
             Some(index) => Some(self.reg(it.id(index)?)?),
@@ -128,7 +128,7 @@ impl Translator<'_> {
         self.define(it, moved)
     }
 
-    fn ballot_operand(&mut self, it: &Instruction, index: usize) -> Outcome<[Reg; 4]> {
+    fn ballot_operand(&mut self, it: &Instruction, index: usize) -> Result<[Reg; 4]> {
         match *self.regs(it.id(index)?)? {
             [a, b, c, d] => Ok([a, b, c, d]),
             _ => malformed("a ballot has four words"),
@@ -151,7 +151,7 @@ impl Translator<'_> {
     }
 
     /// A ballot's words without the bits above the subgroup's.
-    fn ballot_of_subgroup(&mut self, it: &Instruction, index: usize) -> Outcome<[Reg; 4]> {
+    fn ballot_of_subgroup(&mut self, it: &Instruction, index: usize) -> Result<[Reg; 4]> {
         let mut words = self.ballot_operand(it, index)?;
         for (first, word) in (0..).step_by(32).zip(&mut words) {
             let bits = self.options.subgroup_size.saturating_sub(first).min(32);
@@ -163,7 +163,7 @@ impl Translator<'_> {
         Ok(words)
     }
 
-    fn ballot_count(&mut self, it: &Instruction) -> Outcome<()> {
+    fn ballot_count(&mut self, it: &Instruction) -> Result<()> {
         let Some(group) = it.enumerant(1, GroupOperation::from_u32) else {
             return malformed("there is no group operation");
         };
@@ -189,7 +189,7 @@ impl Translator<'_> {
         self.define(it, vec![sum])
     }
 
-    fn ballot_find(&mut self, it: &Instruction) -> Outcome<()> {
+    fn ballot_find(&mut self, it: &Instruction) -> Result<()> {
         let lowest = it.opcode == Op::GroupNonUniformBallotFindLSB;
         let words = self.ballot_of_subgroup(it, 1)?;
         let zero = self.u32(0);
@@ -208,7 +208,7 @@ impl Translator<'_> {
     }
 
     /// Reductions and scans.
-    fn group_arithmetic(&mut self, it: &Instruction) -> Outcome<()> {
+    fn group_arithmetic(&mut self, it: &Instruction) -> Result<()> {
         let (scalar, regs) = self.vector(it.id(2)?)?;
         let Some(op) = group_op(it.opcode, scalar).filter(|op| is_reducible(*op)) else {
             return unsupported(format!("Op{:?}", it.opcode));
@@ -238,8 +238,8 @@ impl Translator<'_> {
             .iter()
             .map(|reg| {
                 let reg = match (signed, unsigned) {
-                    (true, _) => self.as_signed(scalar, *reg),
-                    (_, true) => self.as_unsigned(scalar, *reg),
+                    (true, _) => self.sign_extend(scalar, *reg),
+                    (_, true) => self.zero_extend(scalar, *reg),
                     _ => *reg,
                 };
                 let reg = self.builder.subgroup(operation, Some(reg), None);
@@ -248,7 +248,7 @@ impl Translator<'_> {
                 } else {
                     reg
                 };
-                self.normalize(scalar, reg)
+                self.wrap_to_width(scalar, reg)
             })
             .collect();
         self.define(it, reduced)
@@ -291,5 +291,5 @@ fn group_op(opcode: Op, scalar: Scalar) -> Option<Ir> {
         Op::GroupNonUniformLogicalXor => return Some(Ir::BXor),
         _ => return None,
     };
-    Some(sized(scalar, narrow, wide))
+    Some(op_for_width(scalar, narrow, wide))
 }

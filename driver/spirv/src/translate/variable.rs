@@ -6,14 +6,14 @@ use isa::ir::Reg;
 use isa::op::Op as Ir;
 use spirv::StorageClass;
 
-use super::super::error::{Outcome, malformed};
+use super::super::error::{Result, malformed};
 use super::super::types::Scalar;
 use super::Translator;
-use super::access::Step;
+use super::access::DynamicIndex;
 
 /// A variable: the registers that hold it where the translation is now.
 #[derive(Clone, Debug)]
-pub struct Slot {
+pub struct PromotedVariable {
     pub scalars: Rc<[Scalar]>,
     /// None where nothing was stored yet.
     pub now: Vec<Option<Reg>>,
@@ -25,10 +25,10 @@ pub struct Slot {
 
 impl Translator<'_> {
     /// Makes a variable of a type.
-    pub fn new_slot(&mut self, ty: u32, input: Option<u32>) -> Outcome<usize> {
+    pub fn new_slot(&mut self, ty: u32, input: Option<u32>) -> Result<usize> {
         let scalars: Rc<[Scalar]> = self.globals.types.flatten(ty)?.into();
-        self.spend(scalars.len())?;
-        self.slots.push(Slot {
+        self.charge_budget(scalars.len())?;
+        self.slots.push(PromotedVariable {
             now: vec![None; scalars.len()],
             written: vec![false; scalars.len()],
             scalars,
@@ -38,7 +38,7 @@ impl Translator<'_> {
     }
 
     /// The register that holds a scalar of a variable. Zero if nothing was ever stored.
-    pub fn read_scalar(&mut self, slot: usize, index: usize) -> Outcome<Reg> {
+    pub fn read_scalar(&mut self, slot: usize, index: usize) -> Result<Reg> {
         let found = &self.slots[slot];
         let Some(scalar) = found.scalars.get(index).copied() else {
             return malformed("an access beyond the end of a variable");
@@ -54,7 +54,7 @@ impl Translator<'_> {
         Ok(reg)
     }
 
-    fn write_scalar(&mut self, slot: usize, index: usize, reg: Reg) -> Outcome<()> {
+    fn write_scalar(&mut self, slot: usize, index: usize, reg: Reg) -> Result<()> {
         let found = &mut self.slots[slot];
         match found.scalars.get(index) {
             Some(scalar) if scalar.register() == self.builder.type_of(reg) => {
@@ -71,10 +71,10 @@ impl Translator<'_> {
         &mut self,
         slot: usize,
         start: usize,
-        steps: &[Step],
+        steps: &[DynamicIndex],
         count: usize,
-    ) -> Outcome<Vec<Reg>> {
-        self.spend(count)?;
+    ) -> Result<Vec<Reg>> {
+        self.charge_budget(count)?;
         let Some((step, rest)) = steps.split_first() else {
             return (start..start + count)
                 .map(|index| self.read_scalar(slot, index))
@@ -98,11 +98,11 @@ impl Translator<'_> {
         &mut self,
         slot: usize,
         start: usize,
-        steps: &[Step],
+        steps: &[DynamicIndex],
         regs: &[Reg],
         condition: Option<Reg>,
-    ) -> Outcome<()> {
-        self.spend(regs.len())?;
+    ) -> Result<()> {
+        self.charge_budget(regs.len())?;
         let Some((step, rest)) = steps.split_first() else {
             for (offset, new) in regs.iter().enumerate() {
                 let reg = match condition {

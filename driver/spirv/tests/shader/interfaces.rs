@@ -6,13 +6,13 @@ use std::sync::Arc;
 use crate::common::{folder, translated, words_of};
 use fearless_simd::Level;
 use gaurast_spirv::{
-    BuiltIn, DepthMode, DescriptorKind, InputSource, Interface, Interpolation, Module, Numeric,
-    OutputTarget, Sampling, Specialization,
+    BuiltIn, DepthMode, DescriptorKind, InputSource, Interface, Interpolation, Module,
+    OutputTarget, Sampling, ScalarType, Specialization,
 };
 use isa::exec::{Executable, LaneMask, Machine, Options as ExecOptions, Watchdog};
 use isa::resources::{Resources, words};
 
-const FLOAT: Numeric = Numeric::Float { width: 32 };
+const FLOAT: ScalarType = ScalarType::Float { width: 32 };
 
 fn interface(name: &str) -> Interface {
     translated(name, &Specialization::default()).interface
@@ -107,7 +107,7 @@ fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
     assert_eq!(of(2), (Interpolation::Flat, Sampling::Center));
     assert_eq!(of(3), (Interpolation::Linear, Sampling::Centroid));
     assert!(found.discards && !found.has_side_effects && !found.early_fragment_tests);
-    assert_eq!(found.depth, DepthMode::Any);
+    assert_eq!(found.depth, DepthMode::Replacing);
     assert_eq!(found.descriptors.len(), 1);
     assert_eq!(
         found.descriptors[0].kind,
@@ -120,7 +120,7 @@ fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
         .find(|output| output.target == location(1, 0));
     assert_eq!(
         id.map(|output| output.numeric),
-        Some(Numeric::Uint { width: 32 })
+        Some(ScalarType::Uint { width: 32 })
     );
 
     let found = interface("interpolation.frag");
@@ -142,7 +142,7 @@ fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
 }
 
 #[gaurast_runner::test]
-fn descriptors_have_their_kinds_and_bind_points() {
+fn descriptors_have_their_kinds_and_resource_slots() {
     use DescriptorKind::*;
     let found = interface("images.comp");
     let kinds: Vec<(u32, DescriptorKind, bool)> = found

@@ -11,7 +11,7 @@ use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
-use gaurast_spirv::{BuiltIn, Descriptor, InputSource, Interface, Numeric, OutputTarget, Stage};
+use gaurast_spirv::{BuiltIn, Descriptor, InputSource, Interface, OutputTarget, ScalarType, Stage};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::draw::{
@@ -217,7 +217,7 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
             continue;
         };
         let is_known = varyings.contains_key(&(location, component));
-        if !is_known || input.numeric != (Numeric::Float { width: 32 }) {
+        if !is_known || input.numeric != (ScalarType::Float { width: 32 }) {
             return Err(Error::usage(
                 RESOLVE_INPUTS,
                 format!(
@@ -310,6 +310,6 @@ fn writes_float(interface: &Interface, place: Place) -> bool {
     interface.outputs.iter().any(|output| {
         let is_there = matches!(output.target, OutputTarget::Location { location, component, .. }
             if (location, component) == place);
-        is_there && output.numeric == Numeric::Float { width: 32 }
+        is_there && output.numeric == ScalarType::Float { width: 32 }
     })
 }

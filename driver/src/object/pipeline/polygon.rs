@@ -11,7 +11,7 @@ use crate::capabilities::limits;
 use crate::error::Error;
 use crate::object::device::Device;
 use ash::vk;
-use gaurast_spirv::{Descriptor, Interface, Numeric, Options, Shader, Stage};
+use gaurast_spirv::{Descriptor, Interface, Options, ScalarType, Shader, Stage};
 use simdevice::format;
 use simdevice::packet::draw::{DrawPipeline, DrawState, PolygonMode};
 use std::sync::Arc;
@@ -194,9 +194,9 @@ pub(super) fn translate(
 /// Where each location is read from.
 pub(super) fn attributes(
     info: &GraphicsPipelineInfo,
-    locations: &[(u32, Numeric)],
+    locations: &[(u32, ScalarType)],
 ) -> Result<Vec<AttributeSource>, Error> {
-    let source = |&(location, _): &(u32, Numeric)| {
+    let source = |&(location, _): &(u32, ScalarType)| {
         vertex_input::source(info, location).map_err(|what| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-Input-07904",
@@ -210,13 +210,13 @@ pub(super) fn attributes(
 /// Compares the types of attributes with what the shader reads.
 pub(super) fn check_attributes(
     interface: &Interface,
-    locations: &[(u32, Numeric)],
+    locations: &[(u32, ScalarType)],
     attributes: &[AttributeSource],
 ) -> Result<(), Error> {
     let given = |format: simdevice::Format| match format.numeric() {
-        format::Numeric::Uint => Numeric::Uint { width: 32 },
-        format::Numeric::Sint => Numeric::Int { width: 32 },
-        _ => Numeric::Float { width: 32 },
+        format::Numeric::Uint => ScalarType::Uint { width: 32 },
+        format::Numeric::Sint => ScalarType::Int { width: 32 },
+        _ => ScalarType::Float { width: 32 },
     };
     let described: Vec<_> = std::iter::zip(locations, attributes)
         .map(|(&(location, _), source)| reflect::Attribute {

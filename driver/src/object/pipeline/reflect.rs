@@ -9,7 +9,7 @@
 use std::collections::HashMap;
 
 use gaurast_spirv::{
-    Descriptor, DescriptorKind, InputSource, Interface, Numeric, OutputTarget, Stage,
+    Descriptor, DescriptorKind, InputSource, Interface, OutputTarget, ScalarType, Stage,
 };
 use thiserror::Error;
 
@@ -143,9 +143,9 @@ pub enum Mismatch {
         /// The location.
         location: u32,
         /// What the shader reads.
-        wanted: Numeric,
+        wanted: ScalarType,
         /// What the format gives.
-        given: Numeric,
+        given: ScalarType,
     },
     /// An input that the stage before doesn't write.
     #[error(
@@ -272,7 +272,7 @@ pub struct Attribute {
     /// The location that it feeds.
     pub location: u32,
     /// What the components of its format are read as; normalised and scaled formats are floats.
-    pub numeric: Numeric,
+    pub numeric: ScalarType,
 }
 
 /// Compares what a vertex shader reads with the pipeline's vertex attributes.
@@ -326,19 +326,21 @@ pub fn check_stages(before: &Interface, fragment: &Interface) -> Vec<Mismatch> {
     found
 }
 
-fn is_wide(numeric: Numeric) -> bool {
+fn is_wide(numeric: ScalarType) -> bool {
     matches!(
         numeric,
-        Numeric::Float { width: 64 } | Numeric::Int { width: 64 } | Numeric::Uint { width: 64 }
+        ScalarType::Float { width: 64 }
+            | ScalarType::Int { width: 64 }
+            | ScalarType::Uint { width: 64 }
     )
 }
 
 /// What must agree between a format and an input: the kind of number and whether it has 64 bits.
-fn class(numeric: Numeric) -> (u8, bool) {
+fn class(numeric: ScalarType) -> (u8, bool) {
     let kind = match numeric {
-        Numeric::Float { .. } => 0,
-        Numeric::Int { .. } => 1,
-        Numeric::Uint { .. } | Numeric::Bool => 2,
+        ScalarType::Float { .. } => 0,
+        ScalarType::Int { .. } => 1,
+        ScalarType::Uint { .. } | ScalarType::Bool => 2,
     };
     (kind, is_wide(numeric))
 }
@@ -349,7 +351,7 @@ mod tests {
     use gaurast_spirv::{Module, Options, Specialization, translate};
     use std::path::Path;
 
-    const FLOAT: Numeric = Numeric::Float { width: 32 };
+    const FLOAT: ScalarType = ScalarType::Float { width: 32 };
 
     /// The interface of a shader that is kept for the tests of the translation.
     fn interface(name: &str, stage: Stage) -> Interface {
@@ -432,7 +434,7 @@ mod tests {
             check_attributes(&vertex, &[attribute(0, FLOAT), attribute(1, FLOAT)]),
             []
         );
-        let uint = Numeric::Uint { width: 8 };
+        let uint = ScalarType::Uint { width: 8 };
         assert_eq!(check_attributes(&vertex, &[attribute(0, uint)]).len(), 2);
         let fragment = interface("textured.frag", Stage::Fragment);
         let missing = check_stages(&vertex, &fragment);
