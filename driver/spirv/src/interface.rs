@@ -186,7 +186,7 @@ pub struct ImageUse {
 
 /// A descriptor, or an array of them, that the program uses.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Descriptor {
+pub struct ShaderBinding {
     /// The descriptor set.
     pub set: u32,
     /// The binding in it.
@@ -236,7 +236,7 @@ pub struct Interface {
     /// What it writes; see [`Output`].
     pub outputs: Vec<Output>,
     /// What it is bound to.
-    pub descriptors: Vec<Descriptor>,
+    pub descriptors: Vec<ShaderBinding>,
     /// The bytes of push constants that it declares.
     pub push_constants: Option<Range<u32>>,
     /// Compute: invocations of a workgroup in x, y and z; 1 otherwise.

@@ -20,8 +20,8 @@ mod types;
 pub use error::{Error, InstructionRef};
 pub use globals::Specialization;
 pub use interface::{
-    BuiltIn, DepthMode, Descriptor, DescriptorKind, ImageUse, Input, InputSource, Interface,
-    Interpolation, Output, OutputTarget, Sampling, ScalarType, Shader, Stage,
+    BuiltIn, DepthMode, DescriptorKind, ImageUse, Input, InputSource, Interface, Interpolation,
+    Output, OutputTarget, Sampling, ScalarType, Shader, ShaderBinding, Stage,
 };
 pub use module::Module;
 pub use translate::{Options, is_supported, translate};

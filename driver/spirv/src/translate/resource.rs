@@ -5,7 +5,7 @@ use spirv::{Decoration, Dim, ImageFormat, StorageClass};
 
 use super::super::error::{Diagnostic, Error, Result, malformed, unsupported};
 use super::super::globals::GlobalVariable;
-use super::super::interface::{Descriptor, DescriptorKind, ImageUse, ScalarType};
+use super::super::interface::{DescriptorKind, ImageUse, ScalarType, ShaderBinding};
 use super::super::types::{ImageType, Scalar, Type};
 use super::access::{EXPLICIT, MemoryRef, Pointer, TIGHT};
 use super::{Translator, Value};
@@ -158,7 +158,7 @@ impl Translator<'_> {
             }
             _ => 0,
         };
-        self.interface.descriptors.push(Descriptor {
+        self.interface.descriptors.push(ShaderBinding {
             set,
             binding,
             kind,

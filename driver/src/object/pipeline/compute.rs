@@ -16,7 +16,7 @@ pub(crate) struct ComputePipeline {
     /// What its workgroups run.
     pub(crate) program: Arc<ComputeProgram>,
     /// What the program is bound to.
-    pub(crate) descriptors: Vec<shader::Descriptor>,
+    pub(crate) descriptors: Vec<shader::ShaderBinding>,
 }
 
 /// A shader stage with its pointers followed.

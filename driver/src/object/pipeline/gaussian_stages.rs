@@ -11,7 +11,9 @@ use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
-use gaurast_spirv::{BuiltIn, Descriptor, InputSource, Interface, OutputTarget, ScalarType, Stage};
+use gaurast_spirv::{
+    BuiltIn, InputSource, Interface, OutputTarget, ScalarType, ShaderBinding, Stage,
+};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::draw::{
@@ -28,7 +30,7 @@ pub(crate) struct VertexProjection {
     /// What its attributes count in.
     pub(crate) attributes: Vec<AttributeSource>,
     /// What it is bound to.
-    pub(crate) descriptors: Vec<Descriptor>,
+    pub(crate) descriptors: Vec<ShaderBinding>,
 }
 
 impl VertexProjection {
@@ -90,7 +92,7 @@ pub(crate) struct ResolveStage {
     /// The program.
     pub(crate) program: Arc<ResolveProgram>,
     /// What it is bound to.
-    pub(crate) descriptors: Vec<Descriptor>,
+    pub(crate) descriptors: Vec<ShaderBinding>,
     /// Whether every sample is shaded for itself.
     pub(crate) sample_shading: bool,
     /// Whether alpha makes coverage.

@@ -11,7 +11,7 @@ use crate::capabilities::limits;
 use crate::error::Error;
 use crate::object::device::Device;
 use ash::vk;
-use gaurast_spirv::{Descriptor, Interface, Options, ScalarType, Shader, Stage};
+use gaurast_spirv::{Interface, Options, ScalarType, Shader, ShaderBinding, Stage};
 use simdevice::format;
 use simdevice::packet::draw::{DrawPipeline, DrawState, PolygonMode};
 use std::sync::Arc;
@@ -24,9 +24,9 @@ pub(crate) struct PolygonPipeline {
     /// What the vertex program's attributes count in.
     pub(crate) attributes: Vec<AttributeSource>,
     /// What the vertex program is bound to.
-    pub(crate) vertex_descriptors: Vec<Descriptor>,
+    pub(crate) vertex_descriptors: Vec<ShaderBinding>,
     /// What the fragment program is bound to.
-    pub(crate) fragment_descriptors: Vec<Descriptor>,
+    pub(crate) fragment_descriptors: Vec<ShaderBinding>,
     /// The fixed-function state, as far as it is static.
     pub(crate) fixed: FixedState,
     /// The state for the device, if nothing of it is dynamic.

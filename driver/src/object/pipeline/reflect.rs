@@ -9,7 +9,7 @@
 use std::collections::HashMap;
 
 use gaurast_spirv::{
-    Descriptor, DescriptorKind, InputSource, Interface, OutputTarget, ScalarType, Stage,
+    DescriptorKind, InputSource, Interface, OutputTarget, ScalarType, ShaderBinding, Stage,
 };
 use thiserror::Error;
 
@@ -201,7 +201,7 @@ pub fn check(interface: &Interface, layout: &Layout) -> Vec<Mismatch> {
 
 fn check_descriptor(
     stage: Stage,
-    wanted: &Descriptor,
+    wanted: &ShaderBinding,
     given: Option<&LayoutBinding>,
 ) -> Option<Mismatch> {
     let (set, binding, name) = (wanted.set, wanted.binding, Name(wanted.name.clone()));
