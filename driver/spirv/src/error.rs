@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::Stage;
 
-/// Where in a module a problem was found.
+/// An instruction in which a problem was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstructionRef {
     /// The instruction's name.
@@ -31,7 +31,7 @@ pub enum Error {
     /// The words aren't a SPIR-V module that can be decoded.
     #[error("not SPIR-V: {reason}")]
     Binary {
-        /// What is wrong.
+        /// The fault.
         reason: String,
     },
     /// An instruction breaks a rule of SPIR-V.
@@ -39,7 +39,7 @@ pub enum Error {
     Malformed {
         /// The instruction.
         place: InstructionRef,
-        /// What is wrong.
+        /// The fault.
         reason: String,
     },
     /// An instruction asks for something that this driver doesn't do.
@@ -47,15 +47,15 @@ pub enum Error {
     Unsupported {
         /// The instruction.
         place: InstructionRef,
-        /// What it asks for.
+        /// The thing that it asks for.
         reason: String,
     },
     /// The module, or what comes of it, is too big.
     #[error("shader too large: {what} exceed {limit}")]
     TooLarge {
-        /// What there is too much of.
+        /// The thing that there is too much of.
         what: &'static str,
-        /// How much is allowed.
+        /// The most that is allowed.
         limit: u64,
     },
     /// The module has no such entry point.
@@ -79,7 +79,7 @@ pub enum Error {
     /// The system gave no thread to translate on.
     #[error("there is no thread to translate on: {reason}")]
     NoThread {
-        /// What the system says.
+        /// The system's message.
         reason: String,
     },
     /// The translation broke a rule of the device's IR.

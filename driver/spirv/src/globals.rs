@@ -59,7 +59,7 @@ pub(crate) struct GlobalVariable {
     pub initializer: Option<u32>,
 }
 
-/// What stands before the functions of a module.
+/// All that stands before the functions of a module.
 #[derive(Debug, Default)]
 pub(crate) struct Globals {
     pub types: Types,
@@ -437,7 +437,7 @@ fn evaluate(globals: &Globals, ty: u32, words: &[u32]) -> Result<Vec<u64>> {
         .collect()
 }
 
-/// Where a path of indices leads in a composite: the part's type and the scalars before it.
+/// The part of a composite that a path of indices leads to: its type and the scalars before it.
 fn path(globals: &Globals, mut ty: u32, indices: &[u32]) -> Result<(u32, usize)> {
     let mut start = 0;
     for index in indices {

@@ -1,4 +1,4 @@
-//! What a translated shader exchanges with the outside: inputs, outputs, descriptors, push constants.
+//! The interface of a translated shader: inputs, outputs, descriptors, push constants.
 
 use std::ops::Range;
 
@@ -76,7 +76,7 @@ pub enum BuiltIn {
     NumWorkgroups,
 }
 
-/// How a fragment input follows from the values at the vertices.
+/// The way in which a fragment input follows from the values at the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Interpolation {
     /// Perspective-correct.
@@ -87,7 +87,7 @@ pub enum Interpolation {
     Flat,
 }
 
-/// Where within a pixel a fragment input is taken.
+/// The point within a pixel at which a fragment input is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Sampling {
     /// At the pixel's centre (or at the sample, if the draw shades each sample).
@@ -98,7 +98,7 @@ pub enum Sampling {
     Sample,
 }
 
-/// Where an input comes from.
+/// The source of an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum InputSource {
     /// A vertex attribute or an interpolated output of the stage before.
@@ -114,7 +114,7 @@ pub enum InputSource {
     },
     /// A component, or an element, of a built-in.
     BuiltIn {
-        /// Which.
+        /// The built-in.
         built_in: BuiltIn,
         /// Component or element.
         component: u32,
@@ -124,13 +124,13 @@ pub enum InputSource {
 /// One scalar that the program reads. Its slot in the program is its index in [`Interface::inputs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Input {
-    /// Where it comes from.
+    /// Its source.
     pub source: InputSource,
     /// Its type.
     pub numeric: ScalarType,
 }
 
-/// Where an output goes.
+/// The target of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum OutputTarget {
     /// An input of the next stage, or a colour attachment.
@@ -144,7 +144,7 @@ pub enum OutputTarget {
     },
     /// A component, or an element, of a built-in.
     BuiltIn {
-        /// Which.
+        /// The built-in.
         built_in: BuiltIn,
         /// Component or element.
         component: u32,
@@ -154,13 +154,13 @@ pub enum OutputTarget {
 /// One scalar that the program writes. Its slot in the program is its index in [`Interface::outputs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Output {
-    /// Where it goes.
+    /// Its target.
     pub target: OutputTarget,
     /// Its type.
     pub numeric: ScalarType,
 }
 
-/// What kind of descriptor a variable takes.
+/// The kind of descriptor that a variable takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names are Vulkan's")]
 pub enum DescriptorKind {
@@ -180,7 +180,7 @@ pub enum DescriptorKind {
 pub struct ImageUse {
     /// Its kind.
     pub shape: ImageShape,
-    /// What its texels are read as.
+    /// The type that its texels are read as.
     pub numeric: ScalarType,
 }
 
@@ -191,7 +191,7 @@ pub struct ShaderBinding {
     pub set: u32,
     /// The binding in it.
     pub binding: u32,
-    /// What it holds.
+    /// The kind of its descriptors.
     pub kind: DescriptorKind,
     /// The array's length, or 1.
     pub count: u32,
@@ -200,7 +200,7 @@ pub struct ShaderBinding {
     pub slot: u32,
     /// Buffers: the least size in bytes that covers all members but a runtime array.
     pub size: u64,
-    /// Whether the program may write to it.
+    /// The program may write to it.
     pub writable: bool,
     /// Images: which.
     pub image: Option<ImageUse>,
@@ -210,19 +210,19 @@ pub struct ShaderBinding {
     pub name: Option<String>,
 }
 
-/// What a fragment shader promises about the depth that it writes.
+/// A fragment shader's promise about the depth that it writes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DepthMode {
     /// It writes none.
     #[default]
     NotWritten,
-    /// Any.
+    /// Any depth.
     Replacing,
-    /// At least the fixed one.
+    /// At least the primitive's.
     Greater,
-    /// At most the fixed one.
+    /// At most the primitive's.
     Less,
-    /// The fixed one.
+    /// The primitive's.
     Unchanged,
 }
 
@@ -231,11 +231,11 @@ pub enum DepthMode {
 pub struct Interface {
     /// The stage.
     pub stage: Stage,
-    /// What it reads; see [`Input`].
+    /// The scalars that it reads; see [`Input`].
     pub inputs: Vec<Input>,
-    /// What it writes; see [`Output`].
+    /// The scalars that it writes; see [`Output`].
     pub outputs: Vec<Output>,
-    /// What it is bound to.
+    /// The descriptors that it is bound to.
     pub descriptors: Vec<ShaderBinding>,
     /// The bytes of push constants that it declares.
     pub push_constants: Option<Range<u32>>,
@@ -284,6 +284,6 @@ impl Interface {
 pub struct Shader {
     /// The program.
     pub program: Program,
-    /// What its slots and resource slots mean.
+    /// The meaning of its input, output and resource slots.
     pub interface: Interface,
 }

@@ -20,7 +20,7 @@ struct Decorated {
     parameters: Vec<Operand>,
 }
 
-/// What extended instructions an import gives.
+/// The extended instructions that an import gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ExtendedSet {
     /// `GLSL.std.450`.
@@ -239,7 +239,7 @@ impl Module {
             .collect()
     }
 
-    /// Whether an id is decorated so.
+    /// Tells if an id is decorated so.
     pub(crate) fn has(&self, id: u32, decoration: Decoration) -> bool {
         self.decorations
             .get(&id)
@@ -256,7 +256,7 @@ impl Module {
         built_in(self.decorations.get(&id)?)
     }
 
-    /// Whether a struct's member is decorated so.
+    /// Tells if a struct's member is decorated so.
     pub(crate) fn member_has(&self, id: u32, member: u32, decoration: Decoration) -> bool {
         self.member_decorations
             .get(&(id, member))

@@ -3,10 +3,11 @@
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-use isa::ir;
-use spirv::{BuiltIn, StorageClass};
+use isa::ir::{self, Dimension, ImageShape};
+use spirv::{BuiltIn, Dim, ImageFormat, StorageClass};
 
 use super::error::{Result, malformed, unsupported};
+use super::interface::ScalarType;
 
 /// The most scalars that a value may have.
 pub(crate) const MAX_SCALARS: u32 = 1 << 14;
@@ -41,7 +42,30 @@ impl Scalar {
         }
     }
 
-    /// Whether it takes 64 bits.
+    /// Bits of the scalar; 0 for a truth value, which has none.
+    pub fn bits(self) -> u32 {
+        match self {
+            Self::Bool => 0,
+            Self::Int { width, .. } | Self::Float { width } => width,
+            Self::Address => 64,
+        }
+    }
+
+    /// The type of the scalar at the interface.
+    pub fn at_interface(self) -> ScalarType {
+        match self {
+            Self::Bool => ScalarType::Bool,
+            Self::Int {
+                width,
+                signed: true,
+            } => ScalarType::Int { width },
+            Self::Int { width, .. } => ScalarType::Uint { width },
+            Self::Float { width } => ScalarType::Float { width },
+            Self::Address => ScalarType::Uint { width: 64 },
+        }
+    }
+
+    /// Tells if it takes 64 bits.
     pub fn is_wide(self) -> bool {
         matches!(
             self,
@@ -49,7 +73,7 @@ impl Scalar {
         )
     }
 
-    /// How it lies in memory that the application sees.
+    /// The format in memory that the application sees.
     pub fn format(self) -> ir::Format {
         match self {
             Self::Int {
@@ -67,7 +91,7 @@ impl Scalar {
         }
     }
 
-    /// How it lies in workgroup and private memory, where narrow scalars take a word.
+    /// The format in workgroup and private memory, where narrow scalars take a word.
     pub fn tight_format(self) -> ir::Format {
         if self.is_wide() {
             ir::Format::B64
@@ -95,12 +119,36 @@ pub(crate) struct Member {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ImageType {
     pub sampled_type: u32,
-    pub dim: spirv::Dim,
+    pub dim: Dim,
     pub arrayed: bool,
     pub multisampled: bool,
     /// 1 with a sampler, 2 without (storage).
     pub sampled: u32,
-    pub format: spirv::ImageFormat,
+    pub format: ImageFormat,
+}
+
+impl ImageType {
+    /// The IR's name for the image's kind.
+    pub fn shape(&self) -> Result<ImageShape> {
+        let storage_cube = self.dim == Dim::DimCube && self.sampled == 2;
+        let dimension = match self.dim {
+            Dim::Dim1D => Dimension::D1,
+            Dim::Dim2D | Dim::DimSubpassData => Dimension::D2,
+            Dim::Dim3D => Dimension::D3,
+            Dim::DimCube if storage_cube => Dimension::D2,
+            Dim::DimCube => Dimension::Cube,
+            Dim::DimBuffer => Dimension::Buffer,
+            other => return unsupported(format!("an image of dimension {other:?}")),
+        };
+        if matches!(self.format, ImageFormat::R64i | ImageFormat::R64ui) {
+            return unsupported("images of 64-bit components");
+        }
+        Ok(ImageShape {
+            dimension,
+            arrayed: self.arrayed || storage_cube,
+            multisampled: self.multisampled,
+        })
+    }
 }
 
 /// A type.
@@ -227,7 +275,7 @@ impl Types {
         }
     }
 
-    /// How many scalars a value of a type has.
+    /// The number of scalars of a value of a type.
     pub fn scalars(&self, id: u32) -> Result<u32> {
         match self.entries.get(&id).map(|entry| entry.scalars) {
             Some(Some(scalars)) => Ok(scalars),
@@ -236,7 +284,7 @@ impl Types {
         }
     }
 
-    /// Whether values of a type exist.
+    /// Tells if values of a type exist.
     pub fn is_value(&self, id: u32) -> bool {
         self.scalars(id).is_ok()
     }
@@ -301,7 +349,7 @@ impl Types {
         }
     }
 
-    /// What a composite type is made of: the part's type and the scalars before it. None beyond its end.
+    /// A part of a composite type: its type and the scalars before it.
     pub fn part(&self, id: u32, index: u32) -> Result<(u32, u32)> {
         let (element, count) = match self.get(id)? {
             Type::Vector { element, count }

@@ -1,17 +1,17 @@
-//! What has to be known about functions before they are translated: who calls whom, who stores to which variable, and
-//! which variables are indexed at run time.
+//! Analysis of functions before they are translated: calls among them, the variables that they store to, and those that
+//! are indexed at run time.
 
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 use spirv::Op;
 
-use super::super::error::{Diagnostic, Error, Result, malformed, unsupported};
-use super::super::globals::Globals;
-use super::super::instruction::Instruction;
-use super::super::module::{Function, Module};
-use super::super::types::Type;
-use super::structure::{Tree, structure};
+use super::structurize::{Tree, structurize};
+use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
+use crate::globals::Globals;
+use crate::instruction::Instruction;
+use crate::module::{Function, Module};
+use crate::types::Type;
 
 /// The most calls within one another.
 const MAX_CALL_DEPTH: usize = 64;
@@ -20,7 +20,7 @@ const MAX_PARAMETERS: usize = 255;
 /// Arrays up to this length stay in registers even if they are indexed at run time.
 const MAX_SELECTED_ELEMENTS: u32 = 4;
 
-/// What is known about the functions that an entry point reaches.
+/// Facts about the functions that an entry point reaches.
 #[derive(Debug, Default)]
 pub struct Analysis {
     /// Variables (and pointer parameters) that must live in memory.
@@ -107,7 +107,7 @@ impl Analysis {
                 .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
         }
         let tree = self
-            .structure(module, globals, function)
+            .structurize(module, globals, function)
             .map_err(|diagnostic| diagnostic.locate(definition.reference()))?;
         self.trees.insert(index, Rc::new(tree));
         Ok(())
@@ -166,7 +166,7 @@ impl Analysis {
         Ok(())
     }
 
-    /// What a pointer points to.
+    /// The type that a pointer points to.
     fn pointee(&self, globals: &Globals, pointer: u32) -> Option<u32> {
         if let Some(variable) = globals.variables.get(&pointer) {
             return Some(variable.pointee);
@@ -187,7 +187,7 @@ impl Analysis {
         }
     }
 
-    fn structure(&self, module: &Module, globals: &Globals, function: &Function) -> Result<Tree> {
+    fn structurize(&self, module: &Module, globals: &Globals, function: &Function) -> Result<Tree> {
         let mut stores = Vec::with_capacity(function.blocks.len());
         for block in &function.blocks {
             let mut stored = Vec::new();
@@ -198,10 +198,10 @@ impl Analysis {
             stored.dedup();
             stores.push(stored);
         }
-        structure(function, &stores)
+        structurize(function, &stores)
     }
 
-    /// Which variables and pointer parameters an instruction stores to.
+    /// Adds the variables and pointer parameters that an instruction stores to.
     fn stores(
         &self,
         module: &Module,
@@ -239,7 +239,7 @@ impl Analysis {
     }
 }
 
-/// Whether a chain of indices picks an element of a long array at run time.
+/// Tells if a chain of indices picks an element of a long array at run time.
 fn indexes_array(globals: &Globals, mut ty: u32, indices: &[u32]) -> bool {
     for index in indices {
         let constant = globals.constant_u32(*index);

@@ -5,7 +5,7 @@ use crate::common::{
 };
 use gaurast_spirv::{Module, Shader, Specialization, Stage, translate};
 
-/// How far a result may be from the model's.
+/// The distance that a result may have from the model's.
 #[derive(Clone, Copy)]
 enum Tolerance {
     Exact,

@@ -21,7 +21,7 @@ fn attempt(name: &str, words: &[u32]) -> bool {
     Executable::new(shader.program, &options).is_ok()
 }
 
-/// Where the instructions of a module begin.
+/// The word at which the instructions of a module begin.
 fn instructions(words: &[u32]) -> Vec<usize> {
     let mut starts = Vec::new();
     let mut at = 5;

@@ -10,10 +10,9 @@ use std::rc::Rc;
 use isa::ir::MAX_NESTING;
 use spirv::Op;
 
-use super::super::error::{Result, malformed, unsupported};
-use super::super::instruction::Instruction;
-use super::super::module::Function;
-use super::cases::Target;
+use crate::error::{Result, malformed, unsupported};
+use crate::instruction::{Instruction, Operand};
+use crate::module::Function;
 
 /// A construct that can be left by a break: an index, unique in the function.
 pub type Construct = usize;
@@ -21,7 +20,7 @@ pub type Construct = usize;
 /// A place where control flow comes together: an index into [`Tree::edges`].
 pub type MergePoint = usize;
 
-/// How an edge leaves its list of nodes.
+/// The way in which an edge leaves its list of nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Jump {
     /// By reaching its end, or by going on.
@@ -38,7 +37,7 @@ pub struct Edge {
     pub from: usize,
     pub to: usize,
     pub jump: Jump,
-    pub join: Option<MergePoint>,
+    pub merge_point: Option<MergePoint>,
 }
 
 /// A case of a switch.
@@ -63,7 +62,7 @@ pub enum Node {
         condition: u32,
         then: Vec<Node>,
         otherwise: Vec<Node>,
-        join: Option<MergePoint>,
+        merge_point: Option<MergePoint>,
         modified: Rc<[u32]>,
     },
     Switch {
@@ -71,18 +70,18 @@ pub enum Node {
         selector: u32,
         construct: Construct,
         cases: Vec<Case>,
-        join: Option<MergePoint>,
+        merge_point: Option<MergePoint>,
         modified: Rc<[u32]>,
     },
     Loop {
         construct: Construct,
         body: Vec<Node>,
         continuing: Vec<Node>,
-        /// Where the entry and the back edge meet.
+        /// The merge of the entry and the back edge.
         header: MergePoint,
-        /// Where `continue`s meet; none if the loop's header is its continue target.
+        /// The merge of `continue`s; none if the loop's header is its continue target.
         continues: Option<MergePoint>,
-        /// Where breaks meet.
+        /// The merge of breaks.
         merge: MergePoint,
         modified: Rc<[u32]>,
     },
@@ -96,16 +95,16 @@ pub struct Tree {
     pub nodes: Vec<Node>,
     /// For each [`MergePoint`], the number of edges that lead to it.
     pub edges: Vec<usize>,
-    /// How many blocks return.
+    /// The number of blocks that return.
     pub returns: usize,
-    /// Whether one of them is within a construct.
+    /// One of them is within a construct.
     pub early_return: bool,
     /// Variables and pointer parameters that the function stores to.
     pub modified: Rc<[u32]>,
 }
 
 /// Builds the tree of a function. `stores` names, for each block, the variables that it stores to.
-pub fn structure(function: &Function, stores: &[Vec<u32>]) -> Result<Tree> {
+pub fn structurize(function: &Function, stores: &[Vec<u32>]) -> Result<Tree> {
     let mut structurizer = Structurizer {
         function,
         stores,
@@ -143,7 +142,7 @@ pub fn structure(function: &Function, stores: &[Vec<u32>]) -> Result<Tree> {
 enum Frame {
     Selection {
         merge: usize,
-        join: MergePoint,
+        merge_point: MergePoint,
     },
     Case {
         construct: Construct,
@@ -172,7 +171,7 @@ pub struct Structurizer<'a> {
     edges: Vec<usize>,
     constructs: usize,
     visited: Vec<bool>,
-    /// What the open constructs store to, innermost last.
+    /// Variables that the open constructs store to, innermost last.
     modified: Vec<HashSet<u32>>,
     returns: usize,
     early_return: bool,
@@ -182,7 +181,7 @@ pub struct Structurizer<'a> {
 }
 
 impl Structurizer<'_> {
-    fn join(&mut self) -> MergePoint {
+    fn merge_point(&mut self) -> MergePoint {
         self.edges.push(0);
         self.edges.len() - 1
     }
@@ -287,10 +286,10 @@ impl Structurizer<'_> {
         }
     }
 
-    /// The join at the end of the innermost construct, if that is where a block is.
-    fn natural(&self, to: usize) -> Option<MergePoint> {
-        let (block, join) = match self.frames.last()? {
-            Frame::Selection { merge, join } => (*merge, *join),
+    /// The merge point at the end of the innermost construct, if that is where a block is.
+    fn end_of_construct(&self, to: usize) -> Option<MergePoint> {
+        let (block, merge_point) = match self.frames.last()? {
+            Frame::Selection { merge, merge_point } => (*merge, *merge_point),
             Frame::Case {
                 next: Some(next), ..
             } => *next,
@@ -301,13 +300,15 @@ impl Structurizer<'_> {
             Frame::LoopBody { continues, .. } => *continues,
             Frame::LoopContinuing { header, .. } => *header,
         };
-        (block == to).then_some(join)
+        (block == to).then_some(merge_point)
     }
 
     /// The jump that reaches a block from anywhere within the constructs around.
     fn jump(&self, to: usize) -> Option<(Jump, MergePoint)> {
         let leave = |merge: &Option<(usize, MergePoint)>, construct: Construct| match merge {
-            Some((block, join)) if *block == to => Some((Jump::Break(construct), *join)),
+            Some((block, merge_point)) if *block == to => {
+                Some((Jump::Break(construct), *merge_point))
+            }
             _ => None,
         };
         self.frames.iter().rev().find_map(|frame| match frame {
@@ -329,25 +330,27 @@ impl Structurizer<'_> {
         })
     }
 
-    /// Whether a block is where some construct around ends.
+    /// Tells if some construct around ends at a block.
     pub fn is_target(&self, block: usize) -> bool {
-        self.natural(block).is_some() || self.jump(block).is_some()
+        self.end_of_construct(block).is_some() || self.jump(block).is_some()
     }
 
-    fn edge(&mut self, from: usize, to: usize, (jump, join): (Jump, MergePoint)) -> Node {
-        self.edges[join] += 1;
-        let join = Some(join);
+    fn edge(&mut self, from: usize, to: usize, (jump, merge_point): (Jump, MergePoint)) -> Node {
+        self.edges[merge_point] += 1;
+        let merge_point = Some(merge_point);
         Node::Edge(Edge {
             from,
             to,
             jump,
-            join,
+            merge_point,
         })
     }
 
     /// A branch at the end of a list.
     fn follow(&mut self, from: usize, to: usize, nodes: &mut Vec<Node>) -> Result<Option<usize>> {
-        let end = self.natural(to).map(|join| (Jump::None, join));
+        let end = self
+            .end_of_construct(to)
+            .map(|merge_point| (Jump::None, merge_point));
         if let Some(leaving) = end.or_else(|| self.jump(to)) {
             let edge = self.edge(from, to, leaving);
             nodes.push(edge);
@@ -357,7 +360,7 @@ impl Structurizer<'_> {
             from,
             to,
             jump: Jump::None,
-            join: None,
+            merge_point: None,
         }));
         Ok(Some(to))
     }
@@ -390,14 +393,14 @@ impl Structurizer<'_> {
             return self.conditional_exit(block, condition, then, otherwise, nodes);
         };
         // A merge block that ends an outer construct too is that construct's business.
-        let join = (!self.is_target(merge)).then(|| self.join());
-        if let Some(join) = join {
-            self.frames.push(Frame::Selection { merge, join });
+        let merge_point = (!self.is_target(merge)).then(|| self.merge_point());
+        if let Some(merge_point) = merge_point {
+            self.frames.push(Frame::Selection { merge, merge_point });
         }
         self.begin_modified();
         let then = self.arm(block, then)?;
         let otherwise = self.arm(block, otherwise)?;
-        if join.is_some() {
+        if merge_point.is_some() {
             self.frames.pop();
         }
         nodes.push(Node::If {
@@ -405,10 +408,12 @@ impl Structurizer<'_> {
             condition,
             then,
             otherwise,
-            join,
+            merge_point,
             modified: self.end_modified(),
         });
-        Ok(join.filter(|join| self.edges[*join] > 0).map(|_| merge))
+        Ok(merge_point
+            .filter(|merge_point| self.edges[*merge_point] > 0)
+            .map(|_| merge))
     }
 
     /// A conditional branch without a merge block: at least one of its targets leaves a construct.
@@ -425,7 +430,7 @@ impl Structurizer<'_> {
             condition,
             then,
             otherwise,
-            join: None,
+            merge_point: None,
             modified,
         };
         let none: Rc<[u32]> = Rc::new([]);
@@ -439,7 +444,7 @@ impl Structurizer<'_> {
             nodes.push(node(Vec::new(), vec![edge], none));
             return self.follow(block, then, nodes);
         }
-        if self.natural(then).is_none() && self.natural(otherwise).is_none() {
+        if self.end_of_construct(then).is_none() && self.end_of_construct(otherwise).is_none() {
             return malformed("a conditional branch within a construct has no merge block");
         }
         // One arm ends here; the other takes along the rest of the list.
@@ -459,10 +464,10 @@ impl Structurizer<'_> {
         nodes: &mut Vec<Node>,
     ) -> Result<Option<usize>> {
         let construct = self.construct();
-        let (header, merge_join) = (self.join(), self.join());
+        let (header, merge_join) = (self.merge_point(), self.merge_point());
         self.edges[header] += 1;
         let shared = continues == head;
-        let continue_join = if shared { header } else { self.join() };
+        let continue_join = if shared { header } else { self.merge_point() };
         let leave = (!self.is_target(merge)).then_some((merge, merge_join));
         self.begin_modified();
         self.frames.push(Frame::LoopBody {
@@ -507,8 +512,8 @@ impl Structurizer<'_> {
             return malformed("there is no merge block");
         };
         let construct = self.construct();
-        let join = (!self.is_target(merge)).then(|| self.join());
-        let leave = join.map(|join| (merge, join));
+        let merge_point = (!self.is_target(merge)).then(|| self.merge_point());
+        let leave = merge_point.map(|merge_point| (merge, merge_point));
         let mut cases = self.switch_targets(terminator)?;
         let order = self.order_cases(merge, &cases)?;
         self.begin_modified();
@@ -521,7 +526,7 @@ impl Structurizer<'_> {
                 default,
             } = std::mem::take(&mut cases[*which]);
             let next = fallthrough.then(|| order.get(position + 1)).flatten();
-            let next = next.map(|(next, _)| (cases[*next].block, self.join()));
+            let next = next.map(|(next, _)| (cases[*next].block, self.merge_point()));
             self.frames.push(Frame::Case {
                 construct,
                 merge: leave,
@@ -541,15 +546,15 @@ impl Structurizer<'_> {
                 fallthrough: next.is_some(),
                 entry,
             });
-            entry = next.map(|(to, join)| {
-                self.edges[join] += 1;
+            entry = next.map(|(to, merge_point)| {
+                self.edges[merge_point] += 1;
                 let edge = Edge {
                     from: block,
                     to,
                     jump: Jump::None,
-                    join: Some(join),
+                    merge_point: Some(merge_point),
                 };
-                (join, edge)
+                (merge_point, edge)
             });
         }
         nodes.push(Node::Switch {
@@ -557,9 +562,130 @@ impl Structurizer<'_> {
             selector: terminator.id(0)?,
             construct,
             cases: built,
-            join,
+            merge_point,
             modified: self.end_modified(),
         });
-        Ok(join.filter(|join| self.edges[*join] > 0).map(|_| merge))
+        Ok(merge_point
+            .filter(|merge_point| self.edges[*merge_point] > 0)
+            .map(|_| merge))
+    }
+}
+
+/// The most blocks looked at while ordering the cases of switches.
+const MAX_STEPS: usize = 1 << 22;
+
+/// A target of a switch.
+#[derive(Default)]
+pub struct Target {
+    pub block: usize,
+    pub values: Vec<u32>,
+    pub default: bool,
+}
+
+impl Structurizer<'_> {
+    /// The targets of a switch, each once.
+    pub fn switch_targets(&self, terminator: &Instruction) -> Result<Vec<Target>> {
+        let mut targets: Vec<Target> = Vec::new();
+        let mut by_block = HashMap::new();
+        let mut values = HashSet::new();
+        let mut target = |block| -> usize {
+            *by_block.entry(block).or_insert_with(|| {
+                targets.push(Target {
+                    block,
+                    ..Target::default()
+                });
+                targets.len() - 1
+            })
+        };
+        let default = target(self.block_of(terminator.id(1)?)?);
+        let mut found = Vec::new();
+        for pair in terminator.operands.get(2..).unwrap_or_default().chunks(2) {
+            match pair {
+                [Operand::Literal(value), Operand::Id(label)] => {
+                    if !values.insert(*value) {
+                        return malformed(format!("two cases for {value}"));
+                    }
+                    found.push((target(self.block_of(*label)?), *value));
+                }
+                _ => return unsupported("a selector that isn't 32 bits"),
+            }
+        }
+        targets[default].default = true;
+        for (which, value) in found {
+            targets[which].values.push(value);
+        }
+        Ok(targets)
+    }
+
+    /// The cases in an order in which each that falls through is followed by the one that it falls into; with each,
+    /// whether it does.
+    pub fn order_cases(&mut self, merge: usize, cases: &[Target]) -> Result<Vec<(usize, bool)>> {
+        let which: HashMap<usize, usize> = cases
+            .iter()
+            .enumerate()
+            .filter(|(_, case)| case.block != merge)
+            .map(|(index, case)| (case.block, index))
+            .collect();
+        let mut falls_into = vec![None; cases.len()];
+        let mut fallen_into = vec![false; cases.len()];
+        for (index, case) in cases.iter().enumerate() {
+            if case.block == merge || self.is_target(case.block) {
+                continue;
+            }
+            for next in self.reachable_cases(case.block, merge, &which)? {
+                if falls_into[index]
+                    .replace(next)
+                    .is_some_and(|other| other != next)
+                    || std::mem::replace(&mut fallen_into[next], true)
+                {
+                    return malformed("cases fall through to each other in no order");
+                }
+            }
+        }
+        let mut order = Vec::with_capacity(cases.len());
+        for head in (0..cases.len()).filter(|case| !fallen_into[*case]) {
+            let mut at = Some(head);
+            while let Some(case) = at {
+                at = falls_into[case];
+                order.push((case, at.is_some()));
+            }
+        }
+        if order.len() != cases.len() {
+            return malformed("cases fall through to each other in a circle");
+        }
+        Ok(order)
+    }
+
+    /// The other cases that a case reaches without leaving the switch.
+    fn reachable_cases(
+        &mut self,
+        start: usize,
+        merge: usize,
+        which: &HashMap<usize, usize>,
+    ) -> Result<HashSet<usize>> {
+        let mut found = HashSet::new();
+        let mut seen = HashSet::from([start]);
+        let mut waiting = vec![start];
+        while let Some(block) = waiting.pop() {
+            self.steps += 1;
+            if self.steps > MAX_STEPS {
+                return unsupported("too many blocks in switches");
+            }
+            let terminator = self.terminator(block)?.clone();
+            for label in terminator.operands.iter().filter_map(Operand::id) {
+                let Some(next) = self.index.get(&label).copied() else {
+                    continue;
+                };
+                if next == merge || next == start || self.is_target(next) {
+                    continue;
+                }
+                if let Some(case) = which.get(&next) {
+                    found.insert(*case);
+                } else if seen.insert(next) {
+                    waiting.push(next);
+                }
+            }
+        }
+        Ok(found)
     }
 }

@@ -1,19 +1,20 @@
 //! Inputs and outputs: locations and built-ins.
 
+use std::collections::HashMap;
 use std::rc::Rc;
 
-use isa::ir::{Rate, Reg};
+use isa::ir::{Rate, Reg, Type};
 use isa::op::Op as Ir;
 use spirv::{BuiltIn as Spirv, Decoration};
 
-use super::super::error::{Result, malformed, unsupported};
-use super::super::interface::{
-    BuiltIn, Input, InputSource, Interpolation, Sampling, ScalarType, Stage,
+use super::emitter::Emitter;
+use crate::error::{Result, malformed, unsupported};
+use crate::globals::Globals;
+use crate::interface::{
+    BuiltIn, Input, InputSource, Interpolation, Output, OutputTarget, Sampling, ScalarType, Stage,
 };
-use super::super::types::{Member, Scalar, Type};
-use super::Translator;
-use super::access::Pointer;
-use super::resource::numeric;
+use crate::module::Module;
+use crate::types::{Member, Scalar, Type as SpirvType};
 
 /// The most locations of an interface.
 const MAX_LOCATIONS: u32 = 1 << 10;
@@ -21,7 +22,7 @@ const MAX_LOCATIONS: u32 = 1 << 10;
 /// The most scalars of a built-in.
 const MAX_BUILT_IN_SCALARS: u32 = 64;
 
-/// Where a scalar of an input or output comes from or goes.
+/// The source of a scalar of an input, or the target of one of an output.
 #[derive(Clone, Copy, Debug)]
 pub enum IoLocation {
     Location {
@@ -37,7 +38,7 @@ pub enum IoLocation {
     },
 }
 
-/// Where the next scalar goes.
+/// The location of the next scalar.
 #[derive(Clone, Copy)]
 struct Cursor {
     location: Option<u32>,
@@ -47,18 +48,58 @@ struct Cursor {
     index: u32,
 }
 
-impl Translator<'_> {
-    /// Where each scalar of an input or output variable belongs.
-    pub fn io_locations(&mut self, variable: u32) -> Result<Rc<[IoLocation]>> {
-        if let Some(io_locations) = self.io_locations.get(&variable) {
-            return Ok(io_locations.clone());
+/// The inputs and outputs of an entry point.
+#[derive(Debug)]
+pub struct InputsOutputs<'a> {
+    pub module: &'a Module,
+    pub globals: &'a Globals,
+    pub stage: Stage,
+    pub workgroup_size: [u32; 3],
+    pub subgroup_size: u32,
+    pub inputs: Vec<Input>,
+    pub outputs: Vec<Output>,
+    /// An input is read that differs from sample to sample.
+    pub per_sample: bool,
+    /// The registers of inputs that were read.
+    registers: HashMap<InputSource, Reg>,
+    /// The locations of variables' scalars.
+    locations: HashMap<u32, Rc<[IoLocation]>>,
+}
+
+impl<'a> InputsOutputs<'a> {
+    /// No inputs and outputs yet, of an entry point.
+    pub fn new(
+        module: &'a Module,
+        globals: &'a Globals,
+        stage: Stage,
+        workgroup_size: [u32; 3],
+        subgroup_size: u32,
+    ) -> Self {
+        Self {
+            module,
+            globals,
+            stage,
+            workgroup_size,
+            subgroup_size,
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            per_sample: false,
+            registers: HashMap::new(),
+            locations: HashMap::new(),
         }
-        let io_locations = self.find_io_locations(variable)?;
-        self.io_locations.insert(variable, io_locations.clone());
-        Ok(io_locations)
     }
 
-    fn find_io_locations(&self, variable: u32) -> Result<Rc<[IoLocation]>> {
+    /// The location of each scalar of an input or output variable.
+    pub fn locations(&mut self, variable: u32) -> Result<Rc<[IoLocation]>> {
+        if let Some(locations) = self.locations.get(&variable) {
+            return Ok(locations.clone());
+        }
+        let locations = self.find_locations(variable)?;
+        self.locations.insert(variable, locations.clone());
+        Ok(locations)
+    }
+
+    fn find_locations(&self, variable: u32) -> Result<Rc<[IoLocation]>> {
         let Some(global) = self.globals.variables.get(&variable) else {
             return malformed(format!("%{variable} isn't an input or output"));
         };
@@ -82,15 +123,15 @@ impl Translator<'_> {
             sampling: sampling(has),
             index: number(Decoration::Index).unwrap_or(0),
         };
-        let mut io_locations = Vec::with_capacity(scalars as usize);
-        self.place(global.pointee, &mut cursor, &mut io_locations)?;
-        Ok(io_locations.into())
+        let mut locations = Vec::with_capacity(scalars as usize);
+        self.place(global.pointee, &mut cursor, &mut locations)?;
+        Ok(locations.into())
     }
 
     /// Gives each scalar of a type its location and component.
     fn place(&self, ty: u32, cursor: &mut Cursor, into: &mut Vec<IoLocation>) -> Result<()> {
         match self.globals.types.get(ty)? {
-            Type::Scalar(_) | Type::Vector { .. } => {
+            SpirvType::Scalar(_) | SpirvType::Vector { .. } => {
                 let (scalar, count) = self.globals.types.vector(ty)?;
                 let Some(location) = cursor.location else {
                     return malformed("an input or output has no location");
@@ -118,14 +159,14 @@ impl Translator<'_> {
                 cursor.location = Some(location + end.div_ceil(4));
                 Ok(())
             }
-            Type::Matrix {
+            SpirvType::Matrix {
                 column: element,
                 count,
             }
-            | Type::Array { element, count, .. } => {
+            | SpirvType::Array { element, count, .. } => {
                 (0..*count).try_for_each(|_| self.place(*element, cursor, into))
             }
-            Type::Struct(members) => {
+            SpirvType::Struct(members) => {
                 let mut next = cursor.location;
                 for (index, member) in (0..).zip(members.iter()) {
                     self.place_member(ty, index, member, *cursor, &mut next, into)?;
@@ -175,29 +216,39 @@ impl Translator<'_> {
     }
 
     /// The register of an input, made when it is first read.
-    fn input(&mut self, source: InputSource, scalar: ScalarType, rate: Rate) -> Reg {
-        if let Some(reg) = self.inputs.get(&source) {
+    pub fn input(
+        &mut self,
+        emit: &mut Emitter,
+        source: InputSource,
+        scalar: ScalarType,
+        rate: Rate,
+    ) -> Reg {
+        if let Some(reg) = self.registers.get(&source) {
             return *reg;
         }
         let ty = match scalar {
-            ScalarType::Bool => isa::ir::Type::Bool,
+            ScalarType::Bool => Type::Bool,
             ScalarType::Float { width: 64 }
             | ScalarType::Int { width: 64 }
-            | ScalarType::Uint { width: 64 } => isa::ir::Type::B64,
-            _ => isa::ir::Type::B32,
+            | ScalarType::Uint { width: 64 } => Type::B64,
+            _ => Type::B32,
         };
-        let reg = self
-            .builder
-            .input(self.interface.inputs.len() as u32, ty, rate);
-        self.interface.inputs.push(Input {
+        let reg = emit.builder.input(self.inputs.len() as u32, ty, rate);
+        self.inputs.push(Input {
             source,
             numeric: scalar,
         });
-        self.inputs.insert(source, reg);
+        self.registers.insert(source, reg);
         reg
     }
 
-    fn built_in_input(&mut self, built_in: BuiltIn, component: u32, scalar: ScalarType) -> Reg {
+    fn built_in_input(
+        &mut self,
+        emit: &mut Emitter,
+        built_in: BuiltIn,
+        component: u32,
+        scalar: ScalarType,
+    ) -> Reg {
         let rate = match built_in {
             BuiltIn::BaseVertex
             | BuiltIn::BaseInstance
@@ -211,47 +262,32 @@ impl Translator<'_> {
             built_in,
             component,
         };
-        self.input(source, scalar, rate)
+        self.input(emit, source, scalar, rate)
     }
 
     /// A component of the fragment's position.
-    pub fn frag_coord(&mut self, component: u32) -> Result<Reg> {
-        if self.interface.stage != Stage::Fragment {
+    pub fn frag_coord(&mut self, emit: &mut Emitter, component: u32) -> Result<Reg> {
+        if self.stage != Stage::Fragment {
             return malformed("there are no fragments in this stage");
         }
         Ok(self.built_in_input(
+            emit,
             BuiltIn::FragCoord,
             component,
             ScalarType::Float { width: 32 },
         ))
     }
 
-    /// Computes the scalars of an input that aren't simply given. That is done before anything else, so that they exist
-    /// wherever they are read.
-    pub fn compute_inputs(&mut self, variable: u32) -> Result<()> {
-        let Some(slot) = self.slot_of_root(variable) else {
-            return Ok(());
-        };
-        let io_locations = self.io_locations(variable)?;
-        if io_locations
-            .iter()
-            .any(|io_location| matches!(io_location, IoLocation::BuiltIn { .. }))
-        {
-            for index in 0..io_locations.len() {
-                if let IoLocation::BuiltIn { built_in, .. } = io_locations[index]
-                    && is_computed(built_in)
-                {
-                    self.read_scalar(slot, index)?;
-                }
-            }
-        }
-        Ok(())
-    }
-
     /// The register of a scalar of an input variable.
-    pub fn input_scalar(&mut self, variable: u32, index: usize, scalar: Scalar) -> Result<Reg> {
-        let io_locations = self.io_locations(variable)?;
-        match io_locations.get(index) {
+    pub fn input_scalar(
+        &mut self,
+        emit: &mut Emitter,
+        variable: u32,
+        index: usize,
+        scalar: Scalar,
+    ) -> Result<Reg> {
+        let locations = self.locations(variable)?;
+        match locations.get(index) {
             Some(IoLocation::Location {
                 location,
                 component,
@@ -259,21 +295,21 @@ impl Translator<'_> {
                 sampling,
                 ..
             }) => {
-                self.interface.per_sample |= *sampling == Sampling::Sample;
+                self.per_sample |= *sampling == Sampling::Sample;
                 let source = InputSource::Location {
                     location: *location,
                     component: *component,
                     interpolation: *interpolation,
                     sampling: *sampling,
                 };
-                Ok(self.input(source, numeric(scalar), Rate::Varying))
+                Ok(self.input(emit, source, scalar.at_interface(), Rate::Varying))
             }
             Some(IoLocation::BuiltIn {
                 built_in,
                 component,
             }) => {
-                let reg = self.built_in(*built_in, *component, scalar)?;
-                if self.builder.type_of(reg) != scalar.register() {
+                let reg = self.built_in(emit, *built_in, *component, scalar)?;
+                if emit.builder.type_of(reg) != scalar.register() {
                     return malformed(format!("built-in {built_in:?} is of another type"));
                 }
                 Ok(reg)
@@ -282,69 +318,13 @@ impl Translator<'_> {
         }
     }
 
-    /// Reads what a pointer into an input points to, taken elsewhere in the pixel.
-    pub fn read_input(&mut self, pointer: &Pointer, sampling: Sampling) -> Result<Vec<Reg>> {
-        let Some((variable, start, ty)) = self.interpolant(pointer) else {
-            return unsupported("interpolation of what isn't an input");
-        };
-        let scalars = self.globals.types.flatten(ty)?;
-        let io_locations = self.io_locations(variable)?;
-        let mut regs = Vec::with_capacity(scalars.len());
-        for (offset, scalar) in scalars.into_iter().enumerate() {
-            let Some(IoLocation::Location {
-                location,
-                component,
-                interpolation,
-                ..
-            }) = io_locations.get(start + offset)
-            else {
-                return unsupported("interpolation of a built-in");
-            };
-            let source = InputSource::Location {
-                location: *location,
-                component: *component,
-                interpolation: *interpolation,
-                sampling,
-            };
-            regs.push(self.input(source, numeric(scalar), Rate::Varying));
-        }
-        Ok(regs)
-    }
-
-    /// The input variable that a pointer leads into, the scalar where, and the type of what it points to.
-    fn interpolant(&self, pointer: &Pointer) -> Option<(u32, usize, u32)> {
-        let Pointer::PromotedVariable {
-            slot,
-            start,
-            steps,
-            ty,
-        } = pointer
-        else {
-            return None;
-        };
-        let variable = self.slots[*slot].input.filter(|_| steps.is_empty())?;
-        Some((variable, *start, *ty))
-    }
-
-    fn interpolation_of(&mut self, pointer: &Pointer) -> Option<Interpolation> {
-        let (variable, start, _) = self.interpolant(pointer)?;
-        match self.io_locations(variable).ok()?.get(start)? {
-            IoLocation::Location { interpolation, .. } => Some(*interpolation),
-            IoLocation::BuiltIn { .. } => None,
-        }
-    }
-
-    /// Whether an input isn't interpolated.
-    pub fn is_flat(&mut self, pointer: &Pointer) -> bool {
-        self.interpolation_of(pointer) == Some(Interpolation::Flat)
-    }
-
-    /// Whether an input is interpolated without perspective.
-    pub fn is_linear(&mut self, pointer: &Pointer) -> bool {
-        self.interpolation_of(pointer) == Some(Interpolation::Linear)
-    }
-
-    fn built_in(&mut self, built_in: Spirv, component: u32, scalar: Scalar) -> Result<Reg> {
+    fn built_in(
+        &mut self,
+        emit: &mut Emitter,
+        built_in: Spirv,
+        component: u32,
+        scalar: Scalar,
+    ) -> Result<Reg> {
         let given = match built_in {
             Spirv::VertexIndex => BuiltIn::VertexIndex,
             Spirv::InstanceIndex => BuiltIn::InstanceIndex,
@@ -362,7 +342,7 @@ impl Translator<'_> {
             Spirv::ClipDistance => BuiltIn::ClipDistance,
             Spirv::CullDistance => BuiltIn::CullDistance,
             Spirv::SampleId | Spirv::SamplePosition => {
-                self.interface.per_sample = true;
+                self.per_sample = true;
                 match built_in {
                     Spirv::SampleId => BuiltIn::SampleId,
                     _ => BuiltIn::SamplePosition,
@@ -370,139 +350,172 @@ impl Translator<'_> {
             }
             Spirv::WorkgroupId => BuiltIn::WorkgroupId,
             Spirv::NumWorkgroups => BuiltIn::NumWorkgroups,
-            other => return self.computed_built_in(other, component),
+            other => return self.computed_built_in(emit, other, component),
         };
-        Ok(self.built_in_input(given, component, numeric(scalar)))
+        Ok(self.built_in_input(emit, given, component, scalar.at_interface()))
     }
 
-    fn computed_built_in(&mut self, built_in: Spirv, component: u32) -> Result<Reg> {
-        let [x, y, z] = self.interface.workgroup_size;
+    fn computed_built_in(
+        &mut self,
+        emit: &mut Emitter,
+        built_in: Spirv,
+        component: u32,
+    ) -> Result<Reg> {
+        let [x, y, z] = self.workgroup_size;
         let invocations = x * y * z;
-        let size = self.options.subgroup_size;
+        let size = self.subgroup_size;
         let axis = component.min(2) as usize;
         Ok(match built_in {
-            Spirv::LocalInvocationIndex => self.builder.lane_index(),
-            Spirv::LocalInvocationId => self.local_id(axis),
+            Spirv::LocalInvocationIndex => emit.builder.lane_index(),
+            Spirv::LocalInvocationId => self.local_id(emit, axis),
             Spirv::GlobalInvocationId => {
-                let local = self.local_id(axis);
+                let local = self.local_id(emit, axis);
                 let group = self.built_in_input(
+                    emit,
                     BuiltIn::WorkgroupId,
                     component,
                     ScalarType::Uint { width: 32 },
                 );
-                let each = self.u32([x, y, z][axis]);
-                let first = self.op(Ir::IMul, &[group, each]);
-                self.op(Ir::IAdd, &[first, local])
+                let each = emit.u32([x, y, z][axis]);
+                let first = emit.op(Ir::IMul, &[group, each]);
+                emit.op(Ir::IAdd, &[first, local])
             }
-            Spirv::WorkgroupSize => self.u32([x, y, z][axis]),
-            Spirv::HelperInvocation => self.builder.is_helper(),
-            Spirv::DeviceIndex => self.u32(0),
-            Spirv::SubgroupSize => self.u32(size),
-            Spirv::NumSubgroups => self.u32(invocations.div_ceil(size.max(1))),
+            Spirv::WorkgroupSize => emit.u32([x, y, z][axis]),
+            Spirv::HelperInvocation => emit.builder.is_helper(),
+            Spirv::DeviceIndex => emit.u32(0),
+            Spirv::SubgroupSize => emit.u32(size),
+            Spirv::NumSubgroups => emit.u32(invocations.div_ceil(size.max(1))),
             Spirv::SubgroupId => {
-                let lane = self.builder.lane_index();
-                self.divided(lane, size).0
+                let lane = emit.builder.lane_index();
+                emit.divided(lane, size).0
             }
-            Spirv::SubgroupLocalInvocationId => self.subgroup_lane(),
+            Spirv::SubgroupLocalInvocationId => self.subgroup_lane(emit),
             Spirv::SubgroupEqMask
             | Spirv::SubgroupGeMask
             | Spirv::SubgroupGtMask
             | Spirv::SubgroupLeMask
-            | Spirv::SubgroupLtMask => self.lane_mask(built_in, component),
+            | Spirv::SubgroupLtMask => self.lane_mask(emit, built_in, component),
             other => return unsupported(format!("built-in {other:?}")),
         })
     }
 
     /// The lane's index within its subgroup.
-    pub fn subgroup_lane(&mut self) -> Reg {
-        let lane = self.builder.lane_index();
-        self.divided(lane, self.options.subgroup_size).1
+    pub fn subgroup_lane(&mut self, emit: &mut Emitter) -> Reg {
+        let lane = emit.builder.lane_index();
+        emit.divided(lane, self.subgroup_size).1
     }
 
-    /// Quotient and remainder by a constant.
-    fn divided(&mut self, reg: Reg, by: u32) -> (Reg, Reg) {
-        if by.is_power_of_two() {
-            let (shift, mask) = (self.u32(by.trailing_zeros()), self.u32(by - 1));
-            (
-                self.op(Ir::UShr, &[reg, shift]),
-                self.op(Ir::And, &[reg, mask]),
-            )
-        } else {
-            let by = self.u32(by);
-            (self.op(Ir::UDiv, &[reg, by]), self.op(Ir::URem, &[reg, by]))
-        }
-    }
-
-    fn local_id(&mut self, axis: usize) -> Reg {
-        let [x, y, z] = self.interface.workgroup_size;
+    fn local_id(&mut self, emit: &mut Emitter, axis: usize) -> Reg {
+        let [x, y, z] = self.workgroup_size;
         if [x, y, z][axis] == 1 {
-            return self.u32(0);
+            return emit.u32(0);
         }
-        let lane = self.builder.lane_index();
+        let lane = emit.builder.lane_index();
         if x * y * z == [x, y, z][axis] {
             return lane;
         }
-        let (rest, column) = self.divided(lane, x);
+        let (rest, column) = emit.divided(lane, x);
         match axis {
             0 => column,
-            1 => self.divided(rest, y).1,
-            _ => self.divided(rest, y).0,
+            1 => emit.divided(rest, y).1,
+            _ => emit.divided(rest, y).0,
         }
     }
 
     /// A word of the masks of lanes equal to, above or below one's own.
-    pub fn lane_mask(&mut self, which: Spirv, word: u32) -> Reg {
-        let lane = self.subgroup_lane();
-        let first = self.u32(32 * word);
-        let offset = self.op(Ir::ISub, &[lane, first]);
-        let (zero, one, ones, size) = (self.u32(0), self.u32(1), self.u32(u32::MAX), self.u32(32));
-        let within = self.op(Ir::ULt, &[offset, size]);
-        let before = self.op(Ir::ULt, &[lane, first]);
-        let bit = self.op(Ir::Shl, &[one, offset]);
-        let bit = self.select(within, bit, zero);
+    pub fn lane_mask(&mut self, emit: &mut Emitter, which: Spirv, word: u32) -> Reg {
+        let lane = self.subgroup_lane(emit);
+        let first = emit.u32(32 * word);
+        let offset = emit.op(Ir::ISub, &[lane, first]);
+        let (zero, one, ones, size) = (emit.u32(0), emit.u32(1), emit.u32(u32::MAX), emit.u32(32));
+        let within = emit.op(Ir::ULt, &[offset, size]);
+        let before = emit.op(Ir::ULt, &[lane, first]);
+        let bit = emit.op(Ir::Shl, &[one, offset]);
+        let bit = emit.select(within, bit, zero);
         // Bits below one's own, in this word: none, some, or all.
-        let below = self.op(Ir::ISub, &[bit, one]);
-        let below = self.select(within, below, ones);
-        let below = self.select(before, zero, below);
-        let up_to = self.op(Ir::Or, &[below, bit]);
-        let limit = self.options.subgroup_size.saturating_sub(32 * word).min(32);
+        let below = emit.op(Ir::ISub, &[bit, one]);
+        let below = emit.select(within, below, ones);
+        let below = emit.select(before, zero, below);
+        let up_to = emit.op(Ir::Or, &[below, bit]);
+        let limit = self.subgroup_size.saturating_sub(32 * word).min(32);
         let existing = if limit == 32 {
             u32::MAX
         } else {
             (1 << limit) - 1
         };
-        let existing = self.u32(existing);
+        let existing = emit.u32(existing);
         match which {
             Spirv::SubgroupEqMask => bit,
             Spirv::SubgroupLtMask => below,
             Spirv::SubgroupLeMask => up_to,
             Spirv::SubgroupGtMask => {
-                let above = self.op(Ir::Not, &[up_to]);
-                self.op(Ir::And, &[above, existing])
+                let above = emit.op(Ir::Not, &[up_to]);
+                emit.op(Ir::And, &[above, existing])
             }
             _ => {
-                let above = self.op(Ir::Not, &[below]);
-                self.op(Ir::And, &[above, existing])
+                let above = emit.op(Ir::Not, &[below]);
+                emit.op(Ir::And, &[above, existing])
             }
         }
     }
 
-    /// Reads the workgroup's size from the constant that is decorated as it, which wins over the execution mode.
-    pub fn built_in_workgroup_size(&mut self) {
-        let constants = &self.globals.constants;
-        let found = constants
-            .iter()
-            .find(|(id, _)| self.module.built_in(**id) == Some(Spirv::WorkgroupSize));
-        if let Some((_, constant)) = found
-            && let [x, y, z] = *constant.bits
-        {
-            self.interface.workgroup_size = [x as u32, y as u32, z as u32];
+    /// Assigns a register to the output at a location.
+    pub fn write_output(
+        &mut self,
+        emit: &mut Emitter,
+        location: IoLocation,
+        scalar: Scalar,
+        reg: Reg,
+    ) -> Result<()> {
+        let target = output_target(location)?;
+        if self.outputs.iter().any(|it| it.target == target) {
+            return malformed(format!("two outputs at {target:?}"));
         }
+        let slot = self.outputs.len() as u32;
+        let output = emit.builder.output(slot, scalar.register());
+        self.outputs.push(Output {
+            target,
+            numeric: scalar.at_interface(),
+        });
+        emit.builder.assign(output, reg);
+        Ok(())
     }
 }
 
-/// Whether a built-in input follows from the lane.
-fn is_computed(built_in: Spirv) -> bool {
+fn output_target(location: IoLocation) -> Result<OutputTarget> {
+    Ok(match location {
+        IoLocation::Location {
+            location,
+            component,
+            index,
+            ..
+        } => OutputTarget::Location {
+            location,
+            component,
+            index,
+        },
+        IoLocation::BuiltIn {
+            built_in,
+            component,
+        } => OutputTarget::BuiltIn {
+            built_in: match built_in {
+                Spirv::Position => BuiltIn::Position,
+                Spirv::PointSize => BuiltIn::PointSize,
+                Spirv::ClipDistance => BuiltIn::ClipDistance,
+                Spirv::CullDistance => BuiltIn::CullDistance,
+                Spirv::Layer => BuiltIn::Layer,
+                Spirv::ViewportIndex => BuiltIn::ViewportIndex,
+                Spirv::FragDepth => BuiltIn::FragDepth,
+                Spirv::SampleMask => BuiltIn::SampleMask,
+                other => return unsupported(format!("output built-in {other:?}")),
+            },
+            component,
+        },
+    })
+}
+
+/// Tells if a built-in input follows from the lane.
+pub fn is_computed(built_in: Spirv) -> bool {
     use Spirv::*;
     matches!(
         built_in,
