@@ -2,62 +2,107 @@
 
 use crate::common::OPTIONS;
 use gaurast_spirv::{Error, Module, Shader, Specialization, Stage, translate};
-use rspirv::binary::Assemble;
-use rspirv::dr::Builder;
-use rspirv::spirv::{
-    AddressingModel, Capability, ExecutionMode, ExecutionModel, FunctionControl, MemoryModel,
-    SelectionControl, Word,
+use spirv::{
+    AddressingModel, Capability, ExecutionMode, ExecutionModel, MAGIC_NUMBER, MemoryModel, Op,
 };
 
-/// A module whose entry point is what `body` makes; it gets the types of void, function and bool,
-/// and the constant that means a subgroup.
-fn module(body: impl FnOnce(&mut Builder, [Word; 4]) -> Word) -> Vec<u32> {
-    let mut b = Builder::new();
-    b.set_version(1, 3);
-    b.capability(Capability::Shader);
-    b.memory_model(AddressingModel::Logical, MemoryModel::GLSL450);
-    let void = b.type_void();
-    let function = b.type_function(void, vec![]);
-    b.capability(Capability::GroupNonUniform);
-    let bool = b.type_bool();
-    let uint = b.type_int(32, 0);
-    let subgroup = b.constant_bit32(uint, 3);
-    let main = body(&mut b, [void, function, bool, subgroup]);
-    b.entry_point(ExecutionModel::GLCompute, main, "main", vec![]);
-    b.execution_mode(main, ExecutionMode::LocalSize, vec![1, 1, 1]);
-    b.module().assemble()
+// Ids that all modules have: the types of void, of a function and of bool, and the constant that means a subgroup.
+const VOID: u32 = 1;
+const FUNCTION: u32 = 2;
+const BOOL: u32 = 3;
+const UINT: u32 = 4;
+const SUBGROUP: u32 = 5;
+
+/// Instructions in the making.
+struct Builder {
+    words: Vec<u32>,
+    next_id: u32,
 }
 
-fn begin(b: &mut Builder, [void, ty, ..]: [Word; 4]) -> Word {
-    let function = b
-        .begin_function(void, None, FunctionControl::NONE, ty)
-        .unwrap();
-    b.begin_block(None).unwrap();
-    function
+impl Builder {
+    fn id(&mut self) -> u32 {
+        self.next_id += 1;
+        self.next_id - 1
+    }
+
+    fn op(&mut self, op: Op, operands: &[u32]) {
+        self.words
+            .push((operands.len() as u32 + 1) << 16 | op as u32);
+        self.words.extend_from_slice(operands);
+    }
+
+    /// Begins a function; returns its id.
+    fn begin(&mut self) -> u32 {
+        let (function, label) = (self.id(), self.id());
+        self.op(Op::Function, &[VOID, function, 0, FUNCTION]);
+        self.op(Op::Label, &[label]);
+        function
+    }
+
+    fn end(&mut self) {
+        self.op(Op::Return, &[]);
+        self.op(Op::FunctionEnd, &[]);
+    }
+
+    fn call(&mut self, callee: u32) {
+        let result = self.id();
+        self.op(Op::FunctionCall, &[VOID, result, callee]);
+    }
+
+    /// Opens and closes nested selections, innermost first closed, with something within.
+    fn nest(&mut self, depth: usize, within: impl FnOnce(&mut Self)) {
+        let condition = self.id();
+        self.op(Op::GroupNonUniformElect, &[BOOL, condition, SUBGROUP]);
+        let mut merges = Vec::new();
+        for _ in 0..depth {
+            let (then, merge) = (self.id(), self.id());
+            self.op(Op::SelectionMerge, &[merge, 0]);
+            self.op(Op::BranchConditional, &[condition, then, merge]);
+            self.op(Op::Label, &[then]);
+            merges.push(merge);
+        }
+        within(self);
+        for merge in merges.into_iter().rev() {
+            self.op(Op::Branch, &[merge]);
+            self.op(Op::Label, &[merge]);
+        }
+    }
 }
 
-/// Opens and closes nested selections, innermost first closed, with something within.
-fn nest(
-    b: &mut Builder,
-    [_, _, bool, subgroup]: [Word; 4],
-    depth: usize,
-    within: impl FnOnce(&mut Builder),
-) {
-    let condition = b.group_non_uniform_elect(bool, None, subgroup).unwrap();
-    let mut merges = Vec::new();
-    for _ in 0..depth {
-        let (then, merge) = (b.id(), b.id());
-        b.selection_merge(merge, SelectionControl::NONE).unwrap();
-        b.branch_conditional(condition, then, merge, vec![])
-            .unwrap();
-        b.begin_block(Some(then)).unwrap();
-        merges.push(merge);
-    }
-    within(b);
-    for merge in merges.into_iter().rev() {
-        b.branch(merge).unwrap();
-        b.begin_block(Some(merge)).unwrap();
-    }
+/// A module whose functions `body` makes; it returns the one of the entry point.
+fn module(body: impl FnOnce(&mut Builder) -> u32) -> Vec<u32> {
+    let mut functions = Builder {
+        words: Vec::new(),
+        next_id: SUBGROUP + 1,
+    };
+    let main = body(&mut functions);
+    let bound = functions.next_id;
+    let mut it = Builder {
+        words: vec![MAGIC_NUMBER, 0x0001_0300, 0, bound, 0],
+        next_id: bound,
+    };
+    it.op(Op::Capability, &[Capability::Shader as u32]);
+    it.op(Op::Capability, &[Capability::GroupNonUniform as u32]);
+    it.op(
+        Op::MemoryModel,
+        &[AddressingModel::Logical as u32, MemoryModel::GLSL450 as u32],
+    );
+    let name = u32::from_le_bytes(*b"main");
+    it.op(
+        Op::EntryPoint,
+        &[ExecutionModel::GLCompute as u32, main, name, 0],
+    );
+    it.op(
+        Op::ExecutionMode,
+        &[main, ExecutionMode::LocalSize as u32, 1, 1, 1],
+    );
+    it.op(Op::TypeVoid, &[VOID]);
+    it.op(Op::TypeFunction, &[FUNCTION, VOID]);
+    it.op(Op::TypeBool, &[BOOL]);
+    it.op(Op::TypeInt, &[UINT, 32, 0]);
+    it.op(Op::Constant, &[UINT, SUBGROUP, 3]);
+    it.words.append(&mut functions.words);
+    it.words
 }
 
 fn attempt(words: Vec<u32>) -> Result<Shader, Error> {
@@ -73,11 +118,10 @@ fn attempt(words: Vec<u32>) -> Result<Shader, Error> {
 #[gaurast_runner::test]
 fn nesting_is_bounded() {
     let nested = |depth| {
-        module(|b, types| {
-            let main = begin(b, types);
-            nest(b, types, depth, |_| {});
-            b.ret().unwrap();
-            b.end_function().unwrap();
+        module(|b| {
+            let main = b.begin();
+            b.nest(depth, |_| {});
+            b.end();
             main
         })
     };
@@ -88,17 +132,16 @@ fn nesting_is_bounded() {
 
 #[gaurast_runner::test]
 fn nesting_adds_up_over_calls() {
-    let words = module(|b, types| {
+    let words = module(|b| {
         let mut callee = None;
         for _ in 0..40 {
-            let function = begin(b, types);
-            nest(b, types, 100, |b| {
+            let function = b.begin();
+            b.nest(100, |b| {
                 if let Some(callee) = callee {
-                    b.function_call(types[0], None, callee, vec![]).unwrap();
+                    b.call(callee);
                 }
             });
-            b.ret().unwrap();
-            b.end_function().unwrap();
+            b.end();
             callee = Some(function);
         }
         callee.unwrap()
@@ -109,11 +152,10 @@ fn nesting_adds_up_over_calls() {
 
 #[gaurast_runner::test]
 fn recursion_is_refused() {
-    let words = module(|b, types| {
-        let main = begin(b, types);
-        b.function_call(types[0], None, main, vec![]).unwrap();
-        b.ret().unwrap();
-        b.end_function().unwrap();
+    let words = module(|b| {
+        let main = b.begin();
+        b.call(main);
+        b.end();
         main
     });
     let refused = attempt(words).unwrap_err().to_string();
@@ -123,17 +165,16 @@ fn recursion_is_refused() {
 #[gaurast_runner::test]
 fn calls_that_multiply_are_refused() {
     // Thirty functions that each call the one before four times: 4^30 calls, which nobody would see the end of.
-    let words = module(|b, types| {
+    let words = module(|b| {
         let mut callee = None;
         for _ in 0..30 {
-            let function = begin(b, types);
+            let function = b.begin();
             if let Some(callee) = callee {
                 for _ in 0..4 {
-                    b.function_call(types[0], None, callee, vec![]).unwrap();
+                    b.call(callee);
                 }
             }
-            b.ret().unwrap();
-            b.end_function().unwrap();
+            b.end();
             callee = Some(function);
         }
         callee.unwrap()
