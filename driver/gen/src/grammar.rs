@@ -129,11 +129,14 @@ pub fn generate(json: &Path) -> Result<File, Error> {
         }}
 
         /// The operands of an operation; `None` where the grammar doesn't have it.
+        #[rustfmt::skip]
         pub(crate) fn operands(op: Op) -> Option<Operands> {{
-            use Kind as K;
-            use operands_of as o;
-            Some(match op {{ {operations} _ => return None }})
-        }}
+    use Kind as K;
+    use operands_of as o;
+    Some(match op {{
+{operations}        _ => return None,
+    }})
+}}
 
         impl Kind {{
             /// Tells an enumeration of bits from others.
@@ -220,10 +223,31 @@ fn operations(instructions: &[Instruction]) -> String {
     arms.sort_by_key(|(_, operations)| operations.first().map(|op| *op as u32));
     arms.iter()
         .fold(String::new(), |mut text, (operands, operations)| {
-            let names: Vec<String> = operations.iter().map(|op| format!("Op::{op:?}")).collect();
-            let _ = writeln!(text, "{} => {operands},", names.join(" | "));
+            text += &arm(operations, operands);
             text
         })
+}
+
+/// An arm of a match, in lines that aren't too long: rustfmt would give each pattern a line.
+fn arm(operations: &[Op], operands: &str) -> String {
+    const WIDTH: usize = 116;
+    let mut text = String::new();
+    let mut line = "        ".to_owned();
+    for (index, op) in operations.iter().enumerate() {
+        let separator = if index > 0 { "| " } else { "" };
+        let name = format!("{separator}Op::{op:?} ");
+        if line.len() + name.len() > WIDTH {
+            let _ = writeln!(text, "{}", line.trim_end());
+            line = "        ".to_owned();
+        }
+        line += &name;
+    }
+    if line.len() + operands.len() > WIDTH {
+        let _ = writeln!(text, "{}", line.trim_end());
+        line = "            ".to_owned();
+    }
+    let _ = writeln!(text, "{line}=> {operands},");
+    text
 }
 
 /// A call that makes the operands of an operation.

@@ -92,1451 +92,425 @@ const fn operands_of(
 }
 
 /// The operands of an operation; `None` where the grammar doesn't have it.
-pub(crate) fn operands(op: Op) -> Option<Operands> {
+        #[rustfmt::skip]
+        pub(crate) fn operands(op: Op) -> Option<Operands> {
     use Kind as K;
     use operands_of as o;
     Some(match op {
-        Op::Nop
-        | Op::FunctionEnd
-        | Op::EmitVertex
-        | Op::EndPrimitive
-        | Op::Kill
-        | Op::Return
-        | Op::Unreachable
-        | Op::NoLine
-        | Op::GraphEndARM
-        | Op::TerminateInvocation
-        | Op::IgnoreIntersectionKHR
-        | Op::TerminateRayKHR
-        | Op::IgnoreIntersectionNV
-        | Op::TerminateRayNV
-        | Op::BeginInvocationInterlockEXT
-        | Op::EndInvocationInterlockEXT
-        | Op::DemoteToHelperInvocation => o(&[], &[], None),
-        Op::Undef
-        | Op::ConstantTrue
-        | Op::ConstantFalse
-        | Op::ConstantNull
-        | Op::SpecConstantTrue
-        | Op::SpecConstantFalse
-        | Op::FunctionParameter
-        | Op::CreateUserEvent
-        | Op::GetDefaultQueue
-        | Op::GraphARM
-        | Op::CreateTensorLayoutNV
-        | Op::CreateTensorViewNV
-        | Op::IsHelperInvocationEXT
+        Op::Nop | Op::FunctionEnd | Op::EmitVertex | Op::EndPrimitive | Op::Kill | Op::Return | Op::Unreachable
+        | Op::NoLine | Op::GraphEndARM | Op::TerminateInvocation | Op::IgnoreIntersectionKHR | Op::TerminateRayKHR
+        | Op::IgnoreIntersectionNV | Op::TerminateRayNV | Op::BeginInvocationInterlockEXT
+        | Op::EndInvocationInterlockEXT | Op::DemoteToHelperInvocation => o(&[], &[], None),
+        Op::Undef | Op::ConstantTrue | Op::ConstantFalse | Op::ConstantNull | Op::SpecConstantTrue
+        | Op::SpecConstantFalse | Op::FunctionParameter | Op::CreateUserEvent | Op::GetDefaultQueue | Op::GraphARM
+        | Op::CreateTensorLayoutNV | Op::CreateTensorViewNV | Op::IsHelperInvocationEXT
         | Op::SubgroupAvcMceGetDefaultHighPenaltyCostTableINTEL
         | Op::SubgroupAvcMceGetDefaultMediumPenaltyCostTableINTEL
         | Op::SubgroupAvcMceGetDefaultLowPenaltyCostTableINTEL
         | Op::SubgroupAvcMceGetDefaultNonDcLumaIntraPenaltyINTEL
-        | Op::SubgroupAvcMceGetDefaultIntraChromaModeBasePenaltyINTEL
-        | Op::SaveMemoryINTEL => o(&[K::IdResultType, K::IdResult], &[], None),
-        Op::SourceContinued | Op::SourceExtension | Op::Extension | Op::ModuleProcessed => {
-            o(&[K::String], &[], None)
-        }
+        | Op::SubgroupAvcMceGetDefaultIntraChromaModeBasePenaltyINTEL | Op::SaveMemoryINTEL
+            => o(&[K::IdResultType, K::IdResult], &[], None),
+        Op::SourceContinued | Op::SourceExtension | Op::Extension | Op::ModuleProcessed => o(&[K::String], &[], None),
         Op::Source => o(&[K::SourceLanguage, K::Literal], &[K::Id, K::String], None),
         Op::Name | Op::ConditionalExtensionINTEL => o(&[K::Id, K::String], &[], None),
         Op::MemberName => o(&[K::Id, K::Literal, K::String], &[], None),
-        Op::String
-        | Op::ExtInstImport
-        | Op::TypeOpaque
-        | Op::ConstantStringAMDX
-        | Op::SpecConstantStringAMDX
+        Op::String | Op::ExtInstImport | Op::TypeOpaque | Op::ConstantStringAMDX | Op::SpecConstantStringAMDX
         | Op::AsmTargetINTEL => o(&[K::IdResult, K::String], &[], None),
         Op::Line => o(&[K::Id, K::Literal, K::Literal], &[], None),
-        Op::ExtInst | Op::ExtInstWithForwardRefsKHR => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Literal],
-            &[],
-            Some(K::Id),
-        ),
+        Op::ExtInst | Op::ExtInstWithForwardRefsKHR
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Literal], &[], Some(K::Id)),
         Op::MemoryModel => o(&[K::AddressingModel, K::MemoryModel], &[], None),
         Op::EntryPoint => o(&[K::ExecutionModel, K::Id, K::String], &[], Some(K::Id)),
         Op::ExecutionMode | Op::ExecutionModeId => o(&[K::Id, K::ExecutionMode], &[], None),
         Op::Capability => o(&[K::Capability], &[], None),
-        Op::TypeVoid
-        | Op::TypeBool
-        | Op::TypeSampler
-        | Op::TypeEvent
-        | Op::TypeDeviceEvent
-        | Op::TypeReserveId
-        | Op::TypeQueue
-        | Op::DecorationGroup
-        | Op::Label
-        | Op::TypePipeStorage
-        | Op::TypeNamedBarrier
-        | Op::TypeRayQueryKHR
-        | Op::TypeHitObjectNV
-        | Op::TypeHitObjectEXT
-        | Op::TypeAccelerationStructureKHR
-        | Op::TypeAvcImePayloadINTEL
-        | Op::TypeAvcRefPayloadINTEL
-        | Op::TypeAvcSicPayloadINTEL
-        | Op::TypeAvcMcePayloadINTEL
-        | Op::TypeAvcMceResultINTEL
-        | Op::TypeAvcImeResultINTEL
-        | Op::TypeAvcImeResultSingleReferenceStreamoutINTEL
-        | Op::TypeAvcImeResultDualReferenceStreamoutINTEL
-        | Op::TypeAvcImeSingleReferenceStreaminINTEL
-        | Op::TypeAvcImeDualReferenceStreaminINTEL
-        | Op::TypeAvcRefResultINTEL
-        | Op::TypeAvcSicResultINTEL
-        | Op::TypeTaskSequenceALTERA => o(&[K::IdResult], &[], None),
+        Op::TypeVoid | Op::TypeBool | Op::TypeSampler | Op::TypeEvent | Op::TypeDeviceEvent | Op::TypeReserveId
+        | Op::TypeQueue | Op::DecorationGroup | Op::Label | Op::TypePipeStorage | Op::TypeNamedBarrier
+        | Op::TypeRayQueryKHR | Op::TypeHitObjectNV | Op::TypeHitObjectEXT | Op::TypeAccelerationStructureKHR
+        | Op::TypeAvcImePayloadINTEL | Op::TypeAvcRefPayloadINTEL | Op::TypeAvcSicPayloadINTEL
+        | Op::TypeAvcMcePayloadINTEL | Op::TypeAvcMceResultINTEL | Op::TypeAvcImeResultINTEL
+        | Op::TypeAvcImeResultSingleReferenceStreamoutINTEL | Op::TypeAvcImeResultDualReferenceStreamoutINTEL
+        | Op::TypeAvcImeSingleReferenceStreaminINTEL | Op::TypeAvcImeDualReferenceStreaminINTEL
+        | Op::TypeAvcRefResultINTEL | Op::TypeAvcSicResultINTEL | Op::TypeTaskSequenceALTERA
+            => o(&[K::IdResult], &[], None),
         Op::TypeInt => o(&[K::IdResult, K::Literal, K::Literal], &[], None),
         Op::TypeFloat => o(&[K::IdResult, K::Literal], &[K::FPEncoding], None),
         Op::TypeVector | Op::TypeMatrix => o(&[K::IdResult, K::Id, K::Literal], &[], None),
-        Op::TypeImage => o(
-            &[
-                K::IdResult,
-                K::Id,
-                K::Dim,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-                K::ImageFormat,
-            ],
-            &[K::AccessQualifier],
-            None,
-        ),
-        Op::TypeSampledImage
-        | Op::TypeRuntimeArray
-        | Op::TypeNodePayloadArrayAMDX
-        | Op::TypeVmeImageINTEL => o(&[K::IdResult, K::Id], &[], None),
-        Op::TypeArray | Op::TypeVectorIdEXT | Op::TypeTensorLayoutNV => {
-            o(&[K::IdResult, K::Id, K::Id], &[], None)
-        }
+        Op::TypeImage
+            => o(&[K::IdResult, K::Id, K::Dim, K::Literal, K::Literal, K::Literal, K::Literal, K::ImageFormat], &[K::AccessQualifier], None),
+        Op::TypeSampledImage | Op::TypeRuntimeArray | Op::TypeNodePayloadArrayAMDX | Op::TypeVmeImageINTEL
+            => o(&[K::IdResult, K::Id], &[], None),
+        Op::TypeArray | Op::TypeVectorIdEXT | Op::TypeTensorLayoutNV => o(&[K::IdResult, K::Id, K::Id], &[], None),
         Op::TypeStruct | Op::AliasScopeListDeclINTEL => o(&[K::IdResult], &[], Some(K::Id)),
         Op::TypePointer => o(&[K::IdResult, K::StorageClass, K::Id], &[], None),
         Op::TypeFunction => o(&[K::IdResult, K::Id], &[], Some(K::Id)),
-        Op::TypePipe | Op::TypeBufferSurfaceINTEL => {
-            o(&[K::IdResult, K::AccessQualifier], &[], None)
-        }
+        Op::TypePipe | Op::TypeBufferSurfaceINTEL => o(&[K::IdResult, K::AccessQualifier], &[], None),
         Op::TypeForwardPointer => o(&[K::Id, K::StorageClass], &[], None),
-        Op::Constant | Op::SpecConstant => {
-            o(&[K::IdResultType, K::IdResult, K::TypedLiteral], &[], None)
-        }
-        Op::ConstantComposite
-        | Op::SpecConstantComposite
-        | Op::CompositeConstruct
-        | Op::FunctionPointerCallINTEL
-        | Op::CompositeConstructContinuedINTEL
-        | Op::ConditionalCopyObjectINTEL => o(&[K::IdResultType, K::IdResult], &[], Some(K::Id)),
-        Op::ConstantSampler => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::SamplerAddressingMode,
-                K::Literal,
-                K::SamplerFilterMode,
-            ],
-            &[],
-            None,
-        ),
-        Op::SpecConstantOp => o(
-            &[K::IdResultType, K::IdResult, K::SpecConstantOp],
-            &[],
-            None,
-        ),
-        Op::Function => o(
-            &[K::IdResultType, K::IdResult, K::FunctionControl, K::Id],
-            &[],
-            None,
-        ),
-        Op::FunctionCall
-        | Op::AccessChain
-        | Op::InBoundsAccessChain
-        | Op::GraphInputARM
-        | Op::TensorLayoutSetDimensionNV
-        | Op::TensorLayoutSetStrideNV
-        | Op::TensorLayoutSliceNV
-        | Op::TensorViewSetDimensionNV
-        | Op::TensorViewSetStrideNV
-        | Op::TensorLayoutSetBlockSizeNV
+        Op::Constant | Op::SpecConstant => o(&[K::IdResultType, K::IdResult, K::TypedLiteral], &[], None),
+        Op::ConstantComposite | Op::SpecConstantComposite | Op::CompositeConstruct | Op::FunctionPointerCallINTEL
+        | Op::CompositeConstructContinuedINTEL | Op::ConditionalCopyObjectINTEL
+            => o(&[K::IdResultType, K::IdResult], &[], Some(K::Id)),
+        Op::ConstantSampler
+            => o(&[K::IdResultType, K::IdResult, K::SamplerAddressingMode, K::Literal, K::SamplerFilterMode], &[], None),
+        Op::SpecConstantOp => o(&[K::IdResultType, K::IdResult, K::SpecConstantOp], &[], None),
+        Op::Function => o(&[K::IdResultType, K::IdResult, K::FunctionControl, K::Id], &[], None),
+        Op::FunctionCall | Op::AccessChain | Op::InBoundsAccessChain | Op::GraphInputARM
+        | Op::TensorLayoutSetDimensionNV | Op::TensorLayoutSetStrideNV | Op::TensorLayoutSliceNV
+        | Op::TensorViewSetDimensionNV | Op::TensorViewSetStrideNV | Op::TensorLayoutSetBlockSizeNV
         | Op::AsmCallINTEL => o(&[K::IdResultType, K::IdResult, K::Id], &[], Some(K::Id)),
-        Op::Variable => o(
-            &[K::IdResultType, K::IdResult, K::StorageClass],
-            &[K::Id],
-            None,
-        ),
-        Op::ImageTexelPointer
-        | Op::VectorInsertDynamic
-        | Op::Select
-        | Op::BitFieldSExtract
-        | Op::BitFieldUExtract
-        | Op::AtomicLoad
-        | Op::AtomicIIncrement
-        | Op::AtomicIDecrement
-        | Op::GroupBroadcast
-        | Op::GetNumPipePackets
-        | Op::GetMaxPipePackets
-        | Op::BuildNDRange
-        | Op::AtomicFlagTestAndSet
-        | Op::GroupNonUniformBroadcast
-        | Op::GroupNonUniformBallotBitExtract
-        | Op::GroupNonUniformShuffle
-        | Op::GroupNonUniformShuffleXor
-        | Op::GroupNonUniformShuffleUp
-        | Op::GroupNonUniformShuffleDown
-        | Op::GroupNonUniformQuadBroadcast
-        | Op::GroupNonUniformQuadSwap
-        | Op::FmaKHR
-        | Op::ImageSampleWeightedQCOM
-        | Op::ImageBoxFilterQCOM
-        | Op::FragmentFetchAMD
-        | Op::AllocateNodePayloadsAMDX
-        | Op::CooperativeMatrixMulAddNV
-        | Op::SubgroupShuffleDownINTEL
-        | Op::SubgroupShuffleUpINTEL
+        Op::Variable => o(&[K::IdResultType, K::IdResult, K::StorageClass], &[K::Id], None),
+        Op::ImageTexelPointer | Op::VectorInsertDynamic | Op::Select | Op::BitFieldSExtract | Op::BitFieldUExtract
+        | Op::AtomicLoad | Op::AtomicIIncrement | Op::AtomicIDecrement | Op::GroupBroadcast | Op::GetNumPipePackets
+        | Op::GetMaxPipePackets | Op::BuildNDRange | Op::AtomicFlagTestAndSet | Op::GroupNonUniformBroadcast
+        | Op::GroupNonUniformBallotBitExtract | Op::GroupNonUniformShuffle | Op::GroupNonUniformShuffleXor
+        | Op::GroupNonUniformShuffleUp | Op::GroupNonUniformShuffleDown | Op::GroupNonUniformQuadBroadcast
+        | Op::GroupNonUniformQuadSwap | Op::FmaKHR | Op::ImageSampleWeightedQCOM | Op::ImageBoxFilterQCOM
+        | Op::FragmentFetchAMD | Op::AllocateNodePayloadsAMDX | Op::CooperativeMatrixMulAddNV
+        | Op::SubgroupShuffleDownINTEL | Op::SubgroupShuffleUpINTEL
         | Op::SubgroupAvcMceSetDualReferenceInterlacedFieldPolaritiesINTEL
-        | Op::SubgroupAvcMceGetInterReferenceInterlacedFieldPolaritiesINTEL
-        | Op::SubgroupAvcImeInitializeINTEL
-        | Op::SubgroupAvcImeSetSingleReferenceINTEL
-        | Op::SubgroupAvcImeEvaluateWithSingleReferenceINTEL
+        | Op::SubgroupAvcMceGetInterReferenceInterlacedFieldPolaritiesINTEL | Op::SubgroupAvcImeInitializeINTEL
+        | Op::SubgroupAvcImeSetSingleReferenceINTEL | Op::SubgroupAvcImeEvaluateWithSingleReferenceINTEL
         | Op::SubgroupAvcImeEvaluateWithSingleReferenceStreamoutINTEL
         | Op::SubgroupAvcImeGetStreamoutDualReferenceMajorShapeMotionVectorsINTEL
         | Op::SubgroupAvcImeGetStreamoutDualReferenceMajorShapeDistortionsINTEL
         | Op::SubgroupAvcImeGetStreamoutDualReferenceMajorShapeReferenceIdsINTEL
-        | Op::SubgroupAvcRefEvaluateWithSingleReferenceINTEL
-        | Op::SubgroupAvcRefEvaluateWithMultiReferenceINTEL
-        | Op::SubgroupAvcSicEvaluateWithSingleReferenceINTEL
-        | Op::SubgroupAvcSicEvaluateWithMultiReferenceINTEL => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id],
-            &[],
-            None,
-        ),
-        Op::Load => o(
-            &[K::IdResultType, K::IdResult, K::Id],
-            &[K::MemoryAccess],
-            None,
-        ),
+        | Op::SubgroupAvcRefEvaluateWithSingleReferenceINTEL | Op::SubgroupAvcRefEvaluateWithMultiReferenceINTEL
+        | Op::SubgroupAvcSicEvaluateWithSingleReferenceINTEL | Op::SubgroupAvcSicEvaluateWithMultiReferenceINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id], &[], None),
+        Op::Load => o(&[K::IdResultType, K::IdResult, K::Id], &[K::MemoryAccess], None),
         Op::Store | Op::SubgroupBlockPrefetchINTEL => o(&[K::Id, K::Id], &[K::MemoryAccess], None),
         Op::CopyMemory => o(&[K::Id, K::Id], &[K::MemoryAccess, K::MemoryAccess], None),
-        Op::CopyMemorySized => o(
-            &[K::Id, K::Id, K::Id],
-            &[K::MemoryAccess, K::MemoryAccess],
-            None,
-        ),
-        Op::PtrAccessChain
-        | Op::InBoundsPtrAccessChain
-        | Op::UntypedAccessChainKHR
-        | Op::UntypedInBoundsAccessChainKHR
-        | Op::CooperativeMatrixPerElementOpNV => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id],
-            &[],
-            Some(K::Id),
-        ),
-        Op::ArrayLength => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Literal],
-            &[],
-            None,
-        ),
-        Op::GenericPtrMemSemantics
-        | Op::CopyObject
-        | Op::Transpose
-        | Op::Image
-        | Op::ImageQueryFormat
-        | Op::ImageQueryOrder
-        | Op::ImageQuerySize
-        | Op::ImageQueryLevels
-        | Op::ImageQuerySamples
-        | Op::ConvertFToU
-        | Op::ConvertFToS
-        | Op::ConvertSToF
-        | Op::ConvertUToF
-        | Op::UConvert
-        | Op::SConvert
-        | Op::FConvert
-        | Op::QuantizeToF16
-        | Op::ConvertPtrToU
-        | Op::SatConvertSToU
-        | Op::SatConvertUToS
-        | Op::ConvertUToPtr
-        | Op::PtrCastToGeneric
-        | Op::GenericCastToPtr
-        | Op::Bitcast
-        | Op::SNegate
-        | Op::FNegate
-        | Op::Any
-        | Op::All
-        | Op::IsNan
-        | Op::IsInf
-        | Op::IsFinite
-        | Op::IsNormal
-        | Op::SignBitSet
-        | Op::LogicalNot
-        | Op::Not
-        | Op::BitReverse
-        | Op::BitCount
-        | Op::DPdx
-        | Op::DPdy
-        | Op::Fwidth
-        | Op::DPdxFine
-        | Op::DPdyFine
-        | Op::FwidthFine
-        | Op::DPdxCoarse
-        | Op::DPdyCoarse
-        | Op::FwidthCoarse
-        | Op::IsValidReserveId
-        | Op::IsValidEvent
-        | Op::ImageSparseTexelsResident
-        | Op::SizeOf
-        | Op::CreatePipeFromPipeStorage
-        | Op::NamedBarrierInitialize
-        | Op::GroupNonUniformElect
-        | Op::CopyLogical
-        | Op::SubgroupBallotKHR
-        | Op::SubgroupFirstInvocationKHR
-        | Op::SubgroupAllKHR
-        | Op::SubgroupAnyKHR
-        | Op::SubgroupAllEqualKHR
-        | Op::ConvertUToAccelerationStructureKHR
-        | Op::CooperativeMatrixLengthKHR
-        | Op::ConstantCompositeReplicateEXT
-        | Op::SpecConstantCompositeReplicateEXT
-        | Op::CompositeConstructReplicateEXT
-        | Op::RayQueryProceedKHR
-        | Op::BitCastArrayQCOM
-        | Op::CompositeConstructCoopMatQCOM
-        | Op::CompositeExtractCoopMatQCOM
-        | Op::ReadClockKHR
-        | Op::FinishWritingNodePayloadAMDX
-        | Op::NodePayloadArrayLengthAMDX
-        | Op::GroupNonUniformQuadAllKHR
-        | Op::GroupNonUniformQuadAnyKHR
-        | Op::HitObjectGetWorldToObjectNV
-        | Op::HitObjectGetObjectToWorldNV
-        | Op::HitObjectGetObjectRayDirectionNV
-        | Op::HitObjectGetObjectRayOriginNV
-        | Op::HitObjectGetShaderRecordBufferHandleNV
-        | Op::HitObjectGetShaderBindingTableRecordIndexNV
-        | Op::HitObjectGetCurrentTimeNV
-        | Op::HitObjectGetHitKindNV
-        | Op::HitObjectGetPrimitiveIndexNV
-        | Op::HitObjectGetGeometryIndexNV
-        | Op::HitObjectGetInstanceIdNV
-        | Op::HitObjectGetInstanceCustomIndexNV
-        | Op::HitObjectGetWorldRayDirectionNV
-        | Op::HitObjectGetWorldRayOriginNV
-        | Op::HitObjectGetRayTMaxNV
-        | Op::HitObjectGetRayTMinNV
-        | Op::HitObjectIsEmptyNV
-        | Op::HitObjectIsHitNV
-        | Op::HitObjectIsMissNV
-        | Op::CooperativeMatrixConvertNV
-        | Op::GroupNonUniformPartitionEXT
-        | Op::HitObjectGetIntersectionTriangleVertexPositionsEXT
-        | Op::HitObjectGetRayFlagsEXT
-        | Op::HitObjectGetCurrentTimeEXT
-        | Op::HitObjectGetHitKindEXT
-        | Op::HitObjectGetPrimitiveIndexEXT
-        | Op::HitObjectGetGeometryIndexEXT
-        | Op::HitObjectGetInstanceIdEXT
-        | Op::HitObjectGetInstanceCustomIndexEXT
-        | Op::HitObjectGetObjectRayOriginEXT
-        | Op::HitObjectGetObjectRayDirectionEXT
-        | Op::HitObjectGetWorldRayDirectionEXT
-        | Op::HitObjectGetWorldRayOriginEXT
-        | Op::HitObjectGetObjectToWorldEXT
-        | Op::HitObjectGetWorldToObjectEXT
-        | Op::HitObjectGetRayTMaxEXT
-        | Op::HitObjectGetClusterIdNV
-        | Op::HitObjectGetRayTMinEXT
-        | Op::HitObjectGetShaderBindingTableRecordIndexEXT
-        | Op::HitObjectGetShaderRecordBufferHandleEXT
-        | Op::HitObjectIsEmptyEXT
-        | Op::HitObjectIsHitEXT
-        | Op::HitObjectIsMissEXT
-        | Op::CooperativeMatrixLengthNV
-        | Op::CooperativeMatrixTransposeNV
-        | Op::ConvertUToImageNV
-        | Op::ConvertUToSamplerNV
-        | Op::ConvertImageToUNV
-        | Op::ConvertSamplerToUNV
-        | Op::ConvertUToSampledImageNV
-        | Op::ConvertSampledImageToUNV
-        | Op::HitObjectGetSpherePositionNV
-        | Op::HitObjectGetSphereRadiusNV
-        | Op::HitObjectGetLSSPositionsNV
-        | Op::HitObjectGetLSSRadiiNV
-        | Op::HitObjectIsSphereHitNV
-        | Op::HitObjectIsLSSHitNV
-        | Op::SubgroupBlockReadINTEL
-        | Op::UCountLeadingZerosINTEL
-        | Op::UCountTrailingZerosINTEL
-        | Op::ConstantFunctionPointerINTEL
-        | Op::SubgroupAvcMceSetAcOnlyHaarINTEL
-        | Op::SubgroupAvcMceConvertToImePayloadINTEL
-        | Op::SubgroupAvcMceConvertToImeResultINTEL
-        | Op::SubgroupAvcMceConvertToRefPayloadINTEL
-        | Op::SubgroupAvcMceConvertToRefResultINTEL
-        | Op::SubgroupAvcMceConvertToSicPayloadINTEL
-        | Op::SubgroupAvcMceConvertToSicResultINTEL
-        | Op::SubgroupAvcMceGetMotionVectorsINTEL
-        | Op::SubgroupAvcMceGetInterDistortionsINTEL
-        | Op::SubgroupAvcMceGetBestInterDistortionsINTEL
-        | Op::SubgroupAvcMceGetInterMajorShapeINTEL
-        | Op::SubgroupAvcMceGetInterMinorShapeINTEL
-        | Op::SubgroupAvcMceGetInterDirectionsINTEL
-        | Op::SubgroupAvcMceGetInterMotionVectorCountINTEL
-        | Op::SubgroupAvcMceGetInterReferenceIdsINTEL
-        | Op::SubgroupAvcImeConvertToMcePayloadINTEL
-        | Op::SubgroupAvcImeSetUnidirectionalMixDisableINTEL
-        | Op::SubgroupAvcImeConvertToMceResultINTEL
-        | Op::SubgroupAvcImeGetSingleReferenceStreaminINTEL
-        | Op::SubgroupAvcImeGetDualReferenceStreaminINTEL
-        | Op::SubgroupAvcImeStripSingleReferenceStreamoutINTEL
-        | Op::SubgroupAvcImeStripDualReferenceStreamoutINTEL
-        | Op::SubgroupAvcImeGetTruncatedSearchIndicationINTEL
+        Op::CopyMemorySized => o(&[K::Id, K::Id, K::Id], &[K::MemoryAccess, K::MemoryAccess], None),
+        Op::PtrAccessChain | Op::InBoundsPtrAccessChain | Op::UntypedAccessChainKHR
+        | Op::UntypedInBoundsAccessChainKHR | Op::CooperativeMatrixPerElementOpNV
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id], &[], Some(K::Id)),
+        Op::ArrayLength => o(&[K::IdResultType, K::IdResult, K::Id, K::Literal], &[], None),
+        Op::GenericPtrMemSemantics | Op::CopyObject | Op::Transpose | Op::Image | Op::ImageQueryFormat
+        | Op::ImageQueryOrder | Op::ImageQuerySize | Op::ImageQueryLevels | Op::ImageQuerySamples | Op::ConvertFToU
+        | Op::ConvertFToS | Op::ConvertSToF | Op::ConvertUToF | Op::UConvert | Op::SConvert | Op::FConvert
+        | Op::QuantizeToF16 | Op::ConvertPtrToU | Op::SatConvertSToU | Op::SatConvertUToS | Op::ConvertUToPtr
+        | Op::PtrCastToGeneric | Op::GenericCastToPtr | Op::Bitcast | Op::SNegate | Op::FNegate | Op::Any | Op::All
+        | Op::IsNan | Op::IsInf | Op::IsFinite | Op::IsNormal | Op::SignBitSet | Op::LogicalNot | Op::Not
+        | Op::BitReverse | Op::BitCount | Op::DPdx | Op::DPdy | Op::Fwidth | Op::DPdxFine | Op::DPdyFine
+        | Op::FwidthFine | Op::DPdxCoarse | Op::DPdyCoarse | Op::FwidthCoarse | Op::IsValidReserveId
+        | Op::IsValidEvent | Op::ImageSparseTexelsResident | Op::SizeOf | Op::CreatePipeFromPipeStorage
+        | Op::NamedBarrierInitialize | Op::GroupNonUniformElect | Op::CopyLogical | Op::SubgroupBallotKHR
+        | Op::SubgroupFirstInvocationKHR | Op::SubgroupAllKHR | Op::SubgroupAnyKHR | Op::SubgroupAllEqualKHR
+        | Op::ConvertUToAccelerationStructureKHR | Op::CooperativeMatrixLengthKHR
+        | Op::ConstantCompositeReplicateEXT | Op::SpecConstantCompositeReplicateEXT
+        | Op::CompositeConstructReplicateEXT | Op::RayQueryProceedKHR | Op::BitCastArrayQCOM
+        | Op::CompositeConstructCoopMatQCOM | Op::CompositeExtractCoopMatQCOM | Op::ReadClockKHR
+        | Op::FinishWritingNodePayloadAMDX | Op::NodePayloadArrayLengthAMDX | Op::GroupNonUniformQuadAllKHR
+        | Op::GroupNonUniformQuadAnyKHR | Op::HitObjectGetWorldToObjectNV | Op::HitObjectGetObjectToWorldNV
+        | Op::HitObjectGetObjectRayDirectionNV | Op::HitObjectGetObjectRayOriginNV
+        | Op::HitObjectGetShaderRecordBufferHandleNV | Op::HitObjectGetShaderBindingTableRecordIndexNV
+        | Op::HitObjectGetCurrentTimeNV | Op::HitObjectGetHitKindNV | Op::HitObjectGetPrimitiveIndexNV
+        | Op::HitObjectGetGeometryIndexNV | Op::HitObjectGetInstanceIdNV | Op::HitObjectGetInstanceCustomIndexNV
+        | Op::HitObjectGetWorldRayDirectionNV | Op::HitObjectGetWorldRayOriginNV | Op::HitObjectGetRayTMaxNV
+        | Op::HitObjectGetRayTMinNV | Op::HitObjectIsEmptyNV | Op::HitObjectIsHitNV | Op::HitObjectIsMissNV
+        | Op::CooperativeMatrixConvertNV | Op::GroupNonUniformPartitionEXT
+        | Op::HitObjectGetIntersectionTriangleVertexPositionsEXT | Op::HitObjectGetRayFlagsEXT
+        | Op::HitObjectGetCurrentTimeEXT | Op::HitObjectGetHitKindEXT | Op::HitObjectGetPrimitiveIndexEXT
+        | Op::HitObjectGetGeometryIndexEXT | Op::HitObjectGetInstanceIdEXT | Op::HitObjectGetInstanceCustomIndexEXT
+        | Op::HitObjectGetObjectRayOriginEXT | Op::HitObjectGetObjectRayDirectionEXT
+        | Op::HitObjectGetWorldRayDirectionEXT | Op::HitObjectGetWorldRayOriginEXT
+        | Op::HitObjectGetObjectToWorldEXT | Op::HitObjectGetWorldToObjectEXT | Op::HitObjectGetRayTMaxEXT
+        | Op::HitObjectGetClusterIdNV | Op::HitObjectGetRayTMinEXT
+        | Op::HitObjectGetShaderBindingTableRecordIndexEXT | Op::HitObjectGetShaderRecordBufferHandleEXT
+        | Op::HitObjectIsEmptyEXT | Op::HitObjectIsHitEXT | Op::HitObjectIsMissEXT | Op::CooperativeMatrixLengthNV
+        | Op::CooperativeMatrixTransposeNV | Op::ConvertUToImageNV | Op::ConvertUToSamplerNV
+        | Op::ConvertImageToUNV | Op::ConvertSamplerToUNV | Op::ConvertUToSampledImageNV
+        | Op::ConvertSampledImageToUNV | Op::HitObjectGetSpherePositionNV | Op::HitObjectGetSphereRadiusNV
+        | Op::HitObjectGetLSSPositionsNV | Op::HitObjectGetLSSRadiiNV | Op::HitObjectIsSphereHitNV
+        | Op::HitObjectIsLSSHitNV | Op::SubgroupBlockReadINTEL | Op::UCountLeadingZerosINTEL
+        | Op::UCountTrailingZerosINTEL | Op::ConstantFunctionPointerINTEL | Op::SubgroupAvcMceSetAcOnlyHaarINTEL
+        | Op::SubgroupAvcMceConvertToImePayloadINTEL | Op::SubgroupAvcMceConvertToImeResultINTEL
+        | Op::SubgroupAvcMceConvertToRefPayloadINTEL | Op::SubgroupAvcMceConvertToRefResultINTEL
+        | Op::SubgroupAvcMceConvertToSicPayloadINTEL | Op::SubgroupAvcMceConvertToSicResultINTEL
+        | Op::SubgroupAvcMceGetMotionVectorsINTEL | Op::SubgroupAvcMceGetInterDistortionsINTEL
+        | Op::SubgroupAvcMceGetBestInterDistortionsINTEL | Op::SubgroupAvcMceGetInterMajorShapeINTEL
+        | Op::SubgroupAvcMceGetInterMinorShapeINTEL | Op::SubgroupAvcMceGetInterDirectionsINTEL
+        | Op::SubgroupAvcMceGetInterMotionVectorCountINTEL | Op::SubgroupAvcMceGetInterReferenceIdsINTEL
+        | Op::SubgroupAvcImeConvertToMcePayloadINTEL | Op::SubgroupAvcImeSetUnidirectionalMixDisableINTEL
+        | Op::SubgroupAvcImeConvertToMceResultINTEL | Op::SubgroupAvcImeGetSingleReferenceStreaminINTEL
+        | Op::SubgroupAvcImeGetDualReferenceStreaminINTEL | Op::SubgroupAvcImeStripSingleReferenceStreamoutINTEL
+        | Op::SubgroupAvcImeStripDualReferenceStreamoutINTEL | Op::SubgroupAvcImeGetTruncatedSearchIndicationINTEL
         | Op::SubgroupAvcImeGetUnidirectionalEarlySearchTerminationINTEL
         | Op::SubgroupAvcImeGetWeightingPatternMinimumMotionVectorINTEL
-        | Op::SubgroupAvcImeGetWeightingPatternMinimumDistortionINTEL
-        | Op::SubgroupAvcRefConvertToMcePayloadINTEL
-        | Op::SubgroupAvcRefSetBidirectionalMixDisableINTEL
-        | Op::SubgroupAvcRefSetBilinearFilterEnableINTEL
-        | Op::SubgroupAvcRefConvertToMceResultINTEL
-        | Op::SubgroupAvcSicInitializeINTEL
-        | Op::SubgroupAvcSicConvertToMcePayloadINTEL
-        | Op::SubgroupAvcSicSetBilinearFilterEnableINTEL
-        | Op::SubgroupAvcSicConvertToMceResultINTEL
-        | Op::SubgroupAvcSicGetIpeLumaShapeINTEL
-        | Op::SubgroupAvcSicGetBestIpeLumaDistortionINTEL
-        | Op::SubgroupAvcSicGetBestIpeChromaDistortionINTEL
-        | Op::SubgroupAvcSicGetPackedIpeLumaModesINTEL
-        | Op::SubgroupAvcSicGetIpeChromaModeINTEL
+        | Op::SubgroupAvcImeGetWeightingPatternMinimumDistortionINTEL | Op::SubgroupAvcRefConvertToMcePayloadINTEL
+        | Op::SubgroupAvcRefSetBidirectionalMixDisableINTEL | Op::SubgroupAvcRefSetBilinearFilterEnableINTEL
+        | Op::SubgroupAvcRefConvertToMceResultINTEL | Op::SubgroupAvcSicInitializeINTEL
+        | Op::SubgroupAvcSicConvertToMcePayloadINTEL | Op::SubgroupAvcSicSetBilinearFilterEnableINTEL
+        | Op::SubgroupAvcSicConvertToMceResultINTEL | Op::SubgroupAvcSicGetIpeLumaShapeINTEL
+        | Op::SubgroupAvcSicGetBestIpeLumaDistortionINTEL | Op::SubgroupAvcSicGetBestIpeChromaDistortionINTEL
+        | Op::SubgroupAvcSicGetPackedIpeLumaModesINTEL | Op::SubgroupAvcSicGetIpeChromaModeINTEL
         | Op::SubgroupAvcSicGetPackedSkcLumaCountThresholdINTEL
-        | Op::SubgroupAvcSicGetPackedSkcLumaSumThresholdINTEL
-        | Op::SubgroupAvcSicGetInterRawSadsINTEL
-        | Op::VariableLengthArrayINTEL
-        | Op::PtrCastToCrossWorkgroupALTERA
-        | Op::CrossWorkgroupCastToPtrALTERA
-        | Op::FPGARegALTERA
-        | Op::RayQueryGetRayTMinKHR
-        | Op::RayQueryGetRayFlagsKHR
-        | Op::RayQueryGetIntersectionCandidateAABBOpaqueKHR
-        | Op::RayQueryGetWorldRayDirectionKHR
-        | Op::RayQueryGetWorldRayOriginKHR
-        | Op::ConvertFToBF16INTEL
-        | Op::ConvertBF16ToFINTEL
-        | Op::ArithmeticFenceEXT
-        | Op::TaskSequenceGetALTERA
-        | Op::RoundFToTF32INTEL
-        | Op::ConvertHandleToImageINTEL
-        | Op::ConvertHandleToSamplerINTEL
-        | Op::ConvertHandleToSampledImageINTEL => {
-            o(&[K::IdResultType, K::IdResult, K::Id], &[], None)
-        }
+        | Op::SubgroupAvcSicGetPackedSkcLumaSumThresholdINTEL | Op::SubgroupAvcSicGetInterRawSadsINTEL
+        | Op::VariableLengthArrayINTEL | Op::PtrCastToCrossWorkgroupALTERA | Op::CrossWorkgroupCastToPtrALTERA
+        | Op::FPGARegALTERA | Op::RayQueryGetRayTMinKHR | Op::RayQueryGetRayFlagsKHR
+        | Op::RayQueryGetIntersectionCandidateAABBOpaqueKHR | Op::RayQueryGetWorldRayDirectionKHR
+        | Op::RayQueryGetWorldRayOriginKHR | Op::ConvertFToBF16INTEL | Op::ConvertBF16ToFINTEL
+        | Op::ArithmeticFenceEXT | Op::TaskSequenceGetALTERA | Op::RoundFToTF32INTEL
+        | Op::ConvertHandleToImageINTEL | Op::ConvertHandleToSamplerINTEL | Op::ConvertHandleToSampledImageINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Id], &[], None),
         Op::Decorate | Op::DecorateId | Op::DecorateString => o(&[K::Id, K::Decoration], &[], None),
-        Op::MemberDecorate | Op::MemberDecorateString => {
-            o(&[K::Id, K::Literal, K::Decoration], &[], None)
-        }
+        Op::MemberDecorate | Op::MemberDecorateString => o(&[K::Id, K::Literal, K::Decoration], &[], None),
         Op::GroupDecorate | Op::TaskSequenceAsyncALTERA => o(&[K::Id], &[], Some(K::Id)),
         Op::GroupMemberDecorate => o(&[K::Id], &[], Some(K::IdLiteralPair)),
-        Op::VectorExtractDynamic
-        | Op::SampledImage
-        | Op::ImageQuerySizeLod
-        | Op::ImageQueryLod
-        | Op::IAdd
-        | Op::FAdd
-        | Op::ISub
-        | Op::FSub
-        | Op::IMul
-        | Op::FMul
-        | Op::UDiv
-        | Op::SDiv
-        | Op::FDiv
-        | Op::UMod
-        | Op::SRem
-        | Op::SMod
-        | Op::FRem
-        | Op::FMod
-        | Op::VectorTimesScalar
-        | Op::MatrixTimesScalar
-        | Op::VectorTimesMatrix
-        | Op::MatrixTimesVector
-        | Op::MatrixTimesMatrix
-        | Op::OuterProduct
-        | Op::Dot
-        | Op::IAddCarry
-        | Op::ISubBorrow
-        | Op::UMulExtended
-        | Op::SMulExtended
-        | Op::LessOrGreater
-        | Op::Ordered
-        | Op::Unordered
-        | Op::LogicalEqual
-        | Op::LogicalNotEqual
-        | Op::LogicalOr
-        | Op::LogicalAnd
-        | Op::IEqual
-        | Op::INotEqual
-        | Op::UGreaterThan
-        | Op::SGreaterThan
-        | Op::UGreaterThanEqual
-        | Op::SGreaterThanEqual
-        | Op::ULessThan
-        | Op::SLessThan
-        | Op::ULessThanEqual
-        | Op::SLessThanEqual
-        | Op::FOrdEqual
-        | Op::FUnordEqual
-        | Op::FOrdNotEqual
-        | Op::FUnordNotEqual
-        | Op::FOrdLessThan
-        | Op::FUnordLessThan
-        | Op::FOrdGreaterThan
-        | Op::FUnordGreaterThan
-        | Op::FOrdLessThanEqual
-        | Op::FUnordLessThanEqual
-        | Op::FOrdGreaterThanEqual
-        | Op::FUnordGreaterThanEqual
-        | Op::ShiftRightLogical
-        | Op::ShiftRightArithmetic
-        | Op::ShiftLeftLogical
-        | Op::BitwiseOr
-        | Op::BitwiseXor
-        | Op::BitwiseAnd
-        | Op::GroupAll
-        | Op::GroupAny
-        | Op::GroupNonUniformAll
-        | Op::GroupNonUniformAny
-        | Op::GroupNonUniformAllEqual
-        | Op::GroupNonUniformBroadcastFirst
-        | Op::GroupNonUniformBallot
-        | Op::GroupNonUniformInverseBallot
-        | Op::GroupNonUniformBallotFindLSB
-        | Op::GroupNonUniformBallotFindMSB
-        | Op::PtrEqual
-        | Op::PtrNotEqual
-        | Op::PtrDiff
-        | Op::TensorQuerySizeARM
-        | Op::SubgroupReadInvocationKHR
-        | Op::RayQueryGetIntersectionTypeKHR
-        | Op::ExtractSubArrayQCOM
-        | Op::FragmentMaskFetchAMD
-        | Op::IsNodePayloadValidAMDX
-        | Op::ReportIntersectionKHR
-        | Op::RayQueryGetIntersectionTriangleVertexPositionsKHR
-        | Op::RayQueryGetIntersectionClusterIdNV
-        | Op::TensorLayoutSetClampValueNV
-        | Op::RayQueryGetIntersectionSpherePositionNV
-        | Op::RayQueryGetIntersectionSphereRadiusNV
-        | Op::RayQueryGetIntersectionLSSPositionsNV
-        | Op::RayQueryGetIntersectionLSSRadiiNV
-        | Op::RayQueryGetIntersectionLSSHitValueNV
-        | Op::RayQueryIsSphereHitNV
-        | Op::RayQueryIsLSSHitNV
-        | Op::SubgroupShuffleINTEL
-        | Op::SubgroupShuffleXorINTEL
-        | Op::SubgroupImageBlockReadINTEL
-        | Op::AbsISubINTEL
-        | Op::AbsUSubINTEL
-        | Op::IAddSatINTEL
-        | Op::UAddSatINTEL
-        | Op::IAverageINTEL
-        | Op::UAverageINTEL
-        | Op::IAverageRoundedINTEL
-        | Op::UAverageRoundedINTEL
-        | Op::ISubSatINTEL
-        | Op::USubSatINTEL
-        | Op::IMul32x16INTEL
-        | Op::UMul32x16INTEL
-        | Op::ExpectKHR
-        | Op::VmeImageINTEL
-        | Op::SubgroupAvcMceGetDefaultInterBaseMultiReferencePenaltyINTEL
+        Op::VectorExtractDynamic | Op::SampledImage | Op::ImageQuerySizeLod | Op::ImageQueryLod | Op::IAdd
+        | Op::FAdd | Op::ISub | Op::FSub | Op::IMul | Op::FMul | Op::UDiv | Op::SDiv | Op::FDiv | Op::UMod
+        | Op::SRem | Op::SMod | Op::FRem | Op::FMod | Op::VectorTimesScalar | Op::MatrixTimesScalar
+        | Op::VectorTimesMatrix | Op::MatrixTimesVector | Op::MatrixTimesMatrix | Op::OuterProduct | Op::Dot
+        | Op::IAddCarry | Op::ISubBorrow | Op::UMulExtended | Op::SMulExtended | Op::LessOrGreater | Op::Ordered
+        | Op::Unordered | Op::LogicalEqual | Op::LogicalNotEqual | Op::LogicalOr | Op::LogicalAnd | Op::IEqual
+        | Op::INotEqual | Op::UGreaterThan | Op::SGreaterThan | Op::UGreaterThanEqual | Op::SGreaterThanEqual
+        | Op::ULessThan | Op::SLessThan | Op::ULessThanEqual | Op::SLessThanEqual | Op::FOrdEqual | Op::FUnordEqual
+        | Op::FOrdNotEqual | Op::FUnordNotEqual | Op::FOrdLessThan | Op::FUnordLessThan | Op::FOrdGreaterThan
+        | Op::FUnordGreaterThan | Op::FOrdLessThanEqual | Op::FUnordLessThanEqual | Op::FOrdGreaterThanEqual
+        | Op::FUnordGreaterThanEqual | Op::ShiftRightLogical | Op::ShiftRightArithmetic | Op::ShiftLeftLogical
+        | Op::BitwiseOr | Op::BitwiseXor | Op::BitwiseAnd | Op::GroupAll | Op::GroupAny | Op::GroupNonUniformAll
+        | Op::GroupNonUniformAny | Op::GroupNonUniformAllEqual | Op::GroupNonUniformBroadcastFirst
+        | Op::GroupNonUniformBallot | Op::GroupNonUniformInverseBallot | Op::GroupNonUniformBallotFindLSB
+        | Op::GroupNonUniformBallotFindMSB | Op::PtrEqual | Op::PtrNotEqual | Op::PtrDiff | Op::TensorQuerySizeARM
+        | Op::SubgroupReadInvocationKHR | Op::RayQueryGetIntersectionTypeKHR | Op::ExtractSubArrayQCOM
+        | Op::FragmentMaskFetchAMD | Op::IsNodePayloadValidAMDX | Op::ReportIntersectionKHR
+        | Op::RayQueryGetIntersectionTriangleVertexPositionsKHR | Op::RayQueryGetIntersectionClusterIdNV
+        | Op::TensorLayoutSetClampValueNV | Op::RayQueryGetIntersectionSpherePositionNV
+        | Op::RayQueryGetIntersectionSphereRadiusNV | Op::RayQueryGetIntersectionLSSPositionsNV
+        | Op::RayQueryGetIntersectionLSSRadiiNV | Op::RayQueryGetIntersectionLSSHitValueNV
+        | Op::RayQueryIsSphereHitNV | Op::RayQueryIsLSSHitNV | Op::SubgroupShuffleINTEL
+        | Op::SubgroupShuffleXorINTEL | Op::SubgroupImageBlockReadINTEL | Op::AbsISubINTEL | Op::AbsUSubINTEL
+        | Op::IAddSatINTEL | Op::UAddSatINTEL | Op::IAverageINTEL | Op::UAverageINTEL | Op::IAverageRoundedINTEL
+        | Op::UAverageRoundedINTEL | Op::ISubSatINTEL | Op::USubSatINTEL | Op::IMul32x16INTEL | Op::UMul32x16INTEL
+        | Op::ExpectKHR | Op::VmeImageINTEL | Op::SubgroupAvcMceGetDefaultInterBaseMultiReferencePenaltyINTEL
         | Op::SubgroupAvcMceSetInterBaseMultiReferencePenaltyINTEL
-        | Op::SubgroupAvcMceGetDefaultInterShapePenaltyINTEL
-        | Op::SubgroupAvcMceSetInterShapePenaltyINTEL
-        | Op::SubgroupAvcMceGetDefaultInterDirectionPenaltyINTEL
-        | Op::SubgroupAvcMceSetInterDirectionPenaltyINTEL
+        | Op::SubgroupAvcMceGetDefaultInterShapePenaltyINTEL | Op::SubgroupAvcMceSetInterShapePenaltyINTEL
+        | Op::SubgroupAvcMceGetDefaultInterDirectionPenaltyINTEL | Op::SubgroupAvcMceSetInterDirectionPenaltyINTEL
         | Op::SubgroupAvcMceGetDefaultIntraLumaShapePenaltyINTEL
         | Op::SubgroupAvcMceGetDefaultInterMotionVectorCostTableINTEL
         | Op::SubgroupAvcMceGetDefaultIntraLumaModePenaltyINTEL
         | Op::SubgroupAvcMceSetSourceInterlacedFieldPolarityINTEL
-        | Op::SubgroupAvcMceSetSingleReferenceInterlacedFieldPolarityINTEL
-        | Op::SubgroupAvcImeRefWindowSizeINTEL
+        | Op::SubgroupAvcMceSetSingleReferenceInterlacedFieldPolarityINTEL | Op::SubgroupAvcImeRefWindowSizeINTEL
         | Op::SubgroupAvcImeSetMaxMotionVectorCountINTEL
-        | Op::SubgroupAvcImeSetEarlySearchTerminationThresholdINTEL
-        | Op::SubgroupAvcImeSetWeightedSadINTEL
+        | Op::SubgroupAvcImeSetEarlySearchTerminationThresholdINTEL | Op::SubgroupAvcImeSetWeightedSadINTEL
         | Op::SubgroupAvcImeGetStreamoutSingleReferenceMajorShapeMotionVectorsINTEL
         | Op::SubgroupAvcImeGetStreamoutSingleReferenceMajorShapeDistortionsINTEL
         | Op::SubgroupAvcImeGetStreamoutSingleReferenceMajorShapeReferenceIdsINTEL
-        | Op::SubgroupAvcImeGetBorderReachedINTEL
-        | Op::SubgroupAvcSicGetMotionVectorMaskINTEL
-        | Op::SubgroupAvcSicSetIntraLumaShapePenaltyINTEL
-        | Op::SubgroupAvcSicSetIntraChromaModeCostFunctionINTEL
-        | Op::SubgroupAvcSicSetSkcForwardTransformEnableINTEL
-        | Op::SubgroupAvcSicSetBlockBasedRawSkipSadINTEL
-        | Op::SubgroupAvcSicEvaluateIpeINTEL
-        | Op::ReadPipeBlockingALTERA
-        | Op::WritePipeBlockingALTERA
-        | Op::RayQueryGetIntersectionTKHR
-        | Op::RayQueryGetIntersectionInstanceCustomIndexKHR
+        | Op::SubgroupAvcImeGetBorderReachedINTEL | Op::SubgroupAvcSicGetMotionVectorMaskINTEL
+        | Op::SubgroupAvcSicSetIntraLumaShapePenaltyINTEL | Op::SubgroupAvcSicSetIntraChromaModeCostFunctionINTEL
+        | Op::SubgroupAvcSicSetSkcForwardTransformEnableINTEL | Op::SubgroupAvcSicSetBlockBasedRawSkipSadINTEL
+        | Op::SubgroupAvcSicEvaluateIpeINTEL | Op::ReadPipeBlockingALTERA | Op::WritePipeBlockingALTERA
+        | Op::RayQueryGetIntersectionTKHR | Op::RayQueryGetIntersectionInstanceCustomIndexKHR
         | Op::RayQueryGetIntersectionInstanceIdKHR
         | Op::RayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetKHR
-        | Op::RayQueryGetIntersectionGeometryIndexKHR
-        | Op::RayQueryGetIntersectionPrimitiveIndexKHR
-        | Op::RayQueryGetIntersectionBarycentricsKHR
-        | Op::RayQueryGetIntersectionFrontFaceKHR
-        | Op::RayQueryGetIntersectionObjectRayDirectionKHR
-        | Op::RayQueryGetIntersectionObjectRayOriginKHR
-        | Op::RayQueryGetIntersectionObjectToWorldKHR
-        | Op::RayQueryGetIntersectionWorldToObjectKHR
-        | Op::UntypedVariableLengthArrayINTEL => {
-            o(&[K::IdResultType, K::IdResult, K::Id, K::Id], &[], None)
-        }
-        Op::VectorShuffle | Op::CompositeInsert => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id],
-            &[],
-            Some(K::Literal),
-        ),
-        Op::CompositeExtract => o(
-            &[K::IdResultType, K::IdResult, K::Id],
-            &[],
-            Some(K::Literal),
-        ),
-        Op::ImageSampleImplicitLod
-        | Op::ImageSampleProjImplicitLod
-        | Op::ImageFetch
-        | Op::ImageRead
-        | Op::ImageSparseSampleImplicitLod
-        | Op::ImageSparseSampleProjImplicitLod
-        | Op::ImageSparseFetch
-        | Op::ImageSparseRead => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id],
-            &[K::ImageOperands],
-            None,
-        ),
-        Op::ImageSampleExplicitLod
-        | Op::ImageSampleProjExplicitLod
-        | Op::ImageSparseSampleExplicitLod
-        | Op::ImageSparseSampleProjExplicitLod => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::ImageOperands],
-            &[],
-            None,
-        ),
-        Op::ImageSampleDrefImplicitLod
-        | Op::ImageSampleProjDrefImplicitLod
-        | Op::ImageGather
-        | Op::ImageDrefGather
-        | Op::ImageSparseSampleDrefImplicitLod
-        | Op::ImageSparseSampleProjDrefImplicitLod
-        | Op::ImageSparseGather
-        | Op::ImageSparseDrefGather => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id],
-            &[K::ImageOperands],
-            None,
-        ),
-        Op::ImageSampleDrefExplicitLod
-        | Op::ImageSampleProjDrefExplicitLod
-        | Op::ImageSparseSampleDrefExplicitLod
-        | Op::ImageSparseSampleProjDrefExplicitLod => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::ImageOperands,
-            ],
-            &[],
-            None,
-        ),
+        | Op::RayQueryGetIntersectionGeometryIndexKHR | Op::RayQueryGetIntersectionPrimitiveIndexKHR
+        | Op::RayQueryGetIntersectionBarycentricsKHR | Op::RayQueryGetIntersectionFrontFaceKHR
+        | Op::RayQueryGetIntersectionObjectRayDirectionKHR | Op::RayQueryGetIntersectionObjectRayOriginKHR
+        | Op::RayQueryGetIntersectionObjectToWorldKHR | Op::RayQueryGetIntersectionWorldToObjectKHR
+        | Op::UntypedVariableLengthArrayINTEL => o(&[K::IdResultType, K::IdResult, K::Id, K::Id], &[], None),
+        Op::VectorShuffle | Op::CompositeInsert
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id], &[], Some(K::Literal)),
+        Op::CompositeExtract => o(&[K::IdResultType, K::IdResult, K::Id], &[], Some(K::Literal)),
+        Op::ImageSampleImplicitLod | Op::ImageSampleProjImplicitLod | Op::ImageFetch | Op::ImageRead
+        | Op::ImageSparseSampleImplicitLod | Op::ImageSparseSampleProjImplicitLod | Op::ImageSparseFetch
+        | Op::ImageSparseRead => o(&[K::IdResultType, K::IdResult, K::Id, K::Id], &[K::ImageOperands], None),
+        Op::ImageSampleExplicitLod | Op::ImageSampleProjExplicitLod | Op::ImageSparseSampleExplicitLod
+        | Op::ImageSparseSampleProjExplicitLod
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::ImageOperands], &[], None),
+        Op::ImageSampleDrefImplicitLod | Op::ImageSampleProjDrefImplicitLod | Op::ImageGather | Op::ImageDrefGather
+        | Op::ImageSparseSampleDrefImplicitLod | Op::ImageSparseSampleProjDrefImplicitLod | Op::ImageSparseGather
+        | Op::ImageSparseDrefGather
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id], &[K::ImageOperands], None),
+        Op::ImageSampleDrefExplicitLod | Op::ImageSampleProjDrefExplicitLod | Op::ImageSparseSampleDrefExplicitLod
+        | Op::ImageSparseSampleProjDrefExplicitLod
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::ImageOperands], &[], None),
         Op::ImageWrite => o(&[K::Id, K::Id, K::Id], &[K::ImageOperands], None),
-        Op::GenericCastToPtrExplicit => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::StorageClass],
-            &[],
-            None,
-        ),
-        Op::BitFieldInsert
-        | Op::AtomicExchange
-        | Op::AtomicIAdd
-        | Op::AtomicISub
-        | Op::AtomicSMin
-        | Op::AtomicUMin
-        | Op::AtomicSMax
-        | Op::AtomicUMax
-        | Op::AtomicAnd
-        | Op::AtomicOr
-        | Op::AtomicXor
-        | Op::ReadPipe
-        | Op::WritePipe
-        | Op::ReserveReadPipePackets
-        | Op::ReserveWritePipePackets
-        | Op::EnqueueMarker
-        | Op::GetKernelWorkGroupSize
-        | Op::GetKernelPreferredWorkGroupSizeMultiple
-        | Op::GetKernelMaxNumSubgroups
-        | Op::SubgroupImageMediaBlockReadINTEL
-        | Op::AtomicFMinEXT
-        | Op::AtomicFMaxEXT
-        | Op::SubgroupAvcMceSetMotionVectorCostFunctionINTEL
-        | Op::SubgroupAvcImeSetDualReferenceINTEL
-        | Op::SubgroupAvcImeAdjustRefOffsetINTEL
-        | Op::SubgroupAvcImeEvaluateWithDualReferenceINTEL
+        Op::GenericCastToPtrExplicit => o(&[K::IdResultType, K::IdResult, K::Id, K::StorageClass], &[], None),
+        Op::BitFieldInsert | Op::AtomicExchange | Op::AtomicIAdd | Op::AtomicISub | Op::AtomicSMin | Op::AtomicUMin
+        | Op::AtomicSMax | Op::AtomicUMax | Op::AtomicAnd | Op::AtomicOr | Op::AtomicXor | Op::ReadPipe
+        | Op::WritePipe | Op::ReserveReadPipePackets | Op::ReserveWritePipePackets | Op::EnqueueMarker
+        | Op::GetKernelWorkGroupSize | Op::GetKernelPreferredWorkGroupSizeMultiple | Op::GetKernelMaxNumSubgroups
+        | Op::SubgroupImageMediaBlockReadINTEL | Op::AtomicFMinEXT | Op::AtomicFMaxEXT
+        | Op::SubgroupAvcMceSetMotionVectorCostFunctionINTEL | Op::SubgroupAvcImeSetDualReferenceINTEL
+        | Op::SubgroupAvcImeAdjustRefOffsetINTEL | Op::SubgroupAvcImeEvaluateWithDualReferenceINTEL
         | Op::SubgroupAvcImeEvaluateWithSingleReferenceStreaminINTEL
         | Op::SubgroupAvcImeEvaluateWithDualReferenceStreamoutINTEL
         | Op::SubgroupAvcImeEvaluateWithSingleReferenceStreaminoutINTEL
         | Op::SubgroupAvcRefEvaluateWithDualReferenceINTEL
         | Op::SubgroupAvcRefEvaluateWithMultiReferenceInterlacedINTEL
-        | Op::SubgroupAvcSicSetIntraLumaModeCostFunctionINTEL
-        | Op::SubgroupAvcSicEvaluateWithDualReferenceINTEL
-        | Op::SubgroupAvcSicEvaluateWithMultiReferenceInterlacedINTEL
-        | Op::AtomicFAddEXT
-        | Op::BitwiseFunctionINTEL => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id],
-            &[],
-            None,
-        ),
-        Op::EmitStreamVertex
-        | Op::EndStreamPrimitive
-        | Op::Branch
-        | Op::ReturnValue
-        | Op::RetainEvent
-        | Op::ReleaseEvent
-        | Op::RayQueryTerminateKHR
-        | Op::RayQueryConfirmIntersectionKHR
-        | Op::EnqueueNodePayloadsAMDX
-        | Op::HitObjectRecordEmptyNV
-        | Op::HitObjectRecordEmptyEXT
-        | Op::AssumeTrueKHR
-        | Op::RestoreMemoryINTEL
-        | Op::TaskSequenceReleaseALTERA => o(&[K::Id], &[], None),
-        Op::ControlBarrier
-        | Op::GroupWaitEvents
-        | Op::CaptureEventProfilingInfo
-        | Op::AtomicFlagClear
-        | Op::MemoryNamedBarrier
-        | Op::CooperativeVectorReduceSumAccumulateNV
-        | Op::SubgroupImageBlockWriteINTEL
-        | Op::ControlBarrierArriveINTEL
-        | Op::ControlBarrierWaitINTEL => o(&[K::Id, K::Id, K::Id], &[], None),
-        Op::MemoryBarrier
-        | Op::SetUserEventStatus
-        | Op::ExecuteCallableKHR
-        | Op::RayQueryGenerateIntersectionKHR
-        | Op::HitObjectExecuteShaderNV
-        | Op::HitObjectGetAttributesNV
-        | Op::ReorderThreadWithHintNV
-        | Op::SetMeshOutputsEXT
-        | Op::WritePackedPrimitiveIndices4x8NV
-        | Op::HitObjectSetShaderBindingTableRecordIndexEXT
-        | Op::ReorderThreadWithHintEXT
-        | Op::HitObjectExecuteShaderEXT
-        | Op::HitObjectGetAttributesEXT
-        | Op::ExecuteCallableNV
+        | Op::SubgroupAvcSicSetIntraLumaModeCostFunctionINTEL | Op::SubgroupAvcSicEvaluateWithDualReferenceINTEL
+        | Op::SubgroupAvcSicEvaluateWithMultiReferenceInterlacedINTEL | Op::AtomicFAddEXT
+        | Op::BitwiseFunctionINTEL => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::EmitStreamVertex | Op::EndStreamPrimitive | Op::Branch | Op::ReturnValue | Op::RetainEvent
+        | Op::ReleaseEvent | Op::RayQueryTerminateKHR | Op::RayQueryConfirmIntersectionKHR
+        | Op::EnqueueNodePayloadsAMDX | Op::HitObjectRecordEmptyNV | Op::HitObjectRecordEmptyEXT
+        | Op::AssumeTrueKHR | Op::RestoreMemoryINTEL | Op::TaskSequenceReleaseALTERA => o(&[K::Id], &[], None),
+        Op::ControlBarrier | Op::GroupWaitEvents | Op::CaptureEventProfilingInfo | Op::AtomicFlagClear
+        | Op::MemoryNamedBarrier | Op::CooperativeVectorReduceSumAccumulateNV | Op::SubgroupImageBlockWriteINTEL
+        | Op::ControlBarrierArriveINTEL | Op::ControlBarrierWaitINTEL => o(&[K::Id, K::Id, K::Id], &[], None),
+        Op::MemoryBarrier | Op::SetUserEventStatus | Op::ExecuteCallableKHR | Op::RayQueryGenerateIntersectionKHR
+        | Op::HitObjectExecuteShaderNV | Op::HitObjectGetAttributesNV | Op::ReorderThreadWithHintNV
+        | Op::SetMeshOutputsEXT | Op::WritePackedPrimitiveIndices4x8NV
+        | Op::HitObjectSetShaderBindingTableRecordIndexEXT | Op::ReorderThreadWithHintEXT
+        | Op::HitObjectExecuteShaderEXT | Op::HitObjectGetAttributesEXT | Op::ExecuteCallableNV
         | Op::SubgroupBlockWriteINTEL => o(&[K::Id, K::Id], &[], None),
-        Op::AtomicStore
-        | Op::CommitReadPipe
-        | Op::CommitWritePipe
-        | Op::HitObjectRecordFromQueryEXT => o(&[K::Id, K::Id, K::Id, K::Id], &[], None),
-        Op::AtomicCompareExchange
-        | Op::AtomicCompareExchangeWeak
-        | Op::GroupAsyncCopy
-        | Op::ReservedReadPipe
-        | Op::ReservedWritePipe
-        | Op::SubgroupAvcSicConfigureSkcINTEL => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
+        Op::AtomicStore | Op::CommitReadPipe | Op::CommitWritePipe | Op::HitObjectRecordFromQueryEXT
+            => o(&[K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::AtomicCompareExchange | Op::AtomicCompareExchangeWeak | Op::GroupAsyncCopy | Op::ReservedReadPipe
+        | Op::ReservedWritePipe | Op::SubgroupAvcSicConfigureSkcINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
         Op::Phi => o(&[K::IdResultType, K::IdResult], &[], Some(K::IdPair)),
         Op::LoopMerge => o(&[K::Id, K::Id, K::LoopControl], &[], None),
         Op::SelectionMerge => o(&[K::Id, K::SelectionControl], &[], None),
         Op::BranchConditional => o(&[K::Id, K::Id, K::Id], &[], Some(K::Literal)),
         Op::Switch => o(&[K::Id, K::Id], &[], Some(K::TypedLiteralIdPair)),
         Op::LifetimeStart | Op::LifetimeStop => o(&[K::Id, K::Literal], &[], None),
-        Op::GroupIAdd
-        | Op::GroupFAdd
-        | Op::GroupFMin
-        | Op::GroupUMin
-        | Op::GroupSMin
-        | Op::GroupFMax
-        | Op::GroupUMax
-        | Op::GroupSMax
-        | Op::GroupNonUniformBallotBitCount
-        | Op::GroupIAddNonUniformAMD
-        | Op::GroupFAddNonUniformAMD
-        | Op::GroupFMinNonUniformAMD
-        | Op::GroupUMinNonUniformAMD
-        | Op::GroupSMinNonUniformAMD
-        | Op::GroupFMaxNonUniformAMD
-        | Op::GroupUMaxNonUniformAMD
-        | Op::GroupSMaxNonUniformAMD
-        | Op::GroupIMulKHR
-        | Op::GroupFMulKHR
-        | Op::GroupBitwiseAndKHR
-        | Op::GroupBitwiseOrKHR
-        | Op::GroupBitwiseXorKHR
-        | Op::GroupLogicalAndKHR
-        | Op::GroupLogicalOrKHR
-        | Op::GroupLogicalXorKHR => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::GroupOperation,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::GroupReserveReadPipePackets
-        | Op::GroupReserveWritePipePackets
-        | Op::GetKernelNDrangeSubGroupCount
-        | Op::GetKernelNDrangeMaxSubGroupSize
-        | Op::GetKernelLocalSizeForSubgroupCount
-        | Op::ImageBlockMatchSSDQCOM
-        | Op::ImageBlockMatchSADQCOM
-        | Op::ImageBlockMatchWindowSSDQCOM
-        | Op::ImageBlockMatchWindowSADQCOM
-        | Op::ImageBlockMatchGatherSSDQCOM
-        | Op::ImageBlockMatchGatherSADQCOM
-        | Op::FetchMicroTriangleVertexPositionNV
-        | Op::FetchMicroTriangleVertexBarycentricNV
-        | Op::TensorViewSetClipNV
-        | Op::SubgroupAvcImeEvaluateWithDualReferenceStreaminINTEL
-        | Op::SubgroupAvcImeEvaluateWithDualReferenceStreaminoutINTEL => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::GroupCommitReadPipe
-        | Op::GroupCommitWritePipe
-        | Op::SubgroupImageMediaBlockWriteINTEL => {
-            o(&[K::Id, K::Id, K::Id, K::Id, K::Id], &[], None)
-        }
-        Op::EnqueueKernel => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            Some(K::Id),
-        ),
-        Op::ConstantPipeStorage => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-            ],
-            &[],
-            None,
-        ),
-        Op::GroupNonUniformIAdd
-        | Op::GroupNonUniformFAdd
-        | Op::GroupNonUniformIMul
-        | Op::GroupNonUniformFMul
-        | Op::GroupNonUniformSMin
-        | Op::GroupNonUniformUMin
-        | Op::GroupNonUniformFMin
-        | Op::GroupNonUniformSMax
-        | Op::GroupNonUniformUMax
-        | Op::GroupNonUniformFMax
-        | Op::GroupNonUniformBitwiseAnd
-        | Op::GroupNonUniformBitwiseOr
-        | Op::GroupNonUniformBitwiseXor
-        | Op::GroupNonUniformLogicalAnd
-        | Op::GroupNonUniformLogicalOr
-        | Op::GroupNonUniformLogicalXor => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::GroupOperation,
-                K::Id,
-            ],
-            &[K::Id],
-            None,
-        ),
+        Op::GroupIAdd | Op::GroupFAdd | Op::GroupFMin | Op::GroupUMin | Op::GroupSMin | Op::GroupFMax
+        | Op::GroupUMax | Op::GroupSMax | Op::GroupNonUniformBallotBitCount | Op::GroupIAddNonUniformAMD
+        | Op::GroupFAddNonUniformAMD | Op::GroupFMinNonUniformAMD | Op::GroupUMinNonUniformAMD
+        | Op::GroupSMinNonUniformAMD | Op::GroupFMaxNonUniformAMD | Op::GroupUMaxNonUniformAMD
+        | Op::GroupSMaxNonUniformAMD | Op::GroupIMulKHR | Op::GroupFMulKHR | Op::GroupBitwiseAndKHR
+        | Op::GroupBitwiseOrKHR | Op::GroupBitwiseXorKHR | Op::GroupLogicalAndKHR | Op::GroupLogicalOrKHR
+        | Op::GroupLogicalXorKHR => o(&[K::IdResultType, K::IdResult, K::Id, K::GroupOperation, K::Id], &[], None),
+        Op::GroupReserveReadPipePackets | Op::GroupReserveWritePipePackets | Op::GetKernelNDrangeSubGroupCount
+        | Op::GetKernelNDrangeMaxSubGroupSize | Op::GetKernelLocalSizeForSubgroupCount | Op::ImageBlockMatchSSDQCOM
+        | Op::ImageBlockMatchSADQCOM | Op::ImageBlockMatchWindowSSDQCOM | Op::ImageBlockMatchWindowSADQCOM
+        | Op::ImageBlockMatchGatherSSDQCOM | Op::ImageBlockMatchGatherSADQCOM
+        | Op::FetchMicroTriangleVertexPositionNV | Op::FetchMicroTriangleVertexBarycentricNV
+        | Op::TensorViewSetClipNV | Op::SubgroupAvcImeEvaluateWithDualReferenceStreaminINTEL
+        | Op::SubgroupAvcImeEvaluateWithDualReferenceStreaminoutINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::GroupCommitReadPipe | Op::GroupCommitWritePipe | Op::SubgroupImageMediaBlockWriteINTEL
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::EnqueueKernel
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], Some(K::Id)),
+        Op::ConstantPipeStorage => o(&[K::IdResultType, K::IdResult, K::Literal, K::Literal, K::Literal], &[], None),
+        Op::GroupNonUniformIAdd | Op::GroupNonUniformFAdd | Op::GroupNonUniformIMul | Op::GroupNonUniformFMul
+        | Op::GroupNonUniformSMin | Op::GroupNonUniformUMin | Op::GroupNonUniformFMin | Op::GroupNonUniformSMax
+        | Op::GroupNonUniformUMax | Op::GroupNonUniformFMax | Op::GroupNonUniformBitwiseAnd
+        | Op::GroupNonUniformBitwiseOr | Op::GroupNonUniformBitwiseXor | Op::GroupNonUniformLogicalAnd
+        | Op::GroupNonUniformLogicalOr | Op::GroupNonUniformLogicalXor
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::GroupOperation, K::Id], &[K::Id], None),
         Op::ColorAttachmentReadEXT => o(&[K::IdResultType, K::IdResult, K::Id], &[K::Id], None),
-        Op::DepthAttachmentReadEXT | Op::StencilAttachmentReadEXT => {
-            o(&[K::IdResultType, K::IdResult], &[K::Id], None)
-        }
+        Op::DepthAttachmentReadEXT | Op::StencilAttachmentReadEXT => o(&[K::IdResultType, K::IdResult], &[K::Id], None),
         Op::TypeTensorARM => o(&[K::IdResult, K::Id], &[K::Id, K::Id], None),
-        Op::TensorReadARM => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id],
-            &[K::TensorOperands],
-            None,
-        ),
+        Op::TensorReadARM => o(&[K::IdResultType, K::IdResult, K::Id, K::Id], &[K::TensorOperands], None),
         Op::TensorWriteARM => o(&[K::Id, K::Id, K::Id], &[K::TensorOperands], None),
         Op::GraphConstantARM => o(&[K::IdResultType, K::IdResult, K::Literal], &[], None),
         Op::GraphEntryPointARM => o(&[K::Id, K::String], &[], Some(K::Id)),
         Op::GraphSetOutputARM => o(&[K::Id, K::Id], &[], Some(K::Id)),
         Op::TypeGraphARM => o(&[K::IdResult, K::Literal], &[], Some(K::Id)),
         Op::TypeUntypedPointerKHR => o(&[K::IdResult, K::StorageClass], &[], None),
-        Op::UntypedVariableKHR => o(
-            &[K::IdResultType, K::IdResult, K::StorageClass],
-            &[K::Id, K::Id],
-            None,
-        ),
-        Op::UntypedPtrAccessChainKHR | Op::UntypedInBoundsPtrAccessChainKHR => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id],
-            &[],
-            Some(K::Id),
-        ),
-        Op::UntypedArrayLengthKHR => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Literal],
-            &[],
-            None,
-        ),
+        Op::UntypedVariableKHR => o(&[K::IdResultType, K::IdResult, K::StorageClass], &[K::Id, K::Id], None),
+        Op::UntypedPtrAccessChainKHR | Op::UntypedInBoundsPtrAccessChainKHR
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id], &[], Some(K::Id)),
+        Op::UntypedArrayLengthKHR => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Literal], &[], None),
         Op::UntypedPrefetchKHR => o(&[K::Id, K::Id], &[K::Id, K::Id, K::Id], None),
-        Op::GroupNonUniformRotateKHR => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id],
-            &[K::Id],
-            None,
-        ),
-        Op::UntypedGroupAsyncCopyKHR => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[K::MemoryAccess, K::MemoryAccess],
-            None,
-        ),
-        Op::TraceRayKHR | Op::TraceNV => o(
-            &[
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::SDot | Op::UDot | Op::SUDot => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id],
-            &[K::PackedVectorFormat],
-            None,
-        ),
-        Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id],
-            &[K::PackedVectorFormat],
-            None,
-        ),
-        Op::TypeCooperativeMatrixKHR => {
-            o(&[K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None)
-        }
-        Op::CooperativeMatrixLoadKHR => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id],
-            &[K::Id, K::MemoryAccess],
-            None,
-        ),
+        Op::GroupNonUniformRotateKHR => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id], &[K::Id], None),
+        Op::UntypedGroupAsyncCopyKHR
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[K::MemoryAccess, K::MemoryAccess], None),
+        Op::TraceRayKHR | Op::TraceNV
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::SDot | Op::UDot | Op::SUDot
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id], &[K::PackedVectorFormat], None),
+        Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id], &[K::PackedVectorFormat], None),
+        Op::TypeCooperativeMatrixKHR => o(&[K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::CooperativeMatrixLoadKHR
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id], &[K::Id, K::MemoryAccess], None),
         Op::CooperativeMatrixStoreKHR => o(&[K::Id, K::Id, K::Id], &[K::Id, K::MemoryAccess], None),
-        Op::CooperativeMatrixMulAddKHR => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id],
-            &[K::CooperativeMatrixOperands],
-            None,
-        ),
-        Op::RayQueryInitializeKHR | Op::HitObjectRecordMissMotionEXT => o(
-            &[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id],
-            &[],
-            None,
-        ),
-        Op::HitObjectRecordHitMotionNV => o(
-            &[
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::HitObjectRecordHitWithIndexMotionNV
-        | Op::HitObjectTraceRayMotionNV
-        | Op::HitObjectRecordHitNV
-        | Op::HitObjectTraceRayMotionEXT => o(
-            &[
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::HitObjectRecordMissMotionNV | Op::HitObjectRecordMissEXT => o(
-            &[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id],
-            &[],
-            None,
-        ),
-        Op::HitObjectTraceRayNV
-        | Op::HitObjectRecordHitWithIndexNV
-        | Op::HitObjectTraceRayEXT
-        | Op::TraceMotionNV
-        | Op::TraceRayMotionNV => o(
-            &[
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
+        Op::CooperativeMatrixMulAddKHR
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id], &[K::CooperativeMatrixOperands], None),
+        Op::RayQueryInitializeKHR | Op::HitObjectRecordMissMotionEXT
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::HitObjectRecordHitMotionNV
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::HitObjectRecordHitWithIndexMotionNV | Op::HitObjectTraceRayMotionNV | Op::HitObjectRecordHitNV
+        | Op::HitObjectTraceRayMotionEXT
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::HitObjectRecordMissMotionNV | Op::HitObjectRecordMissEXT
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::HitObjectTraceRayNV | Op::HitObjectRecordHitWithIndexNV | Op::HitObjectTraceRayEXT | Op::TraceMotionNV
+        | Op::TraceRayMotionNV
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
         Op::HitObjectRecordMissNV => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
-        Op::ReorderThreadWithHitObjectNV | Op::ReorderThreadWithHitObjectEXT => {
-            o(&[K::Id], &[K::Id, K::Id], None)
-        }
-        Op::ImageSampleFootprintNV => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id],
-            &[K::ImageOperands],
-            None,
-        ),
-        Op::CooperativeVectorMatrixMulNV => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[K::Id, K::CooperativeMatrixOperands],
-            None,
-        ),
-        Op::CooperativeVectorOuterProductAccumulateNV => {
-            o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[K::Id], None)
-        }
-        Op::CooperativeVectorMatrixMulAddNV => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[K::Id, K::CooperativeMatrixOperands],
-            None,
-        ),
+        Op::ReorderThreadWithHitObjectNV | Op::ReorderThreadWithHitObjectEXT => o(&[K::Id], &[K::Id, K::Id], None),
+        Op::ImageSampleFootprintNV
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id], &[K::ImageOperands], None),
+        Op::CooperativeVectorMatrixMulNV
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[K::Id, K::CooperativeMatrixOperands], None),
+        Op::CooperativeVectorOuterProductAccumulateNV => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[K::Id], None),
+        Op::CooperativeVectorMatrixMulAddNV
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[K::Id, K::CooperativeMatrixOperands], None),
         Op::EmitMeshTasksEXT => o(&[K::Id, K::Id, K::Id], &[K::Id], None),
-        Op::CooperativeVectorLoadNV => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id],
-            &[K::MemoryAccess],
-            None,
-        ),
+        Op::CooperativeVectorLoadNV => o(&[K::IdResultType, K::IdResult, K::Id, K::Id], &[K::MemoryAccess], None),
         Op::CooperativeVectorStoreNV => o(&[K::Id, K::Id, K::Id], &[K::MemoryAccess], None),
         Op::HitObjectReorderExecuteShaderEXT => o(&[K::Id, K::Id], &[K::Id, K::Id], None),
-        Op::HitObjectTraceReorderExecuteEXT => o(
-            &[
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[K::Id, K::Id],
-            None,
-        ),
-        Op::HitObjectTraceMotionReorderExecuteEXT => o(
-            &[
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[K::Id, K::Id],
-            None,
-        ),
+        Op::HitObjectTraceReorderExecuteEXT
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[K::Id, K::Id], None),
+        Op::HitObjectTraceMotionReorderExecuteEXT
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[K::Id, K::Id], None),
         Op::TypeCooperativeMatrixNV => o(&[K::IdResult, K::Id, K::Id, K::Id, K::Id], &[], None),
-        Op::CooperativeMatrixLoadNV => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id],
-            &[K::MemoryAccess],
-            None,
-        ),
+        Op::CooperativeMatrixLoadNV
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id], &[K::MemoryAccess], None),
         Op::CooperativeMatrixStoreNV => o(&[K::Id, K::Id, K::Id, K::Id], &[K::MemoryAccess], None),
-        Op::CooperativeMatrixReduceNV => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::CooperativeMatrixReduce,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::CooperativeMatrixLoadTensorNV => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::MemoryAccess,
-                K::TensorAddressingOperands,
-            ],
-            &[],
-            None,
-        ),
-        Op::CooperativeMatrixStoreTensorNV => o(
-            &[
-                K::Id,
-                K::Id,
-                K::Id,
-                K::MemoryAccess,
-                K::TensorAddressingOperands,
-            ],
-            &[],
-            None,
-        ),
+        Op::CooperativeMatrixReduceNV
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::CooperativeMatrixReduce, K::Id], &[], None),
+        Op::CooperativeMatrixLoadTensorNV
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::MemoryAccess, K::TensorAddressingOperands], &[], None),
+        Op::CooperativeMatrixStoreTensorNV
+            => o(&[K::Id, K::Id, K::Id, K::MemoryAccess, K::TensorAddressingOperands], &[], None),
         Op::TypeTensorViewNV => o(&[K::IdResult, K::Id, K::Id], &[], Some(K::Id)),
         Op::SamplerImageAddressingModeNV => o(&[K::Literal], &[], None),
-        Op::RawAccessChainNV => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id],
-            &[K::RawAccessChainOperands],
-            None,
-        ),
-        Op::AsmINTEL => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::String,
-                K::String,
-            ],
-            &[],
-            None,
-        ),
-        Op::SubgroupAvcFmeInitializeINTEL => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::SubgroupAvcBmeInitializeINTEL | Op::SubgroupAvcSicConfigureIpeLumaINTEL => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::SubgroupAvcSicConfigureIpeLumaChromaINTEL => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::ArbitraryFloatSinCosPiALTERA
-        | Op::ArbitraryFloatCastALTERA
-        | Op::ArbitraryFloatCastFromIntALTERA
-        | Op::ArbitraryFloatCastToIntALTERA
-        | Op::ArbitraryFloatRecipALTERA
-        | Op::ArbitraryFloatRSqrtALTERA
-        | Op::ArbitraryFloatCbrtALTERA
-        | Op::ArbitraryFloatSqrtALTERA
-        | Op::ArbitraryFloatLogINTEL
-        | Op::ArbitraryFloatLog2INTEL
-        | Op::ArbitraryFloatLog10INTEL
-        | Op::ArbitraryFloatLog1pINTEL
-        | Op::ArbitraryFloatExpINTEL
-        | Op::ArbitraryFloatExp2INTEL
-        | Op::ArbitraryFloatExp10INTEL
-        | Op::ArbitraryFloatExpm1INTEL
-        | Op::ArbitraryFloatSinINTEL
-        | Op::ArbitraryFloatCosINTEL
-        | Op::ArbitraryFloatSinCosINTEL
-        | Op::ArbitraryFloatSinPiINTEL
-        | Op::ArbitraryFloatCosPiINTEL
-        | Op::ArbitraryFloatASinINTEL
-        | Op::ArbitraryFloatASinPiINTEL
-        | Op::ArbitraryFloatACosINTEL
-        | Op::ArbitraryFloatACosPiINTEL
-        | Op::ArbitraryFloatATanINTEL
-        | Op::ArbitraryFloatATanPiINTEL
-        | Op::FixedSqrtALTERA
-        | Op::FixedRecipALTERA
-        | Op::FixedRsqrtALTERA
-        | Op::FixedSinALTERA
-        | Op::FixedCosALTERA
-        | Op::FixedSinCosALTERA
-        | Op::FixedSinPiALTERA
-        | Op::FixedCosPiALTERA
-        | Op::FixedSinCosPiALTERA
-        | Op::FixedLogALTERA
-        | Op::FixedExpALTERA => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-            ],
-            &[],
-            None,
-        ),
-        Op::ArbitraryFloatAddALTERA
-        | Op::ArbitraryFloatSubALTERA
-        | Op::ArbitraryFloatMulALTERA
-        | Op::ArbitraryFloatDivALTERA
-        | Op::ArbitraryFloatHypotALTERA
-        | Op::ArbitraryFloatATan2INTEL
-        | Op::ArbitraryFloatPowINTEL
-        | Op::ArbitraryFloatPowRINTEL
-        | Op::ArbitraryFloatPowNINTEL => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Literal,
-                K::Id,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-            ],
-            &[],
-            None,
-        ),
-        Op::ArbitraryFloatGTALTERA
-        | Op::ArbitraryFloatGEALTERA
-        | Op::ArbitraryFloatLTALTERA
-        | Op::ArbitraryFloatLEALTERA
-        | Op::ArbitraryFloatEQALTERA => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Literal,
-                K::Id,
-                K::Literal,
-            ],
-            &[],
-            None,
-        ),
+        Op::RawAccessChainNV
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id], &[K::RawAccessChainOperands], None),
+        Op::AsmINTEL => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::String, K::String], &[], None),
+        Op::SubgroupAvcFmeInitializeINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::SubgroupAvcBmeInitializeINTEL | Op::SubgroupAvcSicConfigureIpeLumaINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::SubgroupAvcSicConfigureIpeLumaChromaINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::ArbitraryFloatSinCosPiALTERA | Op::ArbitraryFloatCastALTERA | Op::ArbitraryFloatCastFromIntALTERA
+        | Op::ArbitraryFloatCastToIntALTERA | Op::ArbitraryFloatRecipALTERA | Op::ArbitraryFloatRSqrtALTERA
+        | Op::ArbitraryFloatCbrtALTERA | Op::ArbitraryFloatSqrtALTERA | Op::ArbitraryFloatLogINTEL
+        | Op::ArbitraryFloatLog2INTEL | Op::ArbitraryFloatLog10INTEL | Op::ArbitraryFloatLog1pINTEL
+        | Op::ArbitraryFloatExpINTEL | Op::ArbitraryFloatExp2INTEL | Op::ArbitraryFloatExp10INTEL
+        | Op::ArbitraryFloatExpm1INTEL | Op::ArbitraryFloatSinINTEL | Op::ArbitraryFloatCosINTEL
+        | Op::ArbitraryFloatSinCosINTEL | Op::ArbitraryFloatSinPiINTEL | Op::ArbitraryFloatCosPiINTEL
+        | Op::ArbitraryFloatASinINTEL | Op::ArbitraryFloatASinPiINTEL | Op::ArbitraryFloatACosINTEL
+        | Op::ArbitraryFloatACosPiINTEL | Op::ArbitraryFloatATanINTEL | Op::ArbitraryFloatATanPiINTEL
+        | Op::FixedSqrtALTERA | Op::FixedRecipALTERA | Op::FixedRsqrtALTERA | Op::FixedSinALTERA
+        | Op::FixedCosALTERA | Op::FixedSinCosALTERA | Op::FixedSinPiALTERA | Op::FixedCosPiALTERA
+        | Op::FixedSinCosPiALTERA | Op::FixedLogALTERA | Op::FixedExpALTERA
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Literal, K::Literal, K::Literal, K::Literal, K::Literal], &[], None),
+        Op::ArbitraryFloatAddALTERA | Op::ArbitraryFloatSubALTERA | Op::ArbitraryFloatMulALTERA
+        | Op::ArbitraryFloatDivALTERA | Op::ArbitraryFloatHypotALTERA | Op::ArbitraryFloatATan2INTEL
+        | Op::ArbitraryFloatPowINTEL | Op::ArbitraryFloatPowRINTEL | Op::ArbitraryFloatPowNINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Literal, K::Id, K::Literal, K::Literal, K::Literal, K::Literal, K::Literal], &[], None),
+        Op::ArbitraryFloatGTALTERA | Op::ArbitraryFloatGEALTERA | Op::ArbitraryFloatLTALTERA
+        | Op::ArbitraryFloatLEALTERA | Op::ArbitraryFloatEQALTERA
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Literal, K::Id, K::Literal], &[], None),
         Op::LoopControlINTEL => o(&[], &[], Some(K::Literal)),
         Op::AliasDomainDeclINTEL => o(&[K::IdResult], &[K::Id], None),
         Op::AliasScopeDeclINTEL => o(&[K::IdResult, K::Id], &[K::Id], None),
-        Op::TypeStructContinuedINTEL
-        | Op::ConstantCompositeContinuedINTEL
+        Op::TypeStructContinuedINTEL | Op::ConstantCompositeContinuedINTEL
         | Op::SpecConstantCompositeContinuedINTEL => o(&[], &[], Some(K::Id)),
-        Op::TaskSequenceCreateALTERA => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-            ],
-            &[],
-            None,
-        ),
-        Op::Subgroup2DBlockLoadINTEL
-        | Op::Subgroup2DBlockLoadTransformINTEL
-        | Op::Subgroup2DBlockLoadTransposeINTEL
-        | Op::Subgroup2DBlockStoreINTEL => o(
-            &[
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::Subgroup2DBlockPrefetchINTEL => o(
-            &[
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
-        Op::SubgroupMatrixMultiplyAccumulateINTEL => o(
-            &[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id],
-            &[K::MatrixMultiplyAccumulateOperands],
-            None,
-        ),
-        Op::ConditionalEntryPointINTEL => o(
-            &[K::Id, K::ExecutionModel, K::Id, K::String],
-            &[],
-            Some(K::Id),
-        ),
+        Op::TaskSequenceCreateALTERA
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Literal, K::Literal, K::Literal, K::Literal], &[], None),
+        Op::Subgroup2DBlockLoadINTEL | Op::Subgroup2DBlockLoadTransformINTEL
+        | Op::Subgroup2DBlockLoadTransposeINTEL | Op::Subgroup2DBlockStoreINTEL
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::Subgroup2DBlockPrefetchINTEL
+            => o(&[K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id, K::Id], &[], None),
+        Op::SubgroupMatrixMultiplyAccumulateINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Id, K::Id, K::Id, K::Id], &[K::MatrixMultiplyAccumulateOperands], None),
+        Op::ConditionalEntryPointINTEL => o(&[K::Id, K::ExecutionModel, K::Id, K::String], &[], Some(K::Id)),
         Op::ConditionalCapabilityINTEL => o(&[K::Id, K::Capability], &[], None),
-        Op::SpecConstantTargetINTEL => o(
-            &[K::IdResultType, K::IdResult, K::Literal],
-            &[],
-            Some(K::Literal),
-        ),
-        Op::SpecConstantArchitectureINTEL => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-                K::Literal,
-            ],
-            &[],
-            None,
-        ),
-        Op::SpecConstantCapabilitiesINTEL => {
-            o(&[K::IdResultType, K::IdResult], &[], Some(K::Capability))
-        }
-        Op::MaskedGatherINTEL => o(
-            &[
-                K::IdResultType,
-                K::IdResult,
-                K::Id,
-                K::Literal,
-                K::Id,
-                K::Id,
-            ],
-            &[],
-            None,
-        ),
+        Op::SpecConstantTargetINTEL => o(&[K::IdResultType, K::IdResult, K::Literal], &[], Some(K::Literal)),
+        Op::SpecConstantArchitectureINTEL
+            => o(&[K::IdResultType, K::IdResult, K::Literal, K::Literal, K::Literal, K::Literal], &[], None),
+        Op::SpecConstantCapabilitiesINTEL => o(&[K::IdResultType, K::IdResult], &[], Some(K::Capability)),
+        Op::MaskedGatherINTEL => o(&[K::IdResultType, K::IdResult, K::Id, K::Literal, K::Id, K::Id], &[], None),
         Op::MaskedScatterINTEL => o(&[K::Id, K::Id, K::Literal, K::Id], &[], None),
         _ => return None,
     })
