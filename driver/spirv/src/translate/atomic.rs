@@ -1,6 +1,10 @@
 //! Atomic operations on buffers, workgroup memory, device addresses and texels.
 
-use super::descriptors::{note_binding_write, note_write};
+use isa::ir::{AtomicOp, Format, ImageAtomic, ImageRead, ImageWrite, Reg, Space, Statement};
+use isa::op::Op as Ir;
+use spirv::Op;
+
+use super::descriptors::{mark_binding_written, mark_written};
 use super::emitter::op_for_width;
 use super::memory::{load_from, store_to};
 use super::translator::Translator;
@@ -8,9 +12,6 @@ use super::value::Pointer;
 use crate::error::{Result, malformed, unsupported};
 use crate::instruction::Instruction;
 use crate::types::Scalar;
-use isa::ir::{AtomicOp, Format, ImageAtomic, ImageRead, ImageWrite, Reg, Space, Statement};
-use isa::op::Op as Ir;
-use spirv::Op;
 
 fn atomic_op(op: Op) -> Result<AtomicOp> {
     Ok(match op {
@@ -111,7 +112,7 @@ fn apply(
                 format @ (Format::B32 | Format::B64) => format,
                 _ => return unsupported("atomics on narrow integers"),
             };
-            note_write(t, place);
+            mark_written(t, place);
             Ok(t.emit
                 .builder
                 .atomic(op, place.at(0), format, value, comparator))
@@ -122,7 +123,7 @@ fn apply(
             coordinate,
             sample,
         } => {
-            note_binding_write(t, *image);
+            mark_binding_written(t, *image);
             let dst = t.emit.builder.value(scalar.register());
             t.emit
                 .builder
@@ -176,7 +177,7 @@ fn store_texel(t: &mut Translator, pointer: &Pointer, value: Reg) -> Result<()> 
     else {
         return malformed("the pointer isn't to a texel");
     };
-    note_binding_write(t, *image);
+    mark_binding_written(t, *image);
     let zero = t.emit.u32(0);
     t.emit
         .builder

@@ -1,14 +1,16 @@
 //! Composites, taken apart and put together; products of vectors and matrices, determinants and inverses.
 
+use std::rc::Rc;
+
+use isa::ir::Reg;
+use isa::op::Op as Ir;
+use spirv::{Decoration, Op};
+
 use super::emitter::op_for_width;
 use super::translator::Translator;
 use crate::error::{Result, malformed};
 use crate::instruction::Instruction;
 use crate::types::Scalar;
-use isa::ir::Reg;
-use isa::op::Op as Ir;
-use spirv::{Decoration, Op};
-use std::rc::Rc;
 
 /// A matrix: its columns one after the other.
 #[derive(Clone, Debug)]

@@ -24,7 +24,7 @@ use crate::module::Block;
 const CALL_COST: usize = 16;
 
 /// A function being inlined.
-pub struct Call {
+struct Call {
     function: usize,
     tree: Rc<Tree>,
     merge_points: HashMap<MergePoint, MergeVariables>,
@@ -61,6 +61,7 @@ pub struct ControlFlow<'a> {
 }
 
 impl<'a> ControlFlow<'a> {
+    /// Control flow of a translation that begins.
     pub fn new(t: Translator<'a>) -> Self {
         Self {
             t,
@@ -73,22 +74,22 @@ impl<'a> ControlFlow<'a> {
     /// Translates the entry point's function and assigns the outputs at its end.
     pub fn run(&mut self, function: usize) -> Result<(), Error> {
         let definition = &self.t.module.sections.functions[function].definition;
-        let place = |diagnostic: Diagnostic| diagnostic.locate(definition.reference());
+        let locate = |diagnostic: Diagnostic| diagnostic.locate(definition.reference());
         variables::global_variables(&mut self.t)?;
         if !self.t.module.sections.functions[function]
             .parameters
             .is_empty()
         {
-            return Err(place(Diagnostic::Malformed(
+            return Err(locate(Diagnostic::Malformed(
                 "the entry point has parameters".into(),
             )));
         }
-        self.inline(function).map_err(place)?;
-        variables::assign_outputs(&mut self.t).map_err(place)
+        self.inline(function).map_err(locate)?;
+        variables::assign_outputs(&mut self.t).map_err(locate)
     }
 
     /// `OpFunctionCall`.
-    pub fn call(&mut self, it: &Instruction) -> Result<()> {
+    fn call(&mut self, it: &Instruction) -> Result<()> {
         let Some(function) = self.t.module.functions.get(&it.id(0)?).copied() else {
             return malformed("there is no such function");
         };

@@ -1,13 +1,14 @@
 //! Descriptors: the resource slots of the variables that they are bound to.
 
+use isa::ir::{Binding, Space};
+use spirv::{Decoration, Dim, StorageClass};
+
 use super::translator::Translator;
 use super::value::{EXPLICIT, MemoryRef, Pointer};
 use crate::error::{Result, malformed, unsupported};
 use crate::globals::GlobalVariable;
 use crate::interface::{DescriptorKind, ImageUse, ShaderBinding};
 use crate::types::{ImageType, Type};
-use isa::ir::{Binding, Space};
-use spirv::{Decoration, Dim, StorageClass};
 
 /// The most descriptors that a shader may be bound to.
 const MAX_DESCRIPTORS: u32 = 1 << 20;
@@ -152,16 +153,16 @@ pub fn resource(
 }
 
 /// Notes that a place may be written.
-pub fn note_write(t: &mut Translator, place: &MemoryRef) {
+pub fn mark_written(t: &mut Translator, place: &MemoryRef) {
     match place.space {
-        Space::Buffer(binding) => note_binding_write(t, binding),
+        Space::Buffer(binding) => mark_binding_written(t, binding),
         Space::Global => t.interface.has_side_effects = true,
         _ => {}
     }
 }
 
 /// Notes that a descriptor's memory may be written.
-pub fn note_binding_write(t: &mut Translator, binding: Binding) {
+pub fn mark_binding_written(t: &mut Translator, binding: Binding) {
     t.interface.has_side_effects = true;
     let found = t
         .interface

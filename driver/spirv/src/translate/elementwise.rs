@@ -508,6 +508,7 @@ fn find_bit(t: &mut Translator, it: &Instruction, find: Ir, extension: Extension
     })
 }
 
+/// `1 / sqrt(reg)`.
 pub fn inverse_sqrt(t: &mut Translator, scalar: Scalar, reg: Reg) -> Reg {
     if scalar.is_wide() {
         let (one, root) = (t.emit.f64(1.0), t.emit.op(Ir::FSqrt64, &[reg]));

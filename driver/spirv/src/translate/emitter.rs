@@ -30,6 +30,7 @@ pub struct Emitter {
 }
 
 impl Emitter {
+    /// An emitter of an empty program.
     pub fn new() -> Self {
         Self {
             builder: Builder::new(),
@@ -60,6 +61,7 @@ impl Emitter {
         self.builder.compute(op, src)
     }
 
+    /// A register that holds these bits.
     pub fn constant(&mut self, ty: Type, bits: u64) -> Reg {
         let reg = self.builder.constant(ty, bits);
         self.constants.insert(reg, bits);
@@ -130,6 +132,7 @@ impl Emitter {
         self.op(op, &[condition, a, b])
     }
 
+    /// `index == element`.
     pub fn index_is(&mut self, index: Reg, element: u32) -> Reg {
         let element = self.u32(element);
         self.op(Ir::IEq, &[index, element])

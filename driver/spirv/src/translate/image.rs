@@ -1,12 +1,5 @@
 //! Images and samplers.
 
-use super::descriptors::note_binding_write;
-use super::translator::Translator;
-use super::value::{Pointer, Value};
-use crate::error::{Result, malformed, unsupported};
-use crate::instruction::Instruction;
-use crate::interface::Stage;
-use crate::types::{ImageType, Type};
 use isa::ir::Type as IrType;
 use isa::ir::{
     Binding, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg, Sample, Statement,
@@ -14,6 +7,14 @@ use isa::ir::{
 use isa::op::Op as Ir;
 use spirv::ImageOperands as ImageOperandMask;
 use spirv::{Dim, Op};
+
+use super::descriptors::mark_binding_written;
+use super::translator::Translator;
+use super::value::{Pointer, Value};
+use crate::error::{Result, malformed, unsupported};
+use crate::instruction::Instruction;
+use crate::interface::Stage;
+use crate::types::{ImageType, Type};
 
 /// The optional operands of an image instruction.
 #[derive(Clone, Debug, Default)]
@@ -36,32 +37,34 @@ struct SampleOp {
     gather: bool,
 }
 
-fn sample_op(op: Op) -> SampleOp {
-    use Op::*;
-    SampleOp {
-        explicit: matches!(
-            op,
-            ImageSampleExplicitLod
-                | ImageSampleDrefExplicitLod
-                | ImageSampleProjExplicitLod
-                | ImageSampleProjDrefExplicitLod
-        ),
-        compare: matches!(
-            op,
-            ImageSampleDrefImplicitLod
-                | ImageSampleDrefExplicitLod
-                | ImageSampleProjDrefImplicitLod
-                | ImageSampleProjDrefExplicitLod
-                | ImageDrefGather
-        ),
-        projective: matches!(
-            op,
-            ImageSampleProjImplicitLod
-                | ImageSampleProjExplicitLod
-                | ImageSampleProjDrefImplicitLod
-                | ImageSampleProjDrefExplicitLod
-        ),
-        gather: matches!(op, ImageGather | ImageDrefGather),
+impl SampleOp {
+    fn of(op: Op) -> Self {
+        use Op::*;
+        Self {
+            explicit: matches!(
+                op,
+                ImageSampleExplicitLod
+                    | ImageSampleDrefExplicitLod
+                    | ImageSampleProjExplicitLod
+                    | ImageSampleProjDrefExplicitLod
+            ),
+            compare: matches!(
+                op,
+                ImageSampleDrefImplicitLod
+                    | ImageSampleDrefExplicitLod
+                    | ImageSampleProjDrefImplicitLod
+                    | ImageSampleProjDrefExplicitLod
+                    | ImageDrefGather
+            ),
+            projective: matches!(
+                op,
+                ImageSampleProjImplicitLod
+                    | ImageSampleProjExplicitLod
+                    | ImageSampleProjDrefImplicitLod
+                    | ImageSampleProjDrefExplicitLod
+            ),
+            gather: matches!(op, ImageGather | ImageDrefGather),
+        }
     }
 }
 
@@ -87,7 +90,7 @@ pub fn image(t: &mut Translator, it: &Instruction) -> Result<()> {
         | Op::ImageQueryLod
         | Op::ImageQueryLevels
         | Op::ImageQuerySamples => query_image(t, it),
-        op => sample(t, it, &sample_op(op)),
+        op => sample(t, it, &SampleOp::of(op)),
     }
 }
 
@@ -325,7 +328,7 @@ fn write_image(t: &mut Translator, it: &Instruction) -> Result<()> {
     }
     let zero = t.emit.u32(0);
     let image_operands = image_operands(t, it, 3)?;
-    note_binding_write(t, image);
+    mark_binding_written(t, image);
     t.emit
         .builder
         .statement(Statement::ImageWrite(Box::new(ImageWrite {

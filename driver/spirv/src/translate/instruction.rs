@@ -1,5 +1,8 @@
 //! The dispatch of instructions to the functions that translate them.
 
+use isa::ir::Axis;
+use spirv::Op;
+
 use super::atomic::atomic;
 use super::composite::{composite, linear_algebra};
 use super::elementwise::{conversion, derivative, elementwise};
@@ -14,8 +17,6 @@ use super::variables::local_variable;
 use crate::error::{Result, unsupported};
 use crate::instruction::Instruction;
 use crate::module::ExtendedSet;
-use isa::ir::Axis;
-use spirv::Op;
 
 fn is_image(op: Op) -> bool {
     use Op::*;

@@ -1,15 +1,17 @@
 //! Loads and stores.
 
-use super::descriptors::note_write;
+use std::rc::Rc;
+
+use isa::ir::{Format, Reg};
+use isa::op::Op as Ir;
+
+use super::descriptors::mark_written;
 use super::promoted::PromotedPart;
 use super::translator::Translator;
 use super::value::{MemoryLayout, MemoryRef, Pointer, Value, scalar_bytes, scalar_format};
 use crate::error::{Result, malformed};
 use crate::instruction::Instruction;
 use crate::types::{Scalar, Type};
-use isa::ir::{Format, Reg};
-use isa::op::Op as Ir;
-use std::rc::Rc;
 
 /// The most elements of one load or store of the IR.
 const MAX_ELEMENTS: usize = 16;
@@ -125,7 +127,7 @@ fn store_place(t: &mut Translator, place: &MemoryRef, regs: &[Reg]) -> Result<()
         return malformed("the object doesn't fit the pointer");
     }
     t.emit.charge_budget(scalars.len())?;
-    note_write(t, place);
+    mark_written(t, place);
     for run in runs(t, place, &scalars)? {
         let src: Vec<Reg> = run
             .places

@@ -19,6 +19,7 @@ mod glsl;
 mod image;
 mod inputs_outputs;
 mod instruction;
+mod interpolation;
 mod memory;
 mod options;
 mod pointer;

@@ -1,14 +1,15 @@
 //! Pointers and access chains.
 
+use isa::ir::{Binding, Reg, Space};
+use isa::op::Op as Ir;
+use spirv::Op;
+
 use super::descriptors::{descriptor_count, descriptors, resource};
 use super::translator::Translator;
 use super::value::{DynamicIndex, MemoryLayout, MemoryRef, Pointer, Value, scalar_bytes};
 use crate::error::{Result, malformed, unsupported};
 use crate::instruction::Instruction;
 use crate::types::{Scalar, Type};
-use isa::ir::{Binding, Reg, Space};
-use isa::op::Op as Ir;
-use spirv::Op;
 
 /// An index of an access chain.
 #[derive(Clone, Copy)]

@@ -162,11 +162,11 @@ enum Frame {
 }
 
 /// Walks a function's blocks.
-pub struct Structurizer<'a> {
+struct Structurizer<'a> {
     function: &'a Function,
     stores: &'a [Vec<u32>],
     /// Blocks by the ids of their labels.
-    pub index: HashMap<u32, usize>,
+    index: HashMap<u32, usize>,
     frames: Vec<Frame>,
     edges: Vec<usize>,
     constructs: usize,
@@ -176,17 +176,17 @@ pub struct Structurizer<'a> {
     returns: usize,
     early_return: bool,
     /// Blocks looked at while ordering cases.
-    pub steps: usize,
+    steps: usize,
     depth: usize,
 }
 
 impl Structurizer<'_> {
-    fn merge_point(&mut self) -> MergePoint {
+    fn add_merge_point(&mut self) -> MergePoint {
         self.edges.push(0);
         self.edges.len() - 1
     }
 
-    fn construct(&mut self) -> Construct {
+    fn add_construct(&mut self) -> Construct {
         self.constructs += 1;
         self.constructs - 1
     }
@@ -205,14 +205,14 @@ impl Structurizer<'_> {
         sorted.into()
     }
 
-    pub fn block_of(&self, label: u32) -> Result<usize> {
+    fn block_of(&self, label: u32) -> Result<usize> {
         match self.index.get(&label) {
             Some(index) => Ok(*index),
             None => malformed(format!("%{label} isn't a block of this function")),
         }
     }
 
-    pub fn terminator(&self, block: usize) -> Result<&Instruction> {
+    fn terminator(&self, block: usize) -> Result<&Instruction> {
         match self.function.blocks[block].instructions.last() {
             Some(last) => Ok(last),
             None => malformed("a block is empty"),
@@ -331,7 +331,7 @@ impl Structurizer<'_> {
     }
 
     /// Tells if some construct around ends at a block.
-    pub fn is_target(&self, block: usize) -> bool {
+    fn is_target(&self, block: usize) -> bool {
         self.end_of_construct(block).is_some() || self.jump(block).is_some()
     }
 
@@ -393,7 +393,7 @@ impl Structurizer<'_> {
             return self.conditional_exit(block, condition, then, otherwise, nodes);
         };
         // A merge block that ends an outer construct too is that construct's business.
-        let merge_point = (!self.is_target(merge)).then(|| self.merge_point());
+        let merge_point = (!self.is_target(merge)).then(|| self.add_merge_point());
         if let Some(merge_point) = merge_point {
             self.frames.push(Frame::Selection { merge, merge_point });
         }
@@ -463,11 +463,15 @@ impl Structurizer<'_> {
         continues: usize,
         nodes: &mut Vec<Node>,
     ) -> Result<Option<usize>> {
-        let construct = self.construct();
-        let (header, merge_join) = (self.merge_point(), self.merge_point());
+        let construct = self.add_construct();
+        let (header, merge_join) = (self.add_merge_point(), self.add_merge_point());
         self.edges[header] += 1;
         let shared = continues == head;
-        let continue_join = if shared { header } else { self.merge_point() };
+        let continue_join = if shared {
+            header
+        } else {
+            self.add_merge_point()
+        };
         let leave = (!self.is_target(merge)).then_some((merge, merge_join));
         self.begin_modified();
         self.frames.push(Frame::LoopBody {
@@ -511,8 +515,8 @@ impl Structurizer<'_> {
         let Some(merge) = self.selection_merge(block)? else {
             return malformed("there is no merge block");
         };
-        let construct = self.construct();
-        let merge_point = (!self.is_target(merge)).then(|| self.merge_point());
+        let construct = self.add_construct();
+        let merge_point = (!self.is_target(merge)).then(|| self.add_merge_point());
         let leave = merge_point.map(|merge_point| (merge, merge_point));
         let mut cases = self.switch_targets(terminator)?;
         let order = self.order_cases(merge, &cases)?;
@@ -526,7 +530,7 @@ impl Structurizer<'_> {
                 default,
             } = std::mem::take(&mut cases[*which]);
             let next = fallthrough.then(|| order.get(position + 1)).flatten();
-            let next = next.map(|(next, _)| (cases[*next].block, self.merge_point()));
+            let next = next.map(|(next, _)| (cases[*next].block, self.add_merge_point()));
             self.frames.push(Frame::Case {
                 construct,
                 merge: leave,
@@ -576,7 +580,7 @@ const MAX_STEPS: usize = 1 << 22;
 
 /// A target of a switch.
 #[derive(Default)]
-pub struct Target {
+struct Target {
     pub block: usize,
     pub values: Vec<u32>,
     pub default: bool,
@@ -584,7 +588,7 @@ pub struct Target {
 
 impl Structurizer<'_> {
     /// The targets of a switch, each once.
-    pub fn switch_targets(&self, terminator: &Instruction) -> Result<Vec<Target>> {
+    fn switch_targets(&self, terminator: &Instruction) -> Result<Vec<Target>> {
         let mut targets: Vec<Target> = Vec::new();
         let mut by_block = HashMap::new();
         let mut values = HashSet::new();
@@ -619,7 +623,7 @@ impl Structurizer<'_> {
 
     /// The cases in an order in which each that falls through is followed by the one that it falls into; with each,
     /// whether it does.
-    pub fn order_cases(&mut self, merge: usize, cases: &[Target]) -> Result<Vec<(usize, bool)>> {
+    fn order_cases(&mut self, merge: usize, cases: &[Target]) -> Result<Vec<(usize, bool)>> {
         let which: HashMap<usize, usize> = cases
             .iter()
             .enumerate()

@@ -1,13 +1,14 @@
 //! Operations across the lanes of a subgroup.
 
+use isa::ir::{Reg, SubgroupOp, is_reducible};
+use isa::op::Op as Ir;
+use spirv::{GroupOperation, Op};
+
 use super::emitter::op_for_width;
 use super::translator::Translator;
 use crate::error::{Result, malformed, unsupported};
 use crate::instruction::Instruction;
 use crate::types::Scalar;
-use isa::ir::{Reg, SubgroupOp, is_reducible};
-use isa::op::Op as Ir;
-use spirv::{GroupOperation, Op};
 
 fn group_op(opcode: Op, scalar: Scalar) -> Option<Ir> {
     let (narrow, wide) = match opcode {

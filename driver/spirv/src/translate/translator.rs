@@ -122,6 +122,7 @@ impl Translator<'_> {
         Ok(())
     }
 
+    /// Gives an instruction's result a meaning.
     pub fn define_as(&mut self, it: &Instruction, value: Value) -> Result<()> {
         let id = it.result()?;
         self.values.insert(id, value);
@@ -164,6 +165,7 @@ impl Translator<'_> {
         Ok(self.emit.op(Ir::IAdd64, &[base, offset]))
     }
 
+    /// Tells if an instruction's product and a sum may be fused.
     pub fn may_contract(&self, it: &Instruction) -> bool {
         let id = it.result_id.unwrap_or(0);
         !self.module.has(id, Decoration::NoContraction)

@@ -1,5 +1,8 @@
 //! An entry point's variables: their places in registers or memory, their initializers, and the outputs at the end.
 
+use isa::ir::{MAX_MEMORY_BYTES, Space};
+use spirv::{Decoration, StorageClass};
+
 use super::descriptors::{descriptor, resource};
 use super::inputs_outputs::{IoLocation, is_computed};
 use super::memory::store_to;
@@ -9,8 +12,6 @@ use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::globals::GlobalVariable;
 use crate::instruction::Instruction;
 use crate::types::Type;
-use isa::ir::{MAX_MEMORY_BYTES, Space};
-use spirv::{Decoration, StorageClass};
 
 /// Tells if variables of a storage class may be held in registers.
 fn is_in_registers(class: StorageClass) -> bool {
@@ -124,6 +125,7 @@ fn private_variable(t: &mut Translator, id: u32, pointee: u32) -> Result<Pointer
     }))
 }
 
+/// `OpVariable` in a function.
 pub fn local_variable(t: &mut Translator, it: &Instruction) -> Result<()> {
     let id = it.result()?;
     let (class, pointee) = t.globals.types.pointer(it.ty()?)?;
