@@ -7,7 +7,7 @@
 //!
 //! Every call here, and every allocation of device memory, is a place where [`injection`] can fail.
 
-use crate::pages;
+use crate::hints;
 use bytemuck::Zeroable;
 use std::alloc::{Layout, alloc_zeroed};
 use std::any::Any;
@@ -69,7 +69,7 @@ fn grow<T>(items: &mut Vec<T>, additional: usize) {
         refused::<T>(additional).unwind();
     }
     // SAFETY: the vector's capacity is its own.
-    unsafe { pages::prefer_huge(items.as_mut_ptr().cast(), items.capacity() * size_of::<T>()) };
+    unsafe { hints::prefer_huge(items.as_mut_ptr().cast(), items.capacity() * size_of::<T>()) };
 }
 
 /// Adds an item.
@@ -147,7 +147,7 @@ pub fn zeroed<T: Zeroable>(count: usize) -> Vec<T> {
         refused::<T>(count).unwind();
     }
     // SAFETY: this is what was allocated.
-    unsafe { pages::prefer_huge(memory.cast(), layout.size()) };
+    unsafe { hints::prefer_huge(memory.cast(), layout.size()) };
     // SAFETY: the global allocator gave this memory for the layout of `count` values, and zeros are values of `T`
     // (`Zeroable`).
     unsafe { Vec::from_raw_parts(memory, count, count) }
