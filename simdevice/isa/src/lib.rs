@@ -54,22 +54,22 @@
 #![forbid(unsafe_code)]
 
 pub mod builder;
-mod display;
-mod escape;
-pub mod exec;
-mod forward;
-mod hoist;
-mod homes;
+mod compiler;
 pub mod ir;
-pub mod op;
-mod optimize;
+mod kernels;
+mod machine;
 pub mod resources;
-mod select;
-mod uniformity;
-pub mod validate;
-mod visit;
+
+/// The public face of the machine.
+pub mod exec {
+    pub use crate::compiler::Options;
+    pub use crate::kernels::combine;
+    pub use crate::kernels::registers::Chunk;
+    pub use crate::machine::{Executable, LaneMask, Machine, Stopped, Watchdog, Work};
+}
 
 pub use devmem::level;
+pub use ir::{op, validate};
 
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::ir::{AtomicOp, CHUNK_LANES, ImageShape};
+use crate::ir::{AtomicOp, CHUNK_LANES, ImageShape};
 use devmem::BufferRange;
 
 /// What a program is bound to while it runs.
@@ -59,7 +59,7 @@ impl GlobalMemory for NoGlobalMemory {
 
 /// The words of a buffer range and its size in bytes. A range that isn't within its memory, or not aligned to words, is
 /// empty.
-pub(super) fn range_words(range: &BufferRange) -> (&[AtomicU32], u32) {
+pub(crate) fn range_words(range: &BufferRange) -> (&[AtomicU32], u32) {
     let memory = range.memory.words();
     let end = range
         .offset
@@ -79,14 +79,14 @@ pub(super) fn range_words(range: &BufferRange) -> (&[AtomicU32], u32) {
 
 /// A word, if the slice has it.
 #[inline(always)]
-pub(super) fn load_word(words: &[AtomicU32], index: usize) -> Option<u32> {
+pub(crate) fn load_word(words: &[AtomicU32], index: usize) -> Option<u32> {
     words.get(index).map(|word| word.load(Ordering::Relaxed))
 }
 
 /// One register for the 16 lanes of a chunk; floats as their bits.
 pub type Lanes = [u32; CHUNK_LANES];
 
-/// How the level of detail of a sample is chosen; see [`super::ir::Lod`].
+/// How the level of detail of a sample is chosen; see [`crate::ir::Lod`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(
     clippy::large_enum_variant,

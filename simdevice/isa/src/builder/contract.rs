@@ -1,61 +1,61 @@
 //! Contraction: a product and a sum become one fused operation.
 
-use super::Builder;
-use crate::ir::{Reg, Role};
-use crate::op::Op;
+use std::collections::HashMap;
+
+use crate::ir::op::Op;
+use crate::ir::{Reg, Register, Role};
+
+/// The products of a program that sums may be fused with.
+#[derive(Debug, Default)]
+pub struct Products {
+    by_register: HashMap<Reg, Product>,
+    /// The straight run of statements without assignments that is being built.
+    segment: u32,
+}
 
 /// A product that may be fused into a sum.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Product {
+struct Product {
     factors: [Reg; 2],
     /// The straight run of statements that it is in.
     segment: u32,
 }
 
-impl Builder {
-    /// Like [`Builder::compute`], where fusing is allowed (not under SPIR-V's `NoContraction`): `FAdd` and `FSub` of a
-    /// product that was itself computed by this method become `FFma`, `FMulSub` or `FNegMulAdd`. The product goes if
-    /// nothing else uses it.
-    pub fn compute_contracted(&mut self, op: Op, src: &[Reg]) -> Reg {
-        if let (Op::FAdd | Op::FSub, &[a, b]) = (op, src) {
-            if let Some([x, y]) = self.factors(a) {
-                let fused = if op == Op::FAdd {
-                    Op::FFma
-                } else {
-                    Op::FMulSub
-                };
-                return self.compute(fused, &[x, y, b]);
-            }
-            if let Some([x, y]) = self.factors(b) {
-                let fused = if op == Op::FAdd {
-                    Op::FFma
-                } else {
-                    Op::FNegMulAdd
-                };
-                return self.compute(fused, &[x, y, a]);
-            }
+impl Products {
+    /// Ends a straight run of statements: variables may have changed after it.
+    pub fn end_segment(&mut self) {
+        self.segment += 1;
+    }
+
+    /// Adds a product, by the register that holds it.
+    pub fn insert(&mut self, product: Reg, factors: [Reg; 2]) {
+        let segment = self.segment;
+        self.by_register
+            .insert(product, Product { factors, segment });
+    }
+
+    /// The fused operation, with its operands, of a sum or difference one of whose operands is a product. None if there
+    /// is no such operand, or the product's factors hold something else by now.
+    pub fn fuse(&self, registers: &[Register], op: Op, src: &[Reg]) -> Option<(Op, [Reg; 3])> {
+        let (of_left, of_right) = match op {
+            Op::FAdd => (Op::FFma, Op::FFma),
+            Op::FSub => (Op::FMulSub, Op::FNegMulAdd),
+            _ => return None,
+        };
+        let &[a, b] = src else { return None };
+        if let Some([x, y]) = self.factors(registers, a) {
+            return Some((of_left, [x, y, b]));
         }
-        let result = self.compute(op, src);
-        if let (Op::FMul, &[x, y]) = (op, src) {
-            self.products.insert(
-                result,
-                Product {
-                    factors: [x, y],
-                    segment: self.segment,
-                },
-            );
-        }
-        result
+        let [x, y] = self.factors(registers, b)?;
+        Some((of_right, [x, y, a]))
     }
 
     /// The factors of a product, if they still hold what they held.
-    fn factors(&self, product: Reg) -> Option<[Reg; 2]> {
-        let Product { factors, segment } = *self.products.get(&product)?;
+    fn factors(&self, registers: &[Register], product: Reg) -> Option<[Reg; 2]> {
+        let Product { factors, segment } = *self.by_register.get(&product)?;
         let is_value = |reg: &Reg| {
-            self.program
-                .registers
-                .get(reg.0 as usize)
-                .is_some_and(|register| register.role == Role::Value)
+            let register = registers.get(reg.0 as usize);
+            register.is_some_and(|register| register.role == Role::Value)
         };
         (segment == self.segment || factors.iter().all(is_value)).then_some(factors)
     }

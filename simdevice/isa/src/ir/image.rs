@@ -1,6 +1,7 @@
 //! Operands of image statements.
 
-use super::{AtomicOp, Binding, Reg};
+use super::memory::{AtomicOp, Binding};
+use super::register::Reg;
 
 /// An image's shape, without its array layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -275,7 +275,7 @@ fn folding_gives_what_running_gives(case: &Case) {
             .map(|ty| random.pick(&table(*ty)))
             .collect();
         let as_bool = |bits: u64| u64::from(bits != 0);
-        let folded = crate::exec::evaluate(level, op, &operands);
+        let folded = crate::kernels::evaluate(level, op, &operands);
         let expected = apply(op, &operands, fuses(name));
         let expected = if op.signature().result == Type::Bool {
             as_bool(expected)

@@ -1,0 +1,96 @@
+//! Lets the caller read outputs where they were computed, where else each batch would copy them.
+
+use crate::ir::{Block, Program, Reg, Role, Statement};
+
+/// Makes outputs that all lanes assign once, to a value of each lane, that value. `varying` says which registers have a
+/// value for each lane.
+pub fn forward(program: &mut Program, varying: &[bool]) {
+    let stay = program.body.iter().position(leaves);
+    let stay = stay.unwrap_or(program.body.len());
+    let mut copied = vec![false; program.body.len()];
+    for output in &mut program.outputs {
+        let variable = output.reg;
+        let is_read = program
+            .body
+            .iter()
+            .any(|statement| statement.reads(variable));
+        if is_read || assignments(&program.body, variable) != 1 {
+            continue;
+        }
+        let assigned = program.body[..stay].iter().position(
+            |statement| matches!(statement, Statement::Assign { dst, .. } if *dst == variable),
+        );
+        let Some(at) = assigned else { continue };
+        let Statement::Assign { src, .. } = program.body[at] else {
+            continue;
+        };
+        let is_value = program.registers[src.0 as usize].role == Role::Value;
+        if is_value && varying[src.0 as usize] {
+            output.reg = src;
+            copied[at] = true;
+        }
+    }
+    let mut copied = copied.into_iter();
+    program.body.retain(|_| copied.next() != Some(true));
+}
+
+/// Whether lanes may end in a statement.
+fn leaves(statement: &Statement) -> bool {
+    matches!(statement, Statement::Return | Statement::Kill)
+        || statement.blocks().into_iter().flatten().any(leaves)
+}
+
+/// How many statements assign to a variable.
+fn assignments(block: &Block, variable: Reg) -> usize {
+    let of = |statement: &Statement| {
+        let own = usize::from(statement.definitions().contains(&variable));
+        let inner = statement.blocks().into_iter();
+        own + inner
+            .map(|block| assignments(block, variable))
+            .sum::<usize>()
+    };
+    block.iter().map(of).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builder::Builder;
+    use crate::compiler::uniformity::varying_registers;
+    use crate::ir::{Rate, Type};
+
+    /// Whether the only output of a program is read where it was computed.
+    fn is_forwarded(rate: Rate, write: impl FnOnce(&mut Builder, Reg, Reg)) -> bool {
+        let mut builder = Builder::new();
+        let input = builder.input(0, Type::B32, rate);
+        let output = builder.output(0, Type::B32);
+        write(&mut builder, input, output);
+        let mut program = builder.finish().expect("a valid program");
+        let varying = varying_registers(&program, false);
+        forward(&mut program, &varying);
+        program.outputs[0].reg != output
+    }
+
+    #[gaurast_runner::test]
+    fn what_every_lane_assigns_once_is_forwarded() {
+        let once = |b: &mut Builder, input, output| b.assign(output, input);
+        assert!(is_forwarded(Rate::Varying, once));
+        assert!(
+            !is_forwarded(Rate::Uniform, once),
+            "it has one value for all"
+        );
+        let twice = |b: &mut Builder, input, output| {
+            b.assign(output, input);
+            b.assign(output, input);
+        };
+        assert!(!is_forwarded(Rate::Varying, twice));
+        let after_leaving = |b: &mut Builder, input, output| {
+            let condition = b.compute(crate::ir::op::Op::INe, &[input, input]);
+            b.begin_if(condition);
+            b.kill();
+            b.end();
+            b.assign(output, input);
+        };
+        assert!(!is_forwarded(Rate::Varying, after_leaving));
+    }
+}

@@ -1,0 +1,537 @@
+//! Lowers a program's tree of statements to steps, with masks made explicit.
+
+use std::collections::{HashMap, HashSet};
+
+use super::allocate::Allocation;
+use super::scopes::loop_private_variables;
+use super::step::{MaskId, RunCost, Step, Target};
+use crate::ir::op::{Kind, Op};
+use crate::ir::{Block, Case, Label, Program, Reg, Statement, Type};
+use crate::kernels::registers::Slot;
+
+/// Steps and what belongs to them.
+pub struct Linearized {
+    /// The steps; the last is [`Step::End`].
+    pub steps: Vec<Step>,
+    /// Masks used.
+    pub masks: usize,
+    /// The cost of each counted run.
+    pub runs: Vec<RunCost>,
+}
+
+/// Lowers a valid program. `count` says whether to count the work.
+pub fn linearize(program: &Program, allocation: &Allocation, count: bool) -> Linearized {
+    let mut linearizer = Linearizer {
+        program,
+        allocation,
+        count,
+        steps: Vec::new(),
+        marks: Vec::new(),
+        free_mask: MaskId::FIRST_FREE,
+        masks: usize::from(MaskId::FIRST_FREE),
+        constructs: HashMap::new(),
+        runs: Vec::new(),
+        run: None,
+        loop_private: loop_private_variables(program),
+        unmasked: HashSet::new(),
+        uses: count_uses(program),
+    };
+    let end = linearizer.mark();
+    linearizer.block(&program.body, end);
+    linearizer.place(end);
+    linearizer.steps.push(Step::End);
+    linearizer.patch_targets()
+}
+
+/// A place in the steps that isn't known yet: an index into the marks.
+type Mark = u32;
+
+/// Where lanes go that leave a construct.
+#[derive(Clone, Copy)]
+struct Exits {
+    breaks: MaskId,
+    continues: Option<MaskId>,
+}
+
+struct Linearizer<'a> {
+    program: &'a Program,
+    allocation: &'a Allocation,
+    count: bool,
+    steps: Vec<Step>,
+    /// Where each mark is.
+    marks: Vec<Target>,
+    free_mask: u16,
+    masks: usize,
+    constructs: HashMap<Label, Exits>,
+    runs: Vec<RunCost>,
+    /// The run that instructions are being added to.
+    run: Option<usize>,
+    /// Variables that only a loop looks at.
+    loop_private: HashMap<Label, HashSet<Reg>>,
+    /// Variables to which assignments, where lowering is now, need no mask.
+    unmasked: HashSet<Reg>,
+    /// How often each register is read.
+    uses: Vec<u32>,
+}
+
+impl Linearizer<'_> {
+    fn mark(&mut self) -> Mark {
+        self.marks.push(0);
+        (self.marks.len() - 1) as Mark
+    }
+
+    fn place(&mut self, mark: Mark) {
+        self.marks[mark as usize] = self.steps.len() as Target;
+        self.run = None;
+    }
+
+    /// Appends a step of control flow.
+    fn control(&mut self, step: Step) {
+        self.steps.push(step);
+        self.run = None;
+    }
+
+    /// Appends an instruction and counts it.
+    fn instruction(&mut self, step: Step, kind: Kind, uniform: bool) {
+        if self.count {
+            let run = match self.run {
+                Some(run) => run,
+                None => {
+                    self.steps.push(Step::Count(self.runs.len() as u32));
+                    self.runs.push(RunCost::default());
+                    *self.run.insert(self.runs.len() - 1)
+                }
+            };
+            let cost = &mut self.runs[run];
+            let counts = if uniform {
+                &mut cost.uniform
+            } else {
+                &mut cost.varying
+            };
+            counts[kind as usize] += 1;
+        }
+        self.steps.push(step);
+    }
+
+    fn take_mask(&mut self) -> MaskId {
+        let mask = MaskId(self.free_mask);
+        self.free_mask += 1;
+        self.masks = self.masks.max(usize::from(self.free_mask));
+        mask
+    }
+
+    fn slot(&self, reg: Reg) -> Slot {
+        self.allocation.slots[reg.0 as usize]
+    }
+
+    fn ty(&self, reg: Reg) -> Type {
+        self.program.registers[reg.0 as usize].ty
+    }
+
+    /// Replaces marks by the places that they mark.
+    fn patch_targets(mut self) -> Linearized {
+        for step in &mut self.steps {
+            if let Some(target) = step.target_mut() {
+                *target = self.marks[*target as usize];
+            }
+        }
+        Linearized {
+            steps: self.steps,
+            masks: self.masks,
+            runs: self.runs,
+        }
+    }
+
+    /// Lowers a block. `empty` is where to go when no lane is active: it is before, or at, a place where lanes come back.
+    fn block(&mut self, block: &Block, empty: Mark) {
+        let unmasked = std::mem::take(&mut self.unmasked);
+        self.block_of_loop(block, empty, unmasked);
+    }
+
+    /// Lowers a block in which assignments to some variables need no mask.
+    fn block_of_loop(&mut self, block: &Block, empty: Mark, unmasked: HashSet<Reg>) {
+        let mut rest = block.iter().peekable();
+        while let Some(statement) = rest.next() {
+            let outer = std::mem::replace(&mut self.unmasked, unmasked.clone());
+            if let Some(assign) = rest.next_if(|next| self.is_assigned_at_once(statement, next)) {
+                self.compute_and_assign(statement, assign);
+            } else {
+                self.statement(statement, empty);
+            }
+            self.unmasked = outer;
+            if leaves(statement) {
+                break;
+            }
+        }
+    }
+
+    /// Whether a computation's only use is the assignment that follows it.
+    fn is_assigned_at_once(&self, statement: &Statement, next: &Statement) -> bool {
+        match (statement, next) {
+            (Statement::Compute { dst: value, .. }, Statement::Assign { dst, src }) => {
+                let same_kind = self.slot(*dst).is_varying() == self.slot(*value).is_varying();
+                value == src && same_kind && self.uses[value.0 as usize] == 1
+            }
+            _ => false,
+        }
+    }
+
+    fn compute_and_assign(&mut self, compute: &Statement, assign: &Statement) {
+        let (
+            Statement::Compute {
+                op,
+                dst: value,
+                src,
+            },
+            Statement::Assign { dst, .. },
+        ) = (compute, assign)
+        else {
+            return;
+        };
+        let (to, temporary) = (self.slot(*dst), self.slot(*value));
+        let src = self.operands(src);
+        let step = if self.unmasked.contains(dst) || !to.is_varying() {
+            Step::Compute {
+                op: *op,
+                dst: to,
+                src,
+            }
+        } else {
+            Step::ComputeAssign {
+                op: *op,
+                dst: to,
+                temporary,
+                src,
+            }
+        };
+        self.instruction(step, op.kind(), !to.is_varying());
+    }
+
+    fn operands(&self, src: &[Reg]) -> [Slot; 4] {
+        let mut slots = [Slot::ZERO; 4];
+        for (slot, reg) in slots.iter_mut().zip(src) {
+            *slot = self.slot(*reg);
+        }
+        slots
+    }
+
+    fn statement(&mut self, statement: &Statement, empty: Mark) {
+        match statement {
+            Statement::Compute { op, dst, src } => self.compute(*op, *dst, src),
+            Statement::Assign { dst, src } => {
+                let (to, from, ty) = (self.slot(*dst), self.slot(*src), self.ty(*dst));
+                let step = if self.unmasked.contains(dst) {
+                    Step::Copy {
+                        dst: to,
+                        src: from,
+                        ty,
+                    }
+                } else {
+                    Step::Assign {
+                        dst: to,
+                        src: from,
+                        ty,
+                    }
+                };
+                self.instruction(step, Kind::Move, !to.is_varying());
+            }
+            Statement::If {
+                condition,
+                then,
+                otherwise,
+            } => self.branch(*condition, then, otherwise, empty),
+            Statement::Switch {
+                label,
+                selector,
+                cases,
+            } => self.switch(*label, *selector, cases, empty),
+            Statement::Loop {
+                label,
+                body,
+                continuing,
+            } => self.repeat(*label, body, continuing, empty),
+            Statement::Scope { label, body } => self.scope(*label, body, empty),
+            Statement::Break(_) | Statement::Continue(_) | Statement::Return => {
+                let into = self.exit(statement);
+                self.control(Step::Leave {
+                    into,
+                    target: empty,
+                });
+            }
+            Statement::Kill => self.control(Step::Kill(empty)),
+            Statement::Demote => self.control(Step::Demote),
+            Statement::Barrier => {}
+            other => {
+                let uniform = other
+                    .definitions()
+                    .first()
+                    .is_some_and(|reg| !self.slot(*reg).is_varying());
+                self.instruction(
+                    Step::Other(Box::new(other.clone())),
+                    kind_of(other),
+                    uniform,
+                );
+            }
+        }
+    }
+
+    fn compute(&mut self, op: Op, dst: Reg, src: &[Reg]) {
+        let (dst, src) = (self.slot(dst), self.operands(src));
+        self.instruction(Step::Compute { op, dst, src }, op.kind(), !dst.is_varying());
+    }
+
+    /// The mask that lanes go to which leave by this statement.
+    fn exit(&self, statement: &Statement) -> MaskId {
+        match statement {
+            Statement::Break(label) => self
+                .constructs
+                .get(label)
+                .map_or(MaskId::DONE, |exits| exits.breaks),
+            Statement::Continue(label) => self
+                .constructs
+                .get(label)
+                .and_then(|exits| exits.continues)
+                .unwrap_or(MaskId::DONE),
+            _ => MaskId::DONE,
+        }
+    }
+
+    fn branch(&mut self, condition: Reg, then: &Block, otherwise: &Block, empty: Mark) {
+        let condition = self.slot(condition);
+        if !condition.is_varying() {
+            let (other, end) = (self.mark(), self.mark());
+            self.control(Step::Unless {
+                condition,
+                target: other,
+            });
+            self.block(then, empty);
+            if !otherwise.is_empty() && !then.last().is_some_and(leaves) {
+                self.control(Step::Jump(end));
+            }
+            self.place(other);
+            self.block(otherwise, empty);
+            self.place(end);
+            return;
+        }
+        match (then.as_slice(), otherwise.as_slice()) {
+            ([exit @ (Statement::Break(_) | Statement::Continue(_) | Statement::Return)], _) => {
+                let into = self.exit(exit);
+                self.control(Step::LeaveIf {
+                    condition,
+                    when: true,
+                    into,
+                    target: empty,
+                });
+                self.block(otherwise, empty);
+            }
+            (_, [exit @ (Statement::Break(_) | Statement::Continue(_) | Statement::Return)]) => {
+                let into = self.exit(exit);
+                self.control(Step::LeaveIf {
+                    condition,
+                    when: false,
+                    into,
+                    target: empty,
+                });
+                self.block(then, empty);
+            }
+            _ => self.divergent_branch(condition, then, otherwise, empty),
+        }
+    }
+
+    fn divergent_branch(&mut self, condition: Slot, then: &Block, otherwise: &Block, empty: Mark) {
+        let saved = self.free_mask;
+        let other = self.take_mask();
+        let (at_else, end) = (self.mark(), self.mark());
+        self.control(Step::If {
+            condition,
+            other,
+            target: at_else,
+        });
+        self.block(then, at_else);
+        self.place(at_else);
+        if !otherwise.is_empty() {
+            self.control(Step::Else { other, target: end });
+            self.block(otherwise, end);
+        }
+        self.place(end);
+        self.control(Step::Join {
+            mask: other,
+            target: empty,
+        });
+        self.free_mask = saved;
+    }
+
+    fn repeat(&mut self, label: Label, body: &Block, continuing: &Block, empty: Mark) {
+        let saved = self.free_mask;
+        let breaks = self.take_mask();
+        let continues = contains(body, &Statement::Continue(label)).then(|| self.take_mask());
+        self.constructs.insert(label, Exits { breaks, continues });
+        let (head, at_continuing, end) = (self.mark(), self.mark(), self.mark());
+        self.control(Step::Clear(breaks));
+        self.place(head);
+        if let Some(continues) = continues {
+            self.control(Step::Clear(continues));
+        }
+        // No statement may run without lanes: it would still set uniform registers.
+        let back = if continues.is_some() {
+            at_continuing
+        } else {
+            end
+        };
+        // Lanes that continue early must keep what they have until then.
+        let private = self.loop_private.remove(&label).unwrap_or_default();
+        let in_body = if continues.is_some() {
+            HashSet::new()
+        } else {
+            private.clone()
+        };
+        self.block_of_loop(body, back, in_body);
+        self.place(at_continuing);
+        if let Some(mask) = continues {
+            self.control(Step::Join { mask, target: end });
+        }
+        self.block_of_loop(continuing, end, private);
+        self.place(end);
+        self.control(Step::Repeat(head));
+        self.control(Step::Join {
+            mask: breaks,
+            target: empty,
+        });
+        self.free_mask = saved;
+    }
+
+    fn scope(&mut self, label: Label, body: &Block, empty: Mark) {
+        let saved = self.free_mask;
+        let breaks = self.take_mask();
+        self.constructs.insert(
+            label,
+            Exits {
+                breaks,
+                continues: None,
+            },
+        );
+        let end = self.mark();
+        self.control(Step::Clear(breaks));
+        self.block(body, end);
+        self.place(end);
+        self.control(Step::Join {
+            mask: breaks,
+            target: empty,
+        });
+        self.free_mask = saved;
+    }
+
+    fn switch(&mut self, label: Label, selector: Reg, cases: &[Case], empty: Mark) {
+        let saved = self.free_mask;
+        let [entered, unmatched, breaks] = [self.take_mask(), self.take_mask(), self.take_mask()];
+        self.constructs.insert(
+            label,
+            Exits {
+                breaks,
+                continues: None,
+            },
+        );
+        let selector = self.slot(selector);
+        let values = cases
+            .iter()
+            .flat_map(|case| case.values.iter().copied())
+            .collect();
+        self.control(Step::Clear(breaks));
+        self.control(Step::Switch {
+            selector,
+            values,
+            entered,
+            unmatched,
+        });
+        let end = self.mark();
+        for (index, case) in cases.iter().enumerate() {
+            let next = self.mark();
+            self.control(Step::Case {
+                selector,
+                values: case.values.as_slice().into(),
+                entered,
+                unmatched: case.default.then_some(unmatched),
+                target: next,
+            });
+            self.block(&case.body, next);
+            let falls = case.fallthrough && index + 1 < cases.len();
+            if !falls && !case.body.last().is_some_and(leaves) {
+                self.control(Step::Leave {
+                    into: breaks,
+                    target: next,
+                });
+            }
+            self.place(next);
+        }
+        if !cases.iter().any(|case| case.default) {
+            self.control(Step::Join {
+                mask: unmatched,
+                target: end,
+            });
+        }
+        self.place(end);
+        self.control(Step::Join {
+            mask: breaks,
+            target: empty,
+        });
+        self.free_mask = saved;
+    }
+}
+
+/// Whether no lane goes on after a statement.
+fn leaves(statement: &Statement) -> bool {
+    matches!(
+        statement,
+        Statement::Break(_) | Statement::Continue(_) | Statement::Return | Statement::Kill
+    )
+}
+
+/// How often each register is read.
+fn count_uses(program: &Program) -> Vec<u32> {
+    fn count(block: &Block, uses: &mut [u32]) {
+        for statement in block {
+            statement
+                .uses()
+                .into_iter()
+                .for_each(|reg| uses[reg.0 as usize] += 1);
+            statement
+                .blocks()
+                .into_iter()
+                .for_each(|block| count(block, uses));
+        }
+    }
+    let mut uses = vec![0; program.registers.len()];
+    count(&program.body, &mut uses);
+    uses
+}
+
+fn contains(block: &Block, wanted: &Statement) -> bool {
+    block.iter().any(|statement| {
+        statement == wanted
+            || statement
+                .blocks()
+                .iter()
+                .any(|block| contains(block, wanted))
+    })
+}
+
+/// What a statement that isn't arithmetic costs.
+fn kind_of(statement: &Statement) -> Kind {
+    match statement {
+        Statement::Compute { op, .. } => op.kind(),
+        Statement::Assign { .. } | Statement::LaneIndex { .. } | Statement::IsHelper { .. } => {
+            Kind::Move
+        }
+        Statement::Load { .. } | Statement::Store { .. } | Statement::BufferSize { .. } => {
+            Kind::Memory
+        }
+        Statement::Atomic { .. } => Kind::Atomic,
+        Statement::Sample(_)
+        | Statement::ImageRead(_)
+        | Statement::ImageWrite(_)
+        | Statement::ImageAtomic(_)
+        | Statement::ImageQuery { .. } => Kind::Image,
+        Statement::Derivative { .. } | Statement::Subgroup { .. } => Kind::CrossLane,
+        _ => Kind::Control,
+    }
+}

@@ -1,0 +1,157 @@
+//! Compiles programs to steps. This file holds the order of the passes; each pass is a module.
+
+mod allocate;
+mod constant_table;
+mod dead_code;
+mod fold;
+mod forwarding;
+mod if_conversion;
+mod licm;
+mod linearize;
+mod scopes;
+mod sink;
+pub mod step;
+mod uniformity;
+
+use std::sync::atomic::AtomicU32;
+
+use fearless_simd::Level;
+
+use crate::ir::validate::{InvalidProgram, validate};
+use crate::ir::{
+    CHUNK_LANES, Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Reg, Role, Type,
+};
+use crate::kernels::registers::Slot;
+use linearize::Linearized;
+use step::{RunCost, Step};
+
+/// The most chunks that a register file may have: 256 MiB.
+const MAX_CHUNKS: usize = 1 << 22;
+
+/// How a program shall run.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Lanes of a batch: a multiple of 16, at most [`MAX_LANES`].
+    pub lanes: usize,
+    /// Lanes of a subgroup: a power of two, at least 4 and at most [`MAX_SUBGROUP_SIZE`]. The last subgroup of a batch may
+    /// be smaller.
+    pub subgroup_size: usize,
+    /// Whether to count the work done (see [`crate::exec::Machine::take_work`]).
+    pub count_work: bool,
+    /// The SIMD level of the kernels.
+    pub level: Level,
+}
+
+impl Options {
+    /// Batches and subgroups of 64 lanes; nothing is counted.
+    pub fn new(level: Level) -> Self {
+        Self {
+            lanes: 64,
+            subgroup_size: 64,
+            count_work: false,
+            level,
+        }
+    }
+}
+
+/// A program as steps for batches of a fixed number of lanes, and what a machine needs to run them.
+#[derive(Debug)]
+pub struct CompiledProgram {
+    /// What is run, in order but for jumps.
+    pub steps: Vec<Step>,
+    /// Each register's place in the register file.
+    pub slots: Vec<Slot>,
+    /// Each register's type.
+    pub types: Vec<Type>,
+    /// Registers that are set once.
+    pub constants: Vec<Constant>,
+    /// Registers that the caller sets.
+    pub inputs: Vec<Input>,
+    /// Registers that the caller reads.
+    pub outputs: Vec<Output>,
+    /// The registers of outputs that are zero until they are assigned.
+    pub cleared: Vec<Reg>,
+    /// The cost of each counted run.
+    pub runs: Vec<RunCost>,
+    /// Masks used.
+    pub masks: usize,
+    /// Chunks of the register file.
+    pub chunks: usize,
+    /// Lanes of a batch.
+    pub lanes: usize,
+    /// Lanes of a subgroup.
+    pub subgroup_size: usize,
+    /// Bytes of workgroup memory.
+    pub shared_bytes: u32,
+    /// Bytes of private memory of each lane.
+    pub private_bytes: u32,
+    /// What private memory holds, if that is the same in all lanes at all times.
+    pub table: Option<Vec<AtomicU32>>,
+}
+
+impl CompiledProgram {
+    /// Checks, optimizes and linearizes a program.
+    ///
+    /// # Errors
+    /// If the program isn't valid, needs too many registers, or the options are out of range.
+    pub fn new(mut program: Program, options: &Options) -> Result<Self, InvalidProgram> {
+        let structure = |problem| Err(InvalidProgram::Structure { problem });
+        let Options {
+            lanes,
+            subgroup_size,
+            count_work,
+            level,
+        } = *options;
+        if lanes == 0 || !lanes.is_multiple_of(CHUNK_LANES) || lanes > MAX_LANES {
+            return structure("the lanes of a batch aren't a multiple of 16 within bounds");
+        }
+        if !subgroup_size.is_power_of_two() || !(4..=MAX_SUBGROUP_SIZE).contains(&subgroup_size) {
+            return structure("the subgroup size isn't a power of two within bounds");
+        }
+        validate(&program)?;
+        fold::fold(&mut program, level);
+        dead_code::remove_dead(&mut program);
+        if_conversion::convert_branches(&mut program);
+        licm::move_invariants(&mut program);
+        dead_code::remove_dead(&mut program);
+        sink::sink(&mut program);
+        let table = constant_table::promote_constants(&mut program);
+        let varying = uniformity::varying_registers(&program, table.is_some());
+        forwarding::forward(&mut program, &varying);
+        let allocation = allocate::allocate(&program, &varying, lanes / CHUNK_LANES);
+        if allocation.chunks > MAX_CHUNKS {
+            return structure("too many registers are live at once");
+        }
+        let linearized = linearize::linearize(&program, &allocation, count_work);
+        let Linearized { steps, masks, runs } = linearized;
+        let is_variable = |reg: &Reg| program.registers[reg.0 as usize].role == Role::Variable;
+        let assigned = program.outputs.iter().map(|output| output.reg);
+        let cleared = assigned.filter(is_variable).collect();
+        let registers = program.registers.iter();
+        Ok(Self {
+            steps,
+            masks,
+            runs,
+            cleared,
+            chunks: allocation.chunks,
+            slots: allocation.slots,
+            types: registers.map(|register| register.ty).collect(),
+            constants: program.constants,
+            inputs: program.inputs,
+            outputs: program.outputs,
+            shared_bytes: program.shared_bytes,
+            private_bytes: program.private_bytes,
+            table: table.map(|words| words.into_iter().map(AtomicU32::new).collect()),
+            lanes,
+            subgroup_size,
+        })
+    }
+
+    /// Words of private memory that each lane has for itself.
+    pub fn private_words(&self) -> usize {
+        match self.table {
+            Some(_) => 0,
+            None => self.private_bytes as usize / 4,
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Where in the tree of statements a variable is used.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::ir::{Block, Label, Program, Reg, Role, Statement};
+
+/// Where variables live.
+///
+/// A variable's home is the innermost block around all that reads or assigns it, if the block's first statement that does
+/// so assigns it at once. Whatever lanes enter the home then find nothing of what lanes did there earlier: only masks that
+/// change within the home matter to the variable. Else the home is the whole program.
+pub struct Homes {
+    variables: HashMap<Reg, Uses>,
+}
+
+/// A block's place in the statement around it: which statement (counted in order of appearance), and which of its blocks.
+type Step = (usize, usize);
+
+struct Uses {
+    /// The way to the home: blocks, outermost first.
+    home: Vec<Step>,
+    /// How many constructs are around the home; none if it is the whole program.
+    depth: usize,
+    /// The labelled constructs around all reads.
+    around_reads: Option<Vec<Label>>,
+}
+
+impl Homes {
+    /// How many constructs are around a variable's home.
+    pub fn depth(&self, variable: Reg) -> usize {
+        self.variables.get(&variable).map_or(0, |uses| uses.depth)
+    }
+
+    /// Whether a variable is read outside a construct.
+    pub fn is_read_outside(&self, variable: Reg, label: Label) -> bool {
+        let uses = self.variables.get(&variable);
+        let around = uses.and_then(|uses| uses.around_reads.as_ref());
+        !around.is_some_and(|around| around.contains(&label))
+    }
+}
+
+/// Finds the homes of a program's variables.
+pub fn homes(program: &Program) -> Homes {
+    let mut search = Search {
+        program,
+        variables: HashMap::new(),
+        path: Vec::new(),
+        labels: Vec::new(),
+        statements: 0,
+    };
+    // The caller sets and reads outputs: they are at home in the whole program.
+    for output in &program.outputs {
+        search.touch(output.reg);
+        search.read(output.reg);
+    }
+    search.block(&program.body);
+    let mut homes = Homes {
+        variables: search.variables,
+    };
+    let mut first = FirstUse {
+        homes: &mut homes,
+        path: Vec::new(),
+        statements: 0,
+        depth: 0,
+    };
+    first.block(&program.body);
+    homes
+}
+
+struct Search<'a> {
+    program: &'a Program,
+    variables: HashMap<Reg, Uses>,
+    path: Vec<Step>,
+    labels: Vec<Label>,
+    statements: usize,
+}
+
+impl Search<'_> {
+    fn is_variable(&self, reg: Reg) -> bool {
+        self.program.registers[reg.0 as usize].role == Role::Variable
+    }
+
+    fn touch(&mut self, reg: Reg) {
+        let path = &self.path;
+        let uses = self.variables.entry(reg).or_insert_with(|| Uses {
+            home: path.clone(),
+            depth: 0,
+            around_reads: None,
+        });
+        let common = uses.home.iter().zip(path).take_while(|(a, b)| a == b);
+        let common = common.count();
+        uses.home.truncate(common);
+    }
+
+    fn read(&mut self, reg: Reg) {
+        let labels = &self.labels;
+        if let Some(uses) = self.variables.get_mut(&reg) {
+            match &mut uses.around_reads {
+                Some(around) => around.retain(|label| labels.contains(label)),
+                none => *none = Some(labels.clone()),
+            }
+        }
+    }
+
+    fn block(&mut self, block: &Block) {
+        for statement in block {
+            let number = self.statements;
+            self.statements += 1;
+            for reg in statement.uses() {
+                if self.is_variable(reg) {
+                    self.touch(reg);
+                    self.read(reg);
+                }
+            }
+            for reg in statement.definitions() {
+                if self.is_variable(reg) {
+                    self.touch(reg);
+                }
+            }
+            let label = label_of(statement);
+            self.labels.extend(label);
+            for (index, inner) in statement.blocks().into_iter().enumerate() {
+                self.path.push((number, index));
+                self.block(inner);
+                self.path.pop();
+            }
+            if label.is_some() {
+                self.labels.pop();
+            }
+        }
+    }
+}
+
+/// Looks whether homes begin with an assignment.
+struct FirstUse<'a> {
+    homes: &'a mut Homes,
+    path: Vec<Step>,
+    statements: usize,
+    /// Constructs around this place, as uniformity analysis counts them: a switch's cases are branches in it.
+    depth: usize,
+}
+
+impl FirstUse<'_> {
+    /// Walks a block. Returns the variables used in it.
+    fn block(&mut self, block: &Block) -> Vec<Reg> {
+        let mut used: Vec<Reg> = Vec::new();
+        for statement in block {
+            let number = self.statements;
+            self.statements += 1;
+            let mut here = statement.uses();
+            let levels = 1 + usize::from(matches!(statement, Statement::Switch { .. }));
+            for (index, inner) in statement.blocks().into_iter().enumerate() {
+                self.path.push((number, index));
+                self.depth += levels;
+                here.extend(self.block(inner));
+                self.depth -= levels;
+                self.path.pop();
+            }
+            if let Statement::Assign { dst, .. } = statement
+                && !used.contains(dst)
+                && !here.contains(dst)
+                && let Some(uses) = self.homes.variables.get_mut(dst)
+                && uses.home == self.path
+            {
+                uses.depth = self.depth;
+            }
+            here.extend(statement.definitions());
+            here.retain(|reg| self.homes.variables.contains_key(reg));
+            used.append(&mut here);
+            used.sort_unstable();
+            used.dedup();
+        }
+        used
+    }
+}
+
+fn label_of(statement: &Statement) -> Option<Label> {
+    match statement {
+        Statement::Loop { label, .. }
+        | Statement::Scope { label, .. }
+        | Statement::Switch { label, .. } => Some(*label),
+        _ => None,
+    }
+}
+
+/// For each loop, the variables that only the loop looks at: those that are read only within it, and that every lane which enters it has assigned just
+/// before (in the block that the loop is in).
+///
+/// An assignment acts on active lanes alone, because lanes that have left a loop may read the variable later. Where they
+/// can't, the mask is not needed: the result may go straight to the variable, in all lanes.
+pub fn loop_private_variables(program: &Program) -> HashMap<Label, HashSet<Reg>> {
+    let mut reads = HashMap::new();
+    count_reads(program, &program.body, &mut reads);
+    for output in &program.outputs {
+        *reads.entry(output.reg).or_default() += 1;
+    }
+    let mut found = HashMap::new();
+    search_loops(program, &program.body, &reads, &mut found);
+    found
+}
+
+/// Counts reads of variables.
+fn count_reads(program: &Program, block: &Block, reads: &mut HashMap<Reg, usize>) {
+    for statement in block {
+        for reg in statement.uses() {
+            if program.registers[reg.0 as usize].role == Role::Variable {
+                *reads.entry(reg).or_default() += 1;
+            }
+        }
+        statement
+            .blocks()
+            .into_iter()
+            .for_each(|block| count_reads(program, block, reads));
+    }
+}
+
+fn search_loops(
+    program: &Program,
+    block: &Block,
+    reads: &HashMap<Reg, usize>,
+    found: &mut HashMap<Label, HashSet<Reg>>,
+) {
+    let mut assigned = HashSet::new();
+    for statement in block {
+        match statement {
+            Statement::Assign { dst, .. } => {
+                assigned.insert(*dst);
+            }
+            Statement::Loop { label, .. } => {
+                let mut within = HashMap::new();
+                statement
+                    .blocks()
+                    .into_iter()
+                    .for_each(|block| count_reads(program, block, &mut within));
+                let private = within.iter().filter(|(reg, count)| {
+                    assigned.contains(*reg) && reads.get(*reg) == Some(*count)
+                });
+                found.insert(*label, private.map(|(reg, _)| *reg).collect());
+            }
+            _ => {}
+        }
+        statement
+            .blocks()
+            .into_iter()
+            .for_each(|block| search_loops(program, block, reads, found));
+    }
+}

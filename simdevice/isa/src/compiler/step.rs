@@ -1,0 +1,127 @@
+//! What a program is lowered to: steps in a row, with jumps.
+
+use crate::ir::op::{Kind, Op};
+use crate::ir::{Statement, Type};
+use crate::kernels::registers::Slot;
+
+/// The index of a mask within a machine's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MaskId(pub u16);
+
+impl MaskId {
+    /// The lanes that execute.
+    pub const ACTIVE: Self = Self(0);
+    /// The lanes whose writes to memory do nothing.
+    pub const HELPER: Self = Self(1);
+    /// The lanes that were killed or demoted.
+    pub const KILLED: Self = Self(2);
+    /// Lanes that are done; nobody reads it.
+    pub const DONE: Self = Self(3);
+    /// The lanes that were active when the batch began; the others never matter.
+    pub const ENTRY: Self = Self(4);
+    /// The first that constructs may use.
+    pub const FIRST_FREE: u16 = 5;
+}
+
+/// An index into the steps.
+pub type Target = u32;
+
+/// One step of the machine. Masks are explicit; a jump is taken when a set of lanes is empty, or by a uniform condition.
+#[derive(Clone, Debug)]
+pub enum Step {
+    /// `dst = op(src...)` in all lanes.
+    Compute { op: Op, dst: Slot, src: [Slot; 4] },
+    /// `dst = op(src...)` in the active lanes, by way of `temporary` if not all lanes are active.
+    ComputeAssign {
+        op: Op,
+        dst: Slot,
+        temporary: Slot,
+        src: [Slot; 4],
+    },
+    /// `dst = src` in all lanes.
+    Copy { dst: Slot, src: Slot, ty: Type },
+    /// `dst = src` in the active lanes (all lanes, if `dst` is uniform).
+    Assign { dst: Slot, src: Slot, ty: Type },
+    /// Anything that reaches across lanes or out of the registers.
+    Other(Box<Statement>),
+    /// A straight run of instructions begins: counts it and the active lanes.
+    Count(u32),
+
+    /// Goes there.
+    Jump(Target),
+    /// Goes there if a uniform condition is false.
+    Unless { condition: Slot, target: Target },
+    /// `other = active & !condition; active &= condition`; goes there if no lane is left.
+    If {
+        condition: Slot,
+        other: MaskId,
+        target: Target,
+    },
+    /// Exchanges `active` and `other`; goes there if no lane is left.
+    Else { other: MaskId, target: Target },
+    /// `mask = {}`.
+    Clear(MaskId),
+    /// `active |= mask`; goes there if that is empty.
+    Join { mask: MaskId, target: Target },
+    /// `into |= active; active = {}`; goes there.
+    Leave { into: MaskId, target: Target },
+    /// The active lanes whose condition equals `when` move to `into`; goes there if none is left.
+    LeaveIf {
+        condition: Slot,
+        when: bool,
+        into: MaskId,
+        target: Target,
+    },
+    /// Goes there, the loop's head, if any lane is active; asks the watchdog.
+    Repeat(Target),
+    /// `entered = active; active = {}; unmatched =` lanes of it whose selector is none of `values`.
+    Switch {
+        selector: Slot,
+        values: Box<[u32]>,
+        entered: MaskId,
+        unmatched: MaskId,
+    },
+    /// Activates also the lanes of `entered` whose selector is one of `values`, and those of `unmatched` if that's given;
+    /// goes there if no lane is active.
+    Case {
+        selector: Slot,
+        values: Box<[u32]>,
+        entered: MaskId,
+        unmatched: Option<MaskId>,
+        target: Target,
+    },
+    /// Active lanes are killed and done; goes there.
+    Kill(Target),
+    /// Active lanes are killed and become helpers.
+    Demote,
+    /// The end.
+    End,
+}
+
+impl Step {
+    /// Calls `visit` on the jump target, if there is one.
+    pub fn target_mut(&mut self) -> Option<&mut Target> {
+        match self {
+            Self::Jump(target)
+            | Self::Repeat(target)
+            | Self::Kill(target)
+            | Self::Unless { target, .. }
+            | Self::If { target, .. }
+            | Self::Else { target, .. }
+            | Self::Join { target, .. }
+            | Self::Leave { target, .. }
+            | Self::LeaveIf { target, .. }
+            | Self::Case { target, .. } => Some(target),
+            _ => None,
+        }
+    }
+}
+
+/// What a straight run of instructions costs each time it runs, by [`Kind`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RunCost {
+    /// Instructions on varying registers.
+    pub varying: [u32; Kind::COUNT],
+    /// Instructions computed once for all lanes.
+    pub uniform: [u32; Kind::COUNT],
+}

@@ -1,0 +1,115 @@
+//! A program: its registers, what it is given and gives, its statements, and the limits of all of them.
+
+use std::fmt::{Display, Formatter, Result};
+
+use super::register::{Reg, Register, Type};
+use super::statement::{Block, write_block};
+
+/// The largest batch, in lanes.
+pub const MAX_LANES: usize = 2048;
+
+/// The largest workgroup memory and the largest private memory of a lane, in bytes.
+pub const MAX_MEMORY_BYTES: u32 = 1 << 20;
+
+/// The largest subgroup, in lanes: a ballot is four 32-bit words.
+pub const MAX_SUBGROUP_SIZE: usize = 128;
+
+/// The most constructs that may be nested.
+pub const MAX_NESTING: usize = 256;
+
+/// Whether an input is the same in all lanes of a batch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Rate {
+    /// One value for the whole batch (for example a workgroup's id).
+    Uniform,
+    /// One value for each lane.
+    Varying,
+}
+
+/// A register that the caller fills before each batch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Input {
+    /// The number by which the caller knows it. What the numbers mean is between the caller and whoever builds the
+    /// program.
+    pub slot: u32,
+    /// The value that holds it.
+    pub reg: Reg,
+    /// One for each lane or one for all.
+    pub rate: Rate,
+}
+
+/// A variable that the caller reads after each batch. It is zero when a batch begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Output {
+    /// The number by which the caller knows it.
+    pub slot: u32,
+    /// The variable that holds it.
+    pub reg: Reg,
+}
+
+/// A constant: a value that is known before the program runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Constant {
+    /// The value that holds it.
+    pub reg: Reg,
+    /// Its bits; the upper half is zero for `B32`; 0 or 1 for `Bool`.
+    pub bits: u64,
+}
+
+/// A program for the shader cores.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Program {
+    /// All registers; [`Reg`] is an index into it.
+    pub registers: Vec<Register>,
+    /// Values known beforehand.
+    pub constants: Vec<Constant>,
+    /// Values that the caller gives.
+    pub inputs: Vec<Input>,
+    /// Variables that the caller reads.
+    pub outputs: Vec<Output>,
+    /// Bytes of workgroup memory, at most [`MAX_MEMORY_BYTES`]. It is zero when a batch begins.
+    pub shared_bytes: u32,
+    /// Bytes of private memory of each lane, a multiple of 4, at most [`MAX_MEMORY_BYTES`]. What it holds when a batch
+    /// begins is not defined.
+    pub private_bytes: u32,
+    /// The statements.
+    pub body: Block,
+}
+
+impl Display for Program {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        for input in &self.inputs {
+            writeln!(f, "{} = input {} {:?}", input.reg, input.slot, input.rate)?;
+        }
+        for output in &self.outputs {
+            writeln!(f, "{} = output {}", output.reg, output.slot)?;
+        }
+        if self.shared_bytes + self.private_bytes > 0 {
+            writeln!(
+                f,
+                "shared {} bytes, private {} bytes",
+                self.shared_bytes, self.private_bytes
+            )?;
+        }
+        for constant in &self.constants {
+            let bits = constant.bits;
+            match self
+                .registers
+                .get(constant.reg.0 as usize)
+                .map(|register| register.ty)
+            {
+                Some(Type::Bool) => writeln!(f, "{} = {}", constant.reg, bits != 0)?,
+                Some(Type::B64) => {
+                    writeln!(f, "{} = {bits} ({:?})", constant.reg, f64::from_bits(bits))?;
+                }
+                _ => writeln!(
+                    f,
+                    "{} = {bits} ({:?})",
+                    constant.reg,
+                    f32::from_bits(bits as u32)
+                )?,
+            }
+        }
+        write_block(&self.body, 0, f)
+    }
+}

@@ -1,0 +1,57 @@
+//! Registers: their types and roles.
+
+use std::fmt::{Display, Formatter, Result};
+
+/// Lanes in a chunk, the unit that registers are stored and computed in. Batches are whole numbers of chunks.
+pub const CHUNK_LANES: usize = 16;
+
+/// A register: an index into [`Program::registers`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Reg(pub u32);
+
+/// How wide a register is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Type {
+    /// A truth value.
+    Bool,
+    /// 32 bits: `f32`, `i32` or `u32`, as the operation says.
+    B32,
+    /// 64 bits: `f64`, `i64` or `u64`.
+    B64,
+}
+
+/// How a register is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Role {
+    /// Defined once, in all lanes.
+    Value,
+    /// Written by [`Statement::Assign`], in the active lanes.
+    Variable,
+}
+
+/// A register's declaration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Register {
+    /// Its type.
+    pub ty: Type,
+    /// How it is written.
+    pub role: Role,
+}
+
+impl Display for Reg {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        write!(f, "%{}", self.0)
+    }
+}
+
+/// Registers with commas between them.
+pub(super) struct List<'a>(pub &'a [Reg]);
+
+impl Display for List<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        for (index, reg) in self.0.iter().enumerate() {
+            write!(f, "{}{reg}", if index > 0 { ", " } else { "" })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,113 @@
+//! A batch while it runs: what every step may reach.
+
+use std::cell::Cell;
+use std::sync::atomic::AtomicU32;
+
+use fearless_simd::{Simd, prelude::*};
+
+use super::masks::{Masks, bits_to_mask};
+use crate::compiler::CompiledProgram;
+use crate::compiler::step::MaskId;
+use crate::ir::{Reg, Type};
+use crate::kernels::registers::{Chunk, File, Slot, load_vector, store_vector};
+use crate::resources::Resources;
+
+/// What a batch's steps work on.
+#[derive(Clone, Copy)]
+pub struct Batch<'a> {
+    pub program: &'a CompiledProgram,
+    pub resources: &'a Resources<'a>,
+    pub file: File<'a>,
+    pub masks: Masks<'a>,
+    /// Workgroup memory.
+    pub shared: &'a [AtomicU32],
+    /// Whether all lanes that the batch began with are active, of those in the chunks that the file spans.
+    pub whole: bool,
+    /// Private memory: a row of chunks for each word.
+    pub private: &'a [Cell<Chunk>],
+}
+
+impl Batch<'_> {
+    /// Where a register lives.
+    #[inline(always)]
+    pub fn slot(&self, reg: Reg) -> Slot {
+        self.program.slots[reg.0 as usize]
+    }
+
+    /// Takes the span of the chunks that have active lanes, after the masks have changed.
+    #[inline(always)]
+    pub fn refresh_span(&mut self) {
+        let (span, whole) = self.masks.span();
+        self.file = self.file.with_span(span);
+        self.whole = whole;
+    }
+
+    /// `dst = src` in the active lanes; in all, if `dst` is uniform.
+    #[inline(always)]
+    pub fn assign<S: Simd>(&self, simd: S, dst: Slot, src: Slot, ty: Type) {
+        let uniform = !dst.is_varying();
+        if self.whole && !uniform {
+            return self.copy(dst, src, ty);
+        }
+        let (dst, src, per_16) = match ty {
+            Type::B64 => (self.file.wide(dst), self.file.wide(src), 2),
+            Type::B32 | Type::Bool => (self.file.narrow(dst), self.file.narrow(src), 1),
+        };
+        if uniform {
+            dst.iter()
+                .zip(src)
+                .for_each(|(dst, src)| dst.set(src.get()));
+            return;
+        }
+        // A uniform source has one chunk (or pair) for all.
+        let step = usize::from(src.len() == dst.len());
+        for chunk in self.file.span() {
+            let active = self.masks.chunk(MaskId::ACTIVE, chunk);
+            for part in 0..per_16 {
+                let to = &dst[chunk * per_16 + part];
+                let new = load_vector(simd, &src[chunk * per_16 * step + part]);
+                let merged = if active == u16::MAX {
+                    new
+                } else if per_16 == 1 {
+                    bits_to_mask(simd, active).select(new, load_vector(simd, to))
+                } else {
+                    bits_to_mask(simd, double(active >> (8 * part)))
+                        .select(new, load_vector(simd, to))
+                };
+                store_vector(to, merged);
+            }
+        }
+    }
+
+    /// `dst = src` in all lanes.
+    #[inline(always)]
+    pub fn copy(&self, dst: Slot, src: Slot, ty: Type) {
+        match ty {
+            Type::B64 => self.copy_chunks(dst, self.file.wide(dst), self.file.wide(src), 2),
+            Type::B32 | Type::Bool => {
+                self.copy_chunks(dst, self.file.narrow(dst), self.file.narrow(src), 1);
+            }
+        }
+    }
+
+    /// Copies the chunks to compute of a register; a uniform source has only the first `per_16`.
+    #[inline(always)]
+    fn copy_chunks(&self, slot: Slot, dst: &[Cell<Chunk>], src: &[Cell<Chunk>], per_16: usize) {
+        let step = usize::from(src.len() == dst.len());
+        for chunk in self.file.rounds(slot) {
+            for part in 0..per_16 {
+                dst[chunk * per_16 + part].set(src[chunk * per_16 * step + part].get());
+            }
+        }
+    }
+}
+
+/// Each of the low eight bits twice: masks of 64-bit lanes as masks of their halves.
+#[inline(always)]
+fn double(bits: u16) -> u16 {
+    let mut spread = bits & 0xff;
+    spread = (spread | spread << 4) & 0x0f0f;
+    spread = (spread | spread << 2) & 0x3333;
+    spread = (spread | spread << 1) & 0x5555;
+    spread | spread << 1
+}

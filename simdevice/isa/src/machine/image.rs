@@ -1,0 +1,319 @@
+//! Image instructions: gathers operands for the image unit, which is asked once for each image among 16 lanes.
+
+use super::batch::Batch;
+use super::masks::lanes_of;
+use crate::compiler::step::MaskId;
+use crate::ir::{
+    Binding, CHUNK_LANES, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg,
+    Sample,
+};
+use crate::resources::{Lanes, LodRequest, SampleRequest, TexelRequest};
+
+/// A bind point that isn't bound to anything.
+const UNBOUND: u32 = u32::MAX;
+
+fn words(batch: &Batch<'_>, reg: Reg, chunk: usize) -> Lanes {
+    batch.file.lanes(batch.slot(reg), chunk)
+}
+
+fn words_or_zero(batch: &Batch<'_>, reg: Option<Reg>, chunk: usize) -> Lanes {
+    reg.map_or([0; CHUNK_LANES], |reg| words(batch, reg, chunk))
+}
+
+fn all_words<const N: usize>(batch: &Batch<'_>, regs: &[Reg], chunk: usize) -> [Lanes; N] {
+    std::array::from_fn(|index| words_or_zero(batch, regs.get(index).copied(), chunk))
+}
+
+/// The bind points that 16 lanes mean.
+fn bind_points(batch: &Batch<'_>, binding: &Binding, chunk: usize) -> Lanes {
+    let indices = words_or_zero(batch, binding.index, chunk);
+    indices.map(|index| {
+        if index < binding.count {
+            binding.slot + index
+        } else {
+            UNBOUND
+        }
+    })
+}
+
+/// Calls `ask(image, sampler, lanes)` for each pair of bind points among `lanes`.
+fn for_each_binding(
+    images: &Lanes,
+    samplers: &Lanes,
+    mut lanes: u16,
+    mut ask: impl FnMut(u32, u32, u16),
+) {
+    while lanes != 0 {
+        let first = lanes.trailing_zeros() as usize;
+        let (image, sampler) = (images[first], samplers[first]);
+        let same = lanes_of(lanes)
+            .filter(|lane| images[*lane] == image && samplers[*lane] == sampler)
+            .fold(0, |same, lane| same | 1 << lane);
+        ask(image, sampler, same);
+        lanes &= !same;
+    }
+}
+
+#[inline(always)]
+fn put_texel(batch: &Batch<'_>, dst: &[Option<Reg>; 4], chunk: usize, texel: &[Lanes; 4]) {
+    for (index, lanes) in texel.iter().enumerate() {
+        if let Some(reg) = dst[index] {
+            batch.file.set(batch.slot(reg), chunk, *lanes);
+        }
+    }
+}
+
+fn lod_request(batch: &Batch<'_>, lod: &Lod, chunk: usize) -> LodRequest {
+    match lod {
+        Lod::Implicit { bias, minimum } => LodRequest::Implicit {
+            bias: words_or_zero(batch, *bias, chunk),
+            minimum: words_or_zero(batch, *minimum, chunk),
+        },
+        Lod::Explicit(level) => LodRequest::Explicit(words(batch, *level, chunk)),
+        Lod::Gradient { dx, dy, minimum } => LodRequest::Gradient {
+            dx: all_words(batch, dx, chunk),
+            dy: all_words(batch, dy, chunk),
+            minimum: words_or_zero(batch, *minimum, chunk),
+        },
+    }
+}
+
+pub fn sample(batch: &Batch<'_>, sample: &Sample) {
+    // What isn't an operand stays as it is here for all chunks.
+    let mut request = SampleRequest {
+        mask: 0,
+        shape: sample.shape,
+        coordinate: [[0; CHUNK_LANES]; 4],
+        lod: LodRequest::Automatic,
+        offset: [[0; CHUNK_LANES]; 3],
+        compare: None,
+        gather: sample.gather,
+    };
+    let bound = fixed_point(&sample.image).zip(fixed_point(&sample.sampler));
+    for chunk in 0..batch.file.width() {
+        let active = batch.masks.chunk(MaskId::ACTIVE, chunk);
+        if active == 0 {
+            continue;
+        }
+        for (index, reg) in sample.coordinate.iter().enumerate().take(4) {
+            request.coordinate[index] = words(batch, *reg, chunk);
+        }
+        for (index, reg) in sample.offset.iter().enumerate().take(3) {
+            request.offset[index] = words(batch, *reg, chunk);
+        }
+        if !is_automatic(&sample.lod) {
+            request.lod = lod_request(batch, &sample.lod, chunk);
+        }
+        if let Some(reg) = sample.compare {
+            request.compare = Some(words(batch, reg, chunk));
+        }
+        let texel = match bound {
+            Some((image, sampler)) => {
+                request.mask = active;
+                batch.resources.images.sample(image, sampler, &request)
+            }
+            None => sample_each(batch, sample, &mut request, chunk, active),
+        };
+        put_texel(batch, &sample.dst, chunk, &texel);
+    }
+}
+
+/// Samples of 16 lanes that may mean different images or samplers.
+fn sample_each(
+    batch: &Batch<'_>,
+    sample: &Sample,
+    request: &mut SampleRequest,
+    chunk: usize,
+    active: u16,
+) -> [Lanes; 4] {
+    let images = bind_points(batch, &sample.image, chunk);
+    let samplers = bind_points(batch, &sample.sampler, chunk);
+    let mut texel = [[0; CHUNK_LANES]; 4];
+    for_each_binding(&images, &samplers, active, |image, sampler, lanes| {
+        request.mask = lanes;
+        let found = batch.resources.images.sample(image, sampler, request);
+        merge(&mut texel, &found, lanes);
+    });
+    texel
+}
+
+fn texel_request(
+    batch: &Batch<'_>,
+    shape: ImageShape,
+    coordinate: &[Reg],
+    level: Option<Reg>,
+    sample: Option<Reg>,
+    chunk: usize,
+) -> TexelRequest {
+    TexelRequest {
+        mask: 0,
+        shape,
+        coordinate: all_words(batch, coordinate, chunk),
+        level: words_or_zero(batch, level, chunk),
+        sample: words_or_zero(batch, sample, chunk),
+    }
+}
+
+pub fn read(batch: &Batch<'_>, read: &ImageRead) {
+    for chunk in 0..batch.file.width() {
+        let active = batch.masks.chunk(MaskId::ACTIVE, chunk);
+        let images = bind_points(batch, &read.image, chunk);
+        let mut request = texel_request(
+            batch,
+            read.shape,
+            &read.coordinate,
+            read.level,
+            read.sample,
+            chunk,
+        );
+        let mut texel = [[0; CHUNK_LANES]; 4];
+        for_each_binding(&images, &[0; CHUNK_LANES], active, |image, _, lanes| {
+            request.mask = lanes;
+            merge(
+                &mut texel,
+                &batch.resources.images.read(image, &request),
+                lanes,
+            );
+        });
+        put_texel(batch, &read.dst, chunk, &texel);
+    }
+}
+
+pub fn write(batch: &Batch<'_>, write: &ImageWrite) {
+    for chunk in 0..batch.file.width() {
+        let lanes = batch.masks.writing(chunk);
+        let images = bind_points(batch, &write.image, chunk);
+        let mut request = texel_request(
+            batch,
+            write.shape,
+            &write.coordinate,
+            None,
+            write.sample,
+            chunk,
+        );
+        let texel = all_words(batch, &write.texel, chunk);
+        for_each_binding(&images, &[0; CHUNK_LANES], lanes, |image, _, lanes| {
+            request.mask = lanes;
+            batch.resources.images.write(image, &request, &texel);
+        });
+    }
+}
+
+pub fn atomic(batch: &Batch<'_>, atomic: &ImageAtomic) {
+    for chunk in 0..batch.file.width() {
+        let lanes = batch.masks.writing(chunk);
+        let images = bind_points(batch, &atomic.image, chunk);
+        let mut request = texel_request(
+            batch,
+            atomic.shape,
+            &atomic.coordinate,
+            None,
+            atomic.sample,
+            chunk,
+        );
+        let value = words(batch, atomic.value, chunk);
+        let comparator = words_or_zero(batch, atomic.comparator, chunk);
+        let mut old = [[0; CHUNK_LANES]];
+        for_each_binding(&images, &[0; CHUNK_LANES], lanes, |image, _, lanes| {
+            request.mask = lanes;
+            let found =
+                batch
+                    .resources
+                    .images
+                    .atomic(image, &request, atomic.op, &value, &comparator);
+            merge(&mut old, &[found], lanes);
+        });
+        if let Some(dst) = atomic.dst {
+            batch.file.set(batch.slot(dst), chunk, old[0]);
+        }
+    }
+}
+
+pub fn query(
+    batch: &Batch<'_>,
+    dst: &[Reg],
+    image: &Binding,
+    shape: ImageShape,
+    query: &ImageQuery,
+) {
+    let images = batch.resources.images;
+    let varying = dst.iter().any(|reg| batch.slot(*reg).is_varying());
+    for chunk in 0..if varying { batch.file.width() } else { 1 } {
+        let bound = bind_points(batch, image, chunk);
+        let answers: [Lanes; 4] = match query {
+            ImageQuery::Lod {
+                sampler,
+                coordinate,
+            } => query_lod(batch, &bound, sampler, coordinate, shape, chunk),
+            ImageQuery::Size { level } => {
+                let levels = words_or_zero(batch, *level, chunk);
+                let sizes: [[u32; 4]; CHUNK_LANES] =
+                    std::array::from_fn(|lane| images.size(bound[lane], shape, levels[lane]));
+                std::array::from_fn(|axis| sizes.map(|size| size[axis]))
+            }
+            ImageQuery::Levels => [bound.map(|image| images.levels(image)); 4],
+            ImageQuery::Samples => [bound.map(|image| images.samples(image)); 4],
+        };
+        for (reg, answer) in dst.iter().zip(answers) {
+            batch.file.set(batch.slot(*reg), chunk, answer);
+        }
+    }
+}
+
+fn query_lod(
+    batch: &Batch<'_>,
+    images: &Lanes,
+    sampler: &Binding,
+    coordinate: &[Reg],
+    shape: ImageShape,
+    chunk: usize,
+) -> [Lanes; 4] {
+    let samplers = bind_points(batch, sampler, chunk);
+    let mut request = SampleRequest {
+        mask: 0,
+        shape,
+        coordinate: all_words(batch, coordinate, chunk),
+        lod: LodRequest::Implicit {
+            bias: [0; CHUNK_LANES],
+            minimum: [0; CHUNK_LANES],
+        },
+        offset: [[0; CHUNK_LANES]; 3],
+        compare: None,
+        gather: None,
+    };
+    let mut answers = [[0; CHUNK_LANES]; 4];
+    let active = batch.masks.chunk(MaskId::ACTIVE, chunk);
+    for_each_binding(images, &samplers, active, |image, sampler, lanes| {
+        request.mask = lanes;
+        let [clamped, unclamped] = batch.resources.images.lod(image, sampler, &request);
+        merge(
+            &mut answers,
+            &[clamped, unclamped, [0; CHUNK_LANES], [0; CHUNK_LANES]],
+            lanes,
+        );
+    });
+    answers
+}
+
+/// The bind point that all lanes mean, if no index tells.
+fn fixed_point(binding: &Binding) -> Option<u32> {
+    (binding.index.is_none() && binding.count > 0).then_some(binding.slot)
+}
+
+/// Whether the level of detail comes from differences alone.
+fn is_automatic(lod: &Lod) -> bool {
+    matches!(
+        lod,
+        Lod::Implicit {
+            bias: None,
+            minimum: None
+        }
+    )
+}
+
+/// Takes some lanes of what was found.
+fn merge<const N: usize>(into: &mut [Lanes; N], found: &[Lanes; N], lanes: u16) {
+    for (into, found) in into.iter_mut().zip(found) {
+        lanes_of(lanes).for_each(|lane| into[lane] = found[lane]);
+    }
+}

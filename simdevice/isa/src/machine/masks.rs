@@ -1,0 +1,234 @@
+//! Sets of lanes: a bit for each, 64 to a word.
+
+use std::cell::Cell;
+
+use fearless_simd::{Simd, prelude::*};
+
+use crate::compiler::step::MaskId;
+use crate::kernels::registers::{File, Slot, Span, load_vector, to_mask};
+
+/// A set of lanes that the caller gives or gets.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LaneMask {
+    words: Vec<u64>,
+}
+
+impl LaneMask {
+    /// No lanes.
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// The first `count` lanes.
+    pub fn first(count: usize) -> Self {
+        let mut words = vec![u64::MAX; count / 64];
+        if !count.is_multiple_of(64) {
+            words.push((1 << (count % 64)) - 1);
+        }
+        Self { words }
+    }
+
+    /// Whether a lane is in the set.
+    pub fn contains(&self, lane: usize) -> bool {
+        self.words
+            .get(lane / 64)
+            .is_some_and(|word| word >> (lane % 64) & 1 != 0)
+    }
+
+    /// Adds or removes a lane.
+    pub fn set(&mut self, lane: usize, present: bool) {
+        if self.words.len() <= lane / 64 {
+            self.words.resize(lane / 64 + 1, 0);
+        }
+        let bit = 1 << (lane % 64);
+        let word = &mut self.words[lane / 64];
+        *word = if present { *word | bit } else { *word & !bit };
+    }
+
+    /// The lanes by 64, lane 0 lowest; words beyond the end are zero.
+    pub fn words(&self) -> &[u64] {
+        &self.words
+    }
+
+    /// The lanes by 64.
+    pub(super) fn from_words(words: &[Cell<u64>]) -> Self {
+        Self {
+            words: words.iter().map(Cell::get).collect(),
+        }
+    }
+
+    /// How many lanes are in the set.
+    pub fn count(&self) -> usize {
+        self.words
+            .iter()
+            .map(|word| word.count_ones() as usize)
+            .sum()
+    }
+}
+
+/// The masks of a batch.
+#[derive(Clone, Copy)]
+pub struct Masks<'a> {
+    words: &'a [Cell<u64>],
+    /// Words of each: lanes / 64, rounded up.
+    width: usize,
+}
+
+impl<'a> Masks<'a> {
+    pub fn new(words: &'a [Cell<u64>], width: usize) -> Self {
+        Self { words, width }
+    }
+
+    #[inline(always)]
+    pub fn get(self, mask: MaskId) -> &'a [Cell<u64>] {
+        &self.words[usize::from(mask.0) * self.width..][..self.width]
+    }
+
+    #[inline(always)]
+    pub fn any(self, mask: MaskId) -> bool {
+        let mut any = 0;
+        for word in self.get(mask) {
+            any |= word.get();
+        }
+        any != 0
+    }
+
+    /// The chunks from the first to the last that has active lanes, and whether in them all lanes are active that were
+    /// when the batch began.
+    #[inline(always)]
+    pub fn span(self) -> (Span, bool) {
+        let (active, entry) = (self.get(MaskId::ACTIVE), self.get(MaskId::ENTRY));
+        let (mut first_word, mut end) = (0, self.width);
+        while first_word < end && active[first_word].get() == 0 {
+            first_word += 1;
+        }
+        if first_word == end {
+            return (Span { first: 0, count: 0 }, true);
+        }
+        while active[end - 1].get() == 0 {
+            end -= 1;
+        }
+        let last_word = end - 1;
+        let first = 4 * first_word + active[first_word].get().trailing_zeros() as usize / 16;
+        let last = 4 * last_word + 3 - active[last_word].get().leading_zeros() as usize / 16;
+        let mut missing = 0;
+        for word in first_word..end {
+            let mut within = u64::MAX;
+            if word == first_word {
+                within &= u64::MAX << (16 * (first % 4));
+            }
+            if word == last_word {
+                within &= u64::MAX >> (48 - 16 * (last % 4));
+            }
+            missing |= entry[word].get() & !active[word].get() & within;
+        }
+        let count = last + 1 - first;
+        (Span { first, count }, missing == 0)
+    }
+
+    #[inline(always)]
+    pub fn count(self, mask: MaskId) -> u64 {
+        let mut count = 0;
+        for word in self.get(mask) {
+            count += u64::from(word.get().count_ones());
+        }
+        count
+    }
+
+    #[inline(always)]
+    pub fn clear(self, mask: MaskId) {
+        for word in self.get(mask) {
+            word.set(0);
+        }
+    }
+
+    /// `into |= from`.
+    #[inline(always)]
+    pub fn join(self, into: MaskId, from: MaskId) {
+        let (into, from) = (self.get(into), self.get(from));
+        for word in 0..self.width {
+            into[word].set(into[word].get() | from[word].get());
+        }
+    }
+
+    /// `into = from`.
+    #[inline(always)]
+    pub fn copy(self, into: MaskId, from: MaskId) {
+        let (into, from) = (self.get(into), self.get(from));
+        for word in 0..self.width {
+            into[word].set(from[word].get());
+        }
+    }
+
+    #[inline(always)]
+    pub fn swap(self, a: MaskId, b: MaskId) {
+        let (a, b) = (self.get(a), self.get(b));
+        for word in 0..self.width {
+            a[word].swap(&b[word]);
+        }
+    }
+
+    /// The bits of lanes 16 `chunk`.. of a mask.
+    #[inline(always)]
+    pub fn chunk(self, mask: MaskId, chunk: usize) -> u16 {
+        (self.get(mask)[chunk / 4].get() >> (16 * (chunk % 4))) as u16
+    }
+
+    /// The active lanes among 16 whose writes count.
+    #[inline(always)]
+    pub fn writing(self, chunk: usize) -> u16 {
+        self.chunk(MaskId::ACTIVE, chunk) & !self.chunk(MaskId::HELPER, chunk)
+    }
+
+    /// Splits the active lanes by a bool register: calls `split(active, true lanes among them, word index)`.
+    #[inline(always)]
+    pub fn split<S: Simd>(
+        self,
+        simd: S,
+        file: File<'_>,
+        condition: Slot,
+        mut split: impl FnMut(&Cell<u64>, u64, usize),
+    ) {
+        let active = self.get(MaskId::ACTIVE);
+        if !condition.is_varying() {
+            let bits = if file.first::<bool>(condition) {
+                u64::MAX
+            } else {
+                0
+            };
+            for (word, active) in active.iter().enumerate() {
+                split(active, active.get() & bits, word);
+            }
+            return;
+        }
+        let chunks = file.narrow(condition);
+        for (word, active) in active.iter().enumerate() {
+            if active.get() == 0 {
+                split(active, 0, word);
+                continue;
+            }
+            let mut bits = 0;
+            for index in 0..(chunks.len() - 4 * word).min(4) {
+                let lanes =
+                    to_mask(load_vector(simd, &chunks[4 * word + index])).to_bitmask() & 0xffff;
+                bits |= lanes << (16 * index);
+            }
+            split(active, active.get() & bits, word);
+        }
+    }
+}
+
+/// The lanes of a 16-lane set, ascending.
+pub fn lanes_of(mut bits: u16) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        (lane < 16).then_some(lane)
+    })
+}
+
+/// A mask vector from bits.
+#[inline(always)]
+pub fn bits_to_mask<S: Simd>(simd: S, bits: u16) -> fearless_simd::mask32x16<S> {
+    simd.from_bitmask_mask32x16(u64::from(bits))
+}

@@ -1,0 +1,269 @@
+//! Runs programs: a lane-batched interpreter.
+//!
+//! An [`Executable`] is a program made ready for batches of a fixed number of lanes: registers have places, uniform ones
+//! only one chunk; control flow is jumps and masks. A [`Machine`] has the registers and memory of one batch at a time
+//! and belongs to one worker. The kernels are compiled for every SIMD level, and the level is dispatched once a batch.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use fearless_simd::Level;
+//! use isa::{
+//!     builder::Builder, exec::{Executable, LaneMask, Machine, Options, Watchdog}, ir::{Rate, Type}, op::Op,
+//!     resources::Resources,
+//! };
+//!
+//! let mut b = Builder::new();
+//! let x = b.input(0, Type::B32, Rate::Varying);
+//! let out = b.output(0, Type::B32);
+//! let square = b.compute(Op::FMul, &[x, x]);
+//! b.assign(out, square);
+//! let program = b.finish().unwrap();
+//!
+//! let executable = Executable::new(program, &Options { lanes: 64, ..Options::new(Level::new()) }).unwrap();
+//! let mut machine = Machine::new(Arc::new(executable));
+//! for lane in 0..64 {
+//!     machine.set_input(0, lane, f32::to_bits(lane as f32));
+//! }
+//! machine.run(&LaneMask::first(64), &LaneMask::none(), &Resources::default(), Watchdog::default()).unwrap();
+//! assert_eq!(f32::from_bits(machine.output(0, 9)), 81.0);
+//! ```
+
+mod batch;
+mod counters;
+mod cross_lane;
+mod engine;
+mod executable;
+mod image;
+mod masks;
+mod memory;
+mod watchdog;
+
+pub use counters::Work;
+pub use executable::Executable;
+pub use masks::LaneMask;
+pub use watchdog::{Stopped, Watchdog};
+
+use std::cell::Cell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+use devmem::host;
+
+use crate::compiler::step::MaskId;
+use crate::ir::{Reg, Type};
+use crate::kernels::registers::{Chunk, File};
+use crate::resources::Resources;
+use batch::Batch;
+use masks::Masks;
+use watchdog::Watch;
+
+/// Runs batches of one executable, one after another. Each worker has its own.
+#[derive(Debug)]
+pub struct Machine {
+    executable: Arc<Executable>,
+    registers: Vec<Chunk>,
+    masks: Vec<u64>,
+    shared: Vec<AtomicU32>,
+    private: Vec<Chunk>,
+    work: Work,
+    /// For each counted run, how often it was executed and with how many lanes.
+    runs: Vec<(u64, u64)>,
+}
+
+impl Machine {
+    /// A machine for an executable; all inputs are zero.
+    pub fn new(executable: Arc<Executable>) -> Self {
+        let width = executable.program.lanes / 16;
+        let mut machine = Self {
+            registers: host::filled(Chunk::default(), executable.program.chunks),
+            masks: host::zeroed(executable.program.masks * executable.program.lanes.div_ceil(64)),
+            shared: host::collect(
+                (0..executable.program.shared_bytes.div_ceil(4)).map(|_| AtomicU32::new(0)),
+            ),
+            private: host::filled(Chunk::default(), executable.program.private_words() * width),
+            work: Work::default(),
+            runs: vec![(0, 0); executable.program.runs.len()],
+            executable,
+        };
+        let file = File::new(
+            Cell::from_mut(&mut machine.registers[..]).as_slice_of_cells(),
+            width,
+        );
+        for constant in &machine.executable.program.constants {
+            let (slot, ty) = (
+                machine.executable.program.slots[constant.reg.0 as usize],
+                machine.executable.program.types[constant.reg.0 as usize],
+            );
+            file.set_constant(slot, ty, constant.bits);
+        }
+        machine
+    }
+
+    /// The executable that it runs.
+    pub fn executable(&self) -> &Arc<Executable> {
+        &self.executable
+    }
+
+    fn input_register(&self, slot: u32) -> Option<Reg> {
+        self.executable
+            .program
+            .inputs
+            .iter()
+            .find(|input| input.slot == slot)
+            .map(|input| input.reg)
+    }
+
+    /// The chunks of a register.
+    fn chunks_of(&self, reg: Reg) -> std::ops::Range<usize> {
+        let slot = self.executable.program.slots[reg.0 as usize];
+        let per_16 = if self.executable.program.types[reg.0 as usize] == Type::B64 {
+            2
+        } else {
+            1
+        };
+        let count = if slot.is_varying() {
+            self.executable.program.lanes / 16
+        } else {
+            1
+        };
+        slot.start()..slot.start() + count * per_16
+    }
+
+    /// An input's lanes, to be filled: 16 to a chunk (8 to a chunk for `B64`); a uniform input has one chunk, of which
+    /// all lanes must be set alike. Bools are 0 or all ones. Empty if the program doesn't read that slot.
+    ///
+    /// Varying inputs must be set before each batch; uniform ones keep their value.
+    pub fn input_mut(&mut self, slot: u32) -> &mut [Chunk] {
+        match self.input_register(slot) {
+            Some(reg) => {
+                let range = self.chunks_of(reg);
+                &mut self.registers[range]
+            }
+            None => &mut [],
+        }
+    }
+
+    /// Sets one lane of a 32-bit input.
+    pub fn set_input(&mut self, slot: u32, lane: usize, bits: u32) {
+        if let Some(chunk) = self.input_mut(slot).get_mut(lane / 16) {
+            chunk.0[lane % 16] = bits;
+        }
+    }
+
+    /// Sets all lanes of a 32-bit input.
+    pub fn fill_input(&mut self, slot: u32, bits: u32) {
+        self.input_mut(slot).fill(Chunk([bits; 16]));
+    }
+
+    /// Sets one lane of a 64-bit input.
+    pub fn set_input64(&mut self, slot: u32, lane: usize, bits: u64) {
+        if let Some(chunk) = self.input_mut(slot).get_mut(lane / 8) {
+            chunk.0[2 * (lane % 8)] = bits as u32;
+            chunk.0[2 * (lane % 8) + 1] = (bits >> 32) as u32;
+        }
+    }
+
+    /// An output's lanes after a batch: 16 to a chunk (8 for `B64`). Empty if the program has no such output.
+    pub fn output_chunks(&self, slot: u32) -> &[Chunk] {
+        let output = self
+            .executable
+            .program
+            .outputs
+            .iter()
+            .find(|output| output.slot == slot);
+        output.map_or(&[], |output| &self.registers[self.chunks_of(output.reg)])
+    }
+
+    /// One lane of a 32-bit output; zero if the program has no such output.
+    pub fn output(&self, slot: u32, lane: usize) -> u32 {
+        self.output_chunks(slot)
+            .get(lane / 16)
+            .map_or(0, |chunk| chunk.0[lane % 16])
+    }
+
+    /// One lane of a 64-bit output.
+    pub fn output64(&self, slot: u32, lane: usize) -> u64 {
+        self.output_chunks(slot).get(lane / 8).map_or(0, |chunk| {
+            u64::from(chunk.0[2 * (lane % 8)]) | u64::from(chunk.0[2 * (lane % 8) + 1]) << 32
+        })
+    }
+
+    /// The lanes that the last batch killed or demoted.
+    pub fn killed(&mut self) -> LaneMask {
+        let width = self.executable.program.lanes.div_ceil(64);
+        let masks = Masks::new(
+            Cell::from_mut(&mut self.masks[..]).as_slice_of_cells(),
+            width,
+        );
+        LaneMask::from_words(masks.get(MaskId::KILLED))
+    }
+
+    /// The work counted since it was last taken; nothing, unless the executable counts.
+    pub fn take_work(&mut self) -> Work {
+        for ((executions, active), cost) in self.runs.iter_mut().zip(&self.executable.program.runs)
+        {
+            self.work
+                .add_run(cost, *executions, *active, self.executable.program.lanes);
+            (*executions, *active) = (0, 0);
+        }
+        std::mem::take(&mut self.work)
+    }
+
+    /// Runs a batch. `active` are the lanes that run; `helpers` those among them that only help with derivatives.
+    ///
+    /// # Errors
+    /// If the watchdog stopped it; what it wrote until then stays written.
+    pub fn run(
+        &mut self,
+        active: &LaneMask,
+        helpers: &LaneMask,
+        resources: &Resources<'_>,
+        watchdog: Watchdog<'_>,
+    ) -> Result<(), Stopped> {
+        let executable = Arc::clone(&self.executable);
+        self.work.batches += 1;
+        self.begin(active, helpers);
+        let file = File::new(
+            Cell::from_mut(&mut self.registers[..]).as_slice_of_cells(),
+            executable.program.lanes / 16,
+        );
+        let masks = Masks::new(
+            Cell::from_mut(&mut self.masks[..]).as_slice_of_cells(),
+            executable.program.lanes.div_ceil(64),
+        );
+        let batch = Batch {
+            program: &executable.program,
+            resources,
+            file,
+            masks,
+            shared: &self.shared,
+            private: Cell::from_mut(&mut self.private[..]).as_slice_of_cells(),
+            whole: false,
+        };
+        if !masks.any(MaskId::ACTIVE) {
+            return Ok(());
+        }
+        executable
+            .engine
+            .run(&batch, &mut self.runs, &mut Watch::new(watchdog))
+    }
+
+    /// Sets masks, outputs and workgroup memory as they are when a batch begins.
+    fn begin(&mut self, active: &LaneMask, helpers: &LaneMask) {
+        let lanes = self.executable.program.lanes;
+        let width = lanes.div_ceil(64);
+        self.masks.fill(0);
+        let whole = LaneMask::first(lanes);
+        for (index, whole) in whole.words().iter().enumerate() {
+            let word = |mask: &LaneMask| mask.words().get(index).copied().unwrap_or(0) & whole;
+            self.masks[usize::from(MaskId::ACTIVE.0) * width + index] = word(active);
+            self.masks[usize::from(MaskId::ENTRY.0) * width + index] = word(active);
+            self.masks[usize::from(MaskId::HELPER.0) * width + index] = word(helpers);
+        }
+        for index in 0..self.executable.program.cleared.len() {
+            let range = self.chunks_of(self.executable.program.cleared[index]);
+            self.registers[range].fill(Chunk::default());
+        }
+        self.shared.iter().for_each(|word| word.store(0, Relaxed));
+    }
+}
