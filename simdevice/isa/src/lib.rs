@@ -64,7 +64,7 @@ pub mod resources;
 pub mod exec {
     pub use crate::compiler::Options;
     pub use crate::kernels::combine;
-    pub use crate::kernels::registers::Chunk;
+    pub use crate::kernels::registers::{Vector, Vector as Chunk};
     pub use crate::machine::{Executable, LaneMask, Machine, Stopped, Watchdog, Work};
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use crate::ir::{AtomicOp, CHUNK_LANES, ImageShape};
+use crate::ir::{AtomicOp, ImageShape, VECTOR_LANES};
 use devmem::BufferRange;
 
 /// What a program is bound to while it runs.
@@ -83,8 +83,8 @@ pub(crate) fn load_word(words: &[AtomicU32], index: usize) -> Option<u32> {
     words.get(index).map(|word| word.load(Ordering::Relaxed))
 }
 
-/// One register for the 16 lanes of a chunk; floats as their bits.
-pub type Lanes = [u32; CHUNK_LANES];
+/// One register for the 16 lanes of a vector; floats as their bits.
+pub type Lanes = [u32; VECTOR_LANES];
 
 /// How the level of detail of a sample is chosen; see [`crate::ir::Lod`].
 #[derive(Clone, Copy, Debug, PartialEq)]

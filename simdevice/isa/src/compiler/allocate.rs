@@ -7,8 +7,8 @@ use crate::kernels::registers::Slot;
 pub struct Allocation {
     /// Each register's place.
     pub slots: Vec<Slot>,
-    /// Chunks of the whole file.
-    pub chunks: usize,
+    /// Vectors of the whole file.
+    pub vectors: usize,
 }
 
 /// When a register is live, in ticks: two for each statement, its reads and then its writes.
@@ -18,7 +18,7 @@ struct Interval {
     end: u32,
 }
 
-/// Allocates the registers of a program, for batches of `width` chunks. `varying` says which have a value for each lane.
+/// Allocates the registers of a program, for batches of `width` vectors. `varying` says which have a value for each lane.
 ///
 /// Constants and uniform inputs have places of their own, so that they need to be set only once. Everything else shares
 /// places with what isn't live at the same time.
@@ -60,7 +60,7 @@ pub fn allocate(program: &Program, varying: &[bool], width: usize) -> Allocation
     scan(program, varying, &intervals, &mut places, &mut slots);
     Allocation {
         slots,
-        chunks: places.next,
+        vectors: places.next,
     }
 }
 

@@ -19,14 +19,14 @@ use fearless_simd::Level;
 
 use crate::ir::validate::{InvalidProgram, validate};
 use crate::ir::{
-    CHUNK_LANES, Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Reg, Role, Type,
+    Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Reg, Role, Type, VECTOR_LANES,
 };
 use crate::kernels::registers::Slot;
 use linearize::Linearized;
 use step::{RunCost, Step};
 
-/// The most chunks that a register file may have: 256 MiB.
-const MAX_CHUNKS: usize = 1 << 22;
+/// The most vectors that a register file may have: 256 MiB.
+const MAX_VECTORS: usize = 1 << 22;
 
 /// How a program shall run.
 #[derive(Clone, Copy, Debug)]
@@ -75,8 +75,8 @@ pub struct CompiledProgram {
     pub runs: Vec<RunCost>,
     /// Masks used.
     pub masks: usize,
-    /// Chunks of the register file.
-    pub chunks: usize,
+    /// Vectors of the register file.
+    pub vectors: usize,
     /// Lanes of a batch.
     pub lanes: usize,
     /// Lanes of a subgroup.
@@ -102,7 +102,7 @@ impl CompiledProgram {
             count_work,
             level,
         } = *options;
-        if lanes == 0 || !lanes.is_multiple_of(CHUNK_LANES) || lanes > MAX_LANES {
+        if lanes == 0 || !lanes.is_multiple_of(VECTOR_LANES) || lanes > MAX_LANES {
             return structure("the lanes of a batch aren't a multiple of 16 within bounds");
         }
         if !subgroup_size.is_power_of_two() || !(4..=MAX_SUBGROUP_SIZE).contains(&subgroup_size) {
@@ -118,8 +118,8 @@ impl CompiledProgram {
         let table = constant_table::promote_constants(&mut program);
         let varying = uniformity::varying_registers(&program, table.is_some());
         forwarding::forward(&mut program, &varying);
-        let allocation = allocate::allocate(&program, &varying, lanes / CHUNK_LANES);
-        if allocation.chunks > MAX_CHUNKS {
+        let allocation = allocate::allocate(&program, &varying, lanes / VECTOR_LANES);
+        if allocation.vectors > MAX_VECTORS {
             return structure("too many registers are live at once");
         }
         let linearized = linearize::linearize(&program, &allocation, count_work);
@@ -133,7 +133,7 @@ impl CompiledProgram {
             masks,
             runs,
             cleared,
-            chunks: allocation.chunks,
+            vectors: allocation.vectors,
             slots: allocation.slots,
             types: registers.map(|register| register.ty).collect(),
             constants: program.constants,

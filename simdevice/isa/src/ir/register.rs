@@ -2,8 +2,8 @@
 
 use std::fmt::{Display, Formatter, Result};
 
-/// Lanes in a chunk, the unit that registers are stored and computed in. Batches are whole numbers of chunks.
-pub const CHUNK_LANES: usize = 16;
+/// Lanes in a vector, the unit that registers are stored and computed in. Batches are whole numbers of vectors.
+pub const VECTOR_LANES: usize = 16;
 
 /// A register: an index into [`Program::registers`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -11,14 +11,14 @@ use fearless_simd::Level;
 
 use crate::ir::op::Op;
 use crate::ir::{AtomicOp, Format, Type};
-use registers::{Chunk, File, Slot};
+use registers::{File, Slot, Vector};
 
 /// The result of an operation on constants, by the same kernels that programs run.
 pub fn evaluate(level: Level, op: Op, operands: &[u64]) -> u64 {
     let signature = op.signature();
     let place = |index: usize| Slot::uniform(2 * index);
-    let chunks: [Cell<Chunk>; 10] = Default::default();
-    let file = File::new(&chunks, 1);
+    let vectors: [Cell<Vector>; 10] = Default::default();
+    let file = File::new(&vectors, 1);
     let mut src = [Slot::ZERO; 4];
     for (index, (bits, ty)) in operands.iter().zip(signature.operands).enumerate() {
         src[index] = place(index + 1);

@@ -1,18 +1,18 @@
-//! The register file: chunks of 16 lanes, and views of them as vectors and as typed lanes.
+//! The register file: vectors of 16 lanes, read as SIMD registers or as typed lanes.
 
 use std::cell::Cell;
 use std::ops::Range;
 
 use fearless_simd::{Simd, i32x16, mask32x16, prelude::*, u32x16};
 
-use crate::ir::{CHUNK_LANES, Type};
+use crate::ir::{Type, VECTOR_LANES};
 
 /// 16 lanes of 32 bits; 64-bit registers use two for 16 lanes, the lower eight lanes first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C, align(64))]
-pub struct Chunk(pub [u32; CHUNK_LANES]);
+pub struct Vector(pub [u32; VECTOR_LANES]);
 
-/// Where a register lives: its first chunk, and whether it has one for each 16 lanes or one for all.
+/// Where a register lives: its first vector, and whether it has one for each 16 lanes or one for all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Slot(u32);
 
@@ -37,7 +37,7 @@ impl Slot {
         self.0 & Self::VARYING != 0
     }
 
-    /// Its first chunk.
+    /// Its first vector.
     pub fn start(self) -> usize {
         (self.0 & !Self::VARYING) as usize
     }
@@ -46,15 +46,15 @@ impl Slot {
 /// All registers of a batch.
 #[derive(Clone, Copy)]
 pub struct File<'a> {
-    chunks: &'a [Cell<Chunk>],
-    /// Chunks of a varying 32-bit register: lanes / 16.
+    vectors: &'a [Cell<Vector>],
+    /// Vectors of a varying 32-bit register: lanes / 16.
     width: usize,
-    /// The chunks that instructions compute.
+    /// The vectors that instructions compute.
     span: Span,
 }
 
-/// Chunks from the first to the last that has active lanes. The others are skipped: nobody looks at what an instruction
-/// gives in lanes that are not active, except within their own chunk.
+/// Vectors from the first to the last that has active lanes. The others are skipped: nobody looks at what an instruction
+/// gives in lanes that are not active, except within their own vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
     pub first: usize,
@@ -62,84 +62,84 @@ pub struct Span {
 }
 
 impl<'a> File<'a> {
-    pub fn new(chunks: &'a [Cell<Chunk>], width: usize) -> Self {
+    pub fn new(vectors: &'a [Cell<Vector>], width: usize) -> Self {
         let span = Span {
             first: 0,
             count: width,
         };
         Self {
-            chunks,
+            vectors,
             width,
             span,
         }
     }
 
-    /// The same registers, of which other chunks shall be computed.
+    /// The same registers, of which other vectors shall be computed.
     #[inline(always)]
     pub fn with_span(self, span: Span) -> Self {
         Self { span, ..self }
     }
 
-    /// The chunks to compute.
+    /// The vectors to compute.
     #[inline(always)]
     pub fn span(self) -> Range<usize> {
         self.span.first..self.span.first + self.span.count
     }
 
-    /// The chunks of a 32-bit register that are to be computed: the span's, or the only one.
+    /// The vectors of a 32-bit register that are to be computed: the span's, or the only one.
     #[inline(always)]
-    fn spanned(self, slot: Slot) -> &'a [Cell<Chunk>] {
+    fn spanned(self, slot: Slot) -> &'a [Cell<Vector>] {
         if slot.is_varying() {
-            &self.chunks[slot.start() + self.span.first..][..self.span.count]
+            &self.vectors[slot.start() + self.span.first..][..self.span.count]
         } else {
-            &self.chunks[slot.start()..][..1]
+            &self.vectors[slot.start()..][..1]
         }
     }
 
-    /// The chunks to be computed of a register: the span, or the first if it is uniform.
+    /// The vectors to be computed of a register: the span, or the first if it is uniform.
     #[inline(always)]
     pub fn rounds(self, dst: Slot) -> Range<usize> {
         if dst.is_varying() { self.span() } else { 0..1 }
     }
 
-    /// Chunks of a varying 32-bit register.
+    /// Vectors of a varying 32-bit register.
     #[inline(always)]
     pub fn width(self) -> usize {
         self.width
     }
 
-    /// The chunks of a 32-bit register or bool: `width` of them, or one.
+    /// The vectors of a 32-bit register or bool: `width` of them, or one.
     #[inline(always)]
-    pub fn narrow(self, slot: Slot) -> &'a [Cell<Chunk>] {
+    pub fn narrow(self, slot: Slot) -> &'a [Cell<Vector>] {
         let count = if slot.is_varying() { self.width } else { 1 };
-        &self.chunks[slot.start()..][..count]
+        &self.vectors[slot.start()..][..count]
     }
 
-    /// The chunks of a 64-bit register.
+    /// The vectors of a 64-bit register.
     #[inline(always)]
-    pub fn wide(self, slot: Slot) -> &'a [Cell<Chunk>] {
+    pub fn wide(self, slot: Slot) -> &'a [Cell<Vector>] {
         let count = if slot.is_varying() { 2 * self.width } else { 2 };
-        &self.chunks[slot.start()..][..count]
+        &self.vectors[slot.start()..][..count]
     }
 
     /// The lanes of a register for 16 lanes of the batch.
     #[inline(always)]
-    pub fn lanes<T: Lane>(self, slot: Slot, index: usize) -> [T; CHUNK_LANES] {
-        let chunks = T::chunks(self, slot);
-        T::load(chunks, if slot.is_varying() { index } else { 0 })
+    pub fn lanes<T: Lane>(self, slot: Slot, index: usize) -> [T; VECTOR_LANES] {
+        let vectors = T::vectors(self, slot);
+        T::load(vectors, if slot.is_varying() { index } else { 0 })
     }
 
     /// The value of a uniform register (or lane 0).
     #[inline(always)]
     pub fn first<T: Lane>(self, slot: Slot) -> T {
-        T::load(T::chunks(self, slot), 0)[0]
+        T::load(T::vectors(self, slot), 0)[0]
     }
 
     /// Sets a register for 16 lanes of the batch.
     #[inline(always)]
-    pub fn set<T: Lane>(self, slot: Slot, index: usize, value: [T; CHUNK_LANES]) {
+    pub fn set<T: Lane>(self, slot: Slot, index: usize, value: [T; VECTOR_LANES]) {
         T::store(
-            T::chunks(self, slot),
+            T::vectors(self, slot),
             if slot.is_varying() { index } else { 0 },
             value,
         );
@@ -148,9 +148,9 @@ impl<'a> File<'a> {
     /// Sets a uniform register to a constant's bits.
     pub fn set_constant(self, slot: Slot, ty: Type, bits: u64) {
         match ty {
-            Type::Bool => self.set(slot, 0, [bits != 0; CHUNK_LANES]),
-            Type::B32 => self.set(slot, 0, [bits as u32; CHUNK_LANES]),
-            Type::B64 => self.set(slot, 0, [bits; CHUNK_LANES]),
+            Type::Bool => self.set(slot, 0, [bits != 0; VECTOR_LANES]),
+            Type::B32 => self.set(slot, 0, [bits as u32; VECTOR_LANES]),
+            Type::B64 => self.set(slot, 0, [bits; VECTOR_LANES]),
         }
     }
 }
@@ -160,22 +160,22 @@ pub type Kernel<S> = fn(S, &File<'_>, Slot, &[Slot; 4]);
 
 /// A type that a register's lanes may be read as.
 pub trait Lane: Copy + Default {
-    /// The chunks of a register of this type's width.
-    fn chunks<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Chunk>];
+    /// The vectors of a register of this type's width.
+    fn vectors<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Vector>];
     /// Lanes 16 `index`..
-    fn load(chunks: &[Cell<Chunk>], index: usize) -> [Self; CHUNK_LANES];
+    fn load(vectors: &[Cell<Vector>], index: usize) -> [Self; VECTOR_LANES];
     /// Sets lanes 16 `index`..
-    fn store(chunks: &[Cell<Chunk>], index: usize, value: [Self; CHUNK_LANES]);
+    fn store(vectors: &[Cell<Vector>], index: usize, value: [Self; VECTOR_LANES]);
 }
 
 /// `f` of each lane. (The standard library's `map` is not always inlined.)
 #[inline(always)]
 pub fn each_lane<A: Copy, B: Copy + Default>(
-    lanes: [A; CHUNK_LANES],
+    lanes: [A; VECTOR_LANES],
     f: impl Fn(A) -> B,
-) -> [B; CHUNK_LANES] {
-    let mut results = [B::default(); CHUNK_LANES];
-    for lane in 0..CHUNK_LANES {
+) -> [B; VECTOR_LANES] {
+    let mut results = [B::default(); VECTOR_LANES];
+    for lane in 0..VECTOR_LANES {
         results[lane] = f(lanes[lane]);
     }
     results
@@ -185,18 +185,18 @@ macro_rules! narrow_lane {
     ($type:ty, $from:expr, $to:expr) => {
         impl Lane for $type {
             #[inline(always)]
-            fn chunks<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Chunk>] {
+            fn vectors<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Vector>] {
                 file.narrow(slot)
             }
 
             #[inline(always)]
-            fn load(chunks: &[Cell<Chunk>], index: usize) -> [Self; CHUNK_LANES] {
-                each_lane(chunks[index].get().0, $from)
+            fn load(vectors: &[Cell<Vector>], index: usize) -> [Self; VECTOR_LANES] {
+                each_lane(vectors[index].get().0, $from)
             }
 
             #[inline(always)]
-            fn store(chunks: &[Cell<Chunk>], index: usize, value: [Self; CHUNK_LANES]) {
-                chunks[index].set(Chunk(each_lane(value, $to)));
+            fn store(vectors: &[Cell<Vector>], index: usize, value: [Self; VECTOR_LANES]) {
+                vectors[index].set(Vector(each_lane(value, $to)));
             }
         }
     };
@@ -216,24 +216,24 @@ macro_rules! wide_lane {
     ($type:ty, $from:expr, $to:expr) => {
         impl Lane for $type {
             #[inline(always)]
-            fn chunks<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Chunk>] {
+            fn vectors<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Vector>] {
                 file.wide(slot)
             }
 
             #[inline(always)]
-            fn load(chunks: &[Cell<Chunk>], index: usize) -> [Self; CHUNK_LANES] {
-                let halves: [[u64; CHUNK_LANES / 2]; 2] = [
-                    bytemuck::cast(chunks[2 * index].get().0),
-                    bytemuck::cast(chunks[2 * index + 1].get().0),
+            fn load(vectors: &[Cell<Vector>], index: usize) -> [Self; VECTOR_LANES] {
+                let halves: [[u64; VECTOR_LANES / 2]; 2] = [
+                    bytemuck::cast(vectors[2 * index].get().0),
+                    bytemuck::cast(vectors[2 * index + 1].get().0),
                 ];
-                each_lane(bytemuck::cast::<_, [u64; CHUNK_LANES]>(halves), $from)
+                each_lane(bytemuck::cast::<_, [u64; VECTOR_LANES]>(halves), $from)
             }
 
             #[inline(always)]
-            fn store(chunks: &[Cell<Chunk>], index: usize, value: [Self; CHUNK_LANES]) {
-                let words: [[u32; CHUNK_LANES]; 2] = bytemuck::cast(each_lane(value, $to));
-                chunks[2 * index].set(Chunk(words[0]));
-                chunks[2 * index + 1].set(Chunk(words[1]));
+            fn store(vectors: &[Cell<Vector>], index: usize, value: [Self; VECTOR_LANES]) {
+                let words: [[u32; VECTOR_LANES]; 2] = bytemuck::cast(each_lane(value, $to));
+                vectors[2 * index].set(Vector(words[0]));
+                vectors[2 * index + 1].set(Vector(words[1]));
             }
         }
     };
@@ -262,8 +262,8 @@ pub fn map2<A: Lane, B: Lane, R: Lane>(
 ) {
     for index in file.rounds(dst) {
         let (a, b) = (file.lanes(src[0], index), file.lanes(src[1], index));
-        let mut results = [R::default(); CHUNK_LANES];
-        for lane in 0..CHUNK_LANES {
+        let mut results = [R::default(); VECTOR_LANES];
+        for lane in 0..VECTOR_LANES {
             results[lane] = f(a[lane], b[lane]);
         }
         file.set(dst, index, results);
@@ -281,27 +281,27 @@ pub fn map3<A: Lane, B: Lane, C: Lane, R: Lane>(
     for index in file.rounds(dst) {
         let (a, b) = (file.lanes(src[0], index), file.lanes(src[1], index));
         let c = file.lanes(src[2], index);
-        let mut results = [R::default(); CHUNK_LANES];
-        for lane in 0..CHUNK_LANES {
+        let mut results = [R::default(); VECTOR_LANES];
+        for lane in 0..VECTOR_LANES {
             results[lane] = f(a[lane], b[lane], c[lane]);
         }
         file.set(dst, index, results);
     }
 }
 
-/// A chunk as a vector.
+/// Loads a vector into a SIMD register.
 #[inline(always)]
-pub fn load_vector<S: Simd>(simd: S, chunk: &Cell<Chunk>) -> u32x16<S> {
-    u32x16::simd_from(simd, chunk.get().0)
+pub fn load_vector<S: Simd>(simd: S, vector: &Cell<Vector>) -> u32x16<S> {
+    u32x16::simd_from(simd, vector.get().0)
 }
 
-/// A vector to a chunk.
+/// Stores a vector from a SIMD register.
 #[inline(always)]
-pub fn store_vector<S: Simd>(chunk: &Cell<Chunk>, value: u32x16<S>) {
-    chunk.set(Chunk(value.into()));
+pub fn store_vector<S: Simd>(vector: &Cell<Vector>, value: u32x16<S>) {
+    vector.set(Vector(value.into()));
 }
 
-/// A bool register's chunk as a mask.
+/// A bool register's vector as a mask.
 #[inline(always)]
 pub fn to_mask<S: Simd>(value: u32x16<S>) -> mask32x16<S> {
     value
@@ -309,7 +309,7 @@ pub fn to_mask<S: Simd>(value: u32x16<S>) -> mask32x16<S> {
         .from_vector_mask32x16(value.bitcast::<i32x16<S>>())
 }
 
-/// A mask as a bool register's chunk.
+/// A mask as a bool register's vector.
 #[inline(always)]
 pub fn from_mask<S: Simd>(mask: mask32x16<S>) -> u32x16<S> {
     ExtractToken::token(&mask)
@@ -320,11 +320,11 @@ pub fn from_mask<S: Simd>(mask: mask32x16<S>) -> u32x16<S> {
 // The loops below are over indices, because the standard library's adapters are not always inlined into functions of
 // another SIMD level.
 
-/// `value` to all chunks.
+/// `value` to all vectors.
 #[inline(always)]
-fn fill<S: Simd>(dst: &[Cell<Chunk>], value: u32x16<S>) {
-    for chunk in dst {
-        store_vector(chunk, value);
+fn fill<S: Simd>(dst: &[Cell<Vector>], value: u32x16<S>) {
+    for vector in dst {
+        store_vector(vector, value);
     }
 }
 
@@ -402,8 +402,8 @@ pub fn vector3<S: Simd>(
         }
         return;
     }
-    // A uniform operand has one chunk for all rounds.
-    let step = |operand: &[Cell<Chunk>]| if operand.len() == n { usize::MAX } else { 0 };
+    // A uniform operand has one vector for all rounds.
+    let step = |operand: &[Cell<Vector>]| if operand.len() == n { usize::MAX } else { 0 };
     let (at_a, at_b, at_c) = (step(a), step(b), step(c));
     for i in 0..n {
         let (a, b) = (

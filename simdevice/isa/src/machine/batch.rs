@@ -9,7 +9,7 @@ use super::masks::{Masks, bits_to_mask};
 use crate::compiler::CompiledProgram;
 use crate::compiler::step::MaskId;
 use crate::ir::{Reg, Type};
-use crate::kernels::registers::{Chunk, File, Slot, load_vector, store_vector};
+use crate::kernels::registers::{File, Slot, Vector, load_vector, store_vector};
 use crate::resources::Resources;
 
 /// What a batch's steps work on.
@@ -21,10 +21,10 @@ pub struct Batch<'a> {
     pub masks: Masks<'a>,
     /// Workgroup memory.
     pub shared: &'a [AtomicU32],
-    /// Whether all lanes that the batch began with are active, of those in the chunks that the file spans.
+    /// Whether all lanes that the batch began with are active, of those in the vectors that the file spans.
     pub whole: bool,
-    /// Private memory: a row of chunks for each word.
-    pub private: &'a [Cell<Chunk>],
+    /// Private memory: a row of vectors for each word.
+    pub private: &'a [Cell<Vector>],
 }
 
 impl Batch<'_> {
@@ -34,7 +34,7 @@ impl Batch<'_> {
         self.program.slots[reg.0 as usize]
     }
 
-    /// Takes the span of the chunks that have active lanes, after the masks have changed.
+    /// Takes the span of the vectors that have active lanes, after the masks have changed.
     #[inline(always)]
     pub fn refresh_span(&mut self) {
         let (span, whole) = self.masks.span();
@@ -59,13 +59,13 @@ impl Batch<'_> {
                 .for_each(|(dst, src)| dst.set(src.get()));
             return;
         }
-        // A uniform source has one chunk (or pair) for all.
+        // A uniform source has one vector (or pair) for all.
         let step = usize::from(src.len() == dst.len());
-        for chunk in self.file.span() {
-            let active = self.masks.chunk(MaskId::ACTIVE, chunk);
+        for vector in self.file.span() {
+            let active = self.masks.bits(MaskId::ACTIVE, vector);
             for part in 0..per_16 {
-                let to = &dst[chunk * per_16 + part];
-                let new = load_vector(simd, &src[chunk * per_16 * step + part]);
+                let to = &dst[vector * per_16 + part];
+                let new = load_vector(simd, &src[vector * per_16 * step + part]);
                 let merged = if active == u16::MAX {
                     new
                 } else if per_16 == 1 {
@@ -83,20 +83,20 @@ impl Batch<'_> {
     #[inline(always)]
     pub fn copy(&self, dst: Slot, src: Slot, ty: Type) {
         match ty {
-            Type::B64 => self.copy_chunks(dst, self.file.wide(dst), self.file.wide(src), 2),
+            Type::B64 => self.copy_vectors(dst, self.file.wide(dst), self.file.wide(src), 2),
             Type::B32 | Type::Bool => {
-                self.copy_chunks(dst, self.file.narrow(dst), self.file.narrow(src), 1);
+                self.copy_vectors(dst, self.file.narrow(dst), self.file.narrow(src), 1);
             }
         }
     }
 
-    /// Copies the chunks to compute of a register; a uniform source has only the first `per_16`.
+    /// Copies the vectors to compute of a register; a uniform source has only the first `per_16`.
     #[inline(always)]
-    fn copy_chunks(&self, slot: Slot, dst: &[Cell<Chunk>], src: &[Cell<Chunk>], per_16: usize) {
+    fn copy_vectors(&self, slot: Slot, dst: &[Cell<Vector>], src: &[Cell<Vector>], per_16: usize) {
         let step = usize::from(src.len() == dst.len());
-        for chunk in self.file.rounds(slot) {
+        for vector in self.file.rounds(slot) {
             for part in 0..per_16 {
-                dst[chunk * per_16 + part].set(src[chunk * per_16 * step + part].get());
+                dst[vector * per_16 + part].set(src[vector * per_16 * step + part].get());
             }
         }
     }

@@ -3,14 +3,14 @@
 use super::batch::Batch;
 use crate::compiler::step::MaskId;
 use crate::ir::op::Op;
-use crate::ir::{Axis, CHUNK_LANES, Reg, SubgroupOp, Type};
+use crate::ir::{Axis, Reg, SubgroupOp, Type, VECTOR_LANES};
 use crate::kernels::registers::{Lane, Slot};
 
 pub fn derivative(batch: &Batch<'_>, dst: Reg, src: Reg, axis: Axis, fine: bool) {
     let (dst, src) = (batch.slot(dst), batch.slot(src));
-    for chunk in 0..batch.file.width() {
-        let values = batch.file.lanes::<f32>(src, chunk);
-        let lanes: [f32; CHUNK_LANES] = std::array::from_fn(|lane| {
+    for vector in 0..batch.file.width() {
+        let values = batch.file.lanes::<f32>(src, vector);
+        let lanes: [f32; VECTOR_LANES] = std::array::from_fn(|lane| {
             let quad = lane & !3;
             // The corner that the difference starts from: of the quad, or of the lane's own row or column.
             let (from, step) = match axis {
@@ -19,7 +19,7 @@ pub fn derivative(batch: &Batch<'_>, dst: Reg, src: Reg, axis: Axis, fine: bool)
             };
             values[from + step] - values[from]
         });
-        batch.file.set(dst, chunk, lanes);
+        batch.file.set(dst, vector, lanes);
     }
 }
 
@@ -35,7 +35,7 @@ pub fn subgroup(
     let lanes = batch.program.lanes;
     let size = batch.program.subgroup_size.min(lanes);
     let active: Vec<bool> = (0..lanes)
-        .map(|lane| batch.masks.chunk(MaskId::ACTIVE, lane / 16) >> (lane % 16) & 1 != 0)
+        .map(|lane| batch.masks.bits(MaskId::ACTIVE, lane / 16) >> (lane % 16) & 1 != 0)
         .collect();
     let values = src.map_or_else(
         || vec![0; lanes],
@@ -70,14 +70,14 @@ pub fn subgroup(
 
 /// All lanes of a register, bools as 0 or all ones.
 fn gather(batch: &Batch<'_>, slot: Slot, wide: bool) -> Vec<u64> {
-    let chunks = 0..batch.file.width();
+    let vectors = 0..batch.file.width();
     if wide {
-        chunks
-            .flat_map(|chunk| batch.file.lanes::<u64>(slot, chunk))
+        vectors
+            .flat_map(|vector| batch.file.lanes::<u64>(slot, vector))
             .collect()
     } else {
-        chunks
-            .flat_map(|chunk| batch.file.lanes::<u32>(slot, chunk).map(u64::from))
+        vectors
+            .flat_map(|vector| batch.file.lanes::<u32>(slot, vector).map(u64::from))
             .collect()
     }
 }
@@ -85,16 +85,16 @@ fn gather(batch: &Batch<'_>, slot: Slot, wide: bool) -> Vec<u64> {
 /// Sets one lane of a register.
 fn scatter(batch: &Batch<'_>, slot: Slot, wide: bool, lane: usize, value: u64) {
     if wide {
-        let cell = &u64::chunks(batch.file, slot)[lane / 8];
-        let mut chunk = cell.get();
-        chunk.0[2 * (lane % 8)] = value as u32;
-        chunk.0[2 * (lane % 8) + 1] = (value >> 32) as u32;
-        cell.set(chunk);
+        let cell = &u64::vectors(batch.file, slot)[lane / 8];
+        let mut vector = cell.get();
+        vector.0[2 * (lane % 8)] = value as u32;
+        vector.0[2 * (lane % 8) + 1] = (value >> 32) as u32;
+        cell.set(vector);
     } else {
         let cell = &batch.file.narrow(slot)[lane / 16];
-        let mut chunk = cell.get();
-        chunk.0[lane % 16] = value as u32;
-        cell.set(chunk);
+        let mut vector = cell.get();
+        vector.0[lane % 16] = value as u32;
+        cell.set(vector);
     }
 }
 

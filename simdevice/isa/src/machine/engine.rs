@@ -237,10 +237,10 @@ fn select_lanes(
 ) {
     for (word, lanes) in masks.get(among).iter().enumerate() {
         let mut bits = 0;
-        for chunk in 4 * word..(4 * word + 4).min(file.width()) {
-            let selectors = file.lanes::<u32>(selector, chunk);
+        for vector in 4 * word..(4 * word + 4).min(file.width()) {
+            let selectors = file.lanes::<u32>(selector, vector);
             for (lane, selector) in selectors.iter().enumerate() {
-                bits |= u64::from(values.contains(selector)) << (16 * (chunk % 4) + lane);
+                bits |= u64::from(values.contains(selector)) << (16 * (vector % 4) + lane);
             }
         }
         found(word, bits & lanes.get());
@@ -251,16 +251,16 @@ fn select_lanes(
 fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
     match statement {
         Statement::LaneIndex { dst } => {
-            for chunk in 0..batch.file.width() {
-                let lanes: [u32; 16] = std::array::from_fn(|lane| (16 * chunk + lane) as u32);
-                batch.file.set(batch.slot(*dst), chunk, lanes);
+            for vector in 0..batch.file.width() {
+                let lanes: [u32; 16] = std::array::from_fn(|lane| (16 * vector + lane) as u32);
+                batch.file.set(batch.slot(*dst), vector, lanes);
             }
         }
         Statement::IsHelper { dst } => {
-            for chunk in 0..batch.file.width() {
-                let helpers = batch.masks.chunk(MaskId::HELPER, chunk);
+            for vector in 0..batch.file.width() {
+                let helpers = batch.masks.bits(MaskId::HELPER, vector);
                 let lanes: [bool; 16] = std::array::from_fn(|lane| helpers >> lane & 1 != 0);
-                batch.file.set(batch.slot(*dst), chunk, lanes);
+                batch.file.set(batch.slot(*dst), vector, lanes);
             }
         }
         Statement::Load {

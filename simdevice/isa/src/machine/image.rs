@@ -4,29 +4,29 @@ use super::batch::Batch;
 use super::masks::lanes_of;
 use crate::compiler::step::MaskId;
 use crate::ir::{
-    Binding, CHUNK_LANES, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg,
-    Sample,
+    Binding, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg, Sample,
+    VECTOR_LANES,
 };
 use crate::resources::{Lanes, LodRequest, SampleRequest, TexelRequest};
 
 /// A bind point that isn't bound to anything.
 const UNBOUND: u32 = u32::MAX;
 
-fn words(batch: &Batch<'_>, reg: Reg, chunk: usize) -> Lanes {
-    batch.file.lanes(batch.slot(reg), chunk)
+fn words(batch: &Batch<'_>, reg: Reg, vector: usize) -> Lanes {
+    batch.file.lanes(batch.slot(reg), vector)
 }
 
-fn words_or_zero(batch: &Batch<'_>, reg: Option<Reg>, chunk: usize) -> Lanes {
-    reg.map_or([0; CHUNK_LANES], |reg| words(batch, reg, chunk))
+fn words_or_zero(batch: &Batch<'_>, reg: Option<Reg>, vector: usize) -> Lanes {
+    reg.map_or([0; VECTOR_LANES], |reg| words(batch, reg, vector))
 }
 
-fn all_words<const N: usize>(batch: &Batch<'_>, regs: &[Reg], chunk: usize) -> [Lanes; N] {
-    std::array::from_fn(|index| words_or_zero(batch, regs.get(index).copied(), chunk))
+fn all_words<const N: usize>(batch: &Batch<'_>, regs: &[Reg], vector: usize) -> [Lanes; N] {
+    std::array::from_fn(|index| words_or_zero(batch, regs.get(index).copied(), vector))
 }
 
 /// The bind points that 16 lanes mean.
-fn bind_points(batch: &Batch<'_>, binding: &Binding, chunk: usize) -> Lanes {
-    let indices = words_or_zero(batch, binding.index, chunk);
+fn bind_points(batch: &Batch<'_>, binding: &Binding, vector: usize) -> Lanes {
+    let indices = words_or_zero(batch, binding.index, vector);
     indices.map(|index| {
         if index < binding.count {
             binding.slot + index
@@ -55,66 +55,66 @@ fn for_each_binding(
 }
 
 #[inline(always)]
-fn put_texel(batch: &Batch<'_>, dst: &[Option<Reg>; 4], chunk: usize, texel: &[Lanes; 4]) {
+fn put_texel(batch: &Batch<'_>, dst: &[Option<Reg>; 4], vector: usize, texel: &[Lanes; 4]) {
     for (index, lanes) in texel.iter().enumerate() {
         if let Some(reg) = dst[index] {
-            batch.file.set(batch.slot(reg), chunk, *lanes);
+            batch.file.set(batch.slot(reg), vector, *lanes);
         }
     }
 }
 
-fn lod_request(batch: &Batch<'_>, lod: &Lod, chunk: usize) -> LodRequest {
+fn lod_request(batch: &Batch<'_>, lod: &Lod, vector: usize) -> LodRequest {
     match lod {
         Lod::Implicit { bias, minimum } => LodRequest::Implicit {
-            bias: words_or_zero(batch, *bias, chunk),
-            minimum: words_or_zero(batch, *minimum, chunk),
+            bias: words_or_zero(batch, *bias, vector),
+            minimum: words_or_zero(batch, *minimum, vector),
         },
-        Lod::Explicit(level) => LodRequest::Explicit(words(batch, *level, chunk)),
+        Lod::Explicit(level) => LodRequest::Explicit(words(batch, *level, vector)),
         Lod::Gradient { dx, dy, minimum } => LodRequest::Gradient {
-            dx: all_words(batch, dx, chunk),
-            dy: all_words(batch, dy, chunk),
-            minimum: words_or_zero(batch, *minimum, chunk),
+            dx: all_words(batch, dx, vector),
+            dy: all_words(batch, dy, vector),
+            minimum: words_or_zero(batch, *minimum, vector),
         },
     }
 }
 
 pub fn sample(batch: &Batch<'_>, sample: &Sample) {
-    // What isn't an operand stays as it is here for all chunks.
+    // What isn't an operand stays as it is here for all vectors.
     let mut request = SampleRequest {
         mask: 0,
         shape: sample.shape,
-        coordinate: [[0; CHUNK_LANES]; 4],
+        coordinate: [[0; VECTOR_LANES]; 4],
         lod: LodRequest::Automatic,
-        offset: [[0; CHUNK_LANES]; 3],
+        offset: [[0; VECTOR_LANES]; 3],
         compare: None,
         gather: sample.gather,
     };
     let bound = fixed_point(&sample.image).zip(fixed_point(&sample.sampler));
-    for chunk in 0..batch.file.width() {
-        let active = batch.masks.chunk(MaskId::ACTIVE, chunk);
+    for vector in 0..batch.file.width() {
+        let active = batch.masks.bits(MaskId::ACTIVE, vector);
         if active == 0 {
             continue;
         }
         for (index, reg) in sample.coordinate.iter().enumerate().take(4) {
-            request.coordinate[index] = words(batch, *reg, chunk);
+            request.coordinate[index] = words(batch, *reg, vector);
         }
         for (index, reg) in sample.offset.iter().enumerate().take(3) {
-            request.offset[index] = words(batch, *reg, chunk);
+            request.offset[index] = words(batch, *reg, vector);
         }
         if !is_automatic(&sample.lod) {
-            request.lod = lod_request(batch, &sample.lod, chunk);
+            request.lod = lod_request(batch, &sample.lod, vector);
         }
         if let Some(reg) = sample.compare {
-            request.compare = Some(words(batch, reg, chunk));
+            request.compare = Some(words(batch, reg, vector));
         }
         let texel = match bound {
             Some((image, sampler)) => {
                 request.mask = active;
                 batch.resources.images.sample(image, sampler, &request)
             }
-            None => sample_each(batch, sample, &mut request, chunk, active),
+            None => sample_each(batch, sample, &mut request, vector, active),
         };
-        put_texel(batch, &sample.dst, chunk, &texel);
+        put_texel(batch, &sample.dst, vector, &texel);
     }
 }
 
@@ -123,12 +123,12 @@ fn sample_each(
     batch: &Batch<'_>,
     sample: &Sample,
     request: &mut SampleRequest,
-    chunk: usize,
+    vector: usize,
     active: u16,
 ) -> [Lanes; 4] {
-    let images = bind_points(batch, &sample.image, chunk);
-    let samplers = bind_points(batch, &sample.sampler, chunk);
-    let mut texel = [[0; CHUNK_LANES]; 4];
+    let images = bind_points(batch, &sample.image, vector);
+    let samplers = bind_points(batch, &sample.sampler, vector);
+    let mut texel = [[0; VECTOR_LANES]; 4];
     for_each_binding(&images, &samplers, active, |image, sampler, lanes| {
         request.mask = lanes;
         let found = batch.resources.images.sample(image, sampler, request);
@@ -143,31 +143,31 @@ fn texel_request(
     coordinate: &[Reg],
     level: Option<Reg>,
     sample: Option<Reg>,
-    chunk: usize,
+    vector: usize,
 ) -> TexelRequest {
     TexelRequest {
         mask: 0,
         shape,
-        coordinate: all_words(batch, coordinate, chunk),
-        level: words_or_zero(batch, level, chunk),
-        sample: words_or_zero(batch, sample, chunk),
+        coordinate: all_words(batch, coordinate, vector),
+        level: words_or_zero(batch, level, vector),
+        sample: words_or_zero(batch, sample, vector),
     }
 }
 
 pub fn read(batch: &Batch<'_>, read: &ImageRead) {
-    for chunk in 0..batch.file.width() {
-        let active = batch.masks.chunk(MaskId::ACTIVE, chunk);
-        let images = bind_points(batch, &read.image, chunk);
+    for vector in 0..batch.file.width() {
+        let active = batch.masks.bits(MaskId::ACTIVE, vector);
+        let images = bind_points(batch, &read.image, vector);
         let mut request = texel_request(
             batch,
             read.shape,
             &read.coordinate,
             read.level,
             read.sample,
-            chunk,
+            vector,
         );
-        let mut texel = [[0; CHUNK_LANES]; 4];
-        for_each_binding(&images, &[0; CHUNK_LANES], active, |image, _, lanes| {
+        let mut texel = [[0; VECTOR_LANES]; 4];
+        for_each_binding(&images, &[0; VECTOR_LANES], active, |image, _, lanes| {
             request.mask = lanes;
             merge(
                 &mut texel,
@@ -175,24 +175,24 @@ pub fn read(batch: &Batch<'_>, read: &ImageRead) {
                 lanes,
             );
         });
-        put_texel(batch, &read.dst, chunk, &texel);
+        put_texel(batch, &read.dst, vector, &texel);
     }
 }
 
 pub fn write(batch: &Batch<'_>, write: &ImageWrite) {
-    for chunk in 0..batch.file.width() {
-        let lanes = batch.masks.writing(chunk);
-        let images = bind_points(batch, &write.image, chunk);
+    for vector in 0..batch.file.width() {
+        let lanes = batch.masks.writing(vector);
+        let images = bind_points(batch, &write.image, vector);
         let mut request = texel_request(
             batch,
             write.shape,
             &write.coordinate,
             None,
             write.sample,
-            chunk,
+            vector,
         );
-        let texel = all_words(batch, &write.texel, chunk);
-        for_each_binding(&images, &[0; CHUNK_LANES], lanes, |image, _, lanes| {
+        let texel = all_words(batch, &write.texel, vector);
+        for_each_binding(&images, &[0; VECTOR_LANES], lanes, |image, _, lanes| {
             request.mask = lanes;
             batch.resources.images.write(image, &request, &texel);
         });
@@ -200,21 +200,21 @@ pub fn write(batch: &Batch<'_>, write: &ImageWrite) {
 }
 
 pub fn atomic(batch: &Batch<'_>, atomic: &ImageAtomic) {
-    for chunk in 0..batch.file.width() {
-        let lanes = batch.masks.writing(chunk);
-        let images = bind_points(batch, &atomic.image, chunk);
+    for vector in 0..batch.file.width() {
+        let lanes = batch.masks.writing(vector);
+        let images = bind_points(batch, &atomic.image, vector);
         let mut request = texel_request(
             batch,
             atomic.shape,
             &atomic.coordinate,
             None,
             atomic.sample,
-            chunk,
+            vector,
         );
-        let value = words(batch, atomic.value, chunk);
-        let comparator = words_or_zero(batch, atomic.comparator, chunk);
-        let mut old = [[0; CHUNK_LANES]];
-        for_each_binding(&images, &[0; CHUNK_LANES], lanes, |image, _, lanes| {
+        let value = words(batch, atomic.value, vector);
+        let comparator = words_or_zero(batch, atomic.comparator, vector);
+        let mut old = [[0; VECTOR_LANES]];
+        for_each_binding(&images, &[0; VECTOR_LANES], lanes, |image, _, lanes| {
             request.mask = lanes;
             let found =
                 batch
@@ -224,7 +224,7 @@ pub fn atomic(batch: &Batch<'_>, atomic: &ImageAtomic) {
             merge(&mut old, &[found], lanes);
         });
         if let Some(dst) = atomic.dst {
-            batch.file.set(batch.slot(dst), chunk, old[0]);
+            batch.file.set(batch.slot(dst), vector, old[0]);
         }
     }
 }
@@ -238,16 +238,16 @@ pub fn query(
 ) {
     let images = batch.resources.images;
     let varying = dst.iter().any(|reg| batch.slot(*reg).is_varying());
-    for chunk in 0..if varying { batch.file.width() } else { 1 } {
-        let bound = bind_points(batch, image, chunk);
+    for vector in 0..if varying { batch.file.width() } else { 1 } {
+        let bound = bind_points(batch, image, vector);
         let answers: [Lanes; 4] = match query {
             ImageQuery::Lod {
                 sampler,
                 coordinate,
-            } => query_lod(batch, &bound, sampler, coordinate, shape, chunk),
+            } => query_lod(batch, &bound, sampler, coordinate, shape, vector),
             ImageQuery::Size { level } => {
-                let levels = words_or_zero(batch, *level, chunk);
-                let sizes: [[u32; 4]; CHUNK_LANES] =
+                let levels = words_or_zero(batch, *level, vector);
+                let sizes: [[u32; 4]; VECTOR_LANES] =
                     std::array::from_fn(|lane| images.size(bound[lane], shape, levels[lane]));
                 std::array::from_fn(|axis| sizes.map(|size| size[axis]))
             }
@@ -255,7 +255,7 @@ pub fn query(
             ImageQuery::Samples => [bound.map(|image| images.samples(image)); 4],
         };
         for (reg, answer) in dst.iter().zip(answers) {
-            batch.file.set(batch.slot(*reg), chunk, answer);
+            batch.file.set(batch.slot(*reg), vector, answer);
         }
     }
 }
@@ -266,29 +266,29 @@ fn query_lod(
     sampler: &Binding,
     coordinate: &[Reg],
     shape: ImageShape,
-    chunk: usize,
+    vector: usize,
 ) -> [Lanes; 4] {
-    let samplers = bind_points(batch, sampler, chunk);
+    let samplers = bind_points(batch, sampler, vector);
     let mut request = SampleRequest {
         mask: 0,
         shape,
-        coordinate: all_words(batch, coordinate, chunk),
+        coordinate: all_words(batch, coordinate, vector),
         lod: LodRequest::Implicit {
-            bias: [0; CHUNK_LANES],
-            minimum: [0; CHUNK_LANES],
+            bias: [0; VECTOR_LANES],
+            minimum: [0; VECTOR_LANES],
         },
-        offset: [[0; CHUNK_LANES]; 3],
+        offset: [[0; VECTOR_LANES]; 3],
         compare: None,
         gather: None,
     };
-    let mut answers = [[0; CHUNK_LANES]; 4];
-    let active = batch.masks.chunk(MaskId::ACTIVE, chunk);
+    let mut answers = [[0; VECTOR_LANES]; 4];
+    let active = batch.masks.bits(MaskId::ACTIVE, vector);
     for_each_binding(images, &samplers, active, |image, sampler, lanes| {
         request.mask = lanes;
         let [clamped, unclamped] = batch.resources.images.lod(image, sampler, &request);
         merge(
             &mut answers,
-            &[clamped, unclamped, [0; CHUNK_LANES], [0; CHUNK_LANES]],
+            &[clamped, unclamped, [0; VECTOR_LANES], [0; VECTOR_LANES]],
             lanes,
         );
     });

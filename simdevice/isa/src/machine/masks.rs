@@ -93,7 +93,7 @@ impl<'a> Masks<'a> {
         any != 0
     }
 
-    /// The chunks from the first to the last that has active lanes, and whether in them all lanes are active that were
+    /// The vectors from the first to the last that has active lanes, and whether in them all lanes are active that were
     /// when the batch began.
     #[inline(always)]
     pub fn span(self) -> (Span, bool) {
@@ -168,16 +168,16 @@ impl<'a> Masks<'a> {
         }
     }
 
-    /// The bits of lanes 16 `chunk`.. of a mask.
+    /// The bits of a mask for the 16 lanes of a vector.
     #[inline(always)]
-    pub fn chunk(self, mask: MaskId, chunk: usize) -> u16 {
-        (self.get(mask)[chunk / 4].get() >> (16 * (chunk % 4))) as u16
+    pub fn bits(self, mask: MaskId, vector: usize) -> u16 {
+        (self.get(mask)[vector / 4].get() >> (16 * (vector % 4))) as u16
     }
 
     /// The active lanes among 16 whose writes count.
     #[inline(always)]
-    pub fn writing(self, chunk: usize) -> u16 {
-        self.chunk(MaskId::ACTIVE, chunk) & !self.chunk(MaskId::HELPER, chunk)
+    pub fn writing(self, vector: usize) -> u16 {
+        self.bits(MaskId::ACTIVE, vector) & !self.bits(MaskId::HELPER, vector)
     }
 
     /// Splits the active lanes by a bool register: calls `split(active, true lanes among them, word index)`.
@@ -201,16 +201,16 @@ impl<'a> Masks<'a> {
             }
             return;
         }
-        let chunks = file.narrow(condition);
+        let vectors = file.narrow(condition);
         for (word, active) in active.iter().enumerate() {
             if active.get() == 0 {
                 split(active, 0, word);
                 continue;
             }
             let mut bits = 0;
-            for index in 0..(chunks.len() - 4 * word).min(4) {
+            for index in 0..(vectors.len() - 4 * word).min(4) {
                 let lanes =
-                    to_mask(load_vector(simd, &chunks[4 * word + index])).to_bitmask() & 0xffff;
+                    to_mask(load_vector(simd, &vectors[4 * word + index])).to_bitmask() & 0xffff;
                 bits |= lanes << (16 * index);
             }
             split(active, active.get() & bits, word);

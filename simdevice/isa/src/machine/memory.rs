@@ -8,7 +8,7 @@ use fearless_simd::{Simd, prelude::*, u32x16};
 use super::batch::Batch;
 use super::masks::{bits_to_mask, lanes_of};
 use crate::compiler::step::MaskId;
-use crate::ir::{Address, AtomicOp, Binding, CHUNK_LANES, Format, Reg, Space};
+use crate::ir::{Address, AtomicOp, Binding, Format, Reg, Space, VECTOR_LANES};
 use crate::kernels::combine;
 use crate::kernels::registers::{Slot, each_lane, load_vector};
 use crate::resources::{load_word, range_words};
@@ -97,8 +97,8 @@ impl<'a> View<'a> {
 /// Where each of 16 lanes accesses.
 struct Places<'a> {
     /// One view for all lanes, or one for each.
-    view: Result<View<'a>, Box<[View<'a>; CHUNK_LANES]>>,
-    addresses: [u64; CHUNK_LANES],
+    view: Result<View<'a>, Box<[View<'a>; VECTOR_LANES]>>,
+    addresses: [u64; VECTOR_LANES],
 }
 
 impl<'a> Places<'a> {
@@ -122,25 +122,25 @@ fn buffer<'a>(batch: &Batch<'a>, binding: &Binding, index: u32) -> View<'a> {
     }
 }
 
-/// Where lanes 16 `chunk`.. access. Lanes outside `lanes` may get any place.
-fn places<'a>(batch: &Batch<'a>, address: &Address, chunk: usize, lanes: u16) -> Places<'a> {
+/// Where lanes 16 `vector`.. access. Lanes outside `lanes` may get any place.
+fn places<'a>(batch: &Batch<'a>, address: &Address, vector: usize, lanes: u16) -> Places<'a> {
     let offset = u64::from(address.offset);
     if address.space == Space::Global {
-        return global_places(batch, address, chunk, lanes);
+        return global_places(batch, address, vector, lanes);
     }
     let addresses = match address.base {
         Some(base) => batch
             .file
-            .lanes::<u32>(batch.slot(base), chunk)
+            .lanes::<u32>(batch.slot(base), vector)
             .map(|base| u64::from(base) + offset),
-        None => [offset; CHUNK_LANES],
+        None => [offset; VECTOR_LANES],
     };
     let view = match &address.space {
         Space::Buffer(binding) => match binding.index {
             None => Ok(buffer(batch, binding, 0)),
             Some(index) => {
                 let slot = batch.slot(index);
-                let indices = batch.file.lanes::<u32>(slot, chunk);
+                let indices = batch.file.lanes::<u32>(slot, vector);
                 if slot.is_varying() {
                     Err(Box::new(indices.map(|index| buffer(batch, binding, index))))
                 } else {
@@ -153,16 +153,21 @@ fn places<'a>(batch: &Batch<'a>, address: &Address, chunk: usize, lanes: u16) ->
     Places { view, addresses }
 }
 
-fn global_places<'a>(batch: &Batch<'a>, address: &Address, chunk: usize, lanes: u16) -> Places<'a> {
+fn global_places<'a>(
+    batch: &Batch<'a>,
+    address: &Address,
+    vector: usize,
+    lanes: u16,
+) -> Places<'a> {
     let mut places = Places {
         view: Ok(View::EMPTY),
-        addresses: [0; CHUNK_LANES],
+        addresses: [0; VECTOR_LANES],
     };
     let Some(base) = address.base else {
         return places;
     };
-    let bases = batch.file.lanes::<u64>(batch.slot(base), chunk);
-    let mut views = [View::EMPTY; CHUNK_LANES];
+    let bases = batch.file.lanes::<u64>(batch.slot(base), vector);
+    let mut views = [View::EMPTY; VECTOR_LANES];
     for lane in lanes_of(lanes) {
         let target = bases[lane].wrapping_add(u64::from(address.offset));
         if let Some((range, start)) = batch.resources.global.find(target) {
@@ -174,23 +179,23 @@ fn global_places<'a>(batch: &Batch<'a>, address: &Address, chunk: usize, lanes: 
     places
 }
 
-/// Sets one lane-chunk of a loaded register.
-fn put(batch: &Batch<'_>, dst: Slot, format: Format, chunk: usize, values: [u64; CHUNK_LANES]) {
+/// Sets 16 lanes of a loaded register.
+fn put(batch: &Batch<'_>, dst: Slot, format: Format, vector: usize, values: [u64; VECTOR_LANES]) {
     if format == Format::B64 {
-        batch.file.set(dst, chunk, values);
+        batch.file.set(dst, vector, values);
     } else {
         batch
             .file
-            .set(dst, chunk, each_lane(values, |value| value as u32));
+            .set(dst, vector, each_lane(values, |value| value as u32));
     }
 }
 
-/// One lane-chunk of a register to store.
-fn take(batch: &Batch<'_>, src: Slot, format: Format, chunk: usize) -> [u64; CHUNK_LANES] {
+/// Takes 16 lanes of a register to store.
+fn take(batch: &Batch<'_>, src: Slot, format: Format, vector: usize) -> [u64; VECTOR_LANES] {
     if format == Format::B64 {
-        batch.file.lanes(src, chunk)
+        batch.file.lanes(src, vector)
     } else {
-        each_lane(batch.file.lanes::<u32>(src, chunk), u64::from)
+        each_lane(batch.file.lanes::<u32>(src, vector), u64::from)
     }
 }
 
@@ -234,27 +239,27 @@ pub fn load<S: Simd>(batch: &Batch<'_>, simd: S, dst: &[Reg], address: &Address,
         _ => batch
             .file
             .span()
-            .for_each(|chunk| load_chunk(batch, dst, address, format, chunk)),
+            .for_each(|vector| load_lanes(batch, dst, address, format, vector)),
     }
 }
 
 /// Loads 16 lanes, one by one.
-fn load_chunk(batch: &Batch<'_>, dst: &[Reg], address: &Address, format: Format, chunk: usize) {
-    let lanes = batch.masks.chunk(MaskId::ACTIVE, chunk);
+fn load_lanes(batch: &Batch<'_>, dst: &[Reg], address: &Address, format: Format, vector: usize) {
+    let lanes = batch.masks.bits(MaskId::ACTIVE, vector);
     if lanes == 0 {
         return;
     }
-    let places = places(batch, address, chunk, lanes);
+    let places = places(batch, address, vector, lanes);
     for (element, reg) in dst.iter().enumerate() {
         let step = element as u64 * u64::from(format.bytes());
-        let mut values = [0; CHUNK_LANES];
+        let mut values = [0; VECTOR_LANES];
         for lane in lanes_of(lanes) {
             values[lane] = places
                 .view(lane)
                 .load(places.addresses[lane] + step, format)
                 .unwrap_or(0);
         }
-        put(batch, batch.slot(*reg), format, chunk, values);
+        put(batch, batch.slot(*reg), format, vector, values);
     }
 }
 
@@ -273,11 +278,11 @@ fn load_uniform_from(
     for reg in dst {
         let value = view.load(at, format).unwrap_or(0);
         if format == Format::B64 {
-            batch.file.set(batch.slot(*reg), 0, [value; CHUNK_LANES]);
+            batch.file.set(batch.slot(*reg), 0, [value; VECTOR_LANES]);
         } else {
             batch
                 .file
-                .set(batch.slot(*reg), 0, [value as u32; CHUNK_LANES]);
+                .set(batch.slot(*reg), 0, [value as u32; VECTOR_LANES]);
         }
         at += u64::from(format.bytes());
     }
@@ -291,7 +296,7 @@ fn load_uniform(batch: &Batch<'_>, dst: &[Reg], address: &Address, format: Forma
             .view(0)
             .load(places.addresses[0] + step, format)
             .unwrap_or(0);
-        put(batch, batch.slot(*reg), format, 0, [value; CHUNK_LANES]);
+        put(batch, batch.slot(*reg), format, 0, [value; VECTOR_LANES]);
     }
 }
 
@@ -302,20 +307,20 @@ pub fn store<S: Simd>(batch: &Batch<'_>, simd: S, src: &[Reg], address: &Address
         _ => batch
             .file
             .span()
-            .for_each(|chunk| store_chunk(batch, src, address, format, chunk)),
+            .for_each(|vector| store_lanes(batch, src, address, format, vector)),
     }
 }
 
 /// Stores 16 lanes, one by one.
-fn store_chunk(batch: &Batch<'_>, src: &[Reg], address: &Address, format: Format, chunk: usize) {
-    let lanes = batch.masks.writing(chunk);
+fn store_lanes(batch: &Batch<'_>, src: &[Reg], address: &Address, format: Format, vector: usize) {
+    let lanes = batch.masks.writing(vector);
     if lanes == 0 {
         return;
     }
-    let places = places(batch, address, chunk, lanes);
+    let places = places(batch, address, vector, lanes);
     for (element, reg) in src.iter().enumerate() {
         let step = element as u64 * u64::from(format.bytes());
-        let values = take(batch, batch.slot(*reg), format, chunk);
+        let values = take(batch, batch.slot(*reg), format, vector);
         for lane in lanes_of(lanes) {
             places
                 .view(lane)
@@ -335,45 +340,45 @@ pub fn atomic<S: Simd>(
     value: Reg,
     comparator: Option<Reg>,
 ) {
-    for chunk in batch.file.span() {
-        let lanes = batch.masks.writing(chunk);
-        let mut old = [0; CHUNK_LANES];
+    for vector in batch.file.span() {
+        let lanes = batch.masks.writing(vector);
+        let mut old = [0; VECTOR_LANES];
         if lanes != 0 {
-            let values = take(batch, batch.slot(value), format, chunk);
-            let comparators = comparator.map_or([0; CHUNK_LANES], |reg| {
-                take(batch, batch.slot(reg), format, chunk)
+            let values = take(batch, batch.slot(value), format, vector);
+            let comparators = comparator.map_or([0; VECTOR_LANES], |reg| {
+                take(batch, batch.slot(reg), format, vector)
             });
             let at_once = (format == Format::B32).then(|| {
                 let [values, comparators] =
                     [values, comparators].map(|lanes| each_lane(lanes, |lane| lane as u32));
-                atomic_words(batch, simd, op, address, chunk, &values, &comparators)
+                atomic_words(batch, simd, op, address, vector, &values, &comparators)
             });
             old = match at_once.flatten() {
                 Some(old) => each_lane(old, u64::from),
                 None => {
                     let change =
                         |lane, old| combine(op, format, old, values[lane], comparators[lane]);
-                    atomic_chunk(batch, address, format, chunk, lanes, change)
+                    atomic_lanes(batch, address, format, vector, lanes, change)
                 }
             };
         }
         if let Some(dst) = dst {
-            put(batch, batch.slot(dst), format, chunk, old);
+            put(batch, batch.slot(dst), format, vector, old);
         }
     }
 }
 
 /// Atomic operations of 16 lanes, one by one. Gives the old values.
-fn atomic_chunk(
+fn atomic_lanes(
     batch: &Batch<'_>,
     address: &Address,
     format: Format,
-    chunk: usize,
+    vector: usize,
     lanes: u16,
     change: impl Fn(usize, u64) -> u64,
-) -> [u64; CHUNK_LANES] {
-    let mut old = [0; CHUNK_LANES];
-    let places = places(batch, address, chunk, lanes);
+) -> [u64; VECTOR_LANES] {
+    let mut old = [0; VECTOR_LANES];
+    let places = places(batch, address, vector, lanes);
     for lane in lanes_of(lanes) {
         let (view, at) = (places.view(lane), places.addresses[lane]);
         old[lane] = update(view, at, format, |old| change(lane, old)).unwrap_or(0);
@@ -383,15 +388,15 @@ fn atomic_chunk(
 
 pub fn buffer_size(batch: &Batch<'_>, dst: Reg, binding: &Binding) {
     let slot = batch.slot(dst);
-    for chunk in batch.file.rounds(slot) {
+    for vector in batch.file.rounds(slot) {
         let sizes = match binding.index {
-            None => [buffer(batch, binding, 0).bytes; CHUNK_LANES],
+            None => [buffer(batch, binding, 0).bytes; VECTOR_LANES],
             Some(index) => batch
                 .file
-                .lanes::<u32>(batch.slot(index), chunk)
+                .lanes::<u32>(batch.slot(index), vector)
                 .map(|index| buffer(batch, binding, index).bytes),
         };
-        batch.file.set(slot, chunk, sizes);
+        batch.file.set(slot, vector, sizes);
     }
 }
 
@@ -456,7 +461,7 @@ impl<'a> Window<'a> {
         count: usize,
     ) -> Option<u32x16<S>> {
         if lanes != u16::MAX {
-            let first = bases[lanes.trailing_zeros() as usize % CHUNK_LANES];
+            let first = bases[lanes.trailing_zeros() as usize % VECTOR_LANES];
             let first = u32x16::splat(simd, first);
             bases = bits_to_mask(simd, lanes).select(bases, first);
         }
@@ -472,9 +477,9 @@ impl<'a> Window<'a> {
 #[inline(always)]
 fn are_apart<S: Simd, const STRIDE: usize>(starts: u32x16<S>) -> bool {
     let steps = const {
-        let mut steps = [0; CHUNK_LANES];
+        let mut steps = [0; VECTOR_LANES];
         let mut lane = 0;
-        while lane < CHUNK_LANES {
+        while lane < VECTOR_LANES {
             steps[lane] = (lane * STRIDE) as u32;
             lane += 1;
         }
@@ -495,9 +500,9 @@ fn element<const COUNT: usize>(words: &[AtomicU32], at: u32) -> &[AtomicU32; COU
 }
 
 #[inline(always)]
-fn bases<S: Simd>(batch: &Batch<'_>, simd: S, address: &Address, chunk: usize) -> u32x16<S> {
+fn bases<S: Simd>(batch: &Batch<'_>, simd: S, address: &Address, vector: usize) -> u32x16<S> {
     match address.base.map(|base| batch.slot(base)) {
-        Some(base) if base.is_varying() => load_vector(simd, &batch.file.narrow(base)[chunk]),
+        Some(base) if base.is_varying() => load_vector(simd, &batch.file.narrow(base)[vector]),
         Some(base) => load_vector(simd, &batch.file.narrow(base)[0]),
         None => u32x16::splat(simd, 0),
     }
@@ -550,15 +555,15 @@ fn load_elements<'a, S: Simd, const COUNT: usize>(
         || {
             let slots = slots(batch, regs);
             let window = Window::new(view, address.offset);
-            for chunk in batch.file.span() {
-                let lanes = batch.masks.chunk(MaskId::ACTIVE, chunk);
+            for vector in batch.file.span() {
+                let lanes = batch.masks.bits(MaskId::ACTIVE, vector);
                 if lanes == 0 {
                     continue;
                 }
-                let bases = bases(batch, simd, address, chunk);
+                let bases = bases(batch, simd, address, vector);
                 match window.starts(simd, bases, lanes, COUNT) {
-                    Some(starts) => gather_words(batch, slots, chunk, window, starts),
-                    None => load_chunk(batch, dst, address, Format::B32, chunk),
+                    Some(starts) => gather_words(batch, slots, vector, window, starts),
+                    None => load_lanes(batch, dst, address, Format::B32, vector),
                 }
             }
         },
@@ -569,26 +574,26 @@ fn load_elements<'a, S: Simd, const COUNT: usize>(
 fn gather_words<S: Simd, const COUNT: usize>(
     batch: &Batch<'_>,
     slots: [Slot; COUNT],
-    chunk: usize,
+    vector: usize,
     window: Window<'_>,
     starts: u32x16<S>,
 ) {
-    let mut values = [[0; CHUNK_LANES]; COUNT];
+    let mut values = [[0; VECTOR_LANES]; COUNT];
     if are_apart::<S, 0>(starts) {
         let element = element::<COUNT>(window.words, starts[0]);
         for index in 0..COUNT {
-            values[index] = [element[index].load(Relaxed); CHUNK_LANES];
+            values[index] = [element[index].load(Relaxed); VECTOR_LANES];
         }
     } else if are_apart::<S, COUNT>(starts) {
-        let run = &window.words[starts[0] as usize..][..CHUNK_LANES * COUNT];
-        for lane in 0..CHUNK_LANES {
+        let run = &window.words[starts[0] as usize..][..VECTOR_LANES * COUNT];
+        for lane in 0..VECTOR_LANES {
             for index in 0..COUNT {
                 values[index][lane] = run[lane * COUNT + index].load(Relaxed);
             }
         }
     } else {
-        let starts: [u32; CHUNK_LANES] = starts.into();
-        for lane in 0..CHUNK_LANES {
+        let starts: [u32; VECTOR_LANES] = starts.into();
+        for lane in 0..VECTOR_LANES {
             let element = element::<COUNT>(window.words, starts[lane]);
             for index in 0..COUNT {
                 values[index][lane] = element[index].load(Relaxed);
@@ -596,7 +601,7 @@ fn gather_words<S: Simd, const COUNT: usize>(
         }
     }
     for index in 0..COUNT {
-        batch.file.set(slots[index], chunk, values[index]);
+        batch.file.set(slots[index], vector, values[index]);
     }
 }
 
@@ -639,15 +644,15 @@ fn store_elements<'a, S: Simd, const COUNT: usize>(
         || {
             let slots = slots(batch, regs);
             let window = Window::new(view, address.offset);
-            for chunk in batch.file.span() {
-                let lanes = batch.masks.writing(chunk);
+            for vector in batch.file.span() {
+                let lanes = batch.masks.writing(vector);
                 if lanes == 0 {
                     continue;
                 }
-                let bases = bases(batch, simd, address, chunk);
+                let bases = bases(batch, simd, address, vector);
                 match window.starts(simd, bases, lanes, COUNT) {
-                    Some(starts) => scatter_words(batch, slots, chunk, lanes, window, starts),
-                    None => store_chunk(batch, src, address, Format::B32, chunk),
+                    Some(starts) => scatter_words(batch, slots, vector, lanes, window, starts),
+                    None => store_lanes(batch, src, address, Format::B32, vector),
                 }
             }
         },
@@ -658,16 +663,16 @@ fn store_elements<'a, S: Simd, const COUNT: usize>(
 fn scatter_words<S: Simd, const COUNT: usize>(
     batch: &Batch<'_>,
     slots: [Slot; COUNT],
-    chunk: usize,
+    vector: usize,
     lanes: u16,
     window: Window<'_>,
     starts: u32x16<S>,
 ) {
-    let mut values = [[0; CHUNK_LANES]; COUNT];
+    let mut values = [[0; VECTOR_LANES]; COUNT];
     for index in 0..COUNT {
-        values[index] = batch.file.lanes::<u32>(slots[index], chunk);
+        values[index] = batch.file.lanes::<u32>(slots[index], vector);
     }
-    let starts: [u32; CHUNK_LANES] = starts.into();
+    let starts: [u32; VECTOR_LANES] = starts.into();
     let put = |lane: usize| {
         let element = element::<COUNT>(window.words, starts[lane]);
         for index in 0..COUNT {
@@ -675,7 +680,7 @@ fn scatter_words<S: Simd, const COUNT: usize>(
         }
     };
     if lanes == u16::MAX {
-        for lane in 0..CHUNK_LANES {
+        for lane in 0..VECTOR_LANES {
             put(lane);
         }
     } else {
@@ -691,13 +696,13 @@ fn atomic_words<S: Simd>(
     simd: S,
     op: AtomicOp,
     address: &Address,
-    chunk: usize,
-    values: &[u32; CHUNK_LANES],
-    comparators: &[u32; CHUNK_LANES],
-) -> Option<[u32; CHUNK_LANES]> {
-    let lanes = batch.masks.writing(chunk);
+    vector: usize,
+    values: &[u32; VECTOR_LANES],
+    comparators: &[u32; VECTOR_LANES],
+) -> Option<[u32; VECTOR_LANES]> {
+    let lanes = batch.masks.writing(vector);
     let window = Window::new(common_view(batch, &address.space)?, address.offset);
-    let starts = window.starts(simd, bases(batch, simd, address, chunk), lanes, 1)?;
+    let starts = window.starts(simd, bases(batch, simd, address, vector), lanes, 1)?;
     let access = Access {
         lanes,
         window,
@@ -737,16 +742,16 @@ fn atomic_words<S: Simd>(
 struct Access<'a> {
     lanes: u16,
     window: Window<'a>,
-    starts: [u32; CHUNK_LANES],
-    values: &'a [u32; CHUNK_LANES],
-    comparators: &'a [u32; CHUNK_LANES],
+    starts: [u32; VECTOR_LANES],
+    values: &'a [u32; VECTOR_LANES],
+    comparators: &'a [u32; VECTOR_LANES],
 }
 
 impl Access<'_> {
     /// Calls `change(word, value, comparator)` for each lane in order; it gives the old value.
     #[inline(always)]
-    fn each(&self, change: impl Fn(&AtomicU32, u32, u32) -> u32) -> [u32; CHUNK_LANES] {
-        let mut old = [0; CHUNK_LANES];
+    fn each(&self, change: impl Fn(&AtomicU32, u32, u32) -> u32) -> [u32; VECTOR_LANES] {
+        let mut old = [0; VECTOR_LANES];
         for lane in lanes_of(self.lanes) {
             let word = &self.window.words[self.starts[lane] as usize];
             old[lane] = change(word, self.values[lane], self.comparators[lane]);
@@ -755,7 +760,7 @@ impl Access<'_> {
     }
 }
 
-// Private memory: of each lane. A word of it is a row of chunks, as a varying register is.
+// Private memory: of each lane. A word of it is a row of vectors, as a varying register is.
 
 /// A word that doesn't exist.
 const NOWHERE: usize = usize::MAX;
@@ -763,7 +768,7 @@ const NOWHERE: usize = usize::MAX;
 /// The rows that 16 lanes access.
 enum Rows {
     Same(usize),
-    Each([usize; CHUNK_LANES]),
+    Each([usize; VECTOR_LANES]),
 }
 
 /// The row of private memory that a byte address means; [`NOWHERE`] if there is none.
@@ -778,7 +783,7 @@ fn private_row(batch: &Batch<'_>, address: u64) -> usize {
 
 /// The rows that 16 lanes access.
 #[inline(always)]
-fn private_rows(batch: &Batch<'_>, address: &Address, step: u64, chunk: usize) -> Rows {
+fn private_rows(batch: &Batch<'_>, address: &Address, step: u64, vector: usize) -> Rows {
     let step = u64::from(address.offset) + step;
     match address.base.map(|base| batch.slot(base)) {
         None => Rows::Same(private_row(batch, step)),
@@ -787,7 +792,7 @@ fn private_rows(batch: &Batch<'_>, address: &Address, step: u64, chunk: usize) -
             u64::from(batch.file.first::<u32>(base)) + step,
         )),
         Some(base) => {
-            let bases = batch.file.lanes::<u32>(base, chunk);
+            let bases = batch.file.lanes::<u32>(base, vector);
             Rows::Each(each_lane(bases, |base| {
                 private_row(batch, u64::from(base) + step)
             }))
@@ -801,17 +806,17 @@ fn private_words(
     batch: &Batch<'_>,
     address: &Address,
     step: u64,
-    chunk: usize,
-) -> [u32; CHUNK_LANES] {
-    let word = |row: usize| batch.private.get(row.wrapping_add(chunk));
-    match private_rows(batch, address, step, chunk) {
-        Rows::Same(NOWHERE) => [0; CHUNK_LANES],
-        Rows::Same(row) => word(row).map_or([0; CHUNK_LANES], |chunk| chunk.get().0),
+    vector: usize,
+) -> [u32; VECTOR_LANES] {
+    let word = |row: usize| batch.private.get(row.wrapping_add(vector));
+    match private_rows(batch, address, step, vector) {
+        Rows::Same(NOWHERE) => [0; VECTOR_LANES],
+        Rows::Same(row) => word(row).map_or([0; VECTOR_LANES], |vector| vector.get().0),
         Rows::Each(rows) => {
-            let mut values = [0; CHUNK_LANES];
+            let mut values = [0; VECTOR_LANES];
             for (lane, row) in rows.into_iter().enumerate() {
                 if row != NOWHERE {
-                    values[lane] = word(row).map_or(0, |chunk| chunk.get().0[lane]);
+                    values[lane] = word(row).map_or(0, |vector| vector.get().0[lane]);
                 }
             }
             values
@@ -820,24 +825,24 @@ fn private_words(
 }
 
 fn load_private(batch: &Batch<'_>, dst: &[Reg], address: &Address, format: Format) {
-    for chunk in batch.file.span() {
+    for vector in batch.file.span() {
         for (element, reg) in dst.iter().enumerate() {
             let step = element as u64 * u64::from(format.bytes());
-            let low = private_words(batch, address, step, chunk);
+            let low = private_words(batch, address, step, vector);
             if format != Format::B64 {
-                batch.file.set(batch.slot(*reg), chunk, low);
+                batch.file.set(batch.slot(*reg), vector, low);
                 continue;
             }
-            let high = private_words(batch, address, step + 4, chunk);
-            let exists = second_exists(batch, address, step, chunk);
-            let values: [u64; CHUNK_LANES] = std::array::from_fn(|lane| {
+            let high = private_words(batch, address, step + 4, vector);
+            let exists = second_exists(batch, address, step, vector);
+            let values: [u64; VECTOR_LANES] = std::array::from_fn(|lane| {
                 if exists[lane] {
                     u64::from(low[lane]) | u64::from(high[lane]) << 32
                 } else {
                     0
                 }
             });
-            batch.file.set(batch.slot(*reg), chunk, values);
+            batch.file.set(batch.slot(*reg), vector, values);
         }
     }
 }
@@ -847,31 +852,31 @@ fn second_exists(
     batch: &Batch<'_>,
     address: &Address,
     step: u64,
-    chunk: usize,
-) -> [bool; CHUNK_LANES] {
-    match private_rows(batch, address, step + 4, chunk) {
-        Rows::Same(row) => [row != NOWHERE; CHUNK_LANES],
+    vector: usize,
+) -> [bool; VECTOR_LANES] {
+    match private_rows(batch, address, step + 4, vector) {
+        Rows::Same(row) => [row != NOWHERE; VECTOR_LANES],
         Rows::Each(rows) => rows.map(|row| row != NOWHERE),
     }
 }
 
 fn store_private(batch: &Batch<'_>, src: &[Reg], address: &Address, format: Format) {
-    for chunk in batch.file.span() {
-        let lanes = batch.masks.chunk(MaskId::ACTIVE, chunk);
+    for vector in batch.file.span() {
+        let lanes = batch.masks.bits(MaskId::ACTIVE, vector);
         for (element, reg) in src.iter().enumerate() {
             let step = element as u64 * u64::from(format.bytes());
             if format == Format::B64 {
-                let values: [u64; CHUNK_LANES] = batch.file.lanes(batch.slot(*reg), chunk);
-                let exists = second_exists(batch, address, step, chunk);
+                let values: [u64; VECTOR_LANES] = batch.file.lanes(batch.slot(*reg), vector);
+                let exists = second_exists(batch, address, step, vector);
                 let whole = lanes_of(lanes).filter(|lane| exists[*lane]);
                 let lanes = whole.fold(0, |lanes, lane| lanes | 1 << lane);
                 let low = values.map(|value| value as u32);
                 let high = values.map(|value| (value >> 32) as u32);
-                set_private(batch, address, step, chunk, lanes, low);
-                set_private(batch, address, step + 4, chunk, lanes, high);
+                set_private(batch, address, step, vector, lanes, low);
+                set_private(batch, address, step + 4, vector, lanes, high);
             } else {
-                let values = batch.file.lanes(batch.slot(*reg), chunk);
-                set_private(batch, address, step, chunk, lanes, values);
+                let values = batch.file.lanes(batch.slot(*reg), vector);
+                set_private(batch, address, step, vector, lanes, values);
             }
         }
     }
@@ -883,30 +888,30 @@ fn set_private(
     batch: &Batch<'_>,
     address: &Address,
     step: u64,
-    chunk: usize,
+    vector: usize,
     lanes: u16,
-    values: [u32; CHUNK_LANES],
+    values: [u32; VECTOR_LANES],
 ) {
-    let word = |row: usize| batch.private.get(row.wrapping_add(chunk));
-    match private_rows(batch, address, step, chunk) {
+    let word = |row: usize| batch.private.get(row.wrapping_add(vector));
+    match private_rows(batch, address, step, vector) {
         Rows::Same(NOWHERE) => {}
         Rows::Same(row) => {
             if let Some(cell) = word(row) {
-                let mut chunk = cell.get();
+                let mut vector = cell.get();
                 for (lane, value) in values.into_iter().enumerate() {
                     if lanes >> lane & 1 != 0 {
-                        chunk.0[lane] = value;
+                        vector.0[lane] = value;
                     }
                 }
-                cell.set(chunk);
+                cell.set(vector);
             }
         }
         Rows::Each(rows) => {
             for lane in lanes_of(lanes).filter(|lane| rows[*lane] != NOWHERE) {
                 if let Some(cell) = word(rows[lane]) {
-                    let mut chunk = cell.get();
-                    chunk.0[lane] = values[lane];
-                    cell.set(chunk);
+                    let mut vector = cell.get();
+                    vector.0[lane] = values[lane];
+                    cell.set(vector);
                 }
             }
         }

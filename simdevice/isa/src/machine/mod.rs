@@ -1,7 +1,7 @@
 //! Runs programs: a lane-batched interpreter.
 //!
 //! An [`Executable`] is a program made ready for batches of a fixed number of lanes: registers have places, uniform ones
-//! only one chunk; control flow is jumps and masks. A [`Machine`] has the registers and memory of one batch at a time
+//! only one vector; control flow is jumps and masks. A [`Machine`] has the registers and memory of one batch at a time
 //! and belongs to one worker. The kernels are compiled for every SIMD level, and the level is dispatched once a batch.
 //!
 //! ```
@@ -51,7 +51,7 @@ use devmem::host;
 
 use crate::compiler::step::MaskId;
 use crate::ir::{Reg, Type};
-use crate::kernels::registers::{Chunk, File};
+use crate::kernels::registers::{File, Vector};
 use crate::resources::Resources;
 use batch::Batch;
 use masks::Masks;
@@ -61,10 +61,10 @@ use watchdog::Watch;
 #[derive(Debug)]
 pub struct Machine {
     executable: Arc<Executable>,
-    registers: Vec<Chunk>,
+    registers: Vec<Vector>,
     masks: Vec<u64>,
     shared: Vec<AtomicU32>,
-    private: Vec<Chunk>,
+    private: Vec<Vector>,
     work: Work,
     /// For each counted run, how often it was executed and with how many lanes.
     runs: Vec<(u64, u64)>,
@@ -75,12 +75,15 @@ impl Machine {
     pub fn new(executable: Arc<Executable>) -> Self {
         let width = executable.program.lanes / 16;
         let mut machine = Self {
-            registers: host::filled(Chunk::default(), executable.program.chunks),
+            registers: host::filled(Vector::default(), executable.program.vectors),
             masks: host::zeroed(executable.program.masks * executable.program.lanes.div_ceil(64)),
             shared: host::collect(
                 (0..executable.program.shared_bytes.div_ceil(4)).map(|_| AtomicU32::new(0)),
             ),
-            private: host::filled(Chunk::default(), executable.program.private_words() * width),
+            private: host::filled(
+                Vector::default(),
+                executable.program.private_words() * width,
+            ),
             work: Work::default(),
             runs: vec![(0, 0); executable.program.runs.len()],
             executable,
@@ -113,8 +116,8 @@ impl Machine {
             .map(|input| input.reg)
     }
 
-    /// The chunks of a register.
-    fn chunks_of(&self, reg: Reg) -> std::ops::Range<usize> {
+    /// The vectors of a register.
+    fn vectors_of(&self, reg: Reg) -> std::ops::Range<usize> {
         let slot = self.executable.program.slots[reg.0 as usize];
         let per_16 = if self.executable.program.types[reg.0 as usize] == Type::B64 {
             2
@@ -129,14 +132,14 @@ impl Machine {
         slot.start()..slot.start() + count * per_16
     }
 
-    /// An input's lanes, to be filled: 16 to a chunk (8 to a chunk for `B64`); a uniform input has one chunk, of which
+    /// An input's lanes, to be filled: 16 to a vector (8 to a vector for `B64`); a uniform input has one vector, of which
     /// all lanes must be set alike. Bools are 0 or all ones. Empty if the program doesn't read that slot.
     ///
     /// Varying inputs must be set before each batch; uniform ones keep their value.
-    pub fn input_mut(&mut self, slot: u32) -> &mut [Chunk] {
+    pub fn input_mut(&mut self, slot: u32) -> &mut [Vector] {
         match self.input_register(slot) {
             Some(reg) => {
-                let range = self.chunks_of(reg);
+                let range = self.vectors_of(reg);
                 &mut self.registers[range]
             }
             None => &mut [],
@@ -145,46 +148,46 @@ impl Machine {
 
     /// Sets one lane of a 32-bit input.
     pub fn set_input(&mut self, slot: u32, lane: usize, bits: u32) {
-        if let Some(chunk) = self.input_mut(slot).get_mut(lane / 16) {
-            chunk.0[lane % 16] = bits;
+        if let Some(vector) = self.input_mut(slot).get_mut(lane / 16) {
+            vector.0[lane % 16] = bits;
         }
     }
 
     /// Sets all lanes of a 32-bit input.
     pub fn fill_input(&mut self, slot: u32, bits: u32) {
-        self.input_mut(slot).fill(Chunk([bits; 16]));
+        self.input_mut(slot).fill(Vector([bits; 16]));
     }
 
     /// Sets one lane of a 64-bit input.
     pub fn set_input64(&mut self, slot: u32, lane: usize, bits: u64) {
-        if let Some(chunk) = self.input_mut(slot).get_mut(lane / 8) {
-            chunk.0[2 * (lane % 8)] = bits as u32;
-            chunk.0[2 * (lane % 8) + 1] = (bits >> 32) as u32;
+        if let Some(vector) = self.input_mut(slot).get_mut(lane / 8) {
+            vector.0[2 * (lane % 8)] = bits as u32;
+            vector.0[2 * (lane % 8) + 1] = (bits >> 32) as u32;
         }
     }
 
-    /// An output's lanes after a batch: 16 to a chunk (8 for `B64`). Empty if the program has no such output.
-    pub fn output_chunks(&self, slot: u32) -> &[Chunk] {
+    /// An output's lanes after a batch: 16 to a vector (8 for `B64`). Empty if the program has no such output.
+    pub fn output_chunks(&self, slot: u32) -> &[Vector] {
         let output = self
             .executable
             .program
             .outputs
             .iter()
             .find(|output| output.slot == slot);
-        output.map_or(&[], |output| &self.registers[self.chunks_of(output.reg)])
+        output.map_or(&[], |output| &self.registers[self.vectors_of(output.reg)])
     }
 
     /// One lane of a 32-bit output; zero if the program has no such output.
     pub fn output(&self, slot: u32, lane: usize) -> u32 {
         self.output_chunks(slot)
             .get(lane / 16)
-            .map_or(0, |chunk| chunk.0[lane % 16])
+            .map_or(0, |vector| vector.0[lane % 16])
     }
 
     /// One lane of a 64-bit output.
     pub fn output64(&self, slot: u32, lane: usize) -> u64 {
-        self.output_chunks(slot).get(lane / 8).map_or(0, |chunk| {
-            u64::from(chunk.0[2 * (lane % 8)]) | u64::from(chunk.0[2 * (lane % 8) + 1]) << 32
+        self.output_chunks(slot).get(lane / 8).map_or(0, |vector| {
+            u64::from(vector.0[2 * (lane % 8)]) | u64::from(vector.0[2 * (lane % 8) + 1]) << 32
         })
     }
 
@@ -261,8 +264,8 @@ impl Machine {
             self.masks[usize::from(MaskId::HELPER.0) * width + index] = word(helpers);
         }
         for index in 0..self.executable.program.cleared.len() {
-            let range = self.chunks_of(self.executable.program.cleared[index]);
-            self.registers[range].fill(Chunk::default());
+            let range = self.vectors_of(self.executable.program.cleared[index]);
+            self.registers[range].fill(Vector::default());
         }
         self.shared.iter().for_each(|word| word.store(0, Relaxed));
     }

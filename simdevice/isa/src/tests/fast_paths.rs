@@ -1,5 +1,5 @@
 //! What the engine takes shortcuts for, beside the same computed lane by lane: at every SIMD level, over batches of many
-//! chunks, some of them partly active or not at all.
+//! vectors, some of them partly active or not at all.
 
 use crate::builder::Builder;
 use crate::ir::{Address, AtomicOp, Binding, Format, Program, Rate, Reg, Space, Type};
@@ -41,14 +41,14 @@ fn place(space: Space, base: Reg, offset: u32) -> Address {
     }
 }
 
-/// For each chunk a pattern of its own: the same address, consecutive ones, scattered ones; some with a lane that is
+/// For each vector a pattern of its own: the same address, consecutive ones, scattered ones; some with a lane that is
 /// beyond the end or misaligned.
 fn addresses(random: &mut Random, elements: u32) -> Vec<u32> {
     let mut all = Vec::new();
     for _ in 0..LANES / 16 {
         let first = 4 * random.below(100) as u32;
         let pattern = random.below(4);
-        let mut chunk: Vec<u32> = (0..16)
+        let mut vector: Vec<u32> = (0..16)
             .map(|lane| match pattern {
                 0 => first,
                 1 => first + 4 * elements * lane,
@@ -57,17 +57,17 @@ fn addresses(random: &mut Random, elements: u32) -> Vec<u32> {
             })
             .collect();
         match random.below(6) {
-            0 => chunk[random.below(16)] = 4 * WORDS - 4 * random.below(12) as u32,
-            1 => chunk[random.below(16)] += 1 + random.below(3) as u32,
-            2 => chunk[random.below(16)] = u32::MAX - random.below(9) as u32,
+            0 => vector[random.below(16)] = 4 * WORDS - 4 * random.below(12) as u32,
+            1 => vector[random.below(16)] += 1 + random.below(3) as u32,
+            2 => vector[random.below(16)] = u32::MAX - random.below(9) as u32,
             _ => {}
         }
-        all.append(&mut chunk);
+        all.append(&mut vector);
     }
     all
 }
 
-/// Which lanes take part: all of a chunk, some, or none.
+/// Which lanes take part: all of a vector, some, or none.
 fn participants(random: &mut Random) -> Vec<bool> {
     let mut all = Vec::new();
     for _ in 0..LANES / 16 {
