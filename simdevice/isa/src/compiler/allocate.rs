@@ -1,12 +1,12 @@
 //! Gives each register a place in the register file, so that what is live fits in the first-level cache.
 
 use crate::ir::{Block, Program, Rate, Reg, Role, Statement, Type};
-use crate::kernels::registers::Slot;
+use crate::kernels::registers::RegisterSlot;
 
 /// Where everything lives.
 pub struct Allocation {
     /// Each register's place.
-    pub slots: Vec<Slot>,
+    pub slots: Vec<RegisterSlot>,
     /// Vectors of the whole file.
     pub vectors: usize,
 }
@@ -44,7 +44,7 @@ pub fn allocate(program: &Program, varying: &[bool], width: usize) -> Allocation
         next: 2,
         width,
     };
-    let mut slots = vec![Slot::ZERO; count];
+    let mut slots = vec![RegisterSlot::ZERO; count];
     let pinned = program.constants.iter().map(|constant| constant.reg);
     let uniform_inputs = program
         .inputs
@@ -70,7 +70,7 @@ fn scan(
     varying: &[bool],
     intervals: &[Option<Interval>],
     places: &mut Places,
-    slots: &mut [Slot],
+    slots: &mut [RegisterSlot],
 ) {
     let mut order: Vec<(usize, Interval)> = intervals
         .iter()
@@ -108,13 +108,13 @@ struct Class {
 }
 
 struct Places {
-    free: [Vec<Slot>; 4],
+    free: [Vec<RegisterSlot>; 4],
     next: usize,
     width: usize,
 }
 
 impl Places {
-    fn take(&mut self, class: Class) -> Slot {
+    fn take(&mut self, class: Class) -> RegisterSlot {
         if let Some(slot) = self.free[class.index()].pop() {
             return slot;
         }
@@ -122,13 +122,13 @@ impl Places {
         let registers = if class.varying { self.width } else { 1 };
         self.next += registers * if class.wide { 2 } else { 1 };
         if class.varying {
-            Slot::varying(start)
+            RegisterSlot::varying(start)
         } else {
-            Slot::uniform(start)
+            RegisterSlot::uniform(start)
         }
     }
 
-    fn release(&mut self, class: Class, slot: Slot) {
+    fn release(&mut self, class: Class, slot: RegisterSlot) {
         self.free[class.index()].push(slot);
     }
 }

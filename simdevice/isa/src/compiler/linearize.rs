@@ -7,7 +7,7 @@ use super::scopes::loop_private_variables;
 use super::step::{MaskId, RunCost, Step, Target};
 use crate::ir::op::{Kind, Op};
 use crate::ir::{Block, Case, Label, Program, Reg, Statement, Type};
-use crate::kernels::registers::Slot;
+use crate::kernels::registers::RegisterSlot;
 
 /// Steps and what belongs to them.
 pub struct Linearized {
@@ -120,7 +120,7 @@ impl Linearizer<'_> {
         mask
     }
 
-    fn slot(&self, reg: Reg) -> Slot {
+    fn slot(&self, reg: Reg) -> RegisterSlot {
         self.allocation.slots[reg.0 as usize]
     }
 
@@ -207,8 +207,8 @@ impl Linearizer<'_> {
         self.instruction(step, op.kind(), !to.is_varying());
     }
 
-    fn operands(&self, src: &[Reg]) -> [Slot; 4] {
-        let mut slots = [Slot::ZERO; 4];
+    fn operands(&self, src: &[Reg]) -> [RegisterSlot; 4] {
+        let mut slots = [RegisterSlot::ZERO; 4];
         for (slot, reg) in slots.iter_mut().zip(src) {
             *slot = self.slot(*reg);
         }
@@ -338,7 +338,13 @@ impl Linearizer<'_> {
         }
     }
 
-    fn divergent_branch(&mut self, condition: Slot, then: &Block, otherwise: &Block, empty: Mark) {
+    fn divergent_branch(
+        &mut self,
+        condition: RegisterSlot,
+        then: &Block,
+        otherwise: &Block,
+        empty: Mark,
+    ) {
         let saved = self.free_mask;
         let other = self.take_mask();
         let (at_else, end) = (self.mark(), self.mark());

@@ -21,7 +21,7 @@ use crate::ir::validate::{InvalidProgram, validate};
 use crate::ir::{
     Constant, Input, MAX_LANES, MAX_SUBGROUP_SIZE, Output, Program, Reg, Role, Type, VECTOR_LANES,
 };
-use crate::kernels::registers::Slot;
+use crate::kernels::registers::RegisterSlot;
 use linearize::Linearized;
 use step::{RunCost, Step};
 
@@ -60,7 +60,7 @@ pub struct CompiledProgram {
     /// What is run, in order but for jumps.
     pub steps: Vec<Step>,
     /// Each register's place in the register file.
-    pub slots: Vec<Slot>,
+    pub slots: Vec<RegisterSlot>,
     /// Each register's type.
     pub types: Vec<Type>,
     /// Registers that are set once.

@@ -2,7 +2,7 @@
 
 use crate::ir::op::{Kind, Op};
 use crate::ir::{Statement, Type};
-use crate::kernels::registers::Slot;
+use crate::kernels::registers::RegisterSlot;
 
 /// The index of a mask within a machine's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,18 +30,30 @@ pub type Target = u32;
 #[derive(Clone, Debug)]
 pub enum Step {
     /// `dst = op(src...)` in all lanes.
-    Compute { op: Op, dst: Slot, src: [Slot; 4] },
+    Compute {
+        op: Op,
+        dst: RegisterSlot,
+        src: [RegisterSlot; 4],
+    },
     /// `dst = op(src...)` in the active lanes, by way of `temporary` if not all lanes are active.
     ComputeAssign {
         op: Op,
-        dst: Slot,
-        temporary: Slot,
-        src: [Slot; 4],
+        dst: RegisterSlot,
+        temporary: RegisterSlot,
+        src: [RegisterSlot; 4],
     },
     /// `dst = src` in all lanes.
-    Copy { dst: Slot, src: Slot, ty: Type },
+    Copy {
+        dst: RegisterSlot,
+        src: RegisterSlot,
+        ty: Type,
+    },
     /// `dst = src` in the active lanes (all lanes, if `dst` is uniform).
-    Assign { dst: Slot, src: Slot, ty: Type },
+    Assign {
+        dst: RegisterSlot,
+        src: RegisterSlot,
+        ty: Type,
+    },
     /// Anything that reaches across lanes or out of the registers.
     Other(Box<Statement>),
     /// A straight run of instructions begins: counts it and the active lanes.
@@ -50,10 +62,13 @@ pub enum Step {
     /// Goes there.
     Jump(Target),
     /// Goes there if a uniform condition is false.
-    Unless { condition: Slot, target: Target },
+    Unless {
+        condition: RegisterSlot,
+        target: Target,
+    },
     /// `other = active & !condition; active &= condition`; goes there if no lane is left.
     If {
-        condition: Slot,
+        condition: RegisterSlot,
         other: MaskId,
         target: Target,
     },
@@ -67,7 +82,7 @@ pub enum Step {
     Leave { into: MaskId, target: Target },
     /// The active lanes whose condition equals `when` move to `into`; goes there if none is left.
     LeaveIf {
-        condition: Slot,
+        condition: RegisterSlot,
         when: bool,
         into: MaskId,
         target: Target,
@@ -76,7 +91,7 @@ pub enum Step {
     Repeat(Target),
     /// `entered = active; active = {}; unmatched =` lanes of it whose selector is none of `values`.
     Switch {
-        selector: Slot,
+        selector: RegisterSlot,
         values: Box<[u32]>,
         entered: MaskId,
         unmatched: MaskId,
@@ -84,7 +99,7 @@ pub enum Step {
     /// Activates also the lanes of `entered` whose selector is one of `values`, and those of `unmatched` if that's given;
     /// goes there if no lane is active.
     Case {
-        selector: Slot,
+        selector: RegisterSlot,
         values: Box<[u32]>,
         entered: MaskId,
         unmatched: Option<MaskId>,

@@ -9,7 +9,8 @@ use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 
 use super::elementary;
 use super::registers::{
-    File, Kernel, Slot, from_mask, map1, map2, map3, to_mask, vector1, vector2, vector3,
+    Kernel, RegisterFile, RegisterSlot, from_mask, map1, map2, map3, to_mask, vector1, vector2,
+    vector3,
 };
 use crate::ir::op::{Kind, Op};
 
@@ -465,7 +466,7 @@ fn insert_bits(base: u32, insert: u32, offset: u32, count: u32) -> u32 {
 
 /// Replaces bits of bases.
 #[inline(always)]
-fn bitfield_insert(file: File<'_>, dst: Slot, src: &[Slot; 4]) {
+fn bitfield_insert(file: RegisterFile<'_>, dst: RegisterSlot, src: &[RegisterSlot; 4]) {
     for index in file.rounds(dst) {
         let (base, insert) = (file.lanes(src[0], index), file.lanes(src[1], index));
         let (offset, count) = (file.lanes(src[2], index), file.lanes(src[3], index));

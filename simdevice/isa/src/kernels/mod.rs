@@ -11,15 +11,15 @@ use fearless_simd::Level;
 
 use crate::ir::op::Op;
 use crate::ir::{AtomicOp, Format, Type};
-use registers::{File, Slot, Vector};
+use registers::{RegisterFile, RegisterSlot, Vector};
 
 /// The result of an operation on constants, by the same kernels that programs run.
 pub fn evaluate(level: Level, op: Op, operands: &[u64]) -> u64 {
     let signature = op.signature();
-    let place = |index: usize| Slot::uniform(2 * index);
+    let place = |index: usize| RegisterSlot::uniform(2 * index);
     let vectors: [Cell<Vector>; 10] = Default::default();
-    let file = File::new(&vectors, 1);
-    let mut src = [Slot::ZERO; 4];
+    let file = RegisterFile::new(&vectors, 1);
+    let mut src = [RegisterSlot::ZERO; 4];
     for (index, (bits, ty)) in operands.iter().zip(signature.operands).enumerate() {
         src[index] = place(index + 1);
         file.set_constant(src[index], *ty, *bits);

@@ -14,9 +14,9 @@ pub struct Vector(pub [u32; VECTOR_LANES]);
 
 /// Where a register lives: its first vector, and whether it has one for each 16 lanes or one for all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Slot(u32);
+pub struct RegisterSlot(u32);
 
-impl Slot {
+impl RegisterSlot {
     const VARYING: u32 = 1 << 31;
 
     /// The register that is always zero; it stands for operands that aren't there.
@@ -45,7 +45,7 @@ impl Slot {
 
 /// All registers of a batch.
 #[derive(Clone, Copy)]
-pub struct File<'a> {
+pub struct RegisterFile<'a> {
     vectors: &'a [Cell<Vector>],
     /// Vectors of a varying 32-bit register: lanes / 16.
     width: usize,
@@ -61,7 +61,7 @@ pub struct Span {
     pub count: usize,
 }
 
-impl<'a> File<'a> {
+impl<'a> RegisterFile<'a> {
     pub fn new(vectors: &'a [Cell<Vector>], width: usize) -> Self {
         let span = Span {
             first: 0,
@@ -88,7 +88,7 @@ impl<'a> File<'a> {
 
     /// The vectors of a 32-bit register that are to be computed: the span's, or the only one.
     #[inline(always)]
-    fn spanned(self, slot: Slot) -> &'a [Cell<Vector>] {
+    fn spanned(self, slot: RegisterSlot) -> &'a [Cell<Vector>] {
         if slot.is_varying() {
             &self.vectors[slot.start() + self.span.first..][..self.span.count]
         } else {
@@ -98,7 +98,7 @@ impl<'a> File<'a> {
 
     /// The vectors to be computed of a register: the span, or the first if it is uniform.
     #[inline(always)]
-    pub fn rounds(self, dst: Slot) -> Range<usize> {
+    pub fn rounds(self, dst: RegisterSlot) -> Range<usize> {
         if dst.is_varying() { self.span() } else { 0..1 }
     }
 
@@ -110,34 +110,34 @@ impl<'a> File<'a> {
 
     /// The vectors of a 32-bit register or bool: `width` of them, or one.
     #[inline(always)]
-    pub fn narrow(self, slot: Slot) -> &'a [Cell<Vector>] {
+    pub fn narrow(self, slot: RegisterSlot) -> &'a [Cell<Vector>] {
         let count = if slot.is_varying() { self.width } else { 1 };
         &self.vectors[slot.start()..][..count]
     }
 
     /// The vectors of a 64-bit register.
     #[inline(always)]
-    pub fn wide(self, slot: Slot) -> &'a [Cell<Vector>] {
+    pub fn wide(self, slot: RegisterSlot) -> &'a [Cell<Vector>] {
         let count = if slot.is_varying() { 2 * self.width } else { 2 };
         &self.vectors[slot.start()..][..count]
     }
 
     /// The lanes of a register for 16 lanes of the batch.
     #[inline(always)]
-    pub fn lanes<T: Lane>(self, slot: Slot, index: usize) -> [T; VECTOR_LANES] {
+    pub fn lanes<T: Lane>(self, slot: RegisterSlot, index: usize) -> [T; VECTOR_LANES] {
         let vectors = T::vectors(self, slot);
         T::load(vectors, if slot.is_varying() { index } else { 0 })
     }
 
     /// The value of a uniform register (or lane 0).
     #[inline(always)]
-    pub fn first<T: Lane>(self, slot: Slot) -> T {
+    pub fn first<T: Lane>(self, slot: RegisterSlot) -> T {
         T::load(T::vectors(self, slot), 0)[0]
     }
 
     /// Sets a register for 16 lanes of the batch.
     #[inline(always)]
-    pub fn set<T: Lane>(self, slot: Slot, index: usize, value: [T; VECTOR_LANES]) {
+    pub fn set<T: Lane>(self, slot: RegisterSlot, index: usize, value: [T; VECTOR_LANES]) {
         T::store(
             T::vectors(self, slot),
             if slot.is_varying() { index } else { 0 },
@@ -146,7 +146,7 @@ impl<'a> File<'a> {
     }
 
     /// Sets a uniform register to a constant's bits.
-    pub fn set_constant(self, slot: Slot, ty: Type, bits: u64) {
+    pub fn set_constant(self, slot: RegisterSlot, ty: Type, bits: u64) {
         match ty {
             Type::Bool => self.set(slot, 0, [bits != 0; VECTOR_LANES]),
             Type::B32 => self.set(slot, 0, [bits as u32; VECTOR_LANES]),
@@ -156,12 +156,12 @@ impl<'a> File<'a> {
 }
 
 /// `dst = op(src...)` in the lanes that a file spans.
-pub type Kernel<S> = fn(S, &File<'_>, Slot, &[Slot; 4]);
+pub type Kernel<S> = fn(S, &RegisterFile<'_>, RegisterSlot, &[RegisterSlot; 4]);
 
 /// A type that a register's lanes may be read as.
 pub trait Lane: Copy + Default {
     /// The vectors of a register of this type's width.
-    fn vectors<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Vector>];
+    fn vectors<'a>(file: RegisterFile<'a>, slot: RegisterSlot) -> &'a [Cell<Vector>];
     /// Lanes 16 `index`..
     fn load(vectors: &[Cell<Vector>], index: usize) -> [Self; VECTOR_LANES];
     /// Sets lanes 16 `index`..
@@ -185,7 +185,7 @@ macro_rules! narrow_lane {
     ($type:ty, $from:expr, $to:expr) => {
         impl Lane for $type {
             #[inline(always)]
-            fn vectors<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Vector>] {
+            fn vectors<'a>(file: RegisterFile<'a>, slot: RegisterSlot) -> &'a [Cell<Vector>] {
                 file.narrow(slot)
             }
 
@@ -216,7 +216,7 @@ macro_rules! wide_lane {
     ($type:ty, $from:expr, $to:expr) => {
         impl Lane for $type {
             #[inline(always)]
-            fn vectors<'a>(file: File<'a>, slot: Slot) -> &'a [Cell<Vector>] {
+            fn vectors<'a>(file: RegisterFile<'a>, slot: RegisterSlot) -> &'a [Cell<Vector>] {
                 file.wide(slot)
             }
 
@@ -246,7 +246,12 @@ wide_lane!(f64, f64::from_bits, f64::to_bits);
 
 /// Lane by lane, one operand.
 #[inline(always)]
-pub fn map1<A: Lane, R: Lane>(file: File<'_>, dst: Slot, src: &[Slot; 4], f: impl Fn(A) -> R) {
+pub fn map1<A: Lane, R: Lane>(
+    file: RegisterFile<'_>,
+    dst: RegisterSlot,
+    src: &[RegisterSlot; 4],
+    f: impl Fn(A) -> R,
+) {
     for index in file.rounds(dst) {
         file.set(dst, index, each_lane(file.lanes(src[0], index), &f));
     }
@@ -255,9 +260,9 @@ pub fn map1<A: Lane, R: Lane>(file: File<'_>, dst: Slot, src: &[Slot; 4], f: imp
 /// Lane by lane, two operands.
 #[inline(always)]
 pub fn map2<A: Lane, B: Lane, R: Lane>(
-    file: File<'_>,
-    dst: Slot,
-    src: &[Slot; 4],
+    file: RegisterFile<'_>,
+    dst: RegisterSlot,
+    src: &[RegisterSlot; 4],
     f: impl Fn(A, B) -> R,
 ) {
     for index in file.rounds(dst) {
@@ -273,9 +278,9 @@ pub fn map2<A: Lane, B: Lane, R: Lane>(
 /// Lane by lane, three operands.
 #[inline(always)]
 pub fn map3<A: Lane, B: Lane, C: Lane, R: Lane>(
-    file: File<'_>,
-    dst: Slot,
-    src: &[Slot; 4],
+    file: RegisterFile<'_>,
+    dst: RegisterSlot,
+    src: &[RegisterSlot; 4],
     f: impl Fn(A, B, C) -> R,
 ) {
     for index in file.rounds(dst) {
@@ -332,9 +337,9 @@ fn fill<S: Simd>(dst: &[Cell<Vector>], value: u32x16<S>) {
 #[inline(always)]
 pub fn vector1<S: Simd>(
     simd: S,
-    file: File<'_>,
-    dst: Slot,
-    src: &[Slot; 4],
+    file: RegisterFile<'_>,
+    dst: RegisterSlot,
+    src: &[RegisterSlot; 4],
     f: impl Fn(u32x16<S>) -> u32x16<S>,
 ) {
     let (dst, a) = (file.spanned(dst), file.spanned(src[0]));
@@ -352,9 +357,9 @@ pub fn vector1<S: Simd>(
 #[inline(always)]
 pub fn vector2<S: Simd>(
     simd: S,
-    file: File<'_>,
-    dst: Slot,
-    src: &[Slot; 4],
+    file: RegisterFile<'_>,
+    dst: RegisterSlot,
+    src: &[RegisterSlot; 4],
     f: impl Fn(u32x16<S>, u32x16<S>) -> u32x16<S>,
 ) {
     let dst = file.spanned(dst);
@@ -386,9 +391,9 @@ pub fn vector2<S: Simd>(
 #[inline(always)]
 pub fn vector3<S: Simd>(
     simd: S,
-    file: File<'_>,
-    dst: Slot,
-    src: &[Slot; 4],
+    file: RegisterFile<'_>,
+    dst: RegisterSlot,
+    src: &[RegisterSlot; 4],
     f: impl Fn(u32x16<S>, u32x16<S>, u32x16<S>) -> u32x16<S>,
 ) {
     let dst = file.spanned(dst);

@@ -9,7 +9,7 @@ use super::masks::{Masks, bits_to_mask};
 use crate::compiler::CompiledProgram;
 use crate::compiler::step::MaskId;
 use crate::ir::{Reg, Type};
-use crate::kernels::registers::{File, Slot, Vector, load_vector, store_vector};
+use crate::kernels::registers::{RegisterFile, RegisterSlot, Vector, load_vector, store_vector};
 use crate::resources::Resources;
 
 /// What a batch's steps work on.
@@ -17,7 +17,7 @@ use crate::resources::Resources;
 pub struct Batch<'a> {
     pub program: &'a CompiledProgram,
     pub resources: &'a Resources<'a>,
-    pub file: File<'a>,
+    pub file: RegisterFile<'a>,
     pub masks: Masks<'a>,
     /// Workgroup memory.
     pub shared: &'a [AtomicU32],
@@ -30,7 +30,7 @@ pub struct Batch<'a> {
 impl Batch<'_> {
     /// Where a register lives.
     #[inline(always)]
-    pub fn slot(&self, reg: Reg) -> Slot {
+    pub fn slot(&self, reg: Reg) -> RegisterSlot {
         self.program.slots[reg.0 as usize]
     }
 
@@ -44,7 +44,7 @@ impl Batch<'_> {
 
     /// `dst = src` in the active lanes; in all, if `dst` is uniform.
     #[inline(always)]
-    pub fn assign<S: Simd>(&self, simd: S, dst: Slot, src: Slot, ty: Type) {
+    pub fn assign<S: Simd>(&self, simd: S, dst: RegisterSlot, src: RegisterSlot, ty: Type) {
         let uniform = !dst.is_varying();
         if self.whole && !uniform {
             return self.copy(dst, src, ty);
@@ -81,7 +81,7 @@ impl Batch<'_> {
 
     /// `dst = src` in all lanes.
     #[inline(always)]
-    pub fn copy(&self, dst: Slot, src: Slot, ty: Type) {
+    pub fn copy(&self, dst: RegisterSlot, src: RegisterSlot, ty: Type) {
         match ty {
             Type::B64 => self.copy_vectors(dst, self.file.wide(dst), self.file.wide(src), 2),
             Type::B32 | Type::Bool => {
@@ -92,7 +92,13 @@ impl Batch<'_> {
 
     /// Copies the vectors to compute of a register; a uniform source has only the first `per_16`.
     #[inline(always)]
-    fn copy_vectors(&self, slot: Slot, dst: &[Cell<Vector>], src: &[Cell<Vector>], per_16: usize) {
+    fn copy_vectors(
+        &self,
+        slot: RegisterSlot,
+        dst: &[Cell<Vector>],
+        src: &[Cell<Vector>],
+        per_16: usize,
+    ) {
         let step = usize::from(src.len() == dst.len());
         for vector in self.file.rounds(slot) {
             for part in 0..per_16 {

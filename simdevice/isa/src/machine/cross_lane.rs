@@ -4,7 +4,7 @@ use super::batch::Batch;
 use crate::compiler::step::MaskId;
 use crate::ir::op::Op;
 use crate::ir::{Axis, Reg, SubgroupOp, Type, VECTOR_LANES};
-use crate::kernels::registers::{Lane, Slot};
+use crate::kernels::registers::{Lane, RegisterSlot};
 
 pub fn derivative(batch: &Batch<'_>, dst: Reg, src: Reg, axis: Axis, fine: bool) {
     let (dst, src) = (batch.slot(dst), batch.slot(src));
@@ -30,7 +30,7 @@ pub fn subgroup(
     src: Option<Reg>,
     index: Option<Reg>,
 ) {
-    let results: Vec<Slot> = dst.iter().map(|reg| batch.slot(*reg)).collect();
+    let results: Vec<RegisterSlot> = dst.iter().map(|reg| batch.slot(*reg)).collect();
     let wide = src.is_some_and(|reg| batch.program.types[reg.0 as usize] == Type::B64);
     let lanes = batch.program.lanes;
     let size = batch.program.subgroup_size.min(lanes);
@@ -69,7 +69,7 @@ pub fn subgroup(
 }
 
 /// All lanes of a register, bools as 0 or all ones.
-fn gather(batch: &Batch<'_>, slot: Slot, wide: bool) -> Vec<u64> {
+fn gather(batch: &Batch<'_>, slot: RegisterSlot, wide: bool) -> Vec<u64> {
     let vectors = 0..batch.file.width();
     if wide {
         vectors
@@ -83,7 +83,7 @@ fn gather(batch: &Batch<'_>, slot: Slot, wide: bool) -> Vec<u64> {
 }
 
 /// Sets one lane of a register.
-fn scatter(batch: &Batch<'_>, slot: Slot, wide: bool, lane: usize, value: u64) {
+fn scatter(batch: &Batch<'_>, slot: RegisterSlot, wide: bool, lane: usize, value: u64) {
     if wide {
         let cell = &u64::vectors(batch.file, slot)[lane / 8];
         let mut vector = cell.get();

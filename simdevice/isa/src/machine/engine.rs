@@ -14,7 +14,7 @@ use crate::compiler::step::{MaskId, Step};
 use crate::ir::Statement;
 use crate::ir::op::Op;
 use crate::kernels::arithmetic::kernel;
-use crate::kernels::registers::{File, Kernel, Slot};
+use crate::kernels::registers::{Kernel, RegisterFile, RegisterSlot};
 
 /// What runs a batch's steps; there is one implementation, compiled for each SIMD level.
 pub trait Engine: fmt::Debug + Send + Sync {
@@ -138,7 +138,7 @@ fn run_steps<S: Simd>(
 
 /// Updates the masks; returns where to go if not on.
 #[inline(always)]
-fn branch<S: Simd>(simd: S, file: File<'_>, masks: Masks<'_>, step: &Step) -> Option<u32> {
+fn branch<S: Simd>(simd: S, file: RegisterFile<'_>, masks: Masks<'_>, step: &Step) -> Option<u32> {
     let unless_any = |target: u32| (!masks.any(MaskId::ACTIVE)).then_some(target);
     match step {
         Step::If {
@@ -228,9 +228,9 @@ fn branch<S: Simd>(simd: S, file: File<'_>, masks: Masks<'_>, step: &Step) -> Op
 
 /// Calls `found(word, lanes)` for the lanes of a mask whose selector is one of `values`.
 fn select_lanes(
-    file: File<'_>,
+    file: RegisterFile<'_>,
     masks: Masks<'_>,
-    selector: Slot,
+    selector: RegisterSlot,
     values: &[u32],
     among: MaskId,
     found: impl Fn(usize, u64),

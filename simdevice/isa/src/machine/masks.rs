@@ -5,7 +5,7 @@ use std::cell::Cell;
 use fearless_simd::{Simd, prelude::*};
 
 use crate::compiler::step::MaskId;
-use crate::kernels::registers::{File, Slot, Span, load_vector, to_mask};
+use crate::kernels::registers::{RegisterFile, RegisterSlot, Span, load_vector, to_mask};
 
 /// A set of lanes that the caller gives or gets.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -185,8 +185,8 @@ impl<'a> Masks<'a> {
     pub fn split<S: Simd>(
         self,
         simd: S,
-        file: File<'_>,
-        condition: Slot,
+        file: RegisterFile<'_>,
+        condition: RegisterSlot,
         mut split: impl FnMut(&Cell<u64>, u64, usize),
     ) {
         let active = self.get(MaskId::ACTIVE);

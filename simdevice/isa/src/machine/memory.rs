@@ -10,7 +10,7 @@ use super::masks::{bits_to_mask, lanes_of};
 use crate::compiler::step::MaskId;
 use crate::ir::{Address, AtomicOp, Binding, Format, Reg, Space, VECTOR_LANES};
 use crate::kernels::combine;
-use crate::kernels::registers::{Slot, each_lane, load_vector};
+use crate::kernels::registers::{RegisterSlot, each_lane, load_vector};
 use crate::resources::{load_word, range_words};
 
 /// Memory that an access goes to: words, and how many bytes of them count.
@@ -180,7 +180,13 @@ fn global_places<'a>(
 }
 
 /// Sets 16 lanes of a loaded register.
-fn put(batch: &Batch<'_>, dst: Slot, format: Format, vector: usize, values: [u64; VECTOR_LANES]) {
+fn put(
+    batch: &Batch<'_>,
+    dst: RegisterSlot,
+    format: Format,
+    vector: usize,
+    values: [u64; VECTOR_LANES],
+) {
     if format == Format::B64 {
         batch.file.set(dst, vector, values);
     } else {
@@ -191,7 +197,12 @@ fn put(batch: &Batch<'_>, dst: Slot, format: Format, vector: usize, values: [u64
 }
 
 /// Takes 16 lanes of a register to store.
-fn take(batch: &Batch<'_>, src: Slot, format: Format, vector: usize) -> [u64; VECTOR_LANES] {
+fn take(
+    batch: &Batch<'_>,
+    src: RegisterSlot,
+    format: Format,
+    vector: usize,
+) -> [u64; VECTOR_LANES] {
     if format == Format::B64 {
         batch.file.lanes(src, vector)
     } else {
@@ -509,8 +520,8 @@ fn bases<S: Simd>(batch: &Batch<'_>, simd: S, address: &Address, vector: usize) 
 }
 
 #[inline(always)]
-fn slots<const COUNT: usize>(batch: &Batch<'_>, regs: [Reg; COUNT]) -> [Slot; COUNT] {
-    let mut slots = [Slot::ZERO; COUNT];
+fn slots<const COUNT: usize>(batch: &Batch<'_>, regs: [Reg; COUNT]) -> [RegisterSlot; COUNT] {
+    let mut slots = [RegisterSlot::ZERO; COUNT];
     for index in 0..COUNT {
         slots[index] = batch.slot(regs[index]);
     }
@@ -573,7 +584,7 @@ fn load_elements<'a, S: Simd, const COUNT: usize>(
 #[inline(always)]
 fn gather_words<S: Simd, const COUNT: usize>(
     batch: &Batch<'_>,
-    slots: [Slot; COUNT],
+    slots: [RegisterSlot; COUNT],
     vector: usize,
     window: Window<'_>,
     starts: u32x16<S>,
@@ -662,7 +673,7 @@ fn store_elements<'a, S: Simd, const COUNT: usize>(
 #[inline(always)]
 fn scatter_words<S: Simd, const COUNT: usize>(
     batch: &Batch<'_>,
-    slots: [Slot; COUNT],
+    slots: [RegisterSlot; COUNT],
     vector: usize,
     lanes: u16,
     window: Window<'_>,

@@ -51,7 +51,7 @@ use devmem::host;
 
 use crate::compiler::step::MaskId;
 use crate::ir::{Reg, Type};
-use crate::kernels::registers::{File, Vector};
+use crate::kernels::registers::{RegisterFile, Vector};
 use crate::resources::Resources;
 use batch::Batch;
 use masks::Masks;
@@ -88,7 +88,7 @@ impl Machine {
             runs: vec![(0, 0); executable.program.runs.len()],
             executable,
         };
-        let file = File::new(
+        let file = RegisterFile::new(
             Cell::from_mut(&mut machine.registers[..]).as_slice_of_cells(),
             width,
         );
@@ -226,7 +226,7 @@ impl Machine {
         let executable = Arc::clone(&self.executable);
         self.work.batches += 1;
         self.begin(active, helpers);
-        let file = File::new(
+        let file = RegisterFile::new(
             Cell::from_mut(&mut self.registers[..]).as_slice_of_cells(),
             executable.program.lanes / 16,
         );
