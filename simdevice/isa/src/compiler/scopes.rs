@@ -1,15 +1,15 @@
-//! Where in the tree of statements a variable is used.
+//! Scopes of variables: the part of the tree of statements that each is used in.
 
 use std::collections::{HashMap, HashSet};
 
 use crate::ir::{Block, Label, Program, Reg, Role, Statement};
 
-/// Where variables live.
+/// The scope of each variable.
 ///
-/// A variable's home is the innermost block around all that reads or assigns it, if the block's first statement that does
-/// so assigns it at once. Whatever lanes enter the home then find nothing of what lanes did there earlier: only masks that
-/// change within the home matter to the variable. Else the home is the whole program.
-pub struct Homes {
+/// A variable's scope is the innermost block around all that reads or assigns it, if the block's first statement that does
+/// so assigns it at once. Whatever lanes enter the scope then find nothing of what lanes did there earlier: only masks that
+/// change within the scope matter to the variable. Else the scope is the whole program.
+pub struct VariableScopes {
     variables: HashMap<Reg, Uses>,
 }
 
@@ -17,16 +17,16 @@ pub struct Homes {
 type Step = (usize, usize);
 
 struct Uses {
-    /// The way to the home: blocks, outermost first.
-    home: Vec<Step>,
-    /// How many constructs are around the home; none if it is the whole program.
+    /// The path to the scope: blocks, outermost first.
+    scope: Vec<Step>,
+    /// How many constructs are around the scope; none if it is the whole program.
     depth: usize,
     /// The labelled constructs around all reads.
     around_reads: Option<Vec<Label>>,
 }
 
-impl Homes {
-    /// How many constructs are around a variable's home.
+impl VariableScopes {
+    /// How many constructs are around a variable's scope.
     pub fn depth(&self, variable: Reg) -> usize {
         self.variables.get(&variable).map_or(0, |uses| uses.depth)
     }
@@ -39,8 +39,8 @@ impl Homes {
     }
 }
 
-/// Finds the homes of a program's variables.
-pub fn homes(program: &Program) -> Homes {
+/// Finds the scopes of a program's variables.
+pub fn variable_scopes(program: &Program) -> VariableScopes {
     let mut search = Search {
         program,
         variables: HashMap::new(),
@@ -48,23 +48,23 @@ pub fn homes(program: &Program) -> Homes {
         labels: Vec::new(),
         statements: 0,
     };
-    // The caller sets and reads outputs: they are at home in the whole program.
+    // The caller sets and reads outputs: they are in scope in the whole program.
     for output in &program.outputs {
         search.touch(output.reg);
         search.read(output.reg);
     }
     search.block(&program.body);
-    let mut homes = Homes {
+    let mut scopes = VariableScopes {
         variables: search.variables,
     };
     let mut first = FirstUse {
-        homes: &mut homes,
+        scopes: &mut scopes,
         path: Vec::new(),
         statements: 0,
         depth: 0,
     };
     first.block(&program.body);
-    homes
+    scopes
 }
 
 struct Search<'a> {
@@ -83,13 +83,13 @@ impl Search<'_> {
     fn touch(&mut self, reg: Reg) {
         let path = &self.path;
         let uses = self.variables.entry(reg).or_insert_with(|| Uses {
-            home: path.clone(),
+            scope: path.clone(),
             depth: 0,
             around_reads: None,
         });
-        let common = uses.home.iter().zip(path).take_while(|(a, b)| a == b);
+        let common = uses.scope.iter().zip(path).take_while(|(a, b)| a == b);
         let common = common.count();
-        uses.home.truncate(common);
+        uses.scope.truncate(common);
     }
 
     fn read(&mut self, reg: Reg) {
@@ -131,9 +131,9 @@ impl Search<'_> {
     }
 }
 
-/// Looks whether homes begin with an assignment.
+/// Finds the scopes that begin with an assignment.
 struct FirstUse<'a> {
-    homes: &'a mut Homes,
+    scopes: &'a mut VariableScopes,
     path: Vec<Step>,
     statements: usize,
     /// Constructs around this place, as uniformity analysis counts them: a switch's cases are branches in it.
@@ -159,13 +159,13 @@ impl FirstUse<'_> {
             if let Statement::Assign { dst, .. } = statement
                 && !used.contains(dst)
                 && !here.contains(dst)
-                && let Some(uses) = self.homes.variables.get_mut(dst)
-                && uses.home == self.path
+                && let Some(uses) = self.scopes.variables.get_mut(dst)
+                && uses.scope == self.path
             {
                 uses.depth = self.depth;
             }
             here.extend(statement.definitions());
-            here.retain(|reg| self.homes.variables.contains_key(reg));
+            here.retain(|reg| self.scopes.variables.contains_key(reg));
             used.append(&mut here);
             used.sort_unstable();
             used.dedup();

@@ -1,13 +1,13 @@
 //! Which registers hold the same value in all lanes. Such a register is kept, and computed, once a batch.
 
-use super::scopes::{Homes, homes};
+use super::scopes::{VariableScopes, variable_scopes};
 use crate::ir::{Block, Label, Program, Rate, Reg, Space, Statement};
 
 /// For each register, whether it may differ between lanes of a batch.
 ///
 /// A value is uniform if it is computed from uniform values. A variable is uniform if all that is assigned to it is, and
 /// no assignment can be masked for a lane that reads it later: none lies in a branch on a varying condition within the
-/// variable's home (see [`Homes`]), or in a construct there that some lanes leave before others and outside which it is
+/// variable's scope (see [`VariableScopes`]), or in a construct there that some lanes leave before others and outside which it is
 /// read. (Lanes that return don't come back.)
 ///
 /// `private_is_uniform` says that private memory holds the same in all lanes.
@@ -15,7 +15,7 @@ pub fn varying_registers(program: &Program, private_is_uniform: bool) -> Vec<boo
     let mut search = Search {
         varying: vec![false; program.registers.len()],
         private_is_uniform,
-        homes: homes(program),
+        scopes: variable_scopes(program),
         left: Vec::new(),
         continued: Vec::new(),
         open: Vec::new(),
@@ -43,7 +43,7 @@ enum Around {
     Varying,
     /// A branch on a uniform condition.
     Uniform,
-    /// A switch or scope, which lanes may leave by name.
+    /// A switch or a scope statement, which lanes may leave by name.
     Labelled(Label),
     /// A loop's body.
     Body(Label),
@@ -63,7 +63,7 @@ impl Around {
 struct Search {
     varying: Vec<bool>,
     private_is_uniform: bool,
-    homes: Homes,
+    scopes: VariableScopes,
     /// Constructs that some lanes break out of before others.
     left: Vec<Label>,
     /// Loops in whose body some lanes continue before others.
@@ -99,12 +99,12 @@ impl Search {
 
     /// Whether an assignment here may be masked for a lane that reads the variable later.
     fn assigned_by_some(&self, variable: Reg) -> bool {
-        let home = self.homes.depth(variable).min(self.open.len());
+        let scope = self.scopes.depth(variable).min(self.open.len());
         // Within a loop, lanes come back to what they left.
         let mut repeated = false;
-        self.open[home..].iter().any(|around| {
+        self.open[scope..].iter().any(|around| {
             let masked = self.masks(around, |label| {
-                let read_later = repeated || self.homes.is_read_outside(variable, label);
+                let read_later = repeated || self.scopes.is_read_outside(variable, label);
                 self.left.contains(&label) && read_later
             });
             repeated |= matches!(around, Around::Body(_) | Around::Continuing(_));
