@@ -84,7 +84,8 @@ pub(crate) fn load_word(words: &[AtomicU32], index: usize) -> Option<u32> {
 }
 
 /// One register for the 16 lanes of a vector; floats as their bits.
-pub type Lanes = [u32; VECTOR_LANES];
+pub type LaneWords = [u32; VECTOR_LANES];
+pub use self::LaneWords as Lanes;
 
 /// How the level of detail of a sample is chosen; see [`crate::ir::Lod`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,20 +99,20 @@ pub enum LodRequest {
     /// From differences within each quad of lanes.
     Implicit {
         /// Added to the level; floats.
-        bias: Lanes,
+        bias: LaneWords,
         /// Least level; floats.
-        minimum: Lanes,
+        minimum: LaneWords,
     },
     /// Given; floats.
-    Explicit(Lanes),
+    Explicit(LaneWords),
     /// From gradients by coordinate; floats.
     Gradient {
         /// Along x.
-        dx: [Lanes; 3],
+        dx: [LaneWords; 3],
         /// Along y.
-        dy: [Lanes; 3],
+        dy: [LaneWords; 3],
         /// Least level.
-        minimum: Lanes,
+        minimum: LaneWords,
     },
 }
 
@@ -123,13 +124,13 @@ pub struct SampleRequest {
     /// The image's kind.
     pub shape: ImageShape,
     /// Floats; the layer, if any, after the other coordinates; the rest is zero.
-    pub coordinate: [Lanes; 4],
+    pub coordinate: [LaneWords; 4],
     /// Level of detail.
     pub lod: LodRequest,
     /// Texel offsets; signed integers.
-    pub offset: [Lanes; 3],
+    pub offset: [LaneWords; 3],
     /// Reference values of a depth comparison; floats.
-    pub compare: Option<Lanes>,
+    pub compare: Option<LaneWords>,
     /// The component to gather, if this is a gather.
     pub gather: Option<u8>,
 }
@@ -142,24 +143,24 @@ pub struct TexelRequest {
     /// The image's kind.
     pub shape: ImageShape,
     /// Integers; the layer, if any, after the other coordinates; the rest is zero.
-    pub coordinate: [Lanes; 4],
+    pub coordinate: [LaneWords; 4],
     /// Mip levels.
-    pub level: Lanes,
+    pub level: LaneWords,
     /// Sample indices.
-    pub sample: Lanes,
+    pub sample: LaneWords,
 }
 
 /// The images and samplers that a program is bound to. Indices are bind points; one that isn't bound, or coordinates
 /// out of range, read zero and write nothing. Results are floats or integers as the image's format says.
 pub trait ImageUnit: Sync {
     /// Filters. Returns red, green, blue, alpha.
-    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 4];
+    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 4];
 
     /// Reads texels. Returns red, green, blue, alpha.
-    fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4];
+    fn read(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4];
 
     /// Writes texels, in order of lanes.
-    fn write(&self, image: u32, request: &TexelRequest, texel: &[Lanes; 4]);
+    fn write(&self, image: u32, request: &TexelRequest, texel: &[LaneWords; 4]);
 
     /// Read-modify-write on texels of one 32-bit component, in order of lanes. Returns the old values.
     fn atomic(
@@ -167,9 +168,9 @@ pub trait ImageUnit: Sync {
         image: u32,
         request: &TexelRequest,
         op: AtomicOp,
-        value: &Lanes,
-        comparator: &Lanes,
-    ) -> Lanes;
+        value: &LaneWords,
+        comparator: &LaneWords,
+    ) -> LaneWords;
 
     /// Width, height, depth as far as the dimension has them, then layers if arrayed; the rest is zero.
     fn size(&self, image: u32, shape: ImageShape, level: u32) -> [u32; 4];
@@ -181,7 +182,7 @@ pub trait ImageUnit: Sync {
     fn samples(&self, image: u32) -> u32;
 
     /// The level of detail of an implicit sample, clamped to what exists, and before clamping; floats.
-    fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 2];
+    fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 2];
 }
 
 /// No image is bound.
@@ -189,25 +190,25 @@ pub trait ImageUnit: Sync {
 pub struct NoImages;
 
 impl ImageUnit for NoImages {
-    fn sample(&self, _image: u32, _sampler: u32, _request: &SampleRequest) -> [Lanes; 4] {
+    fn sample(&self, _image: u32, _sampler: u32, _request: &SampleRequest) -> [LaneWords; 4] {
         Default::default()
     }
 
-    fn read(&self, _image: u32, _request: &TexelRequest) -> [Lanes; 4] {
+    fn read(&self, _image: u32, _request: &TexelRequest) -> [LaneWords; 4] {
         Default::default()
     }
 
-    fn write(&self, _image: u32, _request: &TexelRequest, _texel: &[Lanes; 4]) {}
+    fn write(&self, _image: u32, _request: &TexelRequest, _texel: &[LaneWords; 4]) {}
 
     fn atomic(
         &self,
         _image: u32,
         _request: &TexelRequest,
         _op: AtomicOp,
-        _value: &Lanes,
-        _comparator: &Lanes,
-    ) -> Lanes {
-        Lanes::default()
+        _value: &LaneWords,
+        _comparator: &LaneWords,
+    ) -> LaneWords {
+        LaneWords::default()
     }
 
     fn size(&self, _image: u32, _shape: ImageShape, _level: u32) -> [u32; 4] {
@@ -222,7 +223,7 @@ impl ImageUnit for NoImages {
         0
     }
 
-    fn lod(&self, _image: u32, _sampler: u32, _request: &SampleRequest) -> [Lanes; 2] {
+    fn lod(&self, _image: u32, _sampler: u32, _request: &SampleRequest) -> [LaneWords; 2] {
         Default::default()
     }
 }

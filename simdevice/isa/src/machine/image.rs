@@ -7,25 +7,25 @@ use crate::ir::{
     Binding, ImageAtomic, ImageQuery, ImageRead, ImageShape, ImageWrite, Lod, Reg, Sample,
     VECTOR_LANES,
 };
-use crate::resources::{Lanes, LodRequest, SampleRequest, TexelRequest};
+use crate::resources::{LaneWords, LodRequest, SampleRequest, TexelRequest};
 
 /// A bind point that isn't bound to anything.
 const UNBOUND: u32 = u32::MAX;
 
-fn words(batch: &Batch<'_>, reg: Reg, vector: usize) -> Lanes {
+fn words(batch: &Batch<'_>, reg: Reg, vector: usize) -> LaneWords {
     batch.file.lanes(batch.slot(reg), vector)
 }
 
-fn words_or_zero(batch: &Batch<'_>, reg: Option<Reg>, vector: usize) -> Lanes {
+fn words_or_zero(batch: &Batch<'_>, reg: Option<Reg>, vector: usize) -> LaneWords {
     reg.map_or([0; VECTOR_LANES], |reg| words(batch, reg, vector))
 }
 
-fn all_words<const N: usize>(batch: &Batch<'_>, regs: &[Reg], vector: usize) -> [Lanes; N] {
+fn all_words<const N: usize>(batch: &Batch<'_>, regs: &[Reg], vector: usize) -> [LaneWords; N] {
     std::array::from_fn(|index| words_or_zero(batch, regs.get(index).copied(), vector))
 }
 
 /// The bind points that 16 lanes mean.
-fn bind_points(batch: &Batch<'_>, binding: &Binding, vector: usize) -> Lanes {
+fn bind_points(batch: &Batch<'_>, binding: &Binding, vector: usize) -> LaneWords {
     let indices = words_or_zero(batch, binding.index, vector);
     indices.map(|index| {
         if index < binding.count {
@@ -38,8 +38,8 @@ fn bind_points(batch: &Batch<'_>, binding: &Binding, vector: usize) -> Lanes {
 
 /// Calls `ask(image, sampler, lanes)` for each pair of bind points among `lanes`.
 fn for_each_binding(
-    images: &Lanes,
-    samplers: &Lanes,
+    images: &LaneWords,
+    samplers: &LaneWords,
     mut lanes: u16,
     mut ask: impl FnMut(u32, u32, u16),
 ) {
@@ -55,7 +55,7 @@ fn for_each_binding(
 }
 
 #[inline(always)]
-fn put_texel(batch: &Batch<'_>, dst: &[Option<Reg>; 4], vector: usize, texel: &[Lanes; 4]) {
+fn put_texel(batch: &Batch<'_>, dst: &[Option<Reg>; 4], vector: usize, texel: &[LaneWords; 4]) {
     for (index, lanes) in texel.iter().enumerate() {
         if let Some(reg) = dst[index] {
             batch.file.set(batch.slot(reg), vector, *lanes);
@@ -125,7 +125,7 @@ fn sample_each(
     request: &mut SampleRequest,
     vector: usize,
     active: u16,
-) -> [Lanes; 4] {
+) -> [LaneWords; 4] {
     let images = bind_points(batch, &sample.image, vector);
     let samplers = bind_points(batch, &sample.sampler, vector);
     let mut texel = [[0; VECTOR_LANES]; 4];
@@ -240,7 +240,7 @@ pub fn query(
     let varying = dst.iter().any(|reg| batch.slot(*reg).is_varying());
     for vector in 0..if varying { batch.file.width() } else { 1 } {
         let bound = bind_points(batch, image, vector);
-        let answers: [Lanes; 4] = match query {
+        let answers: [LaneWords; 4] = match query {
             ImageQuery::Lod {
                 sampler,
                 coordinate,
@@ -262,12 +262,12 @@ pub fn query(
 
 fn query_lod(
     batch: &Batch<'_>,
-    images: &Lanes,
+    images: &LaneWords,
     sampler: &Binding,
     coordinate: &[Reg],
     shape: ImageShape,
     vector: usize,
-) -> [Lanes; 4] {
+) -> [LaneWords; 4] {
     let samplers = bind_points(batch, sampler, vector);
     let mut request = SampleRequest {
         mask: 0,
@@ -312,7 +312,7 @@ fn is_automatic(lod: &Lod) -> bool {
 }
 
 /// Takes some lanes of what was found.
-fn merge<const N: usize>(into: &mut [Lanes; N], found: &[Lanes; N], lanes: u16) {
+fn merge<const N: usize>(into: &mut [LaneWords; N], found: &[LaneWords; N], lanes: u16) {
     for (into, found) in into.iter_mut().zip(found) {
         lanes_of(lanes).for_each(|lane| into[lane] = found[lane]);
     }

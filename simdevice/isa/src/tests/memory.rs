@@ -10,7 +10,7 @@ use crate::ir::{
 };
 use crate::op::Op;
 use crate::resources::{
-    GlobalMemory, ImageUnit, Lanes, NoImages, Resources, SampleRequest, TexelRequest, words,
+    GlobalMemory, ImageUnit, LaneWords, NoImages, Resources, SampleRequest, TexelRequest, words,
 };
 use devmem::Allocation;
 use devmem::BufferRange;
@@ -477,11 +477,11 @@ fn device_addresses_reach_their_buffer_and_nothing_else(case: &Case) {
 struct Recorder(Mutex<Vec<(u32, u16)>>);
 
 impl ImageUnit for Recorder {
-    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 4] {
+    fn sample(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 4] {
         NoImages.sample(image, sampler, request)
     }
 
-    fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4] {
+    fn read(&self, image: u32, request: &TexelRequest) -> [LaneWords; 4] {
         [
             request.coordinate[0],
             request.coordinate[1],
@@ -490,7 +490,7 @@ impl ImageUnit for Recorder {
         ]
     }
 
-    fn write(&self, image: u32, request: &TexelRequest, _texel: &[Lanes; 4]) {
+    fn write(&self, image: u32, request: &TexelRequest, _texel: &[LaneWords; 4]) {
         self.0
             .lock()
             .expect("not poisoned")
@@ -502,9 +502,9 @@ impl ImageUnit for Recorder {
         image: u32,
         request: &TexelRequest,
         op: AtomicOp,
-        value: &Lanes,
-        comparator: &Lanes,
-    ) -> Lanes {
+        value: &LaneWords,
+        comparator: &LaneWords,
+    ) -> LaneWords {
         NoImages.atomic(image, request, op, value, comparator)
     }
 
@@ -520,7 +520,7 @@ impl ImageUnit for Recorder {
         NoImages.samples(image)
     }
 
-    fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [Lanes; 2] {
+    fn lod(&self, image: u32, sampler: u32, request: &SampleRequest) -> [LaneWords; 2] {
         NoImages.lod(image, sampler, request)
     }
 }
