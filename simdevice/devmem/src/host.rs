@@ -172,7 +172,7 @@ pub mod injection {
         LEFT.swap(0, Relaxed).checked_sub(2)
     }
 
-    /// Whether this allocation fails.
+    /// Reports whether this allocation fails.
     #[inline]
     pub(crate) fn fails() -> bool {
         // The whole cost where nobody injects.

@@ -112,7 +112,7 @@ impl Allocation {
         self.len
     }
 
-    /// Whether the host may map this memory, and so change it at any time without the device seeing it.
+    /// Reports whether the host may map this memory, and so change it at any time without the device seeing it.
     pub fn is_host_visible(&self) -> bool {
         self.host_visible
     }

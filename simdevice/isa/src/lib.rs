@@ -2,8 +2,8 @@
 //!
 //! # The machine
 //!
-//! A program runs on a **batch** of lanes (a multiple of 16): 64 vertices, 64 fragments (16 quads), or one
-//! compute workgroup. Registers are structure-of-arrays: a register holds one scalar for each lane, and each
+//! A program runs on a **batch** of lanes (a multiple of 16): some vertices, the fragments of some quads, or one
+//! compute workgroup; the caller says how many lanes a batch has. Registers are structure-of-arrays: a register holds one scalar for each lane, and each
 //! instruction processes all lanes before the next begins. So the cost of decoding an instruction is paid once a
 //! batch, and a barrier is nothing more than the end of an instruction.
 //!
@@ -49,7 +49,13 @@
 //! # Life of a program
 //!
 //! [`builder::Builder`] → [`ir::Program`], checked → [`exec::Executable`] (optimized, registers allocated, control flow
-//! flattened, lanes fixed) → [`exec::Machine::run`], once a batch.
+//! linearized, lanes fixed) → [`exec::Machine::run`], once a batch.
+//!
+//! # Modules
+//!
+//! `ir` is imported by all others; `builder` makes programs of it. `kernels` are the operations on registers; `compiler`
+//! makes steps of a program, and folds constants by the kernels; `machine` runs the steps. `resources` is what a program
+//! reaches outside its registers, as traits that the caller implements.
 
 #![forbid(unsafe_code)]
 

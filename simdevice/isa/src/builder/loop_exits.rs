@@ -76,7 +76,7 @@ impl Search {
     }
 }
 
-/// Whether a use in loop `at` is outside loop `defined_in`.
+/// Reports whether a use in loop `at` is outside loop `defined_in`.
 fn escapes(defined_in: Option<Loop>, mut at: Option<Loop>, parents: &[Option<Loop>]) -> bool {
     if defined_in.is_none() {
         return false;

@@ -253,7 +253,7 @@ impl Builder {
         dst
     }
 
-    /// Whether the lane is a helper.
+    /// Reports whether the lane is a helper.
     pub fn is_helper(&mut self) -> Reg {
         let dst = self.value(Type::Bool);
         self.statement(Statement::IsHelper { dst });

@@ -16,7 +16,7 @@ pub fn remove_dead(program: &mut Program) {
     program.inputs.retain(|input| live[input.reg.0 as usize]);
 }
 
-/// Whether a statement must stay though nothing reads its results.
+/// Reports whether a statement must stay though nothing reads its results.
 fn has_effect(statement: &Statement) -> bool {
     !matches!(
         statement,

@@ -34,7 +34,7 @@ pub fn forward(program: &mut Program, varying: &[bool]) {
     program.body.retain(|_| copied.next() != Some(true));
 }
 
-/// Whether lanes may end in a statement.
+/// Reports whether lanes may end in a statement.
 fn leaves(statement: &Statement) -> bool {
     matches!(statement, Statement::Return | Statement::Kill)
         || statement.blocks().into_iter().flatten().any(leaves)
@@ -59,7 +59,7 @@ mod tests {
     use crate::compiler::uniformity::varying_registers;
     use crate::ir::{Rate, Type};
 
-    /// Whether the only output of a program is read where it was computed.
+    /// Reports whether the only output of a program is read where it was computed.
     fn is_forwarded(rate: Rate, write: impl FnOnce(&mut Builder, Reg, Reg)) -> bool {
         let mut builder = Builder::new();
         let input = builder.input(0, Type::B32, rate);

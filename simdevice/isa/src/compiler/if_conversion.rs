@@ -34,7 +34,7 @@ fn block(statements: &mut Block, registers: &mut Vec<Register>) {
     }
 }
 
-/// Whether a branch only computes and assigns, and reads nothing that it assigns.
+/// Reports whether a branch only computes and assigns, and reads nothing that it assigns.
 fn is_short(then: &Block, otherwise: &Block, registers: &[Register]) -> bool {
     let both = || then.iter().chain(otherwise);
     let mut computations = 0;

@@ -148,7 +148,7 @@ impl Sharing<'_> {
         });
     }
 
-    /// Whether an address is computed from values alone.
+    /// Reports whether an address is computed from values alone.
     fn is_fixed(&self, address: &Address) -> bool {
         let is_value = |reg: Reg| self.registers[reg.0 as usize].role == Role::Value;
         let index = match address.space {

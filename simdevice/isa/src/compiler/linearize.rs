@@ -165,7 +165,7 @@ impl Linearizer<'_> {
         }
     }
 
-    /// Whether a computation's only use is the assignment that follows it.
+    /// Reports whether a computation's only use is the assignment that follows it.
     fn is_assigned_at_once(&self, statement: &Statement, next: &Statement) -> bool {
         match (statement, next) {
             (Statement::Compute { dst: value, .. }, Statement::Assign { dst, src }) => {
@@ -484,7 +484,7 @@ impl Linearizer<'_> {
     }
 }
 
-/// Whether no lane goes on after a statement.
+/// Reports whether no lane goes on after a statement.
 fn leaves(statement: &Statement) -> bool {
     matches!(
         statement,

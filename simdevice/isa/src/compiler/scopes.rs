@@ -31,7 +31,7 @@ impl VariableScopes {
         self.variables.get(&variable).map_or(0, |uses| uses.depth)
     }
 
-    /// Whether a variable is read outside a construct.
+    /// Reports whether a variable is read outside a construct.
     pub fn is_read_outside(&self, variable: Reg, label: Label) -> bool {
         let uses = self.variables.get(&variable);
         let around = uses.and_then(|uses| uses.around_reads.as_ref());

@@ -44,7 +44,7 @@ fn sink_block(block: &mut Block, registers: &[Register]) {
     }
 }
 
-/// Whether every lane that runs a statement runs the next one, too.
+/// Reports whether every lane that runs a statement runs the next one, too.
 fn keeps_lanes(statement: &Statement) -> bool {
     let leaves = matches!(
         statement,

@@ -81,13 +81,13 @@ impl Search {
         self.varying[reg.0 as usize]
     }
 
-    /// Whether lanes may be inactive here for reasons that lie within the innermost `depth` constructs.
+    /// Reports whether lanes may be inactive here for reasons that lie within the innermost `depth` constructs.
     fn masked_within(&self, depth: usize) -> bool {
         let mut within = self.open.iter().rev().take(depth);
         within.any(|around| self.masks(around, |label| self.left.contains(&label)))
     }
 
-    /// Whether a construct masks what is in it. `left` says whether it counts that lanes break out of one.
+    /// Reports whether a construct masks what is in it. `left` says whether it counts that lanes break out of one.
     fn masks(&self, around: &Around, left: impl Fn(Label) -> bool) -> bool {
         match around {
             Around::Varying => true,
@@ -97,7 +97,7 @@ impl Search {
         }
     }
 
-    /// Whether an assignment here may be masked for a lane that reads the variable later.
+    /// Reports whether an assignment here may be masked for a lane that reads the variable later.
     fn assigned_by_some(&self, variable: Reg) -> bool {
         let scope = self.scopes.depth(variable).min(self.open.len());
         // Within a loop, lanes come back to what they left.
@@ -122,7 +122,7 @@ impl Search {
         self.open.pop();
     }
 
-    /// Whether only some of the lanes in the construct get here, where they leave it.
+    /// Reports whether only some of the lanes in the construct get here, where they leave it.
     fn diverges(&self, label: Label) -> bool {
         let mut around = self.open.iter().rev();
         let depth = around.position(|around| around.label() == Some(label));
@@ -202,7 +202,7 @@ impl Search {
         }
     }
 
-    /// Whether a statement's results may differ between lanes though its operands don't.
+    /// Reports whether a statement's results may differ between lanes though its operands don't.
     fn differs_by_itself(&self, statement: &Statement) -> bool {
         match statement {
             Statement::Load { address, .. } => {

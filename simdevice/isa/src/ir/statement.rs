@@ -77,7 +77,7 @@ pub enum SubgroupOp {
     ExclusiveScan(Op),
 }
 
-/// Whether subgroup reductions and scans may use an operation.
+/// Reports whether subgroup reductions and scans may use an operation.
 pub fn is_reducible(op: Op) -> bool {
     use Op::*;
     matches!(

@@ -16,7 +16,7 @@ type I<S> = i32x16<S>;
 type U<S> = u32x16<S>;
 type M<S> = mask32x16<S>;
 
-/// Whether an operation is one of these functions.
+/// Reports whether an operation is one of these functions.
 pub fn is_one(op: Op) -> bool {
     (Op::FExp as u8..=Op::FAtanh as u8).contains(&(op as u8))
 }

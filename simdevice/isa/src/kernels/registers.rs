@@ -32,7 +32,7 @@ impl RegisterSlot {
         Self(start as u32 | Self::VARYING)
     }
 
-    /// Whether it has a value for each lane.
+    /// Reports whether it has a value for each lane.
     pub fn is_varying(self) -> bool {
         self.0 & Self::VARYING != 0
     }

@@ -300,7 +300,7 @@ fn fixed_point(binding: &Binding) -> Option<u32> {
     (binding.index.is_none() && binding.count > 0).then_some(binding.slot)
 }
 
-/// Whether the level of detail comes from differences alone.
+/// Reports whether the level of detail comes from differences alone.
 fn is_automatic(lod: &Lod) -> bool {
     matches!(
         lod,

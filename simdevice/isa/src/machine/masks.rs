@@ -28,7 +28,7 @@ impl LaneMask {
         Self { words }
     }
 
-    /// Whether a lane is in the set.
+    /// Reports whether a lane is in the set.
     pub fn contains(&self, lane: usize) -> bool {
         self.words
             .get(lane / 64)

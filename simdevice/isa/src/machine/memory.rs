@@ -484,7 +484,7 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Whether lanes follow one another, `STRIDE` words apart.
+/// Reports whether lanes follow one another, `STRIDE` words apart.
 #[inline(always)]
 fn are_apart<S: Simd, const STRIDE: usize>(starts: u32x16<S>) -> bool {
     let steps = const {
