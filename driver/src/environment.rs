@@ -4,7 +4,7 @@
 //! - `GAURAST_SIMD`: the SIMD level, by name: best (the default), sse2, avx2 or avx512.
 //! - `GAURAST_THREADS`: how many worker threads a device has; 0 (the default) means one per processor.
 //! - `GAURAST_TIMEOUT_MS`: how many milliseconds one batch of shader invocations may take before the device is lost; a
-//!   loop without end is stopped so. A batch is a workgroup, or some 64 vertices or fragments.
+//!   loop without end is stopped so. A batch is a workgroup, 128 vertices, or 64 or 256 fragments.
 //! - `GAURAST_SKIP`: the work that is left out where it changes no image: all (the default), none, or names separated by
 //!   commas (see [`simdevice::skips`]).
 //! - `GAURAST_TRACE`: a file that the work of a device's last 64 render passes is written to, as JSON, when the device is
