@@ -210,7 +210,6 @@ fearless_simd::kernel!(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dispatch;
 
     fn gathered(words: &[AtomicU32], places: [u32; 8]) -> [u32; 8] {
         dispatch!(Level::new(), simd => {

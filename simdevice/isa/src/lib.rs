@@ -2,10 +2,10 @@
 //!
 //! # The machine
 //!
-//! A program runs on a **batch** of lanes (a multiple of 16): some vertices, the fragments of some quads, or one
-//! compute workgroup; the caller says how many lanes a batch has. Registers are structure-of-arrays: a register holds one scalar for each lane, and each
-//! instruction processes all lanes before the next begins. So the cost of decoding an instruction is paid once a
-//! batch, and a barrier is nothing more than the end of an instruction.
+//! A program runs on a **batch** of lanes (a multiple of 16): some vertices, the fragments of some quads, or one compute
+//! workgroup; the caller says how many lanes a batch has. Registers are structure-of-arrays: a register holds one scalar
+//! for each lane, and each instruction processes all lanes before the next begins. So the cost of decoding an instruction
+//! is paid once a batch, and a barrier is nothing more than the end of an instruction.
 //!
 //! # Registers
 //!
