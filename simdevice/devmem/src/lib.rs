@@ -9,12 +9,12 @@
 
 mod hints;
 pub mod host;
+pub mod level;
+mod lookup;
 mod memory;
-pub mod simd;
 
 #[doc(hidden)]
 pub use fearless_simd;
 pub use hints::prefetch;
+pub use lookup::{gather, look_up, places};
 pub use memory::{Allocation, AllocationError, BufferRange, DerivedData, OutOfBounds, PAGE_SIZE};
-pub use simd as level;
-pub use simd::{gather, look_up, places};

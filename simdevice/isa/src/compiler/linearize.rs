@@ -1,4 +1,4 @@
-//! Lowers a program's tree of statements to steps, with masks made explicit.
+//! Linearizes a program's tree of statements to steps, with masks made explicit.
 
 use std::collections::{HashMap, HashSet};
 
@@ -19,7 +19,7 @@ pub struct Linearized {
     pub runs: Vec<RunCost>,
 }
 
-/// Lowers a valid program. `count` says whether to count the work.
+/// Linearizes a valid program. `count` says whether to count the work.
 pub fn linearize(program: &Program, allocation: &Allocation, count: bool) -> Linearized {
     let mut linearizer = Linearizer {
         program,
@@ -68,7 +68,7 @@ struct Linearizer<'a> {
     run: Option<usize>,
     /// Variables that only a loop looks at.
     loop_private: HashMap<Label, HashSet<Reg>>,
-    /// Variables to which assignments, where lowering is now, need no mask.
+    /// Variables to which assignments, where the linearizer is now, need no mask.
     unmasked: HashSet<Reg>,
     /// How often each register is read.
     uses: Vec<u32>,
@@ -142,13 +142,13 @@ impl Linearizer<'_> {
         }
     }
 
-    /// Lowers a block. `empty` is where to go when no lane is active: it is before, or at, a place where lanes come back.
+    /// Linearizes a block. `empty` is where to go when no lane is active: it is before, or at, a place where lanes come back.
     fn block(&mut self, block: &Block, empty: Mark) {
         let unmasked = std::mem::take(&mut self.unmasked);
         self.block_of_loop(block, empty, unmasked);
     }
 
-    /// Lowers a block in which assignments to some variables need no mask.
+    /// Linearizes a block in which assignments to some variables need no mask.
     fn block_of_loop(&mut self, block: &Block, empty: Mark, unmasked: HashSet<Reg>) {
         let mut rest = block.iter().peekable();
         while let Some(statement) = rest.next() {

@@ -1,4 +1,4 @@
-//! What a program is lowered to: steps in a row, with jumps.
+//! Steps in a row, with jumps: the form of a program that machines run.
 
 use crate::ir::op::{Kind, Op};
 use crate::ir::{Statement, Type};
