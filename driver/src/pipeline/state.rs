@@ -1,0 +1,889 @@
+//! The state of graphics pipelines: create infos with their pointers followed, as far as Vulkan has them read; vertex input;
+//! and fixed-function state. What a switch governs is kept beside the switch, as either may be dynamic without the other.
+
+use super::dynamic_state::{self, DynamicState, DynamicStates};
+use super::layout::PipelineLayout;
+use crate::abi::error::Error;
+use crate::abi::handle;
+use crate::abi::valid;
+use crate::convert;
+use crate::physical_device::{formats, limits};
+use crate::registry::features::SUPPORTED;
+use crate::shader_module::ShaderStage;
+use ash::vk;
+use gaurast::vk::{
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use simdevice::Format;
+use simdevice::packet::draw::{
+    CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, PolygonMode, StencilFace, StencilOp,
+    Topology,
+};
+use simdevice::packet::{BlendFactor, BlendState};
+use std::sync::Arc;
+
+/// A `VkGraphicsPipelineCreateInfo` with its pointers followed. State that the application may leave out is
+/// empty, `None` or the default.
+#[derive(Default)]
+pub(crate) struct GraphicsPipelineInfo<'a> {
+    /// The shader stages.
+    pub(crate) stages: Vec<(vk::ShaderStageFlags, ShaderStage<'a>)>,
+    /// The layout.
+    pub(crate) layout: Option<&'a Arc<PipelineLayout>>,
+    /// Vertex bindings.
+    pub(crate) bindings: &'a [vk::VertexInputBindingDescription],
+    /// How many instances an element lasts, of bindings that advance by instance and where that isn't one.
+    pub(crate) divisors: &'a [vk::VertexInputBindingDivisorDescriptionKHR],
+    /// Vertex attributes.
+    pub(crate) attributes: &'a [vk::VertexInputAttributeDescription],
+    /// The topology.
+    pub(crate) topology: vk::PrimitiveTopology,
+    /// Whether an index restarts the primitive.
+    pub(crate) primitive_restart: bool,
+    /// How many viewports; one each is given unless they are dynamic.
+    pub(crate) viewport_count: u32,
+    /// Viewports, unless dynamic.
+    pub(crate) viewports: &'a [vk::Viewport],
+    /// How many scissors.
+    pub(crate) scissor_count: u32,
+    /// Scissors, unless dynamic.
+    pub(crate) scissors: &'a [vk::Rect2D],
+    /// Rasterization state.
+    pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
+    /// Whether a primitive's last vertex, not its first, is the provoking one.
+    pub(crate) provoking_last: bool,
+    /// Multisample state.
+    pub(crate) multisample: vk::PipelineMultisampleStateCreateInfo<'a>,
+    /// The samples that may be covered.
+    pub(crate) sample_mask: u32,
+    /// Depth and stencil state, if the subpass has such an attachment.
+    pub(crate) depth_stencil: Option<vk::PipelineDepthStencilStateCreateInfo<'a>>,
+    /// The logic operation, if it is enabled.
+    pub(crate) logic_op: Option<vk::LogicOp>,
+    /// Blend state by colour attachment.
+    pub(crate) blend: &'a [vk::PipelineColorBlendAttachmentState],
+    /// Blend constants.
+    pub(crate) blend_constants: [f32; 4],
+    /// What is dynamic.
+    pub(crate) dynamic: &'a [vk::DynamicState],
+    /// The colour formats of the subpass; undefined where the attachment is unused.
+    pub(crate) color_formats: Vec<vk::Format>,
+    /// The extension's structure.
+    pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
+    /// The extension's structure of approximations.
+    pub(crate) approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'a>>,
+}
+
+impl<'a> GraphicsPipelineInfo<'a> {
+    /// Follows a create info's pointers. Those that the rest of the create info makes meaningless may point anywhere.
+    ///
+    /// # Safety
+    /// The create info and its chain are valid.
+    pub(crate) unsafe fn from_create_info(
+        info: &'a vk::GraphicsPipelineCreateInfo<'a>,
+    ) -> Result<Self, Error> {
+        let mut gathered = GraphicsPipelineInfo {
+            sample_mask: u32::MAX,
+            ..GraphicsPipelineInfo::default()
+        };
+        // SAFETY: the caller's promise.
+        unsafe {
+            for given in valid::slice(info.p_stages, info.stage_count)? {
+                gathered
+                    .stages
+                    .push((given.stage, ShaderStage::from_create_info(given)?));
+            }
+            gathered.layout = handle::get_optional(info.layout)?;
+            gathered.gaussian =
+                valid::find_in_chain::<PipelineGaussianStateCreateInfoGAURAST>(info.p_next)
+                    .copied();
+            gathered.approximation = valid::find_in_chain::<
+                PipelineGaussianApproximationStateCreateInfoGAURAST,
+            >(info.p_next)
+            .copied();
+            if let Some(state) = valid::optional(info.p_dynamic_state) {
+                gathered.dynamic = valid::slice(state.p_dynamic_states, state.dynamic_state_count)?;
+            }
+            if let Some(state) = valid::optional(info.p_vertex_input_state) {
+                gather_vertex_input(state, &mut gathered)?;
+            }
+            if let Some(state) = valid::optional(info.p_input_assembly_state) {
+                gathered.topology = state.topology;
+                gathered.primitive_restart = state.primitive_restart_enable != vk::FALSE;
+            }
+            if let Some(state) = valid::optional(info.p_rasterization_state) {
+                gathered.rasterization = *state;
+                let provoking = valid::find_in_chain::<
+                    vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT<'_>,
+                >(state.p_next);
+                gathered.provoking_last = provoking.is_some_and(|state| {
+                    state.provoking_vertex_mode == vk::ProvokingVertexModeEXT::LAST_VERTEX
+                });
+            }
+            if !gathered.discards() {
+                gather_fragments(info, &mut gathered)?;
+            }
+        }
+        Ok(gathered)
+    }
+
+    /// Whether a state is dynamic.
+    pub(crate) fn is_dynamic(&self, state: vk::DynamicState) -> bool {
+        self.dynamic.contains(&state)
+    }
+
+    /// Whether nothing is ever rasterized, so that all state of rasterization is left out.
+    pub(crate) fn discards(&self) -> bool {
+        self.rasterization.rasterizer_discard_enable != vk::FALSE
+            && !self.is_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE)
+    }
+
+    /// The width of lines. Pipelines that draw none often leave it at zero.
+    fn line_width(&self) -> f32 {
+        let width = self.rasterization.line_width;
+        if width == 0.0 || self.is_dynamic(vk::DynamicState::LINE_WIDTH) {
+            return 1.0;
+        }
+        width
+    }
+}
+
+/// Vertex bindings and attributes.
+///
+/// # Safety
+/// The state and its chain are valid.
+unsafe fn gather_vertex_input<'a>(
+    state: &'a vk::PipelineVertexInputStateCreateInfo<'a>,
+    gathered: &mut GraphicsPipelineInfo<'a>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        gathered.bindings = valid::slice(
+            state.p_vertex_binding_descriptions,
+            state.vertex_binding_description_count,
+        )?;
+        gathered.attributes = valid::slice(
+            state.p_vertex_attribute_descriptions,
+            state.vertex_attribute_description_count,
+        )?;
+        let divisors = valid::find_in_chain::<vk::PipelineVertexInputDivisorStateCreateInfoKHR<'_>>(
+            state.p_next,
+        );
+        if let Some(state) = divisors {
+            gathered.divisors = valid::slice(
+                state.p_vertex_binding_divisors,
+                state.vertex_binding_divisor_count,
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// The state of pipelines that rasterize.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn gather_fragments<'a>(
+    info: &'a vk::GraphicsPipelineCreateInfo<'a>,
+    gathered: &mut GraphicsPipelineInfo<'a>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let formats = attachment_formats(info)?;
+        if let Some(state) = valid::optional(info.p_viewport_state) {
+            gather_viewports(state, gathered)?;
+        }
+        if let Some(state) = valid::optional(info.p_multisample_state) {
+            gathered.multisample = *state;
+            if let Some(mask) = valid::optional(state.p_sample_mask) {
+                gathered.sample_mask = *mask;
+            }
+        }
+        if formats.has_depth_stencil {
+            gathered.depth_stencil = valid::optional(info.p_depth_stencil_state).copied();
+        }
+        if !formats.color.is_empty()
+            && let Some(state) = valid::optional(info.p_color_blend_state)
+        {
+            gathered.logic_op = (state.logic_op_enable != vk::FALSE).then_some(state.logic_op);
+            gathered.blend = valid::slice(state.p_attachments, state.attachment_count)?;
+            gathered.blend_constants = state.blend_constants;
+        }
+        gathered.color_formats = formats.color;
+    }
+    Ok(())
+}
+
+/// Viewports and scissors; their pointers may be anything where they are dynamic.
+///
+/// # Safety
+/// The state is valid.
+unsafe fn gather_viewports<'a>(
+    state: &'a vk::PipelineViewportStateCreateInfo<'a>,
+    gathered: &mut GraphicsPipelineInfo<'a>,
+) -> Result<(), Error> {
+    use vk::DynamicState as S;
+    gathered.viewport_count = state.viewport_count;
+    gathered.scissor_count = state.scissor_count;
+    let is_dynamic = |states: [S; 2]| states.iter().any(|state| gathered.is_dynamic(*state));
+    let dynamic_viewports = is_dynamic([S::VIEWPORT, S::VIEWPORT_WITH_COUNT]);
+    let dynamic_scissors = is_dynamic([S::SCISSOR, S::SCISSOR_WITH_COUNT]);
+    // SAFETY: the caller's promise; a null pointer is not followed.
+    unsafe {
+        if !dynamic_viewports && !state.p_viewports.is_null() {
+            gathered.viewports = valid::slice(state.p_viewports, state.viewport_count)?;
+        }
+        if !dynamic_scissors && !state.p_scissors.is_null() {
+            gathered.scissors = valid::slice(state.p_scissors, state.scissor_count)?;
+        }
+    }
+    Ok(())
+}
+
+/// What a pipeline renders to.
+#[derive(Default)]
+struct AttachmentFormats {
+    /// By colour attachment; undefined where unused.
+    color: Vec<vk::Format>,
+    /// Whether there is a depth or stencil attachment.
+    has_depth_stencil: bool,
+}
+
+/// The formats of the subpass, or of dynamic rendering, that a pipeline is for.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn attachment_formats(
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+) -> Result<AttachmentFormats, Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        if let Some(render_pass) = handle::get_optional(info.render_pass)? {
+            let index = info.subpass as usize;
+            let missing = || {
+                Error::usage(
+                    "VUID-VkGraphicsPipelineCreateInfo-renderPass-06046",
+                    format!("the render pass has no subpass {index}"),
+                )
+            };
+            let subpass = render_pass.subpasses.get(index).ok_or_else(missing)?;
+            return Ok(AttachmentFormats {
+                color: render_pass.color_formats(index).ok_or_else(missing)?,
+                has_depth_stencil: subpass.depth_stencil.is_some(),
+            });
+        }
+        let Some(rendering) = valid::find_in_chain::<vk::PipelineRenderingCreateInfo>(info.p_next)
+        else {
+            return Ok(AttachmentFormats::default());
+        };
+        let color = valid::slice(
+            rendering.p_color_attachment_formats,
+            rendering.color_attachment_count,
+        )?;
+        let undefined = vk::Format::UNDEFINED;
+        Ok(AttachmentFormats {
+            color: color.to_vec(),
+            has_depth_stencil: rendering.depth_attachment_format != undefined
+                || rendering.stencil_attachment_format != undefined,
+        })
+    }
+}
+
+/// Where a pipeline reads an attribute from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct AttributeSource {
+    /// The vertex buffer binding.
+    pub(crate) binding: u32,
+    /// Bytes from one vertex to the next.
+    pub(crate) stride: u32,
+    /// Bytes from the vertex's start to the attribute.
+    pub(crate) offset: u32,
+    /// How it is stored.
+    pub(crate) format: Format,
+    /// After how many instances it advances (0: never), `None` if it advances by vertex.
+    pub(crate) instance_divisor: Option<u32>,
+}
+
+/// Finds the attribute at `location`, which the extension calls `name` and needs `components` of.
+///
+/// # Errors
+/// An [`Error`] if the location, its binding or its format won't do.
+pub(crate) fn attribute(
+    info: &GraphicsPipelineInfo,
+    name: &str,
+    location: u32,
+    components: u32,
+) -> Result<AttributeSource, Error> {
+    let refuse = |what: String| {
+        Error::usage(
+            "VUID-VkGaussianAttributeLocationsGAURAST-location",
+            format!("{name} is location {location}, {what}"),
+        )
+    };
+    let source = source(info, location).map_err(refuse)?;
+    let format = source.format;
+    if format.is_integer() {
+        return Err(refuse(format!(
+            "whose format {format:?} does not convert to floating point"
+        )));
+    }
+    if (format.components().len() as u32) < components {
+        return Err(refuse(format!(
+            "whose format {format:?} has fewer than {components} components"
+        )));
+    }
+    Ok(source)
+}
+
+/// Finds the attribute at `location`.
+///
+/// # Errors
+/// What is missing or won't do, as the end of a sentence about the location.
+pub(crate) fn source(
+    info: &GraphicsPipelineInfo,
+    location: u32,
+) -> Result<AttributeSource, String> {
+    let attribute = info.attributes.iter().find(|a| a.location == location);
+    let attribute = attribute.ok_or("which the vertex input state does not have")?;
+    let number = attribute.binding;
+    let binding = info.bindings.iter().find(|b| b.binding == number);
+    let binding = binding
+        .ok_or_else(|| format!("whose binding {number} the vertex input state does not have"))?;
+    let features = formats::properties(attribute.format).buffer_features;
+    let format = formats::device_format(attribute.format)
+        .filter(|_| features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
+    let format = format.ok_or_else(|| {
+        format!(
+            "whose format {:?} this device does not read as a vertex attribute",
+            attribute.format
+        )
+    })?;
+    let instance_divisor = match binding.input_rate {
+        vk::VertexInputRate::VERTEX => None,
+        vk::VertexInputRate::INSTANCE => {
+            let given = info.divisors.iter().find(|it| it.binding == number);
+            Some(given.map_or(1, |it| it.divisor))
+        }
+        rate => return Err(format!("whose binding has the unknown rate {rate:?}")),
+    };
+    Ok(AttributeSource {
+        binding: number,
+        stride: binding.stride,
+        offset: attribute.offset,
+        format,
+        instance_divisor,
+    })
+}
+
+/// The blend state of all colour attachments.
+///
+/// # Errors
+/// An [`Error`] if there are not as many as attachments, or for what the device lacks.
+pub(crate) fn blend_states(info: &GraphicsPipelineInfo) -> Result<Vec<BlendState>, Error> {
+    if info.blend.len() != info.color_formats.len() {
+        return Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-renderPass-07609",
+            format!(
+                "the colour blend state's attachmentCount is {}, but the subpass has {} colour attachments",
+                info.blend.len(),
+                info.color_formats.len()
+            ),
+        ));
+    }
+    info.blend.iter().map(convert::blend_state).collect()
+}
+
+/// Whether an attachment is blended with the second source of the fragment stage.
+pub(crate) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState) -> bool {
+    use vk::BlendFactor as F;
+    let factors = [
+        state.src_color_blend_factor,
+        state.dst_color_blend_factor,
+        state.src_alpha_blend_factor,
+        state.dst_alpha_blend_factor,
+    ];
+    let is_second = |factor: F| {
+        matches!(
+            factor,
+            F::SRC1_COLOR | F::ONE_MINUS_SRC1_COLOR | F::SRC1_ALPHA | F::ONE_MINUS_SRC1_ALPHA
+        )
+    };
+    state.blend_enable != vk::FALSE && factors.into_iter().any(is_second)
+}
+
+/// A feature of the device: if it works, and its name.
+macro_rules! supported {
+    ($feature:ident) => {
+        (SUPPORTED.$feature, stringify!($feature))
+    };
+}
+
+/// The state of a pipeline, or of a draw.
+#[derive(Clone, Debug)]
+pub(crate) struct FixedFunctionState {
+    /// All but depth bias, depth and stencil.
+    pub(crate) draw: DrawState,
+    depth_bias_enable: bool,
+    depth_bias: DepthBias,
+    depth_test: bool,
+    depth_write: bool,
+    depth_compare: CompareOp,
+    depth_bounds_test: bool,
+    depth_bounds: (f32, f32),
+    stencil_test: bool,
+    stencil: [StencilFace; 2],
+}
+
+/// A stencil face that changes nothing.
+const KEEP: StencilFace = StencilFace {
+    fail: StencilOp::Keep,
+    pass: StencilOp::Keep,
+    depth_fail: StencilOp::Keep,
+    compare: CompareOp::Always,
+    compare_mask: 0xFF,
+    write_mask: 0xFF,
+    reference: 0,
+};
+
+impl FixedFunctionState {
+    /// Validates and converts the static state of a pipeline.
+    ///
+    /// # Errors
+    /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
+    pub(crate) fn new(info: &GraphicsPipelineInfo) -> Result<Self, Error> {
+        let mut state = Self::of(info, convert::topology(info.topology)?)?;
+        if !info.discards() {
+            state.set_viewports(info)?;
+            state.set_samples(info)?;
+            state.set_depth_stencil(info)?;
+            state.set_blend(info)?;
+        }
+        Ok(state)
+    }
+
+    /// As [`FixedFunctionState::new`], of Gaussians: what becomes of their fragments.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn of_gaussians(info: &GraphicsPipelineInfo) -> Result<Self, Error> {
+        // Nothing comes of the topology.
+        let mut state = Self::of(info, Topology::TriangleStrip)?;
+        if !info.multisample.rasterization_samples.is_empty() {
+            state.set_samples(info)?;
+        }
+        state.set_depth_stencil(info)?;
+        state.set_blend(info)?;
+        Ok(state)
+    }
+
+    /// Vertex assembly and rasterization; the rest such that it does nothing.
+    fn of(info: &GraphicsPipelineInfo, topology: Topology) -> Result<Self, Error> {
+        let raster = &info.rasterization;
+        let polygon_mode = convert::polygon_mode(raster.polygon_mode)?;
+        let needs = [
+            (
+                polygon_mode != PolygonMode::Fill,
+                supported!(fill_mode_non_solid),
+                "a polygon mode but FILL",
+            ),
+            (
+                raster.depth_clamp_enable != vk::FALSE,
+                supported!(depth_clamp),
+                "depthClampEnable",
+            ),
+            (
+                raster.depth_bias_enable != vk::FALSE && raster.depth_bias_clamp != 0.0,
+                supported!(depth_bias_clamp),
+                "depthBiasClamp",
+            ),
+            (
+                info.line_width() != 1.0,
+                supported!(wide_lines),
+                "a line width but 1",
+            ),
+        ];
+        require_all(&needs)?;
+        let is_list = matches!(
+            topology,
+            Topology::PointList | Topology::LineList | Topology::TriangleList
+        );
+        if info.primitive_restart
+            && is_list
+            && !info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
+        {
+            return Err(Error::usage(
+                "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-06252",
+                format!("primitiveRestartEnable is VK_TRUE, but {topology:?} has no restart"),
+            ));
+        }
+        let draw = DrawState {
+            topology,
+            primitive_restart: info.primitive_restart,
+            viewports: Vec::new(),
+            scissors: Vec::new(),
+            depth_clamp: raster.depth_clamp_enable != vk::FALSE,
+            rasterizer_discard: raster.rasterizer_discard_enable != vk::FALSE,
+            polygon_mode,
+            cull_front: false,
+            cull_back: false,
+            front_clockwise: false,
+            depth_bias: None,
+            line_width: info.line_width(),
+            provoking_last: info.provoking_last,
+            samples: 1,
+            sample_mask: u32::MAX,
+            sample_shading: false,
+            alpha_to_coverage: false,
+            alpha_to_one: false,
+            depth_stencil: DepthStencil {
+                depth: None,
+                bounds: None,
+                stencil: None,
+            },
+            logic_op: None,
+            blend: Vec::new(),
+            blend_constants: [0.0; 4],
+        };
+        let mut state = Self {
+            draw,
+            depth_bias_enable: raster.depth_bias_enable != vk::FALSE,
+            depth_bias: DepthBias {
+                constant: raster.depth_bias_constant_factor,
+                clamp: raster.depth_bias_clamp,
+                slope: raster.depth_bias_slope_factor,
+            },
+            depth_test: false,
+            depth_write: false,
+            depth_compare: CompareOp::Always,
+            depth_bounds_test: false,
+            depth_bounds: (0.0, 1.0),
+            stencil_test: false,
+            stencil: [KEEP; 2],
+        };
+        state.set(dynamic_state::cull_mode(raster.cull_mode));
+        state.set(dynamic_state::front_face(raster.front_face));
+        Ok(state)
+    }
+
+    fn set_viewports(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
+        use vk::DynamicState as S;
+        let counts = [info.viewport_count, info.scissor_count];
+        let dynamic = [
+            info.is_dynamic(S::VIEWPORT_WITH_COUNT),
+            info.is_dynamic(S::SCISSOR_WITH_COUNT),
+        ];
+        for (count, dynamic) in counts.into_iter().zip(dynamic) {
+            if count > limits::properties().max_viewports {
+                return Err(Error::usage(
+                    "VUID-VkPipelineViewportStateCreateInfo-viewportCount-01218",
+                    format!("{count} viewports or scissors are more than maxViewports"),
+                ));
+            }
+            if count == 0 && !dynamic {
+                return Err(Error::usage(
+                    "VUID-VkPipelineViewportStateCreateInfo-viewportCount-04135",
+                    "there is no viewport or no scissor, and their count is not dynamic",
+                ));
+            }
+        }
+        if counts[0] != counts[1] && dynamic == [false; 2] {
+            return Err(Error::usage(
+                "VUID-VkPipelineViewportStateCreateInfo-scissorCount-04134",
+                format!(
+                    "there are {} viewports, but {} scissors",
+                    counts[0], counts[1]
+                ),
+            ));
+        }
+        let has = |given: usize, count: u32| given == count as usize;
+        let static_viewports = !(dynamic[0] || info.is_dynamic(S::VIEWPORT));
+        let static_scissors = !(dynamic[1] || info.is_dynamic(S::SCISSOR));
+        if (static_viewports && !has(info.viewports.len(), counts[0]))
+            || (static_scissors && !has(info.scissors.len(), counts[1]))
+        {
+            return Err(Error::usage(
+                "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-04130",
+                "the pipeline has no viewports or scissors, and they are not dynamic",
+            ));
+        }
+        if static_viewports {
+            self.draw.viewports = info
+                .viewports
+                .iter()
+                .copied()
+                .map(convert::viewport)
+                .collect();
+        }
+        if static_scissors {
+            self.draw.scissors = info.scissors.iter().copied().map(convert::rect).collect();
+        }
+        Ok(())
+    }
+
+    fn set_samples(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
+        let multisample = &info.multisample;
+        let samples = multisample.rasterization_samples;
+        let supported = limits::properties().framebuffer_no_attachments_sample_counts;
+        let count = samples.as_raw();
+        if !count.is_power_of_two() || !supported.contains(samples) {
+            return Err(Error::FeatureNotPresent(format!(
+                "rasterizationSamples {samples:?} (there are {supported:?})"
+            )));
+        }
+        let needs = [
+            (
+                multisample.sample_shading_enable != vk::FALSE,
+                supported!(sample_rate_shading),
+                "sampleShadingEnable",
+            ),
+            (
+                multisample.alpha_to_one_enable != vk::FALSE,
+                supported!(alpha_to_one),
+                "alphaToOneEnable",
+            ),
+        ];
+        require_all(&needs)?;
+        let draw = &mut self.draw;
+        draw.samples = count;
+        draw.sample_mask = info.sample_mask;
+        // The device shades either once or every sample, and as many as are asked for is at least.
+        let shaded = (multisample.min_sample_shading * count as f32).ceil();
+        draw.sample_shading = multisample.sample_shading_enable != vk::FALSE && shaded > 1.0;
+        draw.alpha_to_coverage = multisample.alpha_to_coverage_enable != vk::FALSE;
+        draw.alpha_to_one = multisample.alpha_to_one_enable != vk::FALSE;
+        Ok(())
+    }
+
+    fn set_depth_stencil(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
+        let Some(state) = &info.depth_stencil else {
+            return Ok(());
+        };
+        let bounds_test = state.depth_bounds_test_enable != vk::FALSE;
+        require_all(&[(
+            bounds_test,
+            supported!(depth_bounds),
+            "depthBoundsTestEnable",
+        )])?;
+        self.depth_test = state.depth_test_enable != vk::FALSE;
+        self.depth_write = state.depth_write_enable != vk::FALSE;
+        self.depth_bounds_test = bounds_test;
+        self.depth_bounds = (state.min_depth_bounds, state.max_depth_bounds);
+        // What isn't used may hold anything.
+        let may_test = |enabled, state| enabled || info.is_dynamic(state);
+        let tests_depth = may_test(self.depth_test, vk::DynamicState::DEPTH_TEST_ENABLE);
+        if tests_depth && !info.is_dynamic(vk::DynamicState::DEPTH_COMPARE_OP) {
+            self.depth_compare = convert::compare_op(state.depth_compare_op)?;
+        }
+        self.stencil_test = state.stencil_test_enable != vk::FALSE;
+        let tests_stencil = may_test(self.stencil_test, vk::DynamicState::STENCIL_TEST_ENABLE);
+        let static_ops = tests_stencil && !info.is_dynamic(vk::DynamicState::STENCIL_OP);
+        for (face, given) in [state.front, state.back].into_iter().enumerate() {
+            if static_ops {
+                let ops = dynamic_state::stencil_ops(
+                    given.fail_op,
+                    given.pass_op,
+                    given.depth_fail_op,
+                    given.compare_op,
+                )?;
+                self.set(DynamicState::StencilOp(face, ops));
+            }
+            self.set(DynamicState::StencilCompareMask(
+                face,
+                given.compare_mask as u8,
+            ));
+            self.set(DynamicState::StencilWriteMask(face, given.write_mask as u8));
+            self.set(DynamicState::StencilReference(face, given.reference as u8));
+        }
+        Ok(())
+    }
+
+    fn set_blend(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
+        if let Some(op) = info.logic_op {
+            require_all(&[(true, supported!(logic_op), "logicOpEnable")])?;
+            self.draw.logic_op = Some(convert::logic_op(op)?);
+        }
+        self.draw.blend = blend_states(info)?;
+        self.draw.blend_constants = info.blend_constants;
+        Ok(())
+    }
+
+    /// Takes over a setting of the command buffer.
+    pub(crate) fn set(&mut self, setting: DynamicState) {
+        match setting {
+            DynamicState::LineWidth(width) => self.draw.line_width = width,
+            DynamicState::DepthBias(bias) => self.depth_bias = bias,
+            DynamicState::DepthBiasEnable(enable) => self.depth_bias_enable = enable,
+            DynamicState::BlendConstants(constants) => self.draw.blend_constants = constants,
+            DynamicState::DepthBounds(min, max) => self.depth_bounds = (min, max),
+            DynamicState::DepthBoundsTestEnable(enable) => self.depth_bounds_test = enable,
+            DynamicState::DepthTestEnable(enable) => self.depth_test = enable,
+            DynamicState::DepthWriteEnable(enable) => self.depth_write = enable,
+            DynamicState::DepthCompareOp(op) => self.depth_compare = op,
+            DynamicState::StencilTestEnable(enable) => self.stencil_test = enable,
+            DynamicState::StencilOp(face, ops) => {
+                let face = &mut self.stencil[face];
+                face.fail = ops.fail;
+                face.pass = ops.pass;
+                face.depth_fail = ops.depth_fail;
+                face.compare = ops.compare;
+            }
+            DynamicState::StencilCompareMask(face, mask) => self.stencil[face].compare_mask = mask,
+            DynamicState::StencilWriteMask(face, mask) => self.stencil[face].write_mask = mask,
+            DynamicState::StencilReference(face, reference) => {
+                self.stencil[face].reference = reference;
+            }
+            DynamicState::CullMode { front, back } => {
+                self.draw.cull_front = front;
+                self.draw.cull_back = back;
+            }
+            DynamicState::FrontFaceClockwise(clockwise) => self.draw.front_clockwise = clockwise,
+            DynamicState::PrimitiveTopology(topology) => self.draw.topology = topology,
+            DynamicState::PrimitiveRestartEnable(enable) => self.draw.primitive_restart = enable,
+            DynamicState::RasterizerDiscardEnable(enable) => self.draw.rasterizer_discard = enable,
+        }
+    }
+
+    /// Takes over what a command buffer has set of the states that are `dynamic`.
+    ///
+    /// # Errors
+    /// The first that it has not set, though the draw depends on it.
+    pub(crate) fn set_dynamic(
+        &mut self,
+        dynamic: &[vk::DynamicState],
+        settings: &DynamicStates,
+    ) -> Result<(), vk::DynamicState> {
+        let mut missing = Vec::new();
+        for &state in dynamic {
+            let mut any = false;
+            for setting in settings.of(state) {
+                self.set(setting);
+                any = true;
+            }
+            if !any {
+                missing.push(state);
+            }
+        }
+        match missing.into_iter().find(|&state| self.depends_on(state)) {
+            Some(state) => Err(state),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether a draw needs what is dynamic to be set.
+    fn depends_on(&self, state: vk::DynamicState) -> bool {
+        use vk::DynamicState as S;
+        let draw = &self.draw;
+        match state {
+            S::PRIMITIVE_TOPOLOGY | S::PRIMITIVE_RESTART_ENABLE | S::RASTERIZER_DISCARD_ENABLE => {
+                true
+            }
+            _ if draw.rasterizer_discard => false,
+            S::LINE_WIDTH => {
+                draw.polygon_mode == PolygonMode::Line || class(draw.topology) == Class::Lines
+            }
+            S::DEPTH_BIAS => self.depth_bias_enable,
+            S::DEPTH_BOUNDS => self.depth_bounds_test,
+            S::DEPTH_WRITE_ENABLE | S::DEPTH_COMPARE_OP => self.depth_test,
+            S::STENCIL_OP
+            | S::STENCIL_COMPARE_MASK
+            | S::STENCIL_WRITE_MASK
+            | S::STENCIL_REFERENCE => self.stencil_test,
+            S::BLEND_CONSTANTS => draw.logic_op.is_none() && blends_by_constants(draw),
+            _ => true,
+        }
+    }
+
+    /// The state for the device.
+    pub(crate) fn draw_state(&self) -> DrawState {
+        DrawState {
+            depth_bias: self.depth_bias_enable.then_some(self.depth_bias),
+            depth_stencil: DepthStencil {
+                depth: self.depth_test.then_some(DepthTest {
+                    compare: self.depth_compare,
+                    write: self.depth_write,
+                }),
+                bounds: self.depth_bounds_test.then_some(self.depth_bounds),
+                stencil: self.stencil_test.then_some(self.stencil),
+            },
+            ..self.draw.clone()
+        }
+    }
+}
+
+/// Whether an attachment is blended by the constants.
+fn blends_by_constants(state: &DrawState) -> bool {
+    let equations = state.blend.iter().filter_map(|blend| blend.equations);
+    equations
+        .flat_map(|(color, alpha)| {
+            [
+                color.source,
+                color.destination,
+                alpha.source,
+                alpha.destination,
+            ]
+        })
+        .any(|factor| {
+            matches!(
+                factor,
+                BlendFactor::ConstantColor
+                    | BlendFactor::OneMinusConstantColor
+                    | BlendFactor::ConstantAlpha
+                    | BlendFactor::OneMinusConstantAlpha
+            )
+        })
+}
+
+/// What a topology makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Class {
+    /// Points.
+    Points,
+    /// Lines.
+    Lines,
+    /// Triangles.
+    Triangles,
+}
+
+/// A topology's class, which a dynamic topology stays in.
+pub(crate) fn class(topology: Topology) -> Class {
+    match topology {
+        Topology::PointList => Class::Points,
+        Topology::LineList
+        | Topology::LineStrip
+        | Topology::LineListWithAdjacency
+        | Topology::LineStripWithAdjacency => Class::Lines,
+        Topology::TriangleList
+        | Topology::TriangleStrip
+        | Topology::TriangleFan
+        | Topology::TriangleListWithAdjacency
+        | Topology::TriangleStripWithAdjacency => Class::Triangles,
+    }
+}
+
+/// Fails for the first need whose feature the device lacks.
+fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
+    let lacks = |needed: bool, is_supported: bool| needed && !is_supported;
+    match needs
+        .iter()
+        .find(|(needed, (is_supported, _), _)| lacks(*needed, *is_supported))
+    {
+        None => Ok(()),
+        Some((_, (_, feature), what)) => Err(Error::FeatureNotPresent(format!(
+            "{what} (feature {feature})"
+        ))),
+    }
+}
+
+/// For each colour attachment, whether anything comes of its source.
+pub(crate) fn color_effects(info: &GraphicsPipelineInfo, fixed: &FixedFunctionState) -> Vec<bool> {
+    let mut effects: Vec<_> = std::iter::zip(&fixed.draw.blend, &info.color_formats)
+        .map(|(blend, format)| blend.write_mask != 0 && *format != vk::Format::UNDEFINED)
+        .collect();
+    if fixed.draw.alpha_to_coverage {
+        match effects.first_mut() {
+            Some(first) => *first = true,
+            None => effects.push(true),
+        }
+    }
+    effects
+}
