@@ -65,8 +65,8 @@ pub(crate) fn polygon_mode(mode: vk::PolygonMode) -> Result<PolygonMode, Error> 
 /// A comparison.
 ///
 /// # Errors
-/// [`Error::InvalidUsage`] for what is none.
-pub(crate) fn compare_op(op: vk::CompareOp) -> Result<CompareOp, Error> {
+/// [`Error::InvalidUsage`] with the id `vuid` for a value that is none.
+pub(crate) fn compare_op(op: vk::CompareOp, vuid: &'static str) -> Result<CompareOp, Error> {
     match op {
         vk::CompareOp::NEVER => Ok(CompareOp::Never),
         vk::CompareOp::LESS => Ok(CompareOp::Less),
@@ -76,15 +76,15 @@ pub(crate) fn compare_op(op: vk::CompareOp) -> Result<CompareOp, Error> {
         vk::CompareOp::NOT_EQUAL => Ok(CompareOp::NotEqual),
         vk::CompareOp::GREATER_OR_EQUAL => Ok(CompareOp::GreaterOrEqual),
         vk::CompareOp::ALWAYS => Ok(CompareOp::Always),
-        other => Err(unknown("VUID-VkCompareOp-parameter", &other)),
+        other => Err(unknown(vuid, &other)),
     }
 }
 
 /// What becomes of a stencil value.
 ///
 /// # Errors
-/// [`Error::InvalidUsage`] for what is no such operation.
-pub(crate) fn stencil_op(op: vk::StencilOp) -> Result<StencilOp, Error> {
+/// [`Error::InvalidUsage`] with the id `vuid` for a value that is none.
+pub(crate) fn stencil_op(op: vk::StencilOp, vuid: &'static str) -> Result<StencilOp, Error> {
     match op {
         vk::StencilOp::KEEP => Ok(StencilOp::Keep),
         vk::StencilOp::ZERO => Ok(StencilOp::Zero),
@@ -94,7 +94,7 @@ pub(crate) fn stencil_op(op: vk::StencilOp) -> Result<StencilOp, Error> {
         vk::StencilOp::INVERT => Ok(StencilOp::Invert),
         vk::StencilOp::INCREMENT_AND_WRAP => Ok(StencilOp::IncrementAndWrap),
         vk::StencilOp::DECREMENT_AND_WRAP => Ok(StencilOp::DecrementAndWrap),
-        other => Err(unknown("VUID-VkStencilOp-parameter", &other)),
+        other => Err(unknown(vuid, &other)),
     }
 }
 
@@ -141,11 +141,19 @@ pub(crate) fn blend_state(
             state.src_color_blend_factor,
             state.dst_color_blend_factor,
             state.color_blend_op,
+            [
+                "VUID-VkPipelineColorBlendAttachmentState-srcColorBlendFactor-parameter",
+                "VUID-VkPipelineColorBlendAttachmentState-dstColorBlendFactor-parameter",
+            ],
         )?;
         let alpha = equation(
             state.src_alpha_blend_factor,
             state.dst_alpha_blend_factor,
             state.alpha_blend_op,
+            [
+                "VUID-VkPipelineColorBlendAttachmentState-srcAlphaBlendFactor-parameter",
+                "VUID-VkPipelineColorBlendAttachmentState-dstAlphaBlendFactor-parameter",
+            ],
         )?;
         Some((color, alpha))
     };
@@ -159,15 +167,16 @@ fn equation(
     source: vk::BlendFactor,
     destination: vk::BlendFactor,
     op: vk::BlendOp,
+    [source_vuid, destination_vuid]: [&'static str; 2],
 ) -> Result<BlendEquation, Error> {
     Ok(BlendEquation {
-        source: factor(source)?,
-        destination: factor(destination)?,
+        source: factor(source, source_vuid)?,
+        destination: factor(destination, destination_vuid)?,
         op: operation(op)?,
     })
 }
 
-fn factor(factor: vk::BlendFactor) -> Result<BlendFactor, Error> {
+fn factor(factor: vk::BlendFactor, vuid: &'static str) -> Result<BlendFactor, Error> {
     use vk::BlendFactor as F;
     Ok(match factor {
         F::ZERO => BlendFactor::Zero,
@@ -191,7 +200,7 @@ fn factor(factor: vk::BlendFactor) -> Result<BlendFactor, Error> {
         F::ONE_MINUS_SRC1_ALPHA => BlendFactor::OneMinusSrc1Alpha,
         other => {
             return Err(Error::usage(
-                "VUID-VkPipelineColorBlendAttachmentState-parameter",
+                vuid,
                 format!("{other:?} is not a VkBlendFactor"),
             ));
         }

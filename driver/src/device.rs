@@ -207,7 +207,7 @@ fn require_extension(
     match requested.list().into_iter().find(|(_, is_on)| *is_on) {
         None => Ok(()),
         Some((feature, _)) => Err(Error::usage(
-            "VUID-VkDeviceCreateInfo-pNext-extension",
+            "VUID-VkDeviceCreateInfo-pNext-pNext",
             format!("the feature {feature} needs {needed:?}, which is not enabled"),
         )),
     }

@@ -202,13 +202,18 @@ fn result(
 /// Fails unless the pool has the queries.
 ///
 /// # Errors
-/// [`Error::InvalidUsage`].
-pub(crate) fn require_queries(pool: &QueryPool, first: u32, count: u32) -> Result<(), Error> {
+/// [`Error::InvalidUsage`] with the id `vuid`.
+pub(crate) fn require_queries(
+    pool: &QueryPool,
+    first: u32,
+    count: u32,
+    vuid: &'static str,
+) -> Result<(), Error> {
     if pool.has(first, count) {
         return Ok(());
     }
     Err(Error::usage(
-        "VUID-vkCmd-query-queryCount",
+        vuid,
         format!(
             "{count} queries from {first} on of a pool of {}",
             pool.queries.count()
@@ -286,7 +291,12 @@ pub(crate) fn get_query_pool_results(
     stride: vk::DeviceSize,
     flags: QueryResultFlags,
 ) -> Result<vk::Result, Error> {
-    require_queries(query_pool, first_query, query_count)?;
+    require_queries(
+        query_pool,
+        first_query,
+        query_count,
+        "VUID-vkGetQueryPoolResults-firstQuery-00816",
+    )?;
     let mut all_available = true;
     for index in 0..query_count {
         let result = result(query_pool, first_query + index, flags, device.sync())?;

@@ -285,7 +285,7 @@ impl Writer<'_> {
         Ok(Some(format!(
             "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
             unsafe {{
-                record({first}, |recorder| {{
+                record({first}, \"{name}\", |recorder| {{
                     {lists}
                     let info = {ty} {{ {members} ..Default::default() }};
                     {path}(recorder, &info)
@@ -318,7 +318,7 @@ impl Writer<'_> {
             return Ok(if first.ty == "vk :: CommandBuffer" {
                 format!(
                     "// SAFETY: the application follows Vulkan's valid usage: the handle is live.
-                    unsafe {{ record({}, |_| Err({refusal})) }}",
+                    unsafe {{ record({}, \"{name}\", |_| Err({refusal})) }}",
                     first.name
                 )
             } else {
@@ -427,7 +427,10 @@ fn call(
     let call = format!("{}({})", entry_point.path, arguments.join(", "));
     let body = if records {
         is_unsafe = true;
-        format!("record({}, |recorder| {call})", function.parameters[0].name)
+        format!(
+            "record({}, \"{name}\", |recorder| {call})",
+            function.parameters[0].name
+        )
     } else {
         let (body, writes) = write_output(&entry_point.output, function, used, call)
             .ok_or_else(|| wrong(format!("nothing takes a {}", entry_point.output)))?;

@@ -1,6 +1,7 @@
 //! What can go wrong in a command, and the one place where it becomes a `VkResult`.
 
 use ash::vk;
+use std::borrow::Cow;
 
 /// Why a command failed. The message goes to `log` and to the instance's debug messengers; the application receives
 /// [`Error::result`].
@@ -70,8 +71,8 @@ pub(crate) enum Error {
     /// The application breaks a rule of the extension or of Vulkan that the driver must check itself.
     #[error("{message} ({vuid})")]
     InvalidUsage {
-        /// The rule's id, in the style of Vulkan's valid usage ids.
-        vuid: &'static str,
+        /// The rule's id: Vulkan's, the extension's, or the driver's own where those have none.
+        vuid: Cow<'static, str>,
         /// What is wrong, with the values at fault.
         message: String,
     },
@@ -82,9 +83,9 @@ pub(crate) enum Error {
 
 impl Error {
     /// A rule that the application breaks.
-    pub(crate) fn usage(vuid: &'static str, message: impl Into<String>) -> Self {
+    pub(crate) fn usage(vuid: impl Into<Cow<'static, str>>, message: impl Into<String>) -> Self {
         Self::InvalidUsage {
-            vuid,
+            vuid: vuid.into(),
             message: message.into(),
         }
     }
@@ -113,9 +114,10 @@ impl Error {
     }
 
     /// The message id that debug messengers show.
-    pub(crate) fn message_id(&self) -> &'static str {
+    pub(crate) fn message_id(&self) -> &str {
         match self {
-            Self::InvalidUsage { vuid, .. } | Self::FeatureNotEnabled { vuid, .. } => vuid,
+            Self::InvalidUsage { vuid, .. } => vuid,
+            Self::FeatureNotEnabled { vuid, .. } => vuid,
             Self::InvalidHandle { .. } => "GAURAST-invalid-handle",
             Self::NullPointer { .. } => "GAURAST-null-pointer",
             Self::Unsupported { .. } => "GAURAST-unsupported-command",

@@ -8,7 +8,7 @@ use crate::descriptor::set::{self, DescriptorSet, UpdateTemplate};
 use crate::physical_device::limits;
 use crate::pipeline::Pipeline;
 use crate::pipeline::layout::PipelineLayout;
-use crate::resource::buffer::Buffer;
+use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use std::ffi::c_void;
 use std::sync::Arc;
@@ -60,6 +60,18 @@ pub(crate) fn cmd_bind_vertex_buffers2(
     bind_vertex_buffers(recorder, first_binding, buffers, offsets, sizes, strides)
 }
 
+/// The rules on the buffer of `vkCmdBindIndexBuffer`.
+const INDEX_BUFFER: BufferRules = BufferRules {
+    memory: "VUID-vkCmdBindIndexBuffer-buffer-00434",
+    range: "VUID-vkCmdBindIndexBuffer-offset-00431",
+};
+
+/// The rules on the buffers of `vkCmdBindVertexBuffers`, and of its second version.
+const VERTEX_BUFFERS: BufferRules = BufferRules {
+    memory: "VUID-vkCmdBindVertexBuffers-pBuffers-00628",
+    range: "VUID-vkCmdBindVertexBuffers-pOffsets-00626",
+};
+
 #[doc(alias = "vkCmdBindIndexBuffer")]
 pub(crate) fn cmd_bind_index_buffer(
     recorder: &mut Recorder,
@@ -75,7 +87,7 @@ pub(crate) fn cmd_bind_index_buffer(
             return Err(Error::FeatureNotPresent(format!("index type {other:?}")));
         }
     };
-    let range = buffer.range(offset, None)?;
+    let range = buffer.range(offset, None, &INDEX_BUFFER)?;
     recorder.push(Command::BindIndexBuffer(IndexBuffer { range, index_size }));
     Ok(())
 }
@@ -100,7 +112,11 @@ fn bind_vertex_buffers(
     for (index, (buffer, &offset)) in buffers.iter().zip(offsets).enumerate() {
         let size = sizes.get(index).copied().unwrap_or(vk::WHOLE_SIZE);
         bound.push(VertexBuffer {
-            range: buffer.range(offset, (size != vk::WHOLE_SIZE).then_some(size))?,
+            range: buffer.range(
+                offset,
+                (size != vk::WHOLE_SIZE).then_some(size),
+                &VERTEX_BUFFERS,
+            )?,
             stride: strides.get(index).map(|&stride| stride as u32),
         });
     }

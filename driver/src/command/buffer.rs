@@ -149,9 +149,11 @@ impl CommandBuffer {
     /// That of `record`, or [`Error::InvalidUsage`] if the command buffer is not recording.
     pub(crate) fn record(
         &self,
+        command: &'static str,
         record: impl FnOnce(&mut Recorder) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut recorder = self.recorder();
+        recorder.command = command;
         recorder.require_recording()?;
         let recorded = host::catch(|| record(&mut recorder))
             .unwrap_or_else(|memory| Err(Error::OutOfHostMemory(memory.to_string())));
@@ -181,6 +183,8 @@ pub(crate) struct BeginFlags {
 
 /// What a command buffer records into.
 pub(crate) struct Recorder {
+    /// The name of the command that is being recorded.
+    command: &'static str,
     status: Status,
     usage: BeginFlags,
     commands: Vec<Command>,
@@ -212,6 +216,7 @@ impl Recorder {
     /// A command buffer in its initial state.
     pub(crate) fn new() -> Self {
         Self {
+            command: "",
             status: Status::Initial,
             usage: BeginFlags::default(),
             commands: Vec::new(),
@@ -272,7 +277,7 @@ impl Recorder {
             return Ok(());
         }
         Err(Error::usage(
-            "VUID-vkCmd-commandBuffer-recording",
+            self.rule("commandBuffer-recording"),
             format!("the command buffer is {:?}, not recording", self.status),
         ))
     }
@@ -283,6 +288,7 @@ impl Recorder {
     /// The first error met while recording, or [`Error::InvalidUsage`] if it was not recording or a pass has not ended. The
     /// command buffer is invalid then.
     pub(crate) fn end(&mut self) -> Result<(), Error> {
+        self.command = "vkEndCommandBuffer";
         self.require_recording()?;
         self.status = Status::Invalid;
         if let Some(error) = self.error.take() {
@@ -349,6 +355,11 @@ impl Recorder {
         })
     }
 
+    /// The id of a rule of the command that is being recorded.
+    fn rule(&self, rule: &str) -> String {
+        format!("VUID-{}-{rule}", self.command)
+    }
+
     /// Appends a command.
     pub(crate) fn push(&mut self, command: Command) {
         host::push(&mut self.commands, command);
@@ -367,7 +378,7 @@ impl Recorder {
         match self.pass {
             None => Ok(()),
             Some(_) => Err(Error::usage(
-                "VUID-vkCmd-renderpass",
+                self.rule("renderpass"),
                 "the command must not be inside a render pass",
             )),
         }
@@ -384,7 +395,7 @@ impl Recorder {
     fn pass(&self) -> Result<&RenderScope, Error> {
         self.pass.as_ref().ok_or_else(|| {
             Error::usage(
-                "VUID-vkCmd-renderpass",
+                self.rule("renderpass"),
                 "the command must be inside a render pass",
             )
         })
@@ -405,10 +416,11 @@ impl Recorder {
 /// The handle is live.
 pub(crate) unsafe fn record(
     command_buffer: vk::CommandBuffer,
+    command: &'static str,
     record: impl FnOnce(&mut Recorder) -> Result<(), Error>,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
-    unsafe { handle::get(command_buffer)? }.record(record)
+    unsafe { handle::get(command_buffer)? }.record(command, record)
 }
 
 /// The colour formats of the pass that a secondary command buffer continues.
@@ -559,7 +571,7 @@ pub(crate) fn cmd_execute_commands(
             "a secondary command buffer executes others",
         ));
     }
-    command_buffer.record(|recorder| {
+    command_buffer.record("vkCmdExecuteCommands", |recorder| {
         let mut contents = host::with_capacity(command_buffers.len());
         for secondary in command_buffers {
             if !secondary.is_secondary() {
@@ -652,7 +664,7 @@ mod tests {
             recorder: Mutex::new(Recorder::new()),
         };
         buffer.recorder().begin(Default::default()).unwrap();
-        let record = || buffer.record(|_| panic!("in a test"));
+        let record = || buffer.record("vkCmdDraw", |_| panic!("in a test"));
         assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(record)).is_err());
         assert!(matches!(buffer.end(), Err(Error::Panic(_))));
         buffer.recorder().begin(Default::default()).unwrap();

@@ -124,7 +124,7 @@ fn validate(camera: &GaussianCameraGAURAST, model: CameraModel) -> Result<(), Er
     ];
     match rules.iter().find(|(holds, ..)| !holds) {
         None => Ok(()),
-        Some((_, vuid, rule)) => Err(Error::usage(vuid, format!("{rule}; the camera is {c:?}"))),
+        Some((_, vuid, rule)) => Err(Error::usage(*vuid, format!("{rule}; the camera is {c:?}"))),
     }
 }
 

@@ -3,9 +3,27 @@
 use super::buffer::Recorder;
 use super::{Command, Draw, DrawIndirect};
 use crate::abi::error::Error;
-use crate::resource::buffer::Buffer;
+use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use std::sync::Arc;
+
+/// The rules on the parameters of `vkCmdDrawIndirect` and the commands like it.
+const DRAW_INDIRECT: BufferRules = BufferRules {
+    memory: "VUID-vkCmdDrawIndirect-buffer-02708",
+    range: "VUID-vkCmdDrawIndirect-drawCount-00488",
+};
+
+/// The rules on the count of `vkCmdDrawIndirectCount` and the commands like it.
+const DRAW_COUNT: BufferRules = BufferRules {
+    memory: "VUID-vkCmdDrawIndirectCount-countBuffer-02714",
+    range: "VUID-vkCmdDrawIndirectCount-countBufferOffset-04129",
+};
+
+/// The rules on the parameters of `vkCmdDispatchIndirect`.
+const DISPATCH_INDIRECT: BufferRules = BufferRules {
+    memory: "VUID-vkCmdDispatchIndirect-buffer-02708",
+    range: "VUID-vkCmdDispatchIndirect-offset-00407",
+};
 
 #[doc(alias = "vkCmdDraw")]
 pub(crate) fn cmd_draw(
@@ -152,7 +170,7 @@ pub(crate) fn cmd_dispatch_indirect(
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
     let size = size_of::<vk::DispatchIndirectCommand>() as u64;
-    let range = buffer.range(offset, Some(size))?;
+    let range = buffer.range(offset, Some(size), &DISPATCH_INDIRECT)?;
     recorder.push(Command::DispatchIndirect(range));
     Ok(())
 }
@@ -177,9 +195,9 @@ fn draw_indirect(
     indexed: bool,
 ) -> Result<(), Error> {
     recorder.require_pass()?;
-    let parameters = buffer.range(offset, None)?;
+    let parameters = buffer.range(offset, None, &DRAW_INDIRECT)?;
     let count = match count {
-        Some((buffer, offset)) => Some(buffer.range(offset, Some(4))?),
+        Some((buffer, offset)) => Some(buffer.range(offset, Some(4), &DRAW_COUNT)?),
         None => None,
     };
     recorder.push(Command::DrawIndirect(DrawIndirect {

@@ -5,7 +5,7 @@ use super::buffer::Recorder;
 use crate::abi::error::Error;
 use crate::convert;
 use crate::physical_device::limits;
-use crate::pipeline::dynamic_state::{self, DynamicState, Face, faces};
+use crate::pipeline::dynamic_state::{self, DynamicState, Face, StencilOpIds, StencilOps, faces};
 use ash::vk;
 use gaurast::vk::PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
 use simdevice::packet::draw::DepthBias;
@@ -167,6 +167,14 @@ pub(crate) fn cmd_set_stencil_reference(
     })
 }
 
+/// The ids of the rules on the operations of `vkCmdSetStencilOp`.
+const STENCIL_OP: StencilOpIds = StencilOpIds {
+    fail: "VUID-vkCmdSetStencilOp-failOp-parameter",
+    pass: "VUID-vkCmdSetStencilOp-passOp-parameter",
+    depth_fail: "VUID-vkCmdSetStencilOp-depthFailOp-parameter",
+    compare: "VUID-vkCmdSetStencilOp-compareOp-parameter",
+};
+
 #[doc(alias = "vkCmdSetStencilOp")]
 pub(crate) fn cmd_set_stencil_op(
     recorder: &mut Recorder,
@@ -176,7 +184,7 @@ pub(crate) fn cmd_set_stencil_op(
     depth_fail_op: vk::StencilOp,
     compare_op: vk::CompareOp,
 ) -> Result<(), Error> {
-    let ops = dynamic_state::stencil_ops(fail_op, pass_op, depth_fail_op, compare_op)?;
+    let ops = StencilOps::from_vk(fail_op, pass_op, depth_fail_op, compare_op, &STENCIL_OP)?;
     set_faces(recorder, face_mask, |face| {
         DynamicState::StencilOp(face, ops)
     })
@@ -216,7 +224,10 @@ pub(crate) fn cmd_set_depth_compare_op(
     recorder: &mut Recorder,
     depth_compare_op: vk::CompareOp,
 ) -> Result<(), Error> {
-    let op = convert::compare_op(depth_compare_op)?;
+    let op = convert::compare_op(
+        depth_compare_op,
+        "VUID-vkCmdSetDepthCompareOp-depthCompareOp-parameter",
+    )?;
     set(recorder, DynamicState::DepthCompareOp(op))
 }
 

@@ -4,7 +4,7 @@ use super::buffer::Recorder;
 use super::{Command, CopyQueryResults};
 use crate::abi::error::Error;
 use crate::query_pool::{QueryPool, require_queries};
-use crate::resource::buffer::Buffer;
+use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
 use simdevice::Packet;
 use simdevice::packet::BufferRange;
@@ -16,7 +16,7 @@ pub(crate) fn cmd_begin_query(
     query_pool: &Arc<QueryPool>,
     query: u32,
 ) -> Result<(), Error> {
-    require_queries(query_pool, query, 1)?;
+    require_queries(query_pool, query, 1, "VUID-vkCmdBeginQuery-query-00802")?;
     recorder.packet(Packet::BeginQuery {
         pool: Arc::clone(&query_pool.queries),
         index: query,
@@ -30,7 +30,7 @@ pub(crate) fn cmd_end_query(
     query_pool: &Arc<QueryPool>,
     query: u32,
 ) -> Result<(), Error> {
-    require_queries(query_pool, query, 1)?;
+    require_queries(query_pool, query, 1, "VUID-vkCmdEndQuery-query-00810")?;
     recorder.packet(Packet::EndQuery {
         pool: Arc::clone(&query_pool.queries),
         index: query,
@@ -46,7 +46,12 @@ pub(crate) fn cmd_reset_query_pool(
     query_count: u32,
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    require_queries(query_pool, first_query, query_count)?;
+    require_queries(
+        query_pool,
+        first_query,
+        query_count,
+        "VUID-vkCmdResetQueryPool-firstQuery-00797",
+    )?;
     recorder.packet(Packet::ResetQueries {
         pool: Arc::clone(&query_pool.queries),
         first: first_query,
@@ -62,7 +67,7 @@ pub(crate) fn cmd_write_timestamp(
     query_pool: &QueryPool,
     query: u32,
 ) -> Result<(), Error> {
-    require_queries(query_pool, query, 1)?;
+    require_queries(query_pool, query, 1, "VUID-vkCmdWriteTimestamp-query-04904")?;
     recorder.packet(Packet::WriteTimestamp {
         pool: Arc::clone(&query_pool.queries),
         index: query,
@@ -83,17 +88,28 @@ pub(crate) fn cmd_copy_query_pool_results(
     flags: vk::QueryResultFlags,
 ) -> Result<(), Error> {
     recorder.require_outside_pass()?;
-    require_queries(query_pool, first_query, query_count)?;
+    require_queries(
+        query_pool,
+        first_query,
+        query_count,
+        "VUID-vkCmdCopyQueryPoolResults-firstQuery-00821",
+    )?;
     recorder.push(Command::CopyQueryResults(CopyQueryResults {
         pool: Arc::clone(query_pool),
         first: first_query,
         count: query_count,
-        target: dst_buffer.range(dst_offset, None)?,
+        target: dst_buffer.range(dst_offset, None, &TARGET)?,
         stride,
         flags,
     }));
     Ok(())
 }
+
+/// The rules on the target of `vkCmdCopyQueryPoolResults`.
+const TARGET: BufferRules = BufferRules {
+    memory: "VUID-vkCmdCopyQueryPoolResults-dstBuffer-00826",
+    range: "VUID-vkCmdCopyQueryPoolResults-dstOffset-00819",
+};
 
 /// The packets of `vkCmdCopyQueryPoolResults`, as the queries are now. What lies outside the buffer is not written.
 pub(crate) fn copy_packets(copy: &CopyQueryResults) -> Vec<Packet> {

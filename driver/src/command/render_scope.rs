@@ -18,11 +18,20 @@ use std::sync::Arc;
 /// Checks that a view can be an attachment of `layers` layers for an aspect.
 fn check_attachment(view: &ImageView, aspect: Aspect, layers: u32) -> Result<(), Error> {
     let view = &view.view;
-    if view.format.aspects().contains(&aspect) && layers <= view.layer_count {
+    let vuid = if layers > view.layer_count {
+        // Of dynamic rendering, Vulkan has no rule of its own with an id.
+        "VUID-VkFramebufferCreateInfo-flags-04535"
+    } else if view.format.aspects().contains(&aspect) {
         return Ok(());
-    }
+    } else {
+        match aspect {
+            Aspect::Color => "VUID-VkRenderingInfo-colorAttachmentCount-06087",
+            Aspect::Depth => "VUID-VkRenderingInfo-pDepthAttachment-06547",
+            Aspect::Stencil => "VUID-VkRenderingInfo-pStencilAttachment-06548",
+        }
+    };
     Err(Error::usage(
-        "VUID-vkCmdBeginRendering-attachment",
+        vuid,
         format!(
             "a view of format {:?} with {} layers is the {aspect:?} attachment of a pass with {layers} layers",
             view.format, view.layer_count

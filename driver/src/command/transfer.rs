@@ -6,7 +6,7 @@ use crate::abi::error::Error;
 use crate::abi::handle;
 use crate::abi::valid;
 use crate::convert;
-use crate::resource::buffer::Buffer;
+use crate::resource::buffer::{Buffer, BufferRules};
 use crate::resource::image::{Image, count};
 use ash::vk;
 use simdevice::format::Numeric;
@@ -125,7 +125,10 @@ pub(crate) unsafe fn cmd_copy_buffer_to_image2(
     };
     recorder.require_outside_pass()?;
     recorder.packet(Packet::CopyBufferToImage(copy_buffer_image(
-        buffer, image, regions,
+        buffer,
+        image,
+        regions,
+        (&COPY_TO_IMAGE_BUFFER, &COPY_TO_IMAGE),
     )?));
     Ok(())
 }
@@ -148,7 +151,10 @@ pub(crate) unsafe fn cmd_copy_image_to_buffer2(
     };
     recorder.require_outside_pass()?;
     recorder.packet(Packet::CopyImageToBuffer(copy_buffer_image(
-        buffer, image, regions,
+        buffer,
+        image,
+        regions,
+        (&COPY_FROM_IMAGE_BUFFER, &COPY_FROM_IMAGE),
     )?));
     Ok(())
 }
@@ -259,6 +265,134 @@ pub(crate) fn cmd_clear_attachments(
     Ok(())
 }
 
+/// The ids of the rules that a use of an image may break.
+struct ImageRules {
+    /// The image must be bound to memory.
+    memory: &'static str,
+    /// The image must have the aspects that are named.
+    aspect: &'static str,
+    /// The image must have the mip levels that are named.
+    level: &'static str,
+    /// The image must have the array layers that are named.
+    layers: &'static str,
+}
+
+/// The rules on the source of `vkCmdCopyBuffer`.
+const COPY_BUFFER_SOURCE: BufferRules = BufferRules {
+    memory: "VUID-vkCmdCopyBuffer-srcBuffer-00119",
+    range: "VUID-vkCmdCopyBuffer-size-00115",
+};
+
+/// The rules on the target of `vkCmdCopyBuffer`.
+const COPY_BUFFER_TARGET: BufferRules = BufferRules {
+    memory: "VUID-vkCmdCopyBuffer-dstBuffer-00121",
+    range: "VUID-vkCmdCopyBuffer-size-00116",
+};
+
+/// The rules on the target of `vkCmdFillBuffer`.
+const FILL_TARGET: BufferRules = BufferRules {
+    memory: "VUID-vkCmdFillBuffer-dstBuffer-00031",
+    range: "VUID-vkCmdFillBuffer-size-00027",
+};
+
+/// The rules on the target of `vkCmdUpdateBuffer`.
+const UPDATE_TARGET: BufferRules = BufferRules {
+    memory: "VUID-vkCmdUpdateBuffer-dstBuffer-00035",
+    range: "VUID-vkCmdUpdateBuffer-dataSize-00033",
+};
+
+/// The rules on the buffer of `vkCmdCopyBufferToImage`.
+const COPY_TO_IMAGE_BUFFER: BufferRules = BufferRules {
+    memory: "VUID-vkCmdCopyBufferToImage-srcBuffer-00176",
+    range: "VUID-vkCmdCopyBufferToImage-pRegions-00171",
+};
+
+/// The rules on the buffer of `vkCmdCopyImageToBuffer`.
+const COPY_FROM_IMAGE_BUFFER: BufferRules = BufferRules {
+    memory: "VUID-vkCmdCopyImageToBuffer-dstBuffer-00192",
+    range: "VUID-vkCmdCopyImageToBuffer-pRegions-00183",
+};
+
+/// The rules on the image of `vkCmdCopyBufferToImage`.
+const COPY_TO_IMAGE: ImageRules = ImageRules {
+    memory: "VUID-vkCmdCopyBufferToImage-dstImage-00178",
+    aspect: "VUID-vkCmdCopyBufferToImage-aspectMask-00211",
+    level: "VUID-vkCmdCopyBufferToImage-imageSubresource-01701",
+    layers: "VUID-vkCmdCopyBufferToImage-imageSubresource-01702",
+};
+
+/// The rules on the image of `vkCmdCopyImageToBuffer`.
+const COPY_FROM_IMAGE: ImageRules = ImageRules {
+    memory: "VUID-vkCmdCopyImageToBuffer-srcImage-00187",
+    aspect: "VUID-vkCmdCopyImageToBuffer-aspectMask-00211",
+    level: "VUID-vkCmdCopyImageToBuffer-imageSubresource-01703",
+    layers: "VUID-vkCmdCopyImageToBuffer-imageSubresource-01704",
+};
+
+/// The rules on the source of `vkCmdCopyImage`.
+const COPY_SOURCE: ImageRules = ImageRules {
+    memory: "VUID-vkCmdCopyImage-srcImage-01546",
+    aspect: "VUID-vkCmdCopyImage-aspectMask-00142",
+    level: "VUID-vkCmdCopyImage-srcSubresource-01696",
+    layers: "VUID-vkCmdCopyImage-srcSubresource-01698",
+};
+
+/// The rules on the target of `vkCmdCopyImage`.
+const COPY_TARGET: ImageRules = ImageRules {
+    memory: "VUID-vkCmdCopyImage-dstImage-01547",
+    aspect: "VUID-vkCmdCopyImage-aspectMask-00143",
+    level: "VUID-vkCmdCopyImage-dstSubresource-01697",
+    layers: "VUID-vkCmdCopyImage-dstSubresource-01699",
+};
+
+/// The rules on the source of `vkCmdBlitImage`.
+const BLIT_SOURCE: ImageRules = ImageRules {
+    memory: "VUID-vkCmdBlitImage-srcImage-00220",
+    aspect: "VUID-vkCmdBlitImage-aspectMask-00241",
+    level: "VUID-vkCmdBlitImage-srcSubresource-01705",
+    layers: "VUID-vkCmdBlitImage-srcSubresource-01707",
+};
+
+/// The rules on the target of `vkCmdBlitImage`.
+const BLIT_TARGET: ImageRules = ImageRules {
+    memory: "VUID-vkCmdBlitImage-dstImage-00225",
+    aspect: "VUID-vkCmdBlitImage-aspectMask-00242",
+    level: "VUID-vkCmdBlitImage-dstSubresource-01706",
+    layers: "VUID-vkCmdBlitImage-dstSubresource-01708",
+};
+
+/// The rules on the source of `vkCmdResolveImage`.
+const RESOLVE_SOURCE: ImageRules = ImageRules {
+    memory: "VUID-vkCmdResolveImage-srcImage-00256",
+    aspect: "VUID-VkImageResolve-aspectMask-00266",
+    level: "VUID-vkCmdResolveImage-srcSubresource-01709",
+    layers: "VUID-vkCmdResolveImage-srcSubresource-01711",
+};
+
+/// The rules on the target of `vkCmdResolveImage`.
+const RESOLVE_TARGET: ImageRules = ImageRules {
+    memory: "VUID-vkCmdResolveImage-dstImage-00258",
+    aspect: "VUID-VkImageResolve-aspectMask-00266",
+    level: "VUID-vkCmdResolveImage-dstSubresource-01710",
+    layers: "VUID-vkCmdResolveImage-dstSubresource-01712",
+};
+
+/// The rules on the image of `vkCmdClearColorImage`.
+const CLEAR_COLOR: ImageRules = ImageRules {
+    memory: "VUID-vkCmdClearColorImage-image-00003",
+    aspect: "VUID-vkCmdClearColorImage-aspectMask-02498",
+    level: "VUID-vkCmdClearColorImage-pRanges-01692",
+    layers: "VUID-vkCmdClearColorImage-pRanges-01693",
+};
+
+/// The rules on the image of `vkCmdClearDepthStencilImage`.
+const CLEAR_DEPTH_STENCIL: ImageRules = ImageRules {
+    memory: "VUID-vkCmdClearDepthStencilImage-image-00010",
+    aspect: "VUID-vkCmdClearDepthStencilImage-aspectMask-02824",
+    level: "VUID-vkCmdClearDepthStencilImage-pRanges-01694",
+    layers: "VUID-vkCmdClearDepthStencilImage-pRanges-01695",
+};
+
 /// `vkCmdCopyBuffer`.
 ///
 /// # Errors
@@ -269,12 +403,12 @@ fn copy_buffer(
     regions: &[vk::BufferCopy2],
 ) -> Result<Packet, Error> {
     for region in regions {
-        source.range(region.src_offset, Some(region.size))?;
-        target.range(region.dst_offset, Some(region.size))?;
+        source.range(region.src_offset, Some(region.size), &COPY_BUFFER_SOURCE)?;
+        target.range(region.dst_offset, Some(region.size), &COPY_BUFFER_TARGET)?;
     }
     Ok(Packet::CopyBuffer(CopyBuffer {
-        source: source.whole()?,
-        target: target.whole()?,
+        source: source.whole(&COPY_BUFFER_SOURCE)?,
+        target: target.whole(&COPY_BUFFER_TARGET)?,
         regions: regions
             .iter()
             .map(|region| BufferCopyRegion {
@@ -294,6 +428,7 @@ fn copy_buffer_image(
     buffer: &Buffer,
     image: &Image,
     regions: &[vk::BufferImageCopy2],
+    (buffer_rules, image_rules): (&BufferRules, &ImageRules),
 ) -> Result<CopyBufferImage, Error> {
     let side = image.desc.format.block_side();
     let region = |region: &vk::BufferImageCopy2| {
@@ -301,14 +436,19 @@ fn copy_buffer_image(
             buffer_offset: region.buffer_offset,
             buffer_row_length: region.buffer_row_length.div_ceil(side),
             buffer_image_height: region.buffer_image_height.div_ceil(side),
-            subresource: layers(image, &region.image_subresource)?,
+            subresource: layers(
+                image,
+                &region.image_subresource,
+                image_rules,
+                "VUID-VkBufferImageCopy-aspectMask-00212",
+            )?,
             image_offset: block_offset(image, region.image_offset),
             image_extent: block_extent(image, region.image_extent),
         })
     };
     Ok(CopyBufferImage {
-        buffer: buffer.whole()?,
-        image: Arc::clone(image.bound()?),
+        buffer: buffer.whole(buffer_rules)?,
+        image: Arc::clone(image.bound(image_rules.memory)?),
         regions: regions.iter().map(region).collect::<Result<_, Error>>()?,
     })
 }
@@ -329,8 +469,8 @@ fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Res
     let mut converted = simdevice::host::with_capacity(regions.len());
     for region in regions {
         let pairs = layer_pairs(
-            (source, &region.src_subresource),
-            (target, &region.dst_subresource),
+            (source, &region.src_subresource, &COPY_SOURCE),
+            (target, &region.dst_subresource, &COPY_TARGET),
         )?;
         converted.extend(pairs.into_iter().map(|(source, target)| ImageCopyRegion {
             source,
@@ -341,8 +481,8 @@ fn copy_image(source: &Image, target: &Image, regions: &[vk::ImageCopy2]) -> Res
         }));
     }
     Ok(Packet::CopyImage(CopyImage {
-        source: Arc::clone(source.bound()?),
-        target: Arc::clone(target.bound()?),
+        source: Arc::clone(source.bound(COPY_SOURCE.memory)?),
+        target: Arc::clone(target.bound(COPY_TARGET.memory)?),
         regions: converted,
     }))
 }
@@ -371,8 +511,8 @@ fn blit_image(
     let mut converted = simdevice::host::with_capacity(regions.len());
     for region in regions {
         let pairs = layer_pairs(
-            (source, &region.src_subresource),
-            (target, &region.dst_subresource),
+            (source, &region.src_subresource, &BLIT_SOURCE),
+            (target, &region.dst_subresource, &BLIT_TARGET),
         )?;
         converted.extend(pairs.into_iter().map(|(source, target)| ImageBlitRegion {
             source,
@@ -382,8 +522,8 @@ fn blit_image(
         }));
     }
     Ok(Packet::BlitImage(BlitImage {
-        source: Arc::clone(source.bound()?),
-        target: Arc::clone(target.bound()?),
+        source: Arc::clone(source.bound(BLIT_SOURCE.memory)?),
+        target: Arc::clone(target.bound(BLIT_TARGET.memory)?),
         filter: convert::filter(filter)?,
         regions: converted,
     }))
@@ -409,16 +549,26 @@ fn resolve_image(
     }
     let region = |region: &vk::ImageResolve2| {
         Ok(ImageCopyRegion {
-            source: layers(source, &region.src_subresource)?,
+            source: layers(
+                source,
+                &region.src_subresource,
+                &RESOLVE_SOURCE,
+                RESOLVE_SOURCE.aspect,
+            )?,
             source_offset: convert::offset(region.src_offset),
-            target: layers(target, &region.dst_subresource)?,
+            target: layers(
+                target,
+                &region.dst_subresource,
+                &RESOLVE_TARGET,
+                RESOLVE_TARGET.aspect,
+            )?,
             target_offset: convert::offset(region.dst_offset),
             extent: convert::extent(region.extent),
         })
     };
     Ok(Packet::ResolveImage(ResolveImage {
-        source: Arc::clone(source.bound()?),
-        target: Arc::clone(target.bound()?),
+        source: Arc::clone(source.bound(RESOLVE_SOURCE.memory)?),
+        target: Arc::clone(target.bound(RESOLVE_TARGET.memory)?),
         mode: ResolveMode::Average,
         regions: regions.iter().map(region).collect::<Result<_, Error>>()?,
     }))
@@ -456,7 +606,7 @@ fn fill_buffer(
     size: Option<u64>,
     word: u32,
 ) -> Result<Packet, Error> {
-    let range = target.range(offset, size)?;
+    let range = target.range(offset, size, &FILL_TARGET)?;
     let whole_words = BufferRange {
         size: range.size / 4 * 4,
         ..range
@@ -479,7 +629,7 @@ fn fill_buffer(
 /// [`Error::InvalidUsage`] if the buffer is not bound or the range is outside.
 fn update_buffer(target: &Buffer, offset: u64, data: &[u8]) -> Result<Packet, Error> {
     Ok(Packet::UpdateBuffer {
-        target: target.range(offset, Some(data.len() as u64))?,
+        target: target.range(offset, Some(data.len() as u64), &UPDATE_TARGET)?,
         data: data.into(),
     })
 }
@@ -497,6 +647,7 @@ fn clear_color_image(
         image,
         convert::clear_color(image.desc.format, value),
         ranges,
+        &CLEAR_COLOR,
     )
 }
 
@@ -509,22 +660,28 @@ fn clear_depth_stencil_image(
     value: vk::ClearDepthStencilValue,
     ranges: &[vk::ImageSubresourceRange],
 ) -> Result<Packet, Error> {
-    clear_image(image, convert::clear_depth_stencil(value), ranges)
+    clear_image(
+        image,
+        convert::clear_depth_stencil(value),
+        ranges,
+        &CLEAR_DEPTH_STENCIL,
+    )
 }
 
 fn clear_image(
     image: &Image,
     value: ClearValue,
     ranges: &[vk::ImageSubresourceRange],
+    rules: &ImageRules,
 ) -> Result<Packet, Error> {
     let mut converted = simdevice::host::with_capacity(ranges.len());
     for range in ranges {
-        for aspect in aspects(image, range.aspect_mask)? {
-            converted.push(subresource_range(image, aspect, range)?);
+        for aspect in aspects(image, range.aspect_mask, rules)? {
+            converted.push(subresource_range(image, aspect, range, rules)?);
         }
     }
     Ok(Packet::ClearImage(ClearImage {
-        image: Arc::clone(image.bound()?),
+        image: Arc::clone(image.bound(rules.memory)?),
         value,
         ranges: converted,
     }))
@@ -534,6 +691,7 @@ fn subresource_range(
     image: &Image,
     aspect: Aspect,
     range: &vk::ImageSubresourceRange,
+    rules: &ImageRules,
 ) -> Result<SubresourceRange, Error> {
     let desc = &image.desc;
     let levels = count(
@@ -556,24 +714,33 @@ fn subresource_range(
             base_layer: range.base_array_layer,
             layer_count,
         }),
-        _ => Err(no_subresource(range)),
+        (None, _) => Err(no_subresource(rules.level, range)),
+        _ => Err(no_subresource(rules.layers, range)),
     }
 }
 
-/// The subresources of a copy that names exactly one aspect.
-fn layers(image: &Image, layers: &vk::ImageSubresourceLayers) -> Result<SubresourceLayers, Error> {
-    match *aspect_layers(image, layers)?.as_slice() {
+/// The subresources of a copy that names exactly one aspect; the id `single` is that of the rule that it does.
+fn layers(
+    image: &Image,
+    layers: &vk::ImageSubresourceLayers,
+    rules: &ImageRules,
+    single: &'static str,
+) -> Result<SubresourceLayers, Error> {
+    match *aspect_layers(image, layers, rules)?.as_slice() {
         [layers] => Ok(layers),
-        _ => Err(no_subresource(layers)),
+        _ => Err(no_subresource(single, layers)),
     }
 }
 
 /// The subresources on both sides of a copy, aspect by aspect.
 fn layer_pairs(
-    (source, from): (&Image, &vk::ImageSubresourceLayers),
-    (target, to): (&Image, &vk::ImageSubresourceLayers),
+    (source, from, source_rules): (&Image, &vk::ImageSubresourceLayers, &ImageRules),
+    (target, to, target_rules): (&Image, &vk::ImageSubresourceLayers, &ImageRules),
 ) -> Result<Vec<(SubresourceLayers, SubresourceLayers)>, Error> {
-    let (sources, targets) = (aspect_layers(source, from)?, aspect_layers(target, to)?);
+    let (sources, targets) = (
+        aspect_layers(source, from, source_rules)?,
+        aspect_layers(target, to, target_rules)?,
+    );
     if sources.len() != targets.len() {
         return Err(Error::usage(
             "VUID-vkCmdCopyImage-srcImage-01551",
@@ -587,6 +754,7 @@ fn layer_pairs(
 fn aspect_layers(
     image: &Image,
     layers: &vk::ImageSubresourceLayers,
+    rules: &ImageRules,
 ) -> Result<Vec<SubresourceLayers>, Error> {
     let layer_count = count(
         layers.base_array_layer,
@@ -594,10 +762,11 @@ fn aspect_layers(
         vk::REMAINING_ARRAY_LAYERS,
         image.desc.array_layers,
     );
-    let Some(layer_count) = layer_count.filter(|_| layers.mip_level < image.desc.mip_levels) else {
-        return Err(no_subresource(layers));
-    };
-    let aspects = aspects(image, layers.aspect_mask)?.into_iter();
+    if layers.mip_level >= image.desc.mip_levels {
+        return Err(no_subresource(rules.level, layers));
+    }
+    let layer_count = layer_count.ok_or_else(|| no_subresource(rules.layers, layers))?;
+    let aspects = aspects(image, layers.aspect_mask, rules)?.into_iter();
     Ok(aspects
         .map(|aspect| SubresourceLayers {
             aspect,
@@ -609,13 +778,17 @@ fn aspect_layers(
 }
 
 /// The aspects of a mask, all of which the image has.
-fn aspects(image: &Image, mask: vk::ImageAspectFlags) -> Result<Vec<Aspect>, Error> {
-    convert::aspects(image.desc.format, mask).ok_or_else(|| no_subresource(&mask))
+fn aspects(
+    image: &Image,
+    mask: vk::ImageAspectFlags,
+    rules: &ImageRules,
+) -> Result<Vec<Aspect>, Error> {
+    convert::aspects(image.desc.format, mask).ok_or_else(|| no_subresource(rules.aspect, &mask))
 }
 
-fn no_subresource(what: &dyn std::fmt::Debug) -> Error {
+fn no_subresource(vuid: &'static str, what: &dyn std::fmt::Debug) -> Error {
     Error::usage(
-        "VUID-vkCmd-image-subresource",
+        vuid,
         format!("an image does not have the subresource {what:?} that a command names"),
     )
 }

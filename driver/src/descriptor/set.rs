@@ -5,7 +5,7 @@ use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid;
 use crate::device::Device;
-use crate::resource::buffer::BufferView;
+use crate::resource::buffer::{BufferRules, BufferView};
 use crate::resource::image::ImageView;
 use crate::resource::sampler::Sampler;
 use ash::vk;
@@ -408,6 +408,12 @@ unsafe fn image(
     }
 }
 
+/// The rules on the buffer of a descriptor.
+const DESCRIBED: BufferRules = BufferRules {
+    memory: "VUID-VkWriteDescriptorSet-descriptorType-00329",
+    range: "VUID-VkDescriptorBufferInfo-offset-00340",
+};
+
 /// # Safety
 /// The buffer is live.
 unsafe fn buffer(info: &vk::DescriptorBufferInfo) -> Result<Descriptor, Error> {
@@ -416,7 +422,7 @@ unsafe fn buffer(info: &vk::DescriptorBufferInfo) -> Result<Descriptor, Error> {
         return Ok(Descriptor::Empty);
     };
     Ok(Descriptor::Buffer(BufferDescriptor {
-        rest: buffer.range(info.offset, None)?,
+        rest: buffer.range(info.offset, None, &DESCRIBED)?,
         size: (info.range != vk::WHOLE_SIZE).then_some(info.range),
     }))
 }

@@ -1326,7 +1326,7 @@ unsafe extern "system" fn vkCmdCopyBuffer(
     guard(command_buffer, "vkCmdCopyBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyBuffer", |recorder| {
                 let regions =
                     valid::slice(p_regions, region_count)?
                         .iter()
@@ -1363,7 +1363,7 @@ unsafe extern "system" fn vkCmdCopyImage(
     guard(command_buffer, "vkCmdCopyImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyImage", |recorder| {
                 let regions =
                     valid::slice(p_regions, region_count)?
                         .iter()
@@ -1403,7 +1403,7 @@ unsafe extern "system" fn vkCmdCopyBufferToImage(
     guard(command_buffer, "vkCmdCopyBufferToImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyBufferToImage", |recorder| {
                 let regions =
                     valid::slice(p_regions, region_count)?
                         .iter()
@@ -1443,7 +1443,7 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer(
     guard(command_buffer, "vkCmdCopyImageToBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyImageToBuffer", |recorder| {
                 let regions =
                     valid::slice(p_regions, region_count)?
                         .iter()
@@ -1482,7 +1482,7 @@ unsafe extern "system" fn vkCmdUpdateBuffer(
     guard(command_buffer, "vkCmdUpdateBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdUpdateBuffer", |recorder| {
                 crate::command::transfer::cmd_update_buffer(
                     recorder,
                     handle::get(dst_buffer)?,
@@ -1505,7 +1505,7 @@ unsafe extern "system" fn vkCmdFillBuffer(
     guard(command_buffer, "vkCmdFillBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdFillBuffer", |recorder| {
                 crate::command::transfer::cmd_fill_buffer(
                     recorder,
                     handle::get(dst_buffer)?,
@@ -1533,7 +1533,7 @@ unsafe extern "system" fn vkCmdPipelineBarrier(
     guard(command_buffer, "vkCmdPipelineBarrier", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdPipelineBarrier", |recorder| {
                 crate::command::sync::cmd_pipeline_barrier(recorder)
             })
         }
@@ -1549,7 +1549,7 @@ unsafe extern "system" fn vkCmdBeginQuery(
     guard(command_buffer, "vkCmdBeginQuery", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBeginQuery", |recorder| {
                 crate::command::query::cmd_begin_query(recorder, handle::get(query_pool)?, query)
             })
         }
@@ -1564,7 +1564,7 @@ unsafe extern "system" fn vkCmdEndQuery(
     guard(command_buffer, "vkCmdEndQuery", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdEndQuery", |recorder| {
                 crate::command::query::cmd_end_query(recorder, handle::get(query_pool)?, query)
             })
         }
@@ -1580,7 +1580,7 @@ unsafe extern "system" fn vkCmdResetQueryPool(
     guard(command_buffer, "vkCmdResetQueryPool", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdResetQueryPool", |recorder| {
                 crate::command::query::cmd_reset_query_pool(
                     recorder,
                     handle::get(query_pool)?,
@@ -1601,7 +1601,7 @@ unsafe extern "system" fn vkCmdWriteTimestamp(
     guard(command_buffer, "vkCmdWriteTimestamp", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdWriteTimestamp", |recorder| {
                 crate::command::query::cmd_write_timestamp(
                     recorder,
                     handle::get(query_pool)?,
@@ -1625,7 +1625,7 @@ unsafe extern "system" fn vkCmdCopyQueryPoolResults(
     guard(command_buffer, "vkCmdCopyQueryPoolResults", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyQueryPoolResults", |recorder| {
                 crate::command::query::cmd_copy_query_pool_results(
                     recorder,
                     handle::get(query_pool)?,
@@ -2064,7 +2064,7 @@ unsafe extern "system" fn vkCmdBindPipeline(
     guard(command_buffer, "vkCmdBindPipeline", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBindPipeline", |recorder| {
                 crate::command::bind::cmd_bind_pipeline(
                     recorder,
                     pipeline_bind_point,
@@ -2088,7 +2088,7 @@ unsafe extern "system" fn vkCmdBindDescriptorSets(
     guard(command_buffer, "vkCmdBindDescriptorSets", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBindDescriptorSets", |recorder| {
                 crate::command::bind::cmd_bind_descriptor_sets(
                     recorder,
                     pipeline_bind_point,
@@ -2113,7 +2113,7 @@ unsafe extern "system" fn vkCmdClearColorImage(
     guard(command_buffer, "vkCmdClearColorImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdClearColorImage", |recorder| {
                 crate::command::transfer::cmd_clear_color_image(
                     recorder,
                     handle::get(image)?,
@@ -2134,7 +2134,7 @@ unsafe extern "system" fn vkCmdDispatch(
     guard(command_buffer, "vkCmdDispatch", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdDispatch", |recorder| {
                 crate::command::draw::cmd_dispatch(
                     recorder,
                     group_count_x,
@@ -2154,7 +2154,7 @@ unsafe extern "system" fn vkCmdDispatchIndirect(
     guard(command_buffer, "vkCmdDispatchIndirect", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdDispatchIndirect", |recorder| {
                 crate::command::draw::cmd_dispatch_indirect(recorder, handle::get(buffer)?, offset)
             })
         }
@@ -2169,7 +2169,7 @@ unsafe extern "system" fn vkCmdSetEvent(
     guard(command_buffer, "vkCmdSetEvent", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetEvent", |recorder| {
                 crate::command::sync::cmd_set_event(recorder, handle::get(event)?)
             })
         }
@@ -2184,7 +2184,7 @@ unsafe extern "system" fn vkCmdResetEvent(
     guard(command_buffer, "vkCmdResetEvent", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdResetEvent", |recorder| {
                 crate::command::sync::cmd_reset_event(recorder, handle::get(event)?)
             })
         }
@@ -2207,7 +2207,7 @@ unsafe extern "system" fn vkCmdWaitEvents(
     guard(command_buffer, "vkCmdWaitEvents", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdWaitEvents", |recorder| {
                 crate::command::sync::cmd_wait_events(
                     recorder,
                     &handle::get_all(valid::slice(p_events, event_count)?)?,
@@ -2228,7 +2228,7 @@ unsafe extern "system" fn vkCmdPushConstants(
     guard(command_buffer, "vkCmdPushConstants", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdPushConstants", |recorder| {
                 crate::command::bind::cmd_push_constants(
                     recorder,
                     handle::get(layout)?,
@@ -2348,7 +2348,7 @@ unsafe extern "system" fn vkCmdSetViewport(
     guard(command_buffer, "vkCmdSetViewport", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetViewport", |recorder| {
                 crate::command::dynamic_state::cmd_set_viewport(
                     recorder,
                     first_viewport,
@@ -2368,7 +2368,7 @@ unsafe extern "system" fn vkCmdSetScissor(
     guard(command_buffer, "vkCmdSetScissor", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetScissor", |recorder| {
                 crate::command::dynamic_state::cmd_set_scissor(
                     recorder,
                     first_scissor,
@@ -2383,7 +2383,7 @@ unsafe extern "system" fn vkCmdSetLineWidth(command_buffer: vk::CommandBuffer, l
     guard(command_buffer, "vkCmdSetLineWidth", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetLineWidth", |recorder| {
                 crate::command::dynamic_state::cmd_set_line_width(recorder, line_width)
             })
         }
@@ -2399,7 +2399,7 @@ unsafe extern "system" fn vkCmdSetDepthBias(
     guard(command_buffer, "vkCmdSetDepthBias", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetDepthBias", |recorder| {
                 crate::command::dynamic_state::cmd_set_depth_bias(
                     recorder,
                     depth_bias_constant_factor,
@@ -2418,7 +2418,7 @@ unsafe extern "system" fn vkCmdSetBlendConstants(
     guard(command_buffer, "vkCmdSetBlendConstants", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetBlendConstants", |recorder| {
                 crate::command::dynamic_state::cmd_set_blend_constants(
                     recorder,
                     valid::input(blend_constants)?,
@@ -2436,7 +2436,7 @@ unsafe extern "system" fn vkCmdSetDepthBounds(
     guard(command_buffer, "vkCmdSetDepthBounds", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetDepthBounds", |recorder| {
                 crate::command::dynamic_state::cmd_set_depth_bounds(
                     recorder,
                     min_depth_bounds,
@@ -2455,7 +2455,7 @@ unsafe extern "system" fn vkCmdSetStencilCompareMask(
     guard(command_buffer, "vkCmdSetStencilCompareMask", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetStencilCompareMask", |recorder| {
                 crate::command::dynamic_state::cmd_set_stencil_compare_mask(
                     recorder,
                     face_mask,
@@ -2474,7 +2474,7 @@ unsafe extern "system" fn vkCmdSetStencilWriteMask(
     guard(command_buffer, "vkCmdSetStencilWriteMask", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetStencilWriteMask", |recorder| {
                 crate::command::dynamic_state::cmd_set_stencil_write_mask(
                     recorder, face_mask, write_mask,
                 )
@@ -2491,7 +2491,7 @@ unsafe extern "system" fn vkCmdSetStencilReference(
     guard(command_buffer, "vkCmdSetStencilReference", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetStencilReference", |recorder| {
                 crate::command::dynamic_state::cmd_set_stencil_reference(
                     recorder, face_mask, reference,
                 )
@@ -2509,7 +2509,7 @@ unsafe extern "system" fn vkCmdBindIndexBuffer(
     guard(command_buffer, "vkCmdBindIndexBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBindIndexBuffer", |recorder| {
                 crate::command::bind::cmd_bind_index_buffer(
                     recorder,
                     handle::get(buffer)?,
@@ -2531,7 +2531,7 @@ unsafe extern "system" fn vkCmdBindVertexBuffers(
     guard(command_buffer, "vkCmdBindVertexBuffers", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBindVertexBuffers", |recorder| {
                 crate::command::bind::cmd_bind_vertex_buffers(
                     recorder,
                     first_binding,
@@ -2553,7 +2553,7 @@ unsafe extern "system" fn vkCmdDraw(
     guard(command_buffer, "vkCmdDraw", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdDraw", |recorder| {
                 crate::command::draw::cmd_draw(
                     recorder,
                     vertex_count,
@@ -2577,7 +2577,7 @@ unsafe extern "system" fn vkCmdDrawIndexed(
     guard(command_buffer, "vkCmdDrawIndexed", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdDrawIndexed", |recorder| {
                 crate::command::draw::cmd_draw_indexed(
                     recorder,
                     index_count,
@@ -2601,7 +2601,7 @@ unsafe extern "system" fn vkCmdDrawIndirect(
     guard(command_buffer, "vkCmdDrawIndirect", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdDrawIndirect", |recorder| {
                 crate::command::draw::cmd_draw_indirect(
                     recorder,
                     handle::get(buffer)?,
@@ -2624,7 +2624,7 @@ unsafe extern "system" fn vkCmdDrawIndexedIndirect(
     guard(command_buffer, "vkCmdDrawIndexedIndirect", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdDrawIndexedIndirect", |recorder| {
                 crate::command::draw::cmd_draw_indexed_indirect(
                     recorder,
                     handle::get(buffer)?,
@@ -2650,7 +2650,7 @@ unsafe extern "system" fn vkCmdBlitImage(
     guard(command_buffer, "vkCmdBlitImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBlitImage", |recorder| {
                 let regions =
                     valid::slice(p_regions, region_count)?
                         .iter()
@@ -2690,7 +2690,7 @@ unsafe extern "system" fn vkCmdClearDepthStencilImage(
     guard(command_buffer, "vkCmdClearDepthStencilImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdClearDepthStencilImage", |recorder| {
                 crate::command::transfer::cmd_clear_depth_stencil_image(
                     recorder,
                     handle::get(image)?,
@@ -2712,7 +2712,7 @@ unsafe extern "system" fn vkCmdClearAttachments(
     guard(command_buffer, "vkCmdClearAttachments", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdClearAttachments", |recorder| {
                 crate::command::transfer::cmd_clear_attachments(
                     recorder,
                     valid::slice(p_attachments, attachment_count)?,
@@ -2735,7 +2735,7 @@ unsafe extern "system" fn vkCmdResolveImage(
     guard(command_buffer, "vkCmdResolveImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdResolveImage", |recorder| {
                 let regions =
                     valid::slice(p_regions, region_count)?
                         .iter()
@@ -2772,7 +2772,7 @@ unsafe extern "system" fn vkCmdBeginRenderPass(
     guard(command_buffer, "vkCmdBeginRenderPass", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBeginRenderPass", |recorder| {
                 crate::command::render_pass::cmd_begin_render_pass(
                     recorder,
                     valid::input(p_render_pass_begin)?,
@@ -2789,7 +2789,7 @@ unsafe extern "system" fn vkCmdNextSubpass(
     guard(command_buffer, "vkCmdNextSubpass", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdNextSubpass", |recorder| {
                 crate::command::render_pass::cmd_next_subpass(recorder)
             })
         }
@@ -2800,7 +2800,7 @@ unsafe extern "system" fn vkCmdEndRenderPass(command_buffer: vk::CommandBuffer) 
     guard(command_buffer, "vkCmdEndRenderPass", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdEndRenderPass", |recorder| {
                 crate::command::render_pass::cmd_end_render_pass(recorder)
             })
         }
@@ -2873,7 +2873,7 @@ unsafe extern "system" fn vkCmdSetDeviceMask(command_buffer: vk::CommandBuffer, 
     guard(command_buffer, "vkCmdSetDeviceMask", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetDeviceMask", |recorder| {
                 crate::command::sync::cmd_set_device_mask(recorder)
             })
         }
@@ -3165,7 +3165,7 @@ unsafe extern "system" fn vkCmdDispatchBase(
     guard(command_buffer, "vkCmdDispatchBase", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdDispatchBase", |recorder| {
                 crate::command::draw::cmd_dispatch_base(
                     recorder,
                     base_group_x,
@@ -3376,7 +3376,7 @@ unsafe extern "system" fn vkCmdDrawIndirectCount(
     guard(command_buffer, "vkCmdDrawIndirectCount", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdDrawIndirectCount", |recorder| {
                 crate::command::draw::cmd_draw_indirect_count(
                     recorder,
                     handle::get(buffer)?,
@@ -3403,17 +3403,21 @@ unsafe extern "system" fn vkCmdDrawIndexedIndirectCount(
     guard(command_buffer, "vkCmdDrawIndexedIndirectCount", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                crate::command::draw::cmd_draw_indexed_indirect_count(
-                    recorder,
-                    handle::get(buffer)?,
-                    offset,
-                    handle::get(count_buffer)?,
-                    count_buffer_offset,
-                    max_draw_count,
-                    stride,
-                )
-            })
+            record(
+                command_buffer,
+                "vkCmdDrawIndexedIndirectCount",
+                |recorder| {
+                    crate::command::draw::cmd_draw_indexed_indirect_count(
+                        recorder,
+                        handle::get(buffer)?,
+                        offset,
+                        handle::get(count_buffer)?,
+                        count_buffer_offset,
+                        max_draw_count,
+                        stride,
+                    )
+                },
+            )
         }
     })
 }
@@ -3446,7 +3450,7 @@ unsafe extern "system" fn vkCmdBeginRenderPass2(
     guard(command_buffer, "vkCmdBeginRenderPass2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBeginRenderPass2", |recorder| {
                 crate::command::render_pass::cmd_begin_render_pass(
                     recorder,
                     valid::input(p_render_pass_begin)?,
@@ -3464,7 +3468,7 @@ unsafe extern "system" fn vkCmdNextSubpass2(
     guard(command_buffer, "vkCmdNextSubpass2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdNextSubpass2", |recorder| {
                 crate::command::render_pass::cmd_next_subpass(recorder)
             })
         }
@@ -3478,7 +3482,7 @@ unsafe extern "system" fn vkCmdEndRenderPass2(
     guard(command_buffer, "vkCmdEndRenderPass2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdEndRenderPass2", |recorder| {
                 crate::command::render_pass::cmd_end_render_pass(recorder)
             })
         }
@@ -3580,7 +3584,7 @@ unsafe extern "system" fn vkCmdPipelineBarrier2(
     guard(command_buffer, "vkCmdPipelineBarrier2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdPipelineBarrier2", |recorder| {
                 crate::command::sync::cmd_pipeline_barrier(recorder)
             })
         }
@@ -3596,7 +3600,7 @@ unsafe extern "system" fn vkCmdWriteTimestamp2(
     guard(command_buffer, "vkCmdWriteTimestamp2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdWriteTimestamp2", |recorder| {
                 crate::command::query::cmd_write_timestamp(
                     recorder,
                     handle::get(query_pool)?,
@@ -3633,7 +3637,7 @@ unsafe extern "system" fn vkCmdCopyBuffer2(
     guard(command_buffer, "vkCmdCopyBuffer2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyBuffer2", |recorder| {
                 crate::command::transfer::cmd_copy_buffer2(
                     recorder,
                     valid::input(p_copy_buffer_info)?,
@@ -3650,7 +3654,7 @@ unsafe extern "system" fn vkCmdCopyImage2(
     guard(command_buffer, "vkCmdCopyImage2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyImage2", |recorder| {
                 crate::command::transfer::cmd_copy_image2(
                     recorder,
                     valid::input(p_copy_image_info)?,
@@ -3667,7 +3671,7 @@ unsafe extern "system" fn vkCmdCopyBufferToImage2(
     guard(command_buffer, "vkCmdCopyBufferToImage2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyBufferToImage2", |recorder| {
                 crate::command::transfer::cmd_copy_buffer_to_image2(
                     recorder,
                     valid::input(p_copy_buffer_to_image_info)?,
@@ -3684,7 +3688,7 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer2(
     guard(command_buffer, "vkCmdCopyImageToBuffer2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyImageToBuffer2", |recorder| {
                 crate::command::transfer::cmd_copy_image_to_buffer2(
                     recorder,
                     valid::input(p_copy_image_to_buffer_info)?,
@@ -3751,7 +3755,7 @@ unsafe extern "system" fn vkCmdSetEvent2(
     guard(command_buffer, "vkCmdSetEvent2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetEvent2", |recorder| {
                 crate::command::sync::cmd_set_event(recorder, handle::get(event)?)
             })
         }
@@ -3766,7 +3770,7 @@ unsafe extern "system" fn vkCmdResetEvent2(
     guard(command_buffer, "vkCmdResetEvent2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdResetEvent2", |recorder| {
                 crate::command::sync::cmd_reset_event(recorder, handle::get(event)?)
             })
         }
@@ -3782,7 +3786,7 @@ unsafe extern "system" fn vkCmdWaitEvents2(
     guard(command_buffer, "vkCmdWaitEvents2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdWaitEvents2", |recorder| {
                 crate::command::sync::cmd_wait_events(
                     recorder,
                     &handle::get_all(valid::slice(p_events, event_count)?)?,
@@ -3799,7 +3803,7 @@ unsafe extern "system" fn vkCmdBlitImage2(
     guard(command_buffer, "vkCmdBlitImage2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBlitImage2", |recorder| {
                 crate::command::transfer::cmd_blit_image2(
                     recorder,
                     valid::input(p_blit_image_info)?,
@@ -3816,7 +3820,7 @@ unsafe extern "system" fn vkCmdResolveImage2(
     guard(command_buffer, "vkCmdResolveImage2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdResolveImage2", |recorder| {
                 crate::command::transfer::cmd_resolve_image2(
                     recorder,
                     valid::input(p_resolve_image_info)?,
@@ -3833,7 +3837,7 @@ unsafe extern "system" fn vkCmdBeginRendering(
     guard(command_buffer, "vkCmdBeginRendering", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBeginRendering", |recorder| {
                 crate::command::render_pass::cmd_begin_rendering(
                     recorder,
                     valid::input(p_rendering_info)?,
@@ -3847,7 +3851,7 @@ unsafe extern "system" fn vkCmdEndRendering(command_buffer: vk::CommandBuffer) {
     guard(command_buffer, "vkCmdEndRendering", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdEndRendering", |recorder| {
                 crate::command::render_pass::cmd_end_rendering(recorder)
             })
         }
@@ -3861,7 +3865,7 @@ unsafe extern "system" fn vkCmdSetCullMode(
     guard(command_buffer, "vkCmdSetCullMode", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetCullMode", |recorder| {
                 crate::command::dynamic_state::cmd_set_cull_mode(recorder, cull_mode)
             })
         }
@@ -3875,7 +3879,7 @@ unsafe extern "system" fn vkCmdSetFrontFace(
     guard(command_buffer, "vkCmdSetFrontFace", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetFrontFace", |recorder| {
                 crate::command::dynamic_state::cmd_set_front_face(recorder, front_face)
             })
         }
@@ -3889,7 +3893,7 @@ unsafe extern "system" fn vkCmdSetPrimitiveTopology(
     guard(command_buffer, "vkCmdSetPrimitiveTopology", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetPrimitiveTopology", |recorder| {
                 crate::command::dynamic_state::cmd_set_primitive_topology(
                     recorder,
                     primitive_topology,
@@ -3907,7 +3911,7 @@ unsafe extern "system" fn vkCmdSetViewportWithCount(
     guard(command_buffer, "vkCmdSetViewportWithCount", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetViewportWithCount", |recorder| {
                 crate::command::dynamic_state::cmd_set_viewport_with_count(
                     recorder,
                     valid::slice(p_viewports, viewport_count)?,
@@ -3925,7 +3929,7 @@ unsafe extern "system" fn vkCmdSetScissorWithCount(
     guard(command_buffer, "vkCmdSetScissorWithCount", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetScissorWithCount", |recorder| {
                 crate::command::dynamic_state::cmd_set_scissor_with_count(
                     recorder,
                     valid::slice(p_scissors, scissor_count)?,
@@ -3947,7 +3951,7 @@ unsafe extern "system" fn vkCmdBindVertexBuffers2(
     guard(command_buffer, "vkCmdBindVertexBuffers2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBindVertexBuffers2", |recorder| {
                 crate::command::bind::cmd_bind_vertex_buffers2(
                     recorder,
                     first_binding,
@@ -3972,7 +3976,7 @@ unsafe extern "system" fn vkCmdSetDepthTestEnable(
     guard(command_buffer, "vkCmdSetDepthTestEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetDepthTestEnable", |recorder| {
                 crate::command::dynamic_state::cmd_set_depth_test_enable(
                     recorder,
                     depth_test_enable != vk::FALSE,
@@ -3989,7 +3993,7 @@ unsafe extern "system" fn vkCmdSetDepthWriteEnable(
     guard(command_buffer, "vkCmdSetDepthWriteEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetDepthWriteEnable", |recorder| {
                 crate::command::dynamic_state::cmd_set_depth_write_enable(
                     recorder,
                     depth_write_enable != vk::FALSE,
@@ -4006,7 +4010,7 @@ unsafe extern "system" fn vkCmdSetDepthCompareOp(
     guard(command_buffer, "vkCmdSetDepthCompareOp", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetDepthCompareOp", |recorder| {
                 crate::command::dynamic_state::cmd_set_depth_compare_op(recorder, depth_compare_op)
             })
         }
@@ -4020,12 +4024,16 @@ unsafe extern "system" fn vkCmdSetDepthBoundsTestEnable(
     guard(command_buffer, "vkCmdSetDepthBoundsTestEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                crate::command::dynamic_state::cmd_set_depth_bounds_test_enable(
-                    recorder,
-                    depth_bounds_test_enable != vk::FALSE,
-                )
-            })
+            record(
+                command_buffer,
+                "vkCmdSetDepthBoundsTestEnable",
+                |recorder| {
+                    crate::command::dynamic_state::cmd_set_depth_bounds_test_enable(
+                        recorder,
+                        depth_bounds_test_enable != vk::FALSE,
+                    )
+                },
+            )
         }
     })
 }
@@ -4037,7 +4045,7 @@ unsafe extern "system" fn vkCmdSetStencilTestEnable(
     guard(command_buffer, "vkCmdSetStencilTestEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetStencilTestEnable", |recorder| {
                 crate::command::dynamic_state::cmd_set_stencil_test_enable(
                     recorder,
                     stencil_test_enable != vk::FALSE,
@@ -4058,7 +4066,7 @@ unsafe extern "system" fn vkCmdSetStencilOp(
     guard(command_buffer, "vkCmdSetStencilOp", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetStencilOp", |recorder| {
                 crate::command::dynamic_state::cmd_set_stencil_op(
                     recorder,
                     face_mask,
@@ -4079,12 +4087,16 @@ unsafe extern "system" fn vkCmdSetRasterizerDiscardEnable(
     guard(command_buffer, "vkCmdSetRasterizerDiscardEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                crate::command::dynamic_state::cmd_set_rasterizer_discard_enable(
-                    recorder,
-                    rasterizer_discard_enable != vk::FALSE,
-                )
-            })
+            record(
+                command_buffer,
+                "vkCmdSetRasterizerDiscardEnable",
+                |recorder| {
+                    crate::command::dynamic_state::cmd_set_rasterizer_discard_enable(
+                        recorder,
+                        rasterizer_discard_enable != vk::FALSE,
+                    )
+                },
+            )
         }
     })
 }
@@ -4096,7 +4108,7 @@ unsafe extern "system" fn vkCmdSetDepthBiasEnable(
     guard(command_buffer, "vkCmdSetDepthBiasEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdSetDepthBiasEnable", |recorder| {
                 crate::command::dynamic_state::cmd_set_depth_bias_enable(
                     recorder,
                     depth_bias_enable != vk::FALSE,
@@ -4113,12 +4125,16 @@ unsafe extern "system" fn vkCmdSetPrimitiveRestartEnable(
     guard(command_buffer, "vkCmdSetPrimitiveRestartEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                crate::command::dynamic_state::cmd_set_primitive_restart_enable(
-                    recorder,
-                    primitive_restart_enable != vk::FALSE,
-                )
-            })
+            record(
+                command_buffer,
+                "vkCmdSetPrimitiveRestartEnable",
+                |recorder| {
+                    crate::command::dynamic_state::cmd_set_primitive_restart_enable(
+                        recorder,
+                        primitive_restart_enable != vk::FALSE,
+                    )
+                },
+            )
         }
     })
 }
@@ -4240,9 +4256,16 @@ unsafe extern "system" fn vkCmdSetGaussianCameraGAURAST(
     guard(command_buffer, "vkCmdSetGaussianCameraGAURAST", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                crate::command::camera::cmd_set_gaussian_camera(recorder, valid::input(p_camera)?)
-            })
+            record(
+                command_buffer,
+                "vkCmdSetGaussianCameraGAURAST",
+                |recorder| {
+                    crate::command::camera::cmd_set_gaussian_camera(
+                        recorder,
+                        valid::input(p_camera)?,
+                    )
+                },
+            )
         }
     })
 }
@@ -4319,7 +4342,7 @@ unsafe extern "system" fn vkCmdPushDescriptorSetKHR(
     guard(command_buffer, "vkCmdPushDescriptorSetKHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdPushDescriptorSetKHR", |recorder| {
                 crate::command::bind::cmd_push_descriptor_set(
                     recorder,
                     pipeline_bind_point,
@@ -4345,15 +4368,19 @@ unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
         || {
             // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
             unsafe {
-                record(command_buffer, |recorder| {
-                    crate::command::bind::cmd_push_descriptor_set_with_template(
-                        recorder,
-                        handle::get(descriptor_update_template)?,
-                        handle::get(layout)?,
-                        set,
-                        p_data,
-                    )
-                })
+                record(
+                    command_buffer,
+                    "vkCmdPushDescriptorSetWithTemplateKHR",
+                    |recorder| {
+                        crate::command::bind::cmd_push_descriptor_set_with_template(
+                            recorder,
+                            handle::get(descriptor_update_template)?,
+                            handle::get(layout)?,
+                            set,
+                            p_data,
+                        )
+                    },
+                )
             }
         },
     )

@@ -106,22 +106,37 @@ pub(crate) fn front_face(face: vk::FrontFace) -> DynamicState {
     DynamicState::FrontFaceClockwise(face == vk::FrontFace::CLOCKWISE)
 }
 
-/// Stencil operations.
-///
-/// # Errors
-/// [`Error::InvalidUsage`] for what is none.
-pub(crate) fn stencil_ops(
-    fail: vk::StencilOp,
-    pass: vk::StencilOp,
-    depth_fail: vk::StencilOp,
-    compare: vk::CompareOp,
-) -> Result<StencilOps, Error> {
-    Ok(StencilOps {
-        fail: convert::stencil_op(fail)?,
-        pass: convert::stencil_op(pass)?,
-        depth_fail: convert::stencil_op(depth_fail)?,
-        compare: convert::compare_op(compare)?,
-    })
+/// The ids of the rules that stencil operations are values of their enumerations.
+pub(crate) struct StencilOpIds {
+    /// That of the operation when the stencil test fails.
+    pub(crate) fail: &'static str,
+    /// That of the operation when both tests pass.
+    pub(crate) pass: &'static str,
+    /// That of the operation when only the depth test fails.
+    pub(crate) depth_fail: &'static str,
+    /// That of the comparison.
+    pub(crate) compare: &'static str,
+}
+
+impl StencilOps {
+    /// The operations for the device.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] for values that are none.
+    pub(crate) fn from_vk(
+        fail: vk::StencilOp,
+        pass: vk::StencilOp,
+        depth_fail: vk::StencilOp,
+        compare: vk::CompareOp,
+        ids: &StencilOpIds,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            fail: convert::stencil_op(fail, ids.fail)?,
+            pass: convert::stencil_op(pass, ids.pass)?,
+            depth_fail: convert::stencil_op(depth_fail, ids.depth_fail)?,
+            compare: convert::compare_op(compare, ids.compare)?,
+        })
+    }
 }
 
 /// What a command buffer has set so far; the last of each.

@@ -20,7 +20,7 @@ pub(crate) fn translate(
 ) -> Result<Shader, Error> {
     if stage.required_subgroup_size.is_some() {
         return Err(Error::usage(
-            "VUID-VkPipelineShaderStageRequiredSubgroupSizeCreateInfo-pNext-02755",
+            "VUID-VkPipelineShaderStageCreateInfo-pNext-02755",
             format!("the {kind} stage is not in requiredSubgroupSizeStages"),
         ));
     }

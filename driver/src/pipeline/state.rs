@@ -1,7 +1,7 @@
 //! The state of graphics pipelines: create infos with their pointers followed, as far as Vulkan has them read; vertex input;
 //! and fixed-function state. What a switch governs is kept beside the switch, as either may be dynamic without the other.
 
-use super::dynamic_state::{self, DynamicState, DynamicStates};
+use super::dynamic_state::{self, DynamicState, DynamicStates, StencilOpIds, StencilOps};
 use super::layout::PipelineLayout;
 use crate::abi::error::Error;
 use crate::abi::handle;
@@ -434,6 +434,14 @@ pub(crate) struct FixedFunctionState {
     stencil: [StencilFace; 2],
 }
 
+/// The ids of the rules on the operations of `VkStencilOpState`.
+const STENCIL_OP_STATE: StencilOpIds = StencilOpIds {
+    fail: "VUID-VkStencilOpState-failOp-parameter",
+    pass: "VUID-VkStencilOpState-passOp-parameter",
+    depth_fail: "VUID-VkStencilOpState-depthFailOp-parameter",
+    compare: "VUID-VkStencilOpState-compareOp-parameter",
+};
+
 /// A stencil face that changes nothing.
 const KEEP: StencilFace = StencilFace {
     fail: StencilOp::Keep,
@@ -672,18 +680,22 @@ impl FixedFunctionState {
         let may_test = |enabled, state| enabled || info.is_dynamic(state);
         let tests_depth = may_test(self.depth_test, vk::DynamicState::DEPTH_TEST_ENABLE);
         if tests_depth && !info.is_dynamic(vk::DynamicState::DEPTH_COMPARE_OP) {
-            self.depth_compare = convert::compare_op(state.depth_compare_op)?;
+            self.depth_compare = convert::compare_op(
+                state.depth_compare_op,
+                "VUID-VkPipelineDepthStencilStateCreateInfo-depthCompareOp-parameter",
+            )?;
         }
         self.stencil_test = state.stencil_test_enable != vk::FALSE;
         let tests_stencil = may_test(self.stencil_test, vk::DynamicState::STENCIL_TEST_ENABLE);
         let static_ops = tests_stencil && !info.is_dynamic(vk::DynamicState::STENCIL_OP);
         for (face, given) in [state.front, state.back].into_iter().enumerate() {
             if static_ops {
-                let ops = dynamic_state::stencil_ops(
+                let ops = StencilOps::from_vk(
                     given.fail_op,
                     given.pass_op,
                     given.depth_fail_op,
                     given.compare_op,
+                    &STENCIL_OP_STATE,
                 )?;
                 self.set(DynamicState::StencilOp(face, ops));
             }

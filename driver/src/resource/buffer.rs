@@ -27,6 +27,21 @@ objects! {
     vk::BufferView => BufferView;
 }
 
+/// The ids of the rules that a use of a buffer may break.
+#[derive(Debug)]
+pub(crate) struct BufferRules {
+    /// The buffer must be bound to memory.
+    pub(crate) memory: &'static str,
+    /// The buffer must have the bytes that are used.
+    pub(crate) range: &'static str,
+}
+
+/// The rules on the buffer of a view.
+const VIEWED: BufferRules = BufferRules {
+    memory: "VUID-VkBufferViewCreateInfo-buffer-00935",
+    range: "VUID-VkBufferViewCreateInfo-offset-00931",
+};
+
 impl Buffer {
     /// A buffer of `size` bytes, not yet bound to memory.
     pub(crate) fn new(size: u64) -> Self {
@@ -64,10 +79,15 @@ impl Buffer {
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if the buffer is not bound or has no such bytes.
-    pub(crate) fn range(&self, offset: u64, size: Option<u64>) -> Result<BufferRange, Error> {
+    pub(crate) fn range(
+        &self,
+        offset: u64,
+        size: Option<u64>,
+        rules: &BufferRules,
+    ) -> Result<BufferRange, Error> {
         let Some((memory, start)) = self.memory.get() else {
             return Err(Error::usage(
-                "VUID-vkCmd-buffer-memory",
+                rules.memory,
                 "a command uses a buffer that is not bound to memory",
             ));
         };
@@ -79,7 +99,7 @@ impl Buffer {
                 size: size.unwrap_or(rest),
             }),
             _ => Err(Error::usage(
-                "VUID-vkCmd-buffer-range",
+                rules.range,
                 format!(
                     "a command uses {} bytes at offset {offset} of a buffer of {} bytes",
                     size.unwrap_or(0),
@@ -93,8 +113,8 @@ impl Buffer {
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if the buffer is not bound.
-    pub(crate) fn whole(&self) -> Result<BufferRange, Error> {
-        self.range(0, None)
+    pub(crate) fn whole(&self, rules: &BufferRules) -> Result<BufferRange, Error> {
+        self.range(0, None, rules)
     }
 }
 
@@ -272,7 +292,7 @@ pub(crate) unsafe fn create_buffer_view(
     // SAFETY: the caller's promise.
     let buffer = unsafe { handle::get(info.buffer)? };
     Ok(Arc::new(BufferView {
-        range: buffer.range(info.offset, size)?,
+        range: buffer.range(info.offset, size, &VIEWED)?,
         format,
     }))
 }
@@ -284,17 +304,17 @@ mod tests {
     #[test]
     fn ranges_lie_inside_the_buffer() {
         let buffer = Buffer::new(100);
-        assert!(buffer.whole().is_err(), "not bound");
+        assert!(buffer.whole(&VIEWED).is_err(), "not bound");
         let memory = Allocation::new_zeroed(4096).unwrap();
         assert!(buffer.bind(memory.clone(), 4032).is_err(), "does not fit");
         assert!(buffer.bind(memory.clone(), 3).is_err(), "not aligned");
         buffer.bind(memory.clone(), 128).unwrap();
         assert!(buffer.bind(memory, 128).is_err(), "bound already");
-        let range = buffer.range(10, None).unwrap();
+        let range = buffer.range(10, None, &VIEWED).unwrap();
         assert_eq!((range.offset, range.size), (138, 90));
-        assert_eq!(buffer.range(100, None).unwrap().size, 0);
-        assert!(buffer.range(101, None).is_err());
-        assert!(buffer.range(99, Some(2)).is_err());
-        assert!(buffer.range(u64::MAX, Some(2)).is_err());
+        assert_eq!(buffer.range(100, None, &VIEWED).unwrap().size, 0);
+        assert!(buffer.range(101, None, &VIEWED).is_err());
+        assert!(buffer.range(99, Some(2), &VIEWED).is_err());
+        assert!(buffer.range(u64::MAX, Some(2), &VIEWED).is_err());
     }
 }

@@ -81,10 +81,10 @@ impl Image {
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if it is not bound.
-    pub(crate) fn bound(&self) -> Result<&Arc<image::Image>, Error> {
+    pub(crate) fn bound(&self, vuid: &'static str) -> Result<&Arc<image::Image>, Error> {
         self.bound.get().ok_or_else(|| {
             Error::usage(
-                "VUID-vkCmd-image-memory",
+                vuid,
                 "a command or view uses an image that is not bound to memory",
             )
         })
@@ -150,7 +150,7 @@ impl ImageView {
         };
         Ok(Self {
             view: image::ImageView {
-                image: Arc::clone(image.bound()?),
+                image: Arc::clone(image.bound("VUID-VkImageViewCreateInfo-image-01020")?),
                 format,
                 base_mip_level,
                 level_count,

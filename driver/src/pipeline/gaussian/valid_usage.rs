@@ -18,44 +18,86 @@ pub(super) const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
 /// A feature bit of the extension: its value, its name, and the id of the rule that asks for it.
 pub(super) type Feature = (fn(&Features) -> bool, &'static str, &'static str);
 
-macro_rules! feature {
-    ($field:ident, $name:literal) => {
-        (
-            |features| features.$field,
-            $name,
-            concat!(
-                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-",
-                $name,
-                "-feature"
-            ),
-        )
-    };
-}
-
-pub(super) const TOPOLOGY: Feature =
-    feature!(gaussian_primitive_topology, "gaussianPrimitiveTopology");
-pub(super) const VERTEX_SHADER_PROJECTION: Feature =
-    feature!(vertex_shader_projection, "vertexShaderProjection");
-pub(super) const RESOLVE_FRAGMENT_SHADER: Feature =
-    feature!(resolve_fragment_shader, "resolveFragmentShader");
-pub(super) const RADIAL_DISTANCE_ORDER: Feature =
-    feature!(radial_distance_order, "radialDistanceOrder");
-pub(super) const PRIMITIVE_ORDER: Feature = feature!(primitive_order, "primitiveOrder");
-pub(super) const PER_PIXEL_ORDER: Feature = feature!(per_pixel_order, "perPixelOrder");
-pub(super) const RASTERIZATION_FLOAT16: Feature =
-    feature!(rasterization_float16, "rasterizationFloat16");
-pub(super) const OPACITY_COMPENSATION: Feature =
-    feature!(opacity_compensation, "opacityCompensation");
-pub(super) const UNSCENTED_PROJECTION: Feature =
-    feature!(unscented_projection, "unscentedProjection");
-pub(super) const GAUSSIAN_2D: Feature = feature!(gaussian_2d, "gaussian2D");
-pub(super) const UNIFORM_BUFFER_CAMERA: Feature =
-    feature!(uniform_buffer_camera, "uniformBufferCamera");
-pub(super) const MERGED_DRAWS: Feature = feature!(merged_draws, "mergedDraws");
-pub(super) const INSTANCING: Feature = feature!(gaussian_instancing, "gaussianInstancing");
-pub(super) const DEPTH_STENCIL: Feature = feature!(gaussian_depth_stencil, "gaussianDepthStencil");
-pub(super) const MULTISAMPLE: Feature = feature!(gaussian_multisample, "gaussianMultisample");
-pub(super) const APPROXIMATION: Feature = feature!(gaussian_approximation, "gaussianApproximation");
+pub(super) const TOPOLOGY: Feature = (
+    |features| features.gaussian_primitive_topology,
+    "gaussianPrimitiveTopology",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianPrimitiveTopology-feature",
+);
+pub(super) const VERTEX_SHADER_PROJECTION: Feature = (
+    |features| features.vertex_shader_projection,
+    "vertexShaderProjection",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-vertexShaderProjection-feature",
+);
+pub(super) const RESOLVE_FRAGMENT_SHADER: Feature = (
+    |features| features.resolve_fragment_shader,
+    "resolveFragmentShader",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-resolveFragmentShader-feature",
+);
+pub(super) const RADIAL_DISTANCE_ORDER: Feature = (
+    |features| features.radial_distance_order,
+    "radialDistanceOrder",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-radialDistanceOrder-feature",
+);
+pub(super) const PRIMITIVE_ORDER: Feature = (
+    |features| features.primitive_order,
+    "primitiveOrder",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-primitiveOrder-feature",
+);
+pub(super) const PER_PIXEL_ORDER: Feature = (
+    |features| features.per_pixel_order,
+    "perPixelOrder",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-perPixelOrder-feature",
+);
+pub(super) const RASTERIZATION_FLOAT16: Feature = (
+    |features| features.rasterization_float16,
+    "rasterizationFloat16",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-rasterizationFloat16-feature",
+);
+pub(super) const OPACITY_COMPENSATION: Feature = (
+    |features| features.opacity_compensation,
+    "opacityCompensation",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-opacityCompensation-feature",
+);
+pub(super) const UNSCENTED_PROJECTION: Feature = (
+    |features| features.unscented_projection,
+    "unscentedProjection",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-unscentedProjection-feature",
+);
+pub(super) const GAUSSIAN_2D: Feature = (
+    |features| features.gaussian_2d,
+    "gaussian2D",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussian2D-feature",
+);
+pub(super) const UNIFORM_BUFFER_CAMERA: Feature = (
+    |features| features.uniform_buffer_camera,
+    "uniformBufferCamera",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-uniformBufferCamera-feature",
+);
+pub(super) const MERGED_DRAWS: Feature = (
+    |features| features.merged_draws,
+    "mergedDraws",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-mergedDraws-feature",
+);
+pub(super) const INSTANCING: Feature = (
+    |features| features.gaussian_instancing,
+    "gaussianInstancing",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianInstancing-feature",
+);
+pub(super) const DEPTH_STENCIL: Feature = (
+    |features| features.gaussian_depth_stencil,
+    "gaussianDepthStencil",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianDepthStencil-feature",
+);
+pub(super) const MULTISAMPLE: Feature = (
+    |features| features.gaussian_multisample,
+    "gaussianMultisample",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianMultisample-feature",
+);
+pub(super) const APPROXIMATION: Feature = (
+    |features| features.gaussian_approximation,
+    "gaussianApproximation",
+    "VUID-VkPipelineGaussianStateCreateInfoGAURAST-gaussianApproximation-feature",
+);
 
 /// Refuses `what` unless its feature is enabled, which one that the device lacks never is.
 pub(super) fn require(features: &Features, feature: Feature, what: &str) -> Result<(), Error> {
@@ -245,20 +287,6 @@ pub(super) fn modes(
     Ok(())
 }
 
-/// A member's name and the id of the rule on its value.
-macro_rules! named {
-    ($name:literal) => {
-        (
-            $name,
-            concat!(
-                "VUID-VkPipelineGaussianStateCreateInfoGAURAST-",
-                $name,
-                "-value"
-            ),
-        )
-    };
-}
-
 pub(super) fn values(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
     let check = |valid: bool, (name, vuid), value: &dyn std::fmt::Display, rule: &str| {
         if valid {
@@ -271,37 +299,55 @@ pub(super) fn values(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resul
     let g = gaussian;
     check(
         is_shaded(g) || g.spherical_harmonics_degree <= MAX_SPHERICAL_HARMONICS_DEGREE,
-        named!("sphericalHarmonicsDegree"),
+        (
+            "sphericalHarmonicsDegree",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-sphericalHarmonicsDegree-value",
+        ),
         &g.spherical_harmonics_degree,
         "at most maxSphericalHarmonicsDegree (4)",
     )?;
     check(
         g.low_pass_variance >= 0.0 && g.low_pass_variance.is_finite(),
-        named!("lowPassVariance"),
+        (
+            "lowPassVariance",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-lowPassVariance-value",
+        ),
         &g.low_pass_variance,
         "finite and not negative",
     )?;
     check(
         (0.0..=1.0).contains(&g.alpha_floor),
-        named!("alphaFloor"),
+        (
+            "alphaFloor",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaFloor-value",
+        ),
         &g.alpha_floor,
         "at least 0 and at most 1",
     )?;
     check(
         g.alpha_ceiling > 0.0 && g.alpha_ceiling <= 1.0,
-        named!("alphaCeiling"),
+        (
+            "alphaCeiling",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
+        ),
         &g.alpha_ceiling,
         "greater than 0 and at most 1",
     )?;
     check(
         g.alpha_ceiling >= g.alpha_floor,
-        named!("alphaCeiling"),
+        (
+            "alphaCeiling",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-alphaCeiling-value",
+        ),
         &g.alpha_ceiling,
         "at least alphaFloor",
     )?;
     check(
         g.transmittance_floor >= 0.0 && g.transmittance_floor < 1.0,
-        named!("transmittanceFloor"),
+        (
+            "transmittanceFloor",
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-transmittanceFloor-value",
+        ),
         &g.transmittance_floor,
         "at least 0 and less than 1",
     )
