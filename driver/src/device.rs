@@ -422,11 +422,14 @@ mod tests {
             count::<vk::PhysicalDeviceVulkan13Features<'_>>(),
             count::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(),
             count::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(),
+            count::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(),
             count::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(),
             count::<PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(),
         ];
-        assert_eq!(counts, [37, 4, 32, 10, 1, 1, 1, 2, 19]);
+        assert_eq!(counts, [37, 4, 32, 10, 1, 1, 1, 1, 1, 1, 2, 19]);
         assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());
     }
 

@@ -18,7 +18,7 @@ use std::sync::{Arc, LazyLock, PoisonError, RwLock, Weak};
 pub(crate) const API_VERSION: u32 = vk::HEADER_VERSION_COMPLETE;
 
 /// The names of all device extensions.
-fn device_extension_names() -> &'static [&'static CStr] {
+pub(crate) fn device_extension_names() -> &'static [&'static CStr] {
     static NAMES: LazyLock<Vec<&'static CStr>> =
         LazyLock::new(|| DEVICE.iter().map(|&(name, _)| name).collect());
     &NAMES

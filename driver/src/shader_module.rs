@@ -5,6 +5,7 @@ use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid;
 use crate::device::Device;
+use crate::instance::device_extension_names;
 use crate::physical_device::limits;
 use crate::registry::features::{Features, SUPPORTED};
 use crate::registry::spirv::{Enable, enables};
@@ -12,6 +13,7 @@ use crate::shader::{self, Module, Options, Shader, Specialization, Stage};
 use ash::vk;
 use rspirv::spirv::{Capability, Op};
 use simdevice::host;
+use std::ffi::CStr;
 use std::sync::Arc;
 
 /// The first word of SPIR-V.
@@ -32,14 +34,14 @@ impl ShaderModule {
     /// # Errors
     /// [`Error::InvalidUsage`] if it isn't SPIR-V in the host's byte order; [`Error::FeatureNotEnabled`] if it declares a capability
     /// whose feature isn't enabled.
-    pub(crate) fn new(words: &[u32], features: &Features) -> Result<Self, Error> {
+    fn new(words: &[u32], features: &Features, extensions: &[&CStr]) -> Result<Self, Error> {
         if words.first() != Some(&MAGIC) {
             return Err(Error::usage(
                 "VUID-VkShaderModuleCreateInfo-pCode-08738",
                 "the code is not SPIR-V",
             ));
         }
-        check_capabilities(words, features)?;
+        check_capabilities(words, features, extensions)?;
         Ok(Self {
             words: host::boxed(words),
         })
@@ -67,10 +69,14 @@ impl ShaderModule {
 ///
 /// # Errors
 /// [`Error::FeatureNotEnabled`] names the capability and what would enable it.
-fn check_capabilities(words: &[u32], features: &Features) -> Result<(), Error> {
+fn check_capabilities(
+    words: &[u32],
+    features: &Features,
+    extensions: &[&CStr],
+) -> Result<(), Error> {
     match declared(words)
         .filter(|&capability| shader::is_supported(capability))
-        .find(|&capability| !is_enabled(capability, features))
+        .find(|&capability| !is_enabled(capability, features, extensions))
     {
         None => Ok(()),
         Some(capability) => Err(not_enabled(capability)),
@@ -78,12 +84,13 @@ fn check_capabilities(words: &[u32], features: &Features) -> Result<(), Error> {
 }
 
 /// Tells if one of the things that enable a capability is there.
-fn is_enabled(capability: Capability, features: &Features) -> bool {
+fn is_enabled(capability: Capability, features: &Features, extensions: &[&CStr]) -> bool {
     let enables = enables(capability);
     enables.is_empty()
         || enables.iter().any(|enable| match enable {
             Enable::Feature(_, is_enabled) => is_enabled(features),
             Enable::Property(_, is_there) => is_there(limits::properties()),
+            Enable::Extension(name) => extensions.contains(name),
             Enable::Absent(_) => false,
         })
 }
@@ -94,7 +101,7 @@ fn not_enabled(capability: Capability) -> Error {
         .iter()
         .filter_map(|enable| match enable {
             Enable::Feature(name, _) | Enable::Property(name, _) => Some(*name),
-            Enable::Absent(_) => None,
+            Enable::Extension(_) | Enable::Absent(_) => None,
         })
         .collect();
     let absent: Vec<_> = enables(capability)
@@ -105,7 +112,7 @@ fn not_enabled(capability: Capability) -> Error {
         })
         .collect();
     let needed = if known.is_empty() { absent } else { known };
-    let what = if is_enabled(capability, &SUPPORTED) {
+    let what = if is_enabled(capability, &SUPPORTED, device_extension_names()) {
         "which is not enabled"
     } else {
         "which this device does not support"
@@ -243,7 +250,7 @@ pub(crate) unsafe fn create_shader_module(
     let words = u32::try_from(create_info.code_size / 4).unwrap_or(0);
     // SAFETY: the caller's promise.
     let words = unsafe { valid::slice(create_info.p_code, words)? };
-    ShaderModule::new(words, device.features()).map(Arc::new)
+    ShaderModule::new(words, device.features(), device.enabled().device_extensions).map(Arc::new)
 }
 
 #[cfg(test)]
@@ -267,8 +274,9 @@ mod tests {
             shader_output_layer: true,
             ..Features::NONE
         };
-        let check =
-            |capability| check_capabilities(&module(&[Capability::Shader, capability]), &enabled);
+        let check = |capability| {
+            check_capabilities(&module(&[Capability::Shader, capability]), &enabled, &[])
+        };
         assert!(check(Capability::Int64).is_ok());
         assert!(check(Capability::ShaderViewportIndexLayerEXT).is_ok());
         assert!(check(Capability::GroupNonUniformArithmetic).is_ok());
@@ -290,7 +298,7 @@ mod tests {
         let cannot: Vec<_> = (0..0x2000)
             .filter_map(Capability::from_u32)
             .filter(|&capability| shader::is_supported(capability))
-            .filter(|&capability| !is_enabled(capability, &SUPPORTED))
+            .filter(|&capability| !is_enabled(capability, &SUPPORTED, &[]))
             .collect();
         use Capability as C;
         let expected = [
@@ -312,7 +320,7 @@ mod tests {
     #[test]
     fn what_is_malformed_declares_nothing() {
         for words in [&[][..], &[0x0723_0203], &[0; 6], &module(&[])[..6]] {
-            assert!(check_capabilities(words, &Features::NONE).is_ok());
+            assert!(check_capabilities(words, &Features::NONE, &[]).is_ok());
         }
     }
 }

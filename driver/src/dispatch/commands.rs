@@ -272,12 +272,95 @@ static ROWS: &[Command] = rows! {
         vkDestroyDebugUtilsMessengerEXT: vk::PFN_vkDestroyDebugUtilsMessengerEXT = vkDestroyDebugUtilsMessengerEXT;
         vkSubmitDebugUtilsMessageEXT: vk::PFN_vkSubmitDebugUtilsMessageEXT = vkSubmitDebugUtilsMessageEXT;
     }
+    Device, DeviceExtension(c"VK_EXT_extended_dynamic_state") => {
+        vkCmdSetCullModeEXT: vk::PFN_vkCmdSetCullMode = vkCmdSetCullMode;
+        vkCmdSetFrontFaceEXT: vk::PFN_vkCmdSetFrontFace = vkCmdSetFrontFace;
+        vkCmdSetPrimitiveTopologyEXT: vk::PFN_vkCmdSetPrimitiveTopology = vkCmdSetPrimitiveTopology;
+        vkCmdSetViewportWithCountEXT: vk::PFN_vkCmdSetViewportWithCount = vkCmdSetViewportWithCount;
+        vkCmdSetScissorWithCountEXT: vk::PFN_vkCmdSetScissorWithCount = vkCmdSetScissorWithCount;
+        vkCmdBindVertexBuffers2EXT: vk::PFN_vkCmdBindVertexBuffers2 = vkCmdBindVertexBuffers2;
+        vkCmdSetDepthTestEnableEXT: vk::PFN_vkCmdSetDepthTestEnable = vkCmdSetDepthTestEnable;
+        vkCmdSetDepthWriteEnableEXT: vk::PFN_vkCmdSetDepthWriteEnable = vkCmdSetDepthWriteEnable;
+        vkCmdSetDepthCompareOpEXT: vk::PFN_vkCmdSetDepthCompareOp = vkCmdSetDepthCompareOp;
+        vkCmdSetDepthBoundsTestEnableEXT: vk::PFN_vkCmdSetDepthBoundsTestEnable = vkCmdSetDepthBoundsTestEnable;
+        vkCmdSetStencilTestEnableEXT: vk::PFN_vkCmdSetStencilTestEnable = vkCmdSetStencilTestEnable;
+        vkCmdSetStencilOpEXT: vk::PFN_vkCmdSetStencilOp = vkCmdSetStencilOp;
+    }
+    Device, DeviceExtension(c"VK_EXT_extended_dynamic_state2") => {
+        vkCmdSetPatchControlPointsEXT: vk::PFN_vkCmdSetPatchControlPointsEXT = vkCmdSetPatchControlPointsEXT;
+        vkCmdSetRasterizerDiscardEnableEXT: vk::PFN_vkCmdSetRasterizerDiscardEnable = vkCmdSetRasterizerDiscardEnable;
+        vkCmdSetDepthBiasEnableEXT: vk::PFN_vkCmdSetDepthBiasEnable = vkCmdSetDepthBiasEnable;
+        vkCmdSetLogicOpEXT: vk::PFN_vkCmdSetLogicOpEXT = vkCmdSetLogicOpEXT;
+        vkCmdSetPrimitiveRestartEnableEXT: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
+    }
+    Device, DeviceExtension(c"VK_EXT_host_query_reset") => {
+        vkResetQueryPoolEXT: vk::PFN_vkResetQueryPool = vkResetQueryPool;
+    }
+    Device, DeviceExtension(c"VK_EXT_private_data") => {
+        vkCreatePrivateDataSlotEXT: vk::PFN_vkCreatePrivateDataSlot = vkCreatePrivateDataSlot;
+        vkDestroyPrivateDataSlotEXT: vk::PFN_vkDestroyPrivateDataSlot = vkDestroyPrivateDataSlot;
+        vkSetPrivateDataEXT: vk::PFN_vkSetPrivateData = vkSetPrivateData;
+        vkGetPrivateDataEXT: vk::PFN_vkGetPrivateData = vkGetPrivateData;
+    }
+    PhysicalDevice, DeviceExtension(c"VK_EXT_tooling_info") => {
+        vkGetPhysicalDeviceToolPropertiesEXT: vk::PFN_vkGetPhysicalDeviceToolProperties = vkGetPhysicalDeviceToolProperties;
+    }
     Device, DeviceExtension(c"VK_GAURAST_gaussian_primitive_topology") => {
         vkCmdSetGaussianCameraGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCameraGAURAST = vkCmdSetGaussianCameraGAURAST;
+    }
+    Device, DeviceExtension(c"VK_KHR_bind_memory2") => {
+        vkBindBufferMemory2KHR: vk::PFN_vkBindBufferMemory2 = vkBindBufferMemory2;
+        vkBindImageMemory2KHR: vk::PFN_vkBindImageMemory2 = vkBindImageMemory2;
+    }
+    Device, DeviceExtension(c"VK_KHR_copy_commands2") => {
+        vkCmdCopyBuffer2KHR: vk::PFN_vkCmdCopyBuffer2 = vkCmdCopyBuffer2;
+        vkCmdCopyImage2KHR: vk::PFN_vkCmdCopyImage2 = vkCmdCopyImage2;
+        vkCmdCopyBufferToImage2KHR: vk::PFN_vkCmdCopyBufferToImage2 = vkCmdCopyBufferToImage2;
+        vkCmdCopyImageToBuffer2KHR: vk::PFN_vkCmdCopyImageToBuffer2 = vkCmdCopyImageToBuffer2;
+        vkCmdBlitImage2KHR: vk::PFN_vkCmdBlitImage2 = vkCmdBlitImage2;
+        vkCmdResolveImage2KHR: vk::PFN_vkCmdResolveImage2 = vkCmdResolveImage2;
+    }
+    Device, DeviceExtension(c"VK_KHR_create_renderpass2") => {
+        vkCreateRenderPass2KHR: vk::PFN_vkCreateRenderPass2 = vkCreateRenderPass2;
+        vkCmdBeginRenderPass2KHR: vk::PFN_vkCmdBeginRenderPass2 = vkCmdBeginRenderPass2;
+        vkCmdNextSubpass2KHR: vk::PFN_vkCmdNextSubpass2 = vkCmdNextSubpass2;
+        vkCmdEndRenderPass2KHR: vk::PFN_vkCmdEndRenderPass2 = vkCmdEndRenderPass2;
+    }
+    Device, DeviceExtension(c"VK_KHR_descriptor_update_template") => {
+        vkCreateDescriptorUpdateTemplateKHR: vk::PFN_vkCreateDescriptorUpdateTemplate = vkCreateDescriptorUpdateTemplate;
+        vkDestroyDescriptorUpdateTemplateKHR: vk::PFN_vkDestroyDescriptorUpdateTemplate = vkDestroyDescriptorUpdateTemplate;
+        vkUpdateDescriptorSetWithTemplateKHR: vk::PFN_vkUpdateDescriptorSetWithTemplate = vkUpdateDescriptorSetWithTemplate;
+        vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR = vkCmdPushDescriptorSetWithTemplateKHR;
+    }
+    Device, DeviceExtension(c"VK_KHR_device_group") => {
+        vkGetDeviceGroupPeerMemoryFeaturesKHR: vk::PFN_vkGetDeviceGroupPeerMemoryFeatures = vkGetDeviceGroupPeerMemoryFeatures;
+        vkCmdSetDeviceMaskKHR: vk::PFN_vkCmdSetDeviceMask = vkCmdSetDeviceMask;
+        vkCmdDispatchBaseKHR: vk::PFN_vkCmdDispatchBase = vkCmdDispatchBase;
+    }
+    Instance, InstanceExtension(c"VK_KHR_device_group_creation") => {
+        vkEnumeratePhysicalDeviceGroupsKHR: vk::PFN_vkEnumeratePhysicalDeviceGroups = vkEnumeratePhysicalDeviceGroups;
+    }
+    Device, DeviceExtension(c"VK_KHR_draw_indirect_count") => {
+        vkCmdDrawIndirectCountKHR: vk::PFN_vkCmdDrawIndirectCount = vkCmdDrawIndirectCount;
+        vkCmdDrawIndexedIndirectCountKHR: vk::PFN_vkCmdDrawIndexedIndirectCount = vkCmdDrawIndexedIndirectCount;
     }
     Device, DeviceExtension(c"VK_KHR_dynamic_rendering") => {
         vkCmdBeginRenderingKHR: vk::PFN_vkCmdBeginRendering = vkCmdBeginRendering;
         vkCmdEndRenderingKHR: vk::PFN_vkCmdEndRendering = vkCmdEndRendering;
+    }
+    PhysicalDevice, InstanceExtension(c"VK_KHR_external_fence_capabilities") => {
+        vkGetPhysicalDeviceExternalFencePropertiesKHR: vk::PFN_vkGetPhysicalDeviceExternalFenceProperties = vkGetPhysicalDeviceExternalFenceProperties;
+    }
+    PhysicalDevice, InstanceExtension(c"VK_KHR_external_memory_capabilities") => {
+        vkGetPhysicalDeviceExternalBufferPropertiesKHR: vk::PFN_vkGetPhysicalDeviceExternalBufferProperties = vkGetPhysicalDeviceExternalBufferProperties;
+    }
+    PhysicalDevice, InstanceExtension(c"VK_KHR_external_semaphore_capabilities") => {
+        vkGetPhysicalDeviceExternalSemaphorePropertiesKHR: vk::PFN_vkGetPhysicalDeviceExternalSemaphoreProperties = vkGetPhysicalDeviceExternalSemaphoreProperties;
+    }
+    Device, DeviceExtension(c"VK_KHR_get_memory_requirements2") => {
+        vkGetImageMemoryRequirements2KHR: vk::PFN_vkGetImageMemoryRequirements2 = vkGetImageMemoryRequirements2;
+        vkGetBufferMemoryRequirements2KHR: vk::PFN_vkGetBufferMemoryRequirements2 = vkGetBufferMemoryRequirements2;
+        vkGetImageSparseMemoryRequirements2KHR: vk::PFN_vkGetImageSparseMemoryRequirements2 = vkGetImageSparseMemoryRequirements2;
     }
     PhysicalDevice, InstanceExtension(c"VK_KHR_get_physical_device_properties2") => {
         vkGetPhysicalDeviceFeatures2KHR: vk::PFN_vkGetPhysicalDeviceFeatures2 = vkGetPhysicalDeviceFeatures2;
@@ -287,6 +370,17 @@ static ROWS: &[Command] = rows! {
         vkGetPhysicalDeviceQueueFamilyProperties2KHR: vk::PFN_vkGetPhysicalDeviceQueueFamilyProperties2 = vkGetPhysicalDeviceQueueFamilyProperties2;
         vkGetPhysicalDeviceMemoryProperties2KHR: vk::PFN_vkGetPhysicalDeviceMemoryProperties2 = vkGetPhysicalDeviceMemoryProperties2;
         vkGetPhysicalDeviceSparseImageFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 = vkGetPhysicalDeviceSparseImageFormatProperties2;
+    }
+    Device, DeviceExtension(c"VK_KHR_maintenance1") => {
+        vkTrimCommandPoolKHR: vk::PFN_vkTrimCommandPool = vkTrimCommandPool;
+    }
+    Device, DeviceExtension(c"VK_KHR_maintenance3") => {
+        vkGetDescriptorSetLayoutSupportKHR: vk::PFN_vkGetDescriptorSetLayoutSupport = vkGetDescriptorSetLayoutSupport;
+    }
+    Device, DeviceExtension(c"VK_KHR_maintenance4") => {
+        vkGetDeviceBufferMemoryRequirementsKHR: vk::PFN_vkGetDeviceBufferMemoryRequirements = vkGetDeviceBufferMemoryRequirements;
+        vkGetDeviceImageMemoryRequirementsKHR: vk::PFN_vkGetDeviceImageMemoryRequirements = vkGetDeviceImageMemoryRequirements;
+        vkGetDeviceImageSparseMemoryRequirementsKHR: vk::PFN_vkGetDeviceImageSparseMemoryRequirements = vkGetDeviceImageSparseMemoryRequirements;
     }
     PhysicalDevice, DeviceExtension(c"VK_KHR_performance_query") => {
         vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR: vk::PFN_vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR = vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR;
@@ -298,7 +392,6 @@ static ROWS: &[Command] = rows! {
     }
     Device, DeviceExtension(c"VK_KHR_push_descriptor") => {
         vkCmdPushDescriptorSetKHR: vk::PFN_vkCmdPushDescriptorSetKHR = vkCmdPushDescriptorSetKHR;
-        vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR = vkCmdPushDescriptorSetWithTemplateKHR;
     }
     Device, DeviceExtension(c"VK_KHR_synchronization2") => {
         vkCmdSetEvent2KHR: vk::PFN_vkCmdSetEvent2 = vkCmdSetEvent2;
@@ -307,6 +400,11 @@ static ROWS: &[Command] = rows! {
         vkCmdPipelineBarrier2KHR: vk::PFN_vkCmdPipelineBarrier2 = vkCmdPipelineBarrier2;
         vkCmdWriteTimestamp2KHR: vk::PFN_vkCmdWriteTimestamp2 = vkCmdWriteTimestamp2;
         vkQueueSubmit2KHR: vk::PFN_vkQueueSubmit2 = vkQueueSubmit2;
+    }
+    Device, DeviceExtension(c"VK_KHR_timeline_semaphore") => {
+        vkGetSemaphoreCounterValueKHR: vk::PFN_vkGetSemaphoreCounterValue = vkGetSemaphoreCounterValue;
+        vkWaitSemaphoresKHR: vk::PFN_vkWaitSemaphores = vkWaitSemaphores;
+        vkSignalSemaphoreKHR: vk::PFN_vkSignalSemaphore = vkSignalSemaphore;
     }
 };
 
@@ -4249,6 +4347,32 @@ unsafe extern "system" fn vkSubmitDebugUtilsMessageEXT(
     })
 }
 
+unsafe extern "system" fn vkCmdSetPatchControlPointsEXT(command_buffer: vk::CommandBuffer, _: u32) {
+    guard(command_buffer, "vkCmdSetPatchControlPointsEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        unsafe {
+            record(command_buffer, "vkCmdSetPatchControlPointsEXT", |_| {
+                Err(Error::Unsupported {
+                    command: "vkCmdSetPatchControlPointsEXT".to_owned(),
+                })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLogicOpEXT(command_buffer: vk::CommandBuffer, _: vk::LogicOp) {
+    guard(command_buffer, "vkCmdSetLogicOpEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        unsafe {
+            record(command_buffer, "vkCmdSetLogicOpEXT", |_| {
+                Err(Error::Unsupported {
+                    command: "vkCmdSetLogicOpEXT".to_owned(),
+                })
+            })
+        }
+    })
+}
+
 unsafe extern "system" fn vkCmdSetGaussianCameraGAURAST(
     command_buffer: vk::CommandBuffer,
     p_camera: *const gaurast::vk::GaussianCameraGAURAST<'_>,
@@ -4268,6 +4392,37 @@ unsafe extern "system" fn vkCmdSetGaussianCameraGAURAST(
             )
         }
     })
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
+    command_buffer: vk::CommandBuffer,
+    descriptor_update_template: vk::DescriptorUpdateTemplate,
+    layout: vk::PipelineLayout,
+    set: u32,
+    p_data: *const std::ffi::c_void,
+) {
+    guard(
+        command_buffer,
+        "vkCmdPushDescriptorSetWithTemplateKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdPushDescriptorSetWithTemplateKHR",
+                    |recorder| {
+                        crate::command::bind::cmd_push_descriptor_set_with_template(
+                            recorder,
+                            handle::get(descriptor_update_template)?,
+                            handle::get(layout)?,
+                            set,
+                            p_data,
+                        )
+                    },
+                )
+            }
+        },
+    )
 }
 
 unsafe extern "system" fn vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR(
@@ -4353,35 +4508,4 @@ unsafe extern "system" fn vkCmdPushDescriptorSetKHR(
             })
         }
     })
-}
-
-unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
-    command_buffer: vk::CommandBuffer,
-    descriptor_update_template: vk::DescriptorUpdateTemplate,
-    layout: vk::PipelineLayout,
-    set: u32,
-    p_data: *const std::ffi::c_void,
-) {
-    guard(
-        command_buffer,
-        "vkCmdPushDescriptorSetWithTemplateKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(
-                    command_buffer,
-                    "vkCmdPushDescriptorSetWithTemplateKHR",
-                    |recorder| {
-                        crate::command::bind::cmd_push_descriptor_set_with_template(
-                            recorder,
-                            handle::get(descriptor_update_template)?,
-                            handle::get(layout)?,
-                            set,
-                            p_data,
-                        )
-                    },
-                )
-            }
-        },
-    )
 }

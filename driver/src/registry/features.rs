@@ -268,12 +268,22 @@ pub(crate) struct Features {
     pub(crate) shader_integer_dot_product: bool,
     /// `maintenance4`.
     pub(crate) maintenance4: bool,
+    /// `extendedDynamicState`.
+    pub(crate) extended_dynamic_state: bool,
+    /// `extendedDynamicState2`.
+    pub(crate) extended_dynamic_state2: bool,
+    /// `extendedDynamicState2LogicOp`.
+    pub(crate) extended_dynamic_state2_logic_op: bool,
+    /// `extendedDynamicState2PatchControlPoints`.
+    pub(crate) extended_dynamic_state2_patch_control_points: bool,
     /// `indexTypeUint8`.
     pub(crate) index_type_uint8: bool,
     /// `provokingVertexLast`.
     pub(crate) provoking_vertex_last: bool,
     /// `transformFeedbackPreservesProvokingVertex`.
     pub(crate) transform_feedback_preserves_provoking_vertex: bool,
+    /// `texelBufferAlignment`.
+    pub(crate) texel_buffer_alignment: bool,
     /// `vertexAttributeInstanceRateDivisor`.
     pub(crate) vertex_attribute_instance_rate_divisor: bool,
     /// `vertexAttributeInstanceRateZeroDivisor`.
@@ -407,8 +417,11 @@ pub(crate) const SUPPORTED: Features = Features {
     shader_zero_initialize_workgroup_memory: true,
     dynamic_rendering: true,
     maintenance4: true,
+    extended_dynamic_state: true,
+    extended_dynamic_state2: true,
     index_type_uint8: true,
     provoking_vertex_last: true,
+    texel_buffer_alignment: true,
     vertex_attribute_instance_rate_divisor: true,
     vertex_attribute_instance_rate_zero_divisor: true,
     gaussian_primitive_topology: true,
@@ -566,9 +579,14 @@ impl Features {
         dynamic_rendering: false,
         shader_integer_dot_product: false,
         maintenance4: false,
+        extended_dynamic_state: false,
+        extended_dynamic_state2: false,
+        extended_dynamic_state2_logic_op: false,
+        extended_dynamic_state2_patch_control_points: false,
         index_type_uint8: false,
         provoking_vertex_last: false,
         transform_feedback_preserves_provoking_vertex: false,
+        texel_buffer_alignment: false,
         vertex_attribute_instance_rate_divisor: false,
         vertex_attribute_instance_rate_zero_divisor: false,
         gaussian_primitive_topology: false,
@@ -595,7 +613,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 155] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 160] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -903,12 +921,23 @@ impl Features {
                 self.shader_integer_dot_product,
             ),
             ("maintenance4", self.maintenance4),
+            ("extended_dynamic_state", self.extended_dynamic_state),
+            ("extended_dynamic_state2", self.extended_dynamic_state2),
+            (
+                "extended_dynamic_state2_logic_op",
+                self.extended_dynamic_state2_logic_op,
+            ),
+            (
+                "extended_dynamic_state2_patch_control_points",
+                self.extended_dynamic_state2_patch_control_points,
+            ),
             ("index_type_uint8", self.index_type_uint8),
             ("provoking_vertex_last", self.provoking_vertex_last),
             (
                 "transform_feedback_preserves_provoking_vertex",
                 self.transform_feedback_preserves_provoking_vertex,
             ),
+            ("texel_buffer_alignment", self.texel_buffer_alignment),
             (
                 "vertex_attribute_instance_rate_divisor",
                 self.vertex_attribute_instance_rate_divisor,
@@ -1401,6 +1430,18 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>() {
             out.dynamic_rendering = self.dynamic_rendering.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>()
+        {
+            out.extended_dynamic_state = self.extended_dynamic_state.into();
+        }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>()
+        {
+            out.extended_dynamic_state2 = self.extended_dynamic_state2.into();
+            out.extended_dynamic_state2_logic_op = self.extended_dynamic_state2_logic_op.into();
+            out.extended_dynamic_state2_patch_control_points =
+                self.extended_dynamic_state2_patch_control_points.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>() {
             out.index_type_uint8 = self.index_type_uint8.into();
         }
@@ -1408,6 +1449,10 @@ impl Features {
             out.provoking_vertex_last = self.provoking_vertex_last.into();
             out.transform_feedback_preserves_provoking_vertex =
                 self.transform_feedback_preserves_provoking_vertex.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>()
+        {
+            out.texel_buffer_alignment = self.texel_buffer_alignment.into();
         }
         if let Some(out) =
             structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>()
@@ -1794,6 +1839,20 @@ impl Features {
             self.dynamic_rendering |= requested.dynamic_rendering != vk::FALSE;
         }
         if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(structure)
+        {
+            self.extended_dynamic_state |= requested.extended_dynamic_state != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>(structure)
+        {
+            self.extended_dynamic_state2 |= requested.extended_dynamic_state2 != vk::FALSE;
+            self.extended_dynamic_state2_logic_op |=
+                requested.extended_dynamic_state2_logic_op != vk::FALSE;
+            self.extended_dynamic_state2_patch_control_points |=
+                requested.extended_dynamic_state2_patch_control_points != vk::FALSE;
+        }
+        if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(structure)
         {
             self.index_type_uint8 |= requested.index_type_uint8 != vk::FALSE;
@@ -1804,6 +1863,11 @@ impl Features {
             self.provoking_vertex_last |= requested.provoking_vertex_last != vk::FALSE;
             self.transform_feedback_preserves_provoking_vertex |=
                 requested.transform_feedback_preserves_provoking_vertex != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(structure)
+        {
+            self.texel_buffer_alignment |= requested.texel_buffer_alignment != vk::FALSE;
         }
         if let Some(requested) =
             valid::cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(structure)
@@ -1851,11 +1915,20 @@ impl Features {
 /// The extension without which the features of a structure can't be enabled; features of core need none.
 pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr> {
     match structure {
+        vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_extended_dynamic_state")
+        }
+        vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_extended_dynamic_state2")
+        }
         vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_EXT_index_type_uint8")
         }
         vk::PhysicalDeviceProvokingVertexFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_provoking_vertex")
+        }
+        vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_texel_buffer_alignment")
         }
         vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_EXT_vertex_attribute_divisor")
@@ -1876,15 +1949,23 @@ pub(crate) const MANDATORY: &[(u32, &[&str])] = &[
     (vk::API_VERSION_1_0, &["robust_buffer_access"]),
     (
         vk::API_VERSION_1_1,
-        &["multiview", "storage_buffer16_bit_access"],
+        &[
+            "multiview",
+            "shader_draw_parameters",
+            "storage_buffer16_bit_access",
+        ],
     ),
     (
         vk::API_VERSION_1_2,
         &[
+            "draw_indirect_count",
             "host_query_reset",
             "imageless_framebuffer",
+            "sampler_mirror_clamp_to_edge",
             "separate_depth_stencil_layouts",
             "shader_int64",
+            "shader_output_layer",
+            "shader_output_viewport_index",
             "shader_subgroup_extended_types",
             "storage_buffer8_bit_access",
             "subgroup_broadcast_dynamic_id",
