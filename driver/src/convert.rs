@@ -4,7 +4,7 @@ use crate::abi::error::Error;
 use ash::vk;
 use simdevice::Format;
 use simdevice::format::{Channel, Numeric};
-use simdevice::packet::draw::{CompareOp, LogicOp, PolygonMode, StencilOp, Topology};
+use simdevice::packet::draw::{CompareOp, LogicOp, PolygonMode, StencilFace, StencilOp, Topology};
 use simdevice::packet::{
     Aspect, BlendEquation, BlendFactor, BlendOp, BlendState, ClearValue, Rect, ResolveMode,
     Viewport,
@@ -95,6 +95,60 @@ pub(crate) fn stencil_op(op: vk::StencilOp, vuid: &'static str) -> Result<Stenci
         vk::StencilOp::INCREMENT_AND_WRAP => Ok(StencilOp::IncrementAndWrap),
         vk::StencilOp::DECREMENT_AND_WRAP => Ok(StencilOp::DecrementAndWrap),
         other => Err(unknown(vuid, &other)),
+    }
+}
+
+/// The stencil operations of one face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct StencilOps {
+    /// When the stencil test fails.
+    pub(crate) fail: StencilOp,
+    /// When both tests pass.
+    pub(crate) pass: StencilOp,
+    /// When only the depth test fails.
+    pub(crate) depth_fail: StencilOp,
+    /// The comparison.
+    pub(crate) compare: CompareOp,
+}
+
+/// The ids of the rules that stencil operations are values of their enumerations.
+pub(crate) struct StencilOpIds {
+    /// That of the operation when the stencil test fails.
+    pub(crate) fail: &'static str,
+    /// That of the operation when both tests pass.
+    pub(crate) pass: &'static str,
+    /// That of the operation when only the depth test fails.
+    pub(crate) depth_fail: &'static str,
+    /// That of the comparison.
+    pub(crate) compare: &'static str,
+}
+
+impl StencilOps {
+    /// Makes them those of a face.
+    pub(crate) fn set(self, face: &mut StencilFace) {
+        face.fail = self.fail;
+        face.pass = self.pass;
+        face.depth_fail = self.depth_fail;
+        face.compare = self.compare;
+    }
+
+    /// The operations for the device.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] for values that are none.
+    pub(crate) fn from_vk(
+        fail: vk::StencilOp,
+        pass: vk::StencilOp,
+        depth_fail: vk::StencilOp,
+        compare: vk::CompareOp,
+        ids: &StencilOpIds,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            fail: stencil_op(fail, ids.fail)?,
+            pass: stencil_op(pass, ids.pass)?,
+            depth_fail: stencil_op(depth_fail, ids.depth_fail)?,
+            compare: compare_op(compare, ids.compare)?,
+        })
     }
 }
 

@@ -3,16 +3,16 @@
 use super::Command;
 use super::buffer::Recorder;
 use crate::abi::error::Error;
-use crate::convert;
+use crate::convert::{self, StencilOpIds, StencilOps};
 use crate::physical_device::limits;
-use crate::pipeline::dynamic_state::{self, DynamicState, Face, StencilOpIds, StencilOps, faces};
+use crate::pipeline::dynamic_state::{DynamicState, Face, faces};
 use ash::vk;
 use gaurast::vk::PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
 use simdevice::packet::draw::DepthBias;
 
 /// Records a state.
 fn set(recorder: &mut Recorder, state: DynamicState) -> Result<(), Error> {
-    recorder.push(Command::Set(state));
+    recorder.push(Command::SetDynamicState(state));
     Ok(())
 }
 
@@ -22,7 +22,7 @@ fn set_faces(
     mask: vk::StencilFaceFlags,
     state: impl Fn(Face) -> DynamicState,
 ) -> Result<(), Error> {
-    faces(mask).for_each(|face| recorder.push(Command::Set(state(face))));
+    faces(mask).for_each(|face| recorder.push(Command::SetDynamicState(state(face))));
     Ok(())
 }
 
@@ -31,7 +31,12 @@ pub(crate) fn cmd_set_depth_test_enable(
     recorder: &mut Recorder,
     depth_test_enable: bool,
 ) -> Result<(), Error> {
-    set(recorder, DynamicState::DepthTestEnable(depth_test_enable))
+    set(
+        recorder,
+        DynamicState::DepthTestEnable {
+            enable: depth_test_enable,
+        },
+    )
 }
 
 #[doc(alias = "vkCmdSetDepthWriteEnable")]
@@ -39,7 +44,12 @@ pub(crate) fn cmd_set_depth_write_enable(
     recorder: &mut Recorder,
     depth_write_enable: bool,
 ) -> Result<(), Error> {
-    set(recorder, DynamicState::DepthWriteEnable(depth_write_enable))
+    set(
+        recorder,
+        DynamicState::DepthWriteEnable {
+            enable: depth_write_enable,
+        },
+    )
 }
 
 #[doc(alias = "vkCmdSetDepthBoundsTestEnable")]
@@ -49,7 +59,9 @@ pub(crate) fn cmd_set_depth_bounds_test_enable(
 ) -> Result<(), Error> {
     set(
         recorder,
-        DynamicState::DepthBoundsTestEnable(depth_bounds_test_enable),
+        DynamicState::DepthBoundsTestEnable {
+            enable: depth_bounds_test_enable,
+        },
     )
 }
 
@@ -60,7 +72,9 @@ pub(crate) fn cmd_set_stencil_test_enable(
 ) -> Result<(), Error> {
     set(
         recorder,
-        DynamicState::StencilTestEnable(stencil_test_enable),
+        DynamicState::StencilTestEnable {
+            enable: stencil_test_enable,
+        },
     )
 }
 
@@ -71,7 +85,9 @@ pub(crate) fn cmd_set_rasterizer_discard_enable(
 ) -> Result<(), Error> {
     set(
         recorder,
-        DynamicState::RasterizerDiscardEnable(rasterizer_discard_enable),
+        DynamicState::RasterizerDiscardEnable {
+            enable: rasterizer_discard_enable,
+        },
     )
 }
 
@@ -80,7 +96,12 @@ pub(crate) fn cmd_set_depth_bias_enable(
     recorder: &mut Recorder,
     depth_bias_enable: bool,
 ) -> Result<(), Error> {
-    set(recorder, DynamicState::DepthBiasEnable(depth_bias_enable))
+    set(
+        recorder,
+        DynamicState::DepthBiasEnable {
+            enable: depth_bias_enable,
+        },
+    )
 }
 
 #[doc(alias = "vkCmdSetPrimitiveRestartEnable")]
@@ -90,13 +111,15 @@ pub(crate) fn cmd_set_primitive_restart_enable(
 ) -> Result<(), Error> {
     set(
         recorder,
-        DynamicState::PrimitiveRestartEnable(primitive_restart_enable),
+        DynamicState::PrimitiveRestartEnable {
+            enable: primitive_restart_enable,
+        },
     )
 }
 
 #[doc(alias = "vkCmdSetLineWidth")]
 pub(crate) fn cmd_set_line_width(recorder: &mut Recorder, line_width: f32) -> Result<(), Error> {
-    set(recorder, DynamicState::LineWidth(line_width))
+    set(recorder, DynamicState::LineWidth { width: line_width })
 }
 
 #[doc(alias = "vkCmdSetDepthBias")]
@@ -111,7 +134,7 @@ pub(crate) fn cmd_set_depth_bias(
         clamp: depth_bias_clamp,
         slope: depth_bias_slope_factor,
     };
-    set(recorder, DynamicState::DepthBias(bias))
+    set(recorder, DynamicState::DepthBias { bias })
 }
 
 #[doc(alias = "vkCmdSetBlendConstants")]
@@ -119,7 +142,12 @@ pub(crate) fn cmd_set_blend_constants(
     recorder: &mut Recorder,
     blend_constants: &[f32; 4],
 ) -> Result<(), Error> {
-    set(recorder, DynamicState::BlendConstants(*blend_constants))
+    set(
+        recorder,
+        DynamicState::BlendConstants {
+            constants: *blend_constants,
+        },
+    )
 }
 
 #[doc(alias = "vkCmdSetDepthBounds")]
@@ -130,7 +158,9 @@ pub(crate) fn cmd_set_depth_bounds(
 ) -> Result<(), Error> {
     set(
         recorder,
-        DynamicState::DepthBounds(min_depth_bounds, max_depth_bounds),
+        DynamicState::DepthBounds {
+            bounds: (min_depth_bounds, max_depth_bounds),
+        },
     )
 }
 
@@ -141,7 +171,10 @@ pub(crate) fn cmd_set_stencil_compare_mask(
     compare_mask: u32,
 ) -> Result<(), Error> {
     set_faces(recorder, face_mask, |face| {
-        DynamicState::StencilCompareMask(face, compare_mask as u8)
+        DynamicState::StencilCompareMask {
+            face,
+            mask: compare_mask as u8,
+        }
     })
 }
 
@@ -151,8 +184,9 @@ pub(crate) fn cmd_set_stencil_write_mask(
     face_mask: vk::StencilFaceFlags,
     write_mask: u32,
 ) -> Result<(), Error> {
-    set_faces(recorder, face_mask, |face| {
-        DynamicState::StencilWriteMask(face, write_mask as u8)
+    set_faces(recorder, face_mask, |face| DynamicState::StencilWriteMask {
+        face,
+        mask: write_mask as u8,
     })
 }
 
@@ -162,8 +196,9 @@ pub(crate) fn cmd_set_stencil_reference(
     face_mask: vk::StencilFaceFlags,
     reference: u32,
 ) -> Result<(), Error> {
-    set_faces(recorder, face_mask, |face| {
-        DynamicState::StencilReference(face, reference as u8)
+    set_faces(recorder, face_mask, |face| DynamicState::StencilReference {
+        face,
+        reference: reference as u8,
     })
 }
 
@@ -185,8 +220,9 @@ pub(crate) fn cmd_set_stencil_op(
     compare_op: vk::CompareOp,
 ) -> Result<(), Error> {
     let ops = StencilOps::from_vk(fail_op, pass_op, depth_fail_op, compare_op, &STENCIL_OP)?;
-    set_faces(recorder, face_mask, |face| {
-        DynamicState::StencilOp(face, ops)
+    set_faces(recorder, face_mask, |face| DynamicState::StencilOp {
+        face,
+        ops,
     })
 }
 
@@ -195,7 +231,7 @@ pub(crate) fn cmd_set_cull_mode(
     recorder: &mut Recorder,
     cull_mode: vk::CullModeFlags,
 ) -> Result<(), Error> {
-    set(recorder, dynamic_state::cull_mode(cull_mode))
+    set(recorder, DynamicState::CullMode { mode: cull_mode })
 }
 
 #[doc(alias = "vkCmdSetFrontFace")]
@@ -203,7 +239,7 @@ pub(crate) fn cmd_set_front_face(
     recorder: &mut Recorder,
     front_face: vk::FrontFace,
 ) -> Result<(), Error> {
-    set(recorder, dynamic_state::front_face(front_face))
+    set(recorder, DynamicState::FrontFace { face: front_face })
 }
 
 #[doc(alias = "vkCmdSetPrimitiveTopology")]
@@ -216,7 +252,7 @@ pub(crate) fn cmd_set_primitive_topology(
         return Ok(());
     }
     let topology = convert::topology(primitive_topology)?;
-    set(recorder, DynamicState::PrimitiveTopology(topology))
+    set(recorder, DynamicState::PrimitiveTopology { topology })
 }
 
 #[doc(alias = "vkCmdSetDepthCompareOp")]
@@ -228,7 +264,7 @@ pub(crate) fn cmd_set_depth_compare_op(
         depth_compare_op,
         "VUID-vkCmdSetDepthCompareOp-depthCompareOp-parameter",
     )?;
-    set(recorder, DynamicState::DepthCompareOp(op))
+    set(recorder, DynamicState::DepthCompareOp { op })
 }
 
 #[doc(alias = "vkCmdSetViewport")]

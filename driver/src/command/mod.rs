@@ -67,7 +67,7 @@ pub(crate) enum Command {
         with_count: bool,
     },
     /// Any other `vkCmdSet...` of fixed-function state.
-    Set(DynamicState),
+    SetDynamicState(DynamicState),
     /// `vkCmdSetGaussianCameraGAURAST`.
     SetCamera(Box<Camera>),
     /// `vkCmdDraw` and `vkCmdDrawIndexed`.

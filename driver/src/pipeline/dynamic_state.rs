@@ -1,88 +1,151 @@
-//! Fixed-function state that the command buffer may set: one setting of it.
+//! Dynamic state: the table of what a command buffer may set, and what it has set.
 
-use crate::abi::error::Error;
-use crate::convert;
+use super::state::FixedFunctionState as Fixed;
+use crate::convert::StencilOps;
 use ash::vk;
-use simdevice::packet::draw::{CompareOp, DepthBias, StencilOp, Topology};
+use simdevice::packet::draw::{CompareOp, DepthBias, Topology};
 
-/// The face that a stencil setting is for: 0 is the front, 1 the back.
+/// The face that a stencil state is for: 0 is the front, 1 the back.
 pub(crate) type Face = usize;
 
-/// The stencil operations of one face.
+/// The use that Gaussians make of a dynamic state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct StencilOps {
-    /// When the stencil test fails.
-    pub(crate) fail: StencilOp,
-    /// When both tests pass.
-    pub(crate) pass: StencilOp,
-    /// When only the depth test fails.
-    pub(crate) depth_fail: StencilOp,
-    /// The comparison.
-    pub(crate) compare: CompareOp,
+enum Gaussians {
+    /// It says what becomes of their fragments.
+    Taken,
+    /// It has no effect on them.
+    Ignored,
+    /// A pipeline of theirs may not have it dynamic.
+    Refused,
 }
 
-/// One `vkCmdSet...`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs, reason = "the names are those of Vulkan's commands")]
-pub(crate) enum DynamicState {
-    LineWidth(f32),
-    DepthBias(DepthBias),
-    DepthBiasEnable(bool),
-    BlendConstants([f32; 4]),
-    DepthBounds(f32, f32),
-    DepthBoundsTestEnable(bool),
-    DepthTestEnable(bool),
-    DepthWriteEnable(bool),
-    DepthCompareOp(CompareOp),
-    StencilTestEnable(bool),
-    StencilOp(Face, StencilOps),
-    StencilCompareMask(Face, u8),
-    StencilWriteMask(Face, u8),
-    StencilReference(Face, u8),
-    CullMode { front: bool, back: bool },
-    FrontFaceClockwise(bool),
-    PrimitiveTopology(Topology),
-    PrimitiveRestartEnable(bool),
-    RasterizerDiscardEnable(bool),
+/// A row of the table.
+struct Row {
+    state: vk::DynamicState,
+    /// Tells if a draw with the rest of the state needs it to be set.
+    is_needed: fn(&Fixed) -> bool,
+    gaussians: Gaussians,
 }
 
-impl DynamicState {
-    /// What is set.
-    pub(crate) fn state(self) -> vk::DynamicState {
-        use vk::DynamicState as S;
-        match self {
-            Self::LineWidth(_) => S::LINE_WIDTH,
-            Self::DepthBias(_) => S::DEPTH_BIAS,
-            Self::DepthBiasEnable(_) => S::DEPTH_BIAS_ENABLE,
-            Self::BlendConstants(_) => S::BLEND_CONSTANTS,
-            Self::DepthBounds(..) => S::DEPTH_BOUNDS,
-            Self::DepthBoundsTestEnable(_) => S::DEPTH_BOUNDS_TEST_ENABLE,
-            Self::DepthTestEnable(_) => S::DEPTH_TEST_ENABLE,
-            Self::DepthWriteEnable(_) => S::DEPTH_WRITE_ENABLE,
-            Self::DepthCompareOp(_) => S::DEPTH_COMPARE_OP,
-            Self::StencilTestEnable(_) => S::STENCIL_TEST_ENABLE,
-            Self::StencilOp(..) => S::STENCIL_OP,
-            Self::StencilCompareMask(..) => S::STENCIL_COMPARE_MASK,
-            Self::StencilWriteMask(..) => S::STENCIL_WRITE_MASK,
-            Self::StencilReference(..) => S::STENCIL_REFERENCE,
-            Self::CullMode { .. } => S::CULL_MODE,
-            Self::FrontFaceClockwise(_) => S::FRONT_FACE,
-            Self::PrimitiveTopology(_) => S::PRIMITIVE_TOPOLOGY,
-            Self::PrimitiveRestartEnable(_) => S::PRIMITIVE_RESTART_ENABLE,
-            Self::RasterizerDiscardEnable(_) => S::RASTERIZER_DISCARD_ENABLE,
+/// The table: `LINE_WIDTH => LineWidth(width: f32), set .., needed .., gaussians ..;` is the state of that name, its value, how
+/// the value becomes part of fixed-function state, when a draw needs it to be set, and what Gaussians make of it. A state
+/// that each face has of its own names the face in brackets.
+macro_rules! dynamic_states {
+    ($(
+        $state:ident => $variant:ident $([$face:ident])? ($value:ident: $type:ty),
+        set $set:expr, needed $needed:expr, gaussians $gaussians:ident;
+    )*) => {
+        /// A state that a command buffer has set, with its value.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[allow(missing_docs, reason = "the names are those of Vulkan's commands")]
+        pub(crate) enum DynamicState {
+            $($variant { $($face: Face,)? $value: $type },)*
         }
-    }
 
-    /// The face it is for, if it is for one.
-    fn face(self) -> Option<Face> {
-        match self {
-            Self::StencilOp(face, _)
-            | Self::StencilCompareMask(face, _)
-            | Self::StencilWriteMask(face, _)
-            | Self::StencilReference(face, _) => Some(face),
-            _ => None,
+        const ROWS: &[Row] = &[$(Row {
+            state: vk::DynamicState::$state,
+            is_needed: $needed,
+            gaussians: Gaussians::$gaussians,
+        },)*];
+
+        impl DynamicState {
+            /// The state and the face that it is for, if it is for one.
+            fn key(self) -> (vk::DynamicState, Option<Face>) {
+                match self {
+                    $(Self::$variant { $($face,)? .. } => {
+                        (vk::DynamicState::$state, None::<Face>$(.or(Some($face)))?)
+                    })*
+                }
+            }
+
+            /// Makes it part of fixed-function state.
+            pub(crate) fn apply(self, state: &mut Fixed) {
+                fn apply(state: &mut Fixed, set: impl FnOnce(&mut Fixed)) {
+                    set(state);
+                }
+                match self {
+                    $(Self::$variant { $($face,)? $value } => apply(state, $set),)*
+                }
+            }
         }
-    }
+    };
+}
+
+dynamic_states! {
+    LINE_WIDTH => LineWidth(width: f32),
+        set |state| state.draw.line_width = width, needed Fixed::draws_lines, gaussians Ignored;
+    DEPTH_BIAS => DepthBias(bias: DepthBias),
+        set |state| state.depth_bias = bias, needed Fixed::biases_depth, gaussians Ignored;
+    DEPTH_BIAS_ENABLE => DepthBiasEnable(enable: bool),
+        set |state| state.depth_bias_enable = enable, needed Fixed::rasterizes, gaussians Ignored;
+    BLEND_CONSTANTS => BlendConstants(constants: [f32; 4]),
+        set |state| state.draw.blend_constants = constants, needed Fixed::blends_by_constants, gaussians Taken;
+    DEPTH_BOUNDS => DepthBounds(bounds: (f32, f32)),
+        set |state| state.depth_bounds = bounds, needed Fixed::tests_depth_bounds, gaussians Taken;
+    DEPTH_BOUNDS_TEST_ENABLE => DepthBoundsTestEnable(enable: bool),
+        set |state| state.depth_bounds_test = enable, needed Fixed::rasterizes, gaussians Taken;
+    DEPTH_TEST_ENABLE => DepthTestEnable(enable: bool),
+        set |state| state.depth_test = enable, needed Fixed::rasterizes, gaussians Taken;
+    DEPTH_WRITE_ENABLE => DepthWriteEnable(enable: bool),
+        set |state| state.depth_write = enable, needed Fixed::tests_depth, gaussians Taken;
+    DEPTH_COMPARE_OP => DepthCompareOp(op: CompareOp),
+        set |state| state.depth_compare = op, needed Fixed::tests_depth, gaussians Taken;
+    STENCIL_TEST_ENABLE => StencilTestEnable(enable: bool),
+        set |state| state.stencil_test = enable, needed Fixed::rasterizes, gaussians Taken;
+    STENCIL_OP => StencilOp[face](ops: StencilOps),
+        set |state| ops.set(&mut state.stencil[face]), needed Fixed::tests_stencil, gaussians Taken;
+    STENCIL_COMPARE_MASK => StencilCompareMask[face](mask: u8),
+        set |state| state.stencil[face].compare_mask = mask, needed Fixed::tests_stencil, gaussians Taken;
+    STENCIL_WRITE_MASK => StencilWriteMask[face](mask: u8),
+        set |state| state.stencil[face].write_mask = mask, needed Fixed::tests_stencil, gaussians Taken;
+    STENCIL_REFERENCE => StencilReference[face](reference: u8),
+        set |state| state.stencil[face].reference = reference, needed Fixed::tests_stencil, gaussians Taken;
+    CULL_MODE => CullMode(mode: vk::CullModeFlags),
+        set |state| state.set_cull_mode(mode), needed Fixed::rasterizes, gaussians Ignored;
+    FRONT_FACE => FrontFace(face: vk::FrontFace),
+        set |state| state.set_front_face(face), needed Fixed::rasterizes, gaussians Ignored;
+    PRIMITIVE_TOPOLOGY => PrimitiveTopology(topology: Topology),
+        set |state| state.draw.topology = topology, needed |_| true, gaussians Ignored;
+    PRIMITIVE_RESTART_ENABLE => PrimitiveRestartEnable(enable: bool),
+        set |state| state.draw.primitive_restart = enable, needed |_| true, gaussians Refused;
+    RASTERIZER_DISCARD_ENABLE => RasterizerDiscardEnable(enable: bool),
+        set |state| state.draw.rasterizer_discard = enable, needed |_| true, gaussians Refused;
+}
+
+/// The dynamic states that are looked up for each draw, and that no row has a value of: viewports, scissors and strides.
+/// Gaussians may have all of them.
+const LOOKED_UP: [vk::DynamicState; 5] = [
+    vk::DynamicState::VIEWPORT,
+    vk::DynamicState::VIEWPORT_WITH_COUNT,
+    vk::DynamicState::SCISSOR,
+    vk::DynamicState::SCISSOR_WITH_COUNT,
+    vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE,
+];
+
+fn row(state: vk::DynamicState) -> Option<&'static Row> {
+    ROWS.iter().find(|row| row.state == state)
+}
+
+/// Tells if the driver has a dynamic state.
+pub(crate) fn is_supported(state: vk::DynamicState) -> bool {
+    row(state).is_some() || LOOKED_UP.contains(&state)
+}
+
+/// Tells if a dynamic state is set by a value, which [`DynamicStates`] keeps.
+pub(crate) fn has_value(state: vk::DynamicState) -> bool {
+    row(state).is_some()
+}
+
+/// Tells if a Gaussian pipeline takes a state from the command buffer.
+pub(crate) fn is_taken_by_gaussians(state: vk::DynamicState) -> bool {
+    row(state).is_some_and(|row| row.gaussians == Gaussians::Taken)
+}
+
+/// Tells if a Gaussian pipeline may have a state dynamic.
+pub(crate) fn may_gaussians_have(state: vk::DynamicState) -> bool {
+    row(state).map_or(LOOKED_UP.contains(&state), |row| {
+        row.gaussians != Gaussians::Refused
+    })
 }
 
 /// The faces that a mask names.
@@ -93,69 +156,43 @@ pub(crate) fn faces(mask: vk::StencilFaceFlags) -> impl Iterator<Item = Face> {
         .filter_map(move |(face, flag)| mask.contains(flag).then_some(face))
 }
 
-/// Which faces a cull mode culls.
-pub(crate) fn cull_mode(mode: vk::CullModeFlags) -> DynamicState {
-    DynamicState::CullMode {
-        front: mode.contains(vk::CullModeFlags::FRONT),
-        back: mode.contains(vk::CullModeFlags::BACK),
-    }
-}
-
-/// Which face is the front.
-pub(crate) fn front_face(face: vk::FrontFace) -> DynamicState {
-    DynamicState::FrontFaceClockwise(face == vk::FrontFace::CLOCKWISE)
-}
-
-/// The ids of the rules that stencil operations are values of their enumerations.
-pub(crate) struct StencilOpIds {
-    /// That of the operation when the stencil test fails.
-    pub(crate) fail: &'static str,
-    /// That of the operation when both tests pass.
-    pub(crate) pass: &'static str,
-    /// That of the operation when only the depth test fails.
-    pub(crate) depth_fail: &'static str,
-    /// That of the comparison.
-    pub(crate) compare: &'static str,
-}
-
-impl StencilOps {
-    /// The operations for the device.
-    ///
-    /// # Errors
-    /// [`Error::InvalidUsage`] for values that are none.
-    pub(crate) fn from_vk(
-        fail: vk::StencilOp,
-        pass: vk::StencilOp,
-        depth_fail: vk::StencilOp,
-        compare: vk::CompareOp,
-        ids: &StencilOpIds,
-    ) -> Result<Self, Error> {
-        Ok(Self {
-            fail: convert::stencil_op(fail, ids.fail)?,
-            pass: convert::stencil_op(pass, ids.pass)?,
-            depth_fail: convert::stencil_op(depth_fail, ids.depth_fail)?,
-            compare: convert::compare_op(compare, ids.compare)?,
-        })
-    }
-}
-
-/// What a command buffer has set so far; the last of each.
+/// The states that a command buffer has set so far; the last value of each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DynamicStates(Vec<DynamicState>);
 
 impl DynamicStates {
-    /// Sets something, instead of what was set before.
-    pub(crate) fn set(&mut self, setting: DynamicState) {
-        let key = |setting: DynamicState| (setting.state(), setting.face());
-        match self.0.iter_mut().find(|old| key(**old) == key(setting)) {
-            Some(old) => *old = setting,
-            None => self.0.push(setting),
+    /// Sets a state, instead of what was set before.
+    pub(crate) fn set(&mut self, state: DynamicState) {
+        match self.0.iter_mut().find(|old| old.key() == state.key()) {
+            Some(old) => *old = state,
+            None => self.0.push(state),
         }
     }
 
-    /// What was set of a state.
-    pub(crate) fn of(&self, state: vk::DynamicState) -> impl Iterator<Item = DynamicState> {
-        self.0.iter().copied().filter(move |it| it.state() == state)
+    /// The values that were set of a state: one, or one for each face.
+    fn of(&self, state: vk::DynamicState) -> impl Iterator<Item = DynamicState> {
+        self.0.iter().copied().filter(move |it| it.key().0 == state)
+    }
+
+    /// Makes those of the states `dynamic` that were set part of fixed-function state.
+    ///
+    /// # Errors
+    /// The first state that was not set, though a draw needs it.
+    pub(crate) fn apply(
+        &self,
+        dynamic: &[vk::DynamicState],
+        fixed: &mut Fixed,
+    ) -> Result<(), vk::DynamicState> {
+        let mut missing = Vec::new();
+        for &state in dynamic {
+            let mut values = self.of(state).peekable();
+            if values.peek().is_none() {
+                missing.push(state);
+            }
+            values.for_each(|value| value.apply(fixed));
+        }
+        let is_needed = |&state: &_| row(state).is_some_and(|row| (row.is_needed)(fixed));
+        missing.into_iter().find(is_needed).map_or(Ok(()), Err)
     }
 }
 
@@ -164,27 +201,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_setting_of_a_face_holds() {
-        let mut settings = DynamicStates::default();
+    fn the_last_value_of_a_face_holds() {
+        let reference = |face, reference| DynamicState::StencilReference { face, reference };
+        let mut states = DynamicStates::default();
         for face in faces(vk::StencilFaceFlags::FRONT_AND_BACK) {
-            settings.set(DynamicState::StencilReference(face, 1));
+            states.set(reference(face, 1));
         }
         for face in faces(vk::StencilFaceFlags::BACK) {
-            settings.set(DynamicState::StencilReference(face, 2));
+            states.set(reference(face, 2));
         }
-        settings.set(DynamicState::LineWidth(3.0));
-        let of = |state| settings.of(state).collect::<Vec<_>>();
+        let width = DynamicState::LineWidth { width: 3.0 };
+        states.set(width);
+        let of = |state| states.of(state).collect::<Vec<_>>();
         assert_eq!(
             of(vk::DynamicState::STENCIL_REFERENCE),
-            [
-                DynamicState::StencilReference(0, 1),
-                DynamicState::StencilReference(1, 2)
-            ]
+            [reference(0, 1), reference(1, 2)]
         );
-        assert_eq!(
-            of(vk::DynamicState::LINE_WIDTH),
-            [DynamicState::LineWidth(3.0)]
-        );
+        assert_eq!(of(vk::DynamicState::LINE_WIDTH), [width]);
         assert!(of(vk::DynamicState::DEPTH_BIAS).is_empty());
+    }
+
+    #[test]
+    fn gaussians_take_ignore_or_refuse_each_state() {
+        use vk::DynamicState as S;
+        let all = || ROWS.iter().map(|row| row.state).chain(LOOKED_UP);
+        assert!(all().all(is_supported));
+        assert!(!is_supported(S::LINE_STIPPLE_KHR));
+        let taken = all().filter(|&state| is_taken_by_gaussians(state));
+        assert_eq!(taken.count(), 11);
+        let refused = all().filter(|&state| !may_gaussians_have(state));
+        let expected = [S::PRIMITIVE_RESTART_ENABLE, S::RASTERIZER_DISCARD_ENABLE];
+        assert_eq!(refused.collect::<Vec<_>>(), expected);
     }
 }

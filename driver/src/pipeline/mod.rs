@@ -1,6 +1,6 @@
 //! Pipelines: what draws and dispatches need of their create infos, converted and validated once.
 //!
-//! [`GraphicsPipelineInfo`] and [`ShaderStage`] follow the create infos' pointers; everything beyond is safe.
+//! [`GraphicsState`] and [`ShaderStage`] follow the create infos' pointers; everything beyond is safe.
 
 pub(crate) mod compute;
 pub(crate) mod dynamic_state;
@@ -14,7 +14,7 @@ pub(crate) mod state;
 use self::compute::ComputePipeline;
 use self::gaussian::GaussianPipeline;
 use self::primitives::PolygonPipeline;
-use self::state::GraphicsPipelineInfo;
+use self::state::GraphicsState;
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
 use crate::abi::valid;
@@ -64,8 +64,8 @@ impl GraphicsPipeline {
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
-    pub(crate) fn new(device: &Device, info: &GraphicsPipelineInfo) -> Result<Self, Error> {
-        let primitive = if info.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
+    pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
+        let primitive = if info.vertex_input.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
             let gaussian = GaussianPipeline::new(device, info)?;
             Primitive::Gaussian(Box::new(gaussian))
         } else {
@@ -93,7 +93,7 @@ unsafe fn new_graphics_pipeline(
     // SAFETY: the caller's promise.
     let gathered = unsafe {
         write_empty_creation_feedback(info.p_next)?;
-        GraphicsPipelineInfo::from_create_info(info)?
+        GraphicsState::from_create_info(info)?
     };
     let pipeline = GraphicsPipeline::new(device, &gathered)?;
     Ok(Pipeline::Graphics(Arc::new(pipeline)))

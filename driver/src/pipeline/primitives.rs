@@ -1,9 +1,10 @@
 //! Pipelines of points, lines and triangles: shader stages translated, checked and linked, and fixed-function state.
 
+use super::dynamic_state;
 use super::link::{self, Effects};
 use super::stages;
 use super::state::{
-    self, AttributeSource, Class, FixedFunctionState, GraphicsPipelineInfo, color_effects,
+    self, AttributeSource, Class, FixedFunctionState, GraphicsState, color_effects,
     reads_second_source,
 };
 use crate::abi::error::Error;
@@ -53,7 +54,7 @@ impl PolygonPipeline {
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
-    pub(crate) fn new(device: &Device, info: &GraphicsPipelineInfo) -> Result<Self, Error> {
+    pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
         let fixed = FixedFunctionState::new(info)?;
         let (dynamic, viewports, scissors) = dynamic(info)?;
         let layout = info.layout.ok_or_else(|| {
@@ -82,7 +83,7 @@ impl PolygonPipeline {
         let color = color_effects(info, &fixed);
         let effects = Effects {
             color: &color,
-            second_source: info.blend.iter().any(reads_second_source),
+            second_source: info.fragment_output.blend.iter().any(reads_second_source),
             points: state::class(fixed.draw.topology) == Class::Points
                 || fixed.draw.polygon_mode == PolygonMode::Point,
         };
@@ -115,22 +116,15 @@ struct Stages<'a> {
 }
 
 impl<'a> Stages<'a> {
-    fn find(info: &'a GraphicsPipelineInfo) -> Result<Self, Error> {
+    fn find(info: &'a GraphicsState) -> Result<Self, Error> {
         let known = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
-        if let Some((stage, _)) = info
-            .stages
-            .iter()
-            .find(|(stage, _)| !known.contains(*stage))
-        {
+        if let Some((stage, _)) = info.stages().find(|(stage, _)| !known.contains(*stage)) {
             return Err(Error::FeatureNotPresent(format!(
                 "a shader stage {stage:?}"
             )));
         }
         let find = |wanted| {
-            let mut found = info
-                .stages
-                .iter()
-                .filter(move |(stage, _)| *stage == wanted);
+            let mut found = info.stages().filter(move |(stage, _)| *stage == wanted);
             match (found.next(), found.next()) {
                 (_, Some(_)) => Err(Error::usage(
                     "VUID-VkGraphicsPipelineCreateInfo-stage-06897",
@@ -144,7 +138,7 @@ impl<'a> Stages<'a> {
                 "VUID-VkGraphicsPipelineCreateInfo-stage-02096",
                 format!(
                     "a pipeline of topology {:?} has no vertex stage",
-                    info.topology
+                    info.vertex_input.topology
                 ),
             )
         })?;
@@ -158,38 +152,22 @@ impl<'a> Stages<'a> {
 
 /// What is dynamic, and where viewports and scissors come from.
 fn dynamic(
-    info: &GraphicsPipelineInfo,
+    info: &GraphicsState,
 ) -> Result<(Vec<vk::DynamicState>, ViewportSource, ViewportSource), Error> {
     use vk::DynamicState as S;
     let (mut viewports, mut scissors) = (ViewportSource::Static, ViewportSource::Static);
     let mut dynamic = Vec::new();
     for &state in info.dynamic {
         match state {
-            S::VIEWPORT => viewports = ViewportSource::Dynamic(info.viewport_count),
+            S::VIEWPORT => {
+                viewports = ViewportSource::Dynamic(info.pre_rasterization.viewport_count);
+            }
             S::VIEWPORT_WITH_COUNT => viewports = ViewportSource::DynamicWithCount,
-            S::SCISSOR => scissors = ViewportSource::Dynamic(info.scissor_count),
+            S::SCISSOR => scissors = ViewportSource::Dynamic(info.pre_rasterization.scissor_count),
             S::SCISSOR_WITH_COUNT => scissors = ViewportSource::DynamicWithCount,
+            state if dynamic_state::has_value(state) => dynamic.push(state),
             // Attribute streams are looked up for each draw.
-            S::VERTEX_INPUT_BINDING_STRIDE => {}
-            S::LINE_WIDTH
-            | S::DEPTH_BIAS
-            | S::BLEND_CONSTANTS
-            | S::DEPTH_BOUNDS
-            | S::STENCIL_COMPARE_MASK
-            | S::STENCIL_WRITE_MASK
-            | S::STENCIL_REFERENCE
-            | S::CULL_MODE
-            | S::FRONT_FACE
-            | S::PRIMITIVE_TOPOLOGY
-            | S::DEPTH_TEST_ENABLE
-            | S::DEPTH_WRITE_ENABLE
-            | S::DEPTH_COMPARE_OP
-            | S::DEPTH_BOUNDS_TEST_ENABLE
-            | S::STENCIL_TEST_ENABLE
-            | S::STENCIL_OP
-            | S::RASTERIZER_DISCARD_ENABLE
-            | S::DEPTH_BIAS_ENABLE
-            | S::PRIMITIVE_RESTART_ENABLE => dynamic.push(state),
+            state if dynamic_state::is_supported(state) => {}
             other => {
                 return Err(Error::FeatureNotPresent(format!(
                     "the dynamic state {other:?}"

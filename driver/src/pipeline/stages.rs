@@ -1,7 +1,7 @@
 //! Shader stages, translated and compared with the pipeline's layout and vertex input.
 
 use super::layout::PipelineLayout;
-use super::state::{AttributeSource, GraphicsPipelineInfo, source};
+use super::state::{AttributeSource, GraphicsState, source};
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::physical_device::limits;
@@ -46,7 +46,7 @@ pub(crate) fn translate(
 
 /// Where each location is read from.
 pub(crate) fn attributes(
-    info: &GraphicsPipelineInfo,
+    info: &GraphicsState,
     locations: &[(u32, Numeric)],
 ) -> Result<Vec<AttributeSource>, Error> {
     let source = |&(location, _): &(u32, Numeric)| {

@@ -1,12 +1,11 @@
 //! The state of graphics pipelines: create infos with their pointers followed, as far as Vulkan has them read; vertex input;
 //! and fixed-function state. What a switch governs is kept beside the switch, as either may be dynamic without the other.
 
-use super::dynamic_state::{self, DynamicState, DynamicStates, StencilOpIds, StencilOps};
 use super::layout::PipelineLayout;
 use crate::abi::error::Error;
 use crate::abi::handle;
 use crate::abi::valid;
-use crate::convert;
+use crate::convert::{self, StencilOpIds, StencilOps};
 use crate::physical_device::{formats, limits};
 use crate::registry::features::SUPPORTED;
 use crate::shader_module::ShaderStage;
@@ -22,14 +21,31 @@ use simdevice::packet::draw::{
 use simdevice::packet::{BlendFactor, BlendState};
 use std::sync::Arc;
 
-/// A `VkGraphicsPipelineCreateInfo` with its pointers followed. State that the application may leave out is
-/// empty, `None` or the default.
+/// The state of a graphics pipeline: a `VkGraphicsPipelineCreateInfo` with its pointers followed, in the four parts of a
+/// pipeline library. State that the application may leave out is empty, `None` or the default.
 #[derive(Default)]
-pub(crate) struct GraphicsPipelineInfo<'a> {
-    /// The shader stages.
-    pub(crate) stages: Vec<(vk::ShaderStageFlags, ShaderStage<'a>)>,
+pub(crate) struct GraphicsState<'a> {
+    /// The vertex input interface.
+    pub(crate) vertex_input: VertexInputState<'a>,
+    /// The pre-rasterization shaders.
+    pub(crate) pre_rasterization: PreRasterizationState<'a>,
+    /// The fragment shader.
+    pub(crate) fragment_shader: FragmentShaderState<'a>,
+    /// The fragment output interface.
+    pub(crate) fragment_output: FragmentOutputState<'a>,
     /// The layout.
     pub(crate) layout: Option<&'a Arc<PipelineLayout>>,
+    /// What is dynamic.
+    pub(crate) dynamic: &'a [vk::DynamicState],
+    /// The extension's structure.
+    pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
+    /// The extension's structure of approximations.
+    pub(crate) approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'a>>,
+}
+
+/// How vertices are read and assembled.
+#[derive(Default)]
+pub(crate) struct VertexInputState<'a> {
     /// Vertex bindings.
     pub(crate) bindings: &'a [vk::VertexInputBindingDescription],
     /// How many instances an element lasts, of bindings that advance by instance and where that isn't one.
@@ -40,6 +56,13 @@ pub(crate) struct GraphicsPipelineInfo<'a> {
     pub(crate) topology: vk::PrimitiveTopology,
     /// Whether an index restarts the primitive.
     pub(crate) primitive_restart: bool,
+}
+
+/// The stages before rasterization, viewports, and rasterization.
+#[derive(Default)]
+pub(crate) struct PreRasterizationState<'a> {
+    /// The shader stages.
+    pub(crate) stages: Vec<(vk::ShaderStageFlags, ShaderStage<'a>)>,
     /// How many viewports; one each is given unless they are dynamic.
     pub(crate) viewport_count: u32,
     /// Viewports, unless dynamic.
@@ -52,29 +75,35 @@ pub(crate) struct GraphicsPipelineInfo<'a> {
     pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
     /// Whether a primitive's last vertex, not its first, is the provoking one.
     pub(crate) provoking_last: bool,
+}
+
+/// The fragment stage, and the tests of depth and stencil.
+#[derive(Default)]
+pub(crate) struct FragmentShaderState<'a> {
+    /// The fragment stage; there may be none.
+    pub(crate) stages: Vec<(vk::ShaderStageFlags, ShaderStage<'a>)>,
+    /// Depth and stencil state, if the subpass has such an attachment.
+    pub(crate) depth_stencil: Option<vk::PipelineDepthStencilStateCreateInfo<'a>>,
+}
+
+/// Samples, attachments, and how fragments are blended into them.
+#[derive(Default)]
+pub(crate) struct FragmentOutputState<'a> {
     /// Multisample state.
     pub(crate) multisample: vk::PipelineMultisampleStateCreateInfo<'a>,
     /// The samples that may be covered.
     pub(crate) sample_mask: u32,
-    /// Depth and stencil state, if the subpass has such an attachment.
-    pub(crate) depth_stencil: Option<vk::PipelineDepthStencilStateCreateInfo<'a>>,
     /// The logic operation, if it is enabled.
     pub(crate) logic_op: Option<vk::LogicOp>,
     /// Blend state by colour attachment.
     pub(crate) blend: &'a [vk::PipelineColorBlendAttachmentState],
     /// Blend constants.
     pub(crate) blend_constants: [f32; 4],
-    /// What is dynamic.
-    pub(crate) dynamic: &'a [vk::DynamicState],
     /// The colour formats of the subpass; undefined where the attachment is unused.
     pub(crate) color_formats: Vec<vk::Format>,
-    /// The extension's structure.
-    pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
-    /// The extension's structure of approximations.
-    pub(crate) approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'a>>,
 }
 
-impl<'a> GraphicsPipelineInfo<'a> {
+impl<'a> GraphicsState<'a> {
     /// Follows a create info's pointers. Those that the rest of the create info makes meaningless may point anywhere.
     ///
     /// # Safety
@@ -82,16 +111,17 @@ impl<'a> GraphicsPipelineInfo<'a> {
     pub(crate) unsafe fn from_create_info(
         info: &'a vk::GraphicsPipelineCreateInfo<'a>,
     ) -> Result<Self, Error> {
-        let mut gathered = GraphicsPipelineInfo {
-            sample_mask: u32::MAX,
-            ..GraphicsPipelineInfo::default()
-        };
+        let mut gathered = GraphicsState::default();
+        gathered.fragment_output.sample_mask = u32::MAX;
         // SAFETY: the caller's promise.
         unsafe {
             for given in valid::slice(info.p_stages, info.stage_count)? {
-                gathered
-                    .stages
-                    .push((given.stage, ShaderStage::from_create_info(given)?));
+                let stages = if given.stage == vk::ShaderStageFlags::FRAGMENT {
+                    &mut gathered.fragment_shader.stages
+                } else {
+                    &mut gathered.pre_rasterization.stages
+                };
+                stages.push((given.stage, ShaderStage::from_create_info(given)?));
             }
             gathered.layout = handle::get_optional(info.layout)?;
             gathered.gaussian =
@@ -108,15 +138,16 @@ impl<'a> GraphicsPipelineInfo<'a> {
                 gather_vertex_input(state, &mut gathered)?;
             }
             if let Some(state) = valid::optional(info.p_input_assembly_state) {
-                gathered.topology = state.topology;
-                gathered.primitive_restart = state.primitive_restart_enable != vk::FALSE;
+                gathered.vertex_input.topology = state.topology;
+                gathered.vertex_input.primitive_restart =
+                    state.primitive_restart_enable != vk::FALSE;
             }
             if let Some(state) = valid::optional(info.p_rasterization_state) {
-                gathered.rasterization = *state;
+                gathered.pre_rasterization.rasterization = *state;
                 let provoking = valid::find_in_chain::<
                     vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT<'_>,
                 >(state.p_next);
-                gathered.provoking_last = provoking.is_some_and(|state| {
+                gathered.pre_rasterization.provoking_last = provoking.is_some_and(|state| {
                     state.provoking_vertex_mode == vk::ProvokingVertexModeEXT::LAST_VERTEX
                 });
             }
@@ -127,6 +158,12 @@ impl<'a> GraphicsPipelineInfo<'a> {
         Ok(gathered)
     }
 
+    /// The shader stages.
+    pub(crate) fn stages(&self) -> impl Iterator<Item = &(vk::ShaderStageFlags, ShaderStage<'a>)> {
+        let (before, fragment) = (&self.pre_rasterization.stages, &self.fragment_shader.stages);
+        before.iter().chain(fragment)
+    }
+
     /// Whether a state is dynamic.
     pub(crate) fn is_dynamic(&self, state: vk::DynamicState) -> bool {
         self.dynamic.contains(&state)
@@ -134,13 +171,16 @@ impl<'a> GraphicsPipelineInfo<'a> {
 
     /// Whether nothing is ever rasterized, so that all state of rasterization is left out.
     pub(crate) fn discards(&self) -> bool {
-        self.rasterization.rasterizer_discard_enable != vk::FALSE
+        self.pre_rasterization
+            .rasterization
+            .rasterizer_discard_enable
+            != vk::FALSE
             && !self.is_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE)
     }
 
     /// The width of lines. Pipelines that draw none often leave it at zero.
     fn line_width(&self) -> f32 {
-        let width = self.rasterization.line_width;
+        let width = self.pre_rasterization.rasterization.line_width;
         if width == 0.0 || self.is_dynamic(vk::DynamicState::LINE_WIDTH) {
             return 1.0;
         }
@@ -154,15 +194,15 @@ impl<'a> GraphicsPipelineInfo<'a> {
 /// The state and its chain are valid.
 unsafe fn gather_vertex_input<'a>(
     state: &'a vk::PipelineVertexInputStateCreateInfo<'a>,
-    gathered: &mut GraphicsPipelineInfo<'a>,
+    gathered: &mut GraphicsState<'a>,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     unsafe {
-        gathered.bindings = valid::slice(
+        gathered.vertex_input.bindings = valid::slice(
             state.p_vertex_binding_descriptions,
             state.vertex_binding_description_count,
         )?;
-        gathered.attributes = valid::slice(
+        gathered.vertex_input.attributes = valid::slice(
             state.p_vertex_attribute_descriptions,
             state.vertex_attribute_description_count,
         )?;
@@ -170,7 +210,7 @@ unsafe fn gather_vertex_input<'a>(
             state.p_next,
         );
         if let Some(state) = divisors {
-            gathered.divisors = valid::slice(
+            gathered.vertex_input.divisors = valid::slice(
                 state.p_vertex_binding_divisors,
                 state.vertex_binding_divisor_count,
             )?;
@@ -185,7 +225,7 @@ unsafe fn gather_vertex_input<'a>(
 /// The create info and its chain are valid.
 unsafe fn gather_fragments<'a>(
     info: &'a vk::GraphicsPipelineCreateInfo<'a>,
-    gathered: &mut GraphicsPipelineInfo<'a>,
+    gathered: &mut GraphicsState<'a>,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     unsafe {
@@ -194,22 +234,25 @@ unsafe fn gather_fragments<'a>(
             gather_viewports(state, gathered)?;
         }
         if let Some(state) = valid::optional(info.p_multisample_state) {
-            gathered.multisample = *state;
+            gathered.fragment_output.multisample = *state;
             if let Some(mask) = valid::optional(state.p_sample_mask) {
-                gathered.sample_mask = *mask;
+                gathered.fragment_output.sample_mask = *mask;
             }
         }
         if formats.has_depth_stencil {
-            gathered.depth_stencil = valid::optional(info.p_depth_stencil_state).copied();
+            gathered.fragment_shader.depth_stencil =
+                valid::optional(info.p_depth_stencil_state).copied();
         }
         if !formats.color.is_empty()
             && let Some(state) = valid::optional(info.p_color_blend_state)
         {
-            gathered.logic_op = (state.logic_op_enable != vk::FALSE).then_some(state.logic_op);
-            gathered.blend = valid::slice(state.p_attachments, state.attachment_count)?;
-            gathered.blend_constants = state.blend_constants;
+            gathered.fragment_output.logic_op =
+                (state.logic_op_enable != vk::FALSE).then_some(state.logic_op);
+            gathered.fragment_output.blend =
+                valid::slice(state.p_attachments, state.attachment_count)?;
+            gathered.fragment_output.blend_constants = state.blend_constants;
         }
-        gathered.color_formats = formats.color;
+        gathered.fragment_output.color_formats = formats.color;
     }
     Ok(())
 }
@@ -220,21 +263,23 @@ unsafe fn gather_fragments<'a>(
 /// The state is valid.
 unsafe fn gather_viewports<'a>(
     state: &'a vk::PipelineViewportStateCreateInfo<'a>,
-    gathered: &mut GraphicsPipelineInfo<'a>,
+    gathered: &mut GraphicsState<'a>,
 ) -> Result<(), Error> {
     use vk::DynamicState as S;
-    gathered.viewport_count = state.viewport_count;
-    gathered.scissor_count = state.scissor_count;
+    gathered.pre_rasterization.viewport_count = state.viewport_count;
+    gathered.pre_rasterization.scissor_count = state.scissor_count;
     let is_dynamic = |states: [S; 2]| states.iter().any(|state| gathered.is_dynamic(*state));
     let dynamic_viewports = is_dynamic([S::VIEWPORT, S::VIEWPORT_WITH_COUNT]);
     let dynamic_scissors = is_dynamic([S::SCISSOR, S::SCISSOR_WITH_COUNT]);
     // SAFETY: the caller's promise; a null pointer is not followed.
     unsafe {
         if !dynamic_viewports && !state.p_viewports.is_null() {
-            gathered.viewports = valid::slice(state.p_viewports, state.viewport_count)?;
+            gathered.pre_rasterization.viewports =
+                valid::slice(state.p_viewports, state.viewport_count)?;
         }
         if !dynamic_scissors && !state.p_scissors.is_null() {
-            gathered.scissors = valid::slice(state.p_scissors, state.scissor_count)?;
+            gathered.pre_rasterization.scissors =
+                valid::slice(state.p_scissors, state.scissor_count)?;
         }
     }
     Ok(())
@@ -309,7 +354,7 @@ pub(crate) struct AttributeSource {
 /// # Errors
 /// An [`Error`] if the location, its binding or its format won't do.
 pub(crate) fn attribute(
-    info: &GraphicsPipelineInfo,
+    info: &GraphicsState,
     name: &str,
     location: u32,
     components: u32,
@@ -339,14 +384,19 @@ pub(crate) fn attribute(
 ///
 /// # Errors
 /// What is missing or won't do, as the end of a sentence about the location.
-pub(crate) fn source(
-    info: &GraphicsPipelineInfo,
-    location: u32,
-) -> Result<AttributeSource, String> {
-    let attribute = info.attributes.iter().find(|a| a.location == location);
+pub(crate) fn source(info: &GraphicsState, location: u32) -> Result<AttributeSource, String> {
+    let attribute = info
+        .vertex_input
+        .attributes
+        .iter()
+        .find(|a| a.location == location);
     let attribute = attribute.ok_or("which the vertex input state does not have")?;
     let number = attribute.binding;
-    let binding = info.bindings.iter().find(|b| b.binding == number);
+    let binding = info
+        .vertex_input
+        .bindings
+        .iter()
+        .find(|b| b.binding == number);
     let binding = binding
         .ok_or_else(|| format!("whose binding {number} the vertex input state does not have"))?;
     let features = formats::properties(attribute.format).buffer_features;
@@ -361,7 +411,11 @@ pub(crate) fn source(
     let instance_divisor = match binding.input_rate {
         vk::VertexInputRate::VERTEX => None,
         vk::VertexInputRate::INSTANCE => {
-            let given = info.divisors.iter().find(|it| it.binding == number);
+            let given = info
+                .vertex_input
+                .divisors
+                .iter()
+                .find(|it| it.binding == number);
             Some(given.map_or(1, |it| it.divisor))
         }
         rate => return Err(format!("whose binding has the unknown rate {rate:?}")),
@@ -379,18 +433,22 @@ pub(crate) fn source(
 ///
 /// # Errors
 /// An [`Error`] if there are not as many as attachments, or for what the device lacks.
-pub(crate) fn blend_states(info: &GraphicsPipelineInfo) -> Result<Vec<BlendState>, Error> {
-    if info.blend.len() != info.color_formats.len() {
+pub(crate) fn blend_states(info: &GraphicsState) -> Result<Vec<BlendState>, Error> {
+    if info.fragment_output.blend.len() != info.fragment_output.color_formats.len() {
         return Err(Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-renderPass-07609",
             format!(
                 "the colour blend state's attachmentCount is {}, but the subpass has {} colour attachments",
-                info.blend.len(),
-                info.color_formats.len()
+                info.fragment_output.blend.len(),
+                info.fragment_output.color_formats.len()
             ),
         ));
     }
-    info.blend.iter().map(convert::blend_state).collect()
+    info.fragment_output
+        .blend
+        .iter()
+        .map(convert::blend_state)
+        .collect()
 }
 
 /// Whether an attachment is blended with the second source of the fragment stage.
@@ -423,15 +481,15 @@ macro_rules! supported {
 pub(crate) struct FixedFunctionState {
     /// All but depth bias, depth and stencil.
     pub(crate) draw: DrawState,
-    depth_bias_enable: bool,
-    depth_bias: DepthBias,
-    depth_test: bool,
-    depth_write: bool,
-    depth_compare: CompareOp,
-    depth_bounds_test: bool,
-    depth_bounds: (f32, f32),
-    stencil_test: bool,
-    stencil: [StencilFace; 2],
+    pub(super) depth_bias_enable: bool,
+    pub(super) depth_bias: DepthBias,
+    pub(super) depth_test: bool,
+    pub(super) depth_write: bool,
+    pub(super) depth_compare: CompareOp,
+    pub(super) depth_bounds_test: bool,
+    pub(super) depth_bounds: (f32, f32),
+    pub(super) stencil_test: bool,
+    pub(super) stencil: [StencilFace; 2],
 }
 
 /// The ids of the rules on the operations of `VkStencilOpState`.
@@ -458,8 +516,8 @@ impl FixedFunctionState {
     ///
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
-    pub(crate) fn new(info: &GraphicsPipelineInfo) -> Result<Self, Error> {
-        let mut state = Self::of(info, convert::topology(info.topology)?)?;
+    pub(crate) fn new(info: &GraphicsState) -> Result<Self, Error> {
+        let mut state = Self::of(info, convert::topology(info.vertex_input.topology)?)?;
         if !info.discards() {
             state.set_viewports(info)?;
             state.set_samples(info)?;
@@ -473,10 +531,15 @@ impl FixedFunctionState {
     ///
     /// # Errors
     /// As there.
-    pub(crate) fn of_gaussians(info: &GraphicsPipelineInfo) -> Result<Self, Error> {
+    pub(crate) fn of_gaussians(info: &GraphicsState) -> Result<Self, Error> {
         // Nothing comes of the topology.
         let mut state = Self::of(info, Topology::TriangleStrip)?;
-        if !info.multisample.rasterization_samples.is_empty() {
+        if !info
+            .fragment_output
+            .multisample
+            .rasterization_samples
+            .is_empty()
+        {
             state.set_samples(info)?;
         }
         state.set_depth_stencil(info)?;
@@ -485,8 +548,8 @@ impl FixedFunctionState {
     }
 
     /// Vertex assembly and rasterization; the rest such that it does nothing.
-    fn of(info: &GraphicsPipelineInfo, topology: Topology) -> Result<Self, Error> {
-        let raster = &info.rasterization;
+    fn of(info: &GraphicsState, topology: Topology) -> Result<Self, Error> {
+        let raster = &info.pre_rasterization.rasterization;
         let polygon_mode = convert::polygon_mode(raster.polygon_mode)?;
         let needs = [
             (
@@ -515,7 +578,7 @@ impl FixedFunctionState {
             topology,
             Topology::PointList | Topology::LineList | Topology::TriangleList
         );
-        if info.primitive_restart
+        if info.vertex_input.primitive_restart
             && is_list
             && !info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
         {
@@ -526,7 +589,7 @@ impl FixedFunctionState {
         }
         let draw = DrawState {
             topology,
-            primitive_restart: info.primitive_restart,
+            primitive_restart: info.vertex_input.primitive_restart,
             viewports: Vec::new(),
             scissors: Vec::new(),
             depth_clamp: raster.depth_clamp_enable != vk::FALSE,
@@ -537,7 +600,7 @@ impl FixedFunctionState {
             front_clockwise: false,
             depth_bias: None,
             line_width: info.line_width(),
-            provoking_last: info.provoking_last,
+            provoking_last: info.pre_rasterization.provoking_last,
             samples: 1,
             sample_mask: u32::MAX,
             sample_shading: false,
@@ -568,14 +631,17 @@ impl FixedFunctionState {
             stencil_test: false,
             stencil: [KEEP; 2],
         };
-        state.set(dynamic_state::cull_mode(raster.cull_mode));
-        state.set(dynamic_state::front_face(raster.front_face));
+        state.set_cull_mode(raster.cull_mode);
+        state.set_front_face(raster.front_face);
         Ok(state)
     }
 
-    fn set_viewports(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
+    fn set_viewports(&mut self, info: &GraphicsState) -> Result<(), Error> {
         use vk::DynamicState as S;
-        let counts = [info.viewport_count, info.scissor_count];
+        let counts = [
+            info.pre_rasterization.viewport_count,
+            info.pre_rasterization.scissor_count,
+        ];
         let dynamic = [
             info.is_dynamic(S::VIEWPORT_WITH_COUNT),
             info.is_dynamic(S::SCISSOR_WITH_COUNT),
@@ -606,8 +672,8 @@ impl FixedFunctionState {
         let has = |given: usize, count: u32| given == count as usize;
         let static_viewports = !(dynamic[0] || info.is_dynamic(S::VIEWPORT));
         let static_scissors = !(dynamic[1] || info.is_dynamic(S::SCISSOR));
-        if (static_viewports && !has(info.viewports.len(), counts[0]))
-            || (static_scissors && !has(info.scissors.len(), counts[1]))
+        if (static_viewports && !has(info.pre_rasterization.viewports.len(), counts[0]))
+            || (static_scissors && !has(info.pre_rasterization.scissors.len(), counts[1]))
         {
             return Err(Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-04130",
@@ -616,6 +682,7 @@ impl FixedFunctionState {
         }
         if static_viewports {
             self.draw.viewports = info
+                .pre_rasterization
                 .viewports
                 .iter()
                 .copied()
@@ -623,13 +690,19 @@ impl FixedFunctionState {
                 .collect();
         }
         if static_scissors {
-            self.draw.scissors = info.scissors.iter().copied().map(convert::rect).collect();
+            self.draw.scissors = info
+                .pre_rasterization
+                .scissors
+                .iter()
+                .copied()
+                .map(convert::rect)
+                .collect();
         }
         Ok(())
     }
 
-    fn set_samples(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
-        let multisample = &info.multisample;
+    fn set_samples(&mut self, info: &GraphicsState) -> Result<(), Error> {
+        let multisample = &info.fragment_output.multisample;
         let samples = multisample.rasterization_samples;
         let supported = limits::properties().framebuffer_no_attachments_sample_counts;
         let count = samples.as_raw();
@@ -653,7 +726,7 @@ impl FixedFunctionState {
         require_all(&needs)?;
         let draw = &mut self.draw;
         draw.samples = count;
-        draw.sample_mask = info.sample_mask;
+        draw.sample_mask = info.fragment_output.sample_mask;
         // The device shades either once or every sample, and as many as are asked for is at least.
         let shaded = (multisample.min_sample_shading * count as f32).ceil();
         draw.sample_shading = multisample.sample_shading_enable != vk::FALSE && shaded > 1.0;
@@ -662,8 +735,8 @@ impl FixedFunctionState {
         Ok(())
     }
 
-    fn set_depth_stencil(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
-        let Some(state) = &info.depth_stencil else {
+    fn set_depth_stencil(&mut self, info: &GraphicsState) -> Result<(), Error> {
+        let Some(state) = &info.fragment_shader.depth_stencil else {
             return Ok(());
         };
         let bounds_test = state.depth_bounds_test_enable != vk::FALSE;
@@ -697,112 +770,72 @@ impl FixedFunctionState {
                     given.compare_op,
                     &STENCIL_OP_STATE,
                 )?;
-                self.set(DynamicState::StencilOp(face, ops));
+                ops.set(&mut self.stencil[face]);
             }
-            self.set(DynamicState::StencilCompareMask(
-                face,
-                given.compare_mask as u8,
-            ));
-            self.set(DynamicState::StencilWriteMask(face, given.write_mask as u8));
-            self.set(DynamicState::StencilReference(face, given.reference as u8));
+            self.stencil[face].compare_mask = given.compare_mask as u8;
+            self.stencil[face].write_mask = given.write_mask as u8;
+            self.stencil[face].reference = given.reference as u8;
         }
         Ok(())
     }
 
-    fn set_blend(&mut self, info: &GraphicsPipelineInfo) -> Result<(), Error> {
-        if let Some(op) = info.logic_op {
+    fn set_blend(&mut self, info: &GraphicsState) -> Result<(), Error> {
+        if let Some(op) = info.fragment_output.logic_op {
             require_all(&[(true, supported!(logic_op), "logicOpEnable")])?;
             self.draw.logic_op = Some(convert::logic_op(op)?);
         }
         self.draw.blend = blend_states(info)?;
-        self.draw.blend_constants = info.blend_constants;
+        self.draw.blend_constants = info.fragment_output.blend_constants;
         Ok(())
     }
 
-    /// Takes over a setting of the command buffer.
-    pub(crate) fn set(&mut self, setting: DynamicState) {
-        match setting {
-            DynamicState::LineWidth(width) => self.draw.line_width = width,
-            DynamicState::DepthBias(bias) => self.depth_bias = bias,
-            DynamicState::DepthBiasEnable(enable) => self.depth_bias_enable = enable,
-            DynamicState::BlendConstants(constants) => self.draw.blend_constants = constants,
-            DynamicState::DepthBounds(min, max) => self.depth_bounds = (min, max),
-            DynamicState::DepthBoundsTestEnable(enable) => self.depth_bounds_test = enable,
-            DynamicState::DepthTestEnable(enable) => self.depth_test = enable,
-            DynamicState::DepthWriteEnable(enable) => self.depth_write = enable,
-            DynamicState::DepthCompareOp(op) => self.depth_compare = op,
-            DynamicState::StencilTestEnable(enable) => self.stencil_test = enable,
-            DynamicState::StencilOp(face, ops) => {
-                let face = &mut self.stencil[face];
-                face.fail = ops.fail;
-                face.pass = ops.pass;
-                face.depth_fail = ops.depth_fail;
-                face.compare = ops.compare;
-            }
-            DynamicState::StencilCompareMask(face, mask) => self.stencil[face].compare_mask = mask,
-            DynamicState::StencilWriteMask(face, mask) => self.stencil[face].write_mask = mask,
-            DynamicState::StencilReference(face, reference) => {
-                self.stencil[face].reference = reference;
-            }
-            DynamicState::CullMode { front, back } => {
-                self.draw.cull_front = front;
-                self.draw.cull_back = back;
-            }
-            DynamicState::FrontFaceClockwise(clockwise) => self.draw.front_clockwise = clockwise,
-            DynamicState::PrimitiveTopology(topology) => self.draw.topology = topology,
-            DynamicState::PrimitiveRestartEnable(enable) => self.draw.primitive_restart = enable,
-            DynamicState::RasterizerDiscardEnable(enable) => self.draw.rasterizer_discard = enable,
-        }
+    /// Sets the faces that are culled.
+    pub(super) fn set_cull_mode(&mut self, mode: vk::CullModeFlags) {
+        self.draw.cull_front = mode.contains(vk::CullModeFlags::FRONT);
+        self.draw.cull_back = mode.contains(vk::CullModeFlags::BACK);
     }
 
-    /// Takes over what a command buffer has set of the states that are `dynamic`.
-    ///
-    /// # Errors
-    /// The first that it has not set, though the draw depends on it.
-    pub(crate) fn set_dynamic(
-        &mut self,
-        dynamic: &[vk::DynamicState],
-        settings: &DynamicStates,
-    ) -> Result<(), vk::DynamicState> {
-        let mut missing = Vec::new();
-        for &state in dynamic {
-            let mut any = false;
-            for setting in settings.of(state) {
-                self.set(setting);
-                any = true;
-            }
-            if !any {
-                missing.push(state);
-            }
-        }
-        match missing.into_iter().find(|&state| self.depends_on(state)) {
-            Some(state) => Err(state),
-            None => Ok(()),
-        }
+    /// Sets the face that is the front.
+    pub(super) fn set_front_face(&mut self, face: vk::FrontFace) {
+        self.draw.front_clockwise = face == vk::FrontFace::CLOCKWISE;
     }
 
-    /// Whether a draw needs what is dynamic to be set.
-    fn depends_on(&self, state: vk::DynamicState) -> bool {
-        use vk::DynamicState as S;
+    /// Tells if anything is rasterized.
+    pub(super) fn rasterizes(&self) -> bool {
+        !self.draw.rasterizer_discard
+    }
+
+    /// Tells if lines are drawn, so that their width matters.
+    pub(super) fn draws_lines(&self) -> bool {
         let draw = &self.draw;
-        match state {
-            S::PRIMITIVE_TOPOLOGY | S::PRIMITIVE_RESTART_ENABLE | S::RASTERIZER_DISCARD_ENABLE => {
-                true
-            }
-            _ if draw.rasterizer_discard => false,
-            S::LINE_WIDTH => {
-                draw.polygon_mode == PolygonMode::Line || class(draw.topology) == Class::Lines
-            }
-            S::DEPTH_BIAS => self.depth_bias_enable,
-            S::DEPTH_BOUNDS => self.depth_bounds_test,
-            S::DEPTH_WRITE_ENABLE | S::DEPTH_COMPARE_OP => self.depth_test,
-            S::STENCIL_OP
-            | S::STENCIL_COMPARE_MASK
-            | S::STENCIL_WRITE_MASK
-            | S::STENCIL_REFERENCE => self.stencil_test,
-            S::BLEND_CONSTANTS => draw.logic_op.is_none() && blends_by_constants(draw),
-            _ => true,
-        }
+        let are_lines =
+            draw.polygon_mode == PolygonMode::Line || class(draw.topology) == Class::Lines;
+        self.rasterizes() && are_lines
+    }
+
+    /// Tells if fragments' depths are biased.
+    pub(super) fn biases_depth(&self) -> bool {
+        self.rasterizes() && self.depth_bias_enable
+    }
+
+    /// Tells if the attachment's depths are tested against bounds.
+    pub(super) fn tests_depth_bounds(&self) -> bool {
+        self.rasterizes() && self.depth_bounds_test
+    }
+
+    /// Tells if depths are tested.
+    pub(super) fn tests_depth(&self) -> bool {
+        self.rasterizes() && self.depth_test
+    }
+
+    /// Tells if stencil values are tested.
+    pub(super) fn tests_stencil(&self) -> bool {
+        self.rasterizes() && self.stencil_test
+    }
+
+    /// Tells if an attachment is blended by the constants.
+    pub(super) fn blends_by_constants(&self) -> bool {
+        self.rasterizes() && self.draw.logic_op.is_none() && blends_by_constants(&self.draw)
     }
 
     /// The state for the device.
@@ -887,10 +920,11 @@ fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
 }
 
 /// For each colour attachment, whether anything comes of its source.
-pub(crate) fn color_effects(info: &GraphicsPipelineInfo, fixed: &FixedFunctionState) -> Vec<bool> {
-    let mut effects: Vec<_> = std::iter::zip(&fixed.draw.blend, &info.color_formats)
-        .map(|(blend, format)| blend.write_mask != 0 && *format != vk::Format::UNDEFINED)
-        .collect();
+pub(crate) fn color_effects(info: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
+    let mut effects: Vec<_> =
+        std::iter::zip(&fixed.draw.blend, &info.fragment_output.color_formats)
+            .map(|(blend, format)| blend.write_mask != 0 && *format != vk::Format::UNDEFINED)
+            .collect();
     if fixed.draw.alpha_to_coverage {
         match effects.first_mut() {
             Some(first) => *first = true,

@@ -151,8 +151,9 @@ fn draw_state(state: &mut State, polygons: &PolygonPipeline) -> Result<Arc<DrawS
         return Ok(Arc::clone(fixed));
     }
     let mut fixed = polygons.fixed.clone();
-    fixed
-        .set_dynamic(&polygons.dynamic, &state.dynamic_states)
+    state
+        .dynamic_states
+        .apply(&polygons.dynamic, &mut fixed)
         .map_err(Undrawn::Dynamic)?;
     if !fixed.draw.rasterizer_discard {
         if let Some(count) = dynamic_count(polygons.viewports, state.viewport_count) {

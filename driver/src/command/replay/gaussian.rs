@@ -148,8 +148,9 @@ fn fixed_state(state: &State, gaussian: &GaussianPipeline) -> Result<Arc<Gaussia
         return Ok(Arc::clone(&gaussian.state));
     }
     let mut fixed = gaussian.fixed.clone();
-    fixed
-        .set_dynamic(&gaussian.dynamic, &state.dynamic_states)
+    state
+        .dynamic_states
+        .apply(&gaussian.dynamic, &mut fixed)
         .map_err(Undrawn::Dynamic)?;
     let converted = fixed.draw_state();
     Ok(Arc::new(GaussianState {

@@ -142,7 +142,7 @@ fn execute(
             }
             state.draw_state = None;
         }
-        Command::Set(dynamic_state) => {
+        Command::SetDynamicState(dynamic_state) => {
             state.dynamic_states.set(*dynamic_state);
             state.draw_state = None;
         }

@@ -5,7 +5,8 @@ mod valid_usage;
 
 use self::stages::{ResolveStage, VertexProjection};
 use self::valid_usage::*;
-use super::state::{AttributeSource, FixedFunctionState, GraphicsPipelineInfo, attribute};
+use super::dynamic_state::is_taken_by_gaussians;
+use super::state::{AttributeSource, FixedFunctionState, GraphicsState, attribute};
 use crate::abi::error::Error;
 use crate::convert;
 use crate::descriptor::layout::LayoutBinding;
@@ -125,7 +126,7 @@ impl CameraModels {
 
 impl GaussianPipeline {
     /// Validates and converts the Gaussian part of a pipeline.
-    pub(crate) fn new(device: &Device, info: &GraphicsPipelineInfo) -> Result<Self, Error> {
+    pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
         let features = device.features();
         require(features, TOPOLOGY, "the topology is the Gaussian list")?;
         let Some(gaussian) = &info.gaussian else {
@@ -146,6 +147,8 @@ impl GaussianPipeline {
         fixed_state(info, features)?;
         let fragments = FixedFunctionState::of_gaussians(info)?;
 
+        let taken = info.dynamic.iter().copied();
+        let taken = taken.filter(|&state| is_taken_by_gaussians(state));
         Ok(Self {
             source: source(device, info, gaussian)?,
             resolve: ResolveStage::new(device, info, gaussian, &fragments)?,
@@ -153,20 +156,20 @@ impl GaussianPipeline {
                 approximation,
                 ..state(gaussian, features, fragments.draw_state())?
             }),
-            dynamic: info.dynamic.iter().copied().filter(is_taken).collect(),
+            dynamic: taken.collect(),
             fixed: fragments,
             viewport: fixed(
                 "viewport",
                 info.is_dynamic(vk::DynamicState::VIEWPORT)
                     || info.is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
-                info.viewports,
+                info.pre_rasterization.viewports,
             )?
             .map(convert::viewport),
             scissor: fixed(
                 "scissor",
                 info.is_dynamic(vk::DynamicState::SCISSOR)
                     || info.is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
-                info.scissors,
+                info.pre_rasterization.scissors,
             )?
             .map(convert::rect),
             camera: camera_source(info, gaussian, features)?,
@@ -181,7 +184,7 @@ impl GaussianPipeline {
 /// Where Gaussians come from.
 fn source(
     device: &Device,
-    info: &GraphicsPipelineInfo,
+    info: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
 ) -> Result<GaussianSource, Error> {
     if is_shaded(gaussian) {
@@ -314,7 +317,7 @@ fn state(
 
 /// Where draws take their camera from.
 fn camera_source(
-    info: &GraphicsPipelineInfo,
+    info: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
     features: &Features,
 ) -> Result<CameraSource, Error> {

@@ -6,7 +6,7 @@ use crate::pipeline::layout::PipelineLayout;
 use crate::pipeline::link::{self, Effects, Place, Varyings};
 use crate::pipeline::stages;
 use crate::pipeline::state::{
-    AttributeSource, FixedFunctionState, GraphicsPipelineInfo, color_effects, reads_second_source,
+    AttributeSource, FixedFunctionState, GraphicsState, color_effects, reads_second_source,
 };
 use crate::shader::{
     BuiltIn, Descriptor, InputSource, Interface, Numeric, OutputTarget, Stage, reflect,
@@ -42,7 +42,7 @@ impl VertexProjection {
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(crate) fn new(
         device: &Device,
-        info: &GraphicsPipelineInfo,
+        info: &GraphicsState,
         state: &PipelineGaussianStateCreateInfoGAURAST,
     ) -> Result<Self, Error> {
         let stage = find(info, vk::ShaderStageFlags::VERTEX).ok_or_else(|| {
@@ -110,7 +110,7 @@ impl ResolveStage {
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(crate) fn new(
         device: &Device,
-        info: &GraphicsPipelineInfo,
+        info: &GraphicsState,
         state: &PipelineGaussianStateCreateInfoGAURAST,
         fixed: &FixedFunctionState,
     ) -> Result<Option<Self>, Error> {
@@ -127,7 +127,7 @@ impl ResolveStage {
         let color = color_effects(info, fixed);
         let effects = Effects {
             color: &color,
-            second_source: info.blend.iter().any(reads_second_source),
+            second_source: info.fragment_output.blend.iter().any(reads_second_source),
             points: false,
         };
         let programs = link::link_resolve(fragment, &varyings, effects)?;
@@ -245,7 +245,7 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
     Ok(())
 }
 
-fn layout<'a>(info: &GraphicsPipelineInfo<'a>) -> Result<&'a Arc<PipelineLayout>, Error> {
+fn layout<'a>(info: &GraphicsState<'a>) -> Result<&'a Arc<PipelineLayout>, Error> {
     info.layout.ok_or_else(|| {
         Error::usage(
             "VUID-VkGraphicsPipelineCreateInfo-layout-06602",
@@ -255,11 +255,8 @@ fn layout<'a>(info: &GraphicsPipelineInfo<'a>) -> Result<&'a Arc<PipelineLayout>
 }
 
 /// A pipeline's stage of a kind.
-fn find<'a>(
-    info: &'a GraphicsPipelineInfo,
-    wanted: vk::ShaderStageFlags,
-) -> Option<&'a ShaderStage<'a>> {
-    let stages = &mut info.stages.iter();
+fn find<'a>(info: &'a GraphicsState, wanted: vk::ShaderStageFlags) -> Option<&'a ShaderStage<'a>> {
+    let mut stages = info.stages();
     let (_, stage) = stages.find(|(stage, _)| *stage == wanted)?;
     Some(stage)
 }

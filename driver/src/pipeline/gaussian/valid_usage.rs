@@ -2,7 +2,8 @@
 
 use crate::abi::error::Error;
 use crate::physical_device::limits::MAX_SPHERICAL_HARMONICS_DEGREE;
-use crate::pipeline::state::{GraphicsPipelineInfo, reads_second_source};
+use crate::pipeline::dynamic_state::may_gaussians_have;
+use crate::pipeline::state::{GraphicsState, reads_second_source};
 use crate::registry::features::Features;
 use ash::vk;
 use gaurast::vk::{
@@ -121,8 +122,8 @@ pub(super) fn unknown(field: &str, value: &dyn std::fmt::Debug) -> Error {
     )
 }
 
-pub(super) fn has_fragment_stage(info: &GraphicsPipelineInfo) -> bool {
-    let mut stages = info.stages.iter();
+pub(super) fn has_fragment_stage(info: &GraphicsState) -> bool {
+    let mut stages = info.stages();
     stages.any(|(stage, _)| *stage == vk::ShaderStageFlags::FRAGMENT)
 }
 
@@ -133,7 +134,7 @@ pub(super) fn is_shaded(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> bo
 
 /// Refuses modes that mean nothing together.
 pub(super) fn combinations(
-    info: &GraphicsPipelineInfo,
+    info: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
 ) -> Result<(), Error> {
     let broken =
@@ -182,7 +183,7 @@ pub(super) fn combinations(
 }
 
 pub(super) fn stages(
-    info: &GraphicsPipelineInfo,
+    info: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
     features: &Features,
 ) -> Result<(), Error> {
@@ -199,21 +200,14 @@ pub(super) fn stages(
         require(features, RESOLVE_FRAGMENT_SHADER, what)?;
     }
     let shaded = is_shaded(gaussian);
-    let of = |wanted| {
-        info.stages
-            .iter()
-            .filter(move |(stage, _)| *stage == wanted)
-    };
+    let of = |wanted| info.stages().filter(move |(stage, _)| *stage == wanted);
     let known = vk::ShaderStageFlags::FRAGMENT
         | if shaded {
             vk::ShaderStageFlags::VERTEX
         } else {
             vk::ShaderStageFlags::empty()
         };
-    let unwanted = info
-        .stages
-        .iter()
-        .find(|(stage, _)| !known.contains(*stage));
+    let unwanted = info.stages().find(|(stage, _)| !known.contains(*stage));
     let wrong = if let Some((stage, _)) = unwanted {
         Some(format!("must not have a stage {stage:?}"))
     } else if of(vk::ShaderStageFlags::VERTEX).count() != usize::from(shaded) {
@@ -232,7 +226,7 @@ pub(super) fn stages(
             ),
         ));
     }
-    if info.primitive_restart {
+    if info.vertex_input.primitive_restart {
         return Err(Error::usage(
             "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-GAURAST",
             "primitiveRestartEnable is VK_TRUE, but the Gaussian list has no primitive restart",
@@ -354,9 +348,9 @@ pub(super) fn values(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> Resul
 }
 
 /// Refuses what a Gaussian pipeline cannot do yet in the ordinary fixed-function state.
-pub(super) fn fixed_state(info: &GraphicsPipelineInfo, features: &Features) -> Result<(), Error> {
+pub(super) fn fixed_state(info: &GraphicsState, features: &Features) -> Result<(), Error> {
     use vk::DynamicState as S;
-    let depth_stencil = info.depth_stencil.unwrap_or_default();
+    let depth_stencil = info.fragment_shader.depth_stencil.unwrap_or_default();
     let tests = [
         (depth_stencil.depth_test_enable, S::DEPTH_TEST_ENABLE),
         (
@@ -375,7 +369,7 @@ pub(super) fn fixed_state(info: &GraphicsPipelineInfo, features: &Features) -> R
             "the pipeline has a depth, depth bounds or stencil test",
         )?;
     }
-    let multisample = &info.multisample;
+    let multisample = &info.fragment_output.multisample;
     let samples = multisample.rasterization_samples;
     if samples != vk::SampleCountFlags::TYPE_1 && !samples.is_empty() {
         require(
@@ -384,24 +378,33 @@ pub(super) fn fixed_state(info: &GraphicsPipelineInfo, features: &Features) -> R
             "the pipeline has several samples per pixel",
         )?;
     }
-    if info.rasterization.rasterizer_discard_enable != vk::FALSE {
+    if info
+        .pre_rasterization
+        .rasterization
+        .rasterizer_discard_enable
+        != vk::FALSE
+    {
         return Err(Error::FeatureNotPresent(
             "rasterizerDiscardEnable with Gaussians".into(),
         ));
     }
     let shades = has_fragment_stage(info);
-    if let Some(state) = info.dynamic.iter().find(|state| !may_be_dynamic(**state)) {
+    if let Some(state) = info
+        .dynamic
+        .iter()
+        .find(|state| !may_gaussians_have(**state))
+    {
         return Err(Error::FeatureNotPresent(format!(
             "the dynamic state {state:?} with Gaussians"
         )));
     }
-    if !shades && info.blend.iter().any(reads_second_source) {
+    if !shades && info.fragment_output.blend.iter().any(reads_second_source) {
         return Err(Error::FeatureNotPresent(
             "a second source of blending (feature dualSrcBlend) with Gaussians and no fragment stage"
                 .into(),
         ));
     }
-    if info.viewport_count > 1 {
+    if info.pre_rasterization.viewport_count > 1 {
         return Err(Error::usage(
             "VUID-VkPipelineViewportStateCreateInfo-viewportCount-01216",
             "viewportCount is greater than 1, but Gaussians go to one viewport",
@@ -410,29 +413,9 @@ pub(super) fn fixed_state(info: &GraphicsPipelineInfo, features: &Features) -> R
     Ok(())
 }
 
-/// Whether a Gaussian pipeline takes the state from the command buffer, or has no use for it.
-fn may_be_dynamic(state: vk::DynamicState) -> bool {
-    use vk::DynamicState as S;
-    is_taken(&state)
-        || matches!(
-            state,
-            S::VIEWPORT
-                | S::SCISSOR
-                | S::VIEWPORT_WITH_COUNT
-                | S::SCISSOR_WITH_COUNT
-                | S::VERTEX_INPUT_BINDING_STRIDE
-                | S::LINE_WIDTH
-                | S::DEPTH_BIAS
-                | S::DEPTH_BIAS_ENABLE
-                | S::CULL_MODE
-                | S::FRONT_FACE
-                | S::PRIMITIVE_TOPOLOGY
-        )
-}
-
 /// Validates and converts the chain's structure of approximations, if it has one.
 pub(super) fn approximation(
-    info: &GraphicsPipelineInfo,
+    info: &GraphicsState,
     features: &Features,
 ) -> Result<GaussianApproximation, Error> {
     let Some(given) = &info.approximation else {
@@ -468,23 +451,4 @@ fn check_fraction(name: &str, vuid: &'static str, value: f32) -> Result<(), Erro
         "VkPipelineGaussianApproximationStateCreateInfoGAURAST: {name} is {value}, but must be at least 0 and at most 1"
     );
     Err(Error::usage(vuid, message))
-}
-
-/// Whether the state says what becomes of a Gaussian draw's fragments.
-pub(super) fn is_taken(state: &vk::DynamicState) -> bool {
-    use vk::DynamicState as S;
-    matches!(
-        *state,
-        S::BLEND_CONSTANTS
-            | S::DEPTH_BOUNDS
-            | S::DEPTH_BOUNDS_TEST_ENABLE
-            | S::DEPTH_TEST_ENABLE
-            | S::DEPTH_WRITE_ENABLE
-            | S::DEPTH_COMPARE_OP
-            | S::STENCIL_TEST_ENABLE
-            | S::STENCIL_COMPARE_MASK
-            | S::STENCIL_WRITE_MASK
-            | S::STENCIL_REFERENCE
-            | S::STENCIL_OP
-    )
 }
