@@ -127,7 +127,7 @@ fn element<T: Default>(slots: &mut Vec<T>, index: usize) -> &mut T {
 
 /// Why a dispatch does nothing: state that it needs is undefined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum Undispatched {
+pub(crate) enum DispatchError {
     /// No pipeline.
     #[error("no compute pipeline is bound")]
     Pipeline,
@@ -139,16 +139,16 @@ pub(crate) enum Undispatched {
 /// The packet of one dispatch.
 ///
 /// # Errors
-/// [`Undispatched`] where bound state that the dispatch needs is missing.
+/// [`DispatchError`] where bound state that the dispatch needs is missing.
 pub(crate) fn dispatch(
     state: &State,
     base: [u32; 3],
     count: [u32; 3],
-) -> Result<Packet, Undispatched> {
+) -> Result<Packet, DispatchError> {
     let pipeline = state
         .compute_pipeline
         .as_ref()
-        .ok_or(Undispatched::Pipeline)?;
+        .ok_or(DispatchError::Pipeline)?;
     let bindings = bindings(
         &pipeline.descriptors,
         &state.compute_sets,

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 /// Why a draw draws nothing: state that it needs is undefined.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum Undrawn {
+pub(crate) enum DrawError {
     /// No pipeline.
     #[error("no graphics pipeline is bound")]
     Pipeline,
@@ -77,15 +77,15 @@ pub(crate) enum Undrawn {
 /// Where an attribute is read from.
 ///
 /// # Errors
-/// [`Undrawn::VertexBuffer`].
+/// [`DrawError::VertexBuffer`].
 pub(super) fn attribute_stream(
     state: &State,
     pipeline: &GraphicsPipeline,
     source: &AttributeSource,
-) -> Result<AttributeStream, Undrawn> {
+) -> Result<AttributeStream, DrawError> {
     let bound = state
         .vertex_buffer(source.binding)
-        .ok_or(Undrawn::VertexBuffer(source.binding))?;
+        .ok_or(DrawError::VertexBuffer(source.binding))?;
     let dynamic_stride = bound.stride.filter(|_| pipeline.dynamic_stride);
     Ok(AttributeStream {
         buffer: bound.range.clone(),
@@ -99,12 +99,12 @@ pub(super) fn attribute_stream(
 /// Where an indexed draw's indices are read from.
 ///
 /// # Errors
-/// [`Undrawn::IndexBuffer`].
-pub(super) fn indices(state: &State, draw: &Draw) -> Result<Option<IndexStream>, Undrawn> {
+/// [`DrawError::IndexBuffer`].
+pub(super) fn indices(state: &State, draw: &Draw) -> Result<Option<IndexStream>, DrawError> {
     let Some(vertex_offset) = draw.vertex_offset else {
         return Ok(None);
     };
-    let bound = state.index_buffer.as_ref().ok_or(Undrawn::IndexBuffer)?;
+    let bound = state.index_buffer.as_ref().ok_or(DrawError::IndexBuffer)?;
     Ok(Some(IndexStream {
         buffer: bound.range.clone(),
         index_size: bound.index_size,
@@ -115,14 +115,14 @@ pub(super) fn indices(state: &State, draw: &Draw) -> Result<Option<IndexStream>,
 /// The packet of one draw.
 ///
 /// # Errors
-/// [`Undrawn`] where bound state that the draw needs is missing.
+/// [`DrawError`] where bound state that the draw needs is missing.
 pub(super) fn primitives(
     state: &mut State,
     pipeline: &GraphicsPipeline,
     polygons: &PolygonPipeline,
     parameters: &Draw,
     draw_index: u32,
-) -> Result<Packet, Undrawn> {
+) -> Result<Packet, DrawError> {
     let attributes = polygons
         .attributes
         .iter()
@@ -146,7 +146,7 @@ pub(super) fn primitives(
 }
 
 /// The fixed-function state, which is made anew only when something of it has changed since the last draw.
-fn draw_state(state: &mut State, polygons: &PolygonPipeline) -> Result<Arc<DrawState>, Undrawn> {
+fn draw_state(state: &mut State, polygons: &PolygonPipeline) -> Result<Arc<DrawState>, DrawError> {
     if let Some(fixed) = polygons.state.as_ref().or(state.draw_state.as_ref()) {
         return Ok(Arc::clone(fixed));
     }
@@ -154,17 +154,17 @@ fn draw_state(state: &mut State, polygons: &PolygonPipeline) -> Result<Arc<DrawS
     state
         .dynamic_states
         .apply(&polygons.dynamic, &mut fixed)
-        .map_err(Undrawn::Dynamic)?;
+        .map_err(DrawError::Dynamic)?;
     if !fixed.draw.rasterizer_discard {
         if let Some(count) = dynamic_count(polygons.viewports, state.viewport_count) {
-            fixed.draw.viewports = set(&state.viewports, count).ok_or(Undrawn::Viewport)?;
+            fixed.draw.viewports = set(&state.viewports, count).ok_or(DrawError::Viewport)?;
         }
         if let Some(count) = dynamic_count(polygons.scissors, state.scissor_count) {
-            fixed.draw.scissors = set(&state.scissors, count).ok_or(Undrawn::Scissor)?;
+            fixed.draw.scissors = set(&state.scissors, count).ok_or(DrawError::Scissor)?;
         }
         let (viewports, scissors) = (fixed.draw.viewports.len(), fixed.draw.scissors.len());
         if viewports != scissors {
-            return Err(Undrawn::ScissorCount {
+            return Err(DrawError::ScissorCount {
                 viewports,
                 scissors,
             });

@@ -1,7 +1,7 @@
 //! Gaussian draws as the packets of a sorted set.
 
 use super::descriptors::{self, Unbound};
-use super::draw::{Undrawn, attribute_stream, indices};
+use super::draw::{DrawError, attribute_stream, indices};
 use super::state::State;
 use crate::command::{Draw, camera};
 use crate::pipeline::GraphicsPipeline;
@@ -22,13 +22,13 @@ use std::sync::Arc;
 /// What begins a sorted set.
 ///
 /// # Errors
-/// [`Undrawn`] where bound state that the set needs is missing.
-pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Packet>, Undrawn> {
+/// [`DrawError`] where bound state that the set needs is missing.
+pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Packet>, DrawError> {
     let mut packets = vec![Packet::GaussianBegin(Box::new(GaussianBegin {
         state: fixed_state(state, gaussian)?,
         camera: enabled_camera(state, gaussian)?,
-        viewport: upright(state.viewport(gaussian).ok_or(Undrawn::Viewport)?),
-        scissor: state.scissor(gaussian).ok_or(Undrawn::Scissor)?,
+        viewport: upright(state.viewport(gaussian).ok_or(DrawError::Viewport)?),
+        scissor: state.scissor(gaussian).ok_or(DrawError::Scissor)?,
     }))];
     if let Some(stage) = &gaussian.resolve {
         let (sets, constants) = (&state.graphics_sets, &state.push_constants);
@@ -46,14 +46,14 @@ pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Pa
 /// What adds a draw to a sorted set.
 ///
 /// # Errors
-/// [`Undrawn`] where a buffer that the draw needs is not bound.
+/// [`DrawError`] where a buffer that the draw needs is not bound.
 pub(crate) fn append(
     state: &State,
     pipeline: &GraphicsPipeline,
     gaussian: &GaussianPipeline,
     draw: &Draw,
     draw_index: u32,
-) -> Result<Packet, Undrawn> {
+) -> Result<Packet, DrawError> {
     let sources = match &gaussian.source {
         GaussianSource::Attributes(sources) => sources,
         GaussianSource::VertexShader(projection) => {
@@ -78,7 +78,7 @@ fn shaded(
     projection: &VertexProjection,
     parameters: &Draw,
     draw_index: u32,
-) -> Result<Packet, Undrawn> {
+) -> Result<Packet, DrawError> {
     let attributes = projection
         .attributes
         .iter()
@@ -88,7 +88,7 @@ fn shaded(
         &state.graphics_sets,
         &state.push_constants,
     )?;
-    let viewport = state.viewport(gaussian).ok_or(Undrawn::Viewport)?;
+    let viewport = state.viewport(gaussian).ok_or(DrawError::Viewport)?;
     Ok(Packet::GaussianAppendDraw(Box::new(draw::Draw {
         pipeline: Arc::clone(&projection.programs),
         attributes: attributes.collect::<Result<_, _>>()?,
@@ -108,10 +108,10 @@ fn shaded(
 }
 
 /// The camera that a draw sees with, if its model's feature is enabled.
-fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, Undrawn> {
+fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, DrawError> {
     let camera = camera(state, gaussian.camera)?;
     if !gaussian.camera_models.have(camera.model) {
-        return Err(Undrawn::CameraModel(camera.model));
+        return Err(DrawError::CameraModel(camera.model));
     }
     let state = &gaussian.state;
     let is_seen = match camera.model {
@@ -123,27 +123,27 @@ fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, 
         }
     };
     if !is_seen {
-        return Err(Undrawn::ModeOfCameraModel(camera.model));
+        return Err(DrawError::ModeOfCameraModel(camera.model));
     }
     Ok(camera)
 }
 
 /// The camera that a draw is given.
-fn camera(state: &State, source: CameraSource) -> Result<Camera, Undrawn> {
+fn camera(state: &State, source: CameraSource) -> Result<Camera, DrawError> {
     let (set, binding) = match source {
         CameraSource::None => return Ok(Camera::default()),
-        CameraSource::Command => return state.camera.ok_or(Undrawn::Camera),
+        CameraSource::Command => return state.camera.ok_or(DrawError::Camera),
         CameraSource::UniformBuffer { set, binding } => (set, binding),
     };
     let bound = state.graphics_sets.get(set).ok_or(Unbound(set))?;
     let range = bound
         .buffer(binding)
-        .ok_or(Undrawn::CameraBuffer { set, binding })?;
-    camera::read(&range).map_err(|error| Undrawn::CameraData(error.to_string()))
+        .ok_or(DrawError::CameraBuffer { set, binding })?;
+    camera::read(&range).map_err(|error| DrawError::CameraData(error.to_string()))
 }
 
 /// What the pipeline fixes, with the dynamic part filled in.
-fn fixed_state(state: &State, gaussian: &GaussianPipeline) -> Result<Arc<GaussianState>, Undrawn> {
+fn fixed_state(state: &State, gaussian: &GaussianPipeline) -> Result<Arc<GaussianState>, DrawError> {
     if gaussian.dynamic.is_empty() {
         return Ok(Arc::clone(&gaussian.state));
     }
@@ -151,7 +151,7 @@ fn fixed_state(state: &State, gaussian: &GaussianPipeline) -> Result<Arc<Gaussia
     state
         .dynamic_states
         .apply(&gaussian.dynamic, &mut fixed)
-        .map_err(Undrawn::Dynamic)?;
+        .map_err(DrawError::Dynamic)?;
     let converted = fixed.draw_state();
     Ok(Arc::new(GaussianState {
         depth_stencil: converted.depth_stencil,
@@ -177,7 +177,7 @@ fn attributes(
     state: &State,
     pipeline: &GraphicsPipeline,
     sources: &GaussianAttributeSources,
-) -> Result<GaussianAttributes, Undrawn> {
+) -> Result<GaussianAttributes, DrawError> {
     let stream = |source: &AttributeSource| attribute_stream(state, pipeline, source);
     Ok(GaussianAttributes {
         position: stream(&sources.position)?,

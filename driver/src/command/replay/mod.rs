@@ -5,7 +5,7 @@ mod draw;
 mod gaussian;
 mod state;
 
-use self::draw::Undrawn;
+use self::draw::DrawError;
 use self::state::{State, bind};
 use super::{Command, Draw, DrawIndirect, query};
 use crate::abi::error::Error;
@@ -210,8 +210,8 @@ fn draw(
 }
 
 /// The packets of a draw.
-fn packets(state: &mut State, parameters: &Draw, draw_index: u32) -> Result<Vec<Packet>, Undrawn> {
-    let pipeline = state.pipeline.clone().ok_or(Undrawn::Pipeline)?;
+fn packets(state: &mut State, parameters: &Draw, draw_index: u32) -> Result<Vec<Packet>, DrawError> {
+    let pipeline = state.pipeline.clone().ok_or(DrawError::Pipeline)?;
     match &pipeline.primitive {
         Primitive::Gaussian(gaussian) => {
             let append = gaussian::append(state, &pipeline, gaussian, parameters, draw_index)?;
