@@ -16,23 +16,23 @@ use std::sync::Arc;
 /// A set that is not bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("descriptor set {0}, which the pipeline uses, is not bound")]
-pub(crate) struct Unbound(pub(super) u32);
+pub(crate) struct DescriptorSetNotBound(pub(super) u32);
 
 /// What programs that use `descriptors` are bound to. What a set doesn't hold reads as zero.
 ///
 /// # Errors
-/// [`Unbound`] if a set is missing.
+/// [`DescriptorSetNotBound`] if a set is missing.
 pub(crate) fn bindings(
     descriptors: &[shader::Descriptor],
     sets: &BoundSets,
     push_constants: &[u8],
-) -> Result<Bindings, Unbound> {
+) -> Result<Bindings, DescriptorSetNotBound> {
     let mut bindings = Bindings {
         push_constants: push_constants.to_vec(),
         ..Bindings::default()
     };
     for used in descriptors {
-        let bound = sets.get(used.set).ok_or(Unbound(used.set))?;
+        let bound = sets.get(used.set).ok_or(DescriptorSetNotBound(used.set))?;
         if let Some(binding) = bound.set.layout().binding(used.binding) {
             bind(used, bound, binding, &mut bindings);
         }
@@ -133,7 +133,7 @@ pub(crate) enum DispatchError {
     Pipeline,
     /// Something that the pipeline reads is not bound.
     #[error(transparent)]
-    Unbound(#[from] Unbound),
+    DescriptorSetNotBound(#[from] DescriptorSetNotBound),
 }
 
 /// The packet of one dispatch.

@@ -1,7 +1,7 @@
 //! Draws of points, lines and triangles as packets, and what draws of every kind have in common: bound buffers, indirect
 //! parameters, and state that is missing.
 
-use super::descriptors::{self, Unbound};
+use super::descriptors::{self, DescriptorSetNotBound};
 use super::state::State;
 use crate::command::Draw;
 use crate::pipeline::GraphicsPipeline;
@@ -71,7 +71,7 @@ pub(crate) enum DrawError {
     IndexBuffer,
     /// Something that the pipeline reads is not bound.
     #[error(transparent)]
-    Unbound(#[from] Unbound),
+    DescriptorSetNotBound(#[from] DescriptorSetNotBound),
 }
 
 /// Where an attribute is read from.

@@ -1,6 +1,6 @@
 //! Gaussian draws as the packets of a sorted set.
 
-use super::descriptors::{self, Unbound};
+use super::descriptors::{self, DescriptorSetNotBound};
 use super::draw::{DrawError, attribute_stream, indices};
 use super::state::State;
 use crate::command::{Draw, camera};
@@ -135,7 +135,7 @@ fn camera(state: &State, source: CameraSource) -> Result<Camera, DrawError> {
         CameraSource::Command => return state.camera.ok_or(DrawError::Camera),
         CameraSource::UniformBuffer { set, binding } => (set, binding),
     };
-    let bound = state.graphics_sets.get(set).ok_or(Unbound(set))?;
+    let bound = state.graphics_sets.get(set).ok_or(DescriptorSetNotBound(set))?;
     let range = bound
         .buffer(binding)
         .ok_or(DrawError::CameraBuffer { set, binding })?;
