@@ -16,7 +16,7 @@ use std::collections::HashMap;
 
 /// What of the outputs of a pipeline's programs has an effect.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Effects<'a> {
+pub(crate) struct LiveOutputs<'a> {
     /// By colour attachment: whether anything is written to it, or made of its source's alpha.
     pub(crate) color: &'a [bool],
     /// Whether the second source of blending is read.
@@ -39,7 +39,7 @@ pub(crate) fn link(
     vertex: Shader,
     fragment: Option<Shader>,
     stream: impl Fn(u32) -> Option<usize>,
-    effects: Effects<'_>,
+    live_outputs: LiveOutputs<'_>,
 ) -> Result<DrawPrograms, Error> {
     check_widths(&vertex.interface)?;
     let varyings = match &fragment {
@@ -51,8 +51,8 @@ pub(crate) fn link(
     };
     Ok(DrawPrograms {
         varyings: varyings.len() as u32,
-        fragment: fragment.map(|fragment| fragment_programs(fragment, &varyings, effects)),
-        ..vertex_programs(vertex, &varyings, stream, effects)
+        fragment: fragment.map(|fragment| fragment_programs(fragment, &varyings, live_outputs)),
+        ..vertex_programs(vertex, &varyings, stream, live_outputs)
     })
 }
 
@@ -70,7 +70,7 @@ pub(crate) fn link_projection(
     Ok(DrawPrograms {
         varyings: places.len() as u32,
         fragment: None,
-        ..vertex_programs(vertex, &varyings, stream, Effects::default())
+        ..vertex_programs(vertex, &varyings, stream, LiveOutputs::default())
     })
 }
 
@@ -81,10 +81,10 @@ pub(crate) fn link_projection(
 pub(crate) fn link_resolve(
     fragment: Shader,
     varyings: &Varyings,
-    effects: Effects<'_>,
+    live_outputs: LiveOutputs<'_>,
 ) -> Result<FragmentPrograms, Error> {
     check_widths(&fragment.interface)?;
-    Ok(fragment_programs(fragment, varyings, effects))
+    Ok(fragment_programs(fragment, varyings, live_outputs))
 }
 
 /// The vertex program alone.
@@ -92,7 +92,7 @@ fn vertex_programs(
     vertex: Shader,
     varyings: &Varyings,
     stream: impl Fn(u32) -> Option<usize>,
-    effects: Effects<'_>,
+    live_outputs: LiveOutputs<'_>,
 ) -> DrawPrograms {
     let Shader {
         program: mut vertex,
@@ -107,7 +107,7 @@ fn vertex_programs(
     let vertex_outputs: Vec<_> = interface
         .outputs
         .iter()
-        .map(|output| vertex_output(output, varyings, effects))
+        .map(|output| vertex_output(output, varyings, live_outputs))
         .collect();
     drop_outputs(&mut vertex, &vertex_outputs);
     DrawPrograms {
@@ -122,7 +122,7 @@ fn vertex_programs(
 fn fragment_programs(
     fragment: Shader,
     varyings: &Varyings,
-    effects: Effects<'_>,
+    live_outputs: LiveOutputs<'_>,
 ) -> FragmentPrograms {
     let Shader {
         mut program,
@@ -139,7 +139,7 @@ fn fragment_programs(
         .outputs
         .iter()
         .map(|output| {
-            fragment_output(output, effects)
+            fragment_output(output, live_outputs)
                 .filter(|it| !(keeps_depth && *it == FragmentOutput::Depth))
         })
         .collect();
@@ -251,7 +251,7 @@ fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<
 fn vertex_output(
     output: &Output,
     varyings: &Varyings,
-    effects: Effects<'_>,
+    live_outputs: LiveOutputs<'_>,
 ) -> Option<VertexOutput> {
     match output.target {
         OutputTarget::Location {
@@ -268,7 +268,7 @@ fn vertex_output(
             let component = component as usize;
             match built_in {
                 BuiltIn::Position => Some(VertexOutput::Position(component)),
-                BuiltIn::PointSize => effects.points.then_some(VertexOutput::PointSize),
+                BuiltIn::PointSize => live_outputs.points.then_some(VertexOutput::PointSize),
                 BuiltIn::ClipDistance => Some(VertexOutput::ClipDistance(component)),
                 BuiltIn::CullDistance => Some(VertexOutput::CullDistance(component)),
                 BuiltIn::Layer => Some(VertexOutput::Layer),
@@ -323,15 +323,15 @@ fn fragment_input(input: &Input, varyings: &Varyings) -> Option<FragmentInput> {
     }
 }
 
-fn fragment_output(output: &Output, effects: Effects<'_>) -> Option<FragmentOutput> {
+fn fragment_output(output: &Output, live_outputs: LiveOutputs<'_>) -> Option<FragmentOutput> {
     match output.target {
         OutputTarget::Location {
             location,
             component,
             index,
         } => {
-            let has_effect = effects.color.get(location as usize) == Some(&true)
-                && (index == 0 || effects.second_source);
+            let has_effect = live_outputs.color.get(location as usize) == Some(&true)
+                && (index == 0 || live_outputs.second_source);
             has_effect.then_some(FragmentOutput::Color {
                 attachment: location as usize,
                 component: component as usize,
@@ -442,12 +442,12 @@ mod tests {
             vec![at(2, 0), at(9, 0), at(0, 3)],
             vec![to(0, 0), to(1, 0), to(0, 1)],
         );
-        let effects = Effects {
+        let live_outputs = LiveOutputs {
             color: &[true, false],
-            ..Effects::default()
+            ..LiveOutputs::default()
         };
         let stream = |location| (location == 7).then_some(3);
-        let linked = link(vertex, Some(fragment), stream, effects).unwrap();
+        let linked = link(vertex, Some(fragment), stream, live_outputs).unwrap();
         assert_eq!(linked.varyings, 2);
         assert_eq!(
             linked.vertex_inputs,
@@ -501,7 +501,7 @@ mod tests {
         let mut wide = to(0, 0);
         wide.numeric = Numeric::Float { width: 64 };
         let vertex = shader(Stage::Vertex, vec![], vec![wide]);
-        let error = link(vertex, None, |_| None, Effects::default()).unwrap_err();
+        let error = link(vertex, None, |_| None, LiveOutputs::default()).unwrap_err();
         assert_eq!(error.result(), ash::vk::Result::ERROR_FEATURE_NOT_PRESENT);
     }
 }

@@ -1,10 +1,10 @@
 //! Pipelines of points, lines and triangles: shader stages translated, checked and linked, and fixed-function state.
 
 use super::dynamic_state;
-use super::link::{self, Effects};
+use super::link::{self, LiveOutputs};
 use super::stages;
 use super::state::{
-    self, AttributeSource, Class, FixedFunctionState, GraphicsState, color_effects,
+    self, AttributeSource, Class, FixedFunctionState, GraphicsState, live_color_outputs,
     reads_second_source,
 };
 use crate::abi::error::Error;
@@ -80,15 +80,15 @@ impl PolygonPipeline {
         let fragment_descriptors = fragment
             .as_ref()
             .map_or_else(Vec::new, |fragment| fragment.interface.descriptors.clone());
-        let color = color_effects(info, &fixed);
-        let effects = Effects {
+        let color = live_color_outputs(info, &fixed);
+        let live_outputs = LiveOutputs {
             color: &color,
             second_source: info.fragment_output.blend.iter().any(reads_second_source),
             points: state::class(fixed.draw.topology) == Class::Points
                 || fixed.draw.polygon_mode == PolygonMode::Point,
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
-        let programs = link::link(vertex, fragment, stream, effects)?;
+        let programs = link::link(vertex, fragment, stream, live_outputs)?;
         let programs = DrawPipeline::new(device.simulated(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         let is_static = dynamic.is_empty()

@@ -920,16 +920,16 @@ fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
 }
 
 /// For each colour attachment, whether anything comes of its source.
-pub(crate) fn color_effects(info: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
-    let mut effects: Vec<_> =
+pub(crate) fn live_color_outputs(info: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
+    let mut live_outputs: Vec<_> =
         std::iter::zip(&fixed.draw.blend, &info.fragment_output.color_formats)
             .map(|(blend, format)| blend.write_mask != 0 && *format != vk::Format::UNDEFINED)
             .collect();
     if fixed.draw.alpha_to_coverage {
-        match effects.first_mut() {
+        match live_outputs.first_mut() {
             Some(first) => *first = true,
-            None => effects.push(true),
+            None => live_outputs.push(true),
         }
     }
-    effects
+    live_outputs
 }

@@ -3,10 +3,10 @@
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::pipeline::layout::PipelineLayout;
-use crate::pipeline::link::{self, Effects, Place, Varyings};
+use crate::pipeline::link::{self, LiveOutputs, Place, Varyings};
 use crate::pipeline::stages;
 use crate::pipeline::state::{
-    AttributeSource, FixedFunctionState, GraphicsState, color_effects, reads_second_source,
+    AttributeSource, FixedFunctionState, GraphicsState, live_color_outputs, reads_second_source,
 };
 use crate::shader::{
     BuiltIn, Descriptor, InputSource, Interface, Numeric, OutputTarget, Stage, reflect,
@@ -124,13 +124,13 @@ impl ResolveStage {
         let varyings = varyings(state)?;
         check_resolve(&fragment.interface, &varyings)?;
         let descriptors = fragment.interface.descriptors.clone();
-        let color = color_effects(info, fixed);
-        let effects = Effects {
+        let color = live_color_outputs(info, fixed);
+        let live_outputs = LiveOutputs {
             color: &color,
             second_source: info.fragment_output.blend.iter().any(reads_second_source),
             points: false,
         };
-        let programs = link::link_resolve(fragment, &varyings, effects)?;
+        let programs = link::link_resolve(fragment, &varyings, live_outputs)?;
         let program = ResolveProgram::new(device.simulated(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Some(Self {
