@@ -13,7 +13,7 @@ pub(crate) mod state;
 
 use self::compute::ComputePipeline;
 use self::gaussian::GaussianPipeline;
-use self::primitives::PolygonPipeline;
+use self::primitives::PrimitivePipeline;
 use self::state::GraphicsState;
 use crate::abi::error::Error;
 use crate::abi::handle::{self, objects};
@@ -40,18 +40,18 @@ pub(crate) enum Pipeline {
 #[derive(Debug)]
 pub(crate) struct GraphicsPipeline {
     /// What it draws.
-    pub(crate) primitive: Primitive,
+    pub(crate) kind: PipelineKind,
     /// Whether vertex strides come from `vkCmdBindVertexBuffers2`.
     pub(crate) dynamic_stride: bool,
 }
 
 /// What a pipeline draws.
 #[derive(Debug)]
-pub(crate) enum Primitive {
+pub(crate) enum PipelineKind {
     /// Gaussians.
     Gaussian(Box<GaussianPipeline>),
     /// Points, lines or triangles.
-    Polygons(Box<PolygonPipeline>),
+    Primitive(Box<PrimitivePipeline>),
 }
 
 objects! {
@@ -65,14 +65,14 @@ impl GraphicsPipeline {
     /// # Errors
     /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
     pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
-        let primitive = if info.vertex_input.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
+        let kind = if info.vertex_input.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
             let gaussian = GaussianPipeline::new(device, info)?;
-            Primitive::Gaussian(Box::new(gaussian))
+            PipelineKind::Gaussian(Box::new(gaussian))
         } else {
-            Primitive::Polygons(Box::new(PolygonPipeline::new(device, info)?))
+            PipelineKind::Primitive(Box::new(PrimitivePipeline::new(device, info)?))
         };
         Ok(Self {
-            primitive,
+            kind,
             dynamic_stride: info.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE),
         })
     }

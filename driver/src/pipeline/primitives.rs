@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// A pipeline of points, lines or triangles.
 #[derive(Debug)]
-pub(crate) struct PolygonPipeline {
+pub(crate) struct PrimitivePipeline {
     /// The programs.
     pub(crate) programs: Arc<DrawPipeline>,
     /// What the vertex program's attributes count in.
@@ -49,7 +49,7 @@ pub(crate) enum ViewportSource {
     DynamicWithCount,
 }
 
-impl PolygonPipeline {
+impl PrimitivePipeline {
     /// Translates and links the stages, and validates and converts the state.
     ///
     /// # Errors

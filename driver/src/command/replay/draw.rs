@@ -5,7 +5,7 @@ use super::descriptors::{self, DescriptorSetNotBound};
 use super::state::State;
 use crate::command::Draw;
 use crate::pipeline::GraphicsPipeline;
-use crate::pipeline::primitives::{PolygonPipeline, ViewportSource};
+use crate::pipeline::primitives::{PrimitivePipeline, ViewportSource};
 use crate::pipeline::state::AttributeSource;
 use ash::vk;
 use simdevice::Packet;
@@ -119,7 +119,7 @@ pub(super) fn indices(state: &State, draw: &Draw) -> Result<Option<IndexStream>,
 pub(super) fn primitives(
     state: &mut State,
     pipeline: &GraphicsPipeline,
-    polygons: &PolygonPipeline,
+    polygons: &PrimitivePipeline,
     parameters: &Draw,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
@@ -146,7 +146,7 @@ pub(super) fn primitives(
 }
 
 /// The fixed-function state, which is made anew only when something of it has changed since the last draw.
-fn draw_state(state: &mut State, polygons: &PolygonPipeline) -> Result<Arc<DrawState>, DrawError> {
+fn draw_state(state: &mut State, polygons: &PrimitivePipeline) -> Result<Arc<DrawState>, DrawError> {
     if let Some(fixed) = polygons.state.as_ref().or(state.draw_state.as_ref()) {
         return Ok(Arc::clone(fixed));
     }

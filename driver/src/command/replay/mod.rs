@@ -11,7 +11,7 @@ use super::{Command, Draw, DrawIndirect, query};
 use crate::abi::error::Error;
 use crate::device_sync::{DeviceSync, WaitResult};
 use crate::instance::Instance;
-use crate::pipeline::Primitive;
+use crate::pipeline::PipelineKind;
 use ash::vk;
 use simdevice::command_processor::ExecutionError;
 use simdevice::{CommandProcessor, Packet};
@@ -212,8 +212,8 @@ fn draw(
 /// The packets of a draw.
 fn packets(state: &mut State, parameters: &Draw, draw_index: u32) -> Result<Vec<Packet>, DrawError> {
     let pipeline = state.pipeline.clone().ok_or(DrawError::Pipeline)?;
-    match &pipeline.primitive {
-        Primitive::Gaussian(gaussian) => {
+    match &pipeline.kind {
+        PipelineKind::Gaussian(gaussian) => {
             let append = gaussian::append(state, &pipeline, gaussian, parameters, draw_index)?;
             if state.merged_draws_open {
                 return Ok(vec![append]);
@@ -226,7 +226,7 @@ fn packets(state: &mut State, parameters: &Draw, draw_index: u32) -> Result<Vec<
             }
             Ok(packets)
         }
-        Primitive::Polygons(polygons) => {
+        PipelineKind::Primitive(polygons) => {
             draw::primitives(state, &pipeline, polygons, parameters, draw_index)
                 .map(|packet| vec![packet])
         }

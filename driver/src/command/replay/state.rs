@@ -7,7 +7,7 @@ use crate::descriptor::set::{DescriptorSet, Write};
 use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicStates;
 use crate::pipeline::gaussian::{GaussianPipeline, GaussianSource};
-use crate::pipeline::{GraphicsPipeline, Primitive};
+use crate::pipeline::{GraphicsPipeline, PipelineKind};
 use simdevice::packet::draw::DrawState;
 use simdevice::packet::{Camera, Rect, Viewport};
 use std::sync::Arc;
@@ -64,8 +64,8 @@ impl State {
 
     /// Whether the pipeline's Gaussians are projected by a vertex shader.
     pub(crate) fn shades_gaussians(&self) -> bool {
-        let primitive = self.pipeline.as_ref().map(|pipeline| &pipeline.primitive);
-        matches!(primitive, Some(Primitive::Gaussian(gaussian))
+        let primitive = self.pipeline.as_ref().map(|pipeline| &pipeline.kind);
+        matches!(primitive, Some(PipelineKind::Gaussian(gaussian))
             if matches!(gaussian.source, GaussianSource::VertexShader(_)))
     }
 
