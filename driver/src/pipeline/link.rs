@@ -26,10 +26,10 @@ pub(crate) struct LiveOutputs<'a> {
 }
 
 /// A location and a component of it.
-pub(crate) type Place = (u32, u32);
+pub(crate) type InterfaceComponent = (u32, u32);
 
 /// The varyings by their place.
-pub(crate) type Varyings = HashMap<Place, u32>;
+pub(crate) type Varyings = HashMap<InterfaceComponent, u32>;
 
 /// Links programs. `stream` says in which attribute stream a vertex input's location is.
 ///
@@ -56,19 +56,19 @@ pub(crate) fn link(
     })
 }
 
-/// Links a vertex program that projects Gaussians: what it writes to `places` becomes the varyings of those numbers.
+/// Links a vertex program that projects Gaussians: what it writes to `components` becomes the varyings of those numbers.
 ///
 /// # Errors
 /// As [`link`].
 pub(crate) fn link_projection(
     vertex: Shader,
     stream: impl Fn(u32) -> Option<usize>,
-    places: &[Place],
+    components: &[InterfaceComponent],
 ) -> Result<DrawPrograms, Error> {
     check_widths(&vertex.interface)?;
-    let varyings: Varyings = places.iter().copied().zip(0..).collect();
+    let varyings: Varyings = components.iter().copied().zip(0..).collect();
     Ok(DrawPrograms {
-        varyings: places.len() as u32,
+        varyings: components.len() as u32,
         fragment: None,
         ..vertex_programs(vertex, &varyings, stream, LiveOutputs::default())
     })
@@ -174,15 +174,15 @@ fn check_widths(interface: &Interface) -> Result<(), Error> {
     Ok(())
 }
 
-/// Numbers what the vertex stage writes and the fragment stage reads, in order of their places.
+/// Numbers what the vertex stage writes and the fragment stage reads, in order of their components.
 fn varyings(vertex: &Interface, fragment: &Interface) -> Varyings {
-    let written = |place: Place| {
+    let written = |place: InterfaceComponent| {
         vertex.outputs.iter().any(|output| {
             matches!(output.target, OutputTarget::Location { location, component, .. }
                 if (location, component) == place)
         })
     };
-    let mut places: Vec<Place> = fragment
+    let mut components: Vec<InterfaceComponent> = fragment
         .inputs
         .iter()
         .filter_map(|input| match input.source {
@@ -195,9 +195,9 @@ fn varyings(vertex: &Interface, fragment: &Interface) -> Varyings {
         })
         .filter(|place| written(*place))
         .collect();
-    places.sort_unstable();
-    places.dedup();
-    places.into_iter().zip(0..).collect()
+    components.sort_unstable();
+    components.dedup();
+    components.into_iter().zip(0..).collect()
 }
 
 /// Makes constants of zero of the inputs that nothing is put into. (Slots are indices into `inputs`.)

@@ -3,7 +3,7 @@
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::pipeline::layout::PipelineLayout;
-use crate::pipeline::link::{self, LiveOutputs, Place, Varyings};
+use crate::pipeline::link::{self, LiveOutputs, InterfaceComponent, Varyings};
 use crate::pipeline::stages;
 use crate::pipeline::state::{
     AttributeSource, FixedFunctionState, GraphicsState, live_color_outputs, reads_second_source,
@@ -54,13 +54,13 @@ impl VertexProjection {
         check_order(state)?;
         // Nothing of a vertex stage depends on samples.
         let vertex = stages::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
-        let places = places(state, &vertex.interface)?;
+        let components = components(state, &vertex.interface)?;
         let locations = reflect::locations_read(&vertex.interface);
         let attributes = stages::attributes(info, &locations)?;
         stages::check_attributes(&vertex.interface, &locations, &attributes)?;
         let descriptors = vertex.interface.descriptors.clone();
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
-        let programs = link::link_projection(vertex, stream, &places)?;
+        let programs = link::link_projection(vertex, stream, &components)?;
         let programs = DrawPipeline::of_gaussians(device.simulated(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Self {
@@ -262,10 +262,10 @@ fn find<'a>(info: &'a GraphicsState, wanted: vk::ShaderStageFlags) -> Option<&'a
 }
 
 /// Where the vertex shader writes what the device takes, in the order of the numbers of [`gaussian`].
-fn places(
+fn components(
     state: &PipelineGaussianStateCreateInfoGAURAST,
     interface: &Interface,
-) -> Result<Vec<Place>, Error> {
+) -> Result<Vec<InterfaceComponent>, Error> {
     let refuse = |what: String| {
         let vuid = "VUID-VkGaussianVertexOutputLocationsGAURAST-location";
         Err(Error::usage(vuid, what))
@@ -277,13 +277,13 @@ fn places(
         ("color", locations.color, gaussian::COLOR),
         ("depthKey", locations.depth_key, gaussian::DEPTH_KEY),
     ];
-    let mut places: Vec<Place> = Vec::new();
+    let mut components: Vec<InterfaceComponent> = Vec::new();
     for (name, location, first) in wanted {
         let is_key = first == gaussian::DEPTH_KEY;
         if is_key && location == GAUSSIAN_LOCATION_UNUSED_GAURAST {
             continue;
         }
-        if places.iter().any(|&(taken, _)| taken == location) {
+        if components.iter().any(|&(taken, _)| taken == location) {
             return refuse(format!(
                 "{name} is location {location}, as another output is"
             ));
@@ -301,13 +301,13 @@ fn places(
                      {component} of 32-bit floating point"
                 ));
             }
-            places.push(place);
+            components.push(place);
         }
     }
-    Ok(places)
+    Ok(components)
 }
 
-fn writes_float(interface: &Interface, place: Place) -> bool {
+fn writes_float(interface: &Interface, place: InterfaceComponent) -> bool {
     interface.outputs.iter().any(|output| {
         let is_there = matches!(output.target, OutputTarget::Location { location, component, .. }
             if (location, component) == place);
