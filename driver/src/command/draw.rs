@@ -1,7 +1,7 @@
 //! Commands that draw and dispatch.
 
 use super::buffer::Recorder;
-use super::{Command, Draw, DrawIndirect};
+use super::{Command, DrawIndirect, DrawParameters};
 use crate::abi::error::Error;
 use crate::resource::buffer::{Buffer, BufferRules};
 use ash::vk;
@@ -34,7 +34,7 @@ pub(crate) fn cmd_draw(
     first_instance: u32,
 ) -> Result<(), Error> {
     recorder.require_pass()?;
-    recorder.push(Command::Draw(Draw {
+    recorder.push(Command::Draw(DrawParameters {
         vertex_offset: None,
         first: first_vertex,
         count: vertex_count,
@@ -54,7 +54,7 @@ pub(crate) fn cmd_draw_indexed(
     first_instance: u32,
 ) -> Result<(), Error> {
     recorder.require_pass()?;
-    recorder.push(Command::Draw(Draw {
+    recorder.push(Command::Draw(DrawParameters {
         vertex_offset: Some(vertex_offset),
         first: first_index,
         count: index_count,

@@ -71,7 +71,7 @@ pub(crate) enum Command {
     /// `vkCmdSetGaussianCameraGAURAST`.
     SetCamera(Box<Camera>),
     /// `vkCmdDraw` and `vkCmdDrawIndexed`.
-    Draw(Draw),
+    Draw(DrawParameters),
     /// `vkCmdDrawIndirect`, `vkCmdDrawIndexedIndirect` and their forms with a count: the draws are read when they
     /// execute.
     DrawIndirect(DrawIndirect),
@@ -149,9 +149,9 @@ pub(crate) struct IndexBuffer {
     pub(crate) index_size: u32,
 }
 
-/// A draw's numbers.
+/// A draw's parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Draw {
+pub(crate) struct DrawParameters {
     /// The value added to each index, or `None` for a draw without an index buffer.
     pub(crate) vertex_offset: Option<i32>,
     /// The first vertex or index.
@@ -164,16 +164,16 @@ pub(crate) struct Draw {
     pub(crate) instance_count: u32,
 }
 
-/// Draws whose numbers lie in a buffer.
+/// Draws whose parameters lie in a buffer.
 #[derive(Clone, Debug)]
 pub(crate) struct DrawIndirect {
-    /// The bytes from the first draw's numbers to the end of the buffer.
+    /// The bytes from the first draw's parameters to the end of the buffer.
     pub(crate) parameters: BufferRange,
     /// How many draws, at most.
     pub(crate) draw_count: u32,
     /// Where the number of draws is read from, if it lies in a buffer: four bytes.
     pub(crate) count: Option<BufferRange>,
-    /// Bytes from one draw's numbers to the next.
+    /// Bytes from one draw's parameters to the next.
     pub(crate) stride: u32,
     /// Whether they are those of indexed draws.
     pub(crate) indexed: bool,

@@ -135,7 +135,7 @@ impl<'a> GraphicsState<'a> {
                 gathered.dynamic = valid::slice(state.p_dynamic_states, state.dynamic_state_count)?;
             }
             if let Some(state) = valid::optional(info.p_vertex_input_state) {
-                gather_vertex_input(state, &mut gathered)?;
+                read_vertex_input(state, &mut gathered)?;
             }
             if let Some(state) = valid::optional(info.p_input_assembly_state) {
                 gathered.vertex_input.topology = state.topology;
@@ -152,7 +152,7 @@ impl<'a> GraphicsState<'a> {
                 });
             }
             if !gathered.discards() {
-                gather_fragments(info, &mut gathered)?;
+                read_fragments(info, &mut gathered)?;
             }
         }
         Ok(gathered)
@@ -192,7 +192,7 @@ impl<'a> GraphicsState<'a> {
 ///
 /// # Safety
 /// The state and its chain are valid.
-unsafe fn gather_vertex_input<'a>(
+unsafe fn read_vertex_input<'a>(
     state: &'a vk::PipelineVertexInputStateCreateInfo<'a>,
     gathered: &mut GraphicsState<'a>,
 ) -> Result<(), Error> {
@@ -223,7 +223,7 @@ unsafe fn gather_vertex_input<'a>(
 ///
 /// # Safety
 /// The create info and its chain are valid.
-unsafe fn gather_fragments<'a>(
+unsafe fn read_fragments<'a>(
     info: &'a vk::GraphicsPipelineCreateInfo<'a>,
     gathered: &mut GraphicsState<'a>,
 ) -> Result<(), Error> {
@@ -231,7 +231,7 @@ unsafe fn gather_fragments<'a>(
     unsafe {
         let formats = attachment_formats(info)?;
         if let Some(state) = valid::optional(info.p_viewport_state) {
-            gather_viewports(state, gathered)?;
+            read_viewports(state, gathered)?;
         }
         if let Some(state) = valid::optional(info.p_multisample_state) {
             gathered.fragment_output.multisample = *state;
@@ -261,7 +261,7 @@ unsafe fn gather_fragments<'a>(
 ///
 /// # Safety
 /// The state is valid.
-unsafe fn gather_viewports<'a>(
+unsafe fn read_viewports<'a>(
     state: &'a vk::PipelineViewportStateCreateInfo<'a>,
     gathered: &mut GraphicsState<'a>,
 ) -> Result<(), Error> {

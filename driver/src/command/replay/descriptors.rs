@@ -57,7 +57,7 @@ fn bind(
     }
 }
 
-/// Puts what a descriptor holds at a bind point.
+/// Puts what a descriptor holds in a resource slot.
 fn place(
     used: &shader::Descriptor,
     slot: usize,
@@ -116,7 +116,7 @@ fn mark_written(used: &shader::Descriptor, memory: &Arc<Allocation>, bindings: &
     }
 }
 
-/// The element at a bind point, of a list that grows as needed.
+/// The element in a resource slot, of a list that grows as needed.
 fn element<T: Default>(slots: &mut Vec<T>, index: usize) -> &mut T {
     if slots.len() <= index {
         host::reserve(slots, index + 1 - slots.len());

@@ -3,7 +3,7 @@
 
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::state::State;
-use crate::command::Draw;
+use crate::command::DrawParameters;
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::primitives::{PrimitivePipeline, ViewportSource};
 use crate::pipeline::state::AttributeSource;
@@ -100,7 +100,7 @@ pub(super) fn attribute_stream(
 ///
 /// # Errors
 /// [`DrawError::IndexBuffer`].
-pub(super) fn indices(state: &State, draw: &Draw) -> Result<Option<IndexStream>, DrawError> {
+pub(super) fn indices(state: &State, draw: &DrawParameters) -> Result<Option<IndexStream>, DrawError> {
     let Some(vertex_offset) = draw.vertex_offset else {
         return Ok(None);
     };
@@ -120,7 +120,7 @@ pub(super) fn primitives(
     state: &mut State,
     pipeline: &GraphicsPipeline,
     polygons: &PrimitivePipeline,
-    parameters: &Draw,
+    parameters: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
     let attributes = polygons
@@ -202,7 +202,7 @@ pub(super) fn read_count(range: &BufferRange) -> Option<u32> {
 }
 
 /// Reads `VkDrawIndirectCommand` or `VkDrawIndexedIndirectCommand`.
-pub(super) fn read_draw(parameters: &BufferRange, offset: u64, indexed: bool) -> Option<Draw> {
+pub(super) fn read_draw(parameters: &BufferRange, offset: u64, indexed: bool) -> Option<DrawParameters> {
     let mut words = [0u32; 5];
     let words = &mut words[..if indexed { 5 } else { 4 }];
     if offset.checked_add(size_of_val(words) as u64)? > parameters.size {
@@ -211,14 +211,14 @@ pub(super) fn read_draw(parameters: &BufferRange, offset: u64, indexed: bool) ->
     let offset = parameters.offset.checked_add(offset)?;
     parameters.memory.read(offset, words).ok()?;
     Some(match *words {
-        [count, instance_count, first, vertex_offset, first_instance] => Draw {
+        [count, instance_count, first, vertex_offset, first_instance] => DrawParameters {
             vertex_offset: Some(vertex_offset as i32),
             first,
             count,
             first_instance,
             instance_count,
         },
-        [count, instance_count, first, first_instance] => Draw {
+        [count, instance_count, first, first_instance] => DrawParameters {
             vertex_offset: None,
             first,
             count,

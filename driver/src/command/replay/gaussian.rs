@@ -3,7 +3,7 @@
 use super::descriptors::{self, DescriptorSetNotBound};
 use super::draw::{DrawError, attribute_stream, indices};
 use super::state::State;
-use crate::command::{Draw, camera};
+use crate::command::{DrawParameters, camera};
 use crate::pipeline::GraphicsPipeline;
 use crate::pipeline::gaussian::stages::VertexProjection;
 use crate::pipeline::gaussian::{
@@ -51,7 +51,7 @@ pub(crate) fn append(
     state: &State,
     pipeline: &GraphicsPipeline,
     gaussian: &GaussianPipeline,
-    draw: &Draw,
+    draw: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
     let sources = match &gaussian.source {
@@ -76,7 +76,7 @@ fn shaded(
     pipeline: &GraphicsPipeline,
     gaussian: &GaussianPipeline,
     projection: &VertexProjection,
-    parameters: &Draw,
+    parameters: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
     let attributes = projection

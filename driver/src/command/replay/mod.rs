@@ -7,7 +7,7 @@ mod state;
 
 use self::draw::DrawError;
 use self::state::{State, bind};
-use super::{Command, Draw, DrawIndirect, query};
+use super::{Command, DrawIndirect, DrawParameters, query};
 use crate::abi::error::Error;
 use crate::device_sync::{DeviceSync, WaitResult};
 use crate::instance::Instance;
@@ -191,7 +191,7 @@ fn execute(
 
 fn draw(
     state: &mut State,
-    parameters: &Draw,
+    parameters: &DrawParameters,
     draw_index: u32,
     execution: &mut Execution<'_>,
 ) -> Result<(), Error> {
@@ -210,7 +210,7 @@ fn draw(
 }
 
 /// The packets of a draw.
-fn packets(state: &mut State, parameters: &Draw, draw_index: u32) -> Result<Vec<Packet>, DrawError> {
+fn packets(state: &mut State, parameters: &DrawParameters, draw_index: u32) -> Result<Vec<Packet>, DrawError> {
     let pipeline = state.pipeline.clone().ok_or(DrawError::Pipeline)?;
     match &pipeline.kind {
         PipelineKind::Gaussian(gaussian) => {
