@@ -72,8 +72,14 @@ pub(crate) fn cmd_draw_indirect(
     draw_count: u32,
     stride: u32,
 ) -> Result<(), Error> {
-    let parameters = (buffer, offset);
-    draw_indirect(recorder, parameters, None, draw_count, stride, false)
+    let draws = DrawIndirect {
+        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
+        draw_count,
+        count: None,
+        stride,
+        indexed: false,
+    };
+    draw_indirect(recorder, draws)
 }
 
 #[doc(alias = "vkCmdDrawIndexedIndirect")]
@@ -84,8 +90,14 @@ pub(crate) fn cmd_draw_indexed_indirect(
     draw_count: u32,
     stride: u32,
 ) -> Result<(), Error> {
-    let parameters = (buffer, offset);
-    draw_indirect(recorder, parameters, None, draw_count, stride, true)
+    let draws = DrawIndirect {
+        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
+        draw_count,
+        count: None,
+        stride,
+        indexed: true,
+    };
+    draw_indirect(recorder, draws)
 }
 
 #[doc(alias = "vkCmdDrawIndirectCount")]
@@ -98,15 +110,14 @@ pub(crate) fn cmd_draw_indirect_count(
     max_draw_count: u32,
     stride: u32,
 ) -> Result<(), Error> {
-    let parameters = (buffer, offset);
-    draw_indirect(
-        recorder,
-        parameters,
-        Some((count_buffer, count_buffer_offset)),
-        max_draw_count,
+    let draws = DrawIndirect {
+        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
+        draw_count: max_draw_count,
+        count: Some(count_buffer.range(count_buffer_offset, Some(4), &DRAW_COUNT)?),
         stride,
-        false,
-    )
+        indexed: false,
+    };
+    draw_indirect(recorder, draws)
 }
 
 #[doc(alias = "vkCmdDrawIndexedIndirectCount")]
@@ -119,15 +130,14 @@ pub(crate) fn cmd_draw_indexed_indirect_count(
     max_draw_count: u32,
     stride: u32,
 ) -> Result<(), Error> {
-    let parameters = (buffer, offset);
-    draw_indirect(
-        recorder,
-        parameters,
-        Some((count_buffer, count_buffer_offset)),
-        max_draw_count,
+    let draws = DrawIndirect {
+        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
+        draw_count: max_draw_count,
+        count: Some(count_buffer.range(count_buffer_offset, Some(4), &DRAW_COUNT)?),
         stride,
-        true,
-    )
+        indexed: true,
+    };
+    draw_indirect(recorder, draws)
 }
 
 #[doc(alias = "vkCmdDispatch")]
@@ -182,30 +192,9 @@ fn dispatch(recorder: &mut Recorder, base: [u32; 3], count: [u32; 3]) -> Result<
     Ok(())
 }
 
-/// A buffer and an offset in it.
-type Place<'a> = (&'a Buffer, vk::DeviceSize);
-
-/// Records draws whose numbers lie in a buffer.
-fn draw_indirect(
-    recorder: &mut Recorder,
-    (buffer, offset): Place<'_>,
-    count: Option<Place<'_>>,
-    draw_count: u32,
-    stride: u32,
-    indexed: bool,
-) -> Result<(), Error> {
+/// Records draws whose parameters lie in a buffer.
+fn draw_indirect(recorder: &mut Recorder, draws: DrawIndirect) -> Result<(), Error> {
     recorder.require_pass()?;
-    let parameters = buffer.range(offset, None, &DRAW_INDIRECT)?;
-    let count = match count {
-        Some((buffer, offset)) => Some(buffer.range(offset, Some(4), &DRAW_COUNT)?),
-        None => None,
-    };
-    recorder.push(Command::DrawIndirect(DrawIndirect {
-        parameters,
-        draw_count,
-        count,
-        stride,
-        indexed,
-    }));
+    recorder.push(Command::DrawIndirect(draws));
     Ok(())
 }

@@ -100,7 +100,10 @@ pub(super) fn attribute_stream(
 ///
 /// # Errors
 /// [`DrawError::IndexBuffer`].
-pub(super) fn indices(state: &State, draw: &DrawParameters) -> Result<Option<IndexStream>, DrawError> {
+pub(super) fn indices(
+    state: &State,
+    draw: &DrawParameters,
+) -> Result<Option<IndexStream>, DrawError> {
     let Some(vertex_offset) = draw.vertex_offset else {
         return Ok(None);
     };
@@ -119,11 +122,11 @@ pub(super) fn indices(state: &State, draw: &DrawParameters) -> Result<Option<Ind
 pub(super) fn primitives(
     state: &mut State,
     pipeline: &GraphicsPipeline,
-    polygons: &PrimitivePipeline,
+    primitives: &PrimitivePipeline,
     parameters: &DrawParameters,
     draw_index: u32,
 ) -> Result<Packet, DrawError> {
-    let attributes = polygons
+    let attributes = primitives
         .attributes
         .iter()
         .map(|source| attribute_stream(state, pipeline, source));
@@ -131,35 +134,38 @@ pub(super) fn primitives(
         descriptors::bindings(descriptors, &state.graphics_sets, &state.push_constants)
     };
     Ok(Packet::Draw(Box::new(draw::Draw {
-        pipeline: Arc::clone(&polygons.programs),
+        pipeline: Arc::clone(&primitives.programs),
         attributes: attributes.collect::<Result<_, _>>()?,
-        vertex_bindings: bindings(&polygons.vertex_descriptors)?,
-        fragment_bindings: bindings(&polygons.fragment_descriptors)?,
+        vertex_bindings: bindings(&primitives.vertex_descriptors)?,
+        fragment_bindings: bindings(&primitives.fragment_descriptors)?,
         indices: indices(state, parameters)?,
         first: parameters.first,
         count: parameters.count,
         first_instance: parameters.first_instance,
         instance_count: parameters.instance_count,
         draw_index,
-        state: draw_state(state, polygons)?,
+        state: draw_state(state, primitives)?,
     })))
 }
 
 /// The fixed-function state, which is made anew only when something of it has changed since the last draw.
-fn draw_state(state: &mut State, polygons: &PrimitivePipeline) -> Result<Arc<DrawState>, DrawError> {
-    if let Some(fixed) = polygons.state.as_ref().or(state.draw_state.as_ref()) {
+fn draw_state(
+    state: &mut State,
+    primitives: &PrimitivePipeline,
+) -> Result<Arc<DrawState>, DrawError> {
+    if let Some(fixed) = primitives.state.as_ref().or(state.draw_state.as_ref()) {
         return Ok(Arc::clone(fixed));
     }
-    let mut fixed = polygons.fixed.clone();
+    let mut fixed = primitives.fixed.clone();
     state
         .dynamic_states
-        .apply(&polygons.dynamic, &mut fixed)
+        .apply(&primitives.dynamic, &mut fixed)
         .map_err(DrawError::Dynamic)?;
     if !fixed.draw.rasterizer_discard {
-        if let Some(count) = dynamic_count(polygons.viewports, state.viewport_count) {
+        if let Some(count) = dynamic_count(primitives.viewports, state.viewport_count) {
             fixed.draw.viewports = set(&state.viewports, count).ok_or(DrawError::Viewport)?;
         }
-        if let Some(count) = dynamic_count(polygons.scissors, state.scissor_count) {
+        if let Some(count) = dynamic_count(primitives.scissors, state.scissor_count) {
             fixed.draw.scissors = set(&state.scissors, count).ok_or(DrawError::Scissor)?;
         }
         let (viewports, scissors) = (fixed.draw.viewports.len(), fixed.draw.scissors.len());
@@ -202,7 +208,11 @@ pub(super) fn read_count(range: &BufferRange) -> Option<u32> {
 }
 
 /// Reads `VkDrawIndirectCommand` or `VkDrawIndexedIndirectCommand`.
-pub(super) fn read_draw(parameters: &BufferRange, offset: u64, indexed: bool) -> Option<DrawParameters> {
+pub(super) fn read_draw(
+    parameters: &BufferRange,
+    offset: u64,
+    indexed: bool,
+) -> Option<DrawParameters> {
     let mut words = [0u32; 5];
     let words = &mut words[..if indexed { 5 } else { 4 }];
     if offset.checked_add(size_of_val(words) as u64)? > parameters.size {

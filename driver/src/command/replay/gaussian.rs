@@ -135,7 +135,10 @@ fn camera(state: &State, source: CameraSource) -> Result<Camera, DrawError> {
         CameraSource::Command => return state.camera.ok_or(DrawError::Camera),
         CameraSource::UniformBuffer { set, binding } => (set, binding),
     };
-    let bound = state.graphics_sets.get(set).ok_or(DescriptorSetNotBound(set))?;
+    let bound = state
+        .graphics_sets
+        .get(set)
+        .ok_or(DescriptorSetNotBound(set))?;
     let range = bound
         .buffer(binding)
         .ok_or(DrawError::CameraBuffer { set, binding })?;
@@ -143,7 +146,10 @@ fn camera(state: &State, source: CameraSource) -> Result<Camera, DrawError> {
 }
 
 /// What the pipeline fixes, with the dynamic part filled in.
-fn fixed_state(state: &State, gaussian: &GaussianPipeline) -> Result<Arc<GaussianState>, DrawError> {
+fn fixed_state(
+    state: &State,
+    gaussian: &GaussianPipeline,
+) -> Result<Arc<GaussianState>, DrawError> {
     if gaussian.dynamic.is_empty() {
         return Ok(Arc::clone(&gaussian.state));
     }

@@ -210,7 +210,11 @@ fn draw(
 }
 
 /// The packets of a draw.
-fn packets(state: &mut State, parameters: &DrawParameters, draw_index: u32) -> Result<Vec<Packet>, DrawError> {
+fn packets(
+    state: &mut State,
+    parameters: &DrawParameters,
+    draw_index: u32,
+) -> Result<Vec<Packet>, DrawError> {
     let pipeline = state.pipeline.clone().ok_or(DrawError::Pipeline)?;
     match &pipeline.kind {
         PipelineKind::Gaussian(gaussian) => {
@@ -226,8 +230,8 @@ fn packets(state: &mut State, parameters: &DrawParameters, draw_index: u32) -> R
             }
             Ok(packets)
         }
-        PipelineKind::Primitive(polygons) => {
-            draw::primitives(state, &pipeline, polygons, parameters, draw_index)
+        PipelineKind::Primitive(primitives) => {
+            draw::primitives(state, &pipeline, primitives, parameters, draw_index)
                 .map(|packet| vec![packet])
         }
     }
