@@ -382,6 +382,10 @@ static ROWS: &[Command] = rows! {
         vkGetDeviceImageMemoryRequirementsKHR: vk::PFN_vkGetDeviceImageMemoryRequirements = vkGetDeviceImageMemoryRequirements;
         vkGetDeviceImageSparseMemoryRequirementsKHR: vk::PFN_vkGetDeviceImageSparseMemoryRequirements = vkGetDeviceImageSparseMemoryRequirements;
     }
+    Device, DeviceExtension(c"VK_KHR_map_memory2") => {
+        vkMapMemory2KHR: vk::PFN_vkMapMemory2KHR = vkMapMemory2KHR;
+        vkUnmapMemory2KHR: vk::PFN_vkUnmapMemory2KHR = vkUnmapMemory2KHR;
+    }
     PhysicalDevice, DeviceExtension(c"VK_KHR_performance_query") => {
         vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR: vk::PFN_vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR = vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR;
         vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR: vk::PFN_vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR = vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR;
@@ -4423,6 +4427,36 @@ unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
             }
         },
     )
+}
+
+unsafe extern "system" fn vkMapMemory2KHR(
+    device: vk::Device,
+    p_memory_map_info: *const vk::MemoryMapInfoKHR<'_>,
+    pp_data: *mut *mut std::ffi::c_void,
+) -> vk::Result {
+    guard(device, "vkMapMemory2KHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                pp_data,
+                crate::resource::memory::map_memory2(valid::input(p_memory_map_info)?)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkUnmapMemory2KHR(
+    device: vk::Device,
+    p_memory_unmap_info: *const vk::MemoryUnmapInfoKHR<'_>,
+) -> vk::Result {
+    guard(device, "vkUnmapMemory2KHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::memory::unmap_memory2(valid::input(p_memory_unmap_info)?)
+                .map(|()| vk::Result::SUCCESS)
+        }
+    })
 }
 
 unsafe extern "system" fn vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR(

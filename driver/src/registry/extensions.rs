@@ -56,6 +56,7 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_KHR_maintenance2", 1),
     (c"VK_KHR_maintenance3", 1),
     (c"VK_KHR_maintenance4", 2),
+    (c"VK_KHR_map_memory2", 1),
     (c"VK_KHR_performance_query", 1),
     (c"VK_KHR_push_descriptor", 2),
     (c"VK_KHR_relaxed_block_layout", 1),

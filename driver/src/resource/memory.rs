@@ -131,6 +131,27 @@ pub(crate) fn unmap_memory(memory: &Memory) -> Result<(), Error> {
     Ok(())
 }
 
+/// # Safety
+/// The memory is live.
+#[doc(alias = "vkMapMemory2KHR")]
+pub(crate) unsafe fn map_memory2(
+    memory_map_info: &vk::MemoryMapInfoKHR<'_>,
+) -> Result<*mut c_void, Error> {
+    // SAFETY: the caller's promise.
+    let memory = unsafe { handle::get(memory_map_info.memory)? };
+    map_memory(memory, memory_map_info.offset, memory_map_info.size)
+}
+
+/// # Safety
+/// The memory is live.
+#[doc(alias = "vkUnmapMemory2KHR")]
+pub(crate) unsafe fn unmap_memory2(
+    memory_unmap_info: &vk::MemoryUnmapInfoKHR<'_>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unmap_memory(unsafe { handle::get(memory_unmap_info.memory)? })
+}
+
 /// All host-visible memory is coherent.
 ///
 /// # Safety
