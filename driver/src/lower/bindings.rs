@@ -4,7 +4,7 @@ use crate::command::bound::{BoundSet, BoundSets};
 use crate::object::descriptor::Descriptor;
 use crate::object::descriptor::layout::Binding;
 use crate::object::image::ImageView;
-use gaurast_spirv::{self as shader, DescriptorKind};
+use gaurast_spirv::{DescriptorKind, ShaderBinding};
 use simdevice::Allocation;
 use simdevice::bindings::Bindings;
 use simdevice::host;
@@ -21,7 +21,7 @@ pub(crate) struct Unbound(pub(super) u32);
 /// # Errors
 /// [`Unbound`] if a set is missing.
 pub(crate) fn bindings(
-    descriptors: &[shader::ShaderBinding],
+    descriptors: &[ShaderBinding],
     sets: &BoundSets,
     push_constants: &[u8],
 ) -> Result<Bindings, Unbound> {
@@ -39,12 +39,7 @@ pub(crate) fn bindings(
 }
 
 /// Binds what one variable of a program uses.
-fn bind(
-    used: &shader::ShaderBinding,
-    bound: &BoundSet,
-    binding: &Binding,
-    bindings: &mut Bindings,
-) {
+fn bind(used: &ShaderBinding, bound: &BoundSet, binding: &Binding, bindings: &mut Bindings) {
     let held = bound.set.lock();
     let count = used.count.min(binding.count) as usize;
     for (element, descriptor) in held[binding.first..][..count].iter().enumerate() {
@@ -57,7 +52,7 @@ fn bind(
 
 /// Puts what a descriptor holds at a bind point.
 fn place(
-    used: &shader::ShaderBinding,
+    used: &ShaderBinding,
     slot: usize,
     descriptor: &Descriptor,
     dynamic_offset: Option<u32>,
@@ -103,7 +98,7 @@ fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
     }
 }
 
-fn note_written(used: &shader::ShaderBinding, memory: &Arc<Allocation>, bindings: &mut Bindings) {
+fn note_written(used: &ShaderBinding, memory: &Arc<Allocation>, bindings: &mut Bindings) {
     if used.writable
         && !bindings
             .written

@@ -3,7 +3,7 @@
 use crate::capabilities::spirv;
 use crate::error::Error;
 use crate::registry::features::Features;
-use gaurast_spirv::{self as shader, Module, Options, Shader, Specialization, Stage};
+use gaurast_spirv::{Module, Options, Shader, Specialization, Stage, translate};
 use simdevice::host;
 
 /// The first word of SPIR-V.
@@ -49,7 +49,7 @@ impl ShaderModule {
         options: &Options,
     ) -> Result<Shader, Error> {
         Module::parse(&self.words)
-            .and_then(|module| shader::translate(&module, name, stage, specialization, options))
+            .and_then(|module| translate(&module, name, stage, specialization, options))
             .map_err(|error| Error::InvalidShader(error.to_string()))
     }
 }

@@ -5,8 +5,9 @@ use crate::capabilities::limits;
 use crate::error::Error;
 use crate::object::device::Device;
 use crate::object::shader_module::ShaderModule;
-use gaurast_spirv::{self as shader, BuiltIn, InputSource, Interface, Stage};
-use gaurast_spirv::{Options, Specialization};
+use gaurast_spirv::{
+    BuiltIn, Input, InputSource, Interface, Options, ShaderBinding, Specialization, Stage,
+};
 use simdevice::compute::{ComputeInput, ComputeProgram};
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ pub(crate) struct ComputePipeline {
     /// What its workgroups run.
     pub(crate) program: Arc<ComputeProgram>,
     /// What the program is bound to.
-    pub(crate) descriptors: Vec<shader::ShaderBinding>,
+    pub(crate) descriptors: Vec<ShaderBinding>,
 }
 
 /// A shader stage with its pointers followed.
@@ -103,7 +104,7 @@ fn invocations(interface: &Interface) -> Result<u32, Error> {
 
 /// What the device puts into the program's inputs.
 fn inputs(interface: &Interface) -> Vec<Option<ComputeInput>> {
-    let input = |input: &shader::Input| match input.source {
+    let input = |input: &Input| match input.source {
         InputSource::BuiltIn {
             built_in: BuiltIn::WorkgroupId,
             component,
