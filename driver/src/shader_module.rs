@@ -10,7 +10,7 @@ use crate::physical_device::limits;
 use crate::registry::features::{Features, SUPPORTED};
 use crate::registry::spirv::{Enable, enables};
 use ash::vk;
-use gaurast_spirv::{self as shader, Module, Options, Shader, Specialization, Stage};
+use gaurast_spirv::{Module, Options, Shader, Specialization, Stage, is_supported, translate};
 use simdevice::host;
 use spirv::{Capability, Op};
 use std::ffi::CStr;
@@ -59,7 +59,7 @@ impl ShaderModule {
         options: &Options,
     ) -> Result<Shader, Error> {
         Module::parse(&self.words)
-            .and_then(|module| shader::translate(&module, name, stage, specialization, options))
+            .and_then(|module| translate(&module, name, stage, specialization, options))
             .map_err(|error| Error::InvalidShader(error.to_string()))
     }
 }
@@ -75,7 +75,7 @@ fn check_capabilities(
     extensions: &[&CStr],
 ) -> Result<(), Error> {
     match declared(words)
-        .filter(|&capability| shader::is_supported(capability))
+        .filter(|&capability| is_supported(capability))
         .find(|&capability| !is_enabled(capability, features, extensions))
     {
         None => Ok(()),
@@ -297,7 +297,7 @@ mod tests {
     fn every_capability_that_is_translated_and_supported_can_be_had() {
         let cannot: Vec<_> = (0..0x2000)
             .filter_map(Capability::from_u32)
-            .filter(|&capability| shader::is_supported(capability))
+            .filter(|&capability| is_supported(capability))
             .filter(|&capability| !is_enabled(capability, &SUPPORTED, &[]))
             .collect();
         use Capability as C;

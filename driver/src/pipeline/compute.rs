@@ -5,7 +5,7 @@ use crate::abi::error::Error;
 use crate::device::Device;
 use crate::physical_device::limits;
 use crate::shader_module::ShaderStage;
-use gaurast_spirv::{self as shader, BuiltIn, InputSource, Interface, Options, Stage};
+use gaurast_spirv::{BuiltIn, Input, InputSource, Interface, Options, ShaderBinding, Stage};
 use simdevice::compute::{ComputeInput, ComputeProgram};
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ pub(crate) struct ComputePipeline {
     /// What its workgroups run.
     pub(crate) program: Arc<ComputeProgram>,
     /// What the program is bound to.
-    pub(crate) descriptors: Vec<shader::ShaderBinding>,
+    pub(crate) descriptors: Vec<ShaderBinding>,
 }
 
 impl ComputePipeline {
@@ -90,7 +90,7 @@ fn invocations(interface: &Interface) -> Result<u32, Error> {
 
 /// What the device puts into the program's inputs.
 fn inputs(interface: &Interface) -> Vec<Option<ComputeInput>> {
-    let input = |input: &shader::Input| match input.source {
+    let input = |input: &Input| match input.source {
         InputSource::BuiltIn {
             built_in: BuiltIn::WorkgroupId,
             component,
