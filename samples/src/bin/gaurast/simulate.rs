@@ -14,9 +14,10 @@ use thiserror::Error;
 use timing::config::{Config, ConfigError, DEFAULT_PRESET};
 use timing::schedule;
 use timing::simulate::{self, Simulation};
-use timing::what_if::{WhatIf, what_ifs};
 use timing::work::{TRACE_VERSION, Trace};
-use timing::{FrameWork, fast, paper, stepped};
+use timing::{FrameWork, fast};
+use timing_studies::what_if::{WhatIf, what_ifs};
+use timing_studies::{paper, stepped};
 
 use crate::simulate_plot as plot;
 use crate::simulate_report as report;

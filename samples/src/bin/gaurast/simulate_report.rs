@@ -3,10 +3,10 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, ContentArrangement, Table};
 use timing::Config;
-use timing::area;
-use timing::paper::Section;
 use timing::simulate::Simulation;
 use timing::work::{FrameWork, TileWork};
+use timing_studies::area;
+use timing_studies::paper::Section;
 
 fn new_table() -> Table {
     let mut table = Table::new();
@@ -339,7 +339,7 @@ mod tests {
         assert_eq!(csv(&results).lines().count(), 3);
         assert!(csv(&results).contains("\"a,b\","));
         assert!(many(&results).contains("raster speed-up"));
-        let sections = timing::paper::report();
+        let sections = timing_studies::paper::report();
         assert!(paper(&sections).contains("GSCore"));
         let rows: usize = sections.iter().map(|section| section.rows.len()).sum();
         assert_eq!(paper_csv(&sections).lines().count(), rows + 1);

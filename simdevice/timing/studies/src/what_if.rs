@@ -3,10 +3,10 @@
 //! exact block tests; for triangles the blocks that they cover instead of whole tiles; and hierarchical depth. Or each
 //! alone.
 
-use crate::config::Config;
-use crate::simulate::{Simulation, simulate};
-use crate::work::{FrameWork, Mode, Saturation};
 use serde::Serialize;
+use timing::config::Config;
+use timing::simulate::{Simulation, simulate};
+use timing::work::{FrameWork, Mode, Saturation};
 
 /// A variant of the hardware or of the work that reaches it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -194,8 +194,8 @@ fn boxed(frame: &FrameWork) -> FrameWork {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::even_frame;
-    use crate::work::Run;
+    use timing::simulate::even_frame;
+    use timing::work::Run;
 
     #[test]
     fn each_skip_saves_cycles() {

@@ -1,7 +1,7 @@
 //! Area from the paper's component counts: what a PE shares between modes, and what Gaussians add.
 
-use crate::config::Config;
 use serde::Serialize;
+use timing::config::Config;
 
 /// Areas in mm2 of the rasterizer's technology, except where said.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -1,11 +1,11 @@
 //! The cycle-stepped model: every module's fetch engine, buffers and PEs, one clock cycle at a time. Slow, simple, and
 //! what the closed form is held against.
 
-use crate::config::Config;
-use crate::plan::{self, Part, Rates, Task};
-use crate::raster::{ModuleCycles, RasterReport};
-use crate::work::{FrameWork, Mode};
 use std::collections::VecDeque;
+use timing::config::Config;
+use timing::plan::{self, Part, Rates, Task};
+use timing::raster::{ModuleCycles, RasterReport};
+use timing::work::{FrameWork, Mode};
 
 /// Rasterizes a frame, cycle by cycle, while others move `others_gb_s` to and from main memory.
 pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> RasterReport {

@@ -1,8 +1,8 @@
 //! A generated scene for sweeps: round Gaussians in front of each other, composited by the definition, so that lists end
 //! and blocks finish as they do in pictures. It needs no device, and is the same everywhere.
 
-use crate::stages::{self, GaussianCounts};
-use crate::work::{DrawWork, FrameWork, Run, TILE_GROUPS, TILE_SIDE, TILE_SIDES, TileWork};
+use timing::stages::{self, GaussianCounts};
+use timing::work::{DrawWork, FrameWork, Run, TILE_GROUPS, TILE_SIDE, TILE_SIDES, TileWork};
 
 /// Gaussians after which it is looked at what is finished, as in the device.
 const CHUNK: usize = 32;
@@ -210,7 +210,7 @@ fn blend(g: &Round, place: [f64; 2], block: &mut [f64; 16]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::work::Saturation;
+    use timing::work::Saturation;
 
     #[test]
     fn a_generated_scene_has_what_a_picture_has() {

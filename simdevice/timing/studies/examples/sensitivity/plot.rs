@@ -4,8 +4,8 @@ use plotters::prelude::*;
 use plotters::style::{FontStyle, register_font};
 use std::error::Error;
 use std::sync::Once;
-use timing::sensitivity::{Point, Sweep};
 use timing::simulate::Simulation;
+use timing_studies::sensitivity::{Point, Sweep};
 
 const SIZE: (u32, u32) = (640, 360);
 const RASTER: RGBColor = RGBColor(31, 119, 180);

@@ -4,12 +4,12 @@
 fn the_report_in_the_repository_is_up_to_date() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/PAPER.md");
     let stored = std::fs::read_to_string(path).unwrap();
-    let generated = timing::paper::markdown();
+    let generated = timing_studies::paper::markdown();
     for (line, (stored, generated)) in stored.lines().zip(generated.lines()).enumerate() {
         assert_eq!(
             stored,
             generated,
-            "line {}: run `cargo run -p timing --example paper > simdevice/timing/PAPER.md`",
+            "line {}: run `cargo run -p timing-studies --example paper > simdevice/timing/studies/PAPER.md`",
             line + 1
         );
     }
@@ -18,7 +18,7 @@ fn the_report_in_the_repository_is_up_to_date() {
 
 #[gaurast_runner::test]
 fn every_number_of_the_papers_evaluation_has_a_row() {
-    let rows: Vec<_> = timing::paper::report()
+    let rows: Vec<_> = timing_studies::paper::report()
         .into_iter()
         .flat_map(|section| section.rows)
         .collect();

@@ -2,11 +2,11 @@
 
 use super::numbers::SCENES;
 use super::scenes::implied_pairs;
-use super::{Label, Row, Section};
-use crate::config::Config;
-use crate::fast;
-use crate::simulate::even_frame;
+use super::table::{Label, Row, Section};
 use serde::Deserialize;
+use timing::config::Config;
+use timing::fast;
+use timing::simulate::even_frame;
 
 /// What `samples/examples/paper_scenes.rs` writes.
 const MEASURED: &str = include_str!("../../generated_scenes.toml");
@@ -79,7 +79,7 @@ pub fn section() -> Option<Section> {
                at hand), turned and scaled to go around the garden. What lies in front of what decides how many \
                pairs are needed, and in a garden that is another matter, so that nothing here confirms or refutes the pairs that the times imply. Measured by \
                `cargo run --release -p gaurast-samples --example paper_scenes -- CAMERAS > \
-               simdevice/timing/generated_scenes.toml`; the test of this document doesn't repeat it."
+               simdevice/timing/studies/generated_scenes.toml`; the test of this document doesn't repeat it."
             .to_owned(),
         rows,
     })

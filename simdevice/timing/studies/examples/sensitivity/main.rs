@@ -4,7 +4,7 @@ mod plot;
 
 use std::error::Error;
 use std::path::PathBuf;
-use timing::sensitivity;
+use timing_studies::sensitivity;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args().nth(1);

@@ -3,9 +3,9 @@
 #[path = "../../examples/sensitivity/plot.rs"]
 mod plot;
 
-use timing::sensitivity;
+use timing_studies::sensitivity;
 
-const HOW: &str = "run `cargo run --release -p timing --example sensitivity`";
+const HOW: &str = "run `cargo run --release -p timing-studies --example sensitivity`";
 
 fn stored(file: &str) -> String {
     let path = format!("{}/{file}", env!("CARGO_MANIFEST_DIR"));

@@ -5,7 +5,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use timing::config::{Config, preset_names};
 use timing::work::{DrawWork, Mode, Run, Saturation, TILE_SIDES, TileWork};
-use timing::{FrameWork, fast, stepped};
+use timing::{FrameWork, fast};
+use timing_studies::stepped;
 
 /// What a random trace is to press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

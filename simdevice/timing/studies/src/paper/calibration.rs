@@ -1,7 +1,7 @@
 //! Predicting a scene's raster time from its baseline, calibrated on the other six.
 
 use super::numbers::{SCENES, Scene};
-use crate::work::TILE_SIDE;
+use timing::work::TILE_SIDE;
 
 /// A model of GauRast's raster time in ms: a constant per feature of a scene.
 pub struct Model {

@@ -3,12 +3,12 @@
 
 use super::calibration::{MODELS, fitted_error, leave_one_out, mean_error};
 use super::numbers::{SCENES, mean};
-use super::{Label, Row, Section};
-use crate::config::{Config, ConfigError};
-use crate::energy;
-use crate::fast;
-use crate::simulate::even_frame;
-use crate::work::TILE_PIXELS;
+use super::table::{Label, Row, Section};
+use timing::config::{Config, ConfigError};
+use timing::energy;
+use timing::fast;
+use timing::simulate::even_frame;
+use timing::work::TILE_PIXELS;
 
 /// Pairs of a tile and a Gaussian that so many PEs work off in a time, one evaluation each per cycle.
 pub fn implied_pairs(milliseconds: f64, pes: f64, clock_ghz: f64) -> f64 {

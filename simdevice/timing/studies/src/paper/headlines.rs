@@ -4,10 +4,10 @@ use super::numbers::{
     AREA_RATIO, AREA_SOC, BASELINE_FPS, FPS, GSCORE_MM2, GSCORE_RATIO, M2_RATE, M2_SPEEDUP,
     MODULE_W, MODULES, RASTER_ENERGY, RASTER_SHARE, RASTER_SPEEDUP, SCENES, SOC_W, SPEEDUP, mean,
 };
-use super::{Label, Row, Section};
+use super::table::{Label, Row, Section};
 use crate::area;
-use crate::config::{Config, ConfigError};
-use crate::schedule::{self, Policy, Stages};
+use timing::config::{Config, ConfigError};
+use timing::schedule::{self, Policy, Stages};
 
 pub fn sections() -> Vec<Section> {
     let mut sections = vec![raster(), schedules(), inconsistencies()];

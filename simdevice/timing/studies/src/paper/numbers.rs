@@ -1,6 +1,6 @@
 //! What the paper's evaluation says.
 
-use super::{Row, Section};
+use super::table::{Row, Section};
 
 /// A scene of the evaluation.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +88,7 @@ pub fn inputs() -> Section {
         Row::input("added for Gaussians", "2 add, 1 mul, 1 exp")
             .note("Table II; the same. They suffice with the opacity folded into the exponent, which is modelled"),
         Row::input("modules of the scaled design", "15"),
-        Row::new("PEs of the scaled design", "300", "240", super::Label::Input)
+        Row::new("PEs of the scaled design", "300", "240", super::table::Label::Input)
             .note("15 x 16 = 240; preset paper-300 has 15 x 20"),
         Row::input("SoC power", "10 W"),
         Row::input("shader cores, 10 W mode", "4 SM, 612 MHz").note("NVIDIA"),
