@@ -54,13 +54,22 @@ pub fn rasterize(frame: &FrameWork, config: &Config, others_gb_s: f64) -> Raster
 struct Batch {
     mode: Mode,
     /// Groups of 16 pixels of each primitive; empty if the batch was fetched in vain.
-    groups: Vec<u64>,
+    groups: Vec<Groups>,
     bytes: f64,
     first_of_part: bool,
     first_of_tile: bool,
     last_of_tile: bool,
     /// The fetch could not be foreseen: its latency shows.
     cold: bool,
+}
+
+/// Groups of 16 pixels of a primitive.
+#[derive(Clone, Copy, Debug)]
+struct Groups {
+    /// Those in which it is evaluated.
+    evaluated: u64,
+    /// Those among which these are.
+    open: u64,
 }
 
 /// What a port moves, in order.
@@ -252,15 +261,13 @@ impl Computation {
             return;
         };
         self.next += 1;
-        let raster = &config.rasterizer;
-        if groups == 0 {
+        let (raster, mode) = (&config.rasterizer, self.batch.mode);
+        if groups.evaluated == 0 {
             self.controller += 1;
             return;
         }
-        let pixels = groups * 16;
-        let interval = u64::from(raster.interval(self.batch.mode));
-        self.busy = pixels.div_ceil(u64::from(raster.pes_per_module)) * interval;
-        self.dependency = u64::from(raster.carried_latency).saturating_sub(self.busy);
+        self.busy = raster.busy_cycles(mode, groups.evaluated);
+        self.dependency = raster.waiting_cycles(mode, groups.evaluated, groups.open);
     }
 
     fn spend(&mut self, config: &Config, spent: &mut ModuleCycles) {
@@ -304,7 +311,7 @@ fn batches(
     let mut out = VecDeque::new();
     for part in &task.parts {
         let groups = groups_of_each(part);
-        let pixels = groups.iter().sum::<u64>() * 16;
+        let pixels = groups.iter().map(|groups| groups.evaluated).sum::<u64>() * 16;
         report.add_evaluations(part.mode, pixels as f64);
         report.pairs += f64::from(part.needed);
         let mut left = part.needed + part.left_over;
@@ -349,11 +356,14 @@ fn batches(
 }
 
 /// Groups of 16 pixels of each primitive: a segment's are spread evenly.
-fn groups_of_each(part: &Part) -> Vec<u64> {
+fn groups_of_each(part: &Part) -> Vec<Groups> {
     let mut out = Vec::with_capacity(part.needed as usize);
     for segment in &part.segments {
         let n = u64::from(segment.primitives);
-        out.extend((0..n).map(|k| (k + 1) * segment.groups / n - k * segment.groups / n));
+        out.extend((0..n).map(|k| Groups {
+            evaluated: (k + 1) * segment.groups / n - k * segment.groups / n,
+            open: segment.open,
+        }));
     }
     out
 }

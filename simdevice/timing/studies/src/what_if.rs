@@ -4,7 +4,7 @@
 //! alone.
 
 use serde::Serialize;
-use timing::config::Config;
+use timing::config::{Config, Lists};
 use timing::simulate::{Simulation, simulate};
 use timing::work::{FrameWork, Mode, Saturation};
 
@@ -38,6 +38,8 @@ impl Skipping {
     /// A frame on a machine that skips this.
     fn simulate(self, name: &'static str, frame: &FrameWork, config: &Config) -> WhatIf {
         let mut config = config.clone();
+        // The frame has the lists that are asked about.
+        config.rasterizer.lists = Lists::Exact;
         config.rasterizer.saturation = self.saturation;
         config.rasterizer.triangle_traversal = self.traversal;
         config.rasterizer.hierarchical_depth = self.hierarchical_depth;
@@ -75,7 +77,7 @@ pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
     let kinds = Kinds::of(frame);
     let mut variants = Vec::new();
     if kinds.gaussians {
-        let boxed = boxed(frame);
+        let boxed = frame.with_squares();
         variants.extend([
             with(
                 "3-sigma squares, no saturation (estimated)",
@@ -129,7 +131,7 @@ pub fn what_ifs(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
 /// whole tiles and knows no depths but those of pixels: the first variant.
 pub fn each_alone(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
     let kinds = Kinds::of(frame);
-    let (squares, plain) = (boxed(frame), Skipping::of(Saturation::Tile));
+    let (squares, plain) = (frame.with_squares(), Skipping::of(Saturation::Tile));
     let mut variants = vec![plain.simulate("none of them (estimated)", &squares, config)];
     let mut alone = |name, frame: &FrameWork, skipping: Skipping| {
         variants.push(skipping.simulate(name, frame, config));
@@ -164,31 +166,6 @@ pub fn each_alone(frame: &FrameWork, config: &Config) -> Vec<WhatIf> {
         alone("hierarchical depth (estimated)", &squares, depth);
     }
     variants
-}
-
-/// The frame with as many pairs as 3-sigma squares give. Which tiles they are in is not known: every list is lengthened
-/// alike, so what comes of it is an estimate.
-fn boxed(frame: &FrameWork) -> FrameWork {
-    let mut frame = frame.clone();
-    for draw in &mut frame.draws {
-        let pairs = draw.pairs();
-        if pairs == 0 || draw.boxed_pairs <= pairs {
-            continue;
-        }
-        let factor = draw.boxed_pairs as f64 / pairs as f64;
-        let longer = |count: u32| (f64::from(count) * factor).round() as u32;
-        draw.sort = draw.sort.times(factor);
-        draw.boxed_pairs = 0;
-        for tile in &mut draw.tiles {
-            for run in &mut tile.runs {
-                run.primitives = longer(run.primitives);
-                run.hidden = longer(run.hidden).min(run.primitives);
-            }
-            tile.hidden_rest = longer(tile.hidden_rest);
-            tile.listed = longer(tile.listed).max(tile.needed());
-        }
-    }
-    frame
 }
 
 #[cfg(test)]
