@@ -52,8 +52,6 @@ pub enum Error {
     Draw(String),
     #[error("--sweep {0}: not NAME=FIRST..LAST or NAME=VALUE,VALUE,...")]
     Sweep(String),
-    #[error("the plot: {0}")]
-    Plot(String),
     #[error("output: {0}")]
     Output(#[from] std::io::Error),
     #[error("output: {0}")]
@@ -180,7 +178,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
     }
     if let (Some(path), Some(sweep)) = (&arguments.plot, &arguments.sweep) {
         let swept = sweep.split('=').next().unwrap_or_default();
-        let svg = plot::svg(swept, &results).map_err(Error::Plot)?;
+        let svg = plot::svg(swept, &results);
         replace(path, svg.as_bytes())?;
     }
     print(&match (arguments.format, results.as_slice()) {

@@ -1,5 +1,6 @@
 //! How the paper's machine depends on its numbers: sweeps over a generated scene, and where they stop paying.
 
+use crate::chart::{self, Chart, Corner, Curve, Mark};
 use crate::scene;
 use std::fmt::Write;
 use timing::config::{Config, ConfigError, DEFAULT_PRESET};
@@ -58,6 +59,39 @@ impl Sweep {
         };
         let first = self.points.windows(2).find(|pair| !pays(pair));
         first.map(|pair| &pair[0])
+    }
+
+    /// The raster stage's and the frame's speed-up as a picture.
+    pub fn svg(&self) -> String {
+        let curve = |label, color, of: fn(&Simulation) -> f64| Curve {
+            label,
+            color,
+            values: self
+                .points
+                .iter()
+                .map(|point| of(&point.simulation))
+                .collect(),
+        };
+        let knee = self.knee().filter(|_| self.file != "precision");
+        let mark = |label, color, x: Option<f64>| {
+            let step = self.points.iter().position(|point| Some(point.x) == x)?;
+            Some(Mark { label, color, step })
+        };
+        let marks = [
+            mark("knee", "black", knee.map(|point| point.x)),
+            mark("paper", "#787878", Some(self.paper)),
+        ];
+        chart::svg(&[Chart {
+            size: [640, 360],
+            axes: [self.axis, "speed-up over the shader cores"].map(str::to_owned),
+            steps: self.points.iter().map(|point| point.name.clone()).collect(),
+            curves: vec![
+                curve("raster stage", "#1f77b4", |result| result.raster_speedup),
+                curve("whole frame", "#d66027", |result| result.speedup),
+            ],
+            marks: marks.into_iter().flatten().collect(),
+            legend: Corner::LowerRight,
+        }])
     }
 }
 

@@ -186,6 +186,7 @@ impl Module {
         let Some(work) = &mut self.computing else {
             if !(self.out_of_tasks
                 && self.claimed.is_empty()
+                && self.ready.is_empty()
                 && self.port.iter().all(|r| r.batch.is_none()))
             {
                 spent.memory += 1.0;

@@ -1,7 +1,6 @@
 //! Pairs of generated scenes beside those that the published times imply.
 
-use super::numbers::SCENES;
-use super::scenes::implied_pairs;
+use super::numbers::{SCENES, implied_pairs};
 use super::table::{Label, Row, Section};
 use serde::Deserialize;
 use timing::config::Config;

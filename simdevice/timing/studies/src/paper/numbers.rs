@@ -1,6 +1,7 @@
 //! What the paper's evaluation says.
 
-use super::table::{Row, Section};
+use super::table::{Label, Row, Section};
+use timing::work::TILE_PIXELS;
 
 /// A scene of the evaluation.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +49,11 @@ pub fn mean(of: impl Fn(&Scene) -> f64) -> f64 {
     SCENES.iter().map(of).sum::<f64>() / SCENES.len() as f64
 }
 
+/// Pairs of a tile and a Gaussian that so many PEs work off in a time, one evaluation each per cycle.
+pub fn implied_pairs(milliseconds: f64, pes: f64, clock_ghz: f64) -> f64 {
+    milliseconds * clock_ghz * 1e6 * pes / f64::from(TILE_PIXELS)
+}
+
 /// Power of the SoC, W.
 pub const SOC_W: f64 = 10.0;
 /// Power of a module, W.
@@ -88,17 +94,28 @@ pub fn inputs() -> Section {
         Row::input("added for Gaussians", "2 add, 1 mul, 1 exp")
             .note("Table II; the same. They suffice with the opacity folded into the exponent, which is modelled"),
         Row::input("modules of the scaled design", "15"),
-        Row::new("PEs of the scaled design", "300", "240", super::table::Label::Input)
+        Row::new("PEs of the scaled design", "300", "240", Label::Solved)
             .note("15 x 16 = 240; preset paper-300 has 15 x 20"),
         Row::input("SoC power", "10 W"),
-        Row::input("shader cores, 10 W mode", "4 SM, 612 MHz").note("NVIDIA"),
-        Row::input("bandwidth, 10 W mode", "68.3 GB/s").note("NVIDIA"),
-        Row::input("shader cores, maximum mode", "8 SM, 918 MHz").note("NVIDIA"),
-        Row::input("bandwidth, maximum mode", "102.4 GB/s").note("NVIDIA"),
+        Row::input("speed-up of GSCore over Xavier NX", "20x").note("as GauRast tells of it; enters nothing"),
+        Row::without_paper("speed-up of GSCore over a mobile GPU", "15.86x", Label::Cited, "GSCore's own abstract (ASPLOS 2024); enters nothing"),
+        Row::input("SoC of the evaluation", "Jetson Orin NX, 10 W mode"),
+        Row::without_paper("shader cores, 10 W mode", "4 SM, 612 MHz", Label::Cited, "NVIDIA's power mode table"),
+        Row::without_paper("bandwidth, 10 W mode", "68.3 GB/s", Label::Cited, "NVIDIA's data sheet"),
+        Row::without_paper("shader cores, maximum mode", "8 SM, 918 MHz", Label::Cited, "NVIDIA's power mode table"),
+        Row::without_paper("bandwidth, maximum mode", "102.4 GB/s", Label::Cited, "NVIDIA's data sheet"),
+        Row::without_paper("tile side", "16 pixels", Label::Cited, "the original 3DGS code; that the hardware's tiles are as large is assumed"),
+        Row::without_paper("cycles between pixels of a PE", "1", Label::Assumed, "the paper counts a PE's units, not its cycles"),
+        Row::without_paper(
+            "Gaussians of the scenes",
+            "1.19-6.06 M",
+            Label::Cited,
+            "the 3DGS authors' trained models, 30,000 iterations; that the paper draws these is assumed",
+        ),
     ];
     Section {
         title: "What goes in",
-        text: "The hardware of the paper's sections on the design and on the evaluation's set-up."
+        text: "The hardware of the paper's sections on the design and on the evaluation's set-up; what these don't say is cited from elsewhere or assumed, with an empty column of the paper's."
             .to_owned(),
         rows,
     }

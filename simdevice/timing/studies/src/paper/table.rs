@@ -8,6 +8,10 @@ use serde::Serialize;
 pub enum Label {
     /// The paper says it and the model uses it.
     Input,
+    /// Another source than the paper says it and the model uses it.
+    Cited,
+    /// Nobody says it; the model needs it.
+    Assumed,
     /// A constant of the model was chosen so that it comes out.
     Calibrated,
     /// It follows from the paper's numbers by arithmetic.
@@ -23,6 +27,8 @@ impl Label {
     pub fn name(self) -> &'static str {
         match self {
             Self::Input => "input",
+            Self::Cited => "cited",
+            Self::Assumed => "assumed",
             Self::Calibrated => "calibrated",
             Self::Solved => "solved",
             Self::Predicted => "predicted",
@@ -84,6 +90,16 @@ impl Row {
     pub fn input(item: impl Into<String>, value: impl Into<String>) -> Self {
         let value = value.into();
         Self::new(item, value.clone(), value, Label::Input)
+    }
+
+    /// A number of the model's that the paper doesn't say.
+    pub fn without_paper(
+        item: impl Into<String>,
+        value: impl Into<String>,
+        label: Label,
+        source: impl Into<String>,
+    ) -> Self {
+        Self::new(item, "", value, label).note(source)
     }
 
     /// The row, with how its number comes about.

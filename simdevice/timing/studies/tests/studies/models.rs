@@ -178,6 +178,15 @@ fn the_fast_model_is_within_2_percent_of_the_stepped_model(case: &Case) {
         assert!((fast.bytes_wasted - slow.bytes_wasted).abs() < 1e-3);
         assert!((fast.modules.busy - slow.modules.busy).abs() < 1e-3);
         assert!((fast.modules.dependency - slow.modules.dependency).abs() < 1e-3);
+        // The causes of stalls are the same, too.
+        assert!((fast.modules.controller - slow.modules.controller).abs() < 1e-3);
+        assert!((fast.modules.mode_switch - slow.modules.mode_switch).abs() < 1e-3);
+        let all = slow.modules.total().max(1.0);
+        let apart = (fast.modules.memory - slow.modules.memory).abs() / all;
+        assert!(
+            apart < 0.02,
+            "trace {number}: {apart} of all cycles, {fast:?} {slow:?}"
+        );
         if slow.cycles == 0.0 {
             assert_eq!(fast.cycles, 0.0);
             continue;

@@ -1,8 +1,5 @@
 //! SENSITIVITY.md and its plots are generated and up to date.
 
-#[path = "../../examples/sensitivity/plot.rs"]
-mod plot;
-
 use timing_studies::sensitivity;
 
 const HOW: &str = "run `cargo run --release -p timing-studies --example sensitivity`";
@@ -23,7 +20,7 @@ fn the_document_and_its_plots_are_up_to_date() {
     for sweep in sensitivity::sweeps(&sensitivity::frame()).unwrap() {
         let file = format!("sensitivity/{}.svg", sweep.file);
         assert!(generated.contains(&file));
-        assert!(stored(&file) == plot::svg(&sweep).unwrap(), "{file}: {HOW}");
+        assert!(stored(&file) == sweep.svg(), "{file}: {HOW}");
     }
 }
 

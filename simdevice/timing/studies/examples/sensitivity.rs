@@ -1,7 +1,5 @@
 //! Writes SENSITIVITY.md and its plots: `sensitivity [FOLDER]`, by default this crate's.
 
-mod plot;
-
 use std::error::Error;
 use std::path::PathBuf;
 use timing_studies::sensitivity;
@@ -15,7 +13,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let file = folder
             .join("sensitivity")
             .join(format!("{}.svg", sweep.file));
-        std::fs::write(file, plot::svg(&sweep)?)?;
+        std::fs::write(file, sweep.svg())?;
     }
     Ok(())
 }
