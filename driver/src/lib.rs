@@ -22,7 +22,6 @@ mod queue;
 mod registry;
 mod render_pass;
 mod resource;
-pub mod shader;
 mod shader_module;
 mod sync;
 

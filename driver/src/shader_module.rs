@@ -9,10 +9,10 @@ use crate::instance::device_extension_names;
 use crate::physical_device::limits;
 use crate::registry::features::{Features, SUPPORTED};
 use crate::registry::spirv::{Enable, enables};
-use crate::shader::{self, Module, Options, Shader, Specialization, Stage};
 use ash::vk;
-use rspirv::spirv::{Capability, Op};
+use gaurast_spirv::{self as shader, Module, Options, Shader, Specialization, Stage};
 use simdevice::host;
+use spirv::{Capability, Op};
 use std::ffi::CStr;
 use std::sync::Arc;
 

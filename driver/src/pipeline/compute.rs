@@ -4,8 +4,8 @@ use super::layout::PipelineLayout;
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::physical_device::limits;
-use crate::shader::{self, BuiltIn, InputSource, Interface, Options, Stage};
 use crate::shader_module::ShaderStage;
+use gaurast_spirv::{self as shader, BuiltIn, InputSource, Interface, Options, Stage};
 use simdevice::compute::{ComputeInput, ComputeProgram};
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ pub(crate) struct ComputePipeline {
     /// The program that its workgroups run.
     pub(crate) program: Arc<ComputeProgram>,
     /// The resources that the program is bound to.
-    pub(crate) descriptors: Vec<shader::Descriptor>,
+    pub(crate) descriptors: Vec<shader::ShaderBinding>,
 }
 
 impl ComputePipeline {

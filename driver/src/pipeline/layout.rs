@@ -5,8 +5,9 @@ use crate::abi::handle::{self, objects};
 use crate::abi::valid;
 use crate::descriptor::layout::DescriptorSetLayout;
 use crate::physical_device::limits;
-use crate::shader::{DescriptorKind, Interface, Stage, reflect};
+use crate::pipeline::reflect;
 use ash::vk;
+use gaurast_spirv::{DescriptorKind, Interface, Stage};
 use std::sync::Arc;
 
 /// A pipeline's layout: what its programs may be bound to.

@@ -8,6 +8,7 @@ pub(crate) mod gaussian;
 pub(crate) mod layout;
 mod link;
 pub(crate) mod primitives;
+mod reflect;
 mod stages;
 pub(crate) mod state;
 

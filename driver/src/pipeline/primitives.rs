@@ -9,9 +9,9 @@ use super::state::{
 };
 use crate::abi::error::Error;
 use crate::device::Device;
-use crate::shader::{Descriptor, Stage, reflect};
 use crate::shader_module::ShaderStage;
 use ash::vk;
+use gaurast_spirv::{ShaderBinding, Stage};
 use simdevice::packet::draw::{DrawPipeline, DrawState, PolygonMode};
 use std::sync::Arc;
 
@@ -23,9 +23,9 @@ pub(crate) struct PrimitivePipeline {
     /// The sources of the vertex program's attributes.
     pub(crate) attributes: Vec<AttributeSource>,
     /// The resources that the vertex program is bound to.
-    pub(crate) vertex_descriptors: Vec<Descriptor>,
+    pub(crate) vertex_descriptors: Vec<ShaderBinding>,
     /// The resources that the fragment program is bound to.
-    pub(crate) fragment_descriptors: Vec<Descriptor>,
+    pub(crate) fragment_descriptors: Vec<ShaderBinding>,
     /// The fixed-function state, as far as it is static.
     pub(crate) fixed: FixedFunctionState,
     /// The state for the device, if nothing of it is dynamic.
@@ -70,7 +70,7 @@ impl PrimitivePipeline {
             .fragment
             .map(|stage| stages::translate(device, layout, stage, Stage::Fragment, samples))
             .transpose()?;
-        let locations = reflect::locations_read(&vertex.interface);
+        let locations = vertex.interface.locations_read();
         let attributes = stages::attributes(info, &locations)?;
         stages::check_attributes(&vertex.interface, &locations, &attributes)?;
         if let Some(fragment) = &fragment {

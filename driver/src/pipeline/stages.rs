@@ -5,9 +5,10 @@ use super::state::{AttributeSource, GraphicsState, source};
 use crate::abi::error::Error;
 use crate::device::Device;
 use crate::physical_device::limits;
-use crate::shader::{Interface, Numeric, Options, Shader, Stage, reflect};
+use crate::pipeline::reflect;
 use crate::shader_module::ShaderStage;
 use ash::vk;
+use gaurast_spirv::{Interface, Options, ScalarType, Shader, Stage};
 use simdevice::format;
 
 /// Translates a stage and compares it with the layout.
@@ -47,9 +48,9 @@ pub(crate) fn translate(
 /// The sources that locations are read from.
 pub(crate) fn attributes(
     info: &GraphicsState,
-    locations: &[(u32, Numeric)],
+    locations: &[(u32, ScalarType)],
 ) -> Result<Vec<AttributeSource>, Error> {
-    let source = |&(location, _): &(u32, Numeric)| {
+    let source = |&(location, _): &(u32, ScalarType)| {
         source(info, location).map_err(|what| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-Input-07904",
@@ -63,13 +64,13 @@ pub(crate) fn attributes(
 /// Compares the types of attributes with what the shader reads.
 pub(crate) fn check_attributes(
     interface: &Interface,
-    locations: &[(u32, Numeric)],
+    locations: &[(u32, ScalarType)],
     attributes: &[AttributeSource],
 ) -> Result<(), Error> {
     let given = |format: simdevice::Format| match format.numeric() {
-        format::Numeric::Uint => Numeric::Uint { width: 32 },
-        format::Numeric::Sint => Numeric::Int { width: 32 },
-        _ => Numeric::Float { width: 32 },
+        format::Numeric::Uint => ScalarType::Uint { width: 32 },
+        format::Numeric::Sint => ScalarType::Int { width: 32 },
+        _ => ScalarType::Float { width: 32 },
     };
     let described: Vec<_> = std::iter::zip(locations, attributes)
         .map(|(&(location, _), source)| reflect::Attribute {

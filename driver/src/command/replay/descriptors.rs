@@ -5,7 +5,7 @@ use crate::command::BoundSet;
 use crate::descriptor::layout::LayoutBinding;
 use crate::descriptor::set::Descriptor;
 use crate::resource::image::ImageView;
-use crate::shader::{self, DescriptorKind};
+use gaurast_spirv::{self as shader, DescriptorKind};
 use simdevice::bindings::Bindings;
 use simdevice::compute::Dispatch;
 use simdevice::host;
@@ -23,7 +23,7 @@ pub(crate) struct DescriptorSetNotBound(pub(super) u32);
 /// # Errors
 /// [`DescriptorSetNotBound`] if a set is missing.
 pub(crate) fn bindings(
-    descriptors: &[shader::Descriptor],
+    descriptors: &[shader::ShaderBinding],
     sets: &BoundSets,
     push_constants: &[u8],
 ) -> Result<Bindings, DescriptorSetNotBound> {
@@ -42,7 +42,7 @@ pub(crate) fn bindings(
 
 /// Binds what one variable of a program uses.
 fn bind(
-    used: &shader::Descriptor,
+    used: &shader::ShaderBinding,
     bound: &BoundSet,
     binding: &LayoutBinding,
     bindings: &mut Bindings,
@@ -59,7 +59,7 @@ fn bind(
 
 /// Puts what a descriptor holds in a resource slot.
 fn place(
-    used: &shader::Descriptor,
+    used: &shader::ShaderBinding,
     slot: usize,
     descriptor: &Descriptor,
     dynamic_offset: Option<u32>,
@@ -105,7 +105,7 @@ fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
     }
 }
 
-fn mark_written(used: &shader::Descriptor, memory: &Arc<Allocation>, bindings: &mut Bindings) {
+fn mark_written(used: &shader::ShaderBinding, memory: &Arc<Allocation>, bindings: &mut Bindings) {
     if used.writable
         && !bindings
             .written

@@ -8,13 +8,13 @@ use crate::pipeline::stages;
 use crate::pipeline::state::{
     AttributeSource, FixedFunctionState, GraphicsState, live_color_outputs, reads_second_source,
 };
-use crate::shader::{
-    BuiltIn, Descriptor, InputSource, Interface, Numeric, OutputTarget, Stage, reflect,
-};
 use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use gaurast_spirv::{
+    BuiltIn, InputSource, Interface, OutputTarget, ScalarType, ShaderBinding, Stage,
 };
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
@@ -32,7 +32,7 @@ pub(crate) struct VertexProjection {
     /// The sources of its attributes.
     pub(crate) attributes: Vec<AttributeSource>,
     /// The descriptors that it is bound to.
-    pub(crate) descriptors: Vec<Descriptor>,
+    pub(crate) descriptors: Vec<ShaderBinding>,
 }
 
 impl VertexProjection {
@@ -55,7 +55,7 @@ impl VertexProjection {
         // Nothing of a vertex stage depends on samples.
         let vertex = stages::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
         let components = components(state, &vertex.interface)?;
-        let locations = reflect::locations_read(&vertex.interface);
+        let locations = vertex.interface.locations_read();
         let attributes = stages::attributes(info, &locations)?;
         stages::check_attributes(&vertex.interface, &locations, &attributes)?;
         let descriptors = vertex.interface.descriptors.clone();
@@ -94,7 +94,7 @@ pub(crate) struct ResolveStage {
     /// The program.
     pub(crate) program: Arc<ResolveProgram>,
     /// The descriptors that it is bound to.
-    pub(crate) descriptors: Vec<Descriptor>,
+    pub(crate) descriptors: Vec<ShaderBinding>,
     /// True if every sample is shaded for itself.
     pub(crate) sample_shading: bool,
     /// True if alpha makes coverage.
@@ -221,7 +221,7 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
             continue;
         };
         let is_known = varyings.contains_key(&(location, component));
-        if !is_known || input.numeric != (Numeric::Float { width: 32 }) {
+        if !is_known || input.numeric != (ScalarType::Float { width: 32 }) {
             return Err(Error::usage(
                 RESOLVE_INPUTS,
                 format!(
@@ -311,6 +311,6 @@ fn writes_float(interface: &Interface, place: InterfaceComponent) -> bool {
     interface.outputs.iter().any(|output| {
         let is_there = matches!(output.target, OutputTarget::Location { location, component, .. }
             if (location, component) == place);
-        is_there && output.numeric == Numeric::Float { width: 32 }
+        is_there && output.numeric == ScalarType::Float { width: 32 }
     })
 }

@@ -18,12 +18,13 @@ use graph::Arrow;
 use source::Crate;
 
 /// The crates that are held, by their folders.
-const CRATES: [(&str, &str); 5] = [
+const CRATES: [(&str, &str); 6] = [
     ("devmem", "simdevice/devmem"),
     ("isa", "simdevice/isa"),
     ("timing", "simdevice/timing"),
     ("simdevice", "simdevice"),
     ("driver", "driver"),
+    ("gaurast_spirv", "driver/spirv"),
 ];
 
 fn main() -> ExitCode {
