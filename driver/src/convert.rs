@@ -19,12 +19,12 @@ fn unknown(vuid: &'static str, value: &dyn std::fmt::Debug) -> Error {
     Error::usage(vuid, format!("{value:?} is not a value of its enumeration"))
 }
 
-/// What the device lacks.
+/// The error of a value that the device lacks.
 fn lacking(what: &dyn std::fmt::Debug, feature: &str) -> Error {
     Error::FeatureNotPresent(format!("{what:?} (feature {feature})"))
 }
 
-/// How vertices make primitives.
+/// The topology by which vertices make primitives.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] for topologies that only geometry and tessellation stages take.
@@ -49,7 +49,7 @@ pub(crate) fn topology(topology: vk::PrimitiveTopology) -> Result<Topology, Erro
     }
 }
 
-/// What of a polygon is drawn.
+/// The part of polygons that is drawn.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] for modes of extensions.
@@ -80,7 +80,7 @@ pub(crate) fn compare_op(op: vk::CompareOp, vuid: &'static str) -> Result<Compar
     }
 }
 
-/// What becomes of a stencil value.
+/// The operation on a stencil value.
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] with the id `vuid` for a value that is none.
@@ -443,7 +443,7 @@ pub(crate) fn clear_value(format: Format, value: vk::ClearValue) -> ClearValue {
     }
 }
 
-/// How samples become one, if they do.
+/// The mode in which samples become one, if they do.
 ///
 /// # Errors
 /// [`Error::InvalidUsage`] for modes that Vulkan does not have.

@@ -85,12 +85,12 @@ impl Device {
         &self.simulated
     }
 
-    /// Whether the device's programs are printed as pipelines are created.
+    /// Tells if the device's programs are printed as pipelines are created.
     pub(crate) fn dumps_ir(&self) -> bool {
         self.dump.ir
     }
 
-    /// What is waited for on it, and whether it is lost.
+    /// The things that are waited for on it, and its loss.
     pub(crate) fn sync(&self) -> &Arc<DeviceSync> {
         &self.sync
     }
@@ -112,7 +112,7 @@ impl Device {
         self.queues.get().map_or(&[], Vec::as_slice)
     }
 
-    /// What gates commands that are looked up through this device.
+    /// The version and extensions under which commands are looked up through this device.
     pub(crate) fn enabled(&self) -> EnabledExtensions<'_> {
         EnabledExtensions {
             device_extensions: &self.extensions,
@@ -148,7 +148,7 @@ impl Drop for Device {
     }
 }
 
-/// What `vkCreateDevice` was asked to enable, together with `extensions`.
+/// The features that `vkCreateDevice` was asked to enable, together with `extensions`.
 ///
 /// # Errors
 /// [`Error::FeatureNotPresent`] names the first feature that isn't supported, [`Error::InvalidUsage`] one whose extension
@@ -231,7 +231,7 @@ impl PrivateDataSlot {
     }
 }
 
-/// How many queues are asked for.
+/// The number of queues that are asked for.
 unsafe fn queue_count(info: &vk::DeviceCreateInfo<'_>) -> Result<u32, Error> {
     // SAFETY: the caller promises a valid creation info.
     let families =

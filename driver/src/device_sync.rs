@@ -15,10 +15,10 @@ pub(crate) struct DeviceSync {
     lost: OnceLock<String>,
 }
 
-/// How a wait ended.
+/// The end of a wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WaitResult {
-    /// What was waited for is there.
+    /// The thing that was waited for is there.
     Ready,
     /// The time is over.
     TimedOut,

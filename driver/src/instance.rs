@@ -114,7 +114,7 @@ impl Instance {
         self.physical_device
     }
 
-    /// What gates commands that are looked up through this instance.
+    /// The version and extensions under which commands are looked up through this instance.
     pub(crate) fn enabled(&self) -> EnabledExtensions<'_> {
         EnabledExtensions {
             api_version: self.api_version,

@@ -13,7 +13,7 @@ use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How often a wait for a query looks whether the device was lost.
+/// The period in which a wait for a query looks whether the device was lost.
 const POLL: Duration = Duration::from_millis(20);
 
 /// A query pool.
@@ -92,7 +92,7 @@ impl QueryType {
         }
     }
 
-    /// How many values a result has.
+    /// The number of values that a result has.
     fn count(&self) -> usize {
         match self {
             Self::Timestamp => 1,
@@ -102,7 +102,7 @@ impl QueryType {
     }
 }
 
-/// Whether a model of the hardware must run for a counter.
+/// Tells if a model of the hardware must run for a counter.
 fn is_simulated(index: &u32) -> bool {
     let counter = Counter::ALL.get(*index as usize);
     counter.is_some_and(|counter| counter.is_simulated())
@@ -119,12 +119,12 @@ impl QueryPool {
         }
     }
 
-    /// Whether it has queries `first..first + count`.
+    /// Tells if it has queries `first..first + count`.
     pub(crate) fn has(&self, first: u32, count: u32) -> bool {
         u64::from(first) + u64::from(count) <= u64::from(self.queries.count())
     }
 
-    /// What Vulkan writes for a query: its values, as words of 32 or 64 bits, if it is available, and its availability
+    /// The bytes that Vulkan writes for a query: its values, as words of 32 or 64 bits, if it is available, and its availability
     /// after them, if that is asked for. Each is an offset from the query's place and the bytes there.
     pub(crate) fn written(
         &self,

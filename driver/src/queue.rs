@@ -70,7 +70,7 @@ impl Queue {
         &self.instance
     }
 
-    /// What is waited for on its device, and its loss.
+    /// The things that are waited for on its device, and its loss.
     pub(crate) fn sync(&self) -> &Arc<DeviceSync> {
         &self.sync
     }

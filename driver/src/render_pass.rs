@@ -23,13 +23,13 @@ pub(crate) struct RenderPass {
 pub(crate) struct AttachmentDescription {
     /// The format of the view that the framebuffer gives.
     pub(crate) format: vk::Format,
-    /// What its first use does with colour or depth.
+    /// The operation of its first use on colour or depth.
     pub(crate) load: vk::AttachmentLoadOp,
-    /// What its last use does with them.
+    /// The operation of its last use on colour or depth.
     pub(crate) store: vk::AttachmentStoreOp,
-    /// What its first use does with stencil.
+    /// The operation of its first use on stencil.
     pub(crate) stencil_load: vk::AttachmentLoadOp,
-    /// What its last use does with it.
+    /// The operation of its last use on stencil.
     pub(crate) stencil_store: vk::AttachmentStoreOp,
 }
 
@@ -38,24 +38,24 @@ pub(crate) struct AttachmentDescription {
 pub(crate) struct Subpass {
     /// Colour attachments by location.
     pub(crate) color: Vec<Option<usize>>,
-    /// What colour attachments are resolved to, by location; may be short.
+    /// The attachments that colour attachments are resolved to, by location; may be short.
     pub(crate) resolve: Vec<Option<usize>>,
     /// The depth and stencil attachment.
     pub(crate) depth_stencil: Option<usize>,
-    /// What it is resolved to, and how.
+    /// The attachment that it is resolved to, and how.
     pub(crate) depth_stencil_resolve: Option<DepthStencilResolve>,
     /// Attachments that shaders read. Between subpasses they are in memory, so that they are images like any other.
     pub(crate) input: Vec<Option<usize>>,
 }
 
-/// How a subpass resolves its depth and stencil attachment.
+/// The resolve of a subpass's depth and stencil attachment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DepthStencilResolve {
     /// The attachment that it is resolved to.
     pub(crate) attachment: usize,
-    /// How depth is resolved, if it is.
+    /// The way in which depth is resolved, if it is.
     pub(crate) depth: Option<ResolveMode>,
-    /// How stencil is resolved, if it is.
+    /// The way in which stencil is resolved, if it is.
     pub(crate) stencil: Option<ResolveMode>,
 }
 
@@ -69,12 +69,12 @@ impl Subpass {
         all
     }
 
-    /// Whether it uses attachment number `index`.
+    /// Tells if it uses attachment number `index`.
     fn uses(&self, index: usize) -> bool {
         self.attachments().contains(&index)
     }
 
-    /// Whether it renders to attachment number `index`, or resolves to it.
+    /// Tells if it renders to attachment number `index`, or resolves to it.
     fn writes(&self, index: usize) -> bool {
         let resolved = self.depth_stencil_resolve.map(|resolve| resolve.attachment);
         let lists = [&self.color, &self.resolve];
@@ -113,12 +113,12 @@ impl RenderPass {
         })
     }
 
-    /// Whether `subpass` is the first to use attachment number `index`.
+    /// Tells if `subpass` is the first to use attachment number `index`.
     pub(crate) fn is_first_use(&self, subpass: usize, index: usize) -> bool {
         !self.subpasses[..subpass].iter().any(|s| s.uses(index))
     }
 
-    /// Whether `subpass` is the last to use attachment number `index`.
+    /// Tells if `subpass` is the last to use attachment number `index`.
     pub(crate) fn is_last_use(&self, subpass: usize, index: usize) -> bool {
         !self.subpasses[subpass + 1..].iter().any(|s| s.uses(index))
     }
@@ -235,7 +235,7 @@ unsafe fn new_subpass2(subpass: &vk::SubpassDescription2<'_>) -> Result<Subpass,
     })
 }
 
-/// How a subpass resolves depth and stencil, if it does.
+/// The resolve of a subpass's depth and stencil, if it has one.
 ///
 /// # Safety
 /// The structure's pointers are valid.

@@ -31,7 +31,7 @@ impl Fence {
         }
     }
 
-    /// Whether it is signaled.
+    /// Tells if it is signaled.
     pub(crate) fn is_signaled(&self) -> bool {
         self.signaled.load(Ordering::Acquire)
     }
@@ -97,7 +97,7 @@ impl Semaphore {
         });
     }
 
-    /// Whether a wait for `value` (which a binary semaphore ignores) is over.
+    /// Tells if a wait for `value` (which a binary semaphore ignores) is over.
     pub(crate) fn is_reached(&self, value: u64) -> bool {
         match &self.payload {
             Payload::Binary(signaled) => signaled.load(Ordering::Acquire),
@@ -129,7 +129,7 @@ impl Event {
         }
     }
 
-    /// Whether it is set.
+    /// Tells if it is set.
     pub(crate) fn is_set(&self) -> bool {
         self.value.load(Ordering::Acquire)
     }

@@ -119,6 +119,8 @@ fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>
             }
         }
     }
+    // Some commands come with several extensions, of which one is enough.
+    let mut extensions: Vec<(&'a str, &str, Vec<String>)> = Vec::new();
     for extension in support
         .extension
         .keys()
@@ -129,20 +131,25 @@ fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>
         } else {
             "DeviceExtension"
         };
-        for requirement in &extension.requirements {
-            if !support.meets(requirement.depends.as_deref()) {
-                continue;
-            }
-            for name in &requirement.commands {
-                if seen.insert(name) {
-                    rows.push(Row {
-                        name,
-                        gate: format!("{kind}(c\"{}\")", extension.name),
-                    });
-                }
+        let names = extension
+            .requirements
+            .iter()
+            .filter(|requirement| support.meets(requirement.depends.as_deref()))
+            .flat_map(|requirement| &requirement.commands)
+            .filter(|name| !seen.contains(name));
+        for name in names {
+            let by = format!("c\"{}\"", extension.name);
+            match extensions.iter_mut().find(|(known, ..)| known == name) {
+                Some((.., known)) if known.contains(&by) => {}
+                Some((.., known)) => known.push(by),
+                None => extensions.push((name, kind, vec![by])),
             }
         }
     }
+    rows.extend(extensions.into_iter().map(|(name, kind, by)| Row {
+        name,
+        gate: format!("{kind}(&[{}])", by.join(", ")),
+    }));
     Ok(rows)
 }
 

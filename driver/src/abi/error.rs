@@ -3,7 +3,7 @@
 use ash::vk;
 use std::borrow::Cow;
 
-/// Why a command failed. The message goes to `log` and to the instance's debug messengers; the application receives
+/// The reason that a command failed. The message goes to `log` and to the instance's debug messengers; the application receives
 /// [`Error::result`].
 #[derive(Clone, Debug, thiserror::Error)]
 pub(crate) enum Error {
@@ -12,7 +12,7 @@ pub(crate) enum Error {
     InvalidHandle {
         /// The type that was expected.
         expected: vk::ObjectType,
-        /// What was given.
+        /// The handle that was given.
         raw: u64,
     },
     /// A null pointer where Vulkan requires a valid one.
@@ -62,7 +62,7 @@ pub(crate) enum Error {
     FeatureNotEnabled {
         /// The rule's id.
         vuid: &'static str,
-        /// What wants which feature.
+        /// The use of which feature.
         message: String,
     },
     /// A format, or a use of it, that isn't supported.
@@ -73,7 +73,7 @@ pub(crate) enum Error {
     InvalidUsage {
         /// The rule's id: Vulkan's, the extension's, or the driver's own where those have none.
         vuid: Cow<'static, str>,
-        /// What is wrong, with the values at fault.
+        /// The fault, with the values that are wrong.
         message: String,
     },
     /// A defect of the driver: it panicked.
@@ -90,7 +90,7 @@ impl Error {
         }
     }
 
-    /// What the application receives.
+    /// The result that the application receives.
     pub(crate) fn result(&self) -> vk::Result {
         match self {
             Self::InvalidHandle { .. } | Self::NullPointer { .. } | Self::Panic(_) => {
@@ -127,7 +127,7 @@ impl Error {
         }
     }
 
-    /// Whether the application's usage, and not the driver or the machine, is at fault.
+    /// Tells if the application's usage, and not the driver or the machine, is at fault.
     pub(crate) fn is_usage(&self) -> bool {
         matches!(
             self,

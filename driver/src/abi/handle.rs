@@ -10,7 +10,7 @@ use std::cell::UnsafeCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
-/// What the loader expects in the first word of a dispatchable object (`ICD_LOADER_MAGIC`).
+/// The value that the loader expects in the first word of a dispatchable object (`ICD_LOADER_MAGIC`).
 const LOADER_MAGIC: usize = 0x01CD_C0DE;
 
 /// The upper half of every tag; the lower half is the `VkObjectType`.
@@ -19,10 +19,10 @@ const TAG_MAGIC: u64 = 0x4741_5553 << 32;
 /// The tag of a destroyed object, seen if its memory has not been reused.
 const DESTROYED: u64 = 0;
 
-/// How many handles were ever made.
+/// The number of handles that were ever made.
 static MADE: AtomicU64 = AtomicU64::new(0);
 
-/// How many handles exist.
+/// The number of handles that exist.
 static LIVE: AtomicUsize = AtomicUsize::new(0);
 
 /// A Vulkan object: what a handle of type [`Object::Handle`] owns.
@@ -44,7 +44,7 @@ pub(crate) trait Reporter {
 
 /// The handle type of an [`Object`]. Implemented by [`objects!`](crate::objects).
 pub(crate) trait Handle: vk::Handle + Copy {
-    /// What it owns.
+    /// The type of the object that it owns.
     type Object: Object<Handle = Self>;
 }
 
@@ -64,7 +64,7 @@ macro_rules! objects {
 
 pub(crate) use objects;
 
-/// What a handle points at.
+/// The allocation that a handle points at.
 #[repr(C)]
 struct HandleAllocation<T> {
     /// The loader overwrites it with its dispatch table; the driver never reads it.
@@ -210,7 +210,7 @@ pub(crate) unsafe fn serial(object_type: vk::ObjectType, raw: u64) -> Result<u64
     }
 }
 
-/// How many Vulkan objects this process holds handles of, over all instances. Tests find leaks by it.
+/// The number of Vulkan objects this process holds handles of, over all instances. Tests find leaks by it.
 pub fn live_handles() -> usize {
     LIVE.load(Ordering::Relaxed)
 }

@@ -17,7 +17,7 @@ fn null<T>() -> Error {
     }
 }
 
-/// What a required pointer points at.
+/// The value that a required pointer points at.
 ///
 /// # Errors
 /// [`Error::NullPointer`].
@@ -29,7 +29,7 @@ pub(crate) unsafe fn input<'a, T>(pointer: *const T) -> Result<&'a T, Error> {
     unsafe { pointer.as_ref() }.ok_or_else(null::<T>)
 }
 
-/// What an optional pointer points at.
+/// The value that an optional pointer points at.
 ///
 /// # Safety
 /// See the module.

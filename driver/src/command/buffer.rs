@@ -19,7 +19,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// A command pool. It owns the handles of its command buffers.
 pub(crate) struct CommandPool {
     device: Arc<Device>,
-    /// Whether single command buffers may be reset.
+    /// True if single command buffers may be reset.
     allows_reset: bool,
     buffers: Mutex<HashSet<vk::CommandBuffer>>,
 }
@@ -117,12 +117,12 @@ impl CommandBuffer {
         self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether it is a secondary command buffer.
+    /// Tells if it is a secondary command buffer.
     pub(crate) fn is_secondary(&self) -> bool {
         self.level == vk::CommandBufferLevel::SECONDARY
     }
 
-    /// Whether it may be reset by itself, be it by beginning it again.
+    /// Tells if it may be reset by itself, be it by beginning it again.
     pub(crate) fn allows_reset(&self) -> bool {
         self.allows_reset
     }
@@ -161,7 +161,7 @@ impl CommandBuffer {
     }
 }
 
-/// Where a command buffer is in its life. It is pending while a [`PendingUse`] of it lives.
+/// The state of a command buffer's life. It is pending while a [`PendingUse`] of it lives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Status {
     Initial,
@@ -170,7 +170,7 @@ enum Status {
     Invalid,
 }
 
-/// How a recording may be used.
+/// The uses that a recording is begun for.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BeginFlags {
     /// It is submitted once.
@@ -181,7 +181,7 @@ pub(crate) struct BeginFlags {
     pub(crate) inherited_pass: Option<Vec<Option<Format>>>,
 }
 
-/// What a command buffer records into.
+/// The recorder of a command buffer.
 pub(crate) struct Recorder {
     /// The name of the command that is being recorded.
     command: &'static str,
@@ -227,7 +227,7 @@ impl Recorder {
         }
     }
 
-    /// Whether it may be begun again without an explicit reset.
+    /// Tells if it may be begun again without an explicit reset.
     pub(crate) fn is_initial(&self) -> bool {
         self.status == Status::Initial
     }
@@ -312,7 +312,7 @@ impl Recorder {
         }
     }
 
-    /// What was recorded, to be executed.
+    /// The recorded commands, to be executed.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if it is not executable, or pending and not for simultaneous use.
@@ -339,7 +339,7 @@ impl Recorder {
         Ok((Arc::clone(commands), PendingUse::new(&self.pending)))
     }
 
-    /// What was recorded, for a primary command buffer to execute.
+    /// The recorded commands, for a primary command buffer to execute.
     ///
     /// # Errors
     /// [`Error::InvalidUsage`] if it is not executable.

@@ -54,7 +54,7 @@ pub(crate) enum Command {
         first: u32,
         /// One for each viewport.
         viewports: Vec<Viewport>,
-        /// Whether there are no more than these.
+        /// True if there are no more than these.
         with_count: bool,
     },
     /// `vkCmdSetScissor` and `vkCmdSetScissorWithCount`.
@@ -63,7 +63,7 @@ pub(crate) enum Command {
         first: u32,
         /// One for each viewport.
         scissors: Vec<Rect>,
-        /// Whether there are no more than these.
+        /// True if there are no more than these.
         with_count: bool,
     },
     /// Any other `vkCmdSet...` of fixed-function state.
@@ -92,7 +92,7 @@ pub(crate) enum Command {
     Dispatch {
         /// The first workgroup in x, y and z.
         base: [u32; 3],
-        /// How many workgroups in x, y and z.
+        /// The number of workgroups in x, y and z.
         count: [u32; 3],
     },
     /// `vkCmdDispatchIndirect`: the workgroups are counted when it executes.
@@ -127,7 +127,7 @@ pub(crate) struct PushDescriptors {
     pub(crate) set: u32,
     /// The set's layout.
     pub(crate) layout: Arc<DescriptorSetLayout>,
-    /// What changes.
+    /// The changes.
     pub(crate) writes: Vec<Write>,
 }
 
@@ -156,11 +156,11 @@ pub(crate) struct DrawParameters {
     pub(crate) vertex_offset: Option<i32>,
     /// The first vertex or index.
     pub(crate) first: u32,
-    /// How many vertices or indices.
+    /// The number of vertices or indices.
     pub(crate) count: u32,
     /// The first instance.
     pub(crate) first_instance: u32,
-    /// How many instances.
+    /// The number of instances.
     pub(crate) instance_count: u32,
 }
 
@@ -169,13 +169,13 @@ pub(crate) struct DrawParameters {
 pub(crate) struct DrawIndirect {
     /// The bytes from the first draw's parameters to the end of the buffer.
     pub(crate) parameters: BufferRange,
-    /// How many draws, at most.
+    /// The number of draws, at most.
     pub(crate) draw_count: u32,
-    /// Where the number of draws is read from, if it lies in a buffer: four bytes.
+    /// The four bytes that the number of draws is read from, if it lies in a buffer.
     pub(crate) count: Option<BufferRange>,
     /// Bytes from one draw's parameters to the next.
     pub(crate) stride: u32,
-    /// Whether they are those of indexed draws.
+    /// True if they are those of indexed draws.
     pub(crate) indexed: bool,
 }
 
@@ -186,13 +186,13 @@ pub(crate) struct CopyQueryResults {
     pub(crate) pool: Arc<QueryPool>,
     /// The first query.
     pub(crate) first: u32,
-    /// How many queries.
+    /// The number of queries.
     pub(crate) count: u32,
     /// The bytes from the first one written to the end of the buffer.
     pub(crate) target: BufferRange,
     /// Bytes from one query's results to the next.
     pub(crate) stride: u64,
-    /// What is written for each query, and whether the copy waits for it.
+    /// The flags: what is written for each query, and whether the copy waits for it.
     pub(crate) flags: vk::QueryResultFlags,
 }
 

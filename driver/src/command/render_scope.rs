@@ -39,7 +39,7 @@ fn check_attachment(view: &ImageView, aspect: Aspect, layers: u32) -> Result<(),
     ))
 }
 
-/// What an attachment does at the beginning of a pass.
+/// The operation of an attachment at the beginning of a pass.
 fn load(op: vk::AttachmentLoadOp, clear: impl FnOnce() -> ClearValue) -> Result<LoadOp, Error> {
     match op {
         vk::AttachmentLoadOp::LOAD => Ok(LoadOp::Load),
@@ -52,7 +52,7 @@ fn load(op: vk::AttachmentLoadOp, clear: impl FnOnce() -> ClearValue) -> Result<
     }
 }
 
-/// What an attachment does at the end of a pass.
+/// The operation of an attachment at the end of a pass.
 fn store(op: vk::AttachmentStoreOp) -> Result<StoreOp, Error> {
     match op {
         vk::AttachmentStoreOp::STORE => Ok(StoreOp::Store),
@@ -104,7 +104,7 @@ pub(crate) struct RenderPassInstance {
     pub(crate) render_pass: Arc<RenderPass>,
     /// A view for each attachment.
     pub(crate) views: Vec<Arc<ImageView>>,
-    /// What attachments that are cleared become, by attachment; may be short.
+    /// The values of attachments that are cleared, by attachment; may be short.
     pub(crate) clear_values: Vec<vk::ClearValue>,
     /// The pixels rendered.
     pub(crate) area: Rect,
@@ -270,22 +270,22 @@ fn stencil_ops(attachment: &AttachmentDescription) -> Ops {
 /// An attachment of dynamic rendering.
 #[derive(Clone)]
 pub(crate) struct DynamicAttachment {
-    /// What is rendered to.
+    /// The view that is rendered to.
     pub(crate) view: Arc<ImageView>,
-    /// What happens at the beginning.
+    /// The operation at the beginning.
     pub(crate) load: vk::AttachmentLoadOp,
-    /// What happens at the end.
+    /// The operation at the end.
     pub(crate) store: vk::AttachmentStoreOp,
-    /// What it is cleared to.
+    /// The value that it is cleared to.
     pub(crate) clear_value: vk::ClearValue,
-    /// Where it is resolved to, and how.
+    /// The view that it is resolved to, and how.
     pub(crate) resolve: Option<(Arc<ImageView>, ResolveMode)>,
 }
 
 /// Dynamic rendering.
 #[derive(Clone, Default)]
 pub(crate) struct DynamicRendering {
-    /// Whether it suspends or resumes.
+    /// The suspension or resumption of it.
     pub(crate) flags: vk::RenderingFlags,
     /// The pixels rendered.
     pub(crate) area: vk::Rect2D,

@@ -14,17 +14,17 @@ use ash::vk;
 use simdevice::CommandProcessor;
 use std::sync::Arc;
 
-/// What a command buffer held when it was submitted.
+/// The commands that a command buffer held when it was submitted.
 pub(crate) type Commands = (Arc<Vec<Command>>, PendingUse);
 
 /// A batch: semaphores to wait for, command buffers, semaphores to signal; each semaphore with a timeline's value.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {
-    /// What is waited for first.
+    /// The semaphores that are waited for first.
     pub(crate) waits: Vec<(Arc<Semaphore>, u64)>,
-    /// What is executed.
+    /// The command buffers that are executed.
     pub(crate) commands: Vec<Commands>,
-    /// What is signaled last.
+    /// The semaphores that are signaled last.
     pub(crate) signals: Vec<(Arc<Semaphore>, u64)>,
 }
 
@@ -34,7 +34,7 @@ pub(crate) struct Submission {
     pub(crate) batches: Vec<Batch>,
     /// The fence that is signaled when all of them are done.
     pub(crate) fence: Option<Arc<Fence>>,
-    /// What is waited for on the device, and its loss.
+    /// The things that are waited for on the device, and its loss.
     pub(crate) sync: Arc<DeviceSync>,
     /// Who hears of what goes wrong.
     pub(crate) instance: Arc<Instance>,
@@ -174,7 +174,7 @@ unsafe fn semaphores(
         .collect()
 }
 
-/// What command buffers hold now.
+/// The commands that command buffers hold now.
 ///
 /// # Safety
 /// The handles are live.

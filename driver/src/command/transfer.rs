@@ -584,7 +584,7 @@ fn require_one_sample(vuid: &'static str, image: &Image) -> Result<(), Error> {
     }
 }
 
-/// Whether a blit between the formats means something: signed integers, unsigned ones and everything else keep to
+/// Tells if a blit between the formats means something: signed integers, unsigned ones and everything else keep to
 /// themselves, and a depth and stencil format to itself.
 fn converts(from: Format, to: Format) -> bool {
     let class = |format: Format| match format.numeric() {

@@ -17,9 +17,9 @@ pub(crate) const MAX_DESCRIPTORS: u32 = 1 << 20;
 pub(crate) struct BindingInfo {
     /// Its number.
     pub(crate) number: u32,
-    /// What each of its descriptors holds.
+    /// The kind of its descriptors.
     pub(crate) kind: vk::DescriptorType,
-    /// How many descriptors it has; 0 reserves the number.
+    /// The number of descriptors that it has; 0 reserves the number.
     pub(crate) count: u32,
     /// The stages that may use it.
     pub(crate) stages: vk::ShaderStageFlags,
@@ -30,9 +30,9 @@ pub(crate) struct BindingInfo {
 /// A binding in its set.
 #[derive(Clone, Debug)]
 pub(crate) struct LayoutBinding {
-    /// What each of its descriptors holds.
+    /// The kind of its descriptors.
     pub(crate) kind: vk::DescriptorType,
-    /// How many descriptors it has.
+    /// The number of descriptors that it has.
     pub(crate) count: u32,
     /// The stages that may use it.
     pub(crate) stages: vk::ShaderStageFlags,
@@ -55,7 +55,7 @@ pub(crate) struct DescriptorSetLayout {
 
 objects! { vk::DescriptorSetLayout => DescriptorSetLayout; }
 
-/// Whether the kind's offsets are given when the set is bound.
+/// Tells if the kind's offsets are given when the set is bound.
 pub(crate) fn is_dynamic(kind: vk::DescriptorType) -> bool {
     matches!(
         kind,
@@ -63,7 +63,7 @@ pub(crate) fn is_dynamic(kind: vk::DescriptorType) -> bool {
     )
 }
 
-/// Whether the driver has descriptors of this kind.
+/// Tells if the driver has descriptors of this kind.
 pub(crate) fn is_supported(kind: vk::DescriptorType) -> bool {
     matches!(
         kind,
@@ -156,17 +156,17 @@ impl DescriptorSetLayout {
         bindings.filter(|(_, binding)| binding.count > 0)
     }
 
-    /// How many descriptors a set has.
+    /// The number of descriptors that a set has.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
 
-    /// How many dynamic offsets a set takes.
+    /// The number of dynamic offsets that a set takes.
     pub(crate) fn dynamic_count(&self) -> usize {
         self.dynamic_count
     }
 
-    /// Whether its sets are pushed rather than allocated.
+    /// Tells if its sets are pushed rather than allocated.
     pub(crate) fn is_push(&self) -> bool {
         self.is_push
     }

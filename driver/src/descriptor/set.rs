@@ -14,7 +14,7 @@ use simdevice::packet::BufferRange;
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What one element of a descriptor set holds.
+/// An element of a descriptor set.
 #[derive(Clone, Debug, Default)]
 pub(crate) enum Descriptor {
     /// Nothing: programs read zero from it.
@@ -33,12 +33,12 @@ pub(crate) enum Descriptor {
     },
 }
 
-/// What a uniform or storage buffer's descriptor holds.
+/// A uniform or storage buffer's descriptor.
 #[derive(Clone, Debug)]
 pub(crate) struct BufferDescriptor {
     /// The bytes from the descriptor's offset to the end of the buffer.
     pub(crate) rest: BufferRange,
-    /// How many of them count; `None` (`VK_WHOLE_SIZE`) for all.
+    /// The number of them that count; `None` (`VK_WHOLE_SIZE`) for all.
     pub(crate) size: Option<u64>,
 }
 
@@ -69,9 +69,9 @@ pub(crate) struct Write {
     pub(crate) binding: u32,
     /// The first element of it.
     pub(crate) element: u32,
-    /// What the descriptors hold.
+    /// The kind of the descriptors.
     pub(crate) kind: vk::DescriptorType,
-    /// What they become.
+    /// The new descriptors.
     pub(crate) descriptors: Vec<Descriptor>,
 }
 
@@ -106,7 +106,7 @@ impl DescriptorSet {
         &self.layout
     }
 
-    /// What it holds, by index.
+    /// The descriptors, by index.
     pub(crate) fn lock(&self) -> MutexGuard<'_, Vec<Descriptor>> {
         self.descriptors
             .lock()
@@ -205,7 +205,7 @@ fn replace(place: &mut Descriptor, new: Descriptor, immutable: bool) {
 /// A descriptor update template.
 #[derive(Debug)]
 pub(crate) struct UpdateTemplate {
-    /// What is updated, and where it lies in the application's data.
+    /// The entries: what is updated, and where it lies in the application's data.
     pub(crate) entries: Vec<vk::DescriptorUpdateTemplateEntry>,
     /// For templates of pushed descriptors: the bind point that they are pushed to.
     pub(crate) push_bind_point: Option<vk::PipelineBindPoint>,
@@ -301,7 +301,7 @@ enum DescriptorSource {
 }
 
 impl DescriptorSource {
-    /// What describes a descriptor of this kind in a binding of a layout.
+    /// The source of a descriptor of this kind in a binding of a layout.
     fn of(
         kind: vk::DescriptorType,
         layout: &DescriptorSetLayout,

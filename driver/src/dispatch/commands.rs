@@ -257,7 +257,7 @@ static ROWS: &[Command] = rows! {
         vkCmdSetDepthBiasEnable: vk::PFN_vkCmdSetDepthBiasEnable = vkCmdSetDepthBiasEnable;
         vkCmdSetPrimitiveRestartEnable: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
     }
-    Device, InstanceExtension(c"VK_EXT_debug_utils") => {
+    Device, InstanceExtension(&[c"VK_EXT_debug_utils"]) => {
         vkSetDebugUtilsObjectNameEXT: vk::PFN_vkSetDebugUtilsObjectNameEXT = vkSetDebugUtilsObjectNameEXT;
         vkSetDebugUtilsObjectTagEXT: vk::PFN_vkSetDebugUtilsObjectTagEXT = vkSetDebugUtilsObjectTagEXT;
         vkQueueBeginDebugUtilsLabelEXT: vk::PFN_vkQueueBeginDebugUtilsLabelEXT = vkQueueBeginDebugUtilsLabelEXT;
@@ -267,12 +267,12 @@ static ROWS: &[Command] = rows! {
         vkCmdEndDebugUtilsLabelEXT: vk::PFN_vkCmdEndDebugUtilsLabelEXT = vkCmdEndDebugUtilsLabelEXT;
         vkCmdInsertDebugUtilsLabelEXT: vk::PFN_vkCmdInsertDebugUtilsLabelEXT = vkCmdInsertDebugUtilsLabelEXT;
     }
-    Instance, InstanceExtension(c"VK_EXT_debug_utils") => {
+    Instance, InstanceExtension(&[c"VK_EXT_debug_utils"]) => {
         vkCreateDebugUtilsMessengerEXT: vk::PFN_vkCreateDebugUtilsMessengerEXT = vkCreateDebugUtilsMessengerEXT;
         vkDestroyDebugUtilsMessengerEXT: vk::PFN_vkDestroyDebugUtilsMessengerEXT = vkDestroyDebugUtilsMessengerEXT;
         vkSubmitDebugUtilsMessageEXT: vk::PFN_vkSubmitDebugUtilsMessageEXT = vkSubmitDebugUtilsMessageEXT;
     }
-    Device, DeviceExtension(c"VK_EXT_extended_dynamic_state") => {
+    Device, DeviceExtension(&[c"VK_EXT_extended_dynamic_state"]) => {
         vkCmdSetCullModeEXT: vk::PFN_vkCmdSetCullMode = vkCmdSetCullMode;
         vkCmdSetFrontFaceEXT: vk::PFN_vkCmdSetFrontFace = vkCmdSetFrontFace;
         vkCmdSetPrimitiveTopologyEXT: vk::PFN_vkCmdSetPrimitiveTopology = vkCmdSetPrimitiveTopology;
@@ -286,33 +286,33 @@ static ROWS: &[Command] = rows! {
         vkCmdSetStencilTestEnableEXT: vk::PFN_vkCmdSetStencilTestEnable = vkCmdSetStencilTestEnable;
         vkCmdSetStencilOpEXT: vk::PFN_vkCmdSetStencilOp = vkCmdSetStencilOp;
     }
-    Device, DeviceExtension(c"VK_EXT_extended_dynamic_state2") => {
+    Device, DeviceExtension(&[c"VK_EXT_extended_dynamic_state2"]) => {
         vkCmdSetPatchControlPointsEXT: vk::PFN_vkCmdSetPatchControlPointsEXT = vkCmdSetPatchControlPointsEXT;
         vkCmdSetRasterizerDiscardEnableEXT: vk::PFN_vkCmdSetRasterizerDiscardEnable = vkCmdSetRasterizerDiscardEnable;
         vkCmdSetDepthBiasEnableEXT: vk::PFN_vkCmdSetDepthBiasEnable = vkCmdSetDepthBiasEnable;
         vkCmdSetLogicOpEXT: vk::PFN_vkCmdSetLogicOpEXT = vkCmdSetLogicOpEXT;
         vkCmdSetPrimitiveRestartEnableEXT: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
     }
-    Device, DeviceExtension(c"VK_EXT_host_query_reset") => {
+    Device, DeviceExtension(&[c"VK_EXT_host_query_reset"]) => {
         vkResetQueryPoolEXT: vk::PFN_vkResetQueryPool = vkResetQueryPool;
     }
-    Device, DeviceExtension(c"VK_EXT_private_data") => {
+    Device, DeviceExtension(&[c"VK_EXT_private_data"]) => {
         vkCreatePrivateDataSlotEXT: vk::PFN_vkCreatePrivateDataSlot = vkCreatePrivateDataSlot;
         vkDestroyPrivateDataSlotEXT: vk::PFN_vkDestroyPrivateDataSlot = vkDestroyPrivateDataSlot;
         vkSetPrivateDataEXT: vk::PFN_vkSetPrivateData = vkSetPrivateData;
         vkGetPrivateDataEXT: vk::PFN_vkGetPrivateData = vkGetPrivateData;
     }
-    PhysicalDevice, DeviceExtension(c"VK_EXT_tooling_info") => {
+    PhysicalDevice, DeviceExtension(&[c"VK_EXT_tooling_info"]) => {
         vkGetPhysicalDeviceToolPropertiesEXT: vk::PFN_vkGetPhysicalDeviceToolProperties = vkGetPhysicalDeviceToolProperties;
     }
-    Device, DeviceExtension(c"VK_GAURAST_gaussian_primitive_topology") => {
+    Device, DeviceExtension(&[c"VK_GAURAST_gaussian_primitive_topology"]) => {
         vkCmdSetGaussianCameraGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCameraGAURAST = vkCmdSetGaussianCameraGAURAST;
     }
-    Device, DeviceExtension(c"VK_KHR_bind_memory2") => {
+    Device, DeviceExtension(&[c"VK_KHR_bind_memory2"]) => {
         vkBindBufferMemory2KHR: vk::PFN_vkBindBufferMemory2 = vkBindBufferMemory2;
         vkBindImageMemory2KHR: vk::PFN_vkBindImageMemory2 = vkBindImageMemory2;
     }
-    Device, DeviceExtension(c"VK_KHR_copy_commands2") => {
+    Device, DeviceExtension(&[c"VK_KHR_copy_commands2"]) => {
         vkCmdCopyBuffer2KHR: vk::PFN_vkCmdCopyBuffer2 = vkCmdCopyBuffer2;
         vkCmdCopyImage2KHR: vk::PFN_vkCmdCopyImage2 = vkCmdCopyImage2;
         vkCmdCopyBufferToImage2KHR: vk::PFN_vkCmdCopyBufferToImage2 = vkCmdCopyBufferToImage2;
@@ -320,49 +320,43 @@ static ROWS: &[Command] = rows! {
         vkCmdBlitImage2KHR: vk::PFN_vkCmdBlitImage2 = vkCmdBlitImage2;
         vkCmdResolveImage2KHR: vk::PFN_vkCmdResolveImage2 = vkCmdResolveImage2;
     }
-    Device, DeviceExtension(c"VK_KHR_create_renderpass2") => {
+    Device, DeviceExtension(&[c"VK_KHR_create_renderpass2"]) => {
         vkCreateRenderPass2KHR: vk::PFN_vkCreateRenderPass2 = vkCreateRenderPass2;
         vkCmdBeginRenderPass2KHR: vk::PFN_vkCmdBeginRenderPass2 = vkCmdBeginRenderPass2;
         vkCmdNextSubpass2KHR: vk::PFN_vkCmdNextSubpass2 = vkCmdNextSubpass2;
         vkCmdEndRenderPass2KHR: vk::PFN_vkCmdEndRenderPass2 = vkCmdEndRenderPass2;
     }
-    Device, DeviceExtension(c"VK_KHR_descriptor_update_template") => {
+    Device, DeviceExtension(&[c"VK_KHR_descriptor_update_template"]) => {
         vkCreateDescriptorUpdateTemplateKHR: vk::PFN_vkCreateDescriptorUpdateTemplate = vkCreateDescriptorUpdateTemplate;
         vkDestroyDescriptorUpdateTemplateKHR: vk::PFN_vkDestroyDescriptorUpdateTemplate = vkDestroyDescriptorUpdateTemplate;
         vkUpdateDescriptorSetWithTemplateKHR: vk::PFN_vkUpdateDescriptorSetWithTemplate = vkUpdateDescriptorSetWithTemplate;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_descriptor_update_template", c"VK_KHR_push_descriptor"]) => {
         vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR = vkCmdPushDescriptorSetWithTemplateKHR;
     }
-    Device, DeviceExtension(c"VK_KHR_device_group") => {
-        vkGetDeviceGroupPeerMemoryFeaturesKHR: vk::PFN_vkGetDeviceGroupPeerMemoryFeatures = vkGetDeviceGroupPeerMemoryFeatures;
-        vkCmdSetDeviceMaskKHR: vk::PFN_vkCmdSetDeviceMask = vkCmdSetDeviceMask;
-        vkCmdDispatchBaseKHR: vk::PFN_vkCmdDispatchBase = vkCmdDispatchBase;
-    }
-    Instance, InstanceExtension(c"VK_KHR_device_group_creation") => {
-        vkEnumeratePhysicalDeviceGroupsKHR: vk::PFN_vkEnumeratePhysicalDeviceGroups = vkEnumeratePhysicalDeviceGroups;
-    }
-    Device, DeviceExtension(c"VK_KHR_draw_indirect_count") => {
+    Device, DeviceExtension(&[c"VK_KHR_draw_indirect_count"]) => {
         vkCmdDrawIndirectCountKHR: vk::PFN_vkCmdDrawIndirectCount = vkCmdDrawIndirectCount;
         vkCmdDrawIndexedIndirectCountKHR: vk::PFN_vkCmdDrawIndexedIndirectCount = vkCmdDrawIndexedIndirectCount;
     }
-    Device, DeviceExtension(c"VK_KHR_dynamic_rendering") => {
+    Device, DeviceExtension(&[c"VK_KHR_dynamic_rendering"]) => {
         vkCmdBeginRenderingKHR: vk::PFN_vkCmdBeginRendering = vkCmdBeginRendering;
         vkCmdEndRenderingKHR: vk::PFN_vkCmdEndRendering = vkCmdEndRendering;
     }
-    PhysicalDevice, InstanceExtension(c"VK_KHR_external_fence_capabilities") => {
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_fence_capabilities"]) => {
         vkGetPhysicalDeviceExternalFencePropertiesKHR: vk::PFN_vkGetPhysicalDeviceExternalFenceProperties = vkGetPhysicalDeviceExternalFenceProperties;
     }
-    PhysicalDevice, InstanceExtension(c"VK_KHR_external_memory_capabilities") => {
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_memory_capabilities"]) => {
         vkGetPhysicalDeviceExternalBufferPropertiesKHR: vk::PFN_vkGetPhysicalDeviceExternalBufferProperties = vkGetPhysicalDeviceExternalBufferProperties;
     }
-    PhysicalDevice, InstanceExtension(c"VK_KHR_external_semaphore_capabilities") => {
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_semaphore_capabilities"]) => {
         vkGetPhysicalDeviceExternalSemaphorePropertiesKHR: vk::PFN_vkGetPhysicalDeviceExternalSemaphoreProperties = vkGetPhysicalDeviceExternalSemaphoreProperties;
     }
-    Device, DeviceExtension(c"VK_KHR_get_memory_requirements2") => {
+    Device, DeviceExtension(&[c"VK_KHR_get_memory_requirements2"]) => {
         vkGetImageMemoryRequirements2KHR: vk::PFN_vkGetImageMemoryRequirements2 = vkGetImageMemoryRequirements2;
         vkGetBufferMemoryRequirements2KHR: vk::PFN_vkGetBufferMemoryRequirements2 = vkGetBufferMemoryRequirements2;
         vkGetImageSparseMemoryRequirements2KHR: vk::PFN_vkGetImageSparseMemoryRequirements2 = vkGetImageSparseMemoryRequirements2;
     }
-    PhysicalDevice, InstanceExtension(c"VK_KHR_get_physical_device_properties2") => {
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_get_physical_device_properties2"]) => {
         vkGetPhysicalDeviceFeatures2KHR: vk::PFN_vkGetPhysicalDeviceFeatures2 = vkGetPhysicalDeviceFeatures2;
         vkGetPhysicalDeviceProperties2KHR: vk::PFN_vkGetPhysicalDeviceProperties2 = vkGetPhysicalDeviceProperties2;
         vkGetPhysicalDeviceFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceFormatProperties2 = vkGetPhysicalDeviceFormatProperties2;
@@ -371,33 +365,33 @@ static ROWS: &[Command] = rows! {
         vkGetPhysicalDeviceMemoryProperties2KHR: vk::PFN_vkGetPhysicalDeviceMemoryProperties2 = vkGetPhysicalDeviceMemoryProperties2;
         vkGetPhysicalDeviceSparseImageFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 = vkGetPhysicalDeviceSparseImageFormatProperties2;
     }
-    Device, DeviceExtension(c"VK_KHR_maintenance1") => {
+    Device, DeviceExtension(&[c"VK_KHR_maintenance1"]) => {
         vkTrimCommandPoolKHR: vk::PFN_vkTrimCommandPool = vkTrimCommandPool;
     }
-    Device, DeviceExtension(c"VK_KHR_maintenance3") => {
+    Device, DeviceExtension(&[c"VK_KHR_maintenance3"]) => {
         vkGetDescriptorSetLayoutSupportKHR: vk::PFN_vkGetDescriptorSetLayoutSupport = vkGetDescriptorSetLayoutSupport;
     }
-    Device, DeviceExtension(c"VK_KHR_maintenance4") => {
+    Device, DeviceExtension(&[c"VK_KHR_maintenance4"]) => {
         vkGetDeviceBufferMemoryRequirementsKHR: vk::PFN_vkGetDeviceBufferMemoryRequirements = vkGetDeviceBufferMemoryRequirements;
         vkGetDeviceImageMemoryRequirementsKHR: vk::PFN_vkGetDeviceImageMemoryRequirements = vkGetDeviceImageMemoryRequirements;
         vkGetDeviceImageSparseMemoryRequirementsKHR: vk::PFN_vkGetDeviceImageSparseMemoryRequirements = vkGetDeviceImageSparseMemoryRequirements;
     }
-    Device, DeviceExtension(c"VK_KHR_map_memory2") => {
+    Device, DeviceExtension(&[c"VK_KHR_map_memory2"]) => {
         vkMapMemory2KHR: vk::PFN_vkMapMemory2KHR = vkMapMemory2KHR;
         vkUnmapMemory2KHR: vk::PFN_vkUnmapMemory2KHR = vkUnmapMemory2KHR;
     }
-    PhysicalDevice, DeviceExtension(c"VK_KHR_performance_query") => {
+    PhysicalDevice, DeviceExtension(&[c"VK_KHR_performance_query"]) => {
         vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR: vk::PFN_vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR = vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR;
         vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR: vk::PFN_vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR = vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR;
     }
-    Device, DeviceExtension(c"VK_KHR_performance_query") => {
+    Device, DeviceExtension(&[c"VK_KHR_performance_query"]) => {
         vkAcquireProfilingLockKHR: vk::PFN_vkAcquireProfilingLockKHR = vkAcquireProfilingLockKHR;
         vkReleaseProfilingLockKHR: vk::PFN_vkReleaseProfilingLockKHR = vkReleaseProfilingLockKHR;
     }
-    Device, DeviceExtension(c"VK_KHR_push_descriptor") => {
+    Device, DeviceExtension(&[c"VK_KHR_push_descriptor"]) => {
         vkCmdPushDescriptorSetKHR: vk::PFN_vkCmdPushDescriptorSetKHR = vkCmdPushDescriptorSetKHR;
     }
-    Device, DeviceExtension(c"VK_KHR_synchronization2") => {
+    Device, DeviceExtension(&[c"VK_KHR_synchronization2"]) => {
         vkCmdSetEvent2KHR: vk::PFN_vkCmdSetEvent2 = vkCmdSetEvent2;
         vkCmdResetEvent2KHR: vk::PFN_vkCmdResetEvent2 = vkCmdResetEvent2;
         vkCmdWaitEvents2KHR: vk::PFN_vkCmdWaitEvents2 = vkCmdWaitEvents2;
@@ -405,7 +399,7 @@ static ROWS: &[Command] = rows! {
         vkCmdWriteTimestamp2KHR: vk::PFN_vkCmdWriteTimestamp2 = vkCmdWriteTimestamp2;
         vkQueueSubmit2KHR: vk::PFN_vkQueueSubmit2 = vkQueueSubmit2;
     }
-    Device, DeviceExtension(c"VK_KHR_timeline_semaphore") => {
+    Device, DeviceExtension(&[c"VK_KHR_timeline_semaphore"]) => {
         vkGetSemaphoreCounterValueKHR: vk::PFN_vkGetSemaphoreCounterValue = vkGetSemaphoreCounterValue;
         vkWaitSemaphoresKHR: vk::PFN_vkWaitSemaphores = vkWaitSemaphores;
         vkSignalSemaphoreKHR: vk::PFN_vkSignalSemaphore = vkSignalSemaphore;

@@ -24,10 +24,10 @@ pub(super) enum Scope {
 pub(super) enum Availability {
     /// A core version.
     Core(u32),
-    /// An enabled instance extension.
-    InstanceExtension(&'static CStr),
-    /// A device extension: enabled, when looked up for a device; supported, when looked up for an instance.
-    DeviceExtension(&'static CStr),
+    /// An enabled instance extension, one of these.
+    InstanceExtension(&'static [&'static CStr]),
+    /// A device extension, one of these: enabled, when looked up for a device; supported, when looked up for an instance.
+    DeviceExtension(&'static [&'static CStr]),
 }
 
 /// A row of the table.
@@ -147,10 +147,12 @@ fn version_reaches(enabled: u32, needed: u32) -> bool {
 
 impl Availability {
     fn is_available(self, enabled: &EnabledExtensions<'_>) -> bool {
+        let is_any =
+            |names: &[&CStr], enabled: &[&CStr]| names.iter().any(|name| enabled.contains(name));
         match self {
             Self::Core(version) => version_reaches(enabled.api_version, version),
-            Self::InstanceExtension(name) => enabled.instance_extensions.contains(&name),
-            Self::DeviceExtension(name) => enabled.device_extensions.contains(&name),
+            Self::InstanceExtension(names) => is_any(names, enabled.instance_extensions),
+            Self::DeviceExtension(names) => is_any(names, enabled.device_extensions),
         }
     }
 }

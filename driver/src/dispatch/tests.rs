@@ -164,6 +164,20 @@ fn commands_are_there_with_what_is_enabled() {
             .is_some()
     );
 
+    // Two extensions come with this command, and one is enough.
+    let with_template = c"vkCmdPushDescriptorSetWithTemplateKHR";
+    for name in [
+        ash::khr::push_descriptor::NAME,
+        ash::khr::descriptor_update_template::NAME,
+    ] {
+        let enabled = EnabledExtensions {
+            device_extensions: &[name],
+            ..bare
+        };
+        assert!(COMMANDS.device_command(with_template, &enabled).is_some());
+    }
+    assert!(COMMANDS.device_command(with_template, &bare).is_none());
+
     // Only a device's own commands are found through it.
     assert!(COMMANDS.device_command(c"vkCreateBuffer", &bare).is_some());
     assert!(COMMANDS.device_command(c"vkCreateDevice", &bare).is_none());

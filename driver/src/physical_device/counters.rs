@@ -5,7 +5,7 @@ use ash::vk;
 use simdevice::counters::{Counter, Unit};
 use std::ffi::{CString, c_char};
 
-/// How many counters there are.
+/// The number of counters that there are.
 pub(crate) const COUNT: usize = Counter::ALL.len();
 
 /// Writes what counter `index` is and how it is stored.

@@ -57,7 +57,7 @@ pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
     simdevice::Device::new(&config).map_err(|error| Error::InitializationFailed(error.to_string()))
 }
 
-/// Whether timestamps count the simulated hardware's time.
+/// Tells if timestamps count the simulated hardware's time.
 fn simulated_timestamps(name: &str) -> Result<bool, Error> {
     match name {
         "" | "host" => Ok(false),
@@ -78,14 +78,14 @@ fn write_trace(file: &Path, trace: &Trace) {
     }
 }
 
-/// What is printed for people.
+/// The things that are printed for people.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Dump {
     /// The device's programs, as pipelines are created.
     pub(crate) ir: bool,
 }
 
-/// What the environment wants printed.
+/// The things that the environment wants printed.
 ///
 /// # Errors
 /// [`Error::InitializationFailed`] for a name that means nothing.

@@ -37,17 +37,17 @@ fn is_color(format: Format) -> bool {
     format.aspects() == [Aspect::Color]
 }
 
-/// Whether components are integers that are read as floating point: these are attributes of vertices only.
+/// Tells if components are integers that are read as floating point: these are attributes of vertices only.
 fn is_scaled(format: Format) -> bool {
     matches!(format.numeric(), Numeric::Uscaled | Numeric::Sscaled)
 }
 
-/// Whether texels are stored in compressed blocks.
+/// Tells if texels are stored in compressed blocks.
 fn is_compressed(format: Format) -> bool {
     format.decompressed().is_some()
 }
 
-/// What images of the format, of either tiling, can do.
+/// The features of images of the format, of either tiling.
 fn image_features(format: Format) -> vk::FormatFeatureFlags {
     if is_scaled(format) {
         return vk::FormatFeatureFlags::empty();
@@ -85,25 +85,25 @@ fn image_features(format: Format) -> vk::FormatFeatureFlags {
     features
 }
 
-/// Whether programs write texels of a colour format. sRGB and shared exponents are only read.
+/// Tells if programs write texels of a colour format. sRGB and shared exponents are only read.
 fn is_stored(format: Format) -> bool {
     !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent)
         && format.texel_size().is_power_of_two()
         && !format.has(Channel::X)
 }
 
-/// Whether programs update texels atomically: integers of one word.
+/// Tells if programs update texels atomically: integers of one word.
 fn is_atomic(format: Format) -> bool {
     format.is_integer() && format.texel_size() == 4 && format.components().len() == 1
 }
 
-/// Whether texels of a colour format are rendered to. Formats of three equal components make poor attachments:
+/// Tells if texels of a colour format are rendered to. Formats of three equal components make poor attachments:
 /// hardware has none.
 fn is_rendered(format: Format) -> bool {
     format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two()
 }
 
-/// What buffers of the format can do: any colour is a vertex attribute, unless it takes more than its component to
+/// The features of buffers of the format: any colour is a vertex attribute, unless it takes more than its component to
 /// know one. Programs read texels of any format.
 fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
     if !is_color(format) || is_compressed(format) {
@@ -216,7 +216,7 @@ fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) 
     supported.contains(usage)
 }
 
-/// What an image is asked to be.
+/// The description of an image that may be asked for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ImageQuery {
     /// Its format.

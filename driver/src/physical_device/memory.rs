@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Every allocation begins at a multiple of this many bytes, in the device's and in the host's view.
 pub(crate) const ALIGNMENT: u64 = 4096;
 
-/// What the heap has where the host's memory can't be found out.
+/// The size of the heap where the host's memory can't be found out.
 const FALLBACK_HEAP_SIZE: u64 = 2 << 30;
 
 /// The types, in the order of their indices: Vulkan wants a type before those with more properties.

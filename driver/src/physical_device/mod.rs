@@ -17,7 +17,7 @@ use std::ffi::CStr;
 /// The index of the queue family: there is one, with one queue that does everything.
 pub(crate) const QUEUE_FAMILY: u32 = 0;
 
-/// How many queues it has.
+/// The number of queues that it has.
 pub(crate) const QUEUE_COUNT: u32 = 1;
 
 /// `VkQueueFamilyProperties` of the family. Timestamps are the host's nanoseconds in 64 bits.

@@ -12,9 +12,9 @@ use std::sync::Arc;
 /// A compute pipeline.
 #[derive(Debug)]
 pub(crate) struct ComputePipeline {
-    /// What its workgroups run.
+    /// The program that its workgroups run.
     pub(crate) program: Arc<ComputeProgram>,
-    /// What the program is bound to.
+    /// The resources that the program is bound to.
     pub(crate) descriptors: Vec<ShaderBinding>,
 }
 
@@ -70,7 +70,7 @@ impl ComputePipeline {
     }
 }
 
-/// How many invocations a workgroup has.
+/// The number of invocations that a workgroup has.
 fn invocations(interface: &Interface) -> Result<u32, Error> {
     let size = interface.workgroup_size;
     let product = size
@@ -88,7 +88,7 @@ fn invocations(interface: &Interface) -> Result<u32, Error> {
         })
 }
 
-/// What the device puts into the program's inputs.
+/// The values that the device puts into the program's inputs.
 fn inputs(interface: &Interface) -> Vec<Option<ComputeInput>> {
     let input = |input: &Input| match input.source {
         InputSource::BuiltIn {

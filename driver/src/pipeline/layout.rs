@@ -127,7 +127,7 @@ fn stage_flag(stage: Stage) -> vk::ShaderStageFlags {
     }
 }
 
-/// What a shader's variable must be to use descriptors of a type.
+/// The kind of a shader's variable that uses descriptors of a type.
 fn kind(ty: vk::DescriptorType) -> Option<DescriptorKind> {
     match ty {
         vk::DescriptorType::SAMPLER => Some(DescriptorKind::Sampler),

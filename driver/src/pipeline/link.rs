@@ -14,14 +14,14 @@ use simdevice::packet::draw::{
 };
 use std::collections::HashMap;
 
-/// What of the outputs of a pipeline's programs has an effect.
+/// The outputs of a pipeline's programs that have an effect.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LiveOutputs<'a> {
     /// By colour attachment: whether anything is written to it, or made of its source's alpha.
     pub(crate) color: &'a [bool],
-    /// Whether the second source of blending is read.
+    /// True if the second source of blending is read.
     pub(crate) second_source: bool,
-    /// Whether points are drawn, so that their size matters.
+    /// True if points are drawn, so that their size matters.
     pub(crate) points: bool,
 }
 

@@ -28,7 +28,7 @@ use std::ffi::c_void;
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 
-/// What a `VkPipeline` is.
+/// A `VkPipeline`.
 #[derive(Debug)]
 pub(crate) enum Pipeline {
     /// For draws.
@@ -40,13 +40,13 @@ pub(crate) enum Pipeline {
 /// A graphics pipeline.
 #[derive(Debug)]
 pub(crate) struct GraphicsPipeline {
-    /// What it draws.
+    /// The kind of what it draws, with its state.
     pub(crate) kind: PipelineKind,
-    /// Whether vertex strides come from `vkCmdBindVertexBuffers2`.
+    /// True if vertex strides come from `vkCmdBindVertexBuffers2`.
     pub(crate) dynamic_stride: bool,
 }
 
-/// What a pipeline draws.
+/// The kind of a graphics pipeline, by what it draws.
 #[derive(Debug)]
 pub(crate) enum PipelineKind {
     /// Gaussians.

@@ -20,25 +20,25 @@ use std::sync::Arc;
 pub(crate) struct PrimitivePipeline {
     /// The programs.
     pub(crate) programs: Arc<DrawPipeline>,
-    /// What the vertex program's attributes count in.
+    /// The sources of the vertex program's attributes.
     pub(crate) attributes: Vec<AttributeSource>,
-    /// What the vertex program is bound to.
+    /// The resources that the vertex program is bound to.
     pub(crate) vertex_descriptors: Vec<ShaderBinding>,
-    /// What the fragment program is bound to.
+    /// The resources that the fragment program is bound to.
     pub(crate) fragment_descriptors: Vec<ShaderBinding>,
     /// The fixed-function state, as far as it is static.
     pub(crate) fixed: FixedFunctionState,
     /// The state for the device, if nothing of it is dynamic.
     pub(crate) state: Option<Arc<DrawState>>,
-    /// What the command buffer sets, but for viewports and scissors.
+    /// The states that the command buffer sets, but for viewports and scissors.
     pub(crate) dynamic: Vec<vk::DynamicState>,
-    /// Where viewports come from.
+    /// The source of viewports.
     pub(crate) viewports: ViewportSource,
-    /// Where scissors come from.
+    /// The source of scissors.
     pub(crate) scissors: ViewportSource,
 }
 
-/// Where viewports or scissors come from.
+/// The source of viewports or scissors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ViewportSource {
     /// The pipeline.
@@ -150,7 +150,7 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// What is dynamic, and where viewports and scissors come from.
+/// The states that are dynamic, and the sources of viewports and scissors.
 fn dynamic(
     info: &GraphicsState,
 ) -> Result<(Vec<vk::DynamicState>, ViewportSource, ViewportSource), Error> {

@@ -45,7 +45,7 @@ pub(crate) fn translate(
     Ok(shader)
 }
 
-/// Where each location is read from.
+/// The sources that locations are read from.
 pub(crate) fn attributes(
     info: &GraphicsState,
     locations: &[(u32, ScalarType)],

@@ -35,7 +35,7 @@ pub(crate) struct GraphicsState<'a> {
     pub(crate) fragment_output: FragmentOutputState<'a>,
     /// The layout.
     pub(crate) layout: Option<&'a Arc<PipelineLayout>>,
-    /// What is dynamic.
+    /// The states that are dynamic.
     pub(crate) dynamic: &'a [vk::DynamicState],
     /// The extension's structure.
     pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
@@ -43,18 +43,18 @@ pub(crate) struct GraphicsState<'a> {
     pub(crate) approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'a>>,
 }
 
-/// How vertices are read and assembled.
+/// The reading and assembly of vertices.
 #[derive(Default)]
 pub(crate) struct VertexInputState<'a> {
     /// Vertex bindings.
     pub(crate) bindings: &'a [vk::VertexInputBindingDescription],
-    /// How many instances an element lasts, of bindings that advance by instance and where that isn't one.
+    /// The number of instances that an element lasts, of bindings that advance by instance and where that isn't one.
     pub(crate) divisors: &'a [vk::VertexInputBindingDivisorDescriptionKHR],
     /// Vertex attributes.
     pub(crate) attributes: &'a [vk::VertexInputAttributeDescription],
     /// The topology.
     pub(crate) topology: vk::PrimitiveTopology,
-    /// Whether an index restarts the primitive.
+    /// True if an index restarts the primitive.
     pub(crate) primitive_restart: bool,
 }
 
@@ -63,17 +63,17 @@ pub(crate) struct VertexInputState<'a> {
 pub(crate) struct PreRasterizationState<'a> {
     /// The shader stages.
     pub(crate) stages: Vec<(vk::ShaderStageFlags, ShaderStage<'a>)>,
-    /// How many viewports; one each is given unless they are dynamic.
+    /// The number of viewports; one each is given unless they are dynamic.
     pub(crate) viewport_count: u32,
     /// Viewports, unless dynamic.
     pub(crate) viewports: &'a [vk::Viewport],
-    /// How many scissors.
+    /// The number of scissors.
     pub(crate) scissor_count: u32,
     /// Scissors, unless dynamic.
     pub(crate) scissors: &'a [vk::Rect2D],
     /// Rasterization state.
     pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
-    /// Whether a primitive's last vertex, not its first, is the provoking one.
+    /// True if a primitive's last vertex, not its first, is the provoking one.
     pub(crate) provoking_last: bool,
 }
 
@@ -164,12 +164,12 @@ impl<'a> GraphicsState<'a> {
         before.iter().chain(fragment)
     }
 
-    /// Whether a state is dynamic.
+    /// Tells if a state is dynamic.
     pub(crate) fn is_dynamic(&self, state: vk::DynamicState) -> bool {
         self.dynamic.contains(&state)
     }
 
-    /// Whether nothing is ever rasterized, so that all state of rasterization is left out.
+    /// Tells if nothing is ever rasterized, so that all state of rasterization is left out.
     pub(crate) fn discards(&self) -> bool {
         self.pre_rasterization
             .rasterization
@@ -285,12 +285,12 @@ unsafe fn read_viewports<'a>(
     Ok(())
 }
 
-/// What a pipeline renders to.
+/// The attachments that a pipeline renders to.
 #[derive(Default)]
 struct AttachmentFormats {
     /// By colour attachment; undefined where unused.
     color: Vec<vk::Format>,
-    /// Whether there is a depth or stencil attachment.
+    /// True if there is a depth or stencil attachment.
     has_depth_stencil: bool,
 }
 
@@ -334,7 +334,7 @@ unsafe fn attachment_formats(
     }
 }
 
-/// Where a pipeline reads an attribute from.
+/// The source that a pipeline reads an attribute from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct AttributeSource {
     /// The vertex buffer binding.
@@ -343,7 +343,7 @@ pub(crate) struct AttributeSource {
     pub(crate) stride: u32,
     /// Bytes from the vertex's start to the attribute.
     pub(crate) offset: u32,
-    /// How it is stored.
+    /// The format that it is stored in.
     pub(crate) format: Format,
     /// After how many instances it advances (0: never), `None` if it advances by vertex.
     pub(crate) instance_divisor: Option<u32>,
@@ -451,7 +451,7 @@ pub(crate) fn blend_states(info: &GraphicsState) -> Result<Vec<BlendState>, Erro
         .collect()
 }
 
-/// Whether an attachment is blended with the second source of the fragment stage.
+/// Tells if an attachment is blended with the second source of the fragment stage.
 pub(crate) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState) -> bool {
     use vk::BlendFactor as F;
     let factors = [
@@ -855,7 +855,7 @@ impl FixedFunctionState {
     }
 }
 
-/// Whether an attachment is blended by the constants.
+/// Tells if an attachment is blended by the constants.
 fn blends_by_constants(state: &DrawState) -> bool {
     let equations = state.blend.iter().filter_map(|blend| blend.equations);
     equations
@@ -878,7 +878,7 @@ fn blends_by_constants(state: &DrawState) -> bool {
         })
 }
 
-/// What a topology makes.
+/// The class of primitives that a topology makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Class {
     /// Points.

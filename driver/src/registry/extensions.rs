@@ -11,7 +11,6 @@ pub(crate) type Extension = (&'static CStr, u32);
 /// The instance extensions.
 pub(crate) const INSTANCE: &[Extension] = &[
     (c"VK_EXT_debug_utils", 2),
-    (c"VK_KHR_device_group_creation", 1),
     (c"VK_KHR_external_fence_capabilities", 1),
     (c"VK_KHR_external_memory_capabilities", 1),
     (c"VK_KHR_external_semaphore_capabilities", 1),
@@ -44,7 +43,6 @@ pub(crate) const DEVICE: &[Extension] = &[
     (c"VK_KHR_dedicated_allocation", 3),
     (c"VK_KHR_depth_stencil_resolve", 1),
     (c"VK_KHR_descriptor_update_template", 1),
-    (c"VK_KHR_device_group", 4),
     (c"VK_KHR_draw_indirect_count", 1),
     (c"VK_KHR_driver_properties", 1),
     (c"VK_KHR_dynamic_rendering", 1),

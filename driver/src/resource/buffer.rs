@@ -133,7 +133,7 @@ pub(crate) fn requirements(size: u64) -> vk::MemoryRequirements {
 pub(crate) struct BufferView {
     /// The bytes.
     pub(crate) range: BufferRange,
-    /// How texels are stored in them.
+    /// The format of texels in them.
     pub(crate) format: Format,
 }
 

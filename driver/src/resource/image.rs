@@ -98,7 +98,7 @@ pub(crate) struct ImageView {
     pub(crate) view: image::ImageView,
     /// The aspect that shaders read.
     pub(crate) aspect: Aspect,
-    /// How shaders see components rearranged.
+    /// The order in which shaders see components.
     pub(crate) swizzle: Swizzle,
 }
 
@@ -163,7 +163,7 @@ impl ImageView {
     }
 }
 
-/// How many of `available` things a range from `base` on has, if it has any and all exist.
+/// The number of `available` things that a range from `base` on has, if it has any and all exist.
 pub(crate) fn count(base: u32, count: u32, remaining: u32, available: u32) -> Option<u32> {
     let rest = available.checked_sub(base)?;
     let count = if count == remaining { rest } else { count };

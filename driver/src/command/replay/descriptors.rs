@@ -18,7 +18,7 @@ use std::sync::Arc;
 #[error("descriptor set {0}, which the pipeline uses, is not bound")]
 pub(crate) struct DescriptorSetNotBound(pub(super) u32);
 
-/// What programs that use `descriptors` are bound to. What a set doesn't hold reads as zero.
+/// The resources that programs that use `descriptors` are bound to. What a set doesn't hold reads as zero.
 ///
 /// # Errors
 /// [`DescriptorSetNotBound`] if a set is missing.
@@ -120,7 +120,7 @@ fn element<T: Default>(slots: &mut Vec<T>, index: usize) -> &mut T {
     &mut slots[index]
 }
 
-/// Why a dispatch does nothing: state that it needs is undefined.
+/// The reason that a dispatch does nothing: state that it needs is undefined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum DispatchError {
     /// No pipeline.

@@ -13,7 +13,7 @@ use simdevice::packet::draw::{self, DrawState};
 use simdevice::packet::{AttributeStream, BufferRange, CameraModel, IndexStream};
 use std::sync::Arc;
 
-/// Why a draw draws nothing: state that it needs is undefined.
+/// The reason that a draw draws nothing: state that it needs is undefined.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum DrawError {
     /// No pipeline.
@@ -74,7 +74,7 @@ pub(crate) enum DrawError {
     DescriptorSetNotBound(#[from] DescriptorSetNotBound),
 }
 
-/// Where an attribute is read from.
+/// The stream that an attribute is read from.
 ///
 /// # Errors
 /// [`DrawError::VertexBuffer`].
@@ -96,7 +96,7 @@ pub(super) fn attribute_stream(
     })
 }
 
-/// Where an indexed draw's indices are read from.
+/// The stream that an indexed draw's indices are read from.
 ///
 /// # Errors
 /// [`DrawError::IndexBuffer`].
@@ -181,7 +181,7 @@ fn draw_state(
     Ok(converted)
 }
 
-/// How many viewports or scissors the command buffer sets; `None` if the pipeline has them.
+/// The number of viewports or scissors that the command buffer sets; `None` if the pipeline has them.
 fn dynamic_count(origin: ViewportSource, set: Option<u32>) -> Option<u32> {
     match origin {
         ViewportSource::Static => None,

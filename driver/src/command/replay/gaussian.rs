@@ -19,7 +19,7 @@ use simdevice::packet::{
 };
 use std::sync::Arc;
 
-/// What begins a sorted set.
+/// The packets that begin a sorted set.
 ///
 /// # Errors
 /// [`DrawError`] where bound state that the set needs is missing.
@@ -43,7 +43,7 @@ pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Pa
     Ok(packets)
 }
 
-/// What adds a draw to a sorted set.
+/// The packet that adds a draw to a sorted set.
 ///
 /// # Errors
 /// [`DrawError`] where a buffer that the draw needs is not bound.
@@ -70,7 +70,7 @@ pub(crate) fn append(
     })))
 }
 
-/// What adds a draw whose Gaussians a vertex shader projects.
+/// The packet that adds a draw whose Gaussians a vertex shader projects.
 fn shaded(
     state: &State,
     pipeline: &GraphicsPipeline,
@@ -145,7 +145,7 @@ fn camera(state: &State, source: CameraSource) -> Result<Camera, DrawError> {
     camera::read(&range).map_err(|error| DrawError::CameraData(error.to_string()))
 }
 
-/// What the pipeline fixes, with the dynamic part filled in.
+/// The state of the pipeline, with the dynamic part filled in.
 fn fixed_state(
     state: &State,
     gaussian: &GaussianPipeline,

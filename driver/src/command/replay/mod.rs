@@ -20,7 +20,7 @@ use simdevice::{CommandProcessor, Packet};
 pub(super) struct Execution<'a> {
     /// The queue's command processor.
     pub(super) processor: &'a mut CommandProcessor,
-    /// What is waited for on the device, and its loss.
+    /// The things that are waited for on the device, and its loss.
     pub(super) sync: &'a DeviceSync,
     /// The instance that hears of what the application should not have recorded.
     pub(super) instance: &'a Instance,

@@ -33,9 +33,9 @@ pub(crate) struct State {
     pub(crate) viewports: Vec<Option<Viewport>>,
     /// Dynamic scissors.
     pub(crate) scissors: Vec<Option<Rect>>,
-    /// How many viewports were set with their count.
+    /// The number of viewports, where they were set with their count.
     pub(crate) viewport_count: Option<u32>,
-    /// How many scissors were set with their count.
+    /// The number of scissors, where they were set with their count.
     pub(crate) scissor_count: Option<u32>,
     /// All other dynamic state.
     pub(crate) dynamic_states: DynamicStates,
@@ -43,7 +43,7 @@ pub(crate) struct State {
     pub(crate) draw_state: Option<Arc<DrawState>>,
     /// The camera of Gaussian draws; kept when another pipeline is bound.
     pub(crate) camera: Option<Camera>,
-    /// Whether draws are being merged into a sorted set that has begun.
+    /// True if draws are being merged into a sorted set that has begun.
     pub(crate) merged_draws_open: bool,
 }
 
@@ -62,7 +62,7 @@ impl State {
             .or_else(|| self.scissors.first().copied().flatten())
     }
 
-    /// Whether the pipeline's Gaussians are projected by a vertex shader.
+    /// Tells if the pipeline's Gaussians are projected by a vertex shader.
     pub(crate) fn shades_gaussians(&self) -> bool {
         let primitive = self.pipeline.as_ref().map(|pipeline| &pipeline.kind);
         matches!(primitive, Some(PipelineKind::Gaussian(gaussian))

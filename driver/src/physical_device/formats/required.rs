@@ -3,7 +3,7 @@
 use super::properties;
 use ash::vk::{Format as F, FormatFeatureFlags as Feature};
 
-/// What each letter stands for in the image column.
+/// The features that letters stand for in the image column.
 const IMAGE: &[(char, Feature)] = &[
     ('s', Feature::SAMPLED_IMAGE),
     ('b', Feature::BLIT_SRC),
@@ -16,7 +16,7 @@ const IMAGE: &[(char, Feature)] = &[
     ('z', Feature::DEPTH_STENCIL_ATTACHMENT),
 ];
 
-/// What each letter stands for in the buffer column.
+/// The features that letters stand for in the buffer column.
 const BUFFER: &[(char, Feature)] = &[
     ('v', Feature::VERTEX_BUFFER),
     ('u', Feature::UNIFORM_TEXEL_BUFFER),

@@ -29,29 +29,29 @@ use std::sync::Arc;
 /// The Gaussian part of a pipeline.
 #[derive(Debug)]
 pub(crate) struct GaussianPipeline {
-    /// What the device needs to know; what is dynamic of it is filled in for each draw.
+    /// The state for the device; what is dynamic of it is filled in for each draw.
     pub(crate) state: Arc<GaussianState>,
-    /// What becomes of fragments, as far as it is static.
+    /// The state that decides what becomes of fragments, as far as it is static.
     pub(crate) fixed: FixedFunctionState,
-    /// What the command buffer sets of that.
+    /// The states that the command buffer sets of that.
     pub(crate) dynamic: Vec<vk::DynamicState>,
     /// The viewport, unless it is dynamic.
     pub(crate) viewport: Option<Viewport>,
     /// The scissor, unless it is dynamic.
     pub(crate) scissor: Option<Rect>,
-    /// Where draws take their camera from.
+    /// The source of draws' camera.
     pub(crate) camera: CameraSource,
     /// The models that the camera may have.
     pub(crate) camera_models: CameraModels,
-    /// Whether consecutive draws are sorted together.
+    /// True if consecutive draws are sorted together.
     pub(crate) merges_draws: bool,
-    /// Where Gaussians come from.
+    /// The source of Gaussians.
     pub(crate) source: GaussianSource,
-    /// What makes colours of what they accumulate.
+    /// The stage that makes colours of what they accumulate.
     pub(crate) resolve: Option<ResolveStage>,
 }
 
-/// Where the Gaussians of a pipeline come from.
+/// The source of a pipeline's Gaussians.
 #[derive(Debug)]
 pub(crate) enum GaussianSource {
     /// Vertex attributes, which the device projects.
@@ -63,23 +63,23 @@ pub(crate) enum GaussianSource {
 /// The attributes of fixed-function projection.
 #[derive(Debug)]
 pub(crate) struct GaussianAttributeSources {
-    /// Where means are read from.
+    /// The source of means.
     pub(crate) position: AttributeSource,
-    /// Where standard deviations are read from.
+    /// The source of standard deviations.
     pub(crate) scale: AttributeSource,
-    /// Where quaternions are read from.
+    /// The source of quaternions.
     pub(crate) rotation: AttributeSource,
-    /// Where opacities are read from.
+    /// The source of opacities.
     pub(crate) opacity: AttributeSource,
-    /// Where the spherical harmonics' coefficients are read from.
+    /// The sources of the spherical harmonics' coefficients.
     pub(crate) spherical_harmonics: Vec<AttributeSource>,
-    /// Where the rows of model matrices are read from, if there are any.
+    /// The sources of the rows of model matrices, if there are any.
     pub(crate) model_matrix: Option<[AttributeSource; 3]>,
-    /// Where factors of the opacity are read from, if there are any.
+    /// The source of factors of the opacity, if there are any.
     pub(crate) model_opacity: Option<AttributeSource>,
 }
 
-/// Where Gaussian draws take their camera from.
+/// The source of Gaussian draws' camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum CameraSource {
     /// There is none: a vertex shader projects.
@@ -104,7 +104,7 @@ pub(crate) struct CameraModels {
 }
 
 impl CameraModels {
-    /// Those of a device.
+    /// The models of a device.
     pub(crate) fn of(features: &Features) -> Self {
         Self {
             orthographic: features.orthographic_camera,
@@ -113,7 +113,7 @@ impl CameraModels {
         }
     }
 
-    /// Whether a camera of this model may be used.
+    /// Tells if a camera of this model may be used.
     pub(crate) fn have(self, model: CameraModel) -> bool {
         match model {
             CameraModel::Pinhole => true,
@@ -181,7 +181,7 @@ impl GaussianPipeline {
     }
 }
 
-/// Where Gaussians come from.
+/// The source of Gaussians.
 fn source(
     device: &Device,
     info: &GraphicsState,
@@ -315,7 +315,7 @@ fn state(
     })
 }
 
-/// Where draws take their camera from.
+/// The source of draws' camera.
 fn camera_source(
     info: &GraphicsState,
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
@@ -351,7 +351,7 @@ fn camera_source(
     Ok(CameraSource::UniformBuffer { set, binding })
 }
 
-/// Whether a binding is a uniform buffer that the vertex stage sees.
+/// Tells if a binding is a uniform buffer that the vertex stage sees.
 fn holds_camera(binding: &LayoutBinding) -> bool {
     let is_uniform = matches!(
         binding.kind,

@@ -29,9 +29,9 @@ use std::sync::Arc;
 pub(crate) struct VertexProjection {
     /// The program.
     pub(crate) programs: Arc<DrawPipeline>,
-    /// What its attributes count in.
+    /// The sources of its attributes.
     pub(crate) attributes: Vec<AttributeSource>,
-    /// What it is bound to.
+    /// The descriptors that it is bound to.
     pub(crate) descriptors: Vec<ShaderBinding>,
 }
 
@@ -93,13 +93,13 @@ fn check_order(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Err
 pub(crate) struct ResolveStage {
     /// The program.
     pub(crate) program: Arc<ResolveProgram>,
-    /// What it is bound to.
+    /// The descriptors that it is bound to.
     pub(crate) descriptors: Vec<ShaderBinding>,
-    /// Whether every sample is shaded for itself.
+    /// True if every sample is shaded for itself.
     pub(crate) sample_shading: bool,
-    /// Whether alpha makes coverage.
+    /// True if alpha makes coverage.
     pub(crate) alpha_to_coverage: bool,
-    /// Whether alpha becomes 1 after that.
+    /// True if alpha becomes 1 after that.
     pub(crate) alpha_to_one: bool,
 }
 
@@ -261,7 +261,7 @@ fn find<'a>(info: &'a GraphicsState, wanted: vk::ShaderStageFlags) -> Option<&'a
     Some(stage)
 }
 
-/// Where the vertex shader writes what the device takes, in the order of the numbers of [`gaussian`].
+/// The locations to which the vertex shader writes what the device takes, in the order of the numbers of [`gaussian`].
 fn components(
     state: &PipelineGaussianStateCreateInfoGAURAST,
     interface: &Interface,

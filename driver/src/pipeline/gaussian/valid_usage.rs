@@ -127,7 +127,7 @@ pub(super) fn has_fragment_stage(info: &GraphicsState) -> bool {
     stages.any(|(stage, _)| *stage == vk::ShaderStageFlags::FRAGMENT)
 }
 
-/// Whether a vertex shader projects, so that what fixed-function projection is told is ignored.
+/// Tells if a vertex shader projects, so that what fixed-function projection is told is ignored.
 pub(super) fn is_shaded(gaussian: &PipelineGaussianStateCreateInfoGAURAST) -> bool {
     gaussian.projection_mode == GaussianProjectionModeGAURAST::VERTEX_SHADER
 }
@@ -235,7 +235,7 @@ pub(super) fn stages(
     Ok(())
 }
 
-/// What fixed-function projection alone is told.
+/// Checks what fixed-function projection alone is told.
 fn projection(
     gaussian: &PipelineGaussianStateCreateInfoGAURAST,
     features: &Features,
