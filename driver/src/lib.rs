@@ -3,24 +3,39 @@
 //! There are two doors to it. [`entry`] gives an [`ash::Entry`] over the driver linked into this process; and
 //! `driver/icd` exports [`loader`] as a shared library for the Vulkan loader. Both lead to one table of commands.
 //!
-//! The driver keeps Vulkan's objects and lowers recorded commands to [`simdevice`] packets. It never computes a
-//! pixel.
+//! The driver keeps Vulkan's objects, a file for each chapter of the specification, and replays recorded commands as
+//! [`simdevice`] packets. It never computes a pixel.
 
-mod capabilities;
+mod abi;
 mod command;
+mod convert;
+mod descriptor;
+mod device;
+mod device_sync;
 mod dispatch;
-mod embed;
-mod entrypoints;
-mod environment;
-mod error;
-mod float_control;
-mod handle;
+mod instance;
 pub mod loader;
-mod lower;
-mod object;
-mod pnext;
-mod pointer;
+mod physical_device;
+mod pipeline;
+mod query_pool;
+mod queue;
 mod registry;
+mod render_pass;
+mod resource;
+mod shader_module;
+mod sync;
 
-pub use embed::entry;
-pub use handle::live_handles;
+pub use abi::handle::live_handles;
+
+/// The driver as an [`ash::Entry`].
+///
+/// Nothing need be installed, and layers aren't loaded. The entry and what is created from it may be used on any
+/// thread, as Vulkan allows.
+pub fn entry() -> ash::Entry {
+    // SAFETY: the function behaves as Vulkan says and is there as long as the program.
+    unsafe {
+        ash::Entry::from_static_fn(ash::StaticFn {
+            get_instance_proc_addr: dispatch::vkGetInstanceProcAddr,
+        })
+    }
+}

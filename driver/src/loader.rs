@@ -1,10 +1,9 @@
 //! The driver's half of the interface between the Vulkan loader and a driver, which `driver/icd` exports.
 
+use crate::abi::error::Error;
+use crate::abi::guard::guard;
+use crate::abi::{handle, valid};
 use crate::dispatch;
-use crate::entry_points;
-use crate::entrypoints::instance;
-use crate::error::Error;
-use crate::{handle, pointer};
 use ash::vk;
 use std::ffi::c_char;
 
@@ -19,8 +18,16 @@ const OLDEST_INTERFACE: u32 = 2;
 /// # Safety
 /// `version` points at the newest version that the loader knows.
 pub unsafe fn negotiate_interface_version(version: *mut u32) -> vk::Result {
-    // SAFETY: the caller's promise.
-    unsafe { negotiate_loader_icd_interface_version(version) }
+    guard(version, "vk_icdNegotiateLoaderICDInterfaceVersion", || {
+        // SAFETY: the caller's promise.
+        let version = unsafe { valid::output_structure(version)? };
+        *version = NEWEST_INTERFACE.min(*version);
+        Ok(if *version < OLDEST_INTERFACE {
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER
+        } else {
+            vk::Result::SUCCESS
+        })
+    })
 }
 
 /// `vkGetInstanceProcAddr`.
@@ -32,7 +39,7 @@ pub unsafe fn get_instance_proc_addr(
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: the caller's promise.
-    unsafe { instance::get_instance_proc_addr(instance, name) }
+    unsafe { dispatch::vkGetInstanceProcAddr(instance, name) }
 }
 
 /// Finds commands whose first parameter is a physical device.
@@ -43,27 +50,10 @@ pub unsafe fn get_physical_device_proc_addr(
     instance: vk::Instance,
     name: *const c_char,
 ) -> vk::PFN_vkVoidFunction {
-    // SAFETY: the caller's promise.
-    unsafe { physical_device_proc_addr(instance, name) }
-}
-
-entry_points! {
-    fn negotiate_loader_icd_interface_version(version: *mut u32) -> vk::Result {
-        let version = pointer::output_structure(version)?;
-        *version = NEWEST_INTERFACE.min(*version);
-        Ok(if *version < OLDEST_INTERFACE {
-            vk::Result::ERROR_INCOMPATIBLE_DRIVER
-        } else {
-            vk::Result::SUCCESS
-        })
-    }
-
-    fn physical_device_proc_addr(
-        instance: vk::Instance,
-        name: *const c_char,
-    ) -> vk::PFN_vkVoidFunction {
-        let name = pointer::string(name).ok_or(Error::NullPointer { what: "name" })?;
-        let instance = handle::get(instance)?;
+    guard(instance, "vk_icdGetPhysicalDeviceProcAddr", || {
+        // SAFETY: the caller's promise.
+        let (instance, name) = unsafe { (handle::get(instance)?, valid::string(name)) };
+        let name = name.ok_or(Error::NullPointer { what: "name" })?;
         Ok(dispatch::physical_device_command(name, &instance.enabled()))
-    }
+    })
 }

@@ -1,4 +1,4 @@
-//! Prints what each of the device's skips would bring as hardware (`simdevice/timing/WHAT_IF.md`). `what_ifs FOLDER` writes
+//! Prints what each of the device's skips would bring as hardware (`simdevice/timing/studies/WHAT_IF.md`). `what_ifs FOLDER` writes
 //! pictures of the scenes, too.
 
 use gaurast_tests::compare::for_people;

@@ -6,12 +6,11 @@ use gaurast_tests::what_ifs::markdown;
 
 use crate::GLSLANG;
 
-const HOW: &str =
-    "run `cargo run --release -p gaurast-tests --example what_ifs > simdevice/timing/WHAT_IF.md`";
+const HOW: &str = "run `cargo run --release -p gaurast-tests --example what_ifs > simdevice/timing/studies/WHAT_IF.md`";
 
 #[gaurast_runner::test(needs = [GLSLANG])]
 fn the_document_is_up_to_date() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../simdevice/timing/WHAT_IF.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../simdevice/timing/studies/WHAT_IF.md");
     let stored = std::fs::read_to_string(path).expect("the document");
     let (generated, _) = markdown();
     for (stored, generated) in stored.lines().zip(generated.lines()) {

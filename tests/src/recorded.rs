@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use simdevice::timing::config::Config;
+use simdevice::timing::fast;
 use simdevice::timing::work::Trace;
-use simdevice::timing::{fast, stepped};
+use timing_studies::stepped;
 
 /// Machines that traces are run on: a preset, and what is changed of it.
 const MACHINES: [(&str, &[&str]); 6] = [

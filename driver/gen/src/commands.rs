@@ -2,10 +2,11 @@
 //!
 //! A function of the driver's takes those of its command's parameters that it wants, by their names without `p_`, and each
 //! in the form that it declares: the command's own type; a handle as the object (`&Buffer`, `&Arc<Buffer>`,
-//! `Option<&Buffer>`); a pointer as what it points at (`&T`, `&mut T`, `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`); a
-//! `VkBool32` as a `bool`; and a command buffer as its `recorder`. An output pointer that it doesn't take is written with
-//! what it returns: a value, an `Arc` of an object, or a list. Of commands that have a second version, which takes a structure
-//! of the first one's parameters, the second is enough.
+//! `Option<&Buffer>`, or, to be destroyed, `Option<Arc<Buffer>>`); a pointer as what it points at (`&T`, `&mut T`,
+//! `Option<&T>`, `&[T]`, `&[Arc<Buffer>]`, `&CStr`, `&mut [MaybeUninit<T>]`, `OutputChain<'_, T>`, and with its count
+//! `Structures<'_, T>`); a `VkBool32` as a `bool`; a command buffer as its `recorder`; and `&Commands`, the table. An output
+//! pointer that it doesn't take is written with what it returns: a value, an `Arc` of an object, or a list. Of commands that
+//! have a second version, which takes a structure of the first one's parameters, the second is enough.
 
 use crate::ash::{Declarations, Function, Member};
 use crate::entry_points::EntryPoint;
@@ -35,7 +36,7 @@ struct Output {
 impl Output {
     /// The table, laid out, which rustfmt doesn't do within a macro.
     fn table(&self) -> String {
-        let mut text = "table! {\n".to_owned();
+        let mut text = "static ROWS: &[Command] = rows! {\n".to_owned();
         for (block, lines) in &self.blocks {
             let _ = writeln!(text, "    {block} => {{");
             for line in lines {
@@ -43,7 +44,7 @@ impl Output {
             }
             text.push_str("    }\n");
         }
-        text + "}\n"
+        text + "};\n\n/// Every command of the driver.\npub(super) static COMMANDS: Commands = Commands::new(ROWS);\n"
     }
 }
 
@@ -85,12 +86,13 @@ pub(crate) fn write(
             #![allow(clippy::too_many_arguments, reason = \"Vulkan's signatures\")]
             #![allow(clippy::semicolon_if_nothing_returned, reason = \"functions return what their guards do\")]
 
-            use super::Gate::{{Core, DeviceExtension, InstanceExtension}};
-            use super::{{Command, Scope, table}};
-            use crate::entrypoints::command::record;
-            use crate::entrypoints::{{self, guard}};
-            use crate::error::Error;
-            use crate::{{handle, pointer}};
+            use super::lookup::Availability::{{Core, DeviceExtension, InstanceExtension}};
+            use super::lookup::{{Command, Commands, Scope, rows}};
+            use crate::abi::error::Error;
+            use crate::abi::guard::guard;
+            use crate::abi::handle;
+            use crate::abi::valid::{{self, OutputChain, Structures}};
+            use crate::command::buffer::record;
             use ash::vk;
 
 {}
@@ -117,6 +119,8 @@ fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>
             }
         }
     }
+    // Some commands come with several extensions, of which one is enough.
+    let mut extensions: Vec<(&'a str, &str, Vec<String>)> = Vec::new();
     for extension in support
         .extension
         .keys()
@@ -127,20 +131,25 @@ fn rows<'a>(registry: &'a Registry, support: &'a Support) -> Result<Vec<Row<'a>>
         } else {
             "DeviceExtension"
         };
-        for requirement in &extension.requirements {
-            if !support.meets(requirement.depends.as_deref()) {
-                continue;
-            }
-            for name in &requirement.commands {
-                if seen.insert(name) {
-                    rows.push(Row {
-                        name,
-                        gate: format!("{kind}(c\"{}\")", extension.name),
-                    });
-                }
+        let names = extension
+            .requirements
+            .iter()
+            .filter(|requirement| support.meets(requirement.depends.as_deref()))
+            .flat_map(|requirement| &requirement.commands)
+            .filter(|name| !seen.contains(name));
+        for name in names {
+            let by = format!("c\"{}\"", extension.name);
+            match extensions.iter_mut().find(|(known, ..)| known == name) {
+                Some((.., known)) if known.contains(&by) => {}
+                Some((.., known)) => known.push(by),
+                None => extensions.push((name, kind, vec![by])),
             }
         }
     }
+    rows.extend(extensions.into_iter().map(|(name, kind, by)| Row {
+        name,
+        gate: format!("{kind}(&[{}])", by.join(", ")),
+    }));
     Ok(rows)
 }
 
@@ -154,26 +163,19 @@ impl Writer<'_> {
             })?;
         let function = self.declarations.function(self.registry, row.name)?;
         let entry_point = names.iter().find_map(|name| self.entry_points.get(*name));
-        let implementation = match entry_point {
-            Some(entry_point) if entry_point.is_complete => {
-                format!("entrypoints::{}", entry_point.path)
-            }
-            _ => {
-                // The first of the names that is there.
-                let name = output
-                    .defined
-                    .iter()
-                    .find(|defined| names.contains(&defined.as_str()))
-                    .cloned();
-                match name {
-                    Some(name) => name,
-                    None => {
-                        let text = self.function(row.name, definition, function, entry_point)?;
-                        output.functions.push_str(&text);
-                        output.defined.insert(row.name.to_owned());
-                        row.name.to_owned()
-                    }
-                }
+        // The first of the names that is there.
+        let known = output
+            .defined
+            .iter()
+            .find(|defined| names.contains(&defined.as_str()))
+            .cloned();
+        let implementation = match known {
+            Some(name) => name,
+            None => {
+                let text = self.function(row.name, definition, function, entry_point)?;
+                output.functions.push_str(&text);
+                output.defined.insert(row.name.to_owned());
+                row.name.to_owned()
             }
         };
         let block = format!("{}, {}", scope(row.name, definition), row.gate);
@@ -212,8 +214,13 @@ impl Writer<'_> {
             .as_ref()
             .map_or_else(String::new, |output| format!("-> {output}"));
         let first = &function.parameters[0].name;
+        let visibility = if name == "vkGetInstanceProcAddr" {
+            "pub(crate) "
+        } else {
+            ""
+        };
         Ok(format!(
-            "unsafe extern \"system\" fn {name}({parameters}) {output} {{
+            "{visibility}unsafe extern \"system\" fn {name}({parameters}) {output} {{
                 guard({first}, \"{name}\", || {{ {body} }})
             }}
 
@@ -274,7 +281,7 @@ impl Writer<'_> {
             let element = element.trim_end_matches("< '_ >");
             let _ = writeln!(
                 lists,
-                "let {list} = pointer::slice({name}, {count})?.iter().map(|of| {element} {{
+                "let {list} = valid::slice({name}, {count})?.iter().map(|of| {element} {{
                     {converted} ..Default::default()
                 }});
                 let {list} = simdevice::host::collect({list});",
@@ -285,10 +292,10 @@ impl Writer<'_> {
         Ok(Some(format!(
             "// SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
             unsafe {{
-                record({first}, |recorder| {{
+                record({first}, \"{name}\", |recorder| {{
                     {lists}
                     let info = {ty} {{ {members} ..Default::default() }};
-                    entrypoints::{path}(recorder, &info)
+                    {path}(recorder, &info)
                 }})
             }}",
             first = function.parameters[0].name,
@@ -306,7 +313,11 @@ impl Writer<'_> {
     ) -> Result<String, Error> {
         let output = function.output.as_deref().unwrap_or("()");
         if self.support.commands.no_op.contains_key(name) {
-            return Ok("Ok(())".to_owned());
+            let value = match output {
+                "()" => "()",
+                _ => "vk::Result::SUCCESS",
+            };
+            return Ok(format!("Ok({value})"));
         }
         if self.support.commands.refused.contains_key(name) {
             let refusal = format!("Error::Unsupported {{ command: \"{name}\".to_owned() }}");
@@ -314,7 +325,7 @@ impl Writer<'_> {
             return Ok(if first.ty == "vk :: CommandBuffer" {
                 format!(
                     "// SAFETY: the application follows Vulkan's valid usage: the handle is live.
-                    unsafe {{ record({}, |_| Err({refusal})) }}",
+                    unsafe {{ record({}, \"{name}\", |_| Err({refusal})) }}",
                     first.name
                 )
             } else {
@@ -387,6 +398,10 @@ fn call(
             arguments.push("recorder".to_owned());
             continue;
         }
+        if plain(&parameter.ty) == "&Commands" {
+            arguments.push("&COMMANDS".to_owned());
+            continue;
+        }
         let index = function
             .parameters
             .iter()
@@ -401,28 +416,28 @@ fn call(
                 ))
             })?;
         let declared = &function.parameters[index];
-        let count = count_of(definition, function, index);
-        let (argument, converts) = convert(&parameter.ty, declared, count).ok_or_else(|| {
-            wrong(format!(
-                "{} of type {} is not made of {}",
-                parameter.name, parameter.ty, declared.ty
-            ))
-        })?;
+        let count = count(definition, function, index);
+        let (argument, converts) =
+            convert(&parameter.ty, declared, count.as_ref()).ok_or_else(|| {
+                wrong(format!(
+                    "{} of type {} is not made of {}",
+                    parameter.name, parameter.ty, declared.ty
+                ))
+            })?;
         is_unsafe |= converts;
         used.insert(declared.name.clone());
-        if let (Some(count), true) = (count, argument.contains("pointer::slice")) {
-            used.insert(count.name.clone());
+        if let Some(count) = count.filter(|count| argument.contains(&count.expression)) {
+            used.insert(count.parameter);
         }
         arguments.push(argument);
     }
-    let call = format!(
-        "entrypoints::{}({})",
-        entry_point.path,
-        arguments.join(", ")
-    );
+    let call = format!("{}({})", entry_point.path, arguments.join(", "));
     let body = if records {
         is_unsafe = true;
-        format!("record({}, |recorder| {call})", function.parameters[0].name)
+        format!(
+            "record({}, \"{name}\", |recorder| {call})",
+            function.parameters[0].name
+        )
     } else {
         let (body, writes) = write_output(&entry_point.output, function, used, call)
             .ok_or_else(|| wrong(format!("nothing takes a {}", entry_point.output)))?;
@@ -461,8 +476,41 @@ fn count_of<'a>(
     function.parameters.get(index)
 }
 
+/// The number of elements of a parameter.
+struct Count {
+    /// The parameter that has it.
+    parameter: String,
+    /// It, or the member of it, that is the number.
+    expression: String,
+    /// The number's type.
+    ty: String,
+}
+
+/// The number of elements of a parameter: another parameter, or a member of what one points at.
+fn count(definition: &registry::Command, function: &Function, index: usize) -> Option<Count> {
+    if let Some(count) = count_of(definition, function, index) {
+        return Some(Count {
+            parameter: count.name.clone(),
+            expression: count.name.clone(),
+            ty: plain(&count.ty),
+        });
+    }
+    let len = definition.parameters.get(index)?.len.as_deref()?;
+    let (parameter, member) = len.split_once("->")?;
+    let index = definition
+        .parameters
+        .iter()
+        .position(|p| p.name == parameter)?;
+    let parameter = function.parameters.get(index)?.name.clone();
+    Some(Count {
+        expression: format!("valid::input({parameter})?.{}", rust::snake_case(member)),
+        parameter,
+        ty: "u32".to_owned(),
+    })
+}
+
 /// A parameter in the form that a function wants; and if that is unsafe.
-fn convert(wanted: &str, declared: &Member, count: Option<&Member>) -> Option<(String, bool)> {
+fn convert(wanted: &str, declared: &Member, count: Option<&Count>) -> Option<(String, bool)> {
     let (wanted, raw, name) = (plain(wanted), plain(&declared.ty), &declared.name);
     if wanted == raw {
         return Some((name.clone(), false));
@@ -470,43 +518,55 @@ fn convert(wanted: &str, declared: &Member, count: Option<&Member>) -> Option<(S
     if wanted == "bool" && raw == "Bool32" {
         return Some((format!("{name} != vk::FALSE"), false));
     }
-    let conversion = if let Some(pointee) = wanted.strip_prefix('&')
-        && raw == format!("*const{pointee}")
-    {
-        format!("pointer::input({name})?")
-    } else if let Some(element) = wanted.strip_prefix("&[") {
-        let count = &count?.name;
-        let slice = format!("pointer::slice({name}, {count})?");
-        if element == "u8]" && raw == "*constc_void" {
-            format!("pointer::slice({name}.cast::<u8>(), {count})?")
-        } else if element.starts_with("Arc<") {
-            format!("&handle::get_all({slice})?")
-        } else if raw == format!("*const{}", element.trim_end_matches(']')) {
-            slice
+    let conversion = if let Some(pointee) = raw.strip_prefix("*mut") {
+        if wanted == format!("&mut{pointee}") {
+            format!("valid::output_structure({name})?")
+        } else if wanted == format!("OutputChain<,{pointee}>") {
+            format!("OutputChain::new({name})?")
+        } else if wanted == format!("Structures<,{pointee}>") {
+            format!("Structures::new({}, {name})?", count?.expression)
+        } else if let Some(element) = wanted.strip_prefix("&mut[MaybeUninit<") {
+            let Count { expression, ty, .. } = count?;
+            let cast = if ty == "usize" { "" } else { " as usize" };
+            let place = match (element, pointee) {
+                ("u8>]", "c_void") => format!("{name}.cast::<u8>()"),
+                _ if element == format!("{pointee}>]") => name.clone(),
+                _ => return None,
+            };
+            format!("valid::output_slice({place}, {expression}{cast})?")
         } else {
             return None;
         }
-    } else if let Some(element) = wanted.strip_prefix("Option<&[")
-        && raw == format!("*const{}", element.trim_end_matches("]>"))
-    {
-        let count = &count?.name;
-        format!("(!{name}.is_null()).then(|| pointer::slice({name}, {count})).transpose()?")
-    } else if wanted == "&CStr" && raw == "*constc_char" {
-        format!("pointer::string({name}).ok_or(Error::NullPointer {{ what: \"{name}\" }})?")
-    } else if wanted == "Option<&CStr>" && raw == "*constc_char" {
-        format!("pointer::string({name})")
-    } else if let Some(pointee) = wanted.strip_prefix("&mut")
-        && raw == format!("*mut{pointee}")
-    {
-        format!("pointer::output_structure({name})?")
-    } else if let Some(pointee) = wanted.strip_prefix("Option<&")
-        && raw == format!("*const{}", pointee.trim_end_matches('>'))
-    {
-        format!("pointer::optional({name})")
-    } else if raw.starts_with('*') {
-        return None;
-    } else if wanted.starts_with("Option<&") {
+    } else if let Some(pointee) = raw.strip_prefix("*const") {
+        if wanted == format!("&{pointee}") {
+            format!("valid::input({name})?")
+        } else if wanted == format!("Option<&{pointee}>") {
+            format!("valid::optional({name})")
+        } else if wanted == "&CStr" && pointee == "c_char" {
+            format!("valid::string({name}).ok_or(Error::NullPointer {{ what: \"{name}\" }})?")
+        } else if wanted == "Option<&CStr>" && pointee == "c_char" {
+            format!("valid::string({name})")
+        } else {
+            let count = &count?.expression;
+            let slice = format!("valid::slice({name}, {count})?");
+            if wanted == format!("&[{pointee}]") {
+                slice
+            } else if wanted == "&[u8]" && pointee == "c_void" {
+                format!("valid::slice({name}.cast::<u8>(), {count})?")
+            } else if wanted.starts_with("&[Arc<") {
+                format!("&handle::get_all({slice})?")
+            } else if wanted == format!("Option<&[{pointee}]>") {
+                format!("(!{name}.is_null()).then(|| valid::slice({name}, {count})).transpose()?")
+            } else {
+                return None;
+            }
+        }
+    } else if wanted.starts_with("Option<Arc<") {
+        format!("handle::destroy({name})?")
+    } else if wanted.starts_with("Option<&Arc<") {
         format!("handle::get_optional({name})?")
+    } else if wanted.starts_with("Option<&") {
+        format!("handle::get_optional({name})?.map(AsRef::as_ref)")
     } else if wanted.starts_with('&') {
         format!("handle::get({name})?")
     } else {
@@ -524,7 +584,16 @@ fn write_output(
 ) -> Option<(String, bool)> {
     let output = plain(output);
     let returned = function.output.as_deref().map(plain);
-    if output == "()" || output == "Result" || Some(&output) == returned.as_ref() {
+    // The body's value as the command's result.
+    let returns = |body: String, is_result: bool| match (returned.as_deref(), is_result) {
+        (Some("Result"), false) => format!("{body}.map(|()| vk::Result::SUCCESS)"),
+        (None, true) => format!("{body}.map(drop)"),
+        _ => body,
+    };
+    if output == "()" {
+        return Some((returns(call, false), false));
+    }
+    if output == "Result" || Some(&output) == returned.as_ref() {
         return Some((call, false));
     }
     let place = function.parameters.last()?;
@@ -533,21 +602,18 @@ fn write_output(
     used.insert(place.name.clone());
     let name = &place.name;
     if output == pointee {
-        return Some((format!("pointer::output({name}, {call}?)"), true));
+        let body = format!("valid::output({name}, {call}?)");
+        return Some((returns(body, false), true));
     }
     if output.starts_with("Arc<") {
-        return Some((
-            format!("pointer::output({name}, handle::create({call}?))"),
-            true,
-        ));
+        let body = format!("valid::output({name}, handle::create({call}?))");
+        return Some((returns(body, false), true));
     }
     if output == format!("Vec<{pointee}>") || output.starts_with(&format!("[{pointee};")) {
         let count = &function.parameters.iter().rev().nth(1)?.name;
         used.insert(count.clone());
-        return Some((
-            format!("pointer::enumerate({count}, {name}, &{call}?)"),
-            true,
-        ));
+        let body = format!("valid::enumerate({count}, {name}, &{call}?)");
+        return Some((returns(body, true), true));
     }
     None
 }

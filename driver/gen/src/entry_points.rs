@@ -1,22 +1,19 @@
-//! The driver's functions of Vulkan commands: those in `driver/src/entrypoints` with a `#[doc(alias = "vkCommand")]`.
+//! The driver's functions of Vulkan commands: those in `driver/src` with a `#[doc(alias = "vkCommand")]`.
 
 use crate::ash::{Member, type_text};
 use crate::error::Error;
 use crate::registry;
 use std::collections::BTreeMap;
-use std::path::Path;
-use syn::parse::{Parse, ParseStream};
+use std::path::{Path, PathBuf};
 
-/// The folder of the functions, and the module that it is.
-const FOLDER: &str = "driver/src/entrypoints";
+/// The folder of the driver's modules.
+const FOLDER: &str = "driver/src";
 
 /// A function of a command.
 #[derive(Debug)]
 pub(crate) struct EntryPoint {
-    /// Its path within the module of entry points.
+    /// Its path within the driver.
     pub(crate) path: String,
-    /// It has the command's own parameters, guards itself, and is called by Vulkan.
-    pub(crate) is_complete: bool,
     /// It is unsafe to call.
     pub(crate) is_unsafe: bool,
     /// Its parameters.
@@ -25,68 +22,31 @@ pub(crate) struct EntryPoint {
     pub(crate) output: String,
 }
 
-/// Functions in an invocation of `entry_points!`.
-struct Functions(Vec<syn::ItemFn>);
-
-impl Parse for Functions {
-    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
-        let mut functions = Vec::new();
-        while !input.is_empty() {
-            functions.push(input.parse()?);
-        }
-        Ok(Self(functions))
-    }
-}
-
 /// Finds all functions by the names of their commands.
 ///
 /// # Errors
 /// [`Error::EntryPoint`] where two have one command.
 pub(crate) fn find(root: &Path) -> Result<BTreeMap<String, EntryPoint>, Error> {
     let folder = root.join(FOLDER);
-    let failed = |source| Error::File {
-        path: folder.clone(),
-        source,
-    };
-    let mut files = std::fs::read_dir(&folder)
-        .map_err(failed)?
-        .map(|entry| entry.map(|entry| entry.path()))
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(failed)?;
-    files.retain(|path| path.extension().is_some_and(|extension| extension == "rs"));
-    files.sort();
     let mut found = BTreeMap::new();
-    for path in files {
+    for path in source_files(&folder)? {
         let text = registry::read(&path)?;
         let file = syn::parse_file(&text).map_err(|source| Error::Rust {
             path: path.clone(),
             source,
         })?;
-        let module = path.file_stem().unwrap_or_default().to_string_lossy();
+        let module = module(path.strip_prefix(&folder).unwrap_or(&path));
         for item in file.items {
-            let (functions, is_complete) = match item {
-                syn::Item::Fn(function) => (vec![function], false),
-                syn::Item::Macro(item) if is_entry_points(&item.mac.path) => {
-                    let functions =
-                        item.mac
-                            .parse_body::<Functions>()
-                            .map_err(|source| Error::Rust {
-                                path: path.clone(),
-                                source,
-                            })?;
-                    (functions.0, true)
-                }
-                _ => continue,
+            let syn::Item::Fn(function) = item else {
+                continue;
             };
-            for function in functions {
-                for command in commands(&function) {
-                    let entry_point = entry_point(&module, is_complete, &function);
-                    if let Some(other) = found.insert(command.clone(), entry_point) {
-                        return Err(Error::EntryPoint(format!(
-                            "{command} has two functions, one of them {}",
-                            other.path
-                        )));
-                    }
+            for command in commands(&function) {
+                let entry_point = entry_point(&module, &function);
+                if let Some(other) = found.insert(command.clone(), entry_point) {
+                    return Err(Error::EntryPoint(format!(
+                        "{command} has two functions, one of them {}",
+                        other.path
+                    )));
                 }
             }
         }
@@ -94,10 +54,35 @@ pub(crate) fn find(root: &Path) -> Result<BTreeMap<String, EntryPoint>, Error> {
     Ok(found)
 }
 
-fn is_entry_points(path: &syn::Path) -> bool {
-    path.segments
-        .last()
-        .is_some_and(|segment| segment.ident == "entry_points")
+/// The files of a folder and of those in it, in order.
+fn source_files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let failed = |source| Error::File {
+        path: folder.to_owned(),
+        source,
+    };
+    let mut entries = std::fs::read_dir(folder)
+        .map_err(failed)?
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(failed)?;
+    entries.sort();
+    let mut files = Vec::new();
+    for path in entries {
+        if path.is_dir() {
+            files.extend(source_files(&path)?);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    Ok(files)
+}
+
+/// The path of a file's module.
+fn module(path: &Path) -> String {
+    let path = path.with_extension("");
+    let names = path.iter().map(|name| name.to_string_lossy());
+    let names: Vec<_> = names.filter(|name| name != "mod").collect();
+    format!("crate::{}", names.join("::"))
 }
 
 /// The commands that a function says it is.
@@ -119,7 +104,7 @@ fn commands(function: &syn::ItemFn) -> Vec<String> {
     commands
 }
 
-fn entry_point(module: &str, is_complete: bool, function: &syn::ItemFn) -> EntryPoint {
+fn entry_point(module: &str, function: &syn::ItemFn) -> EntryPoint {
     let parameters = function
         .sig
         .inputs
@@ -137,7 +122,6 @@ fn entry_point(module: &str, is_complete: bool, function: &syn::ItemFn) -> Entry
         .collect();
     EntryPoint {
         path: format!("{module}::{}", function.sig.ident),
-        is_complete,
         is_unsafe: function.sig.unsafety.is_some(),
         parameters,
         output: match &function.sig.output {

@@ -54,7 +54,7 @@ pub enum Error {
     #[error("driver/support.toml: {0}")]
     Support(String),
     /// An entry point that contradicts the registry.
-    #[error("driver/src/entrypoints: {0}")]
+    #[error("driver/src: {0}")]
     EntryPoint(String),
     /// A thing of the registry that ash or gaurast doesn't declare.
     #[error("ash declares no {0}")]

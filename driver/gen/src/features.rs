@@ -128,7 +128,7 @@ pub(crate) fn write(
         );
         let _ = writeln!(
             reads,
-            "if let Some(requested) = pnext::cast::<{ty}>(structure) {{ {read} }}"
+            "if let Some(requested) = valid::cast::<{ty}>(structure) {{ {read} }}"
         );
         if let Some(extension) = chained.extension {
             let ty = ty.trim_end_matches("<'_>");
@@ -149,7 +149,7 @@ pub(crate) fn write(
     rust::file(
         "//! Features: those that this driver supports, and the structures in which Vulkan asks for them.",
         &format!(
-            "use crate::pnext;
+            "use crate::abi::valid;
             use ash::vk::{{self, TaggedStructure}};
             use std::ffi::CStr;
 
@@ -176,7 +176,7 @@ pub(crate) fn write(
                 pub(crate) fn add_core(&mut self, requested: &vk::PhysicalDeviceFeatures) {{ {core_in} }}
 
                 /// Writes the features to a structure of a chain, if it holds any that are known here.
-                pub(crate) fn write(&self, mut structure: pnext::Output<'_>) {{ {writes} }}
+                pub(crate) fn write(&self, mut structure: valid::ChainedOutput<'_>) {{ {writes} }}
 
                 /// Adds the features that a structure of a chain requests, if it holds any that are known here.
                 pub(crate) fn add(&mut self, structure: &vk::BaseInStructure<'_>) {{ {reads} }}

@@ -159,7 +159,7 @@ pub(crate) fn write(
     rust::file(
         "//! Properties and limits, and the structures in which Vulkan asks for them.",
         &format!(
-            "use crate::pnext;
+            "use crate::abi::valid;
             use ash::vk;
 
             /// Properties, each once, whatever structures hold it.
@@ -181,7 +181,7 @@ pub(crate) fn write(
                 }}
 
                 /// Writes the properties to a structure of a chain, if it holds any that are known here.
-                pub(crate) fn write(&self, mut structure: pnext::Output<'_>) {{ {writes} }}
+                pub(crate) fn write(&self, mut structure: valid::ChainedOutput<'_>) {{ {writes} }}
             }}
             ",
             core = literal(&core),

@@ -40,3 +40,15 @@ pub(crate) fn format(source: &str) -> Result<String, Error> {
     }
     String::from_utf8(output.stdout).map_err(|error| failed(error.to_string()))
 }
+
+/// A name of the registry as Rust has it: `descriptor_set_count` for `descriptorSetCount`.
+pub(crate) fn snake_case(name: &str) -> String {
+    let mut text = String::new();
+    for letter in name.chars() {
+        if letter.is_ascii_uppercase() {
+            text.push('_');
+        }
+        text.push(letter.to_ascii_lowercase());
+    }
+    text
+}

@@ -47,7 +47,7 @@ pub(crate) fn write(
         for enable in enables {
             match known.enable(enable)? {
                 Some(row) => rows.push(row),
-                // The core version or a listed extension is enough.
+                // The core version is enough.
                 None => {
                     rows.clear();
                     break;
@@ -71,6 +71,7 @@ pub(crate) fn write(
             use crate::registry::properties::Properties;
             use ash::vk;
             use spirv::Capability;
+            use std::ffi::CStr;
 
             /// A thing that enables a capability.
             #[derive(Clone, Copy, Debug)]
@@ -79,12 +80,14 @@ pub(crate) fn write(
                 Feature(&'static str, fn(&Features) -> bool),
                 /// A value of a property, by the property's name in Rust.
                 Property(&'static str, fn(&Properties) -> bool),
+                /// An extension of devices.
+                Extension(&'static CStr),
                 /// A feature, property, extension or version that this driver doesn't have.
                 Absent(&'static str),
             }}
 
-            /// The things of which one enables a capability. There are none where the core version, or an extension
-            /// that is listed, is enough; nor for capabilities that Vulkan doesn't know.
+            /// The things of which one enables a capability. There are none where the core version is enough, nor for
+            /// capabilities that Vulkan doesn't know.
             pub(crate) fn enables(capability: Capability) -> &'static [Enable] {{
                 match capability {{ {arms} _ => &[] }}
             }}
@@ -98,7 +101,9 @@ impl Known<'_> {
     fn enable(&self, enable: &Enable) -> Result<Option<String>, Error> {
         Ok(match enable {
             Enable::Version(name) if self.support.has(name) => None,
-            Enable::Extension(name) if self.support.has(name) => None,
+            Enable::Extension(name) if self.support.has(name) => {
+                Some(format!("Enable::Extension(c\"{name}\")"))
+            }
             Enable::Version(name) | Enable::Extension(name) => Some(absent(name)),
             Enable::Feature(feature) => Some(self.feature(feature)),
             Enable::Property(property) => Some(self.property(property)?),

@@ -213,3 +213,74 @@ impl Decoder<'_> {
         kinds.iter().try_for_each(|kind| self.operand(*kind))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Decodes instructions without a header: each an opcode and operands.
+    fn decoded(instructions: &[(u32, &[u32])]) -> Result<Vec<Instruction>, String> {
+        let mut words = vec![0; HEADER_WORDS];
+        for (opcode, operands) in instructions {
+            words.push((operands.len() as u32 + 1) << 16 | opcode);
+            words.extend_from_slice(operands);
+        }
+        let mut all = Vec::new();
+        let done = decode(&words, |it| {
+            all.push(it);
+            Ok(())
+        });
+        done.map(|()| all).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn operands_are_as_the_grammar_says() {
+        let float = (Op::TypeFloat as u32, [7, 64]);
+        let all = decoded(&[
+            (float.0, &float.1),
+            (Op::Constant as u32, &[7, 8, 1, 2]),
+            (Op::Decorate as u32, &[8, 11, 6]),
+            (Op::Load as u32, &[7, 9, 8, 2, 16]),
+        ])
+        .unwrap();
+        assert_eq!(all[1].operands, [Operand::Literal64(2 << 32 | 1)]);
+        assert_eq!((all[1].result_type, all[1].result_id), (Some(7), Some(8)));
+        let built_in = [
+            Operand::Id(8),
+            Operand::Enumerant(11),
+            Operand::Enumerant(6),
+        ];
+        assert_eq!(all[2].operands, built_in);
+        // The alignment that a bit of the mask asks for.
+        let aligned = [Operand::Id(8), Operand::Enumerant(2), Operand::Literal(16)];
+        assert_eq!(all[3].operands, aligned);
+    }
+
+    #[test]
+    fn errors_name_the_word_and_the_instruction() {
+        let refused = |opcode: u32, operands: &[u32]| decoded(&[(opcode, operands)]).unwrap_err();
+        let name = Op::Name as u32;
+        for (found, expected) in [
+            (refused(0xffff, &[]), "word 5: there is no opcode 65535"),
+            (
+                refused(Op::MemoryModel as u32, &[0]),
+                "word 7: OpMemoryModel: an operand is missing",
+            ),
+            (
+                refused(Op::Nop as u32, &[1]),
+                "word 6: OpNop: there are more operands than the instruction takes",
+            ),
+            (
+                refused(Op::Capability as u32, &[9999]),
+                "word 6: OpCapability: Capability has no 9999",
+            ),
+            (
+                refused(name, &[1, 0x6161_6161]),
+                "word 8: OpName: an operand is missing",
+            ),
+        ] {
+            assert_eq!(found, format!("not SPIR-V: {expected}"));
+        }
+        assert!(refused(name, &[1, 0x00ff]).contains("invalid utf-8"));
+    }
+}

@@ -1,10 +1,244 @@
-//! Command buffers' contents: what recording leaves, and how a queue turns it into packets.
+//! Command buffers' contents: plain data that recording leaves and that a queue replays as packets.
 //!
-//! [`record`] is plain data. [`replay`] walks it through one exhaustive match, with the bound [`state`] that
-//! draws need, and hands packets to the device's command processor.
+//! Everything that the application passed by pointer has been copied, and every object that a command names is held by
+//! [`Arc`]. [`buffer`] has command buffers and their [`Recorder`](buffer::Recorder), the other modules the commands, chapter
+//! by chapter; [`replay`] walks a recording through one exhaustive match, with the bound state that draws need, and
+//! [`submit`] has queues do that.
 
-pub(crate) mod bound;
-pub(crate) mod record;
-pub(crate) mod recorder;
-pub(crate) mod replay;
-pub(crate) mod state;
+pub(crate) mod bind;
+pub(crate) mod buffer;
+pub(crate) mod camera;
+pub(crate) mod draw;
+pub(crate) mod dynamic_state;
+pub(crate) mod query;
+pub(crate) mod render_pass;
+mod render_scope;
+mod replay;
+pub(crate) mod submit;
+pub(crate) mod sync;
+pub(crate) mod transfer;
+
+use crate::abi::error::Error;
+use crate::descriptor::layout::DescriptorSetLayout;
+use crate::descriptor::set::{Descriptor, DescriptorSet, Write};
+use crate::pipeline::GraphicsPipeline;
+use crate::pipeline::compute::ComputePipeline;
+use crate::pipeline::dynamic_state::DynamicState;
+use crate::query_pool::QueryPool;
+use crate::sync::Event;
+use ash::vk;
+use simdevice::Packet;
+use simdevice::packet::{BufferRange, Camera, Rect, Viewport};
+use std::sync::Arc;
+
+/// A recorded command.
+#[derive(Clone, Debug)]
+pub(crate) enum Command {
+    /// A command whose meaning depends on no bound state, already a packet: copies, clears, barriers, the
+    /// beginning and end of passes, queries.
+    Packet(Packet),
+    /// `vkCmdBindPipeline` at the graphics bind point.
+    BindPipeline(Arc<GraphicsPipeline>),
+    /// `vkCmdBindVertexBuffers` and `vkCmdBindVertexBuffers2`.
+    BindVertexBuffers {
+        /// The first binding.
+        first: u32,
+        /// One for each binding.
+        buffers: Vec<VertexBuffer>,
+    },
+    /// `vkCmdBindIndexBuffer`.
+    BindIndexBuffer(IndexBuffer),
+    /// `vkCmdSetViewport` and `vkCmdSetViewportWithCount`.
+    SetViewports {
+        /// The first viewport.
+        first: u32,
+        /// One for each viewport.
+        viewports: Vec<Viewport>,
+        /// True if there are no more than these.
+        with_count: bool,
+    },
+    /// `vkCmdSetScissor` and `vkCmdSetScissorWithCount`.
+    SetScissors {
+        /// The first scissor.
+        first: u32,
+        /// One for each viewport.
+        scissors: Vec<Rect>,
+        /// True if there are no more than these.
+        with_count: bool,
+    },
+    /// Any other `vkCmdSet...` of fixed-function state.
+    SetDynamicState(DynamicState),
+    /// `vkCmdSetGaussianCameraGAURAST`.
+    SetCamera(Box<Camera>),
+    /// `vkCmdDraw` and `vkCmdDrawIndexed`.
+    Draw(DrawParameters),
+    /// `vkCmdDrawIndirect`, `vkCmdDrawIndexedIndirect` and their forms with a count: the draws are read when they
+    /// execute.
+    DrawIndirect(DrawIndirect),
+    /// `vkCmdBindPipeline` at the compute bind point.
+    BindComputePipeline(Arc<ComputePipeline>),
+    /// `vkCmdBindDescriptorSets`.
+    BindSets(Box<BindSets>),
+    /// `vkCmdPushDescriptorSetKHR` and its form with a template.
+    PushDescriptors(Box<PushDescriptors>),
+    /// `vkCmdPushConstants`. Whatever stages they are for, they have one memory.
+    PushConstants {
+        /// The first byte.
+        offset: u32,
+        /// The bytes.
+        bytes: Box<[u8]>,
+    },
+    /// `vkCmdDispatch` and `vkCmdDispatchBase`.
+    Dispatch {
+        /// The first workgroup in x, y and z.
+        base: [u32; 3],
+        /// The number of workgroups in x, y and z.
+        count: [u32; 3],
+    },
+    /// `vkCmdDispatchIndirect`: the workgroups are counted when it executes.
+    DispatchIndirect(BufferRange),
+    /// `vkCmdSetEvent` (true) and `vkCmdResetEvent` (false).
+    SetEvent(Arc<Event>, bool),
+    /// `vkCmdWaitEvents`.
+    WaitEvents(Vec<Arc<Event>>),
+    /// `vkCmdCopyQueryPoolResults`: the results are read when it executes.
+    CopyQueryResults(CopyQueryResults),
+    /// `vkCmdExecuteCommands`: what the secondary command buffers held when this was recorded.
+    Execute(Vec<Arc<Vec<Command>>>),
+}
+
+/// Descriptor sets to be bound.
+#[derive(Clone, Debug)]
+pub(crate) struct BindSets {
+    /// Where.
+    pub(crate) bind_point: BindPoint,
+    /// The first set's number.
+    pub(crate) first: u32,
+    /// The sets.
+    pub(crate) sets: Vec<BoundSet>,
+}
+
+/// Descriptors that are pushed.
+#[derive(Clone, Debug)]
+pub(crate) struct PushDescriptors {
+    /// Where.
+    pub(crate) bind_point: BindPoint,
+    /// The set's number.
+    pub(crate) set: u32,
+    /// The set's layout.
+    pub(crate) layout: Arc<DescriptorSetLayout>,
+    /// The changes.
+    pub(crate) writes: Vec<Write>,
+}
+
+/// A vertex buffer binding.
+#[derive(Clone, Debug)]
+pub(crate) struct VertexBuffer {
+    /// The bytes that vertices are read from.
+    pub(crate) range: BufferRange,
+    /// The stride, where `vkCmdBindVertexBuffers2` gave one.
+    pub(crate) stride: Option<u32>,
+}
+
+/// An index buffer binding.
+#[derive(Clone, Debug)]
+pub(crate) struct IndexBuffer {
+    /// The bytes that indices are read from.
+    pub(crate) range: BufferRange,
+    /// Bytes per index: 1, 2 or 4.
+    pub(crate) index_size: u32,
+}
+
+/// A draw's parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct DrawParameters {
+    /// The value added to each index, or `None` for a draw without an index buffer.
+    pub(crate) vertex_offset: Option<i32>,
+    /// The first vertex or index.
+    pub(crate) first: u32,
+    /// The number of vertices or indices.
+    pub(crate) count: u32,
+    /// The first instance.
+    pub(crate) first_instance: u32,
+    /// The number of instances.
+    pub(crate) instance_count: u32,
+}
+
+/// Draws whose parameters lie in a buffer.
+#[derive(Clone, Debug)]
+pub(crate) struct DrawIndirect {
+    /// The bytes from the first draw's parameters to the end of the buffer.
+    pub(crate) parameters: BufferRange,
+    /// The number of draws, at most.
+    pub(crate) draw_count: u32,
+    /// The four bytes that the number of draws is read from, if it lies in a buffer.
+    pub(crate) count: Option<BufferRange>,
+    /// Bytes from one draw's parameters to the next.
+    pub(crate) stride: u32,
+    /// True if they are those of indexed draws.
+    pub(crate) indexed: bool,
+}
+
+/// A copy of query results to a buffer.
+#[derive(Clone, Debug)]
+pub(crate) struct CopyQueryResults {
+    /// The pool.
+    pub(crate) pool: Arc<QueryPool>,
+    /// The first query.
+    pub(crate) first: u32,
+    /// The number of queries.
+    pub(crate) count: u32,
+    /// The bytes from the first one written to the end of the buffer.
+    pub(crate) target: BufferRange,
+    /// Bytes from one query's results to the next.
+    pub(crate) stride: u64,
+    /// The flags: what is written for each query, and whether the copy waits for it.
+    pub(crate) flags: vk::QueryResultFlags,
+}
+
+/// A bind point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BindPoint {
+    /// Draws.
+    Graphics,
+    /// Dispatches.
+    Compute,
+}
+
+impl BindPoint {
+    /// Vulkan's bind point.
+    ///
+    /// # Errors
+    /// [`Error::FeatureNotPresent`] for those of extensions.
+    pub(crate) fn from_vk(bind_point: vk::PipelineBindPoint) -> Result<Self, Error> {
+        match bind_point {
+            vk::PipelineBindPoint::GRAPHICS => Ok(Self::Graphics),
+            vk::PipelineBindPoint::COMPUTE => Ok(Self::Compute),
+            other => Err(Error::FeatureNotPresent(format!("bind point {other:?}"))),
+        }
+    }
+}
+
+/// A descriptor set as it is bound.
+#[derive(Clone, Debug)]
+pub(crate) struct BoundSet {
+    /// The set; read when a command uses it.
+    pub(crate) set: Arc<DescriptorSet>,
+    /// As many as the set's layout wants.
+    pub(crate) dynamic_offsets: Vec<u32>,
+}
+
+impl BoundSet {
+    /// The bytes of the uniform or storage buffer that the first descriptor of a binding holds.
+    pub(crate) fn buffer(&self, binding: u32) -> Option<BufferRange> {
+        let binding = self.set.layout().binding(binding)?;
+        let held = self.set.lock();
+        let Descriptor::Buffer(descriptor) = held.get(binding.first)? else {
+            return None;
+        };
+        let offset = binding
+            .first_dynamic
+            .and_then(|index| self.dynamic_offsets.get(index));
+        Some(descriptor.range(offset.copied().unwrap_or(0)))
+    }
+}

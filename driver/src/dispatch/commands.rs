@@ -10,82 +10,83 @@
     reason = "functions return what their guards do"
 )]
 
-use super::Gate::{Core, DeviceExtension, InstanceExtension};
-use super::{Command, Scope, table};
-use crate::entrypoints::command::record;
-use crate::entrypoints::{self, guard};
-use crate::error::Error;
-use crate::{handle, pointer};
+use super::lookup::Availability::{Core, DeviceExtension, InstanceExtension};
+use super::lookup::{Command, Commands, Scope, rows};
+use crate::abi::error::Error;
+use crate::abi::guard::guard;
+use crate::abi::handle;
+use crate::abi::valid::{self, OutputChain, Structures};
+use crate::command::buffer::record;
 use ash::vk;
 
-table! {
+static ROWS: &[Command] = rows! {
     Global, Core(vk::API_VERSION_1_0) => {
-        vkCreateInstance: vk::PFN_vkCreateInstance = entrypoints::instance::create_instance;
-        vkGetInstanceProcAddr: vk::PFN_vkGetInstanceProcAddr = entrypoints::instance::get_instance_proc_addr;
-        vkEnumerateInstanceExtensionProperties: vk::PFN_vkEnumerateInstanceExtensionProperties = entrypoints::instance::enumerate_instance_extension_properties;
-        vkEnumerateInstanceLayerProperties: vk::PFN_vkEnumerateInstanceLayerProperties = entrypoints::instance::enumerate_instance_layer_properties;
+        vkCreateInstance: vk::PFN_vkCreateInstance = vkCreateInstance;
+        vkGetInstanceProcAddr: vk::PFN_vkGetInstanceProcAddr = vkGetInstanceProcAddr;
+        vkEnumerateInstanceExtensionProperties: vk::PFN_vkEnumerateInstanceExtensionProperties = vkEnumerateInstanceExtensionProperties;
+        vkEnumerateInstanceLayerProperties: vk::PFN_vkEnumerateInstanceLayerProperties = vkEnumerateInstanceLayerProperties;
     }
     Instance, Core(vk::API_VERSION_1_0) => {
         vkDestroyInstance: vk::PFN_vkDestroyInstance = vkDestroyInstance;
-        vkEnumeratePhysicalDevices: vk::PFN_vkEnumeratePhysicalDevices = entrypoints::instance::enumerate_physical_devices;
+        vkEnumeratePhysicalDevices: vk::PFN_vkEnumeratePhysicalDevices = vkEnumeratePhysicalDevices;
     }
     PhysicalDevice, Core(vk::API_VERSION_1_0) => {
-        vkGetPhysicalDeviceFeatures: vk::PFN_vkGetPhysicalDeviceFeatures = entrypoints::physical_device::get_physical_device_features;
-        vkGetPhysicalDeviceFormatProperties: vk::PFN_vkGetPhysicalDeviceFormatProperties = entrypoints::physical_device::get_physical_device_format_properties;
-        vkGetPhysicalDeviceImageFormatProperties: vk::PFN_vkGetPhysicalDeviceImageFormatProperties = entrypoints::physical_device::get_physical_device_image_format_properties;
-        vkGetPhysicalDeviceProperties: vk::PFN_vkGetPhysicalDeviceProperties = entrypoints::physical_device::get_physical_device_properties;
-        vkGetPhysicalDeviceQueueFamilyProperties: vk::PFN_vkGetPhysicalDeviceQueueFamilyProperties = entrypoints::physical_device::get_physical_device_queue_family_properties;
-        vkGetPhysicalDeviceMemoryProperties: vk::PFN_vkGetPhysicalDeviceMemoryProperties = entrypoints::physical_device::get_physical_device_memory_properties;
-        vkCreateDevice: vk::PFN_vkCreateDevice = entrypoints::device::create_device;
-        vkEnumerateDeviceExtensionProperties: vk::PFN_vkEnumerateDeviceExtensionProperties = entrypoints::physical_device::enumerate_device_extension_properties;
-        vkEnumerateDeviceLayerProperties: vk::PFN_vkEnumerateDeviceLayerProperties = entrypoints::physical_device::enumerate_device_layer_properties;
-        vkGetPhysicalDeviceSparseImageFormatProperties: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties = entrypoints::physical_device::get_physical_device_sparse_image_format_properties;
+        vkGetPhysicalDeviceFeatures: vk::PFN_vkGetPhysicalDeviceFeatures = vkGetPhysicalDeviceFeatures;
+        vkGetPhysicalDeviceFormatProperties: vk::PFN_vkGetPhysicalDeviceFormatProperties = vkGetPhysicalDeviceFormatProperties;
+        vkGetPhysicalDeviceImageFormatProperties: vk::PFN_vkGetPhysicalDeviceImageFormatProperties = vkGetPhysicalDeviceImageFormatProperties;
+        vkGetPhysicalDeviceProperties: vk::PFN_vkGetPhysicalDeviceProperties = vkGetPhysicalDeviceProperties;
+        vkGetPhysicalDeviceQueueFamilyProperties: vk::PFN_vkGetPhysicalDeviceQueueFamilyProperties = vkGetPhysicalDeviceQueueFamilyProperties;
+        vkGetPhysicalDeviceMemoryProperties: vk::PFN_vkGetPhysicalDeviceMemoryProperties = vkGetPhysicalDeviceMemoryProperties;
+        vkCreateDevice: vk::PFN_vkCreateDevice = vkCreateDevice;
+        vkEnumerateDeviceExtensionProperties: vk::PFN_vkEnumerateDeviceExtensionProperties = vkEnumerateDeviceExtensionProperties;
+        vkEnumerateDeviceLayerProperties: vk::PFN_vkEnumerateDeviceLayerProperties = vkEnumerateDeviceLayerProperties;
+        vkGetPhysicalDeviceSparseImageFormatProperties: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties = vkGetPhysicalDeviceSparseImageFormatProperties;
     }
     Device, Core(vk::API_VERSION_1_0) => {
-        vkGetDeviceProcAddr: vk::PFN_vkGetDeviceProcAddr = entrypoints::device::get_device_proc_addr;
-        vkDestroyDevice: vk::PFN_vkDestroyDevice = entrypoints::device::destroy_device;
-        vkGetDeviceQueue: vk::PFN_vkGetDeviceQueue = entrypoints::device::get_device_queue;
-        vkQueueSubmit: vk::PFN_vkQueueSubmit = entrypoints::queue::queue_submit;
-        vkQueueWaitIdle: vk::PFN_vkQueueWaitIdle = entrypoints::queue::queue_wait_idle;
-        vkDeviceWaitIdle: vk::PFN_vkDeviceWaitIdle = entrypoints::queue::device_wait_idle;
-        vkAllocateMemory: vk::PFN_vkAllocateMemory = entrypoints::memory::allocate_memory;
+        vkGetDeviceProcAddr: vk::PFN_vkGetDeviceProcAddr = vkGetDeviceProcAddr;
+        vkDestroyDevice: vk::PFN_vkDestroyDevice = vkDestroyDevice;
+        vkGetDeviceQueue: vk::PFN_vkGetDeviceQueue = vkGetDeviceQueue;
+        vkQueueSubmit: vk::PFN_vkQueueSubmit = vkQueueSubmit;
+        vkQueueWaitIdle: vk::PFN_vkQueueWaitIdle = vkQueueWaitIdle;
+        vkDeviceWaitIdle: vk::PFN_vkDeviceWaitIdle = vkDeviceWaitIdle;
+        vkAllocateMemory: vk::PFN_vkAllocateMemory = vkAllocateMemory;
         vkFreeMemory: vk::PFN_vkFreeMemory = vkFreeMemory;
-        vkMapMemory: vk::PFN_vkMapMemory = entrypoints::memory::map_memory;
-        vkUnmapMemory: vk::PFN_vkUnmapMemory = entrypoints::memory::unmap_memory;
-        vkFlushMappedMemoryRanges: vk::PFN_vkFlushMappedMemoryRanges = entrypoints::memory::flush_mapped_memory_ranges;
-        vkInvalidateMappedMemoryRanges: vk::PFN_vkInvalidateMappedMemoryRanges = entrypoints::memory::invalidate_mapped_memory_ranges;
-        vkGetDeviceMemoryCommitment: vk::PFN_vkGetDeviceMemoryCommitment = entrypoints::memory::get_device_memory_commitment;
-        vkBindBufferMemory: vk::PFN_vkBindBufferMemory = entrypoints::memory::bind_buffer_memory;
-        vkBindImageMemory: vk::PFN_vkBindImageMemory = entrypoints::memory::bind_image_memory;
-        vkGetBufferMemoryRequirements: vk::PFN_vkGetBufferMemoryRequirements = entrypoints::buffer::get_buffer_memory_requirements;
-        vkGetImageMemoryRequirements: vk::PFN_vkGetImageMemoryRequirements = entrypoints::image::get_image_memory_requirements;
-        vkGetImageSparseMemoryRequirements: vk::PFN_vkGetImageSparseMemoryRequirements = entrypoints::image::get_image_sparse_memory_requirements;
+        vkMapMemory: vk::PFN_vkMapMemory = vkMapMemory;
+        vkUnmapMemory: vk::PFN_vkUnmapMemory = vkUnmapMemory;
+        vkFlushMappedMemoryRanges: vk::PFN_vkFlushMappedMemoryRanges = vkFlushMappedMemoryRanges;
+        vkInvalidateMappedMemoryRanges: vk::PFN_vkInvalidateMappedMemoryRanges = vkInvalidateMappedMemoryRanges;
+        vkGetDeviceMemoryCommitment: vk::PFN_vkGetDeviceMemoryCommitment = vkGetDeviceMemoryCommitment;
+        vkBindBufferMemory: vk::PFN_vkBindBufferMemory = vkBindBufferMemory;
+        vkBindImageMemory: vk::PFN_vkBindImageMemory = vkBindImageMemory;
+        vkGetBufferMemoryRequirements: vk::PFN_vkGetBufferMemoryRequirements = vkGetBufferMemoryRequirements;
+        vkGetImageMemoryRequirements: vk::PFN_vkGetImageMemoryRequirements = vkGetImageMemoryRequirements;
+        vkGetImageSparseMemoryRequirements: vk::PFN_vkGetImageSparseMemoryRequirements = vkGetImageSparseMemoryRequirements;
         vkQueueBindSparse: vk::PFN_vkQueueBindSparse = vkQueueBindSparse;
-        vkCreateFence: vk::PFN_vkCreateFence = entrypoints::sync::create_fence;
+        vkCreateFence: vk::PFN_vkCreateFence = vkCreateFence;
         vkDestroyFence: vk::PFN_vkDestroyFence = vkDestroyFence;
-        vkResetFences: vk::PFN_vkResetFences = entrypoints::sync::reset_fences;
-        vkGetFenceStatus: vk::PFN_vkGetFenceStatus = entrypoints::sync::get_fence_status;
-        vkWaitForFences: vk::PFN_vkWaitForFences = entrypoints::sync::wait_for_fences;
-        vkCreateSemaphore: vk::PFN_vkCreateSemaphore = entrypoints::sync::create_semaphore;
+        vkResetFences: vk::PFN_vkResetFences = vkResetFences;
+        vkGetFenceStatus: vk::PFN_vkGetFenceStatus = vkGetFenceStatus;
+        vkWaitForFences: vk::PFN_vkWaitForFences = vkWaitForFences;
+        vkCreateSemaphore: vk::PFN_vkCreateSemaphore = vkCreateSemaphore;
         vkDestroySemaphore: vk::PFN_vkDestroySemaphore = vkDestroySemaphore;
-        vkCreateQueryPool: vk::PFN_vkCreateQueryPool = entrypoints::query::create_query_pool;
+        vkCreateQueryPool: vk::PFN_vkCreateQueryPool = vkCreateQueryPool;
         vkDestroyQueryPool: vk::PFN_vkDestroyQueryPool = vkDestroyQueryPool;
-        vkGetQueryPoolResults: vk::PFN_vkGetQueryPoolResults = entrypoints::query::get_query_pool_results;
-        vkCreateBuffer: vk::PFN_vkCreateBuffer = entrypoints::buffer::create_buffer;
+        vkGetQueryPoolResults: vk::PFN_vkGetQueryPoolResults = vkGetQueryPoolResults;
+        vkCreateBuffer: vk::PFN_vkCreateBuffer = vkCreateBuffer;
         vkDestroyBuffer: vk::PFN_vkDestroyBuffer = vkDestroyBuffer;
-        vkCreateImage: vk::PFN_vkCreateImage = entrypoints::image::create_image;
+        vkCreateImage: vk::PFN_vkCreateImage = vkCreateImage;
         vkDestroyImage: vk::PFN_vkDestroyImage = vkDestroyImage;
-        vkGetImageSubresourceLayout: vk::PFN_vkGetImageSubresourceLayout = entrypoints::image::get_image_subresource_layout;
-        vkCreateImageView: vk::PFN_vkCreateImageView = entrypoints::image::create_image_view;
+        vkGetImageSubresourceLayout: vk::PFN_vkGetImageSubresourceLayout = vkGetImageSubresourceLayout;
+        vkCreateImageView: vk::PFN_vkCreateImageView = vkCreateImageView;
         vkDestroyImageView: vk::PFN_vkDestroyImageView = vkDestroyImageView;
-        vkCreateCommandPool: vk::PFN_vkCreateCommandPool = entrypoints::command_buffer::create_command_pool;
-        vkDestroyCommandPool: vk::PFN_vkDestroyCommandPool = entrypoints::command_buffer::destroy_command_pool;
-        vkResetCommandPool: vk::PFN_vkResetCommandPool = entrypoints::command_buffer::reset_command_pool;
-        vkAllocateCommandBuffers: vk::PFN_vkAllocateCommandBuffers = entrypoints::command_buffer::allocate_command_buffers;
-        vkFreeCommandBuffers: vk::PFN_vkFreeCommandBuffers = entrypoints::command_buffer::free_command_buffers;
-        vkBeginCommandBuffer: vk::PFN_vkBeginCommandBuffer = entrypoints::command_buffer::begin_command_buffer;
-        vkEndCommandBuffer: vk::PFN_vkEndCommandBuffer = entrypoints::command_buffer::end_command_buffer;
-        vkResetCommandBuffer: vk::PFN_vkResetCommandBuffer = entrypoints::command_buffer::reset_command_buffer;
+        vkCreateCommandPool: vk::PFN_vkCreateCommandPool = vkCreateCommandPool;
+        vkDestroyCommandPool: vk::PFN_vkDestroyCommandPool = vkDestroyCommandPool;
+        vkResetCommandPool: vk::PFN_vkResetCommandPool = vkResetCommandPool;
+        vkAllocateCommandBuffers: vk::PFN_vkAllocateCommandBuffers = vkAllocateCommandBuffers;
+        vkFreeCommandBuffers: vk::PFN_vkFreeCommandBuffers = vkFreeCommandBuffers;
+        vkBeginCommandBuffer: vk::PFN_vkBeginCommandBuffer = vkBeginCommandBuffer;
+        vkEndCommandBuffer: vk::PFN_vkEndCommandBuffer = vkEndCommandBuffer;
+        vkResetCommandBuffer: vk::PFN_vkResetCommandBuffer = vkResetCommandBuffer;
         vkCmdCopyBuffer: vk::PFN_vkCmdCopyBuffer = vkCmdCopyBuffer;
         vkCmdCopyImage: vk::PFN_vkCmdCopyImage = vkCmdCopyImage;
         vkCmdCopyBufferToImage: vk::PFN_vkCmdCopyBufferToImage = vkCmdCopyBufferToImage;
@@ -98,34 +99,34 @@ table! {
         vkCmdResetQueryPool: vk::PFN_vkCmdResetQueryPool = vkCmdResetQueryPool;
         vkCmdWriteTimestamp: vk::PFN_vkCmdWriteTimestamp = vkCmdWriteTimestamp;
         vkCmdCopyQueryPoolResults: vk::PFN_vkCmdCopyQueryPoolResults = vkCmdCopyQueryPoolResults;
-        vkCmdExecuteCommands: vk::PFN_vkCmdExecuteCommands = entrypoints::command::cmd_execute_commands;
-        vkCreateEvent: vk::PFN_vkCreateEvent = entrypoints::sync::create_event;
+        vkCmdExecuteCommands: vk::PFN_vkCmdExecuteCommands = vkCmdExecuteCommands;
+        vkCreateEvent: vk::PFN_vkCreateEvent = vkCreateEvent;
         vkDestroyEvent: vk::PFN_vkDestroyEvent = vkDestroyEvent;
-        vkGetEventStatus: vk::PFN_vkGetEventStatus = entrypoints::sync::get_event_status;
-        vkSetEvent: vk::PFN_vkSetEvent = entrypoints::sync::set_event;
-        vkResetEvent: vk::PFN_vkResetEvent = entrypoints::sync::reset_event;
-        vkCreateBufferView: vk::PFN_vkCreateBufferView = entrypoints::buffer_view::create_buffer_view;
+        vkGetEventStatus: vk::PFN_vkGetEventStatus = vkGetEventStatus;
+        vkSetEvent: vk::PFN_vkSetEvent = vkSetEvent;
+        vkResetEvent: vk::PFN_vkResetEvent = vkResetEvent;
+        vkCreateBufferView: vk::PFN_vkCreateBufferView = vkCreateBufferView;
         vkDestroyBufferView: vk::PFN_vkDestroyBufferView = vkDestroyBufferView;
-        vkCreateShaderModule: vk::PFN_vkCreateShaderModule = entrypoints::pipeline::create_shader_module;
+        vkCreateShaderModule: vk::PFN_vkCreateShaderModule = vkCreateShaderModule;
         vkDestroyShaderModule: vk::PFN_vkDestroyShaderModule = vkDestroyShaderModule;
-        vkCreatePipelineCache: vk::PFN_vkCreatePipelineCache = entrypoints::pipeline::create_pipeline_cache;
+        vkCreatePipelineCache: vk::PFN_vkCreatePipelineCache = vkCreatePipelineCache;
         vkDestroyPipelineCache: vk::PFN_vkDestroyPipelineCache = vkDestroyPipelineCache;
-        vkGetPipelineCacheData: vk::PFN_vkGetPipelineCacheData = entrypoints::pipeline::get_pipeline_cache_data;
-        vkMergePipelineCaches: vk::PFN_vkMergePipelineCaches = entrypoints::pipeline::merge_pipeline_caches;
-        vkCreateComputePipelines: vk::PFN_vkCreateComputePipelines = entrypoints::compute_pipeline::create_compute_pipelines;
+        vkGetPipelineCacheData: vk::PFN_vkGetPipelineCacheData = vkGetPipelineCacheData;
+        vkMergePipelineCaches: vk::PFN_vkMergePipelineCaches = vkMergePipelineCaches;
+        vkCreateComputePipelines: vk::PFN_vkCreateComputePipelines = vkCreateComputePipelines;
         vkDestroyPipeline: vk::PFN_vkDestroyPipeline = vkDestroyPipeline;
-        vkCreatePipelineLayout: vk::PFN_vkCreatePipelineLayout = entrypoints::pipeline::create_pipeline_layout;
+        vkCreatePipelineLayout: vk::PFN_vkCreatePipelineLayout = vkCreatePipelineLayout;
         vkDestroyPipelineLayout: vk::PFN_vkDestroyPipelineLayout = vkDestroyPipelineLayout;
-        vkCreateSampler: vk::PFN_vkCreateSampler = entrypoints::sampler::create_sampler;
+        vkCreateSampler: vk::PFN_vkCreateSampler = vkCreateSampler;
         vkDestroySampler: vk::PFN_vkDestroySampler = vkDestroySampler;
-        vkCreateDescriptorSetLayout: vk::PFN_vkCreateDescriptorSetLayout = entrypoints::descriptor::create_descriptor_set_layout;
+        vkCreateDescriptorSetLayout: vk::PFN_vkCreateDescriptorSetLayout = vkCreateDescriptorSetLayout;
         vkDestroyDescriptorSetLayout: vk::PFN_vkDestroyDescriptorSetLayout = vkDestroyDescriptorSetLayout;
-        vkCreateDescriptorPool: vk::PFN_vkCreateDescriptorPool = entrypoints::descriptor::create_descriptor_pool;
-        vkDestroyDescriptorPool: vk::PFN_vkDestroyDescriptorPool = entrypoints::descriptor::destroy_descriptor_pool;
-        vkResetDescriptorPool: vk::PFN_vkResetDescriptorPool = entrypoints::descriptor::reset_descriptor_pool;
-        vkAllocateDescriptorSets: vk::PFN_vkAllocateDescriptorSets = entrypoints::descriptor::allocate_descriptor_sets;
-        vkFreeDescriptorSets: vk::PFN_vkFreeDescriptorSets = entrypoints::descriptor::free_descriptor_sets;
-        vkUpdateDescriptorSets: vk::PFN_vkUpdateDescriptorSets = entrypoints::descriptor_update::update_descriptor_sets;
+        vkCreateDescriptorPool: vk::PFN_vkCreateDescriptorPool = vkCreateDescriptorPool;
+        vkDestroyDescriptorPool: vk::PFN_vkDestroyDescriptorPool = vkDestroyDescriptorPool;
+        vkResetDescriptorPool: vk::PFN_vkResetDescriptorPool = vkResetDescriptorPool;
+        vkAllocateDescriptorSets: vk::PFN_vkAllocateDescriptorSets = vkAllocateDescriptorSets;
+        vkFreeDescriptorSets: vk::PFN_vkFreeDescriptorSets = vkFreeDescriptorSets;
+        vkUpdateDescriptorSets: vk::PFN_vkUpdateDescriptorSets = vkUpdateDescriptorSets;
         vkCmdBindPipeline: vk::PFN_vkCmdBindPipeline = vkCmdBindPipeline;
         vkCmdBindDescriptorSets: vk::PFN_vkCmdBindDescriptorSets = vkCmdBindDescriptorSets;
         vkCmdClearColorImage: vk::PFN_vkCmdClearColorImage = vkCmdClearColorImage;
@@ -135,12 +136,12 @@ table! {
         vkCmdResetEvent: vk::PFN_vkCmdResetEvent = vkCmdResetEvent;
         vkCmdWaitEvents: vk::PFN_vkCmdWaitEvents = vkCmdWaitEvents;
         vkCmdPushConstants: vk::PFN_vkCmdPushConstants = vkCmdPushConstants;
-        vkCreateGraphicsPipelines: vk::PFN_vkCreateGraphicsPipelines = entrypoints::graphics_pipeline::create_graphics_pipelines;
-        vkCreateFramebuffer: vk::PFN_vkCreateFramebuffer = entrypoints::render_pass::create_framebuffer;
+        vkCreateGraphicsPipelines: vk::PFN_vkCreateGraphicsPipelines = vkCreateGraphicsPipelines;
+        vkCreateFramebuffer: vk::PFN_vkCreateFramebuffer = vkCreateFramebuffer;
         vkDestroyFramebuffer: vk::PFN_vkDestroyFramebuffer = vkDestroyFramebuffer;
-        vkCreateRenderPass: vk::PFN_vkCreateRenderPass = entrypoints::render_pass::create_render_pass;
+        vkCreateRenderPass: vk::PFN_vkCreateRenderPass = vkCreateRenderPass;
         vkDestroyRenderPass: vk::PFN_vkDestroyRenderPass = vkDestroyRenderPass;
-        vkGetRenderAreaGranularity: vk::PFN_vkGetRenderAreaGranularity = entrypoints::render_pass::get_render_area_granularity;
+        vkGetRenderAreaGranularity: vk::PFN_vkGetRenderAreaGranularity = vkGetRenderAreaGranularity;
         vkCmdSetViewport: vk::PFN_vkCmdSetViewport = vkCmdSetViewport;
         vkCmdSetScissor: vk::PFN_vkCmdSetScissor = vkCmdSetScissor;
         vkCmdSetLineWidth: vk::PFN_vkCmdSetLineWidth = vkCmdSetLineWidth;
@@ -165,74 +166,74 @@ table! {
         vkCmdEndRenderPass: vk::PFN_vkCmdEndRenderPass = vkCmdEndRenderPass;
     }
     Global, Core(vk::API_VERSION_1_1) => {
-        vkEnumerateInstanceVersion: vk::PFN_vkEnumerateInstanceVersion = entrypoints::instance::enumerate_instance_version;
+        vkEnumerateInstanceVersion: vk::PFN_vkEnumerateInstanceVersion = vkEnumerateInstanceVersion;
     }
     Device, Core(vk::API_VERSION_1_1) => {
-        vkBindBufferMemory2: vk::PFN_vkBindBufferMemory2 = entrypoints::memory::bind_buffer_memory2;
-        vkBindImageMemory2: vk::PFN_vkBindImageMemory2 = entrypoints::memory::bind_image_memory2;
-        vkGetDeviceGroupPeerMemoryFeatures: vk::PFN_vkGetDeviceGroupPeerMemoryFeatures = entrypoints::device::get_device_group_peer_memory_features;
+        vkBindBufferMemory2: vk::PFN_vkBindBufferMemory2 = vkBindBufferMemory2;
+        vkBindImageMemory2: vk::PFN_vkBindImageMemory2 = vkBindImageMemory2;
+        vkGetDeviceGroupPeerMemoryFeatures: vk::PFN_vkGetDeviceGroupPeerMemoryFeatures = vkGetDeviceGroupPeerMemoryFeatures;
         vkCmdSetDeviceMask: vk::PFN_vkCmdSetDeviceMask = vkCmdSetDeviceMask;
-        vkGetImageMemoryRequirements2: vk::PFN_vkGetImageMemoryRequirements2 = entrypoints::image::get_image_memory_requirements2;
-        vkGetBufferMemoryRequirements2: vk::PFN_vkGetBufferMemoryRequirements2 = entrypoints::buffer::get_buffer_memory_requirements2;
-        vkGetImageSparseMemoryRequirements2: vk::PFN_vkGetImageSparseMemoryRequirements2 = entrypoints::image::get_image_sparse_memory_requirements2;
+        vkGetImageMemoryRequirements2: vk::PFN_vkGetImageMemoryRequirements2 = vkGetImageMemoryRequirements2;
+        vkGetBufferMemoryRequirements2: vk::PFN_vkGetBufferMemoryRequirements2 = vkGetBufferMemoryRequirements2;
+        vkGetImageSparseMemoryRequirements2: vk::PFN_vkGetImageSparseMemoryRequirements2 = vkGetImageSparseMemoryRequirements2;
         vkTrimCommandPool: vk::PFN_vkTrimCommandPool = vkTrimCommandPool;
-        vkGetDeviceQueue2: vk::PFN_vkGetDeviceQueue2 = entrypoints::device::get_device_queue2;
+        vkGetDeviceQueue2: vk::PFN_vkGetDeviceQueue2 = vkGetDeviceQueue2;
         vkCmdDispatchBase: vk::PFN_vkCmdDispatchBase = vkCmdDispatchBase;
-        vkCreateDescriptorUpdateTemplate: vk::PFN_vkCreateDescriptorUpdateTemplate = entrypoints::descriptor_update::create_descriptor_update_template;
+        vkCreateDescriptorUpdateTemplate: vk::PFN_vkCreateDescriptorUpdateTemplate = vkCreateDescriptorUpdateTemplate;
         vkDestroyDescriptorUpdateTemplate: vk::PFN_vkDestroyDescriptorUpdateTemplate = vkDestroyDescriptorUpdateTemplate;
-        vkUpdateDescriptorSetWithTemplate: vk::PFN_vkUpdateDescriptorSetWithTemplate = entrypoints::descriptor_update::update_descriptor_set_with_template;
-        vkGetDescriptorSetLayoutSupport: vk::PFN_vkGetDescriptorSetLayoutSupport = entrypoints::descriptor::get_descriptor_set_layout_support;
+        vkUpdateDescriptorSetWithTemplate: vk::PFN_vkUpdateDescriptorSetWithTemplate = vkUpdateDescriptorSetWithTemplate;
+        vkGetDescriptorSetLayoutSupport: vk::PFN_vkGetDescriptorSetLayoutSupport = vkGetDescriptorSetLayoutSupport;
         vkCreateSamplerYcbcrConversion: vk::PFN_vkCreateSamplerYcbcrConversion = vkCreateSamplerYcbcrConversion;
         vkDestroySamplerYcbcrConversion: vk::PFN_vkDestroySamplerYcbcrConversion = vkDestroySamplerYcbcrConversion;
     }
     Instance, Core(vk::API_VERSION_1_1) => {
-        vkEnumeratePhysicalDeviceGroups: vk::PFN_vkEnumeratePhysicalDeviceGroups = entrypoints::instance::enumerate_physical_device_groups;
+        vkEnumeratePhysicalDeviceGroups: vk::PFN_vkEnumeratePhysicalDeviceGroups = vkEnumeratePhysicalDeviceGroups;
     }
     PhysicalDevice, Core(vk::API_VERSION_1_1) => {
-        vkGetPhysicalDeviceFeatures2: vk::PFN_vkGetPhysicalDeviceFeatures2 = entrypoints::physical_device::get_physical_device_features2;
-        vkGetPhysicalDeviceProperties2: vk::PFN_vkGetPhysicalDeviceProperties2 = entrypoints::physical_device::get_physical_device_properties2;
-        vkGetPhysicalDeviceFormatProperties2: vk::PFN_vkGetPhysicalDeviceFormatProperties2 = entrypoints::physical_device::get_physical_device_format_properties2;
-        vkGetPhysicalDeviceImageFormatProperties2: vk::PFN_vkGetPhysicalDeviceImageFormatProperties2 = entrypoints::physical_device::get_physical_device_image_format_properties2;
-        vkGetPhysicalDeviceQueueFamilyProperties2: vk::PFN_vkGetPhysicalDeviceQueueFamilyProperties2 = entrypoints::physical_device::get_physical_device_queue_family_properties2;
-        vkGetPhysicalDeviceMemoryProperties2: vk::PFN_vkGetPhysicalDeviceMemoryProperties2 = entrypoints::physical_device::get_physical_device_memory_properties2;
-        vkGetPhysicalDeviceSparseImageFormatProperties2: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 = entrypoints::physical_device::get_physical_device_sparse_image_format_properties2;
-        vkGetPhysicalDeviceExternalBufferProperties: vk::PFN_vkGetPhysicalDeviceExternalBufferProperties = entrypoints::physical_device::get_physical_device_external_buffer_properties;
-        vkGetPhysicalDeviceExternalFenceProperties: vk::PFN_vkGetPhysicalDeviceExternalFenceProperties = entrypoints::physical_device::get_physical_device_external_fence_properties;
-        vkGetPhysicalDeviceExternalSemaphoreProperties: vk::PFN_vkGetPhysicalDeviceExternalSemaphoreProperties = entrypoints::physical_device::get_physical_device_external_semaphore_properties;
+        vkGetPhysicalDeviceFeatures2: vk::PFN_vkGetPhysicalDeviceFeatures2 = vkGetPhysicalDeviceFeatures2;
+        vkGetPhysicalDeviceProperties2: vk::PFN_vkGetPhysicalDeviceProperties2 = vkGetPhysicalDeviceProperties2;
+        vkGetPhysicalDeviceFormatProperties2: vk::PFN_vkGetPhysicalDeviceFormatProperties2 = vkGetPhysicalDeviceFormatProperties2;
+        vkGetPhysicalDeviceImageFormatProperties2: vk::PFN_vkGetPhysicalDeviceImageFormatProperties2 = vkGetPhysicalDeviceImageFormatProperties2;
+        vkGetPhysicalDeviceQueueFamilyProperties2: vk::PFN_vkGetPhysicalDeviceQueueFamilyProperties2 = vkGetPhysicalDeviceQueueFamilyProperties2;
+        vkGetPhysicalDeviceMemoryProperties2: vk::PFN_vkGetPhysicalDeviceMemoryProperties2 = vkGetPhysicalDeviceMemoryProperties2;
+        vkGetPhysicalDeviceSparseImageFormatProperties2: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 = vkGetPhysicalDeviceSparseImageFormatProperties2;
+        vkGetPhysicalDeviceExternalBufferProperties: vk::PFN_vkGetPhysicalDeviceExternalBufferProperties = vkGetPhysicalDeviceExternalBufferProperties;
+        vkGetPhysicalDeviceExternalFenceProperties: vk::PFN_vkGetPhysicalDeviceExternalFenceProperties = vkGetPhysicalDeviceExternalFenceProperties;
+        vkGetPhysicalDeviceExternalSemaphoreProperties: vk::PFN_vkGetPhysicalDeviceExternalSemaphoreProperties = vkGetPhysicalDeviceExternalSemaphoreProperties;
     }
     Device, Core(vk::API_VERSION_1_2) => {
-        vkResetQueryPool: vk::PFN_vkResetQueryPool = entrypoints::query::reset_query_pool;
-        vkGetSemaphoreCounterValue: vk::PFN_vkGetSemaphoreCounterValue = entrypoints::sync::get_semaphore_counter_value;
-        vkWaitSemaphores: vk::PFN_vkWaitSemaphores = entrypoints::sync::wait_semaphores;
-        vkSignalSemaphore: vk::PFN_vkSignalSemaphore = entrypoints::sync::signal_semaphore;
+        vkResetQueryPool: vk::PFN_vkResetQueryPool = vkResetQueryPool;
+        vkGetSemaphoreCounterValue: vk::PFN_vkGetSemaphoreCounterValue = vkGetSemaphoreCounterValue;
+        vkWaitSemaphores: vk::PFN_vkWaitSemaphores = vkWaitSemaphores;
+        vkSignalSemaphore: vk::PFN_vkSignalSemaphore = vkSignalSemaphore;
         vkGetBufferDeviceAddress: vk::PFN_vkGetBufferDeviceAddress = vkGetBufferDeviceAddress;
         vkGetBufferOpaqueCaptureAddress: vk::PFN_vkGetBufferOpaqueCaptureAddress = vkGetBufferOpaqueCaptureAddress;
         vkGetDeviceMemoryOpaqueCaptureAddress: vk::PFN_vkGetDeviceMemoryOpaqueCaptureAddress = vkGetDeviceMemoryOpaqueCaptureAddress;
         vkCmdDrawIndirectCount: vk::PFN_vkCmdDrawIndirectCount = vkCmdDrawIndirectCount;
         vkCmdDrawIndexedIndirectCount: vk::PFN_vkCmdDrawIndexedIndirectCount = vkCmdDrawIndexedIndirectCount;
-        vkCreateRenderPass2: vk::PFN_vkCreateRenderPass2 = entrypoints::render_pass::create_render_pass2;
+        vkCreateRenderPass2: vk::PFN_vkCreateRenderPass2 = vkCreateRenderPass2;
         vkCmdBeginRenderPass2: vk::PFN_vkCmdBeginRenderPass2 = vkCmdBeginRenderPass2;
         vkCmdNextSubpass2: vk::PFN_vkCmdNextSubpass2 = vkCmdNextSubpass2;
         vkCmdEndRenderPass2: vk::PFN_vkCmdEndRenderPass2 = vkCmdEndRenderPass2;
     }
     PhysicalDevice, Core(vk::API_VERSION_1_3) => {
-        vkGetPhysicalDeviceToolProperties: vk::PFN_vkGetPhysicalDeviceToolProperties = entrypoints::physical_device::get_physical_device_tool_properties;
+        vkGetPhysicalDeviceToolProperties: vk::PFN_vkGetPhysicalDeviceToolProperties = vkGetPhysicalDeviceToolProperties;
     }
     Device, Core(vk::API_VERSION_1_3) => {
-        vkCreatePrivateDataSlot: vk::PFN_vkCreatePrivateDataSlot = entrypoints::private_data::create_private_data_slot;
+        vkCreatePrivateDataSlot: vk::PFN_vkCreatePrivateDataSlot = vkCreatePrivateDataSlot;
         vkDestroyPrivateDataSlot: vk::PFN_vkDestroyPrivateDataSlot = vkDestroyPrivateDataSlot;
-        vkSetPrivateData: vk::PFN_vkSetPrivateData = entrypoints::private_data::set_private_data;
-        vkGetPrivateData: vk::PFN_vkGetPrivateData = entrypoints::private_data::get_private_data;
+        vkSetPrivateData: vk::PFN_vkSetPrivateData = vkSetPrivateData;
+        vkGetPrivateData: vk::PFN_vkGetPrivateData = vkGetPrivateData;
         vkCmdPipelineBarrier2: vk::PFN_vkCmdPipelineBarrier2 = vkCmdPipelineBarrier2;
         vkCmdWriteTimestamp2: vk::PFN_vkCmdWriteTimestamp2 = vkCmdWriteTimestamp2;
-        vkQueueSubmit2: vk::PFN_vkQueueSubmit2 = entrypoints::queue::queue_submit2;
+        vkQueueSubmit2: vk::PFN_vkQueueSubmit2 = vkQueueSubmit2;
         vkCmdCopyBuffer2: vk::PFN_vkCmdCopyBuffer2 = vkCmdCopyBuffer2;
         vkCmdCopyImage2: vk::PFN_vkCmdCopyImage2 = vkCmdCopyImage2;
         vkCmdCopyBufferToImage2: vk::PFN_vkCmdCopyBufferToImage2 = vkCmdCopyBufferToImage2;
         vkCmdCopyImageToBuffer2: vk::PFN_vkCmdCopyImageToBuffer2 = vkCmdCopyImageToBuffer2;
-        vkGetDeviceBufferMemoryRequirements: vk::PFN_vkGetDeviceBufferMemoryRequirements = entrypoints::buffer::get_device_buffer_memory_requirements;
-        vkGetDeviceImageMemoryRequirements: vk::PFN_vkGetDeviceImageMemoryRequirements = entrypoints::image::get_device_image_memory_requirements;
-        vkGetDeviceImageSparseMemoryRequirements: vk::PFN_vkGetDeviceImageSparseMemoryRequirements = entrypoints::image::get_device_image_sparse_memory_requirements;
+        vkGetDeviceBufferMemoryRequirements: vk::PFN_vkGetDeviceBufferMemoryRequirements = vkGetDeviceBufferMemoryRequirements;
+        vkGetDeviceImageMemoryRequirements: vk::PFN_vkGetDeviceImageMemoryRequirements = vkGetDeviceImageMemoryRequirements;
+        vkGetDeviceImageSparseMemoryRequirements: vk::PFN_vkGetDeviceImageSparseMemoryRequirements = vkGetDeviceImageSparseMemoryRequirements;
         vkCmdSetEvent2: vk::PFN_vkCmdSetEvent2 = vkCmdSetEvent2;
         vkCmdResetEvent2: vk::PFN_vkCmdResetEvent2 = vkCmdResetEvent2;
         vkCmdWaitEvents2: vk::PFN_vkCmdWaitEvents2 = vkCmdWaitEvents2;
@@ -256,7 +257,7 @@ table! {
         vkCmdSetDepthBiasEnable: vk::PFN_vkCmdSetDepthBiasEnable = vkCmdSetDepthBiasEnable;
         vkCmdSetPrimitiveRestartEnable: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
     }
-    Device, InstanceExtension(c"VK_EXT_debug_utils") => {
+    Device, InstanceExtension(&[c"VK_EXT_debug_utils"]) => {
         vkSetDebugUtilsObjectNameEXT: vk::PFN_vkSetDebugUtilsObjectNameEXT = vkSetDebugUtilsObjectNameEXT;
         vkSetDebugUtilsObjectTagEXT: vk::PFN_vkSetDebugUtilsObjectTagEXT = vkSetDebugUtilsObjectTagEXT;
         vkQueueBeginDebugUtilsLabelEXT: vk::PFN_vkQueueBeginDebugUtilsLabelEXT = vkQueueBeginDebugUtilsLabelEXT;
@@ -266,47 +267,165 @@ table! {
         vkCmdEndDebugUtilsLabelEXT: vk::PFN_vkCmdEndDebugUtilsLabelEXT = vkCmdEndDebugUtilsLabelEXT;
         vkCmdInsertDebugUtilsLabelEXT: vk::PFN_vkCmdInsertDebugUtilsLabelEXT = vkCmdInsertDebugUtilsLabelEXT;
     }
-    Instance, InstanceExtension(c"VK_EXT_debug_utils") => {
-        vkCreateDebugUtilsMessengerEXT: vk::PFN_vkCreateDebugUtilsMessengerEXT = entrypoints::debug_utils::create_debug_utils_messenger_ext;
-        vkDestroyDebugUtilsMessengerEXT: vk::PFN_vkDestroyDebugUtilsMessengerEXT = entrypoints::debug_utils::destroy_debug_utils_messenger_ext;
-        vkSubmitDebugUtilsMessageEXT: vk::PFN_vkSubmitDebugUtilsMessageEXT = entrypoints::debug_utils::submit_debug_utils_message_ext;
+    Instance, InstanceExtension(&[c"VK_EXT_debug_utils"]) => {
+        vkCreateDebugUtilsMessengerEXT: vk::PFN_vkCreateDebugUtilsMessengerEXT = vkCreateDebugUtilsMessengerEXT;
+        vkDestroyDebugUtilsMessengerEXT: vk::PFN_vkDestroyDebugUtilsMessengerEXT = vkDestroyDebugUtilsMessengerEXT;
+        vkSubmitDebugUtilsMessageEXT: vk::PFN_vkSubmitDebugUtilsMessageEXT = vkSubmitDebugUtilsMessageEXT;
     }
-    Device, DeviceExtension(c"VK_GAURAST_gaussian_primitive_topology") => {
+    Device, DeviceExtension(&[c"VK_EXT_extended_dynamic_state"]) => {
+        vkCmdSetCullModeEXT: vk::PFN_vkCmdSetCullMode = vkCmdSetCullMode;
+        vkCmdSetFrontFaceEXT: vk::PFN_vkCmdSetFrontFace = vkCmdSetFrontFace;
+        vkCmdSetPrimitiveTopologyEXT: vk::PFN_vkCmdSetPrimitiveTopology = vkCmdSetPrimitiveTopology;
+        vkCmdSetViewportWithCountEXT: vk::PFN_vkCmdSetViewportWithCount = vkCmdSetViewportWithCount;
+        vkCmdSetScissorWithCountEXT: vk::PFN_vkCmdSetScissorWithCount = vkCmdSetScissorWithCount;
+        vkCmdBindVertexBuffers2EXT: vk::PFN_vkCmdBindVertexBuffers2 = vkCmdBindVertexBuffers2;
+        vkCmdSetDepthTestEnableEXT: vk::PFN_vkCmdSetDepthTestEnable = vkCmdSetDepthTestEnable;
+        vkCmdSetDepthWriteEnableEXT: vk::PFN_vkCmdSetDepthWriteEnable = vkCmdSetDepthWriteEnable;
+        vkCmdSetDepthCompareOpEXT: vk::PFN_vkCmdSetDepthCompareOp = vkCmdSetDepthCompareOp;
+        vkCmdSetDepthBoundsTestEnableEXT: vk::PFN_vkCmdSetDepthBoundsTestEnable = vkCmdSetDepthBoundsTestEnable;
+        vkCmdSetStencilTestEnableEXT: vk::PFN_vkCmdSetStencilTestEnable = vkCmdSetStencilTestEnable;
+        vkCmdSetStencilOpEXT: vk::PFN_vkCmdSetStencilOp = vkCmdSetStencilOp;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_extended_dynamic_state2"]) => {
+        vkCmdSetPatchControlPointsEXT: vk::PFN_vkCmdSetPatchControlPointsEXT = vkCmdSetPatchControlPointsEXT;
+        vkCmdSetRasterizerDiscardEnableEXT: vk::PFN_vkCmdSetRasterizerDiscardEnable = vkCmdSetRasterizerDiscardEnable;
+        vkCmdSetDepthBiasEnableEXT: vk::PFN_vkCmdSetDepthBiasEnable = vkCmdSetDepthBiasEnable;
+        vkCmdSetLogicOpEXT: vk::PFN_vkCmdSetLogicOpEXT = vkCmdSetLogicOpEXT;
+        vkCmdSetPrimitiveRestartEnableEXT: vk::PFN_vkCmdSetPrimitiveRestartEnable = vkCmdSetPrimitiveRestartEnable;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_host_query_reset"]) => {
+        vkResetQueryPoolEXT: vk::PFN_vkResetQueryPool = vkResetQueryPool;
+    }
+    Device, DeviceExtension(&[c"VK_EXT_private_data"]) => {
+        vkCreatePrivateDataSlotEXT: vk::PFN_vkCreatePrivateDataSlot = vkCreatePrivateDataSlot;
+        vkDestroyPrivateDataSlotEXT: vk::PFN_vkDestroyPrivateDataSlot = vkDestroyPrivateDataSlot;
+        vkSetPrivateDataEXT: vk::PFN_vkSetPrivateData = vkSetPrivateData;
+        vkGetPrivateDataEXT: vk::PFN_vkGetPrivateData = vkGetPrivateData;
+    }
+    PhysicalDevice, DeviceExtension(&[c"VK_EXT_tooling_info"]) => {
+        vkGetPhysicalDeviceToolPropertiesEXT: vk::PFN_vkGetPhysicalDeviceToolProperties = vkGetPhysicalDeviceToolProperties;
+    }
+    Device, DeviceExtension(&[c"VK_GAURAST_gaussian_primitive_topology"]) => {
         vkCmdSetGaussianCameraGAURAST: gaurast::vk::PFN_vkCmdSetGaussianCameraGAURAST = vkCmdSetGaussianCameraGAURAST;
     }
-    Device, DeviceExtension(c"VK_KHR_dynamic_rendering") => {
+    Device, DeviceExtension(&[c"VK_KHR_bind_memory2"]) => {
+        vkBindBufferMemory2KHR: vk::PFN_vkBindBufferMemory2 = vkBindBufferMemory2;
+        vkBindImageMemory2KHR: vk::PFN_vkBindImageMemory2 = vkBindImageMemory2;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_copy_commands2"]) => {
+        vkCmdCopyBuffer2KHR: vk::PFN_vkCmdCopyBuffer2 = vkCmdCopyBuffer2;
+        vkCmdCopyImage2KHR: vk::PFN_vkCmdCopyImage2 = vkCmdCopyImage2;
+        vkCmdCopyBufferToImage2KHR: vk::PFN_vkCmdCopyBufferToImage2 = vkCmdCopyBufferToImage2;
+        vkCmdCopyImageToBuffer2KHR: vk::PFN_vkCmdCopyImageToBuffer2 = vkCmdCopyImageToBuffer2;
+        vkCmdBlitImage2KHR: vk::PFN_vkCmdBlitImage2 = vkCmdBlitImage2;
+        vkCmdResolveImage2KHR: vk::PFN_vkCmdResolveImage2 = vkCmdResolveImage2;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_create_renderpass2"]) => {
+        vkCreateRenderPass2KHR: vk::PFN_vkCreateRenderPass2 = vkCreateRenderPass2;
+        vkCmdBeginRenderPass2KHR: vk::PFN_vkCmdBeginRenderPass2 = vkCmdBeginRenderPass2;
+        vkCmdNextSubpass2KHR: vk::PFN_vkCmdNextSubpass2 = vkCmdNextSubpass2;
+        vkCmdEndRenderPass2KHR: vk::PFN_vkCmdEndRenderPass2 = vkCmdEndRenderPass2;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_descriptor_update_template"]) => {
+        vkCreateDescriptorUpdateTemplateKHR: vk::PFN_vkCreateDescriptorUpdateTemplate = vkCreateDescriptorUpdateTemplate;
+        vkDestroyDescriptorUpdateTemplateKHR: vk::PFN_vkDestroyDescriptorUpdateTemplate = vkDestroyDescriptorUpdateTemplate;
+        vkUpdateDescriptorSetWithTemplateKHR: vk::PFN_vkUpdateDescriptorSetWithTemplate = vkUpdateDescriptorSetWithTemplate;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_descriptor_update_template", c"VK_KHR_push_descriptor"]) => {
+        vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR = vkCmdPushDescriptorSetWithTemplateKHR;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_draw_indirect_count"]) => {
+        vkCmdDrawIndirectCountKHR: vk::PFN_vkCmdDrawIndirectCount = vkCmdDrawIndirectCount;
+        vkCmdDrawIndexedIndirectCountKHR: vk::PFN_vkCmdDrawIndexedIndirectCount = vkCmdDrawIndexedIndirectCount;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_dynamic_rendering"]) => {
         vkCmdBeginRenderingKHR: vk::PFN_vkCmdBeginRendering = vkCmdBeginRendering;
         vkCmdEndRenderingKHR: vk::PFN_vkCmdEndRendering = vkCmdEndRendering;
     }
-    PhysicalDevice, InstanceExtension(c"VK_KHR_get_physical_device_properties2") => {
-        vkGetPhysicalDeviceFeatures2KHR: vk::PFN_vkGetPhysicalDeviceFeatures2 = entrypoints::physical_device::get_physical_device_features2;
-        vkGetPhysicalDeviceProperties2KHR: vk::PFN_vkGetPhysicalDeviceProperties2 = entrypoints::physical_device::get_physical_device_properties2;
-        vkGetPhysicalDeviceFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceFormatProperties2 = entrypoints::physical_device::get_physical_device_format_properties2;
-        vkGetPhysicalDeviceImageFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceImageFormatProperties2 = entrypoints::physical_device::get_physical_device_image_format_properties2;
-        vkGetPhysicalDeviceQueueFamilyProperties2KHR: vk::PFN_vkGetPhysicalDeviceQueueFamilyProperties2 = entrypoints::physical_device::get_physical_device_queue_family_properties2;
-        vkGetPhysicalDeviceMemoryProperties2KHR: vk::PFN_vkGetPhysicalDeviceMemoryProperties2 = entrypoints::physical_device::get_physical_device_memory_properties2;
-        vkGetPhysicalDeviceSparseImageFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 = entrypoints::physical_device::get_physical_device_sparse_image_format_properties2;
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_fence_capabilities"]) => {
+        vkGetPhysicalDeviceExternalFencePropertiesKHR: vk::PFN_vkGetPhysicalDeviceExternalFenceProperties = vkGetPhysicalDeviceExternalFenceProperties;
     }
-    PhysicalDevice, DeviceExtension(c"VK_KHR_performance_query") => {
-        vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR: vk::PFN_vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR = entrypoints::physical_device::enumerate_physical_device_queue_family_performance_query_counters_khr;
-        vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR: vk::PFN_vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR = entrypoints::physical_device::get_physical_device_queue_family_performance_query_passes_khr;
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_memory_capabilities"]) => {
+        vkGetPhysicalDeviceExternalBufferPropertiesKHR: vk::PFN_vkGetPhysicalDeviceExternalBufferProperties = vkGetPhysicalDeviceExternalBufferProperties;
     }
-    Device, DeviceExtension(c"VK_KHR_performance_query") => {
-        vkAcquireProfilingLockKHR: vk::PFN_vkAcquireProfilingLockKHR = entrypoints::device::acquire_profiling_lock_khr;
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_external_semaphore_capabilities"]) => {
+        vkGetPhysicalDeviceExternalSemaphorePropertiesKHR: vk::PFN_vkGetPhysicalDeviceExternalSemaphoreProperties = vkGetPhysicalDeviceExternalSemaphoreProperties;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_get_memory_requirements2"]) => {
+        vkGetImageMemoryRequirements2KHR: vk::PFN_vkGetImageMemoryRequirements2 = vkGetImageMemoryRequirements2;
+        vkGetBufferMemoryRequirements2KHR: vk::PFN_vkGetBufferMemoryRequirements2 = vkGetBufferMemoryRequirements2;
+        vkGetImageSparseMemoryRequirements2KHR: vk::PFN_vkGetImageSparseMemoryRequirements2 = vkGetImageSparseMemoryRequirements2;
+    }
+    PhysicalDevice, InstanceExtension(&[c"VK_KHR_get_physical_device_properties2"]) => {
+        vkGetPhysicalDeviceFeatures2KHR: vk::PFN_vkGetPhysicalDeviceFeatures2 = vkGetPhysicalDeviceFeatures2;
+        vkGetPhysicalDeviceProperties2KHR: vk::PFN_vkGetPhysicalDeviceProperties2 = vkGetPhysicalDeviceProperties2;
+        vkGetPhysicalDeviceFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceFormatProperties2 = vkGetPhysicalDeviceFormatProperties2;
+        vkGetPhysicalDeviceImageFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceImageFormatProperties2 = vkGetPhysicalDeviceImageFormatProperties2;
+        vkGetPhysicalDeviceQueueFamilyProperties2KHR: vk::PFN_vkGetPhysicalDeviceQueueFamilyProperties2 = vkGetPhysicalDeviceQueueFamilyProperties2;
+        vkGetPhysicalDeviceMemoryProperties2KHR: vk::PFN_vkGetPhysicalDeviceMemoryProperties2 = vkGetPhysicalDeviceMemoryProperties2;
+        vkGetPhysicalDeviceSparseImageFormatProperties2KHR: vk::PFN_vkGetPhysicalDeviceSparseImageFormatProperties2 = vkGetPhysicalDeviceSparseImageFormatProperties2;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_maintenance1"]) => {
+        vkTrimCommandPoolKHR: vk::PFN_vkTrimCommandPool = vkTrimCommandPool;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_maintenance3"]) => {
+        vkGetDescriptorSetLayoutSupportKHR: vk::PFN_vkGetDescriptorSetLayoutSupport = vkGetDescriptorSetLayoutSupport;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_maintenance4"]) => {
+        vkGetDeviceBufferMemoryRequirementsKHR: vk::PFN_vkGetDeviceBufferMemoryRequirements = vkGetDeviceBufferMemoryRequirements;
+        vkGetDeviceImageMemoryRequirementsKHR: vk::PFN_vkGetDeviceImageMemoryRequirements = vkGetDeviceImageMemoryRequirements;
+        vkGetDeviceImageSparseMemoryRequirementsKHR: vk::PFN_vkGetDeviceImageSparseMemoryRequirements = vkGetDeviceImageSparseMemoryRequirements;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_map_memory2"]) => {
+        vkMapMemory2KHR: vk::PFN_vkMapMemory2KHR = vkMapMemory2KHR;
+        vkUnmapMemory2KHR: vk::PFN_vkUnmapMemory2KHR = vkUnmapMemory2KHR;
+    }
+    PhysicalDevice, DeviceExtension(&[c"VK_KHR_performance_query"]) => {
+        vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR: vk::PFN_vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR = vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR;
+        vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR: vk::PFN_vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR = vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR;
+    }
+    Device, DeviceExtension(&[c"VK_KHR_performance_query"]) => {
+        vkAcquireProfilingLockKHR: vk::PFN_vkAcquireProfilingLockKHR = vkAcquireProfilingLockKHR;
         vkReleaseProfilingLockKHR: vk::PFN_vkReleaseProfilingLockKHR = vkReleaseProfilingLockKHR;
     }
-    Device, DeviceExtension(c"VK_KHR_push_descriptor") => {
+    Device, DeviceExtension(&[c"VK_KHR_push_descriptor"]) => {
         vkCmdPushDescriptorSetKHR: vk::PFN_vkCmdPushDescriptorSetKHR = vkCmdPushDescriptorSetKHR;
-        vkCmdPushDescriptorSetWithTemplateKHR: vk::PFN_vkCmdPushDescriptorSetWithTemplateKHR = vkCmdPushDescriptorSetWithTemplateKHR;
     }
-    Device, DeviceExtension(c"VK_KHR_synchronization2") => {
+    Device, DeviceExtension(&[c"VK_KHR_synchronization2"]) => {
         vkCmdSetEvent2KHR: vk::PFN_vkCmdSetEvent2 = vkCmdSetEvent2;
         vkCmdResetEvent2KHR: vk::PFN_vkCmdResetEvent2 = vkCmdResetEvent2;
         vkCmdWaitEvents2KHR: vk::PFN_vkCmdWaitEvents2 = vkCmdWaitEvents2;
         vkCmdPipelineBarrier2KHR: vk::PFN_vkCmdPipelineBarrier2 = vkCmdPipelineBarrier2;
         vkCmdWriteTimestamp2KHR: vk::PFN_vkCmdWriteTimestamp2 = vkCmdWriteTimestamp2;
-        vkQueueSubmit2KHR: vk::PFN_vkQueueSubmit2 = entrypoints::queue::queue_submit2;
+        vkQueueSubmit2KHR: vk::PFN_vkQueueSubmit2 = vkQueueSubmit2;
     }
+    Device, DeviceExtension(&[c"VK_KHR_timeline_semaphore"]) => {
+        vkGetSemaphoreCounterValueKHR: vk::PFN_vkGetSemaphoreCounterValue = vkGetSemaphoreCounterValue;
+        vkWaitSemaphoresKHR: vk::PFN_vkWaitSemaphores = vkWaitSemaphores;
+        vkSignalSemaphoreKHR: vk::PFN_vkSignalSemaphore = vkSignalSemaphore;
+    }
+};
+
+/// Every command of the driver.
+pub(super) static COMMANDS: Commands = Commands::new(ROWS);
+
+unsafe extern "system" fn vkCreateInstance(
+    p_create_info: *const vk::InstanceCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_instance: *mut vk::Instance,
+) -> vk::Result {
+    guard(p_create_info, "vkCreateInstance", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_instance,
+                handle::create(crate::instance::create_instance(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
 }
 
 unsafe extern "system" fn vkDestroyInstance(
@@ -319,6 +438,366 @@ unsafe extern "system" fn vkDestroyInstance(
     })
 }
 
+unsafe extern "system" fn vkEnumeratePhysicalDevices(
+    instance: vk::Instance,
+    p_physical_device_count: *mut u32,
+    p_physical_devices: *mut vk::PhysicalDevice,
+) -> vk::Result {
+    guard(instance, "vkEnumeratePhysicalDevices", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_physical_device_count,
+                p_physical_devices,
+                &crate::instance::enumerate_physical_devices(handle::get(instance)?)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceFeatures(
+    physical_device: vk::PhysicalDevice,
+    p_features: *mut vk::PhysicalDeviceFeatures,
+) {
+    guard(physical_device, "vkGetPhysicalDeviceFeatures", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_features,
+                crate::physical_device::get_physical_device_features()?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceFormatProperties(
+    physical_device: vk::PhysicalDevice,
+    format: vk::Format,
+    p_format_properties: *mut vk::FormatProperties,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceFormatProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::output(
+                    p_format_properties,
+                    crate::physical_device::get_physical_device_format_properties(format)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceImageFormatProperties(
+    physical_device: vk::PhysicalDevice,
+    format: vk::Format,
+    ty: vk::ImageType,
+    tiling: vk::ImageTiling,
+    usage: vk::ImageUsageFlags,
+    flags: vk::ImageCreateFlags,
+    p_image_format_properties: *mut vk::ImageFormatProperties,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceImageFormatProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::get_physical_device_image_format_properties(
+                    format,
+                    ty,
+                    tiling,
+                    usage,
+                    flags,
+                    valid::output_structure(p_image_format_properties)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceProperties(
+    physical_device: vk::PhysicalDevice,
+    p_properties: *mut vk::PhysicalDeviceProperties,
+) {
+    guard(physical_device, "vkGetPhysicalDeviceProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_properties,
+                crate::physical_device::get_physical_device_properties()?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyProperties(
+    physical_device: vk::PhysicalDevice,
+    p_queue_family_property_count: *mut u32,
+    p_queue_family_properties: *mut vk::QueueFamilyProperties,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceQueueFamilyProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_queue_family_property_count,
+                    p_queue_family_properties,
+                    &crate::physical_device::get_physical_device_queue_family_properties()?,
+                )
+                .map(drop)
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceMemoryProperties(
+    physical_device: vk::PhysicalDevice,
+    p_memory_properties: *mut vk::PhysicalDeviceMemoryProperties,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceMemoryProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::output(
+                    p_memory_properties,
+                    crate::physical_device::get_physical_device_memory_properties()?,
+                )
+            }
+        },
+    )
+}
+
+pub(crate) unsafe extern "system" fn vkGetInstanceProcAddr(
+    instance: vk::Instance,
+    p_name: *const std::ffi::c_char,
+) -> vk::PFN_vkVoidFunction {
+    guard(instance, "vkGetInstanceProcAddr", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::dispatch::lookup::get_instance_proc_addr(
+                &COMMANDS,
+                handle::get_optional(instance)?.map(AsRef::as_ref),
+                valid::string(p_name).ok_or(Error::NullPointer { what: "p_name" })?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceProcAddr(
+    device: vk::Device,
+    p_name: *const std::ffi::c_char,
+) -> vk::PFN_vkVoidFunction {
+    guard(device, "vkGetDeviceProcAddr", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::dispatch::lookup::get_device_proc_addr(
+                &COMMANDS,
+                handle::get(device)?,
+                valid::string(p_name).ok_or(Error::NullPointer { what: "p_name" })?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateDevice(
+    physical_device: vk::PhysicalDevice,
+    p_create_info: *const vk::DeviceCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_device: *mut vk::Device,
+) -> vk::Result {
+    guard(physical_device, "vkCreateDevice", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_device,
+                handle::create(crate::device::create_device(
+                    handle::get(physical_device)?,
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkDestroyDevice(
+    device: vk::Device,
+    _: *const vk::AllocationCallbacks<'_>,
+) {
+    guard(device, "vkDestroyDevice", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::device::destroy_device(handle::destroy(device)?) }
+    })
+}
+
+unsafe extern "system" fn vkEnumerateInstanceExtensionProperties(
+    p_layer_name: *const std::ffi::c_char,
+    p_property_count: *mut u32,
+    p_properties: *mut vk::ExtensionProperties,
+) -> vk::Result {
+    guard(
+        p_layer_name,
+        "vkEnumerateInstanceExtensionProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_property_count,
+                    p_properties,
+                    &crate::instance::enumerate_instance_extension_properties(valid::string(
+                        p_layer_name,
+                    ))?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkEnumerateDeviceExtensionProperties(
+    physical_device: vk::PhysicalDevice,
+    p_layer_name: *const std::ffi::c_char,
+    p_property_count: *mut u32,
+    p_properties: *mut vk::ExtensionProperties,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkEnumerateDeviceExtensionProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_property_count,
+                    p_properties,
+                    &crate::physical_device::enumerate_device_extension_properties(valid::string(
+                        p_layer_name,
+                    ))?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkEnumerateInstanceLayerProperties(
+    p_property_count: *mut u32,
+    p_properties: *mut vk::LayerProperties,
+) -> vk::Result {
+    guard(
+        p_property_count,
+        "vkEnumerateInstanceLayerProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_property_count,
+                    p_properties,
+                    &crate::instance::enumerate_instance_layer_properties()?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkEnumerateDeviceLayerProperties(
+    physical_device: vk::PhysicalDevice,
+    p_property_count: *mut u32,
+    p_properties: *mut vk::LayerProperties,
+) -> vk::Result {
+    guard(physical_device, "vkEnumerateDeviceLayerProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_property_count,
+                p_properties,
+                &crate::physical_device::enumerate_device_layer_properties()?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceQueue(
+    device: vk::Device,
+    queue_family_index: u32,
+    queue_index: u32,
+    p_queue: *mut vk::Queue,
+) {
+    guard(device, "vkGetDeviceQueue", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_queue,
+                crate::device::get_device_queue(
+                    handle::get(device)?,
+                    queue_family_index,
+                    queue_index,
+                )?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkQueueSubmit(
+    queue: vk::Queue,
+    submit_count: u32,
+    p_submits: *const vk::SubmitInfo<'_>,
+    fence: vk::Fence,
+) -> vk::Result {
+    guard(queue, "vkQueueSubmit", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::submit::queue_submit(
+                handle::get(queue)?,
+                valid::slice(p_submits, submit_count)?,
+                handle::get_optional(fence)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkQueueWaitIdle(queue: vk::Queue) -> vk::Result {
+    guard(queue, "vkQueueWaitIdle", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::queue::queue_wait_idle(handle::get(queue)?).map(|()| vk::Result::SUCCESS) }
+    })
+}
+
+unsafe extern "system" fn vkDeviceWaitIdle(device: vk::Device) -> vk::Result {
+    guard(device, "vkDeviceWaitIdle", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::device::device_wait_idle(handle::get(device)?).map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkAllocateMemory(
+    device: vk::Device,
+    p_allocate_info: *const vk::MemoryAllocateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_memory: *mut vk::DeviceMemory,
+) -> vk::Result {
+    guard(device, "vkAllocateMemory", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_memory,
+                handle::create(crate::resource::memory::allocate_memory(
+                    handle::get(device)?,
+                    valid::input(p_allocate_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkFreeMemory(
     device: vk::Device,
     memory: vk::DeviceMemory,
@@ -328,6 +807,199 @@ unsafe extern "system" fn vkFreeMemory(
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(memory) }.map(drop)
     })
+}
+
+unsafe extern "system" fn vkMapMemory(
+    device: vk::Device,
+    memory: vk::DeviceMemory,
+    offset: vk::DeviceSize,
+    size: vk::DeviceSize,
+    _: vk::MemoryMapFlags,
+    pp_data: *mut *mut std::ffi::c_void,
+) -> vk::Result {
+    guard(device, "vkMapMemory", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                pp_data,
+                crate::resource::memory::map_memory(handle::get(memory)?, offset, size)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkUnmapMemory(device: vk::Device, memory: vk::DeviceMemory) {
+    guard(device, "vkUnmapMemory", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::resource::memory::unmap_memory(handle::get(memory)?) }
+    })
+}
+
+unsafe extern "system" fn vkFlushMappedMemoryRanges(
+    device: vk::Device,
+    memory_range_count: u32,
+    p_memory_ranges: *const vk::MappedMemoryRange<'_>,
+) -> vk::Result {
+    guard(device, "vkFlushMappedMemoryRanges", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::memory::flush_mapped_memory_ranges(valid::slice(
+                p_memory_ranges,
+                memory_range_count,
+            )?)
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkInvalidateMappedMemoryRanges(
+    device: vk::Device,
+    memory_range_count: u32,
+    p_memory_ranges: *const vk::MappedMemoryRange<'_>,
+) -> vk::Result {
+    guard(device, "vkInvalidateMappedMemoryRanges", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::memory::flush_mapped_memory_ranges(valid::slice(
+                p_memory_ranges,
+                memory_range_count,
+            )?)
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceMemoryCommitment(
+    device: vk::Device,
+    memory: vk::DeviceMemory,
+    p_committed_memory_in_bytes: *mut vk::DeviceSize,
+) {
+    guard(device, "vkGetDeviceMemoryCommitment", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_committed_memory_in_bytes,
+                crate::resource::memory::get_device_memory_commitment(handle::get(memory)?)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkBindBufferMemory(
+    device: vk::Device,
+    buffer: vk::Buffer,
+    memory: vk::DeviceMemory,
+    memory_offset: vk::DeviceSize,
+) -> vk::Result {
+    guard(device, "vkBindBufferMemory", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::buffer::bind_buffer_memory(
+                handle::get(buffer)?,
+                handle::get(memory)?,
+                memory_offset,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkBindImageMemory(
+    device: vk::Device,
+    image: vk::Image,
+    memory: vk::DeviceMemory,
+    memory_offset: vk::DeviceSize,
+) -> vk::Result {
+    guard(device, "vkBindImageMemory", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::image::bind_image_memory(
+                handle::get(image)?,
+                handle::get(memory)?,
+                memory_offset,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetBufferMemoryRequirements(
+    device: vk::Device,
+    buffer: vk::Buffer,
+    p_memory_requirements: *mut vk::MemoryRequirements,
+) {
+    guard(device, "vkGetBufferMemoryRequirements", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_memory_requirements,
+                crate::resource::buffer::get_buffer_memory_requirements(handle::get(buffer)?)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetImageMemoryRequirements(
+    device: vk::Device,
+    image: vk::Image,
+    p_memory_requirements: *mut vk::MemoryRequirements,
+) {
+    guard(device, "vkGetImageMemoryRequirements", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_memory_requirements,
+                crate::resource::image::get_image_memory_requirements(handle::get(image)?)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetImageSparseMemoryRequirements(
+    device: vk::Device,
+    _: vk::Image,
+    p_sparse_memory_requirement_count: *mut u32,
+    p_sparse_memory_requirements: *mut vk::SparseImageMemoryRequirements,
+) {
+    guard(device, "vkGetImageSparseMemoryRequirements", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::enumerate(
+                p_sparse_memory_requirement_count,
+                p_sparse_memory_requirements,
+                &crate::resource::image::get_image_sparse_memory_requirements()?,
+            )
+            .map(drop)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSparseImageFormatProperties(
+    physical_device: vk::PhysicalDevice,
+    _: vk::Format,
+    _: vk::ImageType,
+    _: vk::SampleCountFlags,
+    _: vk::ImageUsageFlags,
+    _: vk::ImageTiling,
+    p_property_count: *mut u32,
+    p_properties: *mut vk::SparseImageFormatProperties,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSparseImageFormatProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::enumerate(
+                    p_property_count,
+                    p_properties,
+                    &crate::physical_device::get_physical_device_sparse_image_format_properties()?,
+                )
+                .map(drop)
+            }
+        },
+    )
 }
 
 unsafe extern "system" fn vkQueueBindSparse(
@@ -343,6 +1015,27 @@ unsafe extern "system" fn vkQueueBindSparse(
     })
 }
 
+unsafe extern "system" fn vkCreateFence(
+    device: vk::Device,
+    p_create_info: *const vk::FenceCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_fence: *mut vk::Fence,
+) -> vk::Result {
+    guard(device, "vkCreateFence", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_fence,
+                handle::create(crate::sync::create_fence(
+                    handle::get(device)?,
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyFence(
     device: vk::Device,
     fence: vk::Fence,
@@ -351,6 +1044,68 @@ unsafe extern "system" fn vkDestroyFence(
     guard(device, "vkDestroyFence", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(fence) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkResetFences(
+    device: vk::Device,
+    fence_count: u32,
+    p_fences: *const vk::Fence,
+) -> vk::Result {
+    guard(device, "vkResetFences", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::sync::reset_fences(&handle::get_all(valid::slice(p_fences, fence_count)?)?)
+                .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetFenceStatus(device: vk::Device, fence: vk::Fence) -> vk::Result {
+    guard(device, "vkGetFenceStatus", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::sync::get_fence_status(handle::get(device)?, handle::get(fence)?) }
+    })
+}
+
+unsafe extern "system" fn vkWaitForFences(
+    device: vk::Device,
+    fence_count: u32,
+    p_fences: *const vk::Fence,
+    wait_all: vk::Bool32,
+    timeout: u64,
+) -> vk::Result {
+    guard(device, "vkWaitForFences", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::sync::wait_for_fences(
+                handle::get(device)?,
+                &handle::get_all(valid::slice(p_fences, fence_count)?)?,
+                wait_all != vk::FALSE,
+                timeout,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateSemaphore(
+    device: vk::Device,
+    p_create_info: *const vk::SemaphoreCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_semaphore: *mut vk::Semaphore,
+) -> vk::Result {
+    guard(device, "vkCreateSemaphore", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_semaphore,
+                handle::create(crate::sync::create_semaphore(
+                    handle::get(device)?,
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
     })
 }
 
@@ -365,6 +1120,26 @@ unsafe extern "system" fn vkDestroySemaphore(
     })
 }
 
+unsafe extern "system" fn vkCreateQueryPool(
+    device: vk::Device,
+    p_create_info: *const vk::QueryPoolCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_query_pool: *mut vk::QueryPool,
+) -> vk::Result {
+    guard(device, "vkCreateQueryPool", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_query_pool,
+                handle::create(crate::query_pool::create_query_pool(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyQueryPool(
     device: vk::Device,
     query_pool: vk::QueryPool,
@@ -373,6 +1148,52 @@ unsafe extern "system" fn vkDestroyQueryPool(
     guard(device, "vkDestroyQueryPool", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(query_pool) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkGetQueryPoolResults(
+    device: vk::Device,
+    query_pool: vk::QueryPool,
+    first_query: u32,
+    query_count: u32,
+    data_size: usize,
+    p_data: *mut std::ffi::c_void,
+    stride: vk::DeviceSize,
+    flags: vk::QueryResultFlags,
+) -> vk::Result {
+    guard(device, "vkGetQueryPoolResults", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::query_pool::get_query_pool_results(
+                handle::get(device)?,
+                handle::get(query_pool)?,
+                first_query,
+                query_count,
+                valid::output_slice(p_data.cast::<u8>(), data_size)?,
+                stride,
+                flags,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateBuffer(
+    device: vk::Device,
+    p_create_info: *const vk::BufferCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_buffer: *mut vk::Buffer,
+) -> vk::Result {
+    guard(device, "vkCreateBuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_buffer,
+                handle::create(crate::resource::buffer::create_buffer(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
     })
 }
 
@@ -387,6 +1208,26 @@ unsafe extern "system" fn vkDestroyBuffer(
     })
 }
 
+unsafe extern "system" fn vkCreateImage(
+    device: vk::Device,
+    p_create_info: *const vk::ImageCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_image: *mut vk::Image,
+) -> vk::Result {
+    guard(device, "vkCreateImage", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_image,
+                handle::create(crate::resource::image::create_image(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyImage(
     device: vk::Device,
     image: vk::Image,
@@ -395,6 +1236,46 @@ unsafe extern "system" fn vkDestroyImage(
     guard(device, "vkDestroyImage", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(image) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkGetImageSubresourceLayout(
+    device: vk::Device,
+    image: vk::Image,
+    p_subresource: *const vk::ImageSubresource,
+    p_layout: *mut vk::SubresourceLayout,
+) {
+    guard(device, "vkGetImageSubresourceLayout", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_layout,
+                crate::resource::image::get_image_subresource_layout(
+                    handle::get(image)?,
+                    valid::input(p_subresource)?,
+                )?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateImageView(
+    device: vk::Device,
+    p_create_info: *const vk::ImageViewCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_view: *mut vk::ImageView,
+) -> vk::Result {
+    guard(device, "vkCreateImageView", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_view,
+                handle::create(crate::resource::image::create_image_view(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
     })
 }
 
@@ -409,6 +1290,128 @@ unsafe extern "system" fn vkDestroyImageView(
     })
 }
 
+unsafe extern "system" fn vkCreateCommandPool(
+    device: vk::Device,
+    p_create_info: *const vk::CommandPoolCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_command_pool: *mut vk::CommandPool,
+) -> vk::Result {
+    guard(device, "vkCreateCommandPool", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_command_pool,
+                handle::create(crate::command::buffer::create_command_pool(
+                    handle::get(device)?,
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkDestroyCommandPool(
+    device: vk::Device,
+    command_pool: vk::CommandPool,
+    _: *const vk::AllocationCallbacks<'_>,
+) {
+    guard(device, "vkDestroyCommandPool", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::command::buffer::destroy_command_pool(handle::destroy(command_pool)?) }
+    })
+}
+
+unsafe extern "system" fn vkResetCommandPool(
+    device: vk::Device,
+    command_pool: vk::CommandPool,
+    _: vk::CommandPoolResetFlags,
+) -> vk::Result {
+    guard(device, "vkResetCommandPool", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::buffer::reset_command_pool(handle::get(command_pool)?)
+                .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkAllocateCommandBuffers(
+    device: vk::Device,
+    p_allocate_info: *const vk::CommandBufferAllocateInfo<'_>,
+    p_command_buffers: *mut vk::CommandBuffer,
+) -> vk::Result {
+    guard(device, "vkAllocateCommandBuffers", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::buffer::allocate_command_buffers(
+                valid::input(p_allocate_info)?,
+                valid::output_slice(
+                    p_command_buffers,
+                    valid::input(p_allocate_info)?.command_buffer_count as usize,
+                )?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkFreeCommandBuffers(
+    device: vk::Device,
+    command_pool: vk::CommandPool,
+    command_buffer_count: u32,
+    p_command_buffers: *const vk::CommandBuffer,
+) {
+    guard(device, "vkFreeCommandBuffers", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::buffer::free_command_buffers(
+                handle::get(command_pool)?,
+                valid::slice(p_command_buffers, command_buffer_count)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkBeginCommandBuffer(
+    command_buffer: vk::CommandBuffer,
+    p_begin_info: *const vk::CommandBufferBeginInfo<'_>,
+) -> vk::Result {
+    guard(command_buffer, "vkBeginCommandBuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::buffer::begin_command_buffer(
+                handle::get(command_buffer)?,
+                valid::input(p_begin_info)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkEndCommandBuffer(command_buffer: vk::CommandBuffer) -> vk::Result {
+    guard(command_buffer, "vkEndCommandBuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::buffer::end_command_buffer(handle::get(command_buffer)?)
+                .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkResetCommandBuffer(
+    command_buffer: vk::CommandBuffer,
+    _: vk::CommandBufferResetFlags,
+) -> vk::Result {
+    guard(command_buffer, "vkResetCommandBuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::buffer::reset_command_buffer(handle::get(command_buffer)?)
+                .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkCmdCopyBuffer(
     command_buffer: vk::CommandBuffer,
     src_buffer: vk::Buffer,
@@ -419,9 +1422,9 @@ unsafe extern "system" fn vkCmdCopyBuffer(
     guard(command_buffer, "vkCmdCopyBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyBuffer", |recorder| {
                 let regions =
-                    pointer::slice(p_regions, region_count)?
+                    valid::slice(p_regions, region_count)?
                         .iter()
                         .map(|of| vk::BufferCopy2 {
                             src_offset: of.src_offset,
@@ -438,7 +1441,7 @@ unsafe extern "system" fn vkCmdCopyBuffer(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                entrypoints::transfer::cmd_copy_buffer2(recorder, &info)
+                crate::command::transfer::cmd_copy_buffer2(recorder, &info)
             })
         }
     })
@@ -456,9 +1459,9 @@ unsafe extern "system" fn vkCmdCopyImage(
     guard(command_buffer, "vkCmdCopyImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdCopyImage", |recorder| {
                 let regions =
-                    pointer::slice(p_regions, region_count)?
+                    valid::slice(p_regions, region_count)?
                         .iter()
                         .map(|of| vk::ImageCopy2 {
                             src_subresource: of.src_subresource,
@@ -479,7 +1482,7 @@ unsafe extern "system" fn vkCmdCopyImage(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                entrypoints::transfer::cmd_copy_image2(recorder, &info)
+                crate::command::transfer::cmd_copy_image2(recorder, &info)
             })
         }
     })
@@ -496,18 +1499,19 @@ unsafe extern "system" fn vkCmdCopyBufferToImage(
     guard(command_buffer, "vkCmdCopyBufferToImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                let regions = pointer::slice(p_regions, region_count)?.iter().map(|of| {
-                    vk::BufferImageCopy2 {
-                        buffer_offset: of.buffer_offset,
-                        buffer_row_length: of.buffer_row_length,
-                        buffer_image_height: of.buffer_image_height,
-                        image_subresource: of.image_subresource,
-                        image_offset: of.image_offset,
-                        image_extent: of.image_extent,
-                        ..Default::default()
-                    }
-                });
+            record(command_buffer, "vkCmdCopyBufferToImage", |recorder| {
+                let regions =
+                    valid::slice(p_regions, region_count)?
+                        .iter()
+                        .map(|of| vk::BufferImageCopy2 {
+                            buffer_offset: of.buffer_offset,
+                            buffer_row_length: of.buffer_row_length,
+                            buffer_image_height: of.buffer_image_height,
+                            image_subresource: of.image_subresource,
+                            image_offset: of.image_offset,
+                            image_extent: of.image_extent,
+                            ..Default::default()
+                        });
                 let regions = simdevice::host::collect(regions);
 
                 let info = vk::CopyBufferToImageInfo2 {
@@ -518,7 +1522,7 @@ unsafe extern "system" fn vkCmdCopyBufferToImage(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                entrypoints::transfer::cmd_copy_buffer_to_image2(recorder, &info)
+                crate::command::transfer::cmd_copy_buffer_to_image2(recorder, &info)
             })
         }
     })
@@ -535,18 +1539,19 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer(
     guard(command_buffer, "vkCmdCopyImageToBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                let regions = pointer::slice(p_regions, region_count)?.iter().map(|of| {
-                    vk::BufferImageCopy2 {
-                        buffer_offset: of.buffer_offset,
-                        buffer_row_length: of.buffer_row_length,
-                        buffer_image_height: of.buffer_image_height,
-                        image_subresource: of.image_subresource,
-                        image_offset: of.image_offset,
-                        image_extent: of.image_extent,
-                        ..Default::default()
-                    }
-                });
+            record(command_buffer, "vkCmdCopyImageToBuffer", |recorder| {
+                let regions =
+                    valid::slice(p_regions, region_count)?
+                        .iter()
+                        .map(|of| vk::BufferImageCopy2 {
+                            buffer_offset: of.buffer_offset,
+                            buffer_row_length: of.buffer_row_length,
+                            buffer_image_height: of.buffer_image_height,
+                            image_subresource: of.image_subresource,
+                            image_offset: of.image_offset,
+                            image_extent: of.image_extent,
+                            ..Default::default()
+                        });
                 let regions = simdevice::host::collect(regions);
 
                 let info = vk::CopyImageToBufferInfo2 {
@@ -557,7 +1562,7 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                entrypoints::transfer::cmd_copy_image_to_buffer2(recorder, &info)
+                crate::command::transfer::cmd_copy_image_to_buffer2(recorder, &info)
             })
         }
     })
@@ -573,8 +1578,8 @@ unsafe extern "system" fn vkCmdUpdateBuffer(
     guard(command_buffer, "vkCmdUpdateBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_update_buffer(
+            record(command_buffer, "vkCmdUpdateBuffer", |recorder| {
+                crate::command::transfer::cmd_update_buffer(
                     recorder,
                     handle::get(dst_buffer)?,
                     dst_offset,
@@ -596,8 +1601,8 @@ unsafe extern "system" fn vkCmdFillBuffer(
     guard(command_buffer, "vkCmdFillBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_fill_buffer(
+            record(command_buffer, "vkCmdFillBuffer", |recorder| {
+                crate::command::transfer::cmd_fill_buffer(
                     recorder,
                     handle::get(dst_buffer)?,
                     dst_offset,
@@ -624,8 +1629,8 @@ unsafe extern "system" fn vkCmdPipelineBarrier(
     guard(command_buffer, "vkCmdPipelineBarrier", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_pipeline_barrier(recorder)
+            record(command_buffer, "vkCmdPipelineBarrier", |recorder| {
+                crate::command::sync::cmd_pipeline_barrier(recorder)
             })
         }
     })
@@ -640,8 +1645,8 @@ unsafe extern "system" fn vkCmdBeginQuery(
     guard(command_buffer, "vkCmdBeginQuery", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::query::cmd_begin_query(recorder, handle::get(query_pool)?, query)
+            record(command_buffer, "vkCmdBeginQuery", |recorder| {
+                crate::command::query::cmd_begin_query(recorder, handle::get(query_pool)?, query)
             })
         }
     })
@@ -655,8 +1660,8 @@ unsafe extern "system" fn vkCmdEndQuery(
     guard(command_buffer, "vkCmdEndQuery", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::query::cmd_end_query(recorder, handle::get(query_pool)?, query)
+            record(command_buffer, "vkCmdEndQuery", |recorder| {
+                crate::command::query::cmd_end_query(recorder, handle::get(query_pool)?, query)
             })
         }
     })
@@ -671,8 +1676,8 @@ unsafe extern "system" fn vkCmdResetQueryPool(
     guard(command_buffer, "vkCmdResetQueryPool", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::query::cmd_reset_query_pool(
+            record(command_buffer, "vkCmdResetQueryPool", |recorder| {
+                crate::command::query::cmd_reset_query_pool(
                     recorder,
                     handle::get(query_pool)?,
                     first_query,
@@ -692,8 +1697,12 @@ unsafe extern "system" fn vkCmdWriteTimestamp(
     guard(command_buffer, "vkCmdWriteTimestamp", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::query::cmd_write_timestamp(recorder, handle::get(query_pool)?, query)
+            record(command_buffer, "vkCmdWriteTimestamp", |recorder| {
+                crate::command::query::cmd_write_timestamp(
+                    recorder,
+                    handle::get(query_pool)?,
+                    query,
+                )
             })
         }
     })
@@ -712,8 +1721,8 @@ unsafe extern "system" fn vkCmdCopyQueryPoolResults(
     guard(command_buffer, "vkCmdCopyQueryPoolResults", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::query::cmd_copy_query_pool_results(
+            record(command_buffer, "vkCmdCopyQueryPoolResults", |recorder| {
+                crate::command::query::cmd_copy_query_pool_results(
                     recorder,
                     handle::get(query_pool)?,
                     first_query,
@@ -724,6 +1733,43 @@ unsafe extern "system" fn vkCmdCopyQueryPoolResults(
                     flags,
                 )
             })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdExecuteCommands(
+    command_buffer: vk::CommandBuffer,
+    command_buffer_count: u32,
+    p_command_buffers: *const vk::CommandBuffer,
+) {
+    guard(command_buffer, "vkCmdExecuteCommands", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::buffer::cmd_execute_commands(
+                handle::get(command_buffer)?,
+                &handle::get_all(valid::slice(p_command_buffers, command_buffer_count)?)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateEvent(
+    device: vk::Device,
+    p_create_info: *const vk::EventCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_event: *mut vk::Event,
+) -> vk::Result {
+    guard(device, "vkCreateEvent", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_event,
+                handle::create(crate::sync::create_event(
+                    handle::get(device)?,
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -739,6 +1785,47 @@ unsafe extern "system" fn vkDestroyEvent(
     })
 }
 
+unsafe extern "system" fn vkGetEventStatus(device: vk::Device, event: vk::Event) -> vk::Result {
+    guard(device, "vkGetEventStatus", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::sync::get_event_status(handle::get(device)?, handle::get(event)?) }
+    })
+}
+
+unsafe extern "system" fn vkSetEvent(device: vk::Device, event: vk::Event) -> vk::Result {
+    guard(device, "vkSetEvent", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::sync::set_event(handle::get(event)?).map(|()| vk::Result::SUCCESS) }
+    })
+}
+
+unsafe extern "system" fn vkResetEvent(device: vk::Device, event: vk::Event) -> vk::Result {
+    guard(device, "vkResetEvent", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe { crate::sync::reset_event(handle::get(event)?).map(|()| vk::Result::SUCCESS) }
+    })
+}
+
+unsafe extern "system" fn vkCreateBufferView(
+    device: vk::Device,
+    p_create_info: *const vk::BufferViewCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_view: *mut vk::BufferView,
+) -> vk::Result {
+    guard(device, "vkCreateBufferView", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_view,
+                handle::create(crate::resource::buffer::create_buffer_view(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyBufferView(
     device: vk::Device,
     buffer_view: vk::BufferView,
@@ -747,6 +1834,27 @@ unsafe extern "system" fn vkDestroyBufferView(
     guard(device, "vkDestroyBufferView", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(buffer_view) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkCreateShaderModule(
+    device: vk::Device,
+    p_create_info: *const vk::ShaderModuleCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_shader_module: *mut vk::ShaderModule,
+) -> vk::Result {
+    guard(device, "vkCreateShaderModule", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_shader_module,
+                handle::create(crate::shader_module::create_shader_module(
+                    handle::get(device)?,
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
     })
 }
 
@@ -761,6 +1869,26 @@ unsafe extern "system" fn vkDestroyShaderModule(
     })
 }
 
+unsafe extern "system" fn vkCreatePipelineCache(
+    device: vk::Device,
+    p_create_info: *const vk::PipelineCacheCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_pipeline_cache: *mut vk::PipelineCache,
+) -> vk::Result {
+    guard(device, "vkCreatePipelineCache", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_pipeline_cache,
+                handle::create(crate::pipeline::create_pipeline_cache(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyPipelineCache(
     device: vk::Device,
     pipeline_cache: vk::PipelineCache,
@@ -769,6 +1897,50 @@ unsafe extern "system" fn vkDestroyPipelineCache(
     guard(device, "vkDestroyPipelineCache", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(pipeline_cache) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkGetPipelineCacheData(
+    device: vk::Device,
+    _: vk::PipelineCache,
+    p_data_size: *mut usize,
+    p_data: *mut std::ffi::c_void,
+) -> vk::Result {
+    guard(device, "vkGetPipelineCacheData", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::pipeline::get_pipeline_cache_data(valid::output_structure(p_data_size)?, p_data)
+        }
+    })
+}
+
+unsafe extern "system" fn vkMergePipelineCaches(
+    device: vk::Device,
+    _: vk::PipelineCache,
+    _: u32,
+    _: *const vk::PipelineCache,
+) -> vk::Result {
+    guard(device, "vkMergePipelineCaches", || Ok(vk::Result::SUCCESS))
+}
+
+unsafe extern "system" fn vkCreateComputePipelines(
+    device: vk::Device,
+    _: vk::PipelineCache,
+    create_info_count: u32,
+    p_create_infos: *const vk::ComputePipelineCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_pipelines: *mut vk::Pipeline,
+) -> vk::Result {
+    guard(device, "vkCreateComputePipelines", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::pipeline::create_compute_pipelines(
+                handle::get(device)?,
+                valid::slice(p_create_infos, create_info_count)?,
+                valid::output_slice(p_pipelines, create_info_count as usize)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
     })
 }
 
@@ -783,6 +1955,26 @@ unsafe extern "system" fn vkDestroyPipeline(
     })
 }
 
+unsafe extern "system" fn vkCreatePipelineLayout(
+    device: vk::Device,
+    p_create_info: *const vk::PipelineLayoutCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_pipeline_layout: *mut vk::PipelineLayout,
+) -> vk::Result {
+    guard(device, "vkCreatePipelineLayout", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_pipeline_layout,
+                handle::create(crate::pipeline::layout::create_pipeline_layout(
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyPipelineLayout(
     device: vk::Device,
     pipeline_layout: vk::PipelineLayout,
@@ -791,6 +1983,26 @@ unsafe extern "system" fn vkDestroyPipelineLayout(
     guard(device, "vkDestroyPipelineLayout", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(pipeline_layout) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkCreateSampler(
+    device: vk::Device,
+    p_create_info: *const vk::SamplerCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_sampler: *mut vk::Sampler,
+) -> vk::Result {
+    guard(device, "vkCreateSampler", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_sampler,
+                handle::create(crate::resource::sampler::create_sampler(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
     })
 }
 
@@ -805,6 +2017,26 @@ unsafe extern "system" fn vkDestroySampler(
     })
 }
 
+unsafe extern "system" fn vkCreateDescriptorSetLayout(
+    device: vk::Device,
+    p_create_info: *const vk::DescriptorSetLayoutCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_set_layout: *mut vk::DescriptorSetLayout,
+) -> vk::Result {
+    guard(device, "vkCreateDescriptorSetLayout", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_set_layout,
+                handle::create(crate::descriptor::layout::create_descriptor_set_layout(
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyDescriptorSetLayout(
     device: vk::Device,
     descriptor_set_layout: vk::DescriptorSetLayout,
@@ -816,6 +2048,110 @@ unsafe extern "system" fn vkDestroyDescriptorSetLayout(
     })
 }
 
+unsafe extern "system" fn vkCreateDescriptorPool(
+    device: vk::Device,
+    p_create_info: *const vk::DescriptorPoolCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_descriptor_pool: *mut vk::DescriptorPool,
+) -> vk::Result {
+    guard(device, "vkCreateDescriptorPool", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_descriptor_pool,
+                handle::create(crate::descriptor::pool::create_descriptor_pool(
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkDestroyDescriptorPool(
+    device: vk::Device,
+    descriptor_pool: vk::DescriptorPool,
+    _: *const vk::AllocationCallbacks<'_>,
+) {
+    guard(device, "vkDestroyDescriptorPool", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::descriptor::pool::destroy_descriptor_pool(handle::destroy(descriptor_pool)?)
+        }
+    })
+}
+
+unsafe extern "system" fn vkResetDescriptorPool(
+    device: vk::Device,
+    descriptor_pool: vk::DescriptorPool,
+    _: vk::DescriptorPoolResetFlags,
+) -> vk::Result {
+    guard(device, "vkResetDescriptorPool", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::descriptor::pool::reset_descriptor_pool(handle::get(descriptor_pool)?)
+                .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkAllocateDescriptorSets(
+    device: vk::Device,
+    p_allocate_info: *const vk::DescriptorSetAllocateInfo<'_>,
+    p_descriptor_sets: *mut vk::DescriptorSet,
+) -> vk::Result {
+    guard(device, "vkAllocateDescriptorSets", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::descriptor::pool::allocate_descriptor_sets(
+                valid::input(p_allocate_info)?,
+                valid::output_slice(
+                    p_descriptor_sets,
+                    valid::input(p_allocate_info)?.descriptor_set_count as usize,
+                )?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkFreeDescriptorSets(
+    device: vk::Device,
+    descriptor_pool: vk::DescriptorPool,
+    descriptor_set_count: u32,
+    p_descriptor_sets: *const vk::DescriptorSet,
+) -> vk::Result {
+    guard(device, "vkFreeDescriptorSets", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::descriptor::pool::free_descriptor_sets(
+                handle::get(descriptor_pool)?,
+                valid::slice(p_descriptor_sets, descriptor_set_count)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkUpdateDescriptorSets(
+    device: vk::Device,
+    descriptor_write_count: u32,
+    p_descriptor_writes: *const vk::WriteDescriptorSet<'_>,
+    descriptor_copy_count: u32,
+    p_descriptor_copies: *const vk::CopyDescriptorSet<'_>,
+) {
+    guard(device, "vkUpdateDescriptorSets", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::descriptor::set::update_descriptor_sets(
+                handle::get(device)?,
+                valid::slice(p_descriptor_writes, descriptor_write_count)?,
+                valid::slice(p_descriptor_copies, descriptor_copy_count)?,
+            )
+        }
+    })
+}
+
 unsafe extern "system" fn vkCmdBindPipeline(
     command_buffer: vk::CommandBuffer,
     pipeline_bind_point: vk::PipelineBindPoint,
@@ -824,8 +2160,8 @@ unsafe extern "system" fn vkCmdBindPipeline(
     guard(command_buffer, "vkCmdBindPipeline", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_bind_pipeline(
+            record(command_buffer, "vkCmdBindPipeline", |recorder| {
+                crate::command::bind::cmd_bind_pipeline(
                     recorder,
                     pipeline_bind_point,
                     handle::get(pipeline)?,
@@ -848,14 +2184,14 @@ unsafe extern "system" fn vkCmdBindDescriptorSets(
     guard(command_buffer, "vkCmdBindDescriptorSets", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::compute::cmd_bind_descriptor_sets(
+            record(command_buffer, "vkCmdBindDescriptorSets", |recorder| {
+                crate::command::bind::cmd_bind_descriptor_sets(
                     recorder,
                     pipeline_bind_point,
                     handle::get(layout)?,
                     first_set,
-                    &handle::get_all(pointer::slice(p_descriptor_sets, descriptor_set_count)?)?,
-                    pointer::slice(p_dynamic_offsets, dynamic_offset_count)?,
+                    &handle::get_all(valid::slice(p_descriptor_sets, descriptor_set_count)?)?,
+                    valid::slice(p_dynamic_offsets, dynamic_offset_count)?,
                 )
             })
         }
@@ -873,12 +2209,12 @@ unsafe extern "system" fn vkCmdClearColorImage(
     guard(command_buffer, "vkCmdClearColorImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_clear_color_image(
+            record(command_buffer, "vkCmdClearColorImage", |recorder| {
+                crate::command::transfer::cmd_clear_color_image(
                     recorder,
                     handle::get(image)?,
-                    pointer::input(p_color)?,
-                    pointer::slice(p_ranges, range_count)?,
+                    valid::input(p_color)?,
+                    valid::slice(p_ranges, range_count)?,
                 )
             })
         }
@@ -894,8 +2230,8 @@ unsafe extern "system" fn vkCmdDispatch(
     guard(command_buffer, "vkCmdDispatch", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::compute::cmd_dispatch(
+            record(command_buffer, "vkCmdDispatch", |recorder| {
+                crate::command::draw::cmd_dispatch(
                     recorder,
                     group_count_x,
                     group_count_y,
@@ -914,8 +2250,8 @@ unsafe extern "system" fn vkCmdDispatchIndirect(
     guard(command_buffer, "vkCmdDispatchIndirect", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::compute::cmd_dispatch_indirect(recorder, handle::get(buffer)?, offset)
+            record(command_buffer, "vkCmdDispatchIndirect", |recorder| {
+                crate::command::draw::cmd_dispatch_indirect(recorder, handle::get(buffer)?, offset)
             })
         }
     })
@@ -929,8 +2265,8 @@ unsafe extern "system" fn vkCmdSetEvent(
     guard(command_buffer, "vkCmdSetEvent", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_set_event(recorder, handle::get(event)?)
+            record(command_buffer, "vkCmdSetEvent", |recorder| {
+                crate::command::sync::cmd_set_event(recorder, handle::get(event)?)
             })
         }
     })
@@ -944,8 +2280,8 @@ unsafe extern "system" fn vkCmdResetEvent(
     guard(command_buffer, "vkCmdResetEvent", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_reset_event(recorder, handle::get(event)?)
+            record(command_buffer, "vkCmdResetEvent", |recorder| {
+                crate::command::sync::cmd_reset_event(recorder, handle::get(event)?)
             })
         }
     })
@@ -967,10 +2303,10 @@ unsafe extern "system" fn vkCmdWaitEvents(
     guard(command_buffer, "vkCmdWaitEvents", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_wait_events(
+            record(command_buffer, "vkCmdWaitEvents", |recorder| {
+                crate::command::sync::cmd_wait_events(
                     recorder,
-                    &handle::get_all(pointer::slice(p_events, event_count)?)?,
+                    &handle::get_all(valid::slice(p_events, event_count)?)?,
                 )
             })
         }
@@ -988,14 +2324,55 @@ unsafe extern "system" fn vkCmdPushConstants(
     guard(command_buffer, "vkCmdPushConstants", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::compute::cmd_push_constants(
+            record(command_buffer, "vkCmdPushConstants", |recorder| {
+                crate::command::bind::cmd_push_constants(
                     recorder,
                     handle::get(layout)?,
                     offset,
-                    pointer::slice(p_values.cast::<u8>(), size)?,
+                    valid::slice(p_values.cast::<u8>(), size)?,
                 )
             })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateGraphicsPipelines(
+    device: vk::Device,
+    _: vk::PipelineCache,
+    create_info_count: u32,
+    p_create_infos: *const vk::GraphicsPipelineCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_pipelines: *mut vk::Pipeline,
+) -> vk::Result {
+    guard(device, "vkCreateGraphicsPipelines", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::pipeline::create_graphics_pipelines(
+                handle::get(device)?,
+                valid::slice(p_create_infos, create_info_count)?,
+                valid::output_slice(p_pipelines, create_info_count as usize)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateFramebuffer(
+    device: vk::Device,
+    p_create_info: *const vk::FramebufferCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_framebuffer: *mut vk::Framebuffer,
+) -> vk::Result {
+    guard(device, "vkCreateFramebuffer", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_framebuffer,
+                handle::create(crate::render_pass::create_framebuffer(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1011,6 +2388,26 @@ unsafe extern "system" fn vkDestroyFramebuffer(
     })
 }
 
+unsafe extern "system" fn vkCreateRenderPass(
+    device: vk::Device,
+    p_create_info: *const vk::RenderPassCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_render_pass: *mut vk::RenderPass,
+) -> vk::Result {
+    guard(device, "vkCreateRenderPass", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_render_pass,
+                handle::create(crate::render_pass::create_render_pass(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyRenderPass(
     device: vk::Device,
     render_pass: vk::RenderPass,
@@ -1019,6 +2416,22 @@ unsafe extern "system" fn vkDestroyRenderPass(
     guard(device, "vkDestroyRenderPass", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(render_pass) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkGetRenderAreaGranularity(
+    device: vk::Device,
+    _: vk::RenderPass,
+    p_granularity: *mut vk::Extent2D,
+) {
+    guard(device, "vkGetRenderAreaGranularity", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_granularity,
+                crate::render_pass::get_render_area_granularity()?,
+            )
+        }
     })
 }
 
@@ -1031,11 +2444,11 @@ unsafe extern "system" fn vkCmdSetViewport(
     guard(command_buffer, "vkCmdSetViewport", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_set_viewport(
+            record(command_buffer, "vkCmdSetViewport", |recorder| {
+                crate::command::dynamic_state::cmd_set_viewport(
                     recorder,
                     first_viewport,
-                    pointer::slice(p_viewports, viewport_count)?,
+                    valid::slice(p_viewports, viewport_count)?,
                 )
             })
         }
@@ -1051,11 +2464,11 @@ unsafe extern "system" fn vkCmdSetScissor(
     guard(command_buffer, "vkCmdSetScissor", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_set_scissor(
+            record(command_buffer, "vkCmdSetScissor", |recorder| {
+                crate::command::dynamic_state::cmd_set_scissor(
                     recorder,
                     first_scissor,
-                    pointer::slice(p_scissors, scissor_count)?,
+                    valid::slice(p_scissors, scissor_count)?,
                 )
             })
         }
@@ -1066,8 +2479,8 @@ unsafe extern "system" fn vkCmdSetLineWidth(command_buffer: vk::CommandBuffer, l
     guard(command_buffer, "vkCmdSetLineWidth", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_line_width(recorder, line_width)
+            record(command_buffer, "vkCmdSetLineWidth", |recorder| {
+                crate::command::dynamic_state::cmd_set_line_width(recorder, line_width)
             })
         }
     })
@@ -1082,8 +2495,8 @@ unsafe extern "system" fn vkCmdSetDepthBias(
     guard(command_buffer, "vkCmdSetDepthBias", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_depth_bias(
+            record(command_buffer, "vkCmdSetDepthBias", |recorder| {
+                crate::command::dynamic_state::cmd_set_depth_bias(
                     recorder,
                     depth_bias_constant_factor,
                     depth_bias_clamp,
@@ -1101,10 +2514,10 @@ unsafe extern "system" fn vkCmdSetBlendConstants(
     guard(command_buffer, "vkCmdSetBlendConstants", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_blend_constants(
+            record(command_buffer, "vkCmdSetBlendConstants", |recorder| {
+                crate::command::dynamic_state::cmd_set_blend_constants(
                     recorder,
-                    pointer::input(blend_constants)?,
+                    valid::input(blend_constants)?,
                 )
             })
         }
@@ -1119,8 +2532,8 @@ unsafe extern "system" fn vkCmdSetDepthBounds(
     guard(command_buffer, "vkCmdSetDepthBounds", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_depth_bounds(
+            record(command_buffer, "vkCmdSetDepthBounds", |recorder| {
+                crate::command::dynamic_state::cmd_set_depth_bounds(
                     recorder,
                     min_depth_bounds,
                     max_depth_bounds,
@@ -1138,8 +2551,8 @@ unsafe extern "system" fn vkCmdSetStencilCompareMask(
     guard(command_buffer, "vkCmdSetStencilCompareMask", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_stencil_compare_mask(
+            record(command_buffer, "vkCmdSetStencilCompareMask", |recorder| {
+                crate::command::dynamic_state::cmd_set_stencil_compare_mask(
                     recorder,
                     face_mask,
                     compare_mask,
@@ -1157,8 +2570,8 @@ unsafe extern "system" fn vkCmdSetStencilWriteMask(
     guard(command_buffer, "vkCmdSetStencilWriteMask", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_stencil_write_mask(
+            record(command_buffer, "vkCmdSetStencilWriteMask", |recorder| {
+                crate::command::dynamic_state::cmd_set_stencil_write_mask(
                     recorder, face_mask, write_mask,
                 )
             })
@@ -1174,8 +2587,8 @@ unsafe extern "system" fn vkCmdSetStencilReference(
     guard(command_buffer, "vkCmdSetStencilReference", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_stencil_reference(
+            record(command_buffer, "vkCmdSetStencilReference", |recorder| {
+                crate::command::dynamic_state::cmd_set_stencil_reference(
                     recorder, face_mask, reference,
                 )
             })
@@ -1192,8 +2605,8 @@ unsafe extern "system" fn vkCmdBindIndexBuffer(
     guard(command_buffer, "vkCmdBindIndexBuffer", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_bind_index_buffer(
+            record(command_buffer, "vkCmdBindIndexBuffer", |recorder| {
+                crate::command::bind::cmd_bind_index_buffer(
                     recorder,
                     handle::get(buffer)?,
                     offset,
@@ -1214,12 +2627,12 @@ unsafe extern "system" fn vkCmdBindVertexBuffers(
     guard(command_buffer, "vkCmdBindVertexBuffers", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_bind_vertex_buffers(
+            record(command_buffer, "vkCmdBindVertexBuffers", |recorder| {
+                crate::command::bind::cmd_bind_vertex_buffers(
                     recorder,
                     first_binding,
-                    &handle::get_all(pointer::slice(p_buffers, binding_count)?)?,
-                    pointer::slice(p_offsets, binding_count)?,
+                    &handle::get_all(valid::slice(p_buffers, binding_count)?)?,
+                    valid::slice(p_offsets, binding_count)?,
                 )
             })
         }
@@ -1236,8 +2649,8 @@ unsafe extern "system" fn vkCmdDraw(
     guard(command_buffer, "vkCmdDraw", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_draw(
+            record(command_buffer, "vkCmdDraw", |recorder| {
+                crate::command::draw::cmd_draw(
                     recorder,
                     vertex_count,
                     instance_count,
@@ -1260,8 +2673,8 @@ unsafe extern "system" fn vkCmdDrawIndexed(
     guard(command_buffer, "vkCmdDrawIndexed", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_draw_indexed(
+            record(command_buffer, "vkCmdDrawIndexed", |recorder| {
+                crate::command::draw::cmd_draw_indexed(
                     recorder,
                     index_count,
                     instance_count,
@@ -1284,8 +2697,8 @@ unsafe extern "system" fn vkCmdDrawIndirect(
     guard(command_buffer, "vkCmdDrawIndirect", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_draw_indirect(
+            record(command_buffer, "vkCmdDrawIndirect", |recorder| {
+                crate::command::draw::cmd_draw_indirect(
                     recorder,
                     handle::get(buffer)?,
                     offset,
@@ -1307,8 +2720,8 @@ unsafe extern "system" fn vkCmdDrawIndexedIndirect(
     guard(command_buffer, "vkCmdDrawIndexedIndirect", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_draw_indexed_indirect(
+            record(command_buffer, "vkCmdDrawIndexedIndirect", |recorder| {
+                crate::command::draw::cmd_draw_indexed_indirect(
                     recorder,
                     handle::get(buffer)?,
                     offset,
@@ -1333,9 +2746,9 @@ unsafe extern "system" fn vkCmdBlitImage(
     guard(command_buffer, "vkCmdBlitImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdBlitImage", |recorder| {
                 let regions =
-                    pointer::slice(p_regions, region_count)?
+                    valid::slice(p_regions, region_count)?
                         .iter()
                         .map(|of| vk::ImageBlit2 {
                             src_subresource: of.src_subresource,
@@ -1356,7 +2769,7 @@ unsafe extern "system" fn vkCmdBlitImage(
                     filter,
                     ..Default::default()
                 };
-                entrypoints::transfer::cmd_blit_image2(recorder, &info)
+                crate::command::transfer::cmd_blit_image2(recorder, &info)
             })
         }
     })
@@ -1373,12 +2786,12 @@ unsafe extern "system" fn vkCmdClearDepthStencilImage(
     guard(command_buffer, "vkCmdClearDepthStencilImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_clear_depth_stencil_image(
+            record(command_buffer, "vkCmdClearDepthStencilImage", |recorder| {
+                crate::command::transfer::cmd_clear_depth_stencil_image(
                     recorder,
                     handle::get(image)?,
-                    pointer::input(p_depth_stencil)?,
-                    pointer::slice(p_ranges, range_count)?,
+                    valid::input(p_depth_stencil)?,
+                    valid::slice(p_ranges, range_count)?,
                 )
             })
         }
@@ -1395,11 +2808,11 @@ unsafe extern "system" fn vkCmdClearAttachments(
     guard(command_buffer, "vkCmdClearAttachments", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_clear_attachments(
+            record(command_buffer, "vkCmdClearAttachments", |recorder| {
+                crate::command::transfer::cmd_clear_attachments(
                     recorder,
-                    pointer::slice(p_attachments, attachment_count)?,
-                    pointer::slice(p_rects, rect_count)?,
+                    valid::slice(p_attachments, attachment_count)?,
+                    valid::slice(p_rects, rect_count)?,
                 )
             })
         }
@@ -1418,9 +2831,9 @@ unsafe extern "system" fn vkCmdResolveImage(
     guard(command_buffer, "vkCmdResolveImage", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
+            record(command_buffer, "vkCmdResolveImage", |recorder| {
                 let regions =
-                    pointer::slice(p_regions, region_count)?
+                    valid::slice(p_regions, region_count)?
                         .iter()
                         .map(|of| vk::ImageResolve2 {
                             src_subresource: of.src_subresource,
@@ -1441,7 +2854,7 @@ unsafe extern "system" fn vkCmdResolveImage(
                     p_regions: regions.as_ptr(),
                     ..Default::default()
                 };
-                entrypoints::transfer::cmd_resolve_image2(recorder, &info)
+                crate::command::transfer::cmd_resolve_image2(recorder, &info)
             })
         }
     })
@@ -1455,10 +2868,10 @@ unsafe extern "system" fn vkCmdBeginRenderPass(
     guard(command_buffer, "vkCmdBeginRenderPass", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::rendering::cmd_begin_render_pass(
+            record(command_buffer, "vkCmdBeginRenderPass", |recorder| {
+                crate::command::render_pass::cmd_begin_render_pass(
                     recorder,
-                    pointer::input(p_render_pass_begin)?,
+                    valid::input(p_render_pass_begin)?,
                 )
             })
         }
@@ -1472,8 +2885,8 @@ unsafe extern "system" fn vkCmdNextSubpass(
     guard(command_buffer, "vkCmdNextSubpass", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::rendering::cmd_next_subpass(recorder)
+            record(command_buffer, "vkCmdNextSubpass", |recorder| {
+                crate::command::render_pass::cmd_next_subpass(recorder)
             })
         }
     })
@@ -1483,9 +2896,71 @@ unsafe extern "system" fn vkCmdEndRenderPass(command_buffer: vk::CommandBuffer) 
     guard(command_buffer, "vkCmdEndRenderPass", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::rendering::cmd_end_render_pass(recorder)
+            record(command_buffer, "vkCmdEndRenderPass", |recorder| {
+                crate::command::render_pass::cmd_end_render_pass(recorder)
             })
+        }
+    })
+}
+
+unsafe extern "system" fn vkEnumerateInstanceVersion(p_api_version: *mut u32) -> vk::Result {
+    guard(p_api_version, "vkEnumerateInstanceVersion", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_api_version,
+                crate::instance::enumerate_instance_version()?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkBindBufferMemory2(
+    device: vk::Device,
+    bind_info_count: u32,
+    p_bind_infos: *const vk::BindBufferMemoryInfo<'_>,
+) -> vk::Result {
+    guard(device, "vkBindBufferMemory2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::buffer::bind_buffer_memory2(valid::slice(
+                p_bind_infos,
+                bind_info_count,
+            )?)
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkBindImageMemory2(
+    device: vk::Device,
+    bind_info_count: u32,
+    p_bind_infos: *const vk::BindImageMemoryInfo<'_>,
+) -> vk::Result {
+    guard(device, "vkBindImageMemory2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::image::bind_image_memory2(valid::slice(p_bind_infos, bind_info_count)?)
+                .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceGroupPeerMemoryFeatures(
+    device: vk::Device,
+    _: u32,
+    _: u32,
+    _: u32,
+    p_peer_memory_features: *mut vk::PeerMemoryFeatureFlags,
+) {
+    guard(device, "vkGetDeviceGroupPeerMemoryFeatures", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_peer_memory_features,
+                crate::device::get_device_group_peer_memory_features()?,
+            )
         }
     })
 }
@@ -1494,11 +2969,200 @@ unsafe extern "system" fn vkCmdSetDeviceMask(command_buffer: vk::CommandBuffer, 
     guard(command_buffer, "vkCmdSetDeviceMask", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_device_mask(recorder)
+            record(command_buffer, "vkCmdSetDeviceMask", |recorder| {
+                crate::command::sync::cmd_set_device_mask(recorder)
             })
         }
     })
+}
+
+unsafe extern "system" fn vkEnumeratePhysicalDeviceGroups(
+    instance: vk::Instance,
+    p_physical_device_group_count: *mut u32,
+    p_physical_device_group_properties: *mut vk::PhysicalDeviceGroupProperties<'_>,
+) -> vk::Result {
+    guard(instance, "vkEnumeratePhysicalDeviceGroups", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::instance::enumerate_physical_device_groups(
+                handle::get(instance)?,
+                Structures::new(
+                    p_physical_device_group_count,
+                    p_physical_device_group_properties,
+                )?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetImageMemoryRequirements2(
+    device: vk::Device,
+    p_info: *const vk::ImageMemoryRequirementsInfo2<'_>,
+    p_memory_requirements: *mut vk::MemoryRequirements2<'_>,
+) {
+    guard(device, "vkGetImageMemoryRequirements2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::image::get_image_memory_requirements2(
+                valid::input(p_info)?,
+                OutputChain::new(p_memory_requirements)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetBufferMemoryRequirements2(
+    device: vk::Device,
+    p_info: *const vk::BufferMemoryRequirementsInfo2<'_>,
+    p_memory_requirements: *mut vk::MemoryRequirements2<'_>,
+) {
+    guard(device, "vkGetBufferMemoryRequirements2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::buffer::get_buffer_memory_requirements2(
+                valid::input(p_info)?,
+                OutputChain::new(p_memory_requirements)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetImageSparseMemoryRequirements2(
+    device: vk::Device,
+    _: *const vk::ImageSparseMemoryRequirementsInfo2<'_>,
+    p_sparse_memory_requirement_count: *mut u32,
+    p_sparse_memory_requirements: *mut vk::SparseImageMemoryRequirements2<'_>,
+) {
+    guard(device, "vkGetImageSparseMemoryRequirements2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::image::get_image_sparse_memory_requirements2(Structures::new(
+                p_sparse_memory_requirement_count,
+                p_sparse_memory_requirements,
+            )?)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceFeatures2(
+    physical_device: vk::PhysicalDevice,
+    p_features: *mut vk::PhysicalDeviceFeatures2<'_>,
+) {
+    guard(physical_device, "vkGetPhysicalDeviceFeatures2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_features2(OutputChain::new(p_features)?)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceProperties2(
+    physical_device: vk::PhysicalDevice,
+    p_properties: *mut vk::PhysicalDeviceProperties2<'_>,
+) {
+    guard(physical_device, "vkGetPhysicalDeviceProperties2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_properties2(OutputChain::new(p_properties)?)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceFormatProperties2(
+    physical_device: vk::PhysicalDevice,
+    format: vk::Format,
+    p_format_properties: *mut vk::FormatProperties2<'_>,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceFormatProperties2",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::get_physical_device_format_properties2(
+                    format,
+                    OutputChain::new(p_format_properties)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceImageFormatProperties2(
+    physical_device: vk::PhysicalDevice,
+    p_image_format_info: *const vk::PhysicalDeviceImageFormatInfo2<'_>,
+    p_image_format_properties: *mut vk::ImageFormatProperties2<'_>,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceImageFormatProperties2",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::get_physical_device_image_format_properties2(
+                    valid::input(p_image_format_info)?,
+                    OutputChain::new(p_image_format_properties)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyProperties2(
+    physical_device: vk::PhysicalDevice,
+    p_queue_family_property_count: *mut u32,
+    p_queue_family_properties: *mut vk::QueueFamilyProperties2<'_>,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceQueueFamilyProperties2",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::get_physical_device_queue_family_properties2(
+                    Structures::new(p_queue_family_property_count, p_queue_family_properties)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceMemoryProperties2(
+    physical_device: vk::PhysicalDevice,
+    p_memory_properties: *mut vk::PhysicalDeviceMemoryProperties2<'_>,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceMemoryProperties2",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::get_physical_device_memory_properties2(
+                    valid::output_structure(p_memory_properties)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceSparseImageFormatProperties2(
+    physical_device: vk::PhysicalDevice,
+    _: *const vk::PhysicalDeviceSparseImageFormatInfo2<'_>,
+    p_property_count: *mut u32,
+    p_properties: *mut vk::SparseImageFormatProperties2<'_>,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceSparseImageFormatProperties2",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::get_physical_device_sparse_image_format_properties2(
+                    Structures::new(p_property_count, p_properties)?,
+                )
+            }
+        },
+    )
 }
 
 unsafe extern "system" fn vkTrimCommandPool(
@@ -1507,6 +3171,82 @@ unsafe extern "system" fn vkTrimCommandPool(
     _: vk::CommandPoolTrimFlags,
 ) {
     guard(device, "vkTrimCommandPool", || Ok(()))
+}
+
+unsafe extern "system" fn vkGetDeviceQueue2(
+    device: vk::Device,
+    p_queue_info: *const vk::DeviceQueueInfo2<'_>,
+    p_queue: *mut vk::Queue,
+) {
+    guard(device, "vkGetDeviceQueue2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_queue,
+                crate::device::get_device_queue2(
+                    handle::get(device)?,
+                    valid::input(p_queue_info)?,
+                )?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceExternalBufferProperties(
+    physical_device: vk::PhysicalDevice,
+    _: *const vk::PhysicalDeviceExternalBufferInfo<'_>,
+    p_external_buffer_properties: *mut vk::ExternalBufferProperties<'_>,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceExternalBufferProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::get_physical_device_external_buffer_properties(
+                    valid::output_structure(p_external_buffer_properties)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceExternalFenceProperties(
+    physical_device: vk::PhysicalDevice,
+    _: *const vk::PhysicalDeviceExternalFenceInfo<'_>,
+    p_external_fence_properties: *mut vk::ExternalFenceProperties<'_>,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceExternalFenceProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::get_physical_device_external_fence_properties(
+                    valid::output_structure(p_external_fence_properties)?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceExternalSemaphoreProperties(
+    physical_device: vk::PhysicalDevice,
+    _: *const vk::PhysicalDeviceExternalSemaphoreInfo<'_>,
+    p_external_semaphore_properties: *mut vk::ExternalSemaphoreProperties<'_>,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceExternalSemaphoreProperties",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::get_physical_device_external_semaphore_properties(
+                    valid::output_structure(p_external_semaphore_properties)?,
+                )
+            }
+        },
+    )
 }
 
 unsafe extern "system" fn vkCmdDispatchBase(
@@ -1521,8 +3261,8 @@ unsafe extern "system" fn vkCmdDispatchBase(
     guard(command_buffer, "vkCmdDispatchBase", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::compute::cmd_dispatch_base(
+            record(command_buffer, "vkCmdDispatchBase", |recorder| {
+                crate::command::draw::cmd_dispatch_base(
                     recorder,
                     base_group_x,
                     base_group_y,
@@ -1536,6 +3276,26 @@ unsafe extern "system" fn vkCmdDispatchBase(
     })
 }
 
+unsafe extern "system" fn vkCreateDescriptorUpdateTemplate(
+    device: vk::Device,
+    p_create_info: *const vk::DescriptorUpdateTemplateCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_descriptor_update_template: *mut vk::DescriptorUpdateTemplate,
+) -> vk::Result {
+    guard(device, "vkCreateDescriptorUpdateTemplate", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_descriptor_update_template,
+                handle::create(crate::descriptor::set::create_descriptor_update_template(
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
 unsafe extern "system" fn vkDestroyDescriptorUpdateTemplate(
     device: vk::Device,
     descriptor_update_template: vk::DescriptorUpdateTemplate,
@@ -1544,6 +3304,41 @@ unsafe extern "system" fn vkDestroyDescriptorUpdateTemplate(
     guard(device, "vkDestroyDescriptorUpdateTemplate", || {
         // SAFETY: the application follows Vulkan's valid usage: the handle is null or live, and used no more.
         unsafe { handle::destroy(descriptor_update_template) }.map(drop)
+    })
+}
+
+unsafe extern "system" fn vkUpdateDescriptorSetWithTemplate(
+    device: vk::Device,
+    descriptor_set: vk::DescriptorSet,
+    descriptor_update_template: vk::DescriptorUpdateTemplate,
+    p_data: *const std::ffi::c_void,
+) {
+    guard(device, "vkUpdateDescriptorSetWithTemplate", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::descriptor::set::update_descriptor_set_with_template(
+                handle::get(device)?,
+                handle::get(descriptor_set)?,
+                handle::get(descriptor_update_template)?,
+                p_data,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDescriptorSetLayoutSupport(
+    device: vk::Device,
+    p_create_info: *const vk::DescriptorSetLayoutCreateInfo<'_>,
+    p_support: *mut vk::DescriptorSetLayoutSupport<'_>,
+) {
+    guard(device, "vkGetDescriptorSetLayoutSupport", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::descriptor::layout::get_descriptor_set_layout_support(
+                valid::input(p_create_info)?,
+                OutputChain::new(p_support)?,
+            )
+        }
     })
 }
 
@@ -1569,6 +3364,66 @@ unsafe extern "system" fn vkDestroySamplerYcbcrConversion(
         Err::<(), _>(Error::Unsupported {
             command: "vkDestroySamplerYcbcrConversion".to_owned(),
         })
+    })
+}
+
+unsafe extern "system" fn vkResetQueryPool(
+    device: vk::Device,
+    query_pool: vk::QueryPool,
+    first_query: u32,
+    query_count: u32,
+) {
+    guard(device, "vkResetQueryPool", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::query_pool::reset_query_pool(handle::get(query_pool)?, first_query, query_count)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetSemaphoreCounterValue(
+    device: vk::Device,
+    semaphore: vk::Semaphore,
+    p_value: *mut u64,
+) -> vk::Result {
+    guard(device, "vkGetSemaphoreCounterValue", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_value,
+                crate::sync::get_semaphore_counter_value(
+                    handle::get(device)?,
+                    handle::get(semaphore)?,
+                )?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkWaitSemaphores(
+    device: vk::Device,
+    p_wait_info: *const vk::SemaphoreWaitInfo<'_>,
+    timeout: u64,
+) -> vk::Result {
+    guard(device, "vkWaitSemaphores", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::sync::wait_semaphores(handle::get(device)?, valid::input(p_wait_info)?, timeout)
+        }
+    })
+}
+
+unsafe extern "system" fn vkSignalSemaphore(
+    device: vk::Device,
+    p_signal_info: *const vk::SemaphoreSignalInfo<'_>,
+) -> vk::Result {
+    guard(device, "vkSignalSemaphore", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::sync::signal_semaphore(valid::input(p_signal_info)?)
+                .map(|()| vk::Result::SUCCESS)
+        }
     })
 }
 
@@ -1617,8 +3472,8 @@ unsafe extern "system" fn vkCmdDrawIndirectCount(
     guard(command_buffer, "vkCmdDrawIndirectCount", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_draw_indirect_count(
+            record(command_buffer, "vkCmdDrawIndirectCount", |recorder| {
+                crate::command::draw::cmd_draw_indirect_count(
                     recorder,
                     handle::get(buffer)?,
                     offset,
@@ -1644,17 +3499,41 @@ unsafe extern "system" fn vkCmdDrawIndexedIndirectCount(
     guard(command_buffer, "vkCmdDrawIndexedIndirectCount", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_draw_indexed_indirect_count(
-                    recorder,
-                    handle::get(buffer)?,
-                    offset,
-                    handle::get(count_buffer)?,
-                    count_buffer_offset,
-                    max_draw_count,
-                    stride,
-                )
-            })
+            record(
+                command_buffer,
+                "vkCmdDrawIndexedIndirectCount",
+                |recorder| {
+                    crate::command::draw::cmd_draw_indexed_indirect_count(
+                        recorder,
+                        handle::get(buffer)?,
+                        offset,
+                        handle::get(count_buffer)?,
+                        count_buffer_offset,
+                        max_draw_count,
+                        stride,
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreateRenderPass2(
+    device: vk::Device,
+    p_create_info: *const vk::RenderPassCreateInfo2<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_render_pass: *mut vk::RenderPass,
+) -> vk::Result {
+    guard(device, "vkCreateRenderPass2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_render_pass,
+                handle::create(crate::render_pass::create_render_pass2(valid::input(
+                    p_create_info,
+                )?)?),
+            )
+            .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1667,10 +3546,10 @@ unsafe extern "system" fn vkCmdBeginRenderPass2(
     guard(command_buffer, "vkCmdBeginRenderPass2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::rendering::cmd_begin_render_pass(
+            record(command_buffer, "vkCmdBeginRenderPass2", |recorder| {
+                crate::command::render_pass::cmd_begin_render_pass(
                     recorder,
-                    pointer::input(p_render_pass_begin)?,
+                    valid::input(p_render_pass_begin)?,
                 )
             })
         }
@@ -1685,8 +3564,8 @@ unsafe extern "system" fn vkCmdNextSubpass2(
     guard(command_buffer, "vkCmdNextSubpass2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::rendering::cmd_next_subpass(recorder)
+            record(command_buffer, "vkCmdNextSubpass2", |recorder| {
+                crate::command::render_pass::cmd_next_subpass(recorder)
             })
         }
     })
@@ -1699,9 +3578,43 @@ unsafe extern "system" fn vkCmdEndRenderPass2(
     guard(command_buffer, "vkCmdEndRenderPass2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::rendering::cmd_end_render_pass(recorder)
+            record(command_buffer, "vkCmdEndRenderPass2", |recorder| {
+                crate::command::render_pass::cmd_end_render_pass(recorder)
             })
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceToolProperties(
+    physical_device: vk::PhysicalDevice,
+    p_tool_count: *mut u32,
+    p_tool_properties: *mut vk::PhysicalDeviceToolProperties<'_>,
+) -> vk::Result {
+    guard(physical_device, "vkGetPhysicalDeviceToolProperties", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::physical_device::get_physical_device_tool_properties(Structures::new(
+                p_tool_count,
+                p_tool_properties,
+            )?)
+        }
+    })
+}
+
+unsafe extern "system" fn vkCreatePrivateDataSlot(
+    device: vk::Device,
+    _: *const vk::PrivateDataSlotCreateInfo<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_private_data_slot: *mut vk::PrivateDataSlot,
+) -> vk::Result {
+    guard(device, "vkCreatePrivateDataSlot", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_private_data_slot,
+                handle::create(crate::device::create_private_data_slot()?),
+            )
+            .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1717,6 +3630,49 @@ unsafe extern "system" fn vkDestroyPrivateDataSlot(
     })
 }
 
+unsafe extern "system" fn vkSetPrivateData(
+    device: vk::Device,
+    object_type: vk::ObjectType,
+    object_handle: u64,
+    private_data_slot: vk::PrivateDataSlot,
+    data: u64,
+) -> vk::Result {
+    guard(device, "vkSetPrivateData", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::device::set_private_data(
+                object_type,
+                object_handle,
+                handle::get(private_data_slot)?,
+                data,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetPrivateData(
+    device: vk::Device,
+    object_type: vk::ObjectType,
+    object_handle: u64,
+    private_data_slot: vk::PrivateDataSlot,
+    p_data: *mut u64,
+) {
+    guard(device, "vkGetPrivateData", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_data,
+                crate::device::get_private_data(
+                    object_type,
+                    object_handle,
+                    handle::get(private_data_slot)?,
+                )?,
+            )
+        }
+    })
+}
+
 unsafe extern "system" fn vkCmdPipelineBarrier2(
     command_buffer: vk::CommandBuffer,
     _: *const vk::DependencyInfo<'_>,
@@ -1724,8 +3680,8 @@ unsafe extern "system" fn vkCmdPipelineBarrier2(
     guard(command_buffer, "vkCmdPipelineBarrier2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_pipeline_barrier(recorder)
+            record(command_buffer, "vkCmdPipelineBarrier2", |recorder| {
+                crate::command::sync::cmd_pipeline_barrier(recorder)
             })
         }
     })
@@ -1740,9 +3696,32 @@ unsafe extern "system" fn vkCmdWriteTimestamp2(
     guard(command_buffer, "vkCmdWriteTimestamp2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::query::cmd_write_timestamp(recorder, handle::get(query_pool)?, query)
+            record(command_buffer, "vkCmdWriteTimestamp2", |recorder| {
+                crate::command::query::cmd_write_timestamp(
+                    recorder,
+                    handle::get(query_pool)?,
+                    query,
+                )
             })
+        }
+    })
+}
+
+unsafe extern "system" fn vkQueueSubmit2(
+    queue: vk::Queue,
+    submit_count: u32,
+    p_submits: *const vk::SubmitInfo2<'_>,
+    fence: vk::Fence,
+) -> vk::Result {
+    guard(queue, "vkQueueSubmit2", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::command::submit::queue_submit2(
+                handle::get(queue)?,
+                valid::slice(p_submits, submit_count)?,
+                handle::get_optional(fence)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -1754,10 +3733,10 @@ unsafe extern "system" fn vkCmdCopyBuffer2(
     guard(command_buffer, "vkCmdCopyBuffer2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_copy_buffer2(
+            record(command_buffer, "vkCmdCopyBuffer2", |recorder| {
+                crate::command::transfer::cmd_copy_buffer2(
                     recorder,
-                    pointer::input(p_copy_buffer_info)?,
+                    valid::input(p_copy_buffer_info)?,
                 )
             })
         }
@@ -1771,8 +3750,11 @@ unsafe extern "system" fn vkCmdCopyImage2(
     guard(command_buffer, "vkCmdCopyImage2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_copy_image2(recorder, pointer::input(p_copy_image_info)?)
+            record(command_buffer, "vkCmdCopyImage2", |recorder| {
+                crate::command::transfer::cmd_copy_image2(
+                    recorder,
+                    valid::input(p_copy_image_info)?,
+                )
             })
         }
     })
@@ -1785,10 +3767,10 @@ unsafe extern "system" fn vkCmdCopyBufferToImage2(
     guard(command_buffer, "vkCmdCopyBufferToImage2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_copy_buffer_to_image2(
+            record(command_buffer, "vkCmdCopyBufferToImage2", |recorder| {
+                crate::command::transfer::cmd_copy_buffer_to_image2(
                     recorder,
-                    pointer::input(p_copy_buffer_to_image_info)?,
+                    valid::input(p_copy_buffer_to_image_info)?,
                 )
             })
         }
@@ -1802,12 +3784,61 @@ unsafe extern "system" fn vkCmdCopyImageToBuffer2(
     guard(command_buffer, "vkCmdCopyImageToBuffer2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_copy_image_to_buffer2(
+            record(command_buffer, "vkCmdCopyImageToBuffer2", |recorder| {
+                crate::command::transfer::cmd_copy_image_to_buffer2(
                     recorder,
-                    pointer::input(p_copy_image_to_buffer_info)?,
+                    valid::input(p_copy_image_to_buffer_info)?,
                 )
             })
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceBufferMemoryRequirements(
+    device: vk::Device,
+    p_info: *const vk::DeviceBufferMemoryRequirements<'_>,
+    p_memory_requirements: *mut vk::MemoryRequirements2<'_>,
+) {
+    guard(device, "vkGetDeviceBufferMemoryRequirements", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::buffer::get_device_buffer_memory_requirements(
+                valid::input(p_info)?,
+                OutputChain::new(p_memory_requirements)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceImageMemoryRequirements(
+    device: vk::Device,
+    p_info: *const vk::DeviceImageMemoryRequirements<'_>,
+    p_memory_requirements: *mut vk::MemoryRequirements2<'_>,
+) {
+    guard(device, "vkGetDeviceImageMemoryRequirements", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::image::get_device_image_memory_requirements(
+                valid::input(p_info)?,
+                OutputChain::new(p_memory_requirements)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkGetDeviceImageSparseMemoryRequirements(
+    device: vk::Device,
+    _: *const vk::DeviceImageMemoryRequirements<'_>,
+    p_sparse_memory_requirement_count: *mut u32,
+    p_sparse_memory_requirements: *mut vk::SparseImageMemoryRequirements2<'_>,
+) {
+    guard(device, "vkGetDeviceImageSparseMemoryRequirements", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::image::get_image_sparse_memory_requirements2(Structures::new(
+                p_sparse_memory_requirement_count,
+                p_sparse_memory_requirements,
+            )?)
         }
     })
 }
@@ -1820,8 +3851,8 @@ unsafe extern "system" fn vkCmdSetEvent2(
     guard(command_buffer, "vkCmdSetEvent2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_set_event(recorder, handle::get(event)?)
+            record(command_buffer, "vkCmdSetEvent2", |recorder| {
+                crate::command::sync::cmd_set_event(recorder, handle::get(event)?)
             })
         }
     })
@@ -1835,8 +3866,8 @@ unsafe extern "system" fn vkCmdResetEvent2(
     guard(command_buffer, "vkCmdResetEvent2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_reset_event(recorder, handle::get(event)?)
+            record(command_buffer, "vkCmdResetEvent2", |recorder| {
+                crate::command::sync::cmd_reset_event(recorder, handle::get(event)?)
             })
         }
     })
@@ -1851,10 +3882,10 @@ unsafe extern "system" fn vkCmdWaitEvents2(
     guard(command_buffer, "vkCmdWaitEvents2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_wait_events(
+            record(command_buffer, "vkCmdWaitEvents2", |recorder| {
+                crate::command::sync::cmd_wait_events(
                     recorder,
-                    &handle::get_all(pointer::slice(p_events, event_count)?)?,
+                    &handle::get_all(valid::slice(p_events, event_count)?)?,
                 )
             })
         }
@@ -1868,8 +3899,11 @@ unsafe extern "system" fn vkCmdBlitImage2(
     guard(command_buffer, "vkCmdBlitImage2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_blit_image2(recorder, pointer::input(p_blit_image_info)?)
+            record(command_buffer, "vkCmdBlitImage2", |recorder| {
+                crate::command::transfer::cmd_blit_image2(
+                    recorder,
+                    valid::input(p_blit_image_info)?,
+                )
             })
         }
     })
@@ -1882,10 +3916,10 @@ unsafe extern "system" fn vkCmdResolveImage2(
     guard(command_buffer, "vkCmdResolveImage2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::transfer::cmd_resolve_image2(
+            record(command_buffer, "vkCmdResolveImage2", |recorder| {
+                crate::command::transfer::cmd_resolve_image2(
                     recorder,
-                    pointer::input(p_resolve_image_info)?,
+                    valid::input(p_resolve_image_info)?,
                 )
             })
         }
@@ -1899,10 +3933,10 @@ unsafe extern "system" fn vkCmdBeginRendering(
     guard(command_buffer, "vkCmdBeginRendering", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::rendering::cmd_begin_rendering(
+            record(command_buffer, "vkCmdBeginRendering", |recorder| {
+                crate::command::render_pass::cmd_begin_rendering(
                     recorder,
-                    pointer::input(p_rendering_info)?,
+                    valid::input(p_rendering_info)?,
                 )
             })
         }
@@ -1913,8 +3947,8 @@ unsafe extern "system" fn vkCmdEndRendering(command_buffer: vk::CommandBuffer) {
     guard(command_buffer, "vkCmdEndRendering", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::rendering::cmd_end_rendering(recorder)
+            record(command_buffer, "vkCmdEndRendering", |recorder| {
+                crate::command::render_pass::cmd_end_rendering(recorder)
             })
         }
     })
@@ -1927,8 +3961,8 @@ unsafe extern "system" fn vkCmdSetCullMode(
     guard(command_buffer, "vkCmdSetCullMode", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_cull_mode(recorder, cull_mode)
+            record(command_buffer, "vkCmdSetCullMode", |recorder| {
+                crate::command::dynamic_state::cmd_set_cull_mode(recorder, cull_mode)
             })
         }
     })
@@ -1941,8 +3975,8 @@ unsafe extern "system" fn vkCmdSetFrontFace(
     guard(command_buffer, "vkCmdSetFrontFace", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_front_face(recorder, front_face)
+            record(command_buffer, "vkCmdSetFrontFace", |recorder| {
+                crate::command::dynamic_state::cmd_set_front_face(recorder, front_face)
             })
         }
     })
@@ -1955,8 +3989,11 @@ unsafe extern "system" fn vkCmdSetPrimitiveTopology(
     guard(command_buffer, "vkCmdSetPrimitiveTopology", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_primitive_topology(recorder, primitive_topology)
+            record(command_buffer, "vkCmdSetPrimitiveTopology", |recorder| {
+                crate::command::dynamic_state::cmd_set_primitive_topology(
+                    recorder,
+                    primitive_topology,
+                )
             })
         }
     })
@@ -1970,10 +4007,10 @@ unsafe extern "system" fn vkCmdSetViewportWithCount(
     guard(command_buffer, "vkCmdSetViewportWithCount", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_set_viewport_with_count(
+            record(command_buffer, "vkCmdSetViewportWithCount", |recorder| {
+                crate::command::dynamic_state::cmd_set_viewport_with_count(
                     recorder,
-                    pointer::slice(p_viewports, viewport_count)?,
+                    valid::slice(p_viewports, viewport_count)?,
                 )
             })
         }
@@ -1988,10 +4025,10 @@ unsafe extern "system" fn vkCmdSetScissorWithCount(
     guard(command_buffer, "vkCmdSetScissorWithCount", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_set_scissor_with_count(
+            record(command_buffer, "vkCmdSetScissorWithCount", |recorder| {
+                crate::command::dynamic_state::cmd_set_scissor_with_count(
                     recorder,
-                    pointer::slice(p_scissors, scissor_count)?,
+                    valid::slice(p_scissors, scissor_count)?,
                 )
             })
         }
@@ -2010,17 +4047,17 @@ unsafe extern "system" fn vkCmdBindVertexBuffers2(
     guard(command_buffer, "vkCmdBindVertexBuffers2", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_bind_vertex_buffers2(
+            record(command_buffer, "vkCmdBindVertexBuffers2", |recorder| {
+                crate::command::bind::cmd_bind_vertex_buffers2(
                     recorder,
                     first_binding,
-                    &handle::get_all(pointer::slice(p_buffers, binding_count)?)?,
-                    pointer::slice(p_offsets, binding_count)?,
+                    &handle::get_all(valid::slice(p_buffers, binding_count)?)?,
+                    valid::slice(p_offsets, binding_count)?,
                     (!p_sizes.is_null())
-                        .then(|| pointer::slice(p_sizes, binding_count))
+                        .then(|| valid::slice(p_sizes, binding_count))
                         .transpose()?,
                     (!p_strides.is_null())
-                        .then(|| pointer::slice(p_strides, binding_count))
+                        .then(|| valid::slice(p_strides, binding_count))
                         .transpose()?,
                 )
             })
@@ -2035,8 +4072,8 @@ unsafe extern "system" fn vkCmdSetDepthTestEnable(
     guard(command_buffer, "vkCmdSetDepthTestEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_depth_test_enable(
+            record(command_buffer, "vkCmdSetDepthTestEnable", |recorder| {
+                crate::command::dynamic_state::cmd_set_depth_test_enable(
                     recorder,
                     depth_test_enable != vk::FALSE,
                 )
@@ -2052,8 +4089,8 @@ unsafe extern "system" fn vkCmdSetDepthWriteEnable(
     guard(command_buffer, "vkCmdSetDepthWriteEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_depth_write_enable(
+            record(command_buffer, "vkCmdSetDepthWriteEnable", |recorder| {
+                crate::command::dynamic_state::cmd_set_depth_write_enable(
                     recorder,
                     depth_write_enable != vk::FALSE,
                 )
@@ -2069,8 +4106,8 @@ unsafe extern "system" fn vkCmdSetDepthCompareOp(
     guard(command_buffer, "vkCmdSetDepthCompareOp", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_depth_compare_op(recorder, depth_compare_op)
+            record(command_buffer, "vkCmdSetDepthCompareOp", |recorder| {
+                crate::command::dynamic_state::cmd_set_depth_compare_op(recorder, depth_compare_op)
             })
         }
     })
@@ -2083,12 +4120,16 @@ unsafe extern "system" fn vkCmdSetDepthBoundsTestEnable(
     guard(command_buffer, "vkCmdSetDepthBoundsTestEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_depth_bounds_test_enable(
-                    recorder,
-                    depth_bounds_test_enable != vk::FALSE,
-                )
-            })
+            record(
+                command_buffer,
+                "vkCmdSetDepthBoundsTestEnable",
+                |recorder| {
+                    crate::command::dynamic_state::cmd_set_depth_bounds_test_enable(
+                        recorder,
+                        depth_bounds_test_enable != vk::FALSE,
+                    )
+                },
+            )
         }
     })
 }
@@ -2100,8 +4141,8 @@ unsafe extern "system" fn vkCmdSetStencilTestEnable(
     guard(command_buffer, "vkCmdSetStencilTestEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_stencil_test_enable(
+            record(command_buffer, "vkCmdSetStencilTestEnable", |recorder| {
+                crate::command::dynamic_state::cmd_set_stencil_test_enable(
                     recorder,
                     stencil_test_enable != vk::FALSE,
                 )
@@ -2121,8 +4162,8 @@ unsafe extern "system" fn vkCmdSetStencilOp(
     guard(command_buffer, "vkCmdSetStencilOp", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_stencil_op(
+            record(command_buffer, "vkCmdSetStencilOp", |recorder| {
+                crate::command::dynamic_state::cmd_set_stencil_op(
                     recorder,
                     face_mask,
                     fail_op,
@@ -2142,12 +4183,16 @@ unsafe extern "system" fn vkCmdSetRasterizerDiscardEnable(
     guard(command_buffer, "vkCmdSetRasterizerDiscardEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_rasterizer_discard_enable(
-                    recorder,
-                    rasterizer_discard_enable != vk::FALSE,
-                )
-            })
+            record(
+                command_buffer,
+                "vkCmdSetRasterizerDiscardEnable",
+                |recorder| {
+                    crate::command::dynamic_state::cmd_set_rasterizer_discard_enable(
+                        recorder,
+                        rasterizer_discard_enable != vk::FALSE,
+                    )
+                },
+            )
         }
     })
 }
@@ -2159,8 +4204,8 @@ unsafe extern "system" fn vkCmdSetDepthBiasEnable(
     guard(command_buffer, "vkCmdSetDepthBiasEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_depth_bias_enable(
+            record(command_buffer, "vkCmdSetDepthBiasEnable", |recorder| {
+                crate::command::dynamic_state::cmd_set_depth_bias_enable(
                     recorder,
                     depth_bias_enable != vk::FALSE,
                 )
@@ -2176,12 +4221,16 @@ unsafe extern "system" fn vkCmdSetPrimitiveRestartEnable(
     guard(command_buffer, "vkCmdSetPrimitiveRestartEnable", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::dynamic_state::cmd_set_primitive_restart_enable(
-                    recorder,
-                    primitive_restart_enable != vk::FALSE,
-                )
-            })
+            record(
+                command_buffer,
+                "vkCmdSetPrimitiveRestartEnable",
+                |recorder| {
+                    crate::command::dynamic_state::cmd_set_primitive_restart_enable(
+                        recorder,
+                        primitive_restart_enable != vk::FALSE,
+                    )
+                },
+            )
         }
     })
 }
@@ -2190,14 +4239,18 @@ unsafe extern "system" fn vkSetDebugUtilsObjectNameEXT(
     device: vk::Device,
     _: *const vk::DebugUtilsObjectNameInfoEXT<'_>,
 ) -> vk::Result {
-    guard(device, "vkSetDebugUtilsObjectNameEXT", || Ok(()))
+    guard(device, "vkSetDebugUtilsObjectNameEXT", || {
+        Ok(vk::Result::SUCCESS)
+    })
 }
 
 unsafe extern "system" fn vkSetDebugUtilsObjectTagEXT(
     device: vk::Device,
     _: *const vk::DebugUtilsObjectTagInfoEXT<'_>,
 ) -> vk::Result {
-    guard(device, "vkSetDebugUtilsObjectTagEXT", || Ok(()))
+    guard(device, "vkSetDebugUtilsObjectTagEXT", || {
+        Ok(vk::Result::SUCCESS)
+    })
 }
 
 unsafe extern "system" fn vkQueueBeginDebugUtilsLabelEXT(
@@ -2236,6 +4289,88 @@ unsafe extern "system" fn vkCmdInsertDebugUtilsLabelEXT(
     guard(command_buffer, "vkCmdInsertDebugUtilsLabelEXT", || Ok(()))
 }
 
+unsafe extern "system" fn vkCreateDebugUtilsMessengerEXT(
+    instance: vk::Instance,
+    p_create_info: *const vk::DebugUtilsMessengerCreateInfoEXT<'_>,
+    _: *const vk::AllocationCallbacks<'_>,
+    p_messenger: *mut vk::DebugUtilsMessengerEXT,
+) -> vk::Result {
+    guard(instance, "vkCreateDebugUtilsMessengerEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                p_messenger,
+                handle::create(crate::instance::create_debug_utils_messenger(
+                    handle::get(instance)?,
+                    valid::input(p_create_info)?,
+                )?),
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkDestroyDebugUtilsMessengerEXT(
+    instance: vk::Instance,
+    messenger: vk::DebugUtilsMessengerEXT,
+    _: *const vk::AllocationCallbacks<'_>,
+) {
+    guard(instance, "vkDestroyDebugUtilsMessengerEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::instance::destroy_debug_utils_messenger(
+                handle::get(instance)?,
+                handle::destroy(messenger)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkSubmitDebugUtilsMessageEXT(
+    instance: vk::Instance,
+    message_severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    message_types: vk::DebugUtilsMessageTypeFlagsEXT,
+    p_callback_data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+) {
+    guard(instance, "vkSubmitDebugUtilsMessageEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::instance::submit_debug_utils_message(
+                handle::get(instance)?,
+                message_severity,
+                message_types,
+                valid::input(p_callback_data)?,
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetPatchControlPointsEXT(command_buffer: vk::CommandBuffer, _: u32) {
+    guard(command_buffer, "vkCmdSetPatchControlPointsEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        unsafe {
+            record(command_buffer, "vkCmdSetPatchControlPointsEXT", |_| {
+                Err(Error::Unsupported {
+                    command: "vkCmdSetPatchControlPointsEXT".to_owned(),
+                })
+            })
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdSetLogicOpEXT(command_buffer: vk::CommandBuffer, _: vk::LogicOp) {
+    guard(command_buffer, "vkCmdSetLogicOpEXT", || {
+        // SAFETY: the application follows Vulkan's valid usage: the handle is live.
+        unsafe {
+            record(command_buffer, "vkCmdSetLogicOpEXT", |_| {
+                Err(Error::Unsupported {
+                    command: "vkCmdSetLogicOpEXT".to_owned(),
+                })
+            })
+        }
+    })
+}
+
 unsafe extern "system" fn vkCmdSetGaussianCameraGAURAST(
     command_buffer: vk::CommandBuffer,
     p_camera: *const gaurast::vk::GaussianCameraGAURAST<'_>,
@@ -2243,12 +4378,134 @@ unsafe extern "system" fn vkCmdSetGaussianCameraGAURAST(
     guard(command_buffer, "vkCmdSetGaussianCameraGAURAST", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::command::cmd_set_gaussian_camera_gaurast(
-                    recorder,
-                    pointer::input(p_camera)?,
+            record(
+                command_buffer,
+                "vkCmdSetGaussianCameraGAURAST",
+                |recorder| {
+                    crate::command::camera::cmd_set_gaussian_camera(
+                        recorder,
+                        valid::input(p_camera)?,
+                    )
+                },
+            )
+        }
+    })
+}
+
+unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
+    command_buffer: vk::CommandBuffer,
+    descriptor_update_template: vk::DescriptorUpdateTemplate,
+    layout: vk::PipelineLayout,
+    set: u32,
+    p_data: *const std::ffi::c_void,
+) {
+    guard(
+        command_buffer,
+        "vkCmdPushDescriptorSetWithTemplateKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                record(
+                    command_buffer,
+                    "vkCmdPushDescriptorSetWithTemplateKHR",
+                    |recorder| {
+                        crate::command::bind::cmd_push_descriptor_set_with_template(
+                            recorder,
+                            handle::get(descriptor_update_template)?,
+                            handle::get(layout)?,
+                            set,
+                            p_data,
+                        )
+                    },
                 )
-            })
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkMapMemory2KHR(
+    device: vk::Device,
+    p_memory_map_info: *const vk::MemoryMapInfoKHR<'_>,
+    pp_data: *mut *mut std::ffi::c_void,
+) -> vk::Result {
+    guard(device, "vkMapMemory2KHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            valid::output(
+                pp_data,
+                crate::resource::memory::map_memory2(valid::input(p_memory_map_info)?)?,
+            )
+            .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkUnmapMemory2KHR(
+    device: vk::Device,
+    p_memory_unmap_info: *const vk::MemoryUnmapInfoKHR<'_>,
+) -> vk::Result {
+    guard(device, "vkUnmapMemory2KHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::resource::memory::unmap_memory2(valid::input(p_memory_unmap_info)?)
+                .map(|()| vk::Result::SUCCESS)
+        }
+    })
+}
+
+unsafe extern "system" fn vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR(
+    physical_device: vk::PhysicalDevice,
+    queue_family_index: u32,
+    p_counter_count: *mut u32,
+    p_counters: *mut vk::PerformanceCounterKHR<'_>,
+    p_counter_descriptions: *mut vk::PerformanceCounterDescriptionKHR<'_>,
+) -> vk::Result {
+    guard(
+        physical_device,
+        "vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                crate::physical_device::enumerate_performance_query_counters(
+                    queue_family_index,
+                    p_counter_count,
+                    p_counters,
+                    p_counter_descriptions,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR(
+    physical_device: vk::PhysicalDevice,
+    _: *const vk::QueryPoolPerformanceCreateInfoKHR<'_>,
+    p_num_passes: *mut u32,
+) {
+    guard(
+        physical_device,
+        "vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR",
+        || {
+            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+            unsafe {
+                valid::output(
+                    p_num_passes,
+                    crate::physical_device::get_performance_query_passes()?,
+                )
+            }
+        },
+    )
+}
+
+unsafe extern "system" fn vkAcquireProfilingLockKHR(
+    device: vk::Device,
+    _: *const vk::AcquireProfilingLockInfoKHR<'_>,
+) -> vk::Result {
+    guard(device, "vkAcquireProfilingLockKHR", || {
+        // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
+        unsafe {
+            crate::device::acquire_profiling_lock(handle::get(device)?)
+                .map(|()| vk::Result::SUCCESS)
         }
     })
 }
@@ -2268,42 +4525,15 @@ unsafe extern "system" fn vkCmdPushDescriptorSetKHR(
     guard(command_buffer, "vkCmdPushDescriptorSetKHR", || {
         // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
         unsafe {
-            record(command_buffer, |recorder| {
-                entrypoints::compute::cmd_push_descriptor_set_khr(
+            record(command_buffer, "vkCmdPushDescriptorSetKHR", |recorder| {
+                crate::command::bind::cmd_push_descriptor_set(
                     recorder,
                     pipeline_bind_point,
                     handle::get(layout)?,
                     set,
-                    pointer::slice(p_descriptor_writes, descriptor_write_count)?,
+                    valid::slice(p_descriptor_writes, descriptor_write_count)?,
                 )
             })
         }
     })
-}
-
-unsafe extern "system" fn vkCmdPushDescriptorSetWithTemplateKHR(
-    command_buffer: vk::CommandBuffer,
-    descriptor_update_template: vk::DescriptorUpdateTemplate,
-    layout: vk::PipelineLayout,
-    set: u32,
-    p_data: *const std::ffi::c_void,
-) {
-    guard(
-        command_buffer,
-        "vkCmdPushDescriptorSetWithTemplateKHR",
-        || {
-            // SAFETY: the application follows Vulkan's valid usage: handles are live, pointers null or valid.
-            unsafe {
-                record(command_buffer, |recorder| {
-                    entrypoints::compute::cmd_push_descriptor_set_with_template_khr(
-                        recorder,
-                        handle::get(descriptor_update_template)?,
-                        handle::get(layout)?,
-                        set,
-                        p_data,
-                    )
-                })
-            }
-        },
-    )
 }

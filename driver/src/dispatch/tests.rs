@@ -1,5 +1,6 @@
+use super::lookup::{Availability, Command, Scope};
 use super::*;
-use crate::capabilities::extensions;
+use crate::instance::API_VERSION;
 use std::collections::HashSet;
 use std::ffi::c_void;
 use std::ptr;
@@ -16,14 +17,14 @@ fn names_loaded<T>(load: impl FnOnce(&mut dyn FnMut(&CStr) -> *const c_void) -> 
 }
 
 fn find_by(name: &str) -> Option<&'static Command> {
-    BY_NAME.get(name.as_bytes()).copied()
+    COMMANDS.rows.iter().find(|command| command.name == name)
 }
 
 fn scope_and_version(name: &str) -> Option<(Scope, u32)> {
     match find_by(name)? {
         Command {
             scope,
-            gate: Gate::Core(version),
+            availability: Availability::Core(version),
             ..
         } => Some((*scope, *version)),
         _ => None,
@@ -117,64 +118,113 @@ fn every_command_of_an_advertised_extension_is_there() {
     let is_ours = |name: &String| !name.ends_with("AMD") && !name.ends_with("NV");
     for name in names.into_iter().filter(is_ours) {
         let command = find_by(&name).unwrap_or_else(|| panic!("{name}"));
-        assert!(!matches!(command.gate, Gate::Core(_)), "{name}");
+        assert!(
+            !matches!(command.availability, Availability::Core(_)),
+            "{name}"
+        );
     }
 }
 
 #[test]
 fn names_are_distinct() {
-    let names: HashSet<_> = COMMANDS.iter().map(|command| command.name).collect();
-    assert_eq!(names.len(), COMMANDS.len());
+    let names: HashSet<_> = COMMANDS.rows.iter().map(|command| command.name).collect();
+    assert_eq!(names.len(), COMMANDS.rows.len());
     assert!(names.iter().all(|name| name.starts_with("vk")));
 }
 
 #[test]
-fn gates_open_with_what_is_enabled() {
-    let bare = Enabled {
+fn commands_are_there_with_what_is_enabled() {
+    let bare = EnabledExtensions {
         api_version: vk::API_VERSION_1_0,
         instance_extensions: &[],
         device_extensions: &[],
     };
-    let newest = Enabled {
-        api_version: extensions::API_VERSION,
+    let newest = EnabledExtensions {
+        api_version: API_VERSION,
         ..bare
     };
-    let with_extension = Enabled {
+    let with_extension = EnabledExtensions {
         device_extensions: &[ash::khr::dynamic_rendering::NAME],
         ..bare
     };
-    let with_messengers = Enabled {
+    let with_messengers = EnabledExtensions {
         instance_extensions: &[ash::ext::debug_utils::NAME],
         ..bare
     };
 
     let begin = c"vkCmdBeginRendering";
-    assert!(device_command(begin, &bare).is_none());
-    assert!(device_command(begin, &newest).is_some());
-    assert!(device_command(begin, &with_extension).is_none());
+    assert!(COMMANDS.device_command(begin, &bare).is_none());
+    assert!(COMMANDS.device_command(begin, &newest).is_some());
+    assert!(COMMANDS.device_command(begin, &with_extension).is_none());
     let begin_khr = c"vkCmdBeginRenderingKHR";
-    assert!(device_command(begin_khr, &newest).is_none());
-    assert!(device_command(begin_khr, &with_extension).is_some());
+    assert!(COMMANDS.device_command(begin_khr, &newest).is_none());
+    assert!(
+        COMMANDS
+            .device_command(begin_khr, &with_extension)
+            .is_some()
+    );
+
+    // Two extensions come with this command, and one is enough.
+    let with_template = c"vkCmdPushDescriptorSetWithTemplateKHR";
+    for name in [
+        ash::khr::push_descriptor::NAME,
+        ash::khr::descriptor_update_template::NAME,
+    ] {
+        let enabled = EnabledExtensions {
+            device_extensions: &[name],
+            ..bare
+        };
+        assert!(COMMANDS.device_command(with_template, &enabled).is_some());
+    }
+    assert!(COMMANDS.device_command(with_template, &bare).is_none());
 
     // Only a device's own commands are found through it.
-    assert!(device_command(c"vkCreateBuffer", &bare).is_some());
-    assert!(device_command(c"vkCreateDevice", &bare).is_none());
-    assert!(device_command(c"vkCreateInstance", &bare).is_none());
-    assert!(device_command(c"vkNoSuchCommand", &newest).is_none());
+    assert!(COMMANDS.device_command(c"vkCreateBuffer", &bare).is_some());
+    assert!(COMMANDS.device_command(c"vkCreateDevice", &bare).is_none());
+    assert!(
+        COMMANDS
+            .device_command(c"vkCreateInstance", &bare)
+            .is_none()
+    );
+    assert!(
+        COMMANDS
+            .device_command(c"vkNoSuchCommand", &newest)
+            .is_none()
+    );
 
     // An instance finds its commands and its devices'.
-    assert!(instance_command(c"vkCreateDevice", &bare).is_some());
-    assert!(instance_command(c"vkGetPhysicalDeviceFeatures2", &bare).is_none());
-    assert!(instance_command(c"vkGetPhysicalDeviceFeatures2", &newest).is_some());
-    assert!(instance_command(begin, &bare).is_some());
-    assert!(instance_command(c"vkCreateInstance", &bare).is_none());
+    assert!(
+        COMMANDS
+            .instance_command(c"vkCreateDevice", &bare)
+            .is_some()
+    );
+    assert!(
+        COMMANDS
+            .instance_command(c"vkGetPhysicalDeviceFeatures2", &bare)
+            .is_none()
+    );
+    assert!(
+        COMMANDS
+            .instance_command(c"vkGetPhysicalDeviceFeatures2", &newest)
+            .is_some()
+    );
+    assert!(COMMANDS.instance_command(begin, &bare).is_some());
+    assert!(
+        COMMANDS
+            .instance_command(c"vkCreateInstance", &bare)
+            .is_none()
+    );
     let messenger = c"vkCreateDebugUtilsMessengerEXT";
-    assert!(instance_command(messenger, &bare).is_none());
-    assert!(instance_command(messenger, &with_messengers).is_some());
+    assert!(COMMANDS.instance_command(messenger, &bare).is_none());
+    assert!(
+        COMMANDS
+            .instance_command(messenger, &with_messengers)
+            .is_some()
+    );
 
     // Before there is an instance, and for the loader.
-    assert!(global_command(c"vkCreateInstance").is_some());
-    assert!(global_command(c"vkCreateDevice").is_none());
+    assert!(COMMANDS.global_command(c"vkCreateInstance").is_some());
+    assert!(COMMANDS.global_command(c"vkCreateDevice").is_none());
     assert!(physical_device_command(c"vkGetPhysicalDeviceFeatures", &bare).is_some());
     assert!(physical_device_command(c"vkCreateBuffer", &bare).is_none());
 }

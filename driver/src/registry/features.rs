@@ -3,7 +3,7 @@
 
 //! Features: those that this driver supports, and the structures in which Vulkan asks for them.
 
-use crate::pnext;
+use crate::abi::valid;
 use ash::vk::{self, TaggedStructure};
 use std::ffi::CStr;
 
@@ -268,12 +268,22 @@ pub(crate) struct Features {
     pub(crate) shader_integer_dot_product: bool,
     /// `maintenance4`.
     pub(crate) maintenance4: bool,
+    /// `extendedDynamicState`.
+    pub(crate) extended_dynamic_state: bool,
+    /// `extendedDynamicState2`.
+    pub(crate) extended_dynamic_state2: bool,
+    /// `extendedDynamicState2LogicOp`.
+    pub(crate) extended_dynamic_state2_logic_op: bool,
+    /// `extendedDynamicState2PatchControlPoints`.
+    pub(crate) extended_dynamic_state2_patch_control_points: bool,
     /// `indexTypeUint8`.
     pub(crate) index_type_uint8: bool,
     /// `provokingVertexLast`.
     pub(crate) provoking_vertex_last: bool,
     /// `transformFeedbackPreservesProvokingVertex`.
     pub(crate) transform_feedback_preserves_provoking_vertex: bool,
+    /// `texelBufferAlignment`.
+    pub(crate) texel_buffer_alignment: bool,
     /// `vertexAttributeInstanceRateDivisor`.
     pub(crate) vertex_attribute_instance_rate_divisor: bool,
     /// `vertexAttributeInstanceRateZeroDivisor`.
@@ -407,8 +417,11 @@ pub(crate) const SUPPORTED: Features = Features {
     shader_zero_initialize_workgroup_memory: true,
     dynamic_rendering: true,
     maintenance4: true,
+    extended_dynamic_state: true,
+    extended_dynamic_state2: true,
     index_type_uint8: true,
     provoking_vertex_last: true,
+    texel_buffer_alignment: true,
     vertex_attribute_instance_rate_divisor: true,
     vertex_attribute_instance_rate_zero_divisor: true,
     gaussian_primitive_topology: true,
@@ -566,9 +579,14 @@ impl Features {
         dynamic_rendering: false,
         shader_integer_dot_product: false,
         maintenance4: false,
+        extended_dynamic_state: false,
+        extended_dynamic_state2: false,
+        extended_dynamic_state2_logic_op: false,
+        extended_dynamic_state2_patch_control_points: false,
         index_type_uint8: false,
         provoking_vertex_last: false,
         transform_feedback_preserves_provoking_vertex: false,
+        texel_buffer_alignment: false,
         vertex_attribute_instance_rate_divisor: false,
         vertex_attribute_instance_rate_zero_divisor: false,
         gaussian_primitive_topology: false,
@@ -595,7 +613,7 @@ impl Features {
     };
 
     /// The features by their names in Rust.
-    pub(crate) fn list(&self) -> [(&'static str, bool); 155] {
+    pub(crate) fn list(&self) -> [(&'static str, bool); 160] {
         [
             ("robust_buffer_access", self.robust_buffer_access),
             ("full_draw_index_uint32", self.full_draw_index_uint32),
@@ -903,12 +921,23 @@ impl Features {
                 self.shader_integer_dot_product,
             ),
             ("maintenance4", self.maintenance4),
+            ("extended_dynamic_state", self.extended_dynamic_state),
+            ("extended_dynamic_state2", self.extended_dynamic_state2),
+            (
+                "extended_dynamic_state2_logic_op",
+                self.extended_dynamic_state2_logic_op,
+            ),
+            (
+                "extended_dynamic_state2_patch_control_points",
+                self.extended_dynamic_state2_patch_control_points,
+            ),
             ("index_type_uint8", self.index_type_uint8),
             ("provoking_vertex_last", self.provoking_vertex_last),
             (
                 "transform_feedback_preserves_provoking_vertex",
                 self.transform_feedback_preserves_provoking_vertex,
             ),
+            ("texel_buffer_alignment", self.texel_buffer_alignment),
             (
                 "vertex_attribute_instance_rate_divisor",
                 self.vertex_attribute_instance_rate_divisor,
@@ -1097,7 +1126,7 @@ impl Features {
     }
 
     /// Writes the features to a structure of a chain, if it holds any that are known here.
-    pub(crate) fn write(&self, mut structure: pnext::Output<'_>) {
+    pub(crate) fn write(&self, mut structure: valid::ChainedOutput<'_>) {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan11Features<'_>>() {
             out.storage_buffer16_bit_access = self.storage_buffer16_bit_access.into();
             out.uniform_and_storage_buffer16_bit_access =
@@ -1401,6 +1430,18 @@ impl Features {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>() {
             out.dynamic_rendering = self.dynamic_rendering.into();
         }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>()
+        {
+            out.extended_dynamic_state = self.extended_dynamic_state.into();
+        }
+        if let Some(out) =
+            structure.cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>()
+        {
+            out.extended_dynamic_state2 = self.extended_dynamic_state2.into();
+            out.extended_dynamic_state2_logic_op = self.extended_dynamic_state2_logic_op.into();
+            out.extended_dynamic_state2_patch_control_points =
+                self.extended_dynamic_state2_patch_control_points.into();
+        }
         if let Some(out) = structure.cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>() {
             out.index_type_uint8 = self.index_type_uint8.into();
         }
@@ -1408,6 +1449,10 @@ impl Features {
             out.provoking_vertex_last = self.provoking_vertex_last.into();
             out.transform_feedback_preserves_provoking_vertex =
                 self.transform_feedback_preserves_provoking_vertex.into();
+        }
+        if let Some(out) = structure.cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>()
+        {
+            out.texel_buffer_alignment = self.texel_buffer_alignment.into();
         }
         if let Some(out) =
             structure.cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>()
@@ -1449,7 +1494,7 @@ impl Features {
 
     /// Adds the features that a structure of a chain requests, if it holds any that are known here.
     pub(crate) fn add(&mut self, structure: &vk::BaseInStructure<'_>) {
-        if let Some(requested) = pnext::cast::<vk::PhysicalDeviceVulkan11Features<'_>>(structure) {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkan11Features<'_>>(structure) {
             self.storage_buffer16_bit_access |= requested.storage_buffer16_bit_access != vk::FALSE;
             self.uniform_and_storage_buffer16_bit_access |=
                 requested.uniform_and_storage_buffer16_bit_access != vk::FALSE;
@@ -1466,7 +1511,7 @@ impl Features {
             self.sampler_ycbcr_conversion |= requested.sampler_ycbcr_conversion != vk::FALSE;
             self.shader_draw_parameters |= requested.shader_draw_parameters != vk::FALSE;
         }
-        if let Some(requested) = pnext::cast::<vk::PhysicalDeviceVulkan12Features<'_>>(structure) {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkan12Features<'_>>(structure) {
             self.sampler_mirror_clamp_to_edge |=
                 requested.sampler_mirror_clamp_to_edge != vk::FALSE;
             self.draw_indirect_count |= requested.draw_indirect_count != vk::FALSE;
@@ -1545,7 +1590,7 @@ impl Features {
             self.subgroup_broadcast_dynamic_id |=
                 requested.subgroup_broadcast_dynamic_id != vk::FALSE;
         }
-        if let Some(requested) = pnext::cast::<vk::PhysicalDeviceVulkan13Features<'_>>(structure) {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceVulkan13Features<'_>>(structure) {
             self.robust_image_access |= requested.robust_image_access != vk::FALSE;
             self.inline_uniform_block |= requested.inline_uniform_block != vk::FALSE;
             self.descriptor_binding_inline_uniform_block_update_after_bind |=
@@ -1568,12 +1613,12 @@ impl Features {
             self.maintenance4 |= requested.maintenance4 != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceProtectedMemoryFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceProtectedMemoryFeatures<'_>>(structure)
         {
             self.protected_memory |= requested.protected_memory != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDevice16BitStorageFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDevice16BitStorageFeatures<'_>>(structure)
         {
             self.storage_buffer16_bit_access |= requested.storage_buffer16_bit_access != vk::FALSE;
             self.uniform_and_storage_buffer16_bit_access |=
@@ -1582,30 +1627,30 @@ impl Features {
             self.storage_input_output16 |= requested.storage_input_output16 != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceVariablePointersFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceVariablePointersFeatures<'_>>(structure)
         {
             self.variable_pointers_storage_buffer |=
                 requested.variable_pointers_storage_buffer != vk::FALSE;
             self.variable_pointers |= requested.variable_pointers != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceSamplerYcbcrConversionFeatures<'_>>(structure)
         {
             self.sampler_ycbcr_conversion |= requested.sampler_ycbcr_conversion != vk::FALSE;
         }
-        if let Some(requested) = pnext::cast::<vk::PhysicalDeviceMultiviewFeatures<'_>>(structure) {
+        if let Some(requested) = valid::cast::<vk::PhysicalDeviceMultiviewFeatures<'_>>(structure) {
             self.multiview |= requested.multiview != vk::FALSE;
             self.multiview_geometry_shader |= requested.multiview_geometry_shader != vk::FALSE;
             self.multiview_tessellation_shader |=
                 requested.multiview_tessellation_shader != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceShaderDrawParametersFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceShaderDrawParametersFeatures<'_>>(structure)
         {
             self.shader_draw_parameters |= requested.shader_draw_parameters != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceVulkanMemoryModelFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceVulkanMemoryModelFeatures<'_>>(structure)
         {
             self.vulkan_memory_model |= requested.vulkan_memory_model != vk::FALSE;
             self.vulkan_memory_model_device_scope |=
@@ -1614,17 +1659,17 @@ impl Features {
                 requested.vulkan_memory_model_availability_visibility_chains != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceHostQueryResetFeatures<'_>>(structure)
         {
             self.host_query_reset |= requested.host_query_reset != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceTimelineSemaphoreFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceTimelineSemaphoreFeatures<'_>>(structure)
         {
             self.timeline_semaphore |= requested.timeline_semaphore != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>(structure)
         {
             self.buffer_device_address |= requested.buffer_device_address != vk::FALSE;
             self.buffer_device_address_capture_replay |=
@@ -1632,7 +1677,7 @@ impl Features {
             self.buffer_device_address_multi_device |=
                 requested.buffer_device_address_multi_device != vk::FALSE;
         }
-        if let Some(requested) = pnext::cast::<vk::PhysicalDevice8BitStorageFeatures<'_>>(structure)
+        if let Some(requested) = valid::cast::<vk::PhysicalDevice8BitStorageFeatures<'_>>(structure)
         {
             self.storage_buffer8_bit_access |= requested.storage_buffer8_bit_access != vk::FALSE;
             self.uniform_and_storage_buffer8_bit_access |=
@@ -1640,19 +1685,19 @@ impl Features {
             self.storage_push_constant8 |= requested.storage_push_constant8 != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceShaderAtomicInt64Features<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceShaderAtomicInt64Features<'_>>(structure)
         {
             self.shader_buffer_int64_atomics |= requested.shader_buffer_int64_atomics != vk::FALSE;
             self.shader_shared_int64_atomics |= requested.shader_shared_int64_atomics != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceShaderFloat16Int8Features<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceShaderFloat16Int8Features<'_>>(structure)
         {
             self.shader_float16 |= requested.shader_float16 != vk::FALSE;
             self.shader_int8 |= requested.shader_int8 != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceDescriptorIndexingFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceDescriptorIndexingFeatures<'_>>(structure)
         {
             self.shader_input_attachment_array_dynamic_indexing |=
                 requested.shader_input_attachment_array_dynamic_indexing != vk::FALSE;
@@ -1695,125 +1740,144 @@ impl Features {
             self.runtime_descriptor_array |= requested.runtime_descriptor_array != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceScalarBlockLayoutFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceScalarBlockLayoutFeatures<'_>>(structure)
         {
             self.scalar_block_layout |= requested.scalar_block_layout != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceUniformBufferStandardLayoutFeatures<'_>>(structure)
         {
             self.uniform_buffer_standard_layout |=
                 requested.uniform_buffer_standard_layout != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceShaderSubgroupExtendedTypesFeatures<'_>>(structure)
         {
             self.shader_subgroup_extended_types |=
                 requested.shader_subgroup_extended_types != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceImagelessFramebufferFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceImagelessFramebufferFeatures<'_>>(structure)
         {
             self.imageless_framebuffer |= requested.imageless_framebuffer != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceSeparateDepthStencilLayoutsFeatures<'_>>(structure)
         {
             self.separate_depth_stencil_layouts |=
                 requested.separate_depth_stencil_layouts != vk::FALSE;
         }
-        if let Some(requested) = pnext::cast::<vk::PhysicalDevicePrivateDataFeatures<'_>>(structure)
+        if let Some(requested) = valid::cast::<vk::PhysicalDevicePrivateDataFeatures<'_>>(structure)
         {
             self.private_data |= requested.private_data != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceSynchronization2Features<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceSynchronization2Features<'_>>(structure)
         {
             self.synchronization2 |= requested.synchronization2 != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceTextureCompressionASTCHDRFeatures<'_>>(structure)
         {
             self.texture_compression_astc_hdr |=
                 requested.texture_compression_astc_hdr != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceMaintenance4Features<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceMaintenance4Features<'_>>(structure)
         {
             self.maintenance4 |= requested.maintenance4 != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceShaderTerminateInvocationFeatures<'_>>(structure)
         {
             self.shader_terminate_invocation |= requested.shader_terminate_invocation != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceShaderDemoteToHelperInvocationFeatures<'_>>(structure)
         {
             self.shader_demote_to_helper_invocation |=
                 requested.shader_demote_to_helper_invocation != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDevicePipelineCreationCacheControlFeatures<'_>>(structure)
         {
             self.pipeline_creation_cache_control |=
                 requested.pipeline_creation_cache_control != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceZeroInitializeWorkgroupMemoryFeatures<'_>>(structure)
         {
             self.shader_zero_initialize_workgroup_memory |=
                 requested.shader_zero_initialize_workgroup_memory != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceImageRobustnessFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceImageRobustnessFeatures<'_>>(structure)
         {
             self.robust_image_access |= requested.robust_image_access != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceSubgroupSizeControlFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceSubgroupSizeControlFeatures<'_>>(structure)
         {
             self.subgroup_size_control |= requested.subgroup_size_control != vk::FALSE;
             self.compute_full_subgroups |= requested.compute_full_subgroups != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceInlineUniformBlockFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceInlineUniformBlockFeatures<'_>>(structure)
         {
             self.inline_uniform_block |= requested.inline_uniform_block != vk::FALSE;
             self.descriptor_binding_inline_uniform_block_update_after_bind |=
                 requested.descriptor_binding_inline_uniform_block_update_after_bind != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceShaderIntegerDotProductFeatures<'_>>(structure)
         {
             self.shader_integer_dot_product |= requested.shader_integer_dot_product != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'_>>(structure)
         {
             self.dynamic_rendering |= requested.dynamic_rendering != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(structure)
+        {
+            self.extended_dynamic_state |= requested.extended_dynamic_state != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>(structure)
+        {
+            self.extended_dynamic_state2 |= requested.extended_dynamic_state2 != vk::FALSE;
+            self.extended_dynamic_state2_logic_op |=
+                requested.extended_dynamic_state2_logic_op != vk::FALSE;
+            self.extended_dynamic_state2_patch_control_points |=
+                requested.extended_dynamic_state2_patch_control_points != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(structure)
         {
             self.index_type_uint8 |= requested.index_type_uint8 != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(structure)
         {
             self.provoking_vertex_last |= requested.provoking_vertex_last != vk::FALSE;
             self.transform_feedback_preserves_provoking_vertex |=
                 requested.transform_feedback_preserves_provoking_vertex != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(structure)
+            valid::cast::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(structure)
+        {
+            self.texel_buffer_alignment |= requested.texel_buffer_alignment != vk::FALSE;
+        }
+        if let Some(requested) =
+            valid::cast::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(structure)
         {
             self.vertex_attribute_instance_rate_divisor |=
                 requested.vertex_attribute_instance_rate_divisor != vk::FALSE;
             self.vertex_attribute_instance_rate_zero_divisor |=
                 requested.vertex_attribute_instance_rate_zero_divisor != vk::FALSE;
         }
-        if let Some(requested) = pnext::cast::<
+        if let Some(requested) = valid::cast::<
             gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>,
         >(structure)
         {
@@ -1838,7 +1902,7 @@ impl Features {
             self.gaussian_approximation |= requested.gaussian_approximation != vk::FALSE;
         }
         if let Some(requested) =
-            pnext::cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(structure)
+            valid::cast::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(structure)
         {
             self.performance_counter_query_pools |=
                 requested.performance_counter_query_pools != vk::FALSE;
@@ -1851,11 +1915,20 @@ impl Features {
 /// The extension without which the features of a structure can't be enabled; features of core need none.
 pub(crate) fn extension_of(structure: vk::StructureType) -> Option<&'static CStr> {
     match structure {
+        vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_extended_dynamic_state")
+        }
+        vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_extended_dynamic_state2")
+        }
         vk::PhysicalDeviceIndexTypeUint8FeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_EXT_index_type_uint8")
         }
         vk::PhysicalDeviceProvokingVertexFeaturesEXT::STRUCTURE_TYPE => {
             Some(c"VK_EXT_provoking_vertex")
+        }
+        vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT::STRUCTURE_TYPE => {
+            Some(c"VK_EXT_texel_buffer_alignment")
         }
         vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR::STRUCTURE_TYPE => {
             Some(c"VK_EXT_vertex_attribute_divisor")
@@ -1876,15 +1949,23 @@ pub(crate) const MANDATORY: &[(u32, &[&str])] = &[
     (vk::API_VERSION_1_0, &["robust_buffer_access"]),
     (
         vk::API_VERSION_1_1,
-        &["multiview", "storage_buffer16_bit_access"],
+        &[
+            "multiview",
+            "shader_draw_parameters",
+            "storage_buffer16_bit_access",
+        ],
     ),
     (
         vk::API_VERSION_1_2,
         &[
+            "draw_indirect_count",
             "host_query_reset",
             "imageless_framebuffer",
+            "sampler_mirror_clamp_to_edge",
             "separate_depth_stencil_layouts",
             "shader_int64",
+            "shader_output_layer",
+            "shader_output_viewport_index",
             "shader_subgroup_extended_types",
             "storage_buffer8_bit_access",
             "subgroup_broadcast_dynamic_id",

@@ -3,7 +3,7 @@
 
 //! Properties and limits, and the structures in which Vulkan asks for them.
 
-use crate::pnext;
+use crate::abi::valid;
 use ash::vk;
 
 /// Properties, each once, whatever structures hold it.
@@ -645,7 +645,7 @@ impl Properties {
     }
 
     /// Writes the properties to a structure of a chain, if it holds any that are known here.
-    pub(crate) fn write(&self, mut structure: pnext::Output<'_>) {
+    pub(crate) fn write(&self, mut structure: valid::ChainedOutput<'_>) {
         if let Some(out) = structure.cast::<vk::PhysicalDeviceVulkan11Properties<'_>>() {
             out.device_uuid = self.device_uuid;
             out.driver_uuid = self.driver_uuid;

@@ -7,6 +7,7 @@ use crate::registry::features::Features;
 use crate::registry::properties::Properties;
 use ash::vk;
 use spirv::Capability;
+use std::ffi::CStr;
 
 /// A thing that enables a capability.
 #[derive(Clone, Copy, Debug)]
@@ -15,12 +16,14 @@ pub(crate) enum Enable {
     Feature(&'static str, fn(&Features) -> bool),
     /// A value of a property, by the property's name in Rust.
     Property(&'static str, fn(&Properties) -> bool),
+    /// An extension of devices.
+    Extension(&'static CStr),
     /// A feature, property, extension or version that this driver doesn't have.
     Absent(&'static str),
 }
 
-/// The things of which one enables a capability. There are none where the core version, or an extension
-/// that is listed, is enough; nor for capabilities that Vulkan doesn't know.
+/// The things of which one enables a capability. There are none where the core version is enough, nor for
+/// capabilities that Vulkan doesn't know.
 pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
     match capability {
         Capability::Geometry => &[Enable::Feature("geometry_shader", |f| f.geometry_shader)],
@@ -131,7 +134,7 @@ pub(crate) fn enables(capability: Capability) -> &'static [Enable] {
         Capability::MultiViewport => &[Enable::Feature("multi_viewport", |f| f.multi_viewport)],
         Capability::DrawParameters => &[
             Enable::Feature("shader_draw_parameters", |f| f.shader_draw_parameters),
-            Enable::Absent("VK_KHR_shader_draw_parameters"),
+            Enable::Extension(c"VK_KHR_shader_draw_parameters"),
         ],
         Capability::MultiView => &[Enable::Feature("multiview", |f| f.multiview)],
         Capability::VariablePointersStorageBuffer => {

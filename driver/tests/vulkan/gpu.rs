@@ -111,6 +111,7 @@ impl Gpu {
     ) -> Self {
         let extensions = [
             gaurast::gaussian_primitive_topology::NAME,
+            ash::khr::map_memory2::NAME,
             ash::khr::performance_query::NAME,
             ash::khr::push_descriptor::NAME,
             ash::ext::index_type_uint8::NAME,

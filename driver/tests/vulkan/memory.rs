@@ -36,6 +36,38 @@ fn mapped_memory_keeps_what_is_written() {
 }
 
 #[gaurast_runner::test]
+fn memory_is_mapped_by_a_structure_too() {
+    let gpu = Gpu::new();
+    let memory = gpu.allocate(1000, MAPPABLE);
+    let device = gpu.device.handle();
+    let commands = ash::khr::map_memory2::Device::new(&gpu.instance, &gpu.device);
+    let map_info = vk::MemoryMapInfoKHR::default()
+        .memory(memory)
+        .offset(500)
+        .size(vk::WHOLE_SIZE);
+    let unmap_info = vk::MemoryUnmapInfoKHR::default().memory(memory);
+    let mut mapped = std::ptr::null_mut();
+    // SAFETY: see the crate.
+    unsafe {
+        let (map, unmap) = (
+            commands.fp().map_memory2_khr,
+            commands.fp().unmap_memory2_khr,
+        );
+        map(device, &raw const map_info, &raw mut mapped)
+            .result()
+            .unwrap();
+        mapped.cast::<u8>().write(7);
+        let again = map(device, &raw const map_info, &raw mut mapped).result();
+        assert!(again.is_err(), "mapped");
+        unmap(device, &raw const unmap_info).result().unwrap();
+        let mapped = gpu.device.map_memory(memory, 500, 1, NO_FLAGS).unwrap();
+        assert_eq!(mapped.cast::<u8>().read(), 7);
+        gpu.device.free_memory(memory, None);
+    }
+    assert_eq!(gpu.take_messages().len(), 1, "of the memory mapped twice");
+}
+
+#[gaurast_runner::test]
 fn device_only_memory_is_not_mapped() {
     let gpu = Gpu::new();
     let memory = gpu.allocate(1000, DEVICE_ONLY);

@@ -4,7 +4,7 @@ use crate::canvas::{
     BLUE, CLEAR, Canvas, DEPTH_FORMAT, GREEN, PIXELS, RED, count, everything, layered_image,
     read_layer,
 };
-use crate::polygons::{Request, deep_vertex, vertex, vertex_shader};
+use crate::polygons::{Request, Vertex, deep_vertex, vertex, vertex_shader};
 use crate::scene::{HEIGHT, WIDTH, assert_close, at};
 use crate::spirv;
 use ash::vk;
@@ -198,6 +198,91 @@ fn the_provoking_vertex_is_chosen() {
         count(&canvas.draw_vertices(&request, &vertices), BLUE),
         PIXELS
     );
+}
+
+/// The vertices that give a topology's primitives their flat values, as "Primitive Topologies" of the specification says: a
+/// vertex for each primitive, in the first and in the last convention.
+const PROVOKING: [(vk::PrimitiveTopology, &[usize], &[usize]); 6] = [
+    (
+        vk::PrimitiveTopology::POINT_LIST,
+        &[0, 1, 2, 3, 4, 5],
+        &[0, 1, 2, 3, 4, 5],
+    ),
+    (vk::PrimitiveTopology::LINE_LIST, &[0, 2, 4], &[1, 3, 5]),
+    (
+        vk::PrimitiveTopology::LINE_STRIP,
+        &[0, 1, 2, 3, 4],
+        &[1, 2, 3, 4, 5],
+    ),
+    (vk::PrimitiveTopology::TRIANGLE_LIST, &[0, 3], &[2, 5]),
+    (
+        vk::PrimitiveTopology::TRIANGLE_STRIP,
+        &[0, 1, 2, 3],
+        &[2, 3, 4, 5],
+    ),
+    (
+        vk::PrimitiveTopology::TRIANGLE_FAN,
+        &[1, 2, 3, 4],
+        &[2, 3, 4, 5],
+    ),
+];
+
+/// The corners of a hexagon, which make primitives of every topology that show.
+fn hexagon() -> [Vertex; 6] {
+    std::array::from_fn(|number| {
+        let (sine, cosine) = (number as f32 * std::f32::consts::FRAC_PI_3).sin_cos();
+        let color = [number as f32 + 1.0, 0.0, 0.0, 1.0];
+        vertex(0.9 * cosine, 0.9 * sine, color)
+    })
+}
+
+#[gaurast_runner::test]
+fn each_primitive_has_its_provoking_vertex() {
+    let canvas = Canvas::new();
+    let vertices = hexagon();
+    for (topology, first, last) in PROVOKING {
+        for (provoking_last, expected) in [(false, first), (true, last)] {
+            let request = Request {
+                topology,
+                provoking_last,
+                ..Request::default()
+            }
+            .with_fragment(spirv!("flat.frag"));
+            // Later primitives hide earlier ones, so that each is looked at before the next is drawn.
+            let seen: Vec<usize> = (0..expected.len())
+                .map(|primitive| {
+                    let pixels = canvas.draw(&request, &vertices, |device, commands, _| {
+                        // SAFETY: see the crate.
+                        unsafe {
+                            device.cmd_draw(commands, vertices_to(topology, primitive), 1, 0, 0);
+                        };
+                    });
+                    let before: Vec<f32> = expected[..primitive]
+                        .iter()
+                        .map(|&vertex| vertex as f32 + 1.0)
+                        .collect();
+                    let new = pixels
+                        .iter()
+                        .find(|pixel| **pixel != CLEAR && !before.contains(&pixel[0]))
+                        .unwrap_or_else(|| panic!("{topology:?}: primitive {primitive}"));
+                    new[0] as usize - 1
+                })
+                .collect();
+            assert_eq!(seen, expected, "{topology:?}, last: {provoking_last}");
+        }
+    }
+}
+
+/// The vertices up to the end of a primitive.
+fn vertices_to(topology: vk::PrimitiveTopology, primitive: usize) -> u32 {
+    let count = match topology {
+        vk::PrimitiveTopology::POINT_LIST => primitive + 1,
+        vk::PrimitiveTopology::LINE_LIST => 2 * primitive + 2,
+        vk::PrimitiveTopology::LINE_STRIP => primitive + 2,
+        vk::PrimitiveTopology::TRIANGLE_LIST => 3 * primitive + 3,
+        _ => primitive + 3,
+    };
+    count as u32
 }
 
 #[gaurast_runner::test]

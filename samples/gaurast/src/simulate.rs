@@ -10,12 +10,14 @@ use std::process::Command;
 use clap::{Args, ValueEnum};
 use gaurast_picture::Size;
 use thiserror::Error;
+use timing::FrameWork;
 use timing::config::{Config, ConfigError, DEFAULT_PRESET};
+use timing::raster::RasterReport;
 use timing::schedule;
 use timing::simulate::{self, Simulation};
-use timing::what_if::{WhatIf, what_ifs};
-use timing::work::{TRACE_VERSION, Trace};
-use timing::{FrameWork, fast, paper, stepped};
+use timing::work::{Trace, TraceError};
+use timing_studies::what_if::{WhatIf, what_ifs};
+use timing_studies::{paper, stepped};
 
 use crate::simulate_plot as plot;
 use crate::simulate_report as report;
@@ -35,16 +37,20 @@ pub enum Error {
         path: PathBuf,
         source: serde_json::Error,
     },
-    #[error("{}: a trace of version {found}, not {TRACE_VERSION}", path.display())]
-    Version { path: PathBuf, found: u32 },
+    #[error("{}: {source}", path.display())]
+    Work { path: PathBuf, source: TraceError },
     #[error("{0}: there is no frame in the trace")]
     Empty(String),
+    #[error("{0}: the last frame has no work, so there is nothing to simulate")]
+    NoWork(String),
+    #[error(
+        "--stepped takes at most {MAX_STEPPED_PAIRS} pairs of a tile and a primitive, and the trace has {0}"
+    )]
+    TooLong(u64),
     #[error("drawing the scene: {0}")]
     Draw(String),
     #[error("--sweep {0}: not NAME=FIRST..LAST or NAME=VALUE,VALUE,...")]
     Sweep(String),
-    #[error("the plot: {0}")]
-    Plot(String),
     #[error("output: {0}")]
     Output(#[from] std::io::Error),
     #[error("output: {0}")]
@@ -68,7 +74,7 @@ pub struct SimulateArguments {
     /// The scene file, or a trace of work (.json); a generated garden if there is none
     pub scene: Option<PathBuf>,
 
-    /// The hardware: paper-15x16, paper-300, single-module, fp16, orin-nx-10w, orin-nx-maxn or m2-pro
+    /// The hardware: paper-15x16, paper-pipeline, paper-300, single-module, fp16, orin-nx-10w, orin-nx-maxn or m2-pro
     #[arg(long, value_name = "NAME", default_value = DEFAULT_PRESET)]
     pub preset: String,
 
@@ -151,12 +157,15 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
             .map_or("the garden".to_owned(), |path| path.display().to_string())
     };
     let frame = trace.frames.last().ok_or_else(|| Error::Empty(name()))?;
+    if frame.pairs() == 0 && frame.shader().iter().all(|work| work.operations() == 0.0) {
+        return Err(Error::NoWork(name()));
+    }
     if arguments.what_if {
         let variants = what_ifs(frame, &config);
         return print(&what_if_text(arguments.format, &variants)?);
     }
     if arguments.stepped {
-        return print(&report::compared(&models(&trace, &config)));
+        return print(&report::compared(&models(&trace, &config)?));
     }
     let results: Vec<_> = machines
         .iter()
@@ -168,7 +177,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
     }
     if let (Some(path), Some(sweep)) = (&arguments.plot, &arguments.sweep) {
         let swept = sweep.split('=').next().unwrap_or_default();
-        let svg = plot::svg(swept, &results).map_err(Error::Plot)?;
+        let svg = plot::svg(swept, &results);
         replace(path, svg.as_bytes())?;
     }
     print(&match (arguments.format, results.as_slice()) {
@@ -179,13 +188,33 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Error> {
     })
 }
 
-/// Each frame's cycles by the fast model and by the stepped one.
-fn models(trace: &Trace, config: &Config) -> Vec<[f64; 2]> {
-    let cycles = |frame: &FrameWork| {
-        let fast = fast::rasterize(frame, config, 0.0).cycles;
-        [fast, stepped::rasterize(frame, config, 0.0).cycles]
-    };
-    trace.frames.iter().map(cycles).collect()
+/// Most pairs that are stepped clock by clock, some minutes of work.
+const MAX_STEPPED_PAIRS: u64 = 1 << 24;
+
+/// Each frame's cycles by both models, where frames come one at a time and where they overlap as the hardware lets them.
+fn models(trace: &Trace, config: &Config) -> Result<Vec<report::Compared>, Error> {
+    let pairs = trace.frames.iter().map(FrameWork::pairs).sum();
+    if pairs > MAX_STEPPED_PAIRS {
+        return Err(Error::TooLong(pairs));
+    }
+    let mut compared = Vec::new();
+    for (number, frame) in trace.frames.iter().enumerate() {
+        let result = simulate::simulate(frame, config);
+        let frame = simulate::of_rasterizer(frame, config);
+        let mut compare = |how, fast: &RasterReport, others_gb_s| {
+            compared.push(report::Compared {
+                frame: number,
+                how,
+                fast: fast.clone(),
+                stepped: stepped::rasterize(&frame, config, others_gb_s),
+            });
+        };
+        compare("alone", &result.raster_alone, 0.0);
+        if result.contention_gb_s > 0.0 {
+            compare("overlapping", &result.raster, result.contention_gb_s);
+        }
+    }
+    Ok(compared)
 }
 
 fn what_if_text(format: Format, variants: &[WhatIf]) -> Result<String, Error> {
@@ -275,12 +304,10 @@ fn load(path: &Path) -> Result<Trace, Error> {
         path: path.to_owned(),
         source,
     })?;
-    if trace.version != TRACE_VERSION {
-        return Err(Error::Version {
-            path: path.to_owned(),
-            found: trace.version,
-        });
-    }
+    trace.check().map_err(|source| Error::Work {
+        path: path.to_owned(),
+        source,
+    })?;
     Ok(trace)
 }
 

@@ -3,10 +3,11 @@
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, ContentArrangement, Table};
 use timing::Config;
-use timing::area;
-use timing::paper::Section;
+use timing::raster::RasterReport;
 use timing::simulate::Simulation;
 use timing::work::{FrameWork, TileWork};
+use timing_studies::area;
+use timing_studies::paper::Section;
 
 fn new_table() -> Table {
     let mut table = Table::new();
@@ -110,9 +111,16 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
         ms(stages.raster),
         format!("{:.0} cycles", result.raster.cycles),
     );
-    let modules = &result.raster.modules;
-    for (cause, cycles) in modules.by_cause() {
-        row("PE cycles", cause, share(cycles, modules.total()), none());
+    row(
+        "time",
+        "stage 3, a frame alone",
+        ms(result.stages_alone.raster),
+        format!("{:.0} cycles", result.raster_alone.cycles),
+    );
+    let (modules, alone) = (&result.raster.modules, &result.raster_alone.modules);
+    for ((cause, cycles), (_, in_one)) in modules.by_cause().into_iter().zip(alone.by_cause()) {
+        let note = share(in_one, alone.total()) + " of a frame alone";
+        row("PE cycles", cause, share(cycles, modules.total()), note);
     }
     let gb_s = |bytes: f64| format!("{:.1} GB/s", bytes / stages.raster.max(1e-9) * 1e-6);
     row(
@@ -127,6 +135,12 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
         "shader cores meanwhile",
         format!("{:.1} GB/s", result.contention_gb_s),
         none(),
+    );
+    row(
+        "memory",
+        "not counted",
+        none(),
+        "copies, clears, loads and stores of attachments, depth".to_owned(),
     );
     row(
         "frames",
@@ -150,8 +164,25 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
         "frames",
         "speed-up",
         format!("{:.2}x", result.speedup),
-        format!("raster {:.1}x", result.raster_speedup),
+        none(),
     );
+    let gains = &result.gains;
+    for (name, factor, note) in [
+        ("raster speed-up", result.raster_speedup, "product of:"),
+        (
+            "hardware",
+            gains.hardware,
+            "on the same lists, without stalls",
+        ),
+        (
+            "lists",
+            gains.lists,
+            "the rasterizer's instead of the baseline's",
+        ),
+        ("stalls", gains.stalls, "PEs busy while they are theirs"),
+    ] {
+        row("raster", name, format!("{factor:.2}x"), note.to_owned());
+    }
     for (name, millijoules) in result.energy.by_component() {
         row(
             "energy",
@@ -184,7 +215,7 @@ pub fn one(frame: &FrameWork, result: &Simulation, config: &Config) -> String {
 }
 
 /// The main numbers of a result, and their names.
-fn summary(result: &Simulation) -> [(&'static str, f64, usize); 11] {
+fn summary(result: &Simulation) -> [(&'static str, f64, usize); 14] {
     [
         ("cycles", result.raster.cycles, 0),
         ("raster ms", result.stages.raster, 3),
@@ -197,6 +228,9 @@ fn summary(result: &Simulation) -> [(&'static str, f64, usize); 11] {
         ("FPS", result.fps, 1),
         ("FPS serial", result.fps_serial, 1),
         ("raster speed-up", result.raster_speedup, 2),
+        ("hardware", result.gains.hardware, 2),
+        ("lists", result.gains.lists, 2),
+        ("stalls", result.gains.stalls, 2),
         ("speed-up", result.speedup, 2),
         ("modules mJ", result.energy.modules(), 2),
         ("memory mJ", result.energy.memory, 2),
@@ -218,28 +252,58 @@ pub fn many(results: &[(String, Simulation)]) -> String {
             .map(|(_, value, decimals)| format!("{value:.decimals$}"));
         table.add_row(std::iter::once(name.clone()).chain(values));
     }
-    right(&mut table, 1..12);
+    right(&mut table, 1..15);
     format!("{table}\n")
 }
 
-/// The fast model beside the stepped one, a row for each frame.
-pub fn compared(frames: &[[f64; 2]]) -> String {
+/// A frame by the fast model and by the stepped one.
+#[derive(Debug)]
+pub struct Compared {
+    /// From 0.
+    pub frame: usize,
+    /// Alone, or overlapping others.
+    pub how: &'static str,
+    pub fast: RasterReport,
+    pub stepped: RasterReport,
+}
+
+/// The fast model beside the stepped one: cycles, and the share of each cause of stalls.
+pub fn compared(frames: &[Compared]) -> String {
     let mut table = new_table();
-    table.set_header(["frame", "fast cycles", "stepped cycles", "difference"]);
-    for (number, [fast, stepped]) in frames.iter().enumerate() {
-        let difference = if *stepped == 0.0 {
+    table.set_header(["frame", "", "", "fast", "stepped", "difference"]);
+    for frame in frames {
+        let (fast, stepped) = (&frame.fast, &frame.stepped);
+        let difference = if stepped.cycles == 0.0 {
             0.0
         } else {
-            (fast / stepped - 1.0) * 100.0
+            (fast.cycles / stepped.cycles - 1.0) * 100.0
         };
-        let values = [
-            format!("{fast:.0}"),
-            format!("{stepped:.0}"),
+        table.add_row([
+            frame.frame.to_string(),
+            frame.how.to_owned(),
+            "cycles".to_owned(),
+            format!("{:.0}", fast.cycles),
+            format!("{:.0}", stepped.cycles),
             format!("{difference:+.3} %"),
-        ];
-        table.add_row(std::iter::once(number.to_string()).chain(values));
+        ]);
+        let causes = fast.modules.by_cause().into_iter();
+        for ((cause, ours), (_, theirs)) in causes.zip(stepped.modules.by_cause()) {
+            let of = |part: f64, report: &RasterReport| match report.modules.total() {
+                0.0 => 0.0,
+                total => part / total * 100.0,
+            };
+            let (ours, theirs) = (of(ours, fast), of(theirs, stepped));
+            table.add_row([
+                String::new(),
+                String::new(),
+                cause.to_owned(),
+                format!("{ours:.1} %"),
+                format!("{theirs:.1} %"),
+                format!("{:+.1}", ours - theirs),
+            ]);
+        }
     }
-    right(&mut table, 1..4);
+    right(&mut table, 3..6);
     format!("{table}\n")
 }
 
@@ -324,6 +388,7 @@ mod tests {
         let config = Config::preset("paper-15x16", &[]).expect("a preset");
         let result = simulate(&frame, &config);
         let text = one(&frame, &result, &config);
+        let result_gains = result.gains;
         for part in [
             "320 x 200",
             "50000",
@@ -336,10 +401,28 @@ mod tests {
             assert!(text.contains(part), "{part}: {text}");
         }
         let results = [("a,b".to_owned(), result.clone()), ("c".to_owned(), result)];
+        // Rows, not pieces of them.
+        let cell = |row: &str, column: usize| -> String {
+            let line = text.lines().find(|line| {
+                line.split('┆')
+                    .nth(1)
+                    .is_some_and(|name| name.trim() == row)
+            });
+            let line = line.unwrap_or_else(|| panic!("{row}: {text}"));
+            line.split('┆')
+                .nth(column)
+                .unwrap_or_default()
+                .trim_matches([' ', '│'])
+                .to_owned()
+        };
+        assert_eq!(cell("lists", 2), "1.00x");
+        let gains = result_gains.hardware * result_gains.stalls;
+        assert_eq!(cell("raster speed-up", 2), format!("{gains:.2}x"));
+        assert_eq!(cell("dependency", 3), "0.0 % of a frame alone");
         assert_eq!(csv(&results).lines().count(), 3);
         assert!(csv(&results).contains("\"a,b\","));
         assert!(many(&results).contains("raster speed-up"));
-        let sections = timing::paper::report();
+        let sections = timing_studies::paper::report();
         assert!(paper(&sections).contains("GSCore"));
         let rows: usize = sections.iter().map(|section| section.rows.len()).sum();
         assert_eq!(paper_csv(&sections).lines().count(), rows + 1);

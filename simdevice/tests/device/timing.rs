@@ -10,9 +10,10 @@ use simdevice::timing::config::{Config as Hardware, preset_names};
 use simdevice::timing::raster::RasterReport;
 use simdevice::timing::stages::{self, GaussianCounts};
 use simdevice::timing::work::{Mode, TileWork, Trace};
-use simdevice::timing::{fast, schedule, simulate, stepped};
+use simdevice::timing::{fast, schedule, simulate};
 use simdevice::{Config, Device, Packet};
 use std::sync::Arc;
+use timing_studies::stepped;
 
 const NOTHING: [&[Packet]; 2] = [&[], &[]];
 

@@ -3,6 +3,7 @@
 
 use crate::work::{Mode, Saturation, TILE_SIDES};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use toml::{Table, Value};
 
 /// The hardware.
@@ -27,6 +28,16 @@ pub struct Config {
     pub area: AreaConfig,
 }
 
+/// Tile lists of Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Lists {
+    /// Tiles that a Gaussian's ellipse reaches, as the device makes them.
+    Exact,
+    /// Tiles that the square around a Gaussian's 3-sigma circle touches, as the original 3DGS code makes them.
+    Squares,
+}
+
 /// The rasterizer modules.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -45,7 +56,7 @@ pub struct Rasterizer {
     pub gaussian_latency: u32,
     /// Cycles from operands to weights and depth.
     pub triangle_latency: u32,
-    /// Cycles from a pixel's transmittance (or depth) to its next one: a primitive cannot take fewer.
+    /// Cycles from a pixel's transmittance to its next one: two Gaussians that share a pixel cannot begin closer.
     pub carried_latency: u32,
     /// Whether opacity is folded into the exponent; if not, a Gaussian takes a multiplication more than there are
     /// multipliers, and its interval is one cycle longer.
@@ -60,6 +71,8 @@ pub struct Rasterizer {
     pub tile_side: u32,
     /// Primitives that half of the ping-pong tile buffer holds.
     pub batch: u32,
+    /// Tile lists that the rasterizer takes.
+    pub lists: Lists,
     /// Numbers that a primitive brings in.
     pub numbers_in: u32,
     /// Numbers that a pixel takes out.
@@ -106,17 +119,26 @@ impl Rasterizer {
         }
     }
 
-    /// Cycles that a primitive occupies a module's PEs, evaluated in `groups` groups of 16 pixels.
-    pub fn primitive_cycles(&self, mode: Mode, groups: u64) -> u64 {
+    /// Cycles in which a module's PEs evaluate a primitive in `groups` groups of 16 pixels.
+    pub fn busy_cycles(&self, mode: Mode, groups: u64) -> u64 {
         let pixels = groups * 16;
-        let busy = pixels.div_ceil(u64::from(self.pes_per_module)) * u64::from(self.interval(mode));
-        // Where no pixel is evaluated, the controller still looks at the primitive.
-        let carried = if groups == 0 {
-            1
-        } else {
-            u64::from(self.carried_latency)
-        };
-        busy.max(carried).max(1)
+        pixels.div_ceil(u64::from(self.pes_per_module)) * u64::from(self.interval(mode))
+    }
+
+    /// Cycles in which the PEs wait for a pixel's transmittance after a primitive that is evaluated in `groups` of `open`
+    /// groups of 16 pixels. Triangles carry none. Two Gaussians that need not share a pixel, since each takes at most half
+    /// of the open groups, do not wait for each other; this is a lower bound.
+    pub fn waiting_cycles(&self, mode: Mode, groups: u64, open: u64) -> u64 {
+        let must_share = 2 * groups > open;
+        if mode == Mode::Triangle || groups == 0 || !must_share {
+            return 0;
+        }
+        u64::from(self.carried_latency).saturating_sub(self.busy_cycles(mode, groups))
+    }
+
+    /// Cycles of the controller for a primitive of which no pixel is evaluated.
+    pub fn looking_cycles(groups: u64) -> u64 {
+        u64::from(groups == 0)
     }
 
     /// Bytes that a primitive of a tile's list brings in.
@@ -173,6 +195,8 @@ impl Shader {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Baseline {
+    /// Tile lists that it takes.
+    pub lists: Lists,
     /// 32-bit operations per pixel and primitive.
     pub operations_per_evaluation: f64,
     /// Of the issue slots, those used.
@@ -220,7 +244,6 @@ pub struct EnergyConfig {
     pub dram_pj_per_byte: f64,
     /// Evaluations of the calibration frames that are blended.
     pub blended_share: f64,
-    pub shader_pj_per_operation: f64,
 }
 
 /// Area: square micrometres of the reference technology.
@@ -265,8 +288,15 @@ pub enum ConfigError {
         among: Vec<String>,
     },
     /// A number is out of its range.
-    #[error("{0}")]
-    Range(&'static str),
+    #[error("{field} is {value}; it must be {range}")]
+    Range {
+        /// The field's full name.
+        field: String,
+        /// The number as it is written.
+        value: String,
+        /// The numbers that are allowed.
+        range: Range,
+    },
     /// Presets inherit from each other in a circle, or too deeply.
     #[error("{0} inherits from too many")]
     Inheritance(String),
@@ -274,6 +304,10 @@ pub enum ConfigError {
 
 const PRESETS: &[(&str, &str)] = &[
     ("paper-15x16", include_str!("../presets/paper-15x16.toml")),
+    (
+        "paper-pipeline",
+        include_str!("../presets/paper-pipeline.toml"),
+    ),
     ("paper-300", include_str!("../presets/paper-300.toml")),
     (
         "single-module",
@@ -291,6 +325,123 @@ pub const DEFAULT_PRESET: &str = "paper-15x16";
 /// The names of the presets.
 pub fn preset_names() -> Vec<&'static str> {
     PRESETS.iter().map(|(name, _)| *name).collect()
+}
+
+/// Numbers that a field may have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Range {
+    /// Both ends are in it.
+    From(f64, f64),
+    /// The lower end is not in it.
+    Above(f64, f64),
+    /// These alone.
+    OneOf(&'static [u32]),
+}
+
+impl Range {
+    fn contains(&self, value: f64) -> bool {
+        match *self {
+            Self::From(low, high) => (low..=high).contains(&value),
+            Self::Above(low, high) => value > low && value <= high,
+            Self::OneOf(values) => values.iter().any(|&known| f64::from(known) == value),
+        }
+    }
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::From(low, high) => write!(f, "from {low} to {high}"),
+            Self::Above(low, high) => write!(f, "more than {low} and at most {high}"),
+            Self::OneOf(values) => {
+                let names: Vec<_> = values.iter().map(u32::to_string).collect();
+                write!(f, "one of {}", names.join(", "))
+            }
+        }
+    }
+}
+
+/// The range of every number, by section and field.
+const RANGES: &[(&str, &str, Range)] = {
+    use Range::{Above, From, OneOf};
+    const SHARE: Range = Above(0.0, 1.0);
+    const RATE: Range = From(0.001, 1e5);
+    &[
+        ("rasterizer", "modules", From(0.0, 4096.0)),
+        ("rasterizer", "pes_per_module", From(1.0, 4096.0)),
+        ("rasterizer", "clock_ghz", From(0.001, 100.0)),
+        ("rasterizer", "gaussian_interval", From(1.0, 1000.0)),
+        ("rasterizer", "triangle_interval", From(1.0, 1000.0)),
+        ("rasterizer", "gaussian_latency", From(0.0, 10_000.0)),
+        ("rasterizer", "triangle_latency", From(0.0, 10_000.0)),
+        ("rasterizer", "carried_latency", From(0.0, 10_000.0)),
+        ("rasterizer", "tile_side", OneOf(&TILE_SIDES)),
+        ("rasterizer", "batch", From(1.0, 65_536.0)),
+        ("rasterizer", "numbers_in", From(1.0, 256.0)),
+        ("rasterizer", "numbers_out", From(1.0, 256.0)),
+        ("rasterizer", "number_bytes", From(1.0, 16.0)),
+        ("rasterizer", "index_bytes", From(0.0, 16.0)),
+        ("rasterizer", "port_bytes_per_cycle", From(0.01, 65_536.0)),
+        ("rasterizer", "tile_overhead", From(0.0, 100_000.0)),
+        ("rasterizer", "mode_switch", From(0.0, 100_000.0)),
+        ("memory", "bandwidth_gb_s", From(0.01, 1e5)),
+        ("memory", "efficiency", SHARE),
+        ("memory", "latency_ns", From(0.0, 1e6)),
+        ("shader", "sms", From(1.0, 4096.0)),
+        ("shader", "clock_ghz", From(0.001, 100.0)),
+        ("shader", "float_per_cycle", RATE),
+        ("shader", "integer_per_cycle", RATE),
+        ("shader", "special_per_cycle", RATE),
+        ("shader", "wide_per_cycle", RATE),
+        ("shader", "memory_per_cycle", RATE),
+        ("shader", "image_per_cycle", RATE),
+        ("shader", "efficiency", SHARE),
+        ("baseline", "operations_per_evaluation", From(0.001, 1e5)),
+        ("baseline", "efficiency", SHARE),
+        ("soc", "power_w", Above(0.0, 10_000.0)),
+        ("soc", "area_mm2", Above(0.0, 100_000.0)),
+        ("soc", "node_scaling", From(0.001, 1000.0)),
+        ("schedule", "frames_in_flight", From(1.0, 64.0)),
+        ("energy", "module_power_w", From(0.0, 1000.0)),
+        ("energy", "static_share", From(0.0, 0.99)),
+        ("energy", "scale", From(0.0, 1000.0)),
+        ("energy", "add_pj", Above(0.0, 1e6)),
+        ("energy", "mul_pj", Above(0.0, 1e6)),
+        ("energy", "div_pj", From(0.0, 1e6)),
+        ("energy", "exp_pj", From(0.0, 1e6)),
+        ("energy", "buffer_pj_per_byte", From(0.0, 1e6)),
+        ("energy", "dram_pj_per_byte", From(0.0, 1e6)),
+        ("energy", "blended_share", From(0.0, 1.0)),
+        ("area", "technology_nm", From(1.0, 1000.0)),
+        ("area", "reference_nm", From(1.0, 1000.0)),
+        ("area", "add_um2", Above(0.0, 1e9)),
+        ("area", "mul_um2", Above(0.0, 1e9)),
+        ("area", "div_um2", From(0.0, 1e9)),
+        ("area", "exp_um2", From(0.0, 1e9)),
+        ("area", "half_add_um2", Above(0.0, 1e9)),
+        ("area", "half_mul_um2", Above(0.0, 1e9)),
+        ("area", "enhanced_ratio", From(0.0, 10.0)),
+    ]
+};
+
+/// Checks that every number of a configuration's table is in its range; what is missing or no number is left to serde.
+fn check(table: &Table) -> Result<(), ConfigError> {
+    for &(section, field, range) in RANGES {
+        let value = table.get(section).and_then(|fields| fields.get(field));
+        let number = match value {
+            Some(Value::Integer(number)) => *number as f64,
+            Some(Value::Float(number)) => *number,
+            _ => continue,
+        };
+        if !range.contains(number) {
+            return Err(ConfigError::Range {
+                field: format!("{section}.{field}"),
+                value: number.to_string(),
+                range,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Levels of inheritance.
@@ -367,66 +518,10 @@ impl Config {
                 .ok_or_else(|| ConfigError::Setting(setting.clone()))?;
             set(&mut table, name.trim(), value.trim())?;
         }
-        let config: Self = Value::Table(table)
+        check(&table)?;
+        Value::Table(table)
             .try_into()
-            .map_err(|error: toml::de::Error| ConfigError::Toml(error.to_string()))?;
-        config.check()?;
-        Ok(config)
-    }
-
-    fn check(&self) -> Result<(), ConfigError> {
-        let raster = &self.rasterizer;
-        let counts = [
-            raster.pes_per_module,
-            raster.gaussian_interval,
-            raster.triangle_interval,
-            raster.batch,
-            raster.number_bytes,
-            self.shader.sms,
-            self.schedule.frames_in_flight,
-        ];
-        if counts.contains(&0) {
-            return Err(ConfigError::Range(
-                "PEs, intervals, batch, bytes, SMs and frames in flight are at least 1",
-            ));
-        }
-        if raster.modules > 4096 || raster.batch > 1 << 16 || raster.pes_per_module > 1 << 16 {
-            return Err(ConfigError::Range(
-                "at most 4096 modules, and batches and PEs of 65536",
-            ));
-        }
-        if !TILE_SIDES.contains(&raster.tile_side) {
-            return Err(ConfigError::Range("tiles are of 8, 16, 32 or 64 pixels"));
-        }
-        let positive = [
-            raster.clock_ghz,
-            raster.port_bytes_per_cycle,
-            self.memory.bandwidth_gb_s,
-            self.memory.efficiency,
-            self.shader.clock_ghz,
-            self.shader.float_per_cycle,
-            self.shader.integer_per_cycle,
-            self.shader.special_per_cycle,
-            self.shader.wide_per_cycle,
-            self.shader.memory_per_cycle,
-            self.shader.image_per_cycle,
-            self.shader.efficiency,
-            self.baseline.efficiency,
-            self.baseline.operations_per_evaluation,
-        ];
-        let large = 1e12;
-        if positive.iter().any(|value| !(1e-6..large).contains(value)) {
-            return Err(ConfigError::Range(
-                "clocks, rates, widths and efficiencies are positive",
-            ));
-        }
-        if !(0.0..1e9).contains(&self.memory.latency_ns) {
-            return Err(ConfigError::Range("a latency is not negative"));
-        }
-        if !(0.0..1.0).contains(&self.energy.static_share) {
-            return Err(ConfigError::Range("the static share is from 0 to below 1"));
-        }
-        Ok(())
+            .map_err(|error: toml::de::Error| ConfigError::Toml(error.to_string()))
     }
 }
 
@@ -508,9 +603,6 @@ mod tests {
         );
         assert!(matches!(error("moduls=1"), ConfigError::UnknownField(_)));
         assert!(matches!(error("modules"), ConfigError::Setting(_)));
-        assert!(matches!(error("modules=-1"), ConfigError::Toml(_)));
-        assert!(matches!(error("batch=0"), ConfigError::Range(_)));
-        assert!(matches!(error("bandwidth_gb_s=nan"), ConfigError::Range(_)));
         assert!(matches!(
             Config::preset("paper", &[]).unwrap_err(),
             ConfigError::UnknownPreset(_)
@@ -531,33 +623,105 @@ mod tests {
     }
 
     #[test]
+    fn what_is_out_of_range_is_named_with_its_value_and_range() {
+        let said = |setting: &str| match Config::preset("paper-15x16", &[setting.to_owned()]) {
+            Err(error @ ConfigError::Range { .. }) => error.to_string(),
+            other => panic!("{setting}: {other:?}"),
+        };
+        for (setting, sentence) in [
+            (
+                "memory.efficiency=100",
+                "memory.efficiency is 100; it must be more than 0 and at most 1",
+            ),
+            (
+                "power_w=-5",
+                "soc.power_w is -5; it must be more than 0 and at most 10000",
+            ),
+            (
+                "bandwidth_gb_s=nan",
+                "memory.bandwidth_gb_s is NaN; it must be from 0.01 to 100000",
+            ),
+            (
+                "numbers_in=4294967295",
+                "rasterizer.numbers_in is 4294967295; it must be from 1 to 256",
+            ),
+            (
+                "modules=-1",
+                "rasterizer.modules is -1; it must be from 0 to 4096",
+            ),
+            (
+                "batch=0",
+                "rasterizer.batch is 0; it must be from 1 to 65536",
+            ),
+            (
+                "tile_side=15",
+                "rasterizer.tile_side is 15; it must be one of 8, 16, 32, 64",
+            ),
+            (
+                "latency_ns=inf",
+                "memory.latency_ns is inf; it must be from 0 to 1000000",
+            ),
+        ] {
+            assert_eq!(said(setting), sentence);
+        }
+    }
+
+    #[test]
+    fn every_number_has_a_range_that_its_presets_are_in() {
+        let table = preset_table("paper-15x16", 0).unwrap();
+        let numbers = |fields: &Value| -> Vec<String> {
+            let fields = fields.as_table().unwrap().iter();
+            let numbers = fields.filter(|(_, value)| value.is_integer() || value.is_float());
+            numbers.map(|(name, _)| name.clone()).collect()
+        };
+        let mut count = 0;
+        for (section, fields) in &table {
+            for name in numbers(fields) {
+                let of_it = RANGES
+                    .iter()
+                    .filter(|(s, f, _)| (s, f) == (&section.as_str(), &name.as_str()));
+                assert_eq!(of_it.count(), 1, "{section}.{name}");
+                count += 1;
+                // Nothing is no number.
+                let nan = Config::preset("paper-15x16", &[format!("{section}.{name}=nan")]);
+                assert!(nan.is_err(), "{section}.{name}");
+            }
+        }
+        assert_eq!(count, RANGES.len());
+    }
+
+    #[test]
     fn a_gaussian_takes_16_cycles_of_a_tile() {
         let raster = Config::preset("paper-15x16", &[]).unwrap().rasterizer;
-        assert_eq!(raster.primitive_cycles(Mode::Gaussian, 16), 16);
-        assert_eq!(raster.primitive_cycles(Mode::Triangle, 16), 16);
-        assert_eq!(
-            raster.primitive_cycles(Mode::Gaussian, 2),
-            6,
-            "the carried latency"
-        );
-        assert_eq!(raster.primitive_cycles(Mode::Gaussian, 0), 1);
+        let gaussian = |raster: &Rasterizer, groups| raster.busy_cycles(Mode::Gaussian, groups);
+        assert_eq!(gaussian(&raster, 16), 16);
+        assert_eq!(raster.busy_cycles(Mode::Triangle, 16), 16);
         let wide = Rasterizer {
             pes_per_module: 20,
             ..raster.clone()
         };
-        assert_eq!(
-            wide.primitive_cycles(Mode::Gaussian, 16),
-            13,
-            "256 pixels on 20 PEs"
-        );
+        assert_eq!(gaussian(&wide, 16), 13, "256 pixels on 20 PEs");
         let unfolded = Rasterizer {
             opacity_folded: false,
             ..raster
         };
         assert_eq!(
-            unfolded.primitive_cycles(Mode::Gaussian, 16),
+            gaussian(&unfolded, 16),
             32,
             "11 multiplications on 10 units"
         );
+    }
+
+    #[test]
+    fn gaussians_that_share_a_pixel_wait_and_others_do_not() {
+        let raster = Config::preset("paper-15x16", &[]).unwrap().rasterizer;
+        let waits = |mode, groups, open| raster.waiting_cycles(mode, groups, open);
+        assert_eq!(waits(Mode::Gaussian, 16, 16), 0, "16 groups hide it");
+        assert_eq!(waits(Mode::Gaussian, 2, 2), 4, "both have both blocks");
+        assert_eq!(waits(Mode::Gaussian, 2, 3), 4, "two of three are shared");
+        assert_eq!(waits(Mode::Gaussian, 2, 4), 0, "they may be apart");
+        assert_eq!(waits(Mode::Gaussian, 0, 16), 0);
+        assert_eq!(waits(Mode::Triangle, 2, 2), 0, "no transmittance");
+        assert_eq!([0, 1].map(Rasterizer::looking_cycles), [1, 0]);
     }
 }

@@ -315,16 +315,9 @@ fn cycles_of(segment: &Segment, [from, to]: [u32; 2], mode: Mode, raster: &Raste
     let high = before(to) - before(from) - count * low;
     let [mut busy, mut dependency, mut controller] = [0.0; 3];
     for (groups, count) in [(low, count - high), (low + 1, high)] {
-        let each = raster.primitive_cycles(mode, groups);
-        let interval = u64::from(raster.interval(mode));
-        let active = (groups * 16).div_ceil(u64::from(raster.pes_per_module)) * interval;
-        let waiting = if groups == 0 {
-            &mut controller
-        } else {
-            &mut dependency
-        };
-        *waiting += ((each - active) * count) as f64;
-        busy += (active * count) as f64;
+        busy += (raster.busy_cycles(mode, groups) * count) as f64;
+        dependency += (raster.waiting_cycles(mode, groups, segment.open) * count) as f64;
+        controller += (Rasterizer::looking_cycles(groups) * count) as f64;
     }
     [busy, dependency, controller]
 }

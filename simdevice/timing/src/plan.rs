@@ -152,6 +152,7 @@ fn join(mode: Mode, parts: &[Part], ratio: f64, groups: u64, per_pixel: bool) ->
         } else {
             u64::from(needed) * groups
         },
+        open: groups,
     };
     Part {
         mode,

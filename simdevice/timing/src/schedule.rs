@@ -168,7 +168,7 @@ impl Progress {
     }
 }
 
-/// Frames per second that the same frame, over and over, settles at.
+/// Frames per second that the same frame, over and over, settles at; 0 for a frame that takes no time.
 pub fn fps(stages: Stages, policy: Policy) -> f64 {
     const WARM_UP: usize = 8;
     const MEASURED: usize = 64;
@@ -183,7 +183,11 @@ pub fn fps(stages: Stages, policy: Policy) -> f64 {
         ends.fold(0.0, f64::max)
     };
     let last = end_of(WARM_UP + MEASURED - 1) - end_of(WARM_UP - 1);
-    MEASURED as f64 / last * 1e3
+    if last > 0.0 {
+        MEASURED as f64 / last * 1e3
+    } else {
+        0.0
+    }
 }
 
 /// A timeline in Chrome's trace event format, which Perfetto opens too: a row per engine. To be written as JSON.

@@ -1,6 +1,6 @@
 //! One frame on one piece of hardware: every model of this crate put together.
 
-use crate::config::Config;
+use crate::config::{Config, Lists};
 use crate::energy::{self, Changed, Energy};
 use crate::fast;
 use crate::raster::RasterReport;
@@ -8,12 +8,15 @@ use crate::schedule::{self, Policy, Span, Stages};
 use crate::shader_cores::{self, Roofline};
 use crate::work::{FrameWork, Mode, Saturation};
 use serde::Serialize;
+use std::borrow::Cow;
 
 /// What a frame took, and what it would have taken without the rasterizer.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Simulation {
-    /// The rasterizer's cycles; zero if there is none.
+    /// The rasterizer's cycles as frames overlap in this configuration; zero if there is none.
     pub raster: RasterReport,
+    /// The same for one frame at a time: what performance queries and simulated timestamps count.
+    pub raster_alone: RasterReport,
     /// The share of Gaussians' evaluations that changed a pixel.
     pub blended: f64,
     /// The share of triangles' evaluations that covered a pixel and passed the early tests.
@@ -26,8 +29,10 @@ pub struct Simulation {
     pub sort: Roofline,
     /// Fragment programs.
     pub shade: Roofline,
-    /// Milliseconds of the stages.
+    /// Milliseconds of the stages as frames overlap in this configuration.
     pub stages: Stages,
+    /// The same for one frame at a time.
+    pub stages_alone: Stages,
     /// GB/s that the shader cores take from the rasterizer while both run.
     pub contention_gb_s: f64,
     /// Frames per second as configured.
@@ -42,6 +47,8 @@ pub struct Simulation {
     pub baseline_fps: f64,
     /// Stage 3 against the baseline's.
     pub raster_speedup: f64,
+    /// The factors of `raster_speedup`.
+    pub gains: Gains,
     /// Frames per second against the baseline's.
     pub speedup: f64,
     /// Millijoules of a frame.
@@ -50,20 +57,55 @@ pub struct Simulation {
     pub baseline_mj: f64,
 }
 
-/// Evaluations that stage 3 makes on shader cores: the original code ends a tile's list when all its pixels are
-/// finished, and bins by the square around the 3-sigma circle.
-pub fn baseline_evaluations(frame: &FrameWork) -> f64 {
-    let of_draw = |draw: &crate::work::DrawWork| {
-        let pairs = draw.pairs();
-        let boxed = if pairs == 0 || draw.boxed_pairs == 0 {
-            1.0
-        } else {
-            (draw.boxed_pairs as f64 / pairs as f64).max(1.0)
-        };
-        draw.evaluations(Saturation::Tile, false) as f64 * boxed
+/// Factors of the raster stage's speed-up over the baseline, whose product it is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Gains {
+    /// The hardware on the rasterizer's lists, if its PEs never waited.
+    pub hardware: f64,
+    /// The rasterizer's lists instead of the baseline's, both on shader cores.
+    pub lists: f64,
+    /// Time in which PEs work over the time that they take: at most 1.
+    pub stalls: f64,
+}
+
+impl Gains {
+    /// No gains at all.
+    const NONE: Self = Self {
+        hardware: 1.0,
+        lists: 1.0,
+        stalls: 1.0,
     };
+}
+
+/// Evaluations that stage 3 makes on shader cores, whose original code ends a tile's list when all its pixels are
+/// finished.
+pub fn baseline_evaluations(frame: &FrameWork) -> f64 {
     let gaussians = |draw: &&crate::work::DrawWork| draw.mode == Mode::Gaussian;
-    frame.draws.iter().filter(gaussians).map(of_draw).sum()
+    let evaluations = |draw: &crate::work::DrawWork| draw.evaluations(Saturation::Tile, false);
+    let draws = frame.draws.iter().filter(gaussians);
+    draws.map(evaluations).sum::<u64>() as f64
+}
+
+/// Milliseconds of stage 3 where shader cores draw Gaussians from a frame's lists.
+fn baseline_raster_ms(frame: &FrameWork, config: &Config) -> f64 {
+    shader_cores::stage_3_ms(baseline_evaluations(frame), config) + triangles_ms(frame, config)
+}
+
+/// The frame with the lists that are asked for.
+fn listed(frame: &FrameWork, lists: Lists) -> Cow<'_, FrameWork> {
+    match lists {
+        Lists::Exact => Cow::Borrowed(frame),
+        Lists::Squares => Cow::Owned(frame.with_squares()),
+    }
+}
+
+/// The frame as the configuration's stage 3 takes it, in the rasterizer or, where there is none, on shader cores.
+pub fn of_rasterizer<'a>(frame: &'a FrameWork, config: &Config) -> Cow<'a, FrameWork> {
+    let lists = match config.rasterizer.modules {
+        0 => config.baseline.lists,
+        _ => config.rasterizer.lists,
+    };
+    listed(frame, lists)
 }
 
 /// Milliseconds of the frame's triangles in a rasterizer for triangles alone, which every GPU has: this one or, where
@@ -157,10 +199,15 @@ fn collaborative(frame: &FrameWork, config: &Config, alone: &Both) -> Both {
 /// Simulates a frame.
 pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
     let policy = policy(config);
-    let baseline_raster_ms =
-        shader_cores::stage_3_ms(baseline_evaluations(frame), config) + triangles_ms(frame, config);
+    let of_baseline = listed(frame, config.baseline.lists);
+    let of_rasterizer = of_rasterizer(frame, config);
+    let frame: &FrameWork = &of_rasterizer;
+    let on_baseline = on_shader_cores(&of_baseline, config, 0.0);
+    let baseline_raster_ms = baseline_raster_ms(&of_baseline, config);
+    let same_lists_ms = self::baseline_raster_ms(frame, config);
+    let baseline_ms = milliseconds(&on_baseline) + baseline_raster_ms;
     let alone = serial(frame, config, baseline_raster_ms);
-    let baseline_ms = milliseconds(&alone.shader) + baseline_raster_ms;
+    let (raster_alone, stages_alone) = (alone.raster.clone(), alone.stages());
     let fps = |stages, collaborative| {
         schedule::fps(
             stages,
@@ -198,7 +245,23 @@ pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
     };
     let stages = chosen.stages();
     let [compute, preprocess, sort, shade] = chosen.shader;
+    let busy_ms = chosen.raster.modules.busy
+        / f64::from(config.rasterizer.modules.max(1))
+        / config.rasterizer.clock_ghz
+        * 1e-6;
+    let gains = if policy.has_rasterizer && busy_ms > 0.0 && same_lists_ms > 0.0 {
+        Gains {
+            hardware: same_lists_ms / busy_ms,
+            lists: baseline_raster_ms / same_lists_ms,
+            stalls: busy_ms / stages.raster,
+        }
+    } else {
+        Gains::NONE
+    };
     Simulation {
+        raster_alone,
+        stages_alone,
+        gains,
         blended: changed.blended,
         covered: changed.covered,
         compute,
@@ -211,7 +274,11 @@ pub fn simulate(frame: &FrameWork, config: &Config) -> Simulation {
         fps_collaborative,
         fps_serial,
         baseline_raster_ms,
-        baseline_fps: 1e3 / baseline_ms,
+        baseline_fps: if baseline_ms > 0.0 {
+            1e3 / baseline_ms
+        } else {
+            0.0
+        },
         raster_speedup: if stages.raster > 0.0 {
             baseline_raster_ms / stages.raster
         } else {
@@ -307,6 +374,70 @@ mod tests {
             ..ShaderWork::default()
         };
         frame
+    }
+
+    #[test]
+    fn the_speed_up_is_the_product_of_what_it_is_made_of() {
+        let mut frame = frame();
+        frame.draws[0].boxed_pairs = 3_000_000;
+        let with = |preset: &str| simulate(&frame, &Config::preset(preset, &[]).unwrap());
+        let (exact, squares) = (with("paper-15x16"), with("paper-pipeline"));
+        for result in [&exact, &squares] {
+            let Gains {
+                hardware,
+                lists,
+                stalls,
+            } = result.gains;
+            let product = hardware * lists * stalls;
+            assert!((product / result.raster_speedup - 1.0).abs() < 1e-9);
+            // 26.9 operations an evaluation on 282 G lanes/s, against 240 G evaluations/s.
+            let lanes = 4.0 * 128.0 * 0.612 * 0.9;
+            assert!((hardware - 240.0 * 26.9 / lanes).abs() < 0.05, "{hardware}");
+            assert!(stalls <= 1.0);
+        }
+        assert!((exact.gains.lists - 3.0).abs() < 0.01);
+        assert_eq!(squares.gains.lists, 1.0);
+        // Both baselines sort and evaluate what squares give.
+        assert!((exact.baseline_fps - squares.baseline_fps).abs() < 1e-9);
+        assert!((squares.sort.memory_ms / exact.sort.memory_ms - 3.0).abs() < 0.6);
+        let baseline = with("orin-nx-10w");
+        assert!((baseline.fps - exact.baseline_fps).abs() < 1e-9);
+        assert_eq!(baseline.gains, Gains::NONE);
+    }
+
+    #[test]
+    fn one_frame_at_a_time_is_the_same_whether_others_may_overlap_or_not() {
+        let overlapping = Config::preset("paper-15x16", &[]).unwrap();
+        let serial = overlapping
+            .with(&["collaborative=false".to_owned()])
+            .unwrap();
+        let (a, b) = (
+            simulate(&frame(), &overlapping),
+            simulate(&frame(), &serial),
+        );
+        assert_eq!(a.raster_alone, b.raster);
+        assert_eq!(a.raster_alone, b.raster_alone);
+        assert_eq!(a.stages_alone, b.stages);
+        assert!(a.contention_gb_s > 0.0 && a.raster.modules.memory > b.raster.modules.memory);
+    }
+
+    #[test]
+    fn nothing_is_simulated_in_finite_numbers() {
+        let config = Config::preset("paper-15x16", &[]).unwrap();
+        let result = simulate(&FrameWork::default(), &config);
+        let numbers = [
+            result.fps,
+            result.fps_serial,
+            result.fps_collaborative,
+            result.baseline_fps,
+            result.raster_speedup,
+            result.speedup,
+            result.energy.total(),
+        ];
+        assert!(
+            numbers.iter().all(|number| number.is_finite()),
+            "{numbers:?}"
+        );
     }
 
     #[test]

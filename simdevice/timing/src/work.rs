@@ -25,6 +25,79 @@ pub struct Trace {
     pub frames: Vec<FrameWork>,
 }
 
+/// Most pairs of a tile and a primitive, and most tiles of a draw, that a frame of a trace may have: 19 times what the
+/// paper's largest scene needs.
+pub const MAX_PAIRS: u64 = 1 << 28;
+
+/// Why a trace is none of a device's.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub enum TraceError {
+    /// A layout of another version.
+    #[error("a trace of version {0}, not {TRACE_VERSION}")]
+    Version(u32),
+    /// More than can be simulated in reasonable time.
+    #[error(
+        "frame {frame} has {pairs} pairs of a tile and a primitive; it must be at most {MAX_PAIRS}"
+    )]
+    TooLarge {
+        /// From 0.
+        frame: usize,
+        /// What it has.
+        pairs: u64,
+    },
+    /// A tile's numbers contradict each other.
+    #[error("frame {frame}, tile {at:?}: {what}")]
+    Tile {
+        /// From 0.
+        frame: usize,
+        /// Column and row.
+        at: [u32; 2],
+        /// The contradiction.
+        what: &'static str,
+    },
+    /// Work of shader cores that is negative or no number.
+    #[error("frame {0}: work of shader cores is negative or no number")]
+    ShaderWork(usize),
+}
+
+impl Trace {
+    /// Checks a trace that comes from elsewhere.
+    ///
+    /// # Errors
+    /// [`TraceError`] says what is wrong with it.
+    pub fn check(&self) -> Result<(), TraceError> {
+        if self.version != TRACE_VERSION {
+            return Err(TraceError::Version(self.version));
+        }
+        for (number, frame) in self.frames.iter().enumerate() {
+            frame.check(number)?;
+        }
+        Ok(())
+    }
+}
+
+impl FrameWork {
+    fn check(&self, frame: usize) -> Result<(), TraceError> {
+        let squares = |draw: &DrawWork| draw.boxed_pairs.max(draw.pairs());
+        let pairs = self.draws.iter().map(squares).fold(0, u64::saturating_add);
+        if pairs > MAX_PAIRS {
+            return Err(TraceError::TooLarge { frame, pairs });
+        }
+        let draws = self.draws.iter();
+        let works = draws.flat_map(|draw| [draw.preprocess, draw.sort, draw.shade]);
+        if !works.chain([self.compute]).all(|work| work.is_valid()) {
+            return Err(TraceError::ShaderWork(frame));
+        }
+        for tile in self.draws.iter().flat_map(|draw| &draw.tiles) {
+            if let Some(what) = tile.contradiction() {
+                let at = tile.at;
+                return Err(TraceError::Tile { frame, at, what });
+            }
+        }
+        Ok(())
+    }
+}
+
 /// The work of one frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -103,6 +176,21 @@ pub struct ShaderWork {
 }
 
 impl ShaderWork {
+    /// Reports whether every count is a number and not negative.
+    fn is_valid(&self) -> bool {
+        let counts = [
+            self.float,
+            self.integer,
+            self.special,
+            self.wide,
+            self.memory,
+            self.image,
+            self.other,
+            self.bytes,
+        ];
+        counts.iter().all(|count| (0.0..1e18).contains(count))
+    }
+
     /// Both together.
     pub fn plus(&self, other: &Self) -> Self {
         Self {
@@ -206,6 +294,15 @@ impl Run {
         u64::from(evaluated) * u64::from(open)
     }
 
+    /// Groups of 16 pixels that are open to a primitive.
+    fn open(&self, saturation: Saturation) -> u64 {
+        match saturation {
+            Saturation::None | Saturation::Tile => TILE_GROUPS.into(),
+            Saturation::Row => self.rows.into(),
+            Saturation::Block | Saturation::Reached => self.blocks.into(),
+        }
+    }
+
     /// The run without so many hidden primitives at its end.
     fn without(&self, rest: u32) -> Self {
         Self {
@@ -262,6 +359,26 @@ impl TileWork {
         }
     }
 
+    /// What of its numbers cannot be, if anything.
+    fn contradiction(&self) -> Option<&'static str> {
+        let sum = |of: fn(&Run) -> u32| self.runs.iter().map(|run| u64::from(of(run))).sum::<u64>();
+        let groups = |run: &Run| u64::from(run.primitives) * u64::from(TILE_GROUPS);
+        if sum(|run| run.primitives) > u64::from(self.listed) {
+            return Some("its runs have more primitives than its list");
+        }
+        if self.runs.iter().any(|run| run.rows > 16 || run.blocks > 16) {
+            return Some("a run has more than 16 rows or blocks");
+        }
+        let reached = |run: &Run| u64::from(run.reached) + u64::from(run.hidden_blocks);
+        if self.runs.iter().any(|run| reached(run) > groups(run)) {
+            return Some("a run reaches more blocks than its primitives have");
+        }
+        if self.runs.iter().any(|run| run.hidden > run.primitives) {
+            return Some("a run hides more primitives than it has");
+        }
+        None
+    }
+
     /// Primitives that the tile's unfinished pixels needed, or would have if depths had not hidden them.
     pub fn needed(&self) -> u32 {
         self.runs.iter().map(|run| run.primitives).sum()
@@ -301,11 +418,13 @@ impl TileWork {
             Segment {
                 primitives: run.primitives,
                 groups: run.groups(saturation, hierarchical_depth),
+                open: run.open(saturation),
             }
         });
         let rest = Segment {
             primitives: rest,
             groups: u64::from(rest) * u64::from(TILE_GROUPS),
+            open: TILE_GROUPS.into(),
         };
         runs.chain([rest]).filter(|segment| segment.primitives > 0)
     }
@@ -325,6 +444,8 @@ pub struct Segment {
     pub primitives: u32,
     /// Groups of 16 pixels that they are evaluated in, summed over the primitives.
     pub groups: u64,
+    /// Groups of 16 pixels among which those of each primitive are.
+    pub open: u64,
 }
 
 impl DrawWork {
@@ -367,6 +488,31 @@ impl FrameWork {
                 ]
             },
         )
+    }
+
+    /// The frame with as many pairs as 3-sigma squares give, sorted as many. Which tiles they are in is not known: every
+    /// list is lengthened alike, so what comes of it is an estimate.
+    pub fn with_squares(&self) -> Self {
+        let mut frame = self.clone();
+        for draw in &mut frame.draws {
+            let pairs = draw.pairs();
+            if draw.mode != Mode::Gaussian || pairs == 0 || draw.boxed_pairs <= pairs {
+                continue;
+            }
+            let factor = draw.boxed_pairs as f64 / pairs as f64;
+            let longer = |count: u32| (f64::from(count) * factor).round() as u32;
+            draw.sort = draw.sort.times(factor);
+            draw.boxed_pairs = 0;
+            for tile in &mut draw.tiles {
+                for run in &mut tile.runs {
+                    run.primitives = longer(run.primitives);
+                    run.hidden = longer(run.hidden).min(run.primitives);
+                }
+                tile.hidden_rest = longer(tile.hidden_rest);
+                tile.listed = longer(tile.listed).max(tile.needed());
+            }
+        }
+        frame
     }
 
     /// The frame with the draws of one mode only, and no dispatches.
@@ -419,7 +565,8 @@ mod tests {
             segments[2],
             Segment {
                 primitives: 3,
-                groups: 48
+                groups: 48,
+                open: 16
             }
         );
         assert_eq!(tile().segments(Saturation::Row, false).count(), 2);
@@ -449,6 +596,38 @@ mod tests {
         assert_eq!(Saturation::ALL.map(|s| fetched(s, false)), [10, 7, 7, 7, 7]);
         assert_eq!(Saturation::ALL.map(|s| fetched(s, true)), [10, 5, 5, 5, 5]);
         assert_eq!((tile.hidden(), tile.hidden_blocks()), (3, 6));
+    }
+
+    #[test]
+    fn what_no_device_does_is_refused() {
+        let check = |change: fn(&mut TileWork)| {
+            let mut tile = tile();
+            change(&mut tile);
+            let draw = DrawWork {
+                tiles: vec![tile],
+                ..DrawWork::default()
+            };
+            let frame = FrameWork {
+                draws: vec![draw],
+                ..FrameWork::default()
+            };
+            let (version, frames) = (TRACE_VERSION, vec![frame]);
+            Trace { version, frames }.check()
+        };
+        assert_eq!(check(|_| ()), Ok(()));
+        let pairs = 4_000_000_000;
+        assert_eq!(
+            check(|tile| tile.listed = 4_000_000_000),
+            Err(TraceError::TooLarge { frame: 0, pairs })
+        );
+        for wrong in [
+            (|tile| tile.runs[0].primitives = 10) as fn(&mut TileWork),
+            |tile| tile.runs[0].rows = 17,
+            |tile| tile.runs[1].reached = 65,
+            |tile| tile.runs[1].hidden = 5,
+        ] {
+            assert!(matches!(check(wrong), Err(TraceError::Tile { .. })));
+        }
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! Pairs of tiles and Gaussians of generated scenes as large as the paper's, over the camera paths of its data set:
-//! `paper_scenes FOLDER [VIEWS] > simdevice/timing/generated_scenes.toml`, where FOLDER has bicycle.json, garden.json,
+//! `paper_scenes FOLDER [VIEWS] > simdevice/timing/studies/generated_scenes.toml`, where FOLDER has bicycle.json, garden.json,
 //! room.json and bonsai.json, cameras.json files of the original 3DGS code.
 //!
 //! The scenes are gardens, not the paper's: they have the published counts and sizes and nothing else of them. A path is

@@ -18,12 +18,14 @@ use graph::Arrow;
 use source::Crate;
 
 /// The crates that are held, by their folders.
-const CRATES: [(&str, &str); 5] = [
+const CRATES: [(&str, &str); 7] = [
     ("devmem", "simdevice/devmem"),
     ("isa", "simdevice/isa"),
     ("timing", "simdevice/timing"),
+    ("timing-studies", "simdevice/timing/studies"),
     ("simdevice", "simdevice"),
     ("gaurast_spirv", "driver/spirv"),
+    ("driver", "driver"),
 ];
 
 fn main() -> ExitCode {

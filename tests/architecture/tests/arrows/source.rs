@@ -271,9 +271,13 @@ impl Collector<'_> {
                 }
                 TokenTree::Punct(mark) if mark.as_char() == ':' && !path.is_empty() => colons += 1,
                 other => {
-                    self.path(std::mem::take(&mut path));
+                    let path = std::mem::take(&mut path);
+                    let is_visibility = path == ["pub"];
+                    self.path(path);
                     colons = 0;
-                    if let TokenTree::Group(group) = other {
+                    if let TokenTree::Group(group) = other
+                        && !is_visibility
+                    {
                         self.tokens(group.stream());
                     }
                 }

@@ -1,0 +1,98 @@
+//! The ids of valid usage that the driver's messages name are those of Vulkan's specification, or of the extension's own.
+
+use gaurast_runner::Need;
+use registry_gen::repository;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}
+
+/// The ids of Vulkan's specification, as Debian's package of the headers has them.
+const VALID_USAGE: &str = "/usr/share/vulkan/registry/validusage.json";
+
+/// The ids that Vulkan 1.3.239 lacks, which the package has, and that 1.3.281 has.
+const NEWER: [&str; 9] = [
+    "VUID-RuntimeSpirv-OpEntryPoint-08743",
+    "VUID-VkComputePipelineCreateInfo-layout-07988",
+    "VUID-VkGraphicsPipelineCreateInfo-Input-07904",
+    "VUID-VkGraphicsPipelineCreateInfo-Input-08733",
+    "VUID-VkGraphicsPipelineCreateInfo-layout-07988",
+    "VUID-VkMemoryAllocateInfo-allocationSize-07899",
+    "VUID-VkShaderModuleCreateInfo-pCode-08738",
+    "VUID-VkShaderModuleCreateInfo-pCode-08740",
+    "VUID-vkCmdPushDescriptorSetWithTemplateKHR-descriptorUpdateTemplate-07994",
+];
+
+/// Collects the ids in a text.
+fn ids(text: &str, found: &mut BTreeSet<String>) {
+    for (start, _) in text.match_indices("VUID-") {
+        let rest = &text[start..];
+        let is_of_id = |letter: char| letter.is_ascii_alphanumeric() || "-_".contains(letter);
+        let end = rest.find(|letter| !is_of_id(letter)).unwrap_or(rest.len());
+        found.insert(rest[..end].to_owned());
+    }
+}
+
+/// Collects the ids in the files of a folder and of those in it.
+fn ids_of_folder(folder: &Path) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                ids(&std::fs::read_to_string(path).expect("text"), &mut found);
+            }
+        }
+    }
+    found
+}
+
+#[gaurast_runner::test(needs = [Need::File(VALID_USAGE)])]
+fn messages_name_rules_that_there_are() {
+    let text = std::fs::read_to_string(VALID_USAGE).expect("a file that was just looked at");
+    let mut known = ids_of_folder(&repository().join("api/spec"));
+    ids(&text, &mut known);
+    assert!(known.len() > 10_000, "{} ids", known.len());
+
+    let named = ids_of_folder(&repository().join("driver/src"));
+    // A command's name is put into these, which the next test holds.
+    let is_whole = |id: &&String| !matches!(id.as_str(), "VUID-" | "VUID--");
+    let unknown: Vec<_> = named
+        .iter()
+        .filter(is_whole)
+        .filter(|id| !known.contains(*id) && !NEWER.contains(&id.as_str()))
+        .collect();
+    assert!(unknown.is_empty(), "{unknown:#?}");
+    for newer in NEWER {
+        assert!(named.contains(newer), "{newer} is named no more");
+    }
+}
+
+/// The rules that are named with the name of the command that is recorded.
+#[gaurast_runner::test(needs = [Need::File(VALID_USAGE)])]
+fn every_recorded_command_must_be_in_a_recording() {
+    let text = std::fs::read_to_string(VALID_USAGE).expect("a file that was just looked at");
+    let mut known = ids_of_folder(&repository().join("api/spec"));
+    ids(&text, &mut known);
+    let commands = repository().join("driver/src/dispatch/commands.rs");
+    let commands = std::fs::read_to_string(commands).expect("the generated commands");
+    let commands: String = commands.split_whitespace().collect();
+    let names = commands
+        .split("guard(command_buffer,\"vkCmd")
+        .skip(1)
+        .filter_map(|rest| rest.split_once('"'))
+        // The extension's text leaves implicit valid usage out, as that of others is generated.
+        .filter(|(name, _)| !name.ends_with("GAURAST"));
+    let mut count = 0;
+    for (name, _) in names {
+        let id = format!("VUID-vkCmd{name}-commandBuffer-recording");
+        assert!(known.contains(&id), "{id}");
+        count += 1;
+    }
+    assert!(count > 70, "{count} commands are recorded");
+}

@@ -1,0 +1,140 @@
+//! What can go wrong in a command, and the one place where it becomes a `VkResult`.
+
+use ash::vk;
+use std::borrow::Cow;
+
+/// The reason that a command failed. The message goes to `log` and to the instance's debug messengers; the application receives
+/// [`Error::result`].
+#[derive(Clone, Debug, thiserror::Error)]
+pub(crate) enum Error {
+    /// A handle that is null, destroyed or of another type.
+    #[error("{raw:#x} is not a valid handle of type {expected:?}")]
+    InvalidHandle {
+        /// The type that was expected.
+        expected: vk::ObjectType,
+        /// The handle that was given.
+        raw: u64,
+    },
+    /// A null pointer where Vulkan requires a valid one.
+    #[error("a required pointer to {what} is null")]
+    NullPointer {
+        /// The type pointed at.
+        what: &'static str,
+    },
+    /// A command that this driver doesn't execute.
+    #[error("this driver does not support {command} yet")]
+    Unsupported {
+        /// Its Vulkan name.
+        command: String,
+    },
+    /// The device has no memory for it.
+    #[error("out of device memory: {0}")]
+    OutOfDeviceMemory(String),
+    /// The host has no memory for it.
+    #[error("out of host memory: {0}")]
+    OutOfHostMemory(String),
+    /// A descriptor pool has nothing left of what is wanted.
+    #[error("out of pool memory: {0}")]
+    OutOfPoolMemory(String),
+    /// A shader that is malformed, or that asks for what the device lacks.
+    #[error("invalid shader: {0}")]
+    InvalidShader(String),
+    /// An object could not be made.
+    #[error("{0}")]
+    InitializationFailed(String),
+    /// The device is lost: a submission panicked.
+    #[error("the device is lost: {0}")]
+    DeviceLost(String),
+    /// Memory that can't be mapped.
+    #[error("memory cannot be mapped: {0}")]
+    MemoryMapFailed(String),
+    /// An unknown layer.
+    #[error("there is no layer {0}")]
+    LayerNotPresent(String),
+    /// An unknown extension.
+    #[error("there is no extension {0}")]
+    ExtensionNotPresent(String),
+    /// A feature that isn't supported.
+    #[error("{0} is not supported")]
+    FeatureNotPresent(String),
+    /// A mode of the extension whose feature is not enabled, or does not exist here.
+    #[error("{message} ({vuid})")]
+    FeatureNotEnabled {
+        /// The rule's id.
+        vuid: &'static str,
+        /// The use of which feature.
+        message: String,
+    },
+    /// A format, or a use of it, that isn't supported.
+    #[error("{0}")]
+    FormatNotSupported(String),
+    /// The application breaks a rule of the extension or of Vulkan that the driver must check itself.
+    #[error("{message} ({vuid})")]
+    InvalidUsage {
+        /// The rule's id: Vulkan's, the extension's, or the driver's own where those have none.
+        vuid: Cow<'static, str>,
+        /// The fault, with the values that are wrong.
+        message: String,
+    },
+    /// A defect of the driver: it panicked.
+    #[error("defect in the driver: {0}")]
+    Panic(String),
+}
+
+impl Error {
+    /// A rule that the application breaks.
+    pub(crate) fn usage(vuid: impl Into<Cow<'static, str>>, message: impl Into<String>) -> Self {
+        Self::InvalidUsage {
+            vuid: vuid.into(),
+            message: message.into(),
+        }
+    }
+
+    /// The result that the application receives.
+    pub(crate) fn result(&self) -> vk::Result {
+        match self {
+            Self::InvalidHandle { .. } | Self::NullPointer { .. } | Self::Panic(_) => {
+                vk::Result::ERROR_UNKNOWN
+            }
+            Self::Unsupported { .. }
+            | Self::FeatureNotPresent(_)
+            | Self::FeatureNotEnabled { .. } => vk::Result::ERROR_FEATURE_NOT_PRESENT,
+            Self::OutOfHostMemory(_) => vk::Result::ERROR_OUT_OF_HOST_MEMORY,
+            Self::OutOfDeviceMemory(_) => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+            Self::OutOfPoolMemory(_) => vk::Result::ERROR_OUT_OF_POOL_MEMORY,
+            Self::InvalidShader(_) => vk::Result::ERROR_INVALID_SHADER_NV,
+            Self::InitializationFailed(_) => vk::Result::ERROR_INITIALIZATION_FAILED,
+            Self::DeviceLost(_) => vk::Result::ERROR_DEVICE_LOST,
+            Self::MemoryMapFailed(_) => vk::Result::ERROR_MEMORY_MAP_FAILED,
+            Self::LayerNotPresent(_) => vk::Result::ERROR_LAYER_NOT_PRESENT,
+            Self::ExtensionNotPresent(_) => vk::Result::ERROR_EXTENSION_NOT_PRESENT,
+            Self::FormatNotSupported(_) => vk::Result::ERROR_FORMAT_NOT_SUPPORTED,
+            Self::InvalidUsage { .. } => vk::Result::ERROR_VALIDATION_FAILED_EXT,
+        }
+    }
+
+    /// The message id that debug messengers show.
+    pub(crate) fn message_id(&self) -> &str {
+        match self {
+            Self::InvalidUsage { vuid, .. } => vuid,
+            Self::FeatureNotEnabled { vuid, .. } => vuid,
+            Self::InvalidHandle { .. } => "GAURAST-invalid-handle",
+            Self::NullPointer { .. } => "GAURAST-null-pointer",
+            Self::Unsupported { .. } => "GAURAST-unsupported-command",
+            Self::InvalidShader(_) => "GAURAST-invalid-shader",
+            Self::Panic(_) | Self::DeviceLost(_) => "GAURAST-driver-defect",
+            _ => "GAURAST-error",
+        }
+    }
+
+    /// Tells if the application's usage, and not the driver or the machine, is at fault.
+    pub(crate) fn is_usage(&self) -> bool {
+        matches!(
+            self,
+            Self::InvalidUsage { .. }
+                | Self::FeatureNotEnabled { .. }
+                | Self::InvalidHandle { .. }
+                | Self::NullPointer { .. }
+        )
+    }
+}

@@ -1,0 +1,673 @@
+//! Command pools and command buffers, and recording: a command buffer's life, and the little that must be known while it is
+//! recorded.
+
+use super::Command;
+use super::render_scope::RenderScope;
+use crate::abi::error::Error;
+use crate::abi::handle::{self, Reporter, objects};
+use crate::abi::valid;
+use crate::device::Device;
+use crate::physical_device::formats;
+use ash::vk;
+use simdevice::host;
+use simdevice::{Format, Packet};
+use std::collections::HashSet;
+use std::mem::MaybeUninit;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A command pool. It owns the handles of its command buffers.
+pub(crate) struct CommandPool {
+    device: Arc<Device>,
+    /// True if single command buffers may be reset.
+    allows_reset: bool,
+    buffers: Mutex<HashSet<vk::CommandBuffer>>,
+}
+
+/// A command buffer.
+pub(crate) struct CommandBuffer {
+    device: Arc<Device>,
+    level: vk::CommandBufferLevel,
+    allows_reset: bool,
+    recorder: Mutex<Recorder>,
+}
+
+objects! {
+    vk::CommandPool => CommandPool;
+    vk::CommandBuffer => CommandBuffer {
+        fn reporter(&self) -> Option<Arc<dyn Reporter>> {
+            self.device.reporter()
+        }
+    };
+}
+
+impl CommandPool {
+    /// An empty pool.
+    pub(crate) fn new(device: Arc<Device>, flags: vk::CommandPoolCreateFlags) -> Self {
+        Self {
+            device,
+            allows_reset: flags.contains(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER),
+            buffers: Mutex::default(),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashSet<vk::CommandBuffer>> {
+        self.buffers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes a command buffer.
+    pub(crate) fn allocate(&self, level: vk::CommandBufferLevel) -> vk::CommandBuffer {
+        let buffer = handle::create(Arc::new(CommandBuffer {
+            device: Arc::clone(&self.device),
+            level,
+            allows_reset: self.allows_reset,
+            recorder: Mutex::new(Recorder::new()),
+        }));
+        self.lock().insert(buffer);
+        buffer
+    }
+
+    /// Frees command buffers of this pool; others are left alone.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if one is not of this pool.
+    ///
+    /// # Safety
+    /// Nothing uses the handles any more.
+    pub(crate) unsafe fn free(&self, buffers: &[vk::CommandBuffer]) -> Result<(), Error> {
+        let null = vk::CommandBuffer::null();
+        for &buffer in buffers.iter().filter(|&&buffer| buffer != null) {
+            if !self.lock().remove(&buffer) {
+                return Err(Error::usage(
+                    "VUID-vkFreeCommandBuffers-pCommandBuffers-parent",
+                    "a command buffer is not of the pool",
+                ));
+            }
+            // SAFETY: the pool made the handle and has not destroyed it, and the caller uses it no more.
+            unsafe { handle::destroy(buffer) }?;
+        }
+        Ok(())
+    }
+
+    /// Frees every command buffer.
+    ///
+    /// # Safety
+    /// As [`CommandPool::free`].
+    pub(crate) unsafe fn free_all(&self) -> Result<(), Error> {
+        let all: Vec<_> = self.lock().iter().copied().collect();
+        // SAFETY: the caller's promise.
+        unsafe { self.free(&all) }
+    }
+
+    /// Resets every command buffer.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if one is pending.
+    pub(crate) fn reset(&self) -> Result<(), Error> {
+        self.lock().iter().try_for_each(|&buffer| {
+            // SAFETY: the pool made the handle and has not destroyed it.
+            unsafe { handle::get(buffer) }?.recorder().reset()
+        })
+    }
+}
+
+impl CommandBuffer {
+    /// Its recorder. Vulkan has the application use a command buffer from one thread at a time, so that nobody waits.
+    pub(crate) fn recorder(&self) -> MutexGuard<'_, Recorder> {
+        self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Tells if it is a secondary command buffer.
+    pub(crate) fn is_secondary(&self) -> bool {
+        self.level == vk::CommandBufferLevel::SECONDARY
+    }
+
+    /// Tells if it may be reset by itself, be it by beginning it again.
+    pub(crate) fn allows_reset(&self) -> bool {
+        self.allows_reset
+    }
+
+    /// Ends recording.
+    ///
+    /// # Errors
+    /// That of [`Recorder::end`], or [`Error::Panic`] if a command panicked while it was recorded and so is missing.
+    pub(crate) fn end(&self) -> Result<(), Error> {
+        let panicked = self.recorder.is_poisoned();
+        self.recorder.clear_poison();
+        let mut recorder = self.recorder();
+        if panicked {
+            recorder.fail(Error::Panic(
+                "a command panicked while it was recorded".into(),
+            ));
+        }
+        recorder.end()
+    }
+
+    /// Records: an error of `record` is reported now, and `vkEndCommandBuffer` fails with the first.
+    ///
+    /// # Errors
+    /// That of `record`, or [`Error::InvalidUsage`] if the command buffer is not recording.
+    pub(crate) fn record(
+        &self,
+        command: &'static str,
+        record: impl FnOnce(&mut Recorder) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let mut recorder = self.recorder();
+        recorder.command = command;
+        recorder.require_recording()?;
+        let recorded = host::catch(|| record(&mut recorder))
+            .unwrap_or_else(|memory| Err(Error::OutOfHostMemory(memory.to_string())));
+        recorded.inspect_err(|error| recorder.fail(error.clone()))
+    }
+}
+
+/// The state of a command buffer's life. It is pending while a [`PendingUse`] of it lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Status {
+    Initial,
+    Recording,
+    Executable,
+    Invalid,
+}
+
+/// The uses that a recording is begun for.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct BeginFlags {
+    /// It is submitted once.
+    pub(crate) one_time: bool,
+    /// It may be submitted while it is pending.
+    pub(crate) simultaneous: bool,
+    /// It is a secondary that runs inside a pass with these colour formats.
+    pub(crate) inherited_pass: Option<Vec<Option<Format>>>,
+}
+
+/// The recorder of a command buffer.
+pub(crate) struct Recorder {
+    /// The name of the command that is being recorded.
+    command: &'static str,
+    status: Status,
+    usage: BeginFlags,
+    commands: Vec<Command>,
+    finished: Option<Arc<Vec<Command>>>,
+    /// The render pass, or dynamic rendering, that commands are recorded within.
+    pub(super) pass: Option<RenderScope>,
+    error: Option<Error>,
+    pending: Arc<AtomicUsize>,
+}
+
+/// A submission's or another recording's use of a command buffer, which is pending as long as one lives.
+#[derive(Debug)]
+pub(crate) struct PendingUse(Arc<AtomicUsize>);
+
+impl PendingUse {
+    fn new(count: &Arc<AtomicUsize>) -> Self {
+        count.fetch_add(1, Ordering::AcqRel);
+        Self(Arc::clone(count))
+    }
+}
+
+impl Drop for PendingUse {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+impl Recorder {
+    /// A command buffer in its initial state.
+    pub(crate) fn new() -> Self {
+        Self {
+            command: "",
+            status: Status::Initial,
+            usage: BeginFlags::default(),
+            commands: Vec::new(),
+            finished: None,
+            pass: None,
+            error: None,
+            pending: Arc::default(),
+        }
+    }
+
+    /// Tells if it may be begun again without an explicit reset.
+    pub(crate) fn is_initial(&self) -> bool {
+        self.status == Status::Initial
+    }
+
+    /// Back to the initial state.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if it is pending.
+    pub(crate) fn reset(&mut self) -> Result<(), Error> {
+        if self.pending.load(Ordering::Acquire) > 0 {
+            return Err(Error::usage(
+                "VUID-vkResetCommandBuffer-commandBuffer-00045",
+                "the command buffer is pending",
+            ));
+        }
+        *self = Self::new();
+        Ok(())
+    }
+
+    /// Starts recording anew.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if it is pending or recording.
+    pub(crate) fn begin(&mut self, usage: BeginFlags) -> Result<(), Error> {
+        if self.status == Status::Recording {
+            return Err(Error::usage(
+                "VUID-vkBeginCommandBuffer-commandBuffer-00049",
+                "the command buffer is already recording",
+            ));
+        }
+        self.reset()?;
+        self.status = Status::Recording;
+        self.pass = usage
+            .inherited_pass
+            .clone()
+            .map(|formats| RenderScope::Inherited { formats });
+        self.usage = usage;
+        Ok(())
+    }
+
+    /// Fails unless it is recording.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`].
+    pub(crate) fn require_recording(&self) -> Result<(), Error> {
+        if self.status == Status::Recording {
+            return Ok(());
+        }
+        Err(Error::usage(
+            self.rule("commandBuffer-recording"),
+            format!("the command buffer is {:?}, not recording", self.status),
+        ))
+    }
+
+    /// Ends recording.
+    ///
+    /// # Errors
+    /// The first error met while recording, or [`Error::InvalidUsage`] if it was not recording or a pass has not ended. The
+    /// command buffer is invalid then.
+    pub(crate) fn end(&mut self) -> Result<(), Error> {
+        self.command = "vkEndCommandBuffer";
+        self.require_recording()?;
+        self.status = Status::Invalid;
+        if let Some(error) = self.error.take() {
+            return Err(error);
+        }
+        if !matches!(self.pass, None | Some(RenderScope::Inherited { .. })) {
+            return Err(Error::usage(
+                "VUID-vkEndCommandBuffer-commandBuffer-00060",
+                "a render pass has not ended",
+            ));
+        }
+        self.finished = Some(Arc::new(std::mem::take(&mut self.commands)));
+        self.status = Status::Executable;
+        Ok(())
+    }
+
+    /// Makes [`Recorder::end`] fail with the first error.
+    pub(crate) fn fail(&mut self, error: Error) {
+        if self.status == Status::Recording {
+            self.error.get_or_insert(error);
+        }
+    }
+
+    /// The recorded commands, to be executed.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if it is not executable, or pending and not for simultaneous use.
+    pub(crate) fn submit(&mut self) -> Result<(Arc<Vec<Command>>, PendingUse), Error> {
+        let Some(commands) = self
+            .finished
+            .as_ref()
+            .filter(|_| self.status == Status::Executable)
+        else {
+            return Err(Error::usage(
+                "VUID-vkQueueSubmit-pCommandBuffers-00070",
+                format!("a command buffer is {:?}, not executable", self.status),
+            ));
+        };
+        if self.pending.load(Ordering::Acquire) > 0 && !self.usage.simultaneous {
+            return Err(Error::usage(
+                "VUID-vkQueueSubmit-pCommandBuffers-00071",
+                "a command buffer without VK_COMMAND_BUFFER_USAGE_SIMULTANEOUS_USE_BIT is pending already",
+            ));
+        }
+        if self.usage.one_time {
+            self.status = Status::Invalid;
+        }
+        Ok((Arc::clone(commands), PendingUse::new(&self.pending)))
+    }
+
+    /// The recorded commands, for a primary command buffer to execute.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if it is not executable.
+    pub(crate) fn contents(&self) -> Result<Arc<Vec<Command>>, Error> {
+        self.finished.clone().ok_or_else(|| {
+            Error::usage(
+                "VUID-vkCmdExecuteCommands-pCommandBuffers-00089",
+                format!(
+                    "a secondary command buffer is {:?}, not executable",
+                    self.status
+                ),
+            )
+        })
+    }
+
+    /// The id of a rule of the command that is being recorded.
+    fn rule(&self, rule: &str) -> String {
+        format!("VUID-{}-{rule}", self.command)
+    }
+
+    /// Appends a command.
+    pub(crate) fn push(&mut self, command: Command) {
+        host::push(&mut self.commands, command);
+    }
+
+    /// Appends a packet.
+    pub(crate) fn packet(&mut self, packet: Packet) {
+        host::push(&mut self.commands, Command::Packet(packet));
+    }
+
+    /// Fails inside a pass.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`].
+    pub(crate) fn require_outside_pass(&self) -> Result<(), Error> {
+        match self.pass {
+            None => Ok(()),
+            Some(_) => Err(Error::usage(
+                self.rule("renderpass"),
+                "the command must not be inside a render pass",
+            )),
+        }
+    }
+
+    /// Fails outside a pass.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`].
+    pub(crate) fn require_pass(&self) -> Result<(), Error> {
+        self.pass().map(drop)
+    }
+
+    fn pass(&self) -> Result<&RenderScope, Error> {
+        self.pass.as_ref().ok_or_else(|| {
+            Error::usage(
+                self.rule("renderpass"),
+                "the command must be inside a render pass",
+            )
+        })
+    }
+
+    /// The format of the current pass's colour attachment number `index`; `None` where it is unused.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] outside a pass.
+    pub(crate) fn color_format(&self, index: usize) -> Result<Option<Format>, Error> {
+        Ok(self.pass()?.color_formats().get(index).copied().flatten())
+    }
+}
+
+/// Records into a command buffer; see [`CommandBuffer::record`](CommandBuffer::record).
+///
+/// # Safety
+/// The handle is live.
+pub(crate) unsafe fn record(
+    command_buffer: vk::CommandBuffer,
+    command: &'static str,
+    record: impl FnOnce(&mut Recorder) -> Result<(), Error>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe { handle::get(command_buffer)? }.record(command, record)
+}
+
+/// The colour formats of the pass that a secondary command buffer continues.
+///
+/// # Safety
+/// The inheritance info and its chain are valid.
+unsafe fn inherited_formats(
+    info: &vk::CommandBufferInheritanceInfo<'_>,
+) -> Result<Vec<Option<Format>>, Error> {
+    // SAFETY: the caller's promise.
+    let formats = unsafe {
+        if let Some(render_pass) = handle::get_optional(info.render_pass)? {
+            render_pass
+                .color_formats(info.subpass as usize)
+                .ok_or_else(|| {
+                    Error::usage(
+                        "VUID-VkCommandBufferBeginInfo-flags-06001",
+                        format!("the render pass has no subpass {}", info.subpass),
+                    )
+                })?
+        } else {
+            let rendering =
+                valid::find_in_chain::<vk::CommandBufferInheritanceRenderingInfo>(info.p_next);
+            match rendering {
+                None => Vec::new(),
+                Some(rendering) => valid::slice(
+                    rendering.p_color_attachment_formats,
+                    rendering.color_attachment_count,
+                )?
+                .to_vec(),
+            }
+        }
+    };
+    Ok(formats.into_iter().map(formats::device_format).collect())
+}
+
+#[doc(alias = "vkCreateCommandPool")]
+pub(crate) fn create_command_pool(
+    device: &Arc<Device>,
+    create_info: &vk::CommandPoolCreateInfo<'_>,
+) -> Result<Arc<CommandPool>, Error> {
+    let device = Arc::clone(device);
+    Ok(Arc::new(CommandPool::new(device, create_info.flags)))
+}
+
+/// # Safety
+/// Nothing uses the pool's command buffers any more.
+#[doc(alias = "vkDestroyCommandPool")]
+pub(crate) unsafe fn destroy_command_pool(
+    command_pool: Option<Arc<CommandPool>>,
+) -> Result<(), Error> {
+    match command_pool {
+        // SAFETY: the caller's promise.
+        Some(pool) => unsafe { pool.free_all() },
+        None => Ok(()),
+    }
+}
+
+#[doc(alias = "vkResetCommandPool")]
+pub(crate) fn reset_command_pool(command_pool: &CommandPool) -> Result<(), Error> {
+    command_pool.reset()
+}
+
+/// # Safety
+/// The allocate info's pool is live.
+#[doc(alias = "vkAllocateCommandBuffers")]
+pub(crate) unsafe fn allocate_command_buffers(
+    allocate_info: &vk::CommandBufferAllocateInfo<'_>,
+    command_buffers: &mut [MaybeUninit<vk::CommandBuffer>],
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let pool = unsafe { handle::get(allocate_info.command_pool)? };
+    for place in command_buffers {
+        place.write(pool.allocate(allocate_info.level));
+    }
+    Ok(())
+}
+
+/// # Safety
+/// Nothing uses the command buffers any more.
+#[doc(alias = "vkFreeCommandBuffers")]
+pub(crate) unsafe fn free_command_buffers(
+    command_pool: &CommandPool,
+    command_buffers: &[vk::CommandBuffer],
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe { command_pool.free(command_buffers) }
+}
+
+/// # Safety
+/// The begin info, its inheritance info and their handles are valid.
+#[doc(alias = "vkBeginCommandBuffer")]
+pub(crate) unsafe fn begin_command_buffer(
+    command_buffer: &CommandBuffer,
+    begin_info: &vk::CommandBufferBeginInfo<'_>,
+) -> Result<(), Error> {
+    use vk::CommandBufferUsageFlags as Usage;
+    let given = begin_info.flags;
+    let inherits = command_buffer.is_secondary() && given.contains(Usage::RENDER_PASS_CONTINUE);
+    let flags = BeginFlags {
+        one_time: given.contains(Usage::ONE_TIME_SUBMIT),
+        simultaneous: given.contains(Usage::SIMULTANEOUS_USE),
+        inherited_pass: if inherits {
+            // SAFETY: the caller's promise.
+            unsafe {
+                Some(inherited_formats(valid::input(
+                    begin_info.p_inheritance_info,
+                )?)?)
+            }
+        } else {
+            None
+        },
+    };
+    let mut recorder = command_buffer.recorder();
+    if !recorder.is_initial() && !command_buffer.allows_reset() {
+        return Err(Error::usage(
+            "VUID-vkBeginCommandBuffer-commandBuffer-00050",
+            "the command buffer's pool lacks VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT",
+        ));
+    }
+    recorder.begin(flags)
+}
+
+#[doc(alias = "vkEndCommandBuffer")]
+pub(crate) fn end_command_buffer(command_buffer: &CommandBuffer) -> Result<(), Error> {
+    command_buffer.end()
+}
+
+#[doc(alias = "vkResetCommandBuffer")]
+pub(crate) fn reset_command_buffer(command_buffer: &CommandBuffer) -> Result<(), Error> {
+    if !command_buffer.allows_reset() {
+        return Err(Error::usage(
+            "VUID-vkResetCommandBuffer-commandBuffer-00046",
+            "the command buffer's pool lacks VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT",
+        ));
+    }
+    command_buffer.recorder().reset()
+}
+
+#[doc(alias = "vkCmdExecuteCommands")]
+pub(crate) fn cmd_execute_commands(
+    command_buffer: &CommandBuffer,
+    command_buffers: &[Arc<CommandBuffer>],
+) -> Result<(), Error> {
+    if command_buffer.is_secondary() {
+        return Err(Error::usage(
+            "VUID-vkCmdExecuteCommands-bufferlevel",
+            "a secondary command buffer executes others",
+        ));
+    }
+    command_buffer.record("vkCmdExecuteCommands", |recorder| {
+        let mut contents = host::with_capacity(command_buffers.len());
+        for secondary in command_buffers {
+            if !secondary.is_secondary() {
+                return Err(Error::usage(
+                    "VUID-vkCmdExecuteCommands-pCommandBuffers-00088",
+                    "a primary command buffer is executed from another",
+                ));
+            }
+            contents.push(secondary.recorder().contents()?);
+        }
+        recorder.push(Command::Execute(contents));
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::instance::Instance;
+    use crate::registry::features::Features;
+
+    fn record(usage: BeginFlags) -> Recorder {
+        let mut recorder = Recorder::new();
+        recorder.begin(usage).unwrap();
+        recorder.packet(Packet::Barrier);
+        recorder.end().unwrap();
+        recorder
+    }
+
+    #[test]
+    fn a_recording_is_executable_again_and_again() {
+        let mut recorder = record(BeginFlags::default());
+        for _ in 0..2 {
+            let (commands, _pending) = recorder.submit().unwrap();
+            assert_eq!(commands.len(), 1);
+        }
+        let pending = recorder.submit().unwrap();
+        assert!(recorder.submit().is_err(), "pending");
+        assert!(recorder.reset().is_err(), "pending");
+        drop(pending);
+        recorder.reset().unwrap();
+        assert!(recorder.submit().is_err(), "initial");
+    }
+
+    #[test]
+    fn a_one_time_recording_is_submitted_once() {
+        let mut recorder = record(BeginFlags {
+            one_time: true,
+            ..BeginFlags::default()
+        });
+        drop(recorder.submit().unwrap());
+        assert!(recorder.submit().is_err());
+        recorder.begin(BeginFlags::default()).unwrap();
+    }
+
+    #[test]
+    fn simultaneous_use_allows_several_submissions() {
+        let mut recorder = record(BeginFlags {
+            simultaneous: true,
+            ..BeginFlags::default()
+        });
+        let _first = recorder.submit().unwrap();
+        recorder.submit().unwrap();
+    }
+
+    #[test]
+    fn the_first_error_ends_up_at_the_end() {
+        let mut recorder = Recorder::new();
+        assert!(recorder.end().is_err(), "not recording");
+        recorder.begin(BeginFlags::default()).unwrap();
+        recorder.fail(Error::OutOfDeviceMemory("first".into()));
+        recorder.fail(Error::OutOfDeviceMemory("second".into()));
+        let error = recorder.end().unwrap_err();
+        assert!(error.to_string().contains("first"));
+        assert!(recorder.submit().is_err(), "invalid");
+        recorder.begin(BeginFlags::default()).unwrap();
+        recorder.end().unwrap();
+    }
+
+    #[test]
+    fn a_panic_while_recording_fails_the_recording() {
+        let instance = Instance::new(vk::API_VERSION_1_3, &[]).unwrap();
+        let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
+        let features = Features::NONE;
+        let device = Device::new(instance, Vec::new(), features, simulated, 0).unwrap();
+        let buffer = CommandBuffer {
+            device,
+            level: vk::CommandBufferLevel::PRIMARY,
+            allows_reset: true,
+            recorder: Mutex::new(Recorder::new()),
+        };
+        buffer.recorder().begin(Default::default()).unwrap();
+        let record = || buffer.record("vkCmdDraw", |_| panic!("in a test"));
+        assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(record)).is_err());
+        assert!(matches!(buffer.end(), Err(Error::Panic(_))));
+        buffer.recorder().begin(Default::default()).unwrap();
+        buffer.end().unwrap();
+    }
+}

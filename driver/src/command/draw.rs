@@ -1,0 +1,200 @@
+//! Commands that draw and dispatch.
+
+use super::buffer::Recorder;
+use super::{Command, DrawIndirect, DrawParameters};
+use crate::abi::error::Error;
+use crate::resource::buffer::{Buffer, BufferRules};
+use ash::vk;
+use std::sync::Arc;
+
+/// The rules on the parameters of `vkCmdDrawIndirect` and the commands like it.
+const DRAW_INDIRECT: BufferRules = BufferRules {
+    memory: "VUID-vkCmdDrawIndirect-buffer-02708",
+    range: "VUID-vkCmdDrawIndirect-drawCount-00488",
+};
+
+/// The rules on the count of `vkCmdDrawIndirectCount` and the commands like it.
+const DRAW_COUNT: BufferRules = BufferRules {
+    memory: "VUID-vkCmdDrawIndirectCount-countBuffer-02714",
+    range: "VUID-vkCmdDrawIndirectCount-countBufferOffset-04129",
+};
+
+/// The rules on the parameters of `vkCmdDispatchIndirect`.
+const DISPATCH_INDIRECT: BufferRules = BufferRules {
+    memory: "VUID-vkCmdDispatchIndirect-buffer-02708",
+    range: "VUID-vkCmdDispatchIndirect-offset-00407",
+};
+
+#[doc(alias = "vkCmdDraw")]
+pub(crate) fn cmd_draw(
+    recorder: &mut Recorder,
+    vertex_count: u32,
+    instance_count: u32,
+    first_vertex: u32,
+    first_instance: u32,
+) -> Result<(), Error> {
+    recorder.require_pass()?;
+    recorder.push(Command::Draw(DrawParameters {
+        vertex_offset: None,
+        first: first_vertex,
+        count: vertex_count,
+        first_instance,
+        instance_count,
+    }));
+    Ok(())
+}
+
+#[doc(alias = "vkCmdDrawIndexed")]
+pub(crate) fn cmd_draw_indexed(
+    recorder: &mut Recorder,
+    index_count: u32,
+    instance_count: u32,
+    first_index: u32,
+    vertex_offset: i32,
+    first_instance: u32,
+) -> Result<(), Error> {
+    recorder.require_pass()?;
+    recorder.push(Command::Draw(DrawParameters {
+        vertex_offset: Some(vertex_offset),
+        first: first_index,
+        count: index_count,
+        first_instance,
+        instance_count,
+    }));
+    Ok(())
+}
+
+#[doc(alias = "vkCmdDrawIndirect")]
+pub(crate) fn cmd_draw_indirect(
+    recorder: &mut Recorder,
+    buffer: &Buffer,
+    offset: vk::DeviceSize,
+    draw_count: u32,
+    stride: u32,
+) -> Result<(), Error> {
+    let draws = DrawIndirect {
+        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
+        draw_count,
+        count: None,
+        stride,
+        indexed: false,
+    };
+    draw_indirect(recorder, draws)
+}
+
+#[doc(alias = "vkCmdDrawIndexedIndirect")]
+pub(crate) fn cmd_draw_indexed_indirect(
+    recorder: &mut Recorder,
+    buffer: &Buffer,
+    offset: vk::DeviceSize,
+    draw_count: u32,
+    stride: u32,
+) -> Result<(), Error> {
+    let draws = DrawIndirect {
+        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
+        draw_count,
+        count: None,
+        stride,
+        indexed: true,
+    };
+    draw_indirect(recorder, draws)
+}
+
+#[doc(alias = "vkCmdDrawIndirectCount")]
+pub(crate) fn cmd_draw_indirect_count(
+    recorder: &mut Recorder,
+    buffer: &Buffer,
+    offset: vk::DeviceSize,
+    count_buffer: &Buffer,
+    count_buffer_offset: vk::DeviceSize,
+    max_draw_count: u32,
+    stride: u32,
+) -> Result<(), Error> {
+    let draws = DrawIndirect {
+        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
+        draw_count: max_draw_count,
+        count: Some(count_buffer.range(count_buffer_offset, Some(4), &DRAW_COUNT)?),
+        stride,
+        indexed: false,
+    };
+    draw_indirect(recorder, draws)
+}
+
+#[doc(alias = "vkCmdDrawIndexedIndirectCount")]
+pub(crate) fn cmd_draw_indexed_indirect_count(
+    recorder: &mut Recorder,
+    buffer: &Buffer,
+    offset: vk::DeviceSize,
+    count_buffer: &Buffer,
+    count_buffer_offset: vk::DeviceSize,
+    max_draw_count: u32,
+    stride: u32,
+) -> Result<(), Error> {
+    let draws = DrawIndirect {
+        parameters: buffer.range(offset, None, &DRAW_INDIRECT)?,
+        draw_count: max_draw_count,
+        count: Some(count_buffer.range(count_buffer_offset, Some(4), &DRAW_COUNT)?),
+        stride,
+        indexed: true,
+    };
+    draw_indirect(recorder, draws)
+}
+
+#[doc(alias = "vkCmdDispatch")]
+pub(crate) fn cmd_dispatch(
+    recorder: &mut Recorder,
+    group_count_x: u32,
+    group_count_y: u32,
+    group_count_z: u32,
+) -> Result<(), Error> {
+    dispatch(
+        recorder,
+        [0; 3],
+        [group_count_x, group_count_y, group_count_z],
+    )
+}
+
+#[doc(alias = "vkCmdDispatchBase")]
+pub(crate) fn cmd_dispatch_base(
+    recorder: &mut Recorder,
+    base_group_x: u32,
+    base_group_y: u32,
+    base_group_z: u32,
+    group_count_x: u32,
+    group_count_y: u32,
+    group_count_z: u32,
+) -> Result<(), Error> {
+    let base = [base_group_x, base_group_y, base_group_z];
+    dispatch(
+        recorder,
+        base,
+        [group_count_x, group_count_y, group_count_z],
+    )
+}
+
+#[doc(alias = "vkCmdDispatchIndirect")]
+pub(crate) fn cmd_dispatch_indirect(
+    recorder: &mut Recorder,
+    buffer: &Arc<Buffer>,
+    offset: vk::DeviceSize,
+) -> Result<(), Error> {
+    recorder.require_outside_pass()?;
+    let size = size_of::<vk::DispatchIndirectCommand>() as u64;
+    let range = buffer.range(offset, Some(size), &DISPATCH_INDIRECT)?;
+    recorder.push(Command::DispatchIndirect(range));
+    Ok(())
+}
+
+/// Records a dispatch.
+fn dispatch(recorder: &mut Recorder, base: [u32; 3], count: [u32; 3]) -> Result<(), Error> {
+    recorder.require_outside_pass()?;
+    recorder.push(Command::Dispatch { base, count });
+    Ok(())
+}
+
+/// Records draws whose parameters lie in a buffer.
+fn draw_indirect(recorder: &mut Recorder, draws: DrawIndirect) -> Result<(), Error> {
+    recorder.require_pass()?;
+    recorder.push(Command::DrawIndirect(draws));
+    Ok(())
+}

@@ -1,0 +1,346 @@
+//! Commands that set dynamic state.
+
+use super::Command;
+use super::buffer::Recorder;
+use crate::abi::error::Error;
+use crate::convert::{self, StencilOpIds, StencilOps};
+use crate::physical_device::limits;
+use crate::pipeline::dynamic_state::{DynamicState, Face, faces};
+use ash::vk;
+use gaurast::vk::PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
+use simdevice::packet::draw::DepthBias;
+
+/// Records a state.
+fn set(recorder: &mut Recorder, state: DynamicState) -> Result<(), Error> {
+    recorder.push(Command::SetDynamicState(state));
+    Ok(())
+}
+
+/// Records a state for each face of a mask.
+fn set_faces(
+    recorder: &mut Recorder,
+    mask: vk::StencilFaceFlags,
+    state: impl Fn(Face) -> DynamicState,
+) -> Result<(), Error> {
+    faces(mask).for_each(|face| recorder.push(Command::SetDynamicState(state(face))));
+    Ok(())
+}
+
+#[doc(alias = "vkCmdSetDepthTestEnable")]
+pub(crate) fn cmd_set_depth_test_enable(
+    recorder: &mut Recorder,
+    depth_test_enable: bool,
+) -> Result<(), Error> {
+    set(
+        recorder,
+        DynamicState::DepthTestEnable {
+            enable: depth_test_enable,
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetDepthWriteEnable")]
+pub(crate) fn cmd_set_depth_write_enable(
+    recorder: &mut Recorder,
+    depth_write_enable: bool,
+) -> Result<(), Error> {
+    set(
+        recorder,
+        DynamicState::DepthWriteEnable {
+            enable: depth_write_enable,
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetDepthBoundsTestEnable")]
+pub(crate) fn cmd_set_depth_bounds_test_enable(
+    recorder: &mut Recorder,
+    depth_bounds_test_enable: bool,
+) -> Result<(), Error> {
+    set(
+        recorder,
+        DynamicState::DepthBoundsTestEnable {
+            enable: depth_bounds_test_enable,
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetStencilTestEnable")]
+pub(crate) fn cmd_set_stencil_test_enable(
+    recorder: &mut Recorder,
+    stencil_test_enable: bool,
+) -> Result<(), Error> {
+    set(
+        recorder,
+        DynamicState::StencilTestEnable {
+            enable: stencil_test_enable,
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetRasterizerDiscardEnable")]
+pub(crate) fn cmd_set_rasterizer_discard_enable(
+    recorder: &mut Recorder,
+    rasterizer_discard_enable: bool,
+) -> Result<(), Error> {
+    set(
+        recorder,
+        DynamicState::RasterizerDiscardEnable {
+            enable: rasterizer_discard_enable,
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetDepthBiasEnable")]
+pub(crate) fn cmd_set_depth_bias_enable(
+    recorder: &mut Recorder,
+    depth_bias_enable: bool,
+) -> Result<(), Error> {
+    set(
+        recorder,
+        DynamicState::DepthBiasEnable {
+            enable: depth_bias_enable,
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetPrimitiveRestartEnable")]
+pub(crate) fn cmd_set_primitive_restart_enable(
+    recorder: &mut Recorder,
+    primitive_restart_enable: bool,
+) -> Result<(), Error> {
+    set(
+        recorder,
+        DynamicState::PrimitiveRestartEnable {
+            enable: primitive_restart_enable,
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetLineWidth")]
+pub(crate) fn cmd_set_line_width(recorder: &mut Recorder, line_width: f32) -> Result<(), Error> {
+    set(recorder, DynamicState::LineWidth { width: line_width })
+}
+
+#[doc(alias = "vkCmdSetDepthBias")]
+pub(crate) fn cmd_set_depth_bias(
+    recorder: &mut Recorder,
+    depth_bias_constant_factor: f32,
+    depth_bias_clamp: f32,
+    depth_bias_slope_factor: f32,
+) -> Result<(), Error> {
+    let bias = DepthBias {
+        constant: depth_bias_constant_factor,
+        clamp: depth_bias_clamp,
+        slope: depth_bias_slope_factor,
+    };
+    set(recorder, DynamicState::DepthBias { bias })
+}
+
+#[doc(alias = "vkCmdSetBlendConstants")]
+pub(crate) fn cmd_set_blend_constants(
+    recorder: &mut Recorder,
+    blend_constants: &[f32; 4],
+) -> Result<(), Error> {
+    set(
+        recorder,
+        DynamicState::BlendConstants {
+            constants: *blend_constants,
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetDepthBounds")]
+pub(crate) fn cmd_set_depth_bounds(
+    recorder: &mut Recorder,
+    min_depth_bounds: f32,
+    max_depth_bounds: f32,
+) -> Result<(), Error> {
+    set(
+        recorder,
+        DynamicState::DepthBounds {
+            bounds: (min_depth_bounds, max_depth_bounds),
+        },
+    )
+}
+
+#[doc(alias = "vkCmdSetStencilCompareMask")]
+pub(crate) fn cmd_set_stencil_compare_mask(
+    recorder: &mut Recorder,
+    face_mask: vk::StencilFaceFlags,
+    compare_mask: u32,
+) -> Result<(), Error> {
+    set_faces(recorder, face_mask, |face| {
+        DynamicState::StencilCompareMask {
+            face,
+            mask: compare_mask as u8,
+        }
+    })
+}
+
+#[doc(alias = "vkCmdSetStencilWriteMask")]
+pub(crate) fn cmd_set_stencil_write_mask(
+    recorder: &mut Recorder,
+    face_mask: vk::StencilFaceFlags,
+    write_mask: u32,
+) -> Result<(), Error> {
+    set_faces(recorder, face_mask, |face| DynamicState::StencilWriteMask {
+        face,
+        mask: write_mask as u8,
+    })
+}
+
+#[doc(alias = "vkCmdSetStencilReference")]
+pub(crate) fn cmd_set_stencil_reference(
+    recorder: &mut Recorder,
+    face_mask: vk::StencilFaceFlags,
+    reference: u32,
+) -> Result<(), Error> {
+    set_faces(recorder, face_mask, |face| DynamicState::StencilReference {
+        face,
+        reference: reference as u8,
+    })
+}
+
+/// The ids of the rules on the operations of `vkCmdSetStencilOp`.
+const STENCIL_OP: StencilOpIds = StencilOpIds {
+    fail: "VUID-vkCmdSetStencilOp-failOp-parameter",
+    pass: "VUID-vkCmdSetStencilOp-passOp-parameter",
+    depth_fail: "VUID-vkCmdSetStencilOp-depthFailOp-parameter",
+    compare: "VUID-vkCmdSetStencilOp-compareOp-parameter",
+};
+
+#[doc(alias = "vkCmdSetStencilOp")]
+pub(crate) fn cmd_set_stencil_op(
+    recorder: &mut Recorder,
+    face_mask: vk::StencilFaceFlags,
+    fail_op: vk::StencilOp,
+    pass_op: vk::StencilOp,
+    depth_fail_op: vk::StencilOp,
+    compare_op: vk::CompareOp,
+) -> Result<(), Error> {
+    let ops = StencilOps::from_vk(fail_op, pass_op, depth_fail_op, compare_op, &STENCIL_OP)?;
+    set_faces(recorder, face_mask, |face| DynamicState::StencilOp {
+        face,
+        ops,
+    })
+}
+
+#[doc(alias = "vkCmdSetCullMode")]
+pub(crate) fn cmd_set_cull_mode(
+    recorder: &mut Recorder,
+    cull_mode: vk::CullModeFlags,
+) -> Result<(), Error> {
+    set(recorder, DynamicState::CullMode { mode: cull_mode })
+}
+
+#[doc(alias = "vkCmdSetFrontFace")]
+pub(crate) fn cmd_set_front_face(
+    recorder: &mut Recorder,
+    front_face: vk::FrontFace,
+) -> Result<(), Error> {
+    set(recorder, DynamicState::FrontFace { face: front_face })
+}
+
+#[doc(alias = "vkCmdSetPrimitiveTopology")]
+pub(crate) fn cmd_set_primitive_topology(
+    recorder: &mut Recorder,
+    primitive_topology: vk::PrimitiveTopology,
+) -> Result<(), Error> {
+    // The Gaussian list is a class of its own, so there is nothing to set.
+    if primitive_topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
+        return Ok(());
+    }
+    let topology = convert::topology(primitive_topology)?;
+    set(recorder, DynamicState::PrimitiveTopology { topology })
+}
+
+#[doc(alias = "vkCmdSetDepthCompareOp")]
+pub(crate) fn cmd_set_depth_compare_op(
+    recorder: &mut Recorder,
+    depth_compare_op: vk::CompareOp,
+) -> Result<(), Error> {
+    let op = convert::compare_op(
+        depth_compare_op,
+        "VUID-vkCmdSetDepthCompareOp-depthCompareOp-parameter",
+    )?;
+    set(recorder, DynamicState::DepthCompareOp { op })
+}
+
+#[doc(alias = "vkCmdSetViewport")]
+pub(crate) fn cmd_set_viewport(
+    recorder: &mut Recorder,
+    first_viewport: u32,
+    viewports: &[vk::Viewport],
+) -> Result<(), Error> {
+    set_viewports(recorder, first_viewport, viewports, false)
+}
+
+#[doc(alias = "vkCmdSetViewportWithCount")]
+pub(crate) fn cmd_set_viewport_with_count(
+    recorder: &mut Recorder,
+    viewports: &[vk::Viewport],
+) -> Result<(), Error> {
+    set_viewports(recorder, 0, viewports, true)
+}
+
+#[doc(alias = "vkCmdSetScissor")]
+pub(crate) fn cmd_set_scissor(
+    recorder: &mut Recorder,
+    first_scissor: u32,
+    scissors: &[vk::Rect2D],
+) -> Result<(), Error> {
+    set_scissors(recorder, first_scissor, scissors, false)
+}
+
+#[doc(alias = "vkCmdSetScissorWithCount")]
+pub(crate) fn cmd_set_scissor_with_count(
+    recorder: &mut Recorder,
+    scissors: &[vk::Rect2D],
+) -> Result<(), Error> {
+    set_scissors(recorder, 0, scissors, true)
+}
+
+/// Fails for viewports and scissors beyond those that the device has.
+fn require_viewports(first: u32, count: u32) -> Result<(), Error> {
+    let available = limits::properties().max_viewports;
+    if u64::from(first) + u64::from(count) <= u64::from(available) {
+        return Ok(());
+    }
+    Err(Error::usage(
+        "VUID-vkCmdSetViewport-firstViewport-01223",
+        format!("there are {available} viewports"),
+    ))
+}
+
+/// Records viewports.
+fn set_viewports(
+    recorder: &mut Recorder,
+    first: u32,
+    viewports: &[vk::Viewport],
+    with_count: bool,
+) -> Result<(), Error> {
+    require_viewports(first, viewports.len() as u32)?;
+    recorder.push(Command::SetViewports {
+        first,
+        viewports: viewports.iter().copied().map(convert::viewport).collect(),
+        with_count,
+    });
+    Ok(())
+}
+
+/// Records scissors.
+fn set_scissors(
+    recorder: &mut Recorder,
+    first: u32,
+    scissors: &[vk::Rect2D],
+    with_count: bool,
+) -> Result<(), Error> {
+    require_viewports(first, scissors.len() as u32)?;
+    recorder.push(Command::SetScissors {
+        first,
+        scissors: scissors.iter().copied().map(convert::rect).collect(),
+        with_count,
+    });
+    Ok(())
+}

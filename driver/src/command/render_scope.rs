@@ -1,0 +1,395 @@
+//! Render passes and dynamic rendering that have begun, and the packets that begin them: attachments, load and store
+//! operations, clear values.
+
+#[cfg(test)]
+mod tests;
+
+use crate::abi::error::Error;
+use crate::convert::{clear_value, rect};
+use crate::render_pass::{AttachmentDescription, RenderPass};
+use crate::resource::image::ImageView;
+use ash::vk;
+use simdevice::packet::{
+    Aspect, Attachment, ClearValue, LoadOp, Rect, Rendering, ResolveMode, StoreOp,
+};
+use simdevice::{Format, Packet};
+use std::sync::Arc;
+
+/// Checks that a view can be an attachment of `layers` layers for an aspect.
+fn check_attachment(view: &ImageView, aspect: Aspect, layers: u32) -> Result<(), Error> {
+    let view = &view.view;
+    let vuid = if layers > view.layer_count {
+        // Of dynamic rendering, Vulkan has no rule of its own with an id.
+        "VUID-VkFramebufferCreateInfo-flags-04535"
+    } else if view.format.aspects().contains(&aspect) {
+        return Ok(());
+    } else {
+        match aspect {
+            Aspect::Color => "VUID-VkRenderingInfo-colorAttachmentCount-06087",
+            Aspect::Depth => "VUID-VkRenderingInfo-pDepthAttachment-06547",
+            Aspect::Stencil => "VUID-VkRenderingInfo-pStencilAttachment-06548",
+        }
+    };
+    Err(Error::usage(
+        vuid,
+        format!(
+            "a view of format {:?} with {} layers is the {aspect:?} attachment of a pass with {layers} layers",
+            view.format, view.layer_count
+        ),
+    ))
+}
+
+/// The operation of an attachment at the beginning of a pass.
+fn load(op: vk::AttachmentLoadOp, clear: impl FnOnce() -> ClearValue) -> Result<LoadOp, Error> {
+    match op {
+        vk::AttachmentLoadOp::LOAD => Ok(LoadOp::Load),
+        vk::AttachmentLoadOp::CLEAR => Ok(LoadOp::Clear(clear())),
+        vk::AttachmentLoadOp::DONT_CARE | vk::AttachmentLoadOp::NONE_KHR => Ok(LoadOp::DontCare),
+        other => Err(Error::usage(
+            "VUID-VkRenderingAttachmentInfo-loadOp-parameter",
+            format!("{other:?} is not a VkAttachmentLoadOp"),
+        )),
+    }
+}
+
+/// The operation of an attachment at the end of a pass.
+fn store(op: vk::AttachmentStoreOp) -> Result<StoreOp, Error> {
+    match op {
+        vk::AttachmentStoreOp::STORE => Ok(StoreOp::Store),
+        vk::AttachmentStoreOp::DONT_CARE => Ok(StoreOp::DontCare),
+        vk::AttachmentStoreOp::NONE => Ok(StoreOp::None),
+        other => Err(Error::usage(
+            "VUID-VkRenderingAttachmentInfo-storeOp-parameter",
+            format!("{other:?} is not a VkAttachmentStoreOp"),
+        )),
+    }
+}
+
+/// Checks that an attachment's samples can be resolved to a view.
+fn check_resolve(attachment: &ImageView, view: &ImageView) -> Result<(), Error> {
+    let (from, to) = (&attachment.view, &view.view);
+    let samples = to.image.desc.samples;
+    if from.format == to.format && samples == 1 {
+        return Ok(());
+    }
+    Err(Error::usage(
+        "VUID-VkRenderingAttachmentInfo-imageView-06865",
+        format!(
+            "an attachment of format {:?} is resolved to one of format {:?} with {samples} samples",
+            from.format, to.format
+        ),
+    ))
+}
+
+/// The packet that begins rendering, once its attachments are known to have as many samples as one another: the device
+/// would be lost over them, too late to say which command was wrong.
+fn begin(rendering: Rendering) -> Result<Packet, Error> {
+    let single = [&rendering.depth, &rendering.stencil];
+    let attachments = rendering.color.iter().chain(single).flatten();
+    let samples = attachments.map(|attachment| attachment.view.image.desc.samples);
+    let samples: Vec<_> = samples.collect();
+    if let Some(pair) = samples.windows(2).find(|pair| pair[0] != pair[1]) {
+        return Err(Error::usage(
+            "VUID-VkRenderingInfo-multisampledRenderToSingleSampled-06857",
+            format!("an attachment has {} samples, another {}", pair[0], pair[1]),
+        ));
+    }
+    Ok(Packet::BeginRendering(Box::new(rendering)))
+}
+
+/// A render pass that has begun, with what it renders to.
+#[derive(Clone)]
+pub(crate) struct RenderPassInstance {
+    /// The render pass.
+    pub(crate) render_pass: Arc<RenderPass>,
+    /// A view for each attachment.
+    pub(crate) views: Vec<Arc<ImageView>>,
+    /// The values of attachments that are cleared, by attachment; may be short.
+    pub(crate) clear_values: Vec<vk::ClearValue>,
+    /// The pixels rendered.
+    pub(crate) area: Rect,
+    /// The layers rendered.
+    pub(crate) layers: u32,
+}
+
+impl RenderPassInstance {
+    /// The packet that begins a subpass.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if the pass has no such subpass, a view is missing, or views cannot be attachments of one subpass.
+    pub(crate) fn subpass(&self, index: usize) -> Result<Packet, Error> {
+        let Some(subpass) = self.render_pass.subpasses.get(index) else {
+            return Err(Error::usage(
+                "VUID-vkCmdNextSubpass-None-00909",
+                format!("the render pass has no subpass {index}"),
+            ));
+        };
+        let resolved = subpass
+            .resolve
+            .iter()
+            .copied()
+            .chain(std::iter::repeat(None));
+        let color = subpass.color.iter().zip(resolved).map(|(used, resolved)| {
+            let ops = main_ops;
+            let resolve = resolved.map(|number| (number, ResolveMode::Average));
+            used.map(|number| self.attachment(index, number, Aspect::Color, ops, resolve))
+                .transpose()
+        });
+        let depth_stencil = |aspect, ops| {
+            let has_aspect = |format: Format| format.aspects().contains(&aspect);
+            let number = subpass
+                .depth_stencil
+                .filter(|&number| self.format(number).is_some_and(has_aspect));
+            let resolve = subpass.depth_stencil_resolve.and_then(|resolve| {
+                let mode = match aspect {
+                    Aspect::Stencil => resolve.stencil,
+                    Aspect::Color | Aspect::Depth => resolve.depth,
+                };
+                mode.map(|mode| (resolve.attachment, mode))
+            });
+            number
+                .map(|number| self.attachment(index, number, aspect, ops, resolve))
+                .transpose()
+        };
+        begin(Rendering {
+            area: self.area,
+            layer_count: self.layers,
+            color: color.collect::<Result<_, _>>()?,
+            depth: depth_stencil(Aspect::Depth, main_ops)?,
+            stencil: depth_stencil(Aspect::Stencil, stencil_ops)?,
+        })
+    }
+
+    /// The packets that clear what a subpass reads before anything was rendered to it.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if a view is missing.
+    pub(crate) fn clears_before_reads(&self, index: usize) -> Result<Vec<Packet>, Error> {
+        let mut packets = Vec::new();
+        for number in self.render_pass.first_read(index) {
+            let Some(format) = self.format(number) else {
+                continue;
+            };
+            let cleared = |aspect, ops: fn(&AttachmentDescription) -> Ops| {
+                let (load, _) = ops(&self.render_pass.attachments[number]);
+                let is_cleared =
+                    format.aspects().contains(&aspect) && load == vk::AttachmentLoadOp::CLEAR;
+                is_cleared
+                    .then(|| self.attachment(index, number, aspect, ops, None))
+                    .transpose()
+            };
+            let color = cleared(Aspect::Color, main_ops)?;
+            let depth = cleared(Aspect::Depth, main_ops)?;
+            let stencil = cleared(Aspect::Stencil, stencil_ops)?;
+            let mut attachments = [color, depth, stencil];
+            if attachments.iter().all(Option::is_none) {
+                continue;
+            }
+            for attachment in attachments.iter_mut().flatten() {
+                attachment.store = StoreOp::Store;
+            }
+            let [color, depth, stencil] = attachments;
+            packets.push(Packet::BeginRendering(Box::new(Rendering {
+                area: self.area,
+                layer_count: self.layers,
+                color: vec![color],
+                depth,
+                stencil,
+            })));
+            packets.push(Packet::EndRendering);
+        }
+        Ok(packets)
+    }
+
+    fn format(&self, number: usize) -> Option<Format> {
+        self.views.get(number).map(|view| view.view.format)
+    }
+
+    fn view(&self, number: usize) -> Result<&ImageView, Error> {
+        let view = self.views.get(number).map(Arc::as_ref);
+        view.ok_or_else(|| {
+            Error::usage(
+                "VUID-VkFramebufferCreateInfo-attachmentCount-00876",
+                format!("the framebuffer has no attachment {number}"),
+            )
+        })
+    }
+
+    /// An attachment and, if it is resolved, the attachment that it is resolved to and how.
+    fn attachment(
+        &self,
+        subpass: usize,
+        number: usize,
+        aspect: Aspect,
+        ops: fn(&AttachmentDescription) -> Ops,
+        resolve: Option<(usize, ResolveMode)>,
+    ) -> Result<Attachment, Error> {
+        let view = self.view(number)?;
+        check_attachment(view, aspect, self.layers)?;
+        let resolve = resolve.map(|(number, mode)| {
+            let to = self.view(number)?;
+            check_attachment(to, aspect, self.layers)?;
+            check_resolve(view, to)?;
+            Ok::<_, Error>((to.view.clone(), mode))
+        });
+        let (load_op, store_op) = ops(&self.render_pass.attachments[number]);
+        // A clear value that is missing is the application's error; zero is as good as any.
+        let clear = || {
+            let value = self.clear_values.get(number).copied().unwrap_or_default();
+            clear_value(view.view.format, value)
+        };
+        Ok(Attachment {
+            view: view.view.clone(),
+            load: if self.render_pass.is_first_use(subpass, number) {
+                load(load_op, clear)?
+            } else {
+                LoadOp::Load
+            },
+            store: if self.render_pass.is_last_use(subpass, number) {
+                store(store_op)?
+            } else {
+                StoreOp::Store
+            },
+            resolve: resolve.transpose()?,
+        })
+    }
+}
+
+type Ops = (vk::AttachmentLoadOp, vk::AttachmentStoreOp);
+
+/// The operations of colour and depth.
+fn main_ops(attachment: &AttachmentDescription) -> Ops {
+    (attachment.load, attachment.store)
+}
+
+/// The operations of stencil.
+fn stencil_ops(attachment: &AttachmentDescription) -> Ops {
+    (attachment.stencil_load, attachment.stencil_store)
+}
+
+/// An attachment of dynamic rendering.
+#[derive(Clone)]
+pub(crate) struct DynamicAttachment {
+    /// The view that is rendered to.
+    pub(crate) view: Arc<ImageView>,
+    /// The operation at the beginning.
+    pub(crate) load: vk::AttachmentLoadOp,
+    /// The operation at the end.
+    pub(crate) store: vk::AttachmentStoreOp,
+    /// The value that it is cleared to.
+    pub(crate) clear_value: vk::ClearValue,
+    /// The view that it is resolved to, and how.
+    pub(crate) resolve: Option<(Arc<ImageView>, ResolveMode)>,
+}
+
+/// Dynamic rendering.
+#[derive(Clone, Default)]
+pub(crate) struct DynamicRendering {
+    /// The suspension or resumption of it.
+    pub(crate) flags: vk::RenderingFlags,
+    /// The pixels rendered.
+    pub(crate) area: vk::Rect2D,
+    /// The layers rendered.
+    pub(crate) layers: u32,
+    /// Colour attachments by location.
+    pub(crate) color: Vec<Option<DynamicAttachment>>,
+    /// The depth attachment.
+    pub(crate) depth: Option<DynamicAttachment>,
+    /// The stencil attachment.
+    pub(crate) stencil: Option<DynamicAttachment>,
+}
+
+impl DynamicRendering {
+    /// The packet that begins it.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] for operations that Vulkan does not have and for views that cannot be attachments together.
+    pub(crate) fn packet(&self) -> Result<Packet, Error> {
+        let optional = |attachment: &Option<DynamicAttachment>, aspect| {
+            attachment
+                .as_ref()
+                .map(|attachment| self.attachment(attachment, aspect))
+                .transpose()
+        };
+        begin(Rendering {
+            area: rect(self.area),
+            layer_count: self.layers,
+            color: self
+                .color
+                .iter()
+                .map(|attachment| optional(attachment, Aspect::Color))
+                .collect::<Result<_, _>>()?,
+            depth: optional(&self.depth, Aspect::Depth)?,
+            stencil: optional(&self.stencil, Aspect::Stencil)?,
+        })
+    }
+
+    /// Between suspension and resumption attachments are in memory.
+    fn attachment(
+        &self,
+        attachment: &DynamicAttachment,
+        aspect: Aspect,
+    ) -> Result<Attachment, Error> {
+        check_attachment(&attachment.view, aspect, self.layers)?;
+        // What is suspended is resolved where it ends.
+        let suspends = self.flags.contains(vk::RenderingFlags::SUSPENDING);
+        let resolve = attachment.resolve.as_ref().filter(|_| !suspends);
+        let resolve = resolve.map(|(view, mode)| {
+            check_attachment(view, aspect, self.layers)?;
+            check_resolve(&attachment.view, view)?;
+            Ok::<_, Error>((view.view.clone(), *mode))
+        });
+        let format = attachment.view.view.format;
+        Ok(Attachment {
+            view: attachment.view.view.clone(),
+            load: if self.flags.contains(vk::RenderingFlags::RESUMING) {
+                LoadOp::Load
+            } else {
+                load(attachment.load, || {
+                    clear_value(format, attachment.clear_value)
+                })?
+            },
+            store: if suspends {
+                StoreOp::Store
+            } else {
+                store(attachment.store)?
+            },
+            resolve: resolve.transpose()?,
+        })
+    }
+}
+
+/// The render pass, or dynamic rendering, that commands are recorded within.
+pub(crate) enum RenderScope {
+    /// A render pass, at one of its subpasses.
+    RenderPass {
+        instance: Box<RenderPassInstance>,
+        subpass: usize,
+        formats: Vec<Option<Format>>,
+    },
+    /// Dynamic rendering.
+    Dynamic { formats: Vec<Option<Format>> },
+    /// That of the primary command buffer.
+    Inherited { formats: Vec<Option<Format>> },
+}
+
+impl RenderScope {
+    /// The formats of colour attachments; `None` where one is unused.
+    pub(crate) fn color_formats(&self) -> &[Option<Format>] {
+        let (Self::RenderPass { formats, .. }
+        | Self::Dynamic { formats }
+        | Self::Inherited { formats }) = self;
+        formats
+    }
+}
+
+/// The formats of the colour attachments of a [`Packet::BeginRendering`].
+pub(super) fn color_formats(packet: &Packet) -> Vec<Option<Format>> {
+    let Packet::BeginRendering(rendering) = packet else {
+        return Vec::new();
+    };
+    let format = |attachment: &Option<Attachment>| {
+        attachment.as_ref().map(|attachment| attachment.view.format)
+    };
+    rendering.color.iter().map(format).collect()
+}

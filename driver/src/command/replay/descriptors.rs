@@ -1,0 +1,158 @@
+//! Bound descriptor sets as the resources that programs are bound to, by their slots; and dispatches.
+
+use super::state::{BoundSets, State};
+use crate::command::BoundSet;
+use crate::descriptor::layout::LayoutBinding;
+use crate::descriptor::set::Descriptor;
+use crate::resource::image::ImageView;
+use gaurast_spirv::{DescriptorKind, ShaderBinding};
+use simdevice::bindings::Bindings;
+use simdevice::compute::Dispatch;
+use simdevice::host;
+use simdevice::texture::{ImageBinding, SampledImage, StorageImage, TexelBuffer};
+use simdevice::{Allocation, Packet};
+use std::sync::Arc;
+
+/// A set that is not bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("descriptor set {0}, which the pipeline uses, is not bound")]
+pub(crate) struct DescriptorSetNotBound(pub(super) u32);
+
+/// The resources that programs that use `descriptors` are bound to. What a set doesn't hold reads as zero.
+///
+/// # Errors
+/// [`DescriptorSetNotBound`] if a set is missing.
+pub(crate) fn bindings(
+    descriptors: &[ShaderBinding],
+    sets: &BoundSets,
+    push_constants: &[u8],
+) -> Result<Bindings, DescriptorSetNotBound> {
+    let mut bindings = Bindings {
+        push_constants: push_constants.to_vec(),
+        ..Bindings::default()
+    };
+    for used in descriptors {
+        let bound = sets.get(used.set).ok_or(DescriptorSetNotBound(used.set))?;
+        if let Some(binding) = bound.set.layout().binding(used.binding) {
+            bind(used, bound, binding, &mut bindings);
+        }
+    }
+    Ok(bindings)
+}
+
+/// Binds what one variable of a program uses.
+fn bind(used: &ShaderBinding, bound: &BoundSet, binding: &LayoutBinding, bindings: &mut Bindings) {
+    let held = bound.set.lock();
+    let count = used.count.min(binding.count) as usize;
+    for (element, descriptor) in held[binding.first..][..count].iter().enumerate() {
+        let slot = used.slot as usize + element;
+        let dynamic = binding.first_dynamic.map(|first| first + element);
+        let offset = dynamic.and_then(|index| bound.dynamic_offsets.get(index));
+        place(used, slot, descriptor, offset.copied(), bindings);
+    }
+}
+
+/// Puts what a descriptor holds in a resource slot.
+fn place(
+    used: &ShaderBinding,
+    slot: usize,
+    descriptor: &Descriptor,
+    dynamic_offset: Option<u32>,
+    bindings: &mut Bindings,
+) {
+    match descriptor {
+        Descriptor::Empty => {}
+        Descriptor::Buffer(buffer) => {
+            let range = buffer.range(dynamic_offset.unwrap_or(0));
+            mark_written(used, &range.memory, bindings);
+            *element(&mut bindings.buffers, slot) = Some(range);
+        }
+        Descriptor::TexelBuffer(view) => {
+            mark_written(used, &view.range.memory, bindings);
+            *element(&mut bindings.images, slot) = ImageBinding::TexelBuffer(TexelBuffer {
+                range: view.range.clone(),
+                format: view.format,
+            });
+        }
+        Descriptor::Image { view, sampler } => {
+            if let Some(view) = view {
+                mark_written(used, &view.view.image.memory, bindings);
+                *element(&mut bindings.images, slot) = image(used.kind, view);
+            }
+            if let Some(sampler) = sampler {
+                *element(&mut bindings.samplers, slot) = Some(sampler.state);
+            }
+        }
+    }
+}
+
+/// An image's view as a variable of this kind reads it.
+fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
+    let (aspect, swizzle) = (view.aspect, view.swizzle);
+    let view = view.view.clone();
+    match kind {
+        DescriptorKind::StorageImage => ImageBinding::Storage(StorageImage { view }),
+        _ => ImageBinding::Sampled(SampledImage {
+            view,
+            aspect,
+            swizzle,
+        }),
+    }
+}
+
+fn mark_written(used: &ShaderBinding, memory: &Arc<Allocation>, bindings: &mut Bindings) {
+    if used.writable
+        && !bindings
+            .written
+            .iter()
+            .any(|known| Arc::ptr_eq(known, memory))
+    {
+        bindings.written.push(Arc::clone(memory));
+    }
+}
+
+/// The element in a resource slot, of a list that grows as needed.
+fn element<T: Default>(slots: &mut Vec<T>, index: usize) -> &mut T {
+    if slots.len() <= index {
+        host::reserve(slots, index + 1 - slots.len());
+        slots.resize_with(index + 1, T::default);
+    }
+    &mut slots[index]
+}
+
+/// The reason that a dispatch does nothing: state that it needs is undefined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum DispatchError {
+    /// No pipeline.
+    #[error("no compute pipeline is bound")]
+    Pipeline,
+    /// Something that the pipeline reads is not bound.
+    #[error(transparent)]
+    DescriptorSetNotBound(#[from] DescriptorSetNotBound),
+}
+
+/// The packet of one dispatch.
+///
+/// # Errors
+/// [`DispatchError`] where bound state that the dispatch needs is missing.
+pub(crate) fn dispatch(
+    state: &State,
+    base: [u32; 3],
+    count: [u32; 3],
+) -> Result<Packet, DispatchError> {
+    let pipeline = state
+        .compute_pipeline
+        .as_ref()
+        .ok_or(DispatchError::Pipeline)?;
+    let bindings = bindings(
+        &pipeline.descriptors,
+        &state.compute_sets,
+        &state.push_constants,
+    )?;
+    Ok(Packet::Dispatch(Box::new(Dispatch {
+        program: Arc::clone(&pipeline.program),
+        base,
+        count,
+        bindings,
+    })))
+}

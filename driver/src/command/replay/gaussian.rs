@@ -1,0 +1,226 @@
+//! Gaussian draws as the packets of a sorted set.
+
+use super::descriptors::{self, DescriptorSetNotBound};
+use super::draw::{DrawError, attribute_stream, indices};
+use super::state::State;
+use crate::command::{DrawParameters, camera};
+use crate::pipeline::GraphicsPipeline;
+use crate::pipeline::gaussian::stages::VertexProjection;
+use crate::pipeline::gaussian::{
+    CameraSource, GaussianAttributeSources, GaussianPipeline, GaussianSource,
+};
+use crate::pipeline::state::AttributeSource;
+use simdevice::Packet;
+use simdevice::bindings::Bindings;
+use simdevice::packet::draw::{self, DrawState, ResolveShader, Topology};
+use simdevice::packet::{
+    Camera, CameraModel, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianGeometry,
+    GaussianPrecision, GaussianState, ModelAttributes, Viewport,
+};
+use std::sync::Arc;
+
+/// The packets that begin a sorted set.
+///
+/// # Errors
+/// [`DrawError`] where bound state that the set needs is missing.
+pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Packet>, DrawError> {
+    let mut packets = vec![Packet::GaussianBegin(Box::new(GaussianBegin {
+        state: fixed_state(state, gaussian)?,
+        camera: enabled_camera(state, gaussian)?,
+        viewport: upright(state.viewport(gaussian).ok_or(DrawError::Viewport)?),
+        scissor: state.scissor(gaussian).ok_or(DrawError::Scissor)?,
+    }))];
+    if let Some(stage) = &gaussian.resolve {
+        let (sets, constants) = (&state.graphics_sets, &state.push_constants);
+        packets.push(Packet::GaussianResolveShader(Box::new(ResolveShader {
+            program: Arc::clone(&stage.program),
+            bindings: descriptors::bindings(&stage.descriptors, sets, constants)?,
+            sample_shading: stage.sample_shading,
+            alpha_to_coverage: stage.alpha_to_coverage,
+            alpha_to_one: stage.alpha_to_one,
+        })));
+    }
+    Ok(packets)
+}
+
+/// The packet that adds a draw to a sorted set.
+///
+/// # Errors
+/// [`DrawError`] where a buffer that the draw needs is not bound.
+pub(crate) fn append(
+    state: &State,
+    pipeline: &GraphicsPipeline,
+    gaussian: &GaussianPipeline,
+    draw: &DrawParameters,
+    draw_index: u32,
+) -> Result<Packet, DrawError> {
+    let sources = match &gaussian.source {
+        GaussianSource::Attributes(sources) => sources,
+        GaussianSource::VertexShader(projection) => {
+            return shaded(state, pipeline, gaussian, projection, draw, draw_index);
+        }
+    };
+    Ok(Packet::GaussianAppend(Box::new(GaussianAppend {
+        attributes: attributes(state, pipeline, sources)?,
+        indices: indices(state, draw)?,
+        first: draw.first,
+        count: draw.count,
+        first_instance: draw.first_instance,
+        instance_count: draw.instance_count,
+    })))
+}
+
+/// The packet that adds a draw whose Gaussians a vertex shader projects.
+fn shaded(
+    state: &State,
+    pipeline: &GraphicsPipeline,
+    gaussian: &GaussianPipeline,
+    projection: &VertexProjection,
+    parameters: &DrawParameters,
+    draw_index: u32,
+) -> Result<Packet, DrawError> {
+    let attributes = projection
+        .attributes
+        .iter()
+        .map(|source| attribute_stream(state, pipeline, source));
+    let bindings = descriptors::bindings(
+        &projection.descriptors,
+        &state.graphics_sets,
+        &state.push_constants,
+    )?;
+    let viewport = state.viewport(gaussian).ok_or(DrawError::Viewport)?;
+    Ok(Packet::GaussianAppendDraw(Box::new(draw::Draw {
+        pipeline: Arc::clone(&projection.programs),
+        attributes: attributes.collect::<Result<_, _>>()?,
+        vertex_bindings: bindings,
+        fragment_bindings: Bindings::default(),
+        indices: indices(state, parameters)?,
+        first: parameters.first,
+        count: parameters.count,
+        first_instance: parameters.first_instance,
+        instance_count: parameters.instance_count,
+        draw_index,
+        state: Arc::new(DrawState {
+            viewports: vec![viewport],
+            ..DrawState::new(Topology::PointList, [0; 2])
+        }),
+    })))
+}
+
+/// The camera that a draw sees with, if its model's feature is enabled.
+fn enabled_camera(state: &State, gaussian: &GaussianPipeline) -> Result<Camera, DrawError> {
+    let camera = camera(state, gaussian.camera)?;
+    if !gaussian.camera_models.have(camera.model) {
+        return Err(DrawError::CameraModel(camera.model));
+    }
+    let state = &gaussian.state;
+    let is_seen = match camera.model {
+        CameraModel::Pinhole | CameraModel::Orthographic => true,
+        CameraModel::Fisheye => state.geometry == GaussianGeometry::Volume,
+        CameraModel::Equirectangular => {
+            state.geometry == GaussianGeometry::Volume
+                && state.precision == GaussianPrecision::Float32
+        }
+    };
+    if !is_seen {
+        return Err(DrawError::ModeOfCameraModel(camera.model));
+    }
+    Ok(camera)
+}
+
+/// The camera that a draw is given.
+fn camera(state: &State, source: CameraSource) -> Result<Camera, DrawError> {
+    let (set, binding) = match source {
+        CameraSource::None => return Ok(Camera::default()),
+        CameraSource::Command => return state.camera.ok_or(DrawError::Camera),
+        CameraSource::UniformBuffer { set, binding } => (set, binding),
+    };
+    let bound = state
+        .graphics_sets
+        .get(set)
+        .ok_or(DescriptorSetNotBound(set))?;
+    let range = bound
+        .buffer(binding)
+        .ok_or(DrawError::CameraBuffer { set, binding })?;
+    camera::read(&range).map_err(|error| DrawError::CameraData(error.to_string()))
+}
+
+/// The state of the pipeline, with the dynamic part filled in.
+fn fixed_state(
+    state: &State,
+    gaussian: &GaussianPipeline,
+) -> Result<Arc<GaussianState>, DrawError> {
+    if gaussian.dynamic.is_empty() {
+        return Ok(Arc::clone(&gaussian.state));
+    }
+    let mut fixed = gaussian.fixed.clone();
+    state
+        .dynamic_states
+        .apply(&gaussian.dynamic, &mut fixed)
+        .map_err(DrawError::Dynamic)?;
+    let converted = fixed.draw_state();
+    Ok(Arc::new(GaussianState {
+        depth_stencil: converted.depth_stencil,
+        blend_constants: converted.blend_constants,
+        ..GaussianState::clone(&gaussian.state)
+    }))
+}
+
+/// A Gaussian's pixels count from the upper left corner of the area that the viewport covers, so a negative
+/// height changes nothing but where that corner is.
+fn upright(viewport: Viewport) -> Viewport {
+    if viewport.height >= 0.0 {
+        return viewport;
+    }
+    Viewport {
+        y: viewport.y + viewport.height,
+        height: -viewport.height,
+        ..viewport
+    }
+}
+
+fn attributes(
+    state: &State,
+    pipeline: &GraphicsPipeline,
+    sources: &GaussianAttributeSources,
+) -> Result<GaussianAttributes, DrawError> {
+    let stream = |source: &AttributeSource| attribute_stream(state, pipeline, source);
+    Ok(GaussianAttributes {
+        position: stream(&sources.position)?,
+        scale: stream(&sources.scale)?,
+        rotation: stream(&sources.rotation)?,
+        opacity: stream(&sources.opacity)?,
+        spherical_harmonics: sources
+            .spherical_harmonics
+            .iter()
+            .map(stream)
+            .collect::<Result<_, _>>()?,
+        model: ModelAttributes {
+            matrix: match &sources.model_matrix {
+                None => None,
+                Some([x, y, z]) => Some(Box::new([stream(x)?, stream(y)?, stream(z)?])),
+            },
+            opacity: sources.model_opacity.as_ref().map(stream).transpose()?,
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_negative_height_moves_the_corner() {
+        let viewport = Viewport {
+            x: 3.0,
+            y: 90.0,
+            width: 50.0,
+            height: -80.0,
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
+        let upright = upright(viewport);
+        assert_eq!((upright.y, upright.height), (10.0, 80.0));
+        assert_eq!((upright.x, upright.width), (3.0, 50.0));
+    }
+}

@@ -1,0 +1,275 @@
+//! Replay of recorded commands: the one match from a recording to the packets that the device executes.
+
+mod descriptors;
+mod draw;
+mod gaussian;
+mod state;
+
+use self::draw::DrawError;
+use self::state::{State, bind};
+use super::{Command, DrawIndirect, DrawParameters, query};
+use crate::abi::error::Error;
+use crate::device_sync::{DeviceSync, WaitResult};
+use crate::instance::Instance;
+use crate::pipeline::PipelineKind;
+use ash::vk;
+use simdevice::command_processor::ExecutionError;
+use simdevice::{CommandProcessor, Packet};
+
+/// The execution of commands on a queue's thread.
+pub(super) struct Execution<'a> {
+    /// The queue's command processor.
+    pub(super) processor: &'a mut CommandProcessor,
+    /// The things that are waited for on the device, and its loss.
+    pub(super) sync: &'a DeviceSync,
+    /// The instance that hears of what the application should not have recorded.
+    pub(super) instance: &'a Instance,
+}
+
+impl Execution<'_> {
+    /// Waits until `ready`.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`] if the device was lost meanwhile.
+    pub(super) fn wait(&self, ready: impl Fn() -> bool) -> Result<(), Error> {
+        match self.sync.wait(None, ready) {
+            WaitResult::Ready => Ok(()),
+            WaitResult::TimedOut | WaitResult::Lost => {
+                Err(Error::DeviceLost("it was lost while a queue waited".into()))
+            }
+        }
+    }
+
+    /// Executes a packet; everything before it has been executed.
+    fn execute(&mut self, packet: &Packet) -> Result<(), Error> {
+        match self.processor.execute(packet) {
+            // The draw draws nothing, and what follows is as if it weren't there.
+            Err(error @ ExecutionError::TooManyGaussians(_)) => {
+                self.report(&format!("a draw draws nothing: {error}"));
+                Ok(())
+            }
+            executed => executed.map_err(|error| Error::DeviceLost(error.to_string())),
+        }
+    }
+
+    /// Tells the application of something that it should not have recorded.
+    fn report(&self, message: &str) {
+        log::warn!("{message}");
+        self.instance.report(
+            vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
+            vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION,
+            "GAURAST-draw-skipped",
+            message,
+        );
+    }
+}
+
+/// Replays a command buffer.
+///
+/// # Errors
+/// [`Error::DeviceLost`] if the device is lost while it executes; what follows in the command buffer is then not executed.
+pub(super) fn replay(commands: &[Command], execution: &mut Execution<'_>) -> Result<(), Error> {
+    let mut state = State::default();
+    for command in commands {
+        end_merged_draws_before(command, &mut state, execution)?;
+        execute(command, &mut state, execution)?;
+    }
+    end_merged_draws(&mut state, execution)
+}
+
+/// Ends the sorted set that draws are merged into, unless the command may come between them.
+fn end_merged_draws_before(
+    command: &Command,
+    state: &mut State,
+    execution: &mut Execution<'_>,
+) -> Result<(), Error> {
+    match command {
+        Command::Draw(_)
+        | Command::DrawIndirect(_)
+        | Command::BindVertexBuffers { .. }
+        | Command::BindIndexBuffer(_) => Ok(()),
+        // What a vertex shader is bound to may change from draw to draw.
+        Command::BindSets(_) | Command::PushDescriptors(_) | Command::PushConstants { .. }
+            if state.shades_gaussians() =>
+        {
+            Ok(())
+        }
+        _ => end_merged_draws(state, execution),
+    }
+}
+
+fn end_merged_draws(state: &mut State, execution: &mut Execution<'_>) -> Result<(), Error> {
+    if std::mem::take(&mut state.merged_draws_open) {
+        execution.execute(&Packet::GaussianResolve)?;
+    }
+    Ok(())
+}
+
+fn execute(
+    command: &Command,
+    state: &mut State,
+    execution: &mut Execution<'_>,
+) -> Result<(), Error> {
+    match command {
+        Command::Packet(packet) => execution.execute(packet)?,
+        Command::BindPipeline(pipeline) => {
+            state.pipeline = Some(pipeline.clone());
+            state.draw_state = None;
+        }
+        Command::BindVertexBuffers { first, buffers } => {
+            bind(&mut state.vertex_buffers, *first, buffers);
+        }
+        Command::BindIndexBuffer(buffer) => state.index_buffer = Some(buffer.clone()),
+        Command::SetViewports {
+            first,
+            viewports,
+            with_count,
+        } => {
+            bind(&mut state.viewports, *first, viewports);
+            if *with_count {
+                state.viewport_count = Some(viewports.len() as u32);
+            }
+            state.draw_state = None;
+        }
+        Command::SetScissors {
+            first,
+            scissors,
+            with_count,
+        } => {
+            bind(&mut state.scissors, *first, scissors);
+            if *with_count {
+                state.scissor_count = Some(scissors.len() as u32);
+            }
+            state.draw_state = None;
+        }
+        Command::SetDynamicState(dynamic_state) => {
+            state.dynamic_states.set(*dynamic_state);
+            state.draw_state = None;
+        }
+        Command::SetCamera(camera) => state.camera = Some(**camera),
+        Command::Draw(parameters) => draw(state, parameters, 0, execution)?,
+        Command::DrawIndirect(indirect) => draw_indirect(state, indirect, execution)?,
+        Command::BindComputePipeline(pipeline) => state.compute_pipeline = Some(pipeline.clone()),
+        Command::BindSets(bind) => state.sets_mut(bind.bind_point).bind(bind.first, &bind.sets),
+        Command::PushDescriptors(push) => {
+            let sets = state.sets_mut(push.bind_point);
+            if let Err(error) = sets.push(push.set, &push.layout, &push.writes) {
+                execution.report(&format!("descriptors are not pushed: {error}"));
+            }
+        }
+        Command::PushConstants { offset, bytes } => state.push_constants(*offset, bytes),
+        Command::Dispatch { base, count } => dispatch(state, *base, *count, execution)?,
+        Command::DispatchIndirect(range) => {
+            let mut count = [0; 3];
+            // The range was checked when the command was recorded.
+            if range.memory.read(range.offset, &mut count).is_ok() {
+                dispatch(state, [0; 3], count, execution)?;
+            }
+        }
+        Command::SetEvent(event, value) => event.set(*value),
+        Command::WaitEvents(events) => {
+            for event in events {
+                execution.wait(|| event.is_set())?;
+            }
+        }
+        Command::CopyQueryResults(copy) => {
+            // Everything before has been executed, so a query that isn't available now never will be by this queue.
+            for packet in query::copy_packets(copy) {
+                execution.execute(&packet)?;
+            }
+        }
+        Command::Execute(secondaries) => {
+            for commands in secondaries {
+                replay(commands, execution)?;
+            }
+            // Bound state is undefined after secondaries.
+            *state = State::default();
+        }
+    }
+    Ok(())
+}
+
+fn draw(
+    state: &mut State,
+    parameters: &DrawParameters,
+    draw_index: u32,
+    execution: &mut Execution<'_>,
+) -> Result<(), Error> {
+    if parameters.count == 0 || parameters.instance_count == 0 {
+        return Ok(());
+    }
+    match packets(state, parameters, draw_index) {
+        Ok(packets) => packets
+            .iter()
+            .try_for_each(|packet| execution.execute(packet)),
+        Err(reason) => {
+            execution.report(&format!("a draw draws nothing: {reason}"));
+            Ok(())
+        }
+    }
+}
+
+/// The packets of a draw.
+fn packets(
+    state: &mut State,
+    parameters: &DrawParameters,
+    draw_index: u32,
+) -> Result<Vec<Packet>, DrawError> {
+    let pipeline = state.pipeline.clone().ok_or(DrawError::Pipeline)?;
+    match &pipeline.kind {
+        PipelineKind::Gaussian(gaussian) => {
+            let append = gaussian::append(state, &pipeline, gaussian, parameters, draw_index)?;
+            if state.merged_draws_open {
+                return Ok(vec![append]);
+            }
+            let mut packets = gaussian::begin(state, gaussian)?;
+            state.merged_draws_open = gaussian.merges_draws;
+            packets.push(append);
+            if !gaussian.merges_draws {
+                packets.push(Packet::GaussianResolve);
+            }
+            Ok(packets)
+        }
+        PipelineKind::Primitive(primitives) => {
+            draw::primitives(state, &pipeline, primitives, parameters, draw_index)
+                .map(|packet| vec![packet])
+        }
+    }
+}
+
+fn dispatch(
+    state: &State,
+    base: [u32; 3],
+    count: [u32; 3],
+    execution: &mut Execution<'_>,
+) -> Result<(), Error> {
+    match descriptors::dispatch(state, base, count) {
+        Ok(packet) => execution.execute(&packet),
+        Err(reason) => {
+            execution.report(&format!("a dispatch does nothing: {reason}"));
+            Ok(())
+        }
+    }
+}
+
+fn draw_indirect(
+    state: &mut State,
+    indirect: &DrawIndirect,
+    execution: &mut Execution<'_>,
+) -> Result<(), Error> {
+    let draw_count = match indirect.count.as_ref().map(draw::read_count) {
+        None => indirect.draw_count,
+        Some(count) => count.unwrap_or(0).min(indirect.draw_count),
+    };
+    for index in 0..draw_count {
+        let offset = u64::from(index) * u64::from(indirect.stride);
+        match draw::read_draw(&indirect.parameters, offset, indirect.indexed) {
+            Some(parameters) => draw(state, &parameters, index, execution)?,
+            None => {
+                execution.report("an indirect draw's parameters lie outside their buffer");
+                break;
+            }
+        }
+    }
+    Ok(())
+}

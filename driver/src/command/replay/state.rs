@@ -1,0 +1,163 @@
+//! The state that a command buffer's draws read, as the commands replayed so far have left it.
+
+use crate::abi::error::Error;
+use crate::command::{BindPoint, BoundSet, IndexBuffer, VertexBuffer};
+use crate::descriptor::layout::DescriptorSetLayout;
+use crate::descriptor::set::{DescriptorSet, Write};
+use crate::pipeline::compute::ComputePipeline;
+use crate::pipeline::dynamic_state::DynamicStates;
+use crate::pipeline::gaussian::{GaussianPipeline, GaussianSource};
+use crate::pipeline::{GraphicsPipeline, PipelineKind};
+use simdevice::packet::draw::DrawState;
+use simdevice::packet::{Camera, Rect, Viewport};
+use std::sync::Arc;
+
+/// Bound state. All of it is undefined when a command buffer begins; here "undefined" is `None`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct State {
+    /// The graphics pipeline.
+    pub(crate) pipeline: Option<Arc<GraphicsPipeline>>,
+    /// The compute pipeline.
+    pub(crate) compute_pipeline: Option<Arc<ComputePipeline>>,
+    /// The descriptor sets of draws.
+    pub(crate) graphics_sets: BoundSets,
+    /// The descriptor sets of dispatches.
+    pub(crate) compute_sets: BoundSets,
+    /// Push constants, as far as any were pushed.
+    pub(crate) push_constants: Vec<u8>,
+    /// The vertex buffers by binding.
+    pub(crate) vertex_buffers: Vec<Option<VertexBuffer>>,
+    /// The index buffer.
+    pub(crate) index_buffer: Option<IndexBuffer>,
+    /// Dynamic viewports.
+    pub(crate) viewports: Vec<Option<Viewport>>,
+    /// Dynamic scissors.
+    pub(crate) scissors: Vec<Option<Rect>>,
+    /// The number of viewports, where they were set with their count.
+    pub(crate) viewport_count: Option<u32>,
+    /// The number of scissors, where they were set with their count.
+    pub(crate) scissor_count: Option<u32>,
+    /// All other dynamic state.
+    pub(crate) dynamic_states: DynamicStates,
+    /// The fixed-function state that the last draw made of all this, unless something has changed since.
+    pub(crate) draw_state: Option<Arc<DrawState>>,
+    /// The camera of Gaussian draws; kept when another pipeline is bound.
+    pub(crate) camera: Option<Camera>,
+    /// True if draws are being merged into a sorted set that has begun.
+    pub(crate) merged_draws_open: bool,
+}
+
+impl State {
+    /// The viewport in effect: the pipeline's, or the dynamic one.
+    pub(crate) fn viewport(&self, pipeline: &GaussianPipeline) -> Option<Viewport> {
+        pipeline
+            .viewport
+            .or_else(|| self.viewports.first().copied().flatten())
+    }
+
+    /// The scissor in effect: the pipeline's, or the dynamic one.
+    pub(crate) fn scissor(&self, pipeline: &GaussianPipeline) -> Option<Rect> {
+        pipeline
+            .scissor
+            .or_else(|| self.scissors.first().copied().flatten())
+    }
+
+    /// Tells if the pipeline's Gaussians are projected by a vertex shader.
+    pub(crate) fn shades_gaussians(&self) -> bool {
+        let primitive = self.pipeline.as_ref().map(|pipeline| &pipeline.kind);
+        matches!(primitive, Some(PipelineKind::Gaussian(gaussian))
+            if matches!(gaussian.source, GaussianSource::VertexShader(_)))
+    }
+
+    /// The descriptor sets of a bind point.
+    pub(crate) fn sets_mut(&mut self, bind_point: BindPoint) -> &mut BoundSets {
+        match bind_point {
+            BindPoint::Graphics => &mut self.graphics_sets,
+            BindPoint::Compute => &mut self.compute_sets,
+        }
+    }
+
+    /// Replaces push constants from byte `offset` on.
+    pub(crate) fn push_constants(&mut self, offset: u32, bytes: &[u8]) {
+        let range = offset as usize..offset as usize + bytes.len();
+        if self.push_constants.len() < range.end {
+            self.push_constants.resize(range.end, 0);
+        }
+        self.push_constants[range].copy_from_slice(bytes);
+    }
+
+    /// The vertex buffer bound at `binding`.
+    pub(crate) fn vertex_buffer(&self, binding: u32) -> Option<&VertexBuffer> {
+        self.vertex_buffers.get(binding as usize)?.as_ref()
+    }
+}
+
+/// Replaces the elements of `slots` from `first` on by `values`, growing it as needed.
+pub(crate) fn bind<T: Clone>(slots: &mut Vec<Option<T>>, first: u32, values: &[T]) {
+    let first = first as usize;
+    let end = first + values.len();
+    if slots.len() < end {
+        slots.resize(end, None);
+    }
+    for (slot, value) in slots[first..end].iter_mut().zip(values) {
+        *slot = Some(value.clone());
+    }
+}
+
+/// The sets of a bind point, by number.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct BoundSets(Vec<Option<BoundSet>>);
+
+impl BoundSets {
+    /// Binds sets from number `first` on.
+    pub(crate) fn bind(&mut self, first: u32, sets: &[BoundSet]) {
+        bind(&mut self.0, first, sets);
+    }
+
+    /// Changes descriptors of the pushed set `number`. What was pushed before stays, if it had the same layout.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if the layout does not have what is written.
+    pub(crate) fn push(
+        &mut self,
+        number: u32,
+        layout: &Arc<DescriptorSetLayout>,
+        writes: &[Write],
+    ) -> Result<(), Error> {
+        let same = |bound: &&BoundSet| {
+            bound.set.layout().is_push() && Arc::ptr_eq(bound.set.layout(), layout)
+        };
+        let set = match self.get(number).filter(same) {
+            Some(bound) => Arc::clone(&bound.set),
+            None => {
+                let set = Arc::new(DescriptorSet::new(Arc::clone(layout)));
+                let bound = BoundSet {
+                    set: Arc::clone(&set),
+                    dynamic_offsets: Vec::new(),
+                };
+                self.bind(number, &[bound]);
+                set
+            }
+        };
+        writes.iter().try_for_each(|write| set.write(write))
+    }
+
+    /// Set `number`.
+    pub(crate) fn get(&self, number: u32) -> Option<&BoundSet> {
+        self.0.get(number as usize)?.as_ref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn binding_replaces_a_range_and_leaves_the_rest() {
+        let mut slots = Vec::new();
+        bind(&mut slots, 2, &[5, 6]);
+        bind(&mut slots, 1, &[7]);
+        bind(&mut slots, 2, &[8]);
+        assert_eq!(slots, [None, Some(7), Some(8), Some(6)]);
+    }
+}

@@ -1,0 +1,340 @@
+//! Descriptor set layouts.
+
+use crate::abi::error::Error;
+use crate::abi::handle::{self, objects};
+use crate::abi::valid::{self, OutputChain};
+use crate::physical_device::limits;
+use crate::resource::sampler::Sampler;
+use ash::vk;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The most descriptors of a set.
+pub(crate) const MAX_DESCRIPTORS: u32 = 1 << 20;
+
+/// A binding, as the application describes it.
+#[derive(Clone, Debug)]
+pub(crate) struct BindingInfo {
+    /// Its number.
+    pub(crate) number: u32,
+    /// The kind of its descriptors.
+    pub(crate) kind: vk::DescriptorType,
+    /// The number of descriptors that it has; 0 reserves the number.
+    pub(crate) count: u32,
+    /// The stages that may use it.
+    pub(crate) stages: vk::ShaderStageFlags,
+    /// Samplers that never change, one for each descriptor; or empty.
+    pub(crate) immutable_samplers: Vec<Arc<Sampler>>,
+}
+
+/// A binding in its set.
+#[derive(Clone, Debug)]
+pub(crate) struct LayoutBinding {
+    /// The kind of its descriptors.
+    pub(crate) kind: vk::DescriptorType,
+    /// The number of descriptors that it has.
+    pub(crate) count: u32,
+    /// The stages that may use it.
+    pub(crate) stages: vk::ShaderStageFlags,
+    /// Samplers that never change, one for each descriptor; or empty.
+    pub(crate) immutable_samplers: Vec<Arc<Sampler>>,
+    /// Its first descriptor's index in the set.
+    pub(crate) first: usize,
+    /// Its first dynamic offset's index among the set's, if its offsets are dynamic.
+    pub(crate) first_dynamic: Option<usize>,
+}
+
+/// A descriptor set layout.
+#[derive(Debug)]
+pub(crate) struct DescriptorSetLayout {
+    bindings: BTreeMap<u32, LayoutBinding>,
+    count: usize,
+    dynamic_count: usize,
+    is_push: bool,
+}
+
+objects! { vk::DescriptorSetLayout => DescriptorSetLayout; }
+
+/// Tells if the kind's offsets are given when the set is bound.
+pub(crate) fn is_dynamic(kind: vk::DescriptorType) -> bool {
+    matches!(
+        kind,
+        vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC | vk::DescriptorType::STORAGE_BUFFER_DYNAMIC
+    )
+}
+
+/// Tells if the driver has descriptors of this kind.
+pub(crate) fn is_supported(kind: vk::DescriptorType) -> bool {
+    matches!(
+        kind,
+        vk::DescriptorType::SAMPLER
+            | vk::DescriptorType::COMBINED_IMAGE_SAMPLER
+            | vk::DescriptorType::SAMPLED_IMAGE
+            | vk::DescriptorType::STORAGE_IMAGE
+            | vk::DescriptorType::UNIFORM_TEXEL_BUFFER
+            | vk::DescriptorType::STORAGE_TEXEL_BUFFER
+            | vk::DescriptorType::UNIFORM_BUFFER
+            | vk::DescriptorType::STORAGE_BUFFER
+            | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
+            | vk::DescriptorType::STORAGE_BUFFER_DYNAMIC
+            | vk::DescriptorType::INPUT_ATTACHMENT
+    )
+}
+
+impl DescriptorSetLayout {
+    /// A layout of bindings; `is_push` if its sets are pushed by commands rather than allocated.
+    ///
+    /// # Errors
+    /// [`Error::FeatureNotPresent`] for a kind of descriptor that there isn't, or too many of them;
+    /// [`Error::InvalidUsage`] if two bindings have one number.
+    pub(crate) fn new(infos: Vec<BindingInfo>, is_push: bool) -> Result<Self, Error> {
+        let mut sorted = BTreeMap::new();
+        for info in infos {
+            if !is_supported(info.kind) && info.count > 0 {
+                return Err(Error::FeatureNotPresent(format!(
+                    "a descriptor of type {:?}",
+                    info.kind
+                )));
+            }
+            let number = info.number;
+            if sorted.insert(number, info).is_some() {
+                return Err(Error::usage(
+                    "VUID-VkDescriptorSetLayoutCreateInfo-binding-00279",
+                    format!("binding {number} is there twice"),
+                ));
+            }
+        }
+        let total: u64 = sorted.values().map(|info| u64::from(info.count)).sum();
+        if total > u64::from(MAX_DESCRIPTORS) {
+            return Err(Error::FeatureNotPresent(format!(
+                "a descriptor set of {total} descriptors (there may be {MAX_DESCRIPTORS})"
+            )));
+        }
+        let (mut count, mut dynamic_count) = (0, 0);
+        let place = |(number, info): (u32, BindingInfo)| {
+            let (first, first_dynamic) = (count, dynamic_count);
+            let dynamic = is_dynamic(info.kind);
+            count += info.count as usize;
+            dynamic_count += if dynamic { info.count as usize } else { 0 };
+            let binding = LayoutBinding {
+                kind: info.kind,
+                count: info.count,
+                stages: info.stages,
+                immutable_samplers: info.immutable_samplers,
+                first,
+                first_dynamic: dynamic.then_some(first_dynamic),
+            };
+            (number, binding)
+        };
+        let bindings = sorted.into_iter().map(place).collect();
+        Ok(Self {
+            bindings,
+            count,
+            dynamic_count,
+            is_push,
+        })
+    }
+
+    /// The binding of that number, unless it has no descriptors.
+    pub(crate) fn binding(&self, number: u32) -> Option<&LayoutBinding> {
+        self.bindings
+            .get(&number)
+            .filter(|binding| binding.count > 0)
+    }
+
+    /// The bindings in order of their descriptors.
+    pub(crate) fn bindings(&self) -> impl Iterator<Item = &LayoutBinding> {
+        self.bindings.values()
+    }
+
+    /// The bindings that have descriptors, with their numbers.
+    pub(crate) fn numbered(&self) -> impl Iterator<Item = (u32, &LayoutBinding)> {
+        let bindings = self
+            .bindings
+            .iter()
+            .map(|(&number, binding)| (number, binding));
+        bindings.filter(|(_, binding)| binding.count > 0)
+    }
+
+    /// The number of descriptors that a set has.
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The number of dynamic offsets that a set takes.
+    pub(crate) fn dynamic_count(&self) -> usize {
+        self.dynamic_count
+    }
+
+    /// Tells if its sets are pushed rather than allocated.
+    pub(crate) fn is_push(&self) -> bool {
+        self.is_push
+    }
+
+    /// The index in the set of element `element` of binding `number`, which may lie beyond the binding.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if there is no such binding.
+    pub(crate) fn index(&self, number: u32, element: u32) -> Result<usize, Error> {
+        self.binding(number)
+            .map(|binding| binding.first + element as usize)
+            .ok_or_else(|| {
+                Error::usage(
+                    "VUID-VkWriteDescriptorSet-dstBinding-00315",
+                    format!("the descriptor set has no binding {number}"),
+                )
+            })
+    }
+}
+
+/// The layout that a create info asks for.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn new_layout(
+    info: &vk::DescriptorSetLayoutCreateInfo<'_>,
+) -> Result<DescriptorSetLayout, Error> {
+    let is_push = info
+        .flags
+        .contains(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR);
+    let known = vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR;
+    if !known.contains(info.flags) {
+        return Err(Error::FeatureNotPresent(format!(
+            "a descriptor set layout with flags {:?}",
+            info.flags
+        )));
+    }
+    // SAFETY: the caller's promise.
+    unsafe {
+        if let Some(flags) =
+            valid::find_in_chain::<vk::DescriptorSetLayoutBindingFlagsCreateInfo<'_>>(info.p_next)
+        {
+            let flags = valid::slice(flags.p_binding_flags, flags.binding_count)?;
+            let known = vk::DescriptorBindingFlags::PARTIALLY_BOUND
+                | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING;
+            if let Some(flags) = flags.iter().find(|&&flags| !known.contains(flags)) {
+                return Err(Error::FeatureNotPresent(format!(
+                    "a descriptor binding with flags {flags:?}"
+                )));
+            }
+        }
+        let bindings = valid::slice(info.p_bindings, info.binding_count)?;
+        let bindings = bindings.iter().map(|binding| binding_info(binding));
+        let layout = DescriptorSetLayout::new(bindings.collect::<Result<_, _>>()?, is_push)?;
+        if is_push && layout.count() > limits::MAX_PUSH_DESCRIPTORS as usize {
+            return Err(Error::usage(
+                "VUID-VkDescriptorSetLayoutCreateInfo-flags-00281",
+                format!(
+                    "{} descriptors are pushed; there may be {}",
+                    layout.count(),
+                    limits::MAX_PUSH_DESCRIPTORS
+                ),
+            ));
+        }
+        Ok(layout)
+    }
+}
+
+/// A binding with its pointers followed.
+///
+/// # Safety
+/// The binding is valid.
+unsafe fn binding_info(binding: &vk::DescriptorSetLayoutBinding<'_>) -> Result<BindingInfo, Error> {
+    let has_samplers = matches!(
+        binding.descriptor_type,
+        vk::DescriptorType::SAMPLER | vk::DescriptorType::COMBINED_IMAGE_SAMPLER
+    );
+    let immutable_samplers = if has_samplers && !binding.p_immutable_samplers.is_null() {
+        // SAFETY: the caller's promise; kinds without samplers may have any pointer, which isn't followed.
+        unsafe {
+            let samplers = valid::slice(binding.p_immutable_samplers, binding.descriptor_count)?;
+            handle::get_all(samplers)?
+        }
+    } else {
+        Vec::new()
+    };
+    Ok(BindingInfo {
+        number: binding.binding,
+        kind: binding.descriptor_type,
+        count: binding.descriptor_count,
+        stages: binding.stage_flags,
+        immutable_samplers,
+    })
+}
+
+/// # Safety
+/// The create info and its chain are valid.
+#[doc(alias = "vkCreateDescriptorSetLayout")]
+pub(crate) unsafe fn create_descriptor_set_layout(
+    create_info: &vk::DescriptorSetLayoutCreateInfo<'_>,
+) -> Result<Arc<DescriptorSetLayout>, Error> {
+    // SAFETY: the caller's promise.
+    unsafe { new_layout(create_info) }.map(Arc::new)
+}
+
+/// # Safety
+/// As [`create_descriptor_set_layout`].
+#[doc(alias = "vkGetDescriptorSetLayoutSupport")]
+pub(crate) unsafe fn get_descriptor_set_layout_support(
+    create_info: &vk::DescriptorSetLayoutCreateInfo<'_>,
+    mut support: OutputChain<'_, vk::DescriptorSetLayoutSupport<'_>>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let layout = unsafe { new_layout(create_info) };
+    // A layout that is refused for another reason than its size has no answer but this.
+    let most = limits::MAX_PER_SET_DESCRIPTORS as usize;
+    support.supported = layout.is_ok_and(|layout| layout.count() <= most).into();
+    support.for_each_chained(|mut structure| {
+        if let Some(variable) =
+            structure.cast::<vk::DescriptorSetVariableDescriptorCountLayoutSupport<'_>>()
+        {
+            variable.max_variable_descriptor_count = 0;
+        }
+    });
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn info(number: u32, kind: vk::DescriptorType, count: u32) -> BindingInfo {
+        BindingInfo {
+            number,
+            kind,
+            count,
+            stages: vk::ShaderStageFlags::ALL,
+            immutable_samplers: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn bindings_follow_each_other_by_number() {
+        let dynamic = vk::DescriptorType::STORAGE_BUFFER_DYNAMIC;
+        let infos = vec![
+            info(9, dynamic, 2),
+            info(4, vk::DescriptorType::SAMPLER, 0),
+            info(2, vk::DescriptorType::UNIFORM_BUFFER, 3),
+            info(1, dynamic, 1),
+        ];
+        let layout = DescriptorSetLayout::new(infos, false).unwrap();
+        assert_eq!((layout.count(), layout.dynamic_count()), (6, 3));
+        assert_eq!(layout.index(2, 1).unwrap(), 2);
+        assert_eq!(layout.index(9, 0).unwrap(), 4);
+        assert_eq!(layout.binding(9).unwrap().first_dynamic, Some(1));
+        assert_eq!(layout.binding(2).unwrap().first_dynamic, None);
+        assert!(layout.index(4, 0).is_err(), "reserved only");
+        assert!(layout.index(3, 0).is_err());
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        let kind = vk::DescriptorType::STORAGE_BUFFER;
+        let twice = vec![info(1, kind, 1), info(1, kind, 1)];
+        assert!(DescriptorSetLayout::new(twice, false).is_err());
+        let many = vec![info(1, kind, u32::MAX), info(2, kind, u32::MAX)];
+        assert!(DescriptorSetLayout::new(many, false).is_err());
+        let unknown = vec![info(1, vk::DescriptorType::MUTABLE_EXT, 1)];
+        assert!(DescriptorSetLayout::new(unknown, false).is_err());
+    }
+}

@@ -1,0 +1,235 @@
+//! Descriptor pools.
+
+use super::layout::DescriptorSetLayout;
+use super::set::DescriptorSet;
+use crate::abi::error::Error;
+use crate::abi::handle::{self, objects};
+use crate::abi::valid;
+use ash::vk;
+use std::collections::{HashMap, HashSet};
+use std::mem::MaybeUninit;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A descriptor pool. It owns the handles of its sets, and gives no more than it was made for.
+#[derive(Debug)]
+pub(crate) struct DescriptorPool {
+    max_sets: usize,
+    sizes: HashMap<vk::DescriptorType, u64>,
+    allows_free: bool,
+    allocated: Mutex<Allocated>,
+}
+
+/// The sets that a pool has given, and how many descriptors of each kind they have.
+#[derive(Debug, Default)]
+struct Allocated {
+    sets: HashSet<vk::DescriptorSet>,
+    descriptors: HashMap<vk::DescriptorType, u64>,
+}
+
+objects! { vk::DescriptorPool => DescriptorPool; }
+
+impl DescriptorPool {
+    /// A pool of at most `max_sets` sets with descriptors of at most these sizes together.
+    pub(crate) fn new(
+        max_sets: u32,
+        pool_sizes: &[vk::DescriptorPoolSize],
+        flags: vk::DescriptorPoolCreateFlags,
+    ) -> Self {
+        let mut sizes = HashMap::new();
+        for size in pool_sizes {
+            *sizes.entry(size.ty).or_default() += u64::from(size.descriptor_count);
+        }
+        Self {
+            max_sets: max_sets as usize,
+            sizes,
+            allows_free: flags.contains(vk::DescriptorPoolCreateFlags::FREE_DESCRIPTOR_SET),
+            allocated: Mutex::default(),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Allocated> {
+        self.allocated
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes a set of each layout, or none.
+    ///
+    /// # Errors
+    /// [`Error::OutOfPoolMemory`].
+    pub(crate) fn allocate(
+        &self,
+        layouts: Vec<Arc<DescriptorSetLayout>>,
+    ) -> Result<Vec<vk::DescriptorSet>, Error> {
+        let mut allocated = self.lock();
+        let mut wanted = allocated.descriptors.clone();
+        layouts.iter().for_each(|layout| add(&mut wanted, layout));
+        let sets = allocated.sets.len() + layouts.len();
+        if sets > self.max_sets {
+            return Err(Error::OutOfPoolMemory(format!(
+                "{sets} sets are wanted of a pool of {}",
+                self.max_sets
+            )));
+        }
+        for (kind, &count) in &wanted {
+            let size = self.sizes.get(kind).copied().unwrap_or(0);
+            if count > size {
+                return Err(Error::OutOfPoolMemory(format!(
+                    "{count} descriptors of type {kind:?} are wanted of a pool of {size}"
+                )));
+            }
+        }
+        let sets: Vec<_> = layouts
+            .into_iter()
+            .map(|layout| handle::create(Arc::new(DescriptorSet::new(layout))))
+            .collect();
+        allocated.sets.extend(&sets);
+        allocated.descriptors = wanted;
+        Ok(sets)
+    }
+
+    /// Frees sets of this pool; null is allowed.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if sets of this pool are not freed singly, or one is not of this pool; it is left alone.
+    ///
+    /// # Safety
+    /// Nothing uses the handles any more.
+    pub(crate) unsafe fn free(&self, sets: &[vk::DescriptorSet]) -> Result<(), Error> {
+        if !self.allows_free {
+            return Err(Error::usage(
+                "VUID-vkFreeDescriptorSets-descriptorPool-00312",
+                "the pool was made without VK_DESCRIPTOR_POOL_CREATE_FREE_DESCRIPTOR_SET_BIT",
+            ));
+        }
+        let null = vk::DescriptorSet::null();
+        let mut allocated = self.lock();
+        for &set in sets.iter().filter(|&&set| set != null) {
+            if !allocated.sets.remove(&set) {
+                return Err(Error::usage(
+                    "VUID-vkFreeDescriptorSets-pDescriptorSets-parent",
+                    "a descriptor set is not of the pool",
+                ));
+            }
+            // SAFETY: the pool made the handle and has not destroyed it, and the caller uses it no more.
+            if let Some(set) = unsafe { handle::destroy(set) }? {
+                remove(&mut allocated.descriptors, set.layout());
+            }
+        }
+        Ok(())
+    }
+
+    /// Frees every set.
+    ///
+    /// # Errors
+    /// None but of a defect.
+    ///
+    /// # Safety
+    /// Nothing uses the handles of the pool's sets any more.
+    pub(crate) unsafe fn reset(&self) -> Result<(), Error> {
+        let allocated = std::mem::take(&mut *self.lock());
+        for set in allocated.sets {
+            // SAFETY: the pool made the handle and has not destroyed it, and the caller uses it no more.
+            unsafe { handle::destroy(set) }?;
+        }
+        Ok(())
+    }
+}
+
+fn add(counts: &mut HashMap<vk::DescriptorType, u64>, layout: &DescriptorSetLayout) {
+    for binding in layout.bindings() {
+        *counts.entry(binding.kind).or_default() += u64::from(binding.count);
+    }
+}
+
+fn remove(counts: &mut HashMap<vk::DescriptorType, u64>, layout: &DescriptorSetLayout) {
+    for binding in layout.bindings() {
+        let count = counts.entry(binding.kind).or_default();
+        *count = count.saturating_sub(binding.count.into());
+    }
+}
+
+/// # Safety
+/// The create info is valid.
+#[doc(alias = "vkCreateDescriptorPool")]
+pub(crate) unsafe fn create_descriptor_pool(
+    create_info: &vk::DescriptorPoolCreateInfo<'_>,
+) -> Result<Arc<DescriptorPool>, Error> {
+    let info = create_info;
+    let update_after_bind = vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND;
+    if info.flags.contains(update_after_bind) {
+        return Err(Error::FeatureNotPresent(
+            "a descriptor pool for update after bind".into(),
+        ));
+    }
+    // SAFETY: the caller's promise.
+    let sizes = unsafe { valid::slice(info.p_pool_sizes, info.pool_size_count)? };
+    Ok(Arc::new(DescriptorPool::new(
+        info.max_sets,
+        sizes,
+        info.flags,
+    )))
+}
+
+/// # Safety
+/// Nothing uses the pool's sets any more.
+#[doc(alias = "vkDestroyDescriptorPool")]
+pub(crate) unsafe fn destroy_descriptor_pool(
+    descriptor_pool: Option<Arc<DescriptorPool>>,
+) -> Result<(), Error> {
+    match descriptor_pool {
+        // SAFETY: the caller's promise.
+        Some(pool) => unsafe { pool.reset() },
+        None => Ok(()),
+    }
+}
+
+/// # Safety
+/// Nothing uses the pool's sets any more.
+#[doc(alias = "vkResetDescriptorPool")]
+pub(crate) unsafe fn reset_descriptor_pool(descriptor_pool: &DescriptorPool) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe { descriptor_pool.reset() }
+}
+
+/// Allocates sets; all are null if any fails.
+///
+/// # Safety
+/// The allocate info and its handles are valid.
+#[doc(alias = "vkAllocateDescriptorSets")]
+pub(crate) unsafe fn allocate_descriptor_sets(
+    allocate_info: &vk::DescriptorSetAllocateInfo<'_>,
+    descriptor_sets: &mut [MaybeUninit<vk::DescriptorSet>],
+) -> Result<(), Error> {
+    let info = allocate_info;
+    descriptor_sets.fill(MaybeUninit::new(vk::DescriptorSet::null()));
+    // SAFETY: the caller's promise.
+    let (pool, layouts) = unsafe {
+        let layouts = valid::slice(info.p_set_layouts, info.descriptor_set_count)?;
+        (
+            handle::get(info.descriptor_pool)?,
+            handle::get_all(layouts)?,
+        )
+    };
+    if layouts.iter().any(|layout| layout.is_push()) {
+        return Err(Error::usage(
+            "VUID-VkDescriptorSetAllocateInfo-pSetLayouts-00308",
+            "a set is allocated whose layout is for pushed descriptors",
+        ));
+    }
+    for (place, set) in descriptor_sets.iter_mut().zip(pool.allocate(layouts)?) {
+        place.write(set);
+    }
+    Ok(())
+}
+
+/// # Safety
+/// Nothing uses the sets any more.
+#[doc(alias = "vkFreeDescriptorSets")]
+pub(crate) unsafe fn free_descriptor_sets(
+    descriptor_pool: &DescriptorPool,
+    descriptor_sets: &[vk::DescriptorSet],
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe { descriptor_pool.free(descriptor_sets) }
+}

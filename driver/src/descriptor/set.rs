@@ -1,0 +1,526 @@
+//! Descriptor sets, their descriptors, and updates of them: writes, copies and templates.
+
+use super::layout::{DescriptorSetLayout, LayoutBinding};
+use crate::abi::error::Error;
+use crate::abi::handle::{self, objects};
+use crate::abi::valid;
+use crate::device::Device;
+use crate::resource::buffer::{BufferRules, BufferView};
+use crate::resource::image::ImageView;
+use crate::resource::sampler::Sampler;
+use ash::vk;
+use simdevice::host;
+use simdevice::packet::BufferRange;
+use std::ffi::c_void;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// An element of a descriptor set.
+#[derive(Clone, Debug, Default)]
+pub(crate) enum Descriptor {
+    /// Nothing: programs read zero from it.
+    #[default]
+    Empty,
+    /// A uniform or storage buffer.
+    Buffer(BufferDescriptor),
+    /// A texel buffer.
+    TexelBuffer(Arc<BufferView>),
+    /// An image, a sampler, or both.
+    Image {
+        /// The image.
+        view: Option<Arc<ImageView>>,
+        /// The sampler.
+        sampler: Option<Arc<Sampler>>,
+    },
+}
+
+/// A uniform or storage buffer's descriptor.
+#[derive(Clone, Debug)]
+pub(crate) struct BufferDescriptor {
+    /// The bytes from the descriptor's offset to the end of the buffer.
+    pub(crate) rest: BufferRange,
+    /// The number of them that count; `None` (`VK_WHOLE_SIZE`) for all.
+    pub(crate) size: Option<u64>,
+}
+
+impl BufferDescriptor {
+    /// The bytes that a program may reach, with a dynamic offset. They never go beyond the buffer.
+    pub(crate) fn range(&self, dynamic_offset: u32) -> BufferRange {
+        let offset = u64::from(dynamic_offset).min(self.rest.size);
+        let rest = self.rest.size - offset;
+        BufferRange {
+            memory: Arc::clone(&self.rest.memory),
+            offset: self.rest.offset + offset,
+            size: self.size.map_or(rest, |size| size.min(rest)),
+        }
+    }
+}
+
+/// A descriptor set. Commands read it when they execute.
+#[derive(Debug)]
+pub(crate) struct DescriptorSet {
+    layout: Arc<DescriptorSetLayout>,
+    descriptors: Mutex<Vec<Descriptor>>,
+}
+
+/// An update of consecutive descriptors: its contents are already converted.
+#[derive(Clone, Debug)]
+pub(crate) struct Write {
+    /// The first binding.
+    pub(crate) binding: u32,
+    /// The first element of it.
+    pub(crate) element: u32,
+    /// The kind of the descriptors.
+    pub(crate) kind: vk::DescriptorType,
+    /// The new descriptors.
+    pub(crate) descriptors: Vec<Descriptor>,
+}
+
+objects! {
+    vk::DescriptorSet => DescriptorSet;
+    vk::DescriptorUpdateTemplate => UpdateTemplate;
+}
+
+impl DescriptorSet {
+    /// A set that holds nothing but immutable samplers.
+    pub(crate) fn new(layout: Arc<DescriptorSetLayout>) -> Self {
+        let mut descriptors = host::with_capacity(layout.count());
+        for binding in layout.bindings() {
+            let samplers = binding
+                .immutable_samplers
+                .iter()
+                .map(|sampler| Descriptor::Image {
+                    view: None,
+                    sampler: Some(Arc::clone(sampler)),
+                });
+            descriptors.extend(samplers);
+            descriptors.resize(binding.first + binding.count as usize, Descriptor::Empty);
+        }
+        Self {
+            layout,
+            descriptors: Mutex::new(descriptors),
+        }
+    }
+
+    /// Its layout.
+    pub(crate) fn layout(&self) -> &Arc<DescriptorSetLayout> {
+        &self.layout
+    }
+
+    /// The descriptors, by index.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Vec<Descriptor>> {
+        self.descriptors
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Replaces descriptors.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`], and nothing is replaced, if the set does not have them, or has others.
+    pub(crate) fn write(&self, write: &Write) -> Result<(), Error> {
+        let first = self.layout.index(write.binding, write.element)?;
+        let end = first + write.descriptors.len();
+        if end > self.layout.count() {
+            return Err(Error::usage(
+                "VUID-VkWriteDescriptorSet-dstArrayElement-00321",
+                format!(
+                    "{} descriptors from element {} of binding {} on go beyond the set",
+                    write.descriptors.len(),
+                    write.element,
+                    write.binding
+                ),
+            ));
+        }
+        let written = self.overlapping(first, end);
+        if let Some(other) = written.iter().find(|binding| binding.kind != write.kind) {
+            return Err(Error::usage(
+                "VUID-VkWriteDescriptorSet-descriptorType-00319",
+                format!(
+                    "descriptors of type {:?} are written to binding {}, which has {:?}",
+                    write.kind, write.binding, other.kind
+                ),
+            ));
+        }
+        let immutable = written.iter().any(|b| !b.immutable_samplers.is_empty());
+        let mut descriptors = self.lock();
+        for (place, new) in descriptors[first..end].iter_mut().zip(&write.descriptors) {
+            replace(place, new.clone(), immutable);
+        }
+        Ok(())
+    }
+
+    /// Replaces `count` descriptors by those of another set, or of another part of this one.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`], and nothing is replaced, if either set does not have them.
+    pub(crate) fn copy(
+        &self,
+        (binding, element): (u32, u32),
+        source: &Self,
+        (source_binding, source_element): (u32, u32),
+        count: u32,
+    ) -> Result<(), Error> {
+        let kind = source.layout.binding(source_binding).map(|b| b.kind);
+        let start = source.layout.index(source_binding, source_element)?;
+        let found = source
+            .lock()
+            .get(start..start + count as usize)
+            .map(host::copied);
+        let Some(descriptors) = found else {
+            return Err(Error::usage(
+                "VUID-VkCopyDescriptorSet-srcArrayElement-00346",
+                format!(
+                    "{count} descriptors from element {source_element} of binding {source_binding} on go beyond the \
+                     set"
+                ),
+            ));
+        };
+        self.write(&Write {
+            binding,
+            element,
+            kind: kind.unwrap_or_default(),
+            descriptors,
+        })
+    }
+
+    /// The bindings that descriptors `first..end` belong to.
+    fn overlapping(&self, first: usize, end: usize) -> Vec<&LayoutBinding> {
+        let overlaps = |binding: &&LayoutBinding| {
+            binding.first < end && first < binding.first + binding.count as usize
+        };
+        self.layout.bindings().filter(overlaps).collect()
+    }
+}
+
+/// Replaces a descriptor; an immutable sampler stays.
+fn replace(place: &mut Descriptor, new: Descriptor, immutable: bool) {
+    match (place, new) {
+        (Descriptor::Image { view, .. }, Descriptor::Image { view: new, .. }) if immutable => {
+            *view = new;
+        }
+        (place, new) => *place = new,
+    }
+}
+
+/// A descriptor update template.
+#[derive(Debug)]
+pub(crate) struct UpdateTemplate {
+    /// The entries: what is updated, and where it lies in the application's data.
+    pub(crate) entries: Vec<vk::DescriptorUpdateTemplateEntry>,
+    /// For templates of pushed descriptors: the bind point that they are pushed to.
+    pub(crate) push_bind_point: Option<vk::PipelineBindPoint>,
+}
+
+/// Updates descriptors. There is no result to return, so that the device is lost where memory is wanting: what is drawn
+/// with them would be something else.
+fn update(device: &Device, body: impl FnOnce() -> Result<(), Error>) -> Result<(), Error> {
+    host::catch(body).unwrap_or_else(|memory| {
+        device.sync().lose(&memory.to_string());
+        Err(Error::OutOfHostMemory(memory.to_string()))
+    })
+}
+
+/// A write to a set of a layout, with its pointers followed and its objects looked up.
+///
+/// # Safety
+/// The write is valid.
+pub(crate) unsafe fn write(
+    info: &vk::WriteDescriptorSet<'_>,
+    layout: &DescriptorSetLayout,
+) -> Result<Write, Error> {
+    let kind = info.descriptor_type;
+    let contents = DescriptorSource::of(kind, layout, info.dst_binding)?;
+    let (data, stride) = match contents {
+        DescriptorSource::Image { .. } => (
+            info.p_image_info.cast(),
+            size_of::<vk::DescriptorImageInfo>(),
+        ),
+        DescriptorSource::Buffer => (
+            info.p_buffer_info.cast(),
+            size_of::<vk::DescriptorBufferInfo>(),
+        ),
+        DescriptorSource::TexelBuffer => {
+            (info.p_texel_buffer_view.cast(), size_of::<vk::BufferView>())
+        }
+    };
+    // SAFETY: the caller's promise: the array that belongs to the kind has as many elements.
+    let descriptors = unsafe { descriptors(contents, info.descriptor_count, data, stride)? };
+    Ok(Write {
+        binding: info.dst_binding,
+        element: info.dst_array_element,
+        kind,
+        descriptors,
+    })
+}
+
+/// The writes to a set of a layout that a template makes of the application's data.
+///
+/// # Safety
+/// The data is what the template describes.
+pub(crate) unsafe fn template_writes(
+    template: &UpdateTemplate,
+    layout: &DescriptorSetLayout,
+    data: *const c_void,
+) -> Result<Vec<Write>, Error> {
+    if data.is_null() {
+        return Err(Error::NullPointer {
+            what: "an update template's data",
+        });
+    }
+    let write = |entry: &vk::DescriptorUpdateTemplateEntry| {
+        let contents = DescriptorSource::of(entry.descriptor_type, layout, entry.dst_binding)?;
+        // SAFETY: the caller's promise: the entry's offset and stride lead to valid contents.
+        let descriptors = unsafe {
+            descriptors(
+                contents,
+                entry.descriptor_count,
+                data.byte_add(entry.offset),
+                entry.stride,
+            )?
+        };
+        Ok(Write {
+            binding: entry.dst_binding,
+            element: entry.dst_array_element,
+            kind: entry.descriptor_type,
+            descriptors,
+        })
+    };
+    let mut writes = host::with_capacity(template.entries.len());
+    for entry in &template.entries {
+        writes.push(write(entry)?);
+    }
+    Ok(writes)
+}
+
+/// The structure that describes a descriptor, and the parts of it that count.
+#[derive(Clone, Copy)]
+enum DescriptorSource {
+    Image { view: bool, sampler: bool },
+    Buffer,
+    TexelBuffer,
+}
+
+impl DescriptorSource {
+    /// The source of a descriptor of this kind in a binding of a layout.
+    fn of(
+        kind: vk::DescriptorType,
+        layout: &DescriptorSetLayout,
+        binding: u32,
+    ) -> Result<Self, Error> {
+        let immutable = layout
+            .binding(binding)
+            .is_some_and(|binding| !binding.immutable_samplers.is_empty());
+        match kind {
+            vk::DescriptorType::SAMPLER => Ok(Self::Image {
+                view: false,
+                sampler: !immutable,
+            }),
+            vk::DescriptorType::COMBINED_IMAGE_SAMPLER => Ok(Self::Image {
+                view: true,
+                sampler: !immutable,
+            }),
+            vk::DescriptorType::SAMPLED_IMAGE
+            | vk::DescriptorType::STORAGE_IMAGE
+            | vk::DescriptorType::INPUT_ATTACHMENT => Ok(Self::Image {
+                view: true,
+                sampler: false,
+            }),
+            vk::DescriptorType::UNIFORM_BUFFER
+            | vk::DescriptorType::STORAGE_BUFFER
+            | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
+            | vk::DescriptorType::STORAGE_BUFFER_DYNAMIC => Ok(Self::Buffer),
+            vk::DescriptorType::UNIFORM_TEXEL_BUFFER | vk::DescriptorType::STORAGE_TEXEL_BUFFER => {
+                Ok(Self::TexelBuffer)
+            }
+            other => Err(Error::FeatureNotPresent(format!(
+                "a descriptor of type {other:?}"
+            ))),
+        }
+    }
+}
+
+/// `count` descriptors, described every `stride` bytes from `data` on.
+///
+/// # Safety
+/// The structures that belong to the kind lie there and are valid.
+unsafe fn descriptors(
+    contents: DescriptorSource,
+    count: u32,
+    data: *const c_void,
+    stride: usize,
+) -> Result<Vec<Descriptor>, Error> {
+    if count > 0 && data.is_null() {
+        return Err(Error::NullPointer {
+            what: "the contents of descriptors",
+        });
+    }
+    // SAFETY: the caller's promise, for each element.
+    let one = |index: u32| unsafe {
+        let data = data.byte_add(index as usize * stride);
+        match contents {
+            DescriptorSource::Image { view, sampler } => image(
+                view,
+                sampler,
+                &data.cast::<vk::DescriptorImageInfo>().read_unaligned(),
+            ),
+            DescriptorSource::Buffer => {
+                buffer(&data.cast::<vk::DescriptorBufferInfo>().read_unaligned())
+            }
+            DescriptorSource::TexelBuffer => {
+                let view = data.cast::<vk::BufferView>().read_unaligned();
+                let view = handle::get_optional(view)?.cloned();
+                Ok(view.map_or(Descriptor::Empty, Descriptor::TexelBuffer))
+            }
+        }
+    };
+    let mut all = host::with_capacity(count as usize);
+    for index in 0..count {
+        all.push(one(index)?);
+    }
+    Ok(all)
+}
+
+/// An image's view and a sampler, as far as they count; what doesn't may be anything.
+///
+/// # Safety
+/// The handles that count are live.
+unsafe fn image(
+    view: bool,
+    sampler: bool,
+    info: &vk::DescriptorImageInfo,
+) -> Result<Descriptor, Error> {
+    let view = if view {
+        info.image_view
+    } else {
+        vk::ImageView::null()
+    };
+    let sampler = if sampler {
+        info.sampler
+    } else {
+        vk::Sampler::null()
+    };
+    // SAFETY: the caller's promise.
+    unsafe {
+        Ok(Descriptor::Image {
+            view: handle::get_optional(view)?.cloned(),
+            sampler: handle::get_optional(sampler)?.cloned(),
+        })
+    }
+}
+
+/// The rules on the buffer of a descriptor.
+const DESCRIBED: BufferRules = BufferRules {
+    memory: "VUID-VkWriteDescriptorSet-descriptorType-00329",
+    range: "VUID-VkDescriptorBufferInfo-offset-00340",
+};
+
+/// # Safety
+/// The buffer is live.
+unsafe fn buffer(info: &vk::DescriptorBufferInfo) -> Result<Descriptor, Error> {
+    // SAFETY: the caller's promise.
+    let Some(buffer) = (unsafe { handle::get_optional(info.buffer)? }) else {
+        return Ok(Descriptor::Empty);
+    };
+    Ok(Descriptor::Buffer(BufferDescriptor {
+        rest: buffer.range(info.offset, None, &DESCRIBED)?,
+        size: (info.range != vk::WHOLE_SIZE).then_some(info.range),
+    }))
+}
+
+/// # Safety
+/// The writes and copies, their chains and their handles are valid.
+#[doc(alias = "vkUpdateDescriptorSets")]
+pub(crate) unsafe fn update_descriptor_sets(
+    device: &Device,
+    descriptor_writes: &[vk::WriteDescriptorSet<'_>],
+    descriptor_copies: &[vk::CopyDescriptorSet<'_>],
+) -> Result<(), Error> {
+    update(device, || {
+        for info in descriptor_writes {
+            // SAFETY: the caller's promise.
+            unsafe {
+                let set = handle::get(info.dst_set)?;
+                set.write(&write(info, set.layout())?)?;
+            }
+        }
+        for copy in descriptor_copies {
+            // SAFETY: the caller's promise.
+            let (target, source) =
+                unsafe { (handle::get(copy.dst_set)?, handle::get(copy.src_set)?) };
+            target.copy(
+                (copy.dst_binding, copy.dst_array_element),
+                source,
+                (copy.src_binding, copy.src_array_element),
+                copy.descriptor_count,
+            )?;
+        }
+        Ok(())
+    })
+}
+
+/// # Safety
+/// The create info is valid.
+#[doc(alias = "vkCreateDescriptorUpdateTemplate")]
+pub(crate) unsafe fn create_descriptor_update_template(
+    create_info: &vk::DescriptorUpdateTemplateCreateInfo<'_>,
+) -> Result<Arc<UpdateTemplate>, Error> {
+    let info = create_info;
+    // SAFETY: the caller's promise.
+    let entries = unsafe {
+        valid::slice(
+            info.p_descriptor_update_entries,
+            info.descriptor_update_entry_count,
+        )?
+    };
+    let pushes = info.template_type == vk::DescriptorUpdateTemplateType::PUSH_DESCRIPTORS_KHR;
+    Ok(Arc::new(UpdateTemplate {
+        entries: host::copied(entries),
+        push_bind_point: pushes.then_some(info.pipeline_bind_point),
+    }))
+}
+
+/// # Safety
+/// The data is what the template describes, and its handles are live.
+#[doc(alias = "vkUpdateDescriptorSetWithTemplate")]
+pub(crate) unsafe fn update_descriptor_set_with_template(
+    device: &Device,
+    descriptor_set: &DescriptorSet,
+    descriptor_update_template: &UpdateTemplate,
+    data: *const c_void,
+) -> Result<(), Error> {
+    update(device, || {
+        let layout = descriptor_set.layout();
+        // SAFETY: the caller's promise.
+        let writes = unsafe { template_writes(descriptor_update_template, layout, data)? };
+        writes
+            .iter()
+            .try_for_each(|write| descriptor_set.write(write))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use simdevice::Allocation;
+
+    #[test]
+    fn dynamic_offsets_stay_inside_the_buffer() {
+        let mut buffer = BufferDescriptor {
+            rest: BufferRange {
+                memory: Allocation::new_zeroed(4096).unwrap(),
+                offset: 256,
+                size: 100,
+            },
+            size: Some(64),
+        };
+        let range = |buffer: &BufferDescriptor, offset| {
+            let range = buffer.range(offset);
+            (range.offset, range.size)
+        };
+        assert_eq!(range(&buffer, 0), (256, 64));
+        assert_eq!(range(&buffer, 64), (320, 36));
+        assert_eq!(range(&buffer, 4000), (356, 0));
+        buffer.size = None;
+        assert_eq!(range(&buffer, 64), (320, 36));
+    }
+}

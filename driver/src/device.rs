@@ -1,0 +1,492 @@
+//! Logical devices: the features that are enabled, queues, and private data.
+
+use crate::abi::error::Error;
+use crate::abi::handle::{self, Reporter, objects};
+use crate::abi::valid;
+use crate::device_sync::DeviceSync;
+use crate::instance::{EnabledExtensions, Instance, PhysicalDevice, resolve_extensions};
+use crate::physical_device::environment::{self, Dump};
+use crate::physical_device::memory::{self, Heap};
+use crate::physical_device::{QUEUE_COUNT, QUEUE_FAMILY};
+use crate::queue::Queue;
+use crate::registry;
+use crate::registry::features::{Features, SUPPORTED, extension_of};
+use ash::vk;
+use simdevice::CommandProcessor;
+use std::collections::HashMap;
+use std::ffi::CStr;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// A logical device over a simulated device of its own.
+pub(crate) struct Device {
+    instance: Arc<Instance>,
+    extensions: Vec<&'static CStr>,
+    features: Features,
+    simulated: Arc<simdevice::Device>,
+    dump: Dump,
+    sync: Arc<DeviceSync>,
+    heap: Arc<Heap>,
+    queues: OnceLock<Vec<vk::Queue>>,
+}
+
+objects! {
+    vk::Device => Device {
+        fn reporter(&self) -> Option<Arc<dyn Reporter>> {
+            Some(Arc::clone(&self.instance) as _)
+        }
+    };
+    vk::PrivateDataSlot => PrivateDataSlot;
+}
+
+impl Device {
+    /// Opens a device with `queue_count` queues.
+    ///
+    /// # Errors
+    /// [`Error::InitializationFailed`] if the host gives no thread for a queue, or the environment makes no sense.
+    pub(crate) fn new(
+        instance: Arc<Instance>,
+        extensions: Vec<&'static CStr>,
+        features: Features,
+        simulated: simdevice::Device,
+        queue_count: u32,
+    ) -> Result<Arc<Self>, Error> {
+        let device = Arc::new(Self {
+            instance,
+            extensions,
+            features,
+            simulated: Arc::new(simulated),
+            dump: environment::dump()?,
+            sync: Arc::default(),
+            heap: Arc::new(Heap::new(memory::heap_size())),
+            queues: OnceLock::new(),
+        });
+        let start = |_| {
+            let processor = CommandProcessor::new(Arc::clone(&device.simulated));
+            Queue::start(
+                Arc::clone(&device.instance),
+                Arc::clone(&device.sync),
+                processor,
+            )
+        };
+        let queues: Vec<_> = (0..queue_count).map(start).collect::<Result<_, _>>()?;
+        device
+            .queues
+            .get_or_init(|| queues.into_iter().map(handle::create).collect());
+        Ok(device)
+    }
+
+    /// The features that the application enabled.
+    pub(crate) fn features(&self) -> &Features {
+        &self.features
+    }
+
+    /// The simulated device.
+    pub(crate) fn simulated(&self) -> &simdevice::Device {
+        &self.simulated
+    }
+
+    /// Tells if the device's programs are printed as pipelines are created.
+    pub(crate) fn dumps_ir(&self) -> bool {
+        self.dump.ir
+    }
+
+    /// The things that are waited for on it, and its loss.
+    pub(crate) fn sync(&self) -> &Arc<DeviceSync> {
+        &self.sync
+    }
+
+    /// The heap of a memory type and whether the host may map memory of it; `None` if there is no such type.
+    pub(crate) fn memory_type(&self, index: u32) -> Option<(&Arc<Heap>, bool)> {
+        let properties = memory::type_properties(index)?;
+        let host_visible = properties.contains(vk::MemoryPropertyFlags::HOST_VISIBLE);
+        Some((&self.heap, host_visible))
+    }
+
+    /// The handle of queue `index`.
+    pub(crate) fn queue(&self, index: u32) -> Option<vk::Queue> {
+        self.queues().get(index as usize).copied()
+    }
+
+    /// The handles of its queues.
+    pub(crate) fn queues(&self) -> &[vk::Queue] {
+        self.queues.get().map_or(&[], Vec::as_slice)
+    }
+
+    /// The version and extensions under which commands are looked up through this device.
+    pub(crate) fn enabled(&self) -> EnabledExtensions<'_> {
+        EnabledExtensions {
+            device_extensions: &self.extensions,
+            ..self.instance.enabled()
+        }
+    }
+
+    /// Executes what its queues were given and joins their threads.
+    pub(crate) fn stop(&self) {
+        for &queue in self.queues() {
+            // SAFETY: the handle was made with the device and lives as long.
+            match unsafe { handle::get(queue) } {
+                Ok(queue) => queue.stop(),
+                Err(error) => log::error!("a queue's handle was overwritten: {error}"),
+            }
+        }
+    }
+
+    /// Its instance.
+    pub(crate) fn instance(&self) -> &Arc<Instance> {
+        &self.instance
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        for &queue in self.queues() {
+            // SAFETY: the handle was made with the device, and the application may not use it once that is destroyed.
+            if let Err(error) = unsafe { handle::destroy(queue) } {
+                log::error!("a queue's handle was overwritten: {error}");
+            }
+        }
+    }
+}
+
+/// The features that `vkCreateDevice` was asked to enable, together with `extensions`.
+///
+/// # Errors
+/// [`Error::FeatureNotPresent`] names the first feature that isn't supported, [`Error::InvalidUsage`] one whose extension
+/// isn't enabled.
+///
+/// # Safety
+/// The creation info is valid.
+unsafe fn requested_features(
+    info: &vk::DeviceCreateInfo<'_>,
+    extensions: &[&CStr],
+) -> Result<Features, Error> {
+    let mut enabled = Features::NONE;
+    // SAFETY: the pointer is null or valid in a valid creation info.
+    if let Some(features) = unsafe { info.p_enabled_features.as_ref() } {
+        enabled.add_core(features);
+        require_supported(&enabled)?;
+    }
+    // SAFETY: the chain of a valid creation info is valid.
+    for structure in unsafe { valid::chain(info.p_next) } {
+        if let Some(features) = valid::cast::<vk::PhysicalDeviceFeatures2<'_>>(structure) {
+            enabled.add_core(&features.features);
+        } else {
+            require_extension(structure, extensions)?;
+            enabled.add(structure);
+        }
+        require_supported(&enabled)?;
+    }
+    Ok(enabled)
+}
+
+/// Refuses features that don't work.
+fn require_supported(requested: &Features) -> Result<(), Error> {
+    let supported = SUPPORTED.list();
+    match requested
+        .list()
+        .into_iter()
+        .zip(supported)
+        .find(|((_, is_requested), (_, works))| *is_requested && !works)
+    {
+        None => Ok(()),
+        Some(((name, _), _)) => Err(Error::FeatureNotPresent(format!("the feature {name}"))),
+    }
+}
+
+/// Refuses features of an extension that isn't enabled.
+fn require_extension(
+    structure: &vk::BaseInStructure<'_>,
+    extensions: &[&CStr],
+) -> Result<(), Error> {
+    let Some(needed) = extension_of(structure.s_type).filter(|name| !extensions.contains(name))
+    else {
+        return Ok(());
+    };
+    let mut requested = Features::NONE;
+    requested.add(structure);
+    match requested.list().into_iter().find(|(_, is_on)| *is_on) {
+        None => Ok(()),
+        Some((feature, _)) => Err(Error::usage(
+            "VUID-VkDeviceCreateInfo-pNext-pNext",
+            format!("the feature {feature} needs {needed:?}, which is not enabled"),
+        )),
+    }
+}
+
+/// A slot: one value per object, by the serial number of its handle. Values stay until the slot is destroyed.
+#[derive(Default)]
+pub(crate) struct PrivateDataSlot(Mutex<HashMap<u64, u64>>);
+
+impl PrivateDataSlot {
+    /// Attaches a value to the object.
+    pub(crate) fn set(&self, object: u64, data: u64) {
+        let mut values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        values.insert(object, data);
+    }
+
+    /// The value attached to the object, or 0.
+    pub(crate) fn get(&self, object: u64) -> u64 {
+        let values = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        values.get(&object).copied().unwrap_or(0)
+    }
+}
+
+/// The number of queues that are asked for.
+unsafe fn queue_count(info: &vk::DeviceCreateInfo<'_>) -> Result<u32, Error> {
+    // SAFETY: the caller promises a valid creation info.
+    let families =
+        unsafe { valid::slice(info.p_queue_create_infos, info.queue_create_info_count)? };
+    for family in families {
+        if family.queue_family_index != QUEUE_FAMILY || family.queue_count > QUEUE_COUNT {
+            return Err(Error::InitializationFailed(format!(
+                "{} queues of family {} were asked for; there is family {} with {}",
+                family.queue_count, family.queue_family_index, QUEUE_FAMILY, QUEUE_COUNT
+            )));
+        }
+        if !family.flags.is_empty() {
+            return Err(Error::FeatureNotPresent(
+                "a queue's creation flag".to_owned(),
+            ));
+        }
+    }
+    Ok(families
+        .iter()
+        .map(|family| family.queue_count)
+        .max()
+        .unwrap_or(0))
+}
+
+/// # Safety
+/// The create info and its chain are valid.
+#[doc(alias = "vkCreateDevice")]
+pub(crate) unsafe fn create_device(
+    physical_device: &PhysicalDevice,
+    create_info: &vk::DeviceCreateInfo<'_>,
+) -> Result<Arc<Device>, Error> {
+    let info = create_info;
+    // SAFETY: the caller's promise.
+    unsafe {
+        let names = valid::strings(
+            info.pp_enabled_extension_names,
+            info.enabled_extension_count,
+        )?;
+        let extensions = resolve_extensions(registry::extensions::DEVICE, &names)?;
+        let features = requested_features(info, &extensions)?;
+        Device::new(
+            physical_device.require_instance()?,
+            extensions,
+            features,
+            environment::open_device()?,
+            queue_count(info)?,
+        )
+    }
+}
+
+#[doc(alias = "vkDestroyDevice")]
+pub(crate) fn destroy_device(device: Option<Arc<Device>>) -> Result<(), Error> {
+    if let Some(device) = device {
+        device.stop();
+    }
+    Ok(())
+}
+
+#[doc(alias = "vkGetDeviceQueue")]
+pub(crate) fn get_device_queue(
+    device: &Device,
+    queue_family_index: u32,
+    queue_index: u32,
+) -> Result<vk::Queue, Error> {
+    let found = if queue_family_index == QUEUE_FAMILY {
+        device.queue(queue_index)
+    } else {
+        None
+    };
+    Ok(found.unwrap_or_default())
+}
+
+#[doc(alias = "vkGetDeviceQueue2")]
+pub(crate) fn get_device_queue2(
+    device: &Device,
+    queue_info: &vk::DeviceQueueInfo2<'_>,
+) -> Result<vk::Queue, Error> {
+    if queue_info.flags.is_empty() {
+        get_device_queue(
+            device,
+            queue_info.queue_family_index,
+            queue_info.queue_index,
+        )
+    } else {
+        Ok(vk::Queue::null())
+    }
+}
+
+#[doc(alias = "vkDeviceWaitIdle")]
+pub(crate) fn device_wait_idle(device: &Device) -> Result<(), Error> {
+    device.queues().iter().try_for_each(|&queue| {
+        // SAFETY: the handle was made with the device and lives as long.
+        unsafe { handle::get(queue)? }.wait_idle()
+    })
+}
+
+/// A group has one device, which is no peer of itself.
+#[doc(alias = "vkGetDeviceGroupPeerMemoryFeatures")]
+pub(crate) fn get_device_group_peer_memory_features() -> Result<vk::PeerMemoryFeatureFlags, Error> {
+    Ok(vk::PeerMemoryFeatureFlags::empty())
+}
+
+/// Counters are always on and nobody else has them, so there is nothing to wait for.
+#[doc(alias = "vkAcquireProfilingLockKHR")]
+pub(crate) fn acquire_profiling_lock(_device: &Device) -> Result<(), Error> {
+    Ok(())
+}
+
+#[doc(alias = "vkCreatePrivateDataSlot")]
+pub(crate) fn create_private_data_slot() -> Result<Arc<PrivateDataSlot>, Error> {
+    Ok(Arc::default())
+}
+
+/// # Safety
+/// The object's handle is of the type, and live.
+#[doc(alias = "vkSetPrivateData")]
+pub(crate) unsafe fn set_private_data(
+    object_type: vk::ObjectType,
+    object_handle: u64,
+    private_data_slot: &PrivateDataSlot,
+    data: u64,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let object = unsafe { handle::serial(object_type, object_handle)? };
+    private_data_slot.set(object, data);
+    Ok(())
+}
+
+/// # Safety
+/// As [`set_private_data`].
+#[doc(alias = "vkGetPrivateData")]
+pub(crate) unsafe fn get_private_data(
+    object_type: vk::ObjectType,
+    object_handle: u64,
+    private_data_slot: &PrivateDataSlot,
+) -> Result<u64, Error> {
+    // SAFETY: the caller's promise.
+    let object = unsafe { handle::serial(object_type, object_handle)? };
+    Ok(private_data_slot.get(object))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registry::features::MANDATORY;
+    use gaurast::gaussian_primitive_topology;
+    use gaurast::vk::PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST;
+    use std::collections::HashMap;
+
+    /// Features that Vulkan 1.3 requires of an implementation and that don't work yet; `driver/support.toml` says why.
+    const REQUIRED_BUT_MISSING: &[&str] = &[
+        "buffer_device_address",
+        "inline_uniform_block",
+        "multiview",
+        "pipeline_creation_cache_control",
+        "shader_integer_dot_product",
+    ];
+
+    /// Counts the features that work of a structure.
+    fn count<T: vk::TaggedStructure + Default>() -> usize {
+        let mut structure = T::default();
+        let mut head = vk::PhysicalDeviceFeatures2 {
+            p_next: (&raw mut structure).cast(),
+            ..Default::default()
+        };
+        let mut features = Features::NONE;
+        // SAFETY: the structure is alone in its chain.
+        unsafe {
+            let mut chain = valid::OutputChain::new(&raw mut head).unwrap();
+            chain.for_each_chained(|out| SUPPORTED.write(out));
+            valid::chain((&raw const structure).cast()).for_each(|it| features.add(it));
+        }
+        count_of(&features)
+    }
+
+    fn count_of(features: &Features) -> usize {
+        features.list().iter().filter(|(_, is_on)| *is_on).count()
+    }
+
+    #[test]
+    fn supported_features_are_those_of_the_structures() {
+        let mut core = Features::NONE;
+        core.add_core(&SUPPORTED.core());
+        let counts = [
+            count_of(&core),
+            count::<vk::PhysicalDeviceVulkan11Features<'_>>(),
+            count::<vk::PhysicalDeviceVulkan12Features<'_>>(),
+            count::<vk::PhysicalDeviceVulkan13Features<'_>>(),
+            count::<vk::PhysicalDevicePerformanceQueryFeaturesKHR<'_>>(),
+            count::<vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'_>>(),
+            count::<vk::PhysicalDeviceExtendedDynamicStateFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceExtendedDynamicState2FeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceTexelBufferAlignmentFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceProvokingVertexFeaturesEXT<'_>>(),
+            count::<vk::PhysicalDeviceVertexAttributeDivisorFeaturesKHR<'_>>(),
+            count::<PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST<'_>>(),
+        ];
+        assert_eq!(counts, [37, 4, 32, 10, 1, 1, 1, 1, 1, 1, 2, 19]);
+        assert_eq!(count_of(&SUPPORTED), counts.iter().sum::<usize>());
+    }
+
+    #[test]
+    fn missing_features_are_listed_truly() {
+        let supported: HashMap<_, _> = SUPPORTED.list().into_iter().collect();
+        let mut missing: Vec<_> = MANDATORY
+            .iter()
+            .flat_map(|(_, names)| names.iter().copied())
+            .filter(|name| !supported[name])
+            .collect();
+        missing.sort_unstable();
+        assert_eq!(missing, REQUIRED_BUT_MISSING);
+    }
+
+    #[test]
+    fn requests_are_checked_wherever_they_stand() {
+        let request = |info: &vk::DeviceCreateInfo<'_>| {
+            // SAFETY: ash built the creation info.
+            unsafe { requested_features(info, &[gaussian_primitive_topology::NAME]) }
+        };
+        let mut works = vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true);
+        let core = vk::PhysicalDeviceFeatures::default().robust_buffer_access(true);
+        let info = vk::DeviceCreateInfo::default()
+            .enabled_features(&core)
+            .push_next(&mut works);
+        let enabled = request(&info).unwrap();
+        assert!(enabled.dynamic_rendering && enabled.robust_buffer_access);
+        assert!(!enabled.synchronization2);
+
+        let refused = |result: Result<Features, Error>, name: &str| {
+            let error = result.unwrap_err();
+            assert_eq!(error.result(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
+            assert!(error.to_string().contains(name), "{error}");
+        };
+        let core = vk::PhysicalDeviceFeatures::default().geometry_shader(true);
+        refused(
+            request(&vk::DeviceCreateInfo::default().enabled_features(&core)),
+            "geometry_shader",
+        );
+        let mut core = vk::PhysicalDeviceFeatures2::default();
+        core.features.sparse_binding = vk::TRUE;
+        refused(
+            request(&vk::DeviceCreateInfo::default().push_next(&mut core)),
+            "sparse_binding",
+        );
+        let mut missing = vk::PhysicalDeviceVulkan13Features::default()
+            .dynamic_rendering(true)
+            .inline_uniform_block(true);
+        refused(
+            request(&vk::DeviceCreateInfo::default().push_next(&mut missing)),
+            "inline_uniform_block",
+        );
+
+        let mut other = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()
+            .performance_counter_query_pools(true);
+        let error = request(&vk::DeviceCreateInfo::default().push_next(&mut other)).unwrap_err();
+        assert!(error.is_usage(), "{error}");
+    }
+}

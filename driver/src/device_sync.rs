@@ -1,0 +1,130 @@
+//! What hosts and queue threads wait for: fences, semaphores and events of a device share one lock and one
+//! condition, so that waiting for any of several is simple and losing the device wakes everybody.
+
+use crate::abi::error::Error;
+use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
+
+/// A device's lock and condition for everything that can be waited for.
+///
+/// Values live in atomics of the objects; they change only inside [`DeviceSync::update`].
+#[derive(Debug, Default)]
+pub(crate) struct DeviceSync {
+    gate: Mutex<()>,
+    changed: Condvar,
+    lost: OnceLock<String>,
+}
+
+/// The end of a wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum WaitResult {
+    /// The thing that was waited for is there.
+    Ready,
+    /// The time is over.
+    TimedOut,
+    /// The device was lost, and what was waited for isn't there.
+    Lost,
+}
+
+impl DeviceSync {
+    fn lock(&self) -> MutexGuard<'_, ()> {
+        // The lock guards no data of its own, so that a panic under it leaves nothing half-done.
+        self.gate.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Changes values that others may wait for, and wakes them.
+    pub(crate) fn update<R>(&self, update: impl FnOnce() -> R) -> R {
+        let guard = self.lock();
+        let result = update();
+        drop(guard);
+        self.changed.notify_all();
+        result
+    }
+
+    /// Marks the device as lost and wakes every waiter. The first reason stays: others follow from it.
+    pub(crate) fn lose(&self, reason: &str) {
+        log::error!("the device is lost: {reason}");
+        self.update(|| {
+            self.lost.get_or_init(|| reason.to_owned());
+        });
+    }
+
+    /// Fails if the device is lost. Commands that may return `VK_ERROR_DEVICE_LOST` ask first.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`].
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        match self.lost.get() {
+            None => Ok(()),
+            Some(reason) => Err(Error::DeviceLost(reason.clone())),
+        }
+    }
+
+    /// Waits until `ready`, at most until `deadline` (forever without one).
+    pub(crate) fn wait(&self, deadline: Option<Instant>, ready: impl Fn() -> bool) -> WaitResult {
+        let mut guard = self.lock();
+        loop {
+            if ready() {
+                return WaitResult::Ready;
+            }
+            if self.lost.get().is_some() {
+                return WaitResult::Lost;
+            }
+            guard = match deadline {
+                None => self
+                    .changed
+                    .wait(guard)
+                    .unwrap_or_else(PoisonError::into_inner),
+                Some(deadline) => {
+                    let left = deadline.saturating_duration_since(Instant::now());
+                    if left.is_zero() {
+                        return WaitResult::TimedOut;
+                    }
+                    self.changed
+                        .wait_timeout(guard, left)
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .0
+                }
+            };
+        }
+    }
+}
+
+/// The moment `nanoseconds` from now, or `None` where that is beyond what the clock can tell: forever.
+pub(crate) fn deadline(nanoseconds: u64) -> Option<Instant> {
+    Instant::now().checked_add(Duration::from_nanos(nanoseconds))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    #[test]
+    fn a_change_wakes_a_waiter() {
+        let sync = Arc::new(DeviceSync::default());
+        let value = Arc::new(AtomicBool::new(false));
+        let waiter = std::thread::spawn({
+            let (sync, value) = (sync.clone(), value.clone());
+            move || sync.wait(None, || value.load(Ordering::Acquire))
+        });
+        sync.update(|| value.store(true, Ordering::Release));
+        assert_eq!(waiter.join().unwrap(), WaitResult::Ready);
+    }
+
+    #[test]
+    fn a_wait_ends_at_its_deadline_or_when_the_device_is_lost() {
+        let sync = Arc::new(DeviceSync::default());
+        assert_eq!(sync.wait(deadline(0), || false), WaitResult::TimedOut);
+        assert_eq!(sync.wait(deadline(1000), || false), WaitResult::TimedOut);
+        let waiter = std::thread::spawn({
+            let sync = sync.clone();
+            move || sync.wait(None, || false)
+        });
+        sync.lose("a test");
+        assert_eq!(waiter.join().unwrap(), WaitResult::Lost);
+        assert_eq!(sync.wait(None, || true), WaitResult::Ready);
+        assert!(sync.check().unwrap_err().to_string().contains("a test"));
+    }
+}

@@ -1,0 +1,322 @@
+//! What each format can be used for. The formats themselves, and how texels are stored, are the device's.
+
+#[cfg(test)]
+mod required;
+#[cfg(test)]
+mod tests;
+
+use super::{limits, memory};
+use crate::abi::error::Error;
+use ash::vk;
+use simdevice::Format;
+use simdevice::format::{Channel, Numeric};
+use simdevice::packet::Aspect;
+use std::sync::LazyLock;
+
+/// The device's format of the same name, if it has one.
+pub(crate) fn device_format(format: vk::Format) -> Option<Format> {
+    /// By the values of Vulkan's core formats, which are consecutive.
+    static FORMATS: LazyLock<Vec<Option<Format>>> = LazyLock::new(|| {
+        (0..=vk::Format::BC7_SRGB_BLOCK.as_raw())
+            .map(|raw| named(&format!("{:?}", vk::Format::from_raw(raw))))
+            .collect()
+    });
+    *FORMATS.get(usize::try_from(format.as_raw()).ok()?)?
+}
+
+/// The device's format that has Vulkan's name in camel case.
+fn named(vulkan_name: &str) -> Option<Format> {
+    let name = vulkan_name.replace('_', "");
+    Format::ALL
+        .iter()
+        .copied()
+        .find(|format| format!("{format:?}").eq_ignore_ascii_case(&name))
+}
+
+fn is_color(format: Format) -> bool {
+    format.aspects() == [Aspect::Color]
+}
+
+/// Tells if components are integers that are read as floating point: these are attributes of vertices only.
+fn is_scaled(format: Format) -> bool {
+    matches!(format.numeric(), Numeric::Uscaled | Numeric::Sscaled)
+}
+
+/// Tells if texels are stored in compressed blocks.
+fn is_compressed(format: Format) -> bool {
+    format.decompressed().is_some()
+}
+
+/// The features of images of the format, of either tiling.
+fn image_features(format: Format) -> vk::FormatFeatureFlags {
+    if is_scaled(format) {
+        return vk::FormatFeatureFlags::empty();
+    }
+    if is_compressed(format) {
+        return vk::FormatFeatureFlags::TRANSFER_SRC
+            | vk::FormatFeatureFlags::TRANSFER_DST
+            | vk::FormatFeatureFlags::BLIT_SRC
+            | vk::FormatFeatureFlags::SAMPLED_IMAGE
+            | vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
+    }
+    let mut features = vk::FormatFeatureFlags::TRANSFER_SRC
+        | vk::FormatFeatureFlags::TRANSFER_DST
+        | vk::FormatFeatureFlags::BLIT_SRC
+        | vk::FormatFeatureFlags::BLIT_DST
+        | vk::FormatFeatureFlags::SAMPLED_IMAGE;
+    if !format.is_integer() && format.aspects() != [Aspect::Stencil] {
+        features |= vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
+    }
+    if !is_color(format) {
+        return features | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
+    }
+    if is_stored(format) {
+        features |= vk::FormatFeatureFlags::STORAGE_IMAGE;
+    }
+    if is_atomic(format) {
+        features |= vk::FormatFeatureFlags::STORAGE_IMAGE_ATOMIC;
+    }
+    if is_rendered(format) {
+        features |= vk::FormatFeatureFlags::COLOR_ATTACHMENT;
+        if !format.is_integer() {
+            features |= vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
+        }
+    }
+    features
+}
+
+/// Tells if programs write texels of a colour format. sRGB and shared exponents are only read.
+fn is_stored(format: Format) -> bool {
+    !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent)
+        && format.texel_size().is_power_of_two()
+        && !format.has(Channel::X)
+}
+
+/// Tells if programs update texels atomically: integers of one word.
+fn is_atomic(format: Format) -> bool {
+    format.is_integer() && format.texel_size() == 4 && format.components().len() == 1
+}
+
+/// Tells if texels of a colour format are rendered to. Formats of three equal components make poor attachments:
+/// hardware has none.
+fn is_rendered(format: Format) -> bool {
+    format.numeric() != Numeric::SharedExponent && format.texel_size().is_power_of_two()
+}
+
+/// The features of buffers of the format: any colour is a vertex attribute, unless it takes more than its component to
+/// know one. Programs read texels of any format.
+fn buffer_features(format: Format) -> vk::FormatFeatureFlags {
+    if !is_color(format) || is_compressed(format) {
+        return vk::FormatFeatureFlags::empty();
+    }
+    if is_scaled(format) {
+        return vk::FormatFeatureFlags::VERTEX_BUFFER;
+    }
+    let mut features = vk::FormatFeatureFlags::UNIFORM_TEXEL_BUFFER;
+    if !matches!(format.numeric(), Numeric::Srgb | Numeric::SharedExponent) {
+        features |= vk::FormatFeatureFlags::VERTEX_BUFFER;
+    }
+    if is_stored(format) {
+        features |= vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
+    }
+    if is_atomic(format) {
+        features |= vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER_ATOMIC;
+    }
+    features
+}
+
+/// `VkFormatProperties`. Formats that the device lacks can do nothing.
+pub(crate) fn properties(format: vk::Format) -> vk::FormatProperties {
+    let Some(format) = device_format(format) else {
+        return vk::FormatProperties::default();
+    };
+    let linear = if is_color(format) && !is_compressed(format) {
+        image_features(format)
+    } else {
+        vk::FormatFeatureFlags::empty()
+    };
+    vk::FormatProperties {
+        linear_tiling_features: linear,
+        optimal_tiling_features: image_features(format),
+        buffer_features: buffer_features(format),
+    }
+}
+
+/// The 64-bit features that go with 32-bit ones: `VkFormatProperties3`.
+pub(crate) fn features2(
+    format: vk::Format,
+    features: vk::FormatFeatureFlags,
+) -> vk::FormatFeatureFlags2 {
+    // They begin with the 32-bit ones.
+    let mut wide = vk::FormatFeatureFlags2::from_raw(features.as_raw().into());
+    let stored =
+        vk::FormatFeatureFlags::STORAGE_IMAGE | vk::FormatFeatureFlags::STORAGE_TEXEL_BUFFER;
+    if features.intersects(stored) {
+        wide |= vk::FormatFeatureFlags2::STORAGE_READ_WITHOUT_FORMAT
+            | vk::FormatFeatureFlags2::STORAGE_WRITE_WITHOUT_FORMAT;
+    }
+    let has_depth = device_format(format).is_some_and(|format| format.has(Channel::D));
+    if has_depth && features.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE) {
+        wide |= vk::FormatFeatureFlags2::SAMPLED_IMAGE_DEPTH_COMPARISON;
+    }
+    wide
+}
+
+/// The flags that images may be created with.
+const IMAGE_FLAGS: vk::ImageCreateFlags = vk::ImageCreateFlags::from_raw(
+    vk::ImageCreateFlags::MUTABLE_FORMAT.as_raw()
+        | vk::ImageCreateFlags::EXTENDED_USAGE.as_raw()
+        | vk::ImageCreateFlags::ALIAS.as_raw()
+        | vk::ImageCreateFlags::CUBE_COMPATIBLE.as_raw()
+        | vk::ImageCreateFlags::TYPE_2D_ARRAY_COMPATIBLE.as_raw(),
+);
+
+/// The features that usages need; other usages are not supported.
+const USAGES: &[(vk::ImageUsageFlags, vk::FormatFeatureFlags)] = &[
+    (
+        vk::ImageUsageFlags::TRANSFER_SRC,
+        vk::FormatFeatureFlags::TRANSFER_SRC,
+    ),
+    (
+        vk::ImageUsageFlags::TRANSFER_DST,
+        vk::FormatFeatureFlags::TRANSFER_DST,
+    ),
+    (
+        vk::ImageUsageFlags::SAMPLED,
+        vk::FormatFeatureFlags::SAMPLED_IMAGE,
+    ),
+    (
+        vk::ImageUsageFlags::STORAGE,
+        vk::FormatFeatureFlags::STORAGE_IMAGE,
+    ),
+    (
+        vk::ImageUsageFlags::COLOR_ATTACHMENT,
+        vk::FormatFeatureFlags::COLOR_ATTACHMENT,
+    ),
+    (
+        vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+        vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
+    ),
+    (
+        vk::ImageUsageFlags::INPUT_ATTACHMENT,
+        vk::FormatFeatureFlags::SAMPLED_IMAGE,
+    ),
+    // Its contents live in the tile buffers and never matter outside; it goes with an attachment usage.
+    (
+        vk::ImageUsageFlags::TRANSIENT_ATTACHMENT,
+        vk::FormatFeatureFlags::empty(),
+    ),
+];
+
+fn supports_usage(features: vk::FormatFeatureFlags, usage: vk::ImageUsageFlags) -> bool {
+    let supported = USAGES
+        .iter()
+        .filter(|(_, needed)| features.contains(*needed))
+        .fold(vk::ImageUsageFlags::empty(), |all, (usage, _)| all | *usage);
+    supported.contains(usage)
+}
+
+/// The description of an image that may be asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ImageQuery {
+    /// Its format.
+    pub(crate) format: vk::Format,
+    /// Its dimensions.
+    pub(crate) ty: vk::ImageType,
+    /// Its tiling.
+    pub(crate) tiling: vk::ImageTiling,
+    /// Its usage.
+    pub(crate) usage: vk::ImageUsageFlags,
+    /// Its creation flags.
+    pub(crate) flags: vk::ImageCreateFlags,
+}
+
+/// `VkImageFormatProperties`: how large such an image may be.
+///
+/// # Errors
+/// [`Error::FormatNotSupported`] if there can be no such image.
+pub(crate) fn image_properties(query: ImageQuery) -> Result<vk::ImageFormatProperties, Error> {
+    let refuse = |what: String| Err(Error::FormatNotSupported(what));
+    let ImageQuery {
+        format,
+        ty,
+        tiling,
+        usage,
+        flags,
+    } = query;
+    let properties = properties(format);
+    let features = match tiling {
+        vk::ImageTiling::OPTIMAL => properties.optimal_tiling_features,
+        vk::ImageTiling::LINEAR => properties.linear_tiling_features,
+        _ => return refuse(format!("image tiling {tiling:?} is not supported")),
+    };
+    if features.is_empty() {
+        return refuse(format!(
+            "{tiling:?} images of format {format:?} are not supported"
+        ));
+    }
+    if !supports_usage(features, usage) {
+        return refuse(format!(
+            "images of format {format:?} do not support all of {usage:?}"
+        ));
+    }
+    if !IMAGE_FLAGS.contains(flags) {
+        return refuse(format!("image flags {flags:?} are not supported"));
+    }
+    let is_depth_stencil = features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT);
+    let is_compressed = device_format(format).is_some_and(is_compressed);
+    let (max_extent, layers) = match ty {
+        vk::ImageType::TYPE_1D if !is_compressed => (
+            extent(limits::MAX_IMAGE_DIMENSION, 1, 1),
+            limits::MAX_LAYERS,
+        ),
+        vk::ImageType::TYPE_2D => (
+            extent(limits::MAX_IMAGE_DIMENSION, limits::MAX_IMAGE_DIMENSION, 1),
+            limits::MAX_LAYERS,
+        ),
+        vk::ImageType::TYPE_3D if !is_depth_stencil => {
+            let side = limits::MAX_IMAGE_DIMENSION_3D;
+            (extent(side, side, side), 1)
+        }
+        _ => {
+            return refuse(format!(
+                "{ty:?} images of format {format:?} are not supported"
+            ));
+        }
+    };
+    let is_linear = tiling == vk::ImageTiling::LINEAR;
+    let is_attachment = features.intersects(
+        vk::FormatFeatureFlags::COLOR_ATTACHMENT | vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
+    );
+    let has_samples = is_attachment
+        && !is_linear
+        && ty == vk::ImageType::TYPE_2D
+        && !flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE)
+        && !usage.contains(vk::ImageUsageFlags::STORAGE);
+    if is_linear && ty != vk::ImageType::TYPE_2D {
+        return refuse("linear images have two dimensions".to_owned());
+    }
+    Ok(vk::ImageFormatProperties {
+        max_extent,
+        max_mip_levels: if is_linear {
+            1
+        } else {
+            max_extent.width.ilog2() + 1
+        },
+        max_array_layers: if is_linear { 1 } else { layers },
+        sample_counts: if has_samples {
+            limits::SAMPLE_COUNTS
+        } else {
+            vk::SampleCountFlags::TYPE_1
+        },
+        max_resource_size: memory::heap_size(),
+    })
+}
+
+fn extent(width: u32, height: u32, depth: u32) -> vk::Extent3D {
+    vk::Extent3D {
+        width,
+        height,
+        depth,
+    }
+}

@@ -1,0 +1,402 @@
+//! The physical device's properties and limits.
+//!
+//! Limits are at least what Vulkan requires. [`Properties`] has a field for each property of the core version and of the
+//! extensions that are listed: each is stated here, and nowhere else.
+
+use super::memory;
+use crate::convert;
+use crate::instance::API_VERSION;
+use crate::registry::properties::Properties;
+use ash::vk;
+use simdevice::geometry;
+use std::ffi::{CStr, c_char};
+use std::sync::LazyLock;
+
+const DEVICE_NAME: &CStr = c"GauRast simulated device";
+const DRIVER_NAME: &CStr = c"GauRast";
+
+/// The driver's version, in text.
+const DRIVER_INFO: &CStr =
+    match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+        Ok(text) => text,
+        Err(_) => c"",
+    };
+
+/// No vendor id is registered for this driver.
+const VENDOR_ID: u32 = 0;
+
+/// The first and only device of its vendor.
+const DEVICE_ID: u32 = 1;
+
+/// The most Gaussians of one draw or one sorted set: they are numbered by 32 bits.
+const MAX_GAUSSIANS: u64 = u32::MAX as u64;
+
+/// The greatest degree of spherical harmonics that a pipeline may ask for.
+pub(crate) const MAX_SPHERICAL_HARMONICS_DEGREE: u32 = 4;
+
+/// The paper's scaled design: 15 rasterizer modules of 16 processing elements.
+const RASTERIZER_MODULES: u32 = 15;
+const PROCESSING_ELEMENTS: u32 = 16;
+
+/// The greatest extent of an image in two dimensions, and of framebuffers and viewports.
+pub(crate) const MAX_IMAGE_DIMENSION: u32 = 16384;
+
+/// The greatest extent of an image in three dimensions.
+pub(crate) const MAX_IMAGE_DIMENSION_3D: u32 = 2048;
+
+/// The most array layers of an image or framebuffer.
+pub(crate) const MAX_LAYERS: u32 = 2048;
+
+/// The steps of points' and lines' sizes: those of coordinates.
+const SIZE_GRANULARITY: f32 = 1.0 / 256.0;
+
+/// The most clip and cull distances, together and each.
+const MAX_CLIP_CULL_DISTANCES: u32 = simdevice::packet::draw::MAX_CLIP_CULL_DISTANCES as u32;
+
+/// The samples that texels of attachments may have.
+pub(crate) const SAMPLE_COUNTS: vk::SampleCountFlags = vk::SampleCountFlags::from_raw(
+    vk::SampleCountFlags::TYPE_1.as_raw() | vk::SampleCountFlags::TYPE_4.as_raw(),
+);
+
+/// The most colour attachments.
+pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
+
+/// The greatest magnitude of a sampler's bias of the level of detail.
+pub(crate) const MAX_SAMPLER_LOD_BIAS: f32 = simdevice::texture::MAX_LOD_BIAS;
+
+/// The bytes of push constants.
+pub(crate) const MAX_PUSH_CONSTANTS_SIZE: u32 = 256;
+
+/// The most descriptors of a set that is pushed.
+pub(crate) const MAX_PUSH_DESCRIPTORS: u32 = 32;
+
+/// The most descriptors of a set of any mix of kinds.
+pub(crate) const MAX_PER_SET_DESCRIPTORS: u32 = DESCRIPTORS;
+
+/// The most descriptors of a kind that a stage, or a set, may have. Nothing but memory bounds them.
+const DESCRIPTORS: u32 = 1 << 16;
+
+/// The most descriptors with dynamic offsets.
+const DYNAMIC_DESCRIPTORS: u32 = 64;
+
+/// Offsets of uniform, storage and texel buffers must be multiples of this.
+pub(crate) const MIN_BUFFER_OFFSET_ALIGNMENT: u64 = 16;
+
+/// The most invocations of a workgroup in x, y and z.
+pub(crate) const MAX_WORKGROUP_SIZE: [u32; 3] = [MAX_WORKGROUP_INVOCATIONS; 3];
+
+/// The most invocations of a workgroup.
+pub(crate) const MAX_WORKGROUP_INVOCATIONS: u32 = simdevice::compute::MAX_WORKGROUP_INVOCATIONS;
+
+/// The most bytes of a workgroup's shared memory.
+pub(crate) const MAX_SHARED_BYTES: u32 = simdevice::compute::MAX_SHARED_BYTES;
+
+/// Invocations of a subgroup, unless a pipeline requires another size.
+pub(crate) const SUBGROUP_SIZE: u32 = 32;
+
+/// The least and the greatest size that a pipeline may require.
+pub(crate) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=128;
+
+/// The most vertex attributes and vertex bindings. Gaussians of degree 3 take 20 attributes.
+pub(crate) const MAX_VERTEX_INPUTS: u32 = 32;
+
+fn driver_version() -> [u8; 3] {
+    let part = |text: &str| text.parse().unwrap_or(0);
+    [
+        part(env!("CARGO_PKG_VERSION_MAJOR")),
+        part(env!("CARGO_PKG_VERSION_MINOR")),
+        part(env!("CARGO_PKG_VERSION_PATCH")),
+    ]
+}
+
+/// A UUID that tells what it identifies, and changes with the driver's version if it holds the version.
+fn uuid(name: &[u8; 13], version: [u8; 3]) -> [u8; vk::UUID_SIZE] {
+    let mut uuid = [0; vk::UUID_SIZE];
+    uuid[..13].copy_from_slice(name);
+    uuid[13..].copy_from_slice(&version);
+    uuid
+}
+
+/// The device's properties and limits.
+pub(crate) fn properties() -> &'static Properties {
+    static PROPERTIES: LazyLock<Properties> = LazyLock::new(find_properties);
+    &PROPERTIES
+}
+
+fn find_properties() -> Properties {
+    let [major, minor, patch] = driver_version().map(u32::from);
+    Properties {
+        api_version: API_VERSION,
+        driver_version: vk::make_api_version(0, major, minor, patch),
+        vendor_id: VENDOR_ID,
+        device_id: DEVICE_ID,
+        device_type: vk::PhysicalDeviceType::CPU,
+        device_name: fixed_string(DEVICE_NAME),
+        pipeline_cache_uuid: uuid(b"GauRast cache", driver_version()),
+        max_image_dimension1_d: MAX_IMAGE_DIMENSION,
+        max_image_dimension2_d: MAX_IMAGE_DIMENSION,
+        max_image_dimension3_d: MAX_IMAGE_DIMENSION_3D,
+        max_image_dimension_cube: MAX_IMAGE_DIMENSION,
+        max_image_array_layers: MAX_LAYERS,
+        max_texel_buffer_elements: 1 << 16,
+        max_uniform_buffer_range: 1 << 16,
+        max_storage_buffer_range: u32::MAX,
+        max_push_constants_size: MAX_PUSH_CONSTANTS_SIZE,
+        max_memory_allocation_count: u32::MAX,
+        max_sampler_allocation_count: 1 << 16,
+        buffer_image_granularity: 1,
+        sparse_address_space_size: 0,
+        max_bound_descriptor_sets: 8,
+        max_per_stage_descriptor_samplers: DESCRIPTORS,
+        max_per_stage_descriptor_uniform_buffers: DESCRIPTORS,
+        max_per_stage_descriptor_storage_buffers: DESCRIPTORS,
+        max_per_stage_descriptor_sampled_images: DESCRIPTORS,
+        max_per_stage_descriptor_storage_images: DESCRIPTORS,
+        max_per_stage_descriptor_input_attachments: DESCRIPTORS,
+        max_per_stage_resources: DESCRIPTORS,
+        max_descriptor_set_samplers: DESCRIPTORS,
+        max_descriptor_set_uniform_buffers: DESCRIPTORS,
+        max_descriptor_set_uniform_buffers_dynamic: DYNAMIC_DESCRIPTORS,
+        max_descriptor_set_storage_buffers: DESCRIPTORS,
+        max_descriptor_set_storage_buffers_dynamic: DYNAMIC_DESCRIPTORS,
+        max_descriptor_set_sampled_images: DESCRIPTORS,
+        max_descriptor_set_storage_images: DESCRIPTORS,
+        max_descriptor_set_input_attachments: DESCRIPTORS,
+        max_vertex_input_attributes: MAX_VERTEX_INPUTS,
+        max_vertex_input_bindings: MAX_VERTEX_INPUTS,
+        max_vertex_input_attribute_offset: 65535,
+        max_vertex_input_binding_stride: 65536,
+        max_vertex_output_components: 64,
+        max_tessellation_generation_level: 0,
+        max_tessellation_patch_size: 0,
+        max_tessellation_control_per_vertex_input_components: 0,
+        max_tessellation_control_per_vertex_output_components: 0,
+        max_tessellation_control_per_patch_output_components: 0,
+        max_tessellation_control_total_output_components: 0,
+        max_tessellation_evaluation_input_components: 0,
+        max_tessellation_evaluation_output_components: 0,
+        max_geometry_shader_invocations: 0,
+        max_geometry_input_components: 0,
+        max_geometry_output_components: 0,
+        max_geometry_output_vertices: 0,
+        max_geometry_total_output_components: 0,
+        max_fragment_input_components: 64,
+        max_fragment_output_attachments: MAX_COLOR_ATTACHMENTS,
+        max_fragment_dual_src_attachments: 1,
+        max_fragment_combined_output_resources: DESCRIPTORS,
+        max_compute_shared_memory_size: MAX_SHARED_BYTES,
+        max_compute_work_group_count: [u32::MAX; 3],
+        max_compute_work_group_invocations: MAX_WORKGROUP_INVOCATIONS,
+        max_compute_work_group_size: MAX_WORKGROUP_SIZE,
+        sub_pixel_precision_bits: 8,
+        sub_texel_precision_bits: 8,
+        mipmap_precision_bits: 8,
+        max_draw_indexed_index_value: u32::MAX,
+        max_draw_indirect_count: u32::MAX,
+        max_sampler_lod_bias: MAX_SAMPLER_LOD_BIAS,
+        max_sampler_anisotropy: 1.0,
+        max_viewports: simdevice::packet::draw::MAX_VIEWPORTS as u32,
+        max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],
+        viewport_bounds_range: [
+            -2.0 * MAX_IMAGE_DIMENSION as f32,
+            2.0 * MAX_IMAGE_DIMENSION as f32 - 1.0,
+        ],
+        viewport_sub_pixel_bits: 8,
+        min_memory_map_alignment: memory::ALIGNMENT as usize,
+        min_texel_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
+        min_uniform_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
+        min_storage_buffer_offset_alignment: MIN_BUFFER_OFFSET_ALIGNMENT,
+        min_texel_offset: -8,
+        max_texel_offset: 7,
+        min_texel_gather_offset: -8,
+        max_texel_gather_offset: 7,
+        min_interpolation_offset: -0.5,
+        // The greatest offset is less than half a pixel by one step of its precision.
+        max_interpolation_offset: 0.5 - 1.0 / 16.0,
+        sub_pixel_interpolation_offset_bits: 4,
+        max_framebuffer_width: MAX_IMAGE_DIMENSION,
+        max_framebuffer_height: MAX_IMAGE_DIMENSION,
+        max_framebuffer_layers: MAX_LAYERS,
+        framebuffer_color_sample_counts: SAMPLE_COUNTS,
+        framebuffer_depth_sample_counts: SAMPLE_COUNTS,
+        framebuffer_stencil_sample_counts: SAMPLE_COUNTS,
+        framebuffer_no_attachments_sample_counts: SAMPLE_COUNTS,
+        max_color_attachments: MAX_COLOR_ATTACHMENTS,
+        sampled_image_color_sample_counts: SAMPLE_COUNTS,
+        sampled_image_integer_sample_counts: SAMPLE_COUNTS,
+        sampled_image_depth_sample_counts: SAMPLE_COUNTS,
+        sampled_image_stencil_sample_counts: SAMPLE_COUNTS,
+        storage_image_sample_counts: vk::SampleCountFlags::TYPE_1,
+        max_sample_mask_words: 1,
+        timestamp_compute_and_graphics: true,
+        timestamp_period: 1.0,
+        max_clip_distances: MAX_CLIP_CULL_DISTANCES,
+        max_cull_distances: MAX_CLIP_CULL_DISTANCES,
+        max_combined_clip_and_cull_distances: MAX_CLIP_CULL_DISTANCES,
+        discrete_queue_priorities: 2,
+        point_size_range: [1.0, geometry::MAX_POINT_SIZE],
+        line_width_range: [1.0, geometry::MAX_LINE_WIDTH],
+        point_size_granularity: SIZE_GRANULARITY,
+        line_width_granularity: SIZE_GRANULARITY,
+        strict_lines: true,
+        standard_sample_locations: true,
+        optimal_buffer_copy_offset_alignment: 1,
+        optimal_buffer_copy_row_pitch_alignment: 1,
+        non_coherent_atom_size: 1,
+        residency_standard2_d_block_shape: false,
+        residency_standard2_d_multisample_block_shape: false,
+        residency_standard3_d_block_shape: false,
+        residency_aligned_mip_size: false,
+        residency_non_resident_strict: false,
+        device_uuid: uuid(b"GauRastDevice", [0; 3]),
+        driver_uuid: uuid(b"GauRastDriver", driver_version()),
+        device_luid: [0; vk::LUID_SIZE],
+        device_node_mask: 0,
+        device_luid_valid: false,
+        subgroup_size: SUBGROUP_SIZE,
+        subgroup_supported_stages: vk::ShaderStageFlags::COMPUTE,
+        subgroup_supported_operations: vk::SubgroupFeatureFlags::BASIC
+            | vk::SubgroupFeatureFlags::VOTE
+            | vk::SubgroupFeatureFlags::ARITHMETIC
+            | vk::SubgroupFeatureFlags::BALLOT
+            | vk::SubgroupFeatureFlags::SHUFFLE
+            | vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE
+            | vk::SubgroupFeatureFlags::CLUSTERED
+            | vk::SubgroupFeatureFlags::QUAD,
+        subgroup_quad_operations_in_all_stages: false,
+        point_clipping_behavior: vk::PointClippingBehavior::ALL_CLIP_PLANES,
+        max_multiview_view_count: 0,
+        max_multiview_instance_index: 0,
+        protected_no_fault: false,
+        max_per_set_descriptors: MAX_PER_SET_DESCRIPTORS,
+        max_memory_allocation_size: memory::heap_size(),
+        // No driver id is registered for this driver, and it claims no conformance.
+        driver_id: vk::DriverId::from_raw(0),
+        driver_name: fixed_string(DRIVER_NAME),
+        driver_info: fixed_string(DRIVER_INFO),
+        conformance_version: vk::ConformanceVersion::default(),
+        denorm_behavior_independence: vk::ShaderFloatControlsIndependence::ALL,
+        rounding_mode_independence: vk::ShaderFloatControlsIndependence::ALL,
+        shader_signed_zero_inf_nan_preserve_float16: true,
+        shader_signed_zero_inf_nan_preserve_float32: true,
+        shader_signed_zero_inf_nan_preserve_float64: true,
+        shader_denorm_preserve_float16: true,
+        shader_denorm_preserve_float32: true,
+        shader_denorm_preserve_float64: true,
+        shader_denorm_flush_to_zero_float16: false,
+        shader_denorm_flush_to_zero_float32: false,
+        shader_denorm_flush_to_zero_float64: false,
+        shader_rounding_mode_rte_float16: true,
+        shader_rounding_mode_rte_float32: true,
+        shader_rounding_mode_rte_float64: true,
+        shader_rounding_mode_rtz_float16: false,
+        shader_rounding_mode_rtz_float32: false,
+        shader_rounding_mode_rtz_float64: false,
+        // No descriptor is updated after its set was bound.
+        max_update_after_bind_descriptors_in_all_pools: 0,
+        shader_uniform_buffer_array_non_uniform_indexing_native: true,
+        shader_sampled_image_array_non_uniform_indexing_native: true,
+        shader_storage_buffer_array_non_uniform_indexing_native: true,
+        shader_storage_image_array_non_uniform_indexing_native: true,
+        shader_input_attachment_array_non_uniform_indexing_native: false,
+        robust_buffer_access_update_after_bind: false,
+        quad_divergent_implicit_lod: false,
+        max_per_stage_descriptor_update_after_bind_samplers: 0,
+        max_per_stage_descriptor_update_after_bind_uniform_buffers: 0,
+        max_per_stage_descriptor_update_after_bind_storage_buffers: 0,
+        max_per_stage_descriptor_update_after_bind_sampled_images: 0,
+        max_per_stage_descriptor_update_after_bind_storage_images: 0,
+        max_per_stage_descriptor_update_after_bind_input_attachments: 0,
+        max_per_stage_update_after_bind_resources: 0,
+        max_descriptor_set_update_after_bind_samplers: 0,
+        max_descriptor_set_update_after_bind_uniform_buffers: 0,
+        max_descriptor_set_update_after_bind_uniform_buffers_dynamic: 0,
+        max_descriptor_set_update_after_bind_storage_buffers: 0,
+        max_descriptor_set_update_after_bind_storage_buffers_dynamic: 0,
+        max_descriptor_set_update_after_bind_sampled_images: 0,
+        max_descriptor_set_update_after_bind_storage_images: 0,
+        max_descriptor_set_update_after_bind_input_attachments: 0,
+        supported_depth_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
+            | vk::ResolveModeFlags::AVERAGE
+            | vk::ResolveModeFlags::MIN
+            | vk::ResolveModeFlags::MAX,
+        supported_stencil_resolve_modes: vk::ResolveModeFlags::SAMPLE_ZERO
+            | vk::ResolveModeFlags::MIN
+            | vk::ResolveModeFlags::MAX,
+        independent_resolve_none: true,
+        independent_resolve: true,
+        filter_minmax_single_component_formats: false,
+        filter_minmax_image_component_mapping: false,
+        max_timeline_semaphore_value_difference: u64::MAX,
+        framebuffer_integer_color_sample_counts: SAMPLE_COUNTS,
+        min_subgroup_size: *SUBGROUP_SIZES.start(),
+        max_subgroup_size: *SUBGROUP_SIZES.end(),
+        max_compute_workgroup_subgroups: MAX_WORKGROUP_INVOCATIONS / *SUBGROUP_SIZES.start(),
+        required_subgroup_size_stages: vk::ShaderStageFlags::COMPUTE,
+        max_inline_uniform_block_size: 0,
+        max_per_stage_descriptor_inline_uniform_blocks: 0,
+        max_per_stage_descriptor_update_after_bind_inline_uniform_blocks: 0,
+        max_descriptor_set_inline_uniform_blocks: 0,
+        max_descriptor_set_update_after_bind_inline_uniform_blocks: 0,
+        max_inline_uniform_total_size: 0,
+        // No instruction is a dot product of integers.
+        integer_dot_product8_bit_unsigned_accelerated: false,
+        integer_dot_product8_bit_signed_accelerated: false,
+        integer_dot_product8_bit_mixed_signedness_accelerated: false,
+        integer_dot_product4x8_bit_packed_unsigned_accelerated: false,
+        integer_dot_product4x8_bit_packed_signed_accelerated: false,
+        integer_dot_product4x8_bit_packed_mixed_signedness_accelerated: false,
+        integer_dot_product16_bit_unsigned_accelerated: false,
+        integer_dot_product16_bit_signed_accelerated: false,
+        integer_dot_product16_bit_mixed_signedness_accelerated: false,
+        integer_dot_product32_bit_unsigned_accelerated: false,
+        integer_dot_product32_bit_signed_accelerated: false,
+        integer_dot_product32_bit_mixed_signedness_accelerated: false,
+        integer_dot_product64_bit_unsigned_accelerated: false,
+        integer_dot_product64_bit_signed_accelerated: false,
+        integer_dot_product64_bit_mixed_signedness_accelerated: false,
+        integer_dot_product_accumulating_saturating8_bit_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating8_bit_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating8_bit_mixed_signedness_accelerated: false,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating4x8_bit_packed_mixed_signedness_accelerated:
+            false,
+        integer_dot_product_accumulating_saturating16_bit_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating16_bit_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating16_bit_mixed_signedness_accelerated: false,
+        integer_dot_product_accumulating_saturating32_bit_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating32_bit_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating32_bit_mixed_signedness_accelerated: false,
+        integer_dot_product_accumulating_saturating64_bit_unsigned_accelerated: false,
+        integer_dot_product_accumulating_saturating64_bit_signed_accelerated: false,
+        integer_dot_product_accumulating_saturating64_bit_mixed_signedness_accelerated: false,
+        storage_texel_buffer_offset_alignment_bytes: MIN_BUFFER_OFFSET_ALIGNMENT,
+        storage_texel_buffer_offset_single_texel_alignment: false,
+        uniform_texel_buffer_offset_alignment_bytes: MIN_BUFFER_OFFSET_ALIGNMENT,
+        uniform_texel_buffer_offset_single_texel_alignment: false,
+        max_buffer_size: memory::heap_size(),
+        provoking_vertex_mode_per_pipeline: true,
+        transform_feedback_preserves_triangle_fan_provoking_vertex: false,
+        max_vertex_attrib_divisor: u32::MAX,
+        tile_size: vk::Extent2D {
+            width: 16,
+            height: 16,
+        },
+        rasterizer_module_count: RASTERIZER_MODULES,
+        processing_element_count: PROCESSING_ELEMENTS,
+        max_spherical_harmonics_degree: MAX_SPHERICAL_HARMONICS_DEGREE,
+        gaussian_sample_counts: SAMPLE_COUNTS,
+        max_gaussians_per_draw: MAX_GAUSSIANS,
+        max_gaussians_per_set: MAX_GAUSSIANS,
+        allow_command_buffer_query_copies: false,
+        max_push_descriptors: MAX_PUSH_DESCRIPTORS,
+    }
+}
+
+/// A string as Vulkan's structures hold it, cut off where it doesn't fit.
+fn fixed_string<const N: usize>(text: &CStr) -> [c_char; N] {
+    let mut array = [0; N];
+    convert::write_string(&mut array, text);
+    array
+}

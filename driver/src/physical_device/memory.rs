@@ -1,0 +1,136 @@
+//! Memory heaps and types, and the accounting of a device's heap.
+//!
+//! There is one heap, of the host's memory, with two types: one that only the device sees, from whose contents the
+//! device may derive and keep what it likes, and one that the host may map.
+
+use crate::abi::error::Error;
+use ash::vk;
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Every allocation begins at a multiple of this many bytes, in the device's and in the host's view.
+pub(crate) const ALIGNMENT: u64 = 4096;
+
+/// The size of the heap where the host's memory can't be found out.
+const FALLBACK_HEAP_SIZE: u64 = 2 << 30;
+
+/// The types, in the order of their indices: Vulkan wants a type before those with more properties.
+const TYPES: [vk::MemoryPropertyFlags; 2] = [
+    vk::MemoryPropertyFlags::DEVICE_LOCAL,
+    vk::MemoryPropertyFlags::from_raw(
+        vk::MemoryPropertyFlags::DEVICE_LOCAL.as_raw()
+            | vk::MemoryPropertyFlags::HOST_VISIBLE.as_raw()
+            | vk::MemoryPropertyFlags::HOST_COHERENT.as_raw()
+            | vk::MemoryPropertyFlags::HOST_CACHED.as_raw(),
+    ),
+];
+
+/// The `memoryTypeBits` of a resource that any type will do for.
+pub(crate) const ALL_TYPE_BITS: u32 = (1 << TYPES.len()) - 1;
+
+/// The properties of a memory type, or `None` if there is none of that index.
+pub(crate) fn type_properties(index: u32) -> Option<vk::MemoryPropertyFlags> {
+    TYPES.get(index as usize).copied()
+}
+
+/// Bytes of the heap: three quarters of the host's memory.
+pub(crate) fn heap_size() -> u64 {
+    static SIZE: LazyLock<u64> =
+        LazyLock::new(|| host_memory().map_or(FALLBACK_HEAP_SIZE, |bytes| bytes / 4 * 3));
+    *SIZE
+}
+
+fn host_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    total_memory(&text)
+}
+
+/// The bytes of `MemTotal`, which `/proc/meminfo` gives in KiB.
+fn total_memory(meminfo: &str) -> Option<u64> {
+    let line = meminfo
+        .lines()
+        .find_map(|line| line.strip_prefix("MemTotal:"))?;
+    let kibibytes: u64 = line.split_whitespace().next()?.parse().ok()?;
+    kibibytes.checked_mul(1024)
+}
+
+/// `VkPhysicalDeviceMemoryProperties`.
+pub(crate) fn properties() -> vk::PhysicalDeviceMemoryProperties {
+    let mut properties = vk::PhysicalDeviceMemoryProperties {
+        memory_type_count: TYPES.len() as u32,
+        memory_heap_count: 1,
+        ..Default::default()
+    };
+    for (place, flags) in properties.memory_types.iter_mut().zip(TYPES) {
+        *place = vk::MemoryType {
+            property_flags: flags,
+            heap_index: 0,
+        };
+    }
+    properties.memory_heaps[0] = vk::MemoryHeap {
+        size: heap_size(),
+        flags: vk::MemoryHeapFlags::DEVICE_LOCAL,
+    };
+    properties
+}
+
+/// The accounting of a memory heap.
+#[derive(Debug)]
+pub(crate) struct Heap {
+    size: u64,
+    used: AtomicU64,
+}
+
+impl Heap {
+    /// An unused heap of `size` bytes.
+    pub(crate) fn new(size: u64) -> Self {
+        Self {
+            size,
+            used: AtomicU64::new(0),
+        }
+    }
+
+    /// Takes `size` bytes, or none.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDeviceMemory`].
+    pub(crate) fn take(&self, size: u64) -> Result<(), Error> {
+        let within_budget = |used: u64| used.checked_add(size).filter(|&used| used <= self.size);
+        self.used
+            .fetch_update(Ordering::AcqRel, Ordering::Acquire, within_budget)
+            .map(drop)
+            .map_err(|used| {
+                Error::OutOfDeviceMemory(format!(
+                    "{size} bytes asked for, and {used} of the heap's {} are taken",
+                    self.size
+                ))
+            })
+    }
+
+    /// Gives back what was taken.
+    pub(crate) fn give_back(&self, size: u64) {
+        self.used.fetch_sub(size, Ordering::AcqRel);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_type_comes_before_those_with_more_properties() {
+        for (index, later) in TYPES.iter().enumerate() {
+            for earlier in &TYPES[..index] {
+                assert!(!earlier.contains(*later));
+            }
+        }
+    }
+
+    #[test]
+    fn host_memory_is_read() {
+        assert_eq!(total_memory("MemTotal:  16 kB\nMemFree: 1 kB"), Some(16384));
+        assert_eq!(total_memory("MemTotal: ? kB"), None);
+        assert_eq!(total_memory(""), None);
+        assert!(heap_size() > 0);
+    }
+}

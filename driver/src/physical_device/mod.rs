@@ -1,0 +1,284 @@
+//! The physical device's answers: properties, features, formats, memory, queues and counters, each stated once.
+
+pub(crate) mod counters;
+pub(crate) mod environment;
+pub(crate) mod formats;
+pub(crate) mod limits;
+pub(crate) mod memory;
+
+use self::formats::ImageQuery;
+use crate::abi::error::Error;
+use crate::abi::valid::{self, OutputChain, Structures};
+use crate::instance::extension_properties;
+use crate::registry::{self, features::SUPPORTED};
+use ash::vk;
+use std::ffi::CStr;
+
+/// The index of the queue family: there is one, with one queue that does everything.
+pub(crate) const QUEUE_FAMILY: u32 = 0;
+
+/// The number of queues that it has.
+pub(crate) const QUEUE_COUNT: u32 = 1;
+
+/// `VkQueueFamilyProperties` of the family. Timestamps are the host's nanoseconds in 64 bits.
+fn queue_family_properties() -> vk::QueueFamilyProperties {
+    vk::QueueFamilyProperties {
+        queue_flags: vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE | vk::QueueFlags::TRANSFER,
+        queue_count: QUEUE_COUNT,
+        timestamp_valid_bits: 64,
+        min_image_transfer_granularity: vk::Extent3D {
+            width: 1,
+            height: 1,
+            depth: 1,
+        },
+    }
+}
+
+/// Answers whether there can be such an image. That there can't is an answer and no failure: applications ask to
+/// find out.
+fn image_format_answer(
+    query: ImageQuery,
+    out: &mut vk::ImageFormatProperties,
+) -> Result<vk::Result, Error> {
+    match formats::image_properties(query) {
+        Ok(properties) => {
+            *out = properties;
+            Ok(vk::Result::SUCCESS)
+        }
+        Err(error) => {
+            log::debug!("{error}");
+            *out = vk::ImageFormatProperties::default();
+            Ok(error.result())
+        }
+    }
+}
+
+#[doc(alias = "vkGetPhysicalDeviceProperties")]
+pub(crate) fn get_physical_device_properties() -> Result<vk::PhysicalDeviceProperties, Error> {
+    Ok(limits::properties().core())
+}
+
+#[doc(alias = "vkGetPhysicalDeviceProperties2")]
+pub(crate) fn get_physical_device_properties2(
+    mut properties: OutputChain<'_, vk::PhysicalDeviceProperties2<'_>>,
+) -> Result<(), Error> {
+    properties.properties = limits::properties().core();
+    properties.for_each_chained(|out| limits::properties().write(out));
+    Ok(())
+}
+
+#[doc(alias = "vkGetPhysicalDeviceFeatures")]
+pub(crate) fn get_physical_device_features() -> Result<vk::PhysicalDeviceFeatures, Error> {
+    Ok(SUPPORTED.core())
+}
+
+#[doc(alias = "vkGetPhysicalDeviceFeatures2")]
+pub(crate) fn get_physical_device_features2(
+    mut features: OutputChain<'_, vk::PhysicalDeviceFeatures2<'_>>,
+) -> Result<(), Error> {
+    features.features = SUPPORTED.core();
+    features.for_each_chained(|out| SUPPORTED.write(out));
+    Ok(())
+}
+
+#[doc(alias = "vkGetPhysicalDeviceFormatProperties")]
+pub(crate) fn get_physical_device_format_properties(
+    format: vk::Format,
+) -> Result<vk::FormatProperties, Error> {
+    Ok(formats::properties(format))
+}
+
+#[doc(alias = "vkGetPhysicalDeviceFormatProperties2")]
+pub(crate) fn get_physical_device_format_properties2(
+    format: vk::Format,
+    mut format_properties: OutputChain<'_, vk::FormatProperties2<'_>>,
+) -> Result<(), Error> {
+    let found = formats::properties(format);
+    format_properties.format_properties = found;
+    format_properties.for_each_chained(|mut structure| {
+        if let Some(out) = structure.cast::<vk::FormatProperties3<'_>>() {
+            let widen = |features| formats::features2(format, features);
+            out.linear_tiling_features = widen(found.linear_tiling_features);
+            out.optimal_tiling_features = widen(found.optimal_tiling_features);
+            out.buffer_features = widen(found.buffer_features);
+        }
+    });
+    Ok(())
+}
+
+#[doc(alias = "vkGetPhysicalDeviceImageFormatProperties")]
+pub(crate) fn get_physical_device_image_format_properties(
+    format: vk::Format,
+    ty: vk::ImageType,
+    tiling: vk::ImageTiling,
+    usage: vk::ImageUsageFlags,
+    flags: vk::ImageCreateFlags,
+    image_format_properties: &mut vk::ImageFormatProperties,
+) -> Result<vk::Result, Error> {
+    let query = ImageQuery {
+        format,
+        ty,
+        tiling,
+        usage,
+        flags,
+    };
+    image_format_answer(query, image_format_properties)
+}
+
+/// # Safety
+/// The image format info's chain is valid.
+#[doc(alias = "vkGetPhysicalDeviceImageFormatProperties2")]
+pub(crate) unsafe fn get_physical_device_image_format_properties2(
+    image_format_info: &vk::PhysicalDeviceImageFormatInfo2<'_>,
+    mut image_format_properties: OutputChain<'_, vk::ImageFormatProperties2<'_>>,
+) -> Result<vk::Result, Error> {
+    let info = image_format_info;
+    // SAFETY: the caller's promise.
+    let external = unsafe {
+        valid::find_in_chain::<vk::PhysicalDeviceExternalImageFormatInfo<'_>>(info.p_next)
+    };
+    if external.is_some_and(|external| !external.handle_type.is_empty()) {
+        image_format_properties.image_format_properties = vk::ImageFormatProperties::default();
+        return Ok(vk::Result::ERROR_FORMAT_NOT_SUPPORTED);
+    }
+    image_format_properties.for_each_chained(|mut structure| {
+        if let Some(out) = structure.cast::<vk::ExternalImageFormatProperties<'_>>() {
+            out.external_memory_properties = vk::ExternalMemoryProperties::default();
+        }
+    });
+    let query = ImageQuery {
+        format: info.format,
+        ty: info.ty,
+        tiling: info.tiling,
+        usage: info.usage,
+        flags: info.flags,
+    };
+    image_format_answer(query, &mut image_format_properties.image_format_properties)
+}
+
+#[doc(alias = "vkGetPhysicalDeviceSparseImageFormatProperties")]
+pub(crate) fn get_physical_device_sparse_image_format_properties()
+-> Result<[vk::SparseImageFormatProperties; 0], Error> {
+    Ok([])
+}
+
+#[doc(alias = "vkGetPhysicalDeviceSparseImageFormatProperties2")]
+pub(crate) fn get_physical_device_sparse_image_format_properties2(
+    properties: Structures<'_, vk::SparseImageFormatProperties2<'_>>,
+) -> Result<(), Error> {
+    properties.fill(0, |_, _| ()).map(drop)
+}
+
+#[doc(alias = "vkGetPhysicalDeviceQueueFamilyProperties")]
+pub(crate) fn get_physical_device_queue_family_properties()
+-> Result<[vk::QueueFamilyProperties; 1], Error> {
+    Ok([queue_family_properties()])
+}
+
+#[doc(alias = "vkGetPhysicalDeviceQueueFamilyProperties2")]
+pub(crate) fn get_physical_device_queue_family_properties2(
+    queue_family_properties: Structures<'_, vk::QueueFamilyProperties2<'_>>,
+) -> Result<(), Error> {
+    let fill = |_, family: &mut vk::QueueFamilyProperties2<'_>| {
+        family.queue_family_properties = self::queue_family_properties();
+    };
+    queue_family_properties.fill(1, fill).map(drop)
+}
+
+#[doc(alias = "vkGetPhysicalDeviceMemoryProperties")]
+pub(crate) fn get_physical_device_memory_properties()
+-> Result<vk::PhysicalDeviceMemoryProperties, Error> {
+    Ok(memory::properties())
+}
+
+#[doc(alias = "vkGetPhysicalDeviceMemoryProperties2")]
+pub(crate) fn get_physical_device_memory_properties2(
+    memory_properties: &mut vk::PhysicalDeviceMemoryProperties2<'_>,
+) -> Result<(), Error> {
+    memory_properties.memory_properties = memory::properties();
+    Ok(())
+}
+
+#[doc(alias = "vkEnumerateDeviceExtensionProperties")]
+pub(crate) fn enumerate_device_extension_properties(
+    layer_name: Option<&CStr>,
+) -> Result<Vec<vk::ExtensionProperties>, Error> {
+    match layer_name {
+        None => Ok(extension_properties(registry::extensions::DEVICE)),
+        Some(layer) => Err(Error::LayerNotPresent(layer.to_string_lossy().into_owned())),
+    }
+}
+
+#[doc(alias = "vkEnumerateDeviceLayerProperties")]
+pub(crate) fn enumerate_device_layer_properties() -> Result<[vk::LayerProperties; 0], Error> {
+    Ok([])
+}
+
+#[doc(alias = "vkGetPhysicalDeviceExternalBufferProperties")]
+pub(crate) fn get_physical_device_external_buffer_properties(
+    external_buffer_properties: &mut vk::ExternalBufferProperties<'_>,
+) -> Result<(), Error> {
+    external_buffer_properties.external_memory_properties = vk::ExternalMemoryProperties::default();
+    Ok(())
+}
+
+#[doc(alias = "vkGetPhysicalDeviceExternalFenceProperties")]
+pub(crate) fn get_physical_device_external_fence_properties(
+    external_fence_properties: &mut vk::ExternalFenceProperties<'_>,
+) -> Result<(), Error> {
+    let properties = external_fence_properties;
+    properties.export_from_imported_handle_types = vk::ExternalFenceHandleTypeFlags::empty();
+    properties.compatible_handle_types = vk::ExternalFenceHandleTypeFlags::empty();
+    properties.external_fence_features = vk::ExternalFenceFeatureFlags::empty();
+    Ok(())
+}
+
+#[doc(alias = "vkGetPhysicalDeviceExternalSemaphoreProperties")]
+pub(crate) fn get_physical_device_external_semaphore_properties(
+    external_semaphore_properties: &mut vk::ExternalSemaphoreProperties<'_>,
+) -> Result<(), Error> {
+    let properties = external_semaphore_properties;
+    properties.export_from_imported_handle_types = vk::ExternalSemaphoreHandleTypeFlags::empty();
+    properties.compatible_handle_types = vk::ExternalSemaphoreHandleTypeFlags::empty();
+    properties.external_semaphore_features = vk::ExternalSemaphoreFeatureFlags::empty();
+    Ok(())
+}
+
+#[doc(alias = "vkGetPhysicalDeviceToolProperties")]
+pub(crate) fn get_physical_device_tool_properties(
+    tool_properties: Structures<'_, vk::PhysicalDeviceToolProperties<'_>>,
+) -> Result<vk::Result, Error> {
+    tool_properties.fill(0, |_, _| ())
+}
+
+/// # Safety
+/// The arrays are null or have as many initialised structures as the count says.
+#[doc(alias = "vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR")]
+pub(crate) unsafe fn enumerate_performance_query_counters(
+    queue_family_index: u32,
+    counter_count: *mut u32,
+    counters: *mut vk::PerformanceCounterKHR<'_>,
+    counter_descriptions: *mut vk::PerformanceCounterDescriptionKHR<'_>,
+) -> Result<vk::Result, Error> {
+    let available = if queue_family_index == QUEUE_FAMILY {
+        counters::COUNT
+    } else {
+        0
+    };
+    // SAFETY: the caller's promise.
+    unsafe {
+        if !counters.is_null() {
+            let mut room = *valid::input(counter_count)?;
+            Structures::new(&raw mut room, counter_descriptions)?
+                .fill(available, counters::describe)
+                .map(drop)?;
+        }
+        Structures::new(counter_count, counters)?.fill(available, counters::fill)
+    }
+}
+
+/// Every counter is always on.
+#[doc(alias = "vkGetPhysicalDeviceQueueFamilyPerformanceQueryPassesKHR")]
+pub(crate) fn get_performance_query_passes() -> Result<u32, Error> {
+    Ok(1)
+}

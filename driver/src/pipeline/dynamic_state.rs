@@ -1,0 +1,236 @@
+//! Dynamic state: the table of what a command buffer may set, and what it has set.
+
+use super::state::FixedFunctionState as Fixed;
+use crate::convert::StencilOps;
+use ash::vk;
+use simdevice::packet::draw::{CompareOp, DepthBias, Topology};
+
+/// The face that a stencil state is for: 0 is the front, 1 the back.
+pub(crate) type Face = usize;
+
+/// The use that Gaussians make of a dynamic state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Gaussians {
+    /// It says what becomes of their fragments.
+    Taken,
+    /// It has no effect on them.
+    Ignored,
+    /// A pipeline of theirs may not have it dynamic.
+    Refused,
+}
+
+/// A row of the table.
+struct Row {
+    state: vk::DynamicState,
+    /// Tells if a draw with the rest of the state needs it to be set.
+    is_needed: fn(&Fixed) -> bool,
+    gaussians: Gaussians,
+}
+
+/// The table: `LINE_WIDTH => LineWidth(width: f32), set .., needed .., gaussians ..;` is the state of that name, its value, how
+/// the value becomes part of fixed-function state, when a draw needs it to be set, and what Gaussians make of it. A state
+/// that each face has of its own names the face in brackets.
+macro_rules! dynamic_states {
+    ($(
+        $state:ident => $variant:ident $([$face:ident])? ($value:ident: $type:ty),
+        set $set:expr, needed $needed:expr, gaussians $gaussians:ident;
+    )*) => {
+        /// A state that a command buffer has set, with its value.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[allow(missing_docs, reason = "the names are those of Vulkan's commands")]
+        pub(crate) enum DynamicState {
+            $($variant { $($face: Face,)? $value: $type },)*
+        }
+
+        const ROWS: &[Row] = &[$(Row {
+            state: vk::DynamicState::$state,
+            is_needed: $needed,
+            gaussians: Gaussians::$gaussians,
+        },)*];
+
+        impl DynamicState {
+            /// The state and the face that it is for, if it is for one.
+            fn key(self) -> (vk::DynamicState, Option<Face>) {
+                match self {
+                    $(Self::$variant { $($face,)? .. } => {
+                        (vk::DynamicState::$state, None::<Face>$(.or(Some($face)))?)
+                    })*
+                }
+            }
+
+            /// Makes it part of fixed-function state.
+            pub(crate) fn apply(self, state: &mut Fixed) {
+                fn apply(state: &mut Fixed, set: impl FnOnce(&mut Fixed)) {
+                    set(state);
+                }
+                match self {
+                    $(Self::$variant { $($face,)? $value } => apply(state, $set),)*
+                }
+            }
+        }
+    };
+}
+
+dynamic_states! {
+    LINE_WIDTH => LineWidth(width: f32),
+        set |state| state.draw.line_width = width, needed Fixed::draws_lines, gaussians Ignored;
+    DEPTH_BIAS => DepthBias(bias: DepthBias),
+        set |state| state.depth_bias = bias, needed Fixed::biases_depth, gaussians Ignored;
+    DEPTH_BIAS_ENABLE => DepthBiasEnable(enable: bool),
+        set |state| state.depth_bias_enable = enable, needed Fixed::rasterizes, gaussians Ignored;
+    BLEND_CONSTANTS => BlendConstants(constants: [f32; 4]),
+        set |state| state.draw.blend_constants = constants, needed Fixed::blends_by_constants, gaussians Taken;
+    DEPTH_BOUNDS => DepthBounds(bounds: (f32, f32)),
+        set |state| state.depth_bounds = bounds, needed Fixed::tests_depth_bounds, gaussians Taken;
+    DEPTH_BOUNDS_TEST_ENABLE => DepthBoundsTestEnable(enable: bool),
+        set |state| state.depth_bounds_test = enable, needed Fixed::rasterizes, gaussians Taken;
+    DEPTH_TEST_ENABLE => DepthTestEnable(enable: bool),
+        set |state| state.depth_test = enable, needed Fixed::rasterizes, gaussians Taken;
+    DEPTH_WRITE_ENABLE => DepthWriteEnable(enable: bool),
+        set |state| state.depth_write = enable, needed Fixed::tests_depth, gaussians Taken;
+    DEPTH_COMPARE_OP => DepthCompareOp(op: CompareOp),
+        set |state| state.depth_compare = op, needed Fixed::tests_depth, gaussians Taken;
+    STENCIL_TEST_ENABLE => StencilTestEnable(enable: bool),
+        set |state| state.stencil_test = enable, needed Fixed::rasterizes, gaussians Taken;
+    STENCIL_OP => StencilOp[face](ops: StencilOps),
+        set |state| ops.set(&mut state.stencil[face]), needed Fixed::tests_stencil, gaussians Taken;
+    STENCIL_COMPARE_MASK => StencilCompareMask[face](mask: u8),
+        set |state| state.stencil[face].compare_mask = mask, needed Fixed::tests_stencil, gaussians Taken;
+    STENCIL_WRITE_MASK => StencilWriteMask[face](mask: u8),
+        set |state| state.stencil[face].write_mask = mask, needed Fixed::tests_stencil, gaussians Taken;
+    STENCIL_REFERENCE => StencilReference[face](reference: u8),
+        set |state| state.stencil[face].reference = reference, needed Fixed::tests_stencil, gaussians Taken;
+    CULL_MODE => CullMode(mode: vk::CullModeFlags),
+        set |state| state.set_cull_mode(mode), needed Fixed::rasterizes, gaussians Ignored;
+    FRONT_FACE => FrontFace(face: vk::FrontFace),
+        set |state| state.set_front_face(face), needed Fixed::rasterizes, gaussians Ignored;
+    PRIMITIVE_TOPOLOGY => PrimitiveTopology(topology: Topology),
+        set |state| state.draw.topology = topology, needed |_| true, gaussians Ignored;
+    PRIMITIVE_RESTART_ENABLE => PrimitiveRestartEnable(enable: bool),
+        set |state| state.draw.primitive_restart = enable, needed |_| true, gaussians Refused;
+    RASTERIZER_DISCARD_ENABLE => RasterizerDiscardEnable(enable: bool),
+        set |state| state.draw.rasterizer_discard = enable, needed |_| true, gaussians Refused;
+}
+
+/// The dynamic states that are looked up for each draw, and that no row has a value of: viewports, scissors and strides.
+/// Gaussians may have all of them.
+const LOOKED_UP: [vk::DynamicState; 5] = [
+    vk::DynamicState::VIEWPORT,
+    vk::DynamicState::VIEWPORT_WITH_COUNT,
+    vk::DynamicState::SCISSOR,
+    vk::DynamicState::SCISSOR_WITH_COUNT,
+    vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE,
+];
+
+fn row(state: vk::DynamicState) -> Option<&'static Row> {
+    ROWS.iter().find(|row| row.state == state)
+}
+
+/// Tells if the driver has a dynamic state.
+pub(crate) fn is_supported(state: vk::DynamicState) -> bool {
+    row(state).is_some() || LOOKED_UP.contains(&state)
+}
+
+/// Tells if a dynamic state is set by a value, which [`DynamicStates`] keeps.
+pub(crate) fn has_value(state: vk::DynamicState) -> bool {
+    row(state).is_some()
+}
+
+/// Tells if a Gaussian pipeline takes a state from the command buffer.
+pub(crate) fn is_taken_by_gaussians(state: vk::DynamicState) -> bool {
+    row(state).is_some_and(|row| row.gaussians == Gaussians::Taken)
+}
+
+/// Tells if a Gaussian pipeline may have a state dynamic.
+pub(crate) fn may_gaussians_have(state: vk::DynamicState) -> bool {
+    row(state).map_or(LOOKED_UP.contains(&state), |row| {
+        row.gaussians != Gaussians::Refused
+    })
+}
+
+/// The faces that a mask names.
+pub(crate) fn faces(mask: vk::StencilFaceFlags) -> impl Iterator<Item = Face> {
+    let flags = [vk::StencilFaceFlags::FRONT, vk::StencilFaceFlags::BACK];
+    (0..)
+        .zip(flags)
+        .filter_map(move |(face, flag)| mask.contains(flag).then_some(face))
+}
+
+/// The states that a command buffer has set so far; the last value of each.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DynamicStates(Vec<DynamicState>);
+
+impl DynamicStates {
+    /// Sets a state, instead of what was set before.
+    pub(crate) fn set(&mut self, state: DynamicState) {
+        match self.0.iter_mut().find(|old| old.key() == state.key()) {
+            Some(old) => *old = state,
+            None => self.0.push(state),
+        }
+    }
+
+    /// The values that were set of a state: one, or one for each face.
+    fn of(&self, state: vk::DynamicState) -> impl Iterator<Item = DynamicState> {
+        self.0.iter().copied().filter(move |it| it.key().0 == state)
+    }
+
+    /// Makes those of the states `dynamic` that were set part of fixed-function state.
+    ///
+    /// # Errors
+    /// The first state that was not set, though a draw needs it.
+    pub(crate) fn apply(
+        &self,
+        dynamic: &[vk::DynamicState],
+        fixed: &mut Fixed,
+    ) -> Result<(), vk::DynamicState> {
+        let mut missing = Vec::new();
+        for &state in dynamic {
+            let mut values = self.of(state).peekable();
+            if values.peek().is_none() {
+                missing.push(state);
+            }
+            values.for_each(|value| value.apply(fixed));
+        }
+        let is_needed = |&state: &_| row(state).is_some_and(|row| (row.is_needed)(fixed));
+        missing.into_iter().find(is_needed).map_or(Ok(()), Err)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_value_of_a_face_holds() {
+        let reference = |face, reference| DynamicState::StencilReference { face, reference };
+        let mut states = DynamicStates::default();
+        for face in faces(vk::StencilFaceFlags::FRONT_AND_BACK) {
+            states.set(reference(face, 1));
+        }
+        for face in faces(vk::StencilFaceFlags::BACK) {
+            states.set(reference(face, 2));
+        }
+        let width = DynamicState::LineWidth { width: 3.0 };
+        states.set(width);
+        let of = |state| states.of(state).collect::<Vec<_>>();
+        assert_eq!(
+            of(vk::DynamicState::STENCIL_REFERENCE),
+            [reference(0, 1), reference(1, 2)]
+        );
+        assert_eq!(of(vk::DynamicState::LINE_WIDTH), [width]);
+        assert!(of(vk::DynamicState::DEPTH_BIAS).is_empty());
+    }
+
+    #[test]
+    fn gaussians_take_ignore_or_refuse_each_state() {
+        use vk::DynamicState as S;
+        let all = || ROWS.iter().map(|row| row.state).chain(LOOKED_UP);
+        assert!(all().all(is_supported));
+        assert!(!is_supported(S::LINE_STIPPLE_KHR));
+        let taken = all().filter(|&state| is_taken_by_gaussians(state));
+        assert_eq!(taken.count(), 11);
+        let refused = all().filter(|&state| !may_gaussians_have(state));
+        let expected = [S::PRIMITIVE_RESTART_ENABLE, S::RASTERIZER_DISCARD_ENABLE];
+        assert_eq!(refused.collect::<Vec<_>>(), expected);
+    }
+}

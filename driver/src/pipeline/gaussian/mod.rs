@@ -1,0 +1,361 @@
+//! Pipelines of the Gaussian list topology.
+
+pub(crate) mod stages;
+mod valid_usage;
+
+use self::stages::{ResolveStage, VertexProjection};
+use self::valid_usage::*;
+use super::dynamic_state::is_taken_by_gaussians;
+use super::state::{AttributeSource, FixedFunctionState, GraphicsState, attribute};
+use crate::abi::error::Error;
+use crate::convert;
+use crate::descriptor::layout::LayoutBinding;
+use crate::device::Device;
+use crate::registry::features::Features;
+use ash::vk;
+use gaurast::vk::{
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianCameraSourceGAURAST,
+    GaussianGeometryGAURAST, GaussianLinearizationGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
+};
+use simdevice::packet::draw::DrawState;
+use simdevice::packet::{
+    CameraModel, GaussianApproximation, GaussianGeometry, GaussianLinearization, GaussianOrder,
+    GaussianPrecision, GaussianState, Rect, Viewport,
+};
+use std::sync::Arc;
+
+/// The Gaussian part of a pipeline.
+#[derive(Debug)]
+pub(crate) struct GaussianPipeline {
+    /// The state for the device; what is dynamic of it is filled in for each draw.
+    pub(crate) state: Arc<GaussianState>,
+    /// The state that decides what becomes of fragments, as far as it is static.
+    pub(crate) fixed: FixedFunctionState,
+    /// The states that the command buffer sets of that.
+    pub(crate) dynamic: Vec<vk::DynamicState>,
+    /// The viewport, unless it is dynamic.
+    pub(crate) viewport: Option<Viewport>,
+    /// The scissor, unless it is dynamic.
+    pub(crate) scissor: Option<Rect>,
+    /// The source of draws' camera.
+    pub(crate) camera: CameraSource,
+    /// The models that the camera may have.
+    pub(crate) camera_models: CameraModels,
+    /// True if consecutive draws are sorted together.
+    pub(crate) merges_draws: bool,
+    /// The source of Gaussians.
+    pub(crate) source: GaussianSource,
+    /// The stage that makes colours of what they accumulate.
+    pub(crate) resolve: Option<ResolveStage>,
+}
+
+/// The source of a pipeline's Gaussians.
+#[derive(Debug)]
+pub(crate) enum GaussianSource {
+    /// Vertex attributes, which the device projects.
+    Attributes(GaussianAttributeSources),
+    /// A vertex shader, which projects them itself.
+    VertexShader(VertexProjection),
+}
+
+/// The attributes of fixed-function projection.
+#[derive(Debug)]
+pub(crate) struct GaussianAttributeSources {
+    /// The source of means.
+    pub(crate) position: AttributeSource,
+    /// The source of standard deviations.
+    pub(crate) scale: AttributeSource,
+    /// The source of quaternions.
+    pub(crate) rotation: AttributeSource,
+    /// The source of opacities.
+    pub(crate) opacity: AttributeSource,
+    /// The sources of the spherical harmonics' coefficients.
+    pub(crate) spherical_harmonics: Vec<AttributeSource>,
+    /// The sources of the rows of model matrices, if there are any.
+    pub(crate) model_matrix: Option<[AttributeSource; 3]>,
+    /// The source of factors of the opacity, if there are any.
+    pub(crate) model_opacity: Option<AttributeSource>,
+}
+
+/// The source of Gaussian draws' camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum CameraSource {
+    /// There is none: a vertex shader projects.
+    None,
+    /// `vkCmdSetGaussianCameraGAURAST`.
+    Command,
+    /// A uniform buffer, read when the draw executes.
+    UniformBuffer {
+        /// The descriptor set.
+        set: u32,
+        /// The binding, whose first descriptor it is.
+        binding: u32,
+    },
+}
+
+/// The camera models whose features are enabled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct CameraModels {
+    orthographic: bool,
+    fisheye: bool,
+    equirectangular: bool,
+}
+
+impl CameraModels {
+    /// The models of a device.
+    pub(crate) fn of(features: &Features) -> Self {
+        Self {
+            orthographic: features.orthographic_camera,
+            fisheye: features.fisheye_camera,
+            equirectangular: features.equirectangular_camera,
+        }
+    }
+
+    /// Tells if a camera of this model may be used.
+    pub(crate) fn have(self, model: CameraModel) -> bool {
+        match model {
+            CameraModel::Pinhole => true,
+            CameraModel::Orthographic => self.orthographic,
+            CameraModel::Fisheye => self.fisheye,
+            CameraModel::Equirectangular => self.equirectangular,
+        }
+    }
+}
+
+impl GaussianPipeline {
+    /// Validates and converts the Gaussian part of a pipeline.
+    pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
+        let features = device.features();
+        require(features, TOPOLOGY, "the topology is the Gaussian list")?;
+        let Some(gaussian) = &info.gaussian else {
+            return Err(Error::usage(
+                "VUID-VkGraphicsPipelineCreateInfo-topology-GAURAST",
+                format!(
+                    "a pipeline of topology VK_PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST must chain a \
+                     {STRUCTURE}; if a validation layer is enabled, name the structure to it with \
+                     VK_LAYER_CUSTOM_STYPE_LIST"
+                ),
+            ));
+        };
+        combinations(info, gaussian)?;
+        stages(info, gaussian, features)?;
+        modes(gaussian, features)?;
+        values(gaussian)?;
+        let approximation = approximation(info, features)?;
+        fixed_state(info, features)?;
+        let fragments = FixedFunctionState::of_gaussians(info)?;
+
+        let taken = info.dynamic.iter().copied();
+        let taken = taken.filter(|&state| is_taken_by_gaussians(state));
+        Ok(Self {
+            source: source(device, info, gaussian)?,
+            resolve: ResolveStage::new(device, info, gaussian, &fragments)?,
+            state: Arc::new(GaussianState {
+                approximation,
+                ..state(gaussian, features, fragments.draw_state())?
+            }),
+            dynamic: taken.collect(),
+            fixed: fragments,
+            viewport: fixed(
+                "viewport",
+                info.is_dynamic(vk::DynamicState::VIEWPORT)
+                    || info.is_dynamic(vk::DynamicState::VIEWPORT_WITH_COUNT),
+                info.pre_rasterization.viewports,
+            )?
+            .map(convert::viewport),
+            scissor: fixed(
+                "scissor",
+                info.is_dynamic(vk::DynamicState::SCISSOR)
+                    || info.is_dynamic(vk::DynamicState::SCISSOR_WITH_COUNT),
+                info.pre_rasterization.scissors,
+            )?
+            .map(convert::rect),
+            camera: camera_source(info, gaussian, features)?,
+            camera_models: CameraModels::of(features),
+            merges_draws: gaussian
+                .flags
+                .contains(PipelineGaussianStateCreateFlagsGAURAST::MERGE_DRAWS),
+        })
+    }
+}
+
+/// The source of Gaussians.
+fn source(
+    device: &Device,
+    info: &GraphicsState,
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+) -> Result<GaussianSource, Error> {
+    if is_shaded(gaussian) {
+        let projection = VertexProjection::new(device, info, gaussian)?;
+        return Ok(GaussianSource::VertexShader(projection));
+    }
+    let locations = &gaussian.attribute_locations;
+    for (name, location) in [
+        ("firstModelMatrix", locations.first_model_matrix),
+        ("modelOpacity", locations.model_opacity),
+    ] {
+        if location != GAUSSIAN_LOCATION_UNUSED_GAURAST {
+            require(device.features(), INSTANCING, &format!("{name} is used"))?;
+        }
+    }
+    let degree = gaussian.spherical_harmonics_degree;
+    let coefficients = (degree + 1) * (degree + 1);
+    let first = locations.first_spherical_harmonics;
+    let scales = match gaussian.geometry {
+        GaussianGeometryGAURAST::GAUSSIAN_2D => 2,
+        _ => 3,
+    };
+    Ok(GaussianSource::Attributes(GaussianAttributeSources {
+        position: attribute(info, "position", locations.position, 3)?,
+        scale: attribute(info, "scale", locations.scale, scales)?,
+        rotation: attribute(info, "rotation", locations.rotation, 4)?,
+        opacity: attribute(info, "opacity", locations.opacity, 1)?,
+        spherical_harmonics: (0..coefficients)
+            .map(|k| {
+                let name = format!("spherical harmonics coefficient {k}");
+                attribute(info, &name, first.saturating_add(k), 3)
+            })
+            .collect::<Result<_, _>>()?,
+        model_matrix: match locations.first_model_matrix {
+            GAUSSIAN_LOCATION_UNUSED_GAURAST => None,
+            first => {
+                let row = |k| attribute(info, "a model matrix's row", first.saturating_add(k), 4);
+                Some([row(0)?, row(1)?, row(2)?])
+            }
+        },
+        model_opacity: match locations.model_opacity {
+            GAUSSIAN_LOCATION_UNUSED_GAURAST => None,
+            location => Some(attribute(info, "modelOpacity", location, 1)?),
+        },
+    }))
+}
+
+/// The state's first element, unless it is dynamic.
+fn fixed<T: Copy>(name: &str, dynamic: bool, values: &[T]) -> Result<Option<T>, Error> {
+    match (dynamic, values.first()) {
+        (true, _) => Ok(None),
+        (false, Some(&value)) => Ok(Some(value)),
+        (false, None) => Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-04130",
+            format!("the pipeline has no {name}, and its {name} is not dynamic"),
+        )),
+    }
+}
+
+fn state(
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+    features: &Features,
+    fragments: DrawState,
+) -> Result<GaussianState, Error> {
+    let opacity_compensated = match gaussian.antialiasing {
+        GaussianAntialiasingGAURAST::DILATE => false,
+        GaussianAntialiasingGAURAST::OPACITY_COMPENSATED => {
+            require(
+                features,
+                OPACITY_COMPENSATION,
+                "antialiasing is OPACITY_COMPENSATED",
+            )?;
+            true
+        }
+        other => return Err(unknown("antialiasing", &other)),
+    };
+    let order = match gaussian.order {
+        GaussianOrderGAURAST::VIEW_DEPTH => GaussianOrder::ViewDepth,
+        GaussianOrderGAURAST::RADIAL_DISTANCE => {
+            require(features, RADIAL_DISTANCE_ORDER, "order is RADIAL_DISTANCE")?;
+            GaussianOrder::RadialDistance
+        }
+        GaussianOrderGAURAST::PRIMITIVE => {
+            require(features, PRIMITIVE_ORDER, "order is PRIMITIVE")?;
+            GaussianOrder::Primitive
+        }
+        GaussianOrderGAURAST::PER_PIXEL => {
+            require(features, PER_PIXEL_ORDER, "order is PER_PIXEL")?;
+            GaussianOrder::PerPixel
+        }
+        other => return Err(unknown("order", &other)),
+    };
+    Ok(GaussianState {
+        precision: match gaussian.precision {
+            GaussianPrecisionGAURAST::FLOAT16 => GaussianPrecision::Float16,
+            _ => GaussianPrecision::Float32,
+        },
+        // What a vertex shader projects has neither.
+        geometry: match gaussian.geometry {
+            GaussianGeometryGAURAST::GAUSSIAN_2D if !is_shaded(gaussian) => {
+                GaussianGeometry::Surfel
+            }
+            _ => GaussianGeometry::Volume,
+        },
+        sh_degree: if is_shaded(gaussian) {
+            0
+        } else {
+            gaussian.spherical_harmonics_degree
+        },
+        linearization: match gaussian.linearization {
+            GaussianLinearizationGAURAST::UNSCENTED if !is_shaded(gaussian) => {
+                GaussianLinearization::Unscented
+            }
+            _ => GaussianLinearization::Jacobian,
+        },
+        order,
+        opacity_compensated,
+        low_pass_variance: gaussian.low_pass_variance,
+        alpha_floor: gaussian.alpha_floor,
+        alpha_ceiling: gaussian.alpha_ceiling,
+        transmittance_floor: gaussian.transmittance_floor,
+        approximation: GaussianApproximation::default(),
+        sample_mask: fragments.sample_mask,
+        depth_stencil: fragments.depth_stencil,
+        logic_op: fragments.logic_op,
+        blend: fragments.blend,
+        blend_constants: fragments.blend_constants,
+    })
+}
+
+/// The source of draws' camera.
+fn camera_source(
+    info: &GraphicsState,
+    gaussian: &PipelineGaussianStateCreateInfoGAURAST,
+    features: &Features,
+) -> Result<CameraSource, Error> {
+    match gaussian.camera_source {
+        _ if is_shaded(gaussian) => return Ok(CameraSource::None),
+        GaussianCameraSourceGAURAST::COMMAND => return Ok(CameraSource::Command),
+        GaussianCameraSourceGAURAST::UNIFORM_BUFFER => {}
+        other => return Err(unknown("cameraSource", &other)),
+    }
+    require(
+        features,
+        UNIFORM_BUFFER_CAMERA,
+        "cameraSource is UNIFORM_BUFFER",
+    )?;
+    let (set, binding) = (gaussian.camera_set, gaussian.camera_binding);
+    let is_there = info.layout.is_some_and(|layout| {
+        let found = layout.set_layout(set).ok();
+        found
+            .and_then(|set| set.binding(binding))
+            .is_some_and(holds_camera)
+    });
+    if !is_there {
+        return Err(Error::usage(
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-cameraBinding-layout",
+            format!(
+                "{STRUCTURE}: the pipeline layout has no uniform buffer visible to the vertex stage at set {set}, \
+                 binding {binding}, where cameraSet and cameraBinding want one"
+            ),
+        ));
+    }
+    Ok(CameraSource::UniformBuffer { set, binding })
+}
+
+/// Tells if a binding is a uniform buffer that the vertex stage sees.
+fn holds_camera(binding: &LayoutBinding) -> bool {
+    let is_uniform = matches!(
+        binding.kind,
+        vk::DescriptorType::UNIFORM_BUFFER | vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC
+    );
+    is_uniform && binding.count > 0 && binding.stages.contains(vk::ShaderStageFlags::VERTEX)
+}

@@ -1,0 +1,316 @@
+//! The shader stages of Gaussian pipelines.
+
+use crate::abi::error::Error;
+use crate::device::Device;
+use crate::pipeline::layout::PipelineLayout;
+use crate::pipeline::link::{self, InterfaceComponent, LiveOutputs, Varyings};
+use crate::pipeline::stages;
+use crate::pipeline::state::{
+    AttributeSource, FixedFunctionState, GraphicsState, live_color_outputs, reads_second_source,
+};
+use crate::shader_module::ShaderStage;
+use ash::vk;
+use gaurast::vk::{
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use gaurast_spirv::{
+    BuiltIn, InputSource, Interface, OutputTarget, ScalarType, ShaderBinding, Stage,
+};
+use simdevice::isa::builder::Builder;
+use simdevice::isa::ir::{Rate, Type};
+use simdevice::packet::draw::{
+    DrawPipeline, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, ResolveProgram,
+    Sampling, gaussian, resolve,
+};
+use std::sync::Arc;
+
+/// A vertex shader that projects Gaussians.
+#[derive(Debug)]
+pub(crate) struct VertexProjection {
+    /// The program.
+    pub(crate) programs: Arc<DrawPipeline>,
+    /// The sources of its attributes.
+    pub(crate) attributes: Vec<AttributeSource>,
+    /// The descriptors that it is bound to.
+    pub(crate) descriptors: Vec<ShaderBinding>,
+}
+
+impl VertexProjection {
+    /// Translates the vertex stage, and checks what it reads and writes.
+    ///
+    /// # Errors
+    /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
+    pub(crate) fn new(
+        device: &Device,
+        info: &GraphicsState,
+        state: &PipelineGaussianStateCreateInfoGAURAST,
+    ) -> Result<Self, Error> {
+        let stage = find(info, vk::ShaderStageFlags::VERTEX).ok_or_else(|| {
+            Error::usage(
+                "VUID-VkGraphicsPipelineCreateInfo-projectionMode-GAURAST",
+                "projectionMode is VERTEX_SHADER, and there is no vertex stage",
+            )
+        })?;
+        check_order(state)?;
+        // Nothing of a vertex stage depends on samples.
+        let vertex = stages::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
+        let components = components(state, &vertex.interface)?;
+        let locations = vertex.interface.locations_read();
+        let attributes = stages::attributes(info, &locations)?;
+        stages::check_attributes(&vertex.interface, &locations, &attributes)?;
+        let descriptors = vertex.interface.descriptors.clone();
+        let stream = |location| locations.iter().position(|(read, _)| *read == location);
+        let programs = link::link_projection(vertex, stream, &components)?;
+        let programs = DrawPipeline::of_gaussians(device.simulated(), &programs)
+            .map_err(|error| Error::InvalidShader(error.to_string()))?;
+        Ok(Self {
+            programs: Arc::new(programs),
+            attributes,
+            descriptors,
+        })
+    }
+}
+
+/// Refuses orders that a vertex shader's outputs do not tell.
+fn check_order(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Error> {
+    let has_key = state.vertex_output_locations.depth_key != GAUSSIAN_LOCATION_UNUSED_GAURAST;
+    let (vuid, what) = match state.order {
+        GaussianOrderGAURAST::RADIAL_DISTANCE if !has_key => (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-depthKey-order",
+            "order is RADIAL_DISTANCE, but depthKey is unused",
+        ),
+        GaussianOrderGAURAST::PER_PIXEL => (
+            "VUID-VkPipelineGaussianStateCreateInfoGAURAST-projectionMode-order",
+            "order is PER_PIXEL, but projectionMode is VERTEX_SHADER",
+        ),
+        _ => return Ok(()),
+    };
+    Err(Error::usage(vuid, what))
+}
+
+/// A resolve shader.
+#[derive(Debug)]
+pub(crate) struct ResolveStage {
+    /// The program.
+    pub(crate) program: Arc<ResolveProgram>,
+    /// The descriptors that it is bound to.
+    pub(crate) descriptors: Vec<ShaderBinding>,
+    /// True if every sample is shaded for itself.
+    pub(crate) sample_shading: bool,
+    /// True if alpha makes coverage.
+    pub(crate) alpha_to_coverage: bool,
+    /// True if alpha becomes 1 after that.
+    pub(crate) alpha_to_one: bool,
+}
+
+impl ResolveStage {
+    /// Translates the fragment stage, if there is one, and checks what it reads and writes.
+    ///
+    /// # Errors
+    /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
+    pub(crate) fn new(
+        device: &Device,
+        info: &GraphicsState,
+        state: &PipelineGaussianStateCreateInfoGAURAST,
+        fixed: &FixedFunctionState,
+    ) -> Result<Option<Self>, Error> {
+        let draw = &fixed.draw;
+        let Some(stage) = find(info, vk::ShaderStageFlags::FRAGMENT) else {
+            let is_needed = draw.alpha_to_coverage || draw.alpha_to_one;
+            return is_needed.then(|| Self::passing(device, fixed)).transpose();
+        };
+        let fragment =
+            stages::translate(device, layout(info)?, stage, Stage::Fragment, draw.samples)?;
+        let varyings = varyings(state)?;
+        check_resolve(&fragment.interface, &varyings)?;
+        let descriptors = fragment.interface.descriptors.clone();
+        let color = live_color_outputs(info, fixed);
+        let live_outputs = LiveOutputs {
+            color: &color,
+            second_source: info.fragment_output.blend.iter().any(reads_second_source),
+            points: false,
+        };
+        let programs = link::link_resolve(fragment, &varyings, live_outputs)?;
+        let program = ResolveProgram::new(device.simulated(), &programs)
+            .map_err(|error| Error::InvalidShader(error.to_string()))?;
+        Ok(Some(Self {
+            program: Arc::new(program),
+            descriptors,
+            sample_shading: draw.sample_shading,
+            alpha_to_coverage: draw.alpha_to_coverage,
+            alpha_to_one: draw.alpha_to_one,
+        }))
+    }
+}
+
+impl ResolveStage {
+    /// One that leaves colours as they are, so that their alpha may become coverage, or one.
+    fn passing(device: &Device, fixed: &FixedFunctionState) -> Result<Self, Error> {
+        let mut builder = Builder::new();
+        for slot in 0..4 {
+            let input = builder.input(slot, Type::B32, Rate::Varying);
+            let output = builder.output(slot, Type::B32);
+            builder.assign(output, input);
+        }
+        let invalid = |error: &dyn std::fmt::Display| Error::InvalidShader(error.to_string());
+        let input = |component| {
+            Some(FragmentInput::Varying {
+                index: resolve::ACCUMULATED + component,
+                interpolation: Interpolation::Flat,
+                sampling: Sampling::Center,
+            })
+        };
+        let output = |component| {
+            Some(FragmentOutput::Color {
+                attachment: 0,
+                component,
+                index: 0,
+            })
+        };
+        let programs = FragmentPrograms {
+            program: builder.finish().map_err(|error| invalid(&error))?,
+            inputs: (0..4).map(input).collect(),
+            outputs: (0..4).map(output).collect(),
+            early_tests: false,
+            discards: false,
+            per_sample: false,
+            has_side_effects: false,
+        };
+        let program = ResolveProgram::new(device.simulated(), &programs);
+        Ok(Self {
+            program: Arc::new(program.map_err(|error| invalid(&error))?),
+            descriptors: Vec::new(),
+            sample_shading: false,
+            alpha_to_coverage: fixed.draw.alpha_to_coverage,
+            alpha_to_one: fixed.draw.alpha_to_one,
+        })
+    }
+}
+
+const RESOLVE_INPUTS: &str = "VUID-VkGaussianResolveInputLocationsGAURAST-location";
+
+/// The numbers of what a resolve shader may read, by place.
+fn varyings(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<Varyings, Error> {
+    let locations = &state.resolve_input_locations;
+    let (color, depth) = (locations.accumulated_color, locations.depth);
+    if color == depth && color != GAUSSIAN_LOCATION_UNUSED_GAURAST {
+        return Err(Error::usage(
+            RESOLVE_INPUTS,
+            format!("accumulatedColor and depth are both location {color}"),
+        ));
+    }
+    let at = |location: u32, first: u32, count: u32| {
+        let is_used = location != GAUSSIAN_LOCATION_UNUSED_GAURAST;
+        let numbers = (0..count).filter(move |_| is_used);
+        numbers.map(move |component| ((location, component), first + component))
+    };
+    let accumulated = at(locations.accumulated_color, resolve::ACCUMULATED, 4);
+    let depths = at(locations.depth, resolve::EXPECTED_DEPTH, 2);
+    Ok(accumulated.chain(depths).collect())
+}
+
+/// Refuses what a resolve shader cannot read or write.
+fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error> {
+    for input in &interface.inputs {
+        let InputSource::Location {
+            location,
+            component,
+            ..
+        } = input.source
+        else {
+            continue;
+        };
+        let is_known = varyings.contains_key(&(location, component));
+        if !is_known || input.numeric != (ScalarType::Float { width: 32 }) {
+            return Err(Error::usage(
+                RESOLVE_INPUTS,
+                format!(
+                    "the fragment shader reads component {component} of location {location}, where \
+                     the pipeline has no 32-bit floating point for it: neither accumulatedColor nor \
+                     depth"
+                ),
+            ));
+        }
+    }
+    let writes_depth = interface.outputs.iter().any(|output| {
+        let built_in = BuiltIn::FragDepth;
+        matches!(output.target, OutputTarget::BuiltIn { built_in: b, .. } if b == built_in)
+    });
+    if writes_depth {
+        return Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-FragDepth-GAURAST",
+            "the fragment shader writes FragDepth, but the depth of Gaussians is the median's",
+        ));
+    }
+    Ok(())
+}
+
+fn layout<'a>(info: &GraphicsState<'a>) -> Result<&'a Arc<PipelineLayout>, Error> {
+    info.layout.ok_or_else(|| {
+        Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-layout-06602",
+            "the pipeline has no layout",
+        )
+    })
+}
+
+/// A pipeline's stage of a kind.
+fn find<'a>(info: &'a GraphicsState, wanted: vk::ShaderStageFlags) -> Option<&'a ShaderStage<'a>> {
+    let mut stages = info.stages();
+    let (_, stage) = stages.find(|(stage, _)| *stage == wanted)?;
+    Some(stage)
+}
+
+/// The locations to which the vertex shader writes what the device takes, in the order of the numbers of [`gaussian`].
+fn components(
+    state: &PipelineGaussianStateCreateInfoGAURAST,
+    interface: &Interface,
+) -> Result<Vec<InterfaceComponent>, Error> {
+    let refuse = |what: String| {
+        let vuid = "VUID-VkGaussianVertexOutputLocationsGAURAST-location";
+        Err(Error::usage(vuid, what))
+    };
+    let locations = &state.vertex_output_locations;
+    let wanted = [
+        ("covariance", locations.covariance, gaussian::COVARIANCE),
+        ("opacity", locations.opacity, gaussian::OPACITY),
+        ("color", locations.color, gaussian::COLOR),
+        ("depthKey", locations.depth_key, gaussian::DEPTH_KEY),
+    ];
+    let mut components: Vec<InterfaceComponent> = Vec::new();
+    for (name, location, first) in wanted {
+        let is_key = first == gaussian::DEPTH_KEY;
+        if is_key && location == GAUSSIAN_LOCATION_UNUSED_GAURAST {
+            continue;
+        }
+        if components.iter().any(|&(taken, _)| taken == location) {
+            return refuse(format!(
+                "{name} is location {location}, as another output is"
+            ));
+        }
+        let count = if first == gaussian::OPACITY || is_key {
+            1
+        } else {
+            3
+        };
+        for component in 0..count {
+            let place = (location, component);
+            if !writes_float(interface, place) {
+                return refuse(format!(
+                    "{name} is location {location}, where the vertex shader writes no component \
+                     {component} of 32-bit floating point"
+                ));
+            }
+            components.push(place);
+        }
+    }
+    Ok(components)
+}
+
+fn writes_float(interface: &Interface, place: InterfaceComponent) -> bool {
+    interface.outputs.iter().any(|output| {
+        let is_there = matches!(output.target, OutputTarget::Location { location, component, .. }
+            if (location, component) == place);
+        is_there && output.numeric == ScalarType::Float { width: 32 }
+    })
+}

@@ -1,0 +1,512 @@
+//! Linking: what a vertex and a fragment program exchange, with the device and with each other.
+//!
+//! Stages meet by location and component. A varying is carried only if the fragment program reads it: other outputs are
+//! taken off the vertex program, so that the device drops what computes them. What is read and never written is zero.
+
+use crate::abi::error::Error;
+use gaurast_spirv::{
+    BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget,
+    Sampling, ScalarType, Shader,
+};
+use simdevice::isa::ir::{Constant, Program};
+use simdevice::packet::draw::{
+    self, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, VertexInput, VertexOutput,
+};
+use std::collections::HashMap;
+
+/// The outputs of a pipeline's programs that have an effect.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LiveOutputs<'a> {
+    /// By colour attachment: whether anything is written to it, or made of its source's alpha.
+    pub(crate) color: &'a [bool],
+    /// True if the second source of blending is read.
+    pub(crate) second_source: bool,
+    /// True if points are drawn, so that their size matters.
+    pub(crate) points: bool,
+}
+
+/// A location and a component of it.
+pub(crate) type InterfaceComponent = (u32, u32);
+
+/// The varyings by their place.
+pub(crate) type Varyings = HashMap<InterfaceComponent, u32>;
+
+/// Links programs. `stream` says in which attribute stream a vertex input's location is.
+///
+/// # Errors
+/// [`Error::FeatureNotPresent`] if the stages exchange what the device cannot carry.
+pub(crate) fn link(
+    vertex: Shader,
+    fragment: Option<Shader>,
+    stream: impl Fn(u32) -> Option<usize>,
+    live_outputs: LiveOutputs<'_>,
+) -> Result<DrawPrograms, Error> {
+    check_widths(&vertex.interface)?;
+    let varyings = match &fragment {
+        None => Varyings::new(),
+        Some(fragment) => {
+            check_widths(&fragment.interface)?;
+            varyings(&vertex.interface, &fragment.interface)
+        }
+    };
+    Ok(DrawPrograms {
+        varyings: varyings.len() as u32,
+        fragment: fragment.map(|fragment| fragment_programs(fragment, &varyings, live_outputs)),
+        ..vertex_programs(vertex, &varyings, stream, live_outputs)
+    })
+}
+
+/// Links a vertex program that projects Gaussians: what it writes to `components` becomes the varyings of those numbers.
+///
+/// # Errors
+/// As [`link`].
+pub(crate) fn link_projection(
+    vertex: Shader,
+    stream: impl Fn(u32) -> Option<usize>,
+    components: &[InterfaceComponent],
+) -> Result<DrawPrograms, Error> {
+    check_widths(&vertex.interface)?;
+    let varyings: Varyings = components.iter().copied().zip(0..).collect();
+    Ok(DrawPrograms {
+        varyings: components.len() as u32,
+        fragment: None,
+        ..vertex_programs(vertex, &varyings, stream, LiveOutputs::default())
+    })
+}
+
+/// Links a fragment program that makes colours of what Gaussians accumulate, of which `varyings` says the numbers.
+///
+/// # Errors
+/// As [`link`].
+pub(crate) fn link_resolve(
+    fragment: Shader,
+    varyings: &Varyings,
+    live_outputs: LiveOutputs<'_>,
+) -> Result<FragmentPrograms, Error> {
+    check_widths(&fragment.interface)?;
+    Ok(fragment_programs(fragment, varyings, live_outputs))
+}
+
+/// The vertex program alone.
+fn vertex_programs(
+    vertex: Shader,
+    varyings: &Varyings,
+    stream: impl Fn(u32) -> Option<usize>,
+    live_outputs: LiveOutputs<'_>,
+) -> DrawPrograms {
+    let Shader {
+        program: mut vertex,
+        interface,
+    } = vertex;
+    let vertex_inputs: Vec<_> = interface
+        .inputs
+        .iter()
+        .map(|input| vertex_input(input, &stream))
+        .collect();
+    zero_inputs(&mut vertex, &vertex_inputs);
+    let vertex_outputs: Vec<_> = interface
+        .outputs
+        .iter()
+        .map(|output| vertex_output(output, varyings, live_outputs))
+        .collect();
+    drop_outputs(&mut vertex, &vertex_outputs);
+    DrawPrograms {
+        vertex,
+        vertex_inputs,
+        vertex_outputs,
+        varyings: 0,
+        fragment: None,
+    }
+}
+
+fn fragment_programs(
+    fragment: Shader,
+    varyings: &Varyings,
+    live_outputs: LiveOutputs<'_>,
+) -> FragmentPrograms {
+    let Shader {
+        mut program,
+        interface,
+    } = fragment;
+    let inputs: Vec<_> = interface
+        .inputs
+        .iter()
+        .map(|input| fragment_input(input, varyings))
+        .collect();
+    zero_inputs(&mut program, &inputs);
+    let keeps_depth = matches!(
+        interface.depth,
+        DepthMode::NotWritten | DepthMode::Unchanged
+    );
+    let outputs: Vec<_> = interface
+        .outputs
+        .iter()
+        .map(|output| {
+            fragment_output(output, live_outputs)
+                .filter(|it| !(keeps_depth && *it == FragmentOutput::Depth))
+        })
+        .collect();
+    drop_outputs(&mut program, &outputs);
+    FragmentPrograms {
+        program,
+        inputs,
+        outputs,
+        early_tests: interface.early_fragment_tests,
+        discards: interface.discards,
+        per_sample: interface.per_sample,
+        has_side_effects: interface.has_side_effects,
+    }
+}
+
+/// Refuses values of 64 bits at a stage's inputs and outputs.
+fn check_widths(interface: &Interface) -> Result<(), Error> {
+    let is_wide = |numeric: ScalarType| {
+        matches!(
+            numeric,
+            ScalarType::Float { width: 64 }
+                | ScalarType::Int { width: 64 }
+                | ScalarType::Uint { width: 64 }
+        )
+    };
+    let inputs = interface.inputs.iter().map(|input| input.numeric);
+    let outputs = interface.outputs.iter().map(|output| output.numeric);
+    if inputs.chain(outputs).any(is_wide) {
+        return Err(Error::FeatureNotPresent(format!(
+            "an input or output of 64 bits in the {} shader",
+            interface.stage
+        )));
+    }
+    Ok(())
+}
+
+/// Numbers what the vertex stage writes and the fragment stage reads, in order of their components.
+fn varyings(vertex: &Interface, fragment: &Interface) -> Varyings {
+    let written = |place: InterfaceComponent| {
+        vertex.outputs.iter().any(|output| {
+            matches!(output.target, OutputTarget::Location { location, component, .. }
+                if (location, component) == place)
+        })
+    };
+    let mut components: Vec<InterfaceComponent> = fragment
+        .inputs
+        .iter()
+        .filter_map(|input| match input.source {
+            InputSource::Location {
+                location,
+                component,
+                ..
+            } => Some((location, component)),
+            InputSource::BuiltIn { .. } => None,
+        })
+        .filter(|place| written(*place))
+        .collect();
+    components.sort_unstable();
+    components.dedup();
+    components.into_iter().zip(0..).collect()
+}
+
+/// Makes constants of zero of the inputs that nothing is put into. (Slots are indices into `inputs`.)
+fn zero_inputs<T>(program: &mut Program, inputs: &[Option<T>]) {
+    let Program {
+        inputs: registers,
+        constants,
+        ..
+    } = program;
+    registers.retain(|input| {
+        let is_given = inputs[input.slot as usize].is_some();
+        if !is_given {
+            constants.push(Constant {
+                reg: input.reg,
+                bits: 0,
+            });
+        }
+        is_given
+    });
+}
+
+/// Takes off the outputs that nobody reads.
+fn drop_outputs<T>(program: &mut Program, outputs: &[Option<T>]) {
+    program
+        .outputs
+        .retain(|output| outputs[output.slot as usize].is_some());
+}
+
+fn vertex_input(input: &Input, stream: impl Fn(u32) -> Option<usize>) -> Option<VertexInput> {
+    match input.source {
+        InputSource::Location {
+            location,
+            component,
+            ..
+        } => Some(VertexInput::Attribute {
+            stream: stream(location)?,
+            component: component as usize,
+        }),
+        InputSource::BuiltIn { built_in, .. } => match built_in {
+            BuiltIn::VertexIndex => Some(VertexInput::VertexIndex),
+            BuiltIn::InstanceIndex => Some(VertexInput::InstanceIndex),
+            BuiltIn::BaseVertex => Some(VertexInput::BaseVertex),
+            BuiltIn::BaseInstance => Some(VertexInput::BaseInstance),
+            BuiltIn::DrawIndex => Some(VertexInput::DrawIndex),
+            // There is one view and one device, and their index is zero.
+            _ => None,
+        },
+    }
+}
+
+fn vertex_output(
+    output: &Output,
+    varyings: &Varyings,
+    live_outputs: LiveOutputs<'_>,
+) -> Option<VertexOutput> {
+    match output.target {
+        OutputTarget::Location {
+            location,
+            component,
+            ..
+        } => varyings
+            .get(&(location, component))
+            .map(|&index| VertexOutput::Varying(index)),
+        OutputTarget::BuiltIn {
+            built_in,
+            component,
+        } => {
+            let component = component as usize;
+            match built_in {
+                BuiltIn::Position => Some(VertexOutput::Position(component)),
+                BuiltIn::PointSize => live_outputs.points.then_some(VertexOutput::PointSize),
+                BuiltIn::ClipDistance => Some(VertexOutput::ClipDistance(component)),
+                BuiltIn::CullDistance => Some(VertexOutput::CullDistance(component)),
+                BuiltIn::Layer => Some(VertexOutput::Layer),
+                BuiltIn::ViewportIndex => Some(VertexOutput::ViewportIndex),
+                _ => None,
+            }
+        }
+    }
+}
+
+fn fragment_input(input: &Input, varyings: &Varyings) -> Option<FragmentInput> {
+    match input.source {
+        InputSource::Location {
+            location,
+            component,
+            interpolation,
+            sampling,
+        } => varyings
+            .get(&(location, component))
+            .map(|&index| FragmentInput::Varying {
+                index,
+                interpolation: match interpolation {
+                    Interpolation::Perspective => draw::Interpolation::Perspective,
+                    Interpolation::Linear => draw::Interpolation::Linear,
+                    Interpolation::Flat => draw::Interpolation::Flat,
+                },
+                sampling: match sampling {
+                    Sampling::Center => draw::Sampling::Center,
+                    Sampling::Centroid => draw::Sampling::Centroid,
+                    Sampling::Sample => draw::Sampling::Sample,
+                },
+            }),
+        InputSource::BuiltIn {
+            built_in,
+            component,
+        } => {
+            let component = component as usize;
+            match built_in {
+                BuiltIn::FragCoord => Some(FragmentInput::FragCoord(component)),
+                BuiltIn::PointCoord => Some(FragmentInput::PointCoord(component)),
+                BuiltIn::FrontFacing => Some(FragmentInput::FrontFacing),
+                BuiltIn::PrimitiveId => Some(FragmentInput::PrimitiveId),
+                BuiltIn::SampleId => Some(FragmentInput::SampleId),
+                BuiltIn::SamplePosition => Some(FragmentInput::SamplePosition(component)),
+                // There are fewer samples than bits of the first word.
+                BuiltIn::SampleMask if component == 0 => Some(FragmentInput::SampleMask),
+                BuiltIn::Layer => Some(FragmentInput::Layer),
+                BuiltIn::ViewportIndex => Some(FragmentInput::ViewportIndex),
+                _ => None,
+            }
+        }
+    }
+}
+
+fn fragment_output(output: &Output, live_outputs: LiveOutputs<'_>) -> Option<FragmentOutput> {
+    match output.target {
+        OutputTarget::Location {
+            location,
+            component,
+            index,
+        } => {
+            let has_effect = live_outputs.color.get(location as usize) == Some(&true)
+                && (index == 0 || live_outputs.second_source);
+            has_effect.then_some(FragmentOutput::Color {
+                attachment: location as usize,
+                component: component as usize,
+                index: index as usize,
+            })
+        }
+        OutputTarget::BuiltIn {
+            built_in,
+            component,
+        } => match built_in {
+            BuiltIn::FragDepth => Some(FragmentOutput::Depth),
+            BuiltIn::SampleMask if component == 0 => Some(FragmentOutput::SampleMask),
+            _ => None,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gaurast_spirv::Stage;
+    use simdevice::isa::builder::Builder;
+    use simdevice::isa::ir::{Rate, Type};
+
+    const FLOAT: ScalarType = ScalarType::Float { width: 32 };
+
+    fn at(location: u32, component: u32) -> Input {
+        Input {
+            source: InputSource::Location {
+                location,
+                component,
+                interpolation: Interpolation::Linear,
+                sampling: Sampling::Center,
+            },
+            numeric: FLOAT,
+        }
+    }
+
+    fn to(location: u32, component: u32) -> Output {
+        Output {
+            target: OutputTarget::Location {
+                location,
+                component,
+                index: 0,
+            },
+            numeric: FLOAT,
+        }
+    }
+
+    fn built_in(built_in: BuiltIn, component: u32) -> Output {
+        Output {
+            target: OutputTarget::BuiltIn {
+                built_in,
+                component,
+            },
+            numeric: FLOAT,
+        }
+    }
+
+    /// A shader that gives its inputs to its outputs, and zero to what is left.
+    fn shader(stage: Stage, inputs: Vec<Input>, outputs: Vec<Output>) -> Shader {
+        let mut builder = Builder::new();
+        let read: Vec<_> = (0..inputs.len() as u32)
+            .map(|slot| builder.input(slot, Type::B32, Rate::Varying))
+            .collect();
+        for slot in 0..outputs.len() {
+            let output = builder.output(slot as u32, Type::B32);
+            let value = match read.get(slot) {
+                Some(&reg) => reg,
+                None => builder.constant(Type::B32, 0),
+            };
+            builder.assign(output, value);
+        }
+        Shader {
+            program: builder.finish().unwrap(),
+            interface: Interface {
+                stage,
+                inputs,
+                outputs,
+                descriptors: Vec::new(),
+                push_constants: None,
+                workgroup_size: [1; 3],
+                early_fragment_tests: false,
+                depth: DepthMode::NotWritten,
+                discards: false,
+                per_sample: false,
+                has_side_effects: false,
+                uses_subgroups: false,
+            },
+        }
+    }
+
+    #[test]
+    fn only_what_is_read_is_carried() {
+        let vertex = shader(
+            Stage::Vertex,
+            vec![at(7, 1), at(8, 0)],
+            vec![
+                built_in(BuiltIn::Position, 0),
+                to(2, 0),
+                to(0, 3),
+                to(5, 0),
+                built_in(BuiltIn::PointSize, 0),
+            ],
+        );
+        let fragment = shader(
+            Stage::Fragment,
+            vec![at(2, 0), at(9, 0), at(0, 3)],
+            vec![to(0, 0), to(1, 0), to(0, 1)],
+        );
+        let live_outputs = LiveOutputs {
+            color: &[true, false],
+            ..LiveOutputs::default()
+        };
+        let stream = |location| (location == 7).then_some(3);
+        let linked = link(vertex, Some(fragment), stream, live_outputs).unwrap();
+        assert_eq!(linked.varyings, 2);
+        assert_eq!(
+            linked.vertex_inputs,
+            [
+                Some(VertexInput::Attribute {
+                    stream: 3,
+                    component: 1
+                }),
+                None
+            ]
+        );
+        assert_eq!(
+            linked.vertex_outputs,
+            [
+                Some(VertexOutput::Position(0)),
+                Some(VertexOutput::Varying(1)),
+                Some(VertexOutput::Varying(0)),
+                None,
+                None
+            ]
+        );
+        let slots = |program: &Program| {
+            let inputs: Vec<_> = program.inputs.iter().map(|it| it.slot).collect();
+            let outputs: Vec<_> = program.outputs.iter().map(|it| it.slot).collect();
+            (inputs, outputs)
+        };
+        assert_eq!(slots(&linked.vertex), (vec![0], vec![0, 1, 2]));
+        let fragment = linked.fragment.unwrap();
+        let varying = |index| {
+            Some(FragmentInput::Varying {
+                index,
+                interpolation: draw::Interpolation::Linear,
+                sampling: draw::Sampling::Center,
+            })
+        };
+        assert_eq!(fragment.inputs, [varying(1), None, varying(0)]);
+        // What nobody writes is zero: a constant in the input's place.
+        assert_eq!(slots(&fragment.program), (vec![0, 2], vec![0, 2]));
+        let color = |component| {
+            Some(FragmentOutput::Color {
+                attachment: 0,
+                component,
+                index: 0,
+            })
+        };
+        assert_eq!(fragment.outputs, [color(0), None, color(1)]);
+    }
+
+    #[test]
+    fn wide_values_are_refused() {
+        let mut wide = to(0, 0);
+        wide.numeric = ScalarType::Float { width: 64 };
+        let vertex = shader(Stage::Vertex, vec![], vec![wide]);
+        let error = link(vertex, None, |_| None, LiveOutputs::default()).unwrap_err();
+        assert_eq!(error.result(), ash::vk::Result::ERROR_FEATURE_NOT_PRESENT);
+    }
+}

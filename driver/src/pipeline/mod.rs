@@ -1,0 +1,225 @@
+//! Pipelines: what draws and dispatches need of their create infos, converted and validated once.
+//!
+//! [`GraphicsState`] and [`ShaderStage`] follow the create infos' pointers; everything beyond is safe.
+
+pub(crate) mod compute;
+pub(crate) mod dynamic_state;
+pub(crate) mod gaussian;
+pub(crate) mod layout;
+mod link;
+pub(crate) mod primitives;
+mod reflect;
+mod stages;
+pub(crate) mod state;
+
+use self::compute::ComputePipeline;
+use self::gaussian::GaussianPipeline;
+use self::primitives::PrimitivePipeline;
+use self::state::GraphicsState;
+use crate::abi::error::Error;
+use crate::abi::handle::{self, objects};
+use crate::abi::valid;
+use crate::device::Device;
+use crate::physical_device::limits;
+use crate::shader_module::ShaderStage;
+use ash::vk;
+use gaurast::vk::PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
+use std::ffi::c_void;
+use std::mem::MaybeUninit;
+use std::sync::Arc;
+
+/// A `VkPipeline`.
+#[derive(Debug)]
+pub(crate) enum Pipeline {
+    /// For draws.
+    Graphics(Arc<GraphicsPipeline>),
+    /// For dispatches.
+    Compute(Arc<ComputePipeline>),
+}
+
+/// A graphics pipeline.
+#[derive(Debug)]
+pub(crate) struct GraphicsPipeline {
+    /// The kind of what it draws, with its state.
+    pub(crate) kind: PipelineKind,
+    /// True if vertex strides come from `vkCmdBindVertexBuffers2`.
+    pub(crate) dynamic_stride: bool,
+}
+
+/// The kind of a graphics pipeline, by what it draws.
+#[derive(Debug)]
+pub(crate) enum PipelineKind {
+    /// Gaussians.
+    Gaussian(Box<GaussianPipeline>),
+    /// Points, lines or triangles.
+    Primitive(Box<PrimitivePipeline>),
+}
+
+objects! {
+    vk::Pipeline => Pipeline;
+    vk::PipelineCache => PipelineCache;
+}
+
+impl GraphicsPipeline {
+    /// Creates a pipeline.
+    ///
+    /// # Errors
+    /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
+    pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
+        let kind = if info.vertex_input.topology == PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST {
+            let gaussian = GaussianPipeline::new(device, info)?;
+            PipelineKind::Gaussian(Box::new(gaussian))
+        } else {
+            PipelineKind::Primitive(Box::new(PrimitivePipeline::new(device, info)?))
+        };
+        Ok(Self {
+            kind,
+            dynamic_stride: info.is_dynamic(vk::DynamicState::VERTEX_INPUT_BINDING_STRIDE),
+        })
+    }
+}
+
+/// A pipeline cache. Pipelines are cheap to make, so it stays empty.
+#[derive(Debug)]
+pub(crate) struct PipelineCache;
+
+/// Makes one pipeline.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn new_graphics_pipeline(
+    device: &Device,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+) -> Result<Pipeline, Error> {
+    // SAFETY: the caller's promise.
+    let gathered = unsafe {
+        write_empty_creation_feedback(info.p_next)?;
+        GraphicsState::from_create_info(info)?
+    };
+    let pipeline = GraphicsPipeline::new(device, &gathered)?;
+    Ok(Pipeline::Graphics(Arc::new(pipeline)))
+}
+
+/// Makes one pipeline.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn new_compute_pipeline(
+    device: &Device,
+    info: &vk::ComputePipelineCreateInfo<'_>,
+) -> Result<Pipeline, Error> {
+    if info.stage.stage != vk::ShaderStageFlags::COMPUTE {
+        return Err(Error::usage(
+            "VUID-VkComputePipelineCreateInfo-stage-00701",
+            format!("a compute pipeline has stage {:?}", info.stage.stage),
+        ));
+    }
+    // SAFETY: the caller's promise.
+    let pipeline = unsafe {
+        write_empty_creation_feedback(info.p_next)?;
+        let layout = handle::get(info.layout)?;
+        ComputePipeline::new(device, layout, &ShaderStage::from_create_info(&info.stage)?)?
+    };
+    Ok(Pipeline::Compute(Arc::new(pipeline)))
+}
+
+/// An empty cache's data: `VkPipelineCacheHeaderVersionOne` and nothing more.
+fn cache_header() -> Vec<u8> {
+    let properties = limits::properties();
+    let mut header = Vec::with_capacity(32);
+    header.extend(32u32.to_le_bytes());
+    header.extend(vk::PipelineCacheHeaderVersion::ONE.as_raw().to_le_bytes());
+    header.extend(properties.vendor_id.to_le_bytes());
+    header.extend(properties.device_id.to_le_bytes());
+    header.extend(properties.pipeline_cache_uuid);
+    header
+}
+
+/// Makes a pipeline of each create info. Vulkan lets the rest be skipped once one fails; their handles are null.
+fn create_each<T>(
+    infos: &[T],
+    pipelines: &mut [MaybeUninit<vk::Pipeline>],
+    mut create: impl FnMut(&T) -> Result<Pipeline, Error>,
+) -> Result<(), Error> {
+    pipelines.fill(MaybeUninit::new(vk::Pipeline::null()));
+    for (place, info) in pipelines.iter_mut().zip(infos) {
+        place.write(handle::create(Arc::new(create(info)?)));
+    }
+    Ok(())
+}
+
+/// Says of creation feedback that there is none: it takes no time that anybody would want to know.
+///
+/// # Safety
+/// The create info's chain is valid.
+unsafe fn write_empty_creation_feedback(chain: *const c_void) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let Some(feedback) = valid::find_in_chain::<vk::PipelineCreationFeedbackCreateInfo>(chain)
+        else {
+            return Ok(());
+        };
+        let none = vk::PipelineCreationFeedback::default();
+        valid::output(feedback.p_pipeline_creation_feedback, none)?;
+        for index in 0..feedback.pipeline_stage_creation_feedback_count as usize {
+            let place = feedback.p_pipeline_stage_creation_feedbacks.add(index);
+            valid::output(place, none)?;
+        }
+        Ok(())
+    }
+}
+
+/// # Safety
+/// The create infos and their chains are valid.
+#[doc(alias = "vkCreateGraphicsPipelines")]
+pub(crate) unsafe fn create_graphics_pipelines(
+    device: &Device,
+    create_infos: &[vk::GraphicsPipelineCreateInfo<'_>],
+    pipelines: &mut [MaybeUninit<vk::Pipeline>],
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let create = |info: &_| unsafe { new_graphics_pipeline(device, info) };
+    create_each(create_infos, pipelines, create)
+}
+
+/// # Safety
+/// The create infos and their chains are valid.
+#[doc(alias = "vkCreateComputePipelines")]
+pub(crate) unsafe fn create_compute_pipelines(
+    device: &Device,
+    create_infos: &[vk::ComputePipelineCreateInfo<'_>],
+    pipelines: &mut [MaybeUninit<vk::Pipeline>],
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let create = |info: &_| unsafe { new_compute_pipeline(device, info) };
+    create_each(create_infos, pipelines, create)
+}
+
+#[doc(alias = "vkCreatePipelineCache")]
+pub(crate) fn create_pipeline_cache(
+    _create_info: &vk::PipelineCacheCreateInfo<'_>,
+) -> Result<Arc<PipelineCache>, Error> {
+    Ok(Arc::new(PipelineCache))
+}
+
+/// # Safety
+/// The data is null or as long as its size says.
+#[doc(alias = "vkGetPipelineCacheData")]
+pub(crate) unsafe fn get_pipeline_cache_data(
+    data_size: &mut usize,
+    data: *mut c_void,
+) -> Result<vk::Result, Error> {
+    let header = cache_header();
+    if data.is_null() {
+        *data_size = header.len();
+        return Ok(vk::Result::SUCCESS);
+    }
+    if *data_size < header.len() {
+        *data_size = 0;
+        return Ok(vk::Result::INCOMPLETE);
+    }
+    *data_size = header.len();
+    // SAFETY: the caller's promise; the data has room for the header.
+    unsafe { std::ptr::copy_nonoverlapping(header.as_ptr(), data.cast::<u8>(), header.len()) };
+    Ok(vk::Result::SUCCESS)
+}

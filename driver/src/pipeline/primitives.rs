@@ -1,0 +1,179 @@
+//! Pipelines of points, lines and triangles: shader stages translated, checked and linked, and fixed-function state.
+
+use super::dynamic_state;
+use super::link::{self, LiveOutputs};
+use super::stages;
+use super::state::{
+    self, AttributeSource, Class, FixedFunctionState, GraphicsState, live_color_outputs,
+    reads_second_source,
+};
+use crate::abi::error::Error;
+use crate::device::Device;
+use crate::shader_module::ShaderStage;
+use ash::vk;
+use gaurast_spirv::{ShaderBinding, Stage};
+use simdevice::packet::draw::{DrawPipeline, DrawState, PolygonMode};
+use std::sync::Arc;
+
+/// A pipeline of points, lines or triangles.
+#[derive(Debug)]
+pub(crate) struct PrimitivePipeline {
+    /// The programs.
+    pub(crate) programs: Arc<DrawPipeline>,
+    /// The sources of the vertex program's attributes.
+    pub(crate) attributes: Vec<AttributeSource>,
+    /// The resources that the vertex program is bound to.
+    pub(crate) vertex_descriptors: Vec<ShaderBinding>,
+    /// The resources that the fragment program is bound to.
+    pub(crate) fragment_descriptors: Vec<ShaderBinding>,
+    /// The fixed-function state, as far as it is static.
+    pub(crate) fixed: FixedFunctionState,
+    /// The state for the device, if nothing of it is dynamic.
+    pub(crate) state: Option<Arc<DrawState>>,
+    /// The states that the command buffer sets, but for viewports and scissors.
+    pub(crate) dynamic: Vec<vk::DynamicState>,
+    /// The source of viewports.
+    pub(crate) viewports: ViewportSource,
+    /// The source of scissors.
+    pub(crate) scissors: ViewportSource,
+}
+
+/// The source of viewports or scissors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ViewportSource {
+    /// The pipeline.
+    Static,
+    /// The command buffer; this many.
+    Dynamic(u32),
+    /// The command buffer, which also says how many.
+    DynamicWithCount,
+}
+
+impl PrimitivePipeline {
+    /// Translates and links the stages, and validates and converts the state.
+    ///
+    /// # Errors
+    /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
+    pub(crate) fn new(device: &Device, info: &GraphicsState) -> Result<Self, Error> {
+        let fixed = FixedFunctionState::new(info)?;
+        let (dynamic, viewports, scissors) = dynamic(info)?;
+        let layout = info.layout.ok_or_else(|| {
+            Error::usage(
+                "VUID-VkGraphicsPipelineCreateInfo-layout-06602",
+                "the pipeline has no layout",
+            )
+        })?;
+        let stages = Stages::find(info)?;
+        let samples = fixed.draw.samples;
+        let vertex = stages::translate(device, layout, stages.vertex, Stage::Vertex, samples)?;
+        let fragment = stages
+            .fragment
+            .map(|stage| stages::translate(device, layout, stage, Stage::Fragment, samples))
+            .transpose()?;
+        let locations = vertex.interface.locations_read();
+        let attributes = stages::attributes(info, &locations)?;
+        stages::check_attributes(&vertex.interface, &locations, &attributes)?;
+        if let Some(fragment) = &fragment {
+            stages::warn_of_unwritten(device, &vertex.interface, &fragment.interface);
+        }
+        let vertex_descriptors = vertex.interface.descriptors.clone();
+        let fragment_descriptors = fragment
+            .as_ref()
+            .map_or_else(Vec::new, |fragment| fragment.interface.descriptors.clone());
+        let color = live_color_outputs(info, &fixed);
+        let live_outputs = LiveOutputs {
+            color: &color,
+            second_source: info.fragment_output.blend.iter().any(reads_second_source),
+            points: state::class(fixed.draw.topology) == Class::Points
+                || fixed.draw.polygon_mode == PolygonMode::Point,
+        };
+        let stream = |location| locations.iter().position(|(read, _)| *read == location);
+        let programs = link::link(vertex, fragment, stream, live_outputs)?;
+        let programs = DrawPipeline::new(device.simulated(), &programs)
+            .map_err(|error| Error::InvalidShader(error.to_string()))?;
+        let is_static = dynamic.is_empty()
+            && viewports == ViewportSource::Static
+            && scissors == ViewportSource::Static;
+        Ok(Self {
+            programs: Arc::new(programs),
+            attributes,
+            vertex_descriptors,
+            fragment_descriptors,
+            state: is_static.then(|| Arc::new(fixed.draw_state())),
+            fixed,
+            dynamic,
+            viewports,
+            scissors,
+        })
+    }
+}
+
+/// The stages of a pipeline.
+struct Stages<'a> {
+    vertex: &'a ShaderStage<'a>,
+    /// Absent if nothing is rasterized.
+    fragment: Option<&'a ShaderStage<'a>>,
+}
+
+impl<'a> Stages<'a> {
+    fn find(info: &'a GraphicsState) -> Result<Self, Error> {
+        let known = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
+        if let Some((stage, _)) = info.stages().find(|(stage, _)| !known.contains(*stage)) {
+            return Err(Error::FeatureNotPresent(format!(
+                "a shader stage {stage:?}"
+            )));
+        }
+        let find = |wanted| {
+            let mut found = info.stages().filter(move |(stage, _)| *stage == wanted);
+            match (found.next(), found.next()) {
+                (_, Some(_)) => Err(Error::usage(
+                    "VUID-VkGraphicsPipelineCreateInfo-stage-06897",
+                    format!("the pipeline has several {wanted:?} stages"),
+                )),
+                (first, None) => Ok(first.map(|(_, stage)| stage)),
+            }
+        };
+        let vertex = find(vk::ShaderStageFlags::VERTEX)?.ok_or_else(|| {
+            Error::usage(
+                "VUID-VkGraphicsPipelineCreateInfo-stage-02096",
+                format!(
+                    "a pipeline of topology {:?} has no vertex stage",
+                    info.vertex_input.topology
+                ),
+            )
+        })?;
+        let fragment = find(vk::ShaderStageFlags::FRAGMENT)?;
+        Ok(Self {
+            vertex,
+            fragment: fragment.filter(|_| !info.discards()),
+        })
+    }
+}
+
+/// The states that are dynamic, and the sources of viewports and scissors.
+fn dynamic(
+    info: &GraphicsState,
+) -> Result<(Vec<vk::DynamicState>, ViewportSource, ViewportSource), Error> {
+    use vk::DynamicState as S;
+    let (mut viewports, mut scissors) = (ViewportSource::Static, ViewportSource::Static);
+    let mut dynamic = Vec::new();
+    for &state in info.dynamic {
+        match state {
+            S::VIEWPORT => {
+                viewports = ViewportSource::Dynamic(info.pre_rasterization.viewport_count);
+            }
+            S::VIEWPORT_WITH_COUNT => viewports = ViewportSource::DynamicWithCount,
+            S::SCISSOR => scissors = ViewportSource::Dynamic(info.pre_rasterization.scissor_count),
+            S::SCISSOR_WITH_COUNT => scissors = ViewportSource::DynamicWithCount,
+            state if dynamic_state::has_value(state) => dynamic.push(state),
+            // Attribute streams are looked up for each draw.
+            state if dynamic_state::is_supported(state) => {}
+            other => {
+                return Err(Error::FeatureNotPresent(format!(
+                    "the dynamic state {other:?}"
+                )));
+            }
+        }
+    }
+    Ok((dynamic, viewports, scissors))
+}

@@ -1,0 +1,935 @@
+//! The state of graphics pipelines: create infos with their pointers followed, as far as Vulkan has them read; vertex input;
+//! and fixed-function state. What a switch governs is kept beside the switch, as either may be dynamic without the other.
+
+use super::layout::PipelineLayout;
+use crate::abi::error::Error;
+use crate::abi::handle;
+use crate::abi::valid;
+use crate::convert::{self, StencilOpIds, StencilOps};
+use crate::physical_device::{formats, limits};
+use crate::registry::features::SUPPORTED;
+use crate::shader_module::ShaderStage;
+use ash::vk;
+use gaurast::vk::{
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use simdevice::Format;
+use simdevice::packet::draw::{
+    CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, PolygonMode, StencilFace, StencilOp,
+    Topology,
+};
+use simdevice::packet::{BlendFactor, BlendState};
+use std::sync::Arc;
+
+/// The state of a graphics pipeline: a `VkGraphicsPipelineCreateInfo` with its pointers followed, in the four parts of a
+/// pipeline library. State that the application may leave out is empty, `None` or the default.
+#[derive(Default)]
+pub(crate) struct GraphicsState<'a> {
+    /// The vertex input interface.
+    pub(crate) vertex_input: VertexInputState<'a>,
+    /// The pre-rasterization shaders.
+    pub(crate) pre_rasterization: PreRasterizationState<'a>,
+    /// The fragment shader.
+    pub(crate) fragment_shader: FragmentShaderState<'a>,
+    /// The fragment output interface.
+    pub(crate) fragment_output: FragmentOutputState<'a>,
+    /// The layout.
+    pub(crate) layout: Option<&'a Arc<PipelineLayout>>,
+    /// The states that are dynamic.
+    pub(crate) dynamic: &'a [vk::DynamicState],
+    /// The extension's structure.
+    pub(crate) gaussian: Option<PipelineGaussianStateCreateInfoGAURAST<'a>>,
+    /// The extension's structure of approximations.
+    pub(crate) approximation: Option<PipelineGaussianApproximationStateCreateInfoGAURAST<'a>>,
+}
+
+/// The reading and assembly of vertices.
+#[derive(Default)]
+pub(crate) struct VertexInputState<'a> {
+    /// Vertex bindings.
+    pub(crate) bindings: &'a [vk::VertexInputBindingDescription],
+    /// The number of instances that an element lasts, of bindings that advance by instance and where that isn't one.
+    pub(crate) divisors: &'a [vk::VertexInputBindingDivisorDescriptionKHR],
+    /// Vertex attributes.
+    pub(crate) attributes: &'a [vk::VertexInputAttributeDescription],
+    /// The topology.
+    pub(crate) topology: vk::PrimitiveTopology,
+    /// True if an index restarts the primitive.
+    pub(crate) primitive_restart: bool,
+}
+
+/// The stages before rasterization, viewports, and rasterization.
+#[derive(Default)]
+pub(crate) struct PreRasterizationState<'a> {
+    /// The shader stages.
+    pub(crate) stages: Vec<(vk::ShaderStageFlags, ShaderStage<'a>)>,
+    /// The number of viewports; one each is given unless they are dynamic.
+    pub(crate) viewport_count: u32,
+    /// Viewports, unless dynamic.
+    pub(crate) viewports: &'a [vk::Viewport],
+    /// The number of scissors.
+    pub(crate) scissor_count: u32,
+    /// Scissors, unless dynamic.
+    pub(crate) scissors: &'a [vk::Rect2D],
+    /// Rasterization state.
+    pub(crate) rasterization: vk::PipelineRasterizationStateCreateInfo<'a>,
+    /// True if a primitive's last vertex, not its first, is the provoking one.
+    pub(crate) provoking_last: bool,
+}
+
+/// The fragment stage, and the tests of depth and stencil.
+#[derive(Default)]
+pub(crate) struct FragmentShaderState<'a> {
+    /// The fragment stage; there may be none.
+    pub(crate) stages: Vec<(vk::ShaderStageFlags, ShaderStage<'a>)>,
+    /// Depth and stencil state, if the subpass has such an attachment.
+    pub(crate) depth_stencil: Option<vk::PipelineDepthStencilStateCreateInfo<'a>>,
+}
+
+/// Samples, attachments, and how fragments are blended into them.
+#[derive(Default)]
+pub(crate) struct FragmentOutputState<'a> {
+    /// Multisample state.
+    pub(crate) multisample: vk::PipelineMultisampleStateCreateInfo<'a>,
+    /// The samples that may be covered.
+    pub(crate) sample_mask: u32,
+    /// The logic operation, if it is enabled.
+    pub(crate) logic_op: Option<vk::LogicOp>,
+    /// Blend state by colour attachment.
+    pub(crate) blend: &'a [vk::PipelineColorBlendAttachmentState],
+    /// Blend constants.
+    pub(crate) blend_constants: [f32; 4],
+    /// The colour formats of the subpass; undefined where the attachment is unused.
+    pub(crate) color_formats: Vec<vk::Format>,
+}
+
+impl<'a> GraphicsState<'a> {
+    /// Follows a create info's pointers. Those that the rest of the create info makes meaningless may point anywhere.
+    ///
+    /// # Safety
+    /// The create info and its chain are valid.
+    pub(crate) unsafe fn from_create_info(
+        info: &'a vk::GraphicsPipelineCreateInfo<'a>,
+    ) -> Result<Self, Error> {
+        let mut gathered = GraphicsState::default();
+        gathered.fragment_output.sample_mask = u32::MAX;
+        // SAFETY: the caller's promise.
+        unsafe {
+            for given in valid::slice(info.p_stages, info.stage_count)? {
+                let stages = if given.stage == vk::ShaderStageFlags::FRAGMENT {
+                    &mut gathered.fragment_shader.stages
+                } else {
+                    &mut gathered.pre_rasterization.stages
+                };
+                stages.push((given.stage, ShaderStage::from_create_info(given)?));
+            }
+            gathered.layout = handle::get_optional(info.layout)?;
+            gathered.gaussian =
+                valid::find_in_chain::<PipelineGaussianStateCreateInfoGAURAST>(info.p_next)
+                    .copied();
+            gathered.approximation = valid::find_in_chain::<
+                PipelineGaussianApproximationStateCreateInfoGAURAST,
+            >(info.p_next)
+            .copied();
+            if let Some(state) = valid::optional(info.p_dynamic_state) {
+                gathered.dynamic = valid::slice(state.p_dynamic_states, state.dynamic_state_count)?;
+            }
+            if let Some(state) = valid::optional(info.p_vertex_input_state) {
+                read_vertex_input(state, &mut gathered)?;
+            }
+            if let Some(state) = valid::optional(info.p_input_assembly_state) {
+                gathered.vertex_input.topology = state.topology;
+                gathered.vertex_input.primitive_restart =
+                    state.primitive_restart_enable != vk::FALSE;
+            }
+            if let Some(state) = valid::optional(info.p_rasterization_state) {
+                gathered.pre_rasterization.rasterization = *state;
+                let provoking = valid::find_in_chain::<
+                    vk::PipelineRasterizationProvokingVertexStateCreateInfoEXT<'_>,
+                >(state.p_next);
+                gathered.pre_rasterization.provoking_last = provoking.is_some_and(|state| {
+                    state.provoking_vertex_mode == vk::ProvokingVertexModeEXT::LAST_VERTEX
+                });
+            }
+            if !gathered.discards() {
+                read_fragments(info, &mut gathered)?;
+            }
+        }
+        Ok(gathered)
+    }
+
+    /// The shader stages.
+    pub(crate) fn stages(&self) -> impl Iterator<Item = &(vk::ShaderStageFlags, ShaderStage<'a>)> {
+        let (before, fragment) = (&self.pre_rasterization.stages, &self.fragment_shader.stages);
+        before.iter().chain(fragment)
+    }
+
+    /// Tells if a state is dynamic.
+    pub(crate) fn is_dynamic(&self, state: vk::DynamicState) -> bool {
+        self.dynamic.contains(&state)
+    }
+
+    /// Tells if nothing is ever rasterized, so that all state of rasterization is left out.
+    pub(crate) fn discards(&self) -> bool {
+        self.pre_rasterization
+            .rasterization
+            .rasterizer_discard_enable
+            != vk::FALSE
+            && !self.is_dynamic(vk::DynamicState::RASTERIZER_DISCARD_ENABLE)
+    }
+
+    /// The width of lines. Pipelines that draw none often leave it at zero.
+    fn line_width(&self) -> f32 {
+        let width = self.pre_rasterization.rasterization.line_width;
+        if width == 0.0 || self.is_dynamic(vk::DynamicState::LINE_WIDTH) {
+            return 1.0;
+        }
+        width
+    }
+}
+
+/// Vertex bindings and attributes.
+///
+/// # Safety
+/// The state and its chain are valid.
+unsafe fn read_vertex_input<'a>(
+    state: &'a vk::PipelineVertexInputStateCreateInfo<'a>,
+    gathered: &mut GraphicsState<'a>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        gathered.vertex_input.bindings = valid::slice(
+            state.p_vertex_binding_descriptions,
+            state.vertex_binding_description_count,
+        )?;
+        gathered.vertex_input.attributes = valid::slice(
+            state.p_vertex_attribute_descriptions,
+            state.vertex_attribute_description_count,
+        )?;
+        let divisors = valid::find_in_chain::<vk::PipelineVertexInputDivisorStateCreateInfoKHR<'_>>(
+            state.p_next,
+        );
+        if let Some(state) = divisors {
+            gathered.vertex_input.divisors = valid::slice(
+                state.p_vertex_binding_divisors,
+                state.vertex_binding_divisor_count,
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// The state of pipelines that rasterize.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn read_fragments<'a>(
+    info: &'a vk::GraphicsPipelineCreateInfo<'a>,
+    gathered: &mut GraphicsState<'a>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let formats = attachment_formats(info)?;
+        if let Some(state) = valid::optional(info.p_viewport_state) {
+            read_viewports(state, gathered)?;
+        }
+        if let Some(state) = valid::optional(info.p_multisample_state) {
+            gathered.fragment_output.multisample = *state;
+            if let Some(mask) = valid::optional(state.p_sample_mask) {
+                gathered.fragment_output.sample_mask = *mask;
+            }
+        }
+        if formats.has_depth_stencil {
+            gathered.fragment_shader.depth_stencil =
+                valid::optional(info.p_depth_stencil_state).copied();
+        }
+        if !formats.color.is_empty()
+            && let Some(state) = valid::optional(info.p_color_blend_state)
+        {
+            gathered.fragment_output.logic_op =
+                (state.logic_op_enable != vk::FALSE).then_some(state.logic_op);
+            gathered.fragment_output.blend =
+                valid::slice(state.p_attachments, state.attachment_count)?;
+            gathered.fragment_output.blend_constants = state.blend_constants;
+        }
+        gathered.fragment_output.color_formats = formats.color;
+    }
+    Ok(())
+}
+
+/// Viewports and scissors; their pointers may be anything where they are dynamic.
+///
+/// # Safety
+/// The state is valid.
+unsafe fn read_viewports<'a>(
+    state: &'a vk::PipelineViewportStateCreateInfo<'a>,
+    gathered: &mut GraphicsState<'a>,
+) -> Result<(), Error> {
+    use vk::DynamicState as S;
+    gathered.pre_rasterization.viewport_count = state.viewport_count;
+    gathered.pre_rasterization.scissor_count = state.scissor_count;
+    let is_dynamic = |states: [S; 2]| states.iter().any(|state| gathered.is_dynamic(*state));
+    let dynamic_viewports = is_dynamic([S::VIEWPORT, S::VIEWPORT_WITH_COUNT]);
+    let dynamic_scissors = is_dynamic([S::SCISSOR, S::SCISSOR_WITH_COUNT]);
+    // SAFETY: the caller's promise; a null pointer is not followed.
+    unsafe {
+        if !dynamic_viewports && !state.p_viewports.is_null() {
+            gathered.pre_rasterization.viewports =
+                valid::slice(state.p_viewports, state.viewport_count)?;
+        }
+        if !dynamic_scissors && !state.p_scissors.is_null() {
+            gathered.pre_rasterization.scissors =
+                valid::slice(state.p_scissors, state.scissor_count)?;
+        }
+    }
+    Ok(())
+}
+
+/// The attachments that a pipeline renders to.
+#[derive(Default)]
+struct AttachmentFormats {
+    /// By colour attachment; undefined where unused.
+    color: Vec<vk::Format>,
+    /// True if there is a depth or stencil attachment.
+    has_depth_stencil: bool,
+}
+
+/// The formats of the subpass, or of dynamic rendering, that a pipeline is for.
+///
+/// # Safety
+/// The create info and its chain are valid.
+unsafe fn attachment_formats(
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+) -> Result<AttachmentFormats, Error> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        if let Some(render_pass) = handle::get_optional(info.render_pass)? {
+            let index = info.subpass as usize;
+            let missing = || {
+                Error::usage(
+                    "VUID-VkGraphicsPipelineCreateInfo-renderPass-06046",
+                    format!("the render pass has no subpass {index}"),
+                )
+            };
+            let subpass = render_pass.subpasses.get(index).ok_or_else(missing)?;
+            return Ok(AttachmentFormats {
+                color: render_pass.color_formats(index).ok_or_else(missing)?,
+                has_depth_stencil: subpass.depth_stencil.is_some(),
+            });
+        }
+        let Some(rendering) = valid::find_in_chain::<vk::PipelineRenderingCreateInfo>(info.p_next)
+        else {
+            return Ok(AttachmentFormats::default());
+        };
+        let color = valid::slice(
+            rendering.p_color_attachment_formats,
+            rendering.color_attachment_count,
+        )?;
+        let undefined = vk::Format::UNDEFINED;
+        Ok(AttachmentFormats {
+            color: color.to_vec(),
+            has_depth_stencil: rendering.depth_attachment_format != undefined
+                || rendering.stencil_attachment_format != undefined,
+        })
+    }
+}
+
+/// The source that a pipeline reads an attribute from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct AttributeSource {
+    /// The vertex buffer binding.
+    pub(crate) binding: u32,
+    /// Bytes from one vertex to the next.
+    pub(crate) stride: u32,
+    /// Bytes from the vertex's start to the attribute.
+    pub(crate) offset: u32,
+    /// The format that it is stored in.
+    pub(crate) format: Format,
+    /// After how many instances it advances (0: never), `None` if it advances by vertex.
+    pub(crate) instance_divisor: Option<u32>,
+}
+
+/// Finds the attribute at `location`, which the extension calls `name` and needs `components` of.
+///
+/// # Errors
+/// An [`Error`] if the location, its binding or its format won't do.
+pub(crate) fn attribute(
+    info: &GraphicsState,
+    name: &str,
+    location: u32,
+    components: u32,
+) -> Result<AttributeSource, Error> {
+    let refuse = |what: String| {
+        Error::usage(
+            "VUID-VkGaussianAttributeLocationsGAURAST-location",
+            format!("{name} is location {location}, {what}"),
+        )
+    };
+    let source = source(info, location).map_err(refuse)?;
+    let format = source.format;
+    if format.is_integer() {
+        return Err(refuse(format!(
+            "whose format {format:?} does not convert to floating point"
+        )));
+    }
+    if (format.components().len() as u32) < components {
+        return Err(refuse(format!(
+            "whose format {format:?} has fewer than {components} components"
+        )));
+    }
+    Ok(source)
+}
+
+/// Finds the attribute at `location`.
+///
+/// # Errors
+/// What is missing or won't do, as the end of a sentence about the location.
+pub(crate) fn source(info: &GraphicsState, location: u32) -> Result<AttributeSource, String> {
+    let attribute = info
+        .vertex_input
+        .attributes
+        .iter()
+        .find(|a| a.location == location);
+    let attribute = attribute.ok_or("which the vertex input state does not have")?;
+    let number = attribute.binding;
+    let binding = info
+        .vertex_input
+        .bindings
+        .iter()
+        .find(|b| b.binding == number);
+    let binding = binding
+        .ok_or_else(|| format!("whose binding {number} the vertex input state does not have"))?;
+    let features = formats::properties(attribute.format).buffer_features;
+    let format = formats::device_format(attribute.format)
+        .filter(|_| features.contains(vk::FormatFeatureFlags::VERTEX_BUFFER));
+    let format = format.ok_or_else(|| {
+        format!(
+            "whose format {:?} this device does not read as a vertex attribute",
+            attribute.format
+        )
+    })?;
+    let instance_divisor = match binding.input_rate {
+        vk::VertexInputRate::VERTEX => None,
+        vk::VertexInputRate::INSTANCE => {
+            let given = info
+                .vertex_input
+                .divisors
+                .iter()
+                .find(|it| it.binding == number);
+            Some(given.map_or(1, |it| it.divisor))
+        }
+        rate => return Err(format!("whose binding has the unknown rate {rate:?}")),
+    };
+    Ok(AttributeSource {
+        binding: number,
+        stride: binding.stride,
+        offset: attribute.offset,
+        format,
+        instance_divisor,
+    })
+}
+
+/// The blend state of all colour attachments.
+///
+/// # Errors
+/// An [`Error`] if there are not as many as attachments, or for what the device lacks.
+pub(crate) fn blend_states(info: &GraphicsState) -> Result<Vec<BlendState>, Error> {
+    if info.fragment_output.blend.len() != info.fragment_output.color_formats.len() {
+        return Err(Error::usage(
+            "VUID-VkGraphicsPipelineCreateInfo-renderPass-07609",
+            format!(
+                "the colour blend state's attachmentCount is {}, but the subpass has {} colour attachments",
+                info.fragment_output.blend.len(),
+                info.fragment_output.color_formats.len()
+            ),
+        ));
+    }
+    info.fragment_output
+        .blend
+        .iter()
+        .map(convert::blend_state)
+        .collect()
+}
+
+/// Tells if an attachment is blended with the second source of the fragment stage.
+pub(crate) fn reads_second_source(state: &vk::PipelineColorBlendAttachmentState) -> bool {
+    use vk::BlendFactor as F;
+    let factors = [
+        state.src_color_blend_factor,
+        state.dst_color_blend_factor,
+        state.src_alpha_blend_factor,
+        state.dst_alpha_blend_factor,
+    ];
+    let is_second = |factor: F| {
+        matches!(
+            factor,
+            F::SRC1_COLOR | F::ONE_MINUS_SRC1_COLOR | F::SRC1_ALPHA | F::ONE_MINUS_SRC1_ALPHA
+        )
+    };
+    state.blend_enable != vk::FALSE && factors.into_iter().any(is_second)
+}
+
+/// A feature of the device: if it works, and its name.
+macro_rules! supported {
+    ($feature:ident) => {
+        (SUPPORTED.$feature, stringify!($feature))
+    };
+}
+
+/// The state of a pipeline, or of a draw.
+#[derive(Clone, Debug)]
+pub(crate) struct FixedFunctionState {
+    /// All but depth bias, depth and stencil.
+    pub(crate) draw: DrawState,
+    pub(super) depth_bias_enable: bool,
+    pub(super) depth_bias: DepthBias,
+    pub(super) depth_test: bool,
+    pub(super) depth_write: bool,
+    pub(super) depth_compare: CompareOp,
+    pub(super) depth_bounds_test: bool,
+    pub(super) depth_bounds: (f32, f32),
+    pub(super) stencil_test: bool,
+    pub(super) stencil: [StencilFace; 2],
+}
+
+/// The ids of the rules on the operations of `VkStencilOpState`.
+const STENCIL_OP_STATE: StencilOpIds = StencilOpIds {
+    fail: "VUID-VkStencilOpState-failOp-parameter",
+    pass: "VUID-VkStencilOpState-passOp-parameter",
+    depth_fail: "VUID-VkStencilOpState-depthFailOp-parameter",
+    compare: "VUID-VkStencilOpState-compareOp-parameter",
+};
+
+/// A stencil face that changes nothing.
+const KEEP: StencilFace = StencilFace {
+    fail: StencilOp::Keep,
+    pass: StencilOp::Keep,
+    depth_fail: StencilOp::Keep,
+    compare: CompareOp::Always,
+    compare_mask: 0xFF,
+    write_mask: 0xFF,
+    reference: 0,
+};
+
+impl FixedFunctionState {
+    /// Validates and converts the static state of a pipeline.
+    ///
+    /// # Errors
+    /// An [`Error`] that names the valid usage broken, or the feature that the device lacks.
+    pub(crate) fn new(info: &GraphicsState) -> Result<Self, Error> {
+        let mut state = Self::of(info, convert::topology(info.vertex_input.topology)?)?;
+        if !info.discards() {
+            state.set_viewports(info)?;
+            state.set_samples(info)?;
+            state.set_depth_stencil(info)?;
+            state.set_blend(info)?;
+        }
+        Ok(state)
+    }
+
+    /// As [`FixedFunctionState::new`], of Gaussians: what becomes of their fragments.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn of_gaussians(info: &GraphicsState) -> Result<Self, Error> {
+        // Nothing comes of the topology.
+        let mut state = Self::of(info, Topology::TriangleStrip)?;
+        if !info
+            .fragment_output
+            .multisample
+            .rasterization_samples
+            .is_empty()
+        {
+            state.set_samples(info)?;
+        }
+        state.set_depth_stencil(info)?;
+        state.set_blend(info)?;
+        Ok(state)
+    }
+
+    /// Vertex assembly and rasterization; the rest such that it does nothing.
+    fn of(info: &GraphicsState, topology: Topology) -> Result<Self, Error> {
+        let raster = &info.pre_rasterization.rasterization;
+        let polygon_mode = convert::polygon_mode(raster.polygon_mode)?;
+        let needs = [
+            (
+                polygon_mode != PolygonMode::Fill,
+                supported!(fill_mode_non_solid),
+                "a polygon mode but FILL",
+            ),
+            (
+                raster.depth_clamp_enable != vk::FALSE,
+                supported!(depth_clamp),
+                "depthClampEnable",
+            ),
+            (
+                raster.depth_bias_enable != vk::FALSE && raster.depth_bias_clamp != 0.0,
+                supported!(depth_bias_clamp),
+                "depthBiasClamp",
+            ),
+            (
+                info.line_width() != 1.0,
+                supported!(wide_lines),
+                "a line width but 1",
+            ),
+        ];
+        require_all(&needs)?;
+        let is_list = matches!(
+            topology,
+            Topology::PointList | Topology::LineList | Topology::TriangleList
+        );
+        if info.vertex_input.primitive_restart
+            && is_list
+            && !info.is_dynamic(vk::DynamicState::PRIMITIVE_TOPOLOGY)
+        {
+            return Err(Error::usage(
+                "VUID-VkPipelineInputAssemblyStateCreateInfo-topology-06252",
+                format!("primitiveRestartEnable is VK_TRUE, but {topology:?} has no restart"),
+            ));
+        }
+        let draw = DrawState {
+            topology,
+            primitive_restart: info.vertex_input.primitive_restart,
+            viewports: Vec::new(),
+            scissors: Vec::new(),
+            depth_clamp: raster.depth_clamp_enable != vk::FALSE,
+            rasterizer_discard: raster.rasterizer_discard_enable != vk::FALSE,
+            polygon_mode,
+            cull_front: false,
+            cull_back: false,
+            front_clockwise: false,
+            depth_bias: None,
+            line_width: info.line_width(),
+            provoking_last: info.pre_rasterization.provoking_last,
+            samples: 1,
+            sample_mask: u32::MAX,
+            sample_shading: false,
+            alpha_to_coverage: false,
+            alpha_to_one: false,
+            depth_stencil: DepthStencil {
+                depth: None,
+                bounds: None,
+                stencil: None,
+            },
+            logic_op: None,
+            blend: Vec::new(),
+            blend_constants: [0.0; 4],
+        };
+        let mut state = Self {
+            draw,
+            depth_bias_enable: raster.depth_bias_enable != vk::FALSE,
+            depth_bias: DepthBias {
+                constant: raster.depth_bias_constant_factor,
+                clamp: raster.depth_bias_clamp,
+                slope: raster.depth_bias_slope_factor,
+            },
+            depth_test: false,
+            depth_write: false,
+            depth_compare: CompareOp::Always,
+            depth_bounds_test: false,
+            depth_bounds: (0.0, 1.0),
+            stencil_test: false,
+            stencil: [KEEP; 2],
+        };
+        state.set_cull_mode(raster.cull_mode);
+        state.set_front_face(raster.front_face);
+        Ok(state)
+    }
+
+    fn set_viewports(&mut self, info: &GraphicsState) -> Result<(), Error> {
+        use vk::DynamicState as S;
+        let counts = [
+            info.pre_rasterization.viewport_count,
+            info.pre_rasterization.scissor_count,
+        ];
+        let dynamic = [
+            info.is_dynamic(S::VIEWPORT_WITH_COUNT),
+            info.is_dynamic(S::SCISSOR_WITH_COUNT),
+        ];
+        for (count, dynamic) in counts.into_iter().zip(dynamic) {
+            if count > limits::properties().max_viewports {
+                return Err(Error::usage(
+                    "VUID-VkPipelineViewportStateCreateInfo-viewportCount-01218",
+                    format!("{count} viewports or scissors are more than maxViewports"),
+                ));
+            }
+            if count == 0 && !dynamic {
+                return Err(Error::usage(
+                    "VUID-VkPipelineViewportStateCreateInfo-viewportCount-04135",
+                    "there is no viewport or no scissor, and their count is not dynamic",
+                ));
+            }
+        }
+        if counts[0] != counts[1] && dynamic == [false; 2] {
+            return Err(Error::usage(
+                "VUID-VkPipelineViewportStateCreateInfo-scissorCount-04134",
+                format!(
+                    "there are {} viewports, but {} scissors",
+                    counts[0], counts[1]
+                ),
+            ));
+        }
+        let has = |given: usize, count: u32| given == count as usize;
+        let static_viewports = !(dynamic[0] || info.is_dynamic(S::VIEWPORT));
+        let static_scissors = !(dynamic[1] || info.is_dynamic(S::SCISSOR));
+        if (static_viewports && !has(info.pre_rasterization.viewports.len(), counts[0]))
+            || (static_scissors && !has(info.pre_rasterization.scissors.len(), counts[1]))
+        {
+            return Err(Error::usage(
+                "VUID-VkGraphicsPipelineCreateInfo-pDynamicStates-04130",
+                "the pipeline has no viewports or scissors, and they are not dynamic",
+            ));
+        }
+        if static_viewports {
+            self.draw.viewports = info
+                .pre_rasterization
+                .viewports
+                .iter()
+                .copied()
+                .map(convert::viewport)
+                .collect();
+        }
+        if static_scissors {
+            self.draw.scissors = info
+                .pre_rasterization
+                .scissors
+                .iter()
+                .copied()
+                .map(convert::rect)
+                .collect();
+        }
+        Ok(())
+    }
+
+    fn set_samples(&mut self, info: &GraphicsState) -> Result<(), Error> {
+        let multisample = &info.fragment_output.multisample;
+        let samples = multisample.rasterization_samples;
+        let supported = limits::properties().framebuffer_no_attachments_sample_counts;
+        let count = samples.as_raw();
+        if !count.is_power_of_two() || !supported.contains(samples) {
+            return Err(Error::FeatureNotPresent(format!(
+                "rasterizationSamples {samples:?} (there are {supported:?})"
+            )));
+        }
+        let needs = [
+            (
+                multisample.sample_shading_enable != vk::FALSE,
+                supported!(sample_rate_shading),
+                "sampleShadingEnable",
+            ),
+            (
+                multisample.alpha_to_one_enable != vk::FALSE,
+                supported!(alpha_to_one),
+                "alphaToOneEnable",
+            ),
+        ];
+        require_all(&needs)?;
+        let draw = &mut self.draw;
+        draw.samples = count;
+        draw.sample_mask = info.fragment_output.sample_mask;
+        // The device shades either once or every sample, and as many as are asked for is at least.
+        let shaded = (multisample.min_sample_shading * count as f32).ceil();
+        draw.sample_shading = multisample.sample_shading_enable != vk::FALSE && shaded > 1.0;
+        draw.alpha_to_coverage = multisample.alpha_to_coverage_enable != vk::FALSE;
+        draw.alpha_to_one = multisample.alpha_to_one_enable != vk::FALSE;
+        Ok(())
+    }
+
+    fn set_depth_stencil(&mut self, info: &GraphicsState) -> Result<(), Error> {
+        let Some(state) = &info.fragment_shader.depth_stencil else {
+            return Ok(());
+        };
+        let bounds_test = state.depth_bounds_test_enable != vk::FALSE;
+        require_all(&[(
+            bounds_test,
+            supported!(depth_bounds),
+            "depthBoundsTestEnable",
+        )])?;
+        self.depth_test = state.depth_test_enable != vk::FALSE;
+        self.depth_write = state.depth_write_enable != vk::FALSE;
+        self.depth_bounds_test = bounds_test;
+        self.depth_bounds = (state.min_depth_bounds, state.max_depth_bounds);
+        // What isn't used may hold anything.
+        let may_test = |enabled, state| enabled || info.is_dynamic(state);
+        let tests_depth = may_test(self.depth_test, vk::DynamicState::DEPTH_TEST_ENABLE);
+        if tests_depth && !info.is_dynamic(vk::DynamicState::DEPTH_COMPARE_OP) {
+            self.depth_compare = convert::compare_op(
+                state.depth_compare_op,
+                "VUID-VkPipelineDepthStencilStateCreateInfo-depthCompareOp-parameter",
+            )?;
+        }
+        self.stencil_test = state.stencil_test_enable != vk::FALSE;
+        let tests_stencil = may_test(self.stencil_test, vk::DynamicState::STENCIL_TEST_ENABLE);
+        let static_ops = tests_stencil && !info.is_dynamic(vk::DynamicState::STENCIL_OP);
+        for (face, given) in [state.front, state.back].into_iter().enumerate() {
+            if static_ops {
+                let ops = StencilOps::from_vk(
+                    given.fail_op,
+                    given.pass_op,
+                    given.depth_fail_op,
+                    given.compare_op,
+                    &STENCIL_OP_STATE,
+                )?;
+                ops.set(&mut self.stencil[face]);
+            }
+            self.stencil[face].compare_mask = given.compare_mask as u8;
+            self.stencil[face].write_mask = given.write_mask as u8;
+            self.stencil[face].reference = given.reference as u8;
+        }
+        Ok(())
+    }
+
+    fn set_blend(&mut self, info: &GraphicsState) -> Result<(), Error> {
+        if let Some(op) = info.fragment_output.logic_op {
+            require_all(&[(true, supported!(logic_op), "logicOpEnable")])?;
+            self.draw.logic_op = Some(convert::logic_op(op)?);
+        }
+        self.draw.blend = blend_states(info)?;
+        self.draw.blend_constants = info.fragment_output.blend_constants;
+        Ok(())
+    }
+
+    /// Sets the faces that are culled.
+    pub(super) fn set_cull_mode(&mut self, mode: vk::CullModeFlags) {
+        self.draw.cull_front = mode.contains(vk::CullModeFlags::FRONT);
+        self.draw.cull_back = mode.contains(vk::CullModeFlags::BACK);
+    }
+
+    /// Sets the face that is the front.
+    pub(super) fn set_front_face(&mut self, face: vk::FrontFace) {
+        self.draw.front_clockwise = face == vk::FrontFace::CLOCKWISE;
+    }
+
+    /// Tells if anything is rasterized.
+    pub(super) fn rasterizes(&self) -> bool {
+        !self.draw.rasterizer_discard
+    }
+
+    /// Tells if lines are drawn, so that their width matters.
+    pub(super) fn draws_lines(&self) -> bool {
+        let draw = &self.draw;
+        let are_lines =
+            draw.polygon_mode == PolygonMode::Line || class(draw.topology) == Class::Lines;
+        self.rasterizes() && are_lines
+    }
+
+    /// Tells if fragments' depths are biased.
+    pub(super) fn biases_depth(&self) -> bool {
+        self.rasterizes() && self.depth_bias_enable
+    }
+
+    /// Tells if the attachment's depths are tested against bounds.
+    pub(super) fn tests_depth_bounds(&self) -> bool {
+        self.rasterizes() && self.depth_bounds_test
+    }
+
+    /// Tells if depths are tested.
+    pub(super) fn tests_depth(&self) -> bool {
+        self.rasterizes() && self.depth_test
+    }
+
+    /// Tells if stencil values are tested.
+    pub(super) fn tests_stencil(&self) -> bool {
+        self.rasterizes() && self.stencil_test
+    }
+
+    /// Tells if an attachment is blended by the constants.
+    pub(super) fn blends_by_constants(&self) -> bool {
+        self.rasterizes() && self.draw.logic_op.is_none() && blends_by_constants(&self.draw)
+    }
+
+    /// The state for the device.
+    pub(crate) fn draw_state(&self) -> DrawState {
+        DrawState {
+            depth_bias: self.depth_bias_enable.then_some(self.depth_bias),
+            depth_stencil: DepthStencil {
+                depth: self.depth_test.then_some(DepthTest {
+                    compare: self.depth_compare,
+                    write: self.depth_write,
+                }),
+                bounds: self.depth_bounds_test.then_some(self.depth_bounds),
+                stencil: self.stencil_test.then_some(self.stencil),
+            },
+            ..self.draw.clone()
+        }
+    }
+}
+
+/// Tells if an attachment is blended by the constants.
+fn blends_by_constants(state: &DrawState) -> bool {
+    let equations = state.blend.iter().filter_map(|blend| blend.equations);
+    equations
+        .flat_map(|(color, alpha)| {
+            [
+                color.source,
+                color.destination,
+                alpha.source,
+                alpha.destination,
+            ]
+        })
+        .any(|factor| {
+            matches!(
+                factor,
+                BlendFactor::ConstantColor
+                    | BlendFactor::OneMinusConstantColor
+                    | BlendFactor::ConstantAlpha
+                    | BlendFactor::OneMinusConstantAlpha
+            )
+        })
+}
+
+/// The class of primitives that a topology makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Class {
+    /// Points.
+    Points,
+    /// Lines.
+    Lines,
+    /// Triangles.
+    Triangles,
+}
+
+/// A topology's class, which a dynamic topology stays in.
+pub(crate) fn class(topology: Topology) -> Class {
+    match topology {
+        Topology::PointList => Class::Points,
+        Topology::LineList
+        | Topology::LineStrip
+        | Topology::LineListWithAdjacency
+        | Topology::LineStripWithAdjacency => Class::Lines,
+        Topology::TriangleList
+        | Topology::TriangleStrip
+        | Topology::TriangleFan
+        | Topology::TriangleListWithAdjacency
+        | Topology::TriangleStripWithAdjacency => Class::Triangles,
+    }
+}
+
+/// Fails for the first need whose feature the device lacks.
+fn require_all(needs: &[(bool, (bool, &str), &str)]) -> Result<(), Error> {
+    let lacks = |needed: bool, is_supported: bool| needed && !is_supported;
+    match needs
+        .iter()
+        .find(|(needed, (is_supported, _), _)| lacks(*needed, *is_supported))
+    {
+        None => Ok(()),
+        Some((_, (_, feature), what)) => Err(Error::FeatureNotPresent(format!(
+            "{what} (feature {feature})"
+        ))),
+    }
+}
+
+/// For each colour attachment, whether anything comes of its source.
+pub(crate) fn live_color_outputs(info: &GraphicsState, fixed: &FixedFunctionState) -> Vec<bool> {
+    let mut live_outputs: Vec<_> =
+        std::iter::zip(&fixed.draw.blend, &info.fragment_output.color_formats)
+            .map(|(blend, format)| blend.write_mask != 0 && *format != vk::Format::UNDEFINED)
+            .collect();
+    if fixed.draw.alpha_to_coverage {
+        match live_outputs.first_mut() {
+            Some(first) => *first = true,
+            None => live_outputs.push(true),
+        }
+    }
+    live_outputs
+}

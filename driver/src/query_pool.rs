@@ -1,0 +1,385 @@
+//! Query pools.
+
+use crate::abi::error::Error;
+use crate::abi::handle::objects;
+use crate::abi::valid;
+use crate::device::Device;
+use crate::device_sync::DeviceSync;
+use ash::vk;
+use ash::vk::{QueryPipelineStatisticFlags as Statistic, QueryResultFlags};
+use simdevice::counters::Counter;
+use simdevice::query::{self, QueryKind, QueryResult};
+use std::mem::MaybeUninit;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The period in which a wait for a query looks whether the device was lost.
+const POLL: Duration = Duration::from_millis(20);
+
+/// A query pool.
+#[derive(Debug)]
+pub(crate) struct QueryPool {
+    /// The device's half.
+    pub(crate) queries: Arc<query::QueryPool>,
+    /// The values that results hold.
+    query_type: QueryType,
+}
+
+/// The values that the results of a pool's queries hold.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum QueryType {
+    /// The host's time, or the simulated hardware's.
+    Timestamp,
+    /// Counters as `VkPerformanceCounterResultKHR`s, in order.
+    Performance(Vec<u32>),
+    /// Counters as words, in order: occlusion and pipeline statistics. `None` counts what this device never does.
+    Words(Vec<Option<Counter>>),
+}
+
+impl QueryType {
+    /// Samples that passed all tests. They are always counted exactly.
+    pub(crate) fn occlusion() -> Self {
+        Self::Words(vec![Some(Counter::SamplesPassed)])
+    }
+
+    /// Pipeline statistics, from the lowest flag to the highest.
+    pub(crate) fn statistics(flags: Statistic) -> Self {
+        const ALL: [(Statistic, Option<Counter>); 11] = [
+            (
+                Statistic::INPUT_ASSEMBLY_VERTICES,
+                Some(Counter::InputVertices),
+            ),
+            (
+                Statistic::INPUT_ASSEMBLY_PRIMITIVES,
+                Some(Counter::InputPrimitives),
+            ),
+            (
+                Statistic::VERTEX_SHADER_INVOCATIONS,
+                Some(Counter::VertexInvocations),
+            ),
+            (Statistic::GEOMETRY_SHADER_INVOCATIONS, None),
+            (Statistic::GEOMETRY_SHADER_PRIMITIVES, None),
+            (
+                Statistic::CLIPPING_INVOCATIONS,
+                Some(Counter::ClippingInvocations),
+            ),
+            (
+                Statistic::CLIPPING_PRIMITIVES,
+                Some(Counter::ClippingPrimitives),
+            ),
+            (
+                Statistic::FRAGMENT_SHADER_INVOCATIONS,
+                Some(Counter::FragmentInvocations),
+            ),
+            (Statistic::TESSELLATION_CONTROL_SHADER_PATCHES, None),
+            (Statistic::TESSELLATION_EVALUATION_SHADER_INVOCATIONS, None),
+            (
+                Statistic::COMPUTE_SHADER_INVOCATIONS,
+                Some(Counter::ComputeInvocations),
+            ),
+        ];
+        let counted = ALL.iter().filter(|(flag, _)| flags.contains(*flag));
+        Self::Words(counted.map(|(_, counter)| *counter).collect())
+    }
+
+    fn kind(&self) -> QueryKind {
+        match self {
+            Self::Timestamp => QueryKind::Timestamp,
+            Self::Performance(counters) if counters.iter().any(is_simulated) => {
+                QueryKind::Simulated
+            }
+            Self::Performance(_) | Self::Words(_) => QueryKind::Performance,
+        }
+    }
+
+    /// The number of values that a result has.
+    fn count(&self) -> usize {
+        match self {
+            Self::Timestamp => 1,
+            Self::Performance(counters) => counters.len(),
+            Self::Words(counters) => counters.len(),
+        }
+    }
+}
+
+/// Tells if a model of the hardware must run for a counter.
+fn is_simulated(index: &u32) -> bool {
+    let counter = Counter::ALL.get(*index as usize);
+    counter.is_some_and(|counter| counter.is_simulated())
+}
+
+objects! { vk::QueryPool => QueryPool; }
+
+impl QueryPool {
+    /// A pool of `count` queries.
+    pub(crate) fn new(query_type: QueryType, count: u32) -> Self {
+        Self {
+            queries: Arc::new(query::QueryPool::new(query_type.kind(), count)),
+            query_type,
+        }
+    }
+
+    /// Tells if it has queries `first..first + count`.
+    pub(crate) fn has(&self, first: u32, count: u32) -> bool {
+        u64::from(first) + u64::from(count) <= u64::from(self.queries.count())
+    }
+
+    /// The bytes that Vulkan writes for a query: its values, as words of 32 or 64 bits, if it is available, and its availability
+    /// after them, if that is asked for. Each is an offset from the query's place and the bytes there.
+    pub(crate) fn written(
+        &self,
+        result: Option<&QueryResult>,
+        flags: QueryResultFlags,
+    ) -> Vec<(u64, Vec<u8>)> {
+        // A VkPerformanceCounterResultKHR has eight bytes whatever the flags.
+        let wide = flags.contains(QueryResultFlags::TYPE_64)
+            || matches!(self.query_type, QueryType::Performance(_));
+        let word = |value: u64| {
+            if wide {
+                value.to_ne_bytes().to_vec()
+            } else {
+                (value as u32).to_ne_bytes().to_vec()
+            }
+        };
+        let mut written = Vec::new();
+        let values = match result {
+            Some(result) => Some(self.values(result)),
+            // So far nothing was counted: what is between is only known when the query ends.
+            None if flags.contains(QueryResultFlags::PARTIAL) => {
+                Some(vec![0; self.query_type.count()])
+            }
+            None => None,
+        };
+        if let Some(values) = values {
+            written.push((0, values.into_iter().flat_map(word).collect()));
+        }
+        if flags.contains(QueryResultFlags::WITH_AVAILABILITY) {
+            let place = self.query_type.count() as u64 * if wide { 8 } else { 4 };
+            written.push((place, word(result.is_some().into())));
+        }
+        written
+    }
+
+    fn values(&self, result: &QueryResult) -> Vec<u64> {
+        let counters = match result {
+            QueryResult::Timestamp(nanoseconds) => return vec![*nanoseconds],
+            QueryResult::Performance(counters) => counters,
+        };
+        match &self.query_type {
+            QueryType::Timestamp => vec![0],
+            QueryType::Performance(indices) => {
+                let value = |&index: &u32| counters.values().get(index as usize).copied();
+                indices
+                    .iter()
+                    .map(|index| value(index).unwrap_or(0))
+                    .collect()
+            }
+            QueryType::Words(counted) => counted
+                .iter()
+                .map(|counter| counter.map_or(0, |counter| counters.get(counter)))
+                .collect(),
+        }
+    }
+}
+
+/// A query's result, after a wait where that is asked for.
+fn result(
+    pool: &QueryPool,
+    index: u32,
+    flags: QueryResultFlags,
+    sync: &DeviceSync,
+) -> Result<Option<QueryResult>, Error> {
+    loop {
+        let result = pool.queries.result(index);
+        if result.is_some() || !flags.contains(QueryResultFlags::WAIT) {
+            return Ok(result);
+        }
+        sync.check()?;
+        pool.queries.wait(index, POLL);
+    }
+}
+
+/// Fails unless the pool has the queries.
+///
+/// # Errors
+/// [`Error::InvalidUsage`] with the id `vuid`.
+pub(crate) fn require_queries(
+    pool: &QueryPool,
+    first: u32,
+    count: u32,
+    vuid: &'static str,
+) -> Result<(), Error> {
+    if pool.has(first, count) {
+        return Ok(());
+    }
+    Err(Error::usage(
+        vuid,
+        format!(
+            "{count} queries from {first} on of a pool of {}",
+            pool.queries.count()
+        ),
+    ))
+}
+
+/// The pool that a create info asks for.
+///
+/// # Safety
+/// The create info's chain is valid.
+unsafe fn new_pool(info: &vk::QueryPoolCreateInfo<'_>) -> Result<QueryPool, Error> {
+    let query_type = match info.query_type {
+        vk::QueryType::TIMESTAMP => QueryType::Timestamp,
+        vk::QueryType::OCCLUSION => QueryType::occlusion(),
+        vk::QueryType::PIPELINE_STATISTICS => QueryType::statistics(info.pipeline_statistics),
+        vk::QueryType::PERFORMANCE_QUERY_KHR => {
+            // SAFETY: the caller's promise.
+            let counters = unsafe {
+                valid::find_in_chain::<vk::QueryPoolPerformanceCreateInfoKHR>(info.p_next)
+                    .map(|info| valid::slice(info.p_counter_indices, info.counter_index_count))
+                    .transpose()?
+            };
+            let counters = counters.ok_or_else(|| {
+                Error::usage(
+                    "VUID-VkQueryPoolCreateInfo-queryType-03222",
+                    "a performance query pool must chain a VkQueryPoolPerformanceCreateInfoKHR",
+                )
+            })?;
+            let is_known = |&index: &u32| (index as usize) < Counter::ALL.len();
+            if let Some(index) = counters.iter().find(|index| !is_known(index)) {
+                return Err(Error::usage(
+                    "VUID-VkQueryPoolPerformanceCreateInfoKHR-pCounterIndices-03321",
+                    format!("there is no performance counter {index}"),
+                ));
+            }
+            QueryType::Performance(counters.to_vec())
+        }
+        other => {
+            return Err(Error::FeatureNotPresent(format!(
+                "a query pool of type {other:?}"
+            )));
+        }
+    };
+    Ok(QueryPool::new(query_type, info.query_count))
+}
+
+/// # Safety
+/// The create info's chain is valid.
+#[doc(alias = "vkCreateQueryPool")]
+pub(crate) unsafe fn create_query_pool(
+    create_info: &vk::QueryPoolCreateInfo<'_>,
+) -> Result<Arc<QueryPool>, Error> {
+    // SAFETY: the caller's promise.
+    unsafe { new_pool(create_info) }.map(Arc::new)
+}
+
+#[doc(alias = "vkResetQueryPool")]
+pub(crate) fn reset_query_pool(
+    query_pool: &QueryPool,
+    first_query: u32,
+    query_count: u32,
+) -> Result<(), Error> {
+    query_pool.queries.reset(first_query, query_count);
+    Ok(())
+}
+
+#[doc(alias = "vkGetQueryPoolResults")]
+pub(crate) fn get_query_pool_results(
+    device: &Device,
+    query_pool: &QueryPool,
+    first_query: u32,
+    query_count: u32,
+    data: &mut [MaybeUninit<u8>],
+    stride: vk::DeviceSize,
+    flags: QueryResultFlags,
+) -> Result<vk::Result, Error> {
+    require_queries(
+        query_pool,
+        first_query,
+        query_count,
+        "VUID-vkGetQueryPoolResults-firstQuery-00816",
+    )?;
+    let mut all_available = true;
+    for index in 0..query_count {
+        let result = result(query_pool, first_query + index, flags, device.sync())?;
+        all_available &= result.is_some();
+        for (place, bytes) in query_pool.written(result.as_ref(), flags) {
+            let offset = (u64::from(index) * stride + place) as usize;
+            let Some(target) = data.get_mut(offset..offset + bytes.len()) else {
+                return Err(Error::usage(
+                    "VUID-vkGetQueryPoolResults-dataSize-00817",
+                    format!(
+                        "dataSize is {}, too small for {query_count} queries",
+                        data.len()
+                    ),
+                ));
+            };
+            for (byte, value) in target.iter_mut().zip(bytes) {
+                byte.write(value);
+            }
+        }
+    }
+    Ok(if all_available {
+        vk::Result::SUCCESS
+    } else {
+        vk::Result::NOT_READY
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use simdevice::counters::Counters;
+
+    #[test]
+    fn counters_come_in_the_pools_order() {
+        let mut counters = Counters::default();
+        counters.add(Counter::GaussiansRead, 7);
+        counters.add(Counter::GaussiansDrawn, 5);
+        let order = vec![
+            Counter::GaussiansDrawn as u32,
+            Counter::GaussiansRead as u32,
+        ];
+        let pool = QueryPool::new(QueryType::Performance(order), 1);
+        let result = QueryResult::Performance(Box::new(counters));
+        let written = pool.written(Some(&result), QueryResultFlags::empty());
+        let expected = [5u64.to_ne_bytes(), 7u64.to_ne_bytes()].concat();
+        assert_eq!(written, [(0, expected)]);
+    }
+
+    #[test]
+    fn availability_follows_the_values() {
+        let pool = QueryPool::new(QueryType::Timestamp, 3);
+        let flags = QueryResultFlags::WITH_AVAILABILITY;
+        let result = QueryResult::Timestamp((1 << 32) + 9);
+        assert_eq!(
+            pool.written(Some(&result), flags),
+            [
+                (0, 9u32.to_ne_bytes().to_vec()),
+                (4, 1u32.to_ne_bytes().to_vec())
+            ]
+        );
+        assert_eq!(
+            pool.written(None, flags | QueryResultFlags::TYPE_64),
+            [(8, 0u64.to_ne_bytes().to_vec())]
+        );
+        assert!(pool.written(None, QueryResultFlags::TYPE_64).is_empty());
+        assert!(pool.has(1, 2) && !pool.has(2, 2) && !pool.has(u32::MAX, 2));
+    }
+
+    #[test]
+    fn statistics_are_words_in_the_order_of_their_flags() {
+        let mut counters = Counters::default();
+        counters.add(Counter::FragmentInvocations, 7);
+        counters.add(Counter::InputVertices, 3);
+        let flags = Statistic::FRAGMENT_SHADER_INVOCATIONS
+            | Statistic::GEOMETRY_SHADER_PRIMITIVES
+            | Statistic::INPUT_ASSEMBLY_VERTICES;
+        let pool = QueryPool::new(QueryType::statistics(flags), 1);
+        let result = QueryResult::Performance(Box::new(counters));
+        let words = |words: [u32; 3]| words.map(u32::to_ne_bytes).concat();
+        let none = QueryResultFlags::empty();
+        assert_eq!(pool.written(Some(&result), none), [(0, words([3, 0, 7]))]);
+        assert!(pool.written(None, none).is_empty());
+        let partial = pool.written(None, QueryResultFlags::PARTIAL);
+        assert_eq!(partial, [(0, words([0; 3]))]);
+    }
+}

@@ -1,0 +1,213 @@
+//! Queues: a thread each, which runs submissions in order on its own command processor.
+//!
+//! A submission is a closure. If the device is lost, because an earlier submission panicked, the closures that wait
+//! are dropped without being run: whoever must wake waiters in that case does so in the `Drop` of what the closure
+//! captures.
+
+use crate::abi::error::Error;
+use crate::abi::guard::panic_message;
+use crate::abi::handle::{Reporter, objects};
+use crate::device_sync::DeviceSync;
+use crate::instance::Instance;
+use ash::vk;
+use simdevice::CommandProcessor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+/// A unit of a queue's work.
+pub(crate) type Work = Box<dyn FnOnce(&mut CommandProcessor) + Send>;
+
+/// A queue of a device.
+pub(crate) struct Queue {
+    instance: Arc<Instance>,
+    sync: Arc<DeviceSync>,
+    /// Gone once the queue is stopped.
+    worker: Mutex<Option<Worker>>,
+}
+
+struct Worker {
+    work: Sender<Work>,
+    thread: JoinHandle<()>,
+}
+
+objects! {
+    vk::Queue => Queue {
+        fn reporter(&self) -> Option<Arc<dyn Reporter>> {
+            Some(Arc::clone(&self.instance) as _)
+        }
+    };
+}
+
+impl Queue {
+    /// Starts the thread of a queue whose work runs on `processor`.
+    ///
+    /// # Errors
+    /// [`Error::InitializationFailed`] if the host gives no thread.
+    pub(crate) fn start(
+        instance: Arc<Instance>,
+        sync: Arc<DeviceSync>,
+        processor: CommandProcessor,
+    ) -> Result<Arc<Self>, Error> {
+        let (work, receiver) = channel();
+        let thread_sync = Arc::clone(&sync);
+        let thread = std::thread::Builder::new()
+            .name("gaurast-queue".to_owned())
+            .spawn(move || run(&receiver, processor, &thread_sync))
+            .map_err(|error| {
+                Error::InitializationFailed(format!("the queue's thread cannot start: {error}"))
+            })?;
+        Ok(Arc::new(Self {
+            instance,
+            sync,
+            worker: Mutex::new(Some(Worker { work, thread })),
+        }))
+    }
+
+    /// The instance of its device.
+    pub(crate) fn instance(&self) -> &Arc<Instance> {
+        &self.instance
+    }
+
+    /// The things that are waited for on its device, and its loss.
+    pub(crate) fn sync(&self) -> &Arc<DeviceSync> {
+        &self.sync
+    }
+
+    /// Appends work.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`]; the work is dropped.
+    pub(crate) fn submit(&self, work: Work) -> Result<(), Error> {
+        self.sync.check()?;
+        let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
+        worker
+            .as_ref()
+            .and_then(|worker| worker.work.send(work).ok())
+            .ok_or_else(|| Error::DeviceLost("its queue has stopped".to_owned()))
+    }
+
+    /// Waits until everything submitted before has been executed.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`].
+    pub(crate) fn wait_idle(&self) -> Result<(), Error> {
+        let (done, wait) = channel();
+        self.submit(Box::new(move |_| {
+            // The receiver waits below for as long as this closure lives.
+            let _ = done.send(());
+        }))?;
+        // The sender is dropped unsent only if the queue gave the work up.
+        let waited = wait.recv();
+        self.sync.check()?;
+        waited.map_err(|_| Error::DeviceLost("its queue has stopped".to_owned()))
+    }
+
+    /// Executes what has been submitted, ends the thread and joins it.
+    pub(crate) fn stop(&self) {
+        let worker = self
+            .worker
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        let Some(Worker { work, thread }) = worker else {
+            return;
+        };
+        drop(work);
+        if thread.join().is_err() {
+            log::error!("a queue's thread panicked outside its work");
+        }
+    }
+}
+
+/// The queue's thread: runs work until the queue is stopped. After a panic it drops what comes instead of running it.
+fn run(work: &Receiver<Work>, mut processor: CommandProcessor, sync: &DeviceSync) {
+    while let Ok(work) = work.recv() {
+        let executed = catch_unwind(AssertUnwindSafe(|| {
+            if sync.check().is_ok() {
+                work(&mut processor);
+            } else {
+                drop(work);
+            }
+        }));
+        if let Err(panic) = executed {
+            sync.lose(panic_message(panic.as_ref()));
+        }
+    }
+}
+
+#[doc(alias = "vkQueueWaitIdle")]
+pub(crate) fn queue_wait_idle(queue: &Queue) -> Result<(), Error> {
+    queue.wait_idle()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    fn queue() -> Arc<Queue> {
+        let simulated = simdevice::Device::new(&simdevice::Config::default()).unwrap();
+        Queue::start(
+            Instance::new(0, &[]).unwrap(),
+            Arc::default(),
+            CommandProcessor::new(Arc::new(simulated)),
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn work_is_done_in_order_before_the_queue_is_idle() {
+        let queue = queue();
+        let (sent, received) = channel();
+        for index in 0..10 {
+            let sent = sent.clone();
+            queue
+                .submit(Box::new(move |_| sent.send(index).unwrap()))
+                .unwrap();
+        }
+        queue.wait_idle().unwrap();
+        assert_eq!(
+            received.try_iter().collect::<Vec<_>>(),
+            (0..10).collect::<Vec<_>>()
+        );
+        queue.stop();
+        queue.stop();
+        assert!(queue.submit(Box::new(|_| ())).is_err());
+    }
+
+    #[test]
+    fn a_panic_loses_the_device_and_drops_what_waits() {
+        struct Dropped(Arc<AtomicUsize>);
+        impl Drop for Dropped {
+            fn drop(&mut self) {
+                self.0.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        let queue = queue();
+        let (go, wait) = channel::<()>();
+        let dropped = Arc::new(AtomicUsize::new(0));
+        queue
+            .submit(Box::new(move |_| {
+                let _ = wait.recv();
+                panic!("provoked");
+            }))
+            .unwrap();
+        let ran = Arc::new(AtomicUsize::new(0));
+        let (waiting, counted) = (Dropped(Arc::clone(&dropped)), Arc::clone(&ran));
+        queue
+            .submit(Box::new(move |_| {
+                let _waiting = waiting;
+                counted.fetch_add(1, Ordering::Relaxed);
+            }))
+            .unwrap();
+        go.send(()).unwrap();
+        let error = queue.wait_idle().unwrap_err();
+        assert_eq!(error.result(), vk::Result::ERROR_DEVICE_LOST);
+        assert!(error.to_string().contains("provoked"), "{error}");
+        queue.stop();
+        assert_eq!(dropped.load(Ordering::Relaxed), 1);
+        assert_eq!(ran.load(Ordering::Relaxed), 0);
+    }
+}

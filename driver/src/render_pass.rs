@@ -1,0 +1,422 @@
+//! Render passes and framebuffers.
+
+use crate::abi::error::Error;
+use crate::abi::handle::{self, objects};
+use crate::abi::valid;
+use crate::convert;
+use crate::resource::image::ImageView;
+use ash::vk;
+use simdevice::packet::ResolveMode;
+use std::sync::Arc;
+
+/// A render pass. Subpasses are rendered one after another; between them attachments are in memory.
+#[derive(Debug)]
+pub(crate) struct RenderPass {
+    /// The attachments.
+    pub(crate) attachments: Vec<AttachmentDescription>,
+    /// The subpasses; at least one.
+    pub(crate) subpasses: Vec<Subpass>,
+}
+
+/// An attachment of a render pass.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AttachmentDescription {
+    /// The format of the view that the framebuffer gives.
+    pub(crate) format: vk::Format,
+    /// The operation of its first use on colour or depth.
+    pub(crate) load: vk::AttachmentLoadOp,
+    /// The operation of its last use on colour or depth.
+    pub(crate) store: vk::AttachmentStoreOp,
+    /// The operation of its first use on stencil.
+    pub(crate) stencil_load: vk::AttachmentLoadOp,
+    /// The operation of its last use on stencil.
+    pub(crate) stencil_store: vk::AttachmentStoreOp,
+}
+
+/// A subpass: indices of attachments.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Subpass {
+    /// Colour attachments by location.
+    pub(crate) color: Vec<Option<usize>>,
+    /// The attachments that colour attachments are resolved to, by location; may be short.
+    pub(crate) resolve: Vec<Option<usize>>,
+    /// The depth and stencil attachment.
+    pub(crate) depth_stencil: Option<usize>,
+    /// The attachment that it is resolved to, and how.
+    pub(crate) depth_stencil_resolve: Option<DepthStencilResolve>,
+    /// Attachments that shaders read. Between subpasses they are in memory, so that they are images like any other.
+    pub(crate) input: Vec<Option<usize>>,
+}
+
+/// The resolve of a subpass's depth and stencil attachment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DepthStencilResolve {
+    /// The attachment that it is resolved to.
+    pub(crate) attachment: usize,
+    /// The way in which depth is resolved, if it is.
+    pub(crate) depth: Option<ResolveMode>,
+    /// The way in which stencil is resolved, if it is.
+    pub(crate) stencil: Option<ResolveMode>,
+}
+
+impl Subpass {
+    /// The attachments that it uses.
+    fn attachments(&self) -> Vec<usize> {
+        let lists = [&self.color, &self.resolve, &self.input];
+        let mut all: Vec<_> = lists.into_iter().flatten().copied().flatten().collect();
+        all.extend(self.depth_stencil);
+        all.extend(self.depth_stencil_resolve.map(|resolve| resolve.attachment));
+        all
+    }
+
+    /// Tells if it uses attachment number `index`.
+    fn uses(&self, index: usize) -> bool {
+        self.attachments().contains(&index)
+    }
+
+    /// Tells if it renders to attachment number `index`, or resolves to it.
+    fn writes(&self, index: usize) -> bool {
+        let resolved = self.depth_stencil_resolve.map(|resolve| resolve.attachment);
+        let lists = [&self.color, &self.resolve];
+        lists.iter().any(|list| list.contains(&Some(index)))
+            || [self.depth_stencil, resolved].contains(&Some(index))
+    }
+}
+
+objects! {
+    vk::RenderPass => RenderPass;
+    vk::Framebuffer => Framebuffer;
+}
+
+impl RenderPass {
+    /// A render pass.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if there is no subpass or a subpass names an attachment that isn't there.
+    pub(crate) fn new(
+        attachments: Vec<AttachmentDescription>,
+        subpasses: Vec<Subpass>,
+    ) -> Result<Self, Error> {
+        let exists = |index: usize| index < attachments.len();
+        let valid = subpasses
+            .iter()
+            .all(|subpass| subpass.attachments().into_iter().all(exists));
+        if subpasses.is_empty() || !valid {
+            return Err(Error::usage(
+                "VUID-VkRenderPassCreateInfo-attachment-00834",
+                "a render pass has no subpass, or one that names an attachment that isn't there",
+            ));
+        }
+        Ok(Self {
+            attachments,
+            subpasses,
+        })
+    }
+
+    /// Tells if `subpass` is the first to use attachment number `index`.
+    pub(crate) fn is_first_use(&self, subpass: usize, index: usize) -> bool {
+        !self.subpasses[..subpass].iter().any(|s| s.uses(index))
+    }
+
+    /// Tells if `subpass` is the last to use attachment number `index`.
+    pub(crate) fn is_last_use(&self, subpass: usize, index: usize) -> bool {
+        !self.subpasses[subpass + 1..].iter().any(|s| s.uses(index))
+    }
+
+    /// The attachments that `subpass` is the first to use, and only reads.
+    pub(crate) fn first_read(&self, subpass: usize) -> Vec<usize> {
+        let Some(used) = self.subpasses.get(subpass) else {
+            return Vec::new();
+        };
+        (0..self.attachments.len())
+            .filter(|&index| used.uses(index) && !used.writes(index))
+            .filter(|&index| self.is_first_use(subpass, index))
+            .collect()
+    }
+
+    /// The formats of a subpass's colour attachments; undefined where unused.
+    pub(crate) fn color_formats(&self, subpass: usize) -> Option<Vec<vk::Format>> {
+        let subpass = self.subpasses.get(subpass)?;
+        let format = |used: &Option<usize>| {
+            used.map_or(vk::Format::UNDEFINED, |index| {
+                self.attachments[index].format
+            })
+        };
+        Some(subpass.color.iter().map(format).collect())
+    }
+}
+
+/// A framebuffer.
+#[derive(Debug)]
+pub(crate) struct Framebuffer {
+    /// The views, in the order of the render pass's attachments; `None` for an imageless framebuffer, whose views
+    /// come when a pass begins.
+    pub(crate) views: Option<Vec<Arc<ImageView>>>,
+    /// Its width and height in pixels.
+    pub(crate) extent: vk::Extent2D,
+    /// Its layers.
+    pub(crate) layers: u32,
+}
+
+/// A reference's attachment, if it is used.
+fn used(attachment: u32) -> Option<usize> {
+    (attachment != vk::ATTACHMENT_UNUSED).then_some(attachment as usize)
+}
+
+fn refuse_multiview(view_mask: u32) -> Result<(), Error> {
+    if view_mask == 0 {
+        return Ok(());
+    }
+    Err(Error::FeatureNotPresent(
+        "a view mask (feature multiview)".into(),
+    ))
+}
+
+/// A subpass of `vkCreateRenderPass`.
+///
+/// # Safety
+/// The description's pointers are valid.
+unsafe fn new_subpass(subpass: &vk::SubpassDescription<'_>) -> Result<Subpass, Error> {
+    // SAFETY: the caller's promise.
+    let (color, resolve, input, depth_stencil) = unsafe {
+        let count = subpass.color_attachment_count;
+        let has_resolve = !subpass.p_resolve_attachments.is_null();
+        let resolve_count = if has_resolve { count } else { 0 };
+        (
+            valid::slice(subpass.p_color_attachments, count)?,
+            valid::slice(subpass.p_resolve_attachments, resolve_count)?,
+            valid::slice(subpass.p_input_attachments, subpass.input_attachment_count)?,
+            valid::optional(subpass.p_depth_stencil_attachment),
+        )
+    };
+    let all = |references: &[vk::AttachmentReference]| {
+        references.iter().map(|r| used(r.attachment)).collect()
+    };
+    Ok(Subpass {
+        color: all(color),
+        resolve: all(resolve),
+        depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
+        depth_stencil_resolve: None,
+        input: all(input),
+    })
+}
+
+/// A subpass of `vkCreateRenderPass2`.
+///
+/// # Safety
+/// The description's pointers and chain are valid.
+unsafe fn new_subpass2(subpass: &vk::SubpassDescription2<'_>) -> Result<Subpass, Error> {
+    refuse_multiview(subpass.view_mask)?;
+    // SAFETY: the caller's promise.
+    let (color, resolve, input, depth_stencil, depth_stencil_resolve) = unsafe {
+        let count = subpass.color_attachment_count;
+        let has_resolve = !subpass.p_resolve_attachments.is_null();
+        let resolve_count = if has_resolve { count } else { 0 };
+        (
+            valid::slice(subpass.p_color_attachments, count)?,
+            valid::slice(subpass.p_resolve_attachments, resolve_count)?,
+            valid::slice(subpass.p_input_attachments, subpass.input_attachment_count)?,
+            valid::optional(subpass.p_depth_stencil_attachment),
+            match valid::find_in_chain(subpass.p_next) {
+                Some(info) => new_depth_stencil_resolve(info)?,
+                None => None,
+            },
+        )
+    };
+    let all = |references: &[vk::AttachmentReference2<'_>]| {
+        references.iter().map(|r| used(r.attachment)).collect()
+    };
+    Ok(Subpass {
+        color: all(color),
+        resolve: all(resolve),
+        depth_stencil: depth_stencil.and_then(|r| used(r.attachment)),
+        depth_stencil_resolve,
+        input: all(input),
+    })
+}
+
+/// The resolve of a subpass's depth and stencil, if it has one.
+///
+/// # Safety
+/// The structure's pointers are valid.
+unsafe fn new_depth_stencil_resolve(
+    info: &vk::SubpassDescriptionDepthStencilResolve<'_>,
+) -> Result<Option<DepthStencilResolve>, Error> {
+    // SAFETY: the caller's promise.
+    let reference = unsafe { valid::optional(info.p_depth_stencil_resolve_attachment) };
+    let Some(attachment) = reference.and_then(|r| used(r.attachment)) else {
+        return Ok(None);
+    };
+    Ok(Some(DepthStencilResolve {
+        attachment,
+        depth: convert::resolve_mode(info.depth_resolve_mode)?,
+        stencil: convert::resolve_mode(info.stencil_resolve_mode)?,
+    }))
+}
+
+/// # Safety
+/// The create info and its chain are valid.
+#[doc(alias = "vkCreateRenderPass")]
+pub(crate) unsafe fn create_render_pass(
+    create_info: &vk::RenderPassCreateInfo<'_>,
+) -> Result<Arc<RenderPass>, Error> {
+    let info = create_info;
+    // SAFETY: the caller's promise.
+    unsafe {
+        if let Some(multiview) =
+            valid::find_in_chain::<vk::RenderPassMultiviewCreateInfo>(info.p_next)
+        {
+            let masks = valid::slice(multiview.p_view_masks, multiview.subpass_count)?;
+            masks.iter().try_for_each(|&mask| refuse_multiview(mask))?;
+        }
+        let attachments = valid::slice(info.p_attachments, info.attachment_count)?;
+        let mut subpasses = simdevice::host::with_capacity(info.subpass_count as usize);
+        for subpass in valid::slice(info.p_subpasses, info.subpass_count)? {
+            subpasses.push(new_subpass(subpass)?);
+        }
+        let attachments = attachments.iter().map(|attachment| AttachmentDescription {
+            format: attachment.format,
+            load: attachment.load_op,
+            store: attachment.store_op,
+            stencil_load: attachment.stencil_load_op,
+            stencil_store: attachment.stencil_store_op,
+        });
+        RenderPass::new(attachments.collect(), subpasses).map(Arc::new)
+    }
+}
+
+/// # Safety
+/// The create info and its chain are valid.
+#[doc(alias = "vkCreateRenderPass2")]
+pub(crate) unsafe fn create_render_pass2(
+    create_info: &vk::RenderPassCreateInfo2<'_>,
+) -> Result<Arc<RenderPass>, Error> {
+    let info = create_info;
+    // SAFETY: the caller's promise.
+    unsafe {
+        let attachments = valid::slice(info.p_attachments, info.attachment_count)?;
+        let mut subpasses = simdevice::host::with_capacity(info.subpass_count as usize);
+        for subpass in valid::slice(info.p_subpasses, info.subpass_count)? {
+            subpasses.push(new_subpass2(subpass)?);
+        }
+        let attachments = attachments.iter().map(|attachment| AttachmentDescription {
+            format: attachment.format,
+            load: attachment.load_op,
+            store: attachment.store_op,
+            stencil_load: attachment.stencil_load_op,
+            stencil_store: attachment.stencil_store_op,
+        });
+        RenderPass::new(attachments.collect(), subpasses).map(Arc::new)
+    }
+}
+
+/// Any area is as good as any other.
+#[doc(alias = "vkGetRenderAreaGranularity")]
+pub(crate) fn get_render_area_granularity() -> Result<vk::Extent2D, Error> {
+    Ok(vk::Extent2D {
+        width: 1,
+        height: 1,
+    })
+}
+
+/// # Safety
+/// The create info and its handles are valid.
+#[doc(alias = "vkCreateFramebuffer")]
+pub(crate) unsafe fn create_framebuffer(
+    create_info: &vk::FramebufferCreateInfo<'_>,
+) -> Result<Arc<Framebuffer>, Error> {
+    let info = create_info;
+    let views = if info.flags.contains(vk::FramebufferCreateFlags::IMAGELESS) {
+        None
+    } else {
+        // SAFETY: the caller's promise.
+        let views =
+            unsafe { handle::get_all(valid::slice(info.p_attachments, info.attachment_count)?)? };
+        Some(views)
+    };
+    Ok(Arc::new(Framebuffer {
+        views,
+        extent: vk::Extent2D {
+            width: info.width,
+            height: info.height,
+        },
+        layers: info.layers,
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DESCRIPTION: AttachmentDescription = AttachmentDescription {
+        format: vk::Format::R8G8B8A8_UNORM,
+        load: vk::AttachmentLoadOp::CLEAR,
+        store: vk::AttachmentStoreOp::STORE,
+        stencil_load: vk::AttachmentLoadOp::DONT_CARE,
+        stencil_store: vk::AttachmentStoreOp::DONT_CARE,
+    };
+
+    fn subpass(color: &[Option<usize>]) -> Subpass {
+        Subpass {
+            color: color.to_vec(),
+            ..Subpass::default()
+        }
+    }
+
+    #[test]
+    fn attachments_are_loaded_by_their_first_use_and_stored_by_their_last() {
+        let subpasses = vec![
+            subpass(&[Some(0)]),
+            subpass(&[None, Some(1)]),
+            subpass(&[Some(0)]),
+        ];
+        let pass = RenderPass::new(vec![DESCRIPTION; 2], subpasses).unwrap();
+        assert!(pass.is_first_use(0, 0) && !pass.is_last_use(0, 0));
+        assert!(pass.is_first_use(1, 1) && pass.is_last_use(1, 1));
+        assert!(!pass.is_first_use(2, 0) && pass.is_last_use(2, 0));
+        assert_eq!(
+            pass.color_formats(1).unwrap(),
+            [vk::Format::UNDEFINED, vk::Format::R8G8B8A8_UNORM]
+        );
+        assert!(pass.color_formats(3).is_none());
+    }
+
+    #[test]
+    fn input_and_resolve_attachments_are_used_too() {
+        let subpasses = vec![
+            Subpass {
+                resolve: vec![None, Some(2)],
+                ..subpass(&[Some(0)])
+            },
+            Subpass {
+                input: vec![Some(2), None, Some(3)],
+                ..subpass(&[Some(1)])
+            },
+            Subpass {
+                depth_stencil_resolve: Some(DepthStencilResolve {
+                    attachment: 0,
+                    depth: Some(ResolveMode::SampleZero),
+                    stencil: None,
+                }),
+                ..subpass(&[])
+            },
+        ];
+        let pass = RenderPass::new(vec![DESCRIPTION; 4], subpasses).unwrap();
+        assert!(pass.is_first_use(0, 2) && !pass.is_last_use(0, 2));
+        assert!(!pass.is_first_use(1, 2) && pass.is_last_use(1, 2));
+        assert!(!pass.is_last_use(0, 0) && pass.is_last_use(2, 0));
+        let read: Vec<_> = (0..4).map(|subpass| pass.first_read(subpass)).collect();
+        assert_eq!(read, [vec![], vec![3], vec![], vec![]]);
+        let outside = Subpass {
+            input: vec![Some(1)],
+            ..subpass(&[])
+        };
+        assert!(RenderPass::new(vec![DESCRIPTION], vec![outside]).is_err());
+    }
+
+    #[test]
+    fn subpasses_name_attachments_that_exist() {
+        assert!(RenderPass::new(vec![DESCRIPTION], vec![subpass(&[Some(1)])]).is_err());
+        assert!(RenderPass::new(vec![DESCRIPTION], vec![]).is_err());
+    }
+}

@@ -1,0 +1,320 @@
+//! Buffers and buffer views.
+
+use super::memory::Memory;
+use crate::abi::error::Error;
+use crate::abi::handle::{self, objects};
+use crate::abi::valid::{self, OutputChain};
+use crate::physical_device::formats;
+use crate::physical_device::limits::MIN_BUFFER_OFFSET_ALIGNMENT;
+use crate::physical_device::memory::ALL_TYPE_BITS;
+use ash::vk;
+use simdevice::packet::BufferRange;
+use simdevice::{Allocation, Format};
+use std::sync::{Arc, OnceLock};
+
+/// Every buffer's offset in memory must be a multiple of this. It is a cache line, and as much as any texel needs.
+pub(crate) const ALIGNMENT: u64 = 64;
+
+/// A buffer.
+#[derive(Debug)]
+pub(crate) struct Buffer {
+    size: u64,
+    memory: OnceLock<(Arc<Allocation>, u64)>,
+}
+
+objects! {
+    vk::Buffer => Buffer;
+    vk::BufferView => BufferView;
+}
+
+/// The ids of the rules that a use of a buffer may break.
+#[derive(Debug)]
+pub(crate) struct BufferRules {
+    /// The buffer must be bound to memory.
+    pub(crate) memory: &'static str,
+    /// The buffer must have the bytes that are used.
+    pub(crate) range: &'static str,
+}
+
+/// The rules on the buffer of a view.
+const VIEWED: BufferRules = BufferRules {
+    memory: "VUID-VkBufferViewCreateInfo-buffer-00935",
+    range: "VUID-VkBufferViewCreateInfo-offset-00931",
+};
+
+impl Buffer {
+    /// A buffer of `size` bytes, not yet bound to memory.
+    pub(crate) fn new(size: u64) -> Self {
+        Self {
+            size,
+            memory: OnceLock::new(),
+        }
+    }
+
+    /// The memory that it needs, of any type.
+    fn requirements(&self) -> vk::MemoryRequirements {
+        requirements(self.size)
+    }
+
+    /// Binds it to memory from byte `offset` on.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if it is bound already or does not fit.
+    pub(crate) fn bind(&self, memory: Arc<Allocation>, offset: u64) -> Result<(), Error> {
+        fits(
+            "VUID-vkBindBufferMemory-size-01037",
+            &memory,
+            offset,
+            self.size,
+        )?;
+        self.memory.set((memory, offset)).map_err(|_| {
+            Error::usage(
+                "VUID-vkBindBufferMemory-buffer-07459",
+                "the buffer is bound already",
+            )
+        })
+    }
+
+    /// The bytes from `offset` on: `size` of them, or with `None` (`VK_WHOLE_SIZE`) all that follow.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if the buffer is not bound or has no such bytes.
+    pub(crate) fn range(
+        &self,
+        offset: u64,
+        size: Option<u64>,
+        rules: &BufferRules,
+    ) -> Result<BufferRange, Error> {
+        let Some((memory, start)) = self.memory.get() else {
+            return Err(Error::usage(
+                rules.memory,
+                "a command uses a buffer that is not bound to memory",
+            ));
+        };
+        let rest = self.size.checked_sub(offset);
+        match (rest, size) {
+            (Some(rest), size) if size.is_none_or(|size| size <= rest) => Ok(BufferRange {
+                memory: Arc::clone(memory),
+                offset: start + offset,
+                size: size.unwrap_or(rest),
+            }),
+            _ => Err(Error::usage(
+                rules.range,
+                format!(
+                    "a command uses {} bytes at offset {offset} of a buffer of {} bytes",
+                    size.unwrap_or(0),
+                    self.size
+                ),
+            )),
+        }
+    }
+
+    /// All of the buffer.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if the buffer is not bound.
+    pub(crate) fn whole(&self, rules: &BufferRules) -> Result<BufferRange, Error> {
+        self.range(0, None, rules)
+    }
+}
+
+/// The requirements of a resource of `size` bytes.
+pub(crate) fn requirements(size: u64) -> vk::MemoryRequirements {
+    vk::MemoryRequirements {
+        // No memory has room for what cannot be rounded up.
+        size: size.checked_next_multiple_of(ALIGNMENT).unwrap_or(u64::MAX),
+        alignment: ALIGNMENT,
+        memory_type_bits: ALL_TYPE_BITS,
+    }
+}
+
+/// A buffer view.
+#[derive(Debug)]
+pub(crate) struct BufferView {
+    /// The bytes.
+    pub(crate) range: BufferRange,
+    /// The format of texels in them.
+    pub(crate) format: Format,
+}
+
+/// Checks that `size` bytes from `offset` on lie in `memory` and that the offset is aligned.
+pub(crate) fn fits(
+    vuid: &'static str,
+    memory: &Allocation,
+    offset: u64,
+    size: u64,
+) -> Result<(), Error> {
+    let end = offset.checked_add(size);
+    if offset.is_multiple_of(ALIGNMENT) && end.is_some_and(|end| end <= memory.len()) {
+        return Ok(());
+    }
+    Err(Error::usage(
+        vuid,
+        format!(
+            "a resource of {size} bytes cannot be bound at offset {offset} of {} bytes of memory (offsets are \
+             multiples of {ALIGNMENT})",
+            memory.len()
+        ),
+    ))
+}
+
+/// The buffer that a create info asks for.
+///
+/// # Safety
+/// The create info's chain is valid.
+unsafe fn new_buffer(info: &vk::BufferCreateInfo<'_>) -> Result<Buffer, Error> {
+    // SAFETY: the caller's promise.
+    let external =
+        unsafe { valid::find_in_chain::<vk::ExternalMemoryBufferCreateInfo>(info.p_next) };
+    if external.is_some_and(|external| !external.handle_types.is_empty()) {
+        return Err(Error::FeatureNotPresent("external memory".into()));
+    }
+    let sparse_or_protected = vk::BufferCreateFlags::SPARSE_BINDING
+        | vk::BufferCreateFlags::SPARSE_RESIDENCY
+        | vk::BufferCreateFlags::SPARSE_ALIASED
+        | vk::BufferCreateFlags::PROTECTED;
+    if info.flags.intersects(sparse_or_protected) {
+        return Err(Error::FeatureNotPresent(format!(
+            "a buffer with flags {:?}",
+            info.flags
+        )));
+    }
+    if info.size == 0 {
+        return Err(Error::usage(
+            "VUID-VkBufferCreateInfo-size-00912",
+            "the size of a buffer is 0",
+        ));
+    }
+    Ok(Buffer::new(info.size))
+}
+
+/// Writes requirements and, where asked for, that no dedicated allocation is wanted.
+pub(crate) fn fill_requirements(
+    mut out: OutputChain<'_, vk::MemoryRequirements2<'_>>,
+    requirements: vk::MemoryRequirements,
+) -> Result<(), Error> {
+    out.memory_requirements = requirements;
+    out.for_each_chained(|mut structure| {
+        if let Some(dedicated) = structure.cast::<vk::MemoryDedicatedRequirements>() {
+            dedicated.prefers_dedicated_allocation = vk::FALSE;
+            dedicated.requires_dedicated_allocation = vk::FALSE;
+        }
+    });
+    Ok(())
+}
+
+/// # Safety
+/// The create info's chain is valid.
+#[doc(alias = "vkCreateBuffer")]
+pub(crate) unsafe fn create_buffer(
+    create_info: &vk::BufferCreateInfo<'_>,
+) -> Result<Arc<Buffer>, Error> {
+    // SAFETY: the caller's promise.
+    unsafe { new_buffer(create_info) }.map(Arc::new)
+}
+
+#[doc(alias = "vkGetBufferMemoryRequirements")]
+pub(crate) fn get_buffer_memory_requirements(
+    buffer: &Buffer,
+) -> Result<vk::MemoryRequirements, Error> {
+    Ok(buffer.requirements())
+}
+
+/// # Safety
+/// The buffer is live.
+#[doc(alias = "vkGetBufferMemoryRequirements2")]
+pub(crate) unsafe fn get_buffer_memory_requirements2(
+    info: &vk::BufferMemoryRequirementsInfo2<'_>,
+    memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let buffer = unsafe { handle::get(info.buffer)? };
+    fill_requirements(memory_requirements, buffer.requirements())
+}
+
+/// # Safety
+/// The info's create info is valid.
+#[doc(alias = "vkGetDeviceBufferMemoryRequirements")]
+pub(crate) unsafe fn get_device_buffer_memory_requirements(
+    info: &vk::DeviceBufferMemoryRequirements<'_>,
+    memory_requirements: OutputChain<'_, vk::MemoryRequirements2<'_>>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let buffer = unsafe { new_buffer(valid::input(info.p_create_info)?)? };
+    fill_requirements(memory_requirements, buffer.requirements())
+}
+
+#[doc(alias = "vkBindBufferMemory")]
+pub(crate) fn bind_buffer_memory(
+    buffer: &Buffer,
+    memory: &Memory,
+    memory_offset: vk::DeviceSize,
+) -> Result<(), Error> {
+    buffer.bind(Arc::clone(memory.allocation()), memory_offset)
+}
+
+/// # Safety
+/// The handles are live.
+#[doc(alias = "vkBindBufferMemory2")]
+pub(crate) unsafe fn bind_buffer_memory2(
+    bind_infos: &[vk::BindBufferMemoryInfo<'_>],
+) -> Result<(), Error> {
+    bind_infos.iter().try_for_each(|info| {
+        // SAFETY: the caller's promise.
+        let (buffer, memory) = unsafe { (handle::get(info.buffer)?, handle::get(info.memory)?) };
+        bind_buffer_memory(buffer, memory, info.memory_offset)
+    })
+}
+
+/// # Safety
+/// The buffer is live.
+#[doc(alias = "vkCreateBufferView")]
+pub(crate) unsafe fn create_buffer_view(
+    create_info: &vk::BufferViewCreateInfo<'_>,
+) -> Result<Arc<BufferView>, Error> {
+    let info = create_info;
+    let size = (info.range != vk::WHOLE_SIZE).then_some(info.range);
+    let format = formats::device_format(info.format).ok_or_else(|| {
+        Error::FormatNotSupported(format!(
+            "{:?} is not supported for buffer views",
+            info.format
+        ))
+    })?;
+    if !info.offset.is_multiple_of(MIN_BUFFER_OFFSET_ALIGNMENT) {
+        return Err(Error::usage(
+            "VUID-VkBufferViewCreateInfo-offset-02749",
+            format!(
+                "the offset {} is not a multiple of {MIN_BUFFER_OFFSET_ALIGNMENT}",
+                info.offset
+            ),
+        ));
+    }
+    // SAFETY: the caller's promise.
+    let buffer = unsafe { handle::get(info.buffer)? };
+    Ok(Arc::new(BufferView {
+        range: buffer.range(info.offset, size, &VIEWED)?,
+        format,
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_lie_inside_the_buffer() {
+        let buffer = Buffer::new(100);
+        assert!(buffer.whole(&VIEWED).is_err(), "not bound");
+        let memory = Allocation::new_zeroed(4096).unwrap();
+        assert!(buffer.bind(memory.clone(), 4032).is_err(), "does not fit");
+        assert!(buffer.bind(memory.clone(), 3).is_err(), "not aligned");
+        buffer.bind(memory.clone(), 128).unwrap();
+        assert!(buffer.bind(memory, 128).is_err(), "bound already");
+        let range = buffer.range(10, None, &VIEWED).unwrap();
+        assert_eq!((range.offset, range.size), (138, 90));
+        assert_eq!(buffer.range(100, None, &VIEWED).unwrap().size, 0);
+        assert!(buffer.range(101, None, &VIEWED).is_err());
+        assert!(buffer.range(99, Some(2), &VIEWED).is_err());
+        assert!(buffer.range(u64::MAX, Some(2), &VIEWED).is_err());
+    }
+}

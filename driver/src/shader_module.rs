@@ -1,0 +1,326 @@
+//! Shader modules: SPIR-V, kept as words until a pipeline is made of it, and the stages of pipelines, which are entry points
+//! of them. A module may declare those of SPIR-V's capabilities that its device has enabled.
+
+use crate::abi::error::Error;
+use crate::abi::handle::{self, objects};
+use crate::abi::valid;
+use crate::device::Device;
+use crate::instance::device_extension_names;
+use crate::physical_device::limits;
+use crate::registry::features::{Features, SUPPORTED};
+use crate::registry::spirv::{Enable, enables};
+use ash::vk;
+use gaurast_spirv::{Module, Options, Shader, Specialization, Stage, is_supported, translate};
+use simdevice::host;
+use spirv::{Capability, Op};
+use std::ffi::CStr;
+use std::sync::Arc;
+
+/// The first word of SPIR-V.
+const MAGIC: u32 = 0x0723_0203;
+
+/// A shader module.
+#[derive(Debug)]
+pub(crate) struct ShaderModule {
+    /// Its SPIR-V.
+    words: Box<[u32]>,
+}
+
+objects! { vk::ShaderModule => ShaderModule; }
+
+impl ShaderModule {
+    /// Keeps a copy of SPIR-V.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] if it isn't SPIR-V in the host's byte order; [`Error::FeatureNotEnabled`] if it declares a capability
+    /// whose feature isn't enabled.
+    fn new(words: &[u32], features: &Features, extensions: &[&CStr]) -> Result<Self, Error> {
+        if words.first() != Some(&MAGIC) {
+            return Err(Error::usage(
+                "VUID-VkShaderModuleCreateInfo-pCode-08738",
+                "the code is not SPIR-V",
+            ));
+        }
+        check_capabilities(words, features, extensions)?;
+        Ok(Self {
+            words: host::boxed(words),
+        })
+    }
+
+    /// Translates an entry point for the device.
+    ///
+    /// # Errors
+    /// [`Error::InvalidShader`] names the instruction that is malformed or not supported.
+    pub(crate) fn translate(
+        &self,
+        name: &str,
+        stage: Stage,
+        specialization: &Specialization,
+        options: &Options,
+    ) -> Result<Shader, Error> {
+        Module::parse(&self.words)
+            .and_then(|module| translate(&module, name, stage, specialization, options))
+            .map_err(|error| Error::InvalidShader(error.to_string()))
+    }
+}
+
+/// Refuses a module that declares a capability that isn't enabled. Capabilities that the translator doesn't know are its
+/// own to refuse.
+///
+/// # Errors
+/// [`Error::FeatureNotEnabled`] names the capability and what would enable it.
+fn check_capabilities(
+    words: &[u32],
+    features: &Features,
+    extensions: &[&CStr],
+) -> Result<(), Error> {
+    match declared(words)
+        .filter(|&capability| is_supported(capability))
+        .find(|&capability| !is_enabled(capability, features, extensions))
+    {
+        None => Ok(()),
+        Some(capability) => Err(not_enabled(capability)),
+    }
+}
+
+/// Tells if one of the things that enable a capability is there.
+fn is_enabled(capability: Capability, features: &Features, extensions: &[&CStr]) -> bool {
+    let enables = enables(capability);
+    enables.is_empty()
+        || enables.iter().any(|enable| match enable {
+            Enable::Feature(_, is_enabled) => is_enabled(features),
+            Enable::Property(_, is_there) => is_there(limits::properties()),
+            Enable::Extension(name) => extensions.contains(name),
+            Enable::Absent(_) => false,
+        })
+}
+
+fn not_enabled(capability: Capability) -> Error {
+    // What the device doesn't know is of interest only where nothing else would do.
+    let known: Vec<_> = enables(capability)
+        .iter()
+        .filter_map(|enable| match enable {
+            Enable::Feature(name, _) | Enable::Property(name, _) => Some(*name),
+            Enable::Extension(_) | Enable::Absent(_) => None,
+        })
+        .collect();
+    let absent: Vec<_> = enables(capability)
+        .iter()
+        .filter_map(|enable| match enable {
+            Enable::Absent(name) => Some(*name),
+            _ => None,
+        })
+        .collect();
+    let needed = if known.is_empty() { absent } else { known };
+    let what = if is_enabled(capability, &SUPPORTED, device_extension_names()) {
+        "which is not enabled"
+    } else {
+        "which this device does not support"
+    };
+    Error::FeatureNotEnabled {
+        vuid: "VUID-VkShaderModuleCreateInfo-pCode-08740",
+        message: format!(
+            "the shader module declares the capability {capability:?}, which needs the feature {}, {what}",
+            needed.join(" or ")
+        ),
+    }
+}
+
+/// The capabilities that a module declares. They come first in it; what is malformed is left to those who translate it.
+fn declared(words: &[u32]) -> impl Iterator<Item = Capability> {
+    const HEADER_WORDS: usize = 5;
+    let mut rest = words.get(HEADER_WORDS..).unwrap_or_default();
+    std::iter::from_fn(move || {
+        let [first, capability, ..] = *rest else {
+            return None;
+        };
+        let is_one = first == 2 << 16 | Op::Capability as u32;
+        rest = &rest[2..];
+        is_one.then_some(capability)
+    })
+    .filter_map(Capability::from_u32)
+}
+
+/// A shader stage of a pipeline.
+pub(crate) struct ShaderStage<'a> {
+    /// The shader module.
+    pub(crate) module: &'a ShaderModule,
+    /// The entry point's name.
+    pub(crate) name: &'a str,
+    /// Values of specialization constants.
+    pub(crate) specialization: Specialization,
+    /// The subgroup size that the stage requires.
+    pub(crate) required_subgroup_size: Option<u32>,
+}
+
+impl<'a> ShaderStage<'a> {
+    /// The stage of a create info.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] for a name or a subgroup size that is none.
+    ///
+    /// # Safety
+    /// The create info and its chain are valid.
+    pub(crate) unsafe fn from_create_info(
+        info: &'a vk::PipelineShaderStageCreateInfo<'a>,
+    ) -> Result<Self, Error> {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let name = valid::string(info.p_name).ok_or(Error::NullPointer {
+                what: "an entry point's name",
+            })?;
+            let name = name.to_str().map_err(|_| {
+                Error::usage(
+                    "VUID-VkPipelineShaderStageCreateInfo-pName-parameter",
+                    "the entry point's name is not UTF-8",
+                )
+            })?;
+            let required = valid::find_in_chain::<
+                vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo<'_>,
+            >(info.p_next);
+            Ok(Self {
+                module: handle::get(info.module)?,
+                name,
+                specialization: specialization(valid::optional(info.p_specialization_info))?,
+                required_subgroup_size: required.map(subgroup_size).transpose()?,
+            })
+        }
+    }
+}
+
+fn subgroup_size(
+    required: &vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo<'_>,
+) -> Result<u32, Error> {
+    let size = required.required_subgroup_size;
+    if size.is_power_of_two() && limits::SUBGROUP_SIZES.contains(&size) {
+        return Ok(size);
+    }
+    Err(Error::usage(
+        "VUID-VkPipelineShaderStageRequiredSubgroupSizeCreateInfo-requiredSubgroupSize-02760",
+        format!(
+            "the subgroup size {size} is not a power of two in {:?}",
+            limits::SUBGROUP_SIZES
+        ),
+    ))
+}
+
+/// The values of specialization constants.
+///
+/// # Safety
+/// The specialization info is valid.
+unsafe fn specialization(
+    info: Option<&vk::SpecializationInfo<'_>>,
+) -> Result<Specialization, Error> {
+    let mut specialization = Specialization::default();
+    let Some(info) = info else {
+        return Ok(specialization);
+    };
+    let size = u32::try_from(info.data_size).unwrap_or(u32::MAX);
+    // SAFETY: the caller's promise.
+    let (data, entries) = unsafe {
+        (
+            valid::slice(info.p_data.cast::<u8>(), size)?,
+            valid::slice(info.p_map_entries, info.map_entry_count)?,
+        )
+    };
+    for entry in entries {
+        let offset = entry.offset as usize;
+        let end = offset.checked_add(entry.size);
+        let bytes = end.and_then(|end| data.get(offset..end)).ok_or_else(|| {
+            Error::usage(
+                "VUID-VkSpecializationInfo-pMapEntries-00774",
+                format!(
+                    "the value of specialization constant {} lies outside the {size} bytes given",
+                    entry.constant_id
+                ),
+            )
+        })?;
+        specialization.set(entry.constant_id, bytes);
+    }
+    Ok(specialization)
+}
+
+/// # Safety
+/// The create info is valid.
+#[doc(alias = "vkCreateShaderModule")]
+pub(crate) unsafe fn create_shader_module(
+    device: &Device,
+    create_info: &vk::ShaderModuleCreateInfo<'_>,
+) -> Result<Arc<ShaderModule>, Error> {
+    let words = u32::try_from(create_info.code_size / 4).unwrap_or(0);
+    // SAFETY: the caller's promise.
+    let words = unsafe { valid::slice(create_info.p_code, words)? };
+    ShaderModule::new(words, device.features(), device.enabled().device_extensions).map(Arc::new)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn module(capabilities: &[Capability]) -> Vec<u32> {
+        let mut words = vec![0x0723_0203, 0x0001_0500, 0, 1, 0];
+        for &capability in capabilities {
+            words.extend([2 << 16 | Op::Capability as u32, capability as u32]);
+        }
+        // OpMemoryModel Logical GLSL450.
+        words.extend([3 << 16 | Op::MemoryModel as u32, 0, 1]);
+        words
+    }
+
+    #[test]
+    fn capabilities_need_their_features() {
+        let enabled = Features {
+            shader_int64: true,
+            shader_output_layer: true,
+            ..Features::NONE
+        };
+        let check = |capability| {
+            check_capabilities(&module(&[Capability::Shader, capability]), &enabled, &[])
+        };
+        assert!(check(Capability::Int64).is_ok());
+        assert!(check(Capability::ShaderViewportIndexLayerEXT).is_ok());
+        assert!(check(Capability::GroupNonUniformArithmetic).is_ok());
+        for (capability, words) in [
+            (Capability::Float64, "shader_float64, which is not enabled"),
+            (
+                Capability::PhysicalStorageBufferAddresses,
+                "buffer_device_address, which this device does not support",
+            ),
+        ] {
+            let error = check(capability).unwrap_err();
+            assert_eq!(error.result(), vk::Result::ERROR_FEATURE_NOT_PRESENT);
+            assert!(error.to_string().contains(words), "{error}");
+        }
+    }
+
+    #[test]
+    fn every_capability_that_is_translated_and_supported_can_be_had() {
+        let cannot: Vec<_> = (0..0x2000)
+            .filter_map(Capability::from_u32)
+            .filter(|&capability| is_supported(capability))
+            .filter(|&capability| !is_enabled(capability, &SUPPORTED, &[]))
+            .collect();
+        use Capability as C;
+        let expected = [
+            C::StorageImageMultisample,
+            C::ImageMSArray,
+            C::StorageInputOutput16,
+            C::InputAttachmentArrayDynamicIndexing,
+            C::PhysicalStorageBufferAddresses,
+            C::InputAttachmentArrayNonUniformIndexing,
+            C::AtomicFloat32AddEXT,
+            C::AtomicFloat32MinMaxEXT,
+        ];
+        for capability in &cannot {
+            assert!(expected.contains(capability), "{capability:?}");
+        }
+        assert_eq!(cannot.len(), expected.len(), "{cannot:?}");
+    }
+
+    #[test]
+    fn what_is_malformed_declares_nothing() {
+        for words in [&[][..], &[0x0723_0203], &[0; 6], &module(&[])[..6]] {
+            assert!(check_capabilities(words, &Features::NONE, &[]).is_ok());
+        }
+    }
+}

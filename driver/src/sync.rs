@@ -1,0 +1,318 @@
+//! Fences, semaphores and events.
+
+use crate::abi::error::Error;
+use crate::abi::handle::{self, objects};
+use crate::abi::valid;
+use crate::device::Device;
+use crate::device_sync::{DeviceSync, WaitResult, deadline};
+use ash::vk;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+objects! {
+    vk::Fence => Fence;
+    vk::Semaphore => Semaphore;
+    vk::Event => Event;
+}
+
+/// A fence.
+#[derive(Debug)]
+pub(crate) struct Fence {
+    sync: Arc<DeviceSync>,
+    signaled: AtomicBool,
+}
+
+impl Fence {
+    /// A fence, signaled or not.
+    pub(crate) fn new(sync: Arc<DeviceSync>, signaled: bool) -> Self {
+        Self {
+            sync,
+            signaled: AtomicBool::new(signaled),
+        }
+    }
+
+    /// Tells if it is signaled.
+    pub(crate) fn is_signaled(&self) -> bool {
+        self.signaled.load(Ordering::Acquire)
+    }
+
+    /// DeviceSync it.
+    pub(crate) fn signal(&self) {
+        self.sync
+            .update(|| self.signaled.store(true, Ordering::Release));
+    }
+
+    /// Makes it unsignaled.
+    pub(crate) fn reset(&self) {
+        self.signaled.store(false, Ordering::Release);
+    }
+}
+
+/// A semaphore.
+#[derive(Debug)]
+pub(crate) struct Semaphore {
+    sync: Arc<DeviceSync>,
+    payload: Payload,
+}
+
+#[derive(Debug)]
+enum Payload {
+    Binary(AtomicBool),
+    Timeline(AtomicU64),
+}
+
+impl Semaphore {
+    /// An unsignaled binary semaphore.
+    pub(crate) fn new_binary(sync: Arc<DeviceSync>) -> Self {
+        Self {
+            sync,
+            payload: Payload::Binary(AtomicBool::new(false)),
+        }
+    }
+
+    /// A timeline semaphore with that value.
+    pub(crate) fn new_timeline(sync: Arc<DeviceSync>, value: u64) -> Self {
+        Self {
+            sync,
+            payload: Payload::Timeline(AtomicU64::new(value)),
+        }
+    }
+
+    /// A timeline semaphore's value; `None` for a binary one.
+    pub(crate) fn value(&self) -> Option<u64> {
+        match &self.payload {
+            Payload::Binary(_) => None,
+            Payload::Timeline(value) => Some(value.load(Ordering::Acquire)),
+        }
+    }
+
+    /// DeviceSync it; a timeline semaphore gets `value`.
+    pub(crate) fn signal(&self, value: u64) {
+        self.sync.update(|| match &self.payload {
+            Payload::Binary(signaled) => signaled.store(true, Ordering::Release),
+            // A smaller value is the application's error; a timeline never runs backwards.
+            Payload::Timeline(current) => {
+                current.fetch_max(value, Ordering::AcqRel);
+            }
+        });
+    }
+
+    /// Tells if a wait for `value` (which a binary semaphore ignores) is over.
+    pub(crate) fn is_reached(&self, value: u64) -> bool {
+        match &self.payload {
+            Payload::Binary(signaled) => signaled.load(Ordering::Acquire),
+            Payload::Timeline(current) => current.load(Ordering::Acquire) >= value,
+        }
+    }
+
+    /// Ends a queue's wait: a binary semaphore becomes unsignaled.
+    pub(crate) fn consume(&self) {
+        if let Payload::Binary(signaled) = &self.payload {
+            signaled.store(false, Ordering::Release);
+        }
+    }
+}
+
+/// An event.
+#[derive(Debug)]
+pub(crate) struct Event {
+    sync: Arc<DeviceSync>,
+    value: AtomicBool,
+}
+
+impl Event {
+    /// An event that is not set.
+    pub(crate) fn new(sync: Arc<DeviceSync>) -> Self {
+        Self {
+            sync,
+            value: AtomicBool::new(false),
+        }
+    }
+
+    /// Tells if it is set.
+    pub(crate) fn is_set(&self) -> bool {
+        self.value.load(Ordering::Acquire)
+    }
+
+    /// Sets or resets it.
+    pub(crate) fn set(&self, value: bool) {
+        self.sync
+            .update(|| self.value.store(value, Ordering::Release));
+    }
+}
+
+/// The result of a wait.
+fn wait_result(
+    waited: WaitResult,
+    loss: impl FnOnce() -> Result<(), Error>,
+) -> Result<vk::Result, Error> {
+    match waited {
+        WaitResult::Ready => Ok(vk::Result::SUCCESS),
+        WaitResult::TimedOut => Ok(vk::Result::TIMEOUT),
+        WaitResult::Lost => loss().map(|()| vk::Result::ERROR_DEVICE_LOST),
+    }
+}
+
+fn timeline_value(semaphore: &Semaphore) -> Result<u64, Error> {
+    semaphore.value().ok_or_else(|| {
+        Error::usage(
+            "VUID-vkGetSemaphoreCounterValue-semaphore-03255",
+            "the semaphore is binary, but the command takes a timeline semaphore",
+        )
+    })
+}
+
+#[doc(alias = "vkCreateFence")]
+pub(crate) fn create_fence(
+    device: &Device,
+    create_info: &vk::FenceCreateInfo<'_>,
+) -> Result<Arc<Fence>, Error> {
+    let signaled = create_info.flags.contains(vk::FenceCreateFlags::SIGNALED);
+    Ok(Arc::new(Fence::new(Arc::clone(device.sync()), signaled)))
+}
+
+#[doc(alias = "vkResetFences")]
+pub(crate) fn reset_fences(fences: &[Arc<Fence>]) -> Result<(), Error> {
+    fences.iter().for_each(|fence| fence.reset());
+    Ok(())
+}
+
+#[doc(alias = "vkGetFenceStatus")]
+pub(crate) fn get_fence_status(device: &Device, fence: &Fence) -> Result<vk::Result, Error> {
+    if fence.is_signaled() {
+        return Ok(vk::Result::SUCCESS);
+    }
+    device.sync().check()?;
+    Ok(vk::Result::NOT_READY)
+}
+
+#[doc(alias = "vkWaitForFences")]
+pub(crate) fn wait_for_fences(
+    device: &Device,
+    fences: &[Arc<Fence>],
+    wait_all: bool,
+    timeout: u64,
+) -> Result<vk::Result, Error> {
+    let sync = device.sync();
+    let waited = sync.wait(deadline(timeout), || {
+        let mut signaled = fences.iter().map(|fence| fence.is_signaled());
+        if wait_all {
+            signaled.all(|s| s)
+        } else {
+            signaled.any(|s| s)
+        }
+    });
+    wait_result(waited, || sync.check())
+}
+
+/// # Safety
+/// The create info's chain is valid.
+#[doc(alias = "vkCreateSemaphore")]
+pub(crate) unsafe fn create_semaphore(
+    device: &Device,
+    create_info: &vk::SemaphoreCreateInfo<'_>,
+) -> Result<Arc<Semaphore>, Error> {
+    let sync = Arc::clone(device.sync());
+    // SAFETY: the caller's promise.
+    let (exports, kind) = unsafe {
+        (
+            valid::find_in_chain::<vk::ExportSemaphoreCreateInfo>(create_info.p_next),
+            valid::find_in_chain::<vk::SemaphoreTypeCreateInfo>(create_info.p_next),
+        )
+    };
+    if exports.is_some_and(|export| !export.handle_types.is_empty()) {
+        return Err(Error::FeatureNotPresent("exporting semaphores".into()));
+    }
+    Ok(Arc::new(match kind {
+        Some(kind) if kind.semaphore_type == vk::SemaphoreType::TIMELINE => {
+            Semaphore::new_timeline(sync, kind.initial_value)
+        }
+        _ => Semaphore::new_binary(sync),
+    }))
+}
+
+#[doc(alias = "vkGetSemaphoreCounterValue")]
+pub(crate) fn get_semaphore_counter_value(
+    device: &Device,
+    semaphore: &Semaphore,
+) -> Result<u64, Error> {
+    device.sync().check()?;
+    timeline_value(semaphore)
+}
+
+/// # Safety
+/// The wait info and its handles are valid.
+#[doc(alias = "vkWaitSemaphores")]
+pub(crate) unsafe fn wait_semaphores(
+    device: &Device,
+    wait_info: &vk::SemaphoreWaitInfo<'_>,
+    timeout: u64,
+) -> Result<vk::Result, Error> {
+    let (sync, info) = (device.sync(), wait_info);
+    // SAFETY: the caller's promise.
+    let (semaphores, values) = unsafe {
+        (
+            handle::get_all(valid::slice(info.p_semaphores, info.semaphore_count)?)?,
+            valid::slice(info.p_values, info.semaphore_count)?,
+        )
+    };
+    for semaphore in &semaphores {
+        timeline_value(semaphore)?;
+    }
+    let any = info.flags.contains(vk::SemaphoreWaitFlags::ANY);
+    let waited = sync.wait(deadline(timeout), || {
+        let mut reached = semaphores
+            .iter()
+            .zip(values)
+            .map(|(s, &value)| s.is_reached(value));
+        if any {
+            reached.any(|r| r)
+        } else {
+            reached.all(|r| r)
+        }
+    });
+    wait_result(waited, || sync.check())
+}
+
+/// # Safety
+/// The semaphore is live.
+#[doc(alias = "vkSignalSemaphore")]
+pub(crate) unsafe fn signal_semaphore(
+    signal_info: &vk::SemaphoreSignalInfo<'_>,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let semaphore = unsafe { handle::get(signal_info.semaphore)? };
+    timeline_value(semaphore)?;
+    semaphore.signal(signal_info.value);
+    Ok(())
+}
+
+#[doc(alias = "vkCreateEvent")]
+pub(crate) fn create_event(
+    device: &Device,
+    _create_info: &vk::EventCreateInfo<'_>,
+) -> Result<Arc<Event>, Error> {
+    Ok(Arc::new(Event::new(Arc::clone(device.sync()))))
+}
+
+#[doc(alias = "vkGetEventStatus")]
+pub(crate) fn get_event_status(device: &Device, event: &Event) -> Result<vk::Result, Error> {
+    device.sync().check()?;
+    Ok(if event.is_set() {
+        vk::Result::EVENT_SET
+    } else {
+        vk::Result::EVENT_RESET
+    })
+}
+
+#[doc(alias = "vkSetEvent")]
+pub(crate) fn set_event(event: &Event) -> Result<(), Error> {
+    event.set(true);
+    Ok(())
+}
+
+#[doc(alias = "vkResetEvent")]
+pub(crate) fn reset_event(event: &Event) -> Result<(), Error> {
+    event.set(false);
+    Ok(())
+}

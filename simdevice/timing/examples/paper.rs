@@ -1,5 +1,0 @@
-//! Prints PAPER.md.
-
-fn main() {
-    print!("{}", timing::paper::markdown());
-}

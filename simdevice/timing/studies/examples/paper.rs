@@ -1,0 +1,5 @@
+//! Prints PAPER.md.
+
+fn main() {
+    print!("{}", timing_studies::paper::markdown());
+}

@@ -1,0 +1,122 @@
+//! Area from the paper's component counts: what a PE shares between modes, and what Gaussians add.
+
+use serde::Serialize;
+use timing::config::{AreaConfig, Config};
+
+/// Areas in mm2 of the rasterizer's technology, except where said.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Area {
+    /// A PE's 9 adders, 9 multipliers and divider.
+    pub pe_triangle: f64,
+    /// 2 adders, a multiplier and the exponential more.
+    pub pe_added: f64,
+    /// Of the added: the exponential.
+    pub exponential: f64,
+    /// What Gaussians add to all PEs.
+    pub added: f64,
+    /// The same in the chip's technology.
+    pub added_in_soc: f64,
+    /// The share of the chip that it is.
+    pub share_of_soc: f64,
+    /// Added over what was there.
+    pub ratio: f64,
+    /// What Gaussians add to all PEs with 16-bit units, whatever the machine's are.
+    pub added_half: f64,
+}
+
+/// Areas of single units in um2 of the reference technology.
+#[derive(Clone, Copy)]
+struct Units {
+    add: f64,
+    mul: f64,
+    div: f64,
+    exp: f64,
+}
+
+impl Units {
+    /// Of 32 bits. The exponential is what the paper's ratio leaves to it, unless it is given.
+    fn single(table: &AreaConfig) -> Self {
+        let mut units = Self {
+            add: table.add_um2,
+            mul: table.mul_um2,
+            div: table.div_um2,
+            exp: table.exp_um2,
+        };
+        if units.exp == 0.0 {
+            units.exp = (table.enhanced_ratio * units.there() - units.added()).max(0.0);
+        }
+        units
+    }
+
+    /// Of 16 bits: divider and exponential shrink as multipliers do.
+    fn half(table: &AreaConfig) -> Self {
+        let single = Self::single(table);
+        let shrink = table.half_mul_um2 / table.mul_um2;
+        Self {
+            add: table.half_add_um2,
+            mul: table.half_mul_um2,
+            div: single.div * shrink,
+            exp: single.exp * shrink,
+        }
+    }
+
+    /// Of a PE for triangles.
+    fn there(&self) -> f64 {
+        9.0 * self.add + 9.0 * self.mul + self.div
+    }
+
+    /// Of what Gaussians add to it.
+    fn added(&self) -> f64 {
+        2.0 * self.add + self.mul + self.exp
+    }
+}
+
+/// The area that a configuration's components take: units of 16 bits where its numbers have two bytes at most.
+pub fn area(config: &Config) -> Area {
+    let table = &config.area;
+    let units = if config.rasterizer.number_bytes <= 2 {
+        Units::half(table)
+    } else {
+        Units::single(table)
+    };
+    // Areas shrink as the square of the feature size.
+    let shrink = (table.technology_nm / table.reference_nm).powi(2) * 1e-6;
+    let pes = f64::from(config.rasterizer.pes());
+    let in_soc = units.added() * shrink * pes / config.soc.node_scaling;
+    Area {
+        pe_triangle: units.there() * shrink,
+        pe_added: units.added() * shrink,
+        exponential: units.exp * shrink,
+        added: units.added() * shrink * pes,
+        added_in_soc: in_soc,
+        share_of_soc: in_soc / config.soc.area_mm2,
+        ratio: units.added() / units.there(),
+        added_half: Units::half(table).added() * shrink * pes,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exponential_is_what_the_papers_ratio_leaves() {
+        let config = Config::preset("paper-15x16", &[]).unwrap();
+        let solved = area(&config);
+        assert!((solved.ratio - 0.21).abs() < 1e-12);
+        assert!(solved.exponential > 0.0 && solved.exponential < solved.pe_added);
+        let given = area(&config.with(&["exp_um2=20000".to_owned()]).unwrap());
+        assert!(given.ratio > 0.3);
+        let twice = area(&config.with(&["modules=30".to_owned()]).unwrap());
+        assert!((twice.added - 2.0 * solved.added).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_machine_of_16_bits_has_units_of_16_bits() {
+        let of = |preset: &str| area(&Config::preset(preset, &[]).unwrap());
+        let (single, half) = (of("paper-15x16"), of("fp16"));
+        assert_eq!(half.added, single.added_half);
+        assert!(half.added < 0.5 * single.added && half.pe_triangle < 0.5 * single.pe_triangle);
+        assert!(half.share_of_soc < 0.5 * single.share_of_soc);
+    }
+}

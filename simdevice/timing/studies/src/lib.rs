@@ -1,0 +1,13 @@
+//! Studies of the simulated GauRast hardware, on top of the timing model, which knows none of them: the paper's numbers
+//! beside the model's, sweeps over the machine's numbers, what each skip of the device would bring as hardware, area, charts,
+//! and two references that the model is held against, [`stepped`] cycle by cycle and [`pe`] operation by operation.
+#![forbid(unsafe_code)]
+
+pub mod area;
+pub mod chart;
+pub mod paper;
+pub mod pe;
+pub mod scene;
+pub mod sensitivity;
+pub mod stepped;
+pub mod what_if;

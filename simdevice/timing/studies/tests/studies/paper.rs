@@ -1,0 +1,144 @@
+//! PAPER.md is generated, complete and up to date.
+
+use timing_studies::paper::Label;
+
+#[gaurast_runner::test]
+fn the_report_in_the_repository_is_up_to_date() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/PAPER.md");
+    let stored = std::fs::read_to_string(path).unwrap();
+    let generated = timing_studies::paper::markdown();
+    for (line, (stored, generated)) in stored.lines().zip(generated.lines()).enumerate() {
+        assert_eq!(
+            stored,
+            generated,
+            "line {}: run `cargo run -p timing-studies --example paper > simdevice/timing/studies/PAPER.md`",
+            line + 1
+        );
+    }
+    assert_eq!(stored.lines().count(), generated.lines().count());
+}
+
+#[gaurast_runner::test]
+fn every_number_of_the_papers_evaluation_has_a_row() {
+    let rows: Vec<_> = timing_studies::paper::report()
+        .into_iter()
+        .flat_map(|section| section.rows)
+        .collect();
+    let scenes = [
+        ("bicycle", "321 ms", "15 ms"),
+        ("stump", "149 ms", "6 ms"),
+        ("garden", "232 ms", "9.6 ms"),
+        ("room", "236 ms", "10.5 ms"),
+        ("counter", "216 ms", "9.8 ms"),
+        ("kitchen", "269 ms", "12.2 ms"),
+        ("bonsai", "147 ms", "5.5 ms"),
+    ];
+    let mut numbers = vec![
+        ("raster speed-up, 3DGS".to_owned(), "23.0x", Label::Solved),
+        ("raster energy, 3DGS".to_owned(), "24.0x", Label::Solved),
+    ];
+    for (name, baseline, ours) in scenes {
+        numbers.push((format!("{name}, baseline raster"), baseline, Label::Input));
+        numbers.push((format!("{name}, GauRast raster"), ours, Label::Input));
+    }
+    let others = [
+        ("raster speed-up, Mini-Splatting", "20x", Label::Input),
+        ("raster energy, Mini-Splatting", "22x", Label::Input),
+        ("FPS, 1.0 listed a needed pair", "24.0", Label::Predicted),
+        (
+            "end-to-end speed-up, 1.0 listed a needed pair",
+            "6.00x",
+            Label::Predicted,
+        ),
+        ("Mini-Splatting pipelined: FPS", "46.0", Label::Calibrated),
+        (
+            "Mini-Splatting pipelined: end-to-end speed-up",
+            "4.00x",
+            Label::Calibrated,
+        ),
+        (
+            "3DGS pipelined: raster share of the baseline",
+            "> 80 %",
+            Label::Solved,
+        ),
+        ("baseline FPS, 3DGS", "2-5", Label::Solved),
+        (
+            "area added over the enhanced units",
+            "21.0 %",
+            Label::Calibrated,
+        ),
+        ("area added over the SoC", "0.20 %", Label::Calibrated),
+        (
+            "area added for GSCore's speed, fp16",
+            "0.16 mm2",
+            Label::Calibrated,
+        ),
+        ("area of GSCore", "3.95 mm2", Label::Input),
+        ("area ratio to GSCore", "24.7x", Label::Solved),
+        ("speed-up of GSCore over Xavier NX", "20x", Label::Input),
+        ("speed-up of GSCore over a mobile GPU", "", Label::Cited),
+        ("bicycle, speed-up over the M2 Pro", "11.2x", Label::Solved),
+        (
+            "bicycle, speed-up over the preset m2-pro",
+            "11.2x",
+            Label::Calibrated,
+        ),
+        (
+            "M2 Pro's fp32 rate over the baseline's",
+            "2.6x",
+            Label::Solved,
+        ),
+        ("typical power of a module", "1.7 W", Label::Input),
+        ("SoC power", "10 W", Label::Input),
+        ("PEs of the scaled design", "300", Label::Solved),
+        ("bandwidth, 10 W mode", "", Label::Cited),
+        ("bandwidth, maximum mode", "", Label::Cited),
+        ("tile side", "", Label::Cited),
+        ("cycles between pixels of a PE", "", Label::Assumed),
+        ("Gaussians of the scenes", "", Label::Cited),
+    ];
+    numbers.extend(others.map(|(item, paper, label)| (item.to_owned(), paper, label)));
+    for (item, paper, label) in numbers {
+        let of_it: Vec<_> = rows.iter().filter(|row| row.item == item).collect();
+        assert_eq!(of_it.len(), 1, "{item}");
+        assert_eq!(
+            (of_it[0].paper.as_str(), of_it[0].label),
+            (paper, label),
+            "{item}"
+        );
+    }
+}
+
+#[gaurast_runner::test]
+fn the_first_rows_are_predictions_and_say_how_far_off_they_are() {
+    let report = timing_studies::paper::report();
+    assert_eq!(report[0].title, "Frames, predicted");
+    for row in &report[0].rows {
+        assert_eq!(row.label, Label::Predicted, "{}", row.item);
+        assert_eq!(
+            row.difference.is_empty(),
+            row.paper.is_empty(),
+            "{}",
+            row.item
+        );
+    }
+    assert!(
+        report[0].rows[..8]
+            .iter()
+            .all(|row| row.difference.ends_with(" %"))
+    );
+    let cell = |item: &str| {
+        let row = report[0].rows.iter().find(|row| row.item == item);
+        row.map(|row| row.model.clone())
+            .unwrap_or_else(|| panic!("{item}"))
+    };
+    // No rasterizer passes the bound.
+    let number = |item: &str| cell(item).trim_end_matches('x').parse::<f64>().unwrap();
+    for listed in ["1.0", "1.5"] {
+        let paired = format!("{listed} listed a needed pair");
+        assert!(
+            number(&format!("FPS, {paired}"))
+                <= number(&format!("FPS without a raster stage, {paired}"))
+        );
+    }
+}
