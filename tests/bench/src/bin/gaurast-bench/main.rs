@@ -1,5 +1,6 @@
 //! `gaurast-bench`: run time against error, beside what a machine without a GPU offers otherwise.
 
+mod callgrind;
 mod counts;
 mod frames;
 mod growth;
@@ -46,6 +47,8 @@ pub(crate) enum BenchError {
     Quads(#[from] QuadError),
     #[error(transparent)]
     Counts(#[from] CountsError),
+    #[error(transparent)]
+    Callgrind(#[from] callgrind::CallgrindError),
     #[error("a worker failed: {0}")]
     Worker(String),
     #[error("a worker could not be spoken to: {0}")]
@@ -84,7 +87,7 @@ enum Command {
     /// How time and memory grow with Gaussians, pixels, overlap and the share off the screen.
     Growth(SweepArguments),
     /// What each skip saves, and what Gaussians cost that nobody sees.
-    Skips(SweepArguments),
+    Skips(SkipsArguments),
     /// Holds instructions, hashes of pictures and sizes of functions against stored ones.
     Counts(CountsArguments),
     /// Draws for the other commands, which start it.
@@ -153,6 +156,21 @@ struct SweepArguments {
     /// Threads to draw with, 0 for one for each processor
     #[arg(long, value_name = "N", default_value_t = 1)]
     threads: usize,
+}
+
+/// Arguments of the comparison of skips.
+#[derive(Args)]
+struct SkipsArguments {
+    #[command(flatten)]
+    sweep: SweepArguments,
+
+    /// Counts instructions of a frame with and without each, by Callgrind, instead of measuring time
+    #[arg(long)]
+    instructions: bool,
+
+    /// Counts for skips of these names only
+    #[arg(long, value_name = "NAME", requires = "instructions")]
+    only: Vec<String>,
 }
 
 /// What the sweep over settings takes.

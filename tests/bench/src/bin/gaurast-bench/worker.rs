@@ -17,7 +17,7 @@ use super::BenchError;
 use super::workload::Workload;
 
 /// The hidden command that makes a process a worker.
-const COMMAND: &str = "worker";
+pub const COMMAND: &str = "worker";
 
 /// lavapipe's manifest, where distributions put it.
 const LAVAPIPE_FOLDERS: [&str; 3] = ["/usr/share", "/etc", "/usr/local/share"];
@@ -102,6 +102,43 @@ impl Drawn {
         let found = self.counters.iter().find(|(own, _)| own == name);
         found.map_or(0.0, |(_, value)| *value)
     }
+}
+
+/// The whole input of a worker that draws `views` one after the other and ends.
+///
+/// # Errors
+/// If it cannot be written as JSON.
+pub fn input(workload: &Workload, views: &[Camera]) -> Result<Vec<u8>, BenchError> {
+    let mut input = Vec::new();
+    let setup = Setup {
+        contender: Contender::Gaurast,
+        workload: workload.clone(),
+        threads: 1,
+    };
+    say(&mut input, &setup)?;
+    for camera in views {
+        let request = Request {
+            camera: camera.clone(),
+            settings: Settings::default(),
+            picture: None,
+            is_independent: false,
+        };
+        say(&mut input, &request)?;
+    }
+    Ok(input)
+}
+
+/// Checks that a worker with this output drew all that it was asked to.
+///
+/// # Errors
+/// If it did not.
+pub fn check(output: &str) -> Result<(), BenchError> {
+    for line in output.lines() {
+        if let Reply::Failed(reason) = serde_json::from_str(line)? {
+            return Err(BenchError::Worker(reason));
+        }
+    }
+    Ok(())
 }
 
 /// A worker as its parent sees it.

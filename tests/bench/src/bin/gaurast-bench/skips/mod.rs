@@ -1,5 +1,7 @@
 //! `gaurast-bench skips`: what each skip saves, and what Gaussians cost that nobody sees.
 
+mod instructions;
+
 use std::io::{Write, stdout};
 
 use gaurast_samples::camera::Camera;
@@ -9,7 +11,7 @@ use super::machine::Machine;
 use super::output::{self, Rows, number};
 use super::pair::{Draws, Pair, time};
 use super::worker::SKIPS;
-use super::{BenchError, Extra, Source, SweepArguments, Workload};
+use super::{BenchError, Extra, SkipsArguments, Source, Workload};
 
 /// Skips of Gaussian draws, and the counter of each, as the device has them.
 const COUNTERS: [(&str, &str); 11] = [
@@ -38,6 +40,8 @@ enum Path {
     /// As the workload says, which is far enough for nothing of the last frame to help.
     Own,
     Still,
+    /// The workload's, five times as far away.
+    Afar,
     /// A hundredth of its distance from the origin to its right.
     Sliding,
 }
@@ -56,7 +60,11 @@ impl Path {
     fn views(self, workload: &Workload, frames: usize) -> Result<Vec<Camera>, BenchError> {
         let own = workload.views(&workload.scene()?, frames)?;
         let view = |frame: usize| {
-            let mut view = own[if self == Self::Own { frame } else { 0 }].clone();
+            let goes_on = matches!(self, Self::Own | Self::Afar);
+            let mut view = own[if goes_on { frame } else { 0 }].clone();
+            if self == Self::Afar {
+                view.eye = view.eye.map(|part| 5.0 * part);
+            }
             if self == Self::Sliding {
                 let distance = view.eye.iter().map(|part| part * part).sum::<f64>().sqrt();
                 for (eye, right) in view.eye.iter_mut().zip(view.rotation[0]) {
@@ -71,7 +79,7 @@ impl Path {
     /// How its views are drawn.
     fn draws(self) -> Draws {
         match self {
-            Self::Own => Draws::Again(DRAWS),
+            Self::Own | Self::Afar => Draws::Again(DRAWS),
             Self::Still | Self::Sliding => Draws::Once,
         }
     }
@@ -133,7 +141,11 @@ const UNSEEN_VIEWS_PER_RUN: usize = 2;
 const DRAWS: usize = 3;
 
 /// Runs the comparison.
-pub(super) fn run(arguments: &SweepArguments) -> Result<(), BenchError> {
+pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
+    if arguments.instructions {
+        return instructions::run(arguments);
+    }
+    let arguments = &arguments.sweep;
     let runs = arguments
         .runs
         .unwrap_or(if arguments.quick { 3 } else { 9 }) as usize;
@@ -232,11 +244,7 @@ fn saved_by(
     let counter = COUNTERS.iter().find(|(name, _)| *name == skip);
     let counter = counter.map_or("", |(_, counter)| *counter);
     let path = Path::of(skip);
-    // What saves from frame to frame is on alone, where that is asked for: it would hide what others save.
-    let [with, without] = match path {
-        Path::Own => [SKIPS.to_owned(), format!("{SKIPS},-{skip}")],
-        Path::Still | Path::Sliding => [SKIPS.replace(&format!(",-{skip}"), ""), SKIPS.to_owned()],
-    };
+    let [with, without] = settings(skip);
     let setups = [(workload, &*with), (workload, &*without)];
     let pair = Pair::draw(
         setups,
@@ -254,6 +262,15 @@ fn saved_by(
         without,
         share: pair.quartiles(time, |with, without| 100.0 * (1.0 - with / without)),
     })
+}
+
+/// What the driver leaves out with a skip and without it. What saves from frame to frame is on alone, where that is asked
+/// for: it would hide what others save.
+fn settings(skip: &str) -> [String; 2] {
+    match Path::of(skip) {
+        Path::Own | Path::Afar => [SKIPS.to_owned(), format!("{SKIPS},-{skip}")],
+        Path::Still | Path::Sliding => [SKIPS.replace(&format!(",-{skip}"), ""), SKIPS.to_owned()],
+    }
 }
 
 fn unseen(

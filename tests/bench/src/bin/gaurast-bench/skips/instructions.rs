@@ -1,0 +1,193 @@
+//! `gaurast-bench skips --instructions`: instructions of a frame with and without each skip.
+
+use std::collections::HashMap;
+use std::io::{Write, stdout};
+
+use super::{LAST_ORDER, Path, UNCHANGED};
+use crate::callgrind;
+use crate::counts;
+use crate::output::{self, Rows, number};
+use crate::worker;
+use crate::workload::{Extra, Source, Workload};
+use crate::{BenchError, SkipsArguments};
+
+/// The pictures' size.
+const SIZE: [u32; 2] = [640, 360];
+
+/// Gaussians of most scenes, and of the one that a camera slides through.
+const COUNT: usize = 100_000;
+const MANY: usize = 1_000_000;
+
+/// The frame that makes chunks is the second one; they serve the third.
+const WARM: usize = 3;
+
+/// What a scene draws.
+#[derive(Clone)]
+enum Work {
+    /// Gaussians, seen from a path.
+    Gaussians(Box<Workload>, Path),
+    /// A workload of the counts.
+    Counted(&'static str),
+}
+
+/// A frame whose instructions are counted.
+#[derive(Clone)]
+struct Scene {
+    name: String,
+    work: Work,
+    /// The number of the frame, from 1 on.
+    frame: usize,
+}
+
+impl Scene {
+    fn gaussians(name: &str, workload: &Workload, path: Path, frame: usize) -> Self {
+        Self {
+            name: name.to_owned(),
+            work: Work::Gaussians(Box::new(workload.clone()), path),
+            frame,
+        }
+    }
+
+    fn counted(name: &str, workload: &'static str) -> Self {
+        Self {
+            name: name.to_owned(),
+            work: Work::Counted(workload),
+            frame: WARM,
+        }
+    }
+
+    /// The instructions of the frame: those of a process that draws it less those of one that does not.
+    fn instructions(&self, skips: &str) -> Result<u64, BenchError> {
+        let all = self.process(skips, self.frame)?;
+        Ok(all.saturating_sub(self.process(skips, self.frame - 1)?))
+    }
+
+    /// The instructions of a process that draws so many frames.
+    fn process(&self, skips: &str, frames: usize) -> Result<u64, BenchError> {
+        let environment = [("GAURAST_SKIP", skips)];
+        let counted = match &self.work {
+            Work::Gaussians(workload, path) => {
+                let views = path.views(workload, self.frame)?;
+                let input = worker::input(workload, &views[..frames])?;
+                let counted = callgrind::count(&[worker::COMMAND], &environment, &input)?;
+                worker::check(&counted.output)?;
+                counted
+            }
+            Work::Counted(name) => {
+                let frames = frames.to_string();
+                let arguments = [counts::WORKER, "--frames", &frames, name];
+                callgrind::count(&arguments, &environment, &[])?
+            }
+        };
+        Ok(counted.instructions)
+    }
+}
+
+/// Every skip, with scenes in which it may save something.
+fn cases() -> Vec<(&'static str, Scene)> {
+    let base = Workload::new(Source::Benchmark { count: COUNT }, SIZE);
+    let many = Workload::new(Source::Benchmark { count: MANY }, SIZE);
+    let beside = Workload {
+        extra: Some(Extra::Beside { count: COUNT }),
+        ..base.clone()
+    };
+    let behind = Workload {
+        extra: Some(Extra::Behind { count: COUNT }),
+        ..Workload::new(Source::Wall, SIZE)
+    };
+    let plain = Workload {
+        plain: true,
+        ..base.clone()
+    };
+    let whole = |workload: &Workload, name: &str| Scene::gaussians(name, workload, Path::Own, WARM);
+    let room = || whole(&base, "100k Gaussians");
+    let half_seen = || whole(&beside, "100k Gaussians, as many beside the picture");
+    let first = Scene::gaussians(
+        "100k Gaussians, as many beside the picture, drawn for the first time",
+        &beside,
+        Path::Own,
+        1,
+    );
+    let object = Scene::gaussians(
+        "100k Gaussians from afar: an object on an empty background",
+        &base,
+        Path::Afar,
+        WARM,
+    );
+    let still = Scene::gaussians("100k Gaussians, a camera at rest", &base, Path::Still, WARM);
+    let slid =
+        |workload: &Workload, name: &str| Scene::gaussians(name, workload, Path::Sliding, WARM);
+    let small = || Scene::counted("small triangles", "small-triangles");
+    let layers = || Scene::counted("layers that hide one another", "layered-triangles");
+    let floor = || Scene::counted("a textured floor", "textured-triangles");
+    vec![
+        ("chunks", half_seen()),
+        (
+            "hidden-chunks",
+            whole(&behind, "100k Gaussians behind a wall"),
+        ),
+        (UNCHANGED, still),
+        (LAST_ORDER, slid(&base, "100k Gaussians, a sliding camera")),
+        (LAST_ORDER, slid(&many, "1M Gaussians, a sliding camera")),
+        ("bounds", room()),
+        ("bounds", half_seen()),
+        ("bounds", first),
+        ("ellipse", room()),
+        ("harmonics", half_seen()),
+        (
+            "bands",
+            whole(&plain, "100k Gaussians of degree 3, higher degrees zero"),
+        ),
+        ("blocks", room()),
+        ("saturated", room()),
+        ("saturated", whole(&behind, "100k Gaussians behind a wall")),
+        ("empty-tiles", object),
+        ("overwritten-tiles", floor()),
+        ("masked-quads", small()),
+        ("affine", small()),
+        ("overwritten-quads", layers()),
+        ("hidden-tiles", layers()),
+    ]
+}
+
+/// Counts, tells and writes them.
+///
+/// # Errors
+/// If Callgrind is not installed, or a process fails.
+pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
+    let mut rows = Rows::new(&["skip", "scene", "with", "without", "saved %"]);
+    let mut known = HashMap::new();
+    let only = &arguments.only;
+    let is_wanted = |skip: &str| only.is_empty() || only.iter().any(|name| name == skip);
+    for (skip, scene) in cases() {
+        if !is_wanted(skip) {
+            continue;
+        }
+        let mut count = |skips: String| -> Result<u64, BenchError> {
+            let key = (scene.name.clone(), skips);
+            if let Some(&count) = known.get(&key) {
+                return Ok(count);
+            }
+            let count = scene.instructions(&key.1)?;
+            known.insert(key, count);
+            Ok(count)
+        };
+        let [with, without] = super::settings(skip);
+        let (with, without) = (count(with)?, count(without)?);
+        rows.rows.push(vec![
+            skip.to_owned(),
+            scene.name.clone(),
+            with.to_string(),
+            without.to_string(),
+            number(100.0 * (1.0 - with as f64 / without as f64)),
+        ]);
+        let _ = writeln!(
+            stdout(),
+            "{}",
+            rows.rows.last().map_or(String::new(), |row| row.join("; "))
+        );
+    }
+    let _ = writeln!(stdout(), "{}", rows.table());
+    let csv = rows.csv("Instructions of a frame of 640x360 at AVX2 on one thread");
+    output::write(&arguments.sweep.output.join("skip_instructions.csv"), &csv)
+}
