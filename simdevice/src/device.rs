@@ -2,8 +2,8 @@
 
 use crate::gaussian::cache::ChunkCache;
 use crate::gaussian::unchanged::LastSets;
+use crate::optimizations::Optimizations;
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
-use crate::skips::Skips;
 use crate::trace::Recorder;
 use crate::workers::Workers;
 use fearless_simd::Level;
@@ -24,7 +24,7 @@ pub struct Config {
     /// A pass is flushed early when its bins exceed this many bytes.
     pub bin_budget_bytes: u64,
     /// How many bytes of host memory may hold Gaussians in an order that is faster to read (see
-    /// [`Skip::Chunks`](crate::skips::Skip::Chunks)): 48 for each, and 192 for spherical harmonics
+    /// [`Optimization::ClusterCulling`](crate::optimizations::Optimization::ClusterCulling)): 48 for each, and 192 for spherical harmonics
     /// of degree 3 if there is room for them.
     pub chunk_budget_bytes: u64,
     /// When a pass is flushed.
@@ -32,7 +32,7 @@ pub struct Config {
     /// The longest time that one batch of shader invocations may take.
     pub shader_timeout: Duration,
     /// The work that is left out where it changes no pixel.
-    pub skips: Skips,
+    pub optimizations: Optimizations,
     /// Gathers what draws do in tiles, if anybody wants to know. It never changes an image.
     pub recorder: Option<Arc<Recorder>>,
     /// Timestamps count the simulated hardware's nanoseconds instead of the host's.
@@ -60,7 +60,7 @@ impl Default for Config {
             chunk_budget_bytes: 512 << 20,
             flush: FlushPolicy::WhenFull,
             shader_timeout: Duration::from_secs(5),
-            skips: Skips::default(),
+            optimizations: Optimizations::default(),
             recorder: None,
             simulated_timestamps: false,
         }

@@ -11,8 +11,8 @@ use super::spherical_harmonics::{Bases, DIRECTIONS, coefficient_count};
 use super::splat::{Projected, Splat};
 use super::surfel::{Placed, Surfel};
 use crate::counters::Counter;
+use crate::optimizations::Optimization;
 use crate::packet::{GaussianGeometry, GaussianOrder};
-use crate::skips::Skip;
 use fearless_simd::Simd;
 
 impl Projection {
@@ -90,7 +90,7 @@ impl Projection {
         directions: &[[f32; DIRECTIONS]; 3],
         out: &mut Projected,
     ) -> u32 {
-        if source.degree >= self.sh_degree || !self.skips.has(Skip::Bands) {
+        if source.degree >= self.sh_degree || !self.optimizations.has(Optimization::Bands) {
             return self.sh_degree;
         }
         // Nothing makes zero of what is not a number.
@@ -158,7 +158,7 @@ impl Projection {
         }
         let counters = &mut out.counters;
         counters.add(Counter::GaussiansDrawn, out.splats.len() as u64);
-        if self.skips.has(Skip::Harmonics) {
+        if self.optimizations.has(Optimization::Harmonics) {
             let unread = source.batch.len - scratch.reached.len();
             counters.add(Counter::HarmonicsUnread, unread as u64);
         }

@@ -13,11 +13,11 @@ use super::scratch::Attributes;
 use super::splat::{Projected, Splat};
 use super::{GaussianSet, Workers};
 use crate::counters::{Counter, Counters};
+use crate::optimizations::Optimization;
 use crate::packet::draw::DepthStencil;
 use crate::packet::{
     CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState, Rect,
 };
-use crate::skips::Skip;
 use devmem::host;
 use std::sync::Arc;
 
@@ -113,7 +113,7 @@ impl GaussianSet {
             workers.projection.model,
             CameraModel::Pinhole | CameraModel::Orthographic
         );
-        workers.projection.skips.has(Skip::HiddenChunks)
+        workers.projection.optimizations.has(Optimization::OcclusionCulling)
             // What was recorded is what hardware without this does.
             && workers.device.recorder().is_none()
             && is_along_axis

@@ -39,12 +39,12 @@ use crate::binning::TileLists;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::format::Format;
+use crate::optimizations::{Optimization, Optimizations};
 use crate::packet::draw::{Draw, ResolveShader};
 use crate::packet::{
     GaussianAppend, GaussianBegin, GaussianGeometry, GaussianOrder, GaussianState, Rect, Viewport,
 };
 use crate::raster::DepthCode;
-use crate::skips::{Skip, Skips};
 use crate::trace::{self, DrawRecord};
 use chunks::Chunks;
 use depth::{CenterDepth, Trend};
@@ -136,7 +136,7 @@ pub struct GaussianDraw {
     pub bounds: Rect,
     pub(crate) sorted: Arc<Sorted>,
     /// What is left out in its tiles.
-    pub(crate) skips: Skips,
+    pub(crate) optimizations: Optimizations,
     /// What makes the colours of its fragments.
     pub(crate) resolve: Option<ResolveShader>,
     /// How its depths are numbers.
@@ -227,12 +227,13 @@ impl GaussianSet {
     ) -> Result<GaussianDraw, Unresolved> {
         let chunks = self.find_chunks(device, counters);
         let config = device.config();
-        let skips = [Skip::Unchanged, Skip::LastOrder].map(|skip| config.skips.has(skip));
-        let is_kept = skips.contains(&true) && device.recorder().is_none();
+        let optimizations = [Optimization::TemporalReuse, Optimization::OrderRepair]
+            .map(|one| config.optimizations.has(one));
+        let is_kept = optimizations.contains(&true) && device.recorder().is_none();
         let key = Key::new(&self, &chunks).filter(|_| is_kept);
         let mut last = None;
         if let Some(key) = &key {
-            match device.last_sets().find(key, skips[0]) {
+            match device.last_sets().find(key, optimizations[0]) {
                 LastSet::Same(sorted) => {
                     counters.add_all(&sorted.counters);
                     counters.add(Counter::SetsUnchanged, 1);
@@ -241,7 +242,7 @@ impl GaussianSet {
                 LastSet::Other(order) => last = order,
             }
         }
-        let keeps_order = key.is_some() && skips[1];
+        let keeps_order = key.is_some() && optimizations[1];
         // All of it by workers: for each way from this thread to them and back, threads fall asleep and are woken.
         let (sorted, record) =
             device.install(|| self.sort(&chunks, (last, keeps_order), device, counters))?;
@@ -275,7 +276,7 @@ impl GaussianSet {
             state: begin.state,
             bounds: self.bounds,
             sorted,
-            skips: device.config().skips,
+            optimizations: device.config().optimizations,
             record,
         }
     }
@@ -365,7 +366,7 @@ impl GaussianSet {
     fn find_chunks(&self, device: &Device, counters: &mut Counters) -> Vec<Option<Arc<Chunks>>> {
         let config = device.config();
         let mut found = vec![None; self.appends.len()];
-        if !config.skips.has(Skip::Chunks) {
+        if !config.optimizations.has(Optimization::ClusterCulling) {
             return found;
         }
         let is_flat = self.is_flat();
@@ -409,14 +410,14 @@ impl GaussianSet {
         counters: &mut Counters,
     ) -> Result<(Vec<Projected>, Vec<u32>), TooManyGaussians> {
         let begin = &self.begin;
-        let skips = device.config().skips;
+        let optimizations = device.config().optimizations;
         let projection = Projection::new(
             &begin.state,
             &begin.camera,
             &begin.viewport,
             Visible::from(self.bounds),
             self.depth,
-            skips,
+            optimizations,
         );
         let workers = Workers {
             device,
@@ -425,7 +426,7 @@ impl GaussianSet {
         };
         let hidden = self.find_hidden(&workers, chunks);
         let jobs = self.jobs(chunks, &projection, hidden.as_ref(), counters)?;
-        if skips.has(Skip::Harmonics) {
+        if optimizations.has(Optimization::Harmonics) {
             let unread =
                 counters.get(Counter::OutsideByChunks) + counters.get(Counter::HiddenByOthers);
             counters.add(Counter::HarmonicsUnread, unread);
@@ -500,7 +501,10 @@ impl Workers<'_> {
             }
         }
         let placed;
-        let mut bounds = projection.skips.has(Skip::Bounds).then_some(frustum);
+        let mut bounds = projection
+            .optimizations
+            .has(Optimization::Bounds)
+            .then_some(frustum);
         if let Some(matrices) = source.matrices {
             // What is yet to be placed in the world by the same matrix sees the planes where they are for it.
             let uniform = bounds.and(matrices.uniform());

@@ -17,11 +17,11 @@ use super::scratch::{Attributes, Flat, Scratch};
 use super::spherical_harmonics::{Bases, coefficient_count};
 use super::splat::{Projected, half_room};
 use crate::counters::{Counter, Counters};
+use crate::optimizations::{Optimization, Optimizations};
 use crate::packet::{
     Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
     GaussianState, Viewport,
 };
-use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, prelude::*};
 
 /// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
@@ -58,7 +58,7 @@ pub(crate) struct Projection {
     pub(super) log2_floor: f64,
     pub(super) sh_degree: u32,
     pub(super) visible: Visible,
-    pub(super) skips: Skips,
+    pub(super) optimizations: Optimizations,
     /// How centres become depths, if the draw needs to know.
     pub(super) depth: Option<CenterDepth>,
 }
@@ -103,7 +103,7 @@ impl Projection {
         viewport: &Viewport,
         visible: Visible,
         depth: Option<CenterDepth>,
-        skips: Skips,
+        optimizations: Optimizations,
     ) -> Self {
         let focal = camera.focal_length.map(f64::from);
         let principal = camera.principal_point.map(f64::from);
@@ -136,7 +136,7 @@ impl Projection {
             sh_degree: state.sh_degree,
             visible,
             depth,
-            skips,
+            optimizations,
         }
     }
 
@@ -187,7 +187,7 @@ impl Projection {
             kept = kept.and(passed);
             skipped
         };
-        if !self.skips.has(Skip::Harmonics) {
+        if !self.optimizations.has(Optimization::Harmonics) {
             let colored = self.find_colored(simd, source);
             keep(&colored, Counter::SkippedNonFinite);
         }

@@ -178,7 +178,7 @@ impl Shading {
     ) -> Self {
         let state = &set.begin.state;
         let visible = Visible::from(set.bounds);
-        let skips = device.config().skips;
+        let optimizations = device.config().optimizations;
         // The clip volume takes the place of the camera's planes.
         let camera = Camera {
             near_plane: f32::NEG_INFINITY,
@@ -186,7 +186,7 @@ impl Shading {
         };
         let half = [viewport.width, viewport.height].map(|size| 0.5 * f64::from(size));
         Self {
-            projection: Projection::new(state, &camera, viewport, visible, None, skips),
+            projection: Projection::new(state, &camera, viewport, visible, None, optimizations),
             half,
             middle: [
                 half[0] + f64::from(viewport.x),

@@ -10,8 +10,8 @@ use super::scratch::{Flat, Scratch};
 use super::splat::Projected;
 use crate::counters::{Counter, Counters};
 use crate::lanes::both;
+use crate::optimizations::Optimization;
 use crate::packet::GaussianGeometry;
-use crate::skips::Skip;
 use fearless_simd::{Simd, prelude::*};
 
 /// The reach of each lane, as the two words of [`Reach::words`].
@@ -115,7 +115,7 @@ impl Projection {
     /// Finds the kept Gaussians that reach a tile.
     #[inline(always)]
     pub(super) fn find_tiles<S: Simd>(&self, simd: S, scratch: &mut Scratch, out: &mut Projected) {
-        let by_lanes = self.skips.has(Skip::Ellipse)
+        let by_lanes = self.optimizations.has(Optimization::Ellipse)
             && self.period.is_none()
             && self.geometry == GaussianGeometry::Volume;
         self.find_tiles_by(simd, by_lanes, scratch, out);
@@ -309,7 +309,10 @@ impl Projection {
         if ellipse.half[1].is_nan() {
             return None;
         }
-        let beside = self.skips.has(Skip::Ellipse).then_some(beside);
+        let beside = self
+            .optimizations
+            .has(Optimization::Ellipse)
+            .then_some(beside);
         match self.period {
             None => ellipse.reach(&self.visible, &mut out.spans, beside),
             Some(period) => {
@@ -325,8 +328,8 @@ mod tests {
     use super::super::footprint::Visible;
     use super::*;
     use crate::device::SimdLevel;
+    use crate::optimizations::Optimizations;
     use crate::packet::{Camera, GaussianState, Viewport};
-    use crate::skips::Skips;
     use devmem::dispatch;
     use proptest::prelude::*;
 
@@ -360,7 +363,14 @@ mod tests {
             max_depth: 1.0,
         };
         let state = GaussianState::default();
-        Projection::new(&state, &camera, &viewport, visible, None, Skips::ALL)
+        Projection::new(
+            &state,
+            &camera,
+            &viewport,
+            visible,
+            None,
+            Optimizations::ALL,
+        )
     }
 
     fn tiles<S: Simd>(simd: S, by_lanes: bool, scratch: &mut Scratch) -> Tiles {

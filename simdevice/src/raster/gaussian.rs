@@ -36,7 +36,7 @@ use crate::counters::{Counter, Counters};
 use crate::gaussian::depth::Trend;
 use crate::gaussian::splat::Splat;
 use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
-use crate::skips::{Skip, Skips};
+use crate::optimizations::{Optimization, Optimizations};
 use crate::trace::{self, Run, TileWork};
 use approximation::Way;
 use by_block::TileMode;
@@ -188,7 +188,7 @@ impl GaussianTile {
             splats: &draw.sorted.splats,
             mode,
             list,
-            skips: draw.skips,
+            optimizations: draw.optimizations,
             trend: draw.depth_trend,
             half_period: draw.half_period,
             corner,
@@ -243,7 +243,7 @@ impl GaussianTile {
             splats: &draw.sorted.splats,
             mode: TileMode::of(draw).in_list_order(),
             list: draw.sorted.tiles.list(tile_x, tile_y),
-            skips: Skips::ALL,
+            optimizations: Optimizations::ALL,
             trend: Trend::None,
             half_period: draw.half_period,
             corner: [tile_x, tile_y].map(|tile| tile * TILE_SIZE),
@@ -318,7 +318,7 @@ impl GaussianTile {
     ) -> Work {
         let mut work = Work::default();
         let layer = &mut self.layers[layer];
-        let end_early = task.skips.has(Skip::Saturated);
+        let end_early = task.optimizations.has(Optimization::EarlyTermination);
         for block in 0..BLOCKS {
             layer.find_most_fall(simd, block, task.thresholds);
         }
@@ -430,7 +430,7 @@ struct Task<'a> {
     mode: TileMode<'a>,
     list: &'a [u32],
     /// What is left out.
-    skips: Skips,
+    optimizations: Optimizations,
     trend: Trend,
     /// As [`GaussianDraw::half_period`].
     half_period: f64,

@@ -10,11 +10,11 @@ use crate::gaussian::project::Source;
 use crate::gaussian::scratch::Scratch;
 use crate::gaussian::splat::Projected;
 use crate::gaussian::surfel::Surfel;
+use crate::optimizations::Optimizations;
 use crate::packet::{
     AttributeStream, BufferRange, Camera, GaussianAppend, GaussianAttributes, GaussianGeometry,
     GaussianLinearization, GaussianPrecision, GaussianState, ModelAttributes, Viewport,
 };
-use crate::skips::Skips;
 use devmem::Allocation;
 use devmem::dispatch;
 use rand::{Rng, SeedableRng};
@@ -162,8 +162,14 @@ fn what_is_outside_is_drawn_nowhere() {
                     right: 400,
                     bottom: 400,
                 };
-                let projection =
-                    Projection::new(&state, &camera, &viewport, visible, None, Skips::NONE);
+                let projection = Projection::new(
+                    &state,
+                    &camera,
+                    &viewport,
+                    visible,
+                    None,
+                    Optimizations::NONE,
+                );
                 let frustum = Frustum::new(&projection, 1.0);
                 let attributes = around_edges(&mut rng, geometry == GaussianGeometry::Surfel);
                 let source = Source {

@@ -8,8 +8,8 @@ use crate::gaussian::rays::RayDepths;
 use crate::gaussian::splat::{Splat, half_room};
 use crate::gaussian::surfel::Surfel;
 use crate::gaussian::{GaussianDraw, locate};
+use crate::optimizations::Optimization;
 use crate::packet::GaussianPrecision;
-use crate::skips::Skip;
 use crate::trace::{self, Run};
 use devmem::dispatch;
 use devmem::host;
@@ -156,7 +156,9 @@ impl GaussianTile {
         let layer = &mut self.layers[layer];
         for (block, list) in self.lists.iter().enumerate() {
             for chunk in list.chunks(CHUNK) {
-                if task.skips.has(Skip::Saturated) && layer.open_lanes(block) == 0 {
+                if task.optimizations.has(Optimization::EarlyTermination)
+                    && layer.open_lanes(block) == 0
+                {
                     break;
                 }
                 for &primitive in chunk {
@@ -187,7 +189,7 @@ impl GaussianTile {
             ..Work::default()
         };
         let all = mask32x16::splat(simd, true);
-        let bounded = task.skips.has(Skip::Blocks);
+        let bounded = task.optimizations.has(Optimization::Blocks);
         let tests_depth = task.thresholds.depth_mode > NO_DEPTH;
         for list in &mut self.lists {
             list.clear();

@@ -4,7 +4,7 @@ use super::grid::{BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS_ACROSS, HALF, LANE_X, LANE_Y
 use super::passing::Passing;
 use super::{BLOCKS, CHUNK, DepthMode, LANES, NO_DEPTH, Task};
 use crate::gaussian::splat::Splat;
-use crate::skips::Skip;
+use crate::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
 
 /// What rounding may do to exponents, relative to them.
@@ -75,7 +75,7 @@ impl Chunk {
                 let mut placed = Placed::default();
                 let corner = task.corner.map(f64::from);
                 let most_fall = task.thresholds.most_fall;
-                let bounded = task.skips.has(Skip::Blocks);
+                let bounded = task.optimizations.has(Optimization::Blocks);
                 // Masks are not combined here: that would be calls.
                 let open_mask = mask32x16::from_bitmask(simd, open);
                 let open = open_mask.to_vector();
@@ -177,7 +177,7 @@ pub(super) fn hidden_blocks<S: Simd>(
     task: &Task<'_>,
     open: mask32x16<S>,
 ) -> u32 {
-    let bounded = task.skips.has(Skip::Blocks) && !splat.steep;
+    let bounded = task.optimizations.has(Optimization::Blocks) && !splat.steep;
     let reached = if bounded {
         let most_fall = task.thresholds.most_fall;
         open & Record::default().place(simd, splat, task.corner.map(f64::from), most_fall)

@@ -12,7 +12,7 @@ use super::{CHUNK, FIND_MEDIAN, GaussianTile, NO_DEPTH, Task, Thresholds, Work};
 use crate::gaussian::locate;
 use crate::gaussian::splat::Splat;
 use crate::lanes::{bits_of, floats_of};
-use crate::skips::Skip;
+use crate::optimizations::Optimization;
 use crate::trace::Run;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 use scalar::Splat16;
@@ -76,7 +76,9 @@ impl GaussianTile {
         let thresholds = task.thresholds.rounded();
         for (block, list) in self.lists.iter().enumerate() {
             for chunk in list.chunks(CHUNK) {
-                if task.skips.has(Skip::Saturated) && layer.open_lanes(block) == 0 {
+                if task.optimizations.has(Optimization::EarlyTermination)
+                    && layer.open_lanes(block) == 0
+                {
                     break;
                 }
                 for &primitive in chunk {

@@ -1,6 +1,6 @@
 //! Tiles of draws that have no lists, since those would be too long.
 
-use super::{DepthMode, GaussianTile, Run, Skip, Task, TileMode, Work};
+use super::{DepthMode, GaussianTile, Optimization, Run, Task, TileMode, Work};
 use crate::binning::Stream;
 use crate::gaussian::TILE_SIZE;
 use devmem::dispatch;
@@ -28,7 +28,7 @@ impl GaussianTile {
         let (mut work, mut from) = (Work::default(), 0);
         let mut piece = std::mem::take(&mut self.piece);
         loop {
-            if task.skips.has(Skip::Saturated)
+            if task.optimizations.has(Optimization::EarlyTermination)
                 && dispatch!(level, simd => self.layers[layer].open_blocks(simd, task.way.light))
                     == 0
             {

@@ -11,8 +11,8 @@ use super::{
     BLOCKS, CHUNK, FIND_MEAN, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Thresholds, Work,
     locate,
 };
+use crate::optimizations::Optimization;
 use crate::packet::GaussianState;
-use crate::skips::Skip;
 use crate::trace::Run;
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
@@ -113,7 +113,7 @@ impl GaussianTile {
         for block in 0..BLOCKS {
             let mut sums = Sums::load(layer, block);
             for chunk in self.lists[block].chunks(CHUNK) {
-                if task.skips.has(Skip::Saturated) && !sums.is_open() {
+                if task.optimizations.has(Optimization::EarlyTermination) && !sums.is_open() {
                     break;
                 }
                 for &primitive in chunk {

@@ -110,7 +110,7 @@ fn what_is_left_out_is_within_the_budget() {
 #[test]
 fn skips_that_are_off_leave_nothing_out() {
     let device = Device::new(&Config {
-        skips: Skips::NONE,
+        optimizations: Optimizations::NONE,
         ..Config::default()
     })
     .unwrap();

@@ -6,12 +6,12 @@ mod frames;
 mod growth;
 mod judge;
 mod machine;
+mod optimizations;
 mod output;
 mod pair;
 mod pareto;
 mod plot;
 mod roofline;
-mod skips;
 mod worker;
 mod workload;
 
@@ -86,8 +86,8 @@ enum Command {
     Pareto(ParetoArguments),
     /// How time and memory grow with Gaussians, pixels, overlap and the share off the screen.
     Growth(SweepArguments),
-    /// What each skip saves, and what Gaussians cost that nobody sees.
-    Skips(SkipsArguments),
+    /// What each optimization saves, and what Gaussians cost that nobody sees.
+    Optimizations(OptimizationsArguments),
     /// Holds instructions, hashes of pictures and sizes of functions against stored ones.
     Counts(CountsArguments),
     /// Draws for the other commands, which start it.
@@ -158,9 +158,9 @@ struct SweepArguments {
     threads: usize,
 }
 
-/// Arguments of the comparison of skips.
+/// Arguments of the comparison of optimizations.
 #[derive(Args)]
-struct SkipsArguments {
+struct OptimizationsArguments {
     #[command(flatten)]
     sweep: SweepArguments,
 
@@ -168,7 +168,7 @@ struct SkipsArguments {
     #[arg(long)]
     instructions: bool,
 
-    /// Counts for skips of these names only
+    /// Counts for optimizations of these names only
     #[arg(long, value_name = "NAME", requires = "instructions")]
     only: Vec<String>,
 }
@@ -218,7 +218,7 @@ fn run(command: &Command) -> Result<(), BenchError> {
         Command::Frames(arguments) => frames::run(arguments),
         Command::Pareto(arguments) => pareto::run(arguments),
         Command::Growth(arguments) => growth::run(arguments),
-        Command::Skips(arguments) => skips::run(arguments),
+        Command::Optimizations(arguments) => optimizations::run(arguments),
         Command::Counts(arguments) => Ok(counts::run(arguments)?),
         Command::Worker => worker::run(),
         Command::CountsWorker(arguments) => Ok(counts::work(arguments)?),

@@ -154,7 +154,7 @@ pub struct Worker {
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// What this driver leaves out in benchmarks: all but what only saves where two frames are the same or nearly so.
-pub const SKIPS: &str = "all,-unchanged,-last-order";
+pub const OPTIMIZATIONS: &str = "all,-temporal-reuse,-order-repair";
 
 impl Worker {
     /// Starts a worker that shares its work among `threads`; `None` if its device is not there.
@@ -163,22 +163,22 @@ impl Worker {
         workload: &Workload,
         threads: usize,
     ) -> Result<Option<Self>, BenchError> {
-        let skips = std::env::var("GAURAST_SKIP");
-        let skips = skips.unwrap_or_else(|_| SKIPS.to_owned());
-        Self::with_skips(contender, workload, threads, &skips)
+        let optimizations = std::env::var("GAURAST_OPTIMIZATIONS");
+        let optimizations = optimizations.unwrap_or_else(|_| OPTIMIZATIONS.to_owned());
+        Self::with_optimizations(contender, workload, threads, &optimizations)
     }
 
-    /// As [`Worker::start`]; `skips` says what this driver leaves out.
-    pub fn with_skips(
+    /// As [`Worker::start`]; `optimizations` says what this driver leaves out.
+    pub fn with_optimizations(
         contender: Contender,
         workload: &Workload,
         threads: usize,
-        skips: &str,
+        optimizations: &str,
     ) -> Result<Option<Self>, BenchError> {
         let mut command = Command::new(std::env::current_exe()?);
         command
             .arg(COMMAND)
-            .env("GAURAST_SKIP", skips)
+            .env("GAURAST_OPTIMIZATIONS", optimizations)
             .env("GAURAST_THREADS", threads.to_string())
             // The threads that rasterize; the queue has one more, for vertices.
             .env("LP_NUM_THREADS", threads.to_string())

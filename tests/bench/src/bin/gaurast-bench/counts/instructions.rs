@@ -12,7 +12,7 @@ use super::workload::Workload;
 use super::{CountsError, Report, WORKER};
 use crate::callgrind::{self, LEVEL};
 use crate::output::Rows;
-use crate::worker::SKIPS;
+use crate::worker::OPTIMIZATIONS;
 
 /// Percent by which a count may differ from the stored one.
 const TOLERANCE: f64 = 1.0;
@@ -129,7 +129,7 @@ fn count(workload: Workload, manifest: Option<&Path>) -> Result<u64, CountsError
 fn process(workload: Workload, frames: u32, manifest: Option<&Path>) -> Result<u64, CountsError> {
     let (frames, name) = (frames.to_string(), workload.name());
     let mut arguments = vec![WORKER, "--frames", &frames, &name];
-    let mut environment = vec![("GAURAST_SKIP", SKIPS)];
+    let mut environment = vec![("GAURAST_OPTIMIZATIONS", OPTIMIZATIONS)];
     let manifest = manifest.map(Path::canonicalize).transpose()?;
     let manifest = manifest.map(|path| path.to_string_lossy().into_owned());
     if let Some(manifest) = &manifest {

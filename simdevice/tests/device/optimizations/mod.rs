@@ -1,4 +1,4 @@
-//! Skips: each saves work, and none changes a bit.
+//! Optimizations: each saves work, and none changes a bit.
 //!
 //! Every scene is drawn twice to a target, since some of what is saved is prepared by the first time.
 
@@ -13,9 +13,9 @@ use simdevice::counters::{Counter, Counters};
 use simdevice::geometry::DrawPipeline;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
+use simdevice::optimizations::{Optimization, Optimizations};
 use simdevice::packet::draw::*;
 use simdevice::packet::*;
-use simdevice::skips::{Skip, Skips};
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 
@@ -303,15 +303,15 @@ type Change = fn(&mut GaussianBegin);
 fn every_mode_has_bounds_that_change_no_bit() {
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
     for (mode, packets) in bounded_modes() {
-        let (without, _) = draw(Skips::NONE, &packets, over_black);
-        let saved = |skips, counter| {
-            let (image, counters) = draw(skips, &packets, over_black);
+        let (without, _) = draw(Optimizations::NONE, &packets, over_black);
+        let saved = |optimizations, counter| {
+            let (image, counters) = draw(optimizations, &packets, over_black);
             assert!(image == without, "{mode}");
             counters.get(counter)
         };
-        let chunks = Skips::ALL.without(Skip::Bounds);
+        let chunks = Optimizations::ALL.without(Optimization::Bounds);
         let by_chunks = saved(chunks, Counter::OutsideByChunks);
-        let bounds = Skips::ALL.without(Skip::Chunks);
+        let bounds = Optimizations::ALL.without(Optimization::ClusterCulling);
         let by_bounds = saved(bounds, Counter::OutsideByBounds);
         assert!(by_chunks > 0, "{mode}: no chunk is beside the picture");
         assert!(by_bounds > 2 * by_chunks, "{mode}: {by_bounds} {by_chunks}");
@@ -395,8 +395,11 @@ fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
 }
 
 /// Draws a scene twice, over triangles where the attachment is loaded, on a device of its own; gives colours and depths.
-fn draw(skips: Skips, packets: &[Packet], load: LoadOp) -> (Vec<u8>, Counters) {
-    let config = Config { skips, ..single() };
+fn draw(optimizations: Optimizations, packets: &[Packet], load: LoadOp) -> (Vec<u8>, Counters) {
+    let config = Config {
+        optimizations,
+        ..single()
+    };
     let target = image(Format::R32G32B32A32Sfloat, 1, 0x3E);
     let depth = image(Format::D32Sfloat, 1, 0);
     let device = Arc::new(Device::new(&config).unwrap());
@@ -423,7 +426,7 @@ fn draw(skips: Skips, packets: &[Packet], load: LoadOp) -> (Vec<u8>, Counters) {
     (images, processor.counters().clone())
 }
 
-/// Draws a scene over black, in a pass of its own; gives what that counted. The picture is that of a device without skips.
+/// Draws a scene over black, in a pass of its own; gives what that counted. The picture is that of a device without optimizations.
 fn draw_as_without_skips(processor: &mut CommandProcessor, packets: &[Packet]) -> Counters {
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
     let before = processor.counters().clone();
@@ -434,7 +437,7 @@ fn draw_as_without_skips(processor: &mut CommandProcessor, packets: &[Packet]) -
         processor.execute(packet).unwrap();
     }
     // Depths are not among what is drawn here.
-    let (expected, _) = draw(Skips::NONE, packets, over_black);
+    let (expected, _) = draw(Optimizations::NONE, packets, over_black);
     assert!(bytes(&target) == expected[..bytes(&target).len()]);
     processor.counters().since(&before)
 }
@@ -443,10 +446,13 @@ fn draw_as_without_skips(processor: &mut CommandProcessor, packets: &[Packet]) -
 fn every_skip_saves_work() {
     let mut saved = Counters::default();
     for (_, packets, load) in scenes() {
-        saved.add_all(&draw(Skips::ALL, &packets, load).1);
+        saved.add_all(&draw(Optimizations::ALL, &packets, load).1);
     }
-    for &skip in Skip::ALL {
-        assert!(saved.get(skip.counter()) > 0, "{skip:?} saved nothing");
+    for &optimization in Optimization::ALL {
+        assert!(
+            saved.get(optimization.counter()) > 0,
+            "{optimization:?} saved nothing"
+        );
     }
 }
 
@@ -454,16 +460,26 @@ fn every_skip_saves_work() {
 fn no_skip_changes_a_bit(case: &gaurast_runner::Case) {
     let all = scenes().into_iter().enumerate();
     for (_, (scene, packets, load)) in all.filter(|(number, _)| case.shard().has(*number)) {
-        let (image, _) = draw(Skips::ALL, &packets, load);
-        let (other, without) = draw(Skips::NONE, &packets, load);
-        assert!(other == image, "{scene}: without any skip");
-        for &skip in Skip::ALL {
-            assert_eq!(without.get(skip.counter()), 0, "{scene}: {skip:?}");
-            for skips in [Skips::ALL.without(skip), Skips::NONE.with(skip)] {
-                let (other, counters) = draw(skips, &packets, load);
-                assert!(other == image, "{scene}: {skips:?}");
-                let count = counters.get(skip.counter());
-                assert!(count == 0 || skips.has(skip), "{scene}: {skip:?}");
+        let (image, _) = draw(Optimizations::ALL, &packets, load);
+        let (other, without) = draw(Optimizations::NONE, &packets, load);
+        assert!(other == image, "{scene}: without any optimization");
+        for &optimization in Optimization::ALL {
+            assert_eq!(
+                without.get(optimization.counter()),
+                0,
+                "{scene}: {optimization:?}"
+            );
+            for optimizations in [
+                Optimizations::ALL.without(optimization),
+                Optimizations::NONE.with(optimization),
+            ] {
+                let (other, counters) = draw(optimizations, &packets, load);
+                assert!(other == image, "{scene}: {optimizations:?}");
+                let count = counters.get(optimization.counter());
+                assert!(
+                    count == 0 || optimizations.has(optimization),
+                    "{scene}: {optimization:?}"
+                );
             }
         }
     }
@@ -472,7 +488,7 @@ fn no_skip_changes_a_bit(case: &gaurast_runner::Case) {
 #[gaurast_runner::test]
 fn without_skips_everything_is_worked_on() {
     for (scene, packets, load) in scenes() {
-        let (_, counters) = draw(Skips::NONE, &packets, load);
+        let (_, counters) = draw(Optimizations::NONE, &packets, load);
         let pairs = counters.get(Counter::TilePairs);
         assert_eq!(counters.get(Counter::TilePairsEvaluated), pairs, "{scene}");
         assert_eq!(
@@ -503,7 +519,7 @@ fn draw_again(config: &Config, change: impl Fn(usize, &Allocation)) -> Vec<Count
             processor.execute(packet).unwrap();
         }
         let plain = Config {
-            skips: Skips::ALL.without(Skip::Chunks),
+            optimizations: Optimizations::ALL.without(Optimization::ClusterCulling),
             ..single()
         };
         let drawn = bytes(&target);

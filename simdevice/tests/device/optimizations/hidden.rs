@@ -92,9 +92,12 @@ fn what_is_hidden_changes_no_bit() {
             if let Packet::GaussianBegin(begin) = &mut packets[0] {
                 change(begin);
             }
-            let (image, counters) = draw(Skips::ALL, &packets, over_black);
-            let (other, without) =
-                draw(Skips::ALL.without(Skip::HiddenChunks), &packets, over_black);
+            let (image, counters) = draw(Optimizations::ALL, &packets, over_black);
+            let (other, without) = draw(
+                Optimizations::ALL.without(Optimization::OcclusionCulling),
+                &packets,
+                over_black,
+            );
             assert!(image == other, "{name}, {right}");
             hidden += counters.get(Counter::HiddenByOthers);
             let read = |counters: &Counters| counters.get(Counter::GaussiansRead);

@@ -6,7 +6,7 @@ use super::*;
 pub(super) type Edit = Box<dyn FnMut(&mut [Packet])>;
 
 /// Draws `packets` as they are again and again, with a change before each pass but the first; says in which passes sets were
-/// drawn as they had been. Every picture is that of a device without skips.
+/// drawn as they had been. Every picture is that of a device without optimizations.
 fn reused(packets: &mut [Packet], mut changes: Vec<Edit>) -> Vec<u64> {
     let device = Arc::new(Device::new(&single()).unwrap());
     let mut processor = CommandProcessor::new(device);

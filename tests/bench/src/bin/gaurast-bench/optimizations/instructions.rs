@@ -1,15 +1,15 @@
-//! `gaurast-bench skips --instructions`: instructions of a frame with and without each skip.
+//! `gaurast-bench optimizations --instructions`: instructions of a frame with and without each optimization.
 
 use std::collections::HashMap;
 use std::io::{Write, stdout};
 
-use super::{LAST_ORDER, Path, UNCHANGED};
+use super::{ORDER_REPAIR, Path, TEMPORAL_REUSE};
 use crate::callgrind;
 use crate::counts;
 use crate::output::{self, Rows, number};
 use crate::worker;
 use crate::workload::{Extra, Source, Workload};
-use crate::{BenchError, SkipsArguments};
+use crate::{BenchError, OptimizationsArguments};
 
 /// The pictures' size.
 const SIZE: [u32; 2] = [640, 360];
@@ -57,14 +57,14 @@ impl Scene {
     }
 
     /// The instructions of the frame: those of a process that draws it less those of one that does not.
-    fn instructions(&self, skips: &str) -> Result<u64, BenchError> {
-        let all = self.process(skips, self.frame)?;
-        Ok(all.saturating_sub(self.process(skips, self.frame - 1)?))
+    fn instructions(&self, optimizations: &str) -> Result<u64, BenchError> {
+        let all = self.process(optimizations, self.frame)?;
+        Ok(all.saturating_sub(self.process(optimizations, self.frame - 1)?))
     }
 
     /// The instructions of a process that draws so many frames.
-    fn process(&self, skips: &str, frames: usize) -> Result<u64, BenchError> {
-        let environment = [("GAURAST_SKIP", skips)];
+    fn process(&self, optimizations: &str, frames: usize) -> Result<u64, BenchError> {
+        let environment = [("GAURAST_OPTIMIZATIONS", optimizations)];
         let counted = match &self.work {
             Work::Gaussians(workload, path) => {
                 let views = path.views(workload, self.frame)?;
@@ -83,7 +83,7 @@ impl Scene {
     }
 }
 
-/// Every skip, with scenes in which it may save something.
+/// Every optimization, with scenes in which it may save something.
 fn cases() -> Vec<(&'static str, Scene)> {
     let base = Workload::new(Source::Benchmark { count: COUNT }, SIZE);
     let many = Workload::new(Source::Benchmark { count: MANY }, SIZE);
@@ -121,14 +121,17 @@ fn cases() -> Vec<(&'static str, Scene)> {
     let layers = || Scene::counted("layers that hide one another", "layered-triangles");
     let floor = || Scene::counted("a textured floor", "textured-triangles");
     vec![
-        ("chunks", half_seen()),
+        ("cluster-culling", half_seen()),
         (
-            "hidden-chunks",
+            "occlusion-culling",
             whole(&behind, "100k Gaussians behind a wall"),
         ),
-        (UNCHANGED, still),
-        (LAST_ORDER, slid(&base, "100k Gaussians, a sliding camera")),
-        (LAST_ORDER, slid(&many, "1M Gaussians, a sliding camera")),
+        (TEMPORAL_REUSE, still),
+        (
+            ORDER_REPAIR,
+            slid(&base, "100k Gaussians, a sliding camera"),
+        ),
+        (ORDER_REPAIR, slid(&many, "1M Gaussians, a sliding camera")),
         ("bounds", room()),
         ("bounds", half_seen()),
         ("bounds", first),
@@ -139,14 +142,17 @@ fn cases() -> Vec<(&'static str, Scene)> {
             whole(&plain, "100k Gaussians of degree 3, higher degrees zero"),
         ),
         ("blocks", room()),
-        ("saturated", room()),
-        ("saturated", whole(&behind, "100k Gaussians behind a wall")),
+        ("early-termination", room()),
+        (
+            "early-termination",
+            whole(&behind, "100k Gaussians behind a wall"),
+        ),
         ("empty-tiles", object),
         ("overwritten-tiles", floor()),
         ("masked-quads", small()),
         ("affine", small()),
         ("overwritten-quads", layers()),
-        ("hidden-tiles", layers()),
+        ("hierarchical-depth", layers()),
     ]
 }
 
@@ -154,17 +160,18 @@ fn cases() -> Vec<(&'static str, Scene)> {
 ///
 /// # Errors
 /// If Callgrind is not installed, or a process fails.
-pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
-    let mut rows = Rows::new(&["skip", "scene", "with", "without", "saved %"]);
+pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> {
+    let mut rows = Rows::new(&["optimization", "scene", "with", "without", "saved %"]);
     let mut known = HashMap::new();
     let only = &arguments.only;
-    let is_wanted = |skip: &str| only.is_empty() || only.iter().any(|name| name == skip);
-    for (skip, scene) in cases() {
-        if !is_wanted(skip) {
+    let is_wanted =
+        |optimization: &str| only.is_empty() || only.iter().any(|name| name == optimization);
+    for (optimization, scene) in cases() {
+        if !is_wanted(optimization) {
             continue;
         }
-        let mut count = |skips: String| -> Result<u64, BenchError> {
-            let key = (scene.name.clone(), skips);
+        let mut count = |optimizations: String| -> Result<u64, BenchError> {
+            let key = (scene.name.clone(), optimizations);
             if let Some(&count) = known.get(&key) {
                 return Ok(count);
             }
@@ -172,10 +179,10 @@ pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
             known.insert(key, count);
             Ok(count)
         };
-        let [with, without] = super::settings(skip);
+        let [with, without] = super::settings(optimization);
         let (with, without) = (count(with)?, count(without)?);
         rows.rows.push(vec![
-            skip.to_owned(),
+            optimization.to_owned(),
             scene.name.clone(),
             with.to_string(),
             without.to_string(),
@@ -189,5 +196,8 @@ pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
     }
     let _ = writeln!(stdout(), "{}", rows.table());
     let csv = rows.csv("Instructions of a frame of 640x360 at AVX2 on one thread");
-    output::write(&arguments.sweep.output.join("skip_instructions.csv"), &csv)
+    output::write(
+        &arguments.sweep.output.join("optimization_instructions.csv"),
+        &csv,
+    )
 }

@@ -42,7 +42,7 @@ fn turned(angle: f32, roll: f32) -> Edit {
 }
 
 /// Draws `packets`, of which chunks are made for the second picture, twice, and then after each change; says in which of
-/// the pictures after changes the order was repaired. Every picture is that of a device without skips.
+/// the pictures after changes the order was repaired. Every picture is that of a device without optimizations.
 fn repaired(config: &Config, packets: &mut [Packet], changes: Vec<Edit>) -> Vec<u64> {
     let mut processor = CommandProcessor::new(Arc::new(Device::new(config).unwrap()));
     let nothing: fn() -> Edit = || Box::new(|_| {});
@@ -133,6 +133,10 @@ fn it_needs_no_other_skip() {
     let packets = gaussians_in(false, 56, 3000, OVER);
     let over_black = LoadOp::Clear(ClearValue::Float([0.0, 0.0, 0.0, 1.0]));
     // It is drawn twice; without chunks there is an order from the first picture on.
-    let (_, counters) = draw(Skips::NONE.with(Skip::LastOrder), &packets, over_black);
+    let (_, counters) = draw(
+        Optimizations::NONE.with(Optimization::OrderRepair),
+        &packets,
+        over_black,
+    );
     assert_eq!(counters.get(Counter::OrdersRepaired), 1);
 }

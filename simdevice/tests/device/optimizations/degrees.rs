@@ -4,7 +4,7 @@ use super::unchanged::with_bands_of_zeros;
 use super::*;
 
 /// Draws Gaussians, which have coefficients up to degree 2, by each of these degrees in turn; says in which pictures chunks
-/// were made. Every picture is that of a device without skips.
+/// were made. Every picture is that of a device without optimizations.
 fn built(chunk_budget_bytes: u64, degrees: &[u32]) -> Vec<bool> {
     let config = Config {
         chunk_budget_bytes,

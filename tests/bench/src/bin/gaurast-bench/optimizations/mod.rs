@@ -1,4 +1,4 @@
-//! `gaurast-bench skips`: what each skip saves, and what Gaussians cost that nobody sees.
+//! `gaurast-bench optimizations`: what each optimization saves, and what Gaussians cost that nobody sees.
 
 mod instructions;
 
@@ -10,29 +10,29 @@ use serde::Serialize;
 use super::machine::Machine;
 use super::output::{self, Rows, number};
 use super::pair::{Draws, Pair, time};
-use super::worker::SKIPS;
-use super::{BenchError, Extra, SkipsArguments, Source, Workload};
+use super::worker::OPTIMIZATIONS;
+use super::{BenchError, Extra, OptimizationsArguments, Source, Workload};
 
-/// Skips of Gaussian draws, and the counter of each, as the device has them.
+/// Optimizations of Gaussian draws, and the counter of each, as the device has them.
 const COUNTERS: [(&str, &str); 11] = [
-    ("chunks", "outside by chunks"),
-    ("hidden-chunks", "hidden by others"),
+    ("cluster-culling", "outside by chunks"),
+    ("occlusion-culling", "hidden by others"),
     ("bounds", "outside by bounds"),
     ("ellipse", "tiles beside ellipse"),
     ("harmonics", "harmonics unread"),
     ("bands", "bands of zeros"),
     ("blocks", "blocks beside ellipse"),
-    ("saturated", "blocks saturated"),
+    ("early-termination", "blocks saturated"),
     ("empty-tiles", "tiles untouched"),
-    (UNCHANGED, "sets unchanged"),
-    (LAST_ORDER, "orders repaired"),
+    (TEMPORAL_REUSE, "sets unchanged"),
+    (ORDER_REPAIR, "orders repaired"),
 ];
 
 /// What only a still camera shows.
-const UNCHANGED: &str = "unchanged";
+const TEMPORAL_REUSE: &str = "temporal-reuse";
 
 /// What only a camera shows that does not turn.
-const LAST_ORDER: &str = "last-order";
+const ORDER_REPAIR: &str = "order-repair";
 
 /// How a camera goes from frame to frame.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -47,11 +47,11 @@ enum Path {
 }
 
 impl Path {
-    /// The one that shows a skip.
-    fn of(skip: &str) -> Self {
-        match skip {
-            UNCHANGED => Self::Still,
-            LAST_ORDER => Self::Sliding,
+    /// The one that shows an optimization.
+    fn of(optimization: &str) -> Self {
+        match optimization {
+            TEMPORAL_REUSE => Self::Still,
+            ORDER_REPAIR => Self::Sliding,
             _ => Self::Own,
         }
     }
@@ -93,19 +93,19 @@ struct Results {
     machine: Machine,
     threads: usize,
     runs: usize,
-    /// Each skip in each scene.
-    skips: Vec<Saved>,
+    /// Each optimization in each scene.
+    optimizations: Vec<Saved>,
     unseen: Vec<Unseen>,
 }
 
-/// What a skip saves.
+/// What an optimization saves.
 #[derive(Serialize)]
 struct Saved {
     scene: String,
-    skip: &'static str,
+    optimization: &'static str,
     /// What its counter says of a frame.
     counter: f64,
-    /// Milliseconds of a frame with all skips, but those from frame to frame, of which this one alone is on.
+    /// Milliseconds of a frame with all optimizations, but those from frame to frame, of which this one alone is on.
     with: f64,
     /// Milliseconds of a frame with this one off, too.
     without: f64,
@@ -134,14 +134,14 @@ struct Unseen {
 /// varies by.
 const UNSEEN_PER_SEEN: usize = 10;
 
-/// How many times as many views their cost is found from as what a skip saves.
+/// How many times as many views their cost is found from as what an optimization saves.
 const UNSEEN_VIEWS_PER_RUN: usize = 2;
 
 /// How often a view is drawn, if that changes nothing.
 const DRAWS: usize = 3;
 
 /// Runs the comparison.
-pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
+pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> {
     if arguments.instructions {
         return instructions::run(arguments);
     }
@@ -154,7 +154,7 @@ pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
         machine: Machine::this(),
         threads: arguments.threads,
         runs,
-        skips: Vec::new(),
+        optimizations: Vec::new(),
         unseen: Vec::new(),
     };
     let base = Workload::new(Source::Benchmark { count }, SIZE);
@@ -182,13 +182,13 @@ pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
     ];
     for (name, workload) in scenes {
         results
-            .skips
+            .optimizations
             .extend(saved(&name, &workload, arguments.threads, runs)?);
     }
-    for (skip, camera) in [(UNCHANGED, "still"), (LAST_ORDER, "sliding")] {
+    for (optimization, camera) in [(TEMPORAL_REUSE, "still"), (ORDER_REPAIR, "sliding")] {
         let name = format!("{}, {camera} camera", base.source);
-        let saved = saved_by(skip, &name, &base, arguments.threads, runs)?;
-        results.skips.push(saved);
+        let saved = saved_by(optimization, &name, &base, arguments.threads, runs)?;
+        results.optimizations.push(saved);
     }
     let (count, runs) = (UNSEEN_PER_SEEN * count, UNSEEN_VIEWS_PER_RUN * runs);
     let beside = with(Extra::Beside { count });
@@ -204,7 +204,7 @@ pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
     let _ = writeln!(
         stdout(),
         "{line}\n{}\n{}",
-        skip_rows(&results).table(),
+        optimization_rows(&results).table(),
         unseen_rows(&results).table()
     );
     let folder = &arguments.output;
@@ -212,14 +212,14 @@ pub(super) fn run(arguments: &SkipsArguments) -> Result<(), BenchError> {
         let threads = results.threads;
         format!("{line}; {threads} threads, medians of {views} views; processor time")
     };
-    let skips = skip_rows(&results).csv(&about(results.runs));
-    output::write(&folder.join("skips.csv"), &skips)?;
+    let optimizations = optimization_rows(&results).csv(&about(results.runs));
+    output::write(&folder.join("optimizations.csv"), &optimizations)?;
     let unseen = unseen_rows(&results).csv(&about(runs));
     output::write(&folder.join("unseen.csv"), &unseen)?;
-    output::write_json(&folder.join("skips.json"), &results)
+    output::write_json(&folder.join("optimizations.json"), &results)
 }
 
-/// What each skip saves while the camera moves.
+/// What each optimization saves while the camera moves.
 fn saved(
     scene: &str,
     workload: &Workload,
@@ -233,18 +233,18 @@ fn saved(
         .collect()
 }
 
-/// What a skip saves, on the path that shows it.
+/// What an optimization saves, on the path that shows it.
 fn saved_by(
-    skip: &'static str,
+    optimization: &'static str,
     scene: &str,
     workload: &Workload,
     threads: usize,
     runs: usize,
 ) -> Result<Saved, BenchError> {
-    let counter = COUNTERS.iter().find(|(name, _)| *name == skip);
+    let counter = COUNTERS.iter().find(|(name, _)| *name == optimization);
     let counter = counter.map_or("", |(_, counter)| *counter);
-    let path = Path::of(skip);
-    let [with, without] = settings(skip);
+    let path = Path::of(optimization);
+    let [with, without] = settings(optimization);
     let setups = [(workload, &*with), (workload, &*without)];
     let pair = Pair::draw(
         setups,
@@ -256,7 +256,7 @@ fn saved_by(
     let [counted, _] = pair.medians(|frame| frame.counter(counter));
     Ok(Saved {
         scene: scene.to_owned(),
-        skip,
+        optimization,
         counter: counted,
         with,
         without,
@@ -264,12 +264,18 @@ fn saved_by(
     })
 }
 
-/// What the driver leaves out with a skip and without it. What saves from frame to frame is on alone, where that is asked
+/// What the driver leaves out with an optimization and without it. What saves from frame to frame is on alone, where that is asked
 /// for: it would hide what others save.
-fn settings(skip: &str) -> [String; 2] {
-    match Path::of(skip) {
-        Path::Own | Path::Afar => [SKIPS.to_owned(), format!("{SKIPS},-{skip}")],
-        Path::Still | Path::Sliding => [SKIPS.replace(&format!(",-{skip}"), ""), SKIPS.to_owned()],
+fn settings(optimization: &str) -> [String; 2] {
+    match Path::of(optimization) {
+        Path::Own | Path::Afar => [
+            OPTIMIZATIONS.to_owned(),
+            format!("{OPTIMIZATIONS},-{optimization}"),
+        ],
+        Path::Still | Path::Sliding => [
+            OPTIMIZATIONS.replace(&format!(",-{optimization}"), ""),
+            OPTIMIZATIONS.to_owned(),
+        ],
     }
 }
 
@@ -281,7 +287,7 @@ fn unseen(
     runs: usize,
 ) -> Result<Unseen, BenchError> {
     let views = Path::Own.views(workloads[1], runs + 1)?;
-    let setups = workloads.map(|workload| (workload, SKIPS));
+    let setups = workloads.map(|workload| (workload, OPTIMIZATIONS));
     let pair = Pair::draw(setups, threads, &views, Draws::Again(DRAWS))?;
     let each = |with: f64, without: f64| (with - without) * 1e6 / count as f64;
     let [with, without] = pair.medians(time);
@@ -304,20 +310,20 @@ fn spread([lower, _, upper]: [f64; 3]) -> String {
     format!("{lower:.2} to {upper:.2}")
 }
 
-fn skip_rows(results: &Results) -> Rows {
+fn optimization_rows(results: &Results) -> Rows {
     let mut rows = Rows::new(&[
         "scene",
-        "skip",
+        "optimization",
         "counted",
         "ms with",
         "ms without",
         "saved %",
         "quartiles",
     ]);
-    for saved in &results.skips {
+    for saved in &results.optimizations {
         rows.rows.push(vec![
             saved.scene.clone(),
-            saved.skip.to_owned(),
+            saved.optimization.to_owned(),
             number(saved.counter),
             number(saved.with),
             number(saved.without),
