@@ -78,7 +78,6 @@ counters! {
     OutsideByChunks: "optimizations", "outside by chunks", Count, "Gaussians that were not read because the bounds of their chunk are outside the picture";
     HiddenByOthers: "optimizations", "hidden by others", Count, "Gaussians that were not read because others before their chunk finish all pixels that it reaches";
     SetsUnchanged: "optimizations", "sets unchanged", Count, "sets of Gaussians that were drawn as they had been projected, sorted and binned before";
-    OrdersRepaired: "optimizations", "orders repaired", Count, "sets of Gaussians whose order is that of their last picture, repaired instead of sorted anew";
     OutsideByBounds: "optimizations", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
     TilesBesideEllipse: "optimizations", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
     HarmonicsUnread: "optimizations", "harmonics unread", Count, "Gaussians whose spherical harmonics were not read";

@@ -1,7 +1,7 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
-use crate::gaussian::cache::ChunkCache;
-use crate::gaussian::unchanged::LastSets;
+use crate::gaussian::cluster_cache::ChunkCache;
+use crate::gaussian::reuse::ReuseCache;
 use crate::optimizations::Optimizations;
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
 use crate::trace::Recorder;
@@ -88,7 +88,7 @@ pub struct Device {
     level: Level,
     config: Config,
     chunks: ChunkCache,
-    last_sets: LastSets,
+    last_sets: ReuseCache,
     recorder: Arc<Recorder>,
 }
 
@@ -113,7 +113,7 @@ impl Device {
             level,
             config: config.clone(),
             chunks: ChunkCache::default(),
-            last_sets: LastSets::default(),
+            last_sets: ReuseCache::default(),
             recorder: config.recorder.clone().unwrap_or_default(),
         })
     }
@@ -124,7 +124,7 @@ impl Device {
     }
 
     /// What was last made of Gaussians that may be drawn again.
-    pub(crate) fn last_sets(&self) -> &LastSets {
+    pub(crate) fn last_sets(&self) -> &ReuseCache {
         &self.last_sets
     }
 

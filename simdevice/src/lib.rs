@@ -9,7 +9,6 @@
 #![forbid(unsafe_code)]
 
 pub mod bindings;
-mod binning;
 pub mod command_processor;
 pub mod compute;
 pub mod counters;

@@ -37,7 +37,6 @@ optimizations! {
     ClusterCulling: "cluster-culling", OutsideByChunks, "Gaussians that are drawn again are in chunks, of which those outside the picture are not read.";
     OcclusionCulling: "occlusion-culling", HiddenByOthers, "Gaussians that are drawn again are not read in chunks that others hide.";
     TemporalReuse: "temporal-reuse", SetsUnchanged, "Gaussians in memory that only the device writes are not projected, sorted and binned again while neither they nor the view change.";
-    OrderRepair: "order-repair", OrdersRepaired, "Gaussians in memory that only the device writes are not sorted where the order of their last picture needs little repair.";
     Bounds: "bounds", OutsideByBounds, "A Gaussian whose bounding sphere is off the screen is not projected further.";
     Ellipse: "ellipse", TilesBesideEllipse, "A Gaussian is listed only in tiles that its ellipse reaches, not in all of its box.";
     Harmonics: "harmonics", HarmonicsUnread, "Spherical harmonics are read only for Gaussians that reach a tile.";
@@ -179,7 +178,7 @@ mod tests {
                 .parse::<Optimizations>()
                 .unwrap_err()
                 .to_string(),
-            "\"everything\" is neither all nor none nor an optimization, which are cluster-culling, occlusion-culling, temporal-reuse, order-repair, bounds, ellipse, harmonics, bands, blocks, early-termination, \
+            "\"everything\" is neither all nor none nor an optimization, which are cluster-culling, occlusion-culling, temporal-reuse, bounds, ellipse, harmonics, bands, blocks, early-termination, \
              empty-tiles, overwritten-tiles, overwritten-quads, hierarchical-depth, masked-quads, affine"
         );
     }

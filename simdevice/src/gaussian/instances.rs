@@ -4,16 +4,14 @@
 //! direction from which it is seen is turned back by the inverse of A, so that what was trained in its own space is seen
 //! there by an eye that moved with it.
 
-use super::fetch::{BATCH, Batch, Fetcher};
-use super::lanes::{Bits, F32_LANES, Lanes, NO_LANES};
-use super::project::Projection;
-use super::scratch::Scratch;
+use super::attributes::{Batch, Fetcher};
+use super::lanes::{BATCH, Bits, F32_LANES, Lanes};
 use crate::packet::{AttributeStream, GaussianAppend};
 
 /// Matrices by lane, as they are read.
 #[derive(Clone, Debug)]
 pub(super) struct Matrices {
-    rows: [[[f32; F32_LANES]; 4]; 3],
+    pub(super) rows: [[[f32; F32_LANES]; 4]; 3],
     /// Whether all lanes have the same.
     is_uniform: bool,
 }
@@ -24,7 +22,7 @@ pub(super) type Linear = [[f64; 3]; 3];
 /// What matrices make of the kept Gaussians of a batch.
 #[derive(Clone, Debug)]
 pub(super) struct Placed {
-    matrix: [[Lanes; 4]; 3],
+    pub(super) matrix: [[Lanes; 4]; 3],
     /// A vector from the eye in the Gaussians' space, of any length.
     pub(super) toward: [Lanes; 3],
 }
@@ -112,55 +110,9 @@ impl Matrices {
     }
 }
 
-impl Scratch {
-    /// Packs the kept lanes' matrices densely.
-    pub(super) fn gather_matrices(&mut self, matrices: &Matrices) {
-        let placed = self.placed.get_or_insert_with(|| {
-            Box::new(Placed {
-                matrix: [[NO_LANES; 4]; 3],
-                toward: [NO_LANES; 3],
-            })
-        });
-        let to = placed.matrix.as_flattened_mut().iter_mut();
-        for (from, to) in matrices.rows.as_flattened().iter().zip(to) {
-            for (to, &lane) in to.iter_mut().zip(&self.lanes) {
-                *to = from[lane % BATCH].into();
-            }
-        }
-    }
-}
-
-impl Projection {
-    /// Finds the place of the kept Gaussians in camera space, and from where they are seen in their own.
-    pub(super) fn place_by_matrices(&self, scratch: &mut Scratch) {
-        let Some(placed) = &mut scratch.placed else {
-            return;
-        };
-        let r = &self.rotation;
-        for at in 0..scratch.lanes.len().min(BATCH) {
-            let a = placed.linear(at);
-            let p = scratch.position.each_ref().map(|lanes| lanes[at]);
-            let d = [0, 1, 2]
-                .map(|axis| dot(a[axis], p) + (placed.matrix[axis][3][at] - self.eye[axis]));
-            let t = [0, 3, 6].map(|row| d[0] * r[row] + d[1] * r[row + 1] + d[2] * r[row + 2]);
-            // The columns of the inverse, but for the determinant's magnitude.
-            let columns = cofactors(a);
-            let sign = dot(a[0], columns[0]).signum();
-            for axis in 0..3 {
-                scratch.offset[axis][at] = d[axis];
-                scratch.camera[axis][at] = t[axis];
-                let sum =
-                    d[0] * columns[0][axis] + d[1] * columns[1][axis] + d[2] * columns[2][axis];
-                placed.toward[axis][at] = sign * sum;
-            }
-            scratch.depth[at] = t[2];
-        }
-    }
-}
-
 impl Placed {
     /// A kept Gaussian's matrix, without the translation.
-    fn linear(&self, at: usize) -> Linear {
+    pub(super) fn linear(&self, at: usize) -> Linear {
         [0, 1, 2].map(|row| [0, 1, 2].map(|column| self.matrix[row][column][at]))
     }
 
@@ -198,11 +150,11 @@ pub(super) fn inverse(a: Linear) -> (Linear, f64) {
 }
 
 /// The columns of the inverse, times the determinant.
-fn cofactors(a: Linear) -> Linear {
+pub(super) fn cofactors(a: Linear) -> Linear {
     [cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])]
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

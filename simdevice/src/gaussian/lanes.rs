@@ -1,7 +1,9 @@
 //! A batch's lanes: numbers, sets of lanes, and the logarithm.
 
-use super::fetch::BATCH;
 use fearless_simd::{Simd, prelude::*};
+
+/// Gaussians per batch: what preprocessing holds in its caches at a time.
+pub(super) const BATCH: usize = 256;
 
 /// A number for each Gaussian of a batch.
 ///

@@ -8,17 +8,10 @@
 
 use super::footprint::{Ellipse, Reach, Visible};
 use super::splat::Projected;
-use crate::packet::{Camera, CameraModel};
 use devmem::host;
 
 /// The sides to which Gaussians are copied: right and left.
 const SIDES: [f64; 2] = [1.0, -1.0];
-
-/// After how many pixels a camera's picture repeats to the right and to the left, if it does.
-pub(super) fn period(camera: &Camera) -> Option<f64> {
-    let focal = f64::from(camera.focal_length[0]);
-    (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
-}
 
 /// What lies within half a period of a mean at `x`, with a pixel to spare.
 fn near(visible: &Visible, x: f64, period: f64) -> Visible {

@@ -1,18 +1,31 @@
 //! What a worker needs to project a batch of Gaussians.
 
-use super::fetch::BATCH;
+use super::attributes::Attributes;
 use super::footprint::Reach;
-use super::instances::Placed;
-use super::lanes::{Bits, F32_LANES, Lanes, NO_LANES};
-use super::tiles::Reaches;
+use super::instances::{Matrices, Placed};
+use super::lanes::{BATCH, Bits, F32_LANES, Lanes, NO_LANES};
 
-/// Vertex attributes by lane, as they are read.
-#[derive(Clone, Debug)]
-pub(super) struct Attributes {
-    pub(super) position: [[f32; F32_LANES]; 3],
-    pub(super) scale: [[f32; F32_LANES]; 3],
-    pub(super) rotation: [[f32; F32_LANES]; 4],
-    pub(super) opacity: [f32; F32_LANES],
+/// The reach of each lane, as the two words of [`Reach::words`].
+pub(super) struct Reaches(pub(super) [[u64; BATCH + 8]; 2]);
+
+impl Default for Reaches {
+    fn default() -> Self {
+        Self([[0; BATCH + 8]; 2])
+    }
+}
+
+impl Reaches {
+    /// A lane's.
+    #[inline(always)]
+    pub(super) fn get(&self, at: usize) -> Reach {
+        Reach::from_words([self.0[0][at], self.0[1][at]])
+    }
+
+    pub(super) fn set(&mut self, at: usize, reach: &Reach) {
+        let [first, second] = reach.words();
+        self.0[0][at] = first;
+        self.0[1][at] = second;
+    }
 }
 
 /// What becomes of a batch's Gaussians: of those that were kept, densely, in structures of arrays.
@@ -58,40 +71,6 @@ pub(super) struct Flat {
     pub(super) peak: Lanes,
     /// The unit vector from the eye, in the axes of the Gaussians' space.
     pub(super) direction: [Lanes; 3],
-}
-
-impl Default for Attributes {
-    fn default() -> Self {
-        Self {
-            position: [[0.0; F32_LANES]; 3],
-            scale: [[0.0; F32_LANES]; 3],
-            rotation: [[0.0; F32_LANES]; 4],
-            opacity: [0.0; F32_LANES],
-        }
-    }
-}
-
-impl Attributes {
-    /// The second largest scale of a lane.
-    pub(super) fn second_scale(&self, lane: usize) -> f32 {
-        let [a, b, c] = self.scale.each_ref().map(|scale| scale[lane]);
-        a.max(b).min(a.max(c)).min(b.max(c))
-    }
-
-    /// Makes a lane what a lane of others is.
-    pub(super) fn copy_lane(&mut self, to: usize, others: &Self, from: usize) {
-        let copy = |own: &mut [f32; F32_LANES], other: &[f32; F32_LANES]| own[to] = other[from];
-        for (own, other) in self.position.iter_mut().zip(&others.position) {
-            copy(own, other);
-        }
-        for (own, other) in self.scale.iter_mut().zip(&others.scale) {
-            copy(own, other);
-        }
-        for (own, other) in self.rotation.iter_mut().zip(&others.rotation) {
-            copy(own, other);
-        }
-        copy(&mut self.opacity, &others.opacity);
-    }
 }
 
 impl Default for Flat {
@@ -160,5 +139,21 @@ impl Scratch {
             pack(from, to);
         }
         pack(&attributes.opacity, &mut self.opacity);
+    }
+
+    /// Packs the kept lanes' matrices densely.
+    pub(super) fn gather_matrices(&mut self, matrices: &Matrices) {
+        let placed = self.placed.get_or_insert_with(|| {
+            Box::new(Placed {
+                matrix: [[NO_LANES; 4]; 3],
+                toward: [NO_LANES; 3],
+            })
+        });
+        let to = placed.matrix.as_flattened_mut().iter_mut();
+        for (from, to) in matrices.rows.as_flattened().iter().zip(to) {
+            for (to, &lane) in to.iter_mut().zip(&self.lanes) {
+                *to = from[lane % BATCH].into();
+            }
+        }
     }
 }

@@ -1,7 +1,12 @@
 //! Spherical harmonics: the view-dependent colour of a Gaussian, with the signs and order of 3DGS.
 
-use super::fetch::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
+
+/// The coefficients of all degrees up to 4.
+pub(super) const MAX_COEFFICIENTS: usize = 25;
+
+/// Three components of each, and what makes it whole vectors.
+pub(super) const COEFFICIENT_FLOATS: usize = 80;
 
 const C0: f32 = 0.282_094_79;
 const C1: f32 = 0.488_602_51;

@@ -1,7 +1,8 @@
 //! What projection makes of Gaussians: the rasterizer's nine numbers, and what goes with them.
 
 use super::footprint::{Reach, Span};
-use super::rays::RayDepth;
+use super::lanes::BATCH;
+use super::ray_depth::RayDepth;
 use super::scratch::Flat;
 use super::surfel::Surfel;
 use crate::counters::Counters;
@@ -80,6 +81,12 @@ pub(crate) fn half_room(factor: [f64; 3], room: f64) -> f64 {
     } else {
         f64::INFINITY
     }
+}
+
+/// The batch of a survivor's name, and its place there.
+#[inline(always)]
+pub(crate) fn locate(name: u32) -> (usize, usize) {
+    (name as usize / BATCH, name as usize % BATCH)
 }
 
 /// What came of a batch.

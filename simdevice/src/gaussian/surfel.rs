@@ -5,7 +5,10 @@
 //! `[a b t]`. With `r` at `d` pixels from the mean, the numerators are linear in `d` and zero at the mean, where they lose
 //! nothing; `w` is linear, too. Everything is binary64, without fused operations.
 
+use super::camera::{LN_2, ViewConstants};
 use super::footprint::{Ellipse, Reach, Span, Visible};
+use super::ray_depth;
+use super::scratch::Scratch;
 use crate::packet::CameraModel;
 use fearless_simd::{Simd, f64x8, prelude::*};
 
@@ -245,6 +248,37 @@ impl Surfel {
         }
         distance * UNIT
     }
+}
+
+/// A kept lane as a 2D Gaussian, and the tiles that it reaches, if there are any.
+pub(super) fn surfel_of(
+    view: &ViewConstants,
+    at: usize,
+    scratch: &Scratch,
+    spans: &mut Vec<Span>,
+) -> (Surfel, Option<Reach>) {
+    let [w, x, y, z] = &*scratch.rotation;
+    let axes = ray_depth::axes([w[at], x[at], y[at], z[at]]);
+    let r = &view.rotation;
+    let placed = |axis: usize| {
+        let [x, y, z] = axes[axis].map(|c| c * scratch.scale[axis][at]);
+        [0, 1, 2].map(|row| x * r[3 * row] + y * r[3 * row + 1] + z * r[3 * row + 2])
+    };
+    let [x, y, z] = &*scratch.camera;
+    let mut surfel = Surfel::new(&Placed {
+        model: view.model,
+        focal: view.focal,
+        near: view.near.into(),
+        axes: [placed(0), placed(1)],
+        centre: [x[at], y[at], z[at]],
+    });
+    let flat = &*scratch.flat;
+    // As wide as for volumes: see there.
+    let room = flat.log2_opacity[at] - view.log2_floor;
+    let extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+    let mean = [flat.mean[0][at], flat.mean[1][at]];
+    let reach = surfel.reach(mean, (extent, view.low_pass), &view.visible, spans);
+    (surfel, reach)
 }
 
 #[cfg(test)]

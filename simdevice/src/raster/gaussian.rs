@@ -35,7 +35,8 @@ use super::DepthCode;
 use crate::counters::{Counter, Counters};
 use crate::gaussian::depth::Trend;
 use crate::gaussian::splat::Splat;
-use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
+use crate::gaussian::splat::locate;
+use crate::gaussian::{GaussianDraw, TILE_SIZE};
 use crate::optimizations::{Optimization, Optimizations};
 use crate::trace::{self, Run, TileWork};
 use approximation::Way;
@@ -179,7 +180,7 @@ impl GaussianTile {
         if DEPTH == FIND_MEAN {
             to.clear_means();
         }
-        if list.is_empty() && draw.sorted.tiles.stream().is_none() {
+        if list.is_empty() && draw.sorted.tiles.walk().is_none() {
             return;
         }
         let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
@@ -196,7 +197,7 @@ impl GaussianTile {
             way: Way::of(&draw.state, &mode, DEPTH),
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
-        let work = match draw.sorted.tiles.stream() {
+        let work = match draw.sorted.tiles.walk() {
             None => self.composite_list::<DEPTH>(level, &task, layer, runs.as_mut()),
             Some(stream) => {
                 self.composite_stream::<DEPTH>(level, &task, stream, layer, runs.as_mut())
@@ -254,7 +255,7 @@ impl GaussianTile {
             },
             way: Way::EXACT,
         };
-        match draw.sorted.tiles.stream() {
+        match draw.sorted.tiles.walk() {
             None => self.composite_list::<FIND_REACHED>(level, &task, LAYER, None),
             Some(stream) => {
                 self.composite_stream::<FIND_REACHED>(level, &task, stream, LAYER, None)

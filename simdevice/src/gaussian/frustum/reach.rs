@@ -1,13 +1,27 @@
 //! How far from their means' places Gaussians reach in a picture, by what they are and how they are projected: what the
 //! sides of a frustum are moved out by.
 
-use super::{Frustum, Plane, dot, length};
-use crate::gaussian::lanes::{Bits, F32_LANES};
-use crate::gaussian::project::Projection;
-use crate::gaussian::scratch::Attributes;
+use crate::gaussian::camera::ViewConstants;
 use crate::gaussian::splat::{LEAST_HALF_FACTOR, half_room};
 use crate::packet::{CameraModel, GaussianGeometry, GaussianPrecision};
 use std::f64::consts::LN_2;
+
+/// A Gaussian at `d` from the eye whose largest scale is `s` is outside where
+/// `normal . d + per_scale s + offset < 0`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Plane {
+    pub(super) normal: [f64; 3],
+    pub(super) per_scale: f64,
+    pub(super) offset: f64,
+}
+
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(super) fn length(v: [f64; 3]) -> f64 {
+    dot(v, v).sqrt()
+}
 
 /// How much wider than exact bounds are, so that rounding loses nothing.
 const MARGIN: f64 = 1e-5;
@@ -34,7 +48,7 @@ struct Reach {
 
 /// The sides of a camera's frustum, for Gaussians whose opacities are at most `opacity`, and the plane that says for which of
 /// them they hold.
-pub(super) fn sides(projection: &Projection, opacity: f32) -> (Vec<Plane>, Option<Plane>) {
+pub(super) fn sides(projection: &ViewConstants, opacity: f32) -> (Vec<Plane>, Option<Plane>) {
     let room = f64::from(opacity.max(1.0)).log2() - projection.log2_floor;
     let is_half = projection.precision == GaussianPrecision::Float16;
     let reach = if is_half {
@@ -116,7 +130,7 @@ struct Side {
 
 impl Side {
     /// The side along `axis` that `sign` (1: the lower coordinates) names.
-    fn new(projection: &Projection, axis: usize, sign: f64, reach: &Reach) -> Self {
+    fn new(projection: &ViewConstants, axis: usize, sign: f64, reach: &Reach) -> Self {
         let (across, forward) = (row(projection, axis), row(projection, 2));
         let focal = projection.focal[axis];
         let [first, end] = projection.visible_range(axis);
@@ -159,7 +173,7 @@ impl Side {
     /// D from the mean, with `f D z <= f r (1 + |u|) / (1 - Q)`, r the points' distance and `r <= Q z`. Neither does the
     /// transform's mean, and of its variance the middle point makes `2 D^2` at most and the others one more. All that reaches
     /// `share = Q reach` of `f |u| z <= |A| + |c| z` toward the edge, and `f r reach` besides.
-    fn unscented(&self, projection: &Projection, reach: &Reach) -> Plane {
+    fn unscented(&self, projection: &ViewConstants, reach: &Reach) -> Plane {
         let points = Points::new(projection, reach);
         let straight = self.plane(reach);
         let of_points = self.focal * points.reach * points.per_scale * (1.0 + MARGIN);
@@ -189,7 +203,7 @@ struct Points {
 }
 
 impl Points {
-    fn new(projection: &Projection, reach: &Reach) -> Self {
+    fn new(projection: &ViewConstants, reach: &Reach) -> Self {
         let growth = (0..3).map(|axis| length(row(projection, axis)));
         let of_places = 1.0 + 3.0f64.sqrt() * reach.per_deviation;
         let nearness = UNSCENTED_SHARE / (of_places + UNSCENTED_SHARE);
@@ -201,7 +215,7 @@ impl Points {
     }
 
     /// Outside of this plane Gaussians are small.
-    fn small(&self, projection: &Projection) -> Plane {
+    fn small(&self, projection: &ViewConstants) -> Plane {
         Plane {
             normal: row(projection, 2).map(|forward| -self.nearness * forward),
             per_scale: self.per_scale,
@@ -212,7 +226,7 @@ impl Points {
 
 /// Outside of this plane Gaussians whose deviations are at most `deviation` for each unit of scale have those that `reach`
 /// asks for.
-fn small_deviations(projection: &Projection, deviation: f64, reach: &Reach) -> Plane {
+fn small_deviations(projection: &ViewConstants, deviation: f64, reach: &Reach) -> Plane {
     let (normal, offset) = match projection.model {
         CameraModel::Orthographic => ([0.0; 3], -reach.greatest),
         _ => (
@@ -228,30 +242,11 @@ fn small_deviations(projection: &Projection, deviation: f64, reach: &Reach) -> P
 }
 
 /// A row of the camera's rotation.
-fn row(projection: &Projection, axis: usize) -> [f64; 3] {
+fn row(projection: &ViewConstants, axis: usize) -> [f64; 3] {
     [0, 1, 2].map(|i| projection.rotation[3 * axis + i])
 }
 
 /// `p a + q b`.
 fn add(a: [f64; 3], p: f64, b: [f64; 3], q: f64) -> [f64; 3] {
     [0, 1, 2].map(|i| p * a[i] + q * b[i])
-}
-
-impl Frustum {
-    /// Those of the lanes whose Gaussians are so small that the sides hold for them.
-    pub(super) fn small_lanes(&self, attributes: &Attributes, len: usize) -> Option<Bits> {
-        let small = self.small?;
-        let mut lanes = Bits::default();
-        for lane in 0..len.min(attributes.opacity.len()) {
-            let at = |of: &[f32; F32_LANES]| f64::from(of[lane]);
-            let position = attributes.position.each_ref().map(at);
-            let scale = attributes.scale.each_ref().map(at);
-            let d = [0, 1, 2].map(|axis| position[axis] - self.eye[axis]);
-            let scale = scale.into_iter().fold(0.0, f64::max);
-            // Binary64's errors are far below the margins.
-            let value = dot(small.normal, d) + small.per_scale * scale + small.offset;
-            lanes.set_one(lane, value < 0.0);
-        }
-        Some(lanes)
-    }
 }

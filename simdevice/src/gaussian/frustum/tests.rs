@@ -3,10 +3,10 @@
 use super::*;
 use crate::device::SimdLevel;
 use crate::format::Format;
-use crate::gaussian::chunks::Harmonics;
-use crate::gaussian::fetch::{BATCH, Batch, CoefficientReader};
+use crate::gaussian::attributes::{Batch, CoefficientReader, Harmonics};
 use crate::gaussian::footprint::Visible;
-use crate::gaussian::project::Source;
+use crate::gaussian::lanes::BATCH;
+use crate::gaussian::preprocess::{Source, project};
 use crate::gaussian::scratch::Scratch;
 use crate::gaussian::splat::Projected;
 use crate::gaussian::surfel::Surfel;
@@ -162,7 +162,7 @@ fn what_is_outside_is_drawn_nowhere() {
                     right: 400,
                     bottom: 400,
                 };
-                let projection = Projection::new(
+                let constants = ViewConstants::new(
                     &state,
                     &camera,
                     &viewport,
@@ -170,7 +170,7 @@ fn what_is_outside_is_drawn_nowhere() {
                     None,
                     Optimizations::NONE,
                 );
-                let frustum = Frustum::new(&projection, 1.0);
+                let frustum = Frustum::new(&constants, 1.0);
                 let attributes = around_edges(&mut rng, geometry == GaussianGeometry::Surfel);
                 let source = Source {
                     reader: CoefficientReader::new(&append.attributes.spherical_harmonics),
@@ -186,7 +186,7 @@ fn what_is_outside_is_drawn_nowhere() {
                 let mut scratch = Scratch::new();
                 let outside = dispatch!(level, simd => {
                     let lane = |lane: usize| lane as u32;
-                    projection.run(simd, &source, &mut scratch, lane, &mut out);
+                    project(&constants, simd, &source, &mut scratch, lane, &mut out);
                     frustum.lanes_outside(simd, &attributes, BATCH)
                 });
                 drawn += out.keys.len();

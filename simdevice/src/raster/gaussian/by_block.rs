@@ -4,10 +4,11 @@
 use super::chunk::Record;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::{BLOCKS, CHUNK, GaussianTile, NO_DEPTH, Task, Work, pixels::falls_64, wide_sums};
-use crate::gaussian::rays::RayDepths;
+use crate::gaussian::GaussianDraw;
+use crate::gaussian::ray_depth::RayDepths;
+use crate::gaussian::splat::locate;
 use crate::gaussian::splat::{Splat, half_room};
 use crate::gaussian::surfel::Surfel;
-use crate::gaussian::{GaussianDraw, locate};
 use crate::optimizations::Optimization;
 use crate::packet::GaussianPrecision;
 use crate::trace::{self, Run};

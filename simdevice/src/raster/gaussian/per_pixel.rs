@@ -8,8 +8,8 @@
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::layer::Layer;
 use super::{BLOCKS, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Work};
-use crate::gaussian::locate;
-use crate::gaussian::rays::{PixelRays, RayDepths, Rays, ordered_key};
+use crate::gaussian::ray_depth::{PixelRays, RayDepths, Rays, ordered_key};
+use crate::gaussian::splat::locate;
 use crate::trace::Run;
 use devmem::host;
 use fearless_simd::{Simd, f32x16, prelude::*};

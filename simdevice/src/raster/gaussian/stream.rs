@@ -1,8 +1,8 @@
 //! Tiles of draws that have no lists, since those would be too long.
 
 use super::{DepthMode, GaussianTile, Optimization, Run, Task, TileMode, Work};
-use crate::binning::Stream;
 use crate::gaussian::TILE_SIZE;
+use crate::gaussian::tile_lists::SortedWalk;
 use devmem::dispatch;
 use fearless_simd::Level;
 
@@ -15,7 +15,7 @@ impl GaussianTile {
         &mut self,
         level: Level,
         task: &Task<'_>,
-        stream: &Stream,
+        stream: &SortedWalk,
         layer: usize,
         mut runs: Option<&mut Vec<Run>>,
     ) -> Work {

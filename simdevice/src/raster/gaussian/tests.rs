@@ -10,7 +10,7 @@ use super::exp2::{
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;
-use crate::gaussian::GaussianSet;
+use crate::gaussian::{GaussianSet, sort_and_bin};
 use crate::packet::*;
 use devmem::Allocation;
 use fearless_simd::f32x16;
@@ -140,7 +140,7 @@ fn draw_with_depth(
     };
     let mut set = GaussianSet::begin(&begin, bounds, depth.map(|(format, _)| format));
     set.append(&append);
-    set.resolve(device, &mut Counters::default()).unwrap()
+    sort_and_bin(set, device, &mut Counters::default()).unwrap()
 }
 
 fn defaults() -> GaussianState {

@@ -4,7 +4,6 @@
 
 mod degrees;
 mod hidden;
-mod last_order;
 mod unchanged;
 
 use crate::common::*;
@@ -386,7 +385,6 @@ fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
             LoadOp::Load,
         ),
         ("bands", unchanged::with_bands_of_zeros(), over_black),
-        ("from two sides", last_order::from_two_sides(), over_black),
         ("alone", gaussians_in(false, 13, 300, OVER), over_black),
         ("ties", ties, LoadOp::Load),
         ("several", several.concat(), LoadOp::Load),

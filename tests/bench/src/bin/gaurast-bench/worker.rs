@@ -153,8 +153,8 @@ pub struct Worker {
 /// A worker that was not asked for so long is warmed up again.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same or nearly so.
-pub const OPTIMIZATIONS: &str = "all,-temporal-reuse,-order-repair";
+/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same.
+pub const OPTIMIZATIONS: &str = "all,-temporal-reuse";
 
 impl Worker {
     /// Starts a worker that shares its work among `threads`; `None` if its device is not there.

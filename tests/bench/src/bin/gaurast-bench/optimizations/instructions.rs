@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::io::{Write, stdout};
 
-use super::{ORDER_REPAIR, Path, TEMPORAL_REUSE};
+use super::{Path, TEMPORAL_REUSE};
 use crate::callgrind;
 use crate::counts;
 use crate::output::{self, Rows, number};
@@ -14,9 +14,8 @@ use crate::{BenchError, OptimizationsArguments};
 /// The pictures' size.
 const SIZE: [u32; 2] = [640, 360];
 
-/// Gaussians of most scenes, and of the one that a camera slides through.
+/// Gaussians of a scene.
 const COUNT: usize = 100_000;
-const MANY: usize = 1_000_000;
 
 /// The frame that makes chunks is the second one; they serve the third.
 const WARM: usize = 3;
@@ -86,7 +85,6 @@ impl Scene {
 /// Every optimization, with scenes in which it may save something.
 fn cases() -> Vec<(&'static str, Scene)> {
     let base = Workload::new(Source::Benchmark { count: COUNT }, SIZE);
-    let many = Workload::new(Source::Benchmark { count: MANY }, SIZE);
     let beside = Workload {
         extra: Some(Extra::Beside { count: COUNT }),
         ..base.clone()
@@ -115,8 +113,6 @@ fn cases() -> Vec<(&'static str, Scene)> {
         WARM,
     );
     let still = Scene::gaussians("100k Gaussians, a camera at rest", &base, Path::Still, WARM);
-    let slid =
-        |workload: &Workload, name: &str| Scene::gaussians(name, workload, Path::Sliding, WARM);
     let small = || Scene::counted("small triangles", "small-triangles");
     let layers = || Scene::counted("layers that hide one another", "layered-triangles");
     let floor = || Scene::counted("a textured floor", "textured-triangles");
@@ -127,11 +123,6 @@ fn cases() -> Vec<(&'static str, Scene)> {
             whole(&behind, "100k Gaussians behind a wall"),
         ),
         (TEMPORAL_REUSE, still),
-        (
-            ORDER_REPAIR,
-            slid(&base, "100k Gaussians, a sliding camera"),
-        ),
-        (ORDER_REPAIR, slid(&many, "1M Gaussians, a sliding camera")),
         ("bounds", room()),
         ("bounds", half_seen()),
         ("bounds", first),

@@ -14,7 +14,7 @@ use super::worker::OPTIMIZATIONS;
 use super::{BenchError, Extra, OptimizationsArguments, Source, Workload};
 
 /// Optimizations of Gaussian draws, and the counter of each, as the device has them.
-const COUNTERS: [(&str, &str); 11] = [
+const COUNTERS: [(&str, &str); 10] = [
     ("cluster-culling", "outside by chunks"),
     ("occlusion-culling", "hidden by others"),
     ("bounds", "outside by bounds"),
@@ -25,14 +25,10 @@ const COUNTERS: [(&str, &str); 11] = [
     ("early-termination", "blocks saturated"),
     ("empty-tiles", "tiles untouched"),
     (TEMPORAL_REUSE, "sets unchanged"),
-    (ORDER_REPAIR, "orders repaired"),
 ];
 
 /// What only a still camera shows.
 const TEMPORAL_REUSE: &str = "temporal-reuse";
-
-/// What only a camera shows that does not turn.
-const ORDER_REPAIR: &str = "order-repair";
 
 /// How a camera goes from frame to frame.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -42,8 +38,6 @@ enum Path {
     Still,
     /// The workload's, five times as far away.
     Afar,
-    /// A hundredth of its distance from the origin to its right.
-    Sliding,
 }
 
 impl Path {
@@ -51,7 +45,6 @@ impl Path {
     fn of(optimization: &str) -> Self {
         match optimization {
             TEMPORAL_REUSE => Self::Still,
-            ORDER_REPAIR => Self::Sliding,
             _ => Self::Own,
         }
     }
@@ -65,12 +58,6 @@ impl Path {
             if self == Self::Afar {
                 view.eye = view.eye.map(|part| 5.0 * part);
             }
-            if self == Self::Sliding {
-                let distance = view.eye.iter().map(|part| part * part).sum::<f64>().sqrt();
-                for (eye, right) in view.eye.iter_mut().zip(view.rotation[0]) {
-                    *eye += 0.01 * distance * frame as f64 * right;
-                }
-            }
             view
         };
         Ok((0..frames).map(view).collect())
@@ -80,7 +67,7 @@ impl Path {
     fn draws(self) -> Draws {
         match self {
             Self::Own | Self::Afar => Draws::Again(DRAWS),
-            Self::Still | Self::Sliding => Draws::Once,
+            Self::Still => Draws::Once,
         }
     }
 }
@@ -185,11 +172,9 @@ pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> 
             .optimizations
             .extend(saved(&name, &workload, arguments.threads, runs)?);
     }
-    for (optimization, camera) in [(TEMPORAL_REUSE, "still"), (ORDER_REPAIR, "sliding")] {
-        let name = format!("{}, {camera} camera", base.source);
-        let saved = saved_by(optimization, &name, &base, arguments.threads, runs)?;
-        results.optimizations.push(saved);
-    }
+    let name = format!("{}, still camera", base.source);
+    let saved = saved_by(TEMPORAL_REUSE, &name, &base, arguments.threads, runs)?;
+    results.optimizations.push(saved);
     let (count, runs) = (UNSEEN_PER_SEEN * count, UNSEEN_VIEWS_PER_RUN * runs);
     let beside = with(Extra::Beside { count });
     let pairs = [
@@ -272,7 +257,7 @@ fn settings(optimization: &str) -> [String; 2] {
             OPTIMIZATIONS.to_owned(),
             format!("{OPTIMIZATIONS},-{optimization}"),
         ],
-        Path::Still | Path::Sliding => [
+        Path::Still => [
             OPTIMIZATIONS.replace(&format!(",-{optimization}"), ""),
             OPTIMIZATIONS.to_owned(),
         ],

@@ -2,11 +2,15 @@
 //! once is drawn faster without them. They live in the memory that they are derived from: when that is freed or written,
 //! they are gone.
 
-use super::chunks::{self, Chunks};
-use crate::format::Format;
+use super::attributes::{SourceFingerprint, is_device_local};
+use super::clusters::{self, Chunks};
+use super::set::GaussianSet;
+use crate::counters::{Counter, Counters};
+use crate::device::Device;
+use crate::optimizations::Optimization;
 use crate::packet::{AttributeStream, GaussianAppend};
-use devmem::Allocation;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::time::Instant;
 
 /// Draws of fewer Gaussians have no chunks.
 const LEAST_COUNT: u32 = 512;
@@ -14,22 +18,11 @@ const LEAST_COUNT: u32 = 512;
 /// Draws that are remembered.
 const MAX_ENTRIES: usize = 256;
 
-/// What an attribute is read from.
-#[derive(Debug)]
-pub(super) struct Stream {
-    memory: Weak<Allocation>,
-    generation: u64,
-    /// Offset and size of the buffer, stride and offset of the attribute.
-    place: [u64; 4],
-    format: Format,
-    instance_divisor: Option<u32>,
-}
-
 /// A draw that was seen.
 #[derive(Debug)]
 struct Entry {
     /// Those of positions, scales, rotations, opacities and, if they are in the chunks, spherical harmonics.
-    streams: Vec<Stream>,
+    streams: Vec<SourceFingerprint>,
     first: u32,
     count: u32,
     /// Whether they are 2D Gaussians, whose third scale means nothing.
@@ -53,45 +46,6 @@ struct Entries {
 #[derive(Debug, Default)]
 pub(crate) struct ChunkCache(Mutex<Entries>);
 
-impl Stream {
-    pub(super) fn new(stream: &AttributeStream) -> Self {
-        let buffer = &stream.buffer;
-        Self {
-            memory: Arc::downgrade(&buffer.memory),
-            generation: buffer.memory.generation(),
-            place: [
-                buffer.offset,
-                buffer.size,
-                stream.stride.into(),
-                stream.offset.into(),
-            ],
-            format: stream.format,
-            instance_divisor: stream.instance_divisor,
-        }
-    }
-
-    /// The memory, while it is there.
-    pub(super) fn memory(&self) -> Option<Arc<Allocation>> {
-        self.memory.upgrade()
-    }
-
-    /// Whether the memory still holds what it held.
-    pub(super) fn is_current(&self) -> bool {
-        let memory = self.memory.upgrade();
-        memory.is_some_and(|memory| memory.generation() == self.generation)
-    }
-
-    pub(super) fn is_same(&self, other: &Self) -> bool {
-        let how = |own: &Self| (own.generation, own.format, own.instance_divisor);
-        self.is_same_buffer(other) && how(self) == how(other)
-    }
-
-    /// Whether both are read from the same place, whatever is there.
-    pub(super) fn is_same_buffer(&self, other: &Self) -> bool {
-        self.memory.ptr_eq(&other.memory) && self.place == other.place
-    }
-}
-
 impl Entry {
     fn new(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
         let attributes = &append.attributes;
@@ -99,13 +53,13 @@ impl Entry {
         let shapes = shapes(append).into_iter();
         let streams = shapes.chain(harmonics.filter(|_| with_harmonics));
         Self {
-            streams: streams.map(Stream::new).collect(),
+            streams: streams.map(SourceFingerprint::new).collect(),
             first: append.first,
             count: append.count,
             is_flat,
             used: 0,
             chunks: Weak::new(),
-            bytes: chunks::memory_bytes(append, with_harmonics),
+            bytes: clusters::memory_bytes(append, with_harmonics),
         }
     }
 
@@ -141,7 +95,7 @@ impl Entry {
         let memory = self
             .streams
             .first()
-            .and_then(|positions| positions.memory.upgrade());
+            .and_then(|positions| positions.memory());
         if let Some((memory, chunks)) = memory.zip(self.chunks.upgrade()) {
             memory.drop_derived(&(chunks as _));
         }
@@ -184,11 +138,11 @@ impl ChunkCache {
         budget: u64,
         build: impl FnOnce(bool) -> Chunks,
     ) -> Option<Arc<Chunks>> {
-        if !is_eligible(append) || chunks::memory_bytes(append, false) > budget {
+        if !is_eligible(append) || clusters::memory_bytes(append, false) > budget {
             return None;
         }
         let with_harmonics = append.attributes.spherical_harmonics.iter().all(is_fixed)
-            && chunks::memory_bytes(append, true) <= budget;
+            && clusters::memory_bytes(append, true) <= budget;
         // Generations are read before the memory, so that what is written meanwhile makes them old.
         let mut drawn = Entry::new(append, is_flat, with_harmonics);
         {
@@ -196,7 +150,7 @@ impl ChunkCache {
             entries.now += 1;
             drawn.used = entries.now;
             entries.entries.retain(|entry| {
-                let current = entry.streams.iter().all(Stream::is_current);
+                let current = entry.streams.iter().all(SourceFingerprint::is_current);
                 if !current {
                     entry.release();
                 }
@@ -234,6 +188,32 @@ impl ChunkCache {
     }
 }
 
+/// The chunks of each append that has some.
+pub(super) fn find(
+    set: &GaussianSet,
+    device: &Device,
+    counters: &mut Counters,
+) -> Vec<Option<Arc<Chunks>>> {
+    let config = device.config();
+    let mut found = vec![None; set.appends.len()];
+    if !config.optimizations.has(Optimization::ClusterCulling) {
+        return found;
+    }
+    let is_flat = set.is_flat();
+    for (append, found) in set.appends.iter().zip(&mut found) {
+        let build = |with_harmonics| {
+            let started = Instant::now();
+            let chunks = device.install(|| Chunks::build(append, is_flat, with_harmonics));
+            counters.add(Counter::ChunksBuilt, chunks.chunks.len() as u64);
+            counters.add(Counter::ChunkTime, started.elapsed().as_nanos() as u64);
+            chunks
+        };
+        let cache = device.chunks();
+        *found = cache.get(append, is_flat, config.chunk_budget_bytes, build);
+    }
+    found
+}
+
 /// The attributes that every chunk holds.
 fn shapes(append: &GaussianAppend) -> [&AttributeStream; 4] {
     let attributes = &append.attributes;
@@ -243,11 +223,6 @@ fn shapes(append: &GaussianAppend) -> [&AttributeStream; 4] {
         &attributes.rotation,
         &attributes.opacity,
     ]
-}
-
-/// Whether an attribute is in memory that only the device writes.
-pub(super) fn is_device_local(stream: &AttributeStream) -> bool {
-    !stream.buffer.memory.is_host_visible()
 }
 
 /// Whether it is, and read by vertex.

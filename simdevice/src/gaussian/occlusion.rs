@@ -3,15 +3,16 @@
 //! all finished by then, nothing farther away contributes to it, whatever else is drawn; what reaches only such tiles is
 //! hidden. The answer is conservative, and the picture the same.
 
-use super::chunks::{Bounds, Chunk, Chunks};
-use super::fetch::BATCH;
+use super::attributes::Attributes;
+use super::camera::ViewConstants;
+use super::clusters::{Chunk, Chunks};
 use super::footprint::{TILE_SIZE, Visible};
-use super::frustum::Frustum;
-use super::jobs::{Job, Part};
-use super::project::Projection;
-use super::scratch::Attributes;
+use super::frustum::{Bounds, Frustum};
+use super::lanes::BATCH;
+use super::preprocess::{Job, Part, Preprocessor};
+use super::set::GaussianSet;
+use super::sort;
 use super::splat::{Projected, Splat};
-use super::{GaussianSet, Workers};
 use crate::counters::{Counter, Counters};
 use crate::optimizations::Optimization;
 use crate::packet::draw::DepthStencil;
@@ -40,16 +41,16 @@ const TAKING: usize = 8;
 const MARGIN: f64 = 1e-3;
 
 /// What is hidden.
-pub(super) struct Hidden {
+pub(super) struct OcclusionMap {
     /// The whole picture, as far as anything is seen.
     whole: Frustum,
     /// Its parts, each as far as anything is seen there.
     regions: Vec<Frustum>,
 }
 
-impl Hidden {
+impl OcclusionMap {
     /// Whether nothing of a chunk is seen that is not placed by a model; its Gaussians are counted then.
-    pub(super) fn leaves_out(&self, chunk: &Chunk, counters: &mut Counters) -> bool {
+    pub(super) fn cull_cluster(&self, chunk: &Chunk, counters: &mut Counters) -> bool {
         if !self.hides(&chunk.bounds) {
             return false;
         }
@@ -65,67 +66,64 @@ impl Hidden {
     }
 }
 
-impl GaussianSet {
-    /// What screens hide; `None` if that is nothing, or not to be known.
-    pub(super) fn find_hidden(
-        &self,
-        workers: &Workers<'_>,
-        chunks: &[Option<Arc<Chunks>>],
-    ) -> Option<Hidden> {
-        let projection = workers.projection;
-        if !self.may_hide(workers) {
-            return None;
-        }
-        let mut found = Vec::new();
-        for (append, chunks) in self.appends.iter().zip(chunks) {
-            if let Some(chunks) = chunks
-                && !append.attributes.model.is_some()
-            {
-                let frustum = Arc::new(Frustum::new(projection, chunks.opacity));
-                let screens = large_screens(projection, &frustum, chunks);
-                found.push((append, frustum, screens));
-            }
-        }
-        let mut jobs = Vec::new();
-        for (append, frustum, screens) in &found {
-            jobs.extend(screens.iter().map(|chunk| Job {
-                append,
-                instance: append.first_instance,
-                sequence: 0,
-                number: 0,
-                has_harmonics: false,
-                part: Part::Chunk(chunk),
-                frustum: Arc::clone(frustum),
-            }));
-        }
-        if jobs.is_empty() {
-            return None;
-        }
-        let mut light = Light::new(self.bounds, &self.begin.state);
-        light.pass(&workers.run(&jobs));
-        light.hidden(projection, chunks)
+/// What screens hide; `None` if that is nothing, or not to be known.
+pub(super) fn find(
+    set: &GaussianSet,
+    preprocessor: &Preprocessor<'_>,
+    chunks: &[Option<Arc<Chunks>>],
+) -> Option<OcclusionMap> {
+    let constants = preprocessor.constants;
+    if !may_hide(set, preprocessor) {
+        return None;
     }
+    let mut found = Vec::new();
+    for (append, chunks) in set.appends.iter().zip(chunks) {
+        if let Some(chunks) = chunks
+            && !append.attributes.model.is_some()
+        {
+            let frustum = Arc::new(Frustum::new(constants, chunks.opacity));
+            let screens = large_screens(constants, &frustum, chunks);
+            found.push((append, frustum, screens));
+        }
+    }
+    let mut jobs = Vec::new();
+    for (append, frustum, screens) in &found {
+        jobs.extend(screens.iter().map(|chunk| Job {
+            append,
+            instance: append.first_instance,
+            sequence: 0,
+            has_harmonics: false,
+            part: Part::Chunk(chunk),
+            frustum: Arc::clone(frustum),
+        }));
+    }
+    if jobs.is_empty() {
+        return None;
+    }
+    let mut light = TileTransmittance::new(set.bounds, &set.begin.state);
+    light.pass(&preprocessor.run(&jobs));
+    light.occlusion(constants, chunks)
+}
 
-    /// Whether a finished pixel is all that it takes for what is farther away not to be seen.
-    fn may_hide(&self, workers: &Workers<'_>) -> bool {
-        let state = &self.begin.state;
-        let is_along_axis = matches!(
-            workers.projection.model,
-            CameraModel::Pinhole | CameraModel::Orthographic
-        );
-        workers.projection.optimizations.has(Optimization::OcclusionCulling)
-            // What was recorded is what hardware without this does.
-            && workers.device.recorder().is_none()
-            && is_along_axis
-            && state.order == GaussianOrder::ViewDepth
-            && state.geometry == GaussianGeometry::Volume
-            && state.precision == GaussianPrecision::Float32
-            && least_light(state) > 0.0
-            // What is tested may not take the light that it could.
-            && state.depth_stencil == DepthStencil::default()
-            && self.resolve.is_none()
-            && !self.bounds.is_empty()
-    }
+/// Whether a finished pixel is all that it takes for what is farther away not to be seen.
+fn may_hide(set: &GaussianSet, preprocessor: &Preprocessor<'_>) -> bool {
+    let state = &set.begin.state;
+    let is_along_axis = matches!(
+        preprocessor.constants.model,
+        CameraModel::Pinhole | CameraModel::Orthographic
+    );
+    preprocessor.constants.optimizations.has(Optimization::OcclusionCulling)
+        // What was recorded is what hardware without this does.
+        && preprocessor.device.recorder().is_none()
+        && is_along_axis
+        && state.order == GaussianOrder::ViewDepth
+        && state.geometry == GaussianGeometry::Volume
+        && state.precision == GaussianPrecision::Float32
+        && least_light(state) > 0.0
+        // What is tested may not take the light that it could.
+        && state.depth_stencil == DepthStencil::default()
+        && set.resolve.is_none()
+        && !set.bounds.is_empty()
 }
 
 /// What is behind less light than this is not drawn.
@@ -135,14 +133,14 @@ fn least_light(state: &GaussianState) -> f32 {
 }
 
 /// The screens of chunks that may be wide enough in the picture, packed.
-fn large_screens(projection: &Projection, frustum: &Frustum, chunks: &Chunks) -> Vec<Chunk> {
+fn large_screens(constants: &ViewConstants, frustum: &Frustum, chunks: &Chunks) -> Vec<Chunk> {
     let mut packed: Vec<Chunk> = Vec::new();
     for chunk in &chunks.screens {
         if frustum.excludes(&chunk.bounds).is_some() {
             continue;
         }
         for lane in 0..chunk.numbers.len() {
-            if is_large(projection, &chunk.attributes, lane) {
+            if is_large(constants, &chunk.attributes, lane) {
                 match packed.last_mut() {
                     Some(last) if last.numbers.len() < BATCH => last.push(chunk, lane),
                     _ => packed.push(Chunk::of_one(chunk, lane)),
@@ -154,17 +152,17 @@ fn large_screens(projection: &Projection, frustum: &Frustum, chunks: &Chunks) ->
 }
 
 /// Whether a Gaussian is about as wide as screens are.
-fn is_large(projection: &Projection, attributes: &Attributes, lane: usize) -> bool {
-    let mut per_unit = projection.focal[0].abs().max(projection.focal[1].abs());
-    if projection.model == CameraModel::Pinhole {
-        let forward = &projection.rotation[6..9];
+fn is_large(constants: &ViewConstants, attributes: &Attributes, lane: usize) -> bool {
+    let mut per_unit = constants.focal[0].abs().max(constants.focal[1].abs());
+    if constants.model == CameraModel::Pinhole {
+        let forward = &constants.rotation[6..9];
         let depth: f64 = (0..3)
             .map(|axis| {
                 let position = f64::from(attributes.position[axis][lane]);
-                forward[axis] * (position - projection.eye[axis])
+                forward[axis] * (position - constants.eye[axis])
             })
             .sum();
-        if depth <= f64::from(projection.near) {
+        if depth <= f64::from(constants.near) {
             return false;
         }
         per_unit /= depth;
@@ -173,7 +171,7 @@ fn is_large(projection: &Projection, attributes: &Attributes, lane: usize) -> bo
 }
 
 /// What light is left of each tile of a picture.
-struct Light {
+struct TileTransmittance {
     bounds: Rect,
     /// The first column and row of tiles, and how many.
     first: [u32; 2],
@@ -188,7 +186,7 @@ struct Light {
     alphas: [f64; 2],
 }
 
-impl Light {
+impl TileTransmittance {
     fn new(bounds: Rect, state: &GaussianState) -> Self {
         let [x, y] = [bounds.x.max(0) as u32, bounds.y.max(0) as u32];
         let first = [x / TILE_SIZE, y / TILE_SIZE];
@@ -237,7 +235,7 @@ impl Light {
                     };
                     budget = rest;
                     if !is_finished {
-                        self.take(splat, key, [column, row]);
+                        self.attenuate(splat, key, [column, row]);
                         unfinished -= usize::from(self.depth[tile] < f32::INFINITY);
                     }
                 }
@@ -266,7 +264,7 @@ impl Light {
     }
 
     /// What a screen takes of a tile.
-    fn take(&mut self, splat: &Splat, key: u32, [column, row]: [u32; 2]) {
+    fn attenuate(&mut self, splat: &Splat, key: u32, [column, row]: [u32; 2]) {
         let tile = (row * self.count[0] + column) as usize;
         let [first_column, first_row] = self.first;
         let [ceiling, least] = self.alphas;
@@ -274,21 +272,25 @@ impl Light {
         if alpha > least {
             self.left[tile] *= 1.0 - alpha * (1.0 - MARGIN);
             if self.left[tile] < self.floor {
-                self.depth[tile] = super::sort::value_of(key);
+                self.depth[tile] = sort::value_of(key);
             }
         }
     }
 
     /// What is hidden, if any region is finished; of chunks that may be as opaque as these.
-    fn hidden(&self, projection: &Projection, chunks: &[Option<Arc<Chunks>>]) -> Option<Hidden> {
+    fn occlusion(
+        &self,
+        constants: &ViewConstants,
+        chunks: &[Option<Arc<Chunks>>],
+    ) -> Option<OcclusionMap> {
         let opacities = chunks.iter().flatten().map(|chunks| chunks.opacity);
         let opacity = opacities.fold(0.0, f32::max);
         let frustum_up_to = |farthest: f32, visible: Visible| {
-            let mut projection = projection.clone();
-            projection.visible = visible;
+            let mut constants = constants.clone();
+            constants.visible = visible;
             // What is as far comes before or after.
-            projection.far = projection.far.min(farthest.next_up());
-            Frustum::new(&projection, opacity)
+            constants.far = constants.far.min(farthest.next_up());
+            Frustum::new(&constants, opacity)
         };
         let mut regions = Vec::new();
         let mut any = false;
@@ -323,7 +325,7 @@ impl Light {
             }
         }
         let farthest = self.depth.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        any.then(|| Hidden {
+        any.then(|| OcclusionMap {
             whole: frustum_up_to(farthest, self.bounds.into()),
             regions,
         })

@@ -1,15 +1,16 @@
 //! Gaussians that a vertex program projects: it writes centre, covariance, opacity, colour and perhaps the depth key of
 //! each, and what follows is as with fixed-function projection.
 
-use super::GaussianSet;
+use super::camera::ViewConstants;
 use super::depth::CenterDepth;
-use super::fetch::BATCH;
 use super::footprint::Visible;
-use super::lanes::{Lanes, NO_LANES};
-use super::project::Projection;
+use super::lanes::{BATCH, Lanes, NO_LANES};
+use super::preprocess::shape;
 use super::scratch::Scratch;
+use super::set::GaussianSet;
 use super::sort::ordered_bits;
 use super::splat::{Projected, Splat};
+use super::tiles::find_tiles;
 use crate::counters::Counter;
 use crate::device::Device;
 use crate::geometry::points::PointShader;
@@ -28,7 +29,7 @@ const BATCHES_PER_TASK: usize = 16;
 /// How what the program writes becomes a Gaussian on the screen.
 struct Shading {
     /// What is the same for Gaussians of any origin.
-    projection: Projection,
+    constants: ViewConstants,
     /// Half the viewport's extent and its middle, in framebuffer pixels.
     half: [f64; 2],
     middle: [f64; 2],
@@ -83,11 +84,32 @@ pub(super) fn vertex_bytes(draw: &Draw) -> u64 {
     vertices * (read as u64 + u64::from(index) + written)
 }
 
+/// Shades and projects what vertex programs project of a set.
+///
+/// # Errors
+/// [`Stopped`] if a program ran for too long.
+pub(super) fn project_all(set: &GaussianSet, device: &Device) -> Result<Vec<Projected>, Stopped> {
+    let mut sequence = 0u32;
+    for append in &set.appends {
+        let gaussians = append.count.wrapping_mul(append.instance_count);
+        sequence = sequence.wrapping_add(gaussians);
+    }
+    let mut batches = Vec::new();
+    for draw in &set.draws {
+        let shaded = project(set, draw, sequence, device)?;
+        host::reserve(&mut batches, shaded.len());
+        batches.extend(shaded);
+        let gaussians = draw.count.wrapping_mul(draw.instance_count);
+        sequence = sequence.wrapping_add(gaussians);
+    }
+    Ok(batches)
+}
+
 /// Shades and projects a draw whose first Gaussian is number `sequence` of the set.
 ///
 /// # Errors
 /// [`Stopped`] if the program ran for too long.
-pub(super) fn project(
+fn project(
     set: &GaussianSet,
     draw: &Draw,
     sequence: u32,
@@ -186,7 +208,7 @@ impl Shading {
         };
         let half = [viewport.width, viewport.height].map(|size| 0.5 * f64::from(size));
         Self {
-            projection: Projection::new(state, &camera, viewport, visible, None, optimizations),
+            constants: ViewConstants::new(state, &camera, viewport, visible, None, optimizations),
             half,
             middle: [
                 half[0] + f64::from(viewport.x),
@@ -230,7 +252,7 @@ impl Shading {
                 && finite(&[opacity, key]);
             let skipped = if !all_finite {
                 Some(Counter::SkippedNonFinite)
-            } else if f64::from(opacity) < self.projection.alpha_floor {
+            } else if f64::from(opacity) < self.constants.alpha_floor {
                 Some(Counter::SkippedFaint)
             } else if w <= 0.0 || z < 0.0 {
                 Some(Counter::SkippedNear)
@@ -282,11 +304,19 @@ impl Shading {
             // Products of binary32 numbers are exact in binary64. Rounding in the program may have left less than
             // nothing, of which there is no root, and a logarithm of what is no number is that of zero.
             let area2 = xx * yy - xy * xy;
-            let projection = &self.projection;
-            projection.shape(simd, at, [xx, xy, yy], area2, load(&kept.opacity), flat);
+            let constants = &self.constants;
+            shape(
+                constants,
+                simd,
+                at,
+                [xx, xy, yy],
+                area2,
+                load(&kept.opacity),
+                flat,
+            );
             let determinant = load(&flat.determinant);
             // Both diagonal elements are positive, or neither is, where the determinant is positive.
-            let definite = (xx + projection.low_pass).simd_gt(zero);
+            let definite = (xx + constants.low_pass).simd_gt(zero);
             store(definite.select(determinant, zero), &mut flat.determinant);
             // In front of no plane that is left.
             store(zero, depth);
@@ -303,8 +333,8 @@ impl Shading {
         out: &mut Projected,
     ) {
         out.reserve(scratch.lanes.len());
-        let projection = &self.projection;
-        dispatch!(level, simd => projection.find_tiles(simd, scratch, out));
+        let constants = &self.constants;
+        dispatch!(level, simd => find_tiles(constants, simd, scratch, out));
         for &at in &scratch.reached {
             let at = at % BATCH;
             let sequence = sequence.wrapping_add(scratch.lanes[at] as u32);

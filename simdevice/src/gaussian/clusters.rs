@@ -3,26 +3,16 @@
 //!
 //! They are derived from memory that only the device can write, and never change an image.
 
-use super::cache::Stream;
-use super::fetch::{BATCH, Batch, COEFFICIENT_FLOATS, CoefficientReader, Fetcher};
-use super::scratch::Attributes;
-use super::{sort, spherical_harmonics};
+use super::attributes::{
+    Attributes, Batch, CoefficientReader, Fetcher, Harmonics, SourceFingerprint,
+};
+use super::frustum::Bounds;
+use super::lanes::BATCH;
+use super::sort;
+use super::spherical_harmonics::{self, COEFFICIENT_FLOATS};
 use crate::packet::GaussianAppend;
 use devmem::host;
 use rayon::prelude::*;
-
-/// Bounds of the Gaussians of a chunk that can be drawn at all.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds {
-    /// The least coordinates of the means.
-    pub(super) low: [f32; 3],
-    /// The greatest.
-    pub(super) high: [f32; 3],
-    /// The greatest scale.
-    pub(super) scale: f32,
-    /// The greatest opacity.
-    pub(super) opacity: f32,
-}
 
 /// Some Gaussians that are near one another.
 #[derive(Debug)]
@@ -39,27 +29,11 @@ pub(super) struct Chunk {
     pub(super) is_sound: bool,
 }
 
-/// Spherical harmonics that were read already: those of all lanes, one after the other, or none.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Harmonics<'a> {
-    floats: &'a [f32],
-    /// How many floats a lane has, of which a draw of a lower degree takes the first.
-    stride: usize,
-}
-
-impl<'a> Harmonics<'a> {
-    /// The floats of a lane, and what follows them; none if there are none.
-    #[inline(always)]
-    pub(super) fn from(&self, lane: usize) -> &'a [f32] {
-        self.floats.get(lane * self.stride..).unwrap_or_default()
-    }
-}
-
 /// All Gaussians of a draw without indices.
 #[derive(Debug)]
 pub(super) struct Chunks {
     /// Where the spherical harmonics in them are from, in their order.
-    harmonics: Vec<Stream>,
+    harmonics: Vec<SourceFingerprint>,
     pub(super) chunks: Vec<Chunk>,
     /// Those among them that hide others best: large and opaque.
     pub(super) screens: Vec<Chunk>,
@@ -109,7 +83,7 @@ impl Chunks {
         let harmonics = &append.attributes.spherical_harmonics;
         Self {
             harmonics: match with_harmonics {
-                true => harmonics.iter().map(Stream::new).collect(),
+                true => harmonics.iter().map(SourceFingerprint::new).collect(),
                 false => Vec::new(),
             },
             opacity: opacities.fold(0.0, f32::max),
@@ -124,7 +98,8 @@ impl Chunks {
     pub(super) fn have_harmonics_of(&self, append: &GaussianAppend) -> bool {
         let drawn = &append.attributes.spherical_harmonics;
         let mut both = drawn.iter().zip(&self.harmonics);
-        drawn.len() <= self.harmonics.len() && both.all(|(a, b)| Stream::new(a).is_same(b))
+        drawn.len() <= self.harmonics.len()
+            && both.all(|(a, b)| SourceFingerprint::new(a).is_same(b))
     }
 }
 
@@ -218,10 +193,8 @@ impl Chunk {
 impl Chunk {
     /// Spherical harmonics of all lanes, if it holds them.
     pub(super) fn harmonics(&self) -> Harmonics<'_> {
-        Harmonics {
-            floats: &self.harmonics,
-            stride: self.harmonics.len() / self.numbers.len().max(1),
-        }
+        let stride = self.harmonics.len() / self.numbers.len().max(1);
+        Harmonics::new(&self.harmonics, stride)
     }
 
     /// A chunk of one lane of another, without harmonics.

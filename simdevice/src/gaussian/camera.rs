@@ -1,35 +1,114 @@
-//! Cameras: where a point appears, and how it moves in the picture as it moves in space.
+//! Cameras: what is the same for all Gaussians of a view, where a point appears, and how it moves in the picture as it moves
+//! in space.
 
-use super::fetch::BATCH;
-use super::project::Projection;
-use super::scratch::Scratch;
-use crate::packet::CameraModel;
+use super::depth::CenterDepth;
+use super::footprint::Visible;
+use crate::optimizations::Optimizations;
+use crate::packet::{
+    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
+    GaussianState, Viewport,
+};
 
-impl Projection {
-    /// Depths, means and Jacobians of the kept Gaussians, unless a pinhole sees the world itself.
-    pub(super) fn linearize(&self, by_matrices: bool, scratch: &mut Scratch) {
-        let [x, y, z] = &*scratch.camera;
-        let placed = scratch.placed.as_deref().filter(|_| by_matrices);
-        let r = &self.rotation;
-        for at in 0..scratch.lanes.len().min(BATCH) {
-            let t = [x[at], y[at], z[at]];
-            scratch.depth[at] = depth(self.model, t);
-            let (place, rows) = linearize(self.model, self.slopes(), t);
-            for (axis, row) in rows.iter().enumerate() {
-                scratch.flat.mean[axis][at] = place[axis] * self.focal[axis] + self.center[axis];
-                let j = row.map(|element| element * self.focal[axis]);
-                let of_column =
-                    |column| j[0] * r[column] + j[1] * r[3 + column] + j[2] * r[6 + column];
-                let mut row = [0, 1, 2].map(of_column);
-                if let Some(placed) = placed {
-                    row = placed.row_from_world(at, row);
-                }
-                for (lanes, element) in scratch.jacobian[axis].iter_mut().zip(row) {
-                    lanes[at] = element;
-                }
-            }
+/// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
+/// underflows binary32.
+const LEAST_LOG2_ALPHA: f64 = -150.0;
+
+/// `q / 2` in units of natural exponents is this times `u^2 + v^2`: `ln 2`.
+pub(super) const LN_2: f64 = std::f64::consts::LN_2;
+
+/// What is the same for all Gaussians of a draw.
+#[derive(Clone, Debug)]
+pub(crate) struct ViewConstants {
+    pub(super) model: CameraModel,
+    /// Whether covariances are those of projected points.
+    pub(super) unscented: bool,
+    pub(super) order: GaussianOrder,
+    pub(super) geometry: GaussianGeometry,
+    pub(super) precision: GaussianPrecision,
+    pub(super) rotation: [f64; 9],
+    pub(super) eye: [f64; 3],
+    pub(super) focal: [f64; 2],
+    /// The principal point in framebuffer pixels.
+    pub(super) center: [f64; 2],
+    /// After how many pixels the picture repeats to the right and to the left, if it does.
+    pub(super) period: Option<f64>,
+    /// Bounds of `t.x / t.z` and `t.y / t.z` in the Jacobian.
+    pub(super) slope_min: [f64; 2],
+    pub(super) slope_max: [f64; 2],
+    pub(super) near: f32,
+    pub(super) far: f32,
+    pub(super) low_pass: f64,
+    pub(super) compensated: bool,
+    pub(super) alpha_floor: f64,
+    pub(super) log2_floor: f64,
+    pub(super) sh_degree: u32,
+    pub(super) visible: Visible,
+    pub(super) optimizations: Optimizations,
+    /// How centres become depths, if the draw needs to know.
+    pub(super) depth: Option<CenterDepth>,
+}
+
+impl ViewConstants {
+    /// The constants of a draw that may touch the pixels of `visible`.
+    pub(crate) fn new(
+        state: &GaussianState,
+        camera: &Camera,
+        viewport: &Viewport,
+        visible: Visible,
+        depth: Option<CenterDepth>,
+        optimizations: Optimizations,
+    ) -> Self {
+        let focal = camera.focal_length.map(f64::from);
+        let principal = camera.principal_point.map(f64::from);
+        let size = [viewport.width, viewport.height].map(f64::from);
+        let margin = [0, 1].map(|axis| 0.15 * size[axis] / focal[axis]);
+        Self {
+            model: camera.model,
+            unscented: state.linearization == GaussianLinearization::Unscented,
+            order: state.order,
+            geometry: state.geometry,
+            precision: state.precision,
+            rotation: camera.rotation.map(f64::from),
+            eye: camera.eye,
+            focal,
+            center: [
+                principal[0] + f64::from(viewport.x),
+                principal[1] + f64::from(viewport.y),
+            ],
+            // Discs are not drawn by panoramas.
+            period: period(camera).filter(|_| state.geometry == GaussianGeometry::Volume),
+            slope_min: [0, 1].map(|axis| -(principal[axis] / focal[axis] + margin[axis])),
+            slope_max: [0, 1]
+                .map(|axis| (size[axis] - principal[axis]) / focal[axis] + margin[axis]),
+            near: camera.near_plane,
+            far: camera.far_plane,
+            low_pass: f64::from(state.low_pass_variance),
+            compensated: state.opacity_compensated,
+            alpha_floor: state.alpha_floor.into(),
+            log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
+            sh_degree: state.sh_degree,
+            visible,
+            depth,
+            optimizations,
         }
     }
+
+    /// The bounds of slopes in a pinhole's Jacobian: the least ones and the greatest.
+    pub(super) fn slopes(&self) -> [[f64; 2]; 2] {
+        [self.slope_min, self.slope_max]
+    }
+
+    /// Bounds of the visible pixels' centres along an axis, with a pixel to spare.
+    pub(super) fn visible_range(&self, axis: usize) -> [f64; 2] {
+        let [first, last] = self.visible.pixels(axis);
+        [first - 1.0, last + 2.0]
+    }
+}
+
+/// After how many pixels a camera's picture repeats to the right and to the left, if it does.
+pub(super) fn period(camera: &Camera) -> Option<f64> {
+    let focal = f64::from(camera.focal_length[0]);
+    (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
 }
 
 /// A point's place in the picture relative to the principal point, and the two rows of the place's Jacobian, both

@@ -8,9 +8,8 @@
 //! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
 //! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
-use crate::gaussian::footprint::{HELD_ROWS, Reach, Span, TILE_SIZE};
-use crate::gaussian::locate;
-use crate::gaussian::splat::Projected;
+use super::footprint::{HELD_ROWS, Reach, Span, TILE_SIZE};
+use super::splat::{Projected, locate};
 use crate::lanes::three;
 use crate::packet::Rect;
 use devmem::host;
@@ -38,7 +37,7 @@ pub(crate) struct TileLists {
     band_rows: u32,
     bands: Vec<Band>,
     /// What there is instead of lists.
-    stream: Option<Stream>,
+    walk: Option<SortedWalk>,
 }
 
 /// A primitive and what it reaches.
@@ -46,14 +45,14 @@ type Reaching = (u32, Reach);
 
 /// The survivors in depth order, for tiles to find theirs among them.
 #[derive(Debug)]
-pub(crate) struct Stream {
+pub(crate) struct SortedWalk {
     sorted: Vec<Reaching>,
     /// Of each batch.
     spans: Vec<Vec<Span>>,
     pairs: u64,
 }
 
-impl Stream {
+impl SortedWalk {
     fn new(batches: &mut [Projected], order: &[(u32, u32)]) -> Self {
         let mut sorted: Vec<Reaching> = host::with_capacity(order.len());
         let seen = &*batches;
@@ -167,7 +166,7 @@ impl TileLists {
                 columns: 0,
                 band_rows: 1,
                 bands: Vec::new(),
-                stream: None,
+                walk: None,
             };
         }
         // Visible pixels have coordinates from zero on: the render area lies inside its attachments.
@@ -201,7 +200,7 @@ impl TileLists {
                 columns,
                 band_rows,
                 bands: Vec::new(),
-                stream: Some(Stream::new(batches, order)),
+                walk: Some(SortedWalk::new(batches, order)),
             };
         };
         let bands = (0..bands)
@@ -216,7 +215,7 @@ impl TileLists {
             columns,
             band_rows,
             bands,
-            stream: None,
+            walk: None,
         }
     }
 
@@ -238,21 +237,21 @@ impl TileLists {
     }
 
     /// What there is instead of lists, if those are too long.
-    pub(crate) fn stream(&self) -> Option<&Stream> {
-        self.stream.as_ref()
+    pub(crate) fn walk(&self) -> Option<&SortedWalk> {
+        self.walk.as_ref()
     }
 
     /// How many pairs of tile and primitive there are.
     pub(crate) fn pairs(&self) -> u64 {
         // Each list has room for one more.
         let pairs = |band: &Band| (band.primitives.len() - band.starts.len()) as u64;
-        let streamed = self.stream.as_ref().map_or(0, |stream| stream.pairs);
+        let streamed = self.walk.as_ref().map_or(0, |stream| stream.pairs);
         self.bands.iter().map(pairs).sum::<u64>() + streamed
     }
 
     /// Whether a tile that shares pixels with `rect` has a primitive, or may have one.
     pub(crate) fn any_in(&self, rect: Rect) -> bool {
-        if self.stream.is_some() {
+        if self.walk.is_some() {
             return true;
         }
         let tiles = |start: i32, size: u32| {
@@ -269,7 +268,7 @@ impl TileLists {
     pub(crate) fn memory_bytes(&self) -> u64 {
         let bytes = |band: &Band| 2 * size_of_val(&*band.starts) + size_of_val(&*band.primitives);
         let lists = self.bands.iter().map(|band| bytes(band) as u64);
-        lists.sum::<u64>() + self.stream.as_ref().map_or(0, Stream::memory_bytes)
+        lists.sum::<u64>() + self.walk.as_ref().map_or(0, SortedWalk::memory_bytes)
     }
 }
 

@@ -4,10 +4,10 @@
 //! A set lives in the memory of the positions that it was made from, like chunks: it is gone when that is freed or
 //! written. A buffer has one, that of its last picture, which goes before another is made, so that there are never two.
 
-use super::cache::{Stream, is_device_local};
-use super::chunks::Chunks;
-use super::order::Order;
-use super::{GaussianSet, Sorted};
+use super::attributes::{SourceFingerprint, is_device_local};
+use super::clusters::Chunks;
+use super::set::GaussianSet;
+use super::sorted_set::SortedSet;
 use crate::format::Format;
 use crate::packet::{AttributeStream, Camera, GaussianAppend, GaussianState, Rect, Viewport};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 #[derive(Debug)]
 pub(super) struct Key {
     /// Those of all attributes of all draws, positions of the first one first.
-    streams: Vec<Stream>,
+    streams: Vec<SourceFingerprint>,
     /// First vertex, vertices, first instance, instances of each draw.
     ranges: Vec<[u32; 4]>,
     /// The chunks of each, which its accounts depend on.
@@ -34,21 +34,13 @@ pub(super) struct Key {
 #[derive(Debug)]
 struct Entry {
     key: Key,
-    set: Weak<Sorted>,
+    set: Weak<SortedSet>,
     bytes: u64,
-}
-
-/// What there is of the last picture of a buffer.
-pub(super) enum LastSet {
-    /// The set, which is the same now.
-    Same(Arc<Sorted>),
-    /// Another, of which the order may be left, if its Gaussians have the same names.
-    Other(Option<Arc<Order>>),
 }
 
 /// The last sets of a device's buffers, the oldest first.
 #[derive(Debug, Default)]
-pub(crate) struct LastSets(Mutex<Vec<Entry>>);
+pub(crate) struct ReuseCache(Mutex<Vec<Entry>>);
 
 impl Key {
     /// What `set` depends on; `None` if something of it may change unseen.
@@ -73,7 +65,7 @@ impl Key {
                 .appends
                 .iter()
                 .flat_map(attributes)
-                .map(Stream::new)
+                .map(SourceFingerprint::new)
                 .collect(),
             ranges: ranges.collect(),
             chunks: chunks
@@ -90,7 +82,7 @@ impl Key {
     }
 
     fn is_same(&self, other: &Self) -> bool {
-        let all = |a: &[Stream], b: &[Stream]| {
+        let all = |a: &[SourceFingerprint], b: &[SourceFingerprint]| {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.is_same(b))
         };
         let view = |key: &Self| {
@@ -118,54 +110,45 @@ impl Key {
 
 impl Entry {
     fn is_current(&self) -> bool {
-        self.set.strong_count() > 0 && self.key.streams.iter().all(Stream::is_current)
+        self.set.strong_count() > 0 && self.key.streams.iter().all(SourceFingerprint::is_current)
     }
 
-    /// Frees the set, but for its order.
-    fn release(self) -> Option<Arc<Order>> {
+    /// Frees the set.
+    fn release(self) {
         let positions = self.key.streams.first();
-        let memory = positions.and_then(Stream::memory);
-        let (memory, set) = memory.zip(self.set.upgrade())?;
-        let order = set.order.clone();
-        memory.drop_derived(&(set as _));
-        order
+        let memory = positions.and_then(SourceFingerprint::memory);
+        if let Some((memory, set)) = memory.zip(self.set.upgrade()) {
+            memory.drop_derived(&(set as _));
+        }
     }
 }
 
-impl LastSets {
+impl ReuseCache {
     fn lock(&self) -> MutexGuard<'_, Vec<Entry>> {
         // What a panic left behind is only forgotten sooner.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The set that was made from what has this key, if it may be `reused`. Without it, what the same buffer last made is
-    /// freed, but for its order.
-    pub(super) fn find(&self, key: &Key, reused: bool) -> LastSet {
+    /// The set that was made from what has this key. If there is none, what the same buffer last made is freed.
+    pub(super) fn find(&self, key: &Key) -> Option<Arc<SortedSet>> {
         let mut entries = self.lock();
         let is_old = |entry: &mut Entry| {
-            let is_other =
-                || entry.key.is_of_same_buffer(key) && !(reused && entry.key.is_same(key));
+            let is_other = || entry.key.is_of_same_buffer(key) && !entry.key.is_same(key);
             !entry.is_current() || is_other()
         };
-        let mut last = None;
         for entry in entries.extract_if(.., is_old) {
-            let is_alike = entry.is_current() && entry.key.has_same_batches(key);
-            let order = entry.release().filter(|_| is_alike);
-            last = last.or(order);
+            entry.release();
         }
         let found = entries.iter().find(|entry| entry.key.is_same(key));
-        match found.and_then(|found| found.set.upgrade()) {
-            Some(set) => LastSet::Same(set),
-            None => LastSet::Other(last),
-        }
+        found.and_then(|found| found.set.upgrade())
     }
 
     /// Keeps a set of `bytes`, in place of older ones where all together would take more than `budget`.
-    pub(super) fn keep(&self, key: Key, set: &Arc<Sorted>, bytes: u64, budget: u64) {
+    pub(super) fn keep(&self, key: Key, set: &Arc<SortedSet>, bytes: u64, budget: u64) {
         if bytes > budget {
             return;
         }
-        let Some(memory) = key.streams.first().and_then(Stream::memory) else {
+        let Some(memory) = key.streams.first().and_then(SourceFingerprint::memory) else {
             return;
         };
         let mut entries = self.lock();

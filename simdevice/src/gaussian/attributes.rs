@@ -1,12 +1,54 @@
-//! Vertex fetch for Gaussians: attribute streams to structures of arrays.
+//! Attributes: vertex fetch for Gaussians, from streams to structures of arrays.
 
 use super::lanes::F32_LANES;
-use super::scratch::Attributes;
+use super::spherical_harmonics::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
 use crate::format::Format;
 use crate::packet::{AttributeStream, GaussianAppend, GaussianAttributes, IndexStream};
+use devmem::Allocation;
+use std::sync::{Arc, Weak};
 
-/// Gaussians per batch: what preprocessing holds in its caches at a time.
-pub(super) const BATCH: usize = 256;
+/// Vertex attributes by lane, as they are read.
+#[derive(Clone, Debug)]
+pub(super) struct Attributes {
+    pub(super) position: [[f32; F32_LANES]; 3],
+    pub(super) scale: [[f32; F32_LANES]; 3],
+    pub(super) rotation: [[f32; F32_LANES]; 4],
+    pub(super) opacity: [f32; F32_LANES],
+}
+
+impl Default for Attributes {
+    fn default() -> Self {
+        Self {
+            position: [[0.0; F32_LANES]; 3],
+            scale: [[0.0; F32_LANES]; 3],
+            rotation: [[0.0; F32_LANES]; 4],
+            opacity: [0.0; F32_LANES],
+        }
+    }
+}
+
+impl Attributes {
+    /// The second largest scale of a lane.
+    pub(super) fn second_scale(&self, lane: usize) -> f32 {
+        let [a, b, c] = self.scale.each_ref().map(|scale| scale[lane]);
+        a.max(b).min(a.max(c)).min(b.max(c))
+    }
+
+    /// Makes a lane what a lane of others is.
+    pub(super) fn copy_lane(&mut self, to: usize, others: &Self, from: usize) {
+        let copy = |own: &mut [f32; F32_LANES], other: &[f32; F32_LANES]| own[to] = other[from];
+        for (own, other) in self.position.iter_mut().zip(&others.position) {
+            copy(own, other);
+        }
+        for (own, other) in self.scale.iter_mut().zip(&others.scale) {
+            copy(own, other);
+        }
+        for (own, other) in self.rotation.iter_mut().zip(&others.rotation) {
+            copy(own, other);
+        }
+        copy(&mut self.opacity, &others.opacity);
+    }
+}
 
 /// A contiguous span is read whole where vertices lie at most this far apart, and piecewise beyond.
 const WHOLE_SPAN_STRIDE: u32 = 64;
@@ -245,12 +287,6 @@ fn at(stream: &AttributeStream, batch: &Batch<'_>, lane: usize) -> u64 {
         .saturating_add(u64::from(stream.offset))
 }
 
-/// The coefficients of all degrees up to 4.
-pub(super) const MAX_COEFFICIENTS: usize = 25;
-
-/// Three components of each, and what makes it whole vectors.
-pub(super) const COEFFICIENT_FLOATS: usize = 80;
-
 /// Reads the spherical harmonics of single lanes.
 pub(super) struct CoefficientReader<'a> {
     streams: &'a [AttributeStream],
@@ -262,7 +298,7 @@ impl<'a> CoefficientReader<'a> {
     /// A reader of these streams, one per coefficient.
     pub(super) fn new(streams: &'a [AttributeStream]) -> Self {
         let follows = |a: &AttributeStream, b: &AttributeStream| {
-            std::sync::Arc::ptr_eq(&a.buffer.memory, &b.buffer.memory)
+            Arc::ptr_eq(&a.buffer.memory, &b.buffer.memory)
                 && a.buffer.offset == b.buffer.offset
                 && a.buffer.size == b.buffer.size
                 && a.stride == b.stride
@@ -321,4 +357,80 @@ impl<'a> CoefficientReader<'a> {
             out.copy_from_slice(&stream.format.decode(bytes)[..3]);
         }
     }
+}
+
+/// Spherical harmonics that were read already: those of all lanes, one after the other, or none.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Harmonics<'a> {
+    floats: &'a [f32],
+    /// How many floats a lane has, of which a draw of a lower degree takes the first.
+    stride: usize,
+}
+
+impl<'a> Harmonics<'a> {
+    /// Those of lanes of `stride` floats each.
+    pub(super) fn new(floats: &'a [f32], stride: usize) -> Self {
+        Self { floats, stride }
+    }
+
+    /// The floats of a lane, and what follows them; none if there are none.
+    #[inline(always)]
+    pub(super) fn from(&self, lane: usize) -> &'a [f32] {
+        self.floats.get(lane * self.stride..).unwrap_or_default()
+    }
+}
+
+/// What an attribute is read from.
+#[derive(Debug)]
+pub(super) struct SourceFingerprint {
+    memory: Weak<Allocation>,
+    generation: u64,
+    /// Offset and size of the buffer, stride and offset of the attribute.
+    place: [u64; 4],
+    format: Format,
+    instance_divisor: Option<u32>,
+}
+
+impl SourceFingerprint {
+    pub(super) fn new(stream: &AttributeStream) -> Self {
+        let buffer = &stream.buffer;
+        Self {
+            memory: Arc::downgrade(&buffer.memory),
+            generation: buffer.memory.generation(),
+            place: [
+                buffer.offset,
+                buffer.size,
+                stream.stride.into(),
+                stream.offset.into(),
+            ],
+            format: stream.format,
+            instance_divisor: stream.instance_divisor,
+        }
+    }
+
+    /// The memory, while it is there.
+    pub(super) fn memory(&self) -> Option<Arc<Allocation>> {
+        self.memory.upgrade()
+    }
+
+    /// Whether the memory still holds what it held.
+    pub(super) fn is_current(&self) -> bool {
+        let memory = self.memory.upgrade();
+        memory.is_some_and(|memory| memory.generation() == self.generation)
+    }
+
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        let how = |own: &Self| (own.generation, own.format, own.instance_divisor);
+        self.is_same_buffer(other) && how(self) == how(other)
+    }
+
+    /// Whether both are read from the same place, whatever is there.
+    pub(super) fn is_same_buffer(&self, other: &Self) -> bool {
+        self.memory.ptr_eq(&other.memory) && self.place == other.place
+    }
+}
+
+/// Whether an attribute is in memory that only the device writes.
+pub(super) fn is_device_local(stream: &AttributeStream) -> bool {
+    !stream.buffer.memory.is_host_visible()
 }

@@ -1,0 +1,153 @@
+//! What there is to project: batches of vertices and chunks, without the chunks that no picture needs.
+
+use super::camera::ViewConstants;
+use super::clusters::{Chunk, Chunks};
+use super::frustum::{Frustum, Outside};
+use super::instances::Model;
+use super::lanes::BATCH;
+use super::occlusion::OcclusionMap;
+use super::preprocess::{Job, Part};
+use super::set::{GaussianSet, MAX_BATCHES, SortError};
+use super::vertex_projection;
+use crate::counters::{Counter, Counters};
+use crate::packet::GaussianAppend;
+use devmem::host;
+use std::sync::Arc;
+
+/// What is to be projected, in the order of draw, instance and, but for chunks, position in the draw. What is left
+/// out already is counted.
+pub(super) fn group_tasks<'a>(
+    set: &'a GaussianSet,
+    chunks: &'a [Option<Arc<Chunks>>],
+    constants: &ViewConstants,
+    occlusion: Option<&OcclusionMap>,
+    counters: &mut Counters,
+) -> Result<Vec<Job<'a>>, SortError> {
+    let batches = |append: &GaussianAppend| {
+        let per_instance = append.count.div_ceil(BATCH as u32);
+        u64::from(per_instance) * u64::from(append.instance_count)
+    };
+    let batches = set.appends.iter().map(batches);
+    let batches = batches.chain(set.draws.iter().map(vertex_projection::batches));
+    let batches = batches.fold(0, u64::saturating_add);
+    // A picture that repeats has copies on both sides.
+    let sides = if constants.period.is_some() { 3 } else { 1 };
+    let batches = batches.saturating_mul(sides);
+    if batches > MAX_BATCHES {
+        return Err(SortError::TooManyGaussians { batches });
+    }
+    let mut jobs = Vec::new();
+    // There are no more Gaussians than places in batches, so that this stays within 32 bits but at the very end.
+    let mut sequence = 0u32;
+    for (append, chunks) in set.appends.iter().zip(chunks) {
+        let opacity = chunks.as_ref().map_or(1.0, |chunks| chunks.opacity);
+        let view = InstanceView::new(constants, opacity);
+        let has_harmonics = chunks.as_ref().map(|all| all.have_harmonics_of(append));
+        for instance in 0..append.instance_count {
+            let instance = append.first_instance.saturating_add(instance);
+            let of_instance;
+            let mut view = &view;
+            let occlusion = occlusion.filter(|_| !append.attributes.model.is_some());
+            if chunks.is_some() && append.attributes.model.is_some() {
+                of_instance = InstanceView::of_instance(constants, append, instance, opacity);
+                view = &of_instance;
+            }
+            let job = Job {
+                append,
+                instance,
+                sequence,
+                part: Part::From(0),
+                has_harmonics: has_harmonics.unwrap_or(false),
+                frustum: Arc::clone(&view.frustum),
+            };
+            let batches = match chunks {
+                None => append.count.div_ceil(BATCH as u32) as usize,
+                Some(chunks) => chunks.chunks.len(),
+            };
+            host::reserve(&mut jobs, batches);
+            match chunks {
+                None => {
+                    let starts = (0..append.count).step_by(BATCH);
+                    jobs.extend(starts.map(|start| Job {
+                        part: Part::From(start),
+                        ..job.clone()
+                    }));
+                }
+                Some(chunks) => jobs.extend(
+                    chunks
+                        .chunks
+                        .iter()
+                        .filter(|chunk| {
+                            !view.cull_cluster(chunk, counters)
+                                && !occlusion.is_some_and(|map| map.cull_cluster(chunk, counters))
+                        })
+                        .map(|chunk| Job {
+                            part: Part::Chunk(chunk),
+                            ..job.clone()
+                        }),
+                ),
+            }
+            sequence = sequence.wrapping_add(append.count);
+        }
+    }
+    Ok(jobs)
+}
+
+/// How an instance is seen.
+struct InstanceView {
+    frustum: Arc<Frustum>,
+    /// The same in the instance's own space, unless nothing is certain there.
+    own: Option<Arc<Frustum>>,
+    model: Model,
+}
+
+impl InstanceView {
+    /// Of instances whose opacities are at most `opacity`.
+    fn new(constants: &ViewConstants, opacity: f32) -> Self {
+        let frustum = Arc::new(Frustum::new(constants, opacity));
+        Self {
+            own: Some(Arc::clone(&frustum)),
+            frustum,
+            model: Model::default(),
+        }
+    }
+
+    /// Of an instance that a model places and fades.
+    fn of_instance(
+        constants: &ViewConstants,
+        append: &GaussianAppend,
+        instance: u32,
+        opacity: f32,
+    ) -> Self {
+        let model = Model::read(append, instance);
+        let frustum = Arc::new(Frustum::new(constants, model.greatest_opacity(opacity)));
+        let own = match model.matrix {
+            None => Some(Arc::clone(&frustum)),
+            Some(matrix) => frustum.within(matrix).map(Arc::new),
+        };
+        Self {
+            frustum,
+            own,
+            model,
+        }
+    }
+
+    /// Whether a whole chunk is outside; its Gaussians are counted then.
+    fn cull_cluster(&self, chunk: &Chunk, counters: &mut Counters) -> bool {
+        let mut bounds = chunk.bounds;
+        bounds.opacity = self.model.greatest_opacity(bounds.opacity);
+        let Some(reason) = self.own.as_ref().and_then(|own| own.excludes(&bounds)) else {
+            return false;
+        };
+        let reason = match reason {
+            Outside::Faint => Counter::SkippedFaint,
+            Outside::Near => Counter::SkippedNear,
+            Outside::Far => Counter::SkippedFar,
+            Outside::Beside => Counter::SkippedOffScreen,
+        };
+        for counter in [reason, Counter::GaussiansRead, Counter::OutsideByChunks] {
+            counters.add(counter, chunk.numbers.len() as u64);
+        }
+        true
+    }
+}
