@@ -16,7 +16,7 @@ use crate::packet::{
 };
 use crate::raster::Plane;
 use crate::raster::gaussian::GaussianTile;
-use crate::raster::gaussian::tile_draw::GaussianTileDraw;
+use crate::raster::gaussian::GaussianTileDraw;
 use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
 use crate::raster::tile::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target, Tile};
 use devmem::host;

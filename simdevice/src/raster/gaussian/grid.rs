@@ -1,7 +1,21 @@
 //! Where the pixels of a block and the blocks of a tile are.
 
-use super::{BLOCK, BLOCKS, LANES};
+use crate::gaussian::TILE_SIZE;
+use crate::packet::Rect;
 use crate::raster::tile::place;
+
+/// Pixels along a tile's side.
+pub(super) const TILE: usize = TILE_SIZE as usize;
+/// Pixels of a block, which are the lanes of a vector.
+pub(super) const LANES: usize = 16;
+/// The side of a block in pixels.
+pub(super) const BLOCK: usize = 4;
+/// Blocks of a tile.
+pub(super) const BLOCKS: usize = 16;
+/// A bit for each of them.
+pub(super) const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
+/// Gaussians of a chunk: as many as phases pass on through the first-level cache, and a word has bits.
+pub(super) const CHUNK: usize = 32;
 
 /// Half of the distance between a block's first and last pixel centres.
 pub(super) const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;
@@ -58,4 +72,47 @@ const fn middles(column: bool) -> [f64; BLOCKS] {
         block += 1;
     }
     out
+}
+
+/// Lanes by block.
+pub(super) type Lanes = [u32; BLOCKS];
+
+/// Every lane of a block.
+pub(super) const ALL_LANES: u32 = (1 << LANES) - 1;
+
+/// The block of a pixel of a tile, and the lane in it.
+pub(super) fn block_and_lane(x: usize, y: usize) -> (usize, usize) {
+    let place = place(x, y);
+    (place / LANES % BLOCKS, place % LANES)
+}
+
+/// How many pixels `lanes` has.
+pub(super) fn count(lanes: &Lanes) -> u32 {
+    lanes.iter().map(|lanes| lanes.count_ones()).sum()
+}
+
+/// The pixels of `bounds` in the tile at `corner`.
+pub(super) fn lanes_within(bounds: Rect, corner: [u32; 2]) -> Lanes {
+    let tile = Rect {
+        x: corner[0] as i32,
+        y: corner[1] as i32,
+        width: TILE_SIZE,
+        height: TILE_SIZE,
+    };
+    let inside = bounds.intersect(tile);
+    if [inside.width, inside.height] == [TILE_SIZE; 2] {
+        return [ALL_LANES; BLOCKS];
+    }
+    let mut lanes = [0; BLOCKS];
+    if inside.is_empty() {
+        return lanes;
+    }
+    let first = [inside.x as u32 - corner[0], inside.y as u32 - corner[1]];
+    for y in first[1]..first[1] + inside.height {
+        for x in first[0]..first[0] + inside.width {
+            let (block, lane) = block_and_lane(x as usize, y as usize);
+            lanes[block] |= 1 << lane;
+        }
+    }
+    lanes
 }

@@ -5,9 +5,13 @@
 //! the nearest [`HELD`] at a time: memory is bounded whatever a scene stacks up, and what a pass leaves out is gathered by
 //! the next, so that time stays near linear.
 
-use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
-use super::layer::Layer;
-use super::{BLOCKS, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Work};
+use super::accumulator::Layer;
+use super::block_lists::{BlockLists, part};
+use super::depth_ranges::Passing;
+use super::exact::falls;
+use super::exp2::exp2_of_negated;
+use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64, LANES};
+use super::inputs::{FIND_MEDIAN, NO_DEPTH, Task, Work};
 use crate::gaussian::ray_depth::{PixelRays, RayDepths, Rays, ordered_key};
 use crate::gaussian::splat::locate;
 use crate::trace::Run;
@@ -117,27 +121,35 @@ pub(super) struct PerPixel {
     pixels: [Gathered; LANES],
 }
 
-impl GaussianTile {
-    /// Composites a tile in the per-pixel order.
-    #[inline(always)]
-    pub(super) fn composite_per_pixel<S: Simd>(
-        &mut self,
-        simd: S,
-        task: &Task<'_>,
-        depths: RayDepths<'_>,
-        layer: usize,
-        runs: Option<&mut Vec<Run>>,
-    ) -> Work {
-        let mut work = self.part(simd, task, layer, runs);
-        for block in 0..BLOCKS {
-            if self.lists[block].is_empty() {
-                continue;
-            }
-            work.contributions += self.composite_block(simd, task, depths, (layer, block));
+/// Composites a tile in the per-pixel order.
+#[inline(always)]
+pub(super) fn composite_per_pixel<S: Simd>(
+    scratch: &mut PerPixel,
+    simd: S,
+    task: &Task<'_>,
+    depths: RayDepths<'_>,
+    lists: &mut BlockLists,
+    (layer, passing): (&mut Layer, &Passing),
+    runs: Option<&mut Vec<Run>>,
+) -> Work {
+    let mut work = part(simd, task, lists, (layer, passing), runs);
+    for block in 0..BLOCKS {
+        if lists[block].is_empty() {
+            continue;
         }
-        work
+        work.contributions += scratch.composite_block(
+            simd,
+            task,
+            depths,
+            &lists[block],
+            (&mut *layer, block),
+            passing,
+        );
     }
+    work
+}
 
+impl PerPixel {
     /// Composites a block of a layer; returns how many Gaussians its pixels accepted.
     #[inline(always)]
     fn composite_block<S: Simd>(
@@ -145,26 +157,27 @@ impl GaussianTile {
         simd: S,
         task: &Task<'_>,
         depths: RayDepths<'_>,
-        (layer, block): (usize, usize),
+        names: &[u32],
+        (layer, block): (&mut Layer, usize),
+        passing: &Passing,
     ) -> u64 {
-        let layer = &mut self.layers[layer];
         let mut open = layer.open_lanes(block);
         let rays = block_rays(&depths.rays, task.corner, block);
         let mut sums = [Sum::EMPTY; LANES];
-        for pixel in &mut self.per_pixel.pixels {
+        for pixel in &mut self.pixels {
             pixel.clear();
         }
         let mut contributions = 0;
         while open != 0 {
-            for (number, &primitive) in (0..).zip(&self.lists[block]) {
+            for (number, &primitive) in (0..).zip(names) {
                 let (batch, place) = locate(primitive);
                 let splat = &task.splats[batch][place];
-                let fall = task.falls(simd, (batch, place), block);
+                let fall = falls(simd, task, (batch, place), block);
                 let ceiling = f32x16::splat(simd, task.thresholds.alpha_ceiling);
-                let alpha = super::exp2::exp2_of_negated(simd, fall).min(ceiling);
+                let alpha = exp2_of_negated(simd, fall).min(ceiling);
                 let mut reached = fall.simd_le(task.thresholds.most_fall);
                 if task.thresholds.depth_mode > NO_DEPTH {
-                    reached &= self.passing.pixels(simd, block, splat.depth);
+                    reached &= passing.pixels(simd, block, splat.depth);
                 }
                 let mut reached = reached.to_bitmask() as u32 & open;
                 if reached == 0 {
@@ -179,26 +192,25 @@ impl GaussianTile {
                 });
                 while reached != 0 {
                     let lane = reached.trailing_zeros() as usize % LANES;
-                    self.per_pixel.pixels[lane].add(Contribution {
+                    self.pixels[lane].add(Contribution {
                         place: (ordered_key(along[lane]), number),
                         alpha: alpha[lane].to_bits(),
                     });
                     reached &= reached - 1;
                 }
             }
-            let pixels = sums.iter_mut().zip(&mut self.per_pixel.pixels);
+            let pixels = sums.iter_mut().zip(&mut self.pixels);
             for (lane, (sum, pixel)) in pixels.enumerate() {
                 if open >> lane & 1 == 0 {
                     continue;
                 }
-                let names = &self.lists[block];
                 contributions += composite_pixel(sum, pixel, names, task);
                 if sum.finished || !pixel.advance() {
                     open &= !(1 << lane);
                 }
             }
         }
-        layer.store(block, &sums);
+        store(layer, block, &sums);
         contributions
     }
 }
@@ -242,30 +254,20 @@ fn block_rays(rays: &PixelRays, corner: [u32; 2], block: usize) -> Rays {
     )
 }
 
-impl Layer {
-    /// The pixels of a block that are not finished.
-    pub(super) fn open_lanes(&self, block: usize) -> u32 {
-        let lanes = self.transmittance[block].iter().enumerate();
-        lanes.fold(0, |open, (lane, t)| {
-            open | u32::from(t.is_sign_positive()) << lane
-        })
-    }
-
-    /// Takes what the open pixels of a block accumulated.
-    fn store(&mut self, block: usize, sums: &[Sum; LANES]) {
-        let open = self.open_lanes(block);
-        for (lane, sum) in sums.iter().enumerate() {
-            if open >> lane & 1 == 0 {
-                continue;
-            }
-            let t = sum.transmittance as f32;
-            self.transmittance[block][lane] = if sum.finished { -t } else { t };
-            for (channel, &color) in self.color.iter_mut().zip(&sum.color) {
-                channel[block][lane] = color as f32;
-            }
-            self.median[block][lane] = sum.median;
-            self.covered[block] |= u32::from(sum.covered) << lane;
+/// Takes what the open pixels of a block accumulated.
+fn store(layer: &mut Layer, block: usize, sums: &[Sum; LANES]) {
+    let open = layer.open_lanes(block);
+    for (lane, sum) in sums.iter().enumerate() {
+        if open >> lane & 1 == 0 {
+            continue;
         }
+        let t = sum.transmittance as f32;
+        layer.transmittance[block][lane] = if sum.finished { -t } else { t };
+        for (channel, &color) in layer.color.iter_mut().zip(&sum.color) {
+            channel[block][lane] = color as f32;
+        }
+        layer.median[block][lane] = sum.median;
+        layer.covered[block] |= u32::from(sum.covered) << lane;
     }
 }
 

@@ -7,6 +7,7 @@ mod whole_draws;
 use super::exp2::{
     CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
 };
+use super::grid::block_and_lane;
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;

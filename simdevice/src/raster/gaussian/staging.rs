@@ -1,8 +1,10 @@
 //! Phase 1 of the tile kernel: what the others need of a chunk's Gaussians in a tile, and which blocks each may reach.
 
-use super::grid::{BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS_ACROSS, HALF, LANE_X, LANE_Y};
-use super::passing::Passing;
-use super::{BLOCKS, CHUNK, DepthMode, LANES, NO_DEPTH, Task};
+use super::depth_ranges::Passing;
+use super::grid::{
+    BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, CHUNK, HALF, LANE_X, LANE_Y, LANES,
+};
+use super::inputs::{DepthMode, NO_DEPTH, Task};
 use crate::gaussian::splat::Splat;
 use crate::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
@@ -166,6 +168,14 @@ impl Record {
         let least_u = least_u * least_u;
         let least = least_v.mul_add(least_v, least_u.combine(least_u));
         least.simd_le(room.combine(room))
+    }
+
+    /// How far alpha has fallen at a block's pixels: minus its base-2 logarithm.
+    #[inline(always)]
+    pub(super) fn falls<S: Simd>(&self, simd: S, block: usize) -> f32x16<S> {
+        let from_u = f32x8::from_slice(simd, &self.from_u[block % BLOCKS_ACROSS]);
+        let v = f32x16::from_slice(simd, &self.along) + self.v[block];
+        v.mul_add(v, from_u.combine(from_u))
     }
 }
 

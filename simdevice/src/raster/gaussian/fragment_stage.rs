@@ -4,13 +4,13 @@
 //! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. Lanes that are not covered
 //! help with derivatives: they hold what their own pixels accumulated.
 
-use super::grid::{BLOCK_X, BLOCK_Y, LANE_X, LANE_Y};
-use super::tile_draw::{SAMPLES, Samples};
-use super::{BLOCKS, GaussianTile, LANES, Lanes, TILE_SIZE};
+use super::compositor::GaussianTile;
+use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, LANES, Lanes};
+use super::samples::{SAMPLES, Samples};
 use crate::bindings::Prepared;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
-use crate::gaussian::GaussianDraw;
+use crate::gaussian::{GaussianDraw, TILE_SIZE};
 use crate::packet::draw::{FragmentInput, FragmentPrograms, ResolveShader, resolve};
 use crate::raster::color::ColorOutput;
 use crate::raster::color::load;

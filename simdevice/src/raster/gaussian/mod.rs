@@ -4,29 +4,45 @@
 //! Alpha is that of the pixel's centre, so samples of a pixel differ only in what their tests let pass. The kernel runs
 //! once for all samples that agree in all of a block, and again only in the blocks of a tile where some differ.
 
-use super::passing::Passing;
-use super::resolve::{ResolveDraw, Tools};
-use super::{
-    BLOCKS, DepthMode, FIND_MEAN, FIND_MEDIAN, GaussianTile, LANES, Lanes, NO_DEPTH, TEST_DEPTH,
-    TILE_SIZE, count, lanes_within,
-};
+mod accumulator;
+mod binary16;
+mod block_lists;
+mod compositor;
+mod depth_ranges;
+mod exact;
+mod exp2;
+mod fast;
+mod fragment_stage;
+mod grid;
+mod inputs;
+mod masks;
+mod per_pixel;
+mod pixels;
+mod samples;
+mod staging;
+
+pub use compositor::GaussianTile;
+pub use fragment_stage::ResolveProgram;
+
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
-use crate::gaussian::GaussianDraw;
+use crate::gaussian::{GaussianDraw, TILE_SIZE};
 use crate::packet::BlendState;
 use crate::packet::draw::{StencilFace, StencilOp};
-use crate::raster::MAX_SAMPLES;
 use crate::raster::color::ColorOutput;
 use crate::raster::depth::{Tests, apply, compare};
 use crate::raster::primitives::{Buffers, Targets};
 use crate::raster::quads::Quads;
 use crate::raster::tile::{AREA, Target, Tile};
+use depth_ranges::Passing;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
+use fragment_stage::{ResolveDraw, Tools};
+use grid::{BLOCKS, LANES, Lanes, count, lanes_within};
+use inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
 use isa::exec::Stopped;
+use samples::{SAMPLES, Samples};
 use std::sync::atomic::AtomicBool;
-
-pub(super) const SAMPLES: usize = MAX_SAMPLES as usize;
 
 /// A Gaussian draw made ready for tiles, which all workers share.
 pub struct GaussianTileDraw<'a> {
@@ -40,29 +56,6 @@ pub struct GaussianTileDraw<'a> {
     /// Samples of a pixel.
     samples: usize,
     level: Level,
-}
-
-/// What becomes of a tile's samples: lanes by sample and block.
-#[derive(Debug, Default)]
-pub(super) struct Samples {
-    /// Those that the draw may touch, and whose stored depth lies within bounds.
-    candidates: [Lanes; SAMPLES],
-    /// Those of them that pass the stencil test.
-    tested: [Lanes; SAMPLES],
-    /// The layer that a sample's block is composited in.
-    pub(super) layers: [[usize; BLOCKS]; SAMPLES],
-}
-
-impl Samples {
-    /// Leaves alone what was covered and then discarded, as if nothing had reached it.
-    fn leave(&mut self, covered: &[Lanes; SAMPLES], kept: &[Lanes; SAMPLES]) {
-        let lanes = covered.iter().zip(kept);
-        for (candidates, (covered, kept)) in self.candidates.iter_mut().zip(lanes) {
-            for (block, candidates) in candidates.iter_mut().enumerate() {
-                *candidates &= !(covered[block] & !kept[block]);
-            }
-        }
-    }
 }
 
 impl<'a> GaussianTileDraw<'a> {
@@ -399,3 +392,6 @@ fn blend<S: Simd>(
         output.write(simd, &source, &no_second, lanes as u16, &quads, words);
     }
 }
+
+#[cfg(test)]
+mod tests;

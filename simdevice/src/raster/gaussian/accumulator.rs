@@ -1,15 +1,12 @@
 //! What Gaussian mode accumulates for a tile's pixels, or for one sample of each.
 
-use super::{BLOCKS, LANES, TILE};
-use crate::gaussian::TILE_SIZE;
-use crate::packet::Rect;
+use super::grid::{ALL_LANES, BLOCKS, LANES, Lanes, TILE, block_and_lane};
 use crate::raster::DepthCode;
-use crate::raster::tile::place;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 /// Accumulated colour and transmittance of a tile's pixels, or of one sample of each.
 ///
-/// Arrays are indexed by block, row by row, then by pixel of the block in the order of [`place`].
+/// Arrays are indexed by block, row by row, then by pixel of the block in the order of [`block_and_lane`].
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct Layer {
@@ -46,18 +43,6 @@ impl Light {
             ANY_LIGHT
         }
     }
-}
-
-/// Lanes by block.
-pub(super) type Lanes = [u32; BLOCKS];
-
-/// Every lane of a block.
-pub(super) const ALL_LANES: u32 = (1 << LANES) - 1;
-
-/// The block of a pixel of a tile, and the lane in it.
-pub(super) fn block_and_lane(x: usize, y: usize) -> (usize, usize) {
-    let place = place(x, y);
-    (place / LANES % BLOCKS, place % LANES)
 }
 
 impl Layer {
@@ -169,35 +154,23 @@ impl Layer {
         }
         finished
     }
-}
 
-/// How many pixels `lanes` has.
-pub(super) fn count(lanes: &Lanes) -> u32 {
-    lanes.iter().map(|lanes| lanes.count_ones()).sum()
-}
+    /// Finds how far alphas may fall at a block's pixels: no farther than `most_fall`, and where they are finished, not at all.
+    #[inline(always)]
+    pub(super) fn find_most_fall<S: Simd>(&mut self, simd: S, block: usize, most_fall: f32) {
+        let t = f32x16::from_slice(simd, &self.transmittance[block]);
+        let open = t.bitcast::<i32x16<S>>().simd_ge(i32x16::splat(simd, 0));
+        let most_fall = f32x16::splat(simd, most_fall);
+        let none = f32x16::splat(simd, f32::NEG_INFINITY);
+        open.select(most_fall, none)
+            .store_slice(&mut self.most_fall[block]);
+    }
 
-/// The pixels of `bounds` in the tile at `corner`.
-pub(super) fn lanes_within(bounds: Rect, corner: [u32; 2]) -> Lanes {
-    let tile = Rect {
-        x: corner[0] as i32,
-        y: corner[1] as i32,
-        width: TILE_SIZE,
-        height: TILE_SIZE,
-    };
-    let inside = bounds.intersect(tile);
-    if [inside.width, inside.height] == [TILE_SIZE; 2] {
-        return [ALL_LANES; BLOCKS];
+    /// The pixels of a block that are not finished.
+    pub(super) fn open_lanes(&self, block: usize) -> u32 {
+        let lanes = self.transmittance[block].iter().enumerate();
+        lanes.fold(0, |open, (lane, t)| {
+            open | u32::from(t.is_sign_positive()) << lane
+        })
     }
-    let mut lanes = [0; BLOCKS];
-    if inside.is_empty() {
-        return lanes;
-    }
-    let first = [inside.x as u32 - corner[0], inside.y as u32 - corner[1]];
-    for y in first[1]..first[1] + inside.height {
-        for x in first[0]..first[0] + inside.width {
-            let (block, lane) = block_and_lane(x as usize, y as usize);
-            lanes[block] |= 1 << lane;
-        }
-    }
-    lanes
 }

@@ -4,7 +4,7 @@
 //! stored depth are those from one more to one less. So one subtraction and one comparison do for every operation, and
 //! nothing in the kernel depends on which it is.
 
-use super::{BLOCKS, LANES, Lanes};
+use super::grid::{BLOCKS, LANES, Lanes};
 use crate::gaussian::depth::Trend;
 use crate::packet::draw::CompareOp;
 use fearless_simd::{Simd, mask32x16, prelude::*, u32x16};

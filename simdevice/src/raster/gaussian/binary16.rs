@@ -5,15 +5,14 @@
 //! given, rounded. Powers of two come from the polynomial of binary32, unfused, rounded. Nothing depends on the SIMD
 //! level, and [`scalar`] says the same without vectors.
 
+use super::accumulator::Layer;
+use super::block_lists::BlockKernel;
+use super::depth_ranges::Passing;
 use super::exp2::POWER_OF_TWO;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
-use super::layer::Layer;
-use super::{CHUNK, FIND_MEDIAN, GaussianTile, NO_DEPTH, Task, Thresholds, Work};
+use super::inputs::{FIND_MEDIAN, NO_DEPTH, Task, Thresholds};
 use crate::gaussian::splat::Splat;
-use crate::gaussian::splat::locate;
 use crate::lanes::{bits_of, floats_of};
-use crate::optimizations::Optimization;
-use crate::trace::Run;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 use scalar::Splat16;
 
@@ -50,60 +49,43 @@ fn exp2<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     round(simd, floats_of(bits_of(p) + exponent))
 }
 
-impl Thresholds {
-    fn rounded(&self) -> Self {
+/// Compositing in the order of the list, in binary16.
+pub(super) struct Half {
+    /// The task's thresholds, rounded.
+    thresholds: Thresholds,
+}
+
+impl Half {
+    /// For a task with these thresholds.
+    pub(super) fn new(thresholds: &Thresholds) -> Self {
         Self {
-            alpha_floor: scalar::round(self.alpha_floor),
-            alpha_ceiling: scalar::round(self.alpha_ceiling),
-            transmittance_floor: scalar::round(self.transmittance_floor),
-            ..*self
+            thresholds: rounded(thresholds),
         }
     }
 }
 
-impl GaussianTile {
-    /// Composites a tile in binary16.
+impl BlockKernel for Half {
     #[inline(always)]
-    pub(super) fn composite_half<S: Simd>(
+    fn composite<S: Simd>(
         &mut self,
         simd: S,
         task: &Task<'_>,
-        layer: usize,
-        runs: Option<&mut Vec<Run>>,
-    ) -> Work {
-        let mut work = self.part(simd, task, layer, runs);
-        let layer = &mut self.layers[layer];
-        let thresholds = task.thresholds.rounded();
-        for (block, list) in self.lists.iter().enumerate() {
-            for chunk in list.chunks(CHUNK) {
-                if task.optimizations.has(Optimization::EarlyTermination)
-                    && layer.open_lanes(block) == 0
-                {
-                    break;
-                }
-                for &primitive in chunk {
-                    let (batch, place) = locate(primitive);
-                    let splat = &task.splats[batch][place];
-                    let rounded = Splat16::new(splat);
-                    let d = offsets(simd, splat, task.corner, block);
-                    let alpha = alpha(simd, &rounded, d, thresholds.alpha_ceiling);
-                    let shown = if thresholds.depth_mode <= NO_DEPTH {
-                        mask32x16::splat(simd, true)
-                    } else {
-                        self.passing.pixels(simd, block, splat.depth)
-                    };
-                    work.contributions += layer.accumulate_half(
-                        simd,
-                        block,
-                        alpha,
-                        shown,
-                        (rounded.color, splat.depth),
-                        thresholds,
-                    );
-                }
-            }
-        }
-        work
+        (batch, place): (usize, usize),
+        (layer, block): (&mut Layer, usize),
+        passing: &Passing,
+    ) -> u64 {
+        let thresholds = self.thresholds;
+        let splat = &task.splats[batch][place];
+        let rounded = Splat16::new(splat);
+        let d = offsets(simd, splat, task.corner, block);
+        let alpha = alpha(simd, &rounded, d, thresholds.alpha_ceiling);
+        let shown = if thresholds.depth_mode <= NO_DEPTH {
+            mask32x16::splat(simd, true)
+        } else {
+            passing.pixels(simd, block, splat.depth)
+        };
+        let look = (rounded.color, splat.depth);
+        accumulate(layer, simd, block, alpha, shown, look, thresholds)
     }
 }
 
@@ -131,41 +113,49 @@ fn alpha<S: Simd>(simd: S, g: &Splat16, [dx, dy]: [f32x16<S>; 2], ceiling: f32) 
     is_number.select(alpha, f32x16::splat(simd, -1.0))
 }
 
-impl Layer {
-    /// Composites a Gaussian of a colour and a depth in a block, where it is `shown`; returns how many pixels accepted it.
-    #[inline(always)]
-    fn accumulate_half<S: Simd>(
-        &mut self,
-        simd: S,
-        block: usize,
-        alpha: f32x16<S>,
-        shown: mask32x16<S>,
-        (color, depth): ([f32; 3], u32),
-        thresholds: Thresholds,
-    ) -> u64 {
-        let zero = f32x16::splat(simd, 0.0);
-        let t = f32x16::from_slice(simd, &self.transmittance[block]);
-        let weight = round(simd, t * alpha);
-        let rest = round(simd, t - weight);
-        let reached = alpha.simd_ge(thresholds.alpha_floor) & t.simd_ge(zero) & shown;
-        let accepted = reached & rest.simd_ge(thresholds.transmittance_floor);
-        let finished = reached & rest.simd_lt(thresholds.transmittance_floor);
-        if thresholds.depth_mode >= FIND_MEDIAN {
-            let median = u32x16::from_slice(simd, &self.median[block]);
-            let first_half = accepted & t.simd_ge(0.5);
-            let median = first_half.select(u32x16::splat(simd, depth), median);
-            median.store_slice(&mut self.median[block]);
-        }
-        let t = accepted.select(rest, finished.select(zero - t, t));
-        t.store_slice(&mut self.transmittance[block]);
-        for (channel, color) in self.color.iter_mut().zip(color) {
-            let sum = f32x16::from_slice(simd, &channel[block]);
-            let more = round(simd, sum + round(simd, weight * color));
-            accepted.select(more, sum).store_slice(&mut channel[block]);
-        }
-        let accepted = accepted.to_bitmask() as u32;
-        self.covered[block] |= accepted;
-        u64::from(accepted.count_ones())
+/// Composites a Gaussian of a colour and a depth in a block, where it is `shown`; returns how many pixels accepted it.
+#[inline(always)]
+fn accumulate<S: Simd>(
+    layer: &mut Layer,
+    simd: S,
+    block: usize,
+    alpha: f32x16<S>,
+    shown: mask32x16<S>,
+    (color, depth): ([f32; 3], u32),
+    thresholds: Thresholds,
+) -> u64 {
+    let zero = f32x16::splat(simd, 0.0);
+    let t = f32x16::from_slice(simd, &layer.transmittance[block]);
+    let weight = round(simd, t * alpha);
+    let rest = round(simd, t - weight);
+    let reached = alpha.simd_ge(thresholds.alpha_floor) & t.simd_ge(zero) & shown;
+    let accepted = reached & rest.simd_ge(thresholds.transmittance_floor);
+    let finished = reached & rest.simd_lt(thresholds.transmittance_floor);
+    if thresholds.depth_mode >= FIND_MEDIAN {
+        let median = u32x16::from_slice(simd, &layer.median[block]);
+        let first_half = accepted & t.simd_ge(0.5);
+        let median = first_half.select(u32x16::splat(simd, depth), median);
+        median.store_slice(&mut layer.median[block]);
+    }
+    let t = accepted.select(rest, finished.select(zero - t, t));
+    t.store_slice(&mut layer.transmittance[block]);
+    for (channel, color) in layer.color.iter_mut().zip(color) {
+        let sum = f32x16::from_slice(simd, &channel[block]);
+        let more = round(simd, sum + round(simd, weight * color));
+        accepted.select(more, sum).store_slice(&mut channel[block]);
+    }
+    let accepted = accepted.to_bitmask() as u32;
+    layer.covered[block] |= accepted;
+    u64::from(accepted.count_ones())
+}
+
+/// What an element is given of a draw.
+fn rounded(thresholds: &Thresholds) -> Thresholds {
+    Thresholds {
+        alpha_floor: scalar::round(thresholds.alpha_floor),
+        alpha_ceiling: scalar::round(thresholds.alpha_ceiling),
+        transmittance_floor: scalar::round(thresholds.transmittance_floor),
+        ..*thresholds
     }
 }
 

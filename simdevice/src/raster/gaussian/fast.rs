@@ -1,0 +1,223 @@
+//! The fast kernel: volumes in the order of a tile's list, a round of 32 after the other. Each round is staged ([`staging`]):
+//! what the others need of its Gaussians, and which blocks each may reach. Then the alphas of all that are reached are found,
+//! and then blended, block by block ([`pixels`]).
+//!
+//! [`staging`]: super::staging
+//! [`pixels`]: super::pixels
+
+use super::accumulator::{ANY_LIGHT, Layer};
+use super::depth_ranges::Passing;
+use super::grid::{ALL_BLOCKS, BLOCKS, CHUNK};
+use super::inputs::{DepthMode, NO_DEPTH, Task, Work};
+use super::pixels::{Alphas, evaluate, evaluate_steep};
+use super::staging::{Chunk, Reaching, hidden_blocks};
+use crate::optimizations::Optimization;
+use crate::trace::{self, Run};
+use fearless_simd::{Simd, mask32x16, prelude::*};
+
+/// What the kernel needs besides the pixels.
+#[derive(Debug, Default)]
+pub(super) struct FastScratch {
+    chunk: Chunk,
+    /// Apart, so that both are small enough never to be wanting.
+    alphas: Box<Alphas>,
+}
+
+/// The blocks of a tile that are not finished before a round.
+#[derive(Clone, Copy)]
+struct Open {
+    /// A bit for each.
+    bits: u64,
+    /// How many they are.
+    blocks: u8,
+    /// Rows of pixels with an unfinished one, if work is recorded.
+    rows: u8,
+}
+
+/// Gaussians that are composited together.
+struct Round<'a> {
+    chunk: &'a [u32],
+    /// Those of the round after.
+    next_chunk: &'a [u32],
+    open: Open,
+    is_recorded: bool,
+}
+
+/// Composites a task's list.
+#[inline(always)]
+pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
+    scratch: &mut FastScratch,
+    simd: S,
+    task: &Task<'_>,
+    (layer, passing): (&mut Layer, &Passing),
+    mut runs: Option<&mut Vec<Run>>,
+) -> Work {
+    let mut work = Work::default();
+    for block in 0..BLOCKS {
+        layer.find_most_fall(simd, block, task.thresholds.most_fall);
+    }
+    for primitive in task.list.iter().take(CHUNK) {
+        task.prefetch(Some(primitive));
+    }
+    for (number, chunk) in task.list.chunks(CHUNK).enumerate() {
+        let rest = &task.list[number * CHUNK..];
+        let bits = open_blocks::<_, DEPTH>(simd, task, layer, rest, &mut work);
+        if bits == 0 {
+            break;
+        }
+        let open = Open {
+            bits,
+            blocks: bits.count_ones() as u8,
+            rows: if runs.is_some() { layer.open_rows() } else { 0 },
+        };
+        if DEPTH > NO_DEPTH && passing.hides_from(task.splat(chunk[0]).depth, task.trend) {
+            work.tiles_hidden += rest.len() as u64;
+            if let Some(runs) = &mut runs {
+                work.hidden_rest = rest.len() as u32;
+                trace::push_run(runs, hidden_run(simd, task, rest, open));
+            }
+            break;
+        }
+        let next_chunk = rest.get(CHUNK..).unwrap_or_default();
+        let before = work;
+        let round = Round {
+            chunk,
+            next_chunk,
+            open,
+            is_recorded: runs.is_some(),
+        };
+        let blocks_of_hidden = composite_round::<_, DEPTH>(
+            scratch,
+            simd,
+            task,
+            (&mut *layer, passing),
+            &round,
+            &mut work,
+        );
+        if let Some(runs) = &mut runs {
+            let run = Run {
+                primitives: chunk.len() as u32,
+                rows: open.rows,
+                blocks: open.blocks,
+                reached: (work.items - before.items) as u32,
+                hidden: (work.tiles_hidden - before.tiles_hidden) as u32,
+                hidden_blocks: blocks_of_hidden
+                    + (work.blocks_hidden - before.blocks_hidden) as u32,
+            };
+            trace::push_run(runs, run);
+        }
+    }
+    layer.find_covered(simd);
+    work
+}
+
+/// The blocks that are not finished, a bit for each, before the `rest` of a list. Counts those that are left out since they
+/// have too little light.
+#[inline(always)]
+fn open_blocks<S: Simd, const DEPTH: DepthMode>(
+    simd: S,
+    task: &Task<'_>,
+    layer: &Layer,
+    rest: &[u32],
+    work: &mut Work,
+) -> u64 {
+    if !task.optimizations.has(Optimization::EarlyTermination) {
+        return ALL_BLOCKS;
+    }
+    let open = layer.open_blocks(simd, task.way.light);
+    if DEPTH <= NO_DEPTH && task.way.light != ANY_LIGHT {
+        let left_out = layer.open_blocks(simd, ANY_LIGHT) & !open;
+        // If no block is open, none will be.
+        let of = if open == 0 {
+            rest.len()
+        } else {
+            rest.len().min(CHUNK)
+        };
+        work.blocks_left_out += u64::from(left_out.count_ones()) * of as u64;
+    }
+    open
+}
+
+/// Composites a round. Returns how many blocks those would reach that depths hide in all of the tile, if work is recorded.
+#[inline(always)]
+fn composite_round<S: Simd, const DEPTH: DepthMode>(
+    scratch: &mut FastScratch,
+    simd: S,
+    task: &Task<'_>,
+    (layer, passing): (&mut Layer, &Passing),
+    round: &Round<'_>,
+    work: &mut Work,
+) -> u32 {
+    let (open, blocks) = (round.open.bits, u64::from(round.open.blocks));
+    let (mut blocks_of_hidden, mut from) = (0, 0);
+    let reaching = loop {
+        let placed = scratch.chunk.place::<_, DEPTH>(
+            simd,
+            task,
+            (round.chunk, from, round.next_chunk),
+            (open, passing),
+            round.is_recorded,
+        );
+        work.open += placed.count * blocks;
+        work.tiles_hidden += placed.tiles_hidden;
+        work.blocks_hidden += placed.blocks_hidden;
+        blocks_of_hidden += placed.blocks_of_hidden;
+        let Some(&primitive) = round.chunk.get(placed.end) else {
+            break placed.reaching;
+        };
+        // It is steep; what is before it is composited first.
+        work.items += count_bits(&placed.reaching);
+        let staged = (&scratch.chunk, &mut *scratch.alphas);
+        work.contributions += evaluate::<_, DEPTH>(
+            layer,
+            simd,
+            &placed.reaching,
+            staged,
+            passing,
+            task.thresholds,
+        );
+        let splat = task.splat(primitive);
+        let shown = if DEPTH <= NO_DEPTH {
+            open
+        } else {
+            open & passing.blocks(simd, splat.depth).to_bitmask()
+        };
+        let exact = u64::from(shown.count_ones());
+        work.open += blocks;
+        work.blocks_hidden += blocks - exact;
+        work.items += exact;
+        work.contributions += evaluate_steep::<_, DEPTH>(layer, simd, splat, shown, passing, task);
+        from = placed.end + 1;
+    };
+    work.pairs += round.chunk.len() as u64;
+    work.items += count_bits(&reaching);
+    let staged = (&scratch.chunk, &mut *scratch.alphas);
+    work.contributions +=
+        evaluate::<_, DEPTH>(layer, simd, &reaching, staged, passing, task.thresholds);
+    blocks_of_hidden
+}
+
+/// What a trace tells of the Gaussians at a list's end that depths hide in all of the tile.
+#[inline(always)]
+fn hidden_run<S: Simd>(simd: S, task: &Task<'_>, rest: &[u32], open: Open) -> Run {
+    let mut run = Run {
+        primitives: rest.len() as u32,
+        rows: open.rows,
+        blocks: open.blocks,
+        hidden: rest.len() as u32,
+        ..Run::default()
+    };
+    let open = mask32x16::from_bitmask(simd, open.bits);
+    for &primitive in rest {
+        run.hidden_blocks += hidden_blocks(simd, task.splat(primitive), task, open);
+    }
+    run
+}
+
+/// How many pairs of a block and a Gaussian there are.
+fn count_bits(reaching: &Reaching) -> u64 {
+    reaching
+        .iter()
+        .map(|bits| u64::from(bits.count_ones()))
+        .sum()
+}
