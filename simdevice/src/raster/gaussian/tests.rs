@@ -7,12 +7,16 @@ mod whole_draws;
 use super::exp2::{
     CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
 };
-use super::grid::block_and_lane;
+use super::grid::TILE;
+use super::inputs::needs_f64_sums;
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;
+use crate::gaussian::splat::{Splat, locate};
 use crate::gaussian::{GaussianSet, sort_and_bin};
+use crate::optimizations::Optimizations;
 use crate::packet::*;
+use crate::trace::TileWork;
 use devmem::Allocation;
 use fearless_simd::f32x16;
 use rand::{Rng, SeedableRng};
@@ -239,7 +243,7 @@ fn naive_sample(
         let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
         let u = u + dx * f[0] as f32;
         let v = v + mul_add(dy, f[2] as f32, dx * f[1] as f32);
-        let fall = if g.steep || wide_sums::pays(state) {
+        let fall = if g.steep || needs_f64_sums(state) {
             let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
             let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
             if g.wide && !(-draw.half_period..draw.half_period).contains(&dx) {
@@ -258,7 +262,7 @@ fn naive_sample(
         if !passes(g.depth) {
             continue;
         }
-        if wide_sums::pays(state) {
+        if needs_f64_sums(state) {
             let weight = wide_t * f64::from(alpha);
             if wide_t - weight < f64::from(state.transmittance_floor) {
                 break;
