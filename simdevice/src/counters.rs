@@ -81,7 +81,6 @@ counters! {
     OutsideByBounds: "optimizations", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
     TilesBesideEllipse: "optimizations", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
     HarmonicsUnread: "optimizations", "harmonics unread", Count, "Gaussians whose spherical harmonics were not read";
-    BandsOfZeros: "optimizations", "bands of zeros", Count, "directions in which spherical harmonics were evaluated without the higher degrees, whose coefficients are zero";
     BlocksBesideEllipse: "optimizations", "blocks beside ellipse", Count, "Pairs of an unfinished 4x4 block and a Gaussian of its tile that does not reach the block";
     BlocksSaturated: "optimizations", "blocks saturated", Count, "Pairs of a finished 4x4 block and a Gaussian of its tile";
     TilesUntouched: "optimizations", "tiles untouched", Count, "Tiles of attachments that were not loaded, because nothing was drawn to them";

@@ -40,7 +40,6 @@ optimizations! {
     Bounds: "bounds", OutsideByBounds, "A Gaussian whose bounding sphere is off the screen is not projected further.";
     Ellipse: "ellipse", TilesBesideEllipse, "A Gaussian is listed only in tiles that its ellipse reaches, not in all of its box.";
     Harmonics: "harmonics", HarmonicsUnread, "Spherical harmonics are read only for Gaussians that reach a tile.";
-    Bands: "bands", BandsOfZeros, "Degrees of spherical harmonics whose coefficients are zero are not evaluated for Gaussians that are drawn again.";
     Blocks: "blocks", BlocksBesideEllipse, "A Gaussian is evaluated only in blocks of 4x4 pixels that it may reach.";
     EarlyTermination: "early-termination", BlocksSaturated, "Nothing is evaluated in blocks and tiles whose pixels are all finished.";
     EmptyTiles: "empty-tiles", TilesUntouched, "Tiles that nothing draws to are neither loaded nor stored.";
@@ -155,8 +154,8 @@ mod tests {
         }
         let most = Optimizations::ALL
             .without(Optimization::Blocks)
-            .without(Optimization::Bands);
-        assert_eq!("all,-blocks,-bands".parse(), Ok(most));
+            .without(Optimization::Affine);
+        assert_eq!("all,-blocks,-affine".parse(), Ok(most));
     }
 
     #[test]
@@ -178,7 +177,7 @@ mod tests {
                 .parse::<Optimizations>()
                 .unwrap_err()
                 .to_string(),
-            "\"everything\" is neither all nor none nor an optimization, which are cluster-culling, occlusion-culling, temporal-reuse, bounds, ellipse, harmonics, bands, blocks, early-termination, \
+            "\"everything\" is neither all nor none nor an optimization, which are cluster-culling, occlusion-culling, temporal-reuse, bounds, ellipse, harmonics, blocks, early-termination, \
              empty-tiles, overwritten-tiles, overwritten-quads, hierarchical-depth, masked-quads, affine"
         );
     }

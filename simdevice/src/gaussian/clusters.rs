@@ -9,7 +9,7 @@ use super::attributes::{
 use super::frustum::Bounds;
 use super::lanes::BATCH;
 use super::sort;
-use super::spherical_harmonics::{self, COEFFICIENT_FLOATS};
+use super::spherical_harmonics::COEFFICIENT_FLOATS;
 use crate::packet::GaussianAppend;
 use devmem::host;
 use rayon::prelude::*;
@@ -22,8 +22,6 @@ pub(super) struct Chunk {
     pub(super) attributes: Attributes,
     /// Spherical harmonics, if there was room for them: as many floats for each as [`CoefficientReader::floats`] says.
     harmonics: Vec<f32>,
-    /// No coefficient of a greater degree is other than zero.
-    pub(super) degree: u32,
     pub(super) bounds: Bounds,
     /// No Gaussian of it is skipped for what its attributes are.
     pub(super) is_sound: bool,
@@ -167,15 +165,12 @@ impl Chunk {
             bounds.opacity = bounds.opacity.max(opacity);
         }
         let mut harmonics = Vec::new();
-        let mut degree = u32::MAX;
         if with_harmonics {
-            degree = 0;
             let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
             let mut coefficients = [0.0; COEFFICIENT_FLOATS];
             host::reserve(&mut harmonics, reader.floats() * numbers.len());
             for lane in 0..numbers.len() {
                 reader.read(&batch, lane, &mut coefficients);
-                degree = degree.max(spherical_harmonics::degree_of(&coefficients));
                 harmonics.extend(&coefficients[..reader.floats()]);
             }
         }
@@ -183,7 +178,6 @@ impl Chunk {
             numbers: numbers.to_vec(),
             attributes,
             harmonics,
-            degree,
             bounds,
             is_sound,
         }
@@ -203,7 +197,6 @@ impl Chunk {
             numbers: host::with_capacity(BATCH),
             attributes: Attributes::default(),
             harmonics: Vec::new(),
-            degree: u32::MAX,
             bounds: from.bounds,
             is_sound: true,
         };

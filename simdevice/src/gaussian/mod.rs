@@ -119,7 +119,6 @@ fn sort(
     let most_pairs = device.config().bin_budget_bytes / 3;
     let batches = &mut preprocessed.batches;
     let tiles = TileLists::build(batches, &pairs, set.bounds, threads, most_pairs);
-    drop(pairs);
     let binned = Instant::now();
     let fixed = preprocessed.fixed;
     let (by_device, by_programs) = (preprocessed.by_device, preprocessed.by_programs);

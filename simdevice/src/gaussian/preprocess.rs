@@ -46,8 +46,6 @@ pub(super) struct Source<'a> {
     pub(super) is_sound: bool,
     /// Their spherical harmonics, if they were read already.
     pub(super) harmonics: Harmonics<'a>,
-    /// No coefficient of theirs of a greater degree is other than zero.
-    pub(super) degree: u32,
     /// What bounds those that can be seen; `None` tells nothing of them.
     pub(super) frustum: Option<&'a Frustum>,
 }
@@ -56,7 +54,7 @@ impl Source<'_> {
     /// Has the spherical harmonics of degrees 0 to `degree` of some lanes on their way while other things are computed.
     #[inline(always)]
     fn prefetch_harmonics(&self, degree: u32, lanes: &[usize]) {
-        let count = coefficient_count(degree.min(self.degree));
+        let count = coefficient_count(degree);
         for &lane in lanes {
             match self.harmonics.from(lane) {
                 [] => self.reader.prefetch(&self.batch, lane, count),
@@ -431,25 +429,6 @@ fn ray_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> RayDepth {
     )
 }
 
-/// The degree up to which spherical harmonics of a batch make a difference in some directions.
-#[inline(always)]
-fn degree_in(
-    view: &ViewConstants,
-    source: &Source<'_>,
-    directions: &[[f32; DIRECTIONS]; 3],
-    out: &mut Projected,
-) -> u32 {
-    if source.degree >= view.sh_degree || !view.optimizations.has(Optimization::Bands) {
-        return view.sh_degree;
-    }
-    // Nothing makes zero of what is not a number.
-    if directions.as_flattened().iter().any(|part| part.is_nan()) {
-        return view.sh_degree;
-    }
-    out.counters.add(Counter::BandsOfZeros, DIRECTIONS as u64);
-    source.degree
-}
-
 /// Finds the tiles and the colour of the kept Gaussians and appends what reaches a tile to `out`.
 #[inline(always)]
 pub(super) fn emit<S: Simd>(
@@ -463,6 +442,7 @@ pub(super) fn emit<S: Simd>(
     out.reserve(scratch.lanes.len());
     find_tiles(view, simd, scratch, out);
     let reader = &source.reader;
+    let degree = view.sh_degree;
     let floats = reader.floats();
     let mut read = [0.0; COEFFICIENT_FLOATS];
     let (mut directions, mut bases) = ([[0.0; DIRECTIONS]; 3], Bases::default());
@@ -473,7 +453,6 @@ pub(super) fn emit<S: Simd>(
                 *part = lanes[at % BATCH] as f32;
             }
         }
-        let degree = degree_in(view, source, &directions, out);
         bases.find(simd, degree, &directions);
         let needed = 3 * coefficient_count(degree) + 1;
         let is_whole = floats + 1 >= needed;
@@ -657,9 +636,9 @@ impl<'a> Job<'a> {
             &**matrices
         });
         let is_faded = streams.model.opacity.is_some();
-        let (harmonics, degree) = match self.part {
-            Part::Chunk(chunk) if self.has_harmonics => (chunk.harmonics(), chunk.degree),
-            _ => (Harmonics::default(), u32::MAX),
+        let harmonics = match self.part {
+            Part::Chunk(chunk) if self.has_harmonics => chunk.harmonics(),
+            _ => Harmonics::default(),
         };
         let (attributes, is_sound) = match self.part {
             Part::Chunk(chunk) if !is_faded => (&chunk.attributes, chunk.is_sound),
@@ -685,7 +664,6 @@ impl<'a> Job<'a> {
             matrices,
             is_sound,
             harmonics,
-            degree,
             frustum: None,
         }
     }

@@ -44,12 +44,6 @@ pub fn coefficient_count(degree: u32) -> usize {
     (degree as usize + 1).pow(2)
 }
 
-/// The least degree whose coefficients, and those of lower ones, are all that is not zero.
-pub(super) fn degree_of(coefficients: &[f32; COEFFICIENT_FLOATS]) -> u32 {
-    let last = coefficients.iter().rposition(|&k| k != 0.0);
-    last.map_or(0, |last| (last / 3).isqrt() as u32)
-}
-
 /// Directions whose basis functions are found together.
 pub(super) const DIRECTIONS: usize = 16;
 

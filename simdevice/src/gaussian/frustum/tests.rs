@@ -179,7 +179,6 @@ fn what_is_outside_is_drawn_nowhere() {
                     matrices: None,
                     is_sound: false,
                     harmonics: Harmonics::default(),
-                    degree: u32::MAX,
                     frustum: None,
                 };
                 let mut out = Projected::default();

@@ -93,10 +93,6 @@ fn cases() -> Vec<(&'static str, Scene)> {
         extra: Some(Extra::Behind { count: COUNT }),
         ..Workload::new(Source::Wall, SIZE)
     };
-    let plain = Workload {
-        plain: true,
-        ..base.clone()
-    };
     let whole = |workload: &Workload, name: &str| Scene::gaussians(name, workload, Path::Own, WARM);
     let room = || whole(&base, "100k Gaussians");
     let half_seen = || whole(&beside, "100k Gaussians, as many beside the picture");
@@ -128,10 +124,6 @@ fn cases() -> Vec<(&'static str, Scene)> {
         ("bounds", first),
         ("ellipse", room()),
         ("harmonics", half_seen()),
-        (
-            "bands",
-            whole(&plain, "100k Gaussians of degree 3, higher degrees zero"),
-        ),
         ("blocks", room()),
         ("early-termination", room()),
         (

@@ -14,13 +14,12 @@ use super::worker::OPTIMIZATIONS;
 use super::{BenchError, Extra, OptimizationsArguments, Source, Workload};
 
 /// Optimizations of Gaussian draws, and the counter of each, as the device has them.
-const COUNTERS: [(&str, &str); 10] = [
+const COUNTERS: [(&str, &str); 9] = [
     ("cluster-culling", "outside by chunks"),
     ("occlusion-culling", "hidden by others"),
     ("bounds", "outside by bounds"),
     ("ellipse", "tiles beside ellipse"),
     ("harmonics", "harmonics unread"),
-    ("bands", "bands of zeros"),
     ("blocks", "blocks beside ellipse"),
     ("early-termination", "blocks saturated"),
     ("empty-tiles", "tiles untouched"),
