@@ -67,8 +67,8 @@ enum Vertices<'a> {
     From(u64),
     /// Picked by an index buffer.
     Listed(Vec<u64>),
-    /// The first one of a draw and, from there, each of a chunk.
-    Chunk(u64, &'a [u32]),
+    /// The first one of a draw and, from there, each of a cluster.
+    Cluster(u64, &'a [u32]),
 }
 
 impl<'a> Batch<'a> {
@@ -88,9 +88,9 @@ impl<'a> Batch<'a> {
     }
 
     /// The vertices of `append`'s count whose numbers are `numbers`, for `instance`.
-    pub(super) fn of_chunk(append: &GaussianAppend, instance: u32, numbers: &'a [u32]) -> Self {
+    pub(super) fn of_cluster(append: &GaussianAppend, instance: u32, numbers: &'a [u32]) -> Self {
         Self {
-            vertices: Vertices::Chunk(append.first.into(), numbers),
+            vertices: Vertices::Cluster(append.first.into(), numbers),
             instance,
             first_instance: append.first_instance,
             len: numbers.len(),
@@ -108,7 +108,7 @@ impl<'a> Batch<'a> {
             None => match &self.vertices {
                 Vertices::From(first) => first + lane as u64,
                 Vertices::Listed(list) => list[lane],
-                Vertices::Chunk(first, numbers) => first + u64::from(numbers[lane]),
+                Vertices::Cluster(first, numbers) => first + u64::from(numbers[lane]),
             },
         }
     }

@@ -1,9 +1,9 @@
-//! Which draws have chunks. Those of a draw are made when it is drawn for the second time, since a picture that is drawn
+//! Which draws have clusters. Those of a draw are made when it is drawn for the second time, since a picture that is drawn
 //! once is drawn faster without them. They live in the memory that they are derived from: when that is freed or written,
 //! they are gone.
 
 use super::attributes::{SourceFingerprint, is_device_local};
-use super::clusters::{self, Chunks};
+use super::clusters::{self, Clusters};
 use super::set::GaussianSet;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
@@ -12,7 +12,7 @@ use crate::packet::{AttributeStream, GaussianAppend};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Instant;
 
-/// Draws of fewer Gaussians have no chunks.
+/// Draws of fewer Gaussians have no clusters.
 const LEAST_COUNT: u32 = 512;
 
 /// Draws that are remembered.
@@ -21,7 +21,7 @@ const MAX_ENTRIES: usize = 256;
 /// A draw that was seen.
 #[derive(Debug)]
 struct Entry {
-    /// Those of positions, scales, rotations, opacities and, if they are in the chunks, spherical harmonics.
+    /// Those of positions, scales, rotations, opacities and, if they are in the clusters, spherical harmonics.
     streams: Vec<SourceFingerprint>,
     first: u32,
     count: u32,
@@ -29,8 +29,8 @@ struct Entry {
     is_flat: bool,
     /// When it was last drawn.
     used: u64,
-    /// Its chunks, if they were made; they belong to the memory of its positions.
-    chunks: Weak<Chunks>,
+    /// Its clusters, if they were made; they belong to the memory of its positions.
+    clusters: Weak<Clusters>,
     /// Bytes that they take.
     bytes: u64,
 }
@@ -42,9 +42,9 @@ struct Entries {
     now: u64,
 }
 
-/// The draws of a device that were seen, and their chunks.
+/// The draws of a device that were seen, and their clusters.
 #[derive(Debug, Default)]
-pub(crate) struct ChunkCache(Mutex<Entries>);
+pub(crate) struct ClusterCache(Mutex<Entries>);
 
 impl Entry {
     fn new(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
@@ -58,7 +58,7 @@ impl Entry {
             count: append.count,
             is_flat,
             used: 0,
-            chunks: Weak::new(),
+            clusters: Weak::new(),
             bytes: clusters::memory_bytes(append, with_harmonics),
         }
     }
@@ -72,7 +72,7 @@ impl Entry {
         what(self) == what(other) && streams.all(|(a, b)| a.is_same(b))
     }
 
-    /// Whether its chunks hold all that those of `other` would: the same Gaussians, and at least the same of their spherical
+    /// Whether its clusters hold all that those of `other` would: the same Gaussians, and at least the same of their spherical
     /// harmonics.
     fn covers(&self, other: &Self) -> bool {
         let mut streams = self.streams.iter().zip(&other.streams);
@@ -82,28 +82,28 @@ impl Entry {
             && streams.all(|(a, b)| a.is_same(b))
     }
 
-    /// Bytes that its chunks take.
+    /// Bytes that its clusters take.
     fn memory_bytes(&self) -> u64 {
-        match self.chunks.strong_count() {
+        match self.clusters.strong_count() {
             0 => 0,
             _ => self.bytes,
         }
     }
 
-    /// Frees its chunks.
+    /// Frees its clusters.
     fn release(&self) {
         let memory = self
             .streams
             .first()
             .and_then(|positions| positions.memory());
-        if let Some((memory, chunks)) = memory.zip(self.chunks.upgrade()) {
-            memory.drop_derived(&(chunks as _));
+        if let Some((memory, clusters)) = memory.zip(self.clusters.upgrade()) {
+            memory.drop_derived(&(clusters as _));
         }
     }
 }
 
 impl Entries {
-    /// Makes room for `bytes` more by freeing the chunks that were not used for longest, and those whose memory has
+    /// Makes room for `bytes` more by freeing the clusters that were not used for longest, and those whose memory has
     /// changed.
     fn make_room(&mut self, bytes: u64, budget: u64) {
         self.entries.sort_by_key(|entry| entry.used);
@@ -122,22 +122,22 @@ impl Entries {
     }
 }
 
-impl ChunkCache {
+impl ClusterCache {
     fn lock(&self) -> MutexGuard<'_, Entries> {
         // What a panic left behind is only forgotten sooner.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The chunks of what `append` draws, as 2D Gaussians if `is_flat`, if it has any; `build` makes them, with spherical
-    /// harmonics or without. Draws of the same Gaussians by lower degrees share them. All chunks together take at most
+    /// The clusters of what `append` draws, as 2D Gaussians if `is_flat`, if it has any; `build` makes them, with spherical
+    /// harmonics or without. Draws of the same Gaussians by lower degrees share them. All clusters together take at most
     /// `budget` bytes.
     pub(super) fn get(
         &self,
         append: &GaussianAppend,
         is_flat: bool,
         budget: u64,
-        build: impl FnOnce(bool) -> Chunks,
-    ) -> Option<Arc<Chunks>> {
+        build: impl FnOnce(bool) -> Clusters,
+    ) -> Option<Arc<Clusters>> {
         if !is_eligible(append) || clusters::memory_bytes(append, false) > budget {
             return None;
         }
@@ -158,10 +158,10 @@ impl ChunkCache {
             });
             for entry in entries.entries.iter_mut() {
                 if entry.covers(&drawn)
-                    && let Some(chunks) = entry.chunks.upgrade()
+                    && let Some(clusters) = entry.clusters.upgrade()
                 {
                     entry.used = drawn.used;
-                    return Some(chunks);
+                    return Some(clusters);
                 }
             }
             if !entries.entries.iter().any(|entry| entry.is_same(&drawn)) {
@@ -179,21 +179,21 @@ impl ChunkCache {
             });
             entries.make_room(drawn.bytes, budget);
         }
-        let chunks = Arc::new(build(with_harmonics));
-        drawn.chunks = Arc::downgrade(&chunks);
+        let clusters = Arc::new(build(with_harmonics));
+        drawn.clusters = Arc::downgrade(&clusters);
         let memory = &append.attributes.position.buffer.memory;
-        memory.keep_derived(Arc::clone(&chunks) as _);
+        memory.keep_derived(Arc::clone(&clusters) as _);
         self.lock().entries.push(drawn);
-        Some(chunks)
+        Some(clusters)
     }
 }
 
-/// The chunks of each append that has some.
+/// The clusters of each append that has some.
 pub(super) fn find(
     set: &GaussianSet,
     device: &Device,
     counters: &mut Counters,
-) -> Vec<Option<Arc<Chunks>>> {
+) -> Vec<Option<Arc<Clusters>>> {
     let config = device.config();
     let mut found = vec![None; set.appends.len()];
     if !config.optimizations.has(Optimization::ClusterCulling) {
@@ -203,18 +203,18 @@ pub(super) fn find(
     for (append, found) in set.appends.iter().zip(&mut found) {
         let build = |with_harmonics| {
             let started = Instant::now();
-            let chunks = device.install(|| Chunks::build(append, is_flat, with_harmonics));
-            counters.add(Counter::ChunksBuilt, chunks.chunks.len() as u64);
-            counters.add(Counter::ChunkTime, started.elapsed().as_nanos() as u64);
-            chunks
+            let clusters = device.install(|| Clusters::build(append, is_flat, with_harmonics));
+            counters.add(Counter::ClustersBuilt, clusters.clusters.len() as u64);
+            counters.add(Counter::ClusterTime, started.elapsed().as_nanos() as u64);
+            clusters
         };
-        let cache = device.chunks();
-        *found = cache.get(append, is_flat, config.chunk_budget_bytes, build);
+        let cache = device.clusters();
+        *found = cache.get(append, is_flat, config.cluster_budget_bytes, build);
     }
     found
 }
 
-/// The attributes that every chunk holds.
+/// The attributes that every cluster holds.
 fn shapes(append: &GaussianAppend) -> [&AttributeStream; 4] {
     let attributes = &append.attributes;
     [
@@ -230,11 +230,11 @@ fn is_fixed(stream: &AttributeStream) -> bool {
     is_device_local(stream) && stream.instance_divisor.is_none()
 }
 
-/// Whether what is drawn can have chunks.
+/// Whether what is drawn can have clusters.
 fn is_eligible(append: &GaussianAppend) -> bool {
     let fixed = shapes(append).into_iter().all(is_fixed);
     let model = &append.attributes.model;
-    // What differs from vertex to vertex would have to be in the chunks.
+    // What differs from vertex to vertex would have to be in the clusters.
     let mut of_model = model.matrix.iter().flat_map(|rows| rows.iter());
     let by_instance = of_model.all(is_by_instance) && model.opacity.iter().all(is_by_instance);
     append.indices.is_none() && append.count >= LEAST_COUNT && fixed && by_instance

@@ -1,5 +1,5 @@
-//! Chunks: the Gaussians of a buffer that is drawn again and again, in an order in which neighbours in space are
-//! neighbours in memory. Bounds tell of a whole chunk that no picture needs it; what is left is read in one go.
+//! Clusters: the Gaussians of a buffer that is drawn again and again, in an order in which neighbours in space are
+//! neighbours in memory. Bounds tell of a whole cluster that no picture needs it; what is left is read in one go.
 //!
 //! They are derived from memory that only the device can write, and never change an image.
 
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 /// Some Gaussians that are near one another.
 #[derive(Debug)]
-pub(super) struct Chunk {
+pub(super) struct Cluster {
     /// The vertices' numbers in the draw.
     pub(super) numbers: Vec<u32>,
     pub(super) attributes: Attributes,
@@ -29,12 +29,12 @@ pub(super) struct Chunk {
 
 /// All Gaussians of a draw without indices.
 #[derive(Debug)]
-pub(super) struct Chunks {
+pub(super) struct Clusters {
     /// Where the spherical harmonics in them are from, in their order.
     harmonics: Vec<SourceFingerprint>,
-    pub(super) chunks: Vec<Chunk>,
+    pub(super) clusters: Vec<Cluster>,
     /// Those among them that hide others best: large and opaque.
-    pub(super) screens: Vec<Chunk>,
+    pub(super) occluders: Vec<Cluster>,
     /// The greatest opacity.
     pub(super) opacity: f32,
 }
@@ -42,7 +42,7 @@ pub(super) struct Chunks {
 /// The least opacity of a screen.
 const SCREEN_OPACITY: f32 = 0.5;
 
-/// The most screens of a draw of so many Gaussians: looking for large ones among them must not cost what it saves.
+/// The most occluders of a draw of so many Gaussians: looking for large ones among them must not cost what it saves.
 fn max_screens(count: usize) -> usize {
     (count / 16).min(8 * 1024)
 }
@@ -50,34 +50,34 @@ fn max_screens(count: usize) -> usize {
 /// Bits of an axis in a Morton code.
 const AXIS_BITS: u32 = 10;
 
-/// Bytes of host memory that chunks of what `append` draws take, with and without spherical harmonics.
+/// Bytes of host memory that clusters of what `append` draws take, with and without spherical harmonics.
 pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64 {
     let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
     let floats = if with_harmonics { reader.floats() } else { 0 };
-    let chunk = size_of::<Chunk>() + 4 * BATCH * (1 + floats);
-    let screen = size_of::<Chunk>() + 4 * BATCH;
-    let chunks = |count: u64| count.div_ceil(BATCH as u64);
-    let screens = chunks(max_screens(append.count as usize) as u64);
-    chunks(append.count.into()) * chunk as u64 + screens * screen as u64
+    let cluster = size_of::<Cluster>() + 4 * BATCH * (1 + floats);
+    let screen = size_of::<Cluster>() + 4 * BATCH;
+    let clusters = |count: u64| count.div_ceil(BATCH as u64);
+    let occluders = chunks(max_screens(append.count as usize) as u64);
+    chunks(append.count.into()) * cluster as u64 + occluders * screen as u64
 }
 
-impl Chunks {
-    /// The chunks of what `append` draws, without what its model does to it. It has no indices, and of a model none by vertex.
+impl Clusters {
+    /// The clusters of what `append` draws, without what its model does to it. It has no indices, and of a model none by vertex.
     /// 2D Gaussians' third scales are zero.
     pub(super) fn build(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
         let order = morton_order(append);
-        let mut chunks = host::with_capacity(order.len().div_ceil(BATCH));
+        let mut clusters = host::with_capacity(order.len().div_ceil(BATCH));
         order
             .par_chunks(BATCH)
             .map_init(Fetcher::default, |fetcher, numbers| {
-                Chunk::read(append, fetcher, numbers, (is_flat, with_harmonics))
+                Cluster::read(append, fetcher, numbers, (is_flat, with_harmonics))
             })
-            .collect_into_vec(&mut chunks);
-        let opacities = chunks.iter().map(|chunk| chunk.bounds.opacity);
-        let screens = screens(&chunks, max_screens(order.len()));
-        let screens = screens
+            .collect_into_vec(&mut clusters);
+        let opacities = clusters.iter().map(|cluster| cluster.bounds.opacity);
+        let occluders = occluders(&clusters, max_screens(order.len()));
+        let occluders = occluders
             .chunks(BATCH)
-            .map(|numbers| Chunk::read(append, &mut Fetcher::default(), numbers, (is_flat, false)));
+            .map(|numbers| Cluster::read(append, &mut Fetcher::default(), numbers, (is_flat, false)));
         let harmonics = &append.attributes.spherical_harmonics;
         Self {
             harmonics: match with_harmonics {
@@ -85,13 +85,13 @@ impl Chunks {
                 false => Vec::new(),
             },
             opacity: opacities.fold(0.0, f32::max),
-            screens: host::collect(screens),
-            chunks,
+            occluders: host::collect(occluders),
+            clusters,
         }
     }
 }
 
-impl Chunks {
+impl Clusters {
     /// Whether the spherical harmonics of what `append` draws are in them, perhaps with those of higher degrees.
     pub(super) fn have_harmonics_of(&self, append: &GaussianAppend) -> bool {
         let drawn = &append.attributes.spherical_harmonics;
@@ -102,13 +102,13 @@ impl Chunks {
 }
 
 /// The numbers of at most so many Gaussians that may hide others: of the opaque ones those whose second largest scale is
-/// greatest, in the order of chunks.
-fn screens(chunks: &[Chunk], most: usize) -> Vec<u32> {
+/// greatest, in the order of clusters.
+fn occluders(clusters: &[Cluster], most: usize) -> Vec<u32> {
     let opaque = || {
-        chunks.iter().flat_map(|chunk| {
-            (0..chunk.numbers.len())
-                .filter(|&lane| chunk.attributes.opacity[lane] >= SCREEN_OPACITY)
-                .map(|lane| (chunk.attributes.second_scale(lane), chunk.numbers[lane]))
+        clusters.iter().flat_map(|cluster| {
+            (0..cluster.numbers.len())
+                .filter(|&lane| cluster.attributes.opacity[lane] >= SCREEN_OPACITY)
+                .map(|lane| (cluster.attributes.second_scale(lane), cluster.numbers[lane]))
         })
     };
     let mut seconds: Vec<f32> = host::collect(opaque().map(|(second, _)| second));
@@ -120,14 +120,14 @@ fn screens(chunks: &[Chunk], most: usize) -> Vec<u32> {
     host::collect(large.take(most).map(|(_, number)| number))
 }
 
-impl Chunk {
+impl Cluster {
     fn read(
         append: &GaussianAppend,
         fetcher: &mut Fetcher,
         numbers: &[u32],
         (is_flat, with_harmonics): (bool, bool),
     ) -> Self {
-        let batch = Batch::of_chunk(append, append.first_instance, numbers);
+        let batch = Batch::of_cluster(append, append.first_instance, numbers);
         let mut attributes = Attributes::default();
         fetcher.read_own(&append.attributes, &batch, &mut attributes);
         if is_flat {
@@ -184,27 +184,27 @@ impl Chunk {
     }
 }
 
-impl Chunk {
+impl Cluster {
     /// Spherical harmonics of all lanes, if it holds them.
     pub(super) fn harmonics(&self) -> Harmonics<'_> {
         let stride = self.harmonics.len() / self.numbers.len().max(1);
         Harmonics::new(&self.harmonics, stride)
     }
 
-    /// A chunk of one lane of another, without harmonics.
+    /// A cluster of one lane of another, without harmonics.
     pub(super) fn of_one(from: &Self, lane: usize) -> Self {
-        let mut chunk = Self {
+        let mut cluster = Self {
             numbers: host::with_capacity(BATCH),
             attributes: Attributes::default(),
             harmonics: Vec::new(),
             bounds: from.bounds,
             is_sound: true,
         };
-        chunk.push(from, lane);
-        chunk
+        cluster.push(from, lane);
+        cluster
     }
 
-    /// Adds a lane of another chunk; `bounds` stays as it is.
+    /// Adds a lane of another cluster; `bounds` stays as it is.
     pub(super) fn push(&mut self, from: &Self, lane: usize) {
         self.attributes
             .copy_lane(self.numbers.len(), &from.attributes, lane);

@@ -20,7 +20,7 @@ fn keys_of(batches: &[Projected]) -> Vec<&[[u32; 2]]> {
     host::collect(batches.iter().map(|batch| &batch.keys[..]))
 }
 
-/// Has equal keys of a sorted sequence follow in the order of the set. Batches are not in that, once there are chunks.
+/// Has equal keys of a sorted sequence follow in the order of the set. Batches are not in that, once there are clusters.
 fn settle_ties(keys: &[&[[u32; 2]]], pairs: &mut [Pair]) {
     let sequence = |&(_, name): &Pair| {
         let (batch, place) = locate(name);

@@ -1,4 +1,4 @@
-//! What of space a picture can show. Planes bound it, and tell in a few operations of Gaussians, alone or in a chunk,
+//! What of space a picture can show. Planes bound it, and tell in a few operations of Gaussians, alone or in a cluster,
 //! that they are off the screen. The answer is conservative: what is not surely outside is inside.
 
 mod reach;
@@ -19,7 +19,7 @@ const ERROR: f64 = 1.0 / 1_048_576.0;
 /// The greatest condition of a matrix by which planes are taken to another space.
 const MAX_CONDITION: f64 = 1e5;
 
-/// Bounds of the Gaussians of a chunk that can be drawn at all.
+/// Bounds of the Gaussians of a cluster that can be drawn at all.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     /// The least coordinates of the means.
@@ -128,7 +128,7 @@ impl Frustum {
         })
     }
 
-    /// Why a whole chunk is outside, if it is.
+    /// Why a whole cluster is outside, if it is.
     pub(super) fn excludes(&self, bounds: &Bounds) -> Option<Outside> {
         if f64::from(bounds.opacity) < self.alpha_floor {
             return Some(Outside::Faint);

@@ -1,7 +1,7 @@
-//! What there is to project: batches of vertices and chunks, without the chunks that no picture needs.
+//! What there is to project: batches of vertices and clusters, without the clusters that no picture needs.
 
 use super::camera::ViewConstants;
-use super::clusters::{Chunk, Chunks};
+use super::clusters::{Cluster, Clusters};
 use super::frustum::{Frustum, Outside};
 use super::instances::Model;
 use super::lanes::BATCH;
@@ -14,11 +14,11 @@ use crate::packet::GaussianAppend;
 use devmem::host;
 use std::sync::Arc;
 
-/// What is to be projected, in the order of draw, instance and, but for chunks, position in the draw. What is left
+/// What is to be projected, in the order of draw, instance and, but for clusters, position in the draw. What is left
 /// out already is counted.
 pub(super) fn group_tasks<'a>(
     set: &'a GaussianSet,
-    chunks: &'a [Option<Arc<Chunks>>],
+    clusters: &'a [Option<Arc<Clusters>>],
     constants: &ViewConstants,
     occlusion: Option<&OcclusionMap>,
     counters: &mut Counters,
@@ -39,16 +39,16 @@ pub(super) fn group_tasks<'a>(
     let mut jobs = Vec::new();
     // There are no more Gaussians than places in batches, so that this stays within 32 bits but at the very end.
     let mut sequence = 0u32;
-    for (append, chunks) in set.appends.iter().zip(chunks) {
-        let opacity = chunks.as_ref().map_or(1.0, |chunks| chunks.opacity);
+    for (append, clusters) in set.appends.iter().zip(clusters) {
+        let opacity = clusters.as_ref().map_or(1.0, |clusters| clusters.opacity);
         let view = InstanceView::new(constants, opacity);
-        let has_harmonics = chunks.as_ref().map(|all| all.have_harmonics_of(append));
+        let has_harmonics = clusters.as_ref().map(|all| all.have_harmonics_of(append));
         for instance in 0..append.instance_count {
             let instance = append.first_instance.saturating_add(instance);
             let of_instance;
             let mut view = &view;
             let occlusion = occlusion.filter(|_| !append.attributes.model.is_some());
-            if chunks.is_some() && append.attributes.model.is_some() {
+            if clusters.is_some() && append.attributes.model.is_some() {
                 of_instance = InstanceView::of_instance(constants, append, instance, opacity);
                 view = &of_instance;
             }
@@ -60,12 +60,12 @@ pub(super) fn group_tasks<'a>(
                 has_harmonics: has_harmonics.unwrap_or(false),
                 frustum: Arc::clone(&view.frustum),
             };
-            let batches = match chunks {
+            let batches = match clusters {
                 None => append.count.div_ceil(BATCH as u32) as usize,
-                Some(chunks) => chunks.chunks.len(),
+                Some(clusters) => clusters.clusters.len(),
             };
             host::reserve(&mut jobs, batches);
-            match chunks {
+            match clusters {
                 None => {
                     let starts = (0..append.count).step_by(BATCH);
                     jobs.extend(starts.map(|start| Job {
@@ -73,16 +73,16 @@ pub(super) fn group_tasks<'a>(
                         ..job.clone()
                     }));
                 }
-                Some(chunks) => jobs.extend(
-                    chunks
-                        .chunks
+                Some(clusters) => jobs.extend(
+                    clusters
+                        .clusters
                         .iter()
-                        .filter(|chunk| {
-                            !view.cull_cluster(chunk, counters)
-                                && !occlusion.is_some_and(|map| map.cull_cluster(chunk, counters))
+                        .filter(|cluster| {
+                            !view.cull_cluster(cluster, counters)
+                                && !occlusion.is_some_and(|map| map.cull_cluster(cluster, counters))
                         })
-                        .map(|chunk| Job {
-                            part: Part::Chunk(chunk),
+                        .map(|cluster| Job {
+                            part: Part::Cluster(cluster),
                             ..job.clone()
                         }),
                 ),
@@ -132,9 +132,9 @@ impl InstanceView {
         }
     }
 
-    /// Whether a whole chunk is outside; its Gaussians are counted then.
-    fn cull_cluster(&self, chunk: &Chunk, counters: &mut Counters) -> bool {
-        let mut bounds = chunk.bounds;
+    /// Whether a whole cluster is outside; its Gaussians are counted then.
+    fn cull_cluster(&self, cluster: &Cluster, counters: &mut Counters) -> bool {
+        let mut bounds = cluster.bounds;
         bounds.opacity = self.model.greatest_opacity(bounds.opacity);
         let Some(reason) = self.own.as_ref().and_then(|own| own.excludes(&bounds)) else {
             return false;
@@ -145,8 +145,8 @@ impl InstanceView {
             Outside::Far => Counter::SkippedFar,
             Outside::Beside => Counter::SkippedOffScreen,
         };
-        for counter in [reason, Counter::GaussiansRead, Counter::OutsideByChunks] {
-            counters.add(counter, chunk.numbers.len() as u64);
+        for counter in [reason, Counter::GaussiansRead, Counter::OutsideByClusters] {
+            counters.add(counter, cluster.numbers.len() as u64);
         }
         true
     }

@@ -43,7 +43,7 @@ use crate::device::Device;
 use crate::optimizations::Optimization;
 use crate::trace::{self, DrawRecord};
 use camera::ViewConstants;
-use clusters::Chunks;
+use clusters::Clusters;
 use devmem::host;
 use footprint::Visible;
 use preprocess::Preprocessor;
@@ -85,7 +85,7 @@ pub fn sort_and_bin(
     if let Some(key) = key {
         let bytes = sorted.memory_bytes();
         let sets = device.last_sets();
-        sets.keep(key, &sorted, bytes, config.chunk_budget_bytes);
+        sets.keep(key, &sorted, bytes, config.cluster_budget_bytes);
     }
     Ok(GaussianDraw::new(set, sorted, record, device))
 }
@@ -105,7 +105,7 @@ struct Preprocessed {
 /// know.
 fn sort(
     set: &GaussianSet,
-    clusters: &[Option<Arc<Chunks>>],
+    clusters: &[Option<Arc<Clusters>>],
     device: &Device,
     counters: &mut Counters,
 ) -> Result<(SortedSet, Option<Arc<DrawRecord>>), SortError> {
@@ -159,7 +159,7 @@ fn sort(
 /// Preprocesses what has attributes, but for what is left out with its cluster, and what vertex programs project.
 fn preprocess_set(
     set: &GaussianSet,
-    clusters: &[Option<Arc<Chunks>>],
+    clusters: &[Option<Arc<Clusters>>],
     device: &Device,
 ) -> Result<Preprocessed, SortError> {
     let begin = &set.begin;
@@ -182,7 +182,7 @@ fn preprocess_set(
     let tasks = group_tasks::group_tasks(set, clusters, &constants, map.as_ref(), &mut by_device)?;
     if optimizations.has(Optimization::Harmonics) {
         let unread =
-            by_device.get(Counter::OutsideByChunks) + by_device.get(Counter::HiddenByOthers);
+            by_device.get(Counter::OutsideByClusters) + by_device.get(Counter::HiddenByOthers);
         by_device.add(Counter::HarmonicsUnread, unread);
     }
     let mut batches = preprocessor.run(&tasks);

@@ -1,11 +1,11 @@
-//! Gaussians behind others that leave no light for them. Large opaque ones, screens, are projected first, and followed front
+//! Gaussians behind others that leave no light for them. Large opaque ones, occluders, are projected first, and followed front
 //! to back: each takes of a tile's light at least what it takes of the pixel that it covers least. Where a tile's pixels are
 //! all finished by then, nothing farther away contributes to it, whatever else is drawn; what reaches only such tiles is
 //! hidden. The answer is conservative, and the picture the same.
 
 use super::attributes::Attributes;
 use super::camera::ViewConstants;
-use super::clusters::{Chunk, Chunks};
+use super::clusters::{Cluster, Clusters};
 use super::footprint::{TILE_SIZE, Visible};
 use super::frustum::{Bounds, Frustum};
 use super::lanes::BATCH;
@@ -31,7 +31,7 @@ const LEAST_DEVIATION: f64 = 10.0;
 /// What takes less of a tile is not followed.
 const LEAST_ALPHA: f64 = 0.2;
 
-/// What following screens may cost for each tile, in units of what it costs to see that a tile is finished.
+/// What following occluders may cost for each tile, in units of what it costs to see that a tile is finished.
 const COST_PER_TILE: usize = 512;
 
 /// What it costs to find what a screen takes of a tile, in the same units.
@@ -49,13 +49,13 @@ pub(super) struct OcclusionMap {
 }
 
 impl OcclusionMap {
-    /// Whether nothing of a chunk is seen that is not placed by a model; its Gaussians are counted then.
-    pub(super) fn cull_cluster(&self, chunk: &Chunk, counters: &mut Counters) -> bool {
-        if !self.hides(&chunk.bounds) {
+    /// Whether nothing of a cluster is seen that is not placed by a model; its Gaussians are counted then.
+    pub(super) fn cull_cluster(&self, cluster: &Cluster, counters: &mut Counters) -> bool {
+        if !self.hides(&cluster.bounds) {
             return false;
         }
         for counter in [Counter::GaussiansRead, Counter::HiddenByOthers] {
-            counters.add(counter, chunk.numbers.len() as u64);
+            counters.add(counter, cluster.numbers.len() as u64);
         }
         true
     }
@@ -66,34 +66,34 @@ impl OcclusionMap {
     }
 }
 
-/// What screens hide; `None` if that is nothing, or not to be known.
+/// What occluders hide; `None` if that is nothing, or not to be known.
 pub(super) fn find(
     set: &GaussianSet,
     preprocessor: &Preprocessor<'_>,
-    chunks: &[Option<Arc<Chunks>>],
+    clusters: &[Option<Arc<Clusters>>],
 ) -> Option<OcclusionMap> {
     let constants = preprocessor.constants;
     if !may_hide(set, preprocessor) {
         return None;
     }
     let mut found = Vec::new();
-    for (append, chunks) in set.appends.iter().zip(chunks) {
-        if let Some(chunks) = chunks
+    for (append, clusters) in set.appends.iter().zip(clusters) {
+        if let Some(clusters) = clusters
             && !append.attributes.model.is_some()
         {
-            let frustum = Arc::new(Frustum::new(constants, chunks.opacity));
-            let screens = large_screens(constants, &frustum, chunks);
-            found.push((append, frustum, screens));
+            let frustum = Arc::new(Frustum::new(constants, clusters.opacity));
+            let occluders = large_screens(constants, &frustum, clusters);
+            found.push((append, frustum, occluders));
         }
     }
     let mut jobs = Vec::new();
-    for (append, frustum, screens) in &found {
-        jobs.extend(screens.iter().map(|chunk| Job {
+    for (append, frustum, occluders) in &found {
+        jobs.extend(occluders.iter().map(|cluster| Job {
             append,
             instance: append.first_instance,
             sequence: 0,
             has_harmonics: false,
-            part: Part::Chunk(chunk),
+            part: Part::Cluster(cluster),
             frustum: Arc::clone(frustum),
         }));
     }
@@ -102,7 +102,7 @@ pub(super) fn find(
     }
     let mut light = TileTransmittance::new(set.bounds, &set.begin.state);
     light.pass(&preprocessor.run(&jobs));
-    light.occlusion(constants, chunks)
+    light.occlusion(constants, clusters)
 }
 
 /// Whether a finished pixel is all that it takes for what is farther away not to be seen.
@@ -132,18 +132,18 @@ fn least_light(state: &GaussianState) -> f32 {
     state.transmittance_floor.max(budget)
 }
 
-/// The screens of chunks that may be wide enough in the picture, packed.
-fn large_screens(constants: &ViewConstants, frustum: &Frustum, chunks: &Chunks) -> Vec<Chunk> {
-    let mut packed: Vec<Chunk> = Vec::new();
-    for chunk in &chunks.screens {
-        if frustum.excludes(&chunk.bounds).is_some() {
+/// The occluders of clusters that may be wide enough in the picture, packed.
+fn large_screens(constants: &ViewConstants, frustum: &Frustum, clusters: &Clusters) -> Vec<Cluster> {
+    let mut packed: Vec<Cluster> = Vec::new();
+    for cluster in &clusters.occluders {
+        if frustum.excludes(&cluster.bounds).is_some() {
             continue;
         }
-        for lane in 0..chunk.numbers.len() {
-            if is_large(constants, &chunk.attributes, lane) {
+        for lane in 0..cluster.numbers.len() {
+            if is_large(constants, &cluster.attributes, lane) {
                 match packed.last_mut() {
-                    Some(last) if last.numbers.len() < BATCH => last.push(chunk, lane),
-                    _ => packed.push(Chunk::of_one(chunk, lane)),
+                    Some(last) if last.numbers.len() < BATCH => last.push(cluster, lane),
+                    _ => packed.push(Cluster::of_one(cluster, lane)),
                 }
             }
         }
@@ -151,7 +151,7 @@ fn large_screens(constants: &ViewConstants, frustum: &Frustum, chunks: &Chunks) 
     packed
 }
 
-/// Whether a Gaussian is about as wide as screens are.
+/// Whether a Gaussian is about as wide as occluders are.
 fn is_large(constants: &ViewConstants, attributes: &Attributes, lane: usize) -> bool {
     let mut per_unit = constants.focal[0].abs().max(constants.focal[1].abs());
     if constants.model == CameraModel::Pinhole {
@@ -209,7 +209,7 @@ impl TileTransmittance {
         }
     }
 
-    /// Lets screens take light, front to back.
+    /// Lets occluders take light, front to back.
     fn pass(&mut self, batches: &[Projected]) {
         let mut order = Vec::new();
         for (number, batch) in batches.iter().enumerate() {
@@ -277,13 +277,13 @@ impl TileTransmittance {
         }
     }
 
-    /// What is hidden, if any region is finished; of chunks that may be as opaque as these.
+    /// What is hidden, if any region is finished; of clusters that may be as opaque as these.
     fn occlusion(
         &self,
         constants: &ViewConstants,
-        chunks: &[Option<Arc<Chunks>>],
+        clusters: &[Option<Arc<Clusters>>],
     ) -> Option<OcclusionMap> {
-        let opacities = chunks.iter().flatten().map(|chunks| chunks.opacity);
+        let opacities = clusters.iter().flatten().map(|clusters| clusters.opacity);
         let opacity = opacities.fold(0.0, f32::max);
         let frustum_up_to = |farthest: f32, visible: Visible| {
             let mut constants = constants.clone();

@@ -7,7 +7,7 @@
 
 use super::attributes::{Attributes, Batch, CoefficientReader, Fetcher, Harmonics};
 use super::camera::{self, LN_2, ViewConstants};
-use super::clusters::Chunk;
+use super::clusters::Cluster;
 use super::frustum::Frustum;
 use super::instances::{Matrices, cofactors, dot};
 use super::lanes::{BATCH, Bits, F32_LANES, Lanes, log2};
@@ -601,7 +601,7 @@ pub(super) struct Job<'a> {
     /// Which Gaussian of the set the instance's first is.
     pub(super) sequence: u32,
     pub(super) part: Part<'a>,
-    /// Whether the chunk holds its spherical harmonics.
+    /// Whether the cluster holds its spherical harmonics.
     pub(super) has_harmonics: bool,
     pub(super) frustum: Arc<Frustum>,
 }
@@ -610,11 +610,11 @@ pub(super) struct Job<'a> {
 pub(super) enum Part<'a> {
     /// The vertices from this one on.
     From(u32),
-    Chunk(&'a Chunk),
+    Cluster(&'a Cluster),
 }
 
 impl<'a> Job<'a> {
-    /// Reads the batch, if it lies in no chunk, and what its model does to it.
+    /// Reads the batch, if it lies in no cluster, and what its model does to it.
     pub(super) fn read<'b>(
         &'b self,
         fetcher: &mut Fetcher,
@@ -628,7 +628,7 @@ impl<'a> Job<'a> {
                 let len = (self.append.count - start).min(BATCH as u32) as usize;
                 Batch::new(self.append, self.instance, start, len)
             }
-            Part::Chunk(chunk) => Batch::of_chunk(self.append, self.instance, &chunk.numbers),
+            Part::Cluster(cluster) => Batch::of_cluster(self.append, self.instance, &cluster.numbers),
         };
         let matrices = streams.model.matrix.as_ref().map(|rows| {
             let matrices = matrices.get_or_insert_default();
@@ -637,13 +637,13 @@ impl<'a> Job<'a> {
         });
         let is_faded = streams.model.opacity.is_some();
         let harmonics = match self.part {
-            Part::Chunk(chunk) if self.has_harmonics => chunk.harmonics(),
+            Part::Cluster(cluster) if self.has_harmonics => cluster.harmonics(),
             _ => Harmonics::default(),
         };
         let (attributes, is_sound) = match self.part {
-            Part::Chunk(chunk) if !is_faded => (&chunk.attributes, chunk.is_sound),
-            Part::Chunk(chunk) => {
-                attributes.clone_from(&chunk.attributes);
+            Part::Cluster(cluster) if !is_faded => (&cluster.attributes, cluster.is_sound),
+            Part::Cluster(cluster) => {
+                attributes.clone_from(&cluster.attributes);
                 fetcher.fade(streams, &batch, attributes);
                 // Products need not be finite.
                 (&*attributes, false)
@@ -735,7 +735,7 @@ impl Preprocessor<'_> {
         };
         let sequence = |lane: usize| match &job.part {
             Part::From(start) => job.sequence + start + lane as u32,
-            Part::Chunk(chunk) => job.sequence + chunk.numbers[lane],
+            Part::Cluster(cluster) => job.sequence + cluster.numbers[lane],
         };
         dispatch!(self.device.level(), simd => project(constants, simd, &source, scratch, sequence, &mut out));
         out

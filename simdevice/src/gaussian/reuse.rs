@@ -1,11 +1,11 @@
 //! Sets that are drawn again as they were: where neither what was read nor the view has changed since, they are still
 //! projected, sorted and binned.
 //!
-//! A set lives in the memory of the positions that it was made from, like chunks: it is gone when that is freed or
+//! A set lives in the memory of the positions that it was made from, like clusters: it is gone when that is freed or
 //! written. A buffer has one, that of its last picture, which goes before another is made, so that there are never two.
 
 use super::attributes::{SourceFingerprint, is_device_local};
-use super::clusters::Chunks;
+use super::clusters::Clusters;
 use super::set::GaussianSet;
 use super::sorted_set::SortedSet;
 use crate::format::Format;
@@ -19,8 +19,8 @@ pub(super) struct Key {
     streams: Vec<SourceFingerprint>,
     /// First vertex, vertices, first instance, instances of each draw.
     ranges: Vec<[u32; 4]>,
-    /// The chunks of each, which its accounts depend on.
-    chunks: Vec<Weak<Chunks>>,
+    /// The clusters of each, which its accounts depend on.
+    clusters: Vec<Weak<Clusters>>,
     state: Arc<GaussianState>,
     camera: Camera,
     viewport: Viewport,
@@ -44,7 +44,7 @@ pub(crate) struct ReuseCache(Mutex<Vec<Entry>>);
 
 impl Key {
     /// What `set` depends on; `None` if something of it may change unseen.
-    pub(super) fn new(set: &GaussianSet, chunks: &[Option<Arc<Chunks>>]) -> Option<Self> {
+    pub(super) fn new(set: &GaussianSet, clusters: &[Option<Arc<Clusters>>]) -> Option<Self> {
         let seen = |append: &GaussianAppend| {
             append.indices.is_none() && attributes(append).all(is_device_local)
         };
@@ -68,9 +68,9 @@ impl Key {
                 .map(SourceFingerprint::new)
                 .collect(),
             ranges: ranges.collect(),
-            chunks: chunks
+            clusters: clusters
                 .iter()
-                .map(|chunks| chunks.as_ref().map_or(Weak::new(), Arc::downgrade))
+                .map(|clusters| clusters.as_ref().map_or(Weak::new(), Arc::downgrade))
                 .collect(),
             state: Arc::clone(&begin.state),
             camera: begin.camera,
@@ -97,8 +97,8 @@ impl Key {
 
     /// Whether the same places in the set are in the same batches of both.
     fn has_same_batches(&self, other: &Self) -> bool {
-        let mut chunks = self.chunks.iter().zip(&other.chunks);
-        self.ranges == other.ranges && chunks.all(|(a, b)| a.ptr_eq(b))
+        let mut clusters = self.clusters.iter().zip(&other.clusters);
+        self.ranges == other.ranges && clusters.all(|(a, b)| a.ptr_eq(b))
     }
 
     /// Whether both draw the same buffer first.

@@ -80,7 +80,7 @@ fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
 /// The corner of a tile that no picture has.
 const FAR_OFF: [u32; 2] = [1 << 24; 2];
 
-/// A lane as a chunk of one.
+/// A lane as a cluster of one.
 fn bounds(attributes: &Attributes, lane: usize) -> Bounds {
     let at = |of: &[f32; F32_LANES]| of[lane];
     let position = attributes.position.each_ref().map(at);
