@@ -26,7 +26,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// The heap's size is so many times what chunks of Gaussians may take of host memory beside it.
-const HEAP_PER_CHUNK_BUDGET: u64 = 8;
+const HEAP_PER_CLUSTER_BUDGET: u64 = 8;
 
 const SIMD: &str = "GAURAST_SIMD";
 const THREADS: &str = "GAURAST_THREADS";
@@ -126,7 +126,7 @@ fn config(
     optimizations: Option<&str>,
 ) -> Result<Config, Error> {
     let mut config = Config {
-        chunk_budget_bytes: memory::heap_size() / HEAP_PER_CHUNK_BUDGET,
+        cluster_budget_bytes: memory::heap_size() / HEAP_PER_CLUSTER_BUDGET,
         ..Config::default()
     };
     if let Some(name) = simd {

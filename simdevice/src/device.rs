@@ -1,6 +1,6 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
-use crate::gaussian::cluster_cache::ChunkCache;
+use crate::gaussian::cluster_cache::ClusterCache;
 use crate::gaussian::reuse::ReuseCache;
 use crate::optimizations::Optimizations;
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
@@ -26,7 +26,7 @@ pub struct Config {
     /// How many bytes of host memory may hold Gaussians in an order that is faster to read (see
     /// [`Optimization::ClusterCulling`](crate::optimizations::Optimization::ClusterCulling)): 48 for each, and 192 for spherical harmonics
     /// of degree 3 if there is room for them.
-    pub chunk_budget_bytes: u64,
+    pub cluster_budget_bytes: u64,
     /// When a pass is flushed.
     pub flush: FlushPolicy,
     /// The longest time that one batch of shader invocations may take.
@@ -57,7 +57,7 @@ impl Default for Config {
             simd: SimdLevel::Best,
             macro_tile_size: 64,
             bin_budget_bytes: 256 << 20,
-            chunk_budget_bytes: 512 << 20,
+            cluster_budget_bytes: 512 << 20,
             flush: FlushPolicy::WhenFull,
             shader_timeout: Duration::from_secs(5),
             optimizations: Optimizations::default(),
@@ -87,7 +87,7 @@ pub struct Device {
     workers: Workers,
     level: Level,
     config: Config,
-    chunks: ChunkCache,
+    chunks: ClusterCache,
     last_sets: ReuseCache,
     recorder: Arc<Recorder>,
 }
@@ -112,7 +112,7 @@ impl Device {
             workers,
             level,
             config: config.clone(),
-            chunks: ChunkCache::default(),
+            chunks: ClusterCache::default(),
             last_sets: ReuseCache::default(),
             recorder: config.recorder.clone().unwrap_or_default(),
         })
@@ -129,7 +129,7 @@ impl Device {
     }
 
     /// The chunks of Gaussians that were drawn more than once.
-    pub(crate) fn chunks(&self) -> &ChunkCache {
+    pub(crate) fn chunks(&self) -> &ClusterCache {
         &self.chunks
     }
 

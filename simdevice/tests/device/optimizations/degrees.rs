@@ -5,9 +5,9 @@ use super::*;
 
 /// Draws Gaussians, which have coefficients up to degree 2, by each of these degrees in turn; says in which pictures chunks
 /// were made. Every picture is that of a device without optimizations.
-fn built(chunk_budget_bytes: u64, degrees: &[u32]) -> Vec<bool> {
+fn built(cluster_budget_bytes: u64, degrees: &[u32]) -> Vec<bool> {
     let config = Config {
-        chunk_budget_bytes,
+        cluster_budget_bytes,
         ..single()
     };
     let mut processor = CommandProcessor::new(Arc::new(Device::new(&config).unwrap()));
@@ -25,7 +25,7 @@ fn built(chunk_budget_bytes: u64, degrees: &[u32]) -> Vec<bool> {
             append.attributes.spherical_harmonics.truncate(coefficients);
         }
         let counters = draw_as_without_skips(&mut processor, &packets);
-        counters.get(Counter::ChunksBuilt) > 0
+        counters.get(Counter::ClustersBuilt) > 0
     });
     pictures.collect()
 }

@@ -309,7 +309,7 @@ fn every_mode_has_bounds_that_change_no_bit() {
             counters.get(counter)
         };
         let chunks = Optimizations::ALL.without(Optimization::Bounds);
-        let by_chunks = saved(chunks, Counter::OutsideByChunks);
+        let by_chunks = saved(chunks, Counter::OutsideByClusters);
         let bounds = Optimizations::ALL.without(Optimization::ClusterCulling);
         let by_bounds = saved(bounds, Counter::OutsideByBounds);
         assert!(by_chunks > 0, "{mode}: no chunk is beside the picture");
@@ -533,7 +533,7 @@ fn draw_again(config: &Config, change: impl Fn(usize, &Allocation)) -> Vec<Count
 }
 
 fn chunks_built(passes: &[Counters]) -> Vec<u64> {
-    let built = passes.iter().map(|pass| pass.get(Counter::ChunksBuilt));
+    let built = passes.iter().map(|pass| pass.get(Counter::ClustersBuilt));
     built.collect()
 }
 
@@ -541,7 +541,7 @@ fn chunks_built(passes: &[Counters]) -> Vec<u64> {
 fn chunks_are_made_once() {
     let passes = draw_again(&single(), |_, _| {});
     assert_eq!(chunks_built(&passes), [0, 79, 0, 0]);
-    let left_out = |pass: &Counters| pass.get(Counter::OutsideByChunks);
+    let left_out = |pass: &Counters| pass.get(Counter::OutsideByClusters);
     assert_eq!(left_out(&passes[0]), 0);
     assert!(left_out(&passes[3]) > 0);
     for pass in &passes {
@@ -566,7 +566,7 @@ fn chunks_are_made_anew_when_the_memory_was_written() {
 #[gaurast_runner::test]
 fn chunks_stay_within_their_budget() {
     let config = Config {
-        chunk_budget_bytes: 100_000,
+        cluster_budget_bytes: 100_000,
         ..single()
     };
     assert_eq!(chunks_built(&draw_again(&config, |_, _| {})), [0; 4]);

@@ -15,7 +15,7 @@ use super::{BenchError, Extra, OptimizationsArguments, Source, Workload};
 
 /// Optimizations of Gaussian draws, and the counter of each, as the device has them.
 const COUNTERS: [(&str, &str); 9] = [
-    ("cluster-culling", "outside by chunks"),
+    ("cluster-culling", "outside by clusters"),
     ("occlusion-culling", "hidden by others"),
     ("bounds", "outside by bounds"),
     ("ellipse", "tiles beside ellipse"),
@@ -282,7 +282,7 @@ fn unseen(
         without,
         each: pair.quartiles(time, each),
         to_preprocess: pair.quartiles(|frame| frame.counter("preprocess"), each),
-        chunks: pair.most(|frame| frame.counter("chunks")),
+        chunks: pair.most(|frame| frame.counter("clusters")),
     })
 }
 
