@@ -6,7 +6,7 @@
 use crate::counters::{Counter, Counters};
 use crate::device::{Device, FlushPolicy};
 use crate::format::Format;
-use crate::gaussian::GaussianDraw;
+use crate::gaussian::BinnedDraw;
 use crate::geometry::PrimitiveDraw;
 use crate::image::ImageView;
 use crate::optimizations::Optimization;
@@ -30,7 +30,7 @@ pub enum PassDraw {
     /// Rectangles of attachments to clear.
     Clear(ClearAttachments),
     /// A sorted and binned set of Gaussians.
-    Gaussians(Box<GaussianDraw>),
+    Gaussians(Box<BinnedDraw>),
     /// Points, lines or triangles.
     Primitives(Box<PrimitiveDraw>),
 }

@@ -36,7 +36,7 @@ mod vertex_projection;
 
 pub use footprint::TILE_SIZE;
 pub use set::{GaussianSet, SortError};
-pub use sorted_set::GaussianDraw;
+pub use sorted_set::BinnedDraw;
 
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
@@ -66,7 +66,7 @@ pub fn sort_and_bin(
     set: GaussianSet,
     device: &Device,
     counters: &mut Counters,
-) -> Result<GaussianDraw, SortError> {
+) -> Result<BinnedDraw, SortError> {
     let clusters = cluster_cache::find(&set, device, counters);
     let config = device.config();
     let is_kept = config.optimizations.has(Optimization::TemporalReuse);
@@ -77,7 +77,7 @@ pub fn sort_and_bin(
     {
         counters.add_all(&sorted.counters);
         counters.add(Counter::SetsUnchanged, 1);
-        return Ok(GaussianDraw::new(set, sorted, None, device));
+        return Ok(BinnedDraw::new(set, sorted, None, device));
     }
     // All of it by workers: for each way from this thread to them and back, threads fall asleep and are woken.
     let (sorted, record) = device.install(|| sort(&set, &clusters, device, counters))?;
@@ -87,7 +87,7 @@ pub fn sort_and_bin(
         let sets = device.last_sets();
         sets.keep(key, &sorted, bytes, config.cluster_budget_bytes);
     }
-    Ok(GaussianDraw::new(set, sorted, record, device))
+    Ok(BinnedDraw::new(set, sorted, record, device))
 }
 
 /// What preprocessing makes of a set.

@@ -37,7 +37,7 @@ pub(crate) struct SortedSet {
 
 /// A set that is sorted, binned and immutable, as it is drawn.
 #[derive(Debug)]
-pub struct GaussianDraw {
+pub struct BinnedDraw {
     /// What the pipeline fixes.
     pub state: Arc<GaussianState>,
     /// The pixels that it may touch.
@@ -98,7 +98,7 @@ impl SortedSet {
     }
 }
 
-impl GaussianDraw {
+impl BinnedDraw {
     /// What is drawn of `set`, which became `sorted`.
     pub(super) fn new(
         set: GaussianSet,

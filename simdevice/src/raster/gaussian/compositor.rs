@@ -34,7 +34,7 @@ use super::per_pixel::{PerPixel, composite_per_pixel};
 use crate::counters::{Counter, Counters};
 use crate::gaussian::depth::Trend;
 use crate::gaussian::tile_lists::SortedWalk;
-use crate::gaussian::{GaussianDraw, TILE_SIZE};
+use crate::gaussian::{BinnedDraw, TILE_SIZE};
 use crate::optimizations::{Optimization, Optimizations};
 use crate::raster::MAX_SAMPLES;
 use crate::trace::{Run, TileWork};
@@ -78,7 +78,7 @@ impl GaussianTile {
     /// corner, without tests. Returns whether any pixel was covered.
     pub fn render(
         &mut self,
-        draw: &GaussianDraw,
+        draw: &BinnedDraw,
         level: Level,
         tile_x: u32,
         tile_y: u32,
@@ -93,7 +93,7 @@ impl GaussianTile {
     /// Composites `draw`'s Gaussians in `lanes` of a tile, into a layer.
     pub(super) fn run<const DEPTH: DepthMode>(
         &mut self,
-        draw: &GaussianDraw,
+        draw: &BinnedDraw,
         level: Level,
         [tile_x, tile_y]: [u32; 2],
         layer: usize,
@@ -157,7 +157,7 @@ impl GaussianTile {
     /// Which of `lanes` some Gaussian of `draw` reaches with an alpha of the floor or more, whatever its depth.
     pub(super) fn reached(
         &mut self,
-        draw: &GaussianDraw,
+        draw: &BinnedDraw,
         level: Level,
         [tile_x, tile_y]: [u32; 2],
         lanes: &Lanes,

@@ -10,7 +10,7 @@ use super::samples::{SAMPLES, Samples};
 use crate::bindings::Prepared;
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
-use crate::gaussian::{GaussianDraw, TILE_SIZE};
+use crate::gaussian::{BinnedDraw, TILE_SIZE};
 use crate::packet::draw::{FragmentInput, FragmentPrograms, ResolveShader, resolve};
 use crate::raster::color::ColorOutput;
 use crate::raster::color::load;
@@ -62,7 +62,7 @@ impl ResolveProgram {
 
 /// A resolve shader made ready for tiles, which all workers share.
 pub(super) struct ResolveDraw<'a> {
-    draw: &'a GaussianDraw,
+    draw: &'a BinnedDraw,
     shader: &'a ResolveShader,
     stage: &'a FragmentStage,
     bindings: Prepared<'a>,
@@ -92,7 +92,7 @@ struct Group {
 
 impl<'a> ResolveDraw<'a> {
     pub(super) fn new(
-        draw: &'a GaussianDraw,
+        draw: &'a BinnedDraw,
         shader: &'a ResolveShader,
         targets: Targets<'a>,
         samples: usize,

@@ -11,7 +11,7 @@
 
 use super::accumulator::{ANY_LIGHT, Light};
 use super::exp2::{CUBIC, QUADRATIC, exp2_of_negated};
-use crate::gaussian::GaussianDraw;
+use crate::gaussian::BinnedDraw;
 use crate::gaussian::depth::Trend;
 use crate::gaussian::ray_depth::RayDepths;
 use crate::gaussian::splat::{Splat, locate};
@@ -55,7 +55,7 @@ pub(super) struct Thresholds {
 }
 
 impl Thresholds {
-    pub(super) fn new(draw: &GaussianDraw, depth_mode: DepthMode) -> Self {
+    pub(super) fn new(draw: &BinnedDraw, depth_mode: DepthMode) -> Self {
         let state = &draw.state;
         // Where there is no floor, less than the least normal number is nothing. No alpha reaches a floor above the
         // ceiling.
@@ -96,7 +96,7 @@ pub(super) enum TileMode<'a> {
 }
 
 impl<'a> TileMode<'a> {
-    pub(super) fn of(draw: &'a GaussianDraw) -> Self {
+    pub(super) fn of(draw: &'a BinnedDraw) -> Self {
         let (surfels, depths) = (draw.surfels(), draw.ray_depths());
         if draw.state.precision == GaussianPrecision::Float16 {
             Self::Half
@@ -207,7 +207,7 @@ pub(super) struct Task<'a> {
     /// What is left out.
     pub(super) optimizations: Optimizations,
     pub(super) trend: Trend,
-    /// As [`GaussianDraw::half_period`].
+    /// As [`BinnedDraw::half_period`].
     pub(super) half_period: f64,
     pub(super) corner: [u32; 2],
     pub(super) thresholds: Thresholds,

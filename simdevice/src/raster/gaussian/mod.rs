@@ -26,7 +26,7 @@ pub use fragment_stage::ResolveProgram;
 
 use crate::counters::{Counter, Counters};
 use crate::device::Device;
-use crate::gaussian::{GaussianDraw, TILE_SIZE};
+use crate::gaussian::{BinnedDraw, TILE_SIZE};
 use crate::packet::BlendState;
 use crate::packet::draw::{StencilFace, StencilOp};
 use crate::raster::color::ColorOutput;
@@ -46,7 +46,7 @@ use std::sync::atomic::AtomicBool;
 
 /// A Gaussian draw made ready for tiles, which all workers share.
 pub struct GaussianTileDraw<'a> {
-    draw: &'a GaussianDraw,
+    draw: &'a BinnedDraw,
     targets: Targets<'a>,
     /// The first colour attachment, unless the draw leaves it as it is.
     color: Option<ColorOutput>,
@@ -61,7 +61,7 @@ pub struct GaussianTileDraw<'a> {
 impl<'a> GaussianTileDraw<'a> {
     /// Makes a draw ready. `samples` are the attachments' samples, if there are attachments.
     pub fn new(
-        draw: &'a GaussianDraw,
+        draw: &'a BinnedDraw,
         targets: Targets<'a>,
         samples: Option<u32>,
         device: &Device,

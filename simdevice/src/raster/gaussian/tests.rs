@@ -59,7 +59,7 @@ fn draw(
     state: GaussianState,
     device: &Device,
     bounds: Rect,
-) -> GaussianDraw {
+) -> BinnedDraw {
     draw_with_depth(seed, count, state, device, bounds, None)
 }
 
@@ -71,7 +71,7 @@ fn draw_with_depth(
     device: &Device,
     bounds: Rect,
     depth: Option<(Format, [f32; 2])>,
-) -> GaussianDraw {
+) -> BinnedDraw {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut floats = Vec::new();
     for _ in 0..count {
@@ -154,7 +154,7 @@ fn defaults() -> GaussianState {
 
 /// The tile kernel's naive twin: one pixel at a time through the whole list, no blocks, no saturation.
 fn naive_pixel(
-    draw: &GaussianDraw,
+    draw: &BinnedDraw,
     tile: [u32; 2],
     x: usize,
     y: usize,
@@ -186,7 +186,7 @@ fn by_table<const PLACES: usize, const TERMS: usize>(x: f32, table: &Table<PLACE
 
 /// As [`naive_pixel`], of the Gaussians whose depth passes.
 fn naive_sample(
-    draw: &GaussianDraw,
+    draw: &BinnedDraw,
     tile: [u32; 2],
     [x, y]: [usize; 2],
     level: Level,
@@ -307,7 +307,7 @@ fn check_changed(
     count: u32,
     state: &GaussianState,
     bounds: Rect,
-    change: impl Fn(&mut GaussianDraw),
+    change: impl Fn(&mut BinnedDraw),
 ) {
     for (name, simd) in SimdLevel::supported() {
         let device = Device::new(&Config {

@@ -205,7 +205,7 @@ fn random_scene(seed: u64) -> Scene {
 }
 
 impl Scene {
-    fn draw(&self, device: &Device) -> GaussianDraw {
+    fn draw(&self, device: &Device) -> BinnedDraw {
         let depth = Some((self.depth.plane(Aspect::Depth).unwrap(), self.coefficients));
         draw_with_depth(
             self.seed,
@@ -218,7 +218,7 @@ impl Scene {
     }
 
     /// Each sample for itself.
-    fn naive(&self, draw: &GaussianDraw, level: Level) -> Picture {
+    fn naive(&self, draw: &BinnedDraw, level: Level) -> Picture {
         let mut picture = self.before.clone();
         let state = &self.state;
         let blender = Blender::new(&state.blend[0], state.blend_constants, self.color);
@@ -432,7 +432,7 @@ fn hidden_work(
     compare: CompareOp,
     stored: [f32; 256],
     recorder: Option<Arc<Recorder>>,
-    change: impl Fn(&mut GaussianDraw),
+    change: impl Fn(&mut BinnedDraw),
 ) -> Counters {
     let device = Device::new(&Config {
         recorder,
@@ -504,7 +504,7 @@ fn what_is_behind_a_whole_tile_is_not_even_fetched() {
 #[test]
 fn steep_gaussians_behind_a_whole_tile_are_not_fetched_either() {
     // The nearer ones fail, so that no list's end is hidden at once.
-    let hidden = |change: fn(&mut GaussianDraw)| {
+    let hidden = |change: fn(&mut BinnedDraw)| {
         let counters = hidden_work(FORWARD, CompareOp::Greater, [0.3; 256], None, change);
         counters.get(Counter::GaussianTilesHidden)
     };
