@@ -53,9 +53,9 @@ impl Attributes {
 /// A contiguous span is read whole where vertices lie at most this far apart, and piecewise beyond.
 const WHOLE_SPAN_STRIDE: u32 = 64;
 
-/// The vertices of one batch of one instance.
-pub(super) struct Batch<'a> {
-    /// The vertices, as many as the batch has.
+/// The vertices of one group of one instance.
+pub(super) struct Group<'a> {
+    /// The vertices, as many as the group has.
     vertices: Vertices<'a>,
     pub(super) instance: u32,
     pub(super) first_instance: u32,
@@ -71,7 +71,7 @@ enum Vertices<'a> {
     Cluster(u64, &'a [u32]),
 }
 
-impl<'a> Batch<'a> {
+impl<'a> Group<'a> {
     /// Vertices `start..start + len` of `append`'s count, for `instance`.
     pub(super) fn new(append: &GaussianAppend, instance: u32, start: u32, len: usize) -> Self {
         let first = u64::from(append.first) + u64::from(start);
@@ -171,24 +171,24 @@ pub(super) struct Fetcher {
 }
 
 impl Fetcher {
-    /// Reads lanes `0..batch.len` of `stream` into `out[component][lane]`.
+    /// Reads lanes `0..group.len` of `stream` into `out[component][lane]`.
     pub(super) fn read<const COMPONENTS: usize>(
         &mut self,
         stream: &AttributeStream,
-        batch: &Batch<'_>,
+        group: &Group<'_>,
         mut out: [&mut [f32; F32_LANES]; COMPONENTS],
     ) {
         let (size, floats) = layout(stream.format);
-        if stream.instance_divisor.is_some() && batch.len > 0 {
-            let element = self.read_element(stream, batch.element(stream, 0), size);
+        if stream.instance_divisor.is_some() && group.len > 0 {
+            let element = self.read_element(stream, group.element(stream, 0), size);
             let value = stream.format.decode(element);
             for (component, out) in out.iter_mut().enumerate() {
-                out[..batch.len].fill(value[component]);
+                out[..group.len].fill(value[component]);
             }
             return;
         }
-        let step = self.read_bytes(stream, batch, size);
-        let elements = self.bytes.chunks(step).take(batch.len).enumerate();
+        let step = self.read_bytes(stream, group, size);
+        let elements = self.bytes.chunks(step).take(group.len).enumerate();
         if floats && size >= 4 * COMPONENTS {
             for (lane, bytes) in elements {
                 let words = bytes.as_chunks::<4>().0;
@@ -206,29 +206,29 @@ impl Fetcher {
         }
     }
 
-    /// Reads what a batch's Gaussians are in their own space, but for their colours.
+    /// Reads what a group's Gaussians are in their own space, but for their colours.
     pub(super) fn read_own(
         &mut self,
         streams: &GaussianAttributes,
-        batch: &Batch<'_>,
+        group: &Group<'_>,
         out: &mut Attributes,
     ) {
-        self.read(&streams.position, batch, out.position.each_mut());
-        self.read(&streams.scale, batch, out.scale.each_mut());
-        self.read(&streams.rotation, batch, out.rotation.each_mut());
-        self.read(&streams.opacity, batch, [&mut out.opacity]);
+        self.read(&streams.position, group, out.position.each_mut());
+        self.read(&streams.scale, group, out.scale.each_mut());
+        self.read(&streams.rotation, group, out.rotation.each_mut());
+        self.read(&streams.opacity, group, [&mut out.opacity]);
     }
 
-    /// Multiplies a batch's opacities by the model's, if it has some.
+    /// Multiplies a group's opacities by the model's, if it has some.
     pub(super) fn fade(
         &mut self,
         streams: &GaussianAttributes,
-        batch: &Batch<'_>,
+        group: &Group<'_>,
         out: &mut Attributes,
     ) {
         if let Some(stream) = &streams.model.opacity {
             let mut factor = [0.0; F32_LANES];
-            self.read(stream, batch, [&mut factor]);
+            self.read(stream, group, [&mut factor]);
             for (opacity, factor) in out.opacity.iter_mut().zip(factor) {
                 *opacity *= factor;
             }
@@ -247,15 +247,15 @@ impl Fetcher {
     }
 
     /// Fills the scratch with one element every returned number of bytes.
-    fn read_bytes(&mut self, stream: &AttributeStream, batch: &Batch<'_>, size: usize) -> usize {
+    fn read_bytes(&mut self, stream: &AttributeStream, group: &Group<'_>, size: usize) -> usize {
         let stride = stream.stride as usize;
-        let at = |lane| at(stream, batch, lane);
-        if batch.is_consecutive(stream)
+        let at = |lane| at(stream, group, lane);
+        if group.is_consecutive(stream)
             && stream.stride <= WHOLE_SPAN_STRIDE
             && stride >= size
-            && batch.len > 0
+            && group.len > 0
         {
-            let span = stride * (batch.len - 1) + size;
+            let span = stride * (group.len - 1) + size;
             self.grow(span);
             let start = at(0);
             if start.saturating_add(span as u64) <= stream.buffer.size {
@@ -263,8 +263,8 @@ impl Fetcher {
                 return stride;
             }
         }
-        self.grow(size * batch.len);
-        let elements = self.bytes.chunks_exact_mut(size).take(batch.len);
+        self.grow(size * group.len);
+        let elements = self.bytes.chunks_exact_mut(size).take(group.len);
         for (lane, element) in elements.enumerate() {
             read_clipped(&stream.buffer, at(lane), element);
         }
@@ -280,8 +280,8 @@ impl Fetcher {
 }
 
 /// Where in `stream`'s buffer the element that lane `lane` reads is.
-fn at(stream: &AttributeStream, batch: &Batch<'_>, lane: usize) -> u64 {
-    batch
+fn at(stream: &AttributeStream, group: &Group<'_>, lane: usize) -> u64 {
+    group
         .element(stream, lane)
         .saturating_mul(u64::from(stream.stride))
         .saturating_add(u64::from(stream.offset))
@@ -320,17 +320,17 @@ impl<'a> CoefficientReader<'a> {
 
     /// Has the first `count` coefficients of `lane` on their way while other things are computed, if they are packed.
     #[inline(always)]
-    pub(super) fn prefetch(&self, batch: &Batch<'_>, lane: usize, count: usize) {
+    pub(super) fn prefetch(&self, group: &Group<'_>, lane: usize, count: usize) {
         if let Some(stream) = self.streams.first().filter(|_| self.packed) {
-            let start = stream.buffer.offset.saturating_add(at(stream, batch, lane));
+            let start = stream.buffer.offset.saturating_add(at(stream, group, lane));
             let count = count.min(self.streams.len());
             stream.buffer.memory.prefetch(start, 12 * count);
         }
     }
 
     /// Reads the coefficients of `lane`: red, green, blue of each in turn.
-    pub(super) fn read(&self, batch: &Batch<'_>, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
-        let at = |stream| at(stream, batch, lane);
+    pub(super) fn read(&self, group: &Group<'_>, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
+        let at = |stream| at(stream, group, lane);
         let count = self.streams.len().min(MAX_COEFFICIENTS);
         let out = &mut out[..3 * count];
         if self.packed {

@@ -4,10 +4,10 @@
 //! They are derived from memory that only the device can write, and never change an image.
 
 use super::attributes::{
-    Attributes, Batch, CoefficientReader, Fetcher, Harmonics, SourceFingerprint,
+    Attributes, Group, CoefficientReader, Fetcher, Harmonics, SourceFingerprint,
 };
 use super::frustum::Bounds;
-use super::lanes::BATCH;
+use super::lanes::GROUP;
 use super::sort;
 use super::spherical_harmonics::COEFFICIENT_FLOATS;
 use crate::packet::GaussianAppend;
@@ -54,9 +54,9 @@ const AXIS_BITS: u32 = 10;
 pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64 {
     let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
     let floats = if with_harmonics { reader.floats() } else { 0 };
-    let cluster = size_of::<Cluster>() + 4 * BATCH * (1 + floats);
-    let screen = size_of::<Cluster>() + 4 * BATCH;
-    let clusters = |count: u64| count.div_ceil(BATCH as u64);
+    let cluster = size_of::<Cluster>() + 4 * GROUP * (1 + floats);
+    let screen = size_of::<Cluster>() + 4 * GROUP;
+    let clusters = |count: u64| count.div_ceil(GROUP as u64);
     let occluders = chunks(max_screens(append.count as usize) as u64);
     chunks(append.count.into()) * cluster as u64 + occluders * screen as u64
 }
@@ -66,9 +66,9 @@ impl Clusters {
     /// 2D Gaussians' third scales are zero.
     pub(super) fn build(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
         let order = morton_order(append);
-        let mut clusters = host::with_capacity(order.len().div_ceil(BATCH));
+        let mut clusters = host::with_capacity(order.len().div_ceil(GROUP));
         order
-            .par_chunks(BATCH)
+            .par_chunks(GROUP)
             .map_init(Fetcher::default, |fetcher, numbers| {
                 Cluster::read(append, fetcher, numbers, (is_flat, with_harmonics))
             })
@@ -76,7 +76,7 @@ impl Clusters {
         let opacities = clusters.iter().map(|cluster| cluster.bounds.opacity);
         let occluders = occluders(&clusters, max_screens(order.len()));
         let occluders = occluders
-            .chunks(BATCH)
+            .chunks(GROUP)
             .map(|numbers| Cluster::read(append, &mut Fetcher::default(), numbers, (is_flat, false)));
         let harmonics = &append.attributes.spherical_harmonics;
         Self {
@@ -127,9 +127,9 @@ impl Cluster {
         numbers: &[u32],
         (is_flat, with_harmonics): (bool, bool),
     ) -> Self {
-        let batch = Batch::of_cluster(append, append.first_instance, numbers);
+        let group = Group::of_cluster(append, append.first_instance, numbers);
         let mut attributes = Attributes::default();
-        fetcher.read_own(&append.attributes, &batch, &mut attributes);
+        fetcher.read_own(&append.attributes, &group, &mut attributes);
         if is_flat {
             attributes.scale[2].fill(0.0);
         }
@@ -141,7 +141,7 @@ impl Cluster {
         };
         let mut is_sound = true;
         for lane in 0..numbers.len() {
-            let at = |lanes: &[f32; BATCH]| lanes[lane];
+            let at = |lanes: &[f32; GROUP]| lanes[lane];
             let position = attributes.position.each_ref().map(at);
             let scale = attributes.scale.each_ref().map(at);
             let rotation = attributes.rotation.each_ref().map(at);
@@ -170,7 +170,7 @@ impl Cluster {
             let mut coefficients = [0.0; COEFFICIENT_FLOATS];
             host::reserve(&mut harmonics, reader.floats() * numbers.len());
             for lane in 0..numbers.len() {
-                reader.read(&batch, lane, &mut coefficients);
+                reader.read(&group, lane, &mut coefficients);
                 harmonics.extend(&coefficients[..reader.floats()]);
             }
         }
@@ -194,7 +194,7 @@ impl Cluster {
     /// A cluster of one lane of another, without harmonics.
     pub(super) fn of_one(from: &Self, lane: usize) -> Self {
         let mut cluster = Self {
-            numbers: host::with_capacity(BATCH),
+            numbers: host::with_capacity(GROUP),
             attributes: Attributes::default(),
             harmonics: Vec::new(),
             bounds: from.bounds,
@@ -217,14 +217,14 @@ impl Cluster {
 fn morton_order(append: &GaussianAppend) -> Vec<u32> {
     let mut positions: Vec<[f32; 3]> = host::zeroed(append.count as usize);
     positions
-        .par_chunks_mut(BATCH)
-        .zip((0..append.count).into_par_iter().step_by(BATCH))
+        .par_chunks_mut(GROUP)
+        .zip((0..append.count).into_par_iter().step_by(GROUP))
         .for_each_init(
             || (Fetcher::default(), Attributes::default()),
             |(fetcher, attributes), (positions, start)| {
-                let batch = Batch::new(append, append.first_instance, start, positions.len());
+                let group = Group::new(append, append.first_instance, start, positions.len());
                 let streams = &append.attributes;
-                fetcher.read(&streams.position, &batch, attributes.position.each_mut());
+                fetcher.read(&streams.position, &group, attributes.position.each_mut());
                 let [x, y, z] = &attributes.position;
                 for (at, position) in positions.iter_mut().enumerate() {
                     *position = [x[at], y[at], z[at]];

@@ -33,7 +33,7 @@ pub(crate) const HELD_ROWS: usize = 3;
 pub(crate) struct Reach {
     /// The first row (low half) and how many rows.
     rows: u32,
-    /// The rows' spans (first and end), if they fit; otherwise they lie among those of the batch, at the first one's index.
+    /// The rows' spans (first and end), if they fit; otherwise they lie among those of the group, at the first one's index.
     held: [u32; HELD_ROWS],
 }
 
@@ -356,7 +356,7 @@ mod tests {
 
         /// Row, first tile and one past the last tile of each row.
         fn spans(&self) -> Vec<(u32, u16, u16)> {
-            // Not the first of its batch.
+            // Not the first of its group.
             let mut others = vec![Span::default(); 70_000];
             let reach = self.ellipse().reach(&VISIBLE, &mut others, Some(&mut 0));
             let spans = reach.iter().flat_map(|reach| reach.spans(&others));

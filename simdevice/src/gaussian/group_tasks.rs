@@ -1,13 +1,13 @@
-//! What there is to project: batches of vertices and clusters, without the clusters that no picture needs.
+//! What there is to project: groups of vertices and clusters, without the clusters that no picture needs.
 
 use super::camera::ViewConstants;
 use super::clusters::{Cluster, Clusters};
 use super::frustum::{Frustum, Outside};
 use super::instances::Model;
-use super::lanes::BATCH;
+use super::lanes::GROUP;
 use super::occlusion::OcclusionMap;
 use super::preprocess::{Job, Part};
-use super::set::{GaussianSet, MAX_BATCHES, SortError};
+use super::set::{GaussianSet, MAX_GROUPS, SortError};
 use super::vertex_projection;
 use crate::counters::{Counter, Counters};
 use crate::packet::GaussianAppend;
@@ -23,21 +23,21 @@ pub(super) fn group_tasks<'a>(
     occlusion: Option<&OcclusionMap>,
     counters: &mut Counters,
 ) -> Result<Vec<Job<'a>>, SortError> {
-    let batches = |append: &GaussianAppend| {
-        let per_instance = append.count.div_ceil(BATCH as u32);
+    let groups = |append: &GaussianAppend| {
+        let per_instance = append.count.div_ceil(GROUP as u32);
         u64::from(per_instance) * u64::from(append.instance_count)
     };
-    let batches = set.appends.iter().map(batches);
-    let batches = batches.chain(set.draws.iter().map(vertex_projection::batches));
-    let batches = batches.fold(0, u64::saturating_add);
+    let groups = set.appends.iter().map(groups);
+    let groups = groups.chain(set.draws.iter().map(vertex_projection::groups));
+    let groups = groups.fold(0, u64::saturating_add);
     // A picture that repeats has copies on both sides.
     let sides = if constants.period.is_some() { 3 } else { 1 };
-    let batches = batches.saturating_mul(sides);
-    if batches > MAX_BATCHES {
-        return Err(SortError::TooManyGaussians { batches });
+    let groups = groups.saturating_mul(sides);
+    if groups > MAX_GROUPS {
+        return Err(SortError::TooManyGaussians { groups });
     }
     let mut jobs = Vec::new();
-    // There are no more Gaussians than places in batches, so that this stays within 32 bits but at the very end.
+    // There are no more Gaussians than places in groups, so that this stays within 32 bits but at the very end.
     let mut sequence = 0u32;
     for (append, clusters) in set.appends.iter().zip(clusters) {
         let opacity = clusters.as_ref().map_or(1.0, |clusters| clusters.opacity);
@@ -60,14 +60,14 @@ pub(super) fn group_tasks<'a>(
                 has_harmonics: has_harmonics.unwrap_or(false),
                 frustum: Arc::clone(&view.frustum),
             };
-            let batches = match clusters {
-                None => append.count.div_ceil(BATCH as u32) as usize,
+            let groups = match clusters {
+                None => append.count.div_ceil(GROUP as u32) as usize,
                 Some(clusters) => clusters.clusters.len(),
             };
-            host::reserve(&mut jobs, batches);
+            host::reserve(&mut jobs, groups);
             match clusters {
                 None => {
-                    let starts = (0..append.count).step_by(BATCH);
+                    let starts = (0..append.count).step_by(GROUP);
                     jobs.extend(starts.map(|start| Job {
                         part: Part::From(start),
                         ..job.clone()

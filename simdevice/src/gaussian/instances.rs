@@ -4,8 +4,8 @@
 //! direction from which it is seen is turned back by the inverse of A, so that what was trained in its own space is seen
 //! there by an eye that moved with it.
 
-use super::attributes::{Batch, Fetcher};
-use super::lanes::{BATCH, Bits, F32_LANES, Lanes};
+use super::attributes::{Group, Fetcher};
+use super::lanes::{GROUP, Bits, F32_LANES, Lanes};
 use crate::packet::{AttributeStream, GaussianAppend};
 
 /// Matrices by lane, as they are read.
@@ -19,7 +19,7 @@ pub(super) struct Matrices {
 /// Rows of a matrix, without the translation.
 pub(super) type Linear = [[f64; 3]; 3];
 
-/// What matrices make of the kept Gaussians of a batch.
+/// What matrices make of the kept Gaussians of a group.
 #[derive(Clone, Debug)]
 pub(super) struct Placed {
     pub(super) matrix: [[Lanes; 4]; 3],
@@ -39,16 +39,16 @@ impl Model {
     /// Reads an instance's, whose attributes are by instance.
     pub(super) fn read(append: &GaussianAppend, instance: u32) -> Self {
         let mut fetcher = Fetcher::default();
-        let batch = Batch::new(append, instance, 0, 1);
+        let group = Group::new(append, instance, 0, 1);
         let model = &append.attributes.model;
         let matrix = model.matrix.as_ref().and_then(|rows| {
             let mut matrices = Matrices::default();
-            matrices.read(&mut fetcher, rows, &batch);
+            matrices.read(&mut fetcher, rows, &group);
             matrices.uniform()
         });
         let opacity = model.opacity.as_ref().map(|stream| {
             let mut factor = [0.0; F32_LANES];
-            fetcher.read(stream, &batch, [&mut factor]);
+            fetcher.read(stream, &group, [&mut factor]);
             factor[0]
         });
         Self { matrix, opacity }
@@ -78,16 +78,16 @@ impl Default for Matrices {
 }
 
 impl Matrices {
-    /// Reads a batch's.
+    /// Reads a group's.
     pub(super) fn read(
         &mut self,
         fetcher: &mut Fetcher,
         rows: &[AttributeStream; 3],
-        batch: &Batch<'_>,
+        group: &Group<'_>,
     ) {
         self.is_uniform = rows.iter().all(|stream| stream.instance_divisor.is_some());
         for (stream, row) in rows.iter().zip(&mut self.rows) {
-            fetcher.read(stream, batch, row.each_mut());
+            fetcher.read(stream, group, row.each_mut());
         }
     }
 
@@ -102,7 +102,7 @@ impl Matrices {
     /// Which of the first `len` lanes are finite.
     pub(super) fn find_finite(&self, len: usize) -> Bits {
         let mut finite = Bits::default();
-        for lane in 0..len.min(BATCH) {
+        for lane in 0..len.min(GROUP) {
             let elements = self.rows.as_flattened();
             finite.set_one(lane, elements.iter().all(|lanes| lanes[lane].is_finite()));
         }

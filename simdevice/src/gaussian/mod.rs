@@ -50,13 +50,13 @@ use preprocess::Preprocessor;
 use rayon::prelude::*;
 use reuse::Key;
 use sorted_set::SortedSet;
-use splat::Projected;
+use splat::ProjectedGroup;
 use std::sync::Arc;
 use std::time::Instant;
 use tile_lists::TileLists;
 
-/// The least batches that a worker takes where little is done for each.
-const LEAST_BATCHES: usize = 64;
+/// The least groups that a worker takes where little is done for each.
+const LEAST_GROUPS: usize = 64;
 
 /// Preprocesses, sorts and bins a set, unless it is still there from when it was last drawn.
 ///
@@ -93,7 +93,7 @@ pub fn sort_and_bin(
 /// What preprocessing makes of a set.
 struct Preprocessed {
     /// Those that the device projected, then those of vertex programs.
-    batches: Vec<Projected>,
+    groups: Vec<ProjectedGroup>,
     /// How many of them the device projected.
     fixed: usize,
     /// What became of the Gaussians that the device projected, and of those of vertex programs.
@@ -113,16 +113,16 @@ fn sort(
     let mut preprocessed = preprocess_set(set, clusters, device)?;
     let projected = Instant::now();
     let threads = device.threads();
-    let pairs = depth_order::sorted(&preprocessed.batches, threads);
+    let pairs = depth_order::sorted(&preprocessed.groups, threads);
     let sorted = Instant::now();
     // Twelve bytes a pair while lists are made: four times the budget of all lists of a pass.
     let most_pairs = device.config().bin_budget_bytes / 3;
-    let batches = &mut preprocessed.batches;
-    let tiles = TileLists::build(batches, &pairs, set.bounds, threads, most_pairs);
+    let groups = &mut preprocessed.groups;
+    let tiles = TileLists::build(groups, &pairs, set.bounds, threads, most_pairs);
     let binned = Instant::now();
     let fixed = preprocessed.fixed;
     let (by_device, by_programs) = (preprocessed.by_device, preprocessed.by_programs);
-    let mut sorted_set = SortedSet::new(set, preprocessed.batches, tiles);
+    let mut sorted_set = SortedSet::new(set, preprocessed.groups, tiles);
     let record = device.recorder().map(|_| {
         let (of_device, of_programs) = sorted_set.splats.split_at(fixed);
         let of_device = trace::Projected {
@@ -185,30 +185,30 @@ fn preprocess_set(
             by_device.get(Counter::OutsideByClusters) + by_device.get(Counter::HiddenByOthers);
         by_device.add(Counter::HarmonicsUnread, unread);
     }
-    let mut batches = preprocessor.run(&tasks);
-    panorama::append_copies(&mut batches);
-    let fixed = batches.len();
+    let mut groups = preprocessor.run(&tasks);
+    panorama::append_copies(&mut groups);
+    let fixed = groups.len();
     let shaded = vertex_projection::project_all(set, device)?;
-    host::reserve(&mut batches, shaded.len());
-    batches.extend(shaded);
-    by_device.add_all(&counted(&batches[..fixed]));
+    host::reserve(&mut groups, shaded.len());
+    groups.extend(shaded);
+    by_device.add_all(&counted(&groups[..fixed]));
     Ok(Preprocessed {
-        by_programs: counted(&batches[fixed..]),
-        batches,
+        by_programs: counted(&groups[fixed..]),
+        groups,
         fixed,
         by_device,
     })
 }
 
-/// What all batches counted.
-fn counted(batches: &[Projected]) -> Counters {
+/// What all groups counted.
+fn counted(groups: &[ProjectedGroup]) -> Counters {
     let add = |mut sum: Counters, more: &Counters| {
         sum.add_all(more);
         sum
     };
-    batches
+    groups
         .par_iter()
-        .with_min_len(LEAST_BATCHES)
-        .fold(Counters::default, |sum, batch| add(sum, &batch.counters))
+        .with_min_len(LEAST_GROUPS)
+        .fold(Counters::default, |sum, group| add(sum, &group.counters))
         .reduce(Counters::default, |sum, more| add(sum, &more))
 }

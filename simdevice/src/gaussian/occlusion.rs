@@ -8,11 +8,11 @@ use super::camera::ViewConstants;
 use super::clusters::{Cluster, Clusters};
 use super::footprint::{TILE_SIZE, Visible};
 use super::frustum::{Bounds, Frustum};
-use super::lanes::BATCH;
+use super::lanes::GROUP;
 use super::preprocess::{Job, Part, Preprocessor};
 use super::set::GaussianSet;
 use super::sort;
-use super::splat::{Projected, Splat};
+use super::splat::{ProjectedGroup, Splat};
 use crate::counters::{Counter, Counters};
 use crate::optimizations::Optimization;
 use crate::packet::draw::DepthStencil;
@@ -142,7 +142,7 @@ fn large_screens(constants: &ViewConstants, frustum: &Frustum, clusters: &Cluste
         for lane in 0..cluster.numbers.len() {
             if is_large(constants, &cluster.attributes, lane) {
                 match packed.last_mut() {
-                    Some(last) if last.numbers.len() < BATCH => last.push(cluster, lane),
+                    Some(last) if last.numbers.len() < GROUP => last.push(cluster, lane),
                     _ => packed.push(Cluster::of_one(cluster, lane)),
                 }
             }
@@ -210,11 +210,11 @@ impl TileTransmittance {
     }
 
     /// Lets occluders take light, front to back.
-    fn pass(&mut self, batches: &[Projected]) {
+    fn pass(&mut self, groups: &[ProjectedGroup]) {
         let mut order = Vec::new();
-        for (number, batch) in batches.iter().enumerate() {
-            for (place, &[key, _]) in batch.keys.iter().enumerate() {
-                if reaches_far(&batch.splats[place]) {
+        for (number, group) in groups.iter().enumerate() {
+            for (place, &[key, _]) in group.keys.iter().enumerate() {
+                if reaches_far(&group.splats[place]) {
                     host::push(&mut order, (key, number, place));
                 }
             }
@@ -223,7 +223,7 @@ impl TileTransmittance {
         let mut budget = COST_PER_TILE * self.left.len();
         let mut unfinished = self.left.len();
         for (key, number, place) in order {
-            let splat = &batches[number].splats[place];
+            let splat = &groups[number].splats[place];
             let [columns, rows] = self.covered(splat);
             for row in rows {
                 for column in columns.clone() {

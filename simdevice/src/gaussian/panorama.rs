@@ -7,7 +7,7 @@
 //! [`Splat::wide`]: super::project::Splat::wide
 
 use super::footprint::{Ellipse, Reach, Visible};
-use super::splat::Projected;
+use super::splat::ProjectedGroup;
 use devmem::host;
 
 /// The sides to which Gaussians are copied: right and left.
@@ -33,10 +33,10 @@ pub(super) fn reach(
     period: f64,
     visible: &Visible,
     copies: &mut Vec<(usize, usize, Reach)>,
-    out: &mut Projected,
+    out: &mut ProjectedGroup,
     mut beside: Option<&mut u64>,
 ) -> Option<Reach> {
-    out.copies.resize_with(SIDES.len(), Projected::default);
+    out.copies.resize_with(SIDES.len(), ProjectedGroup::default);
     let [x, y] = ellipse.mean;
     let before = copies.len();
     for (side, direction) in SIDES.into_iter().enumerate() {
@@ -62,7 +62,7 @@ pub(super) fn copy_last(
     at: usize,
     period: f64,
     copies: &mut &[(usize, usize, Reach)],
-    out: &mut Projected,
+    out: &mut ProjectedGroup,
 ) {
     while let Some((&(of, side, reach), rest)) = copies.split_first().filter(|(c, _)| c.0 <= at) {
         *copies = rest;
@@ -81,16 +81,16 @@ pub(super) fn copy_last(
     }
 }
 
-/// Makes batches of the copies, behind all others. Copies have the keys and the places in the order of what they are
+/// Makes groups of the copies, behind all others. Copies have the keys and the places in the order of what they are
 /// copies of; since no pixel counts two of them, their order among themselves is of no account.
-pub(super) fn append_copies(batches: &mut Vec<Projected>) {
-    let copies = batches
+pub(super) fn append_copies(groups: &mut Vec<ProjectedGroup>) {
+    let copies = groups
         .iter_mut()
-        .flat_map(|batch| std::mem::take(&mut batch.copies))
+        .flat_map(|group| std::mem::take(&mut group.copies))
         .filter(|copies| !copies.splats.is_empty());
     let copies = host::collect(copies);
-    host::reserve(batches, copies.len());
-    batches.extend(copies);
+    host::reserve(groups, copies.len());
+    groups.extend(copies);
 }
 
 #[cfg(test)]
@@ -112,7 +112,7 @@ mod tests {
             narrowing: (half / 2.0).powi(2),
             peak: 0.0,
         };
-        let (mut out, mut copies) = (Projected::default(), Vec::new());
+        let (mut out, mut copies) = (ProjectedGroup::default(), Vec::new());
         let reach = reach(
             0,
             &ellipse,

@@ -5,18 +5,18 @@
 //! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
-use super::attributes::{Attributes, Batch, CoefficientReader, Fetcher, Harmonics};
+use super::attributes::{Attributes, Group, CoefficientReader, Fetcher, Harmonics};
 use super::camera::{self, LN_2, ViewConstants};
 use super::clusters::Cluster;
 use super::frustum::Frustum;
 use super::instances::{Matrices, cofactors, dot};
-use super::lanes::{BATCH, Bits, F32_LANES, Lanes, log2};
+use super::lanes::{GROUP, Bits, F32_LANES, Lanes, log2};
 use super::panorama;
 use super::ray_depth::RayDepth;
 use super::scratch::{Flat, Scratch};
 use super::sort::ordered_bits;
 use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, coefficient_count};
-use super::splat::{Projected, Splat, half_room};
+use super::splat::{ProjectedGroup, Splat, half_room};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
 use super::unscented;
@@ -31,14 +31,14 @@ use fearless_simd::{Simd, prelude::*};
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The most batches that a worker takes at a time: the last ones are waited for.
-const BATCHES_PER_TASK: usize = 4;
+/// The most groups that a worker takes at a time: the last ones are waited for.
+const GROUPS_PER_TASK: usize = 4;
 
-/// A batch of Gaussians that were read.
+/// A group of Gaussians that were read.
 pub(super) struct Source<'a> {
     /// What reads their colours.
     pub(super) reader: CoefficientReader<'a>,
-    pub(super) batch: Batch<'a>,
+    pub(super) group: Group<'a>,
     pub(super) attributes: &'a Attributes,
     /// Matrices that place them in the world, if it is not their own space.
     pub(super) matrices: Option<&'a Matrices>,
@@ -57,14 +57,14 @@ impl Source<'_> {
         let count = coefficient_count(degree);
         for &lane in lanes {
             match self.harmonics.from(lane) {
-                [] => self.reader.prefetch(&self.batch, lane, count),
+                [] => self.reader.prefetch(&self.group, lane, count),
                 floats => devmem::prefetch(&floats[..floats.len().min(3 * count)]),
             }
         }
     }
 }
 
-/// Projects a batch. `sequence` tells of each of its Gaussians which of the set it is.
+/// Projects a group. `sequence` tells of each of its Gaussians which of the set it is.
 #[inline(always)]
 pub(super) fn project<S: Simd>(
     view: &ViewConstants,
@@ -72,10 +72,10 @@ pub(super) fn project<S: Simd>(
     source: &Source<'_>,
     scratch: &mut Scratch,
     sequence: impl Fn(usize) -> u32,
-    out: &mut Projected,
+    out: &mut ProjectedGroup,
 ) {
     let counters = &mut out.counters;
-    counters.add(Counter::GaussiansRead, source.batch.len as u64);
+    counters.add(Counter::GaussiansRead, source.group.len as u64);
     let kept = cull(view, simd, source, counters);
     scratch.gather(source.attributes, &kept);
     if let Some(matrices) = source.matrices {
@@ -85,15 +85,15 @@ pub(super) fn project<S: Simd>(
     emit(view, simd, source, scratch, sequence, out);
 }
 
-/// Finds which lanes have finite spherical harmonics, of all that the batch holds.
+/// Finds which lanes have finite spherical harmonics, of all that the group holds.
 #[inline(always)]
 fn find_colored<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>) -> Bits {
     let reader = &source.reader;
     let mut coefficients = [0.0; COEFFICIENT_FLOATS];
     let anywhere = Bases::default();
     let mut colored = Bits::default();
-    for lane in 0..source.batch.len {
-        reader.read(&source.batch, lane, &mut coefficients);
+    for lane in 0..source.group.len {
+        reader.read(&source.group, lane, &mut coefficients);
         let color = anywhere.color(simd, view.sh_degree, 0, &coefficients);
         colored.set_one(lane, color.is_some());
     }
@@ -108,7 +108,7 @@ fn cull<S: Simd>(
     source: &Source<'_>,
     counters: &mut Counters,
 ) -> Bits {
-    let len = source.batch.len;
+    let len = source.group.len;
     let mut kept = Bits::first(len);
     let mut keep = |passed: &Bits, counter: Counter| {
         let skipped = kept.without(passed).count();
@@ -351,7 +351,7 @@ pub(super) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
         return;
     };
     let r = &view.rotation;
-    for at in 0..scratch.lanes.len().min(BATCH) {
+    for at in 0..scratch.lanes.len().min(GROUP) {
         let a = placed.linear(at);
         let p = scratch.position.each_ref().map(|lanes| lanes[at]);
         let d =
@@ -375,7 +375,7 @@ pub(super) fn linearize_group(view: &ViewConstants, by_matrices: bool, scratch: 
     let [x, y, z] = &*scratch.camera;
     let placed = scratch.placed.as_deref().filter(|_| by_matrices);
     let r = &view.rotation;
-    for at in 0..scratch.lanes.len().min(BATCH) {
+    for at in 0..scratch.lanes.len().min(GROUP) {
         let t = [x[at], y[at], z[at]];
         scratch.depth[at] = camera::depth(view.model, t);
         let (place, rows) = camera::linearize(view.model, view.slopes(), t);
@@ -437,7 +437,7 @@ pub(super) fn emit<S: Simd>(
     source: &Source<'_>,
     scratch: &mut Scratch,
     sequence: impl Fn(usize) -> u32,
-    out: &mut Projected,
+    out: &mut ProjectedGroup,
 ) {
     out.reserve(scratch.lanes.len());
     find_tiles(view, simd, scratch, out);
@@ -450,7 +450,7 @@ pub(super) fn emit<S: Simd>(
     for group in scratch.reached.chunks(DIRECTIONS) {
         for (parts, lanes) in directions.iter_mut().zip(&scratch.flat.direction) {
             for (part, &at) in parts.iter_mut().zip(group) {
-                *part = lanes[at % BATCH] as f32;
+                *part = lanes[at % GROUP] as f32;
             }
         }
         bases.find(simd, degree, &directions);
@@ -459,14 +459,14 @@ pub(super) fn emit<S: Simd>(
         // All colours come first: what they wait for memory overlaps then.
         let mut colored = Colored::default();
         for (number, &at) in group.iter().enumerate() {
-            let lane = scratch.lanes[at % BATCH];
+            let lane = scratch.lanes[at % GROUP];
             let rest = source.harmonics.from(lane);
             let coefficients = if is_whole && rest.len() >= needed {
                 rest
             } else {
                 match rest.get(..floats) {
                     Some(last) if floats > 0 => read[..floats].copy_from_slice(last),
-                    _ => reader.read(&source.batch, lane, &mut read),
+                    _ => reader.read(&source.group, lane, &mut read),
                 }
                 &read
             };
@@ -487,7 +487,7 @@ pub(super) fn emit<S: Simd>(
     let counters = &mut out.counters;
     counters.add(Counter::GaussiansDrawn, out.splats.len() as u64);
     if view.optimizations.has(Optimization::Harmonics) {
-        let unread = source.batch.len - scratch.reached.len();
+        let unread = source.group.len - scratch.reached.len();
         counters.add(Counter::HarmonicsUnread, unread as u64);
     }
 }
@@ -499,11 +499,11 @@ fn append(
     lanes: &[ColoredLane],
     scratch: &Scratch,
     sequence: &impl Fn(usize) -> u32,
-    out: &mut Projected,
+    out: &mut ProjectedGroup,
 ) {
     // Iterators that know their lengths write without a look at the room that there is.
     out.keys.extend(lanes.iter().map(|one| {
-        let sequence = sequence(scratch.lanes[one.at % BATCH]);
+        let sequence = sequence(scratch.lanes[one.at % GROUP]);
         [key(view, one.at, sequence, scratch), sequence]
     }));
     out.splats.extend(lanes.iter().map(|one| {
@@ -550,7 +550,7 @@ impl Colored {
     #[inline(always)]
     fn push(&mut self, at: usize, color: [f32; 3]) {
         self.lanes[self.len % DIRECTIONS] = ColoredLane {
-            at: at % BATCH,
+            at: at % GROUP,
             color,
         };
         self.len += 1;
@@ -593,7 +593,7 @@ fn find_sound<S: Simd>(simd: S, attributes: &Attributes, len: usize) -> [Bits; 3
     sound
 }
 
-/// A batch to project.
+/// A group to project.
 #[derive(Clone)]
 pub(super) struct Job<'a> {
     pub(super) append: &'a GaussianAppend,
@@ -614,7 +614,7 @@ pub(super) enum Part<'a> {
 }
 
 impl<'a> Job<'a> {
-    /// Reads the batch, if it lies in no cluster, and what its model does to it.
+    /// Reads the group, if it lies in no cluster, and what its model does to it.
     pub(super) fn read<'b>(
         &'b self,
         fetcher: &mut Fetcher,
@@ -623,16 +623,16 @@ impl<'a> Job<'a> {
         is_flat: bool,
     ) -> Source<'b> {
         let streams = &self.append.attributes;
-        let batch = match self.part {
+        let group = match self.part {
             Part::From(start) => {
-                let len = (self.append.count - start).min(BATCH as u32) as usize;
-                Batch::new(self.append, self.instance, start, len)
+                let len = (self.append.count - start).min(GROUP as u32) as usize;
+                Group::new(self.append, self.instance, start, len)
             }
-            Part::Cluster(cluster) => Batch::of_cluster(self.append, self.instance, &cluster.numbers),
+            Part::Cluster(cluster) => Group::of_cluster(self.append, self.instance, &cluster.numbers),
         };
         let matrices = streams.model.matrix.as_ref().map(|rows| {
             let matrices = matrices.get_or_insert_default();
-            matrices.read(fetcher, rows, &batch);
+            matrices.read(fetcher, rows, &group);
             &**matrices
         });
         let is_faded = streams.model.opacity.is_some();
@@ -644,22 +644,22 @@ impl<'a> Job<'a> {
             Part::Cluster(cluster) if !is_faded => (&cluster.attributes, cluster.is_sound),
             Part::Cluster(cluster) => {
                 attributes.clone_from(&cluster.attributes);
-                fetcher.fade(streams, &batch, attributes);
+                fetcher.fade(streams, &group, attributes);
                 // Products need not be finite.
                 (&*attributes, false)
             }
             Part::From(_) => {
-                fetcher.read_own(streams, &batch, attributes);
-                fetcher.fade(streams, &batch, attributes);
+                fetcher.read_own(streams, &group, attributes);
+                fetcher.fade(streams, &group, attributes);
                 if is_flat {
-                    attributes.scale[2][..batch.len].fill(0.0);
+                    attributes.scale[2][..group.len].fill(0.0);
                 }
                 (&*attributes, false)
             }
         };
         Source {
             reader: CoefficientReader::new(&streams.spherical_harmonics),
-            batch,
+            group,
             attributes,
             matrices,
             is_sound,
@@ -678,7 +678,7 @@ pub(super) struct Preprocessor<'a> {
 
 impl Preprocessor<'_> {
     /// Does all jobs.
-    pub(super) fn run(&self, jobs: &[Job<'_>]) -> Vec<Projected> {
+    pub(super) fn run(&self, jobs: &[Job<'_>]) -> Vec<ProjectedGroup> {
         // Each thread makes its scratch once. Nobody else asks for its lock, and no job waits for others, so that none is
         // begun within another.
         let workers = (0..rayon::current_num_threads()).map(|_| Mutex::new(None));
@@ -688,30 +688,30 @@ impl Preprocessor<'_> {
             let mut worker = workers[own].lock().unwrap_or_else(PoisonError::into_inner);
             self.job(worker.get_or_insert_with(Worker::new), job)
         };
-        let mut batches = host::with_capacity(jobs.len());
+        let mut groups = host::with_capacity(jobs.len());
         jobs.par_iter()
-            .with_max_len(BATCHES_PER_TASK)
+            .with_max_len(GROUPS_PER_TASK)
             .map(one)
-            .collect_into_vec(&mut batches);
-        batches
+            .collect_into_vec(&mut groups);
+        groups
     }
 
     /// Does a job.
-    fn job(&self, worker: &mut Worker, job: &Job<'_>) -> Projected {
+    fn job(&self, worker: &mut Worker, job: &Job<'_>) -> ProjectedGroup {
         let Worker {
             fetcher,
             attributes,
             matrices,
             scratch,
         } = worker;
-        let mut out = Projected::default();
+        let mut out = ProjectedGroup::default();
         let constants = self.constants;
         let source = job.read(fetcher, attributes, matrices, self.is_flat);
         // A frustum is for opacities that it was told of.
         let wider;
         let mut frustum = &*job.frustum;
         if let Part::From(_) = job.part {
-            let opacities = &source.attributes.opacity[..source.batch.len];
+            let opacities = &source.attributes.opacity[..source.group.len];
             let opacity = opacities.iter().copied().fold(1.0, f32::max);
             if opacity > 1.0 {
                 wider = Frustum::new(constants, opacity);
@@ -742,7 +742,7 @@ impl Preprocessor<'_> {
     }
 }
 
-/// What a worker keeps from one batch to the next.
+/// What a worker keeps from one group to the next.
 struct Worker {
     fetcher: Fetcher,
     attributes: Box<Attributes>,

@@ -81,7 +81,7 @@ impl RayDepth {
 /// What a draw in the per-pixel order has besides its splats.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayDepths<'a> {
-    /// By batch, as the splats.
+    /// By group, as the splats.
     pub(crate) of: &'a [Vec<RayDepth>],
     pub(crate) rays: PixelRays,
 }

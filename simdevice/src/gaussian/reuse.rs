@@ -95,7 +95,7 @@ impl Key {
             && self.has_same_batches(other)
     }
 
-    /// Whether the same places in the set are in the same batches of both.
+    /// Whether the same places in the set are in the same groups of both.
     fn has_same_batches(&self, other: &Self) -> bool {
         let mut clusters = self.clusters.iter().zip(&other.clusters);
         self.ranges == other.ranges && clusters.all(|(a, b)| a.ptr_eq(b))

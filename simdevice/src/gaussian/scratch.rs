@@ -1,16 +1,16 @@
-//! What a worker needs to project a batch of Gaussians.
+//! What a worker needs to project a group of Gaussians.
 
 use super::attributes::Attributes;
 use super::footprint::Reach;
 use super::instances::{Matrices, Placed};
-use super::lanes::{BATCH, Bits, F32_LANES, Lanes, NO_LANES};
+use super::lanes::{GROUP, Bits, F32_LANES, Lanes, NO_LANES};
 
 /// The reach of each lane, as the two words of [`Reach::words`].
-pub(super) struct Reaches(pub(super) [[u64; BATCH + 8]; 2]);
+pub(super) struct Reaches(pub(super) [[u64; GROUP + 8]; 2]);
 
 impl Default for Reaches {
     fn default() -> Self {
-        Self([[0; BATCH + 8]; 2])
+        Self([[0; GROUP + 8]; 2])
     }
 }
 
@@ -28,7 +28,7 @@ impl Reaches {
     }
 }
 
-/// What becomes of a batch's Gaussians: of those that were kept, densely, in structures of arrays.
+/// What becomes of a group's Gaussians: of those that were kept, densely, in structures of arrays.
 pub(crate) struct Scratch {
     /// The lanes that were kept; what follows is in their order.
     pub(super) lanes: Vec<usize>,
@@ -93,7 +93,7 @@ impl Scratch {
     /// Scratch for one worker.
     pub(crate) fn new() -> Self {
         Self {
-            lanes: Vec::with_capacity(BATCH),
+            lanes: Vec::with_capacity(GROUP),
             position: Box::new([NO_LANES; 3]),
             scale: Box::new([NO_LANES; 3]),
             rotation: Box::new([NO_LANES; 4]),
@@ -105,7 +105,7 @@ impl Scratch {
             jacobian: Box::new([[NO_LANES; 3]; 2]),
             moments: Box::new([NO_LANES; 4]),
             flat: Box::default(),
-            reached: Vec::with_capacity(BATCH),
+            reached: Vec::with_capacity(GROUP),
             reaches: Box::default(),
             copies: Vec::new(),
         }
@@ -117,7 +117,7 @@ impl Scratch {
         self.lanes.clear();
         kept.for_each(|lane| self.lanes.push(lane));
         let lanes = &*self.lanes;
-        let whole = lanes.len() == BATCH;
+        let whole = lanes.len() == GROUP;
         let pack = |from: &[f32; F32_LANES], to: &mut Lanes| {
             if whole {
                 for (to, &from) in to.iter_mut().zip(from) {
@@ -126,7 +126,7 @@ impl Scratch {
                 return;
             }
             for (to, &lane) in to.iter_mut().zip(lanes) {
-                *to = from[lane % BATCH].into();
+                *to = from[lane % GROUP].into();
             }
         };
         for (from, to) in attributes.position.iter().zip(&mut *self.position) {
@@ -152,7 +152,7 @@ impl Scratch {
         let to = placed.matrix.as_flattened_mut().iter_mut();
         for (from, to) in matrices.rows.as_flattened().iter().zip(to) {
             for (to, &lane) in to.iter_mut().zip(&self.lanes) {
-                *to = from[lane % BATCH].into();
+                *to = from[lane % GROUP].into();
             }
         }
     }

@@ -1,15 +1,15 @@
 //! A set of Gaussians that are sorted and drawn together, as packets describe it.
 
 use super::depth::CenterDepth;
-use super::lanes::BATCH;
+use super::lanes::GROUP;
 use crate::format::Format;
 use crate::packet::draw::{Draw, ResolveShader};
 use crate::packet::{GaussianAppend, GaussianBegin, GaussianGeometry, Rect, Viewport};
 use devmem::host;
 use isa::exec::Stopped;
 
-/// The most batches of a set: a survivor is named by its batch and its place there, in 32 bits.
-pub(super) const MAX_BATCHES: u64 = (1 << 32) / BATCH as u64;
+/// The most groups of a set: a survivor is named by its group and its place there, in 32 bits.
+pub(super) const MAX_GROUPS: u64 = (1 << 32) / GROUP as u64;
 
 /// A set of Gaussians that are sorted and drawn together.
 #[derive(Debug)]
@@ -30,11 +30,11 @@ pub struct GaussianSet {
 pub enum SortError {
     /// It has more Gaussians than one draw can sort.
     #[error(
-        "a sorted set of {batches} batches of Gaussians exceeds the {MAX_BATCHES} that a draw can hold"
+        "a sorted set of {groups} groups of Gaussians exceeds the {MAX_GROUPS} that a draw can hold"
     )]
     TooManyGaussians {
-        /// How many batches it would take.
-        batches: u64,
+        /// How many groups it would take.
+        groups: u64,
     },
     /// A vertex program ran for too long.
     #[error(transparent)]

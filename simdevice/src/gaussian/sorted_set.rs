@@ -4,7 +4,7 @@ use super::camera::period;
 use super::depth::Trend;
 use super::ray_depth::{PixelRays, RayDepth, RayDepths};
 use super::set::GaussianSet;
-use super::splat::{Projected, Splat};
+use super::splat::{ProjectedGroup, Splat};
 use super::surfel::Surfel;
 use super::tile_lists::TileLists;
 use crate::counters::Counters;
@@ -18,18 +18,18 @@ use devmem::host;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// The least batches that a worker takes where little is done for each.
-const LEAST_BATCHES: usize = 64;
+/// The least groups that a worker takes where little is done for each.
+const LEAST_GROUPS: usize = 64;
 
 /// What projection, sort and binning make of a set. Rasterization changes nothing of it.
 #[derive(Debug)]
 pub(crate) struct SortedSet {
-    /// By batch; [`locate`](super::splat::locate) finds a primitive's.
+    /// By group; [`locate`](super::splat::locate) finds a primitive's.
     pub(crate) splats: Vec<Vec<Splat>>,
     pub(crate) tiles: TileLists,
-    /// By batch, as the splats, if they are 2D Gaussians.
+    /// By group, as the splats, if they are 2D Gaussians.
     pub(super) surfels: Option<Vec<Vec<Surfel>>>,
-    /// By batch, as the splats, if each pixel sorts for itself.
+    /// By group, as the splats, if each pixel sorts for itself.
     pub(super) ray_depths: Option<Vec<Vec<RayDepth>>>,
     /// What became of the set's Gaussians.
     pub(super) counters: Counters,
@@ -60,15 +60,15 @@ pub struct BinnedDraw {
 }
 
 impl SortedSet {
-    /// What the tile engine needs of the batches of `set`, which `tiles` holds; nothing is counted yet.
-    pub(super) fn new(set: &GaussianSet, batches: Vec<Projected>, tiles: TileLists) -> Self {
-        let mut splats = host::with_capacity(batches.len());
-        let mut others = host::with_capacity(batches.len());
-        // What else there is of batches goes here; with many, that takes a while.
-        batches
+    /// What the tile engine needs of the groups of `set`, which `tiles` holds; nothing is counted yet.
+    pub(super) fn new(set: &GaussianSet, groups: Vec<ProjectedGroup>, tiles: TileLists) -> Self {
+        let mut splats = host::with_capacity(groups.len());
+        let mut others = host::with_capacity(groups.len());
+        // What else there is of groups goes here; with many, that takes a while.
+        groups
             .into_par_iter()
-            .with_min_len(LEAST_BATCHES)
-            .map(|batch| (batch.splats, (batch.surfels, batch.ray_depths)))
+            .with_min_len(LEAST_GROUPS)
+            .map(|group| (group.splats, (group.surfels, group.ray_depths)))
             .unzip_into_vecs(&mut splats, &mut others);
         let surfels = others
             .iter_mut()
@@ -88,11 +88,11 @@ impl SortedSet {
 
     /// Bytes of host memory that it holds.
     pub(super) fn memory_bytes(&self) -> u64 {
-        let splats = self.splats.iter().map(|batch| size_of_val(&**batch) as u64);
+        let splats = self.splats.iter().map(|group| size_of_val(&**group) as u64);
         let depths = self.ray_depths.iter().flatten();
-        let depths = depths.map(|batch| size_of_val(&**batch) as u64);
+        let depths = depths.map(|group| size_of_val(&**group) as u64);
         let surfels = self.surfels.iter().flatten();
-        let surfels = surfels.map(|batch| size_of_val(&**batch) as u64);
+        let surfels = surfels.map(|group| size_of_val(&**group) as u64);
         let lists = self.tiles.memory_bytes();
         splats.sum::<u64>() + depths.sum::<u64>() + surfels.sum::<u64>() + lists
     }

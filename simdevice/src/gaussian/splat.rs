@@ -1,7 +1,7 @@
 //! What projection makes of Gaussians: the rasterizer's nine numbers, and what goes with them.
 
 use super::footprint::{Reach, Span};
-use super::lanes::BATCH;
+use super::lanes::GROUP;
 use super::ray_depth::RayDepth;
 use super::scratch::Flat;
 use super::surfel::Surfel;
@@ -83,15 +83,15 @@ pub(crate) fn half_room(factor: [f64; 3], room: f64) -> f64 {
     }
 }
 
-/// The batch of a survivor's name, and its place there.
+/// The group of a survivor's name, and its place there.
 #[inline(always)]
 pub(crate) fn locate(name: u32) -> (usize, usize) {
-    (name as usize / BATCH, name as usize % BATCH)
+    (name as usize / GROUP, name as usize % GROUP)
 }
 
-/// What came of a batch.
+/// What came of a group.
 #[derive(Debug, Default)]
-pub(crate) struct Projected {
+pub(crate) struct ProjectedGroup {
     /// What is drawn, in the order of the draw.
     pub splats: Vec<Splat>,
     /// The depth key of each, and its place in the set, which decides between equal keys.
@@ -107,10 +107,10 @@ pub(crate) struct Projected {
     /// What was skipped and why.
     pub counters: Counters,
     /// What is drawn a period to the right or to the left of where it is, by side.
-    pub copies: Vec<Projected>,
+    pub copies: Vec<ProjectedGroup>,
 }
 
-impl Projected {
+impl ProjectedGroup {
     pub(super) fn reserve(&mut self, count: usize) {
         host::reserve(&mut self.splats, count);
         host::reserve(&mut self.keys, count);

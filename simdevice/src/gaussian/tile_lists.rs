@@ -9,7 +9,7 @@
 //! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
 use super::footprint::{HELD_ROWS, Reach, Span, TILE_SIZE};
-use super::splat::{Projected, locate};
+use super::splat::{ProjectedGroup, locate};
 use crate::lanes::three;
 use crate::packet::Rect;
 use devmem::host;
@@ -47,27 +47,27 @@ type Reaching = (u32, Reach);
 #[derive(Debug)]
 pub(crate) struct SortedWalk {
     sorted: Vec<Reaching>,
-    /// Of each batch.
+    /// Of each group.
     spans: Vec<Vec<Span>>,
     pairs: u64,
 }
 
 impl SortedWalk {
-    fn new(batches: &mut [Projected], order: &[(u32, u32)]) -> Self {
+    fn new(groups: &mut [ProjectedGroup], order: &[(u32, u32)]) -> Self {
         let mut sorted: Vec<Reaching> = host::with_capacity(order.len());
-        let seen = &*batches;
+        let seen = &*groups;
         // It writes to the room that there is.
         order
             .par_iter()
             .with_min_len(RUN)
             .map(|&(_, primitive)| {
-                let (batch, place) = locate(primitive);
-                (primitive, seen[batch].reaches[place])
+                let (group, place) = locate(primitive);
+                (primitive, seen[group].reaches[place])
             })
             .collect_into_vec(&mut sorted);
-        let taken = batches
+        let taken = groups
             .iter_mut()
-            .map(|batch| std::mem::take(&mut batch.spans));
+            .map(|group| std::mem::take(&mut group.spans));
         let spans = host::collect(taken);
         let tiles = |(primitive, reach): &Reaching| {
             let spans = reach.spans(&spans[locate(*primitive).0]);
@@ -108,8 +108,8 @@ impl SortedWalk {
     }
 }
 
-/// What batches reach, close together.
-struct Batches<'a> {
+/// What groups reach, close together.
+struct Groups<'a> {
     reaches: Vec<&'a [Reach]>,
     spans: Vec<&'a [Span]>,
 }
@@ -154,7 +154,7 @@ impl TileLists {
     /// Places the survivors named by `order`, in that order, in the lists of the tiles they reach, unless those had more
     /// than `most_pairs` entries together.
     pub(crate) fn build(
-        batches: &mut [Projected],
+        groups: &mut [ProjectedGroup],
         order: &[(u32, u32)],
         bounds: Rect,
         threads: usize,
@@ -186,9 +186,9 @@ impl TileLists {
         };
         let pairs = AtomicU64::new(0);
         let allow = |more: u64| pairs.fetch_add(more, Relaxed) + more <= most_pairs;
-        let seen = Batches {
-            reaches: host::collect(batches.iter().map(|batch| &*batch.reaches)),
-            spans: host::collect(batches.iter().map(|batch| &*batch.spans)),
+        let seen = Groups {
+            reaches: host::collect(groups.iter().map(|group| &*group.reaches)),
+            spans: host::collect(groups.iter().map(|group| &*group.spans)),
         };
         let runs: Option<Vec<Vec<Strips>>> = order
             .par_chunks(order.len().div_ceil(threads))
@@ -200,7 +200,7 @@ impl TileLists {
                 columns,
                 band_rows,
                 bands: Vec::new(),
-                walk: Some(SortedWalk::new(batches, order)),
+                walk: Some(SortedWalk::new(groups, order)),
             };
         };
         let bands = (0..bands)
@@ -277,7 +277,7 @@ impl Rows {
     /// `None` once the budget does not `allow` for so many more.
     fn expand(
         &self,
-        batches: &Batches<'_>,
+        groups: &Groups<'_>,
         run: &[(u32, u32)],
         bands: usize,
         allow: impl Fn(u64) -> bool,
@@ -293,8 +293,8 @@ impl Rows {
             (band as usize, first, span.len() as u32)
         };
         let reach_of = |&(_, primitive): &(u32, u32)| {
-            let (batch, place) = locate(primitive);
-            &batches.reaches[batch][place]
+            let (group, place) = locate(primitive);
+            &groups.reaches[group][place]
         };
         let mut ahead = run.chunks(GATHERED).skip(1);
         for some in run.chunks(GATHERED) {
@@ -317,7 +317,7 @@ impl Rows {
                         strips[band].push(first, tiles, primitive);
                     }
                 } else {
-                    let others = batches.spans[locate(primitive).0];
+                    let others = groups.spans[locate(primitive).0];
                     for (band, first, tiles) in reach.spans(others).map(strip) {
                         count += u64::from(tiles);
                         strips[band].push(first, tiles, primitive);
@@ -448,22 +448,22 @@ mod tests {
                 let first = first.min(columns - 1);
                 Span { first, end: (first + len).min(columns) }
             };
-            let mut batch = Projected::default();
+            let mut group = ProjectedGroup::default();
             let mut expected = vec![Vec::new(); usize::from(rows) * usize::from(columns)];
             let mut pairs = 0;
             for (primitive, (row, spans)) in (0..).zip(&reached) {
                 let row = (*row).min(rows - 1);
                 let spans: Vec<Span> = spans.iter().take((rows - row).into()).map(clip).collect();
-                let mut reach = Reach::new(first_row + row, spans.len() as u16, &mut batch.spans);
+                let mut reach = Reach::new(first_row + row, spans.len() as u16, &mut group.spans);
                 for (number, &span) in (0..).zip(&spans) {
-                    reach.set(&mut batch.spans, number, span);
+                    reach.set(&mut group.spans, number, span);
                     for column in span.first..span.end {
                         let tile = usize::from(row + number) * usize::from(columns) + usize::from(column);
                         expected[tile].push(primitive);
                         pairs += 1;
                     }
                 }
-                batch.reaches.push(reach);
+                group.reaches.push(reach);
             }
             let order: Vec<(u32, u32)> = (0..reached.len() as u32).map(|primitive| (7, primitive)).collect();
             let bounds = Rect {
@@ -472,7 +472,7 @@ mod tests {
                 width: u32::from(columns) * 16 - 5,
                 height: u32::from(rows) * 16 - 15,
             };
-            let lists = TileLists::build(&mut [batch], &order, bounds, threads, u64::MAX);
+            let lists = TileLists::build(&mut [group], &order, bounds, threads, u64::MAX);
             prop_assert_eq!(lists.pairs(), pairs);
             for (tile, expected) in expected.iter().enumerate() {
                 let (x, y) = (tile % usize::from(columns), tile / usize::from(columns));
@@ -483,17 +483,17 @@ mod tests {
 
     #[test]
     fn lists_keep_the_sorted_order() {
-        let mut batch = Projected::default();
+        let mut group = ProjectedGroup::default();
         for (row, spans) in [
             (1, &[(0, 2)][..]),
             (1, &[(1, 2), (0, 3), (0, 0), (0, 0), (0, 0)]),
             (1, &[(0, 1)]),
         ] {
-            let mut reach = Reach::new(row, spans.len() as u16, &mut batch.spans);
+            let mut reach = Reach::new(row, spans.len() as u16, &mut group.spans);
             for (number, &(first, end)) in (0..).zip(spans) {
-                reach.set(&mut batch.spans, number, Span { first, end });
+                reach.set(&mut group.spans, number, Span { first, end });
             }
-            batch.reaches.push(reach);
+            group.reaches.push(reach);
         }
         let order = [(5, 2), (6, 0), (7, 1)];
         let bounds = Rect {
@@ -502,7 +502,7 @@ mod tests {
             width: 40,
             height: 32,
         };
-        let lists = TileLists::build(&mut [batch], &order, bounds, 2, u64::MAX);
+        let lists = TileLists::build(&mut [group], &order, bounds, 2, u64::MAX);
         assert_eq!(lists.list(0, 1), [2, 0]);
         assert_eq!(lists.list(1, 1), [0, 1]);
         assert_eq!(lists.list(2, 1), [0; 0]);

@@ -1,4 +1,4 @@
-//! Which of a batch's kept Gaussians reach tiles, and which tiles: for several at once where they are small, which most
+//! Which of a group's kept Gaussians reach tiles, and which tiles: for several at once where they are small, which most
 //! are, and one at a time for the others.
 
 use super::camera::ViewConstants;
@@ -6,7 +6,7 @@ use super::footprint::{Ellipse, HELD_ROWS, Reach, TILE_SIZE};
 use super::lanes::{Bits, Lanes};
 use super::panorama;
 use super::scratch::{Flat, Scratch};
-use super::splat::Projected;
+use super::splat::ProjectedGroup;
 use super::surfel::surfel_of;
 use crate::counters::{Counter, Counters};
 use crate::lanes::both;
@@ -94,7 +94,7 @@ pub(super) fn find_tiles<S: Simd>(
     view: &ViewConstants,
     simd: S,
     scratch: &mut Scratch,
-    out: &mut Projected,
+    out: &mut ProjectedGroup,
 ) {
     let by_lanes = view.optimizations.has(Optimization::Ellipse)
         && view.period.is_none()
@@ -109,7 +109,7 @@ fn find_tiles_by<S: Simd>(
     simd: S,
     by_lanes: bool,
     scratch: &mut Scratch,
-    out: &mut Projected,
+    out: &mut ProjectedGroup,
 ) {
     let drawn = find_drawn(view, simd, scratch, &mut out.counters);
     let mut beside = 0;
@@ -276,7 +276,7 @@ fn reach_of_one(
     view: &ViewConstants,
     at: usize,
     scratch: &mut Scratch,
-    out: &mut Projected,
+    out: &mut ProjectedGroup,
     beside: &mut u64,
 ) -> Option<Reach> {
     if view.geometry == GaussianGeometry::Surfel {
@@ -320,7 +320,7 @@ mod tests {
     /// Rows, each with its first tile and one past its last.
     type Spans = Vec<(u32, u16, u16)>;
 
-    /// What is found of a batch: the spans of each lane that is reached, and counters.
+    /// What is found of a group: the spans of each lane that is reached, and counters.
     #[derive(Debug, PartialEq)]
     struct Tiles {
         reached: Vec<(usize, Spans)>,
@@ -358,7 +358,7 @@ mod tests {
     }
 
     fn tiles<S: Simd>(simd: S, by_lanes: bool, scratch: &mut Scratch) -> Tiles {
-        let mut out = Projected::default();
+        let mut out = ProjectedGroup::default();
         find_tiles_by(&projection(), simd, by_lanes, scratch, &mut out);
         let spans = |at: usize| {
             let reach = scratch.reaches.get(at);

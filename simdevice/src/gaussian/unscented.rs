@@ -6,7 +6,7 @@
 //! covariance: none is negative, and the covariance is one.
 
 use super::camera::{ViewConstants, linearize};
-use super::lanes::BATCH;
+use super::lanes::GROUP;
 use super::ray_depth;
 use super::scratch::Scratch;
 use crate::packet::CameraModel;
@@ -37,7 +37,7 @@ pub(super) fn transform(view: &ViewConstants, by_matrices: bool, scratch: &mut S
     let r = &view.rotation;
     let placed = scratch.placed.as_deref().filter(|_| by_matrices);
     let [fx, fy] = view.focal;
-    for at in 0..scratch.lanes.len().min(BATCH) {
+    for at in 0..scratch.lanes.len().min(GROUP) {
         let quaternion = scratch.rotation.each_ref().map(|lanes| lanes[at]);
         let scale = scratch.scale.each_ref().map(|lanes| lanes[at]);
         let own = axes(quaternion, scale);

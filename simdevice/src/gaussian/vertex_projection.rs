@@ -4,12 +4,12 @@
 use super::camera::ViewConstants;
 use super::depth::CenterDepth;
 use super::footprint::Visible;
-use super::lanes::{BATCH, Lanes, NO_LANES};
+use super::lanes::{GROUP, Lanes, NO_LANES};
 use super::preprocess::shape;
 use super::scratch::Scratch;
 use super::set::GaussianSet;
 use super::sort::ordered_bits;
-use super::splat::{Projected, Splat};
+use super::splat::{ProjectedGroup, Splat};
 use super::tiles::find_tiles;
 use crate::counters::Counter;
 use crate::device::Device;
@@ -23,8 +23,8 @@ use isa::exec::Stopped;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Batches that a worker takes at a time, so that its shader is made rarely.
-const BATCHES_PER_TASK: usize = 16;
+/// Groups that a worker takes at a time, so that its shader is made rarely.
+const GROUPS_PER_TASK: usize = 16;
 
 /// How what the program writes becomes a Gaussian on the screen.
 struct Shading {
@@ -39,17 +39,17 @@ struct Shading {
     depth: Option<CenterDepth>,
 }
 
-/// Gaussians of a batch that were kept, densely: what the program wrote of each.
+/// Gaussians of a group that were kept, densely: what the program wrote of each.
 struct Outputs {
     /// In clip space.
     position: [Lanes; 4],
     covariance: [Lanes; 3],
     opacity: Lanes,
-    color: [[f32; 3]; BATCH],
-    key: [f32; BATCH],
+    color: [[f32; 3]; GROUP],
+    key: [f32; GROUP],
 }
 
-/// A batch to shade: of which instance, and the place of its first Gaussian in that and in the set.
+/// A group to shade: of which instance, and the place of its first Gaussian in that and in the set.
 #[derive(Clone, Copy)]
 struct Job {
     instance: u32,
@@ -57,7 +57,7 @@ struct Job {
     sequence: u32,
 }
 
-/// What a worker keeps from one batch to the next.
+/// What a worker keeps from one group to the next.
 struct Worker<'a> {
     shader: PointShader<'a>,
     shading: Shading,
@@ -65,9 +65,9 @@ struct Worker<'a> {
     scratch: Scratch,
 }
 
-/// How many batches a draw takes.
-pub(super) fn batches(draw: &Draw) -> u64 {
-    let per_instance = draw.count.div_ceil(BATCH as u32);
+/// How many groups a draw takes.
+pub(super) fn groups(draw: &Draw) -> u64 {
+    let per_instance = draw.count.div_ceil(GROUP as u32);
     u64::from(per_instance) * u64::from(draw.instance_count)
 }
 
@@ -88,21 +88,21 @@ pub(super) fn vertex_bytes(draw: &Draw) -> u64 {
 ///
 /// # Errors
 /// [`Stopped`] if a program ran for too long.
-pub(super) fn project_all(set: &GaussianSet, device: &Device) -> Result<Vec<Projected>, Stopped> {
+pub(super) fn project_all(set: &GaussianSet, device: &Device) -> Result<Vec<ProjectedGroup>, Stopped> {
     let mut sequence = 0u32;
     for append in &set.appends {
         let gaussians = append.count.wrapping_mul(append.instance_count);
         sequence = sequence.wrapping_add(gaussians);
     }
-    let mut batches = Vec::new();
+    let mut groups = Vec::new();
     for draw in &set.draws {
         let shaded = project(set, draw, sequence, device)?;
-        host::reserve(&mut batches, shaded.len());
-        batches.extend(shaded);
+        host::reserve(&mut groups, shaded.len());
+        groups.extend(shaded);
         let gaussians = draw.count.wrapping_mul(draw.instance_count);
         sequence = sequence.wrapping_add(gaussians);
     }
-    Ok(batches)
+    Ok(groups)
 }
 
 /// Shades and projects a draw whose first Gaussian is number `sequence` of the set.
@@ -114,13 +114,13 @@ fn project(
     draw: &Draw,
     sequence: u32,
     device: &Device,
-) -> Result<Vec<Projected>, Stopped> {
+) -> Result<Vec<ProjectedGroup>, Stopped> {
     let Some(viewport) = draw.state.viewports.first() else {
         return Ok(Vec::new());
     };
     let jobs = (0..draw.instance_count).flat_map(|instance| {
         let start = sequence.wrapping_add(instance.wrapping_mul(draw.count));
-        (0..draw.count).step_by(BATCH).map(move |first| Job {
+        (0..draw.count).step_by(GROUP).map(move |first| Job {
             instance,
             first,
             sequence: start.wrapping_add(first),
@@ -142,7 +142,7 @@ fn project(
         if cancel.load(Relaxed) {
             return Err(Stopped::Cancelled);
         }
-        let end = draw.count.min(job.first.saturating_add(BATCH as u32));
+        let end = draw.count.min(job.first.saturating_add(GROUP as u32));
         let done = worker.run(job, end, device.level());
         if done.is_err() {
             cancel.store(true, Relaxed);
@@ -152,7 +152,7 @@ fn project(
     let mut done = host::with_capacity(jobs.len());
     device.install(|| {
         jobs.par_iter()
-            .with_min_len(BATCHES_PER_TASK)
+            .with_min_len(GROUPS_PER_TASK)
             .map_init(worker, one)
             .collect_into_vec(&mut done);
     });
@@ -166,9 +166,9 @@ fn project(
 }
 
 impl Worker<'_> {
-    /// Shades and projects the Gaussians of a batch up to `end`.
-    fn run(&mut self, job: &Job, end: u32, level: Level) -> Result<Projected, Stopped> {
-        let mut out = Projected::default();
+    /// Shades and projects the Gaussians of a group up to `end`.
+    fn run(&mut self, job: &Job, end: u32, level: Level) -> Result<ProjectedGroup, Stopped> {
+        let mut out = ProjectedGroup::default();
         let (shading, outputs, scratch) = (&self.shading, &mut *self.outputs, &mut self.scratch);
         self.shader
             .shade(job.instance, job.first, end, &mut out.counters)?;
@@ -185,8 +185,8 @@ impl Default for Outputs {
             position: [NO_LANES; 4],
             covariance: [NO_LANES; 3],
             opacity: NO_LANES,
-            color: [[0.0; 3]; BATCH],
-            key: [0.0; BATCH],
+            color: [[0.0; 3]; GROUP],
+            key: [0.0; GROUP],
         }
     }
 }
@@ -226,7 +226,7 @@ impl Shading {
         shader: &PointShader<'_>,
         kept: &mut Outputs,
         scratch: &mut Scratch,
-        out: &mut Projected,
+        out: &mut ProjectedGroup,
     ) {
         scratch.lanes.clear();
         let counters = &mut out.counters;
@@ -265,7 +265,7 @@ impl Shading {
                 counters.add(reason, 1);
                 continue;
             }
-            let at = scratch.lanes.len() % BATCH;
+            let at = scratch.lanes.len() % GROUP;
             for (lanes, value) in kept.position.iter_mut().zip(position) {
                 lanes[at] = value.into();
             }
@@ -330,13 +330,13 @@ impl Shading {
         kept: &Outputs,
         scratch: &mut Scratch,
         sequence: u32,
-        out: &mut Projected,
+        out: &mut ProjectedGroup,
     ) {
         out.reserve(scratch.lanes.len());
         let constants = &self.constants;
         dispatch!(level, simd => find_tiles(constants, simd, scratch, out));
         for &at in &scratch.reached {
-            let at = at % BATCH;
+            let at = at % GROUP;
             let sequence = sequence.wrapping_add(scratch.lanes[at] as u32);
             let key = match self.order {
                 GaussianOrder::ViewDepth | GaussianOrder::RadialDistance => {

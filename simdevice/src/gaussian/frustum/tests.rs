@@ -3,12 +3,12 @@
 use super::*;
 use crate::device::SimdLevel;
 use crate::format::Format;
-use crate::gaussian::attributes::{Batch, CoefficientReader, Harmonics};
+use crate::gaussian::attributes::{Group, CoefficientReader, Harmonics};
 use crate::gaussian::footprint::Visible;
-use crate::gaussian::lanes::BATCH;
+use crate::gaussian::lanes::GROUP;
 use crate::gaussian::preprocess::{Source, project};
 use crate::gaussian::scratch::Scratch;
-use crate::gaussian::splat::Projected;
+use crate::gaussian::splat::ProjectedGroup;
 use crate::gaussian::surfel::Surfel;
 use crate::optimizations::Optimizations;
 use crate::packet::{
@@ -47,7 +47,7 @@ fn append() -> GaussianAppend {
         },
         indices: None,
         first: 0,
-        count: BATCH as u32,
+        count: GROUP as u32,
         first_instance: 0,
         instance_count: 1,
     }
@@ -56,7 +56,7 @@ fn append() -> GaussianAppend {
 /// Gaussians all around the edges of what a camera at the origin sees, of all sizes.
 fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
     let mut attributes = Attributes::default();
-    for lane in 0..BATCH {
+    for lane in 0..GROUP {
         let z =
             rng.random_range(-0.5..4.0f32).exp() * if rng.random_bool(0.05) { -1.0 } else { 1.0 };
         let slope = |rng: &mut ChaCha8Rng| rng.random_range(-2.5..2.5f32);
@@ -174,29 +174,29 @@ fn what_is_outside_is_drawn_nowhere() {
                 let attributes = around_edges(&mut rng, geometry == GaussianGeometry::Surfel);
                 let source = Source {
                     reader: CoefficientReader::new(&append.attributes.spherical_harmonics),
-                    batch: Batch::new(&append, 0, 0, BATCH),
+                    group: Group::new(&append, 0, 0, GROUP),
                     attributes: &attributes,
                     matrices: None,
                     is_sound: false,
                     harmonics: Harmonics::default(),
                     frustum: None,
                 };
-                let mut out = Projected::default();
+                let mut out = ProjectedGroup::default();
                 let mut scratch = Scratch::new();
                 let outside = dispatch!(level, simd => {
                     let lane = |lane: usize| lane as u32;
                     project(&constants, simd, &source, &mut scratch, lane, &mut out);
-                    frustum.lanes_outside(simd, &attributes, BATCH)
+                    frustum.lanes_outside(simd, &attributes, GROUP)
                 });
                 drawn += out.keys.len();
                 beside += outside.beside.count();
-                let mut is_drawn = [false; BATCH];
+                let mut is_drawn = [false; GROUP];
                 for (at, &[_, lane]) in out.keys.iter().enumerate() {
                     // Discs that reach the eye's plane are listed everywhere, wherever they are.
                     let everywhere = |surfel: &Surfel| surfel.blocks(FAR_OFF) != 0;
                     is_drawn[lane as usize] = !out.surfels.get(at).is_some_and(everywhere);
                 }
-                let all = Bits::first(BATCH);
+                let all = Bits::first(GROUP);
                 for (of, what) in [
                     (outside.near, "near"),
                     (outside.far, "far"),
