@@ -6,7 +6,7 @@ use super::frustum::{Frustum, Outside};
 use super::instances::Model;
 use super::lanes::GROUP;
 use super::occlusion::OcclusionMap;
-use super::preprocess::{Job, Part};
+use super::preprocess::{GroupTask, GroupSource};
 use super::set::{GaussianSet, MAX_GROUPS, SortError};
 use super::vertex_projection;
 use crate::counters::{Counter, Counters};
@@ -22,7 +22,7 @@ pub(super) fn group_tasks<'a>(
     constants: &ViewConstants,
     occlusion: Option<&OcclusionMap>,
     counters: &mut Counters,
-) -> Result<Vec<Job<'a>>, SortError> {
+) -> Result<Vec<GroupTask<'a>>, SortError> {
     let groups = |append: &GaussianAppend| {
         let per_instance = append.count.div_ceil(GROUP as u32);
         u64::from(per_instance) * u64::from(append.instance_count)
@@ -36,7 +36,7 @@ pub(super) fn group_tasks<'a>(
     if groups > MAX_GROUPS {
         return Err(SortError::TooManyGaussians { groups });
     }
-    let mut jobs = Vec::new();
+    let mut tasks = Vec::new();
     // There are no more Gaussians than places in groups, so that this stays within 32 bits but at the very end.
     let mut sequence = 0u32;
     for (append, clusters) in set.appends.iter().zip(clusters) {
@@ -52,11 +52,11 @@ pub(super) fn group_tasks<'a>(
                 of_instance = InstanceView::of_instance(constants, append, instance, opacity);
                 view = &of_instance;
             }
-            let job = Job {
+            let task = GroupTask {
                 append,
                 instance,
                 sequence,
-                part: Part::From(0),
+                part: GroupSource::From(0),
                 has_harmonics: has_harmonics.unwrap_or(false),
                 frustum: Arc::clone(&view.frustum),
             };
@@ -64,16 +64,16 @@ pub(super) fn group_tasks<'a>(
                 None => append.count.div_ceil(GROUP as u32) as usize,
                 Some(clusters) => clusters.clusters.len(),
             };
-            host::reserve(&mut jobs, groups);
+            host::reserve(&mut tasks, groups);
             match clusters {
                 None => {
                     let starts = (0..append.count).step_by(GROUP);
-                    jobs.extend(starts.map(|start| Job {
-                        part: Part::From(start),
-                        ..job.clone()
+                    tasks.extend(starts.map(|start| GroupTask {
+                        part: GroupSource::From(start),
+                        ..task.clone()
                     }));
                 }
-                Some(clusters) => jobs.extend(
+                Some(clusters) => tasks.extend(
                     clusters
                         .clusters
                         .iter()
@@ -81,16 +81,16 @@ pub(super) fn group_tasks<'a>(
                             !view.cull_cluster(cluster, counters)
                                 && !occlusion.is_some_and(|map| map.cull_cluster(cluster, counters))
                         })
-                        .map(|cluster| Job {
-                            part: Part::Cluster(cluster),
-                            ..job.clone()
+                        .map(|cluster| GroupTask {
+                            part: GroupSource::Cluster(cluster),
+                            ..task.clone()
                         }),
                 ),
             }
             sequence = sequence.wrapping_add(append.count);
         }
     }
-    Ok(jobs)
+    Ok(tasks)
 }
 
 /// How an instance is seen.

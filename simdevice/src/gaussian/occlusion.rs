@@ -9,7 +9,7 @@ use super::clusters::{Cluster, Clusters};
 use super::footprint::{TILE_SIZE, Visible};
 use super::frustum::{Bounds, Frustum};
 use super::lanes::GROUP;
-use super::preprocess::{Job, Part, Preprocessor};
+use super::preprocess::{GroupTask, GroupSource, Preprocessor};
 use super::set::GaussianSet;
 use super::sort;
 use super::splat::{ProjectedGroup, Splat};
@@ -86,22 +86,22 @@ pub(super) fn find(
             found.push((append, frustum, occluders));
         }
     }
-    let mut jobs = Vec::new();
+    let mut tasks = Vec::new();
     for (append, frustum, occluders) in &found {
-        jobs.extend(occluders.iter().map(|cluster| Job {
+        tasks.extend(occluders.iter().map(|cluster| GroupTask {
             append,
             instance: append.first_instance,
             sequence: 0,
             has_harmonics: false,
-            part: Part::Cluster(cluster),
+            part: GroupSource::Cluster(cluster),
             frustum: Arc::clone(frustum),
         }));
     }
-    if jobs.is_empty() {
+    if tasks.is_empty() {
         return None;
     }
     let mut light = TileTransmittance::new(set.bounds, &set.begin.state);
-    light.pass(&preprocessor.run(&jobs));
+    light.pass(&preprocessor.run(&tasks));
     light.occlusion(constants, clusters)
 }
 

@@ -595,25 +595,25 @@ fn find_sound<S: Simd>(simd: S, attributes: &Attributes, len: usize) -> [Bits; 3
 
 /// A group to project.
 #[derive(Clone)]
-pub(super) struct Job<'a> {
+pub(super) struct GroupTask<'a> {
     pub(super) append: &'a GaussianAppend,
     pub(super) instance: u32,
     /// Which Gaussian of the set the instance's first is.
     pub(super) sequence: u32,
-    pub(super) part: Part<'a>,
+    pub(super) part: GroupSource<'a>,
     /// Whether the cluster holds its spherical harmonics.
     pub(super) has_harmonics: bool,
     pub(super) frustum: Arc<Frustum>,
 }
 
 #[derive(Clone, Copy)]
-pub(super) enum Part<'a> {
+pub(super) enum GroupSource<'a> {
     /// The vertices from this one on.
     From(u32),
     Cluster(&'a Cluster),
 }
 
-impl<'a> Job<'a> {
+impl<'a> GroupTask<'a> {
     /// Reads the group, if it lies in no cluster, and what its model does to it.
     pub(super) fn read<'b>(
         &'b self,
@@ -624,11 +624,11 @@ impl<'a> Job<'a> {
     ) -> Source<'b> {
         let streams = &self.append.attributes;
         let group = match self.part {
-            Part::From(start) => {
+            GroupSource::From(start) => {
                 let len = (self.append.count - start).min(GROUP as u32) as usize;
                 Group::new(self.append, self.instance, start, len)
             }
-            Part::Cluster(cluster) => Group::of_cluster(self.append, self.instance, &cluster.numbers),
+            GroupSource::Cluster(cluster) => Group::of_cluster(self.append, self.instance, &cluster.numbers),
         };
         let matrices = streams.model.matrix.as_ref().map(|rows| {
             let matrices = matrices.get_or_insert_default();
@@ -637,18 +637,18 @@ impl<'a> Job<'a> {
         });
         let is_faded = streams.model.opacity.is_some();
         let harmonics = match self.part {
-            Part::Cluster(cluster) if self.has_harmonics => cluster.harmonics(),
+            GroupSource::Cluster(cluster) if self.has_harmonics => cluster.harmonics(),
             _ => Harmonics::default(),
         };
         let (attributes, is_sound) = match self.part {
-            Part::Cluster(cluster) if !is_faded => (&cluster.attributes, cluster.is_sound),
-            Part::Cluster(cluster) => {
+            GroupSource::Cluster(cluster) if !is_faded => (&cluster.attributes, cluster.is_sound),
+            GroupSource::Cluster(cluster) => {
                 attributes.clone_from(&cluster.attributes);
                 fetcher.fade(streams, &group, attributes);
                 // Products need not be finite.
                 (&*attributes, false)
             }
-            Part::From(_) => {
+            GroupSource::From(_) => {
                 fetcher.read_own(streams, &group, attributes);
                 fetcher.fade(streams, &group, attributes);
                 if is_flat {
@@ -669,7 +669,7 @@ impl<'a> Job<'a> {
     }
 }
 
-/// What projects jobs.
+/// What projects tasks.
 pub(super) struct Preprocessor<'a> {
     pub(super) device: &'a Device,
     pub(super) constants: &'a ViewConstants,
@@ -677,27 +677,27 @@ pub(super) struct Preprocessor<'a> {
 }
 
 impl Preprocessor<'_> {
-    /// Does all jobs.
-    pub(super) fn run(&self, jobs: &[Job<'_>]) -> Vec<ProjectedGroup> {
-        // Each thread makes its scratch once. Nobody else asks for its lock, and no job waits for others, so that none is
+    /// Does all tasks.
+    pub(super) fn run(&self, tasks: &[GroupTask<'_>]) -> Vec<ProjectedGroup> {
+        // Each thread makes its scratch once. Nobody else asks for its lock, and no task waits for others, so that none is
         // begun within another.
         let workers = (0..rayon::current_num_threads()).map(|_| Mutex::new(None));
         let workers: Vec<Mutex<Option<Worker>>> = workers.collect();
-        let one = |job| {
+        let one = |task| {
             let own = rayon::current_thread_index().unwrap_or(0) % workers.len();
             let mut worker = workers[own].lock().unwrap_or_else(PoisonError::into_inner);
-            self.job(worker.get_or_insert_with(Worker::new), job)
+            self.task(worker.get_or_insert_with(Worker::new), task)
         };
-        let mut groups = host::with_capacity(jobs.len());
-        jobs.par_iter()
+        let mut groups = host::with_capacity(tasks.len());
+        tasks.par_iter()
             .with_max_len(GROUPS_PER_TASK)
             .map(one)
             .collect_into_vec(&mut groups);
         groups
     }
 
-    /// Does a job.
-    fn job(&self, worker: &mut Worker, job: &Job<'_>) -> ProjectedGroup {
+    /// Does a task.
+    fn task(&self, worker: &mut Worker, task: &GroupTask<'_>) -> ProjectedGroup {
         let Worker {
             fetcher,
             attributes,
@@ -706,11 +706,11 @@ impl Preprocessor<'_> {
         } = worker;
         let mut out = ProjectedGroup::default();
         let constants = self.constants;
-        let source = job.read(fetcher, attributes, matrices, self.is_flat);
+        let source = task.read(fetcher, attributes, matrices, self.is_flat);
         // A frustum is for opacities that it was told of.
         let wider;
-        let mut frustum = &*job.frustum;
-        if let Part::From(_) = job.part {
+        let mut frustum = &*task.frustum;
+        if let GroupSource::From(_) = task.part {
             let opacities = &source.attributes.opacity[..source.group.len];
             let opacity = opacities.iter().copied().fold(1.0, f32::max);
             if opacity > 1.0 {
@@ -733,9 +733,9 @@ impl Preprocessor<'_> {
             frustum: bounds,
             ..source
         };
-        let sequence = |lane: usize| match &job.part {
-            Part::From(start) => job.sequence + start + lane as u32,
-            Part::Cluster(cluster) => job.sequence + cluster.numbers[lane],
+        let sequence = |lane: usize| match &task.part {
+            GroupSource::From(start) => task.sequence + start + lane as u32,
+            GroupSource::Cluster(cluster) => task.sequence + cluster.numbers[lane],
         };
         dispatch!(self.device.level(), simd => project(constants, simd, &source, scratch, sequence, &mut out));
         out

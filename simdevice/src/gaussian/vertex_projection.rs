@@ -51,7 +51,7 @@ struct Outputs {
 
 /// A group to shade: of which instance, and the place of its first Gaussian in that and in the set.
 #[derive(Clone, Copy)]
-struct Job {
+struct GroupTask {
     instance: u32,
     first: u32,
     sequence: u32,
@@ -118,15 +118,15 @@ fn project(
     let Some(viewport) = draw.state.viewports.first() else {
         return Ok(Vec::new());
     };
-    let jobs = (0..draw.instance_count).flat_map(|instance| {
+    let tasks = (0..draw.instance_count).flat_map(|instance| {
         let start = sequence.wrapping_add(instance.wrapping_mul(draw.count));
-        (0..draw.count).step_by(GROUP).map(move |first| Job {
+        (0..draw.count).step_by(GROUP).map(move |first| GroupTask {
             instance,
             first,
             sequence: start.wrapping_add(first),
         })
     });
-    let jobs = host::collect(jobs);
+    let tasks = host::collect(tasks);
     let prepared = draw.vertex_bindings.prepare(device.level());
     let (resources, cancel) = (prepared.resources(), AtomicBool::new(false));
     let worker = || {
@@ -138,20 +138,20 @@ fn project(
             scratch: Scratch::new(),
         }
     };
-    let one = |worker: &mut Worker<'_>, job: &Job| {
+    let one = |worker: &mut Worker<'_>, task: &GroupTask| {
         if cancel.load(Relaxed) {
             return Err(Stopped::Cancelled);
         }
-        let end = draw.count.min(job.first.saturating_add(GROUP as u32));
-        let done = worker.run(job, end, device.level());
+        let end = draw.count.min(task.first.saturating_add(GROUP as u32));
+        let done = worker.run(task, end, device.level());
         if done.is_err() {
             cancel.store(true, Relaxed);
         }
         done
     };
-    let mut done = host::with_capacity(jobs.len());
+    let mut done = host::with_capacity(tasks.len());
     device.install(|| {
-        jobs.par_iter()
+        tasks.par_iter()
             .with_min_len(GROUPS_PER_TASK)
             .map_init(worker, one)
             .collect_into_vec(&mut done);
@@ -167,14 +167,14 @@ fn project(
 
 impl Worker<'_> {
     /// Shades and projects the Gaussians of a group up to `end`.
-    fn run(&mut self, job: &Job, end: u32, level: Level) -> Result<ProjectedGroup, Stopped> {
+    fn run(&mut self, task: &GroupTask, end: u32, level: Level) -> Result<ProjectedGroup, Stopped> {
         let mut out = ProjectedGroup::default();
         let (shading, outputs, scratch) = (&self.shading, &mut *self.outputs, &mut self.scratch);
         self.shader
-            .shade(job.instance, job.first, end, &mut out.counters)?;
+            .shade(task.instance, task.first, end, &mut out.counters)?;
         shading.keep(&self.shader, outputs, scratch, &mut out);
         dispatch!(level, simd => shading.flatten(simd, outputs, scratch));
-        shading.emit(level, outputs, scratch, job.sequence, &mut out);
+        shading.emit(level, outputs, scratch, task.sequence, &mut out);
         Ok(out)
     }
 }
