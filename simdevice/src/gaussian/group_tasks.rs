@@ -3,7 +3,7 @@
 use super::camera::ViewConstants;
 use super::clusters::{Cluster, Clusters};
 use super::frustum::{Frustum, Outside};
-use super::instances::Model;
+use super::instances::InstanceTransform;
 use super::lanes::GROUP;
 use super::occlusion::OcclusionMap;
 use super::preprocess::{GroupTask, GroupSource};
@@ -98,7 +98,7 @@ struct InstanceView {
     frustum: Arc<Frustum>,
     /// The same in the instance's own space, unless nothing is certain there.
     own: Option<Arc<Frustum>>,
-    model: Model,
+    model: InstanceTransform,
 }
 
 impl InstanceView {
@@ -108,7 +108,7 @@ impl InstanceView {
         Self {
             own: Some(Arc::clone(&frustum)),
             frustum,
-            model: Model::default(),
+            model: InstanceTransform::default(),
         }
     }
 
@@ -119,7 +119,7 @@ impl InstanceView {
         instance: u32,
         opacity: f32,
     ) -> Self {
-        let model = Model::read(append, instance);
+        let model = InstanceTransform::read(append, instance);
         let frustum = Arc::new(Frustum::new(constants, model.greatest_opacity(opacity)));
         let own = match model.matrix {
             None => Some(Arc::clone(&frustum)),

@@ -29,13 +29,13 @@ pub(super) struct Placed {
 
 /// What a model does to all Gaussians of an instance.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Model {
+pub(super) struct InstanceTransform {
     /// The matrix that places them and its translation.
     pub(super) matrix: Option<(Linear, [f64; 3])>,
     opacity: Option<f32>,
 }
 
-impl Model {
+impl InstanceTransform {
     /// Reads an instance's, whose attributes are by instance.
     pub(super) fn read(append: &GaussianAppend, instance: u32) -> Self {
         let mut fetcher = Fetcher::default();
