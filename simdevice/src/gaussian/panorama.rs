@@ -6,7 +6,7 @@
 //!
 //! [`Splat::wide`]: super::project::Splat::wide
 
-use super::footprint::{Ellipse, Reach, Visible};
+use super::footprint::{Ellipse, TileFootprint, Visible};
 use super::splat::ProjectedGroup;
 use devmem::host;
 
@@ -32,10 +32,10 @@ pub(super) fn reach(
     ellipse: &Ellipse,
     period: f64,
     visible: &Visible,
-    copies: &mut Vec<(usize, usize, Reach)>,
+    copies: &mut Vec<(usize, usize, TileFootprint)>,
     out: &mut ProjectedGroup,
     mut beside: Option<&mut u64>,
-) -> Option<Reach> {
+) -> Option<TileFootprint> {
     out.copies.resize_with(SIDES.len(), ProjectedGroup::default);
     let [x, y] = ellipse.mean;
     let before = copies.len();
@@ -52,7 +52,7 @@ pub(super) fn reach(
         }
     }
     let reach = ellipse.reach(&near(visible, x, period), &mut out.spans, beside);
-    let by_copies = (copies.len() > before).then(Reach::default);
+    let by_copies = (copies.len() > before).then(TileFootprint::default);
     reach.or(by_copies)
 }
 
@@ -61,7 +61,7 @@ pub(super) fn reach(
 pub(super) fn copy_last(
     at: usize,
     period: f64,
-    copies: &mut &[(usize, usize, Reach)],
+    copies: &mut &[(usize, usize, TileFootprint)],
     out: &mut ProjectedGroup,
 ) {
     while let Some((&(of, side, reach), rest)) = copies.split_first().filter(|(c, _)| c.0 <= at) {
@@ -122,7 +122,7 @@ mod tests {
             &mut out,
             Some(&mut 0),
         );
-        let columns = |reach: &Reach, spans: &[_]| {
+        let columns = |reach: &TileFootprint, spans: &[_]| {
             let spans = reach.spans(spans);
             spans
                 .flat_map(|(_, span)| span.first.into()..span.end.into())

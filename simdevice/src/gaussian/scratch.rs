@@ -1,27 +1,27 @@
 //! What a worker needs to project a group of Gaussians.
 
 use super::attributes::Attributes;
-use super::footprint::Reach;
+use super::footprint::TileFootprint;
 use super::instances::{Matrices, Placed};
 use super::lanes::{GROUP, Bits, F32_LANES, Lanes, NO_LANES};
 
-/// The reach of each lane, as the two words of [`Reach::words`].
-pub(super) struct Reaches(pub(super) [[u64; GROUP + 8]; 2]);
+/// The reach of each lane, as the two words of [`TileFootprint::words`].
+pub(super) struct TileFootprints(pub(super) [[u64; GROUP + 8]; 2]);
 
-impl Default for Reaches {
+impl Default for TileFootprints {
     fn default() -> Self {
         Self([[0; GROUP + 8]; 2])
     }
 }
 
-impl Reaches {
+impl TileFootprints {
     /// A lane's.
     #[inline(always)]
-    pub(super) fn get(&self, at: usize) -> Reach {
-        Reach::from_words([self.0[0][at], self.0[1][at]])
+    pub(super) fn get(&self, at: usize) -> TileFootprint {
+        TileFootprint::from_words([self.0[0][at], self.0[1][at]])
     }
 
-    pub(super) fn set(&mut self, at: usize, reach: &Reach) {
+    pub(super) fn set(&mut self, at: usize, reach: &TileFootprint) {
         let [first, second] = reach.words();
         self.0[0][at] = first;
         self.0[1][at] = second;
@@ -52,9 +52,9 @@ pub(crate) struct Scratch {
     /// Which of them reach tiles.
     pub(super) reached: Vec<usize>,
     /// Which tiles, of those that do.
-    pub(super) reaches: Box<Reaches>,
+    pub(super) reaches: Box<TileFootprints>,
     /// The same of their copies a period beside, in the same order: which side's, 0 or 1, in the middle.
-    pub(super) copies: Vec<(usize, usize, Reach)>,
+    pub(super) copies: Vec<(usize, usize, TileFootprint)>,
 }
 
 /// Gaussians on the screen.

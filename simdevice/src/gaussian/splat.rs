@@ -1,6 +1,6 @@
 //! What projection makes of Gaussians: the rasterizer's nine numbers, and what goes with them.
 
-use super::footprint::{Reach, Span};
+use super::footprint::{TileFootprint, TileSpan};
 use super::lanes::GROUP;
 use super::ray_depth::RayDepth;
 use super::scratch::Flat;
@@ -101,9 +101,9 @@ pub(crate) struct ProjectedGroup {
     /// What each is on the screen, if they are 2D Gaussians.
     pub surfels: Vec<Surfel>,
     /// The tiles of each.
-    pub reaches: Vec<Reach>,
+    pub reaches: Vec<TileFootprint>,
     /// The tiles of those that reach many.
-    pub spans: Vec<Span>,
+    pub spans: Vec<TileSpan>,
     /// What was skipped and why.
     pub counters: Counters,
     /// What is drawn a period to the right or to the left of where it is, by side.

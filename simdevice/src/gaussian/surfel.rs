@@ -6,7 +6,7 @@
 //! nothing; `w` is linear, too. Everything is binary64, without fused operations.
 
 use super::camera::{LN_2, ViewConstants};
-use super::footprint::{Ellipse, Reach, Span, Visible};
+use super::footprint::{Ellipse, TileFootprint, TileSpan, Visible};
 use super::ray_depth;
 use super::scratch::Scratch;
 use crate::packet::CameraModel;
@@ -146,8 +146,8 @@ impl Surfel {
         mean: [f64; 2],
         (extent, low_pass): (f64, f64),
         visible: &Visible,
-        others: &mut Vec<Span>,
-    ) -> Option<Reach> {
+        others: &mut Vec<TileSpan>,
+    ) -> Option<TileFootprint> {
         // What is not a number reaches nothing.
         if !(extent >= 0.0 && mean[0].is_finite() && mean[1].is_finite()) {
             return None;
@@ -169,7 +169,7 @@ impl Surfel {
             f64::NEG_INFINITY,
         ];
         // Both hold the mean, so that what they reach in a row of tiles is one span but for tiles between them.
-        let mut rows: Vec<(u32, Span)> = Vec::new();
+        let mut rows: Vec<(u32, TileSpan)> = Vec::new();
         for shape in shapes.into_iter().flatten() {
             for axis in 0..2 {
                 let (middle, half) = (shape.mean[axis], shape.half[axis]);
@@ -193,7 +193,7 @@ impl Surfel {
         }
         let first = rows.iter().map(|(row, _)| *row).min()?;
         let last = rows.iter().map(|(row, _)| *row).max()?;
-        let mut reach = Reach::new(first as u16, (last - first + 1) as u16, others);
+        let mut reach = TileFootprint::new(first as u16, (last - first + 1) as u16, others);
         for (row, span) in rows {
             reach.set(others, (row - first) as u16, span);
         }
@@ -255,8 +255,8 @@ pub(super) fn surfel_of(
     view: &ViewConstants,
     at: usize,
     scratch: &Scratch,
-    spans: &mut Vec<Span>,
-) -> (Surfel, Option<Reach>) {
+    spans: &mut Vec<TileSpan>,
+) -> (Surfel, Option<TileFootprint>) {
     let [w, x, y, z] = &*scratch.rotation;
     let axes = ray_depth::axes([w[at], x[at], y[at], z[at]]);
     let r = &view.rotation;

@@ -8,7 +8,7 @@
 //! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
 //! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
-use super::footprint::{HELD_ROWS, Reach, Span, TILE_SIZE};
+use super::footprint::{HELD_ROWS, TileFootprint, TileSpan, TILE_SIZE};
 use super::splat::{ProjectedGroup, locate};
 use crate::lanes::three;
 use crate::packet::Rect;
@@ -41,14 +41,14 @@ pub(crate) struct TileLists {
 }
 
 /// A primitive and what it reaches.
-type Reaching = (u32, Reach);
+type Reaching = (u32, TileFootprint);
 
 /// The survivors in depth order, for tiles to find theirs among them.
 #[derive(Debug)]
 pub(crate) struct SortedWalk {
     sorted: Vec<Reaching>,
     /// Of each group.
-    spans: Vec<Vec<Span>>,
+    spans: Vec<Vec<TileSpan>>,
     pairs: u64,
 }
 
@@ -110,8 +110,8 @@ impl SortedWalk {
 
 /// What groups reach, close together.
 struct Groups<'a> {
-    reaches: Vec<&'a [Reach]>,
-    spans: Vec<&'a [Span]>,
+    reaches: Vec<&'a [TileFootprint]>,
+    spans: Vec<&'a [TileSpan]>,
 }
 
 /// The rows of tiles that a draw may touch.
@@ -285,7 +285,7 @@ impl Rows {
         let about = run.len() * STRIPS_PER_PRIMITIVE / bands;
         let mut strips = host::collect((0..bands).map(|_| Strips::with_room(about)));
         let others = self.places.len() - 1;
-        let strip = |(row, span): (u32, Span)| {
+        let strip = |(row, span): (u32, TileSpan)| {
             // Rows without tiles may lie outside.
             let row = (row.wrapping_sub(self.first) as usize).min(others);
             let (band, first) = self.places[row];
@@ -446,15 +446,15 @@ mod tests {
             // Clipped to the tiles that there are.
             let clip = |&(first, len): &(u16, u16)| {
                 let first = first.min(columns - 1);
-                Span { first, end: (first + len).min(columns) }
+                TileSpan { first, end: (first + len).min(columns) }
             };
             let mut group = ProjectedGroup::default();
             let mut expected = vec![Vec::new(); usize::from(rows) * usize::from(columns)];
             let mut pairs = 0;
             for (primitive, (row, spans)) in (0..).zip(&reached) {
                 let row = (*row).min(rows - 1);
-                let spans: Vec<Span> = spans.iter().take((rows - row).into()).map(clip).collect();
-                let mut reach = Reach::new(first_row + row, spans.len() as u16, &mut group.spans);
+                let spans: Vec<TileSpan> = spans.iter().take((rows - row).into()).map(clip).collect();
+                let mut reach = TileFootprint::new(first_row + row, spans.len() as u16, &mut group.spans);
                 for (number, &span) in (0..).zip(&spans) {
                     reach.set(&mut group.spans, number, span);
                     for column in span.first..span.end {
@@ -489,9 +489,9 @@ mod tests {
             (1, &[(1, 2), (0, 3), (0, 0), (0, 0), (0, 0)]),
             (1, &[(0, 1)]),
         ] {
-            let mut reach = Reach::new(row, spans.len() as u16, &mut group.spans);
+            let mut reach = TileFootprint::new(row, spans.len() as u16, &mut group.spans);
             for (number, &(first, end)) in (0..).zip(spans) {
-                reach.set(&mut group.spans, number, Span { first, end });
+                reach.set(&mut group.spans, number, TileSpan { first, end });
             }
             group.reaches.push(reach);
         }

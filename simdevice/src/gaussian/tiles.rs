@@ -2,7 +2,7 @@
 //! are, and one at a time for the others.
 
 use super::camera::ViewConstants;
-use super::footprint::{Ellipse, HELD_ROWS, Reach, TILE_SIZE};
+use super::footprint::{Ellipse, HELD_ROWS, TileFootprint, TILE_SIZE};
 use super::lanes::{Bits, Lanes};
 use super::panorama;
 use super::scratch::{Flat, Scratch};
@@ -22,7 +22,7 @@ const MODERATE: f64 = 1e100;
 
 /// What can be told of several lanes at once.
 struct Found {
-    /// Those that reach tiles; [`Reaches`] holds which.
+    /// Those that reach tiles; [`TileFootprints`] holds which.
     reached: Bits,
     /// Those of which nothing is told.
     left: Bits,
@@ -278,7 +278,7 @@ fn reach_of_one(
     scratch: &mut Scratch,
     out: &mut ProjectedGroup,
     beside: &mut u64,
-) -> Option<Reach> {
+) -> Option<TileFootprint> {
     if view.geometry == GaussianGeometry::Surfel {
         return surfel_of(view, at, scratch, &mut out.spans).1;
     }
