@@ -40,7 +40,7 @@ const UNSCENTED_SHARE: f64 = 0.25;
 /// A Gaussian whose deviation in the picture is `d` pixels reaches no farther than `pixels + per_deviation d` from the place
 /// of its mean, if `d` is at most `greatest`.
 #[derive(Clone, Copy, Debug)]
-struct TileFootprint {
+struct ScreenExtent {
     pixels: f64,
     per_deviation: f64,
     greatest: f64,
@@ -52,9 +52,9 @@ pub(super) fn sides(projection: &ViewConstants, opacity: f32) -> (Vec<Plane>, Op
     let room = f64::from(opacity.max(1.0)).log2() - projection.log2_floor;
     let is_half = projection.precision == GaussianPrecision::Float16;
     let reach = if is_half {
-        TileFootprint::in_half(room, projection.low_pass)
+        ScreenExtent::in_half(room, projection.low_pass)
     } else {
-        Some(TileFootprint::exact(room, projection.low_pass))
+        Some(ScreenExtent::exact(room, projection.low_pass))
     };
     let none = (Vec::new(), None);
     let Some(reach) = reach else { return none };
@@ -79,7 +79,7 @@ pub(super) fn sides(projection: &ViewConstants, opacity: f32) -> (Vec<Plane>, Op
     (sides.collect(), Some(small))
 }
 
-impl TileFootprint {
+impl ScreenExtent {
     fn exact(room: f64, low_pass: f64) -> Self {
         // Wider than the ellipse that the tile engine's margins ask for.
         let sigmas = (2.0 * LN_2 * (1.01 * room + 2e-3)).sqrt();
@@ -130,7 +130,7 @@ struct Side {
 
 impl Side {
     /// The side along `axis` that `sign` (1: the lower coordinates) names.
-    fn new(projection: &ViewConstants, axis: usize, sign: f64, reach: &TileFootprint) -> Self {
+    fn new(projection: &ViewConstants, axis: usize, sign: f64, reach: &ScreenExtent) -> Self {
         let (across, forward) = (row(projection, axis), row(projection, 2));
         let focal = projection.focal[axis];
         let [first, end] = projection.visible_range(axis);
@@ -159,7 +159,7 @@ impl Side {
     }
 
     /// The plane for what is linearized, and for discs.
-    fn plane(&self, reach: &TileFootprint) -> Plane {
+    fn plane(&self, reach: &ScreenExtent) -> Plane {
         Plane {
             normal: self.normal,
             per_scale: reach.per_deviation * self.deviation * (1.0 + MARGIN),
@@ -173,7 +173,7 @@ impl Side {
     /// D from the mean, with `f D z <= f r (1 + |u|) / (1 - Q)`, r the points' distance and `r <= Q z`. Neither does the
     /// transform's mean, and of its variance the middle point makes `2 D^2` at most and the others one more. All that reaches
     /// `share = Q reach` of `f |u| z <= |A| + |c| z` toward the edge, and `f r reach` besides.
-    fn unscented(&self, projection: &ViewConstants, reach: &TileFootprint) -> Plane {
+    fn unscented(&self, projection: &ViewConstants, reach: &ScreenExtent) -> Plane {
         let points = Points::new(projection, reach);
         let straight = self.plane(reach);
         let of_points = self.focal * points.reach * points.per_scale * (1.0 + MARGIN);
@@ -203,7 +203,7 @@ struct Points {
 }
 
 impl Points {
-    fn new(projection: &ViewConstants, reach: &TileFootprint) -> Self {
+    fn new(projection: &ViewConstants, reach: &ScreenExtent) -> Self {
         let growth = (0..3).map(|axis| length(row(projection, axis)));
         let of_places = 1.0 + 3.0f64.sqrt() * reach.per_deviation;
         let nearness = UNSCENTED_SHARE / (of_places + UNSCENTED_SHARE);
@@ -226,7 +226,7 @@ impl Points {
 
 /// Outside of this plane Gaussians whose deviations are at most `deviation` for each unit of scale have those that `reach`
 /// asks for.
-fn small_deviations(projection: &ViewConstants, deviation: f64, reach: &TileFootprint) -> Plane {
+fn small_deviations(projection: &ViewConstants, deviation: f64, reach: &ScreenExtent) -> Plane {
     let (normal, offset) = match projection.model {
         CameraModel::Orthographic => ([0.0; 3], -reach.greatest),
         _ => (
