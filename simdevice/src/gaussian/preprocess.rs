@@ -13,10 +13,10 @@ use super::instances::{Matrices, cofactors, dot};
 use super::lanes::{GROUP, Bits, F32_LANES, Lanes, log2};
 use super::panorama;
 use super::ray_depth::RayDepth;
-use super::scratch::{Flat, Scratch};
+use super::scratch::{ScreenGaussians, Scratch};
 use super::sort::ordered_bits;
 use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, coefficient_count};
-use super::splat::{ProjectedGroup, Splat, half_room};
+use super::splat::{ProjectedGroup, Splat, binary16_headroom};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
 use super::unscented;
@@ -301,7 +301,7 @@ pub(super) fn shape<S: Simd>(
     [xx, xy, yy]: [S::f64s; 3],
     area2: S::f64s,
     mut o: S::f64s,
-    flat: &mut Flat,
+    flat: &mut ScreenGaussians,
 ) {
     let number = |value: f64| S::f64s::splat(simd, value);
     let store = |value: S::f64s, lanes: &mut Lanes| {
@@ -333,7 +333,7 @@ pub(super) fn shape<S: Simd>(
         for lane in at..at + S::f64s::LEN {
             let factor = [0, 1, 2].map(|element| flat.factor[element][lane]);
             let room = flat.log2_opacity[lane] - view.log2_floor;
-            flat.half[0][lane] = half_room(factor, room) * (2.0 * LN_2);
+            flat.half[0][lane] = binary16_headroom(factor, room) * (2.0 * LN_2);
         }
         extent = S::f64s::from_slice(simd, &flat.half[0][at..at + S::f64s::LEN]);
     }

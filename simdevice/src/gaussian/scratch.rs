@@ -48,7 +48,7 @@ pub(crate) struct Scratch {
     pub(super) jacobian: Box<[[Lanes; 3]; 2]>,
     /// Of covariances in the picture: xx, xy, yy and the determinant, where the unscented transform finds them.
     pub(super) moments: Box<[Lanes; 4]>,
-    pub(super) flat: Box<Flat>,
+    pub(super) flat: Box<ScreenGaussians>,
     /// Which of them reach tiles.
     pub(super) reached: Vec<usize>,
     /// Which tiles, of those that do.
@@ -58,7 +58,7 @@ pub(crate) struct Scratch {
 }
 
 /// Gaussians on the screen.
-pub(super) struct Flat {
+pub(super) struct ScreenGaussians {
     pub(super) mean: [Lanes; 2],
     pub(super) determinant: Lanes,
     pub(super) log2_opacity: Lanes,
@@ -73,7 +73,7 @@ pub(super) struct Flat {
     pub(super) direction: [Lanes; 3],
 }
 
-impl Default for Flat {
+impl Default for ScreenGaussians {
     fn default() -> Self {
         Self {
             mean: [NO_LANES; 2],

@@ -3,7 +3,7 @@
 use super::footprint::{TileFootprint, TileSpan};
 use super::lanes::GROUP;
 use super::ray_depth::RayDepth;
-use super::scratch::Flat;
+use super::scratch::ScreenGaussians;
 use super::surfel::Surfel;
 use crate::counters::Counters;
 use devmem::host;
@@ -35,7 +35,7 @@ pub(crate) struct Splat {
 impl Splat {
     /// A lane's.
     #[inline(always)]
-    pub(super) fn new(flat: &Flat, at: usize, color: [f32; 3], depth: u32) -> Self {
+    pub(super) fn new(flat: &ScreenGaussians, at: usize, color: [f32; 3], depth: u32) -> Self {
         let factor = [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]];
         Self {
             mean: [flat.mean[0][at], flat.mean[1][at]],
@@ -71,7 +71,7 @@ pub(super) const LEAST_HALF_FACTOR: f64 = 1.0 / 16384.0;
 /// With a unit roundoff of 2^-11, `u` and the two terms of `v` err by three units each, and `v` by one more. The terms of
 /// `v` are at most `|v| + 2 |factor[1] / factor[0]| |u|`, so that needles, where they cancel, err most. Sums, exponent,
 /// logarithm, power and floor add less than a quarter.
-pub(crate) fn half_room(factor: [f64; 3], room: f64) -> f64 {
+pub(crate) fn binary16_headroom(factor: [f64; 3], room: f64) -> f64 {
     const UNIT: f64 = 1.0 / 2048.0;
     let [a, b, c] = factor.map(f64::abs);
     // What is not a number is bounded by nothing.

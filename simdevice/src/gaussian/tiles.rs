@@ -5,7 +5,7 @@ use super::camera::ViewConstants;
 use super::footprint::{Ellipse, HELD_ROWS, TileFootprint, TILE_SIZE};
 use super::lanes::{Bits, Lanes};
 use super::panorama;
-use super::scratch::{Flat, Scratch};
+use super::scratch::{ScreenGaussians, Scratch};
 use super::splat::ProjectedGroup;
 use super::surfel::surfel_of;
 use crate::counters::{Counter, Counters};
@@ -195,7 +195,7 @@ fn reach_in_lanes<S: Simd>(
     let mut apart = zero;
     for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
         let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
-        let Flat {
+        let ScreenGaussians {
             mean,
             half,
             slope,

@@ -2,7 +2,7 @@
 //! sides of a frustum are moved out by.
 
 use crate::gaussian::camera::ViewConstants;
-use crate::gaussian::splat::{LEAST_HALF_FACTOR, half_room};
+use crate::gaussian::splat::{LEAST_HALF_FACTOR, binary16_headroom};
 use crate::packet::{CameraModel, GaussianGeometry, GaussianPrecision};
 use std::f64::consts::LN_2;
 
@@ -103,7 +103,7 @@ impl ScreenExtent {
         // The ratio of the factors of the binary16 form is at most the ratio of deviation and filter, so that the reach is a
         // convex function of the deviation: the chord is above it.
         let reach_of = |deviation: f64| {
-            let room = half_room([1.0, deviation / filter, 1.0], room);
+            let room = binary16_headroom([1.0, deviation / filter, 1.0], room);
             (2.0 * LN_2 * (1.01 * room + 2e-3)).sqrt() * (deviation + filter)
         };
         let (least, most) = (reach_of(0.0), reach_of(greatest));
