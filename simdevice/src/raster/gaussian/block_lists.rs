@@ -5,7 +5,7 @@ use super::depth_ranges::Passing;
 use super::grid::{BLOCKS, CHUNK};
 use super::inputs::{NO_DEPTH, Task, TileMode, Work};
 use super::staging::Record;
-use crate::gaussian::splat::{Splat, half_room, locate};
+use crate::gaussian::splat::{Splat, binary16_headroom, locate};
 use crate::optimizations::Optimization;
 use crate::trace::{self, Run};
 use devmem::host;
@@ -70,7 +70,7 @@ pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
 /// How far alpha may fall in exact arithmetic where binary16 does not put it below `most_fall`.
 fn half_most_fall(splat: &Splat, most_fall: f32) -> f32 {
     let opacity = f64::from(splat.log2_opacity);
-    (half_room(splat.factor, opacity + f64::from(most_fall)) - opacity) as f32
+    (binary16_headroom(splat.factor, opacity + f64::from(most_fall)) - opacity) as f32
 }
 
 /// Parts a tile's list by blocks: what may reach each, in the order of the list.
