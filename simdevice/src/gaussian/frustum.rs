@@ -65,7 +65,7 @@ pub(super) enum Outside {
     Beside,
 }
 
-/// Lanes that are not in a picture, by the first reason that is found.
+/// GroupF64 that are not in a picture, by the first reason that is found.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct OutsideLanes {
     pub(super) near: Bits,

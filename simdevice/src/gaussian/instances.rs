@@ -5,7 +5,7 @@
 //! there by an eye that moved with it.
 
 use super::attributes::{Group, Fetcher};
-use super::lanes::{GROUP, Bits, F32_LANES, Lanes};
+use super::lanes::{GROUP, Bits, F32_LANES, GroupF64};
 use crate::packet::{AttributeStream, GaussianAppend};
 
 /// Matrices by lane, as they are read.
@@ -22,9 +22,9 @@ pub(super) type Linear = [[f64; 3]; 3];
 /// What matrices make of the kept Gaussians of a group.
 #[derive(Clone, Debug)]
 pub(super) struct Placed {
-    pub(super) matrix: [[Lanes; 4]; 3],
+    pub(super) matrix: [[GroupF64; 4]; 3],
     /// A vector from the eye in the Gaussians' space, of any length.
-    pub(super) toward: [Lanes; 3],
+    pub(super) toward: [GroupF64; 3],
 }
 
 /// What a model does to all Gaussians of an instance.

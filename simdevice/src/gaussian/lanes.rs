@@ -9,12 +9,12 @@ pub(super) const GROUP: usize = 256;
 ///
 /// Some thirty of these are walked side by side: a cache line more than a power of two keeps them from
 /// competing for the same few sets of the first-level cache.
-pub(super) type Lanes = [f64; GROUP + 8];
+pub(super) type GroupF64 = [f64; GROUP + 8];
 
-/// Lanes before anything is known of them.
-pub(super) const NO_LANES: Lanes = [0.0; GROUP + 8];
+/// GroupF64 before anything is known of them.
+pub(super) const NO_GROUP_F64: GroupF64 = [0.0; GROUP + 8];
 
-/// Lanes of what is read: attributes as they are, which their readers walk one after the other.
+/// GroupF64 of what is read: attributes as they are, which their readers walk one after the other.
 pub(super) const F32_LANES: usize = GROUP;
 
 const WORDS: usize = GROUP / 64;
@@ -24,7 +24,7 @@ const WORDS: usize = GROUP / 64;
 pub(super) struct Bits([u64; WORDS]);
 
 impl Bits {
-    /// Lanes `0..len`.
+    /// GroupF64 `0..len`.
     pub(super) fn first(len: usize) -> Self {
         let mut bits = Self::default();
         for (number, word) in bits.0.iter_mut().enumerate() {

@@ -10,7 +10,7 @@ use super::camera::{self, LN_2, ViewConstants};
 use super::clusters::Cluster;
 use super::frustum::Frustum;
 use super::instances::{Matrices, cofactors, dot};
-use super::lanes::{GROUP, Bits, F32_LANES, Lanes, log2};
+use super::lanes::{GROUP, Bits, F32_LANES, GroupF64, log2};
 use super::panorama;
 use super::ray_depth::RayDepth;
 use super::scratch::{ScreenGaussians, Scratch};
@@ -166,8 +166,8 @@ fn find_bright<S: Simd>(
 fn place<S: Simd>(view: &ViewConstants, simd: S, scratch: &mut Scratch) {
     let r = view.rotation;
     for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
-        let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
-        let store = |value: S::f64s, lanes: &mut Lanes| {
+        let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+        let store = |value: S::f64s, lanes: &mut GroupF64| {
             value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
         };
         let [px, py, pz] = &*scratch.position;
@@ -210,13 +210,13 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
         _ => &*scratch.offset,
     };
     let number = |value: f64| S::f64s::splat(simd, value);
-    let load = |lanes: &Lanes, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+    let load = |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
     let (scale, rotation, opacity) = (&*scratch.scale, &*scratch.rotation, &*scratch.opacity);
     let flat = &mut *scratch.flat;
     let r = view.rotation;
     let (one, two) = (number(1.0), number(2.0));
     for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
-        let store = |value: S::f64s, lanes: &mut Lanes| {
+        let store = |value: S::f64s, lanes: &mut GroupF64| {
             value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
         };
         let end = scratch.lanes.len().min(at + S::f64s::LEN);
@@ -304,7 +304,7 @@ pub(super) fn shape<S: Simd>(
     flat: &mut ScreenGaussians,
 ) {
     let number = |value: f64| S::f64s::splat(simd, value);
-    let store = |value: S::f64s, lanes: &mut Lanes| {
+    let store = |value: S::f64s, lanes: &mut GroupF64| {
         value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
     };
     let low_pass = number(view.low_pass);

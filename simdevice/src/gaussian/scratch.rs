@@ -3,7 +3,7 @@
 use super::attributes::Attributes;
 use super::footprint::TileFootprint;
 use super::instances::{Matrices, Placed};
-use super::lanes::{GROUP, Bits, F32_LANES, Lanes, NO_LANES};
+use super::lanes::{GROUP, Bits, F32_LANES, GroupF64, NO_GROUP_F64};
 
 /// The reach of each lane, as the two words of [`TileFootprint::words`].
 pub(super) struct TileFootprints(pub(super) [[u64; GROUP + 8]; 2]);
@@ -32,22 +32,22 @@ impl TileFootprints {
 pub(crate) struct Scratch {
     /// The lanes that were kept; what follows is in their order.
     pub(super) lanes: Vec<usize>,
-    pub(super) position: Box<[Lanes; 3]>,
-    pub(super) scale: Box<[Lanes; 3]>,
-    pub(super) rotation: Box<[Lanes; 4]>,
-    pub(super) opacity: Box<Lanes>,
+    pub(super) position: Box<[GroupF64; 3]>,
+    pub(super) scale: Box<[GroupF64; 3]>,
+    pub(super) rotation: Box<[GroupF64; 4]>,
+    pub(super) opacity: Box<GroupF64>,
     /// The mean from the eye, in world axes.
-    pub(super) offset: Box<[Lanes; 3]>,
+    pub(super) offset: Box<[GroupF64; 3]>,
     /// The mean from the eye, in camera axes.
-    pub(super) camera: Box<[Lanes; 3]>,
+    pub(super) camera: Box<[GroupF64; 3]>,
     /// The depth variable.
-    pub(super) depth: Box<Lanes>,
+    pub(super) depth: Box<GroupF64>,
     /// What model matrices make of them, if there are any.
     pub(super) placed: Option<Box<Placed>>,
     /// The Jacobian's rows in the axes of the Gaussians' space, unless a pinhole sees the world itself.
-    pub(super) jacobian: Box<[[Lanes; 3]; 2]>,
+    pub(super) jacobian: Box<[[GroupF64; 3]; 2]>,
     /// Of covariances in the picture: xx, xy, yy and the determinant, where the unscented transform finds them.
-    pub(super) moments: Box<[Lanes; 4]>,
+    pub(super) moments: Box<[GroupF64; 4]>,
     pub(super) flat: Box<ScreenGaussians>,
     /// Which of them reach tiles.
     pub(super) reached: Vec<usize>,
@@ -59,32 +59,32 @@ pub(crate) struct Scratch {
 
 /// Gaussians on the screen.
 pub(super) struct ScreenGaussians {
-    pub(super) mean: [Lanes; 2],
-    pub(super) determinant: Lanes,
-    pub(super) log2_opacity: Lanes,
+    pub(super) mean: [GroupF64; 2],
+    pub(super) determinant: GroupF64,
+    pub(super) log2_opacity: GroupF64,
     /// See [`Splat::factor`](super::project::Splat::factor).
-    pub(super) factor: [Lanes; 3],
+    pub(super) factor: [GroupF64; 3],
     /// See [`Ellipse`](super::footprint::Ellipse).
-    pub(super) half: [Lanes; 2],
-    pub(super) slope: Lanes,
-    pub(super) narrowing: Lanes,
-    pub(super) peak: Lanes,
+    pub(super) half: [GroupF64; 2],
+    pub(super) slope: GroupF64,
+    pub(super) narrowing: GroupF64,
+    pub(super) peak: GroupF64,
     /// The unit vector from the eye, in the axes of the Gaussians' space.
-    pub(super) direction: [Lanes; 3],
+    pub(super) direction: [GroupF64; 3],
 }
 
 impl Default for ScreenGaussians {
     fn default() -> Self {
         Self {
-            mean: [NO_LANES; 2],
-            determinant: NO_LANES,
-            log2_opacity: NO_LANES,
-            factor: [NO_LANES; 3],
-            half: [NO_LANES; 2],
-            slope: NO_LANES,
-            narrowing: NO_LANES,
-            peak: NO_LANES,
-            direction: [NO_LANES; 3],
+            mean: [NO_GROUP_F64; 2],
+            determinant: NO_GROUP_F64,
+            log2_opacity: NO_GROUP_F64,
+            factor: [NO_GROUP_F64; 3],
+            half: [NO_GROUP_F64; 2],
+            slope: NO_GROUP_F64,
+            narrowing: NO_GROUP_F64,
+            peak: NO_GROUP_F64,
+            direction: [NO_GROUP_F64; 3],
         }
     }
 }
@@ -94,16 +94,16 @@ impl Scratch {
     pub(crate) fn new() -> Self {
         Self {
             lanes: Vec::with_capacity(GROUP),
-            position: Box::new([NO_LANES; 3]),
-            scale: Box::new([NO_LANES; 3]),
-            rotation: Box::new([NO_LANES; 4]),
-            opacity: Box::new(NO_LANES),
-            offset: Box::new([NO_LANES; 3]),
-            camera: Box::new([NO_LANES; 3]),
-            depth: Box::new(NO_LANES),
+            position: Box::new([NO_GROUP_F64; 3]),
+            scale: Box::new([NO_GROUP_F64; 3]),
+            rotation: Box::new([NO_GROUP_F64; 4]),
+            opacity: Box::new(NO_GROUP_F64),
+            offset: Box::new([NO_GROUP_F64; 3]),
+            camera: Box::new([NO_GROUP_F64; 3]),
+            depth: Box::new(NO_GROUP_F64),
             placed: None,
-            jacobian: Box::new([[NO_LANES; 3]; 2]),
-            moments: Box::new([NO_LANES; 4]),
+            jacobian: Box::new([[NO_GROUP_F64; 3]; 2]),
+            moments: Box::new([NO_GROUP_F64; 4]),
             flat: Box::default(),
             reached: Vec::with_capacity(GROUP),
             reaches: Box::default(),
@@ -118,7 +118,7 @@ impl Scratch {
         kept.for_each(|lane| self.lanes.push(lane));
         let lanes = &*self.lanes;
         let whole = lanes.len() == GROUP;
-        let pack = |from: &[f32; F32_LANES], to: &mut Lanes| {
+        let pack = |from: &[f32; F32_LANES], to: &mut GroupF64| {
             if whole {
                 for (to, &from) in to.iter_mut().zip(from) {
                     *to = from.into();
@@ -145,8 +145,8 @@ impl Scratch {
     pub(super) fn gather_matrices(&mut self, matrices: &Matrices) {
         let placed = self.placed.get_or_insert_with(|| {
             Box::new(Placed {
-                matrix: [[NO_LANES; 4]; 3],
-                toward: [NO_LANES; 3],
+                matrix: [[NO_GROUP_F64; 4]; 3],
+                toward: [NO_GROUP_F64; 3],
             })
         });
         let to = placed.matrix.as_flattened_mut().iter_mut();

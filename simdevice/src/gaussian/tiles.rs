@@ -3,7 +3,7 @@
 
 use super::camera::ViewConstants;
 use super::footprint::{Ellipse, HELD_ROWS, TileFootprint, TILE_SIZE};
-use super::lanes::{Bits, Lanes};
+use super::lanes::{Bits, GroupF64};
 use super::panorama;
 use super::scratch::{ScreenGaussians, Scratch};
 use super::splat::ProjectedGroup;
@@ -151,7 +151,7 @@ fn find_drawn<S: Simd>(
     let is_flat = view.geometry == GaussianGeometry::Surfel;
     let [mut beyond_near, mut beyond_far, mut definite] = [Bits::default(); 3];
     for at in (0..len).step_by(S::f64s::LEN) {
-        let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+        let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
         let depth = load(&scratch.depth);
         let determinant = load(&scratch.flat.determinant);
         // What is not a number is nowhere.
@@ -194,7 +194,7 @@ fn reach_in_lanes<S: Simd>(
     };
     let mut apart = zero;
     for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
-        let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+        let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
         let ScreenGaussians {
             mean,
             half,

@@ -4,7 +4,7 @@
 use super::camera::ViewConstants;
 use super::depth::CenterDepth;
 use super::footprint::Visible;
-use super::lanes::{GROUP, Lanes, NO_LANES};
+use super::lanes::{GROUP, GroupF64, NO_GROUP_F64};
 use super::preprocess::shape;
 use super::scratch::Scratch;
 use super::set::GaussianSet;
@@ -42,9 +42,9 @@ struct Shading {
 /// Gaussians of a group that were kept, densely: what the program wrote of each.
 struct Outputs {
     /// In clip space.
-    position: [Lanes; 4],
-    covariance: [Lanes; 3],
-    opacity: Lanes,
+    position: [GroupF64; 4],
+    covariance: [GroupF64; 3],
+    opacity: GroupF64,
     color: [[f32; 3]; GROUP],
     key: [f32; GROUP],
 }
@@ -182,9 +182,9 @@ impl Worker<'_> {
 impl Default for Outputs {
     fn default() -> Self {
         Self {
-            position: [NO_LANES; 4],
-            covariance: [NO_LANES; 3],
-            opacity: NO_LANES,
+            position: [NO_GROUP_F64; 4],
+            covariance: [NO_GROUP_F64; 3],
+            opacity: NO_GROUP_F64,
             color: [[0.0; 3]; GROUP],
             key: [0.0; GROUP],
         }
@@ -287,8 +287,8 @@ impl Shading {
         let (flat, depth) = (&mut *scratch.flat, &mut scratch.depth);
         let zero = S::f64s::splat(simd, 0.0);
         for at in (0..count).step_by(S::f64s::LEN) {
-            let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
-            let store = |value: S::f64s, lanes: &mut Lanes| {
+            let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+            let store = |value: S::f64s, lanes: &mut GroupF64| {
                 value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
             };
             let w = load(&kept.position[3]);
