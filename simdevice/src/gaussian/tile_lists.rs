@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// The lists of some rows of tiles.
 #[derive(Debug, Default)]
-struct Band {
+struct RowBand {
     /// Where each tile's list begins, row by row.
     starts: Vec<u32>,
     /// Where it ends: there is room for one more behind it.
@@ -35,7 +35,7 @@ pub(crate) struct TileLists {
     columns: u32,
     /// Rows of a band; the last may have fewer.
     band_rows: u32,
-    bands: Vec<Band>,
+    bands: Vec<RowBand>,
     /// What there is instead of lists.
     walk: Option<SortedWalk>,
 }
@@ -123,7 +123,7 @@ struct Rows {
 
 /// Tiles that follow one another in a row of a band, and a primitive that reaches them: the first one's number and, from
 /// bit [`COUNT_AT`] on, how many; then the primitive.
-type Strip = [u32; 2];
+type TileRun = [u32; 2];
 
 /// Bits of a tile's number in its band.
 const COUNT_AT: u32 = 22;
@@ -134,17 +134,17 @@ const MAX_TILES: u32 = 1 << COUNT_AT;
 /// The most tiles of a strip.
 const MAX_COUNT: u32 = (1 << (32 - COUNT_AT)) - 1;
 
-/// Strips of a band in the order of primitives. There is room behind them.
+/// TileRuns of a band in the order of primitives. There is room behind them.
 #[derive(Debug)]
-struct Strips {
-    strips: Vec<Strip>,
+struct TileRuns {
+    strips: Vec<TileRun>,
     len: usize,
 }
 
 /// Primitives whose reaches are fetched ahead, and whose pairs are counted before the budget is looked at.
 const GATHERED: usize = 64;
 
-/// Strips that there is room for in the beginning, for each primitive: most have one or two.
+/// TileRuns that there is room for in the beginning, for each primitive: most have one or two.
 const STRIPS_PER_PRIMITIVE: usize = 2;
 
 /// Primitives that a worker brings into order at a time.
@@ -190,7 +190,7 @@ impl TileLists {
             reaches: host::collect(groups.iter().map(|group| &*group.reaches)),
             spans: host::collect(groups.iter().map(|group| &*group.spans)),
         };
-        let runs: Option<Vec<Vec<Strips>>> = order
+        let runs: Option<Vec<Vec<TileRuns>>> = order
             .par_chunks(order.len().div_ceil(threads))
             .map(|run| grid.expand(&seen, run, bands, allow))
             .collect();
@@ -207,7 +207,7 @@ impl TileLists {
             .into_par_iter()
             .map(|band| {
                 let written = runs.iter().map(|run| run[band].written());
-                Band::place(&host::collect(written), (band_rows * columns) as usize)
+                RowBand::place(&host::collect(written), (band_rows * columns) as usize)
             })
             .collect();
         Self {
@@ -244,7 +244,7 @@ impl TileLists {
     /// How many pairs of tile and primitive there are.
     pub(crate) fn pairs(&self) -> u64 {
         // Each list has room for one more.
-        let pairs = |band: &Band| (band.primitives.len() - band.starts.len()) as u64;
+        let pairs = |band: &RowBand| (band.primitives.len() - band.starts.len()) as u64;
         let streamed = self.walk.as_ref().map_or(0, |stream| stream.pairs);
         self.bands.iter().map(pairs).sum::<u64>() + streamed
     }
@@ -266,7 +266,7 @@ impl TileLists {
 
     /// Bytes of host memory that the lists take.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let bytes = |band: &Band| 2 * size_of_val(&*band.starts) + size_of_val(&*band.primitives);
+        let bytes = |band: &RowBand| 2 * size_of_val(&*band.starts) + size_of_val(&*band.primitives);
         let lists = self.bands.iter().map(|band| bytes(band) as u64);
         lists.sum::<u64>() + self.walk.as_ref().map_or(0, SortedWalk::memory_bytes)
     }
@@ -281,9 +281,9 @@ impl Rows {
         run: &[(u32, u32)],
         bands: usize,
         allow: impl Fn(u64) -> bool,
-    ) -> Option<Vec<Strips>> {
+    ) -> Option<Vec<TileRuns>> {
         let about = run.len() * STRIPS_PER_PRIMITIVE / bands;
-        let mut strips = host::collect((0..bands).map(|_| Strips::with_room(about)));
+        let mut strips = host::collect((0..bands).map(|_| TileRuns::with_room(about)));
         let others = self.places.len() - 1;
         let strip = |(row, span): (u32, TileSpan)| {
             // Rows without tiles may lie outside.
@@ -332,7 +332,7 @@ impl Rows {
     }
 }
 
-impl Strips {
+impl TileRuns {
     /// None yet, with room for about so many.
     fn with_room(count: usize) -> Self {
         Self {
@@ -377,15 +377,15 @@ impl Strips {
         host::resize(&mut self.strips, len, [0; 2]);
     }
 
-    fn written(&self) -> &[Strip] {
+    fn written(&self) -> &[TileRun] {
         &self.strips[..self.len]
     }
 }
 
-impl Band {
+impl RowBand {
     /// Counts, then places the strips of a band of so many tiles, in their order.
-    fn place(runs: &[&[Strip]], tiles: usize) -> Self {
-        let parts = |[tile, primitive]: Strip| {
+    fn place(runs: &[&[TileRun]], tiles: usize) -> Self {
+        let parts = |[tile, primitive]: TileRun| {
             let first = tile & ((1 << COUNT_AT) - 1);
             (first as usize, tile >> COUNT_AT, primitive)
         };
