@@ -1,7 +1,7 @@
 //! A sorted set: what preprocessing, sort and binning make of Gaussians, and what the tile engine draws.
 
 use super::camera::period;
-use super::depth::Trend;
+use super::depth::DepthTrend;
 use super::ray_depth::{PixelRays, RayDepth, RayDepths};
 use super::set::GaussianSet;
 use super::splat::{ProjectedGroup, Splat};
@@ -50,7 +50,7 @@ pub struct BinnedDraw {
     /// How its depths are numbers.
     pub(crate) depth_unit: DepthCode,
     /// How the depths of a tile's list follow one another.
-    pub(crate) depth_trend: Trend,
+    pub(crate) depth_trend: DepthTrend,
     /// Half the pixels after which the picture repeats, or infinity.
     pub(crate) half_period: f64,
     /// The pixels' rays.
@@ -111,7 +111,7 @@ impl BinnedDraw {
             depth_trend: match (set.depth, begin.state.order) {
                 // What a program sorts by need not follow its depths.
                 (Some(depth), GaussianOrder::ViewDepth) if set.draws.is_empty() => depth.trend(),
-                _ => Trend::None,
+                _ => DepthTrend::None,
             },
             depth_unit: set.depth.map_or(DepthCode::Float, |depth| depth.unit()),
             resolve: set.resolve,

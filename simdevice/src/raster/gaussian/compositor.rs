@@ -32,7 +32,7 @@ use super::inputs::{
 };
 use super::per_pixel::{PerPixel, composite_per_pixel};
 use crate::counters::{Counter, Counters};
-use crate::gaussian::depth::Trend;
+use crate::gaussian::depth::DepthTrend;
 use crate::gaussian::tile_lists::SortedWalk;
 use crate::gaussian::{BinnedDraw, TILE_SIZE};
 use crate::optimizations::{Optimization, Optimizations};
@@ -169,7 +169,7 @@ impl GaussianTile {
             mode: TileMode::of(draw).in_list_order(),
             list: draw.sorted.tiles.list(tile_x, tile_y),
             optimizations: Optimizations::ALL,
-            trend: Trend::None,
+            trend: DepthTrend::None,
             half_period: draw.half_period,
             corner: [tile_x, tile_y].map(|tile| tile * TILE_SIZE),
             // The first Gaussian that reaches a pixel finishes it.

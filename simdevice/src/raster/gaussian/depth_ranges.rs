@@ -5,7 +5,7 @@
 //! nothing in the kernel depends on which it is.
 
 use super::grid::{BLOCKS, LANES, Lanes};
-use crate::gaussian::depth::Trend;
+use crate::gaussian::depth::DepthTrend;
 use crate::packet::draw::CompareOp;
 use fearless_simd::{Simd, mask32x16, prelude::*, u32x16};
 
@@ -96,11 +96,11 @@ impl Passing {
 
     /// Whether a depth and all that follow it fail in all of the tile.
     #[inline(always)]
-    pub(super) fn hides_from(&self, depth: u32, trend: Trend) -> bool {
+    pub(super) fn hides_from(&self, depth: u32, trend: DepthTrend) -> bool {
         match trend {
-            Trend::Rising => depth > self.tile[1],
-            Trend::Falling => depth < self.tile[0],
-            Trend::None => false,
+            DepthTrend::Rising => depth > self.tile[1],
+            DepthTrend::Falling => depth < self.tile[0],
+            DepthTrend::None => false,
         }
     }
 
@@ -177,9 +177,9 @@ mod tests {
                     }
                     let from = |trend| passing.hides_from(depth, trend);
                     let later = |mut depths: std::ops::Range<u32>| depths.all(|d| passing.hides(d));
-                    assert!(!from(Trend::Rising) || later(depth..200));
-                    assert!(!from(Trend::Falling) || later(0..depth + 1));
-                    assert!(!from(Trend::None));
+                    assert!(!from(DepthTrend::Rising) || later(depth..200));
+                    assert!(!from(DepthTrend::Falling) || later(0..depth + 1));
+                    assert!(!from(DepthTrend::None));
                 }
             }
         }

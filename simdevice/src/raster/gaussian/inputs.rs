@@ -12,7 +12,7 @@
 use super::accumulator::{ANY_LIGHT, Light};
 use super::exp2::{CUBIC, QUADRATIC, exp2_of_negated};
 use crate::gaussian::BinnedDraw;
-use crate::gaussian::depth::Trend;
+use crate::gaussian::depth::DepthTrend;
 use crate::gaussian::ray_depth::RayDepths;
 use crate::gaussian::splat::{Splat, locate};
 use crate::gaussian::surfel::Surfel;
@@ -206,7 +206,7 @@ pub(super) struct Task<'a> {
     pub(super) list: &'a [u32],
     /// What is left out.
     pub(super) optimizations: Optimizations,
-    pub(super) trend: Trend,
+    pub(super) trend: DepthTrend,
     /// As [`BinnedDraw::half_period`].
     pub(super) half_period: f64,
     pub(super) corner: [u32; 2],
