@@ -2,7 +2,7 @@
 
 use super::accumulator::Layer;
 use super::depth_ranges::Passing;
-use super::grid::{BLOCKS, CHUNK};
+use super::grid::{BLOCKS, ROUND};
 use super::inputs::{NO_DEPTH, Task, TileMode, Work};
 use super::staging::Record;
 use crate::gaussian::splat::{Splat, binary16_headroom, locate};
@@ -52,7 +52,7 @@ pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
     let ends_early = task.optimizations.has(Optimization::EarlyTermination);
     for (block, list) in lists.iter().enumerate() {
         kernel.begin(layer, block);
-        for chunk in list.chunks(CHUNK) {
+        for chunk in list.chunks(ROUND) {
             if ends_early && !kernel.is_open(layer, block) {
                 break;
             }

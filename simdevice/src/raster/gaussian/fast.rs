@@ -7,7 +7,7 @@
 
 use super::accumulator::{ANY_LIGHT, Layer};
 use super::depth_ranges::Passing;
-use super::grid::{ALL_BLOCKS, BLOCKS, CHUNK};
+use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, Task, Work};
 use super::pixels::{Alphas, evaluate, evaluate_steep};
 use super::staging::{Chunk, Reaching, hidden_blocks};
@@ -56,11 +56,11 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     for block in 0..BLOCKS {
         layer.find_most_fall(simd, block, task.thresholds.most_fall);
     }
-    for primitive in task.list.iter().take(CHUNK) {
+    for primitive in task.list.iter().take(ROUND) {
         task.prefetch(Some(primitive));
     }
-    for (number, chunk) in task.list.chunks(CHUNK).enumerate() {
-        let rest = &task.list[number * CHUNK..];
+    for (number, chunk) in task.list.chunks(ROUND).enumerate() {
+        let rest = &task.list[number * ROUND..];
         let bits = open_blocks::<_, DEPTH>(simd, task, layer, rest, &mut work);
         if bits == 0 {
             break;
@@ -78,7 +78,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             }
             break;
         }
-        let next_chunk = rest.get(CHUNK..).unwrap_or_default();
+        let next_chunk = rest.get(ROUND..).unwrap_or_default();
         let before = work;
         let round = Round {
             chunk,
@@ -131,7 +131,7 @@ fn open_blocks<S: Simd, const DEPTH: DepthMode>(
         let of = if open == 0 {
             rest.len()
         } else {
-            rest.len().min(CHUNK)
+            rest.len().min(ROUND)
         };
         work.blocks_left_out += u64::from(left_out.count_ones()) * of as u64;
     }

@@ -15,7 +15,7 @@ pub(super) const BLOCKS: usize = 16;
 /// A bit for each of them.
 pub(super) const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
 /// Gaussians of a chunk: as many as phases pass on through the first-level cache, and a word has bits.
-pub(super) const CHUNK: usize = 32;
+pub(super) const ROUND: usize = 32;
 
 /// Half of the distance between a block's first and last pixel centres.
 pub(super) const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;

@@ -3,7 +3,7 @@
 
 use super::accumulator::Layer;
 use super::depth_ranges::Passing;
-use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, CHUNK, LANE_X_64, LANE_Y_64, LANES};
+use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, ROUND, LANE_X_64, LANE_Y_64, LANES};
 use super::inputs::{
     DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, Task, Thresholds, power,
 };
@@ -40,13 +40,13 @@ const FAR_FROM_FLOOR: f32 = 8.0;
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub(super) struct Alphas {
-    alphas: [[f32; LANES]; BLOCKS * CHUNK],
+    alphas: [[f32; LANES]; BLOCKS * ROUND],
 }
 
 impl Default for Alphas {
     fn default() -> Self {
         Self {
-            alphas: [[0.0; LANES]; BLOCKS * CHUNK],
+            alphas: [[0.0; LANES]; BLOCKS * ROUND],
         }
     }
 }
@@ -73,11 +73,11 @@ impl Alphas {
                 let mut items = self.alphas.iter_mut();
                 // Two blocks at a time, so that half as many loops end where nobody can foresee it.
                 for (pair, words) in reaching.as_chunks::<2>().0.iter().enumerate() {
-                    let mut rest = u64::from(words[0]) | u64::from(words[1]) << CHUNK;
+                    let mut rest = u64::from(words[0]) | u64::from(words[1]) << ROUND;
                     while rest != 0 {
                         let bit = rest.trailing_zeros() as usize;
                         rest &= rest - 1;
-                        let (block, number) = ((2 * pair + bit / CHUNK) % BLOCKS, bit % CHUNK);
+                        let (block, number) = ((2 * pair + bit / ROUND) % BLOCKS, bit % ROUND);
                         let fall = chunk.records[number].falls(simd, block);
                         let most_fall = f32x16::from_slice(simd, &most_fall[block]);
                         let at = (block, chunk.looks[number].depth);
@@ -201,7 +201,7 @@ fn composite_far_from_floor<S: Simd>(
     // What is finished has alphas of zero.
     pixels.transmittance = before.max(0.0);
     for alpha in alphas {
-        let look = &chunk.looks[reaching.trailing_zeros() as usize % CHUNK];
+        let look = &chunk.looks[reaching.trailing_zeros() as usize % ROUND];
         reaching &= reaching.wrapping_sub(1);
         let passed = pixels.pass(f32x16::from_slice(simd, alpha));
         pixels.transmittance = passed.rest;
@@ -234,7 +234,7 @@ fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     let mut pixels = pixels(layer, simd, block);
     let mut refused = Tally::new(simd);
     for alpha in alphas {
-        let look = &chunk.looks[reaching.trailing_zeros() as usize % CHUNK];
+        let look = &chunk.looks[reaching.trailing_zeros() as usize % ROUND];
         reaching &= reaching.wrapping_sub(1);
         let alpha = f32x16::from_slice(simd, alpha);
         let (to, look) = ((block, &mut pixels), (look.color, look.depth));

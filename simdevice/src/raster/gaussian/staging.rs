@@ -2,7 +2,7 @@
 
 use super::depth_ranges::Passing;
 use super::grid::{
-    BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, CHUNK, HALF, LANE_X, LANE_Y, LANES,
+    BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, ROUND, HALF, LANE_X, LANE_Y, LANES,
 };
 use super::inputs::{DepthMode, NO_DEPTH, Task};
 use crate::gaussian::splat::Splat;
@@ -18,8 +18,8 @@ pub(super) type Reaching = [u32; BLOCKS];
 /// A chunk's Gaussians in a tile.
 #[derive(Debug, Default)]
 pub(super) struct Chunk {
-    pub(super) records: [Record; CHUNK],
-    pub(super) looks: [Look; CHUNK],
+    pub(super) records: [Record; ROUND],
+    pub(super) looks: [Look; ROUND],
 }
 
 /// What it takes to find alphas.
@@ -97,7 +97,7 @@ impl Chunk {
                     if splat.steep {
                         break;
                     }
-                    let at = number % CHUNK;
+                    let at = number % ROUND;
                     number += 1;
                     let reached = self.records[at].place(simd, splat, corner, most_fall);
                     self.looks[at] = Look {
