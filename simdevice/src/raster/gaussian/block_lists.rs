@@ -4,7 +4,7 @@ use super::accumulator::Layer;
 use super::depth_ranges::Passing;
 use super::grid::{BLOCKS, ROUND};
 use super::inputs::{NO_DEPTH, Task, TileMode, Work};
-use super::staging::Record;
+use super::staging::StagedSplat;
 use crate::gaussian::splat::{Splat, binary16_headroom, locate};
 use crate::optimizations::Optimization;
 use crate::trace::{self, Run};
@@ -52,11 +52,11 @@ pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
     let ends_early = task.optimizations.has(Optimization::EarlyTermination);
     for (block, list) in lists.iter().enumerate() {
         kernel.begin(layer, block);
-        for chunk in list.chunks(ROUND) {
+        for round in list.chunks(ROUND) {
             if ends_early && !kernel.is_open(layer, block) {
                 break;
             }
-            for &primitive in chunk {
+            for &primitive in round {
                 let at = locate(primitive);
                 work.contributions +=
                     kernel.composite(simd, task, at, (&mut *layer, block), passing);
@@ -92,7 +92,7 @@ pub(super) fn part<S: Simd>(
     for list in &mut *lists {
         list.clear();
     }
-    let mut record = Record::default();
+    let mut record = StagedSplat::default();
     let (mut hidden_alone, recorded) = (0, runs.is_some());
     for &primitive in task.list {
         let (batch, place) = locate(primitive);

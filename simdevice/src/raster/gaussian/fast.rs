@@ -10,7 +10,7 @@ use super::depth_ranges::Passing;
 use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, Task, Work};
 use super::pixels::{Alphas, evaluate, evaluate_steep};
-use super::staging::{Chunk, Reaching, hidden_blocks};
+use super::staging::{StagedRound, Reaching, hidden_blocks};
 use crate::optimizations::Optimization;
 use crate::trace::{self, Run};
 use fearless_simd::{Simd, mask32x16, prelude::*};
@@ -18,7 +18,7 @@ use fearless_simd::{Simd, mask32x16, prelude::*};
 /// What the kernel needs besides the pixels.
 #[derive(Debug, Default)]
 pub(super) struct FastScratch {
-    chunk: Chunk,
+    round: StagedRound,
     /// Apart, so that both are small enough never to be wanting.
     alphas: Box<Alphas>,
 }
@@ -36,7 +36,7 @@ struct Open {
 
 /// Gaussians that are composited together.
 struct Round<'a> {
-    chunk: &'a [u32],
+    round: &'a [u32],
     /// Those of the round after.
     next_chunk: &'a [u32],
     open: Open,
@@ -59,7 +59,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     for primitive in task.list.iter().take(ROUND) {
         task.prefetch(Some(primitive));
     }
-    for (number, chunk) in task.list.chunks(ROUND).enumerate() {
+    for (number, round) in task.list.chunks(ROUND).enumerate() {
         let rest = &task.list[number * ROUND..];
         let bits = open_blocks::<_, DEPTH>(simd, task, layer, rest, &mut work);
         if bits == 0 {
@@ -70,7 +70,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             blocks: bits.count_ones() as u8,
             rows: if runs.is_some() { layer.open_rows() } else { 0 },
         };
-        if DEPTH > NO_DEPTH && passing.hides_from(task.splat(chunk[0]).depth, task.trend) {
+        if DEPTH > NO_DEPTH && passing.hides_from(task.splat(round[0]).depth, task.trend) {
             work.tiles_hidden += rest.len() as u64;
             if let Some(runs) = &mut runs {
                 work.hidden_rest = rest.len() as u32;
@@ -81,7 +81,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
         let next_chunk = rest.get(ROUND..).unwrap_or_default();
         let before = work;
         let round = Round {
-            chunk,
+            round,
             next_chunk,
             open,
             is_recorded: runs.is_some(),
@@ -96,7 +96,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
         );
         if let Some(runs) = &mut runs {
             let run = Run {
-                primitives: chunk.len() as u32,
+                primitives: round.len() as u32,
                 rows: open.rows,
                 blocks: open.blocks,
                 reached: (work.items - before.items) as u32,
@@ -151,10 +151,10 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
     let (open, blocks) = (round.open.bits, u64::from(round.open.blocks));
     let (mut blocks_of_hidden, mut from) = (0, 0);
     let reaching = loop {
-        let placed = scratch.chunk.place::<_, DEPTH>(
+        let placed = scratch.round.place::<_, DEPTH>(
             simd,
             task,
-            (round.chunk, from, round.next_chunk),
+            (round.round, from, round.next_chunk),
             (open, passing),
             round.is_recorded,
         );
@@ -162,12 +162,12 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
         work.tiles_hidden += placed.tiles_hidden;
         work.blocks_hidden += placed.blocks_hidden;
         blocks_of_hidden += placed.blocks_of_hidden;
-        let Some(&primitive) = round.chunk.get(placed.end) else {
+        let Some(&primitive) = round.round.get(placed.end) else {
             break placed.reaching;
         };
         // It is steep; what is before it is composited first.
         work.items += count_bits(&placed.reaching);
-        let staged = (&scratch.chunk, &mut *scratch.alphas);
+        let staged = (&scratch.round, &mut *scratch.alphas);
         work.contributions += evaluate::<_, DEPTH>(
             layer,
             simd,
@@ -189,9 +189,9 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
         work.contributions += evaluate_steep::<_, DEPTH>(layer, simd, splat, shown, passing, task);
         from = placed.end + 1;
     };
-    work.pairs += round.chunk.len() as u64;
+    work.pairs += round.round.len() as u64;
     work.items += count_bits(&reaching);
-    let staged = (&scratch.chunk, &mut *scratch.alphas);
+    let staged = (&scratch.round, &mut *scratch.alphas);
     work.contributions +=
         evaluate::<_, DEPTH>(layer, simd, &reaching, staged, passing, task.thresholds);
     blocks_of_hidden

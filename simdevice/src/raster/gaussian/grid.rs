@@ -14,7 +14,7 @@ pub(super) const BLOCK: usize = 4;
 pub(super) const BLOCKS: usize = 16;
 /// A bit for each of them.
 pub(super) const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
-/// Gaussians of a chunk: as many as phases pass on through the first-level cache, and a word has bits.
+/// Gaussians of a round: as many as phases pass on through the first-level cache, and a word has bits.
 pub(super) const ROUND: usize = 32;
 
 /// Half of the distance between a block's first and last pixel centres.

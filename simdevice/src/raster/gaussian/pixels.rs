@@ -8,7 +8,7 @@ use super::inputs::{
     DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, Task, Thresholds, power,
 };
 use super::masks::{Tally, only};
-use super::staging::{Chunk, Reaching};
+use super::staging::{StagedRound, Reaching};
 use crate::gaussian::splat::Splat;
 use crate::lanes::bits_of;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
@@ -32,11 +32,11 @@ struct Passed<S: Simd> {
     rest: f32x16<S>,
 }
 
-/// No pixel of more transmittance than this, in units of the floor, is looked out for while a chunk's Gaussians are
-/// composited: it is seldom finished by one chunk, and where it is, that chunk is composited again.
+/// No pixel of more transmittance than this, in units of the floor, is looked out for while a round's Gaussians are
+/// composited: it is seldom finished by one round, and where it is, that round is composited again.
 const FAR_FROM_FLOOR: f32 = 8.0;
 
-/// The alphas of a chunk's Gaussians in the blocks that they may reach, by block and then in the order of the list.
+/// The alphas of a round's Gaussians in the blocks that they may reach, by block and then in the order of the list.
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub(super) struct Alphas {
@@ -61,7 +61,7 @@ impl Alphas {
         &mut self,
         simd: S,
         reaching: &Reaching,
-        (chunk, most_fall): (&Chunk, &[[f32; LANES]; BLOCKS]),
+        (round, most_fall): (&StagedRound, &[[f32; LANES]; BLOCKS]),
         passing: &Passing,
         thresholds: Thresholds,
     ) -> u64 {
@@ -78,9 +78,9 @@ impl Alphas {
                         let bit = rest.trailing_zeros() as usize;
                         rest &= rest - 1;
                         let (block, number) = ((2 * pair + bit / ROUND) % BLOCKS, bit % ROUND);
-                        let fall = chunk.records[number].falls(simd, block);
+                        let fall = round.records[number].falls(simd, block);
                         let most_fall = f32x16::from_slice(simd, &most_fall[block]);
-                        let at = (block, chunk.looks[number].depth);
+                        let at = (block, round.looks[number].depth);
                         let reached = reached(simd, DEPTH, at, fall, passing, most_fall);
                         pixels.add(reached);
                         let alpha = alpha(simd, DEPTH, reached, fall, ceiling);
@@ -125,30 +125,30 @@ fn alpha<S: Simd>(
     only(simd, reached, power(simd, mode, fall).min(ceiling))
 }
 
-/// Composites those of `chunk` that reach a block in it, for each block; returns how many pixels accepted one.
+/// Composites those of `round` that reach a block in it, for each block; returns how many pixels accepted one.
 #[inline(always)]
 pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
     layer: &mut Layer,
     simd: S,
     reaching: &Reaching,
-    (chunk, alphas): (&Chunk, &mut Alphas),
+    (round, alphas): (&StagedRound, &mut Alphas),
     passing: &Passing,
     thresholds: Thresholds,
 ) -> u64 {
-    let to = (chunk, &layer.most_fall);
+    let to = (round, &layer.most_fall);
     let reached = alphas.find::<_, DEPTH>(simd, reaching, to, passing, thresholds);
-    let refused = composite_all::<_, DEPTH>(layer, simd, reaching, (chunk, alphas), thresholds);
+    let refused = composite_all::<_, DEPTH>(layer, simd, reaching, (round, alphas), thresholds);
     reached.saturating_sub(refused)
 }
 
-/// Composites the alphas of a chunk; returns how many pixels refused one, since they are finished. A function of its own,
+/// Composites the alphas of a round; returns how many pixels refused one, since they are finished. A function of its own,
 /// as [`Alphas::find`].
 #[inline(never)]
 fn composite_all<S: Simd, const DEPTH: DepthMode>(
     layer: &mut Layer,
     simd: S,
     reaching: &Reaching,
-    (chunk, alphas): (&Chunk, &Alphas),
+    (round, alphas): (&StagedRound, &Alphas),
     thresholds: Thresholds,
 ) -> u64 {
     simd.vectorize(
@@ -168,10 +168,10 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
                 let of_block = (block, reaching, alphas);
                 if DEPTH == FIND_REACHED
                     || DEPTH >= FIND_MEDIAN
-                    || !composite_far_from_floor(layer, simd, of_block, chunk, thresholds)
+                    || !composite_far_from_floor(layer, simd, of_block, round, thresholds)
                 {
                     refused +=
-                        composite_carefully::<_, DEPTH>(layer, simd, of_block, chunk, thresholds);
+                        composite_carefully::<_, DEPTH>(layer, simd, of_block, round, thresholds);
                 }
             }
             refused
@@ -186,7 +186,7 @@ fn composite_far_from_floor<S: Simd>(
     layer: &mut Layer,
     simd: S,
     (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
-    chunk: &Chunk,
+    round: &StagedRound,
     thresholds: Thresholds,
 ) -> bool {
     let floor = thresholds.transmittance_floor;
@@ -201,7 +201,7 @@ fn composite_far_from_floor<S: Simd>(
     // What is finished has alphas of zero.
     pixels.transmittance = before.max(0.0);
     for alpha in alphas {
-        let look = &chunk.looks[reaching.trailing_zeros() as usize % ROUND];
+        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
         reaching &= reaching.wrapping_sub(1);
         let passed = pixels.pass(f32x16::from_slice(simd, alpha));
         pixels.transmittance = passed.rest;
@@ -224,7 +224,7 @@ fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     layer: &mut Layer,
     simd: S,
     (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
-    chunk: &Chunk,
+    round: &StagedRound,
     thresholds: Thresholds,
 ) -> u64 {
     let thresholds = Thresholds {
@@ -234,7 +234,7 @@ fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     let mut pixels = pixels(layer, simd, block);
     let mut refused = Tally::new(simd);
     for alpha in alphas {
-        let look = &chunk.looks[reaching.trailing_zeros() as usize % ROUND];
+        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
         reaching &= reaching.wrapping_sub(1);
         let alpha = f32x16::from_slice(simd, alpha);
         let (to, look) = ((block, &mut pixels), (look.color, look.depth));
@@ -295,7 +295,7 @@ pub(super) fn accumulate<S: Simd>(
     accepted.count_ones().into()
 }
 
-/// A block's pixels as they are, before any of a chunk.
+/// A block's pixels as they are, before any of a round.
 #[inline(always)]
 fn pixels<S: Simd>(layer: &Layer, simd: S, block: usize) -> Pixels<S> {
     let [r, g, b] = &layer.color;

@@ -1,4 +1,4 @@
-//! Phase 1 of the tile kernel: what the others need of a chunk's Gaussians in a tile, and which blocks each may reach.
+//! Phase 1 of the tile kernel: what the others need of a round's Gaussians in a tile, and which blocks each may reach.
 
 use super::depth_ranges::Passing;
 use super::grid::{
@@ -12,20 +12,20 @@ use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u
 /// What rounding may do to exponents, relative to them.
 const ROOM_FACTOR: f32 = 1.0 + 1e-5;
 
-/// Which of a chunk's Gaussians may reach each block: a bit for each.
+/// Which of a round's Gaussians may reach each block: a bit for each.
 pub(super) type Reaching = [u32; BLOCKS];
 
-/// A chunk's Gaussians in a tile.
+/// A round's Gaussians in a tile.
 #[derive(Debug, Default)]
-pub(super) struct Chunk {
-    pub(super) records: [Record; ROUND],
-    pub(super) looks: [Look; ROUND],
+pub(super) struct StagedRound {
+    pub(super) records: [StagedSplat; ROUND],
+    pub(super) looks: [SplatColor; ROUND],
 }
 
 /// What it takes to find alphas.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
-pub(super) struct Record {
+pub(super) struct StagedSplat {
     /// By column of blocks, `u^2` less the logarithm of the opacity at the pixels of two rows: both pairs of a block's rows
     /// have the same.
     pub(super) from_u: [[f32; LANES / 2]; BLOCKS_ACROSS],
@@ -37,19 +37,19 @@ pub(super) struct Record {
 
 /// What it takes to composite.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Look {
+pub(super) struct SplatColor {
     pub(super) color: [f32; 3],
     /// As [`Splat::depth`].
     pub(super) depth: u32,
 }
 
-/// What became of a chunk's Gaussians, up to a steep one.
+/// What became of a round's Gaussians, up to a steep one.
 #[derive(Debug, Default)]
 pub(super) struct Placed {
     pub(super) reaching: Reaching,
     /// How many there are.
     pub(super) count: u64,
-    /// The chunk's first that is steep from where they begin, or its end.
+    /// The round's first that is steep from where they begin, or its end.
     pub(super) end: usize,
     /// Those that depths hide in all of the tile.
     pub(super) tiles_hidden: u64,
@@ -59,15 +59,15 @@ pub(super) struct Placed {
     pub(super) blocks_of_hidden: u32,
 }
 
-impl Chunk {
-    /// Places the Gaussians of a tile's chunk from number `from` on, before one that is steep, and has as many of the next chunk
+impl StagedRound {
+    /// Places the Gaussians of a tile's round from number `from` on, before one that is steep, and has as many of the next round
     /// on their way. `open` are the blocks that are not finished.
     #[inline(never)]
     pub(super) fn place<S: Simd, const DEPTH: DepthMode>(
         &mut self,
         simd: S,
         task: &Task<'_>,
-        (chunk, from, next_chunk): (&[u32], usize, &[u32]),
+        (round, from, next_chunk): (&[u32], usize, &[u32]),
         (open, passing): (u64, &Passing),
         is_recorded: bool,
     ) -> Placed {
@@ -83,7 +83,7 @@ impl Chunk {
                 let open = open_mask.to_vector();
                 let mut reaching = i32x16::splat(simd, 0);
                 let mut number = from;
-                while let Some(&primitive) = chunk.get(number) {
+                while let Some(&primitive) = round.get(number) {
                     task.prefetch(next_chunk.get(number));
                     let splat = task.splat(primitive);
                     if DEPTH > NO_DEPTH && passing.hides(splat.depth) {
@@ -100,7 +100,7 @@ impl Chunk {
                     let at = number % ROUND;
                     number += 1;
                     let reached = self.records[at].place(simd, splat, corner, most_fall);
-                    self.looks[at] = Look {
+                    self.looks[at] = SplatColor {
                         color: splat.color,
                         depth: splat.depth,
                     };
@@ -126,7 +126,7 @@ impl Chunk {
     }
 }
 
-impl Record {
+impl StagedSplat {
     /// Makes this the record of `splat` in the tile at `corner`. Returns which blocks it may reach.
     #[inline(always)]
     pub(super) fn place<S: Simd>(
@@ -190,7 +190,7 @@ pub(super) fn hidden_blocks<S: Simd>(
     let bounded = task.optimizations.has(Optimization::Blocks) && !splat.steep;
     let reached = if bounded {
         let most_fall = task.thresholds.most_fall;
-        open & Record::default().place(simd, splat, task.corner.map(f64::from), most_fall)
+        open & StagedSplat::default().place(simd, splat, task.corner.map(f64::from), most_fall)
     } else {
         open
     };
