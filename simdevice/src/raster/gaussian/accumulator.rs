@@ -1,6 +1,6 @@
 //! What Gaussian mode accumulates for a tile's pixels, or for one sample of each.
 
-use super::grid::{ALL_LANES, BLOCKS, LANES, Lanes, TILE, block_and_lane};
+use super::grid::{ALL_LANES, BLOCKS, BLOCK_PIXELS, PixelMask, TILE, block_and_lane};
 use crate::raster::DepthCode;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
@@ -10,17 +10,17 @@ use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct Layer {
-    pub(super) color: [[[f32; LANES]; BLOCKS]; 3],
+    pub(super) color: [[[f32; BLOCK_PIXELS]; BLOCKS]; 3],
     /// Transmittance; negative where the pixel is finished, [`UNTOUCHED`] where it is not to be touched.
-    pub(super) transmittance: [[f32; LANES]; BLOCKS],
+    pub(super) transmittance: [[f32; BLOCK_PIXELS]; BLOCKS],
     /// In the fast kernel, how far alphas may fall at each pixel; where it is finished, none falls so little.
-    pub(super) most_fall: [[f32; LANES]; BLOCKS],
+    pub(super) most_fall: [[f32; BLOCK_PIXELS]; BLOCKS],
     /// Bit `lane` of entry `block` tells that some Gaussian contributed.
     pub(super) covered: [u32; BLOCKS],
     /// The median depth as the attachment holds it, where covered, if the draw writes depth.
-    pub(super) median: [[u32; LANES]; BLOCKS],
+    pub(super) median: [[u32; BLOCK_PIXELS]; BLOCKS],
     /// The sums of weighted depths and of weights, if a fragment program reads their ratio.
-    pub(super) means: [[[f32; LANES]; BLOCKS]; 2],
+    pub(super) means: [[[f32; BLOCK_PIXELS]; BLOCKS]; 2],
 }
 
 /// What no layer leaves anything of, neither more nor less than a floor.
@@ -47,21 +47,21 @@ impl Light {
 
 impl Layer {
     pub(super) const EMPTY: Self = Self {
-        color: [[[0.0; LANES]; BLOCKS]; 3],
-        transmittance: [[1.0; LANES]; BLOCKS],
-        most_fall: [[0.0; LANES]; BLOCKS],
+        color: [[[0.0; BLOCK_PIXELS]; BLOCKS]; 3],
+        transmittance: [[1.0; BLOCK_PIXELS]; BLOCKS],
+        most_fall: [[0.0; BLOCK_PIXELS]; BLOCKS],
         covered: [0; BLOCKS],
-        median: [[0; LANES]; BLOCKS],
-        means: [[[0.0; LANES]; BLOCKS]; 2],
+        median: [[0; BLOCK_PIXELS]; BLOCKS],
+        means: [[[0.0; BLOCK_PIXELS]; BLOCKS]; 2],
     };
 
     /// Makes the pixels in `lanes` fresh, and the others finished.
-    pub(super) fn clear(&mut self, lanes: &Lanes) {
-        self.color = [[[0.0; LANES]; BLOCKS]; 3];
+    pub(super) fn clear(&mut self, lanes: &PixelMask) {
+        self.color = [[[0.0; BLOCK_PIXELS]; BLOCKS]; 3];
         self.covered = [0; BLOCKS];
         for (block, &lanes) in self.transmittance.iter_mut().zip(lanes) {
             if lanes == ALL_LANES {
-                *block = [1.0; LANES];
+                *block = [1.0; BLOCK_PIXELS];
                 continue;
             }
             for (lane, t) in block.iter_mut().enumerate() {
@@ -76,14 +76,14 @@ impl Layer {
 
     /// Makes the sums of depths fresh.
     pub(super) fn clear_means(&mut self) {
-        self.means = [[[0.0; LANES]; BLOCKS]; 2];
+        self.means = [[[0.0; BLOCK_PIXELS]; BLOCKS]; 2];
     }
 
     /// The expected and the median depth of a block's lanes; zero where nothing is covered.
-    pub(super) fn depths(&self, block: usize, unit: DepthCode) -> [[f32; LANES]; 2] {
-        let mut out = [[0.0; LANES]; 2];
+    pub(super) fn depths(&self, block: usize, unit: DepthCode) -> [[f32; BLOCK_PIXELS]; 2] {
+        let mut out = [[0.0; BLOCK_PIXELS]; 2];
         let [depths, weights] = &self.means;
-        for lane in 0..LANES {
+        for lane in 0..BLOCK_PIXELS {
             if self.covered[block] >> lane & 1 == 0 {
                 continue;
             }
@@ -101,7 +101,7 @@ impl Layer {
     #[inline(always)]
     pub(super) fn fragments<S: Simd>(&self, simd: S, block: usize) -> [f32x16<S>; 4] {
         let [r, g, b] = &self.color;
-        let load = |lanes: &[f32; LANES]| f32x16::from_slice(simd, lanes);
+        let load = |lanes: &[f32; BLOCK_PIXELS]| f32x16::from_slice(simd, lanes);
         let rest = load(&self.transmittance[block]).abs();
         [
             load(&r[block]),
@@ -145,7 +145,7 @@ impl Layer {
     }
 
     /// Pixels that are finished or were not to be touched.
-    pub(super) fn finished(&self) -> Lanes {
+    pub(super) fn finished(&self) -> PixelMask {
         let mut finished = [0; BLOCKS];
         for (finished, lanes) in finished.iter_mut().zip(&self.transmittance) {
             for (lane, t) in lanes.iter().enumerate() {

@@ -25,7 +25,7 @@ use super::block_lists::{BlockLists, composite_by_block};
 use super::depth_ranges::Passing;
 use super::exact::{InOrder, WideSums};
 use super::fast::{self, FastScratch};
-use super::grid::{BLOCKS, Lanes, block_and_lane, count, lanes_within};
+use super::grid::{BLOCKS, PixelMask, block_and_lane, count, lanes_within};
 use super::inputs::{
     DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, NO_DEPTH, Task, Thresholds,
     TileMode, Way, Work,
@@ -97,7 +97,7 @@ impl GaussianTile {
         level: Level,
         [tile_x, tile_y]: [u32; 2],
         layer: usize,
-        lanes: &Lanes,
+        lanes: &PixelMask,
         counters: &mut Counters,
     ) {
         let list = draw.sorted.tiles.list(tile_x, tile_y);
@@ -160,8 +160,8 @@ impl GaussianTile {
         draw: &BinnedDraw,
         level: Level,
         [tile_x, tile_y]: [u32; 2],
-        lanes: &Lanes,
-    ) -> Lanes {
+        lanes: &PixelMask,
+    ) -> PixelMask {
         const LAYER: usize = LAYERS - 1;
         self.layers[LAYER].clear(lanes);
         let task = Task {

@@ -4,7 +4,7 @@
 //! stored depth are those from one more to one less. So one subtraction and one comparison do for every operation, and
 //! nothing in the kernel depends on which it is.
 
-use super::grid::{BLOCKS, LANES, Lanes};
+use super::grid::{BLOCKS, BLOCK_PIXELS, PixelMask};
 use crate::gaussian::depth::DepthTrend;
 use crate::packet::draw::CompareOp;
 use fearless_simd::{Simd, mask32x16, prelude::*, u32x16};
@@ -17,8 +17,8 @@ const NO_DEPTH: u32 = u32::MAX;
 #[repr(align(64))]
 pub(super) struct Passing {
     /// A depth passes at a pixel if it is `first` or at most `span` more.
-    first: [[u32; LANES]; BLOCKS],
-    span: [[u32; LANES]; BLOCKS],
+    first: [[u32; BLOCK_PIXELS]; BLOCKS],
+    span: [[u32; BLOCK_PIXELS]; BLOCKS],
     /// Depths beyond these fail in all of a block.
     least: [u32; BLOCKS],
     greatest: [u32; BLOCKS],
@@ -29,8 +29,8 @@ pub(super) struct Passing {
 impl Default for Passing {
     fn default() -> Self {
         Self {
-            first: [[0; LANES]; BLOCKS],
-            span: [[NO_DEPTH; LANES]; BLOCKS],
+            first: [[0; BLOCK_PIXELS]; BLOCKS],
+            span: [[NO_DEPTH; BLOCK_PIXELS]; BLOCKS],
             least: [0; BLOCKS],
             greatest: [NO_DEPTH; BLOCKS],
             tile: [0, NO_DEPTH],
@@ -57,10 +57,10 @@ fn range(op: CompareOp, stored: u32) -> Option<(u32, u32)> {
 
 impl Passing {
     /// Makes this what passes against the depths stored at `lanes` of a tile, which are in the order of its blocks.
-    pub(super) fn set(&mut self, op: CompareOp, stored: &[u32], lanes: &Lanes) {
+    pub(super) fn set(&mut self, op: CompareOp, stored: &[u32], lanes: &PixelMask) {
         self.tile = [NO_DEPTH, 0];
         for (block, stored) in stored
-            .as_chunks::<LANES>()
+            .as_chunks::<BLOCK_PIXELS>()
             .0
             .iter()
             .enumerate()
@@ -168,7 +168,7 @@ mod tests {
                 passing.set(op, &stored, &lanes);
                 for depth in 90..160 {
                     let passes = (0..256).any(|at| {
-                        lanes[at / LANES] >> (at % LANES) & 1 == 1 && compare(op, depth, stored[at])
+                        lanes[at / BLOCK_PIXELS] >> (at % BLOCK_PIXELS) & 1 == 1 && compare(op, depth, stored[at])
                     });
                     assert!(!(passes && passing.hides(depth)), "{op:?} {depth}");
                     // Bounds of single ranges are exact but for Equal, whose depths have gaps.

@@ -11,7 +11,7 @@ use super::accumulator::Layer;
 use super::block_lists::BlockKernel;
 use super::depth_ranges::Passing;
 use super::exp2::exp2_of_negated;
-use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64, LANES};
+use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
 use super::inputs::{FIND_MEAN, FIND_MEDIAN, NO_DEPTH, Task, Thresholds, TileMode};
 use super::pixels::{accumulate, falls_64};
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
@@ -20,8 +20,8 @@ use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Sums {
-    color: [[f64; LANES]; 3],
-    transmittance: [f64; LANES],
+    color: [[f64; BLOCK_PIXELS]; 3],
+    transmittance: [f64; BLOCK_PIXELS],
 }
 
 impl Sums {
@@ -57,7 +57,7 @@ impl Sums {
     ) -> (f32x16<S>, u64) {
         let alphas = alpha.widen();
         let low = self.add_half(simd, 0, alphas.0, color, reached, floor);
-        let high = self.add_half(simd, LANES / 2, alphas.1, color, reached, floor);
+        let high = self.add_half(simd, BLOCK_PIXELS / 2, alphas.1, color, reached, floor);
         (low.0.narrow(high.0), low.1 | high.1)
     }
 
@@ -72,7 +72,7 @@ impl Sums {
         reached: u64,
         floor: f32,
     ) -> (f64x8<S>, u64) {
-        let lanes = first..first + LANES / 2;
+        let lanes = first..first + BLOCK_PIXELS / 2;
         let reached = mask64x8::from_bitmask(simd, reached >> first & 0xff);
         let t = f64x8::from_slice(simd, &self.transmittance[lanes.clone()]);
         let weight = t * alpha;
@@ -119,8 +119,8 @@ impl WideSums {
     /// Sums of no block yet.
     pub(super) fn new() -> Self {
         Self(Sums {
-            color: [[0.0; LANES]; 3],
-            transmittance: [0.0; LANES],
+            color: [[0.0; BLOCK_PIXELS]; 3],
+            transmittance: [0.0; BLOCK_PIXELS],
         })
     }
 }

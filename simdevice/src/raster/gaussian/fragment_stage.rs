@@ -1,11 +1,11 @@
 //! The resolve shader: a fragment program that makes the colours of a Gaussian draw's fragments from what was
 //! accumulated. It runs once for all samples of a pixel that accumulated alike, or for each sample if it asks for that.
 //!
-//! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. Lanes that are not covered
+//! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. PixelMask that are not covered
 //! help with derivatives: they hold what their own pixels accumulated.
 
 use super::compositor::GaussianTile;
-use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, LANES, Lanes};
+use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, BLOCK_PIXELS, PixelMask};
 use super::samples::{SAMPLES, Samples};
 use crate::bindings::Prepared;
 use crate::counters::{Counter, Counters};
@@ -139,7 +139,7 @@ impl<'a> ResolveDraw<'a> {
         &self,
         tile: &Tile,
         samples: &Samples,
-        covered: &mut [Lanes; SAMPLES],
+        covered: &mut [PixelMask; SAMPLES],
         tools: &mut Tools<'_>,
     ) -> Result<(), Stopped> {
         for (index, output) in self.colors.iter().enumerate() {
@@ -183,7 +183,7 @@ impl<'a> ResolveDraw<'a> {
         (leader..self.samples).filter(move |&sample| self.leader(samples, sample, block) == leader)
     }
 
-    fn group(&self, leader: usize, samples: &Samples, covered: &[Lanes; SAMPLES]) -> Group {
+    fn group(&self, leader: usize, samples: &Samples, covered: &[PixelMask; SAMPLES]) -> Group {
         let is_covered = |&block: &usize| {
             let mut members = self.members(samples, leader, block);
             members.any(|sample| covered[sample][block] != 0)
@@ -199,11 +199,11 @@ impl<'a> ResolveDraw<'a> {
         tile: &Tile,
         group: &Group,
         samples: &Samples,
-        covered: &mut [Lanes; SAMPLES],
+        covered: &mut [PixelMask; SAMPLES],
         tools: &mut Tools<'_>,
         machines: &mut Machines,
     ) -> Result<(), Stopped> {
-        let lanes = LANES * group.blocks.len();
+        let lanes = BLOCK_PIXELS * group.blocks.len();
         let size = usize::from(lanes > crate::raster::fragment::BATCH_LANES[0]);
         let machine = self.stage.machine(machines, size);
         let mut helpers = LaneMask::none();
@@ -212,8 +212,8 @@ impl<'a> ResolveDraw<'a> {
             for sample in self.members(samples, group.leader, block) {
                 any |= covered[sample][block];
             }
-            for lane in (0..LANES).filter(|lane| any >> lane & 1 == 0) {
-                helpers.set(LANES * number + lane, true);
+            for lane in (0..BLOCK_PIXELS).filter(|lane| any >> lane & 1 == 0) {
+                helpers.set(BLOCK_PIXELS * number + lane, true);
             }
             self.set_inputs(
                 tile,
@@ -251,7 +251,7 @@ impl<'a> ResolveDraw<'a> {
         group: &Group,
         (number, block): (usize, usize),
         samples: &Samples,
-        covered: &[Lanes; SAMPLES],
+        covered: &[PixelMask; SAMPLES],
         tools: &Tools<'_>,
         machine: &mut Machine,
     ) {
@@ -259,9 +259,9 @@ impl<'a> ResolveDraw<'a> {
         let depths = if self.reads_depth() {
             layer.depths(block, self.draw.depth_unit)
         } else {
-            [[0.0; LANES]; 2]
+            [[0.0; BLOCK_PIXELS]; 2]
         };
-        let accumulated: [[f32; LANES]; 4] = dispatch!(self.level, simd => {
+        let accumulated: [[f32; BLOCK_PIXELS]; 4] = dispatch!(self.level, simd => {
             let [r, g, b, a] = layer.fragments(simd, block);
             [r.into(), g.into(), b.into(), a.into()]
         });
@@ -269,14 +269,14 @@ impl<'a> ResolveDraw<'a> {
             (true, 2..) => SAMPLES_4[group.leader],
             _ => CENTER[0],
         };
-        let bits = |lanes: [f32; LANES]| lanes.map(f32::to_bits);
+        let bits = |lanes: [f32; BLOCK_PIXELS]| lanes.map(f32::to_bits);
         for &(slot, input, _) in &self.stage.interface.inputs {
             let value = match input {
                 FragmentInput::Varying { index, .. } => match index {
                     0..4 => bits(accumulated[index as usize]),
                     resolve::EXPECTED_DEPTH => bits(depths[0]),
                     resolve::MEDIAN_DEPTH => bits(depths[1]),
-                    _ => [0; LANES],
+                    _ => [0; BLOCK_PIXELS],
                 },
                 FragmentInput::FragCoord(axis @ (0 | 1)) => {
                     let (middle, lanes) = if axis == 0 {
@@ -289,14 +289,14 @@ impl<'a> ResolveDraw<'a> {
                     bits(lanes.map(|lane| middle + lane + offset))
                 }
                 FragmentInput::FragCoord(2) => bits(depths[1]),
-                FragmentInput::FragCoord(_) => [1f32.to_bits(); LANES],
-                FragmentInput::FrontFacing => [u32::MAX; LANES],
-                FragmentInput::SampleId => [group.leader as u32; LANES],
+                FragmentInput::FragCoord(_) => [1f32.to_bits(); BLOCK_PIXELS],
+                FragmentInput::FrontFacing => [u32::MAX; BLOCK_PIXELS],
+                FragmentInput::SampleId => [group.leader as u32; BLOCK_PIXELS],
                 FragmentInput::SamplePosition(axis) => {
-                    [(within[axis.min(1)] as f32 / 256.0).to_bits(); LANES]
+                    [(within[axis.min(1)] as f32 / 256.0).to_bits(); BLOCK_PIXELS]
                 }
                 FragmentInput::SampleMask => {
-                    let mut masks = [0; LANES];
+                    let mut masks = [0; BLOCK_PIXELS];
                     for sample in self.members(samples, group.leader, block) {
                         for (lane, mask) in masks.iter_mut().enumerate() {
                             *mask |= (covered[sample][block] >> lane & 1) << sample;
@@ -307,7 +307,7 @@ impl<'a> ResolveDraw<'a> {
                 FragmentInput::PointCoord(_)
                 | FragmentInput::PrimitiveId
                 | FragmentInput::Layer
-                | FragmentInput::ViewportIndex => [0; LANES],
+                | FragmentInput::ViewportIndex => [0; BLOCK_PIXELS],
             };
             // An input that is the same for all lanes has one chunk.
             if let Some(chunk) = machine.input_mut(slot).get_mut(number) {
@@ -328,7 +328,7 @@ impl<'a> ResolveDraw<'a> {
         tile: &Tile,
         group: &Group,
         samples: &Samples,
-        covered: &mut [Lanes; SAMPLES],
+        covered: &mut [PixelMask; SAMPLES],
         killed: &LaneMask,
         machine: &Machine,
         buffers: &mut Buffers,
@@ -399,7 +399,7 @@ impl<'a> ResolveDraw<'a> {
                 second[3] = f32x16::splat(simd, 1.0);
             }
             let plane = &mut buffers.color[index];
-            let first = plane.start(tile.index, sample) + block * LANES;
+            let first = plane.start(tile.index, sample) + block * BLOCK_PIXELS;
             let quads = Quads::block(first);
             output.write(simd, &source, &second, lanes, &quads, plane.words_mut());
         }

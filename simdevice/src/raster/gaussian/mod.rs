@@ -38,7 +38,7 @@ use depth_ranges::Passing;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use fragment_stage::{ResolveDraw, Tools};
-use grid::{BLOCKS, LANES, Lanes, count, lanes_within};
+use grid::{BLOCKS, BLOCK_PIXELS, PixelMask, count, lanes_within};
 use inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
 use isa::exec::Stopped;
 use samples::{SAMPLES, Samples};
@@ -133,7 +133,7 @@ impl<'a> GaussianTileDraw<'a> {
                 self.composite::<FIND_MEDIAN>(tile, &mut samples, buffers, fragments, counters);
             }
         }
-        let mut covered: [Lanes; SAMPLES] = std::array::from_fn(|sample| {
+        let mut covered: [PixelMask; SAMPLES] = std::array::from_fn(|sample| {
             std::array::from_fn(|block| {
                 let layer = &fragments.layers[samples.layers[sample][block]];
                 layer.covered[block] & samples.tested[sample][block]
@@ -257,10 +257,10 @@ impl<'a> GaussianTileDraw<'a> {
     }
 
     /// A sample's stored depths in a block.
-    fn depths(&self, tile: &Tile, buffers: &Buffers, sample: usize, block: usize) -> [u32; LANES] {
-        let start = buffers.depth.start(tile.index, sample) + block * LANES;
-        let mut depths = [0; LANES];
-        depths.copy_from_slice(&buffers.depth.words()[start..][..LANES]);
+    fn depths(&self, tile: &Tile, buffers: &Buffers, sample: usize, block: usize) -> [u32; BLOCK_PIXELS] {
+        let start = buffers.depth.start(tile.index, sample) + block * BLOCK_PIXELS;
+        let mut depths = [0; BLOCK_PIXELS];
+        depths.copy_from_slice(&buffers.depth.words()[start..][..BLOCK_PIXELS]);
         depths
     }
 
@@ -269,7 +269,7 @@ impl<'a> GaussianTileDraw<'a> {
         &self,
         tile: &Tile,
         samples: &Samples,
-        covered: &[Lanes; SAMPLES],
+        covered: &[PixelMask; SAMPLES],
         buffers: &mut Buffers,
         fragments: &GaussianTile,
     ) {
@@ -295,14 +295,14 @@ impl<'a> GaussianTileDraw<'a> {
         &self,
         tile: &Tile,
         samples: &Samples,
-        covered: &[Lanes; SAMPLES],
+        covered: &[PixelMask; SAMPLES],
         buffers: &mut Buffers,
         fragments: &GaussianTile,
     ) {
         for (sample, covered) in covered.iter().enumerate().take(self.samples) {
             let start = buffers.depth.start(tile.index, sample);
             let stored = &mut buffers.depth.words_mut()[start..][..AREA];
-            for (block, stored) in stored.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            for (block, stored) in stored.as_chunks_mut::<BLOCK_PIXELS>().0.iter_mut().enumerate() {
                 let layer = &fragments.layers[samples.layers[sample][block]];
                 for (lane, stored) in stored.iter_mut().enumerate() {
                     if covered[block] >> lane & 1 == 1 {
@@ -320,7 +320,7 @@ impl<'a> GaussianTileDraw<'a> {
         face: &StencilFace,
         tile: &Tile,
         samples: &Samples,
-        covered: &[Lanes; SAMPLES],
+        covered: &[PixelMask; SAMPLES],
         buffers: &mut Buffers,
         fragments: &mut GaussianTile,
     ) {
@@ -341,7 +341,7 @@ impl<'a> GaussianTileDraw<'a> {
             let start = buffers.stencil.start(tile.index, sample);
             let stored = &mut buffers.stencil.bytes_mut()[start..][..AREA];
             for (at, stored) in stored.iter_mut().enumerate() {
-                let (block, lane) = (at / LANES, at % LANES);
+                let (block, lane) = (at / BLOCK_PIXELS, at % BLOCK_PIXELS);
                 let is = |lanes: u32| lanes >> lane & 1 == 1;
                 let op = if is(covered[block]) {
                     face.pass
@@ -360,8 +360,8 @@ impl<'a> GaussianTileDraw<'a> {
 }
 
 /// Takes away the lanes whose stored value, in the order of blocks, does not pass.
-fn keep<T: Copy>(lanes: &mut Lanes, stored: &[T], passes: impl Fn(T) -> bool) {
-    for (lanes, stored) in lanes.iter_mut().zip(stored.as_chunks::<LANES>().0) {
+fn keep<T: Copy>(lanes: &mut PixelMask, stored: &[T], passes: impl Fn(T) -> bool) {
+    for (lanes, stored) in lanes.iter_mut().zip(stored.as_chunks::<BLOCK_PIXELS>().0) {
         for (lane, &stored) in stored.iter().enumerate() {
             if !passes(stored) {
                 *lanes &= !(1 << lane);
@@ -377,7 +377,7 @@ fn blend<S: Simd>(
     output: &ColorOutput,
     fragments: &GaussianTile,
     layers: &[usize; BLOCKS],
-    covered: &Lanes,
+    covered: &PixelMask,
     start: usize,
     words: &mut [u32],
 ) {
@@ -387,7 +387,7 @@ fn blend<S: Simd>(
             continue;
         }
         let source = fragments.layers[layers[block]].fragments(simd, block);
-        let first = start + block * LANES;
+        let first = start + block * BLOCK_PIXELS;
         let quads = Quads::block(first);
         output.write(simd, &source, &no_second, lanes as u16, &quads, words);
     }

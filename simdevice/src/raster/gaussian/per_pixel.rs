@@ -10,7 +10,7 @@ use super::block_lists::{BlockLists, part};
 use super::depth_ranges::Passing;
 use super::exact::falls;
 use super::exp2::exp2_of_negated;
-use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64, LANES};
+use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
 use super::inputs::{FIND_MEDIAN, NO_DEPTH, Task, Work};
 use crate::gaussian::ray_depth::{PixelRays, RayDepths, Rays, ordered_key};
 use crate::gaussian::splat::locate;
@@ -118,7 +118,7 @@ impl Sum {
 /// A worker's scratch for tiles in the per-pixel order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PerPixel {
-    pixels: [Gathered; LANES],
+    pixels: [Gathered; BLOCK_PIXELS],
 }
 
 /// Composites a tile in the per-pixel order.
@@ -163,7 +163,7 @@ impl PerPixel {
     ) -> u64 {
         let mut open = layer.open_lanes(block);
         let rays = block_rays(&depths.rays, task.corner, block);
-        let mut sums = [Sum::EMPTY; LANES];
+        let mut sums = [Sum::EMPTY; BLOCK_PIXELS];
         for pixel in &mut self.pixels {
             pixel.clear();
         }
@@ -185,13 +185,13 @@ impl PerPixel {
                 }
                 let (alpha, along) = (alpha.to_array(), {
                     let depth = &depths.of[batch][place];
-                    let mut along = [0.0; LANES];
+                    let mut along = [0.0; BLOCK_PIXELS];
                     depth.along(simd, &rays, 0).store_slice(&mut along[..8]);
                     depth.along(simd, &rays, 8).store_slice(&mut along[8..]);
                     along
                 });
                 while reached != 0 {
-                    let lane = reached.trailing_zeros() as usize % LANES;
+                    let lane = reached.trailing_zeros() as usize % BLOCK_PIXELS;
                     self.pixels[lane].add(Contribution {
                         place: (ordered_key(along[lane]), number),
                         alpha: alpha[lane].to_bits(),
@@ -255,7 +255,7 @@ fn block_rays(rays: &PixelRays, corner: [u32; 2], block: usize) -> Rays {
 }
 
 /// Takes what the open pixels of a block accumulated.
-fn store(layer: &mut Layer, block: usize, sums: &[Sum; LANES]) {
+fn store(layer: &mut Layer, block: usize, sums: &[Sum; BLOCK_PIXELS]) {
     let open = layer.open_lanes(block);
     for (lane, sum) in sums.iter().enumerate() {
         if open >> lane & 1 == 0 {

@@ -3,7 +3,7 @@
 
 use super::accumulator::Layer;
 use super::depth_ranges::Passing;
-use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, ROUND, LANE_X_64, LANE_Y_64, LANES};
+use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, ROUND, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
 use super::inputs::{
     DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, Task, Thresholds, power,
 };
@@ -40,13 +40,13 @@ const FAR_FROM_FLOOR: f32 = 8.0;
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub(super) struct Alphas {
-    alphas: [[f32; LANES]; BLOCKS * ROUND],
+    alphas: [[f32; BLOCK_PIXELS]; BLOCKS * ROUND],
 }
 
 impl Default for Alphas {
     fn default() -> Self {
         Self {
-            alphas: [[0.0; LANES]; BLOCKS * ROUND],
+            alphas: [[0.0; BLOCK_PIXELS]; BLOCKS * ROUND],
         }
     }
 }
@@ -61,7 +61,7 @@ impl Alphas {
         &mut self,
         simd: S,
         reaching: &Reaching,
-        (round, most_fall): (&StagedRound, &[[f32; LANES]; BLOCKS]),
+        (round, most_fall): (&StagedRound, &[[f32; BLOCK_PIXELS]; BLOCKS]),
         passing: &Passing,
         thresholds: Thresholds,
     ) -> u64 {
@@ -185,7 +185,7 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
 fn composite_far_from_floor<S: Simd>(
     layer: &mut Layer,
     simd: S,
-    (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
+    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> bool {
@@ -223,7 +223,7 @@ fn composite_far_from_floor<S: Simd>(
 fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
     layer: &mut Layer,
     simd: S,
-    (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
+    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> u64 {

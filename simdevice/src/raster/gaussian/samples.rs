@@ -1,6 +1,6 @@
 //! What becomes of a tile's samples.
 
-use super::grid::{BLOCKS, Lanes};
+use super::grid::{BLOCKS, PixelMask};
 use crate::raster::MAX_SAMPLES;
 
 pub(super) const SAMPLES: usize = MAX_SAMPLES as usize;
@@ -9,16 +9,16 @@ pub(super) const SAMPLES: usize = MAX_SAMPLES as usize;
 #[derive(Debug, Default)]
 pub(super) struct Samples {
     /// Those that the draw may touch, and whose stored depth lies within bounds.
-    pub(super) candidates: [Lanes; SAMPLES],
+    pub(super) candidates: [PixelMask; SAMPLES],
     /// Those of them that pass the stencil test.
-    pub(super) tested: [Lanes; SAMPLES],
+    pub(super) tested: [PixelMask; SAMPLES],
     /// The layer that a sample's block is composited in.
     pub(super) layers: [[usize; BLOCKS]; SAMPLES],
 }
 
 impl Samples {
     /// Leaves alone what was covered and then discarded, as if nothing had reached it.
-    pub(super) fn leave(&mut self, covered: &[Lanes; SAMPLES], kept: &[Lanes; SAMPLES]) {
+    pub(super) fn leave(&mut self, covered: &[PixelMask; SAMPLES], kept: &[PixelMask; SAMPLES]) {
         let lanes = covered.iter().zip(kept);
         for (candidates, (covered, kept)) in self.candidates.iter_mut().zip(lanes) {
             for (block, candidates) in candidates.iter_mut().enumerate() {

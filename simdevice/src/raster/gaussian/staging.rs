@@ -2,7 +2,7 @@
 
 use super::depth_ranges::Passing;
 use super::grid::{
-    BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, ROUND, HALF, LANE_X, LANE_Y, LANES,
+    BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, ROUND, HALF, LANE_X, LANE_Y, BLOCK_PIXELS,
 };
 use super::inputs::{DepthMode, NO_DEPTH, Task};
 use crate::gaussian::splat::Splat;
@@ -28,11 +28,11 @@ pub(super) struct StagedRound {
 pub(super) struct StagedSplat {
     /// By column of blocks, `u^2` less the logarithm of the opacity at the pixels of two rows: both pairs of a block's rows
     /// have the same.
-    pub(super) from_u: [[f32; LANES / 2]; BLOCKS_ACROSS],
+    pub(super) from_u: [[f32; BLOCK_PIXELS / 2]; BLOCKS_ACROSS],
     /// `v` at the middle of each block.
     pub(super) v: [f32; BLOCKS],
     /// What a pixel's offset from the middle of its block adds to that.
-    pub(super) along: [f32; LANES],
+    pub(super) along: [f32; BLOCK_PIXELS],
 }
 
 /// What it takes to composite.
@@ -149,7 +149,7 @@ impl StagedSplat {
         let v = upper.combine(lower);
         v.store_slice(&mut self.v);
         let [a, b, c] = [a as f32, b as f32, c as f32];
-        let columns = f32x8::from_slice(simd, &LANE_X[..LANES / 2]);
+        let columns = f32x8::from_slice(simd, &LANE_X[..BLOCK_PIXELS / 2]);
         let across = columns * a;
         let log2_opacity = f32x8::splat(simd, splat.log2_opacity);
         for (column, from_u) in self.from_u.iter_mut().enumerate() {

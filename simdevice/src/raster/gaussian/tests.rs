@@ -24,7 +24,7 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 /// A vector's worth of one value, its power at a level, and that level's name.
-fn exp2_at(level: Level, x: [f32; LANES]) -> [f32; LANES] {
+fn exp2_at(level: Level, x: [f32; BLOCK_PIXELS]) -> [f32; BLOCK_PIXELS] {
     dispatch!(level, simd => exp2_of_negated(simd, -f32x16::simd_from(simd, x)).to_array())
 }
 
@@ -35,7 +35,7 @@ fn powers_of_two_are_within_their_bound_at_every_level() {
         let mut worst = 0.0f64;
         let mut x = -126.0f32;
         while x <= 4.0 {
-            let steps: [f32; LANES] = std::array::from_fn(|lane| x + lane as f32 / 1024.0);
+            let steps: [f32; BLOCK_PIXELS] = std::array::from_fn(|lane| x + lane as f32 / 1024.0);
             for (x, power) in steps.into_iter().zip(exp2_at(level, steps)) {
                 let exact = f64::from(x).exp2();
                 let ulp = f64::from((exact as f32).next_up()) - f64::from(exact as f32);
