@@ -9,7 +9,7 @@ use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 /// Arrays are indexed by block, row by row, then by pixel of the block in the order of [`block_and_lane`].
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub(super) struct Layer {
+pub(super) struct Accumulator {
     pub(super) color: [[[f32; BLOCK_PIXELS]; BLOCKS]; 3],
     /// Transmittance; negative where the pixel is finished, [`UNTOUCHED`] where it is not to be touched.
     pub(super) transmittance: [[f32; BLOCK_PIXELS]; BLOCKS],
@@ -23,7 +23,7 @@ pub(super) struct Layer {
     pub(super) means: [[[f32; BLOCK_PIXELS]; BLOCKS]; 2],
 }
 
-/// What no layer leaves anything of, neither more nor less than a floor.
+/// What no accumulator leaves anything of, neither more nor less than a floor.
 const UNTOUCHED: f32 = f32::NEG_INFINITY;
 
 /// A transmittance that is compared with pixels': its bits, which as integers are in the order of what they stand for, and
@@ -45,7 +45,7 @@ impl Light {
     }
 }
 
-impl Layer {
+impl Accumulator {
     pub(super) const EMPTY: Self = Self {
         color: [[[0.0; BLOCK_PIXELS]; BLOCKS]; 3],
         transmittance: [[1.0; BLOCK_PIXELS]; BLOCKS],

@@ -5,7 +5,7 @@
 //! given, rounded. Powers of two come from the polynomial of binary32, unfused, rounded. Nothing depends on the SIMD
 //! level, and [`scalar`] says the same without vectors.
 
-use super::accumulator::Layer;
+use super::accumulator::Accumulator;
 use super::block_lists::BlockKernel;
 use super::depth_ranges::Passing;
 use super::exp2::POWER_OF_TWO;
@@ -71,7 +71,7 @@ impl BlockKernel for Half {
         simd: S,
         task: &Task<'_>,
         (batch, place): (usize, usize),
-        (layer, block): (&mut Layer, usize),
+        (accumulator, block): (&mut Accumulator, usize),
         passing: &Passing,
     ) -> u64 {
         let thresholds = self.thresholds;
@@ -85,7 +85,7 @@ impl BlockKernel for Half {
             passing.pixels(simd, block, splat.depth)
         };
         let look = (rounded.color, splat.depth);
-        accumulate(layer, simd, block, alpha, shown, look, thresholds)
+        accumulate(accumulator, simd, block, alpha, shown, look, thresholds)
     }
 }
 
@@ -116,7 +116,7 @@ fn alpha<S: Simd>(simd: S, g: &Splat16, [dx, dy]: [f32x16<S>; 2], ceiling: f32) 
 /// Composites a Gaussian of a colour and a depth in a block, where it is `shown`; returns how many pixels accepted it.
 #[inline(always)]
 fn accumulate<S: Simd>(
-    layer: &mut Layer,
+    accumulator: &mut Accumulator,
     simd: S,
     block: usize,
     alpha: f32x16<S>,
@@ -125,27 +125,27 @@ fn accumulate<S: Simd>(
     thresholds: Thresholds,
 ) -> u64 {
     let zero = f32x16::splat(simd, 0.0);
-    let t = f32x16::from_slice(simd, &layer.transmittance[block]);
+    let t = f32x16::from_slice(simd, &accumulator.transmittance[block]);
     let weight = round(simd, t * alpha);
     let rest = round(simd, t - weight);
     let reached = alpha.simd_ge(thresholds.alpha_floor) & t.simd_ge(zero) & shown;
     let accepted = reached & rest.simd_ge(thresholds.transmittance_floor);
     let finished = reached & rest.simd_lt(thresholds.transmittance_floor);
     if thresholds.depth_mode >= FIND_MEDIAN {
-        let median = u32x16::from_slice(simd, &layer.median[block]);
+        let median = u32x16::from_slice(simd, &accumulator.median[block]);
         let first_half = accepted & t.simd_ge(0.5);
         let median = first_half.select(u32x16::splat(simd, depth), median);
-        median.store_slice(&mut layer.median[block]);
+        median.store_slice(&mut accumulator.median[block]);
     }
     let t = accepted.select(rest, finished.select(zero - t, t));
-    t.store_slice(&mut layer.transmittance[block]);
-    for (channel, color) in layer.color.iter_mut().zip(color) {
+    t.store_slice(&mut accumulator.transmittance[block]);
+    for (channel, color) in accumulator.color.iter_mut().zip(color) {
         let sum = f32x16::from_slice(simd, &channel[block]);
         let more = round(simd, sum + round(simd, weight * color));
         accepted.select(more, sum).store_slice(&mut channel[block]);
     }
     let accepted = accepted.to_bitmask() as u32;
-    layer.covered[block] |= accepted;
+    accumulator.covered[block] |= accepted;
     u64::from(accepted.count_ones())
 }
 

@@ -1,6 +1,6 @@
 //! A tile's list parted by blocks of pixels, for kernels that work off one block after the other.
 
-use super::accumulator::Layer;
+use super::accumulator::Accumulator;
 use super::depth_ranges::Passing;
 use super::grid::{BLOCKS, ROUND};
 use super::inputs::{NO_DEPTH, Task, TileMode, Work};
@@ -17,11 +17,11 @@ pub(super) type BlockLists = [Vec<u32>; BLOCKS];
 /// A kernel that composites a block's list, one Gaussian after the other.
 pub(super) trait BlockKernel {
     /// Begins with a block.
-    fn begin(&mut self, _layer: &Layer, _block: usize) {}
+    fn begin(&mut self, _layer: &Accumulator, _block: usize) {}
 
     /// Reports whether a pixel of the block is not finished.
-    fn is_open(&self, layer: &Layer, block: usize) -> bool {
-        layer.open_lanes(block) != 0
+    fn is_open(&self, accumulator: &Accumulator, block: usize) -> bool {
+        accumulator.open_lanes(block) != 0
     }
 
     /// Composites the Gaussian at a batch and a place there; returns how many pixels accepted it.
@@ -30,12 +30,12 @@ pub(super) trait BlockKernel {
         simd: S,
         task: &Task<'_>,
         at: (usize, usize),
-        to: (&mut Layer, usize),
+        to: (&mut Accumulator, usize),
         passing: &Passing,
     ) -> u64;
 
     /// Ends with a block.
-    fn end(&mut self, _layer: &mut Layer, _block: usize) {}
+    fn end(&mut self, _layer: &mut Accumulator, _block: usize) {}
 }
 
 /// Composites a tile by a kernel, in the order of its list.
@@ -45,24 +45,24 @@ pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
     mut kernel: K,
     task: &Task<'_>,
     lists: &mut BlockLists,
-    (layer, passing): (&mut Layer, &Passing),
+    (accumulator, passing): (&mut Accumulator, &Passing),
     runs: Option<&mut Vec<Run>>,
 ) -> Work {
-    let mut work = part(simd, task, lists, (layer, passing), runs);
+    let mut work = part(simd, task, lists, (accumulator, passing), runs);
     let ends_early = task.optimizations.has(Optimization::EarlyTermination);
     for (block, list) in lists.iter().enumerate() {
-        kernel.begin(layer, block);
+        kernel.begin(accumulator, block);
         for round in list.chunks(ROUND) {
-            if ends_early && !kernel.is_open(layer, block) {
+            if ends_early && !kernel.is_open(accumulator, block) {
                 break;
             }
             for &primitive in round {
                 let at = locate(primitive);
                 work.contributions +=
-                    kernel.composite(simd, task, at, (&mut *layer, block), passing);
+                    kernel.composite(simd, task, at, (&mut *accumulator, block), passing);
             }
         }
-        kernel.end(layer, block);
+        kernel.end(accumulator, block);
     }
     work
 }
@@ -79,7 +79,7 @@ pub(super) fn part<S: Simd>(
     simd: S,
     task: &Task<'_>,
     lists: &mut BlockLists,
-    (layer, passing): (&Layer, &Passing),
+    (accumulator, passing): (&Accumulator, &Passing),
     runs: Option<&mut Vec<Run>>,
 ) -> Work {
     let mut work = Work {
@@ -138,7 +138,7 @@ pub(super) fn part<S: Simd>(
             runs,
             Run {
                 primitives: task.list.len() as u32,
-                rows: layer.open_rows(),
+                rows: accumulator.open_rows(),
                 blocks: BLOCKS as u8,
                 reached: work.items as u32,
                 hidden: work.tiles_hidden as u32,

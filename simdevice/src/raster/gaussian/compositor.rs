@@ -19,7 +19,7 @@
 //! [`pixels`]: super::pixels
 //! [`depth_ranges`]: super::depth_ranges
 
-use super::accumulator::Layer;
+use super::accumulator::Accumulator;
 use super::binary16::Half;
 use super::block_lists::{BlockLists, composite_by_block};
 use super::depth_ranges::Passing;
@@ -45,12 +45,12 @@ use fearless_simd::Level;
 const PIECE: usize = 1024;
 
 /// Layers of a tile: one for each sample, and one to find what is reached at all.
-const LAYERS: usize = MAX_SAMPLES as usize + 1;
+const ACCUMULATORS: usize = MAX_SAMPLES as usize + 1;
 
 /// The part of tile buffer B that Gaussian mode uses.
 #[derive(Debug)]
 pub struct GaussianTile {
-    pub(super) layers: [Layer; LAYERS],
+    pub(super) accumulators: [Accumulator; ACCUMULATORS],
     pub(super) passing: Passing,
     fast: FastScratch,
     /// Of the kernels that part lists by blocks.
@@ -63,7 +63,7 @@ pub struct GaussianTile {
 impl Default for GaussianTile {
     fn default() -> Self {
         Self {
-            layers: [Layer::EMPTY; LAYERS],
+            accumulators: [Accumulator::EMPTY; ACCUMULATORS],
             passing: Passing::default(),
             fast: FastScratch::default(),
             lists: Default::default(),
@@ -87,21 +87,21 @@ impl GaussianTile {
         let at = [tile_x, tile_y];
         let lanes = lanes_within(draw.bounds, at.map(|tile| tile * TILE_SIZE));
         self.run::<NO_DEPTH>(draw, level, at, 0, &lanes, counters);
-        self.layers[0].covered != [0; BLOCKS]
+        self.accumulators[0].covered != [0; BLOCKS]
     }
 
-    /// Composites `draw`'s Gaussians in `lanes` of a tile, into a layer.
+    /// Composites `draw`'s Gaussians in `lanes` of a tile, into a accumulator.
     pub(super) fn run<const DEPTH: DepthMode>(
         &mut self,
         draw: &BinnedDraw,
         level: Level,
         [tile_x, tile_y]: [u32; 2],
-        layer: usize,
+        accumulator: usize,
         lanes: &PixelMask,
         counters: &mut Counters,
     ) {
         let list = draw.sorted.tiles.list(tile_x, tile_y);
-        let to = &mut self.layers[layer];
+        let to = &mut self.accumulators[accumulator];
         to.clear(lanes);
         if DEPTH == FIND_MEAN {
             to.clear_means();
@@ -124,8 +124,8 @@ impl GaussianTile {
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
         let work = match draw.sorted.tiles.walk() {
-            None => self.composite_list::<DEPTH>(level, &task, layer, runs.as_mut()),
-            Some(walk) => self.composite_walk::<DEPTH>(level, &task, walk, layer, runs.as_mut()),
+            None => self.composite_list::<DEPTH>(level, &task, accumulator, runs.as_mut()),
+            Some(walk) => self.composite_walk::<DEPTH>(level, &task, walk, accumulator, runs.as_mut()),
         };
         if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
             let outside = TILE_SIZE * TILE_SIZE - count(lanes);
@@ -134,7 +134,7 @@ impl GaussianTile {
                 listed: work.listed as u32,
                 runs,
                 contributions: work.contributions,
-                terminated: count(&self.layers[layer].finished()).saturating_sub(outside),
+                terminated: count(&self.accumulators[accumulator].finished()).saturating_sub(outside),
                 hidden_rest: work.hidden_rest,
                 ..TileWork::default()
             });
@@ -162,8 +162,8 @@ impl GaussianTile {
         [tile_x, tile_y]: [u32; 2],
         lanes: &PixelMask,
     ) -> PixelMask {
-        const LAYER: usize = LAYERS - 1;
-        self.layers[LAYER].clear(lanes);
+        const LAYER: usize = ACCUMULATORS - 1;
+        self.accumulators[LAYER].clear(lanes);
         let task = Task {
             splats: &draw.sorted.splats,
             mode: TileMode::of(draw).in_list_order(),
@@ -183,7 +183,7 @@ impl GaussianTile {
             None => self.composite_list::<FIND_REACHED>(level, &task, LAYER, None),
             Some(walk) => self.composite_walk::<FIND_REACHED>(level, &task, walk, LAYER, None),
         };
-        let finished = self.layers[LAYER].finished();
+        let finished = self.accumulators[LAYER].finished();
         std::array::from_fn(|block| finished[block] & lanes[block])
     }
 
@@ -192,19 +192,19 @@ impl GaussianTile {
         &mut self,
         level: Level,
         task: &Task<'_>,
-        layer: usize,
+        accumulator: usize,
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
         let work = match task.mode {
             TileMode::Fast if DEPTH == NO_DEPTH && task.way.powers != NO_DEPTH => {
-                self.composite_with_fast_powers(level, task, layer, runs)
+                self.composite_with_fast_powers(level, task, accumulator, runs)
             }
             TileMode::Fast => {
-                let to = (&mut self.layers[layer], &self.passing);
+                let to = (&mut self.accumulators[accumulator], &self.passing);
                 let fast = &mut self.fast;
                 dispatch!(level, simd => fast::composite::<_, DEPTH>(fast, simd, task, to, runs))
             }
-            _ => self.composite_by_block(level, task, layer, runs),
+            _ => self.composite_by_block(level, task, accumulator, runs),
         };
         Work {
             listed: task.list.len() as u64,
@@ -217,10 +217,10 @@ impl GaussianTile {
         &mut self,
         level: Level,
         task: &Task<'_>,
-        layer: usize,
+        accumulator: usize,
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
-        let to = (&mut self.layers[layer], &self.passing);
+        let to = (&mut self.accumulators[accumulator], &self.passing);
         let fast = &mut self.fast;
         match task.way.powers {
             FASTER_POWERS => dispatch!(level, simd =>
@@ -235,10 +235,10 @@ impl GaussianTile {
         &mut self,
         level: Level,
         task: &Task<'_>,
-        layer: usize,
+        accumulator: usize,
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
-        let to = (&mut self.layers[layer], &self.passing);
+        let to = (&mut self.accumulators[accumulator], &self.passing);
         let lists = &mut self.lists;
         match task.mode {
             TileMode::Half => {
@@ -260,11 +260,11 @@ impl GaussianTile {
                 dispatch!(level, simd => composite_by_block(simd, kernel, task, lists, to, runs))
             }
             TileMode::Fast | TileMode::Exact { .. } => {
-                let (layer, passing) = to;
+                let (accumulator, passing) = to;
                 dispatch!(level, simd => {
-                    let to = (&mut *layer, passing);
+                    let to = (&mut *accumulator, passing);
                     let work = composite_by_block(simd, InOrder, task, lists, to, runs);
-                    layer.find_covered(simd);
+                    accumulator.find_covered(simd);
                     work
                 })
             }
@@ -277,7 +277,7 @@ impl GaussianTile {
         level: Level,
         task: &Task<'_>,
         walk: &SortedWalk,
-        layer: usize,
+        accumulator: usize,
         mut runs: Option<&mut Vec<Run>>,
     ) -> Work {
         let most = match task.mode {
@@ -290,7 +290,7 @@ impl GaussianTile {
         let mut piece = std::mem::take(&mut self.piece);
         loop {
             if task.optimizations.has(Optimization::EarlyTermination)
-                && dispatch!(level, simd => self.layers[layer].open_blocks(simd, task.way.light))
+                && dispatch!(level, simd => self.accumulators[accumulator].open_blocks(simd, task.way.light))
                     == 0
             {
                 break;
@@ -303,7 +303,7 @@ impl GaussianTile {
                 list: &piece,
                 ..*task
             };
-            let more = self.composite_list::<DEPTH>(level, &task, layer, runs.as_deref_mut());
+            let more = self.composite_list::<DEPTH>(level, &task, accumulator, runs.as_deref_mut());
             work.add(&more);
         }
         self.piece = piece;
@@ -315,14 +315,14 @@ impl GaussianTile {
         self.sample(0, x, y)
     }
 
-    /// As [`GaussianTile::pixel`], of a layer.
-    fn sample(&self, layer: usize, x: usize, y: usize) -> Option<[f32; 4]> {
-        let layer = &self.layers[layer];
+    /// As [`GaussianTile::pixel`], of a accumulator.
+    fn sample(&self, accumulator: usize, x: usize, y: usize) -> Option<[f32; 4]> {
+        let accumulator = &self.accumulators[accumulator];
         let (block, lane) = block_and_lane(x, y);
-        let covered = layer.covered[block] >> lane & 1 == 1;
+        let covered = accumulator.covered[block] >> lane & 1 == 1;
         covered.then(|| {
-            let [r, g, b] = [0, 1, 2].map(|channel| layer.color[channel][block][lane]);
-            [r, g, b, 1.0 - layer.transmittance[block][lane].abs()]
+            let [r, g, b] = [0, 1, 2].map(|channel| accumulator.color[channel][block][lane]);
+            [r, g, b, 1.0 - accumulator.transmittance[block][lane].abs()]
         })
     }
 }

@@ -1,13 +1,13 @@
 //! Kernels for what the fast one cannot do in the order of a list: exponents in binary64 at every pixel, and sums in
 //! binary64.
 //!
-//! Sums are in binary64 for draws whose floors let more layers be seen through each other than the usual ones do.
+//! Sums are in binary64 for draws whose floors let more accumulators be seen through each other than the usual ones do.
 //!
-//! Each layer rounds the transmittance and the colour of a pixel. With the usual floors a pixel ends before that is
-//! worth much; without them errors of thousands of layers add up beyond the contract. A block's whole list is worked off
+//! Each accumulator rounds the transmittance and the colour of a pixel. With the usual floors a pixel ends before that is
+//! worth much; without them errors of thousands of accumulators add up beyond the contract. A block's whole list is worked off
 //! at once here, so that its sums stay at hand and are rounded to binary32 only in the end.
 
-use super::accumulator::Layer;
+use super::accumulator::Accumulator;
 use super::block_lists::BlockKernel;
 use super::depth_ranges::Passing;
 use super::exp2::exp2_of_negated;
@@ -16,7 +16,7 @@ use super::inputs::{FIND_MEAN, FIND_MEDIAN, NO_DEPTH, Task, Thresholds, TileMode
 use super::pixels::{accumulate, falls_64};
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
-/// What the pixels of a block accumulate; signs of transmittances as in [`Layer`].
+/// What the pixels of a block accumulate; signs of transmittances as in [`Accumulator`].
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Sums {
@@ -25,18 +25,18 @@ struct Sums {
 }
 
 impl Sums {
-    fn load(layer: &Layer, block: usize) -> Self {
+    fn load(accumulator: &Accumulator, block: usize) -> Self {
         Self {
-            color: [0, 1, 2].map(|channel| layer.color[channel][block].map(f64::from)),
-            transmittance: layer.transmittance[block].map(f64::from),
+            color: [0, 1, 2].map(|channel| accumulator.color[channel][block].map(f64::from)),
+            transmittance: accumulator.transmittance[block].map(f64::from),
         }
     }
 
-    fn store(&self, layer: &mut Layer, block: usize) {
-        for (channel, color) in layer.color.iter_mut().zip(&self.color) {
+    fn store(&self, accumulator: &mut Accumulator, block: usize) {
+        for (channel, color) in accumulator.color.iter_mut().zip(&self.color) {
             channel[block] = color.map(|color| color as f32);
         }
-        layer.transmittance[block] = self.transmittance.map(|t| t as f32);
+        accumulator.transmittance[block] = self.transmittance.map(|t| t as f32);
     }
 
     /// Whether a pixel is not finished.
@@ -102,13 +102,13 @@ impl BlockKernel for InOrder {
         simd: S,
         task: &Task<'_>,
         (batch, place): (usize, usize),
-        (layer, block): (&mut Layer, usize),
+        (accumulator, block): (&mut Accumulator, usize),
         passing: &Passing,
     ) -> u64 {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
         let look = (splat.color, splat.depth);
-        accumulate(layer, simd, block, fall, look, passing, task.thresholds)
+        accumulate(accumulator, simd, block, fall, look, passing, task.thresholds)
     }
 }
 
@@ -127,12 +127,12 @@ impl WideSums {
 
 impl BlockKernel for WideSums {
     #[inline(always)]
-    fn begin(&mut self, layer: &Layer, block: usize) {
-        self.0 = Sums::load(layer, block);
+    fn begin(&mut self, accumulator: &Accumulator, block: usize) {
+        self.0 = Sums::load(accumulator, block);
     }
 
     #[inline(always)]
-    fn is_open(&self, _: &Layer, _: usize) -> bool {
+    fn is_open(&self, _: &Accumulator, _: usize) -> bool {
         self.0.is_open()
     }
 
@@ -142,26 +142,26 @@ impl BlockKernel for WideSums {
         simd: S,
         task: &Task<'_>,
         (batch, place): (usize, usize),
-        (layer, block): (&mut Layer, usize),
+        (accumulator, block): (&mut Accumulator, usize),
         passing: &Passing,
     ) -> u64 {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
         let look = (splat.color, splat.depth);
         let to = (block, &mut self.0);
-        accumulate_wide(layer, simd, to, fall, look, passing, task.thresholds)
+        accumulate_wide(accumulator, simd, to, fall, look, passing, task.thresholds)
     }
 
     #[inline(always)]
-    fn end(&mut self, layer: &mut Layer, block: usize) {
-        self.0.store(layer, block);
+    fn end(&mut self, accumulator: &mut Accumulator, block: usize) {
+        self.0.store(accumulator, block);
     }
 }
 
 /// As [`accumulate`], to sums that are kept elsewhere.
 #[inline(always)]
 fn accumulate_wide<S: Simd>(
-    layer: &mut Layer,
+    accumulator: &mut Accumulator,
     simd: S,
     (block, sums): (usize, &mut Sums),
     fall: f32x16<S>,
@@ -181,7 +181,7 @@ fn accumulate_wide<S: Simd>(
     let floor = thresholds.transmittance_floor;
     let (weight, accepted) = sums.add(simd, alpha, color, reached.to_bitmask(), floor);
     if thresholds.depth_mode >= FIND_MEDIAN {
-        for (lane, (median, t)) in layer.median[block].iter_mut().zip(before).enumerate() {
+        for (lane, (median, t)) in accumulator.median[block].iter_mut().zip(before).enumerate() {
             if accepted >> lane & 1 == 1 && t >= 0.5 {
                 *median = depth;
             }
@@ -189,13 +189,13 @@ fn accumulate_wide<S: Simd>(
     }
     if thresholds.depth_mode == FIND_MEAN {
         let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
-        let [depths, weights] = &mut layer.means;
+        let [depths, weights] = &mut accumulator.means;
         let sum = f32x16::from_slice(simd, &depths[block]);
         weight.mul_add(depth, sum).store_slice(&mut depths[block]);
         let sum = f32x16::from_slice(simd, &weights[block]) + weight;
         sum.store_slice(&mut weights[block]);
     }
-    layer.covered[block] |= accepted as u32;
+    accumulator.covered[block] |= accepted as u32;
     u64::from(accepted.count_ones())
 }
 

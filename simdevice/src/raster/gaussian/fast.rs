@@ -5,7 +5,7 @@
 //! [`staging`]: super::staging
 //! [`pixels`]: super::pixels
 
-use super::accumulator::{ANY_LIGHT, Layer};
+use super::accumulator::{ANY_LIGHT, Accumulator};
 use super::depth_ranges::Passing;
 use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, Task, Work};
@@ -49,26 +49,26 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     scratch: &mut FastScratch,
     simd: S,
     task: &Task<'_>,
-    (layer, passing): (&mut Layer, &Passing),
+    (accumulator, passing): (&mut Accumulator, &Passing),
     mut runs: Option<&mut Vec<Run>>,
 ) -> Work {
     let mut work = Work::default();
     for block in 0..BLOCKS {
-        layer.find_most_fall(simd, block, task.thresholds.most_fall);
+        accumulator.find_most_fall(simd, block, task.thresholds.most_fall);
     }
     for primitive in task.list.iter().take(ROUND) {
         task.prefetch(Some(primitive));
     }
     for (number, round) in task.list.chunks(ROUND).enumerate() {
         let rest = &task.list[number * ROUND..];
-        let bits = open_blocks::<_, DEPTH>(simd, task, layer, rest, &mut work);
+        let bits = open_blocks::<_, DEPTH>(simd, task, accumulator, rest, &mut work);
         if bits == 0 {
             break;
         }
         let open = Open {
             bits,
             blocks: bits.count_ones() as u8,
-            rows: if runs.is_some() { layer.open_rows() } else { 0 },
+            rows: if runs.is_some() { accumulator.open_rows() } else { 0 },
         };
         if DEPTH > NO_DEPTH && passing.hides_from(task.splat(round[0]).depth, task.trend) {
             work.tiles_hidden += rest.len() as u64;
@@ -90,7 +90,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             scratch,
             simd,
             task,
-            (&mut *layer, passing),
+            (&mut *accumulator, passing),
             &round,
             &mut work,
         );
@@ -107,7 +107,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             trace::push_run(runs, run);
         }
     }
-    layer.find_covered(simd);
+    accumulator.find_covered(simd);
     work
 }
 
@@ -117,16 +117,16 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
 fn open_blocks<S: Simd, const DEPTH: DepthMode>(
     simd: S,
     task: &Task<'_>,
-    layer: &Layer,
+    accumulator: &Accumulator,
     rest: &[u32],
     work: &mut Work,
 ) -> u64 {
     if !task.optimizations.has(Optimization::EarlyTermination) {
         return ALL_BLOCKS;
     }
-    let open = layer.open_blocks(simd, task.way.light);
+    let open = accumulator.open_blocks(simd, task.way.light);
     if DEPTH <= NO_DEPTH && task.way.light != ANY_LIGHT {
-        let left_out = layer.open_blocks(simd, ANY_LIGHT) & !open;
+        let left_out = accumulator.open_blocks(simd, ANY_LIGHT) & !open;
         // If no block is open, none will be.
         let of = if open == 0 {
             rest.len()
@@ -144,7 +144,7 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
     scratch: &mut FastScratch,
     simd: S,
     task: &Task<'_>,
-    (layer, passing): (&mut Layer, &Passing),
+    (accumulator, passing): (&mut Accumulator, &Passing),
     round: &Round<'_>,
     work: &mut Work,
 ) -> u32 {
@@ -169,7 +169,7 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
         work.items += count_bits(&placed.reaching);
         let staged = (&scratch.round, &mut *scratch.alphas);
         work.contributions += evaluate::<_, DEPTH>(
-            layer,
+            accumulator,
             simd,
             &placed.reaching,
             staged,
@@ -186,14 +186,14 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
         work.open += blocks;
         work.blocks_hidden += blocks - exact;
         work.items += exact;
-        work.contributions += evaluate_steep::<_, DEPTH>(layer, simd, splat, shown, passing, task);
+        work.contributions += evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, passing, task);
         from = placed.end + 1;
     };
     work.pairs += round.round.len() as u64;
     work.items += count_bits(&reaching);
     let staged = (&scratch.round, &mut *scratch.alphas);
     work.contributions +=
-        evaluate::<_, DEPTH>(layer, simd, &reaching, staged, passing, task.thresholds);
+        evaluate::<_, DEPTH>(accumulator, simd, &reaching, staged, passing, task.thresholds);
     blocks_of_hidden
 }
 

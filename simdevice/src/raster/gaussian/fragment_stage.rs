@@ -169,7 +169,7 @@ impl<'a> ResolveDraw<'a> {
         if self.per_sample {
             sample
         } else {
-            samples.layers[sample][block]
+            samples.accumulators[sample][block]
         }
     }
 
@@ -255,14 +255,14 @@ impl<'a> ResolveDraw<'a> {
         tools: &Tools<'_>,
         machine: &mut Machine,
     ) {
-        let layer = &tools.fragments.layers[samples.layers[group.leader][block]];
+        let accumulator = &tools.fragments.accumulators[samples.accumulators[group.leader][block]];
         let depths = if self.reads_depth() {
-            layer.depths(block, self.draw.depth_unit)
+            accumulator.depths(block, self.draw.depth_unit)
         } else {
             [[0.0; BLOCK_PIXELS]; 2]
         };
         let accumulated: [[f32; BLOCK_PIXELS]; 4] = dispatch!(self.level, simd => {
-            let [r, g, b, a] = layer.fragments(simd, block);
+            let [r, g, b, a] = accumulator.fragments(simd, block);
             [r.into(), g.into(), b.into(), a.into()]
         });
         let within = match (self.per_sample, self.samples) {
@@ -306,7 +306,7 @@ impl<'a> ResolveDraw<'a> {
                 }
                 FragmentInput::PointCoord(_)
                 | FragmentInput::PrimitiveId
-                | FragmentInput::Layer
+                | FragmentInput::Accumulator
                 | FragmentInput::ViewportIndex => [0; BLOCK_PIXELS],
             };
             // An input that is the same for all lanes has one chunk.

@@ -139,7 +139,7 @@ impl<'a> TileMode<'a> {
     }
 }
 
-/// Whether a draw's floors let more layers be seen than the usual ones.
+/// Whether a draw's floors let more accumulators be seen than the usual ones.
 pub(super) fn needs_f64_sums(state: &GaussianState) -> bool {
     let usual = GaussianState::default();
     state.transmittance_floor < usual.transmittance_floor || state.alpha_floor < usual.alpha_floor

@@ -135,8 +135,8 @@ impl<'a> GaussianTileDraw<'a> {
         }
         let mut covered: [PixelMask; SAMPLES] = std::array::from_fn(|sample| {
             std::array::from_fn(|block| {
-                let layer = &fragments.layers[samples.layers[sample][block]];
-                layer.covered[block] & samples.tested[sample][block]
+                let accumulator = &fragments.accumulators[samples.accumulators[sample][block]];
+                accumulator.covered[block] & samples.tested[sample][block]
             })
         });
         let mut shaded = covered;
@@ -234,10 +234,10 @@ impl<'a> GaussianTileDraw<'a> {
                             || self.depths(tile, buffers, *earlier, block)
                                 == self.depths(tile, buffers, sample, block))
                 };
-                let layer = (0..sample).find(same).unwrap_or(sample);
-                samples.layers[sample][block] = samples.layers[layer][block];
-                if layer == sample {
-                    samples.layers[sample][block] = sample;
+                let accumulator = (0..sample).find(same).unwrap_or(sample);
+                samples.accumulators[sample][block] = samples.accumulators[accumulator][block];
+                if accumulator == sample {
+                    samples.accumulators[sample][block] = sample;
                 } else {
                     *lanes = 0;
                 }
@@ -282,10 +282,10 @@ impl<'a> GaussianTileDraw<'a> {
         plane.touch(target, 0, tile);
         for (sample, lanes) in covered.iter().enumerate().take(self.samples) {
             let start = plane.start(tile.index, sample);
-            let layers = &samples.layers[sample];
+            let accumulators = &samples.accumulators[sample];
             let words = plane.words_mut();
             dispatch!(self.level, simd =>
-                blend(simd, output, fragments, layers, lanes, start, words));
+                blend(simd, output, fragments, accumulators, lanes, start, words));
         }
         plane.changed(tile.index);
     }
@@ -303,10 +303,10 @@ impl<'a> GaussianTileDraw<'a> {
             let start = buffers.depth.start(tile.index, sample);
             let stored = &mut buffers.depth.words_mut()[start..][..AREA];
             for (block, stored) in stored.as_chunks_mut::<BLOCK_PIXELS>().0.iter_mut().enumerate() {
-                let layer = &fragments.layers[samples.layers[sample][block]];
+                let accumulator = &fragments.accumulators[samples.accumulators[sample][block]];
                 for (lane, stored) in stored.iter_mut().enumerate() {
                     if covered[block] >> lane & 1 == 1 {
-                        *stored = layer.median[block][lane];
+                        *stored = accumulator.median[block][lane];
                     }
                 }
             }
@@ -376,7 +376,7 @@ fn blend<S: Simd>(
     simd: S,
     output: &ColorOutput,
     fragments: &GaussianTile,
-    layers: &[usize; BLOCKS],
+    accumulators: &[usize; BLOCKS],
     covered: &PixelMask,
     start: usize,
     words: &mut [u32],
@@ -386,7 +386,7 @@ fn blend<S: Simd>(
         if lanes == 0 {
             continue;
         }
-        let source = fragments.layers[layers[block]].fragments(simd, block);
+        let source = fragments.accumulators[accumulators[block]].fragments(simd, block);
         let first = start + block * BLOCK_PIXELS;
         let quads = Quads::block(first);
         output.write(simd, &source, &no_second, lanes as u16, &quads, words);

@@ -5,7 +5,7 @@
 //! the nearest [`HELD`] at a time: memory is bounded whatever a scene stacks up, and what a pass leaves out is gathered by
 //! the next, so that time stays near linear.
 
-use super::accumulator::Layer;
+use super::accumulator::Accumulator;
 use super::block_lists::{BlockLists, part};
 use super::depth_ranges::Passing;
 use super::exact::falls;
@@ -129,10 +129,10 @@ pub(super) fn composite_per_pixel<S: Simd>(
     task: &Task<'_>,
     depths: RayDepths<'_>,
     lists: &mut BlockLists,
-    (layer, passing): (&mut Layer, &Passing),
+    (accumulator, passing): (&mut Accumulator, &Passing),
     runs: Option<&mut Vec<Run>>,
 ) -> Work {
-    let mut work = part(simd, task, lists, (layer, passing), runs);
+    let mut work = part(simd, task, lists, (accumulator, passing), runs);
     for block in 0..BLOCKS {
         if lists[block].is_empty() {
             continue;
@@ -142,7 +142,7 @@ pub(super) fn composite_per_pixel<S: Simd>(
             task,
             depths,
             &lists[block],
-            (&mut *layer, block),
+            (&mut *accumulator, block),
             passing,
         );
     }
@@ -150,7 +150,7 @@ pub(super) fn composite_per_pixel<S: Simd>(
 }
 
 impl PerPixel {
-    /// Composites a block of a layer; returns how many Gaussians its pixels accepted.
+    /// Composites a block of a accumulator; returns how many Gaussians its pixels accepted.
     #[inline(always)]
     fn composite_block<S: Simd>(
         &mut self,
@@ -158,10 +158,10 @@ impl PerPixel {
         task: &Task<'_>,
         depths: RayDepths<'_>,
         names: &[u32],
-        (layer, block): (&mut Layer, usize),
+        (accumulator, block): (&mut Accumulator, usize),
         passing: &Passing,
     ) -> u64 {
-        let mut open = layer.open_lanes(block);
+        let mut open = accumulator.open_lanes(block);
         let rays = block_rays(&depths.rays, task.corner, block);
         let mut sums = [Sum::EMPTY; BLOCK_PIXELS];
         for pixel in &mut self.pixels {
@@ -210,7 +210,7 @@ impl PerPixel {
                 }
             }
         }
-        store(layer, block, &sums);
+        store(accumulator, block, &sums);
         contributions
     }
 }
@@ -255,19 +255,19 @@ fn block_rays(rays: &PixelRays, corner: [u32; 2], block: usize) -> Rays {
 }
 
 /// Takes what the open pixels of a block accumulated.
-fn store(layer: &mut Layer, block: usize, sums: &[Sum; BLOCK_PIXELS]) {
-    let open = layer.open_lanes(block);
+fn store(accumulator: &mut Accumulator, block: usize, sums: &[Sum; BLOCK_PIXELS]) {
+    let open = accumulator.open_lanes(block);
     for (lane, sum) in sums.iter().enumerate() {
         if open >> lane & 1 == 0 {
             continue;
         }
         let t = sum.transmittance as f32;
-        layer.transmittance[block][lane] = if sum.finished { -t } else { t };
-        for (channel, &color) in layer.color.iter_mut().zip(&sum.color) {
+        accumulator.transmittance[block][lane] = if sum.finished { -t } else { t };
+        for (channel, &color) in accumulator.color.iter_mut().zip(&sum.color) {
             channel[block][lane] = color as f32;
         }
-        layer.median[block][lane] = sum.median;
-        layer.covered[block] |= u32::from(sum.covered) << lane;
+        accumulator.median[block][lane] = sum.median;
+        accumulator.covered[block] |= u32::from(sum.covered) << lane;
     }
 }
 

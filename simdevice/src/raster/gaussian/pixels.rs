@@ -1,7 +1,7 @@
 //! Phases 2 and 3 of the tile kernel: the alphas of Gaussians in blocks, and those through the pixels of a block, which stay in
 //! registers.
 
-use super::accumulator::Layer;
+use super::accumulator::Accumulator;
 use super::depth_ranges::Passing;
 use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, ROUND, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
 use super::inputs::{
@@ -128,16 +128,16 @@ fn alpha<S: Simd>(
 /// Composites those of `round` that reach a block in it, for each block; returns how many pixels accepted one.
 #[inline(always)]
 pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
-    layer: &mut Layer,
+    accumulator: &mut Accumulator,
     simd: S,
     reaching: &Reaching,
     (round, alphas): (&StagedRound, &mut Alphas),
     passing: &Passing,
     thresholds: Thresholds,
 ) -> u64 {
-    let to = (round, &layer.most_fall);
+    let to = (round, &accumulator.most_fall);
     let reached = alphas.find::<_, DEPTH>(simd, reaching, to, passing, thresholds);
-    let refused = composite_all::<_, DEPTH>(layer, simd, reaching, (round, alphas), thresholds);
+    let refused = composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
     reached.saturating_sub(refused)
 }
 
@@ -145,7 +145,7 @@ pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
 /// as [`Alphas::find`].
 #[inline(never)]
 fn composite_all<S: Simd, const DEPTH: DepthMode>(
-    layer: &mut Layer,
+    accumulator: &mut Accumulator,
     simd: S,
     reaching: &Reaching,
     (round, alphas): (&StagedRound, &Alphas),
@@ -168,10 +168,10 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
                 let of_block = (block, reaching, alphas);
                 if DEPTH == FIND_REACHED
                     || DEPTH >= FIND_MEDIAN
-                    || !composite_far_from_floor(layer, simd, of_block, round, thresholds)
+                    || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
                 {
                     refused +=
-                        composite_carefully::<_, DEPTH>(layer, simd, of_block, round, thresholds);
+                        composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
                 }
             }
             refused
@@ -183,14 +183,14 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
 /// whether it did.
 #[inline(always)]
 fn composite_far_from_floor<S: Simd>(
-    layer: &mut Layer,
+    accumulator: &mut Accumulator,
     simd: S,
     (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
     thresholds: Thresholds,
 ) -> bool {
     let floor = thresholds.transmittance_floor;
-    let mut pixels = pixels(layer, simd, block);
+    let mut pixels = pixels(accumulator, simd, block);
     let before = pixels.transmittance;
     // As whole numbers, transmittances are in the order of what they stand for, and greater than all where a pixel is
     // finished. (Masks are not combined here: that would be calls, before which the pixels leave their registers.)
@@ -214,14 +214,14 @@ fn composite_far_from_floor<S: Simd>(
         return false;
     }
     pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
-    keep(layer, block, pixels);
+    keep(accumulator, block, pixels);
     true
 }
 
 /// Composites a block's alphas; returns how many pixels refused one.
 #[inline(always)]
 fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
-    layer: &mut Layer,
+    accumulator: &mut Accumulator,
     simd: S,
     (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
     round: &StagedRound,
@@ -231,25 +231,25 @@ fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
         depth_mode: DEPTH,
         ..thresholds
     };
-    let mut pixels = pixels(layer, simd, block);
+    let mut pixels = pixels(accumulator, simd, block);
     let mut refused = Tally::new(simd);
     for alpha in alphas {
         let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
         reaching &= reaching.wrapping_sub(1);
         let alpha = f32x16::from_slice(simd, alpha);
         let (to, look) = ((block, &mut pixels), (look.color, look.depth));
-        let goes_on = composite_one(layer, simd, to, alpha, look, thresholds);
+        let goes_on = composite_one(accumulator, simd, to, alpha, look, thresholds);
         refused.add_without(alpha.simd_gt(0.0), goes_on);
     }
-    keep(layer, block, pixels);
-    layer.find_most_fall(simd, block, thresholds.most_fall);
+    keep(accumulator, block, pixels);
+    accumulator.find_most_fall(simd, block, thresholds.most_fall);
     refused.total()
 }
 
 /// As [`evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
 #[inline(always)]
 pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
-    layer: &mut Layer,
+    accumulator: &mut Accumulator,
     simd: S,
     splat: &Splat,
     blocks: u64,
@@ -264,8 +264,8 @@ pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
     for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
         let fall = falls_64(simd, splat, task, block);
         let look = (splat.color, splat.depth);
-        contributions += accumulate(layer, simd, block, fall, look, passing, thresholds);
-        layer.find_most_fall(simd, block, thresholds.most_fall);
+        contributions += accumulate(accumulator, simd, block, fall, look, passing, thresholds);
+        accumulator.find_most_fall(simd, block, thresholds.most_fall);
     }
     contributions
 }
@@ -274,7 +274,7 @@ pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
 /// how many pixels accepted it.
 #[inline(always)]
 pub(super) fn accumulate<S: Simd>(
-    layer: &mut Layer,
+    accumulator: &mut Accumulator,
     simd: S,
     block: usize,
     fall: f32x16<S>,
@@ -282,41 +282,41 @@ pub(super) fn accumulate<S: Simd>(
     passing: &Passing,
     thresholds: Thresholds,
 ) -> u64 {
-    let mut pixels = pixels(layer, simd, block);
+    let mut pixels = pixels(accumulator, simd, block);
     let most_fall = f32x16::splat(simd, thresholds.most_fall);
     let mode = thresholds.depth_mode;
     let reached = reached(simd, mode, (block, look.1), fall, passing, most_fall);
     let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
     let alpha = alpha(simd, mode, reached, fall, ceiling);
     let at = (block, &mut pixels);
-    let goes_on = composite_one(layer, simd, at, alpha, look, thresholds);
-    keep(layer, block, pixels);
+    let goes_on = composite_one(accumulator, simd, at, alpha, look, thresholds);
+    keep(accumulator, block, pixels);
     let accepted = goes_on.to_bitmask() & reached.to_bitmask();
     accepted.count_ones().into()
 }
 
 /// A block's pixels as they are, before any of a round.
 #[inline(always)]
-fn pixels<S: Simd>(layer: &Layer, simd: S, block: usize) -> Pixels<S> {
-    let [r, g, b] = &layer.color;
+fn pixels<S: Simd>(accumulator: &Accumulator, simd: S, block: usize) -> Pixels<S> {
+    let [r, g, b] = &accumulator.color;
     Pixels {
         red: f32x16::from_slice(simd, &r[block]),
         green: f32x16::from_slice(simd, &g[block]),
         blue: f32x16::from_slice(simd, &b[block]),
-        transmittance: f32x16::from_slice(simd, &layer.transmittance[block]),
+        transmittance: f32x16::from_slice(simd, &accumulator.transmittance[block]),
     }
 }
 
 /// Puts a block's pixels back.
 #[inline(always)]
-fn keep<S: Simd>(layer: &mut Layer, block: usize, pixels: Pixels<S>) {
-    let [r, g, b] = &mut layer.color;
+fn keep<S: Simd>(accumulator: &mut Accumulator, block: usize, pixels: Pixels<S>) {
+    let [r, g, b] = &mut accumulator.color;
     pixels.red.store_slice(&mut r[block]);
     pixels.green.store_slice(&mut g[block]);
     pixels.blue.store_slice(&mut b[block]);
     pixels
         .transmittance
-        .store_slice(&mut layer.transmittance[block]);
+        .store_slice(&mut accumulator.transmittance[block]);
 }
 
 /// Composites a Gaussian of a colour and a depth in a block; returns which pixels it does not finish.
@@ -325,7 +325,7 @@ fn keep<S: Simd>(layer: &mut Layer, block: usize, pixels: Pixels<S>) {
 /// longer.
 #[inline(always)]
 fn composite_one<S: Simd>(
-    layer: &mut Layer,
+    accumulator: &mut Accumulator,
     simd: S,
     (block, pixels): (usize, &mut Pixels<S>),
     alpha: f32x16<S>,
@@ -345,14 +345,14 @@ fn composite_one<S: Simd>(
     pixels.transmittance = goes_on.select(rest, finished);
     let weight = only(simd, goes_on, weight);
     if thresholds.depth_mode >= FIND_MEDIAN {
-        let median = u32x16::from_slice(simd, &layer.median[block]);
+        let median = u32x16::from_slice(simd, &accumulator.median[block]);
         let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
         let median = first_half.select(u32x16::splat(simd, depth), median);
-        median.store_slice(&mut layer.median[block]);
+        median.store_slice(&mut accumulator.median[block]);
     }
     if thresholds.depth_mode == FIND_MEAN {
         let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
-        let [depths, weights] = &mut layer.means;
+        let [depths, weights] = &mut accumulator.means;
         let sum = f32x16::from_slice(simd, &depths[block]);
         weight.mul_add(depth, sum).store_slice(&mut depths[block]);
         let sum = f32x16::from_slice(simd, &weights[block]) + weight;

@@ -12,8 +12,8 @@ pub(super) struct Samples {
     pub(super) candidates: [PixelMask; SAMPLES],
     /// Those of them that pass the stencil test.
     pub(super) tested: [PixelMask; SAMPLES],
-    /// The layer that a sample's block is composited in.
-    pub(super) layers: [[usize; BLOCKS]; SAMPLES],
+    /// The accumulator that a sample's block is composited in.
+    pub(super) accumulators: [[usize; BLOCKS]; SAMPLES],
 }
 
 impl Samples {
