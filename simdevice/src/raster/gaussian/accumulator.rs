@@ -29,18 +29,18 @@ const UNTOUCHED: f32 = f32::NEG_INFINITY;
 /// A transmittance that is compared with pixels': its bits, which as integers are in the order of what they stand for, and
 /// less than zero where a pixel is finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Light(i32);
+pub(super) struct TransmittanceBits(i32);
 
 /// Every pixel that is not finished has more.
-pub(super) const ANY_LIGHT: Light = Light(-1);
+pub(super) const NOT_TERMINATED: TransmittanceBits = TransmittanceBits(-1);
 
-impl Light {
+impl TransmittanceBits {
     /// A transmittance; with none at all, a pixel whose own is zero is not finished yet.
     pub(super) fn of(transmittance: f32) -> Self {
         if transmittance > 0.0 {
             Self(transmittance.to_bits() as i32)
         } else {
-            ANY_LIGHT
+            NOT_TERMINATED
         }
     }
 }
@@ -113,7 +113,7 @@ impl Accumulator {
 
     /// Bit `block` tells that a pixel of the block is not finished and has more than some light.
     #[inline(always)]
-    pub(super) fn open_blocks<S: Simd>(&self, simd: S, Light(light): Light) -> u64 {
+    pub(super) fn open_blocks<S: Simd>(&self, simd: S, TransmittanceBits(light): TransmittanceBits) -> u64 {
         let light = i32x16::splat(simd, light);
         let mut open = 0;
         for (block, lanes) in self.transmittance.iter().enumerate() {

@@ -5,7 +5,7 @@
 //! [`staging`]: super::staging
 //! [`pixels`]: super::pixels
 
-use super::accumulator::{ANY_LIGHT, Accumulator};
+use super::accumulator::{NOT_TERMINATED, Accumulator};
 use super::depth_ranges::Passing;
 use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, Task, Work};
@@ -125,8 +125,8 @@ fn open_blocks<S: Simd, const DEPTH: DepthMode>(
         return ALL_BLOCKS;
     }
     let open = accumulator.open_blocks(simd, task.way.light);
-    if DEPTH <= NO_DEPTH && task.way.light != ANY_LIGHT {
-        let left_out = accumulator.open_blocks(simd, ANY_LIGHT) & !open;
+    if DEPTH <= NO_DEPTH && task.way.light != NOT_TERMINATED {
+        let left_out = accumulator.open_blocks(simd, NOT_TERMINATED) & !open;
         // If no block is open, none will be.
         let of = if open == 0 {
             rest.len()

@@ -5,11 +5,11 @@
 //! *Powers of two of fewer terms.* An alpha that errs by a part e of it changes a pixel by that part of what the Gaussian
 //! contributes, times the difference of two colours at most; all contributions add up to one.
 //!
-//! *Light that is left.* What is behind a transmittance of T contributes T at most, whatever it is. A block all of whose
+//! *TransmittanceBits that is left.* What is behind a transmittance of T contributes T at most, whatever it is. A block all of whose
 //! pixels have no more than the budget is looked at no further. (To leave out what is faint in front of others, too, needs
 //! a sum for each block and a bound of each Gaussian's alpha in it; that took as long as it saved.)
 
-use super::accumulator::{ANY_LIGHT, Light};
+use super::accumulator::{NOT_TERMINATED, TransmittanceBits};
 use super::exp2::{CUBIC, QUADRATIC, exp2_of_negated};
 use crate::gaussian::BinnedDraw;
 use crate::gaussian::depth::DepthTrend;
@@ -156,14 +156,14 @@ pub(super) struct Way {
     /// [`NO_DEPTH`], or what is cheaper.
     pub(super) powers: DepthMode,
     /// Blocks with no more light are finished.
-    pub(super) light: Light,
+    pub(super) light: TransmittanceBits,
 }
 
 impl Way {
     /// As exactly as it can.
     pub(super) const EXACT: Self = Self {
         powers: NO_DEPTH,
-        light: ANY_LIGHT,
+        light: NOT_TERMINATED,
     };
 
     /// As a state allows it in a mode; all but the plain one are exact.
@@ -183,7 +183,7 @@ impl Way {
             } else {
                 NO_DEPTH
             },
-            light: Light::of(contribution_budget),
+            light: TransmittanceBits::of(contribution_budget),
         }
     }
 }
