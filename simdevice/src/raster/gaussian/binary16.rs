@@ -7,7 +7,7 @@
 
 use super::accumulator::Accumulator;
 use super::block_lists::BlockKernel;
-use super::depth_ranges::Passing;
+use super::depth_ranges::DepthRanges;
 use super::exp2::POWER_OF_TWO;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::inputs::{FIND_MEDIAN, NO_DEPTH, Task, Thresholds};
@@ -72,7 +72,7 @@ impl BlockKernel for Half {
         task: &Task<'_>,
         (batch, place): (usize, usize),
         (accumulator, block): (&mut Accumulator, usize),
-        passing: &Passing,
+        ranges: &DepthRanges,
     ) -> u64 {
         let thresholds = self.thresholds;
         let splat = &task.splats[batch][place];
@@ -82,7 +82,7 @@ impl BlockKernel for Half {
         let shown = if thresholds.depth_mode <= NO_DEPTH {
             mask32x16::splat(simd, true)
         } else {
-            passing.pixels(simd, block, splat.depth)
+            ranges.pixels(simd, block, splat.depth)
         };
         let look = (rounded.color, splat.depth);
         accumulate(accumulator, simd, block, alpha, shown, look, thresholds)

@@ -1,7 +1,7 @@
 //! A tile's list parted by blocks of pixels, for kernels that work off one block after the other.
 
 use super::accumulator::Accumulator;
-use super::depth_ranges::Passing;
+use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCKS, ROUND};
 use super::inputs::{NO_DEPTH, Task, TileMode, Work};
 use super::staging::StagedSplat;
@@ -31,7 +31,7 @@ pub(super) trait BlockKernel {
         task: &Task<'_>,
         at: (usize, usize),
         to: (&mut Accumulator, usize),
-        passing: &Passing,
+        ranges: &DepthRanges,
     ) -> u64;
 
     /// Ends with a block.
@@ -45,10 +45,10 @@ pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
     mut kernel: K,
     task: &Task<'_>,
     lists: &mut BlockLists,
-    (accumulator, passing): (&mut Accumulator, &Passing),
+    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
     runs: Option<&mut Vec<Run>>,
 ) -> Work {
-    let mut work = part(simd, task, lists, (accumulator, passing), runs);
+    let mut work = part(simd, task, lists, (accumulator, ranges), runs);
     let ends_early = task.optimizations.has(Optimization::EarlyTermination);
     for (block, list) in lists.iter().enumerate() {
         kernel.begin(accumulator, block);
@@ -59,7 +59,7 @@ pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
             for &primitive in round {
                 let at = locate(primitive);
                 work.contributions +=
-                    kernel.composite(simd, task, at, (&mut *accumulator, block), passing);
+                    kernel.composite(simd, task, at, (&mut *accumulator, block), ranges);
             }
         }
         kernel.end(accumulator, block);
@@ -79,7 +79,7 @@ pub(super) fn part<S: Simd>(
     simd: S,
     task: &Task<'_>,
     lists: &mut BlockLists,
-    (accumulator, passing): (&Accumulator, &Passing),
+    (accumulator, ranges): (&Accumulator, &DepthRanges),
     runs: Option<&mut Vec<Run>>,
 ) -> Work {
     let mut work = Work {
@@ -97,7 +97,7 @@ pub(super) fn part<S: Simd>(
     for &primitive in task.list {
         let (batch, place) = locate(primitive);
         let splat = &task.splats[batch][place];
-        let hidden = tests_depth && passing.hides(splat.depth);
+        let hidden = tests_depth && ranges.hides(splat.depth);
         if hidden {
             work.tiles_hidden += 1;
             if !recorded {
@@ -121,7 +121,7 @@ pub(super) fn part<S: Simd>(
             continue;
         }
         if tests_depth {
-            let shown = passing.blocks(simd, splat.depth);
+            let shown = ranges.blocks(simd, splat.depth);
             work.blocks_hidden += u64::from((reached & !shown).to_bitmask().count_ones());
             reached &= shown;
         }

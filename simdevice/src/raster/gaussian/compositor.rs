@@ -22,7 +22,7 @@
 use super::accumulator::Accumulator;
 use super::binary16::Half;
 use super::block_lists::{BlockLists, composite_by_block};
-use super::depth_ranges::Passing;
+use super::depth_ranges::DepthRanges;
 use super::exact::{InOrder, WideSums};
 use super::fast::{self, FastScratch};
 use super::grid::{BLOCKS, PixelMask, block_and_lane, count, lanes_within};
@@ -51,7 +51,7 @@ const ACCUMULATORS: usize = MAX_SAMPLES as usize + 1;
 #[derive(Debug)]
 pub struct GaussianTile {
     pub(super) accumulators: [Accumulator; ACCUMULATORS],
-    pub(super) passing: Passing,
+    pub(super) ranges: DepthRanges,
     fast: FastScratch,
     /// Of the kernels that part lists by blocks.
     lists: BlockLists,
@@ -64,7 +64,7 @@ impl Default for GaussianTile {
     fn default() -> Self {
         Self {
             accumulators: [Accumulator::EMPTY; ACCUMULATORS],
-            passing: Passing::default(),
+            ranges: DepthRanges::default(),
             fast: FastScratch::default(),
             lists: Default::default(),
             per_pixel: PerPixel::default(),
@@ -200,7 +200,7 @@ impl GaussianTile {
                 self.composite_with_fast_powers(level, task, accumulator, runs)
             }
             TileMode::Fast => {
-                let to = (&mut self.accumulators[accumulator], &self.passing);
+                let to = (&mut self.accumulators[accumulator], &self.ranges);
                 let fast = &mut self.fast;
                 dispatch!(level, simd => fast::composite::<_, DEPTH>(fast, simd, task, to, runs))
             }
@@ -220,7 +220,7 @@ impl GaussianTile {
         accumulator: usize,
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
-        let to = (&mut self.accumulators[accumulator], &self.passing);
+        let to = (&mut self.accumulators[accumulator], &self.ranges);
         let fast = &mut self.fast;
         match task.way.powers {
             FASTER_POWERS => dispatch!(level, simd =>
@@ -238,7 +238,7 @@ impl GaussianTile {
         accumulator: usize,
         runs: Option<&mut Vec<Run>>,
     ) -> Work {
-        let to = (&mut self.accumulators[accumulator], &self.passing);
+        let to = (&mut self.accumulators[accumulator], &self.ranges);
         let lists = &mut self.lists;
         match task.mode {
             TileMode::Half => {
@@ -260,9 +260,9 @@ impl GaussianTile {
                 dispatch!(level, simd => composite_by_block(simd, kernel, task, lists, to, runs))
             }
             TileMode::Fast | TileMode::Exact { .. } => {
-                let (accumulator, passing) = to;
+                let (accumulator, ranges) = to;
                 dispatch!(level, simd => {
-                    let to = (&mut *accumulator, passing);
+                    let to = (&mut *accumulator, ranges);
                     let work = composite_by_block(simd, InOrder, task, lists, to, runs);
                     accumulator.find_covered(simd);
                     work

@@ -15,7 +15,7 @@ const NO_DEPTH: u32 = u32::MAX;
 /// The depths that pass in a tile.
 #[derive(Debug)]
 #[repr(align(64))]
-pub(super) struct Passing {
+pub(super) struct DepthRanges {
     /// A depth passes at a pixel if it is `first` or at most `span` more.
     first: [[u32; BLOCK_PIXELS]; BLOCKS],
     span: [[u32; BLOCK_PIXELS]; BLOCKS],
@@ -26,7 +26,7 @@ pub(super) struct Passing {
     tile: [u32; 2],
 }
 
-impl Default for Passing {
+impl Default for DepthRanges {
     fn default() -> Self {
         Self {
             first: [[0; BLOCK_PIXELS]; BLOCKS],
@@ -55,7 +55,7 @@ fn range(op: CompareOp, stored: u32) -> Option<(u32, u32)> {
     }
 }
 
-impl Passing {
+impl DepthRanges {
     /// Makes this what passes against the depths stored at `lanes` of a tile, which are in the order of its blocks.
     pub(super) fn set(&mut self, op: CompareOp, stored: &[u32], lanes: &PixelMask) {
         self.tile = [NO_DEPTH, 0];
@@ -96,7 +96,7 @@ impl Passing {
 
     /// Whether a depth and all that follow it fail in all of the tile.
     #[inline(always)]
-    pub(super) fn hides_from(&self, depth: u32, trend: DepthTrend) -> bool {
+    pub(super) fn rejects_rest(&self, depth: u32, trend: DepthTrend) -> bool {
         match trend {
             DepthTrend::Rising => depth > self.tile[1],
             DepthTrend::Falling => depth < self.tile[0],
@@ -164,19 +164,19 @@ mod tests {
         for op in OPS {
             for lanes in [[0xFFFF; BLOCKS], [0x0180; BLOCKS], [0; BLOCKS]] {
                 let stored: Vec<u32> = (0..256).map(|at| 100 + at * 37 % 50).collect();
-                let mut passing = Passing::default();
-                passing.set(op, &stored, &lanes);
+                let mut ranges = DepthRanges::default();
+                ranges.set(op, &stored, &lanes);
                 for depth in 90..160 {
                     let passes = (0..256).any(|at| {
                         lanes[at / BLOCK_PIXELS] >> (at % BLOCK_PIXELS) & 1 == 1 && compare(op, depth, stored[at])
                     });
-                    assert!(!(passes && passing.hides(depth)), "{op:?} {depth}");
+                    assert!(!(passes && ranges.hides(depth)), "{op:?} {depth}");
                     // Bounds of single ranges are exact but for Equal, whose depths have gaps.
                     if !passes && op != CompareOp::Equal {
-                        assert!(passing.hides(depth), "{op:?} {depth}");
+                        assert!(ranges.hides(depth), "{op:?} {depth}");
                     }
-                    let from = |trend| passing.hides_from(depth, trend);
-                    let later = |mut depths: std::ops::Range<u32>| depths.all(|d| passing.hides(d));
+                    let from = |trend| ranges.rejects_rest(depth, trend);
+                    let later = |mut depths: std::ops::Range<u32>| depths.all(|d| ranges.hides(d));
                     assert!(!from(DepthTrend::Rising) || later(depth..200));
                     assert!(!from(DepthTrend::Falling) || later(0..depth + 1));
                     assert!(!from(DepthTrend::None));

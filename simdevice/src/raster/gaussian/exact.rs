@@ -9,7 +9,7 @@
 
 use super::accumulator::Accumulator;
 use super::block_lists::BlockKernel;
-use super::depth_ranges::Passing;
+use super::depth_ranges::DepthRanges;
 use super::exp2::exp2_of_negated;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
 use super::inputs::{FIND_MEAN, FIND_MEDIAN, NO_DEPTH, Task, Thresholds, TileMode};
@@ -103,12 +103,12 @@ impl BlockKernel for InOrder {
         task: &Task<'_>,
         (batch, place): (usize, usize),
         (accumulator, block): (&mut Accumulator, usize),
-        passing: &Passing,
+        ranges: &DepthRanges,
     ) -> u64 {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
         let look = (splat.color, splat.depth);
-        accumulate(accumulator, simd, block, fall, look, passing, task.thresholds)
+        accumulate(accumulator, simd, block, fall, look, ranges, task.thresholds)
     }
 }
 
@@ -143,13 +143,13 @@ impl BlockKernel for WideSums {
         task: &Task<'_>,
         (batch, place): (usize, usize),
         (accumulator, block): (&mut Accumulator, usize),
-        passing: &Passing,
+        ranges: &DepthRanges,
     ) -> u64 {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
         let look = (splat.color, splat.depth);
         let to = (block, &mut self.0);
-        accumulate_wide(accumulator, simd, to, fall, look, passing, task.thresholds)
+        accumulate_wide(accumulator, simd, to, fall, look, ranges, task.thresholds)
     }
 
     #[inline(always)]
@@ -166,14 +166,14 @@ fn accumulate_wide<S: Simd>(
     (block, sums): (usize, &mut Sums),
     fall: f32x16<S>,
     (color, depth): ([f32; 3], u32),
-    passing: &Passing,
+    ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> u64 {
     let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
     let alpha = exp2_of_negated(simd, fall).min(ceiling);
     let mut reached = fall.simd_le(f32x16::splat(simd, thresholds.most_fall));
     if thresholds.depth_mode > NO_DEPTH {
-        reached &= passing.pixels(simd, block, depth);
+        reached &= ranges.pixels(simd, block, depth);
     }
     // What has fallen too far has no meaning, and may be anything.
     let alpha = reached.select(alpha, f32x16::splat(simd, 0.0));

@@ -6,7 +6,7 @@
 //! [`pixels`]: super::pixels
 
 use super::accumulator::{NOT_TERMINATED, Accumulator};
-use super::depth_ranges::Passing;
+use super::depth_ranges::DepthRanges;
 use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, Task, Work};
 use super::pixels::{Alphas, evaluate, evaluate_steep};
@@ -49,7 +49,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     scratch: &mut FastScratch,
     simd: S,
     task: &Task<'_>,
-    (accumulator, passing): (&mut Accumulator, &Passing),
+    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
     mut runs: Option<&mut Vec<Run>>,
 ) -> Work {
     let mut work = Work::default();
@@ -70,7 +70,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             blocks: bits.count_ones() as u8,
             rows: if runs.is_some() { accumulator.open_rows() } else { 0 },
         };
-        if DEPTH > NO_DEPTH && passing.hides_from(task.splat(round[0]).depth, task.trend) {
+        if DEPTH > NO_DEPTH && ranges.rejects_rest(task.splat(round[0]).depth, task.trend) {
             work.tiles_hidden += rest.len() as u64;
             if let Some(runs) = &mut runs {
                 work.hidden_rest = rest.len() as u32;
@@ -90,7 +90,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             scratch,
             simd,
             task,
-            (&mut *accumulator, passing),
+            (&mut *accumulator, ranges),
             &round,
             &mut work,
         );
@@ -144,7 +144,7 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
     scratch: &mut FastScratch,
     simd: S,
     task: &Task<'_>,
-    (accumulator, passing): (&mut Accumulator, &Passing),
+    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
     round: &Round<'_>,
     work: &mut Work,
 ) -> u32 {
@@ -155,7 +155,7 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
             simd,
             task,
             (round.round, from, round.next_chunk),
-            (open, passing),
+            (open, ranges),
             round.is_recorded,
         );
         work.open += placed.count * blocks;
@@ -173,27 +173,27 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
             simd,
             &placed.reaching,
             staged,
-            passing,
+            ranges,
             task.thresholds,
         );
         let splat = task.splat(primitive);
         let shown = if DEPTH <= NO_DEPTH {
             open
         } else {
-            open & passing.blocks(simd, splat.depth).to_bitmask()
+            open & ranges.blocks(simd, splat.depth).to_bitmask()
         };
         let exact = u64::from(shown.count_ones());
         work.open += blocks;
         work.blocks_hidden += blocks - exact;
         work.items += exact;
-        work.contributions += evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, passing, task);
+        work.contributions += evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, ranges, task);
         from = placed.end + 1;
     };
     work.pairs += round.round.len() as u64;
     work.items += count_bits(&reaching);
     let staged = (&scratch.round, &mut *scratch.alphas);
     work.contributions +=
-        evaluate::<_, DEPTH>(accumulator, simd, &reaching, staged, passing, task.thresholds);
+        evaluate::<_, DEPTH>(accumulator, simd, &reaching, staged, ranges, task.thresholds);
     blocks_of_hidden
 }
 

@@ -34,7 +34,7 @@ use crate::raster::depth::{Tests, apply, compare};
 use crate::raster::primitives::{Buffers, Targets};
 use crate::raster::quads::Quads;
 use crate::raster::tile::{AREA, Target, Tile};
-use depth_ranges::Passing;
+use depth_ranges::DepthRanges;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use fragment_stage::{ResolveDraw, Tools};
@@ -248,9 +248,9 @@ impl<'a> GaussianTileDraw<'a> {
             if let Some((op, _)) = self.tests.depth {
                 let start = buffers.depth.start(tile.index, sample);
                 let stored = &buffers.depth.words_mut()[start..][..AREA];
-                fragments.passing.set(op, stored, &lanes);
+                fragments.ranges.set(op, stored, &lanes);
             } else if DEPTH > NO_DEPTH {
-                fragments.passing = Passing::default();
+                fragments.ranges = DepthRanges::default();
             }
             fragments.run::<DEPTH>(self.draw, self.level, tile.at, sample, &lanes, counters);
         }

@@ -7,7 +7,7 @@
 
 use super::accumulator::Accumulator;
 use super::block_lists::{BlockLists, part};
-use super::depth_ranges::Passing;
+use super::depth_ranges::DepthRanges;
 use super::exact::falls;
 use super::exp2::exp2_of_negated;
 use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
@@ -129,10 +129,10 @@ pub(super) fn composite_per_pixel<S: Simd>(
     task: &Task<'_>,
     depths: RayDepths<'_>,
     lists: &mut BlockLists,
-    (accumulator, passing): (&mut Accumulator, &Passing),
+    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
     runs: Option<&mut Vec<Run>>,
 ) -> Work {
-    let mut work = part(simd, task, lists, (accumulator, passing), runs);
+    let mut work = part(simd, task, lists, (accumulator, ranges), runs);
     for block in 0..BLOCKS {
         if lists[block].is_empty() {
             continue;
@@ -143,7 +143,7 @@ pub(super) fn composite_per_pixel<S: Simd>(
             depths,
             &lists[block],
             (&mut *accumulator, block),
-            passing,
+            ranges,
         );
     }
     work
@@ -159,7 +159,7 @@ impl PerPixel {
         depths: RayDepths<'_>,
         names: &[u32],
         (accumulator, block): (&mut Accumulator, usize),
-        passing: &Passing,
+        ranges: &DepthRanges,
     ) -> u64 {
         let mut open = accumulator.open_lanes(block);
         let rays = block_rays(&depths.rays, task.corner, block);
@@ -177,7 +177,7 @@ impl PerPixel {
                 let alpha = exp2_of_negated(simd, fall).min(ceiling);
                 let mut reached = fall.simd_le(task.thresholds.most_fall);
                 if task.thresholds.depth_mode > NO_DEPTH {
-                    reached &= passing.pixels(simd, block, splat.depth);
+                    reached &= ranges.pixels(simd, block, splat.depth);
                 }
                 let mut reached = reached.to_bitmask() as u32 & open;
                 if reached == 0 {

@@ -2,7 +2,7 @@
 //! registers.
 
 use super::accumulator::Accumulator;
-use super::depth_ranges::Passing;
+use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, ROUND, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
 use super::inputs::{
     DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, Task, Thresholds, power,
@@ -62,7 +62,7 @@ impl Alphas {
         simd: S,
         reaching: &Reaching,
         (round, most_fall): (&StagedRound, &[[f32; BLOCK_PIXELS]; BLOCKS]),
-        passing: &Passing,
+        ranges: &DepthRanges,
         thresholds: Thresholds,
     ) -> u64 {
         simd.vectorize(
@@ -81,7 +81,7 @@ impl Alphas {
                         let fall = round.records[number].falls(simd, block);
                         let most_fall = f32x16::from_slice(simd, &most_fall[block]);
                         let at = (block, round.looks[number].depth);
-                        let reached = reached(simd, DEPTH, at, fall, passing, most_fall);
+                        let reached = reached(simd, DEPTH, at, fall, ranges, most_fall);
                         pixels.add(reached);
                         let alpha = alpha(simd, DEPTH, reached, fall, ceiling);
                         if let Some(to) = items.next() {
@@ -102,12 +102,12 @@ fn reached<S: Simd>(
     mode: DepthMode,
     (block, depth): (usize, u32),
     fall: f32x16<S>,
-    passing: &Passing,
+    ranges: &DepthRanges,
     most_fall: f32x16<S>,
 ) -> mask32x16<S> {
     let reached = fall.simd_le(most_fall);
     if mode > NO_DEPTH {
-        reached & passing.pixels(simd, block, depth)
+        reached & ranges.pixels(simd, block, depth)
     } else {
         reached
     }
@@ -132,11 +132,11 @@ pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
     simd: S,
     reaching: &Reaching,
     (round, alphas): (&StagedRound, &mut Alphas),
-    passing: &Passing,
+    ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> u64 {
     let to = (round, &accumulator.most_fall);
-    let reached = alphas.find::<_, DEPTH>(simd, reaching, to, passing, thresholds);
+    let reached = alphas.find::<_, DEPTH>(simd, reaching, to, ranges, thresholds);
     let refused = composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
     reached.saturating_sub(refused)
 }
@@ -253,7 +253,7 @@ pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
     simd: S,
     splat: &Splat,
     blocks: u64,
-    passing: &Passing,
+    ranges: &DepthRanges,
     task: &Task<'_>,
 ) -> u64 {
     let thresholds = Thresholds {
@@ -264,7 +264,7 @@ pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
     for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
         let fall = falls_64(simd, splat, task, block);
         let look = (splat.color, splat.depth);
-        contributions += accumulate(accumulator, simd, block, fall, look, passing, thresholds);
+        contributions += accumulate(accumulator, simd, block, fall, look, ranges, thresholds);
         accumulator.find_most_fall(simd, block, thresholds.most_fall);
     }
     contributions
@@ -279,13 +279,13 @@ pub(super) fn accumulate<S: Simd>(
     block: usize,
     fall: f32x16<S>,
     look: ([f32; 3], u32),
-    passing: &Passing,
+    ranges: &DepthRanges,
     thresholds: Thresholds,
 ) -> u64 {
     let mut pixels = pixels(accumulator, simd, block);
     let most_fall = f32x16::splat(simd, thresholds.most_fall);
     let mode = thresholds.depth_mode;
-    let reached = reached(simd, mode, (block, look.1), fall, passing, most_fall);
+    let reached = reached(simd, mode, (block, look.1), fall, ranges, most_fall);
     let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
     let alpha = alpha(simd, mode, reached, fall, ceiling);
     let at = (block, &mut pixels);

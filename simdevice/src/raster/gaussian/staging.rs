@@ -1,6 +1,6 @@
 //! Phase 1 of the tile kernel: what the others need of a round's Gaussians in a tile, and which blocks each may reach.
 
-use super::depth_ranges::Passing;
+use super::depth_ranges::DepthRanges;
 use super::grid::{
     BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, ROUND, HALF, LANE_X, LANE_Y, BLOCK_PIXELS,
 };
@@ -68,7 +68,7 @@ impl StagedRound {
         simd: S,
         task: &Task<'_>,
         (round, from, next_chunk): (&[u32], usize, &[u32]),
-        (open, passing): (u64, &Passing),
+        (open, ranges): (u64, &DepthRanges),
         is_recorded: bool,
     ) -> Placed {
         simd.vectorize(
@@ -86,7 +86,7 @@ impl StagedRound {
                 while let Some(&primitive) = round.get(number) {
                     task.prefetch(next_chunk.get(number));
                     let splat = task.splat(primitive);
-                    if DEPTH > NO_DEPTH && passing.hides(splat.depth) {
+                    if DEPTH > NO_DEPTH && ranges.hides(splat.depth) {
                         number += 1;
                         placed.tiles_hidden += 1;
                         if is_recorded {
@@ -111,7 +111,7 @@ impl StagedRound {
                         open
                     };
                     if DEPTH > NO_DEPTH {
-                        let shown = passing.blocks(simd, splat.depth).to_vector();
+                        let shown = ranges.blocks(simd, splat.depth).to_vector();
                         let hidden = (reached & (shown ^ -1)).simd_lt(0).to_bitmask();
                         placed.blocks_hidden += u64::from(hidden.count_ones());
                         reached &= shown;

@@ -469,7 +469,7 @@ fn hidden_work(
     let mut tile = Box::new(GaussianTile::default());
     let mut counters = Counters::default();
     let lanes = [u32::from(u16::MAX); BLOCKS];
-    tile.passing.set(compare, &stored.map(f32::to_bits), &lanes);
+    tile.ranges.set(compare, &stored.map(f32::to_bits), &lanes);
     tile.run::<TEST_DEPTH>(&draw, device.level(), [2, 2], 0, &lanes, &mut counters);
     let pairs = counters.get(Counter::TilePairsEvaluated);
     assert!(pairs <= draw.sorted.tiles.list(2, 2).len() as u64);
