@@ -3,7 +3,7 @@
 use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCKS, ROUND};
-use super::inputs::{NO_DEPTH, Task, TileMode, Work};
+use super::inputs::{NO_DEPTH, TileInputs, TileMode, TileCounts};
 use super::staging::StagedSplat;
 use crate::gaussian::splat::{Splat, binary16_headroom, locate};
 use crate::optimizations::Optimization;
@@ -28,7 +28,7 @@ pub(super) trait BlockKernel {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         at: (usize, usize),
         to: (&mut Accumulator, usize),
         ranges: &DepthRanges,
@@ -43,11 +43,11 @@ pub(super) trait BlockKernel {
 pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
     simd: S,
     mut kernel: K,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     lists: &mut BlockLists,
     (accumulator, ranges): (&mut Accumulator, &DepthRanges),
     runs: Option<&mut Vec<Run>>,
-) -> Work {
+) -> TileCounts {
     let mut work = part(simd, task, lists, (accumulator, ranges), runs);
     let ends_early = task.optimizations.has(Optimization::EarlyTermination);
     for (block, list) in lists.iter().enumerate() {
@@ -77,14 +77,14 @@ fn half_most_fall(splat: &Splat, most_fall: f32) -> f32 {
 #[inline(always)]
 pub(super) fn part<S: Simd>(
     simd: S,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     lists: &mut BlockLists,
     (accumulator, ranges): (&Accumulator, &DepthRanges),
     runs: Option<&mut Vec<Run>>,
-) -> Work {
-    let mut work = Work {
+) -> TileCounts {
+    let mut work = TileCounts {
         pairs: task.list.len() as u64,
-        ..Work::default()
+        ..TileCounts::default()
     };
     let all = mask32x16::splat(simd, true);
     let bounded = task.optimizations.has(Optimization::Blocks);

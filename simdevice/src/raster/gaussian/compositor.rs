@@ -27,8 +27,8 @@ use super::exact::{InOrder, WideSums};
 use super::fast::{self, FastScratch};
 use super::grid::{BLOCKS, PixelMask, block_and_lane, count, lanes_within};
 use super::inputs::{
-    DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, NO_DEPTH, Task, Thresholds,
-    TileMode, Way, Work,
+    DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, NO_DEPTH, TileInputs, Thresholds,
+    TileMode, Way, TileCounts,
 };
 use super::per_pixel::{PerPixel, composite_per_pixel};
 use crate::counters::{Counter, Counters};
@@ -111,7 +111,7 @@ impl GaussianTile {
         }
         let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
         let mode = TileMode::of(draw);
-        let task = Task {
+        let task = TileInputs {
             splats: &draw.sorted.splats,
             mode,
             list,
@@ -164,7 +164,7 @@ impl GaussianTile {
     ) -> PixelMask {
         const LAYER: usize = ACCUMULATORS - 1;
         self.accumulators[LAYER].clear(lanes);
-        let task = Task {
+        let task = TileInputs {
             splats: &draw.sorted.splats,
             mode: TileMode::of(draw).in_list_order(),
             list: draw.sorted.tiles.list(tile_x, tile_y),
@@ -191,10 +191,10 @@ impl GaussianTile {
     fn composite_list<const DEPTH: DepthMode>(
         &mut self,
         level: Level,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         accumulator: usize,
         runs: Option<&mut Vec<Run>>,
-    ) -> Work {
+    ) -> TileCounts {
         let work = match task.mode {
             TileMode::Fast if DEPTH == NO_DEPTH && task.way.powers != NO_DEPTH => {
                 self.composite_with_fast_powers(level, task, accumulator, runs)
@@ -206,7 +206,7 @@ impl GaussianTile {
             }
             _ => self.composite_by_block(level, task, accumulator, runs),
         };
-        Work {
+        TileCounts {
             listed: task.list.len() as u64,
             ..work
         }
@@ -216,10 +216,10 @@ impl GaussianTile {
     fn composite_with_fast_powers(
         &mut self,
         level: Level,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         accumulator: usize,
         runs: Option<&mut Vec<Run>>,
-    ) -> Work {
+    ) -> TileCounts {
         let to = (&mut self.accumulators[accumulator], &self.ranges);
         let fast = &mut self.fast;
         match task.way.powers {
@@ -234,10 +234,10 @@ impl GaussianTile {
     fn composite_by_block(
         &mut self,
         level: Level,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         accumulator: usize,
         runs: Option<&mut Vec<Run>>,
-    ) -> Work {
+    ) -> TileCounts {
         let to = (&mut self.accumulators[accumulator], &self.ranges);
         let lists = &mut self.lists;
         match task.mode {
@@ -275,18 +275,18 @@ impl GaussianTile {
     fn composite_walk<const DEPTH: DepthMode>(
         &mut self,
         level: Level,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         walk: &SortedWalk,
         accumulator: usize,
         mut runs: Option<&mut Vec<Run>>,
-    ) -> Work {
+    ) -> TileCounts {
         let most = match task.mode {
             TileMode::Fast => PIECE,
             // Others part or sort the whole list.
             _ => usize::MAX,
         };
         let tile = task.corner.map(|corner| corner / TILE_SIZE);
-        let (mut work, mut from) = (Work::default(), 0);
+        let (mut work, mut from) = (TileCounts::default(), 0);
         let mut piece = std::mem::take(&mut self.piece);
         loop {
             if task.optimizations.has(Optimization::EarlyTermination)
@@ -299,7 +299,7 @@ impl GaussianTile {
             if piece.is_empty() {
                 break;
             }
-            let task = Task {
+            let task = TileInputs {
                 list: &piece,
                 ..*task
             };

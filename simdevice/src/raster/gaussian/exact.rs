@@ -12,7 +12,7 @@ use super::block_lists::BlockKernel;
 use super::depth_ranges::DepthRanges;
 use super::exp2::exp2_of_negated;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
-use super::inputs::{FIND_MEAN, FIND_MEDIAN, NO_DEPTH, Task, Thresholds, TileMode};
+use super::inputs::{FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TileInputs, Thresholds, TileMode};
 use super::pixels::{accumulate, falls_64};
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
@@ -100,7 +100,7 @@ impl BlockKernel for InOrder {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         (batch, place): (usize, usize),
         (accumulator, block): (&mut Accumulator, usize),
         ranges: &DepthRanges,
@@ -140,7 +140,7 @@ impl BlockKernel for WideSums {
     fn composite<S: Simd>(
         &mut self,
         simd: S,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         (batch, place): (usize, usize),
         (accumulator, block): (&mut Accumulator, usize),
         ranges: &DepthRanges,
@@ -203,7 +203,7 @@ fn accumulate_wide<S: Simd>(
 #[inline(always)]
 pub(super) fn falls<S: Simd>(
     simd: S,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     (batch, place): (usize, usize),
     block: usize,
 ) -> f32x16<S> {

@@ -8,7 +8,7 @@
 use super::accumulator::{NOT_TERMINATED, Accumulator};
 use super::depth_ranges::DepthRanges;
 use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
-use super::inputs::{DepthMode, NO_DEPTH, Task, Work};
+use super::inputs::{DepthMode, NO_DEPTH, TileInputs, TileCounts};
 use super::pixels::{Alphas, evaluate, evaluate_steep};
 use super::staging::{StagedRound, Reaching, hidden_blocks};
 use crate::optimizations::Optimization;
@@ -48,11 +48,11 @@ struct Round<'a> {
 pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     scratch: &mut FastScratch,
     simd: S,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     (accumulator, ranges): (&mut Accumulator, &DepthRanges),
     mut runs: Option<&mut Vec<Run>>,
-) -> Work {
-    let mut work = Work::default();
+) -> TileCounts {
+    let mut work = TileCounts::default();
     for block in 0..BLOCKS {
         accumulator.find_most_fall(simd, block, task.thresholds.most_fall);
     }
@@ -116,10 +116,10 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
 #[inline(always)]
 fn open_blocks<S: Simd, const DEPTH: DepthMode>(
     simd: S,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     accumulator: &Accumulator,
     rest: &[u32],
-    work: &mut Work,
+    work: &mut TileCounts,
 ) -> u64 {
     if !task.optimizations.has(Optimization::EarlyTermination) {
         return ALL_BLOCKS;
@@ -143,10 +143,10 @@ fn open_blocks<S: Simd, const DEPTH: DepthMode>(
 fn composite_round<S: Simd, const DEPTH: DepthMode>(
     scratch: &mut FastScratch,
     simd: S,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     (accumulator, ranges): (&mut Accumulator, &DepthRanges),
     round: &Round<'_>,
-    work: &mut Work,
+    work: &mut TileCounts,
 ) -> u32 {
     let (open, blocks) = (round.open.bits, u64::from(round.open.blocks));
     let (mut blocks_of_hidden, mut from) = (0, 0);
@@ -199,7 +199,7 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
 
 /// What a trace tells of the Gaussians at a list's end that depths hide in all of the tile.
 #[inline(always)]
-fn hidden_run<S: Simd>(simd: S, task: &Task<'_>, rest: &[u32], open: Open) -> Run {
+fn hidden_run<S: Simd>(simd: S, task: &TileInputs<'_>, rest: &[u32], open: Open) -> Run {
     let mut run = Run {
         primitives: rest.len() as u32,
         rows: open.rows,

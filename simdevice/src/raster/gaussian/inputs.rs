@@ -200,7 +200,7 @@ pub(super) fn power<S: Simd>(simd: S, mode: DepthMode, fall: f32x16<S>) -> f32x1
 
 /// What a tile's Gaussians are.
 #[derive(Clone, Copy)]
-pub(super) struct Task<'a> {
+pub(super) struct TileInputs<'a> {
     pub(super) splats: &'a [Vec<Splat>],
     pub(super) mode: TileMode<'a>,
     pub(super) list: &'a [u32],
@@ -214,7 +214,7 @@ pub(super) struct Task<'a> {
     pub(super) way: Way,
 }
 
-impl Task<'_> {
+impl TileInputs<'_> {
     #[inline(always)]
     pub(super) fn splat(&self, primitive: u32) -> &Splat {
         let (batch, place) = locate(primitive);
@@ -232,7 +232,7 @@ impl Task<'_> {
 
 /// What compositing a tile took.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Work {
+pub(super) struct TileCounts {
     /// Entries of the tile's list, as far as there was need of it.
     pub(super) listed: u64,
     pub(super) pairs: u64,
@@ -247,7 +247,7 @@ pub(super) struct Work {
     pub(super) hidden_rest: u32,
 }
 
-impl Work {
+impl TileCounts {
     pub(super) fn add(&mut self, more: &Self) {
         self.listed += more.listed;
         self.pairs += more.pairs;

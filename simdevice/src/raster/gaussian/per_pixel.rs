@@ -11,7 +11,7 @@ use super::depth_ranges::DepthRanges;
 use super::exact::falls;
 use super::exp2::exp2_of_negated;
 use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
-use super::inputs::{FIND_MEDIAN, NO_DEPTH, Task, Work};
+use super::inputs::{FIND_MEDIAN, NO_DEPTH, TileInputs, TileCounts};
 use crate::gaussian::ray_depth::{PixelRays, RayDepths, Rays, ordered_key};
 use crate::gaussian::splat::locate;
 use crate::trace::Run;
@@ -126,12 +126,12 @@ pub(super) struct PerPixel {
 pub(super) fn composite_per_pixel<S: Simd>(
     scratch: &mut PerPixel,
     simd: S,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     depths: RayDepths<'_>,
     lists: &mut BlockLists,
     (accumulator, ranges): (&mut Accumulator, &DepthRanges),
     runs: Option<&mut Vec<Run>>,
-) -> Work {
+) -> TileCounts {
     let mut work = part(simd, task, lists, (accumulator, ranges), runs);
     for block in 0..BLOCKS {
         if lists[block].is_empty() {
@@ -155,7 +155,7 @@ impl PerPixel {
     fn composite_block<S: Simd>(
         &mut self,
         simd: S,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         depths: RayDepths<'_>,
         names: &[u32],
         (accumulator, block): (&mut Accumulator, usize),
@@ -216,7 +216,7 @@ impl PerPixel {
 }
 
 /// Composites what a pixel gathered, front to back; returns how many it accepted.
-fn composite_pixel(sum: &mut Sum, pixel: &mut Gathered, names: &[u32], task: &Task<'_>) -> u64 {
+fn composite_pixel(sum: &mut Sum, pixel: &mut Gathered, names: &[u32], task: &TileInputs<'_>) -> u64 {
     let floor = f64::from(task.thresholds.transmittance_floor);
     let mut accepted = 0;
     for contribution in pixel.sorted() {

@@ -5,7 +5,7 @@ use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, ROUND, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
 use super::inputs::{
-    DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, Task, Thresholds, power,
+    DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, TileInputs, Thresholds, power,
 };
 use super::masks::{Tally, only};
 use super::staging::{StagedRound, Reaching};
@@ -254,7 +254,7 @@ pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
     splat: &Splat,
     blocks: u64,
     ranges: &DepthRanges,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
 ) -> u64 {
     let thresholds = Thresholds {
         depth_mode: DEPTH,
@@ -390,7 +390,7 @@ impl<S: Simd> Pixels<S> {
 pub(super) fn falls_64<S: Simd>(
     simd: S,
     splat: &Splat,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     block: usize,
 ) -> f32x16<S> {
     let [a, b, c] = splat.factor;

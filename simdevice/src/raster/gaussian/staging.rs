@@ -4,7 +4,7 @@ use super::depth_ranges::DepthRanges;
 use super::grid::{
     BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, ROUND, HALF, LANE_X, LANE_Y, BLOCK_PIXELS,
 };
-use super::inputs::{DepthMode, NO_DEPTH, Task};
+use super::inputs::{DepthMode, NO_DEPTH, TileInputs};
 use crate::gaussian::splat::Splat;
 use crate::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
@@ -66,7 +66,7 @@ impl StagedRound {
     pub(super) fn place<S: Simd, const DEPTH: DepthMode>(
         &mut self,
         simd: S,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         (round, from, next_chunk): (&[u32], usize, &[u32]),
         (open, ranges): (u64, &DepthRanges),
         is_recorded: bool,
@@ -184,7 +184,7 @@ impl StagedSplat {
 pub(super) fn hidden_blocks<S: Simd>(
     simd: S,
     splat: &Splat,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     open: mask32x16<S>,
 ) -> u32 {
     let bounded = task.optimizations.has(Optimization::Blocks) && !splat.steep;
