@@ -3,7 +3,7 @@
 use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCKS, ROUND};
-use super::inputs::{NO_DEPTH, TileInputs, TileMode, TileCounts};
+use super::inputs::{NO_DEPTH, TileInputs, Kernel, TileCounts};
 use super::staging::StagedSplat;
 use crate::gaussian::splat::{Splat, binary16_headroom, locate};
 use crate::optimizations::Optimization;
@@ -107,7 +107,7 @@ pub(super) fn part<S: Simd>(
             work.open += BLOCKS as u64;
         }
         let most_fall = match task.mode {
-            TileMode::Half => half_most_fall(splat, task.thresholds.most_fall),
+            Kernel::Half => half_most_fall(splat, task.thresholds.most_fall),
             _ => task.thresholds.most_fall,
         };
         let mut reached = match task.mode.surfel((batch, place)) {

@@ -28,7 +28,7 @@ use super::fast::{self, FastScratch};
 use super::grid::{BLOCKS, PixelMask, block_and_lane, count, lanes_within};
 use super::inputs::{
     DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, NO_DEPTH, TileInputs, Thresholds,
-    TileMode, Way, TileCounts,
+    Kernel, Approximation, TileCounts,
 };
 use super::per_pixel::{PerPixel, composite_per_pixel};
 use crate::counters::{Counter, Counters};
@@ -110,7 +110,7 @@ impl GaussianTile {
             return;
         }
         let corner = [tile_x, tile_y].map(|tile| tile * TILE_SIZE);
-        let mode = TileMode::of(draw);
+        let mode = Kernel::of(draw);
         let task = TileInputs {
             splats: &draw.sorted.splats,
             mode,
@@ -120,7 +120,7 @@ impl GaussianTile {
             half_period: draw.half_period,
             corner,
             thresholds: Thresholds::new(draw, DEPTH),
-            way: Way::of(&draw.state, &mode, DEPTH),
+            way: Approximation::of(&draw.state, &mode, DEPTH),
         };
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
         let work = match draw.sorted.tiles.walk() {
@@ -166,7 +166,7 @@ impl GaussianTile {
         self.accumulators[LAYER].clear(lanes);
         let task = TileInputs {
             splats: &draw.sorted.splats,
-            mode: TileMode::of(draw).in_list_order(),
+            mode: Kernel::of(draw).in_list_order(),
             list: draw.sorted.tiles.list(tile_x, tile_y),
             optimizations: Optimizations::ALL,
             trend: DepthTrend::None,
@@ -177,7 +177,7 @@ impl GaussianTile {
                 transmittance_floor: f32::INFINITY,
                 ..Thresholds::new(draw, FIND_REACHED)
             },
-            way: Way::EXACT,
+            way: Approximation::EXACT,
         };
         match draw.sorted.tiles.walk() {
             None => self.composite_list::<FIND_REACHED>(level, &task, LAYER, None),
@@ -196,10 +196,10 @@ impl GaussianTile {
         runs: Option<&mut Vec<Run>>,
     ) -> TileCounts {
         let work = match task.mode {
-            TileMode::Fast if DEPTH == NO_DEPTH && task.way.powers != NO_DEPTH => {
+            Kernel::Fast if DEPTH == NO_DEPTH && task.way.powers != NO_DEPTH => {
                 self.composite_with_fast_powers(level, task, accumulator, runs)
             }
-            TileMode::Fast => {
+            Kernel::Fast => {
                 let to = (&mut self.accumulators[accumulator], &self.ranges);
                 let fast = &mut self.fast;
                 dispatch!(level, simd => fast::composite::<_, DEPTH>(fast, simd, task, to, runs))
@@ -241,11 +241,11 @@ impl GaussianTile {
         let to = (&mut self.accumulators[accumulator], &self.ranges);
         let lists = &mut self.lists;
         match task.mode {
-            TileMode::Half => {
+            Kernel::Half => {
                 let kernel = Half::new(&task.thresholds);
                 dispatch!(level, simd => composite_by_block(simd, kernel, task, lists, to, runs))
             }
-            TileMode::Exact {
+            Kernel::Exact {
                 depths: Some(depths),
                 ..
             } => {
@@ -253,13 +253,13 @@ impl GaussianTile {
                 dispatch!(level, simd =>
                     composite_per_pixel(scratch, simd, task, depths, lists, to, runs))
             }
-            TileMode::Exact {
+            Kernel::Exact {
                 wide_sums: true, ..
             } => {
                 let kernel = WideSums::new();
                 dispatch!(level, simd => composite_by_block(simd, kernel, task, lists, to, runs))
             }
-            TileMode::Fast | TileMode::Exact { .. } => {
+            Kernel::Fast | Kernel::Exact { .. } => {
                 let (accumulator, ranges) = to;
                 dispatch!(level, simd => {
                     let to = (&mut *accumulator, ranges);
@@ -281,7 +281,7 @@ impl GaussianTile {
         mut runs: Option<&mut Vec<Run>>,
     ) -> TileCounts {
         let most = match task.mode {
-            TileMode::Fast => PIECE,
+            Kernel::Fast => PIECE,
             // Others part or sort the whole list.
             _ => usize::MAX,
         };

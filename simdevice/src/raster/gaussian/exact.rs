@@ -12,7 +12,7 @@ use super::block_lists::BlockKernel;
 use super::depth_ranges::DepthRanges;
 use super::exp2::exp2_of_negated;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
-use super::inputs::{FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TileInputs, Thresholds, TileMode};
+use super::inputs::{FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TileInputs, Thresholds, Kernel};
 use super::pixels::{accumulate, falls_64};
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
@@ -208,7 +208,7 @@ pub(super) fn falls<S: Simd>(
     block: usize,
 ) -> f32x16<S> {
     let splat = &task.splats[batch][place];
-    let TileMode::Exact {
+    let Kernel::Exact {
         surfels: Some(surfels),
         inverse_low_pass,
         ..

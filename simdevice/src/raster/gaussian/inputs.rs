@@ -1,6 +1,6 @@
 //! What compositing a tile takes and counts, and which kernel does it.
 //!
-//! A draw may let the plain kernel leave something inexact ([`Way`]).
+//! A draw may let the plain kernel leave something inexact ([`Approximation`]).
 //!
 //! *Powers of two of fewer terms.* An alpha that errs by a part e of it changes a pixel by that part of what the Gaussian
 //! contributes, times the difference of two colours at most; all contributions add up to one.
@@ -77,7 +77,7 @@ impl Thresholds {
 
 /// How a tile is composited; chosen once for a draw.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum TileMode<'a> {
+pub(super) enum Kernel<'a> {
     /// Volumes in the order of the list, in binary32.
     Fast,
     /// Volumes in the order of the list, in binary16.
@@ -95,7 +95,7 @@ pub(super) enum TileMode<'a> {
     },
 }
 
-impl<'a> TileMode<'a> {
+impl<'a> Kernel<'a> {
     pub(super) fn of(draw: &'a BinnedDraw) -> Self {
         let (surfels, depths) = (draw.surfels(), draw.ray_depths());
         if draw.state.precision == GaussianPrecision::Float16 {
@@ -152,14 +152,14 @@ pub(super) const FASTER_POWERS: DepthMode = 2;
 
 /// How the plain kernel goes about a draw.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
+pub(super) struct Approximation {
     /// [`NO_DEPTH`], or what is cheaper.
     pub(super) powers: DepthMode,
     /// Blocks with no more light are finished.
     pub(super) light: TransmittanceBits,
 }
 
-impl Way {
+impl Approximation {
     /// As exactly as it can.
     pub(super) const EXACT: Self = Self {
         powers: NO_DEPTH,
@@ -167,8 +167,8 @@ impl Way {
     };
 
     /// As a state allows it in a mode; all but the plain one are exact.
-    pub(super) fn of(state: &GaussianState, mode: &TileMode<'_>, depth: DepthMode) -> Self {
-        if depth != NO_DEPTH || !matches!(mode, TileMode::Fast) {
+    pub(super) fn of(state: &GaussianState, mode: &Kernel<'_>, depth: DepthMode) -> Self {
+        if depth != NO_DEPTH || !matches!(mode, Kernel::Fast) {
             return Self::EXACT;
         }
         let GaussianApproximation {
@@ -202,7 +202,7 @@ pub(super) fn power<S: Simd>(simd: S, mode: DepthMode, fall: f32x16<S>) -> f32x1
 #[derive(Clone, Copy)]
 pub(super) struct TileInputs<'a> {
     pub(super) splats: &'a [Vec<Splat>],
-    pub(super) mode: TileMode<'a>,
+    pub(super) mode: Kernel<'a>,
     pub(super) list: &'a [u32],
     /// What is left out.
     pub(super) optimizations: Optimizations,
@@ -211,7 +211,7 @@ pub(super) struct TileInputs<'a> {
     pub(super) half_period: f64,
     pub(super) corner: [u32; 2],
     pub(super) thresholds: Thresholds,
-    pub(super) way: Way,
+    pub(super) way: Approximation,
 }
 
 impl TileInputs<'_> {
