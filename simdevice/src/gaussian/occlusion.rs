@@ -336,7 +336,7 @@ impl TileTransmittance {
 fn reaches_far(splat: &Splat) -> bool {
     // In units of the exponent, a tile's middle to its corners.
     let [a, _, c] = splat.factor.map(f64::abs);
-    !splat.wide && a.max(c) * LEAST_DEVIATION < 1.5
+    !splat.exceeds_period && a.max(c) * LEAST_DEVIATION < 1.5
 }
 
 /// The least alpha of a splat at the pixel centres of a tile: that at a corner, since exponents are convex.

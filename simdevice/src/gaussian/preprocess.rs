@@ -513,8 +513,8 @@ fn append(
             .is_some_and(|period| 2.0 * scratch.flat.half[0][one.at] >= period);
         let splat = Splat::new(&scratch.flat, one.at, one.color, depth);
         Splat {
-            steep: wide || splat.steep,
-            wide,
+            needs_f64: wide || splat.needs_f64,
+            exceeds_period: wide,
             ..splat
         }
     }));

@@ -26,10 +26,10 @@ pub(crate) struct Splat {
     /// The centre's depth as the depth attachment holds it, if the draw tests or writes depth.
     pub depth: u32,
     /// Whether its exponent is a difference of numbers so large that binary32 would lose it.
-    pub steep: bool,
+    pub needs_f64: bool,
     /// Whether it is wider than the period of a panorama: it then counts within half a period of its mean only, where
     /// its copies do not. Such a one is steep.
-    pub wide: bool,
+    pub exceeds_period: bool,
 }
 
 impl Splat {
@@ -43,8 +43,8 @@ impl Splat {
             log2_opacity: flat.log2_opacity[at] as f32,
             color,
             depth,
-            steep: is_steep(factor, flat.log2_opacity[at]),
-            wide: false,
+            needs_f64: is_steep(factor, flat.log2_opacity[at]),
+            exceeds_period: false,
         }
     }
 }

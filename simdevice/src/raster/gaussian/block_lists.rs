@@ -113,7 +113,7 @@ pub(super) fn part<S: Simd>(
         let mut reached = match task.mode.surfel((batch, place)) {
             _ if !bounded => all,
             Some(surfel) => mask32x16::from_bitmask(simd, surfel.blocks(task.corner)),
-            None if splat.steep => all,
+            None if splat.needs_f64 => all,
             None => record.place(simd, splat, task.corner.map(f64::from), most_fall),
         };
         if hidden {

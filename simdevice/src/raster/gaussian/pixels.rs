@@ -396,7 +396,7 @@ pub(super) fn falls_64<S: Simd>(
     let [a, b, c] = splat.factor;
     let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
     let opacity = f64x8::splat(simd, splat.log2_opacity.into());
-    let half_period = if splat.wide {
+    let half_period = if splat.exceeds_period {
         task.half_period
     } else {
         f64::INFINITY

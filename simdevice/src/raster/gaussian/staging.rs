@@ -94,7 +94,7 @@ impl StagedRound {
                         }
                         continue;
                     }
-                    if splat.steep {
+                    if splat.needs_f64 {
                         break;
                     }
                     let at = number % ROUND;
@@ -187,7 +187,7 @@ pub(super) fn hidden_blocks<S: Simd>(
     task: &TileInputs<'_>,
     open: mask32x16<S>,
 ) -> u32 {
-    let bounded = task.optimizations.has(Optimization::Blocks) && !splat.steep;
+    let bounded = task.optimizations.has(Optimization::Blocks) && !splat.needs_f64;
     let reached = if bounded {
         let most_fall = task.thresholds.most_fall;
         open & StagedSplat::default().place(simd, splat, task.corner.map(f64::from), most_fall)

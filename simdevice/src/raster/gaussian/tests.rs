@@ -243,10 +243,10 @@ fn naive_sample(
         let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
         let u = u + dx * f[0] as f32;
         let v = v + mul_add(dy, f[2] as f32, dx * f[1] as f32);
-        let fall = if g.steep || needs_f64_sums(state) {
+        let fall = if g.needs_f64 || needs_f64_sums(state) {
             let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
             let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
-            if g.wide && !(-draw.half_period..draw.half_period).contains(&dx) {
+            if g.exceeds_period && !(-draw.half_period..draw.half_period).contains(&dx) {
                 1e3
             } else {
                 ((u * u + v * v - f64::from(g.log2_opacity)) as f32).max(-1.0)
@@ -389,7 +389,7 @@ fn it_does_so_where_gaussians_are_wider_than_a_period() {
         draw.half_period = 2.25;
         let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
         for splat in sorted.splats.iter_mut().flatten().step_by(3) {
-            (splat.wide, splat.steep) = (true, true);
+            (splat.exceeds_period, splat.needs_f64) = (true, true);
         }
     });
 }
@@ -408,7 +408,7 @@ fn it_does_so_where_gaussians_are_steep() {
         .splats
         .iter()
         .flatten()
-        .filter(|splat| splat.steep);
+        .filter(|splat| splat.needs_f64);
     assert!(steep.count() > 10);
     check(5, 3000, &state, WHOLE);
 }

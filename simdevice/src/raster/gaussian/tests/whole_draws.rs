@@ -511,7 +511,7 @@ fn steep_gaussians_behind_a_whole_tile_are_not_fetched_either() {
     let steep = hidden(|draw| {
         let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
         for splat in sorted.splats.iter_mut().flatten() {
-            splat.steep = true;
+            splat.needs_f64 = true;
         }
     });
     assert!(steep > 0);
