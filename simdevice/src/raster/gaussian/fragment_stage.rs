@@ -61,7 +61,7 @@ impl ResolveProgram {
 }
 
 /// A resolve shader made ready for tiles, which all workers share.
-pub(super) struct ResolveDraw<'a> {
+pub(super) struct FragmentStageDraw<'a> {
     draw: &'a BinnedDraw,
     shader: &'a ResolveShader,
     stage: &'a FragmentStage,
@@ -84,13 +84,13 @@ pub(super) struct Tools<'a> {
 }
 
 /// Fragments of a tile that are shaded together: of samples that accumulated as sample `leader` did.
-struct Group {
+struct SampleGroup {
     leader: usize,
     /// The blocks that have some, of which each is a chunk of lanes.
     blocks: Vec<usize>,
 }
 
-impl<'a> ResolveDraw<'a> {
+impl<'a> FragmentStageDraw<'a> {
     pub(super) fn new(
         draw: &'a BinnedDraw,
         shader: &'a ResolveShader,
@@ -147,7 +147,7 @@ impl<'a> ResolveDraw<'a> {
                 tools.buffers.color[index].touch(target, 0, tile);
             }
         }
-        let groups: Vec<Group> = (0..self.samples)
+        let groups: Vec<SampleGroup> = (0..self.samples)
             .map(|leader| self.group(leader, samples, covered))
             .filter(|group| !group.blocks.is_empty())
             .collect();
@@ -183,12 +183,12 @@ impl<'a> ResolveDraw<'a> {
         (leader..self.samples).filter(move |&sample| self.leader(samples, sample, block) == leader)
     }
 
-    fn group(&self, leader: usize, samples: &Samples, covered: &[PixelMask; SAMPLES]) -> Group {
+    fn group(&self, leader: usize, samples: &Samples, covered: &[PixelMask; SAMPLES]) -> SampleGroup {
         let is_covered = |&block: &usize| {
             let mut members = self.members(samples, leader, block);
             members.any(|sample| covered[sample][block] != 0)
         };
-        Group {
+        SampleGroup {
             leader,
             blocks: (0..BLOCKS).filter(is_covered).collect(),
         }
@@ -197,7 +197,7 @@ impl<'a> ResolveDraw<'a> {
     fn shade(
         &self,
         tile: &Tile,
-        group: &Group,
+        group: &SampleGroup,
         samples: &Samples,
         covered: &mut [PixelMask; SAMPLES],
         tools: &mut Tools<'_>,
@@ -248,7 +248,7 @@ impl<'a> ResolveDraw<'a> {
     fn set_inputs(
         &self,
         tile: &Tile,
-        group: &Group,
+        group: &SampleGroup,
         (number, block): (usize, usize),
         samples: &Samples,
         covered: &[PixelMask; SAMPLES],
@@ -326,7 +326,7 @@ impl<'a> ResolveDraw<'a> {
         &self,
         simd: S,
         tile: &Tile,
-        group: &Group,
+        group: &SampleGroup,
         samples: &Samples,
         covered: &mut [PixelMask; SAMPLES],
         killed: &LaneMask,
