@@ -37,7 +37,7 @@ use crate::raster::tile::{AREA, Target, Tile};
 use depth_ranges::DepthRanges;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
-use fragment_stage::{ResolveDraw, Tools};
+use fragment_stage::{FragmentStageDraw, Tools};
 use grid::{BLOCKS, BLOCK_PIXELS, PixelMask, count, lanes_within};
 use inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
 use isa::exec::Stopped;
@@ -51,7 +51,7 @@ pub struct GaussianTileDraw<'a> {
     /// The first colour attachment, unless the draw leaves it as it is.
     color: Option<ColorOutput>,
     /// What makes colours in its place.
-    resolve: Option<ResolveDraw<'a>>,
+    resolve: Option<FragmentStageDraw<'a>>,
     tests: Tests,
     /// Samples of a pixel.
     samples: usize,
@@ -87,7 +87,7 @@ impl<'a> GaussianTileDraw<'a> {
             draw,
             targets,
             color,
-            resolve: resolve.map(|shader| ResolveDraw::new(draw, shader, targets, samples, device)),
+            resolve: resolve.map(|shader| FragmentStageDraw::new(draw, shader, targets, samples, device)),
             tests: Tests::new(&state.depth_stencil, depth, targets.stencil.is_some()),
             samples,
             level: device.level(),
@@ -120,7 +120,7 @@ impl<'a> GaussianTileDraw<'a> {
             buffers.stencil.touch(target, 0, tile);
         }
         let mut samples = self.test_first(tile, buffers);
-        let reads_depth = self.resolve.as_ref().is_some_and(ResolveDraw::reads_depth);
+        let reads_depth = self.resolve.as_ref().is_some_and(FragmentStageDraw::reads_depth);
         match self.tests.depth {
             _ if reads_depth => {
                 self.composite::<FIND_MEAN>(tile, &mut samples, buffers, fragments, counters);
