@@ -65,7 +65,7 @@ macro_rules! counters {
 
 counters! {
     GaussiansRead: "gaussians", "gaussians read", Count, "Gaussians that draws named";
-    ClustersBuilt: "gaussians", "chunks built", Count, "Chunks of up to 256 Gaussians that were made of memory that is drawn again";
+    ClustersBuilt: "gaussians", "clusters built", Count, "Clusters of up to 256 Gaussians that were made of memory that is drawn again";
     GaussiansDrawn: "gaussians", "gaussians drawn", Count, "Gaussians that reached at least one tile";
     SkippedNonFinite: "gaussians skipped", "non-finite", Count, "Gaussians with a non-finite attribute";
     SkippedZeroRotation: "gaussians skipped", "zero quaternion", Count, "Gaussians whose quaternion is all zero";
@@ -75,8 +75,8 @@ counters! {
     SkippedFar: "gaussians skipped", "beyond far plane", Count, "Gaussians not before the far plane";
     SkippedDegenerate: "gaussians skipped", "degenerate covariance", Count, "Gaussians whose screen-space covariance is not positive and finite";
     SkippedOffScreen: "gaussians skipped", "off screen", Count, "Gaussians that reach no pixel of the scissored viewport at the alpha floor";
-    OutsideByClusters: "optimizations", "outside by clusters", Count, "Gaussians that were not read because the bounds of their chunk are outside the picture";
-    HiddenByOthers: "optimizations", "hidden by others", Count, "Gaussians that were not read because others before their chunk finish all pixels that it reaches";
+    OutsideByClusters: "optimizations", "outside by clusters", Count, "Gaussians that were not read because the bounds of their cluster are outside the picture";
+    HiddenByOthers: "optimizations", "hidden by others", Count, "Gaussians that were not read because others before their cluster finish all pixels that it reaches";
     SetsUnchanged: "optimizations", "sets unchanged", Count, "sets of Gaussians that were drawn as they had been projected, sorted and binned before";
     OutsideByBounds: "optimizations", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
     TilesBesideEllipse: "optimizations", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
@@ -122,7 +122,7 @@ counters! {
     ShaderLanes: "shader cores", "lanes", Count, "Lanes that could have been active, summed alike; active lanes by it is the lane occupancy";
     GeometryTime: "time", "geometry", Nanoseconds, "All of points, lines and triangles before tiles: vertices, set-up, binning";
     PreprocessTime: "time", "preprocess", Nanoseconds, "Reading, culling, projecting and colouring Gaussians";
-    ClusterTime: "time", "chunks", Nanoseconds, "Putting Gaussians that are drawn again into chunks; not part of preprocess";
+    ClusterTime: "time", "clusters", Nanoseconds, "Putting Gaussians that are drawn again into clusters; not part of preprocess";
     SortTime: "time", "sort", Nanoseconds, "Sorting by depth";
     BinningTime: "time", "binning", Nanoseconds, "Placing Gaussians and primitives in the lists of their tiles";
     ShaderTime: "time", "dispatches", Nanoseconds, "Running the workgroups of compute programs";

@@ -87,7 +87,7 @@ pub struct Device {
     workers: Workers,
     level: Level,
     config: Config,
-    chunks: ClusterCache,
+    clusters: ClusterCache,
     last_sets: ReuseCache,
     recorder: Arc<Recorder>,
 }
@@ -112,7 +112,7 @@ impl Device {
             workers,
             level,
             config: config.clone(),
-            chunks: ClusterCache::default(),
+            clusters: ClusterCache::default(),
             last_sets: ReuseCache::default(),
             recorder: config.recorder.clone().unwrap_or_default(),
         })
@@ -128,9 +128,9 @@ impl Device {
         &self.last_sets
     }
 
-    /// The chunks of Gaussians that were drawn more than once.
-    pub(crate) fn chunks(&self) -> &ClusterCache {
-        &self.chunks
+    /// The clusters of Gaussians that were drawn more than once.
+    pub(crate) fn clusters(&self) -> &ClusterCache {
+        &self.clusters
     }
 
     /// Where what is done goes, if anybody wants to know now.

@@ -34,8 +34,8 @@ macro_rules! optimizations {
 }
 
 optimizations! {
-    ClusterCulling: "cluster-culling", OutsideByClusters, "Gaussians that are drawn again are in chunks, of which those outside the picture are not read.";
-    OcclusionCulling: "occlusion-culling", HiddenByOthers, "Gaussians that are drawn again are not read in chunks that others hide.";
+    ClusterCulling: "cluster-culling", OutsideByClusters, "Gaussians that are drawn again are in clusters, of which those outside the picture are not read.";
+    OcclusionCulling: "occlusion-culling", HiddenByOthers, "Gaussians that are drawn again are not read in clusters that others hide.";
     TemporalReuse: "temporal-reuse", SetsUnchanged, "Gaussians in memory that only the device writes are not projected, sorted and binned again while neither they nor the view change.";
     Bounds: "bounds", OutsideByBounds, "A Gaussian whose bounding sphere is off the screen is not projected further.";
     Ellipse: "ellipse", TilesBesideEllipse, "A Gaussian is listed only in tiles that its ellipse reaches, not in all of its box.";

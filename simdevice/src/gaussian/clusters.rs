@@ -4,7 +4,7 @@
 //! They are derived from memory that only the device can write, and never change an image.
 
 use super::attributes::{
-    Attributes, Group, CoefficientReader, Fetcher, Harmonics, SourceFingerprint,
+    Attributes, CoefficientReader, Fetcher, Group, Harmonics, SourceFingerprint,
 };
 use super::frustum::Bounds;
 use super::lanes::GROUP;
@@ -39,11 +39,11 @@ pub(super) struct Clusters {
     pub(super) opacity: f32,
 }
 
-/// The least opacity of a screen.
-const SCREEN_OPACITY: f32 = 0.5;
+/// The least opacity of an occluder.
+const OCCLUDER_OPACITY: f32 = 0.5;
 
 /// The most occluders of a draw of so many Gaussians: looking for large ones among them must not cost what it saves.
-fn max_screens(count: usize) -> usize {
+fn max_occluders(count: usize) -> usize {
     (count / 16).min(8 * 1024)
 }
 
@@ -55,10 +55,10 @@ pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64
     let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
     let floats = if with_harmonics { reader.floats() } else { 0 };
     let cluster = size_of::<Cluster>() + 4 * GROUP * (1 + floats);
-    let screen = size_of::<Cluster>() + 4 * GROUP;
+    let occluder = size_of::<Cluster>() + 4 * GROUP;
     let clusters = |count: u64| count.div_ceil(GROUP as u64);
-    let occluders = chunks(max_screens(append.count as usize) as u64);
-    chunks(append.count.into()) * cluster as u64 + occluders * screen as u64
+    let occluders = clusters(max_occluders(append.count as usize) as u64);
+    clusters(append.count.into()) * cluster as u64 + occluders * occluder as u64
 }
 
 impl Clusters {
@@ -74,10 +74,10 @@ impl Clusters {
             })
             .collect_into_vec(&mut clusters);
         let opacities = clusters.iter().map(|cluster| cluster.bounds.opacity);
-        let occluders = occluders(&clusters, max_screens(order.len()));
-        let occluders = occluders
-            .chunks(GROUP)
-            .map(|numbers| Cluster::read(append, &mut Fetcher::default(), numbers, (is_flat, false)));
+        let occluders = occluders(&clusters, max_occluders(order.len()));
+        let occluders = occluders.chunks(GROUP).map(|numbers| {
+            Cluster::read(append, &mut Fetcher::default(), numbers, (is_flat, false))
+        });
         let harmonics = &append.attributes.spherical_harmonics;
         Self {
             harmonics: match with_harmonics {
@@ -107,7 +107,7 @@ fn occluders(clusters: &[Cluster], most: usize) -> Vec<u32> {
     let opaque = || {
         clusters.iter().flat_map(|cluster| {
             (0..cluster.numbers.len())
-                .filter(|&lane| cluster.attributes.opacity[lane] >= SCREEN_OPACITY)
+                .filter(|&lane| cluster.attributes.opacity[lane] >= OCCLUDER_OPACITY)
                 .map(|lane| (cluster.attributes.second_scale(lane), cluster.numbers[lane]))
         })
     };

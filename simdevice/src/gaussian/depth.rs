@@ -145,8 +145,18 @@ mod tests {
                 [0.25, 0.75],
                 DepthTrend::Rising,
             ),
-            (CameraModel::Pinhole, [0.0, 1.0], [0.0, 1.0], DepthTrend::Falling),
-            (CameraModel::Fisheye, [0.0, 1.0], [1.0, 0.5], DepthTrend::Rising),
+            (
+                CameraModel::Pinhole,
+                [0.0, 1.0],
+                [0.0, 1.0],
+                DepthTrend::Falling,
+            ),
+            (
+                CameraModel::Fisheye,
+                [0.0, 1.0],
+                [1.0, 0.5],
+                DepthTrend::Rising,
+            ),
             (
                 CameraModel::Orthographic,
                 [0.5, 0.01],

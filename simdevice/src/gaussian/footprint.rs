@@ -111,7 +111,10 @@ impl TileFootprint {
 
     /// Its rows, each with its span, which may be empty.
     #[inline(always)]
-    pub(crate) fn spans<'a>(&'a self, others: &'a [TileSpan]) -> impl Iterator<Item = (u32, TileSpan)> {
+    pub(crate) fn spans<'a>(
+        &'a self,
+        others: &'a [TileSpan],
+    ) -> impl Iterator<Item = (u32, TileSpan)> {
         (self.row()..).zip((0..self.len()).map(|number| self.span(others, number)))
     }
 

@@ -6,7 +6,7 @@ use super::frustum::{Frustum, Outside};
 use super::instances::InstanceTransform;
 use super::lanes::GROUP;
 use super::occlusion::OcclusionMap;
-use super::preprocess::{GroupTask, GroupSource};
+use super::preprocess::{GroupSource, GroupTask};
 use super::set::{GaussianSet, MAX_GROUPS, SortError};
 use super::vertex_projection;
 use crate::counters::{Counter, Counters};

@@ -4,8 +4,8 @@
 //! direction from which it is seen is turned back by the inverse of A, so that what was trained in its own space is seen
 //! there by an eye that moved with it.
 
-use super::attributes::{Group, Fetcher};
-use super::lanes::{GROUP, Bits, F32_LANES, GroupF64};
+use super::attributes::{Fetcher, Group};
+use super::lanes::{Bits, F32_LANES, GROUP, GroupF64};
 use crate::packet::{AttributeStream, GaussianAppend};
 
 /// Matrices by lane, as they are read.

@@ -9,7 +9,7 @@ use super::clusters::{Cluster, Clusters};
 use super::footprint::{TILE_SIZE, Visible};
 use super::frustum::{Bounds, Frustum};
 use super::lanes::GROUP;
-use super::preprocess::{GroupTask, GroupSource, Preprocessor};
+use super::preprocess::{GroupSource, GroupTask, Preprocessor};
 use super::set::GaussianSet;
 use super::sort;
 use super::splat::{ProjectedGroup, Splat};
@@ -34,7 +34,7 @@ const LEAST_ALPHA: f64 = 0.2;
 /// What following occluders may cost for each tile, in units of what it costs to see that a tile is finished.
 const COST_PER_TILE: usize = 512;
 
-/// What it costs to find what a screen takes of a tile, in the same units.
+/// What it costs to find what an occluder takes of a tile, in the same units.
 const TAKING: usize = 8;
 
 /// What rounding may do to an alpha and to a product of many, relative to it.
@@ -82,7 +82,7 @@ pub(super) fn find(
             && !append.attributes.model.is_some()
         {
             let frustum = Arc::new(Frustum::new(constants, clusters.opacity));
-            let occluders = large_screens(constants, &frustum, clusters);
+            let occluders = large_occluders(constants, &frustum, clusters);
             found.push((append, frustum, occluders));
         }
     }
@@ -133,7 +133,11 @@ fn least_light(state: &GaussianState) -> f32 {
 }
 
 /// The occluders of clusters that may be wide enough in the picture, packed.
-fn large_screens(constants: &ViewConstants, frustum: &Frustum, clusters: &Clusters) -> Vec<Cluster> {
+fn large_occluders(
+    constants: &ViewConstants,
+    frustum: &Frustum,
+    clusters: &Clusters,
+) -> Vec<Cluster> {
     let mut packed: Vec<Cluster> = Vec::new();
     for cluster in &clusters.occluders {
         if frustum.excludes(&cluster.bounds).is_some() {
@@ -246,7 +250,7 @@ impl TileTransmittance {
         }
     }
 
-    /// The columns and rows of the tiles of which a screen may take enough.
+    /// The columns and rows of the tiles of which an occluder may take enough.
     fn covered(&self, splat: &Splat) -> [std::ops::Range<u32>; 2] {
         let [a, b, c] = splat.factor;
         let extent = f64::from(splat.log2_opacity) - self.alphas[1].log2();
@@ -263,7 +267,7 @@ impl TileTransmittance {
         [along(0), along(1)]
     }
 
-    /// What a screen takes of a tile.
+    /// What an occluder takes of a tile.
     fn attenuate(&mut self, splat: &Splat, key: u32, [column, row]: [u32; 2]) {
         let tile = (row * self.count[0] + column) as usize;
         let [first_column, first_row] = self.first;

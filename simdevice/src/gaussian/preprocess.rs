@@ -5,15 +5,15 @@
 //! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
-use super::attributes::{Attributes, Group, CoefficientReader, Fetcher, Harmonics};
+use super::attributes::{Attributes, CoefficientReader, Fetcher, Group, Harmonics};
 use super::camera::{self, LN_2, ViewConstants};
 use super::clusters::Cluster;
 use super::frustum::Frustum;
 use super::instances::{Matrices, cofactors, dot};
-use super::lanes::{GROUP, Bits, F32_LANES, GroupF64, log2};
+use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, log2};
 use super::panorama;
 use super::ray_depth::RayDepth;
-use super::scratch::{ScreenGaussians, Scratch};
+use super::scratch::{Scratch, ScreenGaussians};
 use super::sort::ordered_bits;
 use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, coefficient_count};
 use super::splat::{ProjectedGroup, Splat, binary16_headroom};
@@ -210,7 +210,8 @@ fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch:
         _ => &*scratch.offset,
     };
     let number = |value: f64| S::f64s::splat(simd, value);
-    let load = |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+    let load =
+        |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
     let (scale, rotation, opacity) = (&*scratch.scale, &*scratch.rotation, &*scratch.opacity);
     let flat = &mut *scratch.flat;
     let r = view.rotation;
@@ -628,7 +629,9 @@ impl<'a> GroupTask<'a> {
                 let len = (self.append.count - start).min(GROUP as u32) as usize;
                 Group::new(self.append, self.instance, start, len)
             }
-            GroupSource::Cluster(cluster) => Group::of_cluster(self.append, self.instance, &cluster.numbers),
+            GroupSource::Cluster(cluster) => {
+                Group::of_cluster(self.append, self.instance, &cluster.numbers)
+            }
         };
         let matrices = streams.model.matrix.as_ref().map(|rows| {
             let matrices = matrices.get_or_insert_default();
@@ -689,7 +692,8 @@ impl Preprocessor<'_> {
             self.task(worker.get_or_insert_with(Worker::new), task)
         };
         let mut groups = host::with_capacity(tasks.len());
-        tasks.par_iter()
+        tasks
+            .par_iter()
             .with_max_len(GROUPS_PER_TASK)
             .map(one)
             .collect_into_vec(&mut groups);

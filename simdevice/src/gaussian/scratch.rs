@@ -3,7 +3,7 @@
 use super::attributes::Attributes;
 use super::footprint::TileFootprint;
 use super::instances::{Matrices, Placed};
-use super::lanes::{GROUP, Bits, F32_LANES, GroupF64, NO_GROUP_F64};
+use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, NO_GROUP_F64};
 
 /// The reach of each lane, as the two words of [`TileFootprint::words`].
 pub(super) struct TileFootprints(pub(super) [[u64; GROUP + 8]; 2]);

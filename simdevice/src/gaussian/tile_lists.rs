@@ -8,7 +8,7 @@
 //! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
 //! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
-use super::footprint::{HELD_ROWS, TileFootprint, TileSpan, TILE_SIZE};
+use super::footprint::{HELD_ROWS, TILE_SIZE, TileFootprint, TileSpan};
 use super::splat::{ProjectedGroup, locate};
 use crate::lanes::three;
 use crate::packet::Rect;
@@ -266,7 +266,8 @@ impl TileLists {
 
     /// Bytes of host memory that the lists take.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let bytes = |band: &RowBand| 2 * size_of_val(&*band.starts) + size_of_val(&*band.primitives);
+        let bytes =
+            |band: &RowBand| 2 * size_of_val(&*band.starts) + size_of_val(&*band.primitives);
         let lists = self.bands.iter().map(|band| bytes(band) as u64);
         lists.sum::<u64>() + self.walk.as_ref().map_or(0, SortedWalk::memory_bytes)
     }

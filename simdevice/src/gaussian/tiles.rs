@@ -2,10 +2,10 @@
 //! are, and one at a time for the others.
 
 use super::camera::ViewConstants;
-use super::footprint::{Ellipse, HELD_ROWS, TileFootprint, TILE_SIZE};
+use super::footprint::{Ellipse, HELD_ROWS, TILE_SIZE, TileFootprint};
 use super::lanes::{Bits, GroupF64};
 use super::panorama;
-use super::scratch::{ScreenGaussians, Scratch};
+use super::scratch::{Scratch, ScreenGaussians};
 use super::splat::ProjectedGroup;
 use super::surfel::surfel_of;
 use crate::counters::{Counter, Counters};

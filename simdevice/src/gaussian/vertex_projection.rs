@@ -88,7 +88,10 @@ pub(super) fn vertex_bytes(draw: &Draw) -> u64 {
 ///
 /// # Errors
 /// [`Stopped`] if a program ran for too long.
-pub(super) fn project_all(set: &GaussianSet, device: &Device) -> Result<Vec<ProjectedGroup>, Stopped> {
+pub(super) fn project_all(
+    set: &GaussianSet,
+    device: &Device,
+) -> Result<Vec<ProjectedGroup>, Stopped> {
     let mut sequence = 0u32;
     for append in &set.appends {
         let gaussians = append.count.wrapping_mul(append.instance_count);
@@ -151,7 +154,8 @@ fn project(
     };
     let mut done = host::with_capacity(tasks.len());
     device.install(|| {
-        tasks.par_iter()
+        tasks
+            .par_iter()
             .with_min_len(GROUPS_PER_TASK)
             .map_init(worker, one)
             .collect_into_vec(&mut done);

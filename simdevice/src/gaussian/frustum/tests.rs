@@ -3,7 +3,7 @@
 use super::*;
 use crate::device::SimdLevel;
 use crate::format::Format;
-use crate::gaussian::attributes::{Group, CoefficientReader, Harmonics};
+use crate::gaussian::attributes::{CoefficientReader, Group, Harmonics};
 use crate::gaussian::footprint::Visible;
 use crate::gaussian::lanes::GROUP;
 use crate::gaussian::preprocess::{Source, project};

@@ -1,6 +1,6 @@
 //! What Gaussian mode accumulates for a tile's pixels, or for one sample of each.
 
-use super::grid::{ALL_LANES, BLOCKS, BLOCK_PIXELS, PixelMask, TILE, block_and_lane};
+use super::grid::{ALL_LANES, BLOCK_PIXELS, BLOCKS, PixelMask, TILE, block_and_lane};
 use crate::raster::DepthCode;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
@@ -113,7 +113,11 @@ impl Accumulator {
 
     /// Bit `block` tells that a pixel of the block is not finished and has more than some light.
     #[inline(always)]
-    pub(super) fn open_blocks<S: Simd>(&self, simd: S, TransmittanceBits(light): TransmittanceBits) -> u64 {
+    pub(super) fn open_blocks<S: Simd>(
+        &self,
+        simd: S,
+        TransmittanceBits(light): TransmittanceBits,
+    ) -> u64 {
         let light = i32x16::splat(simd, light);
         let mut open = 0;
         for (block, lanes) in self.transmittance.iter().enumerate() {

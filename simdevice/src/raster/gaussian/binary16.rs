@@ -10,7 +10,7 @@ use super::block_lists::BlockKernel;
 use super::depth_ranges::DepthRanges;
 use super::exp2::POWER_OF_TWO;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
-use super::inputs::{FIND_MEDIAN, NO_DEPTH, TileInputs, Thresholds};
+use super::inputs::{FIND_MEDIAN, NO_DEPTH, Thresholds, TileInputs};
 use crate::gaussian::splat::Splat;
 use crate::lanes::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*, u32x16};

@@ -3,7 +3,7 @@
 use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
 use super::grid::{BLOCKS, ROUND};
-use super::inputs::{NO_DEPTH, TileInputs, Kernel, TileCounts};
+use super::inputs::{Kernel, NO_DEPTH, TileCounts, TileInputs};
 use super::staging::StagedSplat;
 use crate::gaussian::splat::{Splat, binary16_headroom, locate};
 use crate::optimizations::Optimization;

@@ -27,8 +27,8 @@ use super::exact::{InOrder, WideSums};
 use super::fast::{self, FastScratch};
 use super::grid::{BLOCKS, PixelMask, block_and_lane, count, lanes_within};
 use super::inputs::{
-    DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, NO_DEPTH, TileInputs, Thresholds,
-    Kernel, Approximation, TileCounts,
+    Approximation, DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, Kernel,
+    NO_DEPTH, Thresholds, TileCounts, TileInputs,
 };
 use super::per_pixel::{PerPixel, composite_per_pixel};
 use crate::counters::{Counter, Counters};
@@ -125,7 +125,9 @@ impl GaussianTile {
         let mut runs = draw.record.as_ref().map(|_| Vec::new());
         let work = match draw.sorted.tiles.walk() {
             None => self.composite_list::<DEPTH>(level, &task, accumulator, runs.as_mut()),
-            Some(walk) => self.composite_walk::<DEPTH>(level, &task, walk, accumulator, runs.as_mut()),
+            Some(walk) => {
+                self.composite_walk::<DEPTH>(level, &task, walk, accumulator, runs.as_mut())
+            }
         };
         if let Some((record, runs)) = draw.record.as_ref().zip(runs) {
             let outside = TILE_SIZE * TILE_SIZE - count(lanes);
@@ -134,7 +136,8 @@ impl GaussianTile {
                 listed: work.listed as u32,
                 runs,
                 contributions: work.contributions,
-                terminated: count(&self.accumulators[accumulator].finished()).saturating_sub(outside),
+                terminated: count(&self.accumulators[accumulator].finished())
+                    .saturating_sub(outside),
                 hidden_rest: work.hidden_rest,
                 ..TileWork::default()
             });

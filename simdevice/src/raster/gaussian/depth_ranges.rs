@@ -4,7 +4,7 @@
 //! stored depth are those from one more to one less. So one subtraction and one comparison do for every operation, and
 //! nothing in the kernel depends on which it is.
 
-use super::grid::{BLOCKS, BLOCK_PIXELS, PixelMask};
+use super::grid::{BLOCK_PIXELS, BLOCKS, PixelMask};
 use crate::gaussian::depth::DepthTrend;
 use crate::packet::draw::CompareOp;
 use fearless_simd::{Simd, mask32x16, prelude::*, u32x16};
@@ -168,7 +168,8 @@ mod tests {
                 ranges.set(op, &stored, &lanes);
                 for depth in 90..160 {
                     let passes = (0..256).any(|at| {
-                        lanes[at / BLOCK_PIXELS] >> (at % BLOCK_PIXELS) & 1 == 1 && compare(op, depth, stored[at])
+                        lanes[at / BLOCK_PIXELS] >> (at % BLOCK_PIXELS) & 1 == 1
+                            && compare(op, depth, stored[at])
                     });
                     assert!(!(passes && ranges.hides(depth)), "{op:?} {depth}");
                     // Bounds of single ranges are exact but for Equal, whose depths have gaps.

@@ -11,8 +11,8 @@ use super::accumulator::Accumulator;
 use super::block_lists::BlockKernel;
 use super::depth_ranges::DepthRanges;
 use super::exp2::exp2_of_negated;
-use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
-use super::inputs::{FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TileInputs, Thresholds, Kernel};
+use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
+use super::inputs::{FIND_MEAN, FIND_MEDIAN, Kernel, NO_DEPTH, Thresholds, TileInputs};
 use super::pixels::{accumulate, falls_64};
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
@@ -108,7 +108,15 @@ impl BlockKernel for InOrder {
         let splat = &task.splats[batch][place];
         let fall = falls(simd, task, (batch, place), block);
         let look = (splat.color, splat.depth);
-        accumulate(accumulator, simd, block, fall, look, ranges, task.thresholds)
+        accumulate(
+            accumulator,
+            simd,
+            block,
+            fall,
+            look,
+            ranges,
+            task.thresholds,
+        )
     }
 }
 

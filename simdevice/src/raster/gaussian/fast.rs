@@ -5,12 +5,12 @@
 //! [`staging`]: super::staging
 //! [`pixels`]: super::pixels
 
-use super::accumulator::{NOT_TERMINATED, Accumulator};
+use super::accumulator::{Accumulator, NOT_TERMINATED};
 use super::depth_ranges::DepthRanges;
 use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
-use super::inputs::{DepthMode, NO_DEPTH, TileInputs, TileCounts};
+use super::inputs::{DepthMode, NO_DEPTH, TileCounts, TileInputs};
 use super::pixels::{Alphas, evaluate, evaluate_steep};
-use super::staging::{StagedRound, Reaching, hidden_blocks};
+use super::staging::{Reaching, StagedRound, hidden_blocks};
 use crate::optimizations::Optimization;
 use crate::trace::{self, Run};
 use fearless_simd::{Simd, mask32x16, prelude::*};
@@ -18,7 +18,7 @@ use fearless_simd::{Simd, mask32x16, prelude::*};
 /// What the kernel needs besides the pixels.
 #[derive(Debug, Default)]
 pub(super) struct FastScratch {
-    round: StagedRound,
+    staged: StagedRound,
     /// Apart, so that both are small enough never to be wanting.
     alphas: Box<Alphas>,
 }
@@ -36,9 +36,9 @@ struct Open {
 
 /// Gaussians that are composited together.
 struct Round<'a> {
-    round: &'a [u32],
+    primitives: &'a [u32],
     /// Those of the round after.
-    next_chunk: &'a [u32],
+    next: &'a [u32],
     open: Open,
     is_recorded: bool,
 }
@@ -59,7 +59,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
     for primitive in task.list.iter().take(ROUND) {
         task.prefetch(Some(primitive));
     }
-    for (number, round) in task.list.chunks(ROUND).enumerate() {
+    for (number, primitives) in task.list.chunks(ROUND).enumerate() {
         let rest = &task.list[number * ROUND..];
         let bits = open_blocks::<_, DEPTH>(simd, task, accumulator, rest, &mut work);
         if bits == 0 {
@@ -68,9 +68,13 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
         let open = Open {
             bits,
             blocks: bits.count_ones() as u8,
-            rows: if runs.is_some() { accumulator.open_rows() } else { 0 },
+            rows: if runs.is_some() {
+                accumulator.open_rows()
+            } else {
+                0
+            },
         };
-        if DEPTH > NO_DEPTH && ranges.rejects_rest(task.splat(round[0]).depth, task.trend) {
+        if DEPTH > NO_DEPTH && ranges.rejects_rest(task.splat(primitives[0]).depth, task.trend) {
             work.tiles_hidden += rest.len() as u64;
             if let Some(runs) = &mut runs {
                 work.hidden_rest = rest.len() as u32;
@@ -78,11 +82,11 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             }
             break;
         }
-        let next_chunk = rest.get(ROUND..).unwrap_or_default();
+        let next = rest.get(ROUND..).unwrap_or_default();
         let before = work;
         let round = Round {
-            round,
-            next_chunk,
+            primitives,
+            next,
             open,
             is_recorded: runs.is_some(),
         };
@@ -96,7 +100,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
         );
         if let Some(runs) = &mut runs {
             let run = Run {
-                primitives: round.len() as u32,
+                primitives: primitives.len() as u32,
                 rows: open.rows,
                 blocks: open.blocks,
                 reached: (work.items - before.items) as u32,
@@ -151,10 +155,10 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
     let (open, blocks) = (round.open.bits, u64::from(round.open.blocks));
     let (mut blocks_of_hidden, mut from) = (0, 0);
     let reaching = loop {
-        let placed = scratch.round.place::<_, DEPTH>(
+        let placed = scratch.staged.place::<_, DEPTH>(
             simd,
             task,
-            (round.round, from, round.next_chunk),
+            (round.primitives, from, round.next),
             (open, ranges),
             round.is_recorded,
         );
@@ -162,12 +166,12 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
         work.tiles_hidden += placed.tiles_hidden;
         work.blocks_hidden += placed.blocks_hidden;
         blocks_of_hidden += placed.blocks_of_hidden;
-        let Some(&primitive) = round.round.get(placed.end) else {
+        let Some(&primitive) = round.primitives.get(placed.end) else {
             break placed.reaching;
         };
         // It is steep; what is before it is composited first.
         work.items += count_bits(&placed.reaching);
-        let staged = (&scratch.round, &mut *scratch.alphas);
+        let staged = (&scratch.staged, &mut *scratch.alphas);
         work.contributions += evaluate::<_, DEPTH>(
             accumulator,
             simd,
@@ -186,14 +190,21 @@ fn composite_round<S: Simd, const DEPTH: DepthMode>(
         work.open += blocks;
         work.blocks_hidden += blocks - exact;
         work.items += exact;
-        work.contributions += evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, ranges, task);
+        work.contributions +=
+            evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, ranges, task);
         from = placed.end + 1;
     };
-    work.pairs += round.round.len() as u64;
+    work.pairs += round.primitives.len() as u64;
     work.items += count_bits(&reaching);
-    let staged = (&scratch.round, &mut *scratch.alphas);
-    work.contributions +=
-        evaluate::<_, DEPTH>(accumulator, simd, &reaching, staged, ranges, task.thresholds);
+    let staged = (&scratch.staged, &mut *scratch.alphas);
+    work.contributions += evaluate::<_, DEPTH>(
+        accumulator,
+        simd,
+        &reaching,
+        staged,
+        ranges,
+        task.thresholds,
+    );
     blocks_of_hidden
 }
 

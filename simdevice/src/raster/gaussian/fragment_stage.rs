@@ -5,7 +5,7 @@
 //! help with derivatives: they hold what their own pixels accumulated.
 
 use super::compositor::GaussianTile;
-use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, BLOCK_PIXELS, PixelMask};
+use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, PixelMask};
 use super::samples::{SAMPLES, Samples};
 use crate::bindings::Prepared;
 use crate::counters::{Counter, Counters};
@@ -183,7 +183,12 @@ impl<'a> FragmentStageDraw<'a> {
         (leader..self.samples).filter(move |&sample| self.leader(samples, sample, block) == leader)
     }
 
-    fn group(&self, leader: usize, samples: &Samples, covered: &[PixelMask; SAMPLES]) -> SampleGroup {
+    fn group(
+        &self,
+        leader: usize,
+        samples: &Samples,
+        covered: &[PixelMask; SAMPLES],
+    ) -> SampleGroup {
         let is_covered = |&block: &usize| {
             let mut members = self.members(samples, leader, block);
             members.any(|sample| covered[sample][block] != 0)
@@ -306,7 +311,7 @@ impl<'a> FragmentStageDraw<'a> {
                 }
                 FragmentInput::PointCoord(_)
                 | FragmentInput::PrimitiveId
-                | FragmentInput::Accumulator
+                | FragmentInput::Layer
                 | FragmentInput::ViewportIndex => [0; BLOCK_PIXELS],
             };
             // An input that is the same for all lanes has one chunk.

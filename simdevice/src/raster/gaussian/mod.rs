@@ -38,7 +38,7 @@ use depth_ranges::DepthRanges;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use fragment_stage::{FragmentStageDraw, Tools};
-use grid::{BLOCKS, BLOCK_PIXELS, PixelMask, count, lanes_within};
+use grid::{BLOCK_PIXELS, BLOCKS, PixelMask, count, lanes_within};
 use inputs::{DepthMode, FIND_MEAN, FIND_MEDIAN, NO_DEPTH, TEST_DEPTH};
 use isa::exec::Stopped;
 use samples::{SAMPLES, Samples};
@@ -87,7 +87,8 @@ impl<'a> GaussianTileDraw<'a> {
             draw,
             targets,
             color,
-            resolve: resolve.map(|shader| FragmentStageDraw::new(draw, shader, targets, samples, device)),
+            resolve: resolve
+                .map(|shader| FragmentStageDraw::new(draw, shader, targets, samples, device)),
             tests: Tests::new(&state.depth_stencil, depth, targets.stencil.is_some()),
             samples,
             level: device.level(),
@@ -120,7 +121,10 @@ impl<'a> GaussianTileDraw<'a> {
             buffers.stencil.touch(target, 0, tile);
         }
         let mut samples = self.test_first(tile, buffers);
-        let reads_depth = self.resolve.as_ref().is_some_and(FragmentStageDraw::reads_depth);
+        let reads_depth = self
+            .resolve
+            .as_ref()
+            .is_some_and(FragmentStageDraw::reads_depth);
         match self.tests.depth {
             _ if reads_depth => {
                 self.composite::<FIND_MEAN>(tile, &mut samples, buffers, fragments, counters);
@@ -257,7 +261,13 @@ impl<'a> GaussianTileDraw<'a> {
     }
 
     /// A sample's stored depths in a block.
-    fn depths(&self, tile: &Tile, buffers: &Buffers, sample: usize, block: usize) -> [u32; BLOCK_PIXELS] {
+    fn depths(
+        &self,
+        tile: &Tile,
+        buffers: &Buffers,
+        sample: usize,
+        block: usize,
+    ) -> [u32; BLOCK_PIXELS] {
         let start = buffers.depth.start(tile.index, sample) + block * BLOCK_PIXELS;
         let mut depths = [0; BLOCK_PIXELS];
         depths.copy_from_slice(&buffers.depth.words()[start..][..BLOCK_PIXELS]);
@@ -302,7 +312,12 @@ impl<'a> GaussianTileDraw<'a> {
         for (sample, covered) in covered.iter().enumerate().take(self.samples) {
             let start = buffers.depth.start(tile.index, sample);
             let stored = &mut buffers.depth.words_mut()[start..][..AREA];
-            for (block, stored) in stored.as_chunks_mut::<BLOCK_PIXELS>().0.iter_mut().enumerate() {
+            for (block, stored) in stored
+                .as_chunks_mut::<BLOCK_PIXELS>()
+                .0
+                .iter_mut()
+                .enumerate()
+            {
                 let accumulator = &fragments.accumulators[samples.accumulators[sample][block]];
                 for (lane, stored) in stored.iter_mut().enumerate() {
                     if covered[block] >> lane & 1 == 1 {

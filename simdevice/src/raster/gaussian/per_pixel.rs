@@ -10,8 +10,8 @@ use super::block_lists::{BlockLists, part};
 use super::depth_ranges::DepthRanges;
 use super::exact::falls;
 use super::exp2::exp2_of_negated;
-use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
-use super::inputs::{FIND_MEDIAN, NO_DEPTH, TileInputs, TileCounts};
+use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64};
+use super::inputs::{FIND_MEDIAN, NO_DEPTH, TileCounts, TileInputs};
 use crate::gaussian::ray_depth::{PixelRays, RayDepths, Rays, ordered_key};
 use crate::gaussian::splat::locate;
 use crate::trace::Run;
@@ -216,7 +216,12 @@ impl PerPixel {
 }
 
 /// Composites what a pixel gathered, front to back; returns how many it accepted.
-fn composite_pixel(sum: &mut Sum, pixel: &mut Gathered, names: &[u32], task: &TileInputs<'_>) -> u64 {
+fn composite_pixel(
+    sum: &mut Sum,
+    pixel: &mut Gathered,
+    names: &[u32],
+    task: &TileInputs<'_>,
+) -> u64 {
     let floor = f64::from(task.thresholds.transmittance_floor);
     let mut accepted = 0;
     for contribution in pixel.sorted() {

@@ -3,12 +3,12 @@
 
 use super::accumulator::Accumulator;
 use super::depth_ranges::DepthRanges;
-use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS, ROUND, LANE_X_64, LANE_Y_64, BLOCK_PIXELS};
+use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64, ROUND};
 use super::inputs::{
-    DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, TileInputs, Thresholds, power,
+    DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, Thresholds, TileInputs, power,
 };
 use super::masks::{Tally, only};
-use super::staging::{StagedRound, Reaching};
+use super::staging::{Reaching, StagedRound};
 use crate::gaussian::splat::Splat;
 use crate::lanes::bits_of;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
@@ -137,7 +137,8 @@ pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
 ) -> u64 {
     let to = (round, &accumulator.most_fall);
     let reached = alphas.find::<_, DEPTH>(simd, reaching, to, ranges, thresholds);
-    let refused = composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
+    let refused =
+        composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
     reached.saturating_sub(refused)
 }
 
@@ -170,8 +171,13 @@ fn composite_all<S: Simd, const DEPTH: DepthMode>(
                     || DEPTH >= FIND_MEDIAN
                     || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
                 {
-                    refused +=
-                        composite_carefully::<_, DEPTH>(accumulator, simd, of_block, round, thresholds);
+                    refused += composite_carefully::<_, DEPTH>(
+                        accumulator,
+                        simd,
+                        of_block,
+                        round,
+                        thresholds,
+                    );
                 }
             }
             refused

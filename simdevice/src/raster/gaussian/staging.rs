@@ -2,7 +2,7 @@
 
 use super::depth_ranges::DepthRanges;
 use super::grid::{
-    BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, ROUND, HALF, LANE_X, LANE_Y, BLOCK_PIXELS,
+    BLOCK_COLUMNS, BLOCK_PIXELS, BLOCK_ROWS, BLOCKS, BLOCKS_ACROSS, HALF, LANE_X, LANE_Y, ROUND,
 };
 use super::inputs::{DepthMode, NO_DEPTH, TileInputs};
 use crate::gaussian::splat::Splat;
@@ -67,7 +67,7 @@ impl StagedRound {
         &mut self,
         simd: S,
         task: &TileInputs<'_>,
-        (round, from, next_chunk): (&[u32], usize, &[u32]),
+        (round, from, next): (&[u32], usize, &[u32]),
         (open, ranges): (u64, &DepthRanges),
         is_recorded: bool,
     ) -> Placed {
@@ -84,7 +84,7 @@ impl StagedRound {
                 let mut reaching = i32x16::splat(simd, 0);
                 let mut number = from;
                 while let Some(&primitive) = round.get(number) {
-                    task.prefetch(next_chunk.get(number));
+                    task.prefetch(next.get(number));
                     let splat = task.splat(primitive);
                     if DEPTH > NO_DEPTH && ranges.hides(splat.depth) {
                         number += 1;

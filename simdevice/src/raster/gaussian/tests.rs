@@ -53,13 +53,7 @@ fn powers_of_two_are_within_their_bound_at_every_level() {
 }
 
 /// A scene of `count` Gaussians before a camera at the origin, from dust to ones that fill the screen.
-fn draw(
-    seed: u64,
-    count: u32,
-    state: GaussianState,
-    device: &Device,
-    bounds: Rect,
-) -> BinnedDraw {
+fn draw(seed: u64, count: u32, state: GaussianState, device: &Device, bounds: Rect) -> BinnedDraw {
     draw_with_depth(seed, count, state, device, bounds, None)
 }
 

@@ -377,7 +377,7 @@ fn scenes() -> Vec<(&'static str, Vec<Packet>, LoadOp)> {
         ("placed", placed(), over_black),
         ("few", gaussians(1, 12, OVER), LoadOp::Load),
         ("many", gaussians(2, 5000, OVER), over_black),
-        ("chunks", mostly_beside(5, 6000), over_black),
+        ("clusters", mostly_beside(5, 6000), over_black),
         ("behind a wall", hidden::walled(11, 1.3, 0.99), over_black),
         (
             "behind half a wall",
