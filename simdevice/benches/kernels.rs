@@ -10,7 +10,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::counters::{Counter, Counters};
 use simdevice::device::SimdLevel;
-use simdevice::gaussian::{GaussianDraw, GaussianSet, sort};
+use simdevice::gaussian::{BinnedDraw, GaussianSet, sort, sort_and_bin};
 use simdevice::packet::*;
 use simdevice::raster::gaussian::GaussianTile;
 use simdevice::{Allocation, Config, Device, Format};
@@ -154,11 +154,10 @@ fn begin(degree: u32) -> GaussianBegin {
     }
 }
 
-fn resolve(device: &Device, begin: &GaussianBegin, append: &GaussianAppend) -> GaussianDraw {
+fn resolve(device: &Device, begin: &GaussianBegin, append: &GaussianAppend) -> BinnedDraw {
     let mut set = GaussianSet::begin(begin, area(), None);
     set.append(append);
-    set.resolve(device, &mut Counters::default())
-        .expect("not too many")
+    sort_and_bin(set, device, &mut Counters::default()).expect("not too many")
 }
 
 const COUNT: usize = 50_000;

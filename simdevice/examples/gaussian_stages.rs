@@ -10,7 +10,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::counters::{Counter, Counters};
 use simdevice::device::SimdLevel;
-use simdevice::gaussian::GaussianSet;
+use simdevice::gaussian::{GaussianSet, sort_and_bin};
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::draw::{CompareOp, DepthStencil, DepthTest};
 use simdevice::packet::*;
@@ -236,7 +236,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut counters = Counters::default();
         let mut set = GaussianSet::begin(&begin, area, Some(Format::D32Sfloat));
         set.append(&append);
-        let draw = set.resolve(&device, &mut counters)?;
+        let draw = sort_and_bin(set, &device, &mut counters)?;
         let started = Instant::now();
         let mut pass = Pass::begin(&rendering)?;
         pass.push(PassDraw::Gaussians(Box::new(draw)), &device, &mut counters)?;

@@ -1,9 +1,9 @@
 //! The device: its worker pool, its SIMD level and its configuration, chosen once when it is created.
 
-use crate::gaussian::cache::ChunkCache;
-use crate::gaussian::unchanged::LastSets;
+use crate::gaussian::cluster_cache::ClusterCache;
+use crate::gaussian::reuse::ReuseCache;
+use crate::optimizations::Optimizations;
 use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
-use crate::skips::Skips;
 use crate::trace::Recorder;
 use crate::workers::Workers;
 use fearless_simd::Level;
@@ -24,15 +24,15 @@ pub struct Config {
     /// A pass is flushed early when its bins exceed this many bytes.
     pub bin_budget_bytes: u64,
     /// How many bytes of host memory may hold Gaussians in an order that is faster to read (see
-    /// [`Skip::Chunks`](crate::skips::Skip::Chunks)): 48 for each, and 192 for spherical harmonics
+    /// [`Optimization::ClusterCulling`](crate::optimizations::Optimization::ClusterCulling)): 48 for each, and 192 for spherical harmonics
     /// of degree 3 if there is room for them.
-    pub chunk_budget_bytes: u64,
+    pub cluster_budget_bytes: u64,
     /// When a pass is flushed.
     pub flush: FlushPolicy,
     /// The longest time that one batch of shader invocations may take.
     pub shader_timeout: Duration,
     /// The work that is left out where it changes no pixel.
-    pub skips: Skips,
+    pub optimizations: Optimizations,
     /// Gathers what draws do in tiles, if anybody wants to know. It never changes an image.
     pub recorder: Option<Arc<Recorder>>,
     /// Timestamps count the simulated hardware's nanoseconds instead of the host's.
@@ -57,10 +57,10 @@ impl Default for Config {
             simd: SimdLevel::Best,
             macro_tile_size: 64,
             bin_budget_bytes: 256 << 20,
-            chunk_budget_bytes: 512 << 20,
+            cluster_budget_bytes: 512 << 20,
             flush: FlushPolicy::WhenFull,
             shader_timeout: Duration::from_secs(5),
-            skips: Skips::default(),
+            optimizations: Optimizations::default(),
             recorder: None,
             simulated_timestamps: false,
         }
@@ -87,8 +87,8 @@ pub struct Device {
     workers: Workers,
     level: Level,
     config: Config,
-    chunks: ChunkCache,
-    last_sets: LastSets,
+    clusters: ClusterCache,
+    last_sets: ReuseCache,
     recorder: Arc<Recorder>,
 }
 
@@ -112,8 +112,8 @@ impl Device {
             workers,
             level,
             config: config.clone(),
-            chunks: ChunkCache::default(),
-            last_sets: LastSets::default(),
+            clusters: ClusterCache::default(),
+            last_sets: ReuseCache::default(),
             recorder: config.recorder.clone().unwrap_or_default(),
         })
     }
@@ -124,13 +124,13 @@ impl Device {
     }
 
     /// What was last made of Gaussians that may be drawn again.
-    pub(crate) fn last_sets(&self) -> &LastSets {
+    pub(crate) fn last_sets(&self) -> &ReuseCache {
         &self.last_sets
     }
 
-    /// The chunks of Gaussians that were drawn more than once.
-    pub(crate) fn chunks(&self) -> &ChunkCache {
-        &self.chunks
+    /// The clusters of Gaussians that were drawn more than once.
+    pub(crate) fn clusters(&self) -> &ClusterCache {
+        &self.clusters
     }
 
     /// Where what is done goes, if anybody wants to know now.

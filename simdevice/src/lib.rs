@@ -9,7 +9,6 @@
 #![forbid(unsafe_code)]
 
 pub mod bindings;
-mod binning;
 pub mod command_processor;
 pub mod compute;
 pub mod counters;
@@ -20,11 +19,11 @@ pub mod geometry;
 pub mod image;
 mod lanes;
 mod model;
+pub mod optimizations;
 pub mod packet;
 pub mod pass;
 pub mod query;
 pub mod raster;
-pub mod skips;
 pub mod texture;
 pub mod trace;
 pub mod transfer;

@@ -6,19 +6,19 @@
 use crate::counters::{Counter, Counters};
 use crate::device::{Device, FlushPolicy};
 use crate::format::Format;
-use crate::gaussian::GaussianDraw;
+use crate::gaussian::BinnedDraw;
 use crate::geometry::PrimitiveDraw;
 use crate::image::ImageView;
+use crate::optimizations::Optimization;
 use crate::packet::{
     Aspect, Attachment, AttachmentClear, ClearAttachments, ClearValue, LoadOp, Rect, Rendering,
     ResolveMode, StoreOp,
 };
 use crate::raster::Plane;
 use crate::raster::gaussian::GaussianTile;
-use crate::raster::gaussian::tile_draw::GaussianTileDraw;
+use crate::raster::gaussian::GaussianTileDraw;
 use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
 use crate::raster::tile::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target, Tile};
-use crate::skips::Skip;
 use devmem::host;
 use isa::exec::Stopped;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -30,7 +30,7 @@ pub enum PassDraw {
     /// Rectangles of attachments to clear.
     Clear(ClearAttachments),
     /// A sorted and binned set of Gaussians.
-    Gaussians(Box<GaussianDraw>),
+    Gaussians(Box<BinnedDraw>),
     /// Points, lines or triangles.
     Primitives(Box<PrimitiveDraw>),
 }
@@ -461,7 +461,12 @@ impl Frame<'_> {
                 )?,
             }
         }
-        if !self.device.config().skips.has(Skip::EmptyTiles) {
+        if !self
+            .device
+            .config()
+            .optimizations
+            .has(Optimization::EmptyTiles)
+        {
             tiles().for_each(|tile| self.touch_all(worker, layer, &tile));
         }
         for tile in tiles() {

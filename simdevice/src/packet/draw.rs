@@ -3,7 +3,7 @@
 use super::{AttributeStream, BlendState, IndexStream, Rect, Viewport};
 use crate::bindings::Bindings;
 pub use crate::geometry::DrawPipeline;
-pub use crate::raster::gaussian::resolve::ResolveProgram;
+pub use crate::raster::gaussian::ResolveProgram;
 use isa::ir::Program;
 use std::sync::Arc;
 

@@ -6,8 +6,8 @@ use super::quads::Quads;
 use super::setup::Setup;
 use crate::geometry::{Primitive, PrimitiveKind, Varyings};
 use crate::lanes::{both, three};
+use crate::optimizations::{Optimization, Optimizations};
 use crate::packet::draw::Interpolation;
-use crate::skips::{Skip, Skips};
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::LaneMask;
 
@@ -185,9 +185,9 @@ impl<S: Simd> BlockValues<S> {
 impl Batch {
     /// Empties it, for a draw whose fragments need this, within a macro-tile: its column and row, and its side in
     /// pixels.
-    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32, skips: Skips) {
+    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32, optimizations: Optimizations) {
         self.needs = needs;
-        self.detects_affine = skips.has(Skip::Affine);
+        self.detects_affine = optimizations.has(Optimization::Affine);
         self.corner = at.map(|at| at * size);
         self.side = size / super::TILE_SIZE;
         self.clear();

@@ -10,9 +10,9 @@ use super::tile::Target;
 use crate::bindings::Prepared;
 use crate::device::Device;
 use crate::geometry::PrimitiveDraw;
+use crate::optimizations::{Optimization, Optimizations};
 use crate::packet::draw::{FragmentInput, Interpolation, LogicOp};
 use crate::packet::{BlendState, Rect};
-use crate::skips::{Skip, Skips};
 use fearless_simd::Level;
 use std::time::Duration;
 
@@ -65,7 +65,7 @@ pub struct TileDraw<'a> {
     /// What fragments need.
     pub(super) needs: Needs,
     /// What is left out in its tiles.
-    pub(super) skips: Skips,
+    pub(super) optimizations: Optimizations,
     pub(super) level: Level,
     pub(super) limit: Duration,
 }
@@ -132,7 +132,10 @@ impl<'a> TileDraw<'a> {
         let viewports = state.viewports.iter();
         let plain = plain && !state.alpha_to_one;
         // What was recorded is what hardware without this does.
-        let defers = device.config().skips.has(Skip::OverwrittenQuads)
+        let defers = device
+            .config()
+            .optimizations
+            .has(Optimization::OverwrittenQuads)
             && plain
             && !multisampled
             && state.sample_mask & 1 == 1
@@ -190,7 +193,7 @@ impl<'a> TileDraw<'a> {
                     )
                 }),
             },
-            skips: device.config().skips,
+            optimizations: device.config().optimizations,
             level: device.level(),
             limit: device.config().shader_timeout,
         }

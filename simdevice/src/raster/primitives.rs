@@ -16,8 +16,8 @@ use super::{Plane, TILE_SIZE};
 use crate::counters::{Counter, Counters};
 use crate::geometry::{Primitive, Varyings};
 use crate::lanes::both;
+use crate::optimizations::Optimization;
 use crate::packet::Rect;
-use crate::skips::Skip;
 use crate::trace::MacroTileWork;
 use devmem::dispatch;
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -100,7 +100,7 @@ impl TileDraw<'_> {
         };
         renderer
             .batch
-            .begin(self.needs, place.at, place.size, self.skips);
+            .begin(self.needs, place.at, place.size, self.optimizations);
         let level = self.level;
         let pending = &mut *scratch.pending;
         pending.clear();
@@ -113,7 +113,7 @@ impl TileDraw<'_> {
         let (passed, masked) = (renderer.samples_passed, renderer.quads_masked);
         let work = renderer.work;
         counters.add(Counter::SamplesPassed, passed);
-        if self.skips.has(Skip::MaskedQuads) {
+        if self.optimizations.has(Optimization::MaskedQuads) {
             counters.add(Counter::QuadsMasked, masked);
         }
         if let Some(stage) = self.stage {
@@ -286,7 +286,7 @@ impl Renderer<'_, '_> {
         if let Some(tests) = early
             && coverage.blocks.count_ones() >= HIDDEN_BLOCKS
             && tests.stencil.is_none()
-            && draw.skips.has(Skip::HiddenTiles)
+            && draw.optimizations.has(Optimization::HierarchicalDepth)
             && self.is_hidden(simd, tests, current, tile, at)
         {
             if let Some(work) = &mut self.work {
@@ -306,7 +306,7 @@ impl Renderer<'_, '_> {
         }
         let state = &draw.draw.state;
         let masked = state.sample_mask & ((1 << N) - 1) != (1 << N) - 1;
-        let skips_masked = draw.skips.has(Skip::MaskedQuads);
+        let skips_masked = draw.optimizations.has(Optimization::MaskedQuads);
         let mut touched = false;
         for block in bits(coverage.blocks) {
             let mut lanes = coverage.lanes[block];
@@ -419,7 +419,7 @@ impl Renderer<'_, '_> {
             return Ok(());
         }
         let values = values.lanes();
-        let skips_masked = self.draw.skips.has(Skip::MaskedQuads);
+        let skips_masked = self.draw.optimizations.has(Optimization::MaskedQuads);
         for number in 0..4 {
             let mut cover = 0;
             for (sample, lanes) in lanes.iter().enumerate() {

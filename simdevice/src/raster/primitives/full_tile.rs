@@ -9,8 +9,8 @@ use super::whole::{BLOCKS, block_corner};
 use super::{Current, Renderer};
 use crate::counters::Counter;
 use crate::lanes::{bits_of, both, three};
+use crate::optimizations::Optimization;
 use crate::packet::draw::{FragmentInput, Interpolation};
-use crate::skips::Skip;
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::{Chunk, LaneMask, Stopped, Watchdog};
 
@@ -64,7 +64,7 @@ impl Renderer<'_, '_> {
         full.attributes.clear();
         let (primitive, varyings) = (current.primitive, current.varyings);
         add_attributes(primitive, interface, varyings, &mut full.attributes);
-        let affine = current.setup.affine && draw.skips.has(Skip::Affine);
+        let affine = current.setup.affine && draw.optimizations.has(Optimization::Affine);
         let divides = draw.needs.inverse_w && !affine;
         if draw.needs.barycentrics {
             let needs = Needs {

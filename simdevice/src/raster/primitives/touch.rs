@@ -4,9 +4,9 @@ use super::super::coverage::Coverage;
 use super::super::tile::Tile;
 use super::Renderer;
 use crate::counters::Counter;
+use crate::optimizations::Optimization;
 use crate::packet::Rect;
 use crate::raster::TILE_SIZE;
-use crate::skips::Skip;
 
 impl Renderer<'_, '_> {
     /// Makes sure that depth and stencil of a tile are there.
@@ -42,7 +42,7 @@ impl Renderer<'_, '_> {
                 && output.overwrites()
                 && coverage.is_whole()
                 && state.sample_mask & 15 == 15
-                && self.draw.skips.has(Skip::OverwrittenTiles)
+                && self.draw.optimizations.has(Optimization::OverwrittenTiles)
             {
                 self.buffers.color[index].touch_unread(tile);
                 self.counters.add(Counter::TilesOverwritten, 1);
@@ -77,7 +77,7 @@ impl Renderer<'_, '_> {
 
     /// Makes sure that a tile of the colours written is there, of which nothing will be left.
     pub(super) fn touch_unread(&mut self, tile: usize) {
-        if !self.draw.skips.has(Skip::OverwrittenTiles) {
+        if !self.draw.optimizations.has(Optimization::OverwrittenTiles) {
             return self.touch_read(tile);
         }
         for (index, output) in self.draw.colors.iter().enumerate() {

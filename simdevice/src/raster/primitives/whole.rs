@@ -7,8 +7,8 @@ use super::super::pending::Pending;
 use super::super::tile::{AREA, SIDE};
 use super::{Current, Renderer};
 use crate::counters::Counter;
+use crate::optimizations::Optimization;
 use crate::raster::TILE_SIZE;
-use crate::skips::Skip;
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::Stopped;
 
@@ -124,7 +124,7 @@ impl Renderer<'_, '_> {
         let needs = self.draw.needs;
         let mut touched = false;
         for (block, &lanes) in lanes.iter().enumerate() {
-            if lanes == 0 && self.draw.skips.has(Skip::MaskedQuads) {
+            if lanes == 0 && self.draw.optimizations.has(Optimization::MaskedQuads) {
                 self.quads_masked += 4;
                 continue;
             }
