@@ -247,7 +247,9 @@ fn select_lanes(
     }
 }
 
-/// Runs a statement that reaches across lanes or out of the registers.
+/// Runs a statement that reaches across lanes or out of the registers. It stands outside the loop over the steps, where
+/// its cases would take registers from the common steps.
+#[inline(never)]
 fn run_statement<S: Simd>(batch: &Batch<'_>, simd: S, statement: &Statement) {
     match statement {
         Statement::LaneIndex { dst } => {
