@@ -145,7 +145,7 @@ fn every_place_is_listed() {
     let listed: BTreeSet<String> = rows
         .filter_map(|row| Some(row.split_once("` |")?.0.to_owned()))
         .collect();
-    let mut found = BTreeSet::from(["simdevice/devmem/src/lib.rs".to_owned()]);
+    let mut found = BTreeSet::from(["simdevice/devmem/src/memory.rs".to_owned()]);
     let mut folders: Vec<_> = ["simdevice/src", "simdevice/isa/src", "driver/src"]
         .map(|folder| root.join(folder))
         .into();
