@@ -304,6 +304,6 @@ fn skull_pops_by_view_depth_alone() {
         steps: 2,
     };
     rays_pop_not(&scene, &camera, sampling);
-    // By up to 0.072, as `ARCHITECTURE.md` says.
+    // By up to 0.072, as `docs/gaussian-draws.md` says.
     compare(scene, camera, 0.071..0.073);
 }
