@@ -8,11 +8,13 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::counters::{Counter, Counters};
 use simdevice::device::SimdLevel;
 use simdevice::gaussian::{GaussianDraw, GaussianSet, sort};
 use simdevice::packet::*;
 use simdevice::raster::gaussian::GaussianTile;
+use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
+use simdevice::state::{Rect, Viewport};
+use simdevice::stats::counters::{Counter, Counters};
 use simdevice::{Allocation, Config, Device, Format};
 use std::sync::Arc;
 

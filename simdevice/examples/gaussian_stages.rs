@@ -8,13 +8,15 @@
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::counters::{Counter, Counters};
 use simdevice::device::SimdLevel;
+use simdevice::format::ClearValue;
 use simdevice::gaussian::GaussianSet;
 use simdevice::image::{ImageDesc, ImageKind};
-use simdevice::packet::draw::{CompareOp, DepthStencil, DepthTest};
 use simdevice::packet::*;
 use simdevice::pass::{Pass, PassDraw};
+use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
+use simdevice::state::{CompareOp, DepthStencil, DepthTest, Rect, Viewport};
+use simdevice::stats::counters::{Counter, Counters};
 use simdevice::{Allocation, Config, Device, Format, Image, ImageView};
 use std::f64::consts::TAU;
 use std::sync::Arc;

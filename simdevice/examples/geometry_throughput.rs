@@ -3,14 +3,18 @@
 //! `cargo run --release -p simdevice --example geometry_throughput`
 
 use simdevice::bindings::Bindings;
-use simdevice::counters::Counter;
-use simdevice::geometry::DrawPipeline;
+use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Address, Format as Element, Program, Rate, Space, Type};
 use simdevice::isa::op::Op;
-use simdevice::packet::draw::*;
 use simdevice::packet::*;
+use simdevice::program::interface::{
+    DrawPrograms, FragmentInput, FragmentPrograms, Interpolation, Sampling, VertexInput,
+    VertexOutput,
+};
+use simdevice::state::{BlendState, DrawState, Topology};
+use simdevice::stats::counters::Counter;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 

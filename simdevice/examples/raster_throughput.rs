@@ -3,14 +3,22 @@
 //! `cargo run --release -p simdevice --example raster_throughput [workers [words of a scene's name]]`
 
 use simdevice::bindings::Bindings;
-use simdevice::counters::Counter;
-use simdevice::geometry::DrawPipeline;
+use simdevice::format::ClearValue;
+use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
 use simdevice::isa::op::Op;
-use simdevice::packet::draw::*;
 use simdevice::packet::*;
+use simdevice::program::interface::{
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+    VertexInput, VertexOutput,
+};
+use simdevice::state::{
+    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, DrawState,
+    Rect, Topology,
+};
+use simdevice::stats::counters::Counter;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 

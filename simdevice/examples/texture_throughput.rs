@@ -8,10 +8,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use simdevice::device::SimdLevel;
+use simdevice::format::Aspect;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::ir::{Dimension, ImageShape};
 use simdevice::isa::resources::{ImageUnit, LodRequest, SampleRequest};
-use simdevice::packet::Aspect;
 use simdevice::texture::{
     AddressMode, CompareOp, Filter, IDENTITY, ImageBinding, ImageTable, MipmapMode, SampledImage,
     Sampler,

@@ -8,11 +8,12 @@
 //! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
 //! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
-use crate::gaussian::footprint::{HELD_ROWS, Reach, Span, TILE_SIZE};
+use crate::gaussian::footprint::{HELD_ROWS, Reach, Span};
 use crate::gaussian::locate;
 use crate::gaussian::splat::Projected;
-use crate::lanes::three;
-use crate::packet::Rect;
+use crate::limits::TILE_SIZE;
+use crate::simd::three;
+use crate::state::Rect;
 use devmem::host;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};

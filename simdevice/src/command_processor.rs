@@ -1,17 +1,16 @@
 //! The command processor: the one match over [`Packet`].
 
 use crate::compute;
-use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::gaussian::{GaussianSet, TooManyGaussians, Unresolved};
 use crate::geometry::{FrontEnd, Surface};
 use crate::model::Model;
-use crate::packet::Packet;
-use crate::packet::draw::Draw;
+use crate::packet::{Draw, Packet};
 use crate::pass::{Pass, PassDraw};
-use crate::query::{QueryKind, host_time};
 use crate::raster::tile::AttachmentError;
-use crate::trace::{DrawRecord, Owner};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::query::{QueryKind, host_time};
+use crate::stats::recorder::{DrawRecord, Owner};
 use crate::transfer::{self, Direction};
 use devmem::host::{self, OutOfMemory};
 use isa::exec::Stopped;

@@ -1,8 +1,9 @@
 //! Dispatches: workgroups of a compute program, a batch each, run in any order by the device's workers.
 
-use crate::bindings::Bindings;
-use crate::counters::{Counter, Counters};
 use crate::device::Device;
+use crate::packet::Dispatch;
+use crate::program::interface::ComputeInput;
+use crate::stats::counters::{Counter, Counters};
 use isa::exec::{Executable, LaneMask, Machine, Options, Stopped, Watchdog, Work};
 use isa::ir::{CHUNK_LANES, Program};
 use isa::resources::Resources;
@@ -12,23 +13,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The most invocations of a workgroup.
-pub const MAX_WORKGROUP_INVOCATIONS: u32 = 1024;
-
-/// The most bytes of workgroup memory that a program should ask for.
-pub const MAX_SHARED_BYTES: u32 = 64 << 10;
-
 /// How many pieces each worker's share of a dispatch is cut into, so that workers end together.
 const PIECES_PER_WORKER: u64 = 16;
-
-/// What the device puts into a program's input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ComputeInput {
-    /// The workgroup's number along an axis: 0 to 2.
-    WorkgroupId(usize),
-    /// How many workgroups the dispatch has along an axis: 0 to 2.
-    WorkgroupCount(usize),
-}
 
 /// A program ready to be dispatched on one device.
 #[derive(Debug)]
@@ -38,19 +24,6 @@ pub struct ComputeProgram {
     invocations: usize,
     /// Machines of earlier dispatches, to be used again.
     idle: Mutex<Vec<Machine>>,
-}
-
-/// See [`Packet::Dispatch`](crate::Packet::Dispatch).
-#[derive(Clone, Debug)]
-pub struct Dispatch {
-    /// What each workgroup runs.
-    pub program: Arc<ComputeProgram>,
-    /// The first workgroup's number in x, y and z.
-    pub base: [u32; 3],
-    /// How many workgroups there are in x, y and z.
-    pub count: [u32; 3],
-    /// What the program is bound to.
-    pub bindings: Bindings,
 }
 
 impl ComputeProgram {

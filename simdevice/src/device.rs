@@ -2,9 +2,9 @@
 
 use crate::gaussian::cache::ChunkCache;
 use crate::gaussian::unchanged::LastSets;
-use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
-use crate::skips::Skips;
-use crate::trace::Recorder;
+use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::stats::optimizations::Skips;
+use crate::stats::recorder::Recorder;
 use crate::workers::Workers;
 use fearless_simd::Level;
 pub use isa::level::SimdLevel;
@@ -24,7 +24,7 @@ pub struct Config {
     /// A pass is flushed early when its bins exceed this many bytes.
     pub bin_budget_bytes: u64,
     /// How many bytes of host memory may hold Gaussians in an order that is faster to read (see
-    /// [`Skip::Chunks`](crate::skips::Skip::Chunks)): 48 for each, and 192 for spherical harmonics
+    /// [`Skip::Chunks`](crate::stats::optimizations::Skip::Chunks)): 48 for each, and 192 for spherical harmonics
     /// of degree 3 if there is room for them.
     pub chunk_budget_bytes: u64,
     /// When a pass is flushed.

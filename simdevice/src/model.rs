@@ -1,9 +1,9 @@
 //! The model of the hardware beside the command processor: what was recorded becomes counters.
 
-use crate::counters::{Counter, Counters};
 use crate::device::Device;
-use crate::packet::Rect;
-use crate::trace::Owner;
+use crate::state::Rect;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::recorder::Owner;
 use timing::FrameWork;
 use timing::config::{Config, DEFAULT_PRESET};
 use timing::simulate::simulate;

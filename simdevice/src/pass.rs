@@ -3,22 +3,21 @@
 //! Every macro-tile is rendered by one worker that runs all draws in submission order against its tile buffers, so
 //! that the image depends neither on the number of workers nor on when the pass is flushed.
 
-use crate::counters::{Counter, Counters};
 use crate::device::{Device, FlushPolicy};
-use crate::format::Format;
+use crate::format::{Aspect, ClearValue, Format};
 use crate::gaussian::GaussianDraw;
 use crate::geometry::PrimitiveDraw;
 use crate::image::ImageView;
-use crate::packet::{
-    Aspect, Attachment, AttachmentClear, ClearAttachments, ClearValue, LoadOp, Rect, Rendering,
-    ResolveMode, StoreOp,
-};
+use crate::limits::{MAX_FRAMEBUFFER_LAYERS, MAX_FRAMEBUFFER_SIZE};
+use crate::packet::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
 use crate::raster::Plane;
 use crate::raster::gaussian::GaussianTile;
 use crate::raster::gaussian::tile_draw::GaussianTileDraw;
 use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
-use crate::raster::tile::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target, Tile};
-use crate::skips::Skip;
+use crate::raster::tile::{AttachmentError, Target, Tile};
+use crate::state::{Rect, ResolveMode};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Skip;
 use devmem::host;
 use isa::exec::Stopped;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -56,9 +55,6 @@ struct Resolves {
 
 /// What an attachment is resolved to, and how.
 type Resolve = (Target, ResolveMode);
-
-/// Layers of a pass at most, where no attachment has fewer.
-const MAX_FRAMEBUFFER_LAYERS: u32 = 2048;
 
 /// A render pass between its beginning and its end.
 #[derive(Debug)]

@@ -2,7 +2,7 @@
 
 use crate::capabilities::extensions::fill_string;
 use ash::vk;
-use simdevice::counters::{Counter, Unit};
+use simdevice::stats::counters::{Counter, Unit};
 use std::ffi::{CString, c_char};
 
 /// How many counters there are.

@@ -10,7 +10,9 @@ use crate::object::pipeline::compute::ComputePipeline;
 use crate::object::pipeline::setting::Setting;
 use crate::object::query_pool::QueryPool;
 use simdevice::Packet;
-use simdevice::packet::{BufferRange, Camera, Rect, Viewport};
+use simdevice::packet::BufferRange;
+use simdevice::state::gaussian::Camera;
+use simdevice::state::{Rect, Viewport};
 use std::sync::Arc;
 
 /// A recorded command.

@@ -5,8 +5,8 @@ use super::record::{IndexBuffer, VertexBuffer};
 use crate::object::pipeline::compute::ComputePipeline;
 use crate::object::pipeline::setting::Settings;
 use crate::object::pipeline::{GaussianPipeline, GaussianSource, GraphicsPipeline, Primitive};
-use simdevice::packet::draw::DrawState;
-use simdevice::packet::{Camera, Rect, Viewport};
+use simdevice::state::gaussian::Camera;
+use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
 
 /// Bound state. All of it is undefined when a command buffer begins; here "undefined" is `None`.

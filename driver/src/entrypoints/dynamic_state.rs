@@ -7,7 +7,7 @@ use crate::object::pipeline::convert;
 use crate::object::pipeline::setting::{self, Face, Setting, faces};
 use ash::vk;
 use gaurast::vk::PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
-use simdevice::packet::draw::DepthBias;
+use simdevice::state::DepthBias;
 
 /// Records one setting.
 fn set(recorder: &mut Recorder, setting: Setting) -> Result<(), Error> {

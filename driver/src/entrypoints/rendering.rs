@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::lower::rendering::{self, BegunPass, DynamicAttachment, DynamicRendering, rect};
 use crate::{handle, pnext, pointer};
 use ash::vk;
-use simdevice::packet::Rect;
+use simdevice::state::Rect;
 use std::sync::Arc;
 
 /// # Safety

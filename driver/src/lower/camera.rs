@@ -3,7 +3,8 @@
 use crate::error::Error;
 use crate::registry::features::Features;
 use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
-use simdevice::packet::{BufferRange, Camera, CameraModel};
+use simdevice::packet::BufferRange;
+use simdevice::state::gaussian::{Camera, CameraModel};
 
 /// The camera models whose features are enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use super::bindings::{self, Unbound};
 use crate::command::state::State;
 use simdevice::Packet;
-use simdevice::compute::Dispatch;
+use simdevice::packet::Dispatch;
 use std::sync::Arc;
 
 /// Why a dispatch does nothing: state that it needs is undefined.

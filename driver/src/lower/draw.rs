@@ -5,7 +5,8 @@ use crate::command::record::Draw;
 use crate::command::state::State;
 use crate::object::pipeline::{AttributeSource, GraphicsPipeline};
 use ash::vk;
-use simdevice::packet::{AttributeStream, CameraModel, IndexStream};
+use simdevice::packet::{AttributeStream, IndexStream};
+use simdevice::state::gaussian::CameraModel;
 
 /// Why a draw draws nothing: state that it needs is undefined.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -12,11 +12,12 @@ use crate::object::pipeline::{
 };
 use simdevice::Packet;
 use simdevice::bindings::Bindings;
-use simdevice::packet::draw::{self, DrawState, ResolveShader, Topology};
-use simdevice::packet::{
-    Camera, CameraModel, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianGeometry,
-    GaussianPrecision, GaussianState, ModelAttributes, Viewport,
+use simdevice::packet::{self, ResolveShader};
+use simdevice::packet::{GaussianAppend, GaussianAttributes, GaussianBegin, ModelAttributes};
+use simdevice::state::gaussian::{
+    Camera, CameraModel, GaussianGeometry, GaussianPrecision, GaussianState,
 };
+use simdevice::state::{DrawState, Topology, Viewport};
 use std::sync::Arc;
 
 /// What begins a sorted set.
@@ -86,7 +87,7 @@ fn shaded(
     let descriptors = &projection.descriptors;
     let bindings = bindings::bindings(descriptors, &state.graphics_sets, &state.push_constants)?;
     let viewport = state.viewport(gaussian).ok_or(Undrawn::Viewport)?;
-    Ok(Packet::GaussianAppendDraw(Box::new(draw::Draw {
+    Ok(Packet::GaussianAppendDraw(Box::new(packet::Draw {
         pipeline: Arc::clone(&projection.programs),
         attributes: attributes.collect::<Result<_, _>>()?,
         vertex_bindings: bindings,

@@ -7,7 +7,8 @@ use crate::command::state::State;
 use crate::object::pipeline::GraphicsPipeline;
 use crate::object::pipeline::polygon::{Origin, PolygonPipeline};
 use simdevice::Packet;
-use simdevice::packet::draw::{self, DrawState};
+use simdevice::packet;
+use simdevice::state::DrawState;
 use std::sync::Arc;
 
 /// The packet of one draw.
@@ -27,7 +28,7 @@ pub(crate) fn draw(
         .map(|source| attribute_stream(state, pipeline, source));
     let bindings =
         |descriptors| bindings::bindings(descriptors, &state.graphics_sets, &state.push_constants);
-    Ok(Packet::Draw(Box::new(draw::Draw {
+    Ok(Packet::Draw(Box::new(packet::Draw {
         pipeline: Arc::clone(&polygons.programs),
         attributes: attributes.collect::<Result<_, _>>()?,
         vertex_bindings: bindings(&polygons.vertex_descriptors)?,

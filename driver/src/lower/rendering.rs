@@ -7,10 +7,9 @@ use crate::error::Error;
 use crate::object::image::ImageView;
 use crate::object::render_pass::{AttachmentDescription, RenderPass};
 use ash::vk;
-use simdevice::format::{Channel, Numeric};
-use simdevice::packet::{
-    Aspect, Attachment, ClearValue, LoadOp, Rect, Rendering, ResolveMode, StoreOp,
-};
+use simdevice::format::{Aspect, Channel, ClearValue, Numeric};
+use simdevice::packet::{Attachment, LoadOp, Rendering, StoreOp};
+use simdevice::state::{Rect, ResolveMode};
 use simdevice::{Format, Packet};
 use std::sync::Arc;
 

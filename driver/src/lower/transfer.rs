@@ -6,12 +6,13 @@ use crate::object::buffer::Buffer;
 use crate::object::image::{Image, count};
 use crate::object::sampler;
 use ash::vk;
-use simdevice::format::Numeric;
+use simdevice::format::{Aspect, ClearValue, Numeric};
 use simdevice::packet::{
-    Aspect, BlitImage, BufferCopyRegion, BufferImageRegion, BufferRange, ClearImage, ClearValue,
-    CopyBuffer, CopyBufferImage, CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage,
-    ResolveMode, SubresourceLayers, SubresourceRange,
+    BlitImage, BufferCopyRegion, BufferImageRegion, BufferRange, ClearImage, CopyBuffer,
+    CopyBufferImage, CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers,
+    SubresourceRange,
 };
+use simdevice::state::ResolveMode;
 use simdevice::{Format, Packet};
 use std::sync::Arc;
 

@@ -4,8 +4,8 @@ use super::buffer;
 use crate::error::Error;
 use ash::vk;
 use simdevice::Allocation;
+use simdevice::format::Aspect;
 use simdevice::image::{self, ImageDesc, ImageKind};
-use simdevice::packet::Aspect;
 use simdevice::texture::{ComponentSwizzle, IDENTITY, Swizzle};
 use std::sync::{Arc, OnceLock};
 

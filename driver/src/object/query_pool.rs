@@ -3,9 +3,10 @@
 use crate::command::record::CopyQueryResults;
 use ash::vk::{QueryPipelineStatisticFlags as Statistic, QueryResultFlags};
 use simdevice::Packet;
-use simdevice::counters::Counter;
 use simdevice::packet::BufferRange;
-use simdevice::query::{self, QueryKind, QueryResult};
+use simdevice::stats::counters::Counter;
+use simdevice::stats::query;
+use simdevice::stats::query::{QueryKind, QueryResult};
 use std::sync::Arc;
 
 /// A query pool.
@@ -200,7 +201,7 @@ pub(crate) fn copy_packets(copy: &CopyQueryResults) -> Vec<Packet> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use simdevice::counters::Counters;
+    use simdevice::stats::counters::Counters;
 
     #[test]
     fn counters_come_in_the_pools_order() {

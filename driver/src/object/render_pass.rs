@@ -3,7 +3,7 @@
 use super::image::ImageView;
 use crate::error::Error;
 use ash::vk;
-use simdevice::packet::ResolveMode;
+use simdevice::state::ResolveMode;
 use std::sync::Arc;
 
 /// A render pass. Subpasses are rendered one after another; between them attachments are in memory.

@@ -10,9 +10,9 @@ use super::sort::ordered_bits;
 use super::spherical_harmonics::{Bases, DIRECTIONS, coefficient_count};
 use super::splat::{Projected, Splat};
 use super::surfel::{Placed, Surfel};
-use crate::counters::Counter;
-use crate::packet::{GaussianGeometry, GaussianOrder};
-use crate::skips::Skip;
+use crate::state::gaussian::{GaussianGeometry, GaussianOrder};
+use crate::stats::counters::Counter;
+use crate::stats::optimizations::Skip;
 use fearless_simd::Simd;
 
 impl Projection {

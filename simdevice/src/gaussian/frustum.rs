@@ -10,7 +10,7 @@ use super::instances::{Linear, inverse};
 use super::lanes::{Bits, F32_LANES};
 use super::project::Projection;
 use super::scratch::Attributes;
-use crate::packet::CameraModel;
+use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, prelude::*};
 
 /// Bounds of binary32's error relative to the sum of the magnitudes of what is summed.

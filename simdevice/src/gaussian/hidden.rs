@@ -5,19 +5,20 @@
 
 use super::chunks::{Bounds, Chunk, Chunks};
 use super::fetch::BATCH;
-use super::footprint::{TILE_SIZE, Visible};
+use super::footprint::Visible;
 use super::frustum::Frustum;
 use super::jobs::{Job, Part};
 use super::project::Projection;
 use super::scratch::Attributes;
 use super::splat::{Projected, Splat};
 use super::{GaussianSet, Workers};
-use crate::counters::{Counter, Counters};
-use crate::packet::draw::DepthStencil;
-use crate::packet::{
-    CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState, Rect,
+use crate::limits::TILE_SIZE;
+use crate::state::gaussian::{
+    CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState,
 };
-use crate::skips::Skip;
+use crate::state::{DepthStencil, Rect};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Skip;
 use devmem::host;
 use std::sync::Arc;
 

@@ -8,8 +8,8 @@ use super::instances::{Matrices, Model};
 use super::project::{Projection, Source};
 use super::scratch::Attributes;
 use super::{GaussianSet, MAX_BATCHES, TooManyGaussians, shaded};
-use crate::counters::{Counter, Counters};
 use crate::packet::GaussianAppend;
+use crate::stats::counters::{Counter, Counters};
 use devmem::host;
 use std::sync::Arc;
 

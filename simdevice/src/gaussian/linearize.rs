@@ -3,7 +3,7 @@
 use super::fetch::BATCH;
 use super::project::Projection;
 use super::scratch::Scratch;
-use crate::packet::CameraModel;
+use crate::state::gaussian::CameraModel;
 
 impl Projection {
     /// Depths, means and Jacobians of the kept Gaussians, unless a pinhole sees the world itself.

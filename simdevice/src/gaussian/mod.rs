@@ -33,19 +33,17 @@ mod tiles;
 pub(crate) mod unchanged;
 mod unscented;
 
-pub use footprint::TILE_SIZE;
-
 use crate::binning::TileLists;
-use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::format::Format;
-use crate::packet::draw::{Draw, ResolveShader};
-use crate::packet::{
-    GaussianAppend, GaussianBegin, GaussianGeometry, GaussianOrder, GaussianState, Rect, Viewport,
-};
-use crate::raster::DepthCode;
-use crate::skips::{Skip, Skips};
-use crate::trace::{self, DrawRecord};
+use crate::format::depth::DepthEncoding;
+use crate::packet::{Draw, GaussianAppend, GaussianBegin, ResolveShader};
+use crate::state::gaussian::{GaussianGeometry, GaussianOrder, GaussianState};
+use crate::state::{Rect, Viewport};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::{Skip, Skips};
+use crate::stats::recorder;
+use crate::stats::recorder::DrawRecord;
 use chunks::Chunks;
 use depth::{CenterDepth, Trend};
 use devmem::dispatch;
@@ -140,7 +138,7 @@ pub struct GaussianDraw {
     /// What makes the colours of its fragments.
     pub(crate) resolve: Option<ResolveShader>,
     /// How its depths are numbers.
-    pub(crate) depth_unit: DepthCode,
+    pub(crate) depth_unit: DepthEncoding,
     /// How the depths of a tile's list follow one another.
     pub(crate) depth_trend: Trend,
     /// Half the pixels after which the picture repeats, or infinity.
@@ -268,7 +266,9 @@ impl GaussianSet {
                 (Some(depth), GaussianOrder::ViewDepth) if self.draws.is_empty() => depth.trend(),
                 _ => Trend::None,
             },
-            depth_unit: self.depth.map_or(DepthCode::Float, |depth| depth.unit()),
+            depth_unit: self
+                .depth
+                .map_or(DepthEncoding::Float, |depth| depth.unit()),
             resolve: self.resolve,
             half_period: panorama::period(&begin.camera).map_or(f64::INFINITY, |p| 0.5 * p),
             rays: PixelRays::new(&begin.camera, &begin.viewport),
@@ -326,16 +326,16 @@ impl GaussianSet {
             let degree = self.begin.state.sh_degree;
             let (pairs, bounds) = (tiles.pairs(), self.bounds);
             let (by_device, by_program) = splats.split_at(fixed);
-            let fixed = trace::Projected {
+            let fixed = recorder::Projected {
                 counters: &work,
                 splats: by_device,
             };
-            let by_program = trace::Projected {
+            let by_program = recorder::Projected {
                 counters: &by_programs,
                 splats: by_program,
             };
             let bytes = self.draws.iter().map(shaded::vertex_bytes).sum();
-            let draw = trace::gaussian_draw(&fixed, &by_program, bytes, pairs, degree, bounds);
+            let draw = recorder::gaussian_draw(&fixed, &by_program, bytes, pairs, degree, bounds);
             DrawRecord::new(draw)
         });
         work.add_all(&by_programs);

@@ -8,7 +8,7 @@
 
 use super::footprint::{Ellipse, Reach, Visible};
 use super::splat::Projected;
-use crate::packet::{Camera, CameraModel};
+use crate::state::gaussian::{Camera, CameraModel};
 use devmem::host;
 
 /// The sides to which Gaussians are copied: right and left.

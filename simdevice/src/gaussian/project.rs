@@ -16,12 +16,13 @@ use super::panorama;
 use super::scratch::{Attributes, Flat, Scratch};
 use super::spherical_harmonics::{Bases, coefficient_count};
 use super::splat::{Projected, half_room};
-use crate::counters::{Counter, Counters};
-use crate::packet::{
+use crate::state::Viewport;
+use crate::state::gaussian::{
     Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
-    GaussianState, Viewport,
+    GaussianState,
 };
-use crate::skips::{Skip, Skips};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::{Skip, Skips};
 use fearless_simd::{Simd, prelude::*};
 
 /// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha

@@ -4,7 +4,7 @@ use super::footprint::{Reach, Span};
 use super::rays::RayDepth;
 use super::scratch::Flat;
 use super::surfel::Surfel;
-use crate::counters::Counters;
+use crate::stats::counters::Counters;
 use devmem::host;
 
 /// A projected Gaussian: what the tile engine needs of it, in one cache line.

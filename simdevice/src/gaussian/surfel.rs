@@ -6,7 +6,7 @@
 //! nothing; `w` is linear, too. Everything is binary64, without fused operations.
 
 use super::footprint::{Ellipse, Reach, Span, Visible};
-use crate::packet::CameraModel;
+use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, f64x8, prelude::*};
 
 /// What a squared distance of 1 takes off an exponent of 2.

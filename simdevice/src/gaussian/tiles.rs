@@ -2,16 +2,17 @@
 //! are, and one at a time for the others.
 
 use super::fetch::BATCH;
-use super::footprint::{Ellipse, HELD_ROWS, Reach, TILE_SIZE};
+use super::footprint::{Ellipse, HELD_ROWS, Reach};
 use super::lanes::{Bits, Lanes};
 use super::panorama;
 use super::project::Projection;
 use super::scratch::{Flat, Scratch};
 use super::splat::Projected;
-use crate::counters::{Counter, Counters};
-use crate::lanes::both;
-use crate::packet::GaussianGeometry;
-use crate::skips::Skip;
+use crate::limits::TILE_SIZE;
+use crate::simd::both;
+use crate::state::gaussian::GaussianGeometry;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Skip;
 use fearless_simd::{Simd, prelude::*};
 
 /// The reach of each lane, as the two words of [`Reach::words`].
@@ -325,8 +326,9 @@ mod tests {
     use super::super::footprint::Visible;
     use super::*;
     use crate::device::SimdLevel;
-    use crate::packet::{Camera, GaussianState, Viewport};
-    use crate::skips::Skips;
+    use crate::state::Viewport;
+    use crate::state::gaussian::{Camera, GaussianState};
+    use crate::stats::optimizations::Skips;
     use devmem::dispatch;
     use proptest::prelude::*;
 

@@ -10,7 +10,7 @@ use super::linearize::linearize;
 use super::project::Projection;
 use super::rays;
 use super::scratch::Scratch;
-use crate::packet::CameraModel;
+use crate::state::gaussian::CameraModel;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// The distance of the points from the mean, in standard deviations: the root of the number of dimensions.

@@ -5,14 +5,10 @@ use super::clip::ClipVertex;
 use super::primitive::{Primitive, PrimitiveKind};
 use super::setup::{Current, Job, NONE, Origin, Place, cross};
 use super::viewport::{ONE, Projected, snap_away, snap_length};
-use crate::lanes::{both, three};
-use crate::packet::draw::Interpolation;
+use crate::limits::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
+use crate::program::interface::Interpolation;
+use crate::simd::{both, three};
 use devmem::host;
-
-/// The greatest side of a point, in pixels.
-pub const MAX_POINT_SIZE: f32 = 255.0;
-/// The greatest width of a line, in pixels.
-pub const MAX_LINE_WIDTH: f32 = 255.0;
 
 /// Offsets of what snapping has not moved.
 const UNMOVED: [[i16; 2]; 3] = [[0; 2]; 3];

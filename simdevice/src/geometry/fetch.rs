@@ -2,8 +2,8 @@
 
 use super::pipeline::LANES;
 use crate::format::{Format, Numeric};
-use crate::packet::AttributeStream;
-use crate::packet::draw::{Draw, VertexInput};
+use crate::packet::{AttributeStream, Draw};
+use crate::program::interface::VertexInput;
 use isa::exec::{Chunk, Machine};
 
 /// A span of vertices is read whole where it has at most this many bytes for each vertex wanted.

@@ -1,8 +1,9 @@
 //! Programs made ready for draws.
 
 use crate::device::Device;
-use crate::packet::draw::{
-    DrawPrograms, FragmentInput, Interpolation, MAX_CLIP_CULL_DISTANCES, VertexInput, VertexOutput,
+use crate::limits::MAX_CLIP_CULL_DISTANCES;
+use crate::program::interface::{
+    DrawPrograms, FragmentInput, Interpolation, VertexInput, VertexOutput,
 };
 use crate::raster::fragment::FragmentStage;
 use isa::exec::{Executable, Machine, Options};
@@ -63,7 +64,7 @@ impl DrawPipeline {
         Ok(Self { vertex, fragment })
     }
 
-    /// Makes a vertex program ready that projects Gaussians; see [`gaussian`](crate::packet::draw::gaussian).
+    /// Makes a vertex program ready that projects Gaussians; see [`gaussian`](crate::program::interface::gaussian).
     ///
     /// # Errors
     /// [`InvalidProgram`] if it cannot run on the device.

@@ -1,10 +1,11 @@
 //! What the front end hands to the rasterizer.
 
-use super::{Bins, DrawPipeline};
+use super::Bins;
 use crate::bindings::Bindings;
-use crate::packet::Rect;
-use crate::packet::draw::{Draw, DrawState};
-use crate::trace::DrawRecord;
+use crate::geometry::pipeline::DrawPipeline;
+use crate::packet::Draw;
+use crate::state::{DrawState, Rect};
+use crate::stats::recorder::DrawRecord;
 use std::sync::Arc;
 
 /// A draw that was shaded, assembled, clipped, set up and binned.

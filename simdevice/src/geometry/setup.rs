@@ -9,9 +9,8 @@ use super::pipeline::VertexOutputs;
 use super::primitive::Primitive;
 use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
 use super::viewport::{Projected, Transform, code};
-use crate::lanes::three;
-use crate::packet::Rect;
-use crate::packet::draw::{DrawState, PolygonMode};
+use crate::simd::three;
+use crate::state::{DrawState, PolygonMode, Rect};
 
 /// What a chunk of primitives became. Vertices and primitives are numbered from 0.
 #[derive(Debug, Default)]

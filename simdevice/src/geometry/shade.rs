@@ -4,7 +4,7 @@ use super::elements::Elements;
 use super::fetch::Fetcher;
 use super::pipeline::{LANES, Lease, VertexOutputs};
 use super::viewport::{Projected, Projections, Transform, code};
-use crate::packet::draw::MAX_CLIP_CULL_DISTANCES;
+use crate::limits::MAX_CLIP_CULL_DISTANCES;
 use devmem::dispatch;
 use devmem::host;
 use fearless_simd::Level;

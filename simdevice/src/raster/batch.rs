@@ -5,9 +5,9 @@ use super::fragment::{BATCH_LANES, Interface};
 use super::quads::Quads;
 use super::setup::Setup;
 use crate::geometry::{Primitive, PrimitiveKind, Varyings};
-use crate::lanes::{both, three};
-use crate::packet::draw::Interpolation;
-use crate::skips::{Skip, Skips};
+use crate::program::interface::Interpolation;
+use crate::simd::{both, three};
+use crate::stats::optimizations::{Skip, Skips};
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::LaneMask;
 
@@ -189,7 +189,7 @@ impl Batch {
         self.needs = needs;
         self.detects_affine = skips.has(Skip::Affine);
         self.corner = at.map(|at| at * size);
-        self.side = size / super::TILE_SIZE;
+        self.side = size / crate::limits::TILE_SIZE;
         self.clear();
     }
 

@@ -3,7 +3,7 @@
 
 use super::setup::{Edge, Setup};
 use super::tile::SIDE;
-use crate::packet::Rect;
+use crate::state::Rect;
 use fearless_simd::{Simd, i32x16, mask32x16, prelude::*};
 
 /// The column of each lane of a block.

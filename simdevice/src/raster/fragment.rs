@@ -1,9 +1,9 @@
 //! Fragment programs made ready for draws.
 
-use crate::counters::Counters;
-use crate::packet::draw::{
+use crate::program::interface::{
     FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
 };
+use crate::stats::counters::Counters;
 use fearless_simd::Level;
 use isa::exec::{Executable, Machine, Options};
 use isa::validate::InvalidProgram;

@@ -18,7 +18,6 @@
 mod approximation;
 mod by_block;
 mod chunk;
-mod exp2;
 mod grid;
 mod half;
 mod layer;
@@ -31,13 +30,15 @@ mod stream;
 pub(crate) mod tile_draw;
 mod wide_sums;
 
-use super::DepthCode;
-use crate::counters::{Counter, Counters};
+use crate::format::depth::DepthEncoding;
 use crate::gaussian::depth::Trend;
 use crate::gaussian::splat::Splat;
-use crate::gaussian::{GaussianDraw, TILE_SIZE, locate};
-use crate::skips::{Skip, Skips};
-use crate::trace::{self, Run, TileWork};
+use crate::gaussian::{GaussianDraw, locate};
+use crate::limits::TILE_SIZE;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::{Skip, Skips};
+use crate::stats::recorder;
+use crate::stats::recorder::{Run, TileWork};
 use approximation::Way;
 use by_block::TileMode;
 use chunk::{Chunk, Reaching, hidden_blocks};
@@ -65,7 +66,7 @@ const CHUNK: usize = 32;
 const MOST_FALL: f64 = 126.0;
 
 /// Layers of a tile: one for each sample, and one to find what is reached at all.
-const LAYERS: usize = super::MAX_SAMPLES as usize + 1;
+const LAYERS: usize = crate::limits::MAX_SAMPLES as usize + 1;
 
 /// The part of tile buffer B that Gaussian mode uses.
 #[derive(Debug)]
@@ -106,7 +107,7 @@ struct Thresholds {
     alpha_ceiling: f32,
     transmittance_floor: f32,
     /// What numbers of depths mean.
-    depth_unit: DepthCode,
+    depth_unit: DepthEncoding,
     /// The mode, for code that is the same for all of them: where time matters it is a constant.
     depth_mode: DepthMode,
 }
@@ -357,7 +358,7 @@ impl GaussianTile {
                 if let Some(runs) = &mut runs {
                     work.hidden_rest = rest.len() as u32;
                     let open = mask32x16::from_bitmask(simd, open);
-                    trace::push_run(runs, hidden_run(simd, task, rest, (open, rows, blocks)));
+                    recorder::push_run(runs, hidden_run(simd, task, rest, (open, rows, blocks)));
                 }
                 break;
             }
@@ -401,7 +402,7 @@ impl GaussianTile {
             work.pairs += chunk.len() as u64;
             work.items += count_bits(&reaching);
             if let Some(runs) = &mut runs {
-                trace::push_run(
+                recorder::push_run(
                     runs,
                     Run {
                         primitives: chunk.len() as u32,

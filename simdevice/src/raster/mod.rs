@@ -17,12 +17,5 @@ mod setup;
 mod target;
 pub mod tile;
 
-pub use crate::gaussian::TILE_SIZE;
-pub(crate) use depth::DepthCode;
+pub use crate::limits::TILE_SIZE;
 pub(crate) use plane::Plane;
-
-/// The greatest side of a macro-tile in pixels.
-pub const MAX_MACRO_TILE_SIZE: u32 = 128;
-
-/// The most samples per pixel; the other count is 1.
-pub const MAX_SAMPLES: u32 = 4;

@@ -7,7 +7,7 @@ use super::fragment::Interface;
 use super::prepared::{TileDraw, Timing};
 use super::primitives::Buffers;
 use super::quads::Quads;
-use crate::lanes::as_floats;
+use crate::simd::as_floats;
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::exec::{Chunk, LaneMask, Machine};
 

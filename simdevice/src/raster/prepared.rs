@@ -10,9 +10,9 @@ use super::tile::Target;
 use crate::bindings::Prepared;
 use crate::device::Device;
 use crate::geometry::PrimitiveDraw;
-use crate::packet::draw::{FragmentInput, Interpolation, LogicOp};
-use crate::packet::{BlendState, Rect};
-use crate::skips::{Skip, Skips};
+use crate::program::interface::{FragmentInput, Interpolation};
+use crate::state::{BlendState, LogicOp, Rect};
+use crate::stats::optimizations::{Skip, Skips};
 use fearless_simd::Level;
 use std::time::Duration;
 

@@ -1,6 +1,7 @@
 //! Triangle mode of the tile engine: the primitives of a draw, one after another, through coverage, early tests and
 //! shading.
 
+use super::Plane;
 use super::batch::{Batch, BlockValues, Needs, QUADS, Quad, Samples, at_sample, offset};
 use super::coverage::{Coverage, bits};
 use super::depth::Tests;
@@ -12,13 +13,13 @@ pub use super::prepared::{Targets, TileDraw};
 use super::quads::Quads;
 use super::setup::Setup;
 use super::tile::{AREA, SIDE};
-use super::{Plane, TILE_SIZE};
-use crate::counters::{Counter, Counters};
 use crate::geometry::{Primitive, Varyings};
-use crate::lanes::both;
-use crate::packet::Rect;
-use crate::skips::Skip;
-use crate::trace::MacroTileWork;
+use crate::limits::TILE_SIZE;
+use crate::simd::both;
+use crate::state::Rect;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Skip;
+use crate::stats::recorder::MacroTileWork;
 use devmem::dispatch;
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};

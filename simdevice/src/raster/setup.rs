@@ -3,8 +3,8 @@
 use super::batch::Needs;
 use super::coverage::{LANE_X, LANE_Y};
 use crate::geometry::{Primitive, PrimitiveKind};
-use crate::lanes::{both, three};
-use crate::packet::Rect;
+use crate::simd::{both, three};
+use crate::state::Rect;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 /// Primitives reach at most this far from the framebuffer's corner, in 1/256 pixels, so that edge functions fit 64 bits;

@@ -3,10 +3,10 @@
 //! Pixels are kept in an order in which 2x2 quads are consecutive, then 4x4 blocks, then rows of blocks, so that a quad
 //! is four lanes of a vector and a block all sixteen.
 
-use crate::packet::Rect;
-use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
-
-pub use super::target::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target};
+pub use super::target::{AttachmentError, Target};
+pub use crate::limits::MAX_FRAMEBUFFER_SIZE;
+use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::state::Rect;
 
 /// The side of a tile in pixels.
 pub const SIDE: usize = TILE_SIZE as usize;

@@ -4,8 +4,9 @@
 //! four quads, without fused operations, so that every SIMD level chooses the same levels.
 
 use super::cube::Hit;
-use super::sampler::{Filter, MAX_LOD_BIAS, MipmapMode, Sampler};
+use super::sampler::{Filter, MipmapMode, Sampler};
 use super::surface::Surface;
+use crate::limits::MAX_LOD_BIAS;
 use isa::ir::{CHUNK_LANES, Dimension};
 use isa::resources::{Lanes, LodRequest, SampleRequest};
 

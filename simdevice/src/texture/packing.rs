@@ -8,10 +8,12 @@ use std::sync::LazyLock;
 use std::sync::atomic::AtomicU32;
 
 use devmem::gather;
-use fearless_simd::{Simd, f32x8, f32x16, i32x8, i32x16, prelude::*, u32x8, u32x16};
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, f32x16, i32x8, u32x8, u32x16};
 
 use super::lod::Floats;
 use super::surface::Surface;
+use crate::format::unorm8::unorm8_fraction_8;
 use crate::format::{Channel, Format};
 use isa::ir::CHUNK_LANES;
 use isa::resources::Lanes;
@@ -345,33 +347,6 @@ fn gather_narrow<S: Simd>(
     let shift = (index & (texels_per_word - 1)) * (32 / texels_per_word);
     word >> shift
 }
-
-/// 1/255 as the sum of a number of 16 bits, whose product with a code is exact, and the rest: the sum of the two
-/// products rounds as the quotient does.
-const INV_255: [f32; 2] = {
-    let high = f32::from_bits((1f32 / 255.0).to_bits() & !0xFF);
-    [high, (1.0 / 255.0 - high as f64) as f32]
-};
-
-/// Defines how one byte of each word is a fraction of 255, as its quotient rounds.
-macro_rules! unorm8_fraction {
-    ($name:ident, $words:ident, $integers:ident, $floats:ident) => {
-        /// One byte of each word as a fraction of 255, as its quotient rounds.
-        #[inline(always)]
-        pub(crate) fn $name<S: Simd>(word: $words<S>, shift: u32) -> $floats<S> {
-            let code = if shift == 24 {
-                word >> 24
-            } else {
-                (word >> shift) & 0xFF
-            };
-            let code = $floats::float_from(code.bitcast::<$integers<S>>());
-            code * INV_255[0] + code * INV_255[1]
-        }
-    };
-}
-
-unorm8_fraction!(unorm8_fraction, u32x16, i32x16, f32x16);
-unorm8_fraction!(unorm8_fraction_8, u32x8, i32x8, f32x8);
 
 /// Linear values of sRGB codes.
 static LINEAR: LazyLock<[f32; 256]> =

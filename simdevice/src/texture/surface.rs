@@ -5,9 +5,8 @@ use std::sync::Arc;
 
 use super::packing::Packing;
 use super::view::{ComponentSwizzle, IDENTITY, SampledImage, StorageImage, Swizzle, TexelBuffer};
-use crate::format::{Format, MAX_TEXEL_SIZE};
+use crate::format::{Aspect, Format, MAX_TEXEL_SIZE};
 use crate::image::ImageView;
-use crate::packet::Aspect;
 
 /// A mip level of a view: extents in texels, places and pitches in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

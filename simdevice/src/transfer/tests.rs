@@ -1,10 +1,10 @@
 use super::*;
 use crate::Format;
 use crate::device::Config;
+use crate::format::{Aspect, ClearValue};
 use crate::image::{ImageDesc, ImageKind};
 use crate::packet::{
-    Aspect, BufferCopyRegion, ClearValue, CopyImage, ImageCopyRegion, SubresourceLayers,
-    SubresourceRange,
+    BufferCopyRegion, CopyImage, ImageCopyRegion, SubresourceLayers, SubresourceRange,
 };
 use devmem::Allocation;
 use std::sync::Arc;

@@ -4,13 +4,22 @@ use super::common::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::bindings::Bindings;
-use simdevice::compute::{ComputeProgram, Dispatch};
+use simdevice::compute::ComputeProgram;
+use simdevice::format::ClearValue;
+use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
 use simdevice::isa::op::Op;
-use simdevice::packet::draw::*;
+use simdevice::packet::Dispatch;
 use simdevice::packet::*;
-use simdevice::trace::Recorder;
+use simdevice::program::interface::{
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+    VertexInput, VertexOutput, gaussian, resolve,
+};
+use simdevice::raster::gaussian::resolve::ResolveProgram;
+use simdevice::state::gaussian::GaussianState;
+use simdevice::state::{CompareOp, DepthStencil, DepthTest, DrawState, Topology};
+use simdevice::stats::recorder::Recorder;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 

@@ -2,13 +2,14 @@
 
 use simdevice::bindings::Bindings;
 use simdevice::command_processor::ExecutionError;
-use simdevice::compute::{ComputeInput, ComputeProgram, Dispatch};
-use simdevice::counters::Counter;
+use simdevice::compute::ComputeProgram;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::exec::Stopped;
 use simdevice::isa::ir::{Address, Binding, Format, Label, Program, Rate, Space, Statement, Type};
 use simdevice::isa::op::Op;
-use simdevice::packet::BufferRange;
+use simdevice::packet::{BufferRange, Dispatch};
+use simdevice::program::interface::ComputeInput;
+use simdevice::stats::counters::Counter;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Packet};
 use std::sync::Arc;
 use std::time::Duration;

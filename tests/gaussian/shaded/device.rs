@@ -5,20 +5,23 @@ use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, render_shaded
 use gaurast_tests::oracle::{OracleOrder, OracleState};
 use gaurast_tests::scenes::SceneBuffers;
 use simdevice::bindings::Bindings;
-use simdevice::counters::Counters;
 use simdevice::device::SimdLevel;
+use simdevice::format::{Aspect, ClearValue};
+use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
-use simdevice::packet::draw::{
-    CompareOp, DepthStencil, DepthTest, Draw, DrawPipeline, DrawPrograms, DrawState, ResolveShader,
-    Topology, VertexInput, VertexOutput, gaussian,
-};
 use simdevice::packet::{
-    Aspect, Attachment, AttributeStream, BlendState, BufferRange, Camera, ClearValue,
-    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianOrder, GaussianState, LoadOp,
-    ModelAttributes, Rect, Rendering, ResolveMode, StoreOp, Viewport,
+    Attachment, AttributeStream, BufferRange, Draw, GaussianAppend, GaussianAttributes,
+    GaussianBegin, LoadOp, ModelAttributes, Rendering, ResolveShader, StoreOp,
 };
+use simdevice::program::interface::{DrawPrograms, VertexInput, VertexOutput, gaussian};
+use simdevice::state::gaussian::{Camera, GaussianOrder, GaussianState};
+use simdevice::state::{
+    BlendState, CompareOp, DepthStencil, DepthTest, DrawState, Rect, ResolveMode, Topology,
+    Viewport,
+};
+use simdevice::stats::counters::Counters;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 

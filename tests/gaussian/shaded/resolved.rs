@@ -8,15 +8,17 @@ use gaurast_tests::oracle::{OracleDepthFormat, OracleState, OracleTests};
 use gaurast_tests::scenes;
 use simdevice::Format;
 use simdevice::bindings::Bindings;
-use simdevice::counters::Counter;
 use simdevice::device::SimdLevel;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
-use simdevice::packet::draw::{
-    CompareOp, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, ResolveProgram,
-    ResolveShader, Sampling, resolve,
+use simdevice::packet::ResolveShader;
+use simdevice::program::interface::{
+    FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, resolve,
 };
-use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState, Camera};
+use simdevice::raster::gaussian::resolve::ResolveProgram;
+use simdevice::state::gaussian::Camera;
+use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp};
+use simdevice::stats::counters::Counter;
 use std::sync::Arc;
 
 /// Passes its inputs on: four to each attachment in turn.

@@ -3,7 +3,7 @@
 use super::GraphicsPipelineInfo;
 use crate::error::Error;
 use ash::vk;
-use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
+use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState};
 
 /// The blend state of all colour attachments.
 ///

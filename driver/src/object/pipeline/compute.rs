@@ -7,7 +7,8 @@ use crate::object::device::Device;
 use crate::object::shader_module::ShaderModule;
 use crate::shader::{self, BuiltIn, InputSource, Interface, Stage};
 use crate::shader::{Options, Specialization};
-use simdevice::compute::{ComputeInput, ComputeProgram};
+use simdevice::compute::ComputeProgram;
+use simdevice::program::interface::ComputeInput;
 use std::sync::Arc;
 
 /// A compute pipeline.

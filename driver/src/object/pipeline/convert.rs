@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use ash::vk;
-use simdevice::packet::draw::{CompareOp, LogicOp, PolygonMode, StencilOp, Topology};
+use simdevice::state::{CompareOp, LogicOp, PolygonMode, StencilOp, Topology};
 
 /// A value that is none of an enumeration's.
 fn unknown(vuid: &'static str, value: &dyn std::fmt::Debug) -> Error {

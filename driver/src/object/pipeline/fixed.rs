@@ -8,10 +8,9 @@ use crate::error::Error;
 use crate::lower::rendering;
 use crate::registry::features::SUPPORTED;
 use ash::vk;
-use simdevice::packet::BlendFactor;
-use simdevice::packet::draw::{
-    CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, PolygonMode, StencilFace, StencilOp,
-    Topology,
+use simdevice::state::{
+    BlendFactor, CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, PolygonMode,
+    StencilFace, StencilOp, Topology,
 };
 
 /// A feature of the device: if it works, and its name.

@@ -25,8 +25,8 @@ use gaurast::vk::{
     GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
     PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
-use simdevice::packet::draw::DrawState;
-use simdevice::packet::{
+use simdevice::state::DrawState;
+use simdevice::state::gaussian::{
     GaussianApproximation, GaussianGeometry, GaussianLinearization, GaussianOrder,
     GaussianPrecision, GaussianState,
 };

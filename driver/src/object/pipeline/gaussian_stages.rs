@@ -14,12 +14,13 @@ use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
+use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
-use simdevice::packet::draw::{
-    DrawPipeline, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, ResolveProgram,
-    Sampling, gaussian, resolve,
+use simdevice::program::interface::{
+    FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, gaussian, resolve,
 };
+use simdevice::raster::gaussian::resolve::ResolveProgram;
 use std::sync::Arc;
 
 /// A vertex shader that projects Gaussians.

@@ -9,7 +9,7 @@ use crate::shader::{
     OutputTarget, Sampling, Shader,
 };
 use simdevice::isa::ir::{Constant, Program};
-use simdevice::packet::draw::{
+use simdevice::program::interface::{
     self, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, VertexInput, VertexOutput,
 };
 use std::collections::HashMap;
@@ -291,14 +291,14 @@ fn fragment_input(input: &Input, varyings: &Varyings) -> Option<FragmentInput> {
             .map(|&index| FragmentInput::Varying {
                 index,
                 interpolation: match interpolation {
-                    Interpolation::Perspective => draw::Interpolation::Perspective,
-                    Interpolation::Linear => draw::Interpolation::Linear,
-                    Interpolation::Flat => draw::Interpolation::Flat,
+                    Interpolation::Perspective => interface::Interpolation::Perspective,
+                    Interpolation::Linear => interface::Interpolation::Linear,
+                    Interpolation::Flat => interface::Interpolation::Flat,
                 },
                 sampling: match sampling {
-                    Sampling::Center => draw::Sampling::Center,
-                    Sampling::Centroid => draw::Sampling::Centroid,
-                    Sampling::Sample => draw::Sampling::Sample,
+                    Sampling::Center => interface::Sampling::Center,
+                    Sampling::Centroid => interface::Sampling::Centroid,
+                    Sampling::Sample => interface::Sampling::Sample,
                 },
             }),
         InputSource::BuiltIn {
@@ -479,8 +479,8 @@ mod tests {
         let varying = |index| {
             Some(FragmentInput::Varying {
                 index,
-                interpolation: draw::Interpolation::Linear,
-                sampling: draw::Sampling::Center,
+                interpolation: interface::Interpolation::Linear,
+                sampling: interface::Sampling::Center,
             })
         };
         assert_eq!(fragment.inputs, [varying(1), None, varying(0)]);

@@ -28,7 +28,8 @@ use gaurast::vk::{
 use gaussian_stages::{ResolveStage, VertexProjection};
 use layout::PipelineLayout;
 use polygon::PolygonPipeline;
-use simdevice::packet::{GaussianState, Rect, Viewport};
+use simdevice::state::gaussian::GaussianState;
+use simdevice::state::{Rect, Viewport};
 use std::sync::Arc;
 pub(crate) use vertex_input::AttributeSource;
 

@@ -12,7 +12,8 @@ use crate::object::device::Device;
 use crate::shader::{Descriptor, Interface, Numeric, Options, Shader, Stage, reflect};
 use ash::vk;
 use simdevice::format;
-use simdevice::packet::draw::{DrawPipeline, DrawState, PolygonMode};
+use simdevice::geometry::pipeline::DrawPipeline;
+use simdevice::state::{DrawState, PolygonMode};
 use std::sync::Arc;
 
 /// A pipeline of points, lines or triangles.

@@ -3,7 +3,7 @@
 use super::convert;
 use crate::error::Error;
 use ash::vk;
-use simdevice::packet::draw::{CompareOp, DepthBias, StencilOp, Topology};
+use simdevice::state::{CompareOp, DepthBias, StencilOp, Topology};
 
 /// The face that a stencil setting is for: 0 is the front, 1 the back.
 pub(crate) type Face = usize;

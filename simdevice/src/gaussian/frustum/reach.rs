@@ -6,7 +6,7 @@ use crate::gaussian::lanes::{Bits, F32_LANES};
 use crate::gaussian::project::Projection;
 use crate::gaussian::scratch::Attributes;
 use crate::gaussian::splat::{LEAST_HALF_FACTOR, half_room};
-use crate::packet::{CameraModel, GaussianGeometry, GaussianPrecision};
+use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianPrecision};
 use std::f64::consts::LN_2;
 
 /// How much wider than exact bounds are, so that rounding loses nothing.

@@ -11,10 +11,13 @@ use crate::gaussian::scratch::Scratch;
 use crate::gaussian::splat::Projected;
 use crate::gaussian::surfel::Surfel;
 use crate::packet::{
-    AttributeStream, BufferRange, Camera, GaussianAppend, GaussianAttributes, GaussianGeometry,
-    GaussianLinearization, GaussianPrecision, GaussianState, ModelAttributes, Viewport,
+    AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, ModelAttributes,
 };
-use crate::skips::Skips;
+use crate::state::Viewport;
+use crate::state::gaussian::{
+    Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState,
+};
+use crate::stats::optimizations::Skips;
 use devmem::Allocation;
 use devmem::dispatch;
 use rand::{Rng, SeedableRng};

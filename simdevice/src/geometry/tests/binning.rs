@@ -2,10 +2,10 @@
 
 use super::super::{FrontEnd, Primitive, PrimitiveKind, Surface};
 use super::scene::*;
-use crate::counters::Counters;
 use crate::device::{Config, Device};
-use crate::packet::Rect;
-use crate::packet::draw::{Topology, VertexOutput};
+use crate::program::interface::VertexOutput;
+use crate::state::{Rect, Topology};
+use crate::stats::counters::Counters;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,12 +1,21 @@
 //! Draws that the tests share.
 
-use super::super::{Bins, DrawPipeline, FrontEnd, Primitive, PrimitiveDraw, Surface, Varyings};
+use super::super::{Bins, FrontEnd, Primitive, PrimitiveDraw, Surface, Varyings};
 use crate::bindings::Bindings;
-use crate::counters::Counters;
 use crate::device::{Config, Device};
 use crate::format::Format;
-use crate::packet::draw::*;
-use crate::packet::{AttributeStream, BufferRange, IndexStream, Rect};
+use crate::geometry::pipeline::DrawPipeline;
+
+use crate::packet::*;
+use crate::packet::{AttributeStream, BufferRange, IndexStream};
+
+use crate::program::interface::{
+    DrawPrograms, FragmentInput, FragmentPrograms, Interpolation, Sampling, VertexInput,
+    VertexOutput,
+};
+
+use crate::state::{DrawState, Rect, Topology};
+use crate::stats::counters::Counters;
 use devmem::Allocation;
 use isa::builder::Builder;
 use isa::ir::{Program, Rate, Type};

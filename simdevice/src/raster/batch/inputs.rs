@@ -2,9 +2,9 @@
 
 use super::super::fragment::Interface;
 use super::{Batch, LANES, Quad, Record, Samples, offset};
-use crate::lanes::bits_of;
-use crate::packet::draw::{FragmentInput, Interpolation, Sampling};
-use crate::raster::TILE_SIZE;
+use crate::limits::TILE_SIZE;
+use crate::program::interface::{FragmentInput, Interpolation, Sampling};
+use crate::simd::bits_of;
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
 use isa::exec::{Chunk, Machine};
 

@@ -7,11 +7,11 @@
 //! pixels have no more than the budget is looked at no further. (To leave out what is faint in front of others, too, needs
 //! a sum for each block and a bound of each Gaussian's alpha in it; that took as long as it saved.)
 
-use super::exp2::{CUBIC, QUADRATIC, exp2_of_negated};
 use super::layer::{ANY_LIGHT, Light};
 use super::{DepthMode, GaussianTile, NO_DEPTH, Task, TileMode, Work};
-use crate::packet::{GaussianApproximation, GaussianState};
-use crate::trace::Run;
+use crate::simd::exp2::{CUBIC, QUADRATIC, exp2_of_negated};
+use crate::state::gaussian::{GaussianApproximation, GaussianState};
+use crate::stats::recorder::Run;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16};
 

@@ -8,9 +8,10 @@ use crate::gaussian::rays::RayDepths;
 use crate::gaussian::splat::{Splat, half_room};
 use crate::gaussian::surfel::Surfel;
 use crate::gaussian::{GaussianDraw, locate};
-use crate::packet::GaussianPrecision;
-use crate::skips::Skip;
-use crate::trace::{self, Run};
+use crate::state::gaussian::GaussianPrecision;
+use crate::stats::optimizations::Skip;
+use crate::stats::recorder;
+use crate::stats::recorder::Run;
 use devmem::dispatch;
 use devmem::host;
 use fearless_simd::{Level, Simd, f32x16, f64x8, mask32x16, prelude::*};
@@ -234,7 +235,7 @@ impl GaussianTile {
             }
         }
         if let Some(runs) = runs {
-            trace::push_run(
+            recorder::push_run(
                 runs,
                 Run {
                     primitives: task.list.len() as u32,

@@ -4,7 +4,7 @@ use super::grid::{BLOCK_COLUMNS, BLOCK_ROWS, BLOCKS_ACROSS, HALF, LANE_X, LANE_Y
 use super::passing::Passing;
 use super::{BLOCKS, CHUNK, DepthMode, LANES, NO_DEPTH, Task};
 use crate::gaussian::splat::Splat;
-use crate::skips::Skip;
+use crate::stats::optimizations::Skip;
 use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
 
 /// What rounding may do to exponents, relative to them.

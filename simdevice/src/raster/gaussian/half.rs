@@ -5,15 +5,15 @@
 //! given, rounded. Powers of two come from the polynomial of binary32, unfused, rounded. Nothing depends on the SIMD
 //! level, and [`scalar`] says the same without vectors.
 
-use super::exp2::POWER_OF_TWO;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::layer::Layer;
 use super::{CHUNK, FIND_MEDIAN, GaussianTile, NO_DEPTH, Task, Thresholds, Work};
 use crate::gaussian::locate;
 use crate::gaussian::splat::Splat;
-use crate::lanes::{bits_of, floats_of};
-use crate::skips::Skip;
-use crate::trace::Run;
+use crate::simd::exp2::POWER_OF_TWO;
+use crate::simd::{bits_of, floats_of};
+use crate::stats::optimizations::Skip;
+use crate::stats::recorder::Run;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 use scalar::Splat16;
 
@@ -218,7 +218,7 @@ pub(super) mod scalar {
     mod definition {
         use super::super::POWER_OF_TWO;
         use super::{Splat16, round};
-        use crate::packet::GaussianState;
+        use crate::state::gaussian::GaussianState;
 
         pub(crate) fn exp2(x: f32) -> f32 {
             let x = x.clamp(-126.0, 1.0);

@@ -1,10 +1,10 @@
 //! What Gaussian mode accumulates for a tile's pixels, or for one sample of each.
 
 use super::{BLOCKS, LANES, TILE};
-use crate::gaussian::TILE_SIZE;
-use crate::packet::Rect;
-use crate::raster::DepthCode;
+use crate::format::depth::DepthEncoding;
+use crate::limits::TILE_SIZE;
 use crate::raster::tile::place;
+use crate::state::Rect;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 /// Accumulated colour and transmittance of a tile's pixels, or of one sample of each.
@@ -95,7 +95,7 @@ impl Layer {
     }
 
     /// The expected and the median depth of a block's lanes; zero where nothing is covered.
-    pub(super) fn depths(&self, block: usize, unit: DepthCode) -> [[f32; LANES]; 2] {
+    pub(super) fn depths(&self, block: usize, unit: DepthEncoding) -> [[f32; LANES]; 2] {
         let mut out = [[0.0; LANES]; 2];
         let [depths, weights] = &self.means;
         for lane in 0..LANES {

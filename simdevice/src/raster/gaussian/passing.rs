@@ -6,7 +6,7 @@
 
 use super::{BLOCKS, LANES, Lanes};
 use crate::gaussian::depth::Trend;
-use crate::packet::draw::CompareOp;
+use crate::state::CompareOp;
 use fearless_simd::{Simd, mask32x16, prelude::*, u32x16};
 
 /// No depth has this number or a greater one.

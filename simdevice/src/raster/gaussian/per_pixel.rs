@@ -10,7 +10,7 @@ use super::layer::Layer;
 use super::{BLOCKS, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Work};
 use crate::gaussian::locate;
 use crate::gaussian::rays::{PixelRays, RayDepths, Rays, ordered_key};
-use crate::trace::Run;
+use crate::stats::recorder::Run;
 use devmem::host;
 use fearless_simd::{Simd, f32x16, prelude::*};
 
@@ -161,7 +161,7 @@ impl GaussianTile {
                 let splat = &task.splats[batch][place];
                 let fall = task.falls(simd, (batch, place), block);
                 let ceiling = f32x16::splat(simd, task.thresholds.alpha_ceiling);
-                let alpha = super::exp2::exp2_of_negated(simd, fall).min(ceiling);
+                let alpha = crate::simd::exp2::exp2_of_negated(simd, fall).min(ceiling);
                 let mut reached = fall.simd_le(task.thresholds.most_fall);
                 if task.thresholds.depth_mode > NO_DEPTH {
                     reached &= self.passing.pixels(simd, block, splat.depth);

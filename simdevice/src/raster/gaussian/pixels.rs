@@ -12,7 +12,7 @@ use super::{
     Thresholds,
 };
 use crate::gaussian::splat::Splat;
-use crate::lanes::bits_of;
+use crate::simd::bits_of;
 use fearless_simd::{Simd, f32x8, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
 
 /// What a block's pixels have accumulated.

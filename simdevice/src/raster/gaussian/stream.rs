@@ -2,7 +2,7 @@
 
 use super::{DepthMode, GaussianTile, Run, Skip, Task, TileMode, Work};
 use crate::binning::Stream;
-use crate::gaussian::TILE_SIZE;
+use crate::limits::TILE_SIZE;
 use devmem::dispatch;
 use fearless_simd::Level;
 

@@ -4,14 +4,16 @@ mod per_pixel;
 mod streamed;
 mod whole_draws;
 
-use super::exp2::{
-    CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
-};
 use super::*;
 use crate::device::{Config, Device, SimdLevel};
 use crate::format::Format;
 use crate::gaussian::GaussianSet;
 use crate::packet::*;
+use crate::simd::exp2::{
+    CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
+};
+use crate::state::gaussian::{Camera, CameraModel, GaussianPrecision, GaussianState};
+use crate::state::{Rect, Viewport};
 use devmem::Allocation;
 use fearless_simd::f32x16;
 use rand::{Rng, SeedableRng};
@@ -450,7 +452,7 @@ fn a_saturated_tile_fetches_no_more() {
 
 #[test]
 fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
-    use crate::trace::{DrawWork, Recorder};
+    use crate::stats::recorder::{DrawWork, Recorder};
     let quiet = Device::new(&Config::default()).unwrap();
     for (seed, bounds) in [
         (40, WHOLE),

@@ -10,17 +10,16 @@ use super::{
     BLOCKS, DepthMode, FIND_MEAN, FIND_MEDIAN, GaussianTile, LANES, Lanes, NO_DEPTH, TEST_DEPTH,
     TILE_SIZE, count, lanes_within,
 };
-use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::gaussian::GaussianDraw;
-use crate::packet::BlendState;
-use crate::packet::draw::{StencilFace, StencilOp};
-use crate::raster::MAX_SAMPLES;
+use crate::limits::MAX_SAMPLES;
 use crate::raster::color::ColorOutput;
 use crate::raster::depth::{Tests, apply, compare};
 use crate::raster::primitives::{Buffers, Targets};
 use crate::raster::quads::Quads;
 use crate::raster::tile::{AREA, Target, Tile};
+use crate::state::{BlendState, StencilFace, StencilOp};
+use crate::stats::counters::{Counter, Counters};
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use isa::exec::Stopped;

@@ -4,16 +4,16 @@
 //! worth much; without them errors of thousands of layers add up beyond the contract. A block's whole list is worked off
 //! at once here, so that its sums stay at hand and are rounded to binary32 only in the end.
 
-use super::exp2::exp2_of_negated;
 use super::layer::Layer;
 use super::passing::Passing;
 use super::{
     BLOCKS, CHUNK, FIND_MEAN, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Thresholds, Work,
     locate,
 };
-use crate::packet::GaussianState;
-use crate::skips::Skip;
-use crate::trace::Run;
+use crate::simd::exp2::exp2_of_negated;
+use crate::state::gaussian::GaussianState;
+use crate::stats::optimizations::Skip;
+use crate::stats::recorder::Run;
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
 /// Whether a draw's floors let more layers be seen than the usual ones.

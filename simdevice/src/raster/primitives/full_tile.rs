@@ -7,10 +7,10 @@ use super::super::setup::Setup;
 use super::super::tile::AREA;
 use super::whole::{BLOCKS, block_corner};
 use super::{Current, Renderer};
-use crate::counters::Counter;
-use crate::lanes::{bits_of, both, three};
-use crate::packet::draw::{FragmentInput, Interpolation};
-use crate::skips::Skip;
+use crate::program::interface::{FragmentInput, Interpolation};
+use crate::simd::{bits_of, both, three};
+use crate::stats::counters::Counter;
+use crate::stats::optimizations::Skip;
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::{Chunk, LaneMask, Stopped, Watchdog};
 

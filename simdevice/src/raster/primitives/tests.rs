@@ -7,14 +7,21 @@ use super::*;
 use crate::bindings::Bindings;
 use crate::device::Device;
 use crate::device::{Config, FlushPolicy};
-use crate::format::Format;
-use crate::geometry::{Bins, DrawPipeline, PrimitiveKind, Varyings};
+use crate::format::{Aspect, ClearValue, Format};
+use crate::geometry::pipeline::DrawPipeline;
+use crate::geometry::{Bins, PrimitiveKind, Varyings};
 use crate::geometry::{PrimitiveChunk, PrimitiveDraw};
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
-use crate::packet::draw::*;
-use crate::packet::*;
+use crate::packet::{Attachment, LoadOp, Rendering, StoreOp};
+
 use crate::pass::{Pass, PassDraw};
+
+use crate::program::interface::{
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+};
 use crate::raster::setup::{CENTER, SAMPLES_4};
+use crate::state::*;
+use crate::state::{DrawState, Rect, Topology};
 use devmem::Allocation;
 use isa::builder::Builder;
 use isa::ir::{Program, Rate, Statement, Type};

@@ -3,10 +3,10 @@
 use super::super::coverage::Coverage;
 use super::super::tile::Tile;
 use super::Renderer;
-use crate::counters::Counter;
-use crate::packet::Rect;
-use crate::raster::TILE_SIZE;
-use crate::skips::Skip;
+use crate::limits::TILE_SIZE;
+use crate::state::Rect;
+use crate::stats::counters::Counter;
+use crate::stats::optimizations::Skip;
 
 impl Renderer<'_, '_> {
     /// Makes sure that depth and stencil of a tile are there.

@@ -6,9 +6,9 @@ use super::super::coverage::Coverage;
 use super::super::pending::Pending;
 use super::super::tile::{AREA, SIDE};
 use super::{Current, Renderer};
-use crate::counters::Counter;
-use crate::raster::TILE_SIZE;
-use crate::skips::Skip;
+use crate::limits::TILE_SIZE;
+use crate::stats::counters::Counter;
+use crate::stats::optimizations::Skip;
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::Stopped;
 

@@ -9,13 +9,22 @@ mod unchanged;
 
 use crate::common::*;
 use simdevice::bindings::Bindings;
-use simdevice::counters::{Counter, Counters};
-use simdevice::geometry::DrawPipeline;
+use simdevice::format::ClearValue;
+use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
-use simdevice::packet::draw::*;
 use simdevice::packet::*;
-use simdevice::skips::{Skip, Skips};
+use simdevice::program::interface::{
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+    VertexInput, VertexOutput,
+};
+use simdevice::state::gaussian::{
+    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
+    GaussianState,
+};
+use simdevice::state::{CompareOp, DepthTest, DrawState, Rect, Topology};
+use simdevice::stats::counters::{Counter, Counters};
+use simdevice::stats::optimizations::{Skip, Skips};
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 

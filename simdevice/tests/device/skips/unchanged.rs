@@ -1,6 +1,8 @@
 //! What is drawn again as it was is not projected again, and whatever changes is seen.
 
 use super::*;
+use simdevice::program::interface::resolve;
+use simdevice::raster::gaussian::resolve::ResolveProgram;
 
 /// What changes packets before they are drawn again.
 pub(super) type Edit = Box<dyn FnMut(&mut [Packet])>;

@@ -4,7 +4,7 @@ use super::feature::{APPROXIMATION, require};
 use crate::error::Error;
 use crate::object::pipeline::GraphicsPipelineInfo;
 use crate::registry::features::Features;
-use simdevice::packet::GaussianApproximation;
+use simdevice::state::gaussian::GaussianApproximation;
 
 const STRUCTURE: &str = "VkPipelineGaussianApproximationStateCreateInfoGAURAST";
 

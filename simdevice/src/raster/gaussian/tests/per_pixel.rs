@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::gaussian::rays::ordered_key;
+use crate::state::gaussian::GaussianOrder;
 
 /// As [`naive_sample`](super::naive_sample), in the per-pixel order.
 pub(super) fn naive_sample(

@@ -1,12 +1,21 @@
 //! Whole draws with random tests against a twin that takes each sample for itself.
 
 use super::*;
+use crate::format::Aspect;
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
-use crate::packet::draw::*;
+
+use crate::packet::*;
 use crate::pass::{Pass, PassDraw};
+
 use crate::raster::blend::Blender;
 use crate::raster::depth::{apply, compare};
-use crate::trace::Recorder;
+use crate::state::gaussian::{GaussianOrder, GaussianPrecision, GaussianState};
+
+use crate::state::{
+    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, Rect,
+    StencilFace, StencilOp,
+};
+use crate::stats::recorder::Recorder;
 use rand::seq::IndexedRandom;
 use timing::work::Saturation;
 

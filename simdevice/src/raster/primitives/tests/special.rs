@@ -1,6 +1,7 @@
 //! What random states do not reach: samples, layers, resolves, side effects, programs that do not end.
 
 use super::*;
+use crate::packet::{Attachment, BufferRange, Rendering};
 use isa::exec::Stopped;
 use isa::ir::{Address, AtomicOp, Binding, Format as Element, Space};
 use std::time::Duration;

@@ -17,7 +17,7 @@ use crate::packet::{BufferImageRegion, BufferRange, ClearImage, CopyBuffer, Copy
 pub use blit::blit_image;
 pub use image_copy::copy_image;
 use rayon::prelude::*;
-pub use resolve::{resolve_image, resolve_row};
+pub use resolve::resolve_image;
 use std::sync::Arc;
 
 /// The offset into the memory of bytes `offset..offset + size` of a range, if the range has them.

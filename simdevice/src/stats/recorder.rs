@@ -6,9 +6,10 @@ mod primitives;
 
 pub(crate) use primitives::MacroTileWork;
 
-use crate::counters::{Counter, Counters};
-use crate::gaussian::{TILE_SIZE, splat::Splat};
-use crate::packet::Rect;
+use crate::gaussian::splat::Splat;
+use crate::limits::TILE_SIZE;
+use crate::state::Rect;
+use crate::stats::counters::{Counter, Counters};
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -430,7 +431,8 @@ fn boxed_tiles(splat: &Splat, bounds: Rect) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+
+    use crate::stats::recorder::*;
 
     const BOUNDS: Rect = Rect {
         x: 0,

@@ -253,7 +253,8 @@ impl Counters {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+
+    use crate::stats::counters::*;
 
     #[test]
     fn a_query_reads_the_difference() {

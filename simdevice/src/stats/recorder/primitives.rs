@@ -1,10 +1,10 @@
 //! Points, lines and triangles in the trace.
 
-use super::{DrawRecord, ShaderWork, shader_work, sized_tiles};
-use crate::counters::{Counter, Counters};
 use crate::geometry::PrimitiveDraw;
-use crate::packet::draw::Draw;
-use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::packet::Draw;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::recorder::{DrawRecord, ShaderWork, shader_work, sized_tiles};
 use std::sync::PoisonError;
 use timing::work::{DrawWork, Mode, Run, TILE_GROUPS, TileWork};
 
@@ -154,7 +154,8 @@ impl DrawRecord {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+
+    use crate::stats::recorder::primitives::*;
 
     #[test]
     fn quads_and_blocks_are_counted_once() {
