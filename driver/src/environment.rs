@@ -18,7 +18,7 @@
 
 use crate::capabilities::memory;
 use crate::error::Error;
-use simdevice::device::{Config, SimdLevel};
+use simdevice::runtime::{Config, SimdLevel};
 use simdevice::stats::optimizations::UnknownSkip;
 use simdevice::stats::recorder::{Recorder, Trace};
 use std::path::{Path, PathBuf};

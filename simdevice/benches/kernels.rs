@@ -8,10 +8,10 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::device::SimdLevel;
 use simdevice::gaussian::{GaussianDraw, GaussianSet, sort};
 use simdevice::packet::*;
 use simdevice::raster::gaussian::GaussianTile;
+use simdevice::runtime::SimdLevel;
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
 use simdevice::state::{Rect, Viewport};
 use simdevice::stats::counters::{Counter, Counters};
@@ -159,7 +159,7 @@ fn begin(degree: u32) -> GaussianBegin {
 fn resolve(device: &Device, begin: &GaussianBegin, append: &GaussianAppend) -> GaussianDraw {
     let mut set = GaussianSet::begin(begin, area(), None);
     set.append(append);
-    set.resolve(device, &mut Counters::default())
+    set.resolve(device.runtime(), device.caches(), &mut Counters::default())
         .expect("not too many")
 }
 

@@ -8,12 +8,12 @@
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::device::SimdLevel;
 use simdevice::format::ClearValue;
 use simdevice::gaussian::GaussianSet;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::*;
 use simdevice::pass::{Pass, PassDraw};
+use simdevice::runtime::SimdLevel;
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
 use simdevice::state::{CompareOp, DepthStencil, DepthTest, Rect, Viewport};
 use simdevice::stats::counters::{Counter, Counters};
@@ -238,11 +238,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut counters = Counters::default();
         let mut set = GaussianSet::begin(&begin, area, Some(Format::D32Sfloat));
         set.append(&append);
-        let draw = set.resolve(&device, &mut counters)?;
+        let draw = set.resolve(device.runtime(), device.caches(), &mut counters)?;
         let started = Instant::now();
         let mut pass = Pass::begin(&rendering)?;
-        pass.push(PassDraw::Gaussians(Box::new(draw)), &device, &mut counters)?;
-        pass.end(&device, &mut counters)?;
+        pass.push(
+            PassDraw::Gaussians(Box::new(draw)),
+            device.runtime(),
+            &mut counters,
+        )?;
+        pass.end(device.runtime(), &mut counters)?;
         let raster = started.elapsed().as_secs_f64() * 1e3;
         let ms = |counter| counters.get(counter) as f64 / 1e6;
         times.push([

@@ -8,7 +8,6 @@
 //! [`counters`] records the work that was done.
 #![forbid(unsafe_code)]
 
-pub mod bindings;
 mod binning;
 pub mod command_processor;
 pub mod compute;
@@ -16,25 +15,26 @@ pub mod device;
 pub mod format;
 pub mod gaussian;
 pub mod geometry;
+mod hardware_model;
 pub mod image;
 pub mod limits;
-mod model;
 pub mod packet;
 pub mod pass;
 pub mod program;
 pub mod raster;
+pub mod runtime;
 mod simd;
 pub mod state;
 pub mod stats;
 pub mod texture;
 pub mod transfer;
-mod workers;
 
 pub use command_processor::CommandProcessor;
-pub use device::{Config, Device};
+pub use device::Device;
 pub use devmem::{Allocation, host};
 pub use format::Format;
 pub use image::{Image, ImageView};
 pub use isa;
 pub use packet::Packet;
+pub use runtime::Config;
 pub use timing;

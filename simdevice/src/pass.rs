@@ -3,7 +3,6 @@
 //! Every macro-tile is rendered by one worker that runs all draws in submission order against its tile buffers, so
 //! that the image depends neither on the number of workers nor on when the pass is flushed.
 
-use crate::device::{Device, FlushPolicy};
 use crate::format::{Aspect, ClearValue, Format};
 use crate::gaussian::GaussianDraw;
 use crate::geometry::PrimitiveDraw;
@@ -15,12 +14,13 @@ use crate::raster::gaussian::GaussianTile;
 use crate::raster::gaussian::tile_draw::GaussianTileDraw;
 use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
 use crate::raster::tile::{AttachmentError, Target, Tile};
+use crate::runtime::{FlushPolicy, Runtime};
 use crate::state::{Rect, ResolveMode};
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Skip;
 use devmem::host;
 use isa::exec::Stopped;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// A draw that waits in a pass.
@@ -176,20 +176,20 @@ impl Pass {
     pub fn push(
         &mut self,
         draw: PassDraw,
-        device: &Device,
+        runtime: &Runtime,
         counters: &mut Counters,
     ) -> Result<(), Stopped> {
         self.bin_bytes = self.bin_bytes.saturating_add(draw.memory_bytes());
         host::push(&mut self.draws, draw);
         self.pushed += 1;
-        let config = device.config();
+        let config = runtime.config();
         let full = match config.flush {
             FlushPolicy::WhenFull => self.bin_bytes > config.bin_budget_bytes,
             FlushPolicy::EveryDraw => true,
             FlushPolicy::SomeDraws(seed) => flushes(seed, self.pushed),
         };
         if full {
-            self.flush(device, counters)?;
+            self.flush(runtime, counters)?;
         }
         Ok(())
     }
@@ -198,16 +198,16 @@ impl Pass {
     ///
     /// # Errors
     /// [`Stopped`] if a fragment program ran for too long; the image is then undefined.
-    pub fn flush(&mut self, device: &Device, counters: &mut Counters) -> Result<(), Stopped> {
-        self.render(device, counters, false)
+    pub fn flush(&mut self, runtime: &Runtime, counters: &mut Counters) -> Result<(), Stopped> {
+        self.render(runtime, counters, false)
     }
 
     /// Renders all draws that wait, and stores and resolves the attachments as they are to be.
     ///
     /// # Errors
     /// As [`Pass::flush`].
-    pub fn end(mut self, device: &Device, counters: &mut Counters) -> Result<(), Stopped> {
-        self.render(device, counters, true)
+    pub fn end(mut self, runtime: &Runtime, counters: &mut Counters) -> Result<(), Stopped> {
+        self.render(runtime, counters, true)
     }
 
     fn resolve_targets(&self) -> impl Iterator<Item = &Target> {
@@ -228,7 +228,7 @@ impl Pass {
 
     fn render(
         &mut self,
-        device: &Device,
+        runtime: &Runtime,
         counters: &mut Counters,
         last: bool,
     ) -> Result<(), Stopped> {
@@ -237,14 +237,7 @@ impl Pass {
         let mut done = Ok(());
         if !self.area.is_empty() && (pending || !self.draws.is_empty()) {
             let started = Instant::now();
-            for (work, result) in self.render_macro_tiles(device, last) {
-                counters.add_all(&work);
-                done = match (done, result) {
-                    // That others were cancelled when one stopped tells nothing.
-                    (Err(Stopped::Cancelled), Err(stopped)) | (Err(stopped), _) => Err(stopped),
-                    (Ok(()), result) => result,
-                };
-            }
+            done = self.render_macro_tiles(runtime, counters, last);
             for target in self.targets().chain(self.resolve_targets()) {
                 target.bump_generation();
             }
@@ -260,14 +253,14 @@ impl Pass {
         done
     }
 
-    /// Renders all macro-tiles, each by whichever worker is free; returns what every worker counted, and whether it
-    /// was stopped.
+    /// Renders all macro-tiles, each by whichever worker is free.
     fn render_macro_tiles(
         &self,
-        device: &Device,
+        runtime: &Runtime,
+        counters: &mut Counters,
         last: bool,
-    ) -> Vec<(Counters, Result<(), Stopped>)> {
-        let size = device.config().macro_tile_size;
+    ) -> Result<(), Stopped> {
+        let size = runtime.config().macro_tile_size;
         // The area begins at or after the framebuffer's corner.
         let range = |start: i32, length: u32| {
             let start = start as u32;
@@ -277,34 +270,31 @@ impl Pass {
         let rows = range(self.area.y, self.area.height);
         let (width, height) = (columns.len() as u64, rows.len() as u64);
         let count = width * height * u64::from(self.layer_count);
-        let frame = Frame {
+        let flush = Flush {
             pass: self,
-            device,
+            runtime,
             last,
-            draws: self.tile_draws(device),
+            draws: self.tile_draws(runtime),
             cancel: AtomicBool::new(false),
         };
-        let next = AtomicU64::new(0);
-        let work = || {
-            let mut worker = Worker::new(self, size);
-            loop {
-                let job = next.fetch_add(1, Ordering::Relaxed);
-                if job >= count || frame.cancel.load(Ordering::Relaxed) {
-                    return (worker.counters, Ok(()));
-                }
-                let (layer, place) = (job / (width * height), job % (width * height));
+        let (workers, done) = runtime.share(
+            0..count,
+            1,
+            &flush.cancel,
+            || Worker::new(self, size),
+            |worker, task| {
+                let (layer, place) = (task / (width * height), task % (width * height));
                 let at = [
                     columns.start + (place % width) as u32,
                     rows.start + (place / width) as u32,
                 ];
-                if let Err(stopped) = frame.render_macro_tile(&mut worker, layer as u32, at) {
-                    frame.cancel.store(true, Ordering::Relaxed);
-                    return (worker.counters, Err(stopped));
-                }
-            }
-        };
-        let done = device.install(|| rayon::broadcast(|_| work()));
-        for draw in &frame.draws {
+                flush.render_macro_tile(worker, layer as u32, at)
+            },
+        );
+        for worker in &workers {
+            counters.add_all(&worker.counters);
+        }
+        for draw in &flush.draws {
             match draw {
                 Ready::Primitives(draw) => draw.finish(),
                 Ready::Gaussians(draw) => draw.finish(),
@@ -315,7 +305,7 @@ impl Pass {
     }
 
     /// The waiting draws made ready for tiles.
-    fn tile_draws<'a>(&'a self, device: &Device) -> Vec<Ready<'a>> {
+    fn tile_draws<'a>(&'a self, runtime: &Runtime) -> Vec<Ready<'a>> {
         let targets = Targets {
             color: &self.color,
             depth: self.depth.as_ref(),
@@ -327,7 +317,7 @@ impl Pass {
                 draw,
                 targets,
                 self.samples,
-                device,
+                runtime,
             ))),
             PassDraw::Primitives(draw) if draw.chunks.is_empty() => Ready::Nothing,
             PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TileDraw::new(
@@ -335,7 +325,7 @@ impl Pass {
                 targets,
                 self.samples,
                 self.area,
-                device,
+                runtime,
             ))),
         };
         host::collect(self.draws.iter().map(ready))
@@ -412,9 +402,9 @@ impl Worker {
 }
 
 /// What the workers of a flush share.
-struct Frame<'a> {
+struct Flush<'a> {
     pass: &'a Pass,
-    device: &'a Device,
+    runtime: &'a Runtime,
     /// Whether the pass ends, so that only what is to be stored is kept.
     last: bool,
     draws: Vec<Ready<'a>>,
@@ -422,7 +412,7 @@ struct Frame<'a> {
     cancel: AtomicBool,
 }
 
-impl Frame<'_> {
+impl Flush<'_> {
     /// Runs all draws in one macro-tile, then stores its tiles.
     fn render_macro_tile(
         &self,
@@ -431,7 +421,7 @@ impl Frame<'_> {
         at: [u32; 2],
     ) -> Result<(), Stopped> {
         let pass = self.pass;
-        let size = self.device.config().macro_tile_size;
+        let size = self.runtime.config().macro_tile_size;
         let tiles = || Tile::of_macro_tile(size, at, pass.area);
         for draw in &self.draws {
             match draw {
@@ -457,7 +447,7 @@ impl Frame<'_> {
                 )?,
             }
         }
-        if !self.device.config().skips.has(Skip::EmptyTiles) {
+        if !self.runtime.config().skips.has(Skip::EmptyTiles) {
             tiles().for_each(|tile| self.touch_all(worker, layer, &tile));
         }
         for tile in tiles() {
@@ -508,7 +498,7 @@ impl Frame<'_> {
                 .add(Counter::TilesUntouched, untouched.into());
             if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
                 plane.touch(target, layer, tile);
-                let level = self.device.level();
+                let level = self.runtime.level();
                 plane.resolve(level, target, (resolve, *mode), layer, tile);
             }
             let keep = !self.last || target.store == StoreOp::Store;

@@ -6,8 +6,8 @@ use crate::object::descriptor::layout::Binding;
 use crate::object::image::ImageView;
 use crate::shader::{self, DescriptorKind};
 use simdevice::Allocation;
-use simdevice::bindings::Bindings;
 use simdevice::host;
+use simdevice::program::bindings::Bindings;
 use simdevice::texture::{ImageBinding, SampledImage, StorageImage, TexelBuffer};
 use std::sync::Arc;
 

@@ -11,9 +11,9 @@ use crate::object::pipeline::{
     GraphicsPipeline,
 };
 use simdevice::Packet;
-use simdevice::bindings::Bindings;
 use simdevice::packet::{self, ResolveShader};
 use simdevice::packet::{GaussianAppend, GaussianAttributes, GaussianBegin, ModelAttributes};
+use simdevice::program::bindings::Bindings;
 use simdevice::state::gaussian::{
     Camera, CameraModel, GaussianGeometry, GaussianPrecision, GaussianState,
 };

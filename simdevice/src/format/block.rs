@@ -96,7 +96,6 @@ pub(super) fn bc7(bytes: &[u8; 16]) -> Block {
 
 #[cfg(test)]
 mod tests {
-
     use crate::Format;
 
     /// The registers of each texel of a block.

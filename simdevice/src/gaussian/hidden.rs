@@ -116,7 +116,7 @@ impl GaussianSet {
         );
         workers.projection.skips.has(Skip::HiddenChunks)
             // What was recorded is what hardware without this does.
-            && workers.device.recorder().is_none()
+            && workers.runtime.recorder().is_none()
             && is_along_axis
             && state.order == GaussianOrder::ViewDepth
             && state.geometry == GaussianGeometry::Volume

@@ -7,6 +7,7 @@
 //! [`binning`](crate::binning) places them in tile lists.
 
 pub(crate) mod cache;
+pub mod caches;
 mod chunks;
 pub(crate) mod depth;
 mod emit;
@@ -22,6 +23,7 @@ mod order;
 mod panorama;
 pub(crate) mod project;
 pub(crate) mod rays;
+mod recording;
 mod scratch;
 mod shaded;
 #[doc(hidden)] // For the benchmarks.
@@ -34,15 +36,15 @@ pub(crate) mod unchanged;
 mod unscented;
 
 use crate::binning::TileLists;
-use crate::device::Device;
 use crate::format::Format;
 use crate::format::depth::DepthEncoding;
+use crate::gaussian::caches::Caches;
 use crate::packet::{Draw, GaussianAppend, GaussianBegin, ResolveShader};
+use crate::runtime::Runtime;
 use crate::state::gaussian::{GaussianGeometry, GaussianOrder, GaussianState};
 use crate::state::{Rect, Viewport};
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::{Skip, Skips};
-use crate::stats::recorder;
 use crate::stats::recorder::DrawRecord;
 use chunks::Chunks;
 use depth::{CenterDepth, Trend};
@@ -220,21 +222,22 @@ impl GaussianSet {
     /// [`Unresolved`] if the set exceeds what 32 bits can name, or a vertex program runs for too long.
     pub fn resolve(
         self,
-        device: &Device,
+        runtime: &Runtime,
+        caches: &Caches,
         counters: &mut Counters,
     ) -> Result<GaussianDraw, Unresolved> {
-        let chunks = self.find_chunks(device, counters);
-        let config = device.config();
+        let chunks = self.find_chunks(runtime, caches, counters);
+        let config = runtime.config();
         let skips = [Skip::Unchanged, Skip::LastOrder].map(|skip| config.skips.has(skip));
-        let is_kept = skips.contains(&true) && device.recorder().is_none();
+        let is_kept = skips.contains(&true) && runtime.recorder().is_none();
         let key = Key::new(&self, &chunks).filter(|_| is_kept);
         let mut last = None;
         if let Some(key) = &key {
-            match device.last_sets().find(key, skips[0]) {
+            match caches.last_sets.find(key, skips[0]) {
                 LastSet::Same(sorted) => {
                     counters.add_all(&sorted.counters);
                     counters.add(Counter::SetsUnchanged, 1);
-                    return Ok(self.drawn(sorted, None, device));
+                    return Ok(self.drawn(sorted, None, runtime));
                 }
                 LastSet::Other(order) => last = order,
             }
@@ -242,14 +245,14 @@ impl GaussianSet {
         let keeps_order = key.is_some() && skips[1];
         // All of it by workers: for each way from this thread to them and back, threads fall asleep and are woken.
         let (sorted, record) =
-            device.install(|| self.sort(&chunks, (last, keeps_order), device, counters))?;
+            runtime.install(|| self.sort(&chunks, (last, keeps_order), runtime, counters))?;
         let sorted = Arc::new(sorted);
         if let Some(key) = key {
             let bytes = sorted.memory_bytes();
-            let sets = device.last_sets();
+            let sets = &caches.last_sets;
             sets.keep(key, &sorted, bytes, config.chunk_budget_bytes);
         }
-        Ok(self.drawn(sorted, record, device))
+        Ok(self.drawn(sorted, record, runtime))
     }
 
     /// The set as it is drawn.
@@ -257,7 +260,7 @@ impl GaussianSet {
         self,
         sorted: Arc<Sorted>,
         record: Option<Arc<DrawRecord>>,
-        device: &Device,
+        runtime: &Runtime,
     ) -> GaussianDraw {
         let begin = self.begin;
         GaussianDraw {
@@ -275,7 +278,7 @@ impl GaussianSet {
             state: begin.state,
             bounds: self.bounds,
             sorted,
-            skips: device.config().skips,
+            skips: runtime.config().skips,
             record,
         }
     }
@@ -286,24 +289,24 @@ impl GaussianSet {
         &self,
         chunks: &[Option<Arc<Chunks>>],
         (last, keeps_order): (Option<Arc<Order>>, bool),
-        device: &Device,
+        runtime: &Runtime,
         counters: &mut Counters,
     ) -> Result<(Sorted, Option<Arc<DrawRecord>>), Unresolved> {
         let started = Instant::now();
         let mut work = Counters::default();
-        let (mut batches, numbers) = self.project(device, chunks, &mut work)?;
+        let (mut batches, numbers) = self.project(runtime, chunks, &mut work)?;
         let fixed = batches.len();
-        self.shade(device, &mut batches)?;
+        self.shade(runtime, &mut batches)?;
         work.add_all(&counted(&batches[..fixed]));
         let by_programs = counted(&batches[fixed..]);
         let projected = Instant::now();
-        let threads = device.threads();
+        let threads = runtime.threads();
         let (order, is_repaired) = order::find(&batches, &numbers, last.as_deref(), threads);
         counters.add(Counter::OrdersRepaired, is_repaired.into());
         drop(last);
         let sorted = Instant::now();
         // Twelve bytes a pair while lists are made: four times the budget of all lists of a pass.
-        let most_pairs = device.config().bin_budget_bytes / 3;
+        let most_pairs = runtime.config().bin_budget_bytes / 3;
         let tiles = TileLists::build(&mut batches, &order, self.bounds, threads, most_pairs);
         let kept = keeps_order.then(|| Order::keep(numbers, &mut batches, order));
         let binned = Instant::now();
@@ -322,20 +325,20 @@ impl GaussianSet {
         let surfels = self.is_flat().then(|| host::collect(surfels));
         let depths = others.into_iter().map(|others| others.1);
         let ray_depths = is_per_pixel.then(|| host::collect(depths));
-        let record = device.recorder().map(|_| {
+        let record = runtime.recorder().map(|_| {
             let degree = self.begin.state.sh_degree;
             let (pairs, bounds) = (tiles.pairs(), self.bounds);
             let (by_device, by_program) = splats.split_at(fixed);
-            let fixed = recorder::Projected {
+            let fixed = recording::Projected {
                 counters: &work,
                 splats: by_device,
             };
-            let by_program = recorder::Projected {
+            let by_program = recording::Projected {
                 counters: &by_programs,
                 splats: by_program,
             };
             let bytes = self.draws.iter().map(shaded::vertex_bytes).sum();
-            let draw = recorder::gaussian_draw(&fixed, &by_program, bytes, pairs, degree, bounds);
+            let draw = recording::gaussian_draw(&fixed, &by_program, bytes, pairs, degree, bounds);
             DrawRecord::new(draw)
         });
         work.add_all(&by_programs);
@@ -362,8 +365,13 @@ impl GaussianSet {
     }
 
     /// The chunks of each append that has some.
-    fn find_chunks(&self, device: &Device, counters: &mut Counters) -> Vec<Option<Arc<Chunks>>> {
-        let config = device.config();
+    fn find_chunks(
+        &self,
+        runtime: &Runtime,
+        caches: &Caches,
+        counters: &mut Counters,
+    ) -> Vec<Option<Arc<Chunks>>> {
+        let config = runtime.config();
         let mut found = vec![None; self.appends.len()];
         if !config.skips.has(Skip::Chunks) {
             return found;
@@ -372,26 +380,26 @@ impl GaussianSet {
         for (append, found) in self.appends.iter().zip(&mut found) {
             let build = |with_harmonics| {
                 let started = Instant::now();
-                let chunks = device.install(|| Chunks::build(append, is_flat, with_harmonics));
+                let chunks = runtime.install(|| Chunks::build(append, is_flat, with_harmonics));
                 counters.add(Counter::ChunksBuilt, chunks.chunks.len() as u64);
                 counters.add(Counter::ChunkTime, started.elapsed().as_nanos() as u64);
                 chunks
             };
-            let cache = device.chunks();
+            let cache = &caches.chunks;
             *found = cache.get(append, is_flat, config.chunk_budget_bytes, build);
         }
         found
     }
 
     /// Shades and projects what vertex programs project.
-    fn shade(&self, device: &Device, batches: &mut Vec<Projected>) -> Result<(), Stopped> {
+    fn shade(&self, runtime: &Runtime, batches: &mut Vec<Projected>) -> Result<(), Stopped> {
         let mut sequence = 0u32;
         for append in &self.appends {
             let gaussians = append.count.wrapping_mul(append.instance_count);
             sequence = sequence.wrapping_add(gaussians);
         }
         for draw in &self.draws {
-            let shaded = shaded::project(self, draw, sequence, device)?;
+            let shaded = shaded::project(self, draw, sequence, runtime)?;
             host::reserve(batches, shaded.len());
             batches.extend(shaded);
             let gaussians = draw.count.wrapping_mul(draw.instance_count);
@@ -404,12 +412,12 @@ impl GaussianSet {
     /// chunk is counted in `counters`.
     fn project(
         &self,
-        device: &Device,
+        runtime: &Runtime,
         chunks: &[Option<Arc<Chunks>>],
         counters: &mut Counters,
     ) -> Result<(Vec<Projected>, Vec<u32>), TooManyGaussians> {
         let begin = &self.begin;
-        let skips = device.config().skips;
+        let skips = runtime.config().skips;
         let projection = Projection::new(
             &begin.state,
             &begin.camera,
@@ -419,7 +427,7 @@ impl GaussianSet {
             skips,
         );
         let workers = Workers {
-            device,
+            runtime,
             projection: &projection,
             is_flat: self.is_flat(),
         };
@@ -452,7 +460,7 @@ fn counted(batches: &[Projected]) -> Counters {
 
 /// What projects jobs.
 struct Workers<'a> {
-    device: &'a Device,
+    runtime: &'a Runtime,
     projection: &'a Projection,
     is_flat: bool,
 }
@@ -515,7 +523,7 @@ impl Workers<'_> {
             Part::From(start) => job.sequence + start + lane as u32,
             Part::Chunk(chunk) => job.sequence + chunk.numbers[lane],
         };
-        dispatch!(self.device.level(), simd => projection.run(simd, &source, scratch, sequence, &mut out));
+        dispatch!(self.runtime.level(), simd => projection.run(simd, &source, scratch, sequence, &mut out));
         out
     }
 }

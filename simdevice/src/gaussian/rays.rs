@@ -210,7 +210,7 @@ impl PixelRays {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::SimdLevel;
+    use crate::runtime::SimdLevel;
     use devmem::dispatch;
     use proptest::prelude::*;
 

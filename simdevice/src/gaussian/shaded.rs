@@ -10,10 +10,10 @@ use super::project::Projection;
 use super::scratch::Scratch;
 use super::sort::ordered_bits;
 use super::splat::{Projected, Splat};
-use crate::device::Device;
 use crate::geometry::points::PointShader;
 use crate::packet::Draw;
 use crate::program::interface::gaussian;
+use crate::runtime::Runtime;
 use crate::state::Viewport;
 use crate::state::gaussian::{Camera, GaussianOrder};
 use crate::stats::counters::Counter;
@@ -93,7 +93,7 @@ pub(super) fn project(
     set: &GaussianSet,
     draw: &Draw,
     sequence: u32,
-    device: &Device,
+    runtime: &Runtime,
 ) -> Result<Vec<Projected>, Stopped> {
     let Some(viewport) = draw.state.viewports.first() else {
         return Ok(Vec::new());
@@ -107,12 +107,12 @@ pub(super) fn project(
         })
     });
     let jobs = host::collect(jobs);
-    let prepared = draw.vertex_bindings.prepare(device.level());
+    let prepared = draw.vertex_bindings.bind(runtime.level());
     let (resources, cancel) = (prepared.resources(), AtomicBool::new(false));
     let worker = || {
-        let shader = PointShader::new(draw, device, &resources, &cancel);
+        let shader = PointShader::new(draw, runtime, &resources, &cancel);
         Worker {
-            shading: Shading::new(set, viewport, &shader, device),
+            shading: Shading::new(set, viewport, &shader, runtime),
             shader,
             outputs: Box::default(),
             scratch: Scratch::new(),
@@ -123,14 +123,14 @@ pub(super) fn project(
             return Err(Stopped::Cancelled);
         }
         let end = draw.count.min(job.first.saturating_add(BATCH as u32));
-        let done = worker.run(job, end, device.level());
+        let done = worker.run(job, end, runtime.level());
         if done.is_err() {
             cancel.store(true, Relaxed);
         }
         done
     };
     let mut done = host::with_capacity(jobs.len());
-    device.install(|| {
+    runtime.install(|| {
         jobs.par_iter()
             .with_min_len(BATCHES_PER_TASK)
             .map_init(worker, one)
@@ -176,11 +176,11 @@ impl Shading {
         set: &GaussianSet,
         viewport: &Viewport,
         shader: &PointShader<'_>,
-        device: &Device,
+        runtime: &Runtime,
     ) -> Self {
         let state = &set.begin.state;
         let visible = Visible::from(set.bounds);
-        let skips = device.config().skips;
+        let skips = runtime.config().skips;
         // The clip volume takes the place of the camera's planes.
         let camera = Camera {
             near_plane: f32::NEG_INFINITY,

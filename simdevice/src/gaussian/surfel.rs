@@ -250,7 +250,7 @@ impl Surfel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::SimdLevel;
+    use crate::runtime::SimdLevel;
     use devmem::dispatch;
     use proptest::prelude::*;
 

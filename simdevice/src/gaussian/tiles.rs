@@ -325,7 +325,7 @@ impl Projection {
 mod tests {
     use super::super::footprint::Visible;
     use super::*;
-    use crate::device::SimdLevel;
+    use crate::runtime::SimdLevel;
     use crate::state::Viewport;
     use crate::state::gaussian::{Camera, GaussianState};
     use crate::stats::optimizations::Skips;

@@ -1,9 +1,9 @@
 //! What the front end hands to the rasterizer.
 
 use super::Bins;
-use crate::bindings::Bindings;
-use crate::geometry::pipeline::DrawPipeline;
 use crate::packet::Draw;
+use crate::program::bindings::Bindings;
+use crate::program::vertex::DrawPipeline;
 use crate::state::{DrawState, Rect};
 use crate::stats::recorder::DrawRecord;
 use std::sync::Arc;

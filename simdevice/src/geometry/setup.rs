@@ -5,10 +5,10 @@ use super::bins::{Grid, Pair};
 use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
 use super::depth_bias::{self, DepthUnit};
 use super::elements::Elements;
-use super::pipeline::VertexOutputs;
 use super::primitive::Primitive;
 use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
 use super::viewport::{Projected, Transform, code};
+use crate::program::vertex::VertexOutputs;
 use crate::simd::three;
 use crate::state::{DrawState, PolygonMode, Rect};
 

@@ -1,9 +1,9 @@
 //! Draws of points, lines and triangles, and dispatches.
 
-use crate::bindings::Bindings;
-use crate::compute::ComputeProgram;
 use crate::format::Format;
-use crate::geometry::pipeline::DrawPipeline;
+use crate::program::bindings::Bindings;
+use crate::program::compute::ComputeProgram;
+use crate::program::vertex::DrawPipeline;
 use crate::state::DrawState;
 use devmem::BufferRange;
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 //! Sorted sets of Gaussians.
 
-use crate::bindings::Bindings;
 use crate::packet::{AttributeStream, IndexStream};
-use crate::raster::gaussian::resolve::ResolveProgram;
+use crate::program::bindings::Bindings;
+use crate::program::fragment::GaussianFragmentProgram;
 use crate::state::gaussian::{Camera, GaussianState};
 use crate::state::{Rect, Viewport};
 use std::sync::Arc;
@@ -75,7 +75,7 @@ pub struct GaussianAppend {
 #[derive(Clone, Debug)]
 pub struct ResolveShader {
     /// The program.
-    pub program: Arc<ResolveProgram>,
+    pub program: Arc<GaussianFragmentProgram>,
     /// What it is bound to.
     pub bindings: Bindings,
     /// Whether every sample is shaded for itself.

@@ -1,10 +1,10 @@
 //! Batches of fragments: 2x2 quads of any primitives of a draw within a macro-tile, and what the fragment program gets
 //! of them.
 
-use super::fragment::{BATCH_LANES, Interface};
 use super::quads::Quads;
 use super::setup::Setup;
 use crate::geometry::{Primitive, PrimitiveKind, Varyings};
+use crate::program::fragment::{BATCH_LANES, Interface};
 use crate::program::interface::Interpolation;
 use crate::simd::{both, three};
 use crate::stats::optimizations::{Skip, Skips};

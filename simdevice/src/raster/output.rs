@@ -3,10 +3,10 @@
 use super::batch::{Batch, offset};
 use super::color::load;
 use super::depth::Tests;
-use super::fragment::Interface;
 use super::prepared::{TileDraw, Timing};
 use super::primitives::Buffers;
 use super::quads::Quads;
+use crate::program::fragment::Interface;
 use crate::simd::as_floats;
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::exec::{Chunk, LaneMask, Machine};

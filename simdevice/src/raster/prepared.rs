@@ -4,13 +4,13 @@
 use super::batch::Needs;
 use super::color::ColorOutput;
 use super::depth::Tests;
-use super::fragment::{FragmentStage, Interface};
 use super::setup::{CENTER, SAMPLES_4};
 use super::tile::Target;
-use crate::bindings::Prepared;
-use crate::device::Device;
 use crate::geometry::PrimitiveDraw;
+use crate::program::bindings::BoundResources;
+use crate::program::fragment::{FragmentStage, Interface};
 use crate::program::interface::{FragmentInput, Interpolation};
+use crate::runtime::Runtime;
 use crate::state::{BlendState, LogicOp, Rect};
 use crate::stats::optimizations::{Skip, Skips};
 use fearless_simd::Level;
@@ -38,7 +38,7 @@ pub struct TileDraw<'a> {
     pub(super) draw: &'a PrimitiveDraw,
     /// The program, if it must run.
     pub(super) stage: Option<&'a FragmentStage>,
-    pub(super) bindings: Prepared<'a>,
+    pub(super) bindings: BoundResources<'a>,
     pub(super) targets: Targets<'a>,
     pub(super) colors: Vec<Option<ColorOutput>>,
     pub(super) tests: Tests,
@@ -77,7 +77,7 @@ impl<'a> TileDraw<'a> {
         targets: Targets<'a>,
         samples: Option<u32>,
         area: Rect,
-        device: &Device,
+        runtime: &Runtime,
     ) -> Self {
         let state = &*draw.state;
         let multisampled = samples.unwrap_or(state.samples) > 1;
@@ -132,7 +132,7 @@ impl<'a> TileDraw<'a> {
         let viewports = state.viewports.iter();
         let plain = plain && !state.alpha_to_one;
         // What was recorded is what hardware without this does.
-        let defers = device.config().skips.has(Skip::OverwrittenQuads)
+        let defers = runtime.config().skips.has(Skip::OverwrittenQuads)
             && plain
             && !multisampled
             && state.sample_mask & 1 == 1
@@ -147,7 +147,7 @@ impl<'a> TileDraw<'a> {
         Self {
             draw,
             stage,
-            bindings: draw.bindings.prepare(device.level()),
+            bindings: draw.bindings.bind(runtime.level()),
             targets,
             colors,
             tests,
@@ -190,9 +190,9 @@ impl<'a> TileDraw<'a> {
                     )
                 }),
             },
-            skips: device.config().skips,
-            level: device.level(),
-            limit: device.config().shader_timeout,
+            skips: runtime.config().skips,
+            level: runtime.level(),
+            limit: runtime.config().shader_timeout,
         }
     }
 

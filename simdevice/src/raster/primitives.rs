@@ -5,21 +5,21 @@ use super::Plane;
 use super::batch::{Batch, BlockValues, Needs, QUADS, Quad, Samples, at_sample, offset};
 use super::coverage::{Coverage, bits};
 use super::depth::Tests;
-use super::fragment::{FragmentStage, Machines};
 use super::output;
 use super::pending::Pending;
 use super::prepared::Timing;
 pub use super::prepared::{Targets, TileDraw};
 use super::quads::Quads;
+use super::recording::{self, MacroTileWork};
 use super::setup::Setup;
 use super::tile::{AREA, SIDE};
 use crate::geometry::{Primitive, Varyings};
 use crate::limits::TILE_SIZE;
+use crate::program::fragment::{FragmentMachines, FragmentStage};
 use crate::simd::both;
 use crate::state::Rect;
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Skip;
-use crate::stats::recorder::MacroTileWork;
 use devmem::dispatch;
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
@@ -82,17 +82,14 @@ impl TileDraw<'_> {
         }
         let record = self.draw.record.as_ref();
         let before = record.map(|_| counters.clone());
-        let mut machines = self
-            .stage
-            .map(FragmentStage::take_machines)
-            .unwrap_or_default();
+        let mut machines = self.stage.map(FragmentStage::machines);
         let mut renderer = Renderer {
             draw: self,
             place,
             buffers,
             batch: &mut scratch.batch,
             full: &mut scratch.full,
-            machines: &mut machines,
+            machines: machines.as_mut(),
             counters,
             cancel,
             samples_passed: 0,
@@ -117,11 +114,11 @@ impl TileDraw<'_> {
         if self.skips.has(Skip::MaskedQuads) {
             counters.add(Counter::QuadsMasked, masked);
         }
-        if let Some(stage) = self.stage {
-            stage.put_back(machines, counters);
+        if let Some(machines) = machines {
+            machines.give_back(counters);
         }
         if let (Some(record), Some(before), Some(work)) = (record, before, work) {
-            record.add_macro_tile(place.at, place.size, work, &counters.since(&before));
+            recording::add_macro_tile(record, place.at, place.size, work, &counters.since(&before));
         }
         done
     }
@@ -134,7 +131,7 @@ pub(super) struct Renderer<'a, 'd> {
     pub buffers: &'a mut Buffers,
     pub batch: &'a mut Batch,
     full: &'a mut FullTile,
-    pub machines: &'a mut Machines,
+    pub machines: Option<&'a mut FragmentMachines<'d>>,
     pub counters: &'a mut Counters,
     pub cancel: &'a AtomicBool,
     pub samples_passed: u64,
@@ -525,12 +522,13 @@ impl Renderer<'_, '_> {
     /// Shades what the batch has.
     #[inline(never)]
     pub fn flush(&mut self) -> Result<(), Stopped> {
-        let Some(stage) = self.draw.stage.filter(|_| self.batch.count > 0) else {
+        let programs = self.draw.stage.zip(self.machines.as_mut());
+        let Some((stage, machines)) = programs.filter(|_| self.batch.count > 0) else {
             return Ok(());
         };
-        let size = usize::from(4 * self.batch.count > super::fragment::BATCH_LANES[0]);
+        let size = usize::from(4 * self.batch.count > crate::program::fragment::BATCH_LANES[0]);
         let (level, draw) = (self.draw.level, self.draw);
-        let machine = stage.machine(self.machines, size);
+        let machine = machines.of_size(size);
         let batch = &mut *self.batch;
         batch.prepare();
         let samples = Samples {

@@ -253,8 +253,7 @@ impl Counters {
 
 #[cfg(test)]
 mod tests {
-
-    use crate::stats::counters::*;
+    use super::*;
 
     #[test]
     fn a_query_reads_the_difference() {

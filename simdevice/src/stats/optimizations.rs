@@ -125,8 +125,7 @@ impl FromStr for Skips {
 
 #[cfg(test)]
 mod tests {
-
-    use crate::stats::optimizations::*;
+    use super::*;
 
     #[test]
     fn sets_are_read_from_their_names() {

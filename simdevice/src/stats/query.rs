@@ -141,9 +141,8 @@ impl QueryPool {
 
 #[cfg(test)]
 mod tests {
-
+    use super::*;
     use crate::stats::counters::Counter;
-    use crate::stats::query::*;
 
     #[test]
     fn a_query_is_available_only_between_its_end_and_a_reset() {

@@ -513,7 +513,7 @@ impl Texels for Float32x4 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::SimdLevel;
+    use crate::runtime::SimdLevel;
     use devmem::dispatch;
 
     /// Texels 0.. of these words, as a packing and as their format decodes them.

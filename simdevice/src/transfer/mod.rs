@@ -10,10 +10,10 @@ mod resolve;
 #[cfg(test)]
 mod tests;
 
-use crate::device::Device;
 use crate::format::MAX_TEXEL_SIZE;
 use crate::image::{Image, SubresourceLayout};
 use crate::packet::{BufferImageRegion, BufferRange, ClearImage, CopyBuffer, CopyBufferImage};
+use crate::runtime::Runtime;
 pub use blit::blit_image;
 pub use image_copy::copy_image;
 use rayon::prelude::*;
@@ -107,7 +107,7 @@ pub enum Direction {
 const LEAST_SHARED: u64 = 1 << 20;
 
 /// Executes a copy between a buffer and an image.
-pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, device: &Device) {
+pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, runtime: &Runtime) {
     for region in &copy.regions {
         let layers = &region.subresource;
         let end = copy.image.desc.array_layers;
@@ -117,7 +117,7 @@ pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, device: &
                 .image
                 .subresource(layers.aspect, layers.mip_level, first + index);
             if let Some(layout) = layout {
-                copy_layer(copy, direction, (region, index), &layout, device);
+                copy_layer(copy, direction, (region, index), &layout, runtime);
             }
         }
     }
@@ -133,7 +133,7 @@ fn copy_layer(
     direction: Direction,
     (region, index): (&BufferImageRegion, u32),
     layout: &SubresourceLayout,
-    device: &Device,
+    runtime: &Runtime,
 ) {
     let texel_size = layout.format.texel_size() as u64;
     let [width, height, depth] = region.image_extent;
@@ -181,11 +181,11 @@ fn copy_layer(
     let are_apart = row_length >= width.into()
         && image_height >= height.into()
         && !Arc::ptr_eq(&image.memory, buffer);
-    let threads = device.threads();
+    let threads = runtime.threads();
     let bytes = size.saturating_mul(rows as u64);
     let is_whole = if are_apart && threads > 1 && bytes >= LEAST_SHARED {
         let least = rows.div_ceil(4 * threads);
-        device.install(|| {
+        runtime.install(|| {
             let numbers = (0..rows).into_par_iter();
             numbers.with_min_len(least).all(copy_row)
         })

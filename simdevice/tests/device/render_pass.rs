@@ -1,10 +1,10 @@
 //! Render passes: the image depends on the draws alone, not on how the device goes about them.
 
 use crate::common::*;
-use simdevice::device::FlushPolicy;
 use simdevice::format::{Aspect, ClearValue};
 use simdevice::packet::*;
 use simdevice::raster::blend::Blender;
+use simdevice::runtime::FlushPolicy;
 use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, Rect};
 use simdevice::stats::counters::{Counter, Counters};
 use simdevice::stats::query::{QueryKind, QueryPool, QueryResult};

@@ -4,11 +4,7 @@ use super::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
 use ash::vk;
 use gaurast_tests::scenes::SceneBuffers;
 use gaurast_tests::triangles::edges::to_clip;
-use simdevice::bindings::Bindings;
-use simdevice::compute::ComputeProgram;
-use simdevice::device::{FlushPolicy, SimdLevel};
 use simdevice::format::{Aspect, ClearValue};
-use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Address, Binding, Format as Word, Program, Rate, Space, Type};
@@ -20,10 +16,14 @@ use simdevice::packet::{
     SubresourceRange,
 };
 use simdevice::packet::{Dispatch, Draw, draw};
+use simdevice::program::bindings::Bindings;
+use simdevice::program::compute::ComputeProgram;
 use simdevice::program::interface::{
     ComputeInput, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation,
     Sampling, VertexInput, VertexOutput,
 };
+use simdevice::program::vertex::DrawPipeline;
+use simdevice::runtime::{FlushPolicy, SimdLevel};
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
 use simdevice::state::{
     BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, DrawState,
@@ -299,9 +299,9 @@ impl Player {
         };
         let device = Arc::new(Device::new(&config).expect("a device"));
         let inputs = vec![Some(ComputeInput::WorkgroupId(0))];
-        let recolor = ComputeProgram::new(&device, recolor(), GROUP, 32, inputs);
+        let recolor = ComputeProgram::new(device.level(), recolor(), GROUP, 32, inputs);
         Self {
-            pipeline: Arc::new(DrawPipeline::new(&device, &programs()).expect("a pipeline")),
+            pipeline: Arc::new(DrawPipeline::new(device.level(), &programs()).expect("a pipeline")),
             recolor: Arc::new(recolor.expect("a program")),
             device,
         }

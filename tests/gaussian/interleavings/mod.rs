@@ -19,7 +19,7 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use simdevice::device::FlushPolicy;
+use simdevice::runtime::FlushPolicy;
 use simdevice::stats::recorder::{Recorder, Trace};
 
 /// The side of the framebuffer in pixels, so that units of a position are halves of a pixel.

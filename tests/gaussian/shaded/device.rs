@@ -4,10 +4,7 @@ use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, render_shaded};
 use gaurast_tests::oracle::{OracleOrder, OracleState};
 use gaurast_tests::scenes::SceneBuffers;
-use simdevice::bindings::Bindings;
-use simdevice::device::SimdLevel;
 use simdevice::format::{Aspect, ClearValue};
-use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
@@ -15,7 +12,10 @@ use simdevice::packet::{
     Attachment, AttributeStream, BufferRange, Draw, GaussianAppend, GaussianAttributes,
     GaussianBegin, LoadOp, ModelAttributes, Rendering, ResolveShader, StoreOp,
 };
+use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{DrawPrograms, VertexInput, VertexOutput, gaussian};
+use simdevice::program::vertex::DrawPipeline;
+use simdevice::runtime::SimdLevel;
 use simdevice::state::gaussian::{Camera, GaussianOrder, GaussianState};
 use simdevice::state::{
     BlendState, CompareOp, DepthStencil, DepthTest, DrawState, Rect, ResolveMode, Topology,
@@ -86,7 +86,7 @@ pub fn triangle(device: &Device, samples: u32) -> Draw {
         ..DrawState::new(Topology::TriangleList, SIZE)
     };
     Draw {
-        pipeline: Arc::new(DrawPipeline::new(device, &programs).expect("a pipeline")),
+        pipeline: Arc::new(DrawPipeline::new(device.level(), &programs).expect("a pipeline")),
         state: Arc::new(state),
         attributes: vec![AttributeStream {
             buffer: buffer(&corners),
@@ -165,7 +165,7 @@ fn pipeline(device: &Device, with_key: bool) -> Arc<DrawPipeline> {
         varyings,
         fragment: None,
     };
-    Arc::new(DrawPipeline::of_gaussians(device, &programs).expect("a pipeline"))
+    Arc::new(DrawPipeline::of_gaussians(device.level(), &programs).expect("a pipeline"))
 }
 
 /// A fragment replaces what the attachment holds.

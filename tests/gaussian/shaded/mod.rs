@@ -11,8 +11,8 @@ use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, project, rend
 use gaurast_tests::oracle::{OracleOrder, OracleState, SkipReason};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::device::{FlushPolicy, SimdLevel};
 use simdevice::packet::{Draw, IndexStream};
+use simdevice::runtime::{FlushPolicy, SimdLevel};
 use simdevice::state::CompareOp;
 use simdevice::stats::counters::Counter;
 use simdevice::{Config, Device};

@@ -7,15 +7,15 @@ use gaurast_tests::oracle::resolve::{Resolved, resolve_scene, resolve_shaded};
 use gaurast_tests::oracle::{OracleDepthFormat, OracleState, OracleTests};
 use gaurast_tests::scenes;
 use simdevice::Format;
-use simdevice::bindings::Bindings;
-use simdevice::device::SimdLevel;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::ResolveShader;
+use simdevice::program::bindings::Bindings;
+use simdevice::program::fragment::GaussianFragmentProgram;
 use simdevice::program::interface::{
     FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, resolve,
 };
-use simdevice::raster::gaussian::resolve::ResolveProgram;
+use simdevice::runtime::SimdLevel;
 use simdevice::state::gaussian::Camera;
 use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp};
 use simdevice::stats::counters::Counter;
@@ -44,7 +44,9 @@ fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> ResolveSh
         has_side_effects: false,
     };
     ResolveShader {
-        program: Arc::new(ResolveProgram::new(device, &programs).expect("a program")),
+        program: Arc::new(
+            GaussianFragmentProgram::new(device.level(), &programs).expect("a program"),
+        ),
         bindings: Bindings::default(),
         sample_shading: false,
         alpha_to_coverage: false,

@@ -7,7 +7,7 @@ use crate::object::device::Device;
 use crate::object::shader_module::ShaderModule;
 use crate::shader::{self, BuiltIn, InputSource, Interface, Stage};
 use crate::shader::{Options, Specialization};
-use simdevice::compute::ComputeProgram;
+use simdevice::program::compute::ComputeProgram;
 use simdevice::program::interface::ComputeInput;
 use std::sync::Arc;
 
@@ -70,7 +70,7 @@ impl ComputePipeline {
         }
         let inputs = inputs(interface);
         let program = ComputeProgram::new(
-            device.simulated(),
+            device.simulated().level(),
             shader.program,
             invocations,
             subgroup_size,

@@ -14,13 +14,13 @@ use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
-use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
+use simdevice::program::fragment::GaussianFragmentProgram;
 use simdevice::program::interface::{
     FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, gaussian, resolve,
 };
-use simdevice::raster::gaussian::resolve::ResolveProgram;
+use simdevice::program::vertex::DrawPipeline;
 use std::sync::Arc;
 
 /// A vertex shader that projects Gaussians.
@@ -60,7 +60,7 @@ impl VertexProjection {
         let descriptors = vertex.interface.descriptors.clone();
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link_projection(vertex, stream, &places)?;
-        let programs = DrawPipeline::of_gaussians(device.simulated(), &programs)
+        let programs = DrawPipeline::of_gaussians(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Self {
             programs: Arc::new(programs),
@@ -91,7 +91,7 @@ fn check_order(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Err
 #[derive(Debug)]
 pub(crate) struct ResolveStage {
     /// The program.
-    pub(crate) program: Arc<ResolveProgram>,
+    pub(crate) program: Arc<GaussianFragmentProgram>,
     /// What it is bound to.
     pub(crate) descriptors: Vec<Descriptor>,
     /// Whether every sample is shaded for itself.
@@ -130,7 +130,7 @@ impl ResolveStage {
             points: false,
         };
         let programs = link::link_resolve(fragment, &varyings, effects)?;
-        let program = ResolveProgram::new(device.simulated(), &programs)
+        let program = GaussianFragmentProgram::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Some(Self {
             program: Arc::new(program),
@@ -175,7 +175,7 @@ impl ResolveStage {
             per_sample: false,
             has_side_effects: false,
         };
-        let program = ResolveProgram::new(device.simulated(), &programs);
+        let program = GaussianFragmentProgram::new(device.simulated().level(), &programs);
         Ok(Self {
             program: Arc::new(program.map_err(|error| invalid(&error))?),
             descriptors: Vec::new(),

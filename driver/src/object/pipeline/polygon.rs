@@ -12,7 +12,7 @@ use crate::object::device::Device;
 use crate::shader::{Descriptor, Interface, Numeric, Options, Shader, Stage, reflect};
 use ash::vk;
 use simdevice::format;
-use simdevice::geometry::pipeline::DrawPipeline;
+use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::{DrawState, PolygonMode};
 use std::sync::Arc;
 
@@ -90,7 +90,7 @@ impl PolygonPipeline {
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link(vertex, fragment, stream, effects)?;
-        let programs = DrawPipeline::new(device.simulated(), &programs)
+        let programs = DrawPipeline::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         let is_static =
             dynamic.is_empty() && viewports == Origin::Static && scissors == Origin::Static;

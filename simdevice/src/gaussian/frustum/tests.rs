@@ -1,7 +1,6 @@
 //! What is found to be outside is drawn nowhere, in any mode.
 
 use super::*;
-use crate::device::SimdLevel;
 use crate::format::Format;
 use crate::gaussian::chunks::Harmonics;
 use crate::gaussian::fetch::{BATCH, Batch, CoefficientReader};
@@ -13,6 +12,7 @@ use crate::gaussian::surfel::Surfel;
 use crate::packet::{
     AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, ModelAttributes,
 };
+use crate::runtime::SimdLevel;
 use crate::state::Viewport;
 use crate::state::gaussian::{
     Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState,

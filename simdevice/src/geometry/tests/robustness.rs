@@ -188,7 +188,7 @@ fn the_number_of_workers_changes_nothing() {
 #[test]
 fn a_vertex_program_without_end_is_stopped() {
     use super::super::{FrontEnd, Surface};
-    use crate::device::{Config, Device};
+    use crate::{Config, Device};
     use isa::ir::{Label, Program, Statement};
     let config = Config {
         threads: 2,
@@ -211,7 +211,7 @@ fn a_vertex_program_without_end_is_stopped() {
         depth: None,
     };
     let mut counters = crate::stats::counters::Counters::default();
-    let mut front = FrontEnd::new(&draw, surface, &device, &mut counters);
+    let mut front = FrontEnd::new(&draw, surface, device.runtime(), &mut counters);
     let stopped = front.next_part(&mut counters).unwrap_err();
     assert!(matches!(stopped, isa::exec::Stopped::TimedOut { .. }));
 }

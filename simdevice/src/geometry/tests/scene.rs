@@ -1,10 +1,11 @@
 //! Draws that the tests share.
 
 use super::super::{Bins, FrontEnd, Primitive, PrimitiveDraw, Surface, Varyings};
-use crate::bindings::Bindings;
-use crate::device::{Config, Device};
+use crate::device::Device;
 use crate::format::Format;
-use crate::geometry::pipeline::DrawPipeline;
+use crate::program::bindings::Bindings;
+use crate::program::vertex::DrawPipeline;
+use crate::runtime::Config;
 
 use crate::packet::*;
 use crate::packet::{AttributeStream, BufferRange, IndexStream};
@@ -175,7 +176,7 @@ pub fn draw_with(
 ) -> Draw {
     let values: Vec<f32> = (0..positions.len()).map(|vertex| vertex as f32).collect();
     Draw {
-        pipeline: Arc::new(DrawPipeline::new(device, &programs).unwrap()),
+        pipeline: Arc::new(DrawPipeline::new(device.level(), &programs).unwrap()),
         state: Arc::new(state),
         attributes: vec![
             stream(positions, Format::R32G32B32A32Sfloat),
@@ -248,7 +249,7 @@ pub fn parts(device: &Device, draw: &Draw) -> (Vec<Found>, Counters) {
         depth: Some(Format::D32Sfloat),
     };
     let mut counters = Counters::default();
-    let mut front = FrontEnd::new(draw, surface, device, &mut counters);
+    let mut front = FrontEnd::new(draw, surface, device.runtime(), &mut counters);
     let mut parts = Vec::new();
     while let Some(part) = front.next_part(&mut counters).unwrap() {
         parts.push(Found::new(part));

@@ -1,8 +1,8 @@
 //! What a fragment program gets of a batch.
 
-use super::super::fragment::Interface;
 use super::{Batch, LANES, Quad, Record, Samples, offset};
 use crate::limits::TILE_SIZE;
+use crate::program::fragment::Interface;
 use crate::program::interface::{FragmentInput, Interpolation, Sampling};
 use crate::simd::bits_of;
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*};

@@ -5,10 +5,11 @@ mod streamed;
 mod whole_draws;
 
 use super::*;
-use crate::device::{Config, Device, SimdLevel};
+use crate::device::Device;
 use crate::format::Format;
 use crate::gaussian::GaussianSet;
 use crate::packet::*;
+use crate::runtime::{Config, SimdLevel};
 use crate::simd::exp2::{
     CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
 };
@@ -142,7 +143,8 @@ fn draw_with_depth(
     };
     let mut set = GaussianSet::begin(&begin, bounds, depth.map(|(format, _)| format));
     set.append(&append);
-    set.resolve(device, &mut Counters::default()).unwrap()
+    set.resolve(device.runtime(), device.caches(), &mut Counters::default())
+        .unwrap()
 }
 
 fn defaults() -> GaussianState {
@@ -475,8 +477,12 @@ fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
         recorder.begin_frame(0, bounds);
         let pictures = [&quiet, &recording].map(|device| {
             let draw = draw(seed, 3000, defaults(), device, bounds);
-            assert_eq!(draw.record.is_some(), device.config().recorder.is_some());
-            if let Some((recorder, record)) = device.recorder().zip(draw.record.as_ref()) {
+            assert_eq!(
+                draw.record.is_some(),
+                device.runtime().config().recorder.is_some()
+            );
+            if let Some((recorder, record)) = device.runtime().recorder().zip(draw.record.as_ref())
+            {
                 recorder.add_draw(0, record);
             }
             let mut tile = Box::new(GaussianTile::default());

@@ -10,7 +10,6 @@ use super::{
     BLOCKS, DepthMode, FIND_MEAN, FIND_MEDIAN, GaussianTile, LANES, Lanes, NO_DEPTH, TEST_DEPTH,
     TILE_SIZE, count, lanes_within,
 };
-use crate::device::Device;
 use crate::gaussian::GaussianDraw;
 use crate::limits::MAX_SAMPLES;
 use crate::raster::color::ColorOutput;
@@ -18,6 +17,7 @@ use crate::raster::depth::{Tests, apply, compare};
 use crate::raster::primitives::{Buffers, Targets};
 use crate::raster::quads::Quads;
 use crate::raster::tile::{AREA, Target, Tile};
+use crate::runtime::Runtime;
 use crate::state::{BlendState, StencilFace, StencilOp};
 use crate::stats::counters::{Counter, Counters};
 use devmem::dispatch;
@@ -70,7 +70,7 @@ impl<'a> GaussianTileDraw<'a> {
         draw: &'a GaussianDraw,
         targets: Targets<'a>,
         samples: Option<u32>,
-        device: &Device,
+        runtime: &Runtime,
     ) -> Self {
         const REPLACE: BlendState = BlendState {
             equations: None,
@@ -93,10 +93,11 @@ impl<'a> GaussianTileDraw<'a> {
             draw,
             targets,
             color,
-            resolve: resolve.map(|shader| ResolveDraw::new(draw, shader, targets, samples, device)),
+            resolve: resolve
+                .map(|shader| ResolveDraw::new(draw, shader, targets, samples, runtime)),
             tests: Tests::new(&state.depth_stencil, depth, targets.stencil.is_some()),
             samples,
-            level: device.level(),
+            level: runtime.level(),
         }
     }
 

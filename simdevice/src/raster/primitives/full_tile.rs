@@ -73,7 +73,10 @@ impl Renderer<'_, '_> {
             };
             full.find_barycentrics(simd, current.setup, at, needs);
         }
-        let machine = stage.machine(self.machines, 1);
+        let Some(machines) = self.machines.as_mut() else {
+            return Ok(());
+        };
+        let machine = machines.of_size(1);
         for &(slot, kind, place) in &interface.inputs {
             if let FragmentInput::Varying { interpolation, .. } = kind {
                 let attribute = full.attributes[place];

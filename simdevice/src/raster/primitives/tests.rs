@@ -4,15 +4,15 @@ mod special;
 mod twin;
 
 use super::*;
-use crate::bindings::Bindings;
 use crate::device::Device;
-use crate::device::{Config, FlushPolicy};
 use crate::format::{Aspect, ClearValue, Format};
-use crate::geometry::pipeline::DrawPipeline;
 use crate::geometry::{Bins, PrimitiveKind, Varyings};
 use crate::geometry::{PrimitiveChunk, PrimitiveDraw};
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::{Attachment, LoadOp, Rendering, StoreOp};
+use crate::program::bindings::Bindings;
+use crate::program::vertex::DrawPipeline;
+use crate::runtime::{Config, FlushPolicy};
 
 use crate::pass::{Pass, PassDraw};
 
@@ -174,7 +174,7 @@ fn draw(
     let state = Arc::new(state);
     let scissors = state.scissors.clone().into_iter();
     PrimitiveDraw {
-        pipeline: Arc::new(DrawPipeline::new(device, &programs).unwrap()),
+        pipeline: Arc::new(DrawPipeline::new(device.level(), &programs).unwrap()),
         state,
         bindings: Bindings::default(),
         regions: scissors.map(|scissor| scissor.intersect(area)).collect(),
@@ -182,7 +182,7 @@ fn draw(
             bins: Bins::everywhere(
                 &primitives,
                 area,
-                device.config().macro_tile_size,
+                device.runtime().config().macro_tile_size,
                 layers.unwrap_or(1),
             ),
             primitives,
@@ -233,10 +233,14 @@ fn run(
     let mut counters = Counters::default();
     let mut pass = Pass::begin(rendering).unwrap();
     for draw in draws(&device) {
-        pass.push(PassDraw::Primitives(Box::new(draw)), &device, &mut counters)
-            .unwrap();
+        pass.push(
+            PassDraw::Primitives(Box::new(draw)),
+            device.runtime(),
+            &mut counters,
+        )
+        .unwrap();
     }
-    pass.end(&device, &mut counters).unwrap();
+    pass.end(device.runtime(), &mut counters).unwrap();
     counters
 }
 

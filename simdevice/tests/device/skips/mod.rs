@@ -8,16 +8,16 @@ mod last_order;
 mod unchanged;
 
 use crate::common::*;
-use simdevice::bindings::Bindings;
 use simdevice::format::ClearValue;
-use simdevice::geometry::pipeline::DrawPipeline;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
 use simdevice::packet::*;
+use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{
     DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
     VertexInput, VertexOutput,
 };
+use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::gaussian::{
     Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
     GaussianState,
@@ -101,7 +101,7 @@ fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet {
         write: true,
     });
     Packet::Draw(Box::new(Draw {
-        pipeline: Arc::new(DrawPipeline::new(device, &programs()).unwrap()),
+        pipeline: Arc::new(DrawPipeline::new(device.level(), &programs()).unwrap()),
         state: Arc::new(state),
         attributes: vec![stream(0), stream(16)],
         vertex_bindings: Bindings::default(),

@@ -368,8 +368,8 @@ impl Scene {
         .unwrap();
         let mut counters = Counters::default();
         let draw = PassDraw::Gaussians(Box::new(self.draw(device)));
-        pass.push(draw, device, &mut counters).unwrap();
-        pass.end(device, &mut counters).unwrap();
+        pass.push(draw, device.runtime(), &mut counters).unwrap();
+        pass.end(device.runtime(), &mut counters).unwrap();
         let read = |view: &ImageView, aspect| {
             let mut texels = Vec::new();
             self.each(view, aspect, |_, layout, place, size| {
@@ -448,7 +448,7 @@ fn hidden_work(
         ..Config::default()
     })
     .unwrap();
-    if let Some(recorder) = &device.config().recorder {
+    if let Some(recorder) = &device.runtime().config().recorder {
         recorder.begin_frame(0, WHOLE);
     }
     let state = GaussianState {
@@ -472,7 +472,7 @@ fn hidden_work(
         Some((Format::D32Sfloat, coefficients)),
     );
     change(&mut draw);
-    if let Some((recorder, record)) = device.recorder().zip(draw.record.as_ref()) {
+    if let Some((recorder, record)) = device.runtime().recorder().zip(draw.record.as_ref()) {
         recorder.add_draw(0, record);
     }
     let mut tile = Box::new(GaussianTile::default());
