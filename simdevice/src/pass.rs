@@ -9,11 +9,13 @@ use crate::geometry::PrimitiveDraw;
 use crate::image::ImageView;
 use crate::limits::{MAX_FRAMEBUFFER_LAYERS, MAX_FRAMEBUFFER_SIZE};
 use crate::packet::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
-use crate::raster::Plane;
 use crate::raster::gaussian::GaussianTile;
 use crate::raster::gaussian::tile_draw::GaussianTileDraw;
-use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
+use crate::raster::output::{Buffers, Targets};
+use crate::raster::prepared::TileDraw;
+use crate::raster::primitives::{Place, Scratch};
 use crate::raster::tile::{AttachmentError, Target, Tile};
+use crate::raster::{Plane, primitives};
 use crate::runtime::{FlushPolicy, Runtime};
 use crate::state::{Rect, ResolveMode};
 use crate::stats::counters::{Counter, Counters};
@@ -438,7 +440,8 @@ impl Flush<'_> {
                     }
                 }
                 Ready::Gaussians(_) => {}
-                Ready::Primitives(draw) => draw.render(
+                Ready::Primitives(draw) => primitives::render(
+                    draw,
                     Place { layer, at, size },
                     &mut worker.buffers,
                     &mut worker.scratch,

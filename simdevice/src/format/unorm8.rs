@@ -16,7 +16,7 @@ macro_rules! unorm8_fraction {
     ($name:ident, $words:ident, $integers:ident, $floats:ident) => {
         /// One byte of each word as a fraction of 255, as its quotient rounds.
         #[inline(always)]
-        pub(crate) fn $name<S: Simd>(word: $words<S>, shift: u32) -> $floats<S> {
+        pub fn $name<S: Simd>(word: $words<S>, shift: u32) -> $floats<S> {
             let code = if shift == 24 {
                 word >> 24
             } else {

@@ -11,8 +11,8 @@ mod assemble;
 mod bins;
 mod clip;
 mod depth_bias;
+mod draw;
 mod elements;
-mod emit;
 mod fetch;
 mod order;
 pub(crate) mod points;
@@ -24,7 +24,8 @@ mod tests;
 mod viewport;
 
 pub use bins::Bins;
-pub use primitive::{Primitive, PrimitiveChunk, PrimitiveDraw, PrimitiveKind, Varyings};
+pub use draw::{PrimitiveChunk, PrimitiveDraw};
+pub use primitive::{Primitive, PrimitiveKind, Varyings};
 
 use crate::format::Format;
 use crate::packet::Draw;

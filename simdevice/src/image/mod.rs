@@ -271,6 +271,103 @@ pub struct ImageView {
     pub layer_count: u32,
 }
 
+/// What is kept of a compressed image: its texels, and the generation of its memory that they were decoded from.
+#[derive(Debug, Default)]
+struct Decompressed(Mutex<Option<(u64, Arc<Image>)>>);
+
+impl Image {
+    /// An image of the same texels without compression; `None` if this one has none, or there is no memory for it.
+    pub(crate) fn decompressed(&self) -> Option<Arc<Self>> {
+        self.desc.format.decompressed()?;
+        if self.memory.is_host_visible() {
+            return self.decompress();
+        }
+        // Decoding twice is harmless, and so is what a panic left behind.
+        let mut kept = self
+            .decompressed
+            .0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let generation = self.memory.generation();
+        if let Some((known, image)) = &*kept
+            && *known == generation
+        {
+            return Some(Arc::clone(image));
+        }
+        let image = self.decompress()?;
+        *kept = Some((generation, Arc::clone(&image)));
+        Some(image)
+    }
+
+    fn decompress(&self) -> Option<Arc<Self>> {
+        let desc = ImageDesc {
+            format: self.desc.format.decompressed()?,
+            ..self.desc
+        };
+        let memory = Allocation::new_zeroed(desc.memory_size()?).ok()?;
+        let plain = Self::new(desc, memory, 0).ok()?;
+        for layer in 0..desc.array_layers {
+            for level in 0..desc.mip_levels {
+                let blocks = self.subresource(Aspect::Color, level, layer)?;
+                let texels = plain.subresource(Aspect::Color, level, layer)?;
+                self.decompress_subresource(&blocks, &plain, &texels)?;
+            }
+        }
+        Some(Arc::new(plain))
+    }
+
+    fn decompress_subresource(
+        &self,
+        blocks: &SubresourceLayout,
+        plain: &Self,
+        texels: &SubresourceLayout,
+    ) -> Option<()> {
+        let format = self.desc.format;
+        let side = format.block_side();
+        let [columns, rows, slices] = blocks.extent;
+        let block_size = format.texel_size();
+        let mut bytes: Vec<u8> = host::zeroed(columns as usize * block_size);
+        let pitch = side as usize * texels.format.texel_size();
+        let mut decoded: Vec<Vec<u8>> =
+            host::collect((0..side).map(|_| host::zeroed(columns as usize * pitch)));
+        let row_size = texels.extent[0] as usize * texels.format.texel_size();
+        for z in 0..slices {
+            for row in 0..rows {
+                self.read_row(blocks, [0, row, z], &mut bytes)?;
+                for (column, bytes) in bytes.chunks_exact(block_size).enumerate() {
+                    let mut block = [0; MAX_TEXEL_SIZE];
+                    block[..block_size].copy_from_slice(bytes);
+                    let block = format.decode_block(&block)?;
+                    for (line, out) in decoded.iter_mut().enumerate() {
+                        out[column * pitch..][..pitch].copy_from_slice(block.row(line));
+                    }
+                }
+                // Blocks at the edges reach beyond the image.
+                let height = side.min(texels.extent[1] - side * row);
+                for (line, texels_of_line) in (0..height).zip(&decoded) {
+                    let at = [0, side * row + line, z];
+                    plain.write_row(texels, at, &texels_of_line[..row_size])?;
+                }
+            }
+        }
+        Some(())
+    }
+}
+
+impl ImageView {
+    /// A view of the same texels without compression; itself if there is none.
+    pub(crate) fn decompressed(&self) -> Option<Self> {
+        match self.format.decompressed() {
+            None => Some(self.clone()),
+            Some(format) => Some(Self {
+                image: self.image.decompressed()?,
+                format,
+                ..self.clone()
+            }),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -382,103 +479,6 @@ mod tests {
         assert_eq!(image.read_row(&layout, [0, 7, 0], &mut out), None);
         assert_eq!(image.read_row(&layout, [0, 0, 1], &mut out), None);
         assert_eq!(image.read_row(&layout, [34, 0, 0], &mut out), None);
-    }
-}
-
-/// What is kept of a compressed image: its texels, and the generation of its memory that they were decoded from.
-#[derive(Debug, Default)]
-struct Decompressed(Mutex<Option<(u64, Arc<Image>)>>);
-
-impl Image {
-    /// An image of the same texels without compression; `None` if this one has none, or there is no memory for it.
-    pub(crate) fn decompressed(&self) -> Option<Arc<Self>> {
-        self.desc.format.decompressed()?;
-        if self.memory.is_host_visible() {
-            return self.decompress();
-        }
-        // Decoding twice is harmless, and so is what a panic left behind.
-        let mut kept = self
-            .decompressed
-            .0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        let generation = self.memory.generation();
-        if let Some((known, image)) = &*kept
-            && *known == generation
-        {
-            return Some(Arc::clone(image));
-        }
-        let image = self.decompress()?;
-        *kept = Some((generation, Arc::clone(&image)));
-        Some(image)
-    }
-
-    fn decompress(&self) -> Option<Arc<Self>> {
-        let desc = ImageDesc {
-            format: self.desc.format.decompressed()?,
-            ..self.desc
-        };
-        let memory = Allocation::new_zeroed(desc.memory_size()?).ok()?;
-        let plain = Self::new(desc, memory, 0).ok()?;
-        for layer in 0..desc.array_layers {
-            for level in 0..desc.mip_levels {
-                let blocks = self.subresource(Aspect::Color, level, layer)?;
-                let texels = plain.subresource(Aspect::Color, level, layer)?;
-                self.decompress_subresource(&blocks, &plain, &texels)?;
-            }
-        }
-        Some(Arc::new(plain))
-    }
-
-    fn decompress_subresource(
-        &self,
-        blocks: &SubresourceLayout,
-        plain: &Self,
-        texels: &SubresourceLayout,
-    ) -> Option<()> {
-        let format = self.desc.format;
-        let side = format.block_side();
-        let [columns, rows, slices] = blocks.extent;
-        let block_size = format.texel_size();
-        let mut bytes: Vec<u8> = host::zeroed(columns as usize * block_size);
-        let pitch = side as usize * texels.format.texel_size();
-        let mut decoded: Vec<Vec<u8>> =
-            host::collect((0..side).map(|_| host::zeroed(columns as usize * pitch)));
-        let row_size = texels.extent[0] as usize * texels.format.texel_size();
-        for z in 0..slices {
-            for row in 0..rows {
-                self.read_row(blocks, [0, row, z], &mut bytes)?;
-                for (column, bytes) in bytes.chunks_exact(block_size).enumerate() {
-                    let mut block = [0; MAX_TEXEL_SIZE];
-                    block[..block_size].copy_from_slice(bytes);
-                    let block = format.decode_block(&block)?;
-                    for (line, out) in decoded.iter_mut().enumerate() {
-                        out[column * pitch..][..pitch].copy_from_slice(block.row(line));
-                    }
-                }
-                // Blocks at the edges reach beyond the image.
-                let height = side.min(texels.extent[1] - side * row);
-                for (line, texels_of_line) in (0..height).zip(&decoded) {
-                    let at = [0, side * row + line, z];
-                    plain.write_row(texels, at, &texels_of_line[..row_size])?;
-                }
-            }
-        }
-        Some(())
-    }
-}
-
-impl ImageView {
-    /// A view of the same texels without compression; itself if there is none.
-    pub(crate) fn decompressed(&self) -> Option<Self> {
-        match self.format.decompressed() {
-            None => Some(self.clone()),
-            Some(format) => Some(Self {
-                image: self.image.decompressed()?,
-                format,
-                ..self.clone()
-            }),
-        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! A draw's state made ready for tiles, once for all workers: what its fragments need, when they are tested, and where
 //! they go.
 
-use super::batch::Needs;
 use super::color::ColorOutput;
 use super::depth::Tests;
 use super::setup::{CENTER, SAMPLES_4};
@@ -10,19 +9,13 @@ use crate::geometry::PrimitiveDraw;
 use crate::program::bindings::BoundResources;
 use crate::program::fragment::{FragmentStage, Interface};
 use crate::program::interface::{FragmentInput, Interpolation};
+use crate::raster::output::{Targets, color_outputs};
+use crate::raster::setup::Needs;
 use crate::runtime::Runtime;
-use crate::state::{BlendState, LogicOp, Rect};
+use crate::state::Rect;
 use crate::stats::optimizations::{Skip, Skips};
 use fearless_simd::Level;
 use std::time::Duration;
-
-/// The attachments of a pass.
-#[derive(Clone, Copy, Debug)]
-pub struct Targets<'a> {
-    pub color: &'a [Option<Target>],
-    pub depth: Option<&'a Target>,
-    pub stencil: Option<&'a Target>,
-}
 
 /// When depth and stencil are tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,25 +195,4 @@ impl<'a> TileDraw<'a> {
             self.draw.bindings.bump_generations();
         }
     }
-}
-
-/// What becomes of the attachments that a program writes to.
-pub(super) fn color_outputs(
-    stage: Option<&FragmentStage>,
-    targets: &[Option<Target>],
-    blend: &[BlendState],
-    logic: Option<LogicOp>,
-    constants: [f32; 4],
-) -> Vec<Option<ColorOutput>> {
-    const REPLACE: BlendState = BlendState {
-        equations: None,
-        write_mask: 0xF,
-    };
-    let color = |(index, target): (usize, &Option<Target>)| {
-        let written = stage?.interface.colors.get(index)?;
-        written.iter().flatten().flatten().next()?;
-        let blend = blend.get(index).unwrap_or(&REPLACE);
-        ColorOutput::new(blend, logic, constants, target.as_ref()?.format())
-    };
-    targets.iter().enumerate().map(color).collect()
 }

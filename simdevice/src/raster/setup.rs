@@ -1,8 +1,7 @@
 //! A primitive made ready for tiles: its edges as exact integers, and what varies over it as planes.
 
-use super::batch::Needs;
-use super::coverage::{LANE_X, LANE_Y};
 use crate::geometry::{Primitive, PrimitiveKind};
+use crate::raster::tile::{LANE_X, LANE_Y};
 use crate::simd::{both, three};
 use crate::state::Rect;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
@@ -326,4 +325,14 @@ impl Edge {
             lanes: (x + y).into(),
         }
     }
+}
+
+/// What fragments need of their primitive's planes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Needs {
+    pub barycentrics: bool,
+    /// After the early tests.
+    pub depth: bool,
+    /// 1 / w.
+    pub inverse_w: bool,
 }

@@ -7,11 +7,9 @@ use super::cube::Hit;
 use super::sampler::{Filter, MipmapMode, Sampler};
 use super::surface::Surface;
 use crate::limits::MAX_LOD_BIAS;
+use crate::texture::packing::Floats;
 use isa::ir::{CHUNK_LANES, Dimension};
 use isa::resources::{Lanes, LodRequest, SampleRequest};
-
-/// A float for each of 16 lanes.
-pub(super) type Floats = [f32; CHUNK_LANES];
 
 /// Quads of a chunk.
 pub(super) const QUADS: usize = CHUNK_LANES / 4;

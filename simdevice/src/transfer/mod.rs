@@ -6,6 +6,7 @@
 
 mod blit;
 mod image_copy;
+mod region;
 mod resolve;
 #[cfg(test)]
 mod tests;
@@ -14,6 +15,7 @@ use crate::format::MAX_TEXEL_SIZE;
 use crate::image::{Image, SubresourceLayout};
 use crate::packet::{BufferImageRegion, BufferRange, ClearImage, CopyBuffer, CopyBufferImage};
 use crate::runtime::Runtime;
+use crate::transfer::region::clip;
 pub use blit::blit_image;
 pub use image_copy::copy_image;
 use rayon::prelude::*;
@@ -68,30 +70,6 @@ pub fn update_buffer(target: &BufferRange, data: &[u8]) {
         log::warn!("left out a buffer update that lies outside");
     }
     target.memory.bump_generation();
-}
-
-/// The part of a region that lies in an image, along one axis.
-#[derive(Clone, Copy)]
-struct Clipped {
-    /// Texels of the region before it.
-    skipped: u32,
-    /// Its first texel in the image.
-    first: u32,
-    /// Its texels.
-    count: u32,
-}
-
-/// Clips texels `offset..offset + extent` to an axis of `size` texels.
-fn clip(offset: i32, extent: u32, size: u32) -> Clipped {
-    let offset = i64::from(offset);
-    let first = offset.max(0);
-    let end = (offset + i64::from(extent)).min(size.into());
-    // Both lie in 0..=u32::MAX where the count is positive.
-    Clipped {
-        skipped: (first - offset) as u32,
-        first: first as u32,
-        count: (end - first).max(0) as u32,
-    }
 }
 
 /// Which way a copy between a buffer and an image goes.

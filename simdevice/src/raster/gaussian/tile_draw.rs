@@ -14,7 +14,7 @@ use crate::gaussian::GaussianDraw;
 use crate::limits::MAX_SAMPLES;
 use crate::raster::color::ColorOutput;
 use crate::raster::depth::{Tests, apply, compare};
-use crate::raster::primitives::{Buffers, Targets};
+use crate::raster::output::{Buffers, Targets};
 use crate::raster::quads::Quads;
 use crate::raster::tile::{AREA, Target, Tile};
 use crate::runtime::Runtime;

@@ -345,6 +345,9 @@ impl<'ast> Visit<'ast> for Collector<'_> {
         self.tokens(call.tokens.clone());
     }
 
+    // `pub(crate)` says who may come here, not who is gone to.
+    fn visit_visibility(&mut self, _: &'ast syn::Visibility) {}
+
     // Attributes name no modules.
     fn visit_attribute(&mut self, _: &'ast Attribute) {}
 }
