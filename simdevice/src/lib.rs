@@ -5,7 +5,9 @@
 //! the driver lowers Vulkan state to packets.
 //!
 //! Data flows one way: packets -> geometry and Gaussian preprocessing -> binning -> the tile engine -> memory.
-//! [`counters`] records the work that was done.
+//! [`stats::counters`] records the work that was done. A module imports only those before it: [`limits`], [`state`] and the
+//! vector helpers; [`format`] and [`stats`]; [`image`] and [`runtime`]; [`texture`]; [`program`]; [`packet`]; [`geometry`],
+//! [`compute`] and [`transfer`]; [`gaussian`]; [`raster`]; [`pass`]; [`command_processor`].
 #![forbid(unsafe_code)]
 
 mod binning;
