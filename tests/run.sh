@@ -39,13 +39,14 @@ trap 'rm -rf "$work"' EXIT
 export GAURAST_TEST_REPORT="$work/report"
 touch "$GAURAST_TEST_REPORT"
 
-# The Vulkan registry, which the driver's generated files are compared with.
-if [ -z "${GAURAST_VK_XML:-}" ]; then
-    echo "fetching vk.xml"
+# The Vulkan registry and SPIR-V's grammar, which the driver's generated files are compared with.
+if [ -z "${GAURAST_VK_XML:-}" ] || [ -z "${GAURAST_SPIRV_GRAMMAR:-}" ]; then
+    echo "fetching vk.xml and spirv.core.grammar.json"
     if driver/gen/fetch.sh "$work"; then
-        export GAURAST_VK_XML="$work/vk.xml"
+        export GAURAST_VK_XML="${GAURAST_VK_XML:-$work/vk.xml}"
+        export GAURAST_SPIRV_GRAMMAR="${GAURAST_SPIRV_GRAMMAR:-$work/spirv.core.grammar.json}"
     else
-        echo "there is no vk.xml, and the test that needs it will be ignored" >&2
+        echo "they can't be had, and the tests that need them will be ignored" >&2
     fi
 fi
 

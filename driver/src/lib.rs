@@ -21,7 +21,6 @@ mod object;
 mod pnext;
 mod pointer;
 mod registry;
-pub mod shader;
 
 pub use embed::entry;
 pub use handle::live_handles;

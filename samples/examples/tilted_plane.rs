@@ -7,10 +7,9 @@
 use std::error::Error;
 use std::path::Path;
 
-use gaurast_samples::camera::Camera;
-use gaurast_samples::output;
-use gaurast_samples::renderer::{Geometry, Renderer, Settings};
-use gaurast_samples::scene::{Scene, Shape};
+use gaurast_render::{Geometry, Renderer, Settings};
+use gaurast_scene::camera::Camera;
+use gaurast_scene::{GaussianShape, Scene};
 
 /// Discs to a side of the floor, and their distance.
 const SIDE: i32 = 24;
@@ -22,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for row in 0..SIDE {
         for column in 0..SIDE {
             let position = [(column - SIDE / 2) as f32 * STEP, 0.0, row as f32 * STEP];
-            let shape = Shape {
+            let shape = GaussianShape {
                 scale: [0.22 * STEP, 0.22 * STEP, 0.0],
                 // From x and y to x and z.
                 rotation: [0.5f32.sqrt(), 0.5f32.sqrt(), 0.0, 0.0],
@@ -56,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         renderer.set(&mut uploaded, settings)?;
         let frame = renderer.render(&uploaded, &camera)?;
-        output::write(
+        gaurast_picture::write(
             &Path::new(&folder).join(name),
             &frame.picture,
             Some([0.1; 3]),

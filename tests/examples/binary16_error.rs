@@ -4,8 +4,7 @@
 //! Each scene is drawn in binary16 and in binary32, and both are held against the binary64 oracle.
 
 use gaurast::vk::{GaussianPrecisionGAURAST, PipelineGaussianStateCreateInfoGAURAST};
-use gaurast_samples::camera::{Camera, DEFAULT_FOV};
-use gaurast_samples::scene::Scene;
+use gaurast_scene::camera::DEFAULT_FOV;
 use gaurast_tests::contexts::{
     Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
@@ -55,8 +54,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let camera = scenes::camera(SIZE[0], SIZE[1]).to_vulkan();
         subjects.push((name.to_owned(), scene, camera));
     }
-    let garden = Scene::generate(1, 100_000);
-    let camera = Camera::of_generated(None, SIZE)?.to_vulkan();
+    let garden = gaurast_scene::garden::scene(1, 100_000);
+    let camera = gaurast_scene::garden::camera(None, SIZE)?.to_vulkan();
     subjects.push((
         "a garden of 100,000".to_owned(),
         SceneBuffers::from(&garden),
@@ -64,13 +63,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     ));
     for file in std::env::args().skip(1) {
         let path = Path::new(&file);
-        let scene = Scene::load(path)?;
+        let scene = gaurast_scene::open(path)?;
         let name = path
             .file_name()
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
-        let camera = Camera::framing(&scene, DEFAULT_FOV, SIZE).to_vulkan();
+        let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE).to_vulkan();
         subjects.push((name, SceneBuffers::from(&scene), camera));
     }
 

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use gaurast_bench::quads::QuadRenderer;
-use gaurast_samples::camera::{Camera, Model};
-use gaurast_samples::scene::{Scene, Shape};
+use gaurast_scene::camera::{Camera, Model};
+use gaurast_scene::{GaussianShape, Scene};
 use gaurast_tests::contexts::{Context, Settings};
 use gaurast_tests::for_levels::levels;
 use gaurast_tests::oracle::{
@@ -71,7 +71,7 @@ fn for_quads(stress: &Stress) -> Option<(Scene, Camera)> {
     let triples = (buffers.degree as usize + 1).pow(2);
     let mut scene = Scene::with_capacity(buffers.degree, buffers.positions.len());
     for (index, &position) in buffers.positions.iter().enumerate() {
-        let shape = Shape {
+        let shape = GaussianShape {
             scale: buffers.scales[index],
             rotation: buffers.rotations[index],
             opacity: buffers.opacities[index],

@@ -14,7 +14,7 @@ use super::{are_many, panics, runs, watch_panics};
 
 /// The kept compute shaders that use buffers alone, and some of random control flow.
 fn seeds() -> Vec<(String, Vec<u32>, Layout)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../driver/tests/shaders");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../driver/spirv/tests/shaders");
     let mut names: Vec<_> = std::fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path())

@@ -8,8 +8,8 @@ use gaurast::vk::{
     GaussianLinearizationGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Case, Need, data, simd_levels};
-use gaurast_samples::camera::{Camera, DEFAULT_FOV};
-use gaurast_samples::scene::Scene;
+use gaurast_scene::Scene;
+use gaurast_scene::camera::{Camera, DEFAULT_FOV};
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{
     Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
@@ -307,7 +307,7 @@ fn views(scene: &Scene) -> Vec<View> {
         .into_iter()
         .flat_map(|size| {
             let cameras = [
-                ("whole", Camera::framing(scene, DEFAULT_FOV, size)),
+                ("whole", gaurast_scene::frame(scene, DEFAULT_FOV, size)),
                 ("side", look([1.4, -0.5, 0.9], [0.0, 0.1, 0.1], 60.0, size)),
                 (
                     "inside",
@@ -348,7 +348,7 @@ fn bulk(scene: &Scene) -> (DVec3, f64) {
 
 /// Judges the pictures of a file.
 fn file_keeps_the_contract(case: &Case, name: &'static str) {
-    let scene = Scene::load(&data(name)).expect("a scene");
+    let scene = gaurast_scene::open(data(name)).expect("a scene");
     let views = views(&scene);
     let scene = SceneBuffers::from(&scene);
     Devices::new(case.variant()).judge(name, &scene, State::default(), &views);

@@ -6,7 +6,6 @@ use gaurast::vk::{
     PipelineGaussianStateCreateInfoGAURAST as State,
 };
 use gaurast_runner::{Case, simd_levels};
-use gaurast_samples::scene::Scene;
 use gaurast_tests::contexts::{
     Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
 };
@@ -37,7 +36,7 @@ fn layers() -> SceneBuffers {
 
 /// The generated scene of the benchmarks, before the camera of the others.
 fn benchmark() -> SceneBuffers {
-    let mut scene = SceneBuffers::from(&Scene::benchmark(1, 20_000));
+    let mut scene = SceneBuffers::from(&scenes::synthetic(1, 20_000));
     for [_, _, z] in &mut scene.positions {
         *z += 6.0;
     }

@@ -1,8 +1,7 @@
 //! The oracle on scenes that were trained, and beside another renderer.
 
 use gaurast_runner::{Case, Need, Variant, data};
-use gaurast_samples::camera::{Camera, DEFAULT_FOV};
-use gaurast_samples::scene::Scene;
+use gaurast_scene::camera::DEFAULT_FOV;
 use gaurast_tests::compare::Statistics;
 use gaurast_tests::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_tests::scenes::SceneBuffers;
@@ -24,9 +23,9 @@ fn trained() -> Vec<Variant> {
 #[gaurast_runner::test(each = trained())]
 fn trained_scenes_are_drawn_and_nearly_all_decidable(case: &Case) {
     let file = TRAINED.into_iter().find(|file| *file == case.variant());
-    let scene = Scene::load(&data(file.expect("a file"))).unwrap();
+    let scene = gaurast_scene::open(data(file.expect("a file"))).unwrap();
     let size = [192, 144];
-    let camera = Camera::framing(&scene, DEFAULT_FOV, size).to_vulkan();
+    let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, size).to_vulkan();
     let reference = render_bounded(
         &SceneBuffers::from(&scene).as_oracle(),
         &OracleCamera::new(&camera, size).unwrap(),
@@ -42,7 +41,7 @@ fn trained_scenes_are_drawn_and_nearly_all_decidable(case: &Case) {
 /// Pictures by splat-transform with its own cut-offs, 8 bits a channel and lossy: another independent renderer is as far
 /// from them as is asked here.
 fn assert_psnr(given: &Given, least: f64) {
-    let scene = Scene::load(&data(given.scene)).unwrap();
+    let scene = gaurast_scene::open(data(given.scene)).unwrap();
     let drawn = render_bounded(
         &SceneBuffers::from(&scene).as_oracle(),
         &OracleCamera::new(&given.camera().to_vulkan(), given.size).unwrap(),

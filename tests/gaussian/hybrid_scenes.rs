@@ -6,8 +6,8 @@ use std::path::Path;
 use ash::vk;
 use gaurast::vk::GaussianCameraGAURAST;
 use gaurast_runner::{Need, data};
-use gaurast_samples::camera::{Camera, DEFAULT_FOV};
-use gaurast_samples::scene::Scene;
+use gaurast_scene::Scene;
+use gaurast_scene::camera::DEFAULT_FOV;
 use gaurast_tests::compare::{Limits, assert_contract, for_people};
 use gaurast_tests::contexts::Settings;
 use gaurast_tests::hybrid::{
@@ -217,7 +217,7 @@ pub(super) const GARDEN: [Need; 2] = [GLSLANG, Need::Data(Model::AFRICAN_HEAD)];
 
 pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Hybrid {
     let model = Model::african_head().expect("its files");
-    let camera = Camera::of_generated(None, SIZE).expect("a camera");
+    let camera = gaurast_scene::garden::camera(None, SIZE).expect("a camera");
     let (near, far) = (0.5f32, 60.0f32);
     let camera = camera
         .to_vulkan()
@@ -238,7 +238,7 @@ pub(super) fn garden(name: &'static str, depth: vk::Format, samples: u32) -> Hyb
     ];
     Hybrid {
         name,
-        scene: SceneBuffers::from(&Scene::generate(1, 40_000)),
+        scene: SceneBuffers::from(&gaurast_scene::garden::scene(1, 40_000)),
         camera,
         head: head(&model, place, &to_clip),
         pane: pane(pane_corners.map(turn), &to_clip),
@@ -278,9 +278,9 @@ pub(super) const WITH_PLAYBOT: [Need; 3] = [
 /// A head inside a trained scene, with reversed depth.
 pub(super) fn playbot() -> Hybrid {
     let model = Model::african_head().expect("its files");
-    let scene = Scene::load(&data(PLAYBOT)).expect("a scene");
+    let scene = gaurast_scene::open(data(PLAYBOT)).expect("a scene");
     let (near, far) = (0.1f32, 200.0f32);
-    let camera = Camera::framing(&scene, DEFAULT_FOV, SIZE)
+    let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE)
         .to_vulkan()
         .depth_coefficients([-near / (far - near), near * far / (far - near)]);
     let to_clip = ToClip { camera, size: SIZE };

@@ -8,8 +8,7 @@ use gaurast::vk::{
     GaussianCameraGAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use gaurast_runner::{Need, data};
-use gaurast_samples::camera::{Camera, DEFAULT_FOV};
-use gaurast_samples::scene::Scene;
+use gaurast_scene::camera::DEFAULT_FOV;
 use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::contexts::{
     Buffer, Context, DeviceScene, Pass, Pipeline, PipelineOptions, Settings, Target,
@@ -296,8 +295,8 @@ fn turning_pops_nowhere_where_each_pixel_sorts_for_itself() {
 
 #[gaurast_runner::test(needs = [Need::Data(SKULL)])]
 fn skull_pops_by_view_depth_alone() {
-    let scene = Scene::load(&data(SKULL)).expect("a scene");
-    let camera = Camera::framing(&scene, DEFAULT_FOV, SIZE).to_vulkan();
+    let scene = gaurast_scene::open(data(SKULL)).expect("a scene");
+    let camera = gaurast_scene::frame(&scene, DEFAULT_FOV, SIZE).to_vulkan();
     let scene = SceneBuffers::from(&scene);
     // Tens of thousands of Gaussians at every pixel that is looked at.
     let sampling = Sampling {

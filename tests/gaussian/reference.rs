@@ -2,11 +2,9 @@
 
 use std::path::Path;
 
+use gaurast_render::Renderer;
 use gaurast_runner::{Need, data};
-use gaurast_samples::camera::Camera;
-use gaurast_samples::output;
-use gaurast_samples::renderer::Renderer;
-use gaurast_samples::scene::Scene;
+use gaurast_scene::camera::Camera;
 use gaurast_tests::compare::Statistics;
 use gaurast_tests::contexts::{Settings, with_settings};
 
@@ -63,7 +61,7 @@ fn pixels(path: &Path) -> Vec<[f32; 4]> {
 
 /// PSNR of the PNG that the `gaurast` command would write.
 fn assert_psnr(given: &Given, least: f64) {
-    let scene = Scene::load(&data(given.scene)).expect("a scene");
+    let scene = gaurast_scene::open(data(given.scene)).expect("a scene");
     let renderer = with_settings(&Settings::default(), || {
         Renderer::new(vulkan_gaurast::entry())
     });
@@ -73,7 +71,7 @@ fn assert_psnr(given: &Given, least: f64) {
 
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("drawn.png");
-    output::write(&path, &frame.expect("a frame").picture, None).expect("written");
+    gaurast_picture::write(&path, &frame.expect("a frame").picture, None).expect("written");
     let statistics = Statistics::new(&pixels(&path), &given.pixels(), given.size[0]);
     assert!(statistics.psnr >= least, "{statistics}");
 }

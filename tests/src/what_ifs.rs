@@ -4,8 +4,6 @@
 use std::fmt::Write as _;
 
 use ash::vk;
-use gaurast_samples::camera::Camera;
-use gaurast_samples::scene::Scene;
 use glam::DVec3;
 use simdevice::timing::Config;
 use simdevice::timing::what_if::{WhatIf, each_alone, what_ifs};
@@ -67,7 +65,7 @@ const PRESETS: [&str; 2] = ["paper-15x16", "single-module"];
 
 /// A camera of the garden, with a perspective projection's depths.
 fn to_clip() -> ToClip {
-    let camera = Camera::of_generated(None, SIZE).expect("a camera");
+    let camera = gaurast_scene::garden::camera(None, SIZE).expect("a camera");
     let (near, far) = (0.5f32, 1000.0f32);
     let depth = [far / (far - near), -near * far / (far - near)];
     ToClip {
@@ -126,7 +124,7 @@ fn draw(gpu: &Gpu, with_colonnade: bool) -> Output {
             ..PipelineOptions::default()
         },
     );
-    let buffers = SceneBuffers::from(&Scene::generate(1, GAUSSIANS));
+    let buffers = SceneBuffers::from(&gaurast_scene::garden::scene(1, GAUSSIANS));
     let options = GaussianOptions {
         depth_stencil,
         ..GaussianOptions::default()

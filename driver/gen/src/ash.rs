@@ -51,7 +51,7 @@ impl Declarations {
     /// expected.
     pub fn read(root: &Path) -> Result<Self, Error> {
         let ash = ash_folder(root)?.join("src/vk");
-        let api = root.join("api/src");
+        let api = root.join("api/gaurast/src");
         let files = [
             ash.join("definitions.rs"),
             ash.join("features.rs"),

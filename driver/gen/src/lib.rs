@@ -1,10 +1,10 @@
-//! Writes the driver's Rust from the Vulkan registry.
+//! Writes the driver's Rust from the Vulkan registry and from SPIR-V's grammar.
 //!
 //! What the registry says isn't copied by hand: this reads `vk.xml`, the fragment of the driver's own extension, and
 //! `driver/support.toml`, which says what of it the driver supports, and writes the files of `driver/src/registry` and
-//! the dispatch table. They
-//! are checked in, so that building the driver needs neither this crate nor `vk.xml`, which `driver/gen/fetch.sh` gets.
-//! What the things are called in Rust it learns from the sources of ash and of `api/`.
+//! the dispatch table. From the machine-readable grammar of SPIR-V it writes the table that modules are decoded by. All
+//! are checked in, so that building the driver needs neither this crate nor these files, which `driver/gen/fetch.sh`
+//! gets. What the things are called in Rust it learns from the sources of ash and of `api/`.
 
 mod ash;
 mod chains;
@@ -13,6 +13,7 @@ mod entry_points;
 mod error;
 mod extensions;
 mod features;
+mod grammar;
 mod properties;
 mod registry;
 mod rust;
@@ -20,6 +21,7 @@ mod spirv;
 mod support;
 
 pub use error::Error;
+pub use grammar::generate as generate_grammar;
 
 use crate::ash::Declarations;
 use crate::registry::Registry;

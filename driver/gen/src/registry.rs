@@ -109,14 +109,7 @@ impl Registry {
     /// # Errors
     /// [`Error::OtherRegistry`], and what reading and parsing may fail with.
     pub fn read(vk_xml: &Path, fragment: &Path) -> Result<Self, Error> {
-        let found = format!("{:x}", Sha256::digest(read(vk_xml)?));
-        if found != SHA256 {
-            return Err(Error::OtherRegistry {
-                path: vk_xml.to_owned(),
-                found,
-                expected: format!("{VERSION} with {SHA256}"),
-            });
-        }
+        read_version(vk_xml, VERSION, SHA256)?;
         let mut registry = Self::default();
         registry.add(vk_xml)?;
         registry.add(fragment)?;
@@ -250,6 +243,20 @@ impl Registry {
 ///
 /// # Errors
 /// [`Error::File`].
+/// Reads a file of a pinned version.
+pub(crate) fn read_version(path: &Path, version: &str, sha256: &str) -> Result<String, Error> {
+    let text = read(path)?;
+    let found = format!("{:x}", Sha256::digest(&text));
+    if found == sha256 {
+        return Ok(text);
+    }
+    Err(Error::OtherRegistry {
+        path: path.to_owned(),
+        found,
+        expected: format!("{version} with {sha256}"),
+    })
+}
+
 pub(crate) fn read(path: &Path) -> Result<String, Error> {
     std::fs::read_to_string(path).map_err(|source| Error::File {
         path: path.to_owned(),

@@ -14,7 +14,7 @@ pub(crate) fn file(documentation: &str, code: &str) -> Result<String, Error> {
 }
 
 /// Lays source out as `cargo fmt` does.
-fn format(source: &str) -> Result<String, Error> {
+pub(crate) fn format(source: &str) -> Result<String, Error> {
     let failed = |reason: String| Error::Program {
         program: "rustfmt",
         reason,

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::registry::Registry;
 use crate::support::Support;
 use crate::{features, properties, rust};
-use rspirv::spirv::Capability;
+use spirv::Capability;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::str::FromStr;
@@ -70,7 +70,7 @@ pub(crate) fn write(
             "use crate::registry::features::Features;
             use crate::registry::properties::Properties;
             use ash::vk;
-            use rspirv::spirv::Capability;
+            use spirv::Capability;
 
             /// A thing that enables a capability.
             #[derive(Clone, Copy, Debug)]

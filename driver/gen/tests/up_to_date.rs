@@ -1,8 +1,8 @@
 //! The generated files are what the generator writes.
 
 use gaurast_runner::Need;
-use registry_gen::{generate, repository};
-use std::path::Path;
+use registry_gen::{File, generate, generate_grammar, repository};
+use std::path::PathBuf;
 
 fn main() -> std::process::ExitCode {
     gaurast_runner::main()
@@ -10,19 +10,33 @@ fn main() -> std::process::ExitCode {
 
 /// The variable that names the registry's file, which `driver/gen/fetch.sh` gets.
 const VK_XML: &str = "GAURAST_VK_XML";
+/// The variable that names the file of SPIR-V's grammar, which `driver/gen/fetch.sh` gets.
+const SPIRV_GRAMMAR: &str = "GAURAST_SPIRV_GRAMMAR";
+
+fn path_in(variable: &str) -> PathBuf {
+    std::env::var_os(variable)
+        .expect("a variable that was just looked at")
+        .into()
+}
+
+fn assert_up_to_date(file: &File) {
+    let found = std::fs::read_to_string(repository().join(file.path)).unwrap();
+    assert!(
+        found == file.text,
+        "{} is not what the generator writes: run `cargo run -p registry-gen -- $GAURAST_VK_XML $GAURAST_SPIRV_GRAMMAR`",
+        file.path
+    );
+}
 
 #[gaurast_runner::test(needs = [Need::FileOf(VK_XML)])]
 fn generated_files_are_up_to_date() {
-    let vk_xml = std::env::var_os(VK_XML).expect("a variable that was just looked at");
-    let files =
-        generate(repository(), Path::new(&vk_xml)).unwrap_or_else(|error| panic!("{error}"));
+    let files = generate(repository(), &path_in(VK_XML)).unwrap_or_else(|error| panic!("{error}"));
     assert!(!files.is_empty());
-    for file in files {
-        let found = std::fs::read_to_string(repository().join(file.path)).unwrap();
-        assert!(
-            found == file.text,
-            "{} is not what the generator writes: run `cargo run -p registry-gen -- $GAURAST_VK_XML`",
-            file.path
-        );
-    }
+    files.iter().for_each(assert_up_to_date);
+}
+
+#[gaurast_runner::test(needs = [Need::FileOf(SPIRV_GRAMMAR)])]
+fn the_grammar_is_up_to_date() {
+    let file = generate_grammar(&path_in(SPIRV_GRAMMAR)).unwrap_or_else(|error| panic!("{error}"));
+    assert_up_to_date(&file);
 }

@@ -4,7 +4,7 @@ use crate::capabilities::limits;
 use crate::error::Error;
 use crate::registry::features::{Features, SUPPORTED};
 use crate::registry::spirv::{Enable, enables};
-use rspirv::spirv::{Capability, Op};
+use spirv::{Capability, Op};
 
 /// Refuses a module that declares a capability that isn't enabled. Capabilities that the translator doesn't know are its
 /// own to refuse.
@@ -13,7 +13,7 @@ use rspirv::spirv::{Capability, Op};
 /// [`Error::FeatureNotEnabled`] names the capability and what would enable it.
 pub(crate) fn check(words: &[u32], features: &Features) -> Result<(), Error> {
     match declared(words)
-        .filter(|&capability| crate::shader::is_supported(capability))
+        .filter(|&capability| gaurast_spirv::is_supported(capability))
         .find(|&capability| !is_enabled(capability, features))
     {
         None => Ok(()),
@@ -120,7 +120,7 @@ mod tests {
     fn every_capability_that_is_translated_and_supported_can_be_had() {
         let cannot: Vec<_> = (0..0x2000)
             .filter_map(Capability::from_u32)
-            .filter(|&capability| crate::shader::is_supported(capability))
+            .filter(|&capability| gaurast_spirv::is_supported(capability))
             .filter(|&capability| !is_enabled(capability, &SUPPORTED))
             .collect();
         use Capability as C;

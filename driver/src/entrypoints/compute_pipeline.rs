@@ -6,9 +6,9 @@ use crate::error::Error;
 use crate::object::device::Device;
 use crate::object::pipeline::Pipeline;
 use crate::object::pipeline::compute::{ComputePipeline, StageInfo};
-use crate::shader::Specialization;
 use crate::{handle, pnext, pointer};
 use ash::vk;
+use gaurast_spirv::Specialization;
 use std::sync::Arc;
 
 crate::entry_points! {

@@ -4,7 +4,7 @@ use crate::command::bound::{BoundSet, BoundSets};
 use crate::object::descriptor::Descriptor;
 use crate::object::descriptor::layout::Binding;
 use crate::object::image::ImageView;
-use crate::shader::{self, DescriptorKind};
+use gaurast_spirv::{self as shader, DescriptorKind};
 use simdevice::Allocation;
 use simdevice::host;
 use simdevice::program::bindings::Bindings;
@@ -21,7 +21,7 @@ pub(crate) struct Unbound(pub(super) u32);
 /// # Errors
 /// [`Unbound`] if a set is missing.
 pub(crate) fn bindings(
-    descriptors: &[shader::Descriptor],
+    descriptors: &[shader::ShaderBinding],
     sets: &BoundSets,
     push_constants: &[u8],
 ) -> Result<Bindings, Unbound> {
@@ -39,7 +39,12 @@ pub(crate) fn bindings(
 }
 
 /// Binds what one variable of a program uses.
-fn bind(used: &shader::Descriptor, bound: &BoundSet, binding: &Binding, bindings: &mut Bindings) {
+fn bind(
+    used: &shader::ShaderBinding,
+    bound: &BoundSet,
+    binding: &Binding,
+    bindings: &mut Bindings,
+) {
     let held = bound.set.lock();
     let count = used.count.min(binding.count) as usize;
     for (element, descriptor) in held[binding.first..][..count].iter().enumerate() {
@@ -52,7 +57,7 @@ fn bind(used: &shader::Descriptor, bound: &BoundSet, binding: &Binding, bindings
 
 /// Puts what a descriptor holds at a bind point.
 fn place(
-    used: &shader::Descriptor,
+    used: &shader::ShaderBinding,
     slot: usize,
     descriptor: &Descriptor,
     dynamic_offset: Option<u32>,
@@ -98,7 +103,7 @@ fn image(kind: DescriptorKind, view: &ImageView) -> ImageBinding {
     }
 }
 
-fn note_written(used: &shader::Descriptor, memory: &Arc<Allocation>, bindings: &mut Bindings) {
+fn note_written(used: &shader::ShaderBinding, memory: &Arc<Allocation>, bindings: &mut Bindings) {
     if used.writable
         && !bindings
             .written

@@ -3,7 +3,7 @@
 use crate::capabilities::spirv;
 use crate::error::Error;
 use crate::registry::features::Features;
-use crate::shader::{self, Module, Options, Shader, Specialization, Stage};
+use gaurast_spirv::{self as shader, Module, Options, Shader, Specialization, Stage};
 use simdevice::host;
 
 /// The first word of SPIR-V.

@@ -6,7 +6,7 @@
 use crate::registry::features::Features;
 use crate::registry::properties::Properties;
 use ash::vk;
-use rspirv::spirv::Capability;
+use spirv::Capability;
 
 /// A thing that enables a capability.
 #[derive(Clone, Copy, Debug)]

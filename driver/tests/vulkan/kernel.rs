@@ -9,7 +9,7 @@ macro_rules! spirv {
     ($name:literal) => {
         $crate::kernel::words(include_bytes!(concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/tests/shaders/",
+            "/spirv/tests/shaders/",
             $name,
             ".spv"
         )))

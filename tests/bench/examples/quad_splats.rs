@@ -4,9 +4,6 @@
 //! llvmpipe), or by this driver without one. `gaurast render` draws the same picture as it is meant.
 
 use gaurast_bench::quads::QuadRenderer;
-use gaurast_samples::camera::Camera;
-use gaurast_samples::output;
-use gaurast_samples::scene::{DEFAULT_COUNT, Scene};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -18,13 +15,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let size = [1280, 720];
     let (scene, camera) = match arguments.next() {
         Some(path) => {
-            let scene = Scene::load(path.as_ref())?;
-            let camera = Camera::framing(&scene, 50.0, size);
+            let scene = gaurast_scene::open(path)?;
+            let camera = gaurast_scene::frame(&scene, 50.0, size);
             (scene, camera)
         }
         None => (
-            Scene::generate(1, DEFAULT_COUNT),
-            Camera::of_generated(None, size)?,
+            gaurast_scene::garden::scene(1, gaurast_scene::garden::DEFAULT_COUNT),
+            gaurast_scene::garden::camera(None, size)?,
         ),
     };
     for frame in ["first", "second"] {
@@ -33,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for step in &frame_drawn.counters {
             println!("{:>10}: {:8.2} ms", step.name, step.value * 1e-6);
         }
-        output::write("quad_splats.png".as_ref(), &frame_drawn.picture, None)?;
+        gaurast_picture::write("quad_splats.png".as_ref(), &frame_drawn.picture, None)?;
     }
     Ok(())
 }

@@ -26,6 +26,7 @@
 //! |---|---|
 //! | `GAURAST_TEST_DATA` | the folder of real data: splat files, meshes, cameras |
 //! | `GAURAST_VK_XML` | the Vulkan registry's `vk.xml`, which `driver/gen/fetch.sh` gets |
+//! | `GAURAST_SPIRV_GRAMMAR` | SPIR-V's `spirv.core.grammar.json`, which `driver/gen/fetch.sh` gets |
 //! | `GAURAST_TEST_REQUIRE` | `programs`: a missing program or system file is a failure; `all`: missing data, too |
 //! | `GAURAST_TEST_LONG` | `1`: tests that have a small sample run whole |
 //! | `GAURAST_TEST_LIBRARIES` | the folder of shared libraries that were built with the tests |

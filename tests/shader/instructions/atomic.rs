@@ -4,7 +4,7 @@
 use super::row;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Row};
-use rspirv::spirv::{Capability, Op};
+use spirv::{Capability, Op};
 
 /// From the old value and the operand, the new value.
 type Update = fn(Kind, u64, u64) -> u64;

@@ -5,7 +5,7 @@ use gaurast_tests::programs::assembler::Id;
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Row};
-use rspirv::spirv::{Op, StorageClass};
+use spirv::{Op, StorageClass};
 
 /// A row that only moves values: its model gives bits.
 fn moves(

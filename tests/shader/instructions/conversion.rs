@@ -6,7 +6,7 @@ use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::precision::{HALF, exactly};
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Expect, Row};
-use rspirv::spirv::Op;
+use spirv::Op;
 
 pub fn rows() -> Vec<Row> {
     let mut rows = Vec::new();

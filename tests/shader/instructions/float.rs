@@ -5,7 +5,7 @@ use super::{each, row};
 use gaurast_tests::programs::precision::{Interval, exactly, format};
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Expect, Row};
-use rspirv::spirv::{GlslStd450Op as G, Op};
+use spirv::{GlslStd450Op as G, Op};
 use std::cmp::Ordering::{self, Equal, Greater, Less};
 
 /// A shape for each kind, so that all sizes of vectors occur.
@@ -149,7 +149,7 @@ fn fused_by_hand(kind: Kind, ty: Ty) -> Row {
             let product = body.asm.emit(Op::FMul, id, &v[..2]);
             let sum = body.asm.emit(Op::FAdd, id, &[product, v[2]]);
             for id in [product, sum] {
-                let decoration = rspirv::spirv::Decoration::NoContraction;
+                let decoration = spirv::Decoration::NoContraction;
                 body.asm.decorate(id, decoration, &[]);
             }
             vec![sum]

@@ -7,7 +7,7 @@ use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::precision::{Format, Interval, Maybe, exactly, format};
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Row};
-use rspirv::spirv::{GlslStd450Op as G, Op};
+use spirv::{GlslStd450Op as G, Op};
 use std::f64::consts::PI;
 
 pub fn rows() -> Vec<Row> {
@@ -200,7 +200,7 @@ fn split(kind: Kind) -> Vec<Row> {
         let whole_ty = body.ty(ty);
         let length = body.asm.u32(4);
         let array = body.asm.declare(Op::TypeArray, None, &[whole_ty, length]);
-        let class = rspirv::spirv::StorageClass::Private;
+        let class = spirv::StorageClass::Private;
         let variable = body.asm.global(class, array);
         let pointer = body.asm.pointer(class, whole_ty);
         let place = body.asm.emit(Op::AccessChain, pointer, &[variable, v[1]]);

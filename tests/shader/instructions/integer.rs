@@ -5,7 +5,7 @@ use super::{each, row, whole};
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Expect, Row};
-use rspirv::spirv::{GlslStd450Op as G, Op};
+use spirv::{GlslStd450Op as G, Op};
 
 /// What two integers give; None where it is undefined.
 type Two = fn(i128, i128) -> Option<i128>;

@@ -6,7 +6,7 @@ use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::precision::{Format, Interval, Maybe, exactly, format};
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Expect, Row};
-use rspirv::spirv::{GlslStd450Op as G, Op};
+use spirv::{GlslStd450Op as G, Op};
 
 fn numbers(kind: Kind, bits: &[u64]) -> Vec<f64> {
     bits.iter().map(|bits| kind.float(*bits)).collect()

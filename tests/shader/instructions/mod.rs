@@ -17,7 +17,7 @@ use gaurast_tests::kernels::Context;
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::Ty;
 use gaurast_tests::programs::{Body, Expect, LANES, Model, Row, check};
-use rspirv::spirv::{GlslStd450Op as G, Op};
+use spirv::{GlslStd450Op as G, Op};
 
 /// An instruction of the core or of GLSL.std.450.
 #[derive(Clone, Copy)]

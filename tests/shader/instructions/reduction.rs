@@ -4,7 +4,7 @@ use super::subgroup::{BOOL, group, scoped, where_true};
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Lane, Row};
-use rspirv::spirv::{Capability, GroupOperation, Op};
+use spirv::{Capability, GroupOperation, Op};
 
 /// Combines two values, as bits.
 type Combine = fn(Kind, u64, u64) -> u64;

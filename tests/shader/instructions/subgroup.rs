@@ -5,7 +5,7 @@ use ash::vk::SubgroupFeatureFlags as Flags;
 use gaurast_tests::programs::inputs::Domain;
 use gaurast_tests::programs::types::{Kind, Ty};
 use gaurast_tests::programs::{Body, Expect, Lane, Model, Row};
-use rspirv::spirv::{BuiltIn, Capability, GroupOperation, Op};
+use spirv::{BuiltIn, Capability, GroupOperation, Op};
 
 /// A row whose model sees the whole subgroup. Its instruction names a scope first.
 pub fn group(

@@ -1,7 +1,7 @@
 //! A device that runs what it is given, and looks afterwards whether anything outside the bound ranges was written.
 
 use ash::vk;
-use vulkan_gaurast::shader::{DescriptorKind, Module, Options, Specialization, Stage, translate};
+use gaurast_spirv::{DescriptorKind, Module, Options, Specialization, Stage, translate};
 
 /// Bytes of each bound range, and of the guards before and after it.
 const RANGE: u64 = 1024;

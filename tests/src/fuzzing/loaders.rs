@@ -4,7 +4,6 @@ use std::path::Path;
 
 use flate2::Compression;
 use flate2::read::GzEncoder;
-use gaurast_samples::scene::Scene;
 use std::io::Read;
 
 use super::bytes::Bytes;
@@ -37,7 +36,7 @@ pub fn load(data: &[u8]) -> Option<usize> {
         file = compressed;
     }
     let len = file.len() as u64;
-    match Scene::read(Path::new(name), &mut &file[..], len) {
+    match gaurast_scene::read(Path::new(name), &mut &file[..], len) {
         Ok(scene) => {
             let count = scene.len();
             assert_eq!(scene.positions().len(), count);

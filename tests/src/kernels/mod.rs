@@ -110,7 +110,7 @@ macro_rules! spirv {
     ($name:literal) => {
         Cow::Borrowed(include_bytes!(concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/../driver/tests/shaders/",
+            "/../driver/spirv/tests/shaders/",
             $name,
             ".comp.spv"
         )))

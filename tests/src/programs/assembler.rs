@@ -1,6 +1,6 @@
 //! Writes SPIR-V, word by word: what a test needs of a module's layout, and no more.
 
-use rspirv::spirv::{
+use spirv::{
     AddressingModel, BuiltIn, Capability, Decoration, ExecutionMode, ExecutionModel,
     FunctionControl, GlslStd450Op, MemoryModel, Op, StorageClass,
 };

@@ -7,7 +7,7 @@ use super::types::{Kind, Ty};
 use crate::kernels::{Context, Kernel, Refused};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rspirv::spirv::{BuiltIn, Capability, ExecutionMode, Op, StorageClass};
+use spirv::{BuiltIn, Capability, ExecutionMode, Op, StorageClass};
 use std::borrow::Cow;
 
 /// Invocations that run each row.

@@ -2,7 +2,7 @@
 
 use super::assembler::{Assembler, Id};
 use half::f16;
-use rspirv::spirv::{Capability, Op};
+use spirv::{Capability, Op};
 
 /// What a component is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -5,8 +5,8 @@ use crate::capabilities::limits;
 use crate::error::Error;
 use crate::object::device::Device;
 use crate::object::shader_module::ShaderModule;
-use crate::shader::{self, BuiltIn, InputSource, Interface, Stage};
-use crate::shader::{Options, Specialization};
+use gaurast_spirv::{self as shader, BuiltIn, InputSource, Interface, Stage};
+use gaurast_spirv::{Options, Specialization};
 use simdevice::program::compute::ComputeProgram;
 use simdevice::program::interface::ComputeInput;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ pub(crate) struct ComputePipeline {
     /// What its workgroups run.
     pub(crate) program: Arc<ComputeProgram>,
     /// What the program is bound to.
-    pub(crate) descriptors: Vec<shader::Descriptor>,
+    pub(crate) descriptors: Vec<shader::ShaderBinding>,
 }
 
 /// A shader stage with its pointers followed.

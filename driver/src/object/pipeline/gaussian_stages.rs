@@ -7,12 +7,12 @@ use super::link::{self, Effects, Place, Varyings};
 use super::{AttributeSource, GraphicsPipelineInfo, blend, polygon};
 use crate::error::Error;
 use crate::object::device::Device;
-use crate::shader::{
-    BuiltIn, Descriptor, InputSource, Interface, Numeric, OutputTarget, Stage, reflect,
-};
 use ash::vk;
 use gaurast::vk::{
     GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianOrderGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+use gaurast_spirv::{
+    BuiltIn, InputSource, Interface, OutputTarget, ScalarType, ShaderBinding, Stage,
 };
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
@@ -31,7 +31,7 @@ pub(crate) struct VertexProjection {
     /// What its attributes count in.
     pub(crate) attributes: Vec<AttributeSource>,
     /// What it is bound to.
-    pub(crate) descriptors: Vec<Descriptor>,
+    pub(crate) descriptors: Vec<ShaderBinding>,
 }
 
 impl VertexProjection {
@@ -54,7 +54,7 @@ impl VertexProjection {
         // Nothing of a vertex stage depends on samples.
         let vertex = polygon::translate(device, layout(info)?, stage, Stage::Vertex, 1)?;
         let places = places(state, &vertex.interface)?;
-        let locations = reflect::locations_read(&vertex.interface);
+        let locations = vertex.interface.locations_read();
         let attributes = polygon::attributes(info, &locations)?;
         polygon::check_attributes(&vertex.interface, &locations, &attributes)?;
         let descriptors = vertex.interface.descriptors.clone();
@@ -93,7 +93,7 @@ pub(crate) struct ResolveStage {
     /// The program.
     pub(crate) program: Arc<GaussianFragmentProgram>,
     /// What it is bound to.
-    pub(crate) descriptors: Vec<Descriptor>,
+    pub(crate) descriptors: Vec<ShaderBinding>,
     /// Whether every sample is shaded for itself.
     pub(crate) sample_shading: bool,
     /// Whether alpha makes coverage.
@@ -220,7 +220,7 @@ fn check_resolve(interface: &Interface, varyings: &Varyings) -> Result<(), Error
             continue;
         };
         let is_known = varyings.contains_key(&(location, component));
-        if !is_known || input.numeric != (Numeric::Float { width: 32 }) {
+        if !is_known || input.numeric != (ScalarType::Float { width: 32 }) {
             return Err(Error::usage(
                 RESOLVE_INPUTS,
                 format!(
@@ -313,6 +313,6 @@ fn writes_float(interface: &Interface, place: Place) -> bool {
     interface.outputs.iter().any(|output| {
         let is_there = matches!(output.target, OutputTarget::Location { location, component, .. }
             if (location, component) == place);
-        is_there && output.numeric == Numeric::Float { width: 32 }
+        is_there && output.numeric == ScalarType::Float { width: 32 }
     })
 }

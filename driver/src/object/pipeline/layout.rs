@@ -1,9 +1,10 @@
 //! Pipeline layouts.
 
+use super::reflect;
 use crate::error::Error;
 use crate::object::descriptor::layout::DescriptorSetLayout;
-use crate::shader::{DescriptorKind, Interface, Stage, reflect};
 use ash::vk;
+use gaurast_spirv::{DescriptorKind, Interface, Stage};
 use std::sync::Arc;
 
 /// A pipeline's layout: what its programs may be bound to.

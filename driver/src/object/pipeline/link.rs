@@ -4,9 +4,9 @@
 //! taken off the vertex program, so that the device drops what computes them. What is read and never written is zero.
 
 use crate::error::Error;
-use crate::shader::{
-    BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Numeric, Output,
-    OutputTarget, Sampling, Shader,
+use gaurast_spirv::{
+    BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget,
+    Sampling, ScalarType, Shader,
 };
 use simdevice::isa::ir::{Constant, Program};
 use simdevice::program::interface::{
@@ -134,7 +134,10 @@ fn fragment_programs(
         .map(|input| fragment_input(input, varyings))
         .collect();
     zero_inputs(&mut program, &inputs);
-    let keeps_depth = matches!(interface.depth, DepthMode::Fixed | DepthMode::Unchanged);
+    let keeps_depth = matches!(
+        interface.depth,
+        DepthMode::NotWritten | DepthMode::Unchanged
+    );
     let outputs: Vec<_> = interface
         .outputs
         .iter()
@@ -157,10 +160,12 @@ fn fragment_programs(
 
 /// Refuses values of 64 bits at a stage's inputs and outputs.
 fn check_widths(interface: &Interface) -> Result<(), Error> {
-    let is_wide = |numeric: Numeric| {
+    let is_wide = |numeric: ScalarType| {
         matches!(
             numeric,
-            Numeric::Float { width: 64 } | Numeric::Int { width: 64 } | Numeric::Uint { width: 64 }
+            ScalarType::Float { width: 64 }
+                | ScalarType::Int { width: 64 }
+                | ScalarType::Uint { width: 64 }
         )
     };
     let inputs = interface.inputs.iter().map(|input| input.numeric);
@@ -352,11 +357,11 @@ fn fragment_output(output: &Output, effects: Effects<'_>) -> Option<FragmentOutp
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shader::Stage;
+    use gaurast_spirv::Stage;
     use simdevice::isa::builder::Builder;
     use simdevice::isa::ir::{Rate, Type};
 
-    const FLOAT: Numeric = Numeric::Float { width: 32 };
+    const FLOAT: ScalarType = ScalarType::Float { width: 32 };
 
     fn at(location: u32, component: u32) -> Input {
         Input {
@@ -415,7 +420,7 @@ mod tests {
                 push_constants: None,
                 workgroup_size: [1; 3],
                 early_fragment_tests: false,
-                depth: DepthMode::Fixed,
+                depth: DepthMode::NotWritten,
                 discards: false,
                 per_sample: false,
                 has_side_effects: false,
@@ -499,7 +504,7 @@ mod tests {
     #[test]
     fn wide_values_are_refused() {
         let mut wide = to(0, 0);
-        wide.numeric = Numeric::Float { width: 64 };
+        wide.numeric = ScalarType::Float { width: 64 };
         let vertex = shader(Stage::Vertex, vec![], vec![wide]);
         let error = link(vertex, None, |_| None, Effects::default()).unwrap_err();
         assert_eq!(error.result(), ash::vk::Result::ERROR_FEATURE_NOT_PRESENT);

@@ -12,6 +12,7 @@ pub(crate) mod gaussian_stages;
 pub(crate) mod layout;
 mod link;
 pub(crate) mod polygon;
+mod reflect;
 pub(crate) mod setting;
 mod vertex_input;
 

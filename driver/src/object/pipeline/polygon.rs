@@ -4,13 +4,14 @@ use super::compute::StageInfo;
 use super::fixed::{self, Class, FixedState};
 use super::layout::PipelineLayout;
 use super::link::{self, Effects};
+use super::reflect;
 use super::vertex_input::{self, AttributeSource};
 use super::{GraphicsPipelineInfo, blend};
 use crate::capabilities::limits;
 use crate::error::Error;
 use crate::object::device::Device;
-use crate::shader::{Descriptor, Interface, Numeric, Options, Shader, Stage, reflect};
 use ash::vk;
+use gaurast_spirv::{Interface, Options, ScalarType, Shader, ShaderBinding, Stage};
 use simdevice::format;
 use simdevice::program::vertex::DrawPipeline;
 use simdevice::state::{DrawState, PolygonMode};
@@ -24,9 +25,9 @@ pub(crate) struct PolygonPipeline {
     /// What the vertex program's attributes count in.
     pub(crate) attributes: Vec<AttributeSource>,
     /// What the vertex program is bound to.
-    pub(crate) vertex_descriptors: Vec<Descriptor>,
+    pub(crate) vertex_descriptors: Vec<ShaderBinding>,
     /// What the fragment program is bound to.
-    pub(crate) fragment_descriptors: Vec<Descriptor>,
+    pub(crate) fragment_descriptors: Vec<ShaderBinding>,
     /// The fixed-function state, as far as it is static.
     pub(crate) fixed: FixedState,
     /// The state for the device, if nothing of it is dynamic.
@@ -71,7 +72,7 @@ impl PolygonPipeline {
             .fragment
             .map(|stage| translate(device, layout, stage, Stage::Fragment, samples))
             .transpose()?;
-        let locations = reflect::locations_read(&vertex.interface);
+        let locations = vertex.interface.locations_read();
         let attributes = attributes(info, &locations)?;
         check_attributes(&vertex.interface, &locations, &attributes)?;
         if let Some(fragment) = &fragment {
@@ -194,9 +195,9 @@ pub(super) fn translate(
 /// Where each location is read from.
 pub(super) fn attributes(
     info: &GraphicsPipelineInfo,
-    locations: &[(u32, Numeric)],
+    locations: &[(u32, ScalarType)],
 ) -> Result<Vec<AttributeSource>, Error> {
-    let source = |&(location, _): &(u32, Numeric)| {
+    let source = |&(location, _): &(u32, ScalarType)| {
         vertex_input::source(info, location).map_err(|what| {
             Error::usage(
                 "VUID-VkGraphicsPipelineCreateInfo-Input-07904",
@@ -210,13 +211,13 @@ pub(super) fn attributes(
 /// Compares the types of attributes with what the shader reads.
 pub(super) fn check_attributes(
     interface: &Interface,
-    locations: &[(u32, Numeric)],
+    locations: &[(u32, ScalarType)],
     attributes: &[AttributeSource],
 ) -> Result<(), Error> {
     let given = |format: simdevice::Format| match format.numeric() {
-        format::Numeric::Uint => Numeric::Uint { width: 32 },
-        format::Numeric::Sint => Numeric::Int { width: 32 },
-        _ => Numeric::Float { width: 32 },
+        format::Numeric::Uint => ScalarType::Uint { width: 32 },
+        format::Numeric::Sint => ScalarType::Int { width: 32 },
+        _ => ScalarType::Float { width: 32 },
     };
     let described: Vec<_> = std::iter::zip(locations, attributes)
         .map(|(&(location, _), source)| reflect::Attribute {

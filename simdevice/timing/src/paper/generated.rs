@@ -78,7 +78,7 @@ pub fn section() -> Option<Section> {
                along camera paths of the data set (stump along garden's, counter and kitchen along room's, which alone are \
                at hand), turned and scaled to go around the garden. What lies in front of what decides how many \
                pairs are needed, and in a garden that is another matter, so that nothing here confirms or refutes the pairs that the times imply. Measured by \
-               `cargo run --release -p gaurast-samples --example paper_scenes -- CAMERAS > \
+               `cargo run --release -p gaurast-bench --example paper_scenes -- CAMERAS > \
                simdevice/timing/generated_scenes.toml`; the test of this document doesn't repeat it."
             .to_owned(),
         rows,

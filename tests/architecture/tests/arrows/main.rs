@@ -18,11 +18,12 @@ use graph::Arrow;
 use source::Crate;
 
 /// The crates that are held, by their folders.
-const CRATES: [(&str, &str); 4] = [
+const CRATES: [(&str, &str); 5] = [
     ("devmem", "simdevice/devmem"),
     ("isa", "simdevice/isa"),
     ("timing", "simdevice/timing"),
     ("simdevice", "simdevice"),
+    ("gaurast_spirv", "driver/spirv"),
 ];
 
 fn main() -> ExitCode {

@@ -1,5 +1,5 @@
 //! Gaussians as blended quads: how a Vulkan application draws them on a device that has only triangles, a software one
-//! for example. It is what [`Renderer`](gaurast_samples::renderer::Renderer) is measured against.
+//! for example. It is what [`Renderer`](gaurast_render::Renderer) is measured against.
 //!
 //! Each frame, the processor projects the Gaussians that may be seen, sorts them by depth and writes them to a buffer;
 //! the device draws an oriented quad for each, as far as its alpha reaches the floor, from the back to the front.
@@ -15,13 +15,13 @@ use std::time::{Duration, Instant};
 use ash::vk;
 use rayon::prelude::*;
 
-use gaurast_samples::camera::Camera;
-use gaurast_samples::output::Picture;
-use gaurast_samples::renderer::device::{Device, Purpose};
-use gaurast_samples::renderer::resource::{Buffer, CommandBuffers, Memory};
-use gaurast_samples::renderer::{Counter, Frame, RenderError, Target, check_size, record_copy};
-use gaurast_samples::scene::Scene;
-use gaurast_samples::usage::processor_time;
+use gaurast_picture::Picture;
+use gaurast_render::device::{Device, Purpose};
+use gaurast_render::process_stats::processor_time;
+use gaurast_render::resource::{Buffer, CommandBuffers, Memory};
+use gaurast_render::{Counter, Frame, RenderError, Target, check_size, record_copy};
+use gaurast_scene::Scene;
+use gaurast_scene::camera::Camera;
 use thiserror::Error;
 
 use pipeline::{Push, QuadPipeline};

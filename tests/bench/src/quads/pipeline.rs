@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use gaurast_samples::renderer::device::Device;
-use gaurast_samples::renderer::resource::Buffer;
-use gaurast_samples::renderer::{COLOR_FORMAT, During, RenderError};
+use gaurast_render::device::Device;
+use gaurast_render::resource::Buffer;
+use gaurast_render::{COLOR_FORMAT, During, RenderError};
 
 /// What the shaders are pushed: a pixel in normalised device coordinates, and the alpha floor.
 pub(super) type Push = [f32; 3];

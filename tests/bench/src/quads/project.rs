@@ -3,8 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Quat, Vec2, Vec3};
 
-use gaurast_samples::camera::Camera;
-use gaurast_samples::scene::Scene;
+use gaurast_scene::Scene;
+use gaurast_scene::camera::Camera;
 
 /// The most spherical harmonics that are evaluated: degree 3.
 const COEFFICIENTS: usize = 16;
@@ -244,7 +244,7 @@ mod tests {
             ([0.0, 0.0, 4.0], 0.001),
             ([9.0, 0.0, 4.0], 0.5),
         ] {
-            let shape = gaurast_samples::scene::Shape {
+            let shape = gaurast_scene::GaussianShape {
                 scale: [0.1; 3],
                 rotation: [2.0, 0.0, 0.0, 0.0],
                 opacity,

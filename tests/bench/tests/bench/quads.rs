@@ -2,10 +2,10 @@
 
 use gaurast_bench::quads::QuadRenderer;
 use gaurast_oracle::compare::Statistics;
-use gaurast_samples::camera::Camera;
-use gaurast_samples::output::Picture;
-use gaurast_samples::renderer::Renderer;
-use gaurast_samples::scene::Scene;
+use gaurast_picture::Picture;
+use gaurast_render::Renderer;
+use gaurast_scene::Scene;
+use gaurast_scene::camera::Camera;
 
 const SIZE: [u32; 2] = [160, 90];
 const ALPHA_FLOOR: f32 = 1.0 / 255.0;
@@ -13,10 +13,13 @@ const ALPHA_FLOOR: f32 = 1.0 / 255.0;
 /// Scenes with their views, of Gaussians small and large.
 fn scenes() -> Vec<(Scene, Camera)> {
     vec![
-        (Scene::benchmark(2, 5000), Camera::benchmark(SIZE)),
         (
-            Scene::generate(2, 8000),
-            Camera::of_generated(None, SIZE).expect("a camera"),
+            gaurast_oracle::scenes::synthetic(2, 5000),
+            gaurast_oracle::scenes::synthetic_camera(SIZE),
+        ),
+        (
+            gaurast_scene::garden::scene(2, 8000),
+            gaurast_scene::garden::camera(None, SIZE).expect("a camera"),
         ),
     ]
 }
@@ -76,7 +79,12 @@ fn an_empty_scene_is_an_empty_picture() {
     let mut quads = QuadRenderer::new(vulkan_gaurast::entry(), "", 1).expect("a device");
     let scene = Scene::with_capacity(0, 0);
     let frame = quads
-        .render(&scene, &Camera::benchmark([8, 8]), 0, ALPHA_FLOOR)
+        .render(
+            &scene,
+            &gaurast_oracle::scenes::synthetic_camera([8, 8]),
+            0,
+            ALPHA_FLOOR,
+        )
         .expect("a frame");
     assert_eq!(frame.picture.pixels, vec![[0.0; 4]; 64]);
 }

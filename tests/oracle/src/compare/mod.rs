@@ -8,11 +8,9 @@
 //!
 //! Images are slices of premultiplied red, green, blue and alpha, row by row from the top.
 
-pub mod flip;
 mod picture;
-mod statistics;
 mod verdict;
 
+pub use gaurast_picture::Statistics;
 pub use picture::{PictureError, write_difference};
-pub use statistics::Statistics;
 pub use verdict::{Limits, Verdict, assert_contract, verdict};

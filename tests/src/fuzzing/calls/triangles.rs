@@ -4,10 +4,10 @@ use ash::vk;
 
 use super::{Bytes, DEPTH_FORMATS, FORMATS, OBJECTS, Run};
 
-const VERTEX: &[u8] = include_bytes!("../../../../driver/tests/shaders/colored.vert.spv");
+const VERTEX: &[u8] = include_bytes!("../../../../driver/spirv/tests/shaders/colored.vert.spv");
 const FRAGMENTS: [&[u8]; 2] = [
-    include_bytes!("../../../../driver/tests/shaders/colored.frag.spv"),
-    include_bytes!("../../../../driver/tests/shaders/flat.frag.spv"),
+    include_bytes!("../../../../driver/spirv/tests/shaders/colored.frag.spv"),
+    include_bytes!("../../../../driver/spirv/tests/shaders/flat.frag.spv"),
 ];
 const VERTEX_FORMATS: [vk::Format; 4] = [
     vk::Format::R32G32B32A32_SFLOAT,

@@ -5,7 +5,7 @@ use super::{
     ARRAY, Binary, Compare, Condition, Expression, Function, INVOCATIONS, Loop, Program, Statement,
     Switch, VARIABLES,
 };
-use rspirv::spirv::{BuiltIn, Op, StorageClass};
+use spirv::{BuiltIn, Op, StorageClass};
 
 struct Types {
     void: Id,

@@ -2,8 +2,8 @@
 
 use std::io::{Write, stdout};
 
-use gaurast_samples::camera::Camera;
-use gaurast_samples::renderer::Settings;
+use gaurast_render::Settings;
+use gaurast_scene::camera::Camera;
 use serde::Serialize;
 
 use super::judge::{Error, Judge, PictureFile};

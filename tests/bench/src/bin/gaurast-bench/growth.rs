@@ -3,7 +3,7 @@
 use std::io::{Write, stdout};
 use std::path::Path;
 
-use gaurast_samples::renderer::Settings;
+use gaurast_render::Settings;
 use serde::Serialize;
 
 use super::machine::Machine;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use gaurast_oracle::compare::Statistics;
 use gaurast_oracle::oracle::{OracleCamera, OracleState, render_bounded};
 use gaurast_oracle::scenes::SceneBuffers;
-use gaurast_samples::camera::Camera;
-use gaurast_samples::scene::Scene;
+use gaurast_scene::Scene;
+use gaurast_scene::camera::Camera;
 use serde::Serialize;
 
 use super::BenchError;

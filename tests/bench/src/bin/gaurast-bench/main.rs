@@ -19,10 +19,10 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 use gaurast_bench::quads::QuadError;
-use gaurast_samples::camera::{CameraError, CameraFileError};
-use gaurast_samples::renderer::RenderError;
-use gaurast_samples::scene::SceneError;
-use gaurast_samples::size::Size;
+use gaurast_picture::Size;
+use gaurast_render::RenderError;
+use gaurast_scene::SceneError;
+use gaurast_scene::{camera::CameraError, camera_files::CameraFileError};
 use thiserror::Error;
 
 use counts::{CountsArguments, CountsError, WorkerArguments};

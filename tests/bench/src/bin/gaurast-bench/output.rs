@@ -4,7 +4,6 @@ use std::path::Path;
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
-use gaurast_samples::file;
 use serde::Serialize;
 
 use super::BenchError;
@@ -91,7 +90,7 @@ pub fn write(path: &Path, text: &str) -> Result<(), BenchError> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
-    Ok(file::replace(path, text.as_bytes())?)
+    Ok(gaurast_picture::write_atomically(path, text.as_bytes())?)
 }
 
 /// Writes `value` as JSON for people.

@@ -3,8 +3,8 @@
 //! processes that are started in one order and in the other: of two that do the same, the first has been seen to take up to a
 //! tenth longer for as long as both live.
 
-use gaurast_samples::camera::Camera;
-use gaurast_samples::renderer::Settings;
+use gaurast_render::Settings;
+use gaurast_scene::camera::Camera;
 
 use super::worker::{Contender, Drawn, Worker};
 use super::{BenchError, Workload, median};

@@ -3,9 +3,9 @@
 use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
 
-use gaurast_samples::camera::Camera;
-use gaurast_samples::renderer::{Precision, Settings};
-use gaurast_samples::scene::Scene;
+use gaurast_render::{Precision, Settings};
+use gaurast_scene::Scene;
+use gaurast_scene::camera::Camera;
 use serde::Serialize;
 
 use super::judge::{Error, Judge, PictureFile};

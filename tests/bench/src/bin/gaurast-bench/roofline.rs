@@ -8,7 +8,7 @@ use devmem::dispatch;
 use fearless_simd::{Level, Simd, prelude::*};
 use serde::Serialize;
 
-use gaurast_samples::renderer::Settings;
+use gaurast_render::Settings;
 
 use super::BenchError;
 use super::worker::{Contender, Drawn, Worker};

@@ -2,7 +2,7 @@
 
 use std::io::{Write, stdout};
 
-use gaurast_samples::camera::Camera;
+use gaurast_scene::camera::Camera;
 use serde::Serialize;
 
 use super::machine::Machine;

@@ -7,10 +7,10 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use gaurast_bench::quads::QuadRenderer;
-use gaurast_samples::camera::Camera;
-use gaurast_samples::renderer::{DeviceScene, Frame, Renderer, Settings};
-use gaurast_samples::scene::Scene;
-use gaurast_samples::usage;
+use gaurast_render::process_stats as usage;
+use gaurast_render::{DeviceScene, Frame, Renderer, Settings};
+use gaurast_scene::Scene;
+use gaurast_scene::camera::Camera;
 use serde::{Deserialize, Serialize};
 
 use super::BenchError;

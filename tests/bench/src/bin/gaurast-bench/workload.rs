@@ -3,8 +3,9 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use gaurast_samples::camera::{self, Camera, DEFAULT_FOV, Model};
-use gaurast_samples::scene::{Scene, Shape};
+use gaurast_oracle::scenes;
+use gaurast_scene::camera::{Camera, DEFAULT_FOV, Model};
+use gaurast_scene::{GaussianShape, Scene};
 use serde::{Deserialize, Serialize};
 
 use super::BenchError;
@@ -100,32 +101,36 @@ impl Workload {
     /// The scene.
     pub fn scene(&self) -> Result<Scene, BenchError> {
         let scene = match &self.source {
-            Source::Benchmark { count } => Scene::benchmark(SEED, *count),
-            Source::Garden { count } => Scene::generate(SEED, *count),
+            Source::Benchmark { count } => scenes::synthetic(SEED, *count),
+            Source::Garden { count } => gaurast_scene::garden::scene(SEED, *count),
             Source::Captured { count, .. } => {
-                Scene::captured(SEED, *count, &self.source.cameras(self.size)?)
+                scenes::trained_like(SEED, *count, &self.source.cameras(self.size)?)
             }
-            Source::File { path } => Scene::load(path)?,
+            Source::File { path } => gaurast_scene::open(path)?,
             Source::Tiles {
                 whole,
                 tiles: count,
             } => tiles(*whole, *count),
             Source::Wall => wall(),
         };
-        let mut scene = scene.scaled(self.scale).partly_away(self.away);
+        let mut scene = scenes::partly_moved_away(&scenes::scaled(&scene, self.scale), self.away);
         if self.plain {
-            scene = scene.plain();
+            scene = scenes::view_independent(&scene);
         }
         let unseen = match self.extra {
             None => return Ok(scene),
             Some(Extra::Beside { count }) => {
-                Scene::benchmark(SEED, count).moved(|[x, y, z]| [x, y + 30.0, z])
+                scenes::moved(&scenes::synthetic(SEED, count), |[x, y, z]| {
+                    [x, y + 30.0, z]
+                })
             }
             Some(Extra::Behind { count }) => {
-                Scene::benchmark(SEED, count).moved(|position| position.map(|at| 0.5 * at))
+                scenes::moved(&scenes::synthetic(SEED, count), |position| {
+                    position.map(|at| 0.5 * at)
+                })
             }
         };
-        Ok(scene.shuffled_with(&unseen, SEED))
+        Ok(scenes::shuffled_with(&scene, &unseen, SEED))
     }
 
     /// `count` views that differ, in the order of the path.
@@ -138,8 +143,10 @@ impl Workload {
                 .collect()
         };
         Ok(match &self.source {
-            Source::Benchmark { .. } | Source::Wall => around(Camera::benchmark(size), [0.0; 3]),
-            Source::Garden { .. } => around(Camera::of_generated(None, size)?, [0.0; 3]),
+            Source::Benchmark { .. } | Source::Wall => {
+                around(scenes::synthetic_camera(size), [0.0; 3])
+            }
+            Source::Garden { .. } => around(gaurast_scene::garden::camera(None, size)?, [0.0; 3]),
             Source::Captured { .. } => {
                 let cameras = self.source.cameras(size)?;
                 (0..count)
@@ -149,7 +156,7 @@ impl Workload {
                     .collect()
             }
             Source::File { .. } => {
-                let camera = Camera::framing(scene, DEFAULT_FOV, size);
+                let camera = gaurast_scene::frame(scene, DEFAULT_FOV, size);
                 // About a point ahead, as far as the scene's middle is.
                 let distance = distance_to(scene, &camera);
                 let pivot = std::array::from_fn(|axis| {
@@ -171,7 +178,7 @@ impl Source {
         else {
             return Ok(Camera::orbit(90, size));
         };
-        let views = camera::load(path, size)?;
+        let views = gaurast_scene::camera_files::load(path, size)?;
         if views.is_empty() {
             return Err(BenchError::NoCamera(path.clone()));
         }
@@ -244,7 +251,7 @@ fn tiles(whole: bool, tiles: usize) -> Scene {
         } else {
             (0.01, 0.05)
         };
-        let shape = Shape {
+        let shape = GaussianShape {
             scale: [scale; 3],
             rotation: [1.0, 0.0, 0.0, 0.0],
             opacity,
@@ -274,7 +281,7 @@ fn wall() -> Scene {
                 let radius = RADIUS + 0.01 * layer as f32;
                 let y = 0.25 * (row as f32 - 0.5 * rows as f32);
                 sh[0] = [0.3 + 0.4 * (column % 2) as f32, 0.1, 0.3 * (row % 2) as f32];
-                let shape = Shape {
+                let shape = GaussianShape {
                     scale: [0.4; 3],
                     rotation: [1.0, 0.0, 0.0, 0.0],
                     opacity: 0.99,

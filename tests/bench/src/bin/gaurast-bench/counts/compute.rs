@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use ash::vk;
-use gaurast_samples::renderer::RenderError;
-use gaurast_samples::renderer::device::{Device, Purpose};
-use gaurast_samples::renderer::resource::{Buffer, CommandBuffers, Memory};
+use gaurast_render::RenderError;
+use gaurast_render::device::{Device, Purpose};
+use gaurast_render::resource::{Buffer, CommandBuffers, Memory};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

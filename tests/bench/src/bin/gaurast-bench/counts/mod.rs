@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use gaurast_bench::quads::QuadError;
-use gaurast_samples::renderer::RenderError;
+use gaurast_render::RenderError;
 use thiserror::Error;
 
 use instructions::Obstacle;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use ash::vk;
-use gaurast_samples::renderer::device::Device;
-use gaurast_samples::renderer::{During, RenderError};
+use gaurast_render::device::Device;
+use gaurast_render::{During, RenderError};
 
 /// Objects of one device. They live until no submission uses any of them.
 pub(super) struct Objects {

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use gaurast_samples::renderer::device::{Device, Purpose};
-use gaurast_samples::renderer::resource::{Buffer, CommandBuffers, Memory};
-use gaurast_samples::renderer::{COLOR_FORMAT, RenderError, Target, record_copy};
+use gaurast_render::device::{Device, Purpose};
+use gaurast_render::resource::{Buffer, CommandBuffers, Memory};
+use gaurast_render::{COLOR_FORMAT, RenderError, Target, record_copy};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -7,9 +7,9 @@
 use ash::Entry;
 use clap::ValueEnum;
 use gaurast_bench::quads::QuadRenderer;
-use gaurast_samples::camera::Camera;
-use gaurast_samples::renderer::Renderer;
-use gaurast_samples::scene::Scene;
+use gaurast_render::Renderer;
+use gaurast_scene::Scene;
+use gaurast_scene::camera::Camera;
 
 use super::compute::Bodies;
 use super::triangles::Triangles;
@@ -55,12 +55,17 @@ impl Workload {
     fn draw(self, entry: Entry, frames: u32) -> Result<u64, CountsError> {
         match self {
             Self::GaussiansSynthetic => {
-                let scene = Scene::benchmark(1, GAUSSIANS);
-                gaussians(entry, frames, &scene, &Camera::benchmark(SIZE))
+                let scene = gaurast_oracle::scenes::synthetic(1, GAUSSIANS);
+                gaussians(
+                    entry,
+                    frames,
+                    &scene,
+                    &gaurast_oracle::scenes::synthetic_camera(SIZE),
+                )
             }
             Self::GaussiansCaptured => {
                 let cameras = Camera::orbit(8, SIZE);
-                let scene = Scene::captured(1, GAUSSIANS, &cameras);
+                let scene = gaurast_oracle::scenes::trained_like(1, GAUSSIANS, &cameras);
                 gaussians(entry, frames, &scene, &cameras[0])
             }
             Self::SmallTriangles => triangles(Triangles::small(entry, SIZE)?, frames),
@@ -100,9 +105,14 @@ fn triangles(mut triangles: Triangles, frames: u32) -> Result<u64, CountsError> 
 }
 
 fn quads(entry: Entry, frames: u32) -> Result<u64, CountsError> {
-    let scene = Scene::benchmark(1, QUADS);
+    let scene = gaurast_oracle::scenes::synthetic(1, QUADS);
     let mut renderer = QuadRenderer::new(entry, "", 1)?;
-    let mut prepared = renderer.prepare(&scene, &Camera::benchmark(SIZE), 3, ALPHA_FLOOR)?;
+    let mut prepared = renderer.prepare(
+        &scene,
+        &gaurast_oracle::scenes::synthetic_camera(SIZE),
+        3,
+        ALPHA_FLOOR,
+    )?;
     for _ in 0..frames {
         prepared.draw()?;
     }

@@ -1,0 +1,33 @@
+//! A picture in memory.
+
+/// Pixels as a draw leaves them: RGBA in rows from the top, premultiplied.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// (C, 1 - T) of each pixel; `width` times `height` of them.
+    pub pixels: Vec<[f32; 4]>,
+}
+
+impl Picture {
+    /// This picture over an opaque background: C + T background, with alpha 1.
+    #[must_use]
+    pub fn over(&self, background: [f32; 3]) -> Self {
+        let over = |&[r, g, b, alpha]: &[f32; 4]| {
+            let transmittance = 1.0 - alpha;
+            let channel = |colour: f32, behind: f32| colour + transmittance * behind;
+            [
+                channel(r, background[0]),
+                channel(g, background[1]),
+                channel(b, background[2]),
+                1.0,
+            ]
+        };
+        Self {
+            pixels: self.pixels.iter().map(over).collect(),
+            ..*self
+        }
+    }
+}

@@ -1,0 +1,385 @@
+//! Instance, device and queue.
+
+use std::ffi::CStr;
+
+use ash::vk;
+use gaurast::gaussian_primitive_topology;
+use gaurast::vk::{
+    PhysicalDeviceGaussianPrimitiveTopologyFeaturesGAURAST as GaussianFeatures,
+    PhysicalDeviceGaussianPrimitiveTopologyPropertiesGAURAST as GaussianProperties,
+};
+
+use crate::{During, RenderError};
+
+/// An instance, which outlives everything made from it.
+struct Instance {
+    raw: ash::Instance,
+    /// Last: it may own the library that `raw` calls.
+    _entry: ash::Entry,
+}
+
+impl Instance {
+    fn new(entry: ash::Entry) -> Result<Self, RenderError> {
+        let application = vk::ApplicationInfo::default()
+            .application_name(c"gaurast")
+            .api_version(vk::API_VERSION_1_3);
+        let create_info = vk::InstanceCreateInfo::default().application_info(&application);
+        // SAFETY: the structures are valid, and `_entry` outlives the instance.
+        let raw =
+            unsafe { entry.create_instance(&create_info, None) }.during("vkCreateInstance")?;
+        Ok(Self { raw, _entry: entry })
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: the device, the only child, has been destroyed before.
+        unsafe { self.raw.destroy_instance(None) };
+    }
+}
+
+/// What a device is wanted for.
+#[derive(Clone, Copy, Debug)]
+pub enum Purpose<'a> {
+    /// The Gaussian primitive topology.
+    Gaussians,
+    /// Triangles alone, on the first device whose name holds this text.
+    Triangles(&'a str),
+}
+
+/// A logical device, its queue, and what is known about it.
+pub struct Device {
+    raw: ash::Device,
+    queue: vk::Queue,
+    /// Absent if the device doesn't count.
+    performance: Option<ash::khr::performance_query::Device>,
+    physical: PhysicalDevice,
+    /// Last: the device is its child.
+    instance: Instance,
+}
+
+/// A physical device and the queue family that is used.
+struct PhysicalDevice {
+    handle: vk::PhysicalDevice,
+    queue_family: u32,
+    name: String,
+    counts: bool,
+    max_size: u32,
+    max_gaussians: u64,
+    max_sh_degree: u32,
+    memory: vk::PhysicalDeviceMemoryProperties,
+}
+
+impl Device {
+    /// The first device of `entry` that serves the purpose.
+    ///
+    /// # Errors
+    /// If there is none, or Vulkan fails.
+    pub fn new(entry: ash::Entry, purpose: Purpose<'_>) -> Result<Self, RenderError> {
+        let instance = Instance::new(entry)?;
+        let physical = PhysicalDevice::choose(&instance.raw, purpose)?;
+
+        let priorities = [1.0];
+        let queues = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(physical.queue_family)
+            .queue_priorities(&priorities)];
+        let mut extensions = Vec::new();
+        // Every mode that there is.
+        let mut gaussian = GaussianFeatures::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut gaussian);
+        // SAFETY: the structures are valid; a device without the extension leaves its structure as it is.
+        unsafe {
+            (instance.raw).get_physical_device_features2(physical.handle, &mut features);
+        }
+        gaussian.p_next = std::ptr::null_mut();
+        let mut rendering =
+            vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
+        let mut counting = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default()
+            .performance_counter_query_pools(true);
+        if matches!(purpose, Purpose::Gaussians) {
+            extensions.push(gaussian_primitive_topology::NAME.as_ptr());
+        }
+        if physical.counts {
+            extensions.push(ash::khr::performance_query::NAME.as_ptr());
+        }
+        let mut create_info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions)
+            .push_next(&mut rendering);
+        if matches!(purpose, Purpose::Gaussians) {
+            create_info = create_info.push_next(&mut gaussian);
+        }
+        if physical.counts {
+            create_info = create_info.push_next(&mut counting);
+        }
+        // SAFETY: the structures are valid, and the physical device has what is enabled.
+        let raw = unsafe {
+            instance
+                .raw
+                .create_device(physical.handle, &create_info, None)
+        }
+        .during("vkCreateDevice")?;
+        Ok(Self {
+            // SAFETY: the queue was asked for at creation.
+            queue: unsafe { raw.get_device_queue(physical.queue_family, 0) },
+            performance: physical
+                .counts
+                .then(|| ash::khr::performance_query::Device::new(&instance.raw, &raw)),
+            raw,
+            physical,
+            instance,
+        })
+    }
+
+    /// The device's functions.
+    pub fn raw(&self) -> &ash::Device {
+        &self.raw
+    }
+
+    /// The one queue.
+    pub fn queue(&self) -> vk::Queue {
+        self.queue
+    }
+
+    /// The queue's family.
+    pub fn queue_family(&self) -> u32 {
+        self.physical.queue_family
+    }
+
+    /// The functions of the Gaussian primitive topology, for a device that was made to draw
+    /// Gaussians.
+    pub(super) fn gaussian_functions(&self) -> gaussian_primitive_topology::Device {
+        gaussian_primitive_topology::Device::new(&self.instance.raw, &self.raw)
+    }
+
+    /// The functions of performance queries, if the device counts.
+    pub(super) fn performance(&self) -> Option<&ash::khr::performance_query::Device> {
+        self.performance.as_ref()
+    }
+
+    /// The device's name.
+    pub fn name(&self) -> &str {
+        &self.physical.name
+    }
+
+    /// The greatest width and height of an attachment.
+    pub(super) fn max_size(&self) -> u32 {
+        self.physical.max_size
+    }
+
+    pub(super) fn max_gaussians(&self) -> u64 {
+        self.physical.max_gaussians
+    }
+
+    pub(super) fn max_sh_degree(&self) -> u32 {
+        self.physical.max_sh_degree
+    }
+
+    /// The first memory type allowed by `type_bits` that has the properties of one of `wishes`,
+    /// tried in order: those that it must have and those that it must not.
+    pub fn memory_type(
+        &self,
+        type_bits: u32,
+        wishes: &[(vk::MemoryPropertyFlags, vk::MemoryPropertyFlags)],
+    ) -> Option<u32> {
+        let types = self.physical.memory.memory_types_as_slice();
+        wishes.iter().find_map(|(wanted, unwanted)| {
+            (0..types.len() as u32).find(|index| {
+                let flags = types[*index as usize].property_flags;
+                type_bits & (1 << index) != 0
+                    && flags.contains(*wanted)
+                    && !flags.intersects(*unwanted)
+            })
+        })
+    }
+
+    /// The counters that the queue can count, with their descriptions.
+    pub(super) fn counters(&self) -> Result<Vec<CounterDescription>, RenderError> {
+        let instance =
+            ash::khr::performance_query::Instance::new(&self.instance._entry, &self.instance.raw);
+        let (device, family) = (self.physical.handle, self.physical.queue_family);
+        // SAFETY: the physical device has the extension, and the family exists.
+        let count = unsafe {
+            instance.enumerate_physical_device_queue_family_performance_query_counters_len(
+                device, family,
+            )
+        }
+        .during("vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR")?;
+        let mut counters = vec![vk::PerformanceCounterKHR::default(); count];
+        let mut descriptions = vec![vk::PerformanceCounterDescriptionKHR::default(); count];
+        // SAFETY: as above; both arrays hold default structures.
+        unsafe {
+            instance.enumerate_physical_device_queue_family_performance_query_counters(
+                device,
+                family,
+                &mut counters,
+                &mut descriptions,
+            )
+        }
+        .during("vkEnumeratePhysicalDeviceQueueFamilyPerformanceQueryCountersKHR")?;
+        let text = |array: &[std::ffi::c_char]| {
+            CStr::from_bytes_until_nul(bytemuck::cast_slice(array))
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned()
+        };
+        Ok(counters
+            .iter()
+            .zip(&descriptions)
+            .map(|(counter, description)| CounterDescription {
+                category: text(&description.category),
+                name: text(&description.name),
+                description: text(&description.description),
+                impacting: description
+                    .flags
+                    .contains(vk::PerformanceCounterDescriptionFlagsKHR::PERFORMANCE_IMPACTING),
+                unit: counter.unit,
+                storage: counter.storage,
+            })
+            .collect())
+    }
+
+    /// How many submissions it takes to count what `create_info` names.
+    pub(super) fn counter_passes(
+        &self,
+        create_info: &vk::QueryPoolPerformanceCreateInfoKHR<'_>,
+    ) -> u32 {
+        let instance =
+            ash::khr::performance_query::Instance::new(&self.instance._entry, &self.instance.raw);
+        // SAFETY: the physical device has the extension, and the structure names its counters.
+        unsafe {
+            instance.get_physical_device_queue_family_performance_query_passes(
+                self.physical.handle,
+                create_info,
+            )
+        }
+    }
+}
+
+/// A counter as the device enumerates it.
+#[derive(Clone)]
+pub(super) struct CounterDescription {
+    pub(super) category: String,
+    pub(super) name: String,
+    pub(super) description: String,
+    /// Counting it changes how long things take.
+    pub(super) impacting: bool,
+    pub(super) unit: vk::PerformanceCounterUnitKHR,
+    pub(super) storage: vk::PerformanceCounterStorageKHR,
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: every object made from the device holds it alive, so there is none left, and
+        // every submission is waited for.
+        unsafe { self.raw.destroy_device(None) };
+    }
+}
+
+impl PhysicalDevice {
+    /// The first physical device that serves the purpose and has a graphics queue.
+    fn choose(instance: &ash::Instance, purpose: Purpose<'_>) -> Result<Self, RenderError> {
+        // SAFETY: the instance is alive.
+        let handles = unsafe { instance.enumerate_physical_devices() }
+            .during("vkEnumeratePhysicalDevices")?;
+        let mut found = Vec::new();
+        for handle in handles {
+            // SAFETY: the handle was just enumerated.
+            let properties = unsafe { instance.get_physical_device_properties(handle) };
+            let name = properties
+                .device_name_as_c_str()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            if let Some(physical) = Self::suitable(instance, handle, &properties, &name, purpose)? {
+                return Ok(physical);
+            }
+            found.push(name);
+        }
+        let found = if found.is_empty() {
+            "none at all".to_owned()
+        } else {
+            found.join(", ")
+        };
+        Err(match purpose {
+            Purpose::Gaussians => RenderError::NoDevice { found },
+            Purpose::Triangles(name) => RenderError::NoSuchDevice {
+                name: name.to_owned(),
+                found,
+            },
+        })
+    }
+
+    fn suitable(
+        instance: &ash::Instance,
+        handle: vk::PhysicalDevice,
+        properties: &vk::PhysicalDeviceProperties,
+        name: &str,
+        purpose: Purpose<'_>,
+    ) -> Result<Option<Self>, RenderError> {
+        // SAFETY: the handle is the instance's.
+        let extensions = unsafe { instance.enumerate_device_extension_properties(handle) }
+            .during("vkEnumerateDeviceExtensionProperties")?;
+        let has = |name: &CStr| {
+            extensions
+                .iter()
+                .any(|extension| extension.extension_name_as_c_str() == Ok(name))
+        };
+        let serves = match purpose {
+            Purpose::Gaussians => has(gaussian_primitive_topology::NAME),
+            Purpose::Triangles(text) => name.contains(text),
+        };
+        if !serves || properties.api_version < vk::API_VERSION_1_3 {
+            return Ok(None);
+        }
+        // SAFETY: the handle is the instance's.
+        let families = unsafe { instance.get_physical_device_queue_family_properties(handle) };
+        let graphics = families
+            .iter()
+            .position(|family| family.queue_flags.contains(vk::QueueFlags::GRAPHICS));
+        let Some(queue_family) = graphics else {
+            return Ok(None);
+        };
+        // A device without the extension leaves its limits as they are: zero.
+        let mut gaussian = GaussianProperties::default();
+        let mut chain = vk::PhysicalDeviceProperties2::default();
+        if has(gaussian_primitive_topology::NAME) {
+            chain = chain.push_next(&mut gaussian);
+        }
+        // SAFETY: the chain holds structures of extensions that the device has.
+        unsafe { instance.get_physical_device_properties2(handle, &mut chain) };
+        let draws_gaussians = matches!(purpose, Purpose::Gaussians);
+        let counts = draws_gaussians && has(ash::khr::performance_query::NAME) && {
+            let mut counting = vk::PhysicalDevicePerformanceQueryFeaturesKHR::default();
+            let mut chain = vk::PhysicalDeviceFeatures2::default().push_next(&mut counting);
+            // SAFETY: as above.
+            unsafe { instance.get_physical_device_features2(handle, &mut chain) };
+            counting.performance_counter_query_pools == vk::TRUE
+        };
+        let mut features = GaussianFeatures::default();
+        if draws_gaussians && has(gaussian_primitive_topology::NAME) {
+            let mut chain = vk::PhysicalDeviceFeatures2::default().push_next(&mut features);
+            // SAFETY: as above.
+            unsafe { instance.get_physical_device_features2(handle, &mut chain) };
+        }
+        let limits = &properties.limits;
+        let max_size = [
+            limits.max_image_dimension2_d,
+            limits.max_framebuffer_width,
+            limits.max_framebuffer_height,
+            limits.max_viewport_dimensions[0],
+            limits.max_viewport_dimensions[1],
+        ];
+        Ok(Some(Self {
+            handle,
+            queue_family: queue_family as u32,
+            name: name.to_owned(),
+            counts,
+            max_size: max_size.into_iter().min().unwrap_or_default(),
+            max_gaussians: gaussian.max_gaussians_per_draw,
+            max_sh_degree: gaussian.max_spherical_harmonics_degree,
+            // SAFETY: the handle is the instance's.
+            memory: unsafe { instance.get_physical_device_memory_properties(handle) },
+        }))
+    }
+}

@@ -1,0 +1,163 @@
+//! The pipeline that draws a scene's Gaussians.
+
+use std::sync::Arc;
+
+use ash::vk;
+use gaurast::vk::{
+    GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
+    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+};
+
+use crate::device::Device;
+use crate::{During, RenderError, Settings};
+use gaurast_scene::GaussianShape;
+
+/// Vertex buffers: positions, shapes, spherical harmonics.
+pub(super) const BINDINGS: usize = 3;
+
+/// The first location of the spherical harmonics; those before are position, scale, rotation and
+/// opacity.
+const FIRST_SH: u32 = 4;
+
+/// A pipeline with its layout.
+pub(super) struct GaussianPipeline {
+    handle: vk::Pipeline,
+    layout: vk::PipelineLayout,
+    device: Arc<Device>,
+}
+
+impl GaussianPipeline {
+    /// A pipeline for vertex buffers of `strides`, that draws by `settings` (with a degree that is
+    /// stored) into an attachment of `format`, over what it holds or in its place.
+    pub(super) fn new(
+        device: &Arc<Device>,
+        strides: [u32; BINDINGS],
+        settings: Settings,
+        format: vk::Format,
+        over: bool,
+    ) -> Result<Self, RenderError> {
+        let raw = device.raw();
+        // SAFETY: the structure is valid.
+        let layout = unsafe { raw.create_pipeline_layout(&Default::default(), None) }
+            .during("vkCreatePipelineLayout")?;
+        let mut pipeline = Self {
+            handle: vk::Pipeline::null(),
+            layout,
+            device: device.clone(),
+        };
+
+        let bindings = [0, 1, 2].map(|binding| {
+            vk::VertexInputBindingDescription::default()
+                .binding(binding)
+                .stride(strides[binding as usize])
+        });
+        let attributes = attributes(settings.sh_degree);
+        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
+            .vertex_binding_descriptions(&bindings)
+            .vertex_attribute_descriptions(&attributes);
+        let input_assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
+            .topology(PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST);
+        let viewport = vk::PipelineViewportStateCreateInfo::default()
+            .viewport_count(1)
+            .scissor_count(1);
+        let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
+        let multisample = vk::PipelineMultisampleStateCreateInfo::default()
+            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        // Without blending the attachment takes (C, 1 - T) itself.
+        let attachments = [vk::PipelineColorBlendAttachmentState::default()
+            .blend_enable(over)
+            .src_color_blend_factor(vk::BlendFactor::ONE)
+            .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
+            .src_alpha_blend_factor(vk::BlendFactor::ONE)
+            .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
+            .color_write_mask(vk::ColorComponentFlags::RGBA)];
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
+        let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
+        let formats = [format];
+        let mut rendering =
+            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+        let mut gaussian = PipelineGaussianStateCreateInfoGAURAST::default()
+            .spherical_harmonics_degree(settings.sh_degree)
+            .alpha_floor(settings.alpha_floor)
+            .transmittance_floor(settings.transmittance_floor)
+            .order(settings.order.raw())
+            .geometry(settings.geometry.raw())
+            .precision(settings.precision.raw())
+            .low_pass_variance(settings.geometry.low_pass_variance())
+            .attribute_locations(
+                GaussianAttributeLocationsGAURAST::default()
+                    .position(0)
+                    .scale(1)
+                    .rotation(2)
+                    .opacity(3)
+                    .first_spherical_harmonics(FIRST_SH),
+            );
+        let mut approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
+            .exponential_error(settings.exponential_error)
+            .contribution_budget(settings.contribution_budget);
+        let create_info = vk::GraphicsPipelineCreateInfo::default()
+            .vertex_input_state(&vertex_input)
+            .input_assembly_state(&input_assembly)
+            .viewport_state(&viewport)
+            .rasterization_state(&rasterization)
+            .multisample_state(&multisample)
+            .color_blend_state(&blend)
+            .dynamic_state(&dynamic)
+            .layout(layout)
+            .push_next(&mut gaussian)
+            .push_next(&mut approximation)
+            .push_next(&mut rendering);
+        // SAFETY: the structures are valid and live until the call returns.
+        let created = unsafe {
+            raw.create_graphics_pipelines(vk::PipelineCache::null(), &[create_info], None)
+        };
+        let handles = created
+            .map_err(|(_, result)| result)
+            .during("vkCreateGraphicsPipelines")?;
+        pipeline.handle = handles[0];
+        Ok(pipeline)
+    }
+
+    pub(super) fn handle(&self) -> vk::Pipeline {
+        self.handle
+    }
+}
+
+/// Where a Gaussian's numbers lie in the vertex buffers.
+fn attributes(sh_degree: u32) -> Vec<vk::VertexInputAttributeDescription> {
+    let attribute = |location: u32, binding: u32, format, offset: usize| {
+        vk::VertexInputAttributeDescription::default()
+            .location(location)
+            .binding(binding)
+            .format(format)
+            .offset(offset as u32)
+    };
+    let vec3 = vk::Format::R32G32B32_SFLOAT;
+    let vec4 = vk::Format::R32G32B32A32_SFLOAT;
+    let scalar = vk::Format::R32_SFLOAT;
+    let mut attributes = vec![
+        attribute(0, 0, vec3, 0),
+        attribute(1, 1, vec3, std::mem::offset_of!(GaussianShape, scale)),
+        attribute(2, 1, vec4, std::mem::offset_of!(GaussianShape, rotation)),
+        attribute(3, 1, scalar, std::mem::offset_of!(GaussianShape, opacity)),
+    ];
+    let coefficients = (sh_degree + 1).pow(2);
+    attributes.extend(
+        (0..coefficients)
+            .map(|k| attribute(FIRST_SH + k, 2, vec3, k as usize * size_of::<[f32; 3]>())),
+    );
+    attributes
+}
+
+impl Drop for GaussianPipeline {
+    fn drop(&mut self) {
+        let raw = self.device.raw();
+        // SAFETY: every submission has been waited for, so the device doesn't use the pipeline,
+        // which may be null.
+        unsafe {
+            raw.destroy_pipeline(self.handle, None);
+            raw.destroy_pipeline_layout(self.layout, None);
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! A camera with its picture's size.
+
+use gaurast::vk::{GaussianCameraGAURAST, GaussianCameraModelGAURAST};
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// The vertical field of view where none is given, in degrees.
+pub const DEFAULT_FOV: f64 = 50.0;
+
+/// How a camera projects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+pub enum Model {
+    /// Perspective.
+    #[default]
+    Pinhole,
+    /// Equidistant fisheye: focal lengths are pixels per radian.
+    Fisheye,
+    /// A panorama of longitude and latitude: focal lengths are pixels per radian.
+    Equirectangular,
+}
+
+/// A camera with its picture's size.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Camera {
+    /// How it projects.
+    #[serde(default)]
+    pub model: Model,
+    /// World to camera, row by row: the directions right, down and forward in the world.
+    pub rotation: [[f64; 3]; 3],
+    /// The camera's position in the world.
+    pub eye: [f64; 3],
+    /// Focal lengths along x and y, in pixels.
+    pub focal: [f64; 2],
+    /// The point straight ahead, in pixels from the picture's upper left corner.
+    pub principal: [f64; 2],
+    /// The picture's width in pixels.
+    pub width: u32,
+    /// The picture's height in pixels.
+    pub height: u32,
+}
+
+/// Why a camera given by hand is none.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum CameraError {
+    /// A number is infinite or not a number.
+    #[error("the camera has a number that is not finite")]
+    NotFinite,
+    /// The eye is the target.
+    #[error("the eye and the target are the same point")]
+    NoDirection,
+    /// Up is zero or along the line of sight.
+    #[error("up is zero, or along the line of sight")]
+    NoUp,
+    /// The field of view is not between 0 and 180 degrees.
+    #[error("the field of view is not between 0 and 180 degrees")]
+    FieldOfView,
+}
+
+impl Camera {
+    /// A camera at `eye` that looks at `target`, with `up` upwards in the picture. `fov` is the
+    /// vertical field of view in degrees; `size` the picture's in pixels.
+    ///
+    /// # Errors
+    /// See [`CameraError`].
+    pub fn look_at(
+        eye: [f64; 3],
+        target: [f64; 3],
+        up: [f64; 3],
+        fov: f64,
+        size: [u32; 2],
+    ) -> Result<Self, CameraError> {
+        let [position, target, up] = [eye, target, up].map(DVec3::from_array);
+        if !(position.is_finite() && target.is_finite() && up.is_finite() && fov.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        if fov <= 0.0 || fov >= 180.0 {
+            return Err(CameraError::FieldOfView);
+        }
+        let forward = (target - position)
+            .try_normalize()
+            .ok_or(CameraError::NoDirection)?;
+        let right = up
+            .try_normalize()
+            .map(|up| forward.cross(up))
+            .filter(|right| right.length() > 1e-9)
+            .ok_or(CameraError::NoUp)?
+            .normalize();
+        let down = forward.cross(right);
+        Ok(Self::new(
+            [right, down, forward].map(<[f64; 3]>::from),
+            eye,
+            fov,
+            size,
+        ))
+    }
+
+    /// A camera of vertical field of view `fov` in degrees, looking through its picture's centre.
+    pub(crate) fn new(rotation: [[f64; 3]; 3], eye: [f64; 3], fov: f64, size: [u32; 2]) -> Self {
+        let [width, height] = size.map(f64::from);
+        let focal = height / 2.0 / (fov.to_radians() / 2.0).tan();
+        Self {
+            model: Model::Pinhole,
+            rotation,
+            eye,
+            focal: [focal; 2],
+            principal: [width / 2.0, height / 2.0],
+            width: size[0],
+            height: size[1],
+        }
+    }
+
+    /// A fisheye with the same axes, whose vertical field of view is `fov` degrees.
+    #[must_use]
+    pub fn fisheye(&self, fov: f64) -> Self {
+        let height = f64::from(self.height);
+        Self {
+            model: Model::Fisheye,
+            focal: [height / fov.to_radians(); 2],
+            principal: [f64::from(self.width) / 2.0, height / 2.0],
+            ..*self
+        }
+    }
+
+    /// A panorama with the same axes: all 360 by 180 degrees fill the picture.
+    #[must_use]
+    pub fn panorama(&self) -> Self {
+        let [width, height] = [self.width, self.height].map(f64::from);
+        Self {
+            model: Model::Equirectangular,
+            focal: [width / std::f64::consts::TAU, height / std::f64::consts::PI],
+            principal: [width / 2.0, height / 2.0],
+            ..*self
+        }
+    }
+
+    /// The same view in a picture of another size: each axis is scaled on its own.
+    #[must_use]
+    pub fn resized(&self, [width, height]: [u32; 2]) -> Self {
+        let scale = [
+            f64::from(width) / f64::from(self.width),
+            f64::from(height) / f64::from(self.height),
+        ];
+        let scaled = |values: [f64; 2]| [values[0] * scale[0], values[1] * scale[1]];
+        Self {
+            focal: scaled(self.focal),
+            principal: scaled(self.principal),
+            width,
+            height,
+            ..*self
+        }
+    }
+
+    /// The camera turned by `angle` radians about an axis through `pivot`.
+    #[must_use]
+    pub fn turned(&self, pivot: [f64; 3], axis: [f64; 3], angle: f64) -> Self {
+        let pivot = DVec3::from_array(pivot);
+        let turn = DMat3::from_axis_angle(DVec3::from_array(axis).normalize(), angle);
+        let eye = pivot + turn * (DVec3::from_array(self.eye) - pivot);
+        Self {
+            rotation: self
+                .rotation
+                .map(|row| (turn * DVec3::from_array(row)).to_array()),
+            eye: eye.to_array(),
+            ..*self
+        }
+    }
+
+    /// `count` cameras evenly around the origin at a distance of 4, somewhat above it, that look
+    /// at it: a path for scenes that come without one.
+    pub fn orbit(count: usize, size: [u32; 2]) -> Vec<Self> {
+        let eye = DVec3::new(0.0, -0.35, -1.0).normalize() * 4.0;
+        let forward = -eye.normalize();
+        let right = DVec3::X;
+        let rotation = [right, forward.cross(right), forward].map(<[f64; 3]>::from);
+        let first = Self::new(rotation, eye.to_array(), DEFAULT_FOV, size);
+        (0..count)
+            .map(|i| i as f64 / count as f64 * std::f64::consts::TAU)
+            .map(|angle| first.turned([0.0; 3], [0.0, 1.0, 0.0], angle))
+            .collect()
+    }
+
+    /// Where `point` of the world appears, in pixels, to a pinhole, if it is in front of the camera.
+    pub fn project(&self, point: [f64; 3]) -> Option<[f64; 2]> {
+        let rotation = DMat3::from_cols_array_2d(&self.rotation).transpose();
+        let t = rotation * (DVec3::from_array(point) - DVec3::from_array(self.eye));
+        (t.z > 0.0).then(|| {
+            [
+                self.focal[0] * t.x / t.z + self.principal[0],
+                self.focal[1] * t.y / t.z + self.principal[1],
+            ]
+        })
+    }
+
+    /// The camera as a draw takes it, with the default planes: 0.2 and infinity.
+    pub fn to_vulkan(&self) -> GaussianCameraGAURAST<'static> {
+        let rotation = self.rotation.as_flattened();
+        let model = match self.model {
+            Model::Pinhole => GaussianCameraModelGAURAST::PINHOLE,
+            Model::Fisheye => GaussianCameraModelGAURAST::FISHEYE,
+            Model::Equirectangular => GaussianCameraModelGAURAST::EQUIRECTANGULAR,
+        };
+        GaussianCameraGAURAST::default()
+            .model(model)
+            .rotation(std::array::from_fn(|i| rotation[i] as f32))
+            .eye(self.eye)
+            .focal_length(self.focal.map(|f| f as f32))
+            .principal_point(self.principal.map(|c| c as f32))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn close(a: Option<[f64; 2]>, b: [f64; 2]) {
+        let a = a.expect("in front");
+        assert!(
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9),
+            "{a:?} {b:?}"
+        );
+    }
+
+    #[test]
+    fn look_at_puts_known_points_where_they_belong() {
+        // From (0, 0, -4) along +z with -y upwards: x is right, y is down.
+        let camera = Camera::look_at([0., 0., -4.], [0.; 3], [0., -1., 0.], 90.0, [200, 100])
+            .expect("a camera");
+        assert_eq!(camera.rotation, [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]]);
+        // A vertical field of view of 90 degrees: 4 ahead, 4 down is the lower edge.
+        close(camera.project([0., 4., 0.]), [100., 100.]);
+        close(camera.project([2., 0., 0.]), [125., 50.]);
+        assert_eq!(camera.project([0., 0., -5.]), None);
+
+        // Y-up world, from +z: x is right still, and up is up.
+        let camera = Camera::look_at([1., 1., 5.], [1., 1., 0.], [0., 1., 0.], 90.0, [200, 100])
+            .expect("a camera");
+        close(camera.project([1., 1., 0.]), [100., 50.]);
+        close(camera.project([2., 2., 0.]), [110., 40.]);
+    }
+
+    #[test]
+    fn cameras_that_are_none() {
+        let look = |eye, target, up, fov| Camera::look_at(eye, target, up, fov, [8, 8]).err();
+        let (o, z, y) = ([0.; 3], [0., 0., 1.], [0., 1., 0.]);
+        assert_eq!(look(o, o, y, 50.), Some(CameraError::NoDirection));
+        assert_eq!(look(o, z, z, 50.), Some(CameraError::NoUp));
+        assert_eq!(look(o, z, o, 50.), Some(CameraError::NoUp));
+        assert_eq!(look(o, z, y, 180.), Some(CameraError::FieldOfView));
+        assert_eq!(look(o, [f64::NAN; 3], y, 50.), Some(CameraError::NotFinite));
+    }
+
+    #[test]
+    fn resizing_scales_both_axes_separately() {
+        let camera = Camera::look_at([0.; 3], [0., 0., 1.], [0., -1., 0.], 60.0, [400, 300])
+            .expect("a camera");
+        let resized = camera.resized([800, 900]);
+        let point = [0.1, -0.2, 1.0];
+        let [x, y] = camera.project(point).expect("in front");
+        close(resized.project(point), [2.0 * x, 3.0 * y]);
+    }
+
+    #[test]
+    fn an_orbit_looks_at_the_middle_from_all_sides() {
+        let cameras = Camera::orbit(7, [64, 48]);
+        assert_eq!(cameras.len(), 7);
+        for camera in &cameras {
+            close(camera.project([0.; 3]), [32., 24.]);
+            // Up is up.
+            let [_, y] = camera.project([0., -0.5, 0.]).expect("in front");
+            assert!(y < 24.0);
+            let rows = DMat3::from_cols_array_2d(&camera.rotation);
+            assert!((rows.determinant() - 1.0).abs() < 1e-9);
+        }
+        assert!(cameras[0] != cameras[1]);
+    }
+
+    #[test]
+    fn a_panorama_fills_its_picture() {
+        let pinhole = Camera::orbit(1, [200, 100]).remove(0);
+        let panorama = pinhole.panorama();
+        assert_eq!(panorama.rotation, pinhole.rotation);
+        let turn = [
+            panorama.focal[0] * std::f64::consts::TAU,
+            panorama.focal[1] * std::f64::consts::PI,
+        ];
+        close(Some(turn), [200.0, 100.0]);
+        let fisheye = pinhole.fisheye(180.0);
+        close(
+            Some(fisheye.focal.map(|focal| focal * std::f64::consts::PI)),
+            [100.0; 2],
+        );
+        assert_eq!(
+            panorama.to_vulkan().model,
+            GaussianCameraModelGAURAST::EQUIRECTANGULAR
+        );
+    }
+
+    #[test]
+    fn vulkan_takes_the_same_camera() {
+        let camera =
+            Camera::look_at([3., 1., 2.], [0.; 3], [0., 0., 1.], 60.0, [64, 48]).expect("a camera");
+        let vulkan = camera.to_vulkan();
+        assert_eq!(vulkan.eye, [3., 1., 2.]);
+        assert_eq!(vulkan.rotation[5], camera.rotation[1][2] as f32);
+        assert_eq!(vulkan.principal_point, [32., 24.]);
+        assert_eq!((vulkan.near_plane, vulkan.far_plane), (0.2, f32::INFINITY));
+    }
+}

@@ -1,0 +1,222 @@
+//! What can be wrong with a scene file, and where.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+/// Why a scene could not be read. Displayed as one sentence: file, place, reason.
+#[derive(Debug, Error)]
+pub enum SceneError {
+    /// The file cannot be opened or read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Neither the name nor the first bytes tell what the file is.
+    #[error("{}: this is not a scene file of a known kind ({known})", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+        /// The extensions that are known, with commas between them.
+        known: String,
+    },
+    /// The format is known, but there is no reader for it.
+    #[error("{}: {format} files are not read yet", path.display())]
+    NotReadYet {
+        /// The file.
+        path: PathBuf,
+        /// The format's name.
+        format: &'static str,
+    },
+    /// The content is malformed.
+    #[error("{}: {place}: {reason}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Where in the file.
+        place: Place,
+        /// What is wrong there.
+        reason: Reason,
+    },
+}
+
+/// A place in a scene file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    File,
+    /// A line of text, counted from 1.
+    Line(u64),
+    /// A byte offset; in a compressed file, of the decompressed data.
+    Byte(u64),
+    /// The header, or a field of it.
+    Header(&'static str),
+    /// An element of a PLY file.
+    Element(String),
+    /// A property of an element of a PLY file.
+    Property {
+        /// The element's name.
+        element: String,
+        /// The property's name.
+        property: String,
+    },
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => f.write_str("the file"),
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+            Self::Header(field) => write!(f, "header, {field}"),
+            Self::Element(element) => write!(f, "element {element}"),
+            Self::Property { element, property } => {
+                write!(f, "element {element}, property {property}")
+            }
+        }
+    }
+}
+
+/// What is wrong at a [`Place`].
+#[derive(Debug, Error)]
+pub enum Reason {
+    /// The system failed to read.
+    #[error("{0}")]
+    Io(#[from] io::Error),
+    /// The first bytes are not the format's.
+    #[error("this is not {expected}")]
+    Magic {
+        /// What the file should be.
+        expected: &'static str,
+    },
+    /// A version that is unknown or not read.
+    #[error("version {found} is not one of those read ({read})")]
+    Version {
+        /// The file's version.
+        found: u32,
+        /// The versions that are read.
+        read: &'static str,
+    },
+    /// The header's text is malformed.
+    #[error("{0}")]
+    Header(String),
+    /// Something required is absent.
+    #[error("it is missing")]
+    Missing,
+    /// An element or a property is declared twice.
+    #[error("an element or a property is declared twice")]
+    Twice,
+    /// A property is a list.
+    #[error("it is a list, not a single number")]
+    List,
+    /// A property has another type than the format demands.
+    #[error("its type is {found}, not {expected}")]
+    Type {
+        /// The type in the file.
+        found: String,
+        /// The type that the format demands.
+        expected: &'static str,
+    },
+    /// The number of f_rest properties is not three times that of a whole degree.
+    #[error("{0} f_rest properties are not those of a whole spherical harmonics degree, 0 to 4")]
+    ShCount(usize),
+    /// A degree beyond 4.
+    #[error("spherical harmonics degree {0} exceeds 4")]
+    ShDegree(u32),
+    /// A text that is not a number.
+    #[error("{0:?} is not a number")]
+    Number(String),
+    /// Fewer or more values in a line than properties.
+    #[error("the line has {found} values, and its element has {expected} properties")]
+    Values {
+        /// Values in the line.
+        found: usize,
+        /// Properties of the element.
+        expected: usize,
+    },
+    /// A count that disagrees with another one.
+    #[error("it holds {found} entries, and {expected} are needed")]
+    Count {
+        /// Entries there are.
+        found: u64,
+        /// Entries there should be.
+        expected: u64,
+    },
+    /// The header claims more than the file can hold.
+    #[error("{claimed} bytes are claimed, and {available} are there")]
+    TooShort {
+        /// Bytes that the header's counts amount to (at least).
+        claimed: u64,
+        /// Bytes that are there (at most).
+        available: u64,
+    },
+    /// The data ends early.
+    #[error("the data ends here, too early")]
+    Truncated,
+    /// Data follows the end.
+    #[error("there is data after the end of the scene")]
+    Trailing,
+    /// A file size that is not whole records.
+    #[error("{len} bytes are not a whole number of {record}-byte records")]
+    Records {
+        /// The file's size in bytes.
+        len: u64,
+        /// A record's size in bytes.
+        record: u64,
+    },
+    /// The compressed stream is damaged.
+    #[error("the gzip stream is damaged ({0})")]
+    Gzip(io::Error),
+    /// A field holds a value outside its range.
+    #[error("{found} is outside {range}")]
+    Range {
+        /// The value.
+        found: u32,
+        /// The range.
+        range: &'static str,
+    },
+    /// There is no Gaussian.
+    #[error("it holds no Gaussians")]
+    Empty,
+    /// The format has no reader; becomes [`SceneError::NotReadYet`].
+    #[error("{0} files are not read yet")]
+    NotReadYet(&'static str),
+}
+
+impl Reason {
+    /// This reason, at `place`.
+    pub(crate) fn at(self, place: Place) -> Fault {
+        Fault {
+            place,
+            reason: self,
+        }
+    }
+}
+
+/// A [`SceneError`] before the file's name is known.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    pub(crate) place: Place,
+    pub(crate) reason: Reason,
+}
+
+impl Fault {
+    /// This fault, of the file `path`.
+    pub(crate) fn of(self, path: &Path) -> SceneError {
+        let path = path.to_owned();
+        match self.reason {
+            Reason::NotReadYet(format) => SceneError::NotReadYet { path, format },
+            Reason::Io(source) => SceneError::Io { path, source },
+            reason => SceneError::Malformed {
+                path,
+                place: self.place,
+                reason,
+            },
+        }
+    }
+}

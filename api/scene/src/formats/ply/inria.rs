@@ -1,0 +1,79 @@
+//! The PLY layout of the original 3DGS code (INRIA's): one `vertex` element, a property a number.
+//!
+//! Scales are logarithms, opacities logits, quaternions w, x, y, z and not normalised. `f_dc_*`
+//! are the constant coefficients; `f_rest_*` the others, channel by channel: all of red, then of
+//! green, then of blue. Properties may stand in any order, and any other ones are passed over.
+
+use super::table::{Column, Table};
+use crate::error::{Fault, Place, Reason};
+use crate::scene::{GaussianShape, MAX_SH_DEGREE, Scene, sh_coefficients, sigmoid};
+
+const VERTEX: &str = "vertex";
+
+/// The properties that every file has; `push` unpacks them in this order.
+const REQUIRED: [&str; 14] = [
+    "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity",
+    "f_dc_0", "f_dc_1", "f_dc_2",
+];
+
+/// Reads the scene.
+pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
+    let mut columns = REQUIRED
+        .iter()
+        .map(|property| table.column(VERTEX, property))
+        .collect::<Result<Vec<_>, _>>()?;
+    let (degree, rest) = rest_columns(&table, VERTEX)?;
+    columns.extend(rest);
+    let count = table.count(VERTEX)?;
+    if count == 0 {
+        return Err(Reason::Empty.at(Place::Element(VERTEX.to_owned())));
+    }
+    let mut scene = Scene::with_capacity(degree, count);
+    let mut sh = vec![[0.0; 3]; scene.sh_stride()];
+    table.read(VERTEX, &columns, |_, values| {
+        push(&mut scene, values, &mut sh);
+    })?;
+    Ok(scene)
+}
+
+fn push(scene: &mut Scene, values: &[f64], sh: &mut [[f32; 3]]) {
+    let (required, rest) = values.split_at(REQUIRED.len());
+    let shape = GaussianShape {
+        scale: std::array::from_fn(|axis| required[3 + axis].exp() as f32),
+        rotation: std::array::from_fn(|i| required[6 + i] as f32),
+        opacity: sigmoid(required[10]),
+    };
+    sh[0] = std::array::from_fn(|channel| required[11 + channel] as f32);
+    unpack_rest(rest, &mut sh[1..]);
+    scene.push(std::array::from_fn(|axis| required[axis] as f32), shape, sh);
+}
+
+/// Transposes channel-major `rest` into RGB triples.
+pub(super) fn unpack_rest(rest: &[f64], sh: &mut [[f32; 3]]) {
+    let per_channel = sh.len();
+    for (k, rgb) in sh.iter_mut().enumerate() {
+        *rgb = std::array::from_fn(|channel| rest[channel * per_channel + k] as f32);
+    }
+}
+
+/// The degree that `element` stores and its columns `f_rest_0`, `f_rest_1`, ...
+pub(super) fn rest_columns(
+    table: &Table<'_, '_>,
+    element: &str,
+) -> Result<(u32, Vec<Column>), Fault> {
+    let count = table.element(element).map_or(0, |definition| {
+        definition
+            .properties
+            .keys()
+            .filter(|name| name.starts_with("f_rest_"))
+            .count()
+    });
+    // A gap in the numbering shows as a missing property.
+    let columns = (0..count)
+        .map(|i| table.column(element, &format!("f_rest_{i}")))
+        .collect::<Result<Vec<_>, _>>()?;
+    let degree = (0..=MAX_SH_DEGREE)
+        .find(|degree| 3 * (sh_coefficients(*degree) - 1) == count)
+        .ok_or_else(|| Reason::ShCount(count).at(Place::Element(element.to_owned())))?;
+    Ok((degree, columns))
+}

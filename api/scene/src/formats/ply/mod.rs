@@ -1,0 +1,35 @@
+//! PLY files: the layout of the original 3DGS code, and PlayCanvas's compressed one.
+
+mod compressed;
+mod inria;
+mod table;
+
+use super::input::{Format, Input};
+use crate::error::Fault;
+use crate::scene::Scene;
+
+/// The format. Which layout it is, the header's elements tell.
+pub(in crate::formats) struct Ply;
+
+impl Format for Ply {
+    fn name(&self) -> &'static str {
+        "PLY"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["ply"]
+    }
+
+    fn magic(&self) -> Option<&'static [u8]> {
+        Some(b"ply")
+    }
+
+    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+        let table = table::Table::open(input)?;
+        if table.element("chunk").is_some() {
+            compressed::load(table)
+        } else {
+            inria::load(table)
+        }
+    }
+}

@@ -1,0 +1,352 @@
+//! A PLY file as a row of tables: named elements with named columns of numbers.
+//!
+//! The header is `ply-rs-bw`'s to parse. The payload is read here, because that library hands
+//! over every single number with its property's name: the 62 name look-ups per Gaussian cost
+//! several times as much as everything else, and its text grammar knows neither `nan` nor `inf`.
+
+use std::io::Cursor;
+
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, Header, PropertyType, ScalarType};
+
+use crate::error::{Fault, Place, Reason};
+use crate::formats::input::Input;
+
+/// The longest header that is read, in bytes. Real ones have a few thousand.
+const MAX_HEADER: usize = 1 << 20;
+
+/// The longest line of a text payload that is read, in bytes.
+const MAX_LINE: u64 = 1 << 16;
+
+/// Bytes read at once from a binary payload, about.
+const BLOCK: usize = 1 << 16;
+
+/// An opened PLY file, whose elements are read in the order of the file.
+pub(super) struct Table<'i, 'a> {
+    input: &'i mut Input<'a>,
+    header: Header,
+    /// The index of the element that comes next.
+    next: usize,
+    /// Lines consumed, in a text file.
+    lines: u64,
+}
+
+/// Which column of an element, and the type of its numbers.
+#[derive(Clone)]
+pub(super) struct Column {
+    index: usize,
+    offset: usize,
+    kind: ScalarType,
+}
+
+impl<'i, 'a> Table<'i, 'a> {
+    /// Reads the header and checks that the file can hold what it claims.
+    pub(super) fn open(input: &'i mut Input<'a>) -> Result<Self, Fault> {
+        let text = header_text(input)?;
+        let header = Parser::<DefaultElement>::new()
+            .read_header(&mut Reader::new(Cursor::new(&text)))
+            .map_err(|error| {
+                let place = error
+                    .line()
+                    .map_or(Place::Header("its text"), |line| Place::Line(line as u64));
+                Reason::Header(first_sentence(&error.to_string())).at(place)
+            })?;
+        // The library keeps the last of two declarations of one name.
+        let declared = |keyword: &[u8]| {
+            text.split(|byte| *byte == b'\n')
+                .filter(|line| line.trim_ascii_start().starts_with(keyword))
+                .count()
+        };
+        let properties: usize = header.elements.values().map(|e| e.properties.len()).sum();
+        if declared(b"element ") > header.elements.len() || declared(b"property ") > properties {
+            return Err(Reason::Twice.at(Place::Header("its declarations")));
+        }
+        let lines = text.iter().filter(|byte| **byte == b'\n').count() as u64;
+        Ok(Self {
+            input,
+            header,
+            next: 0,
+            lines,
+        })
+    }
+
+    /// The element `name`, if there is one.
+    pub(super) fn element(&self, name: &str) -> Option<&ElementDef> {
+        self.header.elements.get(name)
+    }
+
+    /// The number of rows of element `name`, which the rest of the file is long enough to hold
+    /// together with everything before it.
+    pub(super) fn count(&self, name: &str) -> Result<usize, Fault> {
+        let element = || Place::Element(name.to_owned());
+        let index = self
+            .header
+            .elements
+            .get_index_of(name)
+            .ok_or_else(|| Reason::Missing.at(element()))?;
+        let mut claimed = 0_u64;
+        let coming = self.header.elements.values().take(index + 1);
+        for definition in coming.skip(self.next) {
+            let row = match self.header.encoding {
+                // A digit and a separator each; the last line may lack its end.
+                Encoding::Ascii => 2 * definition.properties.len() as u64,
+                _ => stride(definition)? as u64,
+            };
+            claimed = row
+                .max(1)
+                .checked_mul(definition.count as u64)
+                .and_then(|bytes| bytes.checked_add(claimed))
+                .unwrap_or(u64::MAX);
+        }
+        let claimed = claimed - u64::from(self.header.encoding == Encoding::Ascii && claimed > 0);
+        let available = self.input.remaining();
+        if claimed > available {
+            return Err(Reason::TooShort { claimed, available }.at(element()));
+        }
+        Ok(self.header.elements[index].count)
+    }
+
+    /// Column `property` of element `element`.
+    pub(super) fn column(&self, element: &str, property: &str) -> Result<Column, Fault> {
+        let place = || Place::Property {
+            element: element.to_owned(),
+            property: property.to_owned(),
+        };
+        let definition = self
+            .element(element)
+            .ok_or_else(|| Reason::Missing.at(Place::Element(element.to_owned())))?;
+        let mut offset = 0;
+        for (index, found) in definition.properties.values().enumerate() {
+            let wanted = found.name == property;
+            match &found.data_type {
+                PropertyType::Scalar(kind) if wanted => {
+                    let kind = kind.clone();
+                    return Ok(Column {
+                        index,
+                        offset,
+                        kind,
+                    });
+                }
+                PropertyType::List(..) if wanted => return Err(Reason::List.at(place())),
+                PropertyType::Scalar(kind) => offset += size(kind),
+                // `read` refuses the element; until then the offset doesn't matter.
+                PropertyType::List(..) => {}
+            }
+        }
+        Err(Reason::Missing.at(place()))
+    }
+
+    /// The same, of type `kind`.
+    pub(super) fn column_of(
+        &self,
+        element: &str,
+        property: &str,
+        kind: &ScalarType,
+        expected: &'static str,
+    ) -> Result<Column, Fault> {
+        let column = self.column(element, property)?;
+        if column.kind == *kind {
+            return Ok(column);
+        }
+        let found = format!("{:?}", column.kind).to_lowercase();
+        Err(Reason::Type { found, expected }.at(Place::Property {
+            element: element.to_owned(),
+            property: property.to_owned(),
+        }))
+    }
+
+    /// Reads element `name`: calls `each` with a row's index and its values of `columns`. A
+    /// binary64 holds every type's values exactly. Elements before it are passed over; those
+    /// before the last element read are gone.
+    pub(super) fn read(
+        &mut self,
+        name: &str,
+        columns: &[Column],
+        mut each: impl FnMut(usize, &[f64]),
+    ) -> Result<(), Fault> {
+        self.count(name)?;
+        let index = self
+            .header
+            .elements
+            .get_index_of(name)
+            .filter(|index| *index >= self.next)
+            .ok_or_else(|| {
+                Reason::Header("it stands before an element that it depends on".to_owned())
+                    .at(Place::Element(name.to_owned()))
+            })?;
+        for passed in self.next..index {
+            self.read_element(passed, &[], &mut |_, _| {})?;
+        }
+        self.next = index + 1;
+        self.read_element(index, columns, &mut each)
+    }
+
+    fn read_element(
+        &mut self,
+        index: usize,
+        columns: &[Column],
+        each: &mut impl FnMut(usize, &[f64]),
+    ) -> Result<(), Fault> {
+        let element = self.header.elements[index].clone();
+        match self.header.encoding {
+            Encoding::Ascii => self.read_text(&element, columns, each),
+            Encoding::BinaryLittleEndian => {
+                self.read_binary(&element, columns, each, number::<false>)
+            }
+            Encoding::BinaryBigEndian => self.read_binary(&element, columns, each, number::<true>),
+        }
+    }
+
+    fn read_binary(
+        &mut self,
+        element: &ElementDef,
+        columns: &[Column],
+        each: &mut impl FnMut(usize, &[f64]),
+        number: impl Fn(&Column, &[u8]) -> f64,
+    ) -> Result<(), Fault> {
+        let stride = stride(element)?;
+        if stride == 0 {
+            return Ok(());
+        }
+        let rows_per_block = (BLOCK / stride).max(1);
+        let mut block = vec![0; rows_per_block * stride];
+        let mut values = vec![0.0; columns.len()];
+        let mut row = 0;
+        while row < element.count {
+            let rows = rows_per_block.min(element.count - row);
+            let block = &mut block[..rows * stride];
+            self.input.fill(block)?;
+            for bytes in block.chunks_exact(stride) {
+                for (value, column) in values.iter_mut().zip(columns) {
+                    *value = number(column, bytes);
+                }
+                each(row, &values);
+                row += 1;
+            }
+        }
+        Ok(())
+    }
+
+    fn read_text(
+        &mut self,
+        element: &ElementDef,
+        columns: &[Column],
+        each: &mut impl FnMut(usize, &[f64]),
+    ) -> Result<(), Fault> {
+        stride(element)?;
+        let mut line = Vec::new();
+        let mut values = vec![0.0; columns.len()];
+        for row in 0..element.count {
+            self.lines += 1;
+            let at_line = |reason: Reason, line| reason.at(Place::Line(line));
+            line.clear();
+            self.input.line(&mut line, MAX_LINE)?;
+            if line.is_empty() {
+                return Err(at_line(Reason::Truncated, self.lines));
+            }
+            let text = String::from_utf8_lossy(&line);
+            let words: Vec<&str> = text.split_ascii_whitespace().collect();
+            if words.len() != element.properties.len() {
+                let (found, expected) = (words.len(), element.properties.len());
+                return Err(at_line(Reason::Values { found, expected }, self.lines));
+            }
+            for (value, column) in values.iter_mut().zip(columns) {
+                let word = words[column.index];
+                *value = text_number(&column.kind, word)
+                    .ok_or_else(|| at_line(Reason::Number(word.to_owned()), self.lines))?;
+            }
+            each(row, &values);
+        }
+        Ok(())
+    }
+}
+
+/// The header's bytes, up to and including the line `end_header`.
+fn header_text(input: &mut Input<'_>) -> Result<Vec<u8>, Fault> {
+    let mut text = Vec::new();
+    loop {
+        let start = text.len();
+        input.line(&mut text, (MAX_HEADER - start) as u64)?;
+        let line = text[start..].trim_ascii();
+        if start == 0 && line != b"ply" {
+            let expected = "a PLY file";
+            return Err(Reason::Magic { expected }.at(Place::Byte(0)));
+        }
+        if line == b"end_header" {
+            return Ok(text);
+        }
+        if text.len() == start {
+            return Err(Reason::Truncated.at(Place::Header("before end_header")));
+        }
+    }
+}
+
+/// The library's messages go on with the line's text and the parser's state.
+fn first_sentence(message: &str) -> String {
+    let message = message.lines().next().unwrap_or_default();
+    let message = message
+        .strip_prefix("Line ")
+        .and_then(|rest| rest.split_once(": "))
+        .map_or(message, |(_, rest)| rest);
+    message.trim_end_matches('.').to_owned()
+}
+
+/// The size of a row in bytes; an element with lists has none.
+fn stride(element: &ElementDef) -> Result<usize, Fault> {
+    element
+        .properties
+        .values()
+        .map(|property| match &property.data_type {
+            PropertyType::Scalar(kind) => Ok(size(kind)),
+            PropertyType::List(..) => Err(Reason::List.at(Place::Property {
+                element: element.name.clone(),
+                property: property.name.clone(),
+            })),
+        })
+        .sum()
+}
+
+fn size(kind: &ScalarType) -> usize {
+    match kind {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
+}
+
+/// The value of `column` in a binary row.
+fn number<const BIG_ENDIAN: bool>(column: &Column, row: &[u8]) -> f64 {
+    fn bytes<const N: usize, const BIG_ENDIAN: bool>(column: &Column, row: &[u8]) -> [u8; N] {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(&row[column.offset..][..N]);
+        if BIG_ENDIAN {
+            bytes.reverse();
+        }
+        bytes
+    }
+    match column.kind {
+        ScalarType::Float => f64::from(f32::from_le_bytes(bytes::<4, BIG_ENDIAN>(column, row))),
+        ScalarType::Double => f64::from_le_bytes(bytes::<8, BIG_ENDIAN>(column, row)),
+        ScalarType::Char => f64::from(i8::from_le_bytes(bytes::<1, BIG_ENDIAN>(column, row))),
+        ScalarType::UChar => f64::from(u8::from_le_bytes(bytes::<1, BIG_ENDIAN>(column, row))),
+        ScalarType::Short => f64::from(i16::from_le_bytes(bytes::<2, BIG_ENDIAN>(column, row))),
+        ScalarType::UShort => f64::from(u16::from_le_bytes(bytes::<2, BIG_ENDIAN>(column, row))),
+        ScalarType::Int => f64::from(i32::from_le_bytes(bytes::<4, BIG_ENDIAN>(column, row))),
+        ScalarType::UInt => f64::from(u32::from_le_bytes(bytes::<4, BIG_ENDIAN>(column, row))),
+    }
+}
+
+/// The value of `word` as a number of type `kind`; `nan` and `inf` are numbers here.
+fn text_number(kind: &ScalarType, word: &str) -> Option<f64> {
+    match kind {
+        ScalarType::Float => word.parse::<f32>().ok().map(f64::from),
+        ScalarType::Double => word.parse().ok(),
+        ScalarType::Char => word.parse::<i8>().ok().map(f64::from),
+        ScalarType::UChar => word.parse::<u8>().ok().map(f64::from),
+        ScalarType::Short => word.parse::<i16>().ok().map(f64::from),
+        ScalarType::UShort => word.parse::<u16>().ok().map(f64::from),
+        ScalarType::Int => word.parse::<i32>().ok().map(f64::from),
+        ScalarType::UInt => word.parse::<u32>().ok().map(f64::from),
+    }
+}

@@ -1,0 +1,64 @@
+//! The `.splat` format of antimatter15's viewer: records of 32 bytes and nothing else.
+//!
+//! A record is position (3 floats), scale (3 floats, linear), colour and opacity (4 bytes, 0 to
+//! 255) and a quaternion w, x, y, z (4 bytes, 128 being zero), little-endian. The frame is that
+//! of PLY files.
+
+use super::input::{Format, Input};
+use crate::error::{Fault, Place, Reason};
+use crate::scene::{GaussianShape, SH_C0, Scene};
+
+/// The format.
+pub(super) struct Splat;
+
+/// Bytes of one Gaussian.
+const RECORD: usize = 32;
+
+impl Format for Splat {
+    fn name(&self) -> &'static str {
+        "splat"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["splat"]
+    }
+
+    fn magic(&self) -> Option<&'static [u8]> {
+        None
+    }
+
+    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+        let len = input.size();
+        if len == 0 {
+            return Err(Reason::Empty.at(Place::File));
+        }
+        if !len.is_multiple_of(RECORD as u64) {
+            let record = RECORD as u64;
+            return Err(Reason::Records { len, record }.at(Place::File));
+        }
+        let count = len / RECORD as u64;
+        let mut scene = Scene::with_capacity(0, count as usize);
+        let mut record = [0; RECORD];
+        for _ in 0..count {
+            input.fill(&mut record)?;
+            push(&mut scene, &record);
+        }
+        Ok(scene)
+    }
+}
+
+fn push(scene: &mut Scene, record: &[u8; RECORD]) {
+    let float =
+        |index: usize| f32::from_le_bytes(std::array::from_fn(|byte| record[4 * index + byte]));
+    let colour = |channel: usize| ((f64::from(record[24 + channel]) / 255.0 - 0.5) / SH_C0) as f32;
+    let shape = GaussianShape {
+        scale: std::array::from_fn(|axis| float(3 + axis)),
+        rotation: std::array::from_fn(|i| (f32::from(record[28 + i]) - 128.0) / 128.0),
+        opacity: f32::from(record[27]) / 255.0,
+    };
+    scene.push(
+        std::array::from_fn(float),
+        shape,
+        &[std::array::from_fn(colour)],
+    );
+}

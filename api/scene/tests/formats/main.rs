@@ -1,0 +1,169 @@
+//! Scene files: real ones, small ones with known values, malformed ones, and damaged ones.
+
+mod ply;
+mod spz;
+mod support;
+
+use std::path::Path;
+
+use gaurast_runner::{Case, Need, Variant};
+use gaurast_scene::{Reason, SceneError};
+use proptest::prelude::*;
+
+use support::*;
+
+#[gaurast_runner::test]
+fn splat_values() {
+    let mut file = Vec::new();
+    for value in [1.0_f32, -2.0, 3.0, 0.1, 0.2, 0.3] {
+        file.extend(value.to_le_bytes());
+    }
+    file.extend([255, 0, 51, 102]);
+    file.extend([192, 128, 64, 0]);
+    let scene = read("a.splat", &file).expect("a good file");
+    assert_eq!(scene.positions(), [[1.0, -2.0, 3.0]]);
+    let shape = scene.shapes()[0];
+    assert_eq!(shape.scale, [0.1, 0.2, 0.3]);
+    assert_eq!(shape.rotation, [0.5, 0.0, -0.5, -1.0]);
+    assert_eq!(shape.opacity, 0.4);
+    let colour = scene.sh()[0].map(|c| 0.5 + SH_C0 * c);
+    close(&colour, &[1.0, 0.0, 0.2], 1e-6);
+
+    file.pop();
+    assert!(matches!(
+        refusal("a.splat", &file).1,
+        Reason::Records {
+            len: 31,
+            record: 32
+        }
+    ));
+    assert!(matches!(refusal("a.splat", &[]).1, Reason::Empty));
+}
+
+/// Real scenes with their numbers of Gaussians and degrees of spherical harmonics.
+const REAL_SCENES: [(&str, usize, u32); 8] = [
+    ("splats/skull.ply", 94_936, 3),
+    ("splats/playbot-125k.ply", 125_000, 2),
+    ("splats/plant.splat", 14_007, 0),
+    ("splats/guitar.compressed.ply", 90_854, 0),
+    ("splats/yashica-t4-top8192.ply", 8192, 3),
+    ("splats/yashica-t4-top8192.spz", 8192, 3),
+    ("splats/leica-sofort-top8192.ply", 8192, 3),
+    ("splats/leica-sofort-top8192.spz", 8192, 3),
+];
+
+fn real_scenes() -> Vec<Variant> {
+    let variant = |(file, ..): (&'static str, usize, u32)| Variant {
+        name: file.to_owned(),
+        needs: vec![Need::Data(file)],
+    };
+    REAL_SCENES.map(variant).into()
+}
+
+#[gaurast_runner::test(each = real_scenes())]
+fn real_scenes_are_read(case: &Case) {
+    let (file, count, degree) = REAL_SCENES
+        .into_iter()
+        .find(|(file, ..)| *file == case.variant())
+        .expect("a scene");
+    let scene = gaurast_scene::open(gaurast_runner::data(file)).expect("a good file");
+    assert_eq!((scene.len(), scene.sh_degree()), (count, degree));
+    let sane = scene
+        .positions()
+        .iter()
+        .zip(scene.shapes())
+        .filter(|(p, s)| {
+            p.iter().all(|c| c.abs() < 1e3)
+                && s.scale.iter().all(|c| (0.0..1e2).contains(c))
+                && (0.0..=1.0).contains(&s.opacity)
+                && s.rotation.iter().any(|c| c.abs() > 1e-3)
+        });
+    assert!(sane.count() > count * 99 / 100);
+}
+
+#[gaurast_runner::test]
+fn formats_that_are_not_read_and_unknown_ones_are_named() {
+    let not_read = |name: &str, bytes: &[u8]| match read(name, bytes) {
+        Err(SceneError::NotReadYet { format, .. }) => format,
+        other => panic!("{name}: {other:?}"),
+    };
+    assert_eq!(not_read("a.sog", b"PK\x03\x04"), "SOG");
+    assert_eq!(not_read("A.GLTF", b"{}"), "glTF");
+    assert_eq!(not_read("a", b"glTF\x02"), "binary glTF");
+    let error = read("a.txt", b"hello").expect_err("unknown");
+    assert!(matches!(error, SceneError::UnknownFormat { .. }));
+    assert!(error.to_string().contains(".splat"), "{error}");
+    let (properties, rows) = distinct(0, 1);
+    let file = ply(Encoding::Little, &properties, &rows);
+    assert_eq!(
+        read("no extension", &file)
+            .expect("by its first bytes")
+            .len(),
+        1
+    );
+    let missing = gaurast_scene::open(Path::new("no/such/file.ply")).expect_err("missing");
+    assert!(matches!(missing, SceneError::Io { .. }));
+}
+
+/// Small good files of every kind.
+fn good_files() -> Vec<(&'static str, Vec<u8>)> {
+    let (properties, rows) = distinct(1, 2);
+    let spz = [spz_header(3, 2, 1, 0), vec![99; 2 * 29]].concat();
+    vec![
+        ("ascii.ply", ply(Encoding::Ascii, &properties, &rows)),
+        ("little.ply", ply(Encoding::Little, &properties, &rows)),
+        ("big.ply", ply(Encoding::Big, &properties, &rows)),
+        ("compressed.ply", compressed_ply(true, true)),
+        ("a.spz", gzip(&spz)),
+        ("a.splat", vec![77; 64]),
+    ]
+}
+
+#[gaurast_runner::test]
+fn every_truncation_of_a_good_file_is_refused() {
+    for (name, file) in good_files() {
+        let whole = read(name, &file).expect("a good file");
+        let last_word = file.trim_ascii_end().iter().rposition(|b| *b == b' ');
+        for len in 0..file.len() {
+            match read(name, &file[..len]) {
+                Err(_) => {}
+                // Fewer records, or a text whose last number may have lost digits.
+                Ok(part) => assert!(
+                    name == "a.splat" && part.len() < whole.len()
+                        || name == "ascii.ply" && Some(len) > last_word.map(|i| i + 1),
+                    "{name} cut to {len} bytes of {}",
+                    file.len()
+                ),
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 4000,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(3),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    /// No flip of bytes makes a reader panic, or hold more than the file could.
+    #[gaurast_runner::test]
+    fn flipped_bytes_never_panic(
+        which in 0_usize..6,
+        flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let (name, mut file) = good_files().swap_remove(which);
+        for (index, byte) in flips {
+            let index = index.index(file.len());
+            file[index] = byte;
+        }
+        if let Ok(scene) = read(name, &file) {
+            prop_assert!(scene.len() <= file.len());
+        }
+    }
+}
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}

@@ -1,0 +1,218 @@
+//! SPZ files.
+
+use gaurast_runner::data;
+use gaurast_scene::{Place, Reason, SceneError};
+
+use super::support::*;
+
+#[gaurast_runner::test]
+fn malformed_spz_is_refused_with_place_and_reason() {
+    let body = [7; 19];
+    let good = |flags| [spz_header(2, 1, 0, flags), body.to_vec()].concat();
+    assert_eq!(
+        read("a.spz", &gzip(&good(0))).expect("a good file").len(),
+        1
+    );
+
+    let trailing = [good(0), b"EXTRA!".to_vec()].concat();
+    let (place, reason) = refusal("a.spz", &gzip(&trailing));
+    assert_eq!(place, Place::Byte(35));
+    assert!(matches!(reason, Reason::Trailing));
+    // With the flag, what follows are extension records.
+    let extended = [good(2), b"EXTRA!".to_vec()].concat();
+    assert_eq!(
+        read("a.spz", &gzip(&extended)).expect("a good file").len(),
+        1
+    );
+    let junk = [gzip(&good(0)), b"JUNK".to_vec()].concat();
+    assert!(matches!(refusal("a.spz", &junk).1, Reason::Trailing));
+
+    let mut bad_sum = gzip(&good(0));
+    let sum = bad_sum.len() - 8;
+    bad_sum[sum] ^= 0xff;
+    assert!(matches!(refusal("a.spz", &bad_sum).1, Reason::Gzip(_)));
+
+    let (place, reason) = refusal("a.spz", &spz_header(4, 100, 1, 0));
+    assert_eq!(place, Place::Header("version"));
+    assert!(matches!(reason, Reason::Version { found: 4, .. }));
+
+    // A bomb: the header claims little, and a gigabyte follows.
+    let bomb = [good(2), vec![0; 64 << 20]].concat();
+    assert!(matches!(refusal("a.spz", &gzip(&bomb)).1, Reason::Trailing));
+    // And one whose header claims what its size could just hold, but doesn't.
+    let claim = gzip(&spz_header(2, 1800, 0, 0));
+    let (place, reason) = refusal("a.spz", &claim);
+    assert!(matches!(
+        (place, reason),
+        (Place::Byte(16), Reason::Truncated)
+    ));
+}
+
+#[gaurast_runner::test]
+fn malformed_spz_fixtures_are_refused() {
+    let refused: &[(&str, IsReason)] = &[
+        ("bad-fhcrc-v2", |r| matches!(r, Reason::Gzip(_))),
+        ("corrupt-deflate", |r| matches!(r, Reason::Gzip(_))),
+        ("empty-points-v2", |r| matches!(r, Reason::Empty)),
+        ("gzip-not-spz", |r| matches!(r, Reason::Magic { .. })),
+        ("huge-count-v2", |r| matches!(r, Reason::TooShort { .. })),
+        ("plaintext-v2", |r| matches!(r, Reason::Magic { .. })),
+        ("sh-degree-5-v2", |r| matches!(r, Reason::ShDegree(5))),
+        ("trailing-decompressed-v2", |r| {
+            matches!(r, Reason::Trailing)
+        }),
+        ("truncated-gzip-header", |r| matches!(r, Reason::Truncated)),
+        ("version-0", |r| {
+            matches!(r, Reason::Version { found: 0, .. })
+        }),
+    ];
+    let fixtures = data("fixtures");
+    for (name, is_reason) in refused {
+        let path = fixtures.join(format!("{name}.spz"));
+        let error = gaurast_scene::open(&path).expect_err(name);
+        let SceneError::Malformed { reason, .. } = &error else {
+            panic!("{name}: {error}");
+        };
+        assert!(is_reason(reason), "{name}: {error}");
+        assert_eq!(error.to_string().lines().count(), 1, "{name}: {error}");
+    }
+}
+
+/// The fixture's four Gaussians sit on the format's grid; these are the formulas that made it.
+#[gaurast_runner::test]
+fn spz_fixture_holds_the_values_that_made_it() {
+    let path = data("fixtures/equiv-degree3-exact-v2.spz");
+    let scene = gaurast_scene::open(&path).expect("a good file");
+    assert_eq!((scene.len(), scene.sh_degree()), (4, 3));
+    let rotations: [[f32; 4]; 4] = [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.9, 0.3, -0.2, 0.1],
+        [0.6, -0.5, 0.5, -0.377],
+        [0.5, 0.5, -0.5, 0.5],
+    ];
+    for (n, i) in (0_i32..4).enumerate() {
+        let units = [
+            (i - 1) * 1024 + 37,
+            (1 - i) * 2048 - 61,
+            (i * i - 2) * 512 + 13,
+        ];
+        let [x, y, z] = units.map(|u| u as f32 / 4096.0);
+        assert_eq!(scene.positions()[n], [x, -y, -z]);
+        let steps = [i - 16, 8 - 2 * i, 3 * i];
+        let shape = scene.shapes()[n];
+        close(&shape.scale, &steps.map(|s| (s as f32 / 16.0).exp()), 1e-6);
+        close(&[shape.opacity], &[(25 + 60 * i) as f32 / 255.0], 1e-6);
+        let length = rotations[n].iter().map(|c| c * c).sum::<f32>().sqrt();
+        let [w, x, y, z] = rotations[n].map(|c| c / length);
+        close(&shape.rotation, &[w, x, -y, -z], 8e-3);
+        let bytes = [40 + 7 * i, 128 + 3 * i, 210 - 11 * i];
+        close(
+            &scene.sh()[16 * n],
+            &bytes.map(|b| (b as f32 - 127.5) / 38.25),
+            1e-5,
+        );
+        for (k, sign) in TURN.iter().enumerate() {
+            let k_i = k as i32;
+            let bytes = [
+                13 * k_i + 5 * i,
+                200 - 9 * k_i + 4 * i,
+                128 + 17 * k_i - 6 * i,
+            ]
+            .map(|b| 1 + b.rem_euclid(255));
+            let expected = bytes.map(|b| sign * (b as f32 - 128.0) / 128.0);
+            assert_eq!(
+                scene.sh()[16 * n + 1 + k],
+                expected,
+                "coefficient {k} of {n}"
+            );
+        }
+    }
+}
+
+/// One Gaussian stored as a PLY file and as SPZ of each version is the same Gaussian.
+#[gaurast_runner::test]
+fn spz_and_ply_of_one_gaussian_agree() {
+    let rest: Vec<u8> = (0..45).map(|i| 60 + 3 * i).collect();
+    let (colour, scales, opacity) = ([40, 128, 210], [144, 160, 176], 200);
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    // Right-up-back.
+    let (position, quaternion) = ([0.5, -2.25, 1.0], [half, 0.0, half, 0.0]);
+    for version in 1..=3 {
+        let mut file = spz_header(version, 1, 3, 0);
+        for value in position {
+            if version == 1 {
+                file.extend(half::f16::from_f32(value).to_le_bytes());
+            } else {
+                file.extend(&((value * 4096.0) as i32).to_le_bytes()[..3]);
+            }
+        }
+        file.push(opacity);
+        file.extend(colour);
+        file.extend(scales);
+        if version < 3 {
+            file.extend(
+                quaternion[1..]
+                    .iter()
+                    .map(|c| (c * 127.5 + 127.5).round() as u8),
+            );
+        } else {
+            // The largest is y (index 1); x and z are zero, w is at its maximum.
+            file.extend((1_u32 << 30 | 511).to_le_bytes());
+        }
+        file.extend(&rest);
+        let spz = read("a.spz", &gzip(&file)).expect("a good file");
+
+        let opacity = f32::from(opacity) / 255.0;
+        let mut row = vec![position[0], -position[1], -position[2]];
+        row.extend(scales.map(|b| f32::from(b) / 16.0 - 10.0));
+        row.extend([quaternion[0], quaternion[1], -quaternion[2], -quaternion[3]]);
+        row.push((opacity / (1.0 - opacity)).ln());
+        row.extend(colour.map(|b| (f32::from(b) - 127.5) / 38.25));
+        for channel in 0..3 {
+            row.extend(
+                (0..15).map(|k| TURN[k] * (f32::from(rest[3 * k + channel]) - 128.0) / 128.0),
+            );
+        }
+        let (properties, _) = distinct(3, 0);
+        let ply = read("a.ply", &ply(Encoding::Little, &properties, &[row])).expect("a good file");
+
+        assert_eq!(spz.positions(), ply.positions(), "version {version}");
+        close(&spz.shapes()[0].scale, &ply.shapes()[0].scale, 1e-7);
+        close(&spz.shapes()[0].rotation, &ply.shapes()[0].rotation, 8e-3);
+        close(&[spz.shapes()[0].opacity], &[ply.shapes()[0].opacity], 1e-6);
+        close(spz.sh().as_flattened(), ply.sh().as_flattened(), 1e-5);
+    }
+}
+
+#[gaurast_runner::test]
+fn good_spz_fixtures_are_read() {
+    let fixtures = data("fixtures");
+    for (name, count, degree) in [
+        ("minimal-v1", 1, 0),
+        ("minimal-v3", 1, 0),
+        ("decode-v1", 1, 0),
+        ("decode-degree1-v2", 2, 1),
+        ("three-points-degree1-v2", 3, 1),
+        ("degree3-v2", 1, 3),
+        ("decode-degree4-v2", 1, 4),
+    ] {
+        let path = fixtures.join(format!("{name}.spz"));
+        let scene = gaurast_scene::open(&path).expect(name);
+        assert_eq!((scene.len(), scene.sh_degree()), (count, degree), "{name}");
+    }
+}
+
+/// Inside the gzip stream of an SPZ file, where a flip outside would only break its sum.
+#[gaurast_runner::test]
+fn every_header_byte_of_spz_may_be_anything() {
+    let good = [spz_header(2, 1, 1, 0), vec![7; 28]].concat();
+    for position in 0..16 {
+        for byte in 0..=255 {
+            let mut file = good.clone();
+            file[position] = byte;
+            if let Ok(scene) = read("a.spz", &gzip(&file)) {
+                assert_eq!(scene.len(), 1);
+            }
+        }
+    }
+}

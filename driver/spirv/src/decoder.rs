@@ -1,0 +1,215 @@
+//! From words to instructions, by the grammar. The words may be anything.
+
+use std::collections::HashMap;
+
+use spirv::Op;
+
+use super::error::Error;
+use super::grammar::{self, Kind};
+use super::instruction::{Instruction, Operand};
+
+/// The words before the first instruction.
+pub(crate) const HEADER_WORDS: usize = 5;
+
+/// Decodes the instructions of a module, in order, and gives each to `each`.
+///
+/// # Errors
+/// [`Error::Binary`] names the first word that isn't as the grammar says, and what `each` fails with.
+pub(crate) fn decode(
+    words: &[u32],
+    mut each: impl FnMut(Instruction) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let mut literal_widths = HashMap::new();
+    let mut at = HEADER_WORDS;
+    while let Some(first) = words.get(at) {
+        let (count, opcode) = ((first >> 16) as usize, first & 0xffff);
+        if count == 0 || count > words.len() - at {
+            return invalid(at, format!("the instruction has a word count of {count}"));
+        }
+        let Some((opcode, layout)) =
+            Op::from_u32(opcode).and_then(|op| Some((op, grammar::operands(op)?)))
+        else {
+            return invalid(at, format!("there is no opcode {opcode}"));
+        };
+        let mut decoder = Decoder {
+            words: &words[..at + count],
+            at: at + 1,
+            literal_widths: &literal_widths,
+            it: Instruction {
+                opcode,
+                result_type: None,
+                result_id: None,
+                operands: Vec::new(),
+            },
+        };
+        decoder.operands(layout)?;
+        let it = decoder.it;
+        if let (Some(id), Some(width)) = (it.result_id, literal_width(&it, &literal_widths)) {
+            literal_widths.insert(id, width);
+        }
+        each(it)?;
+        at += count;
+    }
+    Ok(())
+}
+
+fn invalid<T>(word: usize, reason: impl std::fmt::Display) -> Result<T, Error> {
+    Err(Error::Binary {
+        reason: format!("word {word}: {reason}"),
+    })
+}
+
+/// The bits of a literal of a type, or of the type of a value.
+fn literal_width(it: &Instruction, widths: &HashMap<u32, u32>) -> Option<u32> {
+    match it.opcode {
+        Op::TypeInt | Op::TypeFloat => it.number(0).ok(),
+        _ => widths.get(&it.result_type?).copied(),
+    }
+}
+
+/// Decodes one instruction.
+struct Decoder<'a> {
+    /// All words, up to the instruction's end.
+    words: &'a [u32],
+    /// The next word.
+    at: usize,
+    /// Bits of literals by the ids of types and values.
+    literal_widths: &'a HashMap<u32, u32>,
+    it: Instruction,
+}
+
+impl Decoder<'_> {
+    fn operands(&mut self, layout: grammar::Operands) -> Result<(), Error> {
+        for kind in layout.required {
+            self.operand(*kind)?;
+        }
+        for kind in layout.optional {
+            if self.is_at_end() {
+                return Ok(());
+            }
+            self.operand(*kind)?;
+        }
+        if let Some(kind) = layout.repeated {
+            while !self.is_at_end() {
+                self.operand(kind)?;
+            }
+        }
+        match self.is_at_end() {
+            true => Ok(()),
+            false => self.invalid("there are more operands than the instruction takes"),
+        }
+    }
+
+    fn is_at_end(&self) -> bool {
+        self.at == self.words.len()
+    }
+
+    fn invalid<T>(&self, reason: impl std::fmt::Display) -> Result<T, Error> {
+        invalid(self.at, format!("Op{:?}: {reason}", self.it.opcode))
+    }
+
+    fn word(&mut self) -> Result<u32, Error> {
+        let Some(word) = self.words.get(self.at) else {
+            return self.invalid("an operand is missing");
+        };
+        self.at += 1;
+        Ok(*word)
+    }
+
+    fn operand(&mut self, kind: Kind) -> Result<(), Error> {
+        match kind {
+            Kind::IdResultType => self.it.result_type = Some(self.word()?),
+            Kind::IdResult => self.it.result_id = Some(self.word()?),
+            Kind::Id => self.id()?,
+            Kind::Literal => self.literal()?,
+            Kind::TypedLiteral => self.typed_literal(self.it.result_type)?,
+            Kind::TypedLiteralIdPair => {
+                let selector = self.it.operands.first().and_then(Operand::id);
+                self.typed_literal(selector)?;
+                self.id()?;
+            }
+            Kind::IdLiteralPair => {
+                self.id()?;
+                self.literal()?;
+            }
+            Kind::IdPair => {
+                self.id()?;
+                self.id()?;
+            }
+            Kind::String => self.string()?,
+            Kind::SpecConstantOp => {
+                self.literal()?;
+                while !self.is_at_end() {
+                    self.literal()?;
+                }
+            }
+            enumeration => self.enumerant(enumeration)?,
+        }
+        Ok(())
+    }
+
+    fn id(&mut self) -> Result<(), Error> {
+        let id = self.word()?;
+        self.it.operands.push(Operand::Id(id));
+        Ok(())
+    }
+
+    fn literal(&mut self) -> Result<(), Error> {
+        let value = self.word()?;
+        self.it.operands.push(Operand::Literal(value));
+        Ok(())
+    }
+
+    /// A literal of a type, or of the type of a value; of one word if that isn't known.
+    fn typed_literal(&mut self, of: Option<u32>) -> Result<(), Error> {
+        match of.and_then(|id| self.literal_widths.get(&id)) {
+            None | Some(8 | 16 | 32) => self.literal(),
+            Some(64) => {
+                let (low, high) = (self.word()?, self.word()?);
+                let value = u64::from(high) << 32 | u64::from(low);
+                self.it.operands.push(Operand::Literal64(value));
+                Ok(())
+            }
+            Some(width) => self.invalid(format!("there are no literals of {width} bits")),
+        }
+    }
+
+    /// A string of UTF-8, to the word with its zero byte.
+    fn string(&mut self) -> Result<(), Error> {
+        let mut bytes = Vec::new();
+        loop {
+            let word = self.word()?.to_le_bytes();
+            let end = word.iter().position(|byte| *byte == 0);
+            bytes.extend_from_slice(&word[..end.unwrap_or(4)]);
+            if end.is_some() {
+                break;
+            }
+        }
+        match String::from_utf8(bytes) {
+            Ok(string) => self.it.operands.push(Operand::String(string)),
+            Err(error) => return self.invalid(error.utf8_error()),
+        }
+        Ok(())
+    }
+
+    /// A value of an enumeration and its parameters; a mask, and the parameters of its bits.
+    fn enumerant(&mut self, enumeration: Kind) -> Result<(), Error> {
+        let value = self.word()?;
+        if !enumeration.has(value) {
+            self.at -= 1;
+            return self.invalid(format!("{enumeration:?} has no {value}"));
+        }
+        self.it.operands.push(Operand::Enumerant(value));
+        if !enumeration.is_mask() {
+            return self.parameters(enumeration.parameters(value));
+        }
+        (0..u32::BITS)
+            .map(|bit| value & 1 << bit)
+            .filter(|bit| *bit != 0)
+            .try_for_each(|bit| self.parameters(enumeration.parameters(bit)))
+    }
+
+    fn parameters(&mut self, kinds: &[Kind]) -> Result<(), Error> {
+        kinds.iter().try_for_each(|kind| self.operand(*kind))
+    }
+}

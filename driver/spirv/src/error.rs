@@ -1,0 +1,129 @@
+//! Why a shader can't be used: the instruction and the reason.
+
+use isa::validate::InvalidProgram;
+use spirv::Op;
+use thiserror::Error;
+
+use super::Stage;
+
+/// An instruction in which a problem was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InstructionRef {
+    /// The instruction's name.
+    pub opcode: Op,
+    /// The id that it defines, or, if it defines none, the first id that it names.
+    pub id: Option<u32>,
+}
+
+impl std::fmt::Display for InstructionRef {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Op{:?}", self.opcode)?;
+        match self.id {
+            Some(id) => write!(f, " %{id}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Why a shader module, or an entry point of it, can't be used.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum Error {
+    /// The words aren't a SPIR-V module that can be decoded.
+    #[error("not SPIR-V: {reason}")]
+    Binary {
+        /// The fault.
+        reason: String,
+    },
+    /// An instruction breaks a rule of SPIR-V.
+    #[error("malformed SPIR-V: {place}: {reason}")]
+    Malformed {
+        /// The instruction.
+        place: InstructionRef,
+        /// The fault.
+        reason: String,
+    },
+    /// An instruction asks for something that this driver doesn't do.
+    #[error("unsupported SPIR-V: {place}: {reason}")]
+    Unsupported {
+        /// The instruction.
+        place: InstructionRef,
+        /// The thing that it asks for.
+        reason: String,
+    },
+    /// The module, or what comes of it, is too big.
+    #[error("shader too large: {what} exceed {limit}")]
+    TooLarge {
+        /// The thing that there is too much of.
+        what: &'static str,
+        /// The most that is allowed.
+        limit: u64,
+    },
+    /// The module has no such entry point.
+    #[error("the module has no {stage} entry point named \"{name}\"")]
+    NoEntryPoint {
+        /// The name asked for.
+        name: String,
+        /// The stage asked for.
+        stage: Stage,
+    },
+    /// A specialization constant is given a value of the wrong size.
+    #[error("specialization constant {id} takes {expected} bytes, but was given {given}")]
+    Specialization {
+        /// The constant's `SpecId`.
+        id: u32,
+        /// Bytes it takes.
+        expected: usize,
+        /// Bytes it was given.
+        given: usize,
+    },
+    /// The system gave no thread to translate on.
+    #[error("there is no thread to translate on: {reason}")]
+    NoThread {
+        /// The system's message.
+        reason: String,
+    },
+    /// The translation broke a rule of the device's IR.
+    #[error("the shader can't be translated: {0}")]
+    Program(#[from] InvalidProgram),
+}
+
+/// A problem whose place isn't known yet.
+#[derive(Clone, Debug)]
+pub(crate) enum Diagnostic {
+    /// See [`Error::Malformed`].
+    Malformed(String),
+    /// See [`Error::Unsupported`].
+    Unsupported(String),
+    /// A complete error.
+    Located(Error),
+}
+
+/// The result of translating a part of a shader.
+pub(crate) type Result<T, E = Diagnostic> = std::result::Result<T, E>;
+
+/// A diagnostic: SPIR-V's rules are broken.
+pub(crate) fn malformed<T>(reason: impl Into<String>) -> Result<T> {
+    Err(Diagnostic::Malformed(reason.into()))
+}
+
+/// A diagnostic: this driver can't do it.
+pub(crate) fn unsupported<T>(reason: impl Into<String>) -> Result<T> {
+    Err(Diagnostic::Unsupported(reason.into()))
+}
+
+impl Diagnostic {
+    /// Says which instruction it was, unless that is known already.
+    pub(crate) fn locate(self, place: InstructionRef) -> Error {
+        match self {
+            Self::Malformed(reason) => Error::Malformed { place, reason },
+            Self::Unsupported(reason) => Error::Unsupported { place, reason },
+            Self::Located(error) => error,
+        }
+    }
+}
+
+impl From<Error> for Diagnostic {
+    fn from(error: Error) -> Self {
+        Self::Located(error)
+    }
+}

@@ -1,0 +1,289 @@
+//! The interface of a translated shader: inputs, outputs, descriptors, push constants.
+
+use std::ops::Range;
+
+use isa::ir::{ImageShape, Program};
+
+/// A programmable stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Runs once for each vertex (or Gaussian).
+    Vertex,
+    /// Runs once for each fragment, in quads.
+    Fragment,
+    /// Runs in workgroups.
+    Compute,
+}
+
+impl std::fmt::Display for Stage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Vertex => "vertex",
+            Self::Fragment => "fragment",
+            Self::Compute => "compute",
+        })
+    }
+}
+
+/// The numeric type of a scalar at the interface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ScalarType {
+    /// A float of 16 (in a register: 32), 32 or 64 bits.
+    Float {
+        /// Bits.
+        width: u32,
+    },
+    /// A signed integer of 8 to 64 bits.
+    Int {
+        /// Bits.
+        width: u32,
+    },
+    /// An unsigned integer of 8 to 64 bits.
+    Uint {
+        /// Bits.
+        width: u32,
+    },
+    /// A truth value.
+    Bool,
+}
+
+/// A value that Vulkan defines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "the names are SPIR-V's")]
+pub enum BuiltIn {
+    Position,
+    PointSize,
+    ClipDistance,
+    CullDistance,
+    VertexIndex,
+    InstanceIndex,
+    BaseVertex,
+    BaseInstance,
+    DrawIndex,
+    ViewIndex,
+    DeviceIndex,
+    Layer,
+    ViewportIndex,
+    PrimitiveId,
+    FragCoord,
+    PointCoord,
+    FrontFacing,
+    SampleId,
+    SamplePosition,
+    SampleMask,
+    FragDepth,
+    WorkgroupId,
+    NumWorkgroups,
+}
+
+/// The way in which a fragment input follows from the values at the vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Interpolation {
+    /// Perspective-correct.
+    Perspective,
+    /// Linear in the framebuffer.
+    Linear,
+    /// The provoking vertex's value.
+    Flat,
+}
+
+/// The point within a pixel at which a fragment input is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Sampling {
+    /// At the pixel's centre (or at the sample, if the draw shades each sample).
+    Center,
+    /// At a point within both the pixel and the primitive.
+    Centroid,
+    /// At the sample.
+    Sample,
+}
+
+/// The source of an input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum InputSource {
+    /// A vertex attribute or an interpolated output of the stage before.
+    Location {
+        /// The location.
+        location: u32,
+        /// The component, in units of 32 bits.
+        component: u32,
+        /// Fragment stage only.
+        interpolation: Interpolation,
+        /// Fragment stage only.
+        sampling: Sampling,
+    },
+    /// A component, or an element, of a built-in.
+    BuiltIn {
+        /// The built-in.
+        built_in: BuiltIn,
+        /// Component or element.
+        component: u32,
+    },
+}
+
+/// One scalar that the program reads. Its slot in the program is its index in [`Interface::inputs`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Input {
+    /// Its source.
+    pub source: InputSource,
+    /// Its type.
+    pub numeric: ScalarType,
+}
+
+/// The target of an output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum OutputTarget {
+    /// An input of the next stage, or a colour attachment.
+    Location {
+        /// The location.
+        location: u32,
+        /// The component, in units of 32 bits.
+        component: u32,
+        /// The input of the blend equation, for dual-source blending.
+        index: u32,
+    },
+    /// A component, or an element, of a built-in.
+    BuiltIn {
+        /// The built-in.
+        built_in: BuiltIn,
+        /// Component or element.
+        component: u32,
+    },
+}
+
+/// One scalar that the program writes. Its slot in the program is its index in [`Interface::outputs`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Output {
+    /// Its target.
+    pub target: OutputTarget,
+    /// Its type.
+    pub numeric: ScalarType,
+}
+
+/// The kind of descriptor that a variable takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "the names are Vulkan's")]
+pub enum DescriptorKind {
+    Sampler,
+    SampledImage,
+    CombinedImageSampler,
+    StorageImage,
+    UniformTexelBuffer,
+    StorageTexelBuffer,
+    UniformBuffer,
+    StorageBuffer,
+    InputAttachment,
+}
+
+/// The image that a descriptor must hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageUse {
+    /// Its kind.
+    pub shape: ImageShape,
+    /// The type that its texels are read as.
+    pub numeric: ScalarType,
+}
+
+/// A descriptor, or an array of them, that the program uses.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShaderBinding {
+    /// The descriptor set.
+    pub set: u32,
+    /// The binding in it.
+    pub binding: u32,
+    /// The kind of its descriptors.
+    pub kind: DescriptorKind,
+    /// The array's length, or 1.
+    pub count: u32,
+    /// The program's resource slot of the first; the others follow. Resource slots are unique over all kinds; a combined
+    /// image sampler uses the same for both.
+    pub slot: u32,
+    /// Buffers: the least size in bytes that covers all members but a runtime array.
+    pub size: u64,
+    /// The program may write to it.
+    pub writable: bool,
+    /// Images: which.
+    pub image: Option<ImageUse>,
+    /// Input attachments: the index of the attachment.
+    pub attachment: Option<u32>,
+    /// The variable's name, for messages.
+    pub name: Option<String>,
+}
+
+/// A fragment shader's promise about the depth that it writes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DepthMode {
+    /// It writes none.
+    #[default]
+    NotWritten,
+    /// Any depth.
+    Replacing,
+    /// At least the primitive's.
+    Greater,
+    /// At most the primitive's.
+    Less,
+    /// The primitive's.
+    Unchanged,
+}
+
+/// A translated shader's interface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Interface {
+    /// The stage.
+    pub stage: Stage,
+    /// The scalars that it reads; see [`Input`].
+    pub inputs: Vec<Input>,
+    /// The scalars that it writes; see [`Output`].
+    pub outputs: Vec<Output>,
+    /// The descriptors that it is bound to.
+    pub descriptors: Vec<ShaderBinding>,
+    /// The bytes of push constants that it declares.
+    pub push_constants: Option<Range<u32>>,
+    /// Compute: invocations of a workgroup in x, y and z; 1 otherwise.
+    pub workgroup_size: [u32; 3],
+    /// Fragment: depth and stencil are tested before the shader.
+    pub early_fragment_tests: bool,
+    /// Fragment: the depth that it writes.
+    pub depth: DepthMode,
+    /// Fragment: it may kill or demote.
+    pub discards: bool,
+    /// Fragment: it must run for each sample.
+    pub per_sample: bool,
+    /// It stores to buffers or images, or uses atomics: it can't be skipped.
+    pub has_side_effects: bool,
+    /// It uses operations of a subgroup.
+    pub uses_subgroups: bool,
+}
+
+impl Interface {
+    /// The locations that the program reads, in order, each with the type of its first scalar.
+    pub fn locations_read(&self) -> Vec<(u32, ScalarType)> {
+        let mut found: Vec<(u32, u32, ScalarType)> = self
+            .inputs
+            .iter()
+            .filter_map(|input| match input.source {
+                InputSource::Location {
+                    location,
+                    component,
+                    ..
+                } => Some((location, component, input.numeric)),
+                InputSource::BuiltIn { .. } => None,
+            })
+            .collect();
+        found.sort_by_key(|(location, component, _)| (*location, *component));
+        found.dedup_by_key(|(location, ..)| *location);
+        found
+            .into_iter()
+            .map(|(location, _, numeric)| (location, numeric))
+            .collect()
+    }
+}
+
+/// A shader ready for the device.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shader {
+    /// The program.
+    pub program: Program,
+    /// The meaning of its input, output and resource slots.
+    pub interface: Interface,
+}

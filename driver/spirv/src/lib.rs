@@ -1,0 +1,27 @@
+//! The shader compiler's front end: a SPIR-V module is decoded, and its entry points are translated to programs of the
+//! device's shader cores, each with an [`Interface`] that says what the program exchanges with the outside.
+//!
+//! [`Module::parse`] when a shader module is created; [`translate`] for each stage when a pipeline is created, with its
+//! specialization constants.
+//!
+//! The words of a module may be anything: what is malformed or unsupported is an [`Error`] that names the instruction,
+//! in bounded time and memory, never a panic.
+
+mod decoder;
+mod error;
+mod globals;
+mod grammar;
+mod instruction;
+mod interface;
+mod module;
+mod translate;
+mod types;
+
+pub use error::{Error, InstructionRef};
+pub use globals::Specialization;
+pub use interface::{
+    BuiltIn, DepthMode, DescriptorKind, ImageUse, Input, InputSource, Interface, Interpolation,
+    Output, OutputTarget, Sampling, ScalarType, Shader, ShaderBinding, Stage,
+};
+pub use module::Module;
+pub use translate::{Options, is_supported, translate};

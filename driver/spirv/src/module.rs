@@ -1,0 +1,474 @@
+//! A SPIR-V module: its instructions by section and function, and its decorations by id.
+
+use std::collections::HashMap;
+
+use spirv::{BuiltIn, Decoration, ExecutionModel, Op};
+
+use super::decoder::{HEADER_WORDS, decode};
+use super::error::Error;
+use super::instruction::{Instruction, Operand};
+
+/// The most words of a module.
+const MAX_WORDS: usize = 1 << 20;
+/// The most decorations after groups are expanded.
+const MAX_DECORATIONS: usize = 1 << 20;
+
+/// A decoration and its parameters.
+#[derive(Clone, Debug)]
+struct Decorated {
+    decoration: Decoration,
+    parameters: Vec<Operand>,
+}
+
+/// The extended instructions that an import gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ExtendedSet {
+    /// `GLSL.std.450`.
+    Glsl,
+    /// `NonSemantic.*` and debug information: nothing to do.
+    NonSemantic,
+    /// Any other.
+    Unknown,
+}
+
+/// A basic block: its last instruction is its terminator.
+#[derive(Clone, Debug)]
+pub(crate) struct Block {
+    pub label: Option<u32>,
+    pub instructions: Vec<Instruction>,
+}
+
+/// A function.
+#[derive(Clone, Debug)]
+pub(crate) struct Function {
+    pub definition: Instruction,
+    pub parameters: Vec<Instruction>,
+    pub blocks: Vec<Block>,
+}
+
+/// The instructions of a module, those that matter, by what they are.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sections {
+    pub capabilities: Vec<Instruction>,
+    pub imports: Vec<Instruction>,
+    pub memory_model: Option<Instruction>,
+    pub entry_points: Vec<Instruction>,
+    pub execution_modes: Vec<Instruction>,
+    pub names: Vec<Instruction>,
+    pub annotations: Vec<Instruction>,
+    /// Types, constants and variables outside functions.
+    pub globals: Vec<Instruction>,
+    pub functions: Vec<Function>,
+}
+
+/// Puts instructions where they belong.
+#[derive(Default)]
+struct Loader {
+    sections: Sections,
+    function: Option<Function>,
+    block: Option<Block>,
+}
+
+impl Loader {
+    fn add(&mut self, it: Instruction) -> Result<(), Error> {
+        let sections = &mut self.sections;
+        match it.opcode {
+            Op::Capability => sections.capabilities.push(it),
+            Op::ExtInstImport => sections.imports.push(it),
+            Op::MemoryModel => sections.memory_model = Some(it),
+            Op::EntryPoint => sections.entry_points.push(it),
+            Op::ExecutionMode | Op::ExecutionModeId => sections.execution_modes.push(it),
+            Op::Name => sections.names.push(it),
+            Op::Extension
+            | Op::String
+            | Op::SourceExtension
+            | Op::Source
+            | Op::SourceContinued
+            | Op::MemberName
+            | Op::ModuleProcessed
+            | Op::Line
+            | Op::NoLine => {}
+            // Debug information.
+            Op::ExtInst if self.function.is_none() => {}
+            op if op.is_annotation() => sections.annotations.push(it),
+            op if op.is_type() || op.is_constant() => sections.globals.push(it),
+            Op::Variable | Op::Undef if self.function.is_none() => sections.globals.push(it),
+            Op::Function => {
+                let function = Function {
+                    definition: it,
+                    parameters: Vec::new(),
+                    blocks: Vec::new(),
+                };
+                if self.function.replace(function).is_some() {
+                    return invalid("a function begins within another");
+                }
+            }
+            Op::FunctionParameter => match &mut self.function {
+                Some(function) => function.parameters.push(it),
+                None => return invalid("a parameter outside functions"),
+            },
+            Op::Label => {
+                let block = Block {
+                    label: it.result_id,
+                    instructions: Vec::new(),
+                };
+                if self.function.is_none() {
+                    return invalid("a block outside functions");
+                }
+                if self.block.replace(block).is_some() {
+                    return invalid("a block begins within another");
+                }
+            }
+            Op::FunctionEnd => self.end_function()?,
+            op => {
+                let Some(block) = &mut self.block else {
+                    return invalid(format!("Op{op:?} outside blocks"));
+                };
+                block.instructions.push(it);
+                if is_terminator(op)
+                    && let (Some(function), Some(block)) = (&mut self.function, self.block.take())
+                {
+                    function.blocks.push(block);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn end_function(&mut self) -> Result<(), Error> {
+        if self.block.is_some() {
+            return invalid("a block without a terminator");
+        }
+        match self.function.take() {
+            Some(function) => self.sections.functions.push(function),
+            None => return invalid("a function ends that didn't begin"),
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Result<Sections, Error> {
+        match self.function {
+            Some(_) => invalid("a function without an end"),
+            None => Ok(self.sections),
+        }
+    }
+}
+
+/// Tells if an operation ends a block.
+fn is_terminator(op: Op) -> bool {
+    matches!(
+        op,
+        Op::Branch
+            | Op::BranchConditional
+            | Op::Switch
+            | Op::Return
+            | Op::ReturnValue
+            | Op::Kill
+            | Op::TerminateInvocation
+            | Op::TerminateRayKHR
+            | Op::IgnoreIntersectionKHR
+            | Op::EmitMeshTasksEXT
+            | Op::Unreachable
+    )
+}
+
+fn invalid<T>(reason: impl Into<String>) -> Result<T, Error> {
+    Err(Error::Binary {
+        reason: reason.into(),
+    })
+}
+
+/// A shader module: decoded, indexed, but not yet checked beyond that.
+#[derive(Debug)]
+pub struct Module {
+    pub(crate) sections: Sections,
+    pub(crate) extended_sets: HashMap<u32, ExtendedSet>,
+    /// Indices into the sections' functions by id.
+    pub(crate) functions: HashMap<u32, usize>,
+    decorations: HashMap<u32, Vec<Decorated>>,
+    member_decorations: HashMap<(u32, u32), Vec<Decorated>>,
+    names: HashMap<u32, String>,
+    version: (u8, u8),
+}
+
+impl Module {
+    /// Decodes a module of SPIR-V 1.0 to 1.6.
+    ///
+    /// # Errors
+    /// [`Error::Binary`] or [`Error::TooLarge`].
+    pub fn parse(words: &[u32]) -> Result<Self, Error> {
+        let version = check_header(words)?;
+        let mut loader = Loader::default();
+        decode(words, |it| loader.add(it))?;
+        let sections = loader.finish()?;
+        let functions = sections.functions.iter().enumerate();
+        let mut module = Self {
+            extended_sets: extended_sets(&sections),
+            functions: functions
+                .filter_map(|(index, function)| Some((function.definition.result_id?, index)))
+                .collect(),
+            decorations: HashMap::new(),
+            member_decorations: HashMap::new(),
+            names: names(&sections),
+            version,
+            sections,
+        };
+        module.index_decorations()?;
+        Ok(module)
+    }
+
+    /// SPIR-V's major and minor version.
+    pub fn version(&self) -> (u8, u8) {
+        self.version
+    }
+
+    /// The name that debug information gives an id.
+    pub fn name(&self, id: u32) -> Option<&str> {
+        self.names.get(&id).map(String::as_str)
+    }
+
+    /// Names and execution models of all entry points.
+    pub fn entry_points(&self) -> Vec<(String, ExecutionModel)> {
+        self.sections
+            .entry_points
+            .iter()
+            .filter_map(|entry| {
+                let model = entry.enumerant(0, ExecutionModel::from_u32)?;
+                Some((entry.string(2)?.to_owned(), model))
+            })
+            .collect()
+    }
+
+    /// Tells if an id is decorated so.
+    pub(crate) fn has(&self, id: u32, decoration: Decoration) -> bool {
+        self.decorations
+            .get(&id)
+            .is_some_and(|all| all.iter().any(|one| one.decoration == decoration))
+    }
+
+    /// The number that an id is decorated with.
+    pub(crate) fn literal(&self, id: u32, decoration: Decoration) -> Option<u32> {
+        literal(self.decorations.get(&id)?, decoration)
+    }
+
+    /// The built-in that an id is decorated as.
+    pub(crate) fn built_in(&self, id: u32) -> Option<BuiltIn> {
+        built_in(self.decorations.get(&id)?)
+    }
+
+    /// Tells if a struct's member is decorated so.
+    pub(crate) fn member_has(&self, id: u32, member: u32, decoration: Decoration) -> bool {
+        self.member_decorations
+            .get(&(id, member))
+            .is_some_and(|all| all.iter().any(|one| one.decoration == decoration))
+    }
+
+    /// The number that a struct's member is decorated with.
+    pub(crate) fn member_literal(
+        &self,
+        id: u32,
+        member: u32,
+        decoration: Decoration,
+    ) -> Option<u32> {
+        literal(self.member_decorations.get(&(id, member))?, decoration)
+    }
+
+    /// The built-in that a struct's member is decorated as.
+    pub(crate) fn member_built_in(&self, id: u32, member: u32) -> Option<BuiltIn> {
+        built_in(self.member_decorations.get(&(id, member))?)
+    }
+
+    fn index_decorations(&mut self) -> Result<(), Error> {
+        let annotations = std::mem::take(&mut self.sections.annotations);
+        let mut count = 0;
+        for annotation in &annotations {
+            let operands = annotation.operands.as_slice();
+            match annotation.opcode {
+                Op::Decorate | Op::DecorateId => {
+                    if let ([Operand::Id(id), _, parameters @ ..], Some(decoration)) =
+                        (operands, annotation.enumerant(1, Decoration::from_u32))
+                    {
+                        count += 1;
+                        self.decorations.entry(*id).or_default().push(Decorated {
+                            decoration,
+                            parameters: parameters.to_vec(),
+                        });
+                    }
+                }
+                Op::MemberDecorate => {
+                    if let (
+                        [
+                            Operand::Id(id),
+                            Operand::Literal(member),
+                            _,
+                            parameters @ ..,
+                        ],
+                        Some(decoration),
+                    ) = (operands, annotation.enumerant(2, Decoration::from_u32))
+                    {
+                        count += 1;
+                        let entry = self.member_decorations.entry((*id, *member)).or_default();
+                        entry.push(Decorated {
+                            decoration,
+                            parameters: parameters.to_vec(),
+                        });
+                    }
+                }
+                Op::GroupDecorate => count += self.apply_group(operands, MAX_DECORATIONS - count),
+                Op::GroupMemberDecorate => {
+                    count += self.apply_member_group(operands, MAX_DECORATIONS - count);
+                }
+                _ => {}
+            }
+            if count >= MAX_DECORATIONS {
+                return Err(Error::TooLarge {
+                    what: "decorations",
+                    limit: MAX_DECORATIONS as u64,
+                });
+            }
+        }
+        self.sections.annotations = annotations;
+        Ok(())
+    }
+
+    /// Decorates each target as the group is; returns how many decorations that were, stopping at `limit`.
+    fn apply_group(&mut self, operands: &[Operand], limit: usize) -> usize {
+        let Some(group) = operands.first().and_then(Operand::id) else {
+            return 0;
+        };
+        let group = self.decorations.get(&group).cloned().unwrap_or_default();
+        let mut applied = 0;
+        for target in operands[1..].iter().filter_map(Operand::id) {
+            applied += group.len();
+            if applied >= limit {
+                return limit;
+            }
+            let entry = self.decorations.entry(target).or_default();
+            entry.extend_from_slice(&group);
+        }
+        applied
+    }
+
+    fn apply_member_group(&mut self, operands: &[Operand], limit: usize) -> usize {
+        let Some(group) = operands.first().and_then(Operand::id) else {
+            return 0;
+        };
+        let group = self.decorations.get(&group).cloned().unwrap_or_default();
+        let mut applied = 0;
+        for pair in operands[1..].chunks_exact(2) {
+            if let [Operand::Id(id), Operand::Literal(member)] = pair {
+                applied += group.len();
+                if applied >= limit {
+                    return limit;
+                }
+                let entry = self.member_decorations.entry((*id, *member)).or_default();
+                entry.extend_from_slice(&group);
+            }
+        }
+        applied
+    }
+}
+
+fn literal(all: &[Decorated], decoration: Decoration) -> Option<u32> {
+    let found = all.iter().find(|one| one.decoration == decoration)?;
+    match found.parameters.first()? {
+        Operand::Literal(value) => Some(*value),
+        _ => None,
+    }
+}
+
+fn built_in(all: &[Decorated]) -> Option<BuiltIn> {
+    let mut found = all
+        .iter()
+        .filter(|one| one.decoration == Decoration::BuiltIn);
+    match found.next()?.parameters.first()? {
+        Operand::Enumerant(value) => BuiltIn::from_u32(*value),
+        _ => None,
+    }
+}
+
+fn extended_sets(sections: &Sections) -> HashMap<u32, ExtendedSet> {
+    let set = |import: &Instruction| match import.string(0) {
+        Some("GLSL.std.450") => ExtendedSet::Glsl,
+        Some(name) if name.starts_with("NonSemantic.") || name == "OpenCL.DebugInfo.100" => {
+            ExtendedSet::NonSemantic
+        }
+        _ => ExtendedSet::Unknown,
+    };
+    sections
+        .imports
+        .iter()
+        .filter_map(|import| Some((import.result_id?, set(import))))
+        .collect()
+}
+
+fn names(sections: &Sections) -> HashMap<u32, String> {
+    sections
+        .names
+        .iter()
+        .filter_map(|it| {
+            let name = it.string(1).filter(|name| !name.is_empty())?;
+            Some((it.id(0).ok()?, name.to_owned()))
+        })
+        .collect()
+}
+
+fn check_header(words: &[u32]) -> Result<(u8, u8), Error> {
+    if words.len() > MAX_WORDS {
+        return Err(Error::TooLarge {
+            what: "words of a module",
+            limit: MAX_WORDS as u64,
+        });
+    }
+    let [magic, version, ..] = words else {
+        return invalid("there is no header");
+    };
+    if words.len() < HEADER_WORDS {
+        return invalid("the header is cut off");
+    }
+    if *magic != spirv::MAGIC_NUMBER {
+        return invalid("the magic number is wrong");
+    }
+    let (major, minor) = ((version >> 16) as u8, (version >> 8) as u8);
+    if version & 0xff00_00ff != 0 || major != 1 || minor > 6 {
+        return invalid("only versions 1.0 to 1.6 are supported");
+    }
+    Ok((major, minor))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn binaries_that_are_cut_off_are_errors() {
+        let header = [spirv::MAGIC_NUMBER, 0x0001_0000, 0, 8, 0];
+        assert!(Module::parse(&[]).is_err());
+        assert!(Module::parse(&header[..4]).is_err());
+        assert!(Module::parse(&header).is_ok());
+        // An OpString that claims to be longer than the binary.
+        let mut long = header.to_vec();
+        long.extend([40 << 16 | Op::String as u32, 1, 0x6161_6161]);
+        assert!(matches!(Module::parse(&long), Err(Error::Binary { .. })));
+        long[5] = 3 << 16 | Op::String as u32;
+        assert!(matches!(Module::parse(&long), Err(Error::Binary { .. })));
+    }
+
+    #[test]
+    fn operations_on_constants_keep_all_words() {
+        let mut words = vec![spirv::MAGIC_NUMBER, 0x0001_0300, 0, 8, 0];
+        words.extend([
+            7 << 16 | Op::SpecConstantOp as u32,
+            1,
+            2,
+            Op::CompositeExtract as u32,
+            3,
+            0,
+            1,
+        ]);
+        let module = Module::parse(&words).unwrap();
+        let it = &module.sections.globals[0];
+        assert_eq!(it.numbers(0), [Op::CompositeExtract as u32, 3, 0, 1]);
+        assert_eq!(module.version(), (1, 3));
+    }
+}

@@ -1,0 +1,171 @@
+//! The dispatch of instructions to the functions that translate them.
+
+use isa::ir::Axis;
+use spirv::Op;
+
+use super::atomic::atomic;
+use super::composite::{composite, linear_algebra};
+use super::elementwise::{conversion, derivative, elementwise};
+use super::glsl::glsl;
+use super::image::image;
+use super::memory::{copy_memory, load, store};
+use super::pointer::{access_chain, array_length};
+use super::subgroup::subgroup;
+use super::translator::Translator;
+use super::value::Value;
+use super::variables::local_variable;
+use crate::error::{Result, unsupported};
+use crate::instruction::Instruction;
+use crate::module::ExtendedSet;
+
+fn is_image(op: Op) -> bool {
+    use Op::*;
+    matches!(
+        op,
+        SampledImage
+            | Image
+            | ImageTexelPointer
+            | ImageSampleImplicitLod
+            | ImageSampleExplicitLod
+            | ImageSampleDrefImplicitLod
+            | ImageSampleDrefExplicitLod
+            | ImageSampleProjImplicitLod
+            | ImageSampleProjExplicitLod
+            | ImageSampleProjDrefImplicitLod
+            | ImageSampleProjDrefExplicitLod
+            | ImageFetch
+            | ImageGather
+            | ImageDrefGather
+            | ImageRead
+            | ImageWrite
+            | ImageQuerySizeLod
+            | ImageQuerySize
+            | ImageQueryLod
+            | ImageQueryLevels
+            | ImageQuerySamples
+    )
+}
+
+fn is_subgroup(op: Op) -> bool {
+    let number = op as u32;
+    let core = Op::GroupNonUniformElect as u32..=Op::GroupNonUniformQuadSwap as u32;
+    core.contains(&number)
+        || matches!(
+            op,
+            Op::SubgroupBallotKHR
+                | Op::SubgroupFirstInvocationKHR
+                | Op::SubgroupAllKHR
+                | Op::SubgroupAnyKHR
+                | Op::SubgroupAllEqualKHR
+                | Op::SubgroupReadInvocationKHR
+        )
+}
+
+/// Translates an instruction within a block that is neither a phi nor a terminator.
+pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
+    match it.opcode {
+        Op::Nop => Ok(()),
+        Op::Undef => {
+            let scalars = t.globals.types.flatten(it.ty()?)?;
+            t.emit.charge_budget(scalars.len())?;
+            let zeros = scalars
+                .iter()
+                .map(|it| t.emit.constant(it.register(), 0))
+                .collect();
+            t.define(it, zeros)
+        }
+        Op::Variable => local_variable(t, it),
+        Op::Load => load(t, it),
+        Op::Store => store(t, it),
+        Op::CopyMemory => copy_memory(t, it),
+        Op::AccessChain
+        | Op::InBoundsAccessChain
+        | Op::PtrAccessChain
+        | Op::InBoundsPtrAccessChain => access_chain(t, it),
+        Op::ArrayLength => array_length(t, it),
+        Op::ExtInst => extended(t, it),
+        Op::CopyObject => {
+            let value = t.value(it.id(0)?)?;
+            match value {
+                Value::Regs(regs) => t.define(it, regs.to_vec()),
+                other => t.define_as(it, other),
+            }
+        }
+        Op::VectorExtractDynamic
+        | Op::VectorInsertDynamic
+        | Op::VectorShuffle
+        | Op::CompositeConstruct
+        | Op::CompositeExtract
+        | Op::CompositeInsert
+        | Op::CopyLogical
+        | Op::Transpose => composite(t, it),
+        Op::VectorTimesScalar
+        | Op::MatrixTimesScalar
+        | Op::VectorTimesMatrix
+        | Op::MatrixTimesVector
+        | Op::MatrixTimesMatrix
+        | Op::OuterProduct
+        | Op::Dot => linear_algebra(t, it),
+        Op::ConvertFToU
+        | Op::ConvertFToS
+        | Op::ConvertSToF
+        | Op::ConvertUToF
+        | Op::UConvert
+        | Op::SConvert
+        | Op::FConvert
+        | Op::QuantizeToF16
+        | Op::Bitcast
+        | Op::ConvertPtrToU
+        | Op::ConvertUToPtr => conversion(t, it),
+        Op::DPdx | Op::DPdxCoarse => derivative(t, it, &[Axis::X], false),
+        Op::DPdxFine => derivative(t, it, &[Axis::X], true),
+        Op::DPdy | Op::DPdyCoarse => derivative(t, it, &[Axis::Y], false),
+        Op::DPdyFine => derivative(t, it, &[Axis::Y], true),
+        Op::Fwidth | Op::FwidthCoarse => derivative(t, it, &[Axis::X, Axis::Y], false),
+        Op::FwidthFine => derivative(t, it, &[Axis::X, Axis::Y], true),
+        Op::ControlBarrier => {
+            t.emit.builder.barrier();
+            Ok(())
+        }
+        // Each instruction ends for all lanes before the next begins.
+        Op::MemoryBarrier => Ok(()),
+        Op::DemoteToHelperInvocation => {
+            t.interface.discards = true;
+            t.emit.builder.demote();
+            Ok(())
+        }
+        Op::IsHelperInvocationEXT => {
+            let helper = t.emit.builder.is_helper();
+            t.define(it, vec![helper])
+        }
+        Op::AtomicLoad
+        | Op::AtomicStore
+        | Op::AtomicExchange
+        | Op::AtomicCompareExchange
+        | Op::AtomicIIncrement
+        | Op::AtomicIDecrement
+        | Op::AtomicIAdd
+        | Op::AtomicISub
+        | Op::AtomicSMin
+        | Op::AtomicUMin
+        | Op::AtomicSMax
+        | Op::AtomicUMax
+        | Op::AtomicAnd
+        | Op::AtomicOr
+        | Op::AtomicXor
+        | Op::AtomicFAddEXT
+        | Op::AtomicFMinEXT
+        | Op::AtomicFMaxEXT => atomic(t, it),
+        op if is_image(op) => image(t, it),
+        op if is_subgroup(op) => subgroup(t, it),
+        _ => elementwise(t, it),
+    }
+}
+
+fn extended(t: &mut Translator, it: &Instruction) -> Result<()> {
+    match t.module.extended_sets.get(&it.id(0)?) {
+        Some(ExtendedSet::Glsl) => glsl(t, it),
+        Some(ExtendedSet::NonSemantic) => Ok(()),
+        _ => unsupported("an unknown set of extended instructions"),
+    }
+}

@@ -1,0 +1,361 @@
+//! From SPIR-V to the device's IR.
+//!
+//! A function's blocks become a tree of constructs first ([`structurize`]); then the tree is walked ([`control_flow`])
+//! and each instruction is taken apart into scalar ones ([`instruction`]). Calls are inlined. Variables of a function,
+//! `Private` variables, inputs and outputs are never stored to by an instruction of the IR: a store only notes the
+//! registers that hold the variable now, and where control flow comes together a variable that differs becomes a
+//! variable of the IR ([`promoted`]). Those that are arrays indexed at run time live in per-lane memory instead.
+//!
+//! All sizes are bounded: scalars of a value, nesting, calls, and the instructions made.
+
+mod analysis;
+mod atomic;
+mod composite;
+mod control_flow;
+mod descriptors;
+mod elementwise;
+mod emitter;
+mod glsl;
+mod image;
+mod inputs_outputs;
+mod instruction;
+mod interpolation;
+mod memory;
+mod options;
+mod pointer;
+mod promoted;
+mod structurize;
+mod subgroup;
+mod translator;
+mod value;
+mod variables;
+
+use std::collections::HashMap;
+
+use isa::ir::MAX_LANES;
+use spirv::{AddressingModel, BuiltIn, Capability, ExecutionMode, ExecutionModel, MemoryModel};
+
+use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
+use crate::globals::{Globals, Specialization};
+use crate::instruction::Instruction;
+use crate::interface::{DepthMode, Interface, Shader, Stage};
+use crate::module::Module;
+use analysis::Analysis;
+use control_flow::ControlFlow;
+use emitter::Emitter;
+use inputs_outputs::InputsOutputs;
+use promoted::PromotedVariables;
+use translator::Translator;
+
+pub use options::Options;
+
+/// The stack that a translation runs on.
+const STACK_BYTES: usize = 16 << 20;
+
+/// Translates an entry point.
+///
+/// That is done on a thread of its own, whose stack is large enough for all nesting that is allowed, whatever the
+/// application's stack is.
+///
+/// # Errors
+/// [`Error`] names what is malformed, unsupported or too large.
+pub fn translate(
+    module: &Module,
+    name: &str,
+    stage: Stage,
+    specialization: &Specialization,
+    options: &Options,
+) -> Result<Shader, Error> {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new()
+            .name("gaurast-shader".into())
+            .stack_size(STACK_BYTES);
+        let translation = thread
+            .spawn_scoped(scope, || {
+                translate_here(module, name, stage, specialization, options)
+            })
+            .map_err(|error| Error::NoThread {
+                reason: error.to_string(),
+            })?;
+        translation
+            .join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+fn translate_here(
+    module: &Module,
+    name: &str,
+    stage: Stage,
+    specialization: &Specialization,
+    options: &Options,
+) -> Result<Shader, Error> {
+    check_capabilities(module)?;
+    let globals = Globals::new(module, specialization)?;
+    let entry = find_entry(module, name, stage)?;
+    let function = module
+        .functions
+        .get(&entry)
+        .copied()
+        .ok_or_else(|| no_entry(name, stage))?;
+    let analysis = Analysis::new(module, &globals, function)?;
+    let interface = execution_modes(module, &globals, entry, stage)?;
+    let translator = Translator {
+        module,
+        globals: &globals,
+        analysis: &analysis,
+        options: *options,
+        emit: Emitter::new(),
+        io: InputsOutputs::new(
+            module,
+            &globals,
+            stage,
+            interface.workgroup_size,
+            options.subgroup_size,
+        ),
+        promoted: PromotedVariables::default(),
+        interface,
+        next_resource_slot: 0,
+        values: HashMap::new(),
+        types: HashMap::new(),
+    };
+    let mut control_flow = ControlFlow::new(translator);
+    control_flow.run(function)?;
+    finish(control_flow.t)
+}
+
+/// The interface of an entry point as its execution modes begin it: nothing goes in or out yet.
+fn execution_modes(
+    module: &Module,
+    globals: &Globals,
+    entry: u32,
+    stage: Stage,
+) -> Result<Interface, Error> {
+    let mut interface = empty_interface(stage);
+    for it in &module.sections.execution_modes {
+        if it.id(0).ok() == Some(entry) {
+            execution_mode(globals, it, &mut interface)
+                .map_err(|diagnostic| diagnostic.locate(it.reference()))?;
+        }
+    }
+    if stage == Stage::Compute {
+        if let Some(size) = built_in_workgroup_size(module, globals) {
+            interface.workgroup_size = size;
+        }
+        let [x, y, z] = interface.workgroup_size.map(u64::from);
+        let limit = MAX_LANES as u64;
+        if x.saturating_mul(y).saturating_mul(z) > limit || x * y * z == 0 {
+            return Err(Error::TooLarge {
+                what: "invocations of a workgroup",
+                limit,
+            });
+        }
+    }
+    Ok(interface)
+}
+
+/// The workgroup's size from the constant that is decorated as it, which wins over the execution mode.
+fn built_in_workgroup_size(module: &Module, globals: &Globals) -> Option<[u32; 3]> {
+    let mut constants = globals.constants.iter();
+    let (_, constant) =
+        constants.find(|(id, _)| module.built_in(**id) == Some(BuiltIn::WorkgroupSize))?;
+    match *constant.bits {
+        [x, y, z] => Some([x as u32, y as u32, z as u32]),
+        _ => None,
+    }
+}
+
+fn execution_mode(globals: &Globals, it: &Instruction, interface: &mut Interface) -> Result<()> {
+    let constant = |index| {
+        let id = it.id(index)?;
+        match globals.constant_u32(id) {
+            Some(value) => Ok(value),
+            None => unsupported(format!("%{id} isn't a constant")),
+        }
+    };
+    let Some(mode) = it.enumerant(1, ExecutionMode::from_u32) else {
+        return malformed("there is no mode");
+    };
+    match mode {
+        ExecutionMode::LocalSize => {
+            interface.workgroup_size = [it.number(2)?, it.number(3)?, it.number(4)?];
+        }
+        ExecutionMode::LocalSizeId => {
+            interface.workgroup_size = [constant(2)?, constant(3)?, constant(4)?];
+        }
+        ExecutionMode::EarlyFragmentTests => interface.early_fragment_tests = true,
+        ExecutionMode::DepthReplacing if interface.depth == DepthMode::NotWritten => {
+            interface.depth = DepthMode::Replacing;
+        }
+        ExecutionMode::DepthGreater => interface.depth = DepthMode::Greater,
+        ExecutionMode::DepthLess => interface.depth = DepthMode::Less,
+        ExecutionMode::DepthUnchanged => interface.depth = DepthMode::Unchanged,
+        ExecutionMode::OriginLowerLeft => {
+            return unsupported("an origin at the lower left");
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+fn finish(mut t: Translator) -> Result<Shader, Error> {
+    variables::declare_push_constants(&mut t);
+    t.interface.inputs = t.io.inputs;
+    t.interface.outputs = t.io.outputs;
+    t.interface.per_sample = t.io.per_sample;
+    Ok(Shader {
+        program: t.emit.builder.finish()?,
+        interface: t.interface,
+    })
+}
+
+fn empty_interface(stage: Stage) -> Interface {
+    Interface {
+        stage,
+        inputs: Vec::new(),
+        outputs: Vec::new(),
+        descriptors: Vec::new(),
+        push_constants: None,
+        workgroup_size: [1; 3],
+        early_fragment_tests: false,
+        depth: DepthMode::NotWritten,
+        discards: false,
+        per_sample: false,
+        has_side_effects: false,
+        uses_subgroups: false,
+    }
+}
+
+fn no_entry(name: &str, stage: Stage) -> Error {
+    Error::NoEntryPoint {
+        name: name.into(),
+        stage,
+    }
+}
+
+/// The function of an entry point.
+fn find_entry(module: &Module, name: &str, stage: Stage) -> Result<u32, Error> {
+    let model = match stage {
+        Stage::Vertex => ExecutionModel::Vertex,
+        Stage::Fragment => ExecutionModel::Fragment,
+        Stage::Compute => ExecutionModel::GLCompute,
+    };
+    let mut entries = module.sections.entry_points.iter();
+    entries
+        .find(|it| {
+            it.enumerant(0, ExecutionModel::from_u32) == Some(model) && it.string(2) == Some(name)
+        })
+        .and_then(|it| it.id(1).ok())
+        .ok_or_else(|| no_entry(name, stage))
+}
+
+/// Refuses modules that declare what isn't supported.
+fn check_capabilities(module: &Module) -> Result<(), Error> {
+    for it in &module.sections.capabilities {
+        if let Some(capability) = it.enumerant(0, Capability::from_u32)
+            && !is_supported(capability)
+        {
+            let diagnostic = Diagnostic::Unsupported(format!("capability {capability:?}"));
+            return Err(diagnostic.locate(it.reference()));
+        }
+    }
+    let model = module.sections.memory_model.as_ref();
+    let Some(model) = model else {
+        return Err(Error::Binary {
+            reason: "there is no memory model".into(),
+        });
+    };
+    let addressing = model.enumerant(0, AddressingModel::from_u32);
+    let memory = model.enumerant(1, MemoryModel::from_u32);
+    match (addressing, memory) {
+        (
+            Some(AddressingModel::Logical | AddressingModel::PhysicalStorageBuffer64),
+            Some(MemoryModel::GLSL450 | MemoryModel::Vulkan),
+        ) => Ok(()),
+        _ => Err(Diagnostic::Unsupported("this memory model".into()).locate(model.reference())),
+    }
+}
+
+/// Tells if a capability's instructions and decorations are translated.
+pub fn is_supported(capability: Capability) -> bool {
+    use Capability as C;
+    matches!(
+        capability,
+        C::Matrix
+            | C::Shader
+            | C::Float16
+            | C::Float64
+            | C::Int64
+            | C::Int64Atomics
+            | C::Int16
+            | C::Int8
+            | C::ImageGatherExtended
+            | C::StorageImageMultisample
+            | C::UniformBufferArrayDynamicIndexing
+            | C::SampledImageArrayDynamicIndexing
+            | C::StorageBufferArrayDynamicIndexing
+            | C::StorageImageArrayDynamicIndexing
+            | C::ClipDistance
+            | C::CullDistance
+            | C::ImageCubeArray
+            | C::SampleRateShading
+            | C::SampledCubeArray
+            | C::InputAttachment
+            | C::MinLod
+            | C::Sampled1D
+            | C::Image1D
+            | C::SampledBuffer
+            | C::ImageBuffer
+            | C::ImageMSArray
+            | C::StorageImageExtendedFormats
+            | C::ImageQuery
+            | C::DerivativeControl
+            | C::InterpolationFunction
+            | C::StorageImageReadWithoutFormat
+            | C::StorageImageWriteWithoutFormat
+            | C::MultiViewport
+            | C::GroupNonUniform
+            | C::GroupNonUniformVote
+            | C::GroupNonUniformArithmetic
+            | C::GroupNonUniformBallot
+            | C::GroupNonUniformShuffle
+            | C::GroupNonUniformShuffleRelative
+            | C::GroupNonUniformClustered
+            | C::GroupNonUniformQuad
+            | C::ShaderLayer
+            | C::ShaderViewportIndex
+            | C::ShaderViewportIndexLayerEXT
+            | C::SubgroupBallotKHR
+            | C::SubgroupVoteKHR
+            | C::DrawParameters
+            | C::DeviceGroup
+            | C::StorageBuffer16BitAccess
+            | C::UniformAndStorageBuffer16BitAccess
+            | C::StoragePushConstant16
+            | C::StorageInputOutput16
+            | C::StorageBuffer8BitAccess
+            | C::UniformAndStorageBuffer8BitAccess
+            | C::StoragePushConstant8
+            | C::SignedZeroInfNanPreserve
+            | C::DenormPreserve
+            | C::RoundingModeRTE
+            | C::ShaderNonUniform
+            | C::RuntimeDescriptorArray
+            | C::InputAttachmentArrayDynamicIndexing
+            | C::UniformTexelBufferArrayDynamicIndexing
+            | C::StorageTexelBufferArrayDynamicIndexing
+            | C::UniformBufferArrayNonUniformIndexing
+            | C::SampledImageArrayNonUniformIndexing
+            | C::StorageBufferArrayNonUniformIndexing
+            | C::StorageImageArrayNonUniformIndexing
+            | C::InputAttachmentArrayNonUniformIndexing
+            | C::UniformTexelBufferArrayNonUniformIndexing
+            | C::StorageTexelBufferArrayNonUniformIndexing
+            | C::PhysicalStorageBufferAddresses
+            | C::VulkanMemoryModel
+            | C::VulkanMemoryModelDeviceScope
+            | C::DemoteToHelperInvocation
+            | C::AtomicFloat32AddEXT
+            | C::AtomicFloat32MinMaxEXT
+    )
+}

@@ -1,0 +1,22 @@
+//! Options of a translation.
+
+/// Options of a translation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Invocations of a subgroup: a power of two, at most 128.
+    pub subgroup_size: u32,
+    /// Samples of a pixel that `interpolateAtSample` may name, at the standard positions.
+    pub samples: u32,
+    /// The length that a descriptor array without one is given.
+    pub unsized_descriptors: u32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            subgroup_size: 64,
+            samples: 1,
+            unsized_descriptors: 1,
+        }
+    }
+}

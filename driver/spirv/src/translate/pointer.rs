@@ -1,0 +1,291 @@
+//! Pointers and access chains.
+
+use isa::ir::{Binding, Reg, Space};
+use isa::op::Op as Ir;
+use spirv::Op;
+
+use super::descriptors::{descriptor_count, descriptors, resource};
+use super::translator::Translator;
+use super::value::{DynamicIndex, MemoryLayout, MemoryRef, Pointer, Value, scalar_bytes};
+use crate::error::{Result, malformed, unsupported};
+use crate::instruction::Instruction;
+use crate::types::{Scalar, Type};
+
+/// An index of an access chain.
+#[derive(Clone, Copy)]
+enum Index {
+    Constant(u32),
+    Dynamic { reg: Reg, scalar: Scalar },
+}
+
+/// `OpAccessChain` and its relatives.
+pub fn access_chain(t: &mut Translator, it: &Instruction) -> Result<()> {
+    let by_element = matches!(it.opcode, Op::PtrAccessChain | Op::InBoundsPtrAccessChain);
+    let mut pointer = t.pointer(it.id(0)?)?;
+    if by_element {
+        let element = index(t, it.id(1)?)?;
+        pointer = next_element(t, pointer, t.type_of(it.id(0)?)?, element)?;
+    }
+    for id in it.ids(1 + usize::from(by_element)) {
+        let index = index(t, id)?;
+        pointer = pointer_to_part(t, pointer, index)?;
+    }
+    t.define_as(it, Value::Pointer(pointer.into()))
+}
+
+fn index(t: &mut Translator, id: u32) -> Result<Index> {
+    if let Some(index) = t.globals.constant_u32(id) {
+        return Ok(Index::Constant(index));
+    }
+    let (scalar, regs) = t.vector(id)?;
+    match (scalar, &*regs) {
+        (Scalar::Int { width: 64, .. }, [reg]) => Ok(Index::Dynamic {
+            reg: t.emit.op(Ir::Low32, &[*reg]),
+            scalar: Scalar::Int {
+                width: 32,
+                signed: true,
+            },
+        }),
+        (Scalar::Int { .. }, [reg]) => Ok(Index::Dynamic { reg: *reg, scalar }),
+        _ => malformed(format!("index %{id} isn't an integer")),
+    }
+}
+
+/// A pointer moved by whole elements of the array that it points into.
+fn next_element(t: &mut Translator, pointer: Pointer, ty: u32, element: Index) -> Result<Pointer> {
+    let stride = t.module.literal(ty, spirv::Decoration::ArrayStride);
+    match (pointer, stride) {
+        (Pointer::Memory(place), Some(stride)) => {
+            Ok(Pointer::Memory(moved(t, place, element, stride)?))
+        }
+        _ => unsupported("pointer arithmetic on this pointer"),
+    }
+}
+
+fn pointer_to_part(t: &mut Translator, pointer: Pointer, index: Index) -> Result<Pointer> {
+    match pointer {
+        Pointer::PromotedVariable {
+            variable,
+            start,
+            mut indices,
+            ty,
+        } => {
+            let (part, start) = match index {
+                Index::Constant(index) => {
+                    let (part, before) = t.globals.types.part(ty, index)?;
+                    (part, start + before as usize)
+                }
+                Index::Dynamic { reg, .. } => {
+                    let (part, count) = elements(t, ty)?;
+                    let scalars = t.globals.types.scalars(part)?;
+                    indices.push(DynamicIndex {
+                        index: reg,
+                        count,
+                        scalars,
+                    });
+                    (part, start)
+                }
+            };
+            Ok(Pointer::PromotedVariable {
+                variable,
+                start,
+                indices,
+                ty: part,
+            })
+        }
+        Pointer::Memory(place) => Ok(Pointer::Memory(place_of_part(t, place, index)?)),
+        Pointer::Resource { binding, class, ty } => {
+            let (element, _) = descriptors(t, ty)?;
+            let each = descriptor_count(t, element)?;
+            let binding = pick_descriptor(t, binding, index, each)?;
+            resource(t, binding, class, element)
+        }
+        Pointer::Texel { .. } => malformed("a texel has no parts"),
+    }
+}
+
+/// The element type and the length of what a run-time index may go into.
+fn elements(t: &Translator, ty: u32) -> Result<(u32, u32)> {
+    match t.globals.types.get(ty)? {
+        Type::Vector { element, count }
+        | Type::Matrix {
+            column: element,
+            count,
+        }
+        | Type::Array { element, count, .. } => Ok((*element, *count)),
+        _ => malformed("an index that isn't constant into what isn't an array"),
+    }
+}
+
+fn place_of_part(t: &mut Translator, mut place: MemoryRef, index: Index) -> Result<MemoryRef> {
+    let types = &t.globals.types;
+    match types.get(place.ty)? {
+        Type::Struct(members) => {
+            let Index::Constant(number) = index else {
+                return malformed("the index of a member isn't a constant");
+            };
+            let Some(member) = members.get(number as usize) else {
+                return malformed(format!("there is no member {number}"));
+            };
+            let offset = if place.layout.explicit {
+                place.layout.matrix = member
+                    .matrix_stride
+                    .map(|stride| (stride, member.row_major));
+                match member.offset {
+                    Some(offset) => offset,
+                    None => return malformed(format!("member {number} has no offset")),
+                }
+            } else {
+                let mut before = 0_u64;
+                for earlier in &members[..number as usize] {
+                    before += types.tight_size(earlier.ty)?;
+                }
+                u32::try_from(before).unwrap_or(u32::MAX)
+            };
+            place.offset = place.offset.saturating_add(offset);
+            place.ty = member.ty;
+            Ok(place)
+        }
+        Type::Array {
+            element, stride, ..
+        }
+        | Type::RuntimeArray { element, stride } => {
+            let (element, stride) = (*element, *stride);
+            let stride = if place.layout.explicit {
+                match stride {
+                    Some(stride) => stride,
+                    None => return malformed("the array has no stride"),
+                }
+            } else {
+                u32::try_from(types.tight_size(element)?).unwrap_or(u32::MAX)
+            };
+            place.ty = element;
+            moved(t, place, index, stride)
+        }
+        Type::Matrix { column, .. } => {
+            let column = *column;
+            let (scalar, rows) = types.vector(column)?;
+            place.ty = column;
+            let bytes = scalar_bytes(scalar, place.layout);
+            let stride = match place.layout {
+                MemoryLayout {
+                    explicit: false, ..
+                } => bytes * rows,
+                MemoryLayout {
+                    matrix: Some((stride, row_major)),
+                    ..
+                } => {
+                    place.layout.component_stride = row_major.then_some(stride);
+                    if row_major { bytes } else { stride }
+                }
+                _ => return malformed("the matrix has no stride"),
+            };
+            moved(t, place, index, stride)
+        }
+        Type::Vector { element, .. } => {
+            let element = *element;
+            let (scalar, _) = types.vector(element)?;
+            place.ty = element;
+            let stride = place.layout.component_stride;
+            let stride = stride.unwrap_or(scalar_bytes(scalar, place.layout));
+            moved(t, place, index, stride)
+        }
+        _ => malformed("an index into what has no parts"),
+    }
+}
+
+/// A place moved by `index * stride` bytes.
+fn moved(t: &mut Translator, mut place: MemoryRef, index: Index, stride: u32) -> Result<MemoryRef> {
+    match index {
+        Index::Constant(index) if place.space != Space::Global || index < 1 << 31 => {
+            let bytes = u64::from(index) * u64::from(stride) + u64::from(place.offset);
+            place.offset = u32::try_from(bytes).unwrap_or(u32::MAX);
+        }
+        _ if place.space == Space::Global => {
+            let wide = match index {
+                Index::Constant(index) => t.emit.u64(i64::from(index.cast_signed()) as u64),
+                Index::Dynamic { reg, scalar } => {
+                    let signed = matches!(scalar, Scalar::Int { signed: true, .. });
+                    t.emit
+                        .op(if signed { Ir::SToS64 } else { Ir::UToU64 }, &[reg])
+                }
+            };
+            let stride = t.emit.u64(u64::from(stride));
+            let bytes = t.emit.op(Ir::IMul64, &[wide, stride]);
+            let base = place.base.unwrap_or(bytes);
+            place.base = Some(t.emit.op(Ir::IAdd64, &[base, bytes]));
+        }
+        Index::Constant(_) => return malformed("the index is out of range"),
+        Index::Dynamic { reg, .. } => {
+            let stride = t.emit.u32(stride);
+            let bytes = t.emit.op(Ir::IMul, &[reg, stride]);
+            place.base = Some(match place.base {
+                Some(base) => t.emit.op(Ir::IAdd, &[base, bytes]),
+                None => bytes,
+            });
+        }
+    }
+    Ok(place)
+}
+
+/// One element, of `each` descriptors, of an array of descriptors.
+fn pick_descriptor(t: &mut Translator, array: Binding, index: Index, each: u32) -> Result<Binding> {
+    let index = match index {
+        Index::Constant(index) if array.index.is_none() => {
+            let first = u64::from(index) * u64::from(each);
+            if first + u64::from(each) > u64::from(array.count) {
+                return malformed("the index is beyond the end of the array of descriptors");
+            }
+            return Ok(Binding {
+                slot: array.slot + first as u32,
+                count: each,
+                index: None,
+            });
+        }
+        Index::Constant(index) => t.emit.u32(index),
+        Index::Dynamic { reg, .. } => reg,
+    };
+    let each = t.emit.u32(each);
+    let mut element = t.emit.op(Ir::IMul, &[index, each]);
+    if let Some(outer) = array.index {
+        element = t.emit.op(Ir::IAdd, &[outer, element]);
+    }
+    Ok(Binding {
+        index: Some(element),
+        ..array
+    })
+}
+
+/// `OpArrayLength`.
+pub fn array_length(t: &mut Translator, it: &Instruction) -> Result<()> {
+    let pointer = t.pointer(it.id(0)?)?;
+    let member = it.number(1)?;
+    let Pointer::Memory(MemoryRef {
+        space: Space::Buffer(buffer),
+        offset: 0,
+        base: None,
+        ty,
+        ..
+    }) = pointer
+    else {
+        return malformed("the operand isn't a pointer to a buffer");
+    };
+    let (array, _) = t.globals.types.part(ty, member)?;
+    let (
+        Type::RuntimeArray {
+            stride: Some(stride),
+            ..
+        },
+        Type::Struct(members),
+    ) = (t.globals.types.get(array)?, t.globals.types.get(ty)?)
+    else {
+        return malformed("the member isn't an array with a stride");
+    };
+    let offset = members[member as usize].offset.unwrap_or(0);
+    let size = t.emit.builder.buffer_size(buffer);
+    let (offset, stride) = (t.emit.u32(offset), t.emit.u32((*stride).max(1)));
+    let end = t.emit.op(Ir::UMax, &[size, offset]);
+    let bytes = t.emit.op(Ir::ISub, &[end, offset]);
+    let length = t.emit.op(Ir::UDiv, &[bytes, stride]);
+    t.define(it, vec![length])
+}

@@ -1,0 +1,290 @@
+//! Operations across the lanes of a subgroup.
+
+use isa::ir::{Reg, SubgroupOp, is_reducible};
+use isa::op::Op as Ir;
+use spirv::{GroupOperation, Op};
+
+use super::emitter::op_for_width;
+use super::translator::Translator;
+use crate::error::{Result, malformed, unsupported};
+use crate::instruction::Instruction;
+use crate::types::Scalar;
+
+fn group_op(opcode: Op, scalar: Scalar) -> Option<Ir> {
+    let (narrow, wide) = match opcode {
+        Op::GroupNonUniformIAdd => (Ir::IAdd, Ir::IAdd64),
+        Op::GroupNonUniformFAdd => (Ir::FAdd, Ir::FAdd64),
+        Op::GroupNonUniformIMul => (Ir::IMul, Ir::IMul64),
+        Op::GroupNonUniformFMul => (Ir::FMul, Ir::FMul64),
+        Op::GroupNonUniformSMin => (Ir::SMin, Ir::SMin64),
+        Op::GroupNonUniformUMin => (Ir::UMin, Ir::UMin64),
+        Op::GroupNonUniformFMin => (Ir::FMin, Ir::FMin64),
+        Op::GroupNonUniformSMax => (Ir::SMax, Ir::SMax64),
+        Op::GroupNonUniformUMax => (Ir::UMax, Ir::UMax64),
+        Op::GroupNonUniformFMax => (Ir::FMax, Ir::FMax64),
+        Op::GroupNonUniformBitwiseAnd => (Ir::And, Ir::And64),
+        Op::GroupNonUniformBitwiseOr => (Ir::Or, Ir::Or64),
+        Op::GroupNonUniformBitwiseXor => (Ir::Xor, Ir::Xor64),
+        Op::GroupNonUniformLogicalAnd => return Some(Ir::BAnd),
+        Op::GroupNonUniformLogicalOr => return Some(Ir::BOr),
+        Op::GroupNonUniformLogicalXor => return Some(Ir::BXor),
+        _ => return None,
+    };
+    Some(op_for_width(scalar, narrow, wide))
+}
+
+/// `OpGroupNonUniform*` and the older `OpSubgroup*KHR`.
+pub fn subgroup(t: &mut Translator, it: &Instruction) -> Result<()> {
+    t.interface.uses_subgroups = true;
+    let opcode = it.opcode;
+    // The newer instructions name a scope first.
+    let khr = matches!(
+        opcode,
+        Op::SubgroupBallotKHR
+            | Op::SubgroupFirstInvocationKHR
+            | Op::SubgroupAllKHR
+            | Op::SubgroupAnyKHR
+            | Op::SubgroupAllEqualKHR
+            | Op::SubgroupReadInvocationKHR
+    );
+    let first = usize::from(!khr);
+    match opcode {
+        Op::GroupNonUniformElect => {
+            let elected = t.emit.builder.subgroup(SubgroupOp::Elect, None, None);
+            t.define(it, vec![elected])
+        }
+        Op::GroupNonUniformAll | Op::SubgroupAllKHR => vote(t, it, SubgroupOp::All, first),
+        Op::GroupNonUniformAny | Op::SubgroupAnyKHR => vote(t, it, SubgroupOp::Any, first),
+        Op::GroupNonUniformAllEqual | Op::SubgroupAllEqualKHR => {
+            let regs = t.regs(it.id(first)?)?;
+            let mut all = None;
+            for reg in regs.iter() {
+                let equal = t
+                    .emit
+                    .builder
+                    .subgroup(SubgroupOp::AllEqual, Some(*reg), None);
+                all = Some(match all {
+                    Some(all) => t.emit.op(Ir::BAnd, &[all, equal]),
+                    None => equal,
+                });
+            }
+            t.define(it, all.into_iter().collect())
+        }
+        Op::GroupNonUniformBroadcastFirst | Op::SubgroupFirstInvocationKHR => {
+            move_lanes(t, it, SubgroupOp::BroadcastFirst, first, None)
+        }
+        Op::GroupNonUniformBroadcast
+        | Op::GroupNonUniformShuffle
+        | Op::SubgroupReadInvocationKHR => {
+            move_lanes(t, it, SubgroupOp::Shuffle, first, Some(first + 1))
+        }
+        Op::GroupNonUniformShuffleXor => {
+            move_lanes(t, it, SubgroupOp::ShuffleXor, first, Some(first + 1))
+        }
+        Op::GroupNonUniformShuffleUp => {
+            move_lanes(t, it, SubgroupOp::ShuffleUp, first, Some(first + 1))
+        }
+        Op::GroupNonUniformShuffleDown => {
+            move_lanes(t, it, SubgroupOp::ShuffleDown, first, Some(first + 1))
+        }
+        Op::GroupNonUniformQuadBroadcast => {
+            move_lanes(t, it, SubgroupOp::QuadBroadcast, first, Some(first + 1))
+        }
+        Op::GroupNonUniformQuadSwap => {
+            let direction = t.literal(it.id(2)?)?;
+            let across = t.emit.u32(direction.min(2) + 1);
+            let regs = t.regs(it.id(1)?)?;
+            let op = SubgroupOp::QuadSwap;
+            let moved = regs
+                .iter()
+                .map(|reg| t.emit.builder.subgroup(op, Some(*reg), Some(across)))
+                .collect();
+            t.define(it, moved)
+        }
+        Op::GroupNonUniformBallot | Op::SubgroupBallotKHR => {
+            let value = t.reg(it.id(first)?)?;
+            let words = t.emit.builder.ballot(value);
+            t.define(it, words.to_vec())
+        }
+        Op::GroupNonUniformInverseBallot => {
+            let words = ballot_operand(t, it, 1)?;
+            let lane = t.io.subgroup_lane(&mut t.emit);
+            let bit = ballot_bit(t, &words, lane);
+            t.define(it, vec![bit])
+        }
+        Op::GroupNonUniformBallotBitExtract => {
+            let words = ballot_operand(t, it, 1)?;
+            let index = t.reg(it.id(2)?)?;
+            let bit = ballot_bit(t, &words, index);
+            t.define(it, vec![bit])
+        }
+        Op::GroupNonUniformBallotBitCount => ballot_count(t, it),
+        Op::GroupNonUniformBallotFindLSB | Op::GroupNonUniformBallotFindMSB => ballot_find(t, it),
+        _ => group_arithmetic(t, it),
+    }
+}
+
+fn vote(t: &mut Translator, it: &Instruction, op: SubgroupOp, operand: usize) -> Result<()> {
+    let value = t.reg(it.id(operand)?)?;
+    let reg = t.emit.builder.subgroup(op, Some(value), None);
+    t.define(it, vec![reg])
+}
+
+fn move_lanes(
+    t: &mut Translator,
+    it: &Instruction,
+    op: SubgroupOp,
+    value: usize,
+    index: Option<usize>,
+) -> Result<()> {
+    let regs = t.regs(it.id(value)?)?;
+    let index = match index {
+        Some(index) => Some(t.reg(it.id(index)?)?),
+        None => None,
+    };
+    let moved = regs
+        .iter()
+        .map(|reg| t.emit.builder.subgroup(op, Some(*reg), index))
+        .collect();
+    t.define(it, moved)
+}
+
+fn ballot_operand(t: &mut Translator, it: &Instruction, index: usize) -> Result<[Reg; 4]> {
+    match *t.regs(it.id(index)?)? {
+        [a, b, c, d] => Ok([a, b, c, d]),
+        _ => malformed("a ballot has four words"),
+    }
+}
+
+/// A truth value: a bit of a ballot is set.
+fn ballot_bit(t: &mut Translator, words: &[Reg; 4], index: Reg) -> Reg {
+    let (five, one, zero) = (t.emit.u32(5), t.emit.u32(1), t.emit.u32(0));
+    let which = t.emit.op(Ir::UShr, &[index, five]);
+    let mut word = words[0];
+    for (number, candidate) in (1..).zip(&words[1..]) {
+        let number = t.emit.u32(number);
+        let this = t.emit.op(Ir::IEq, &[which, number]);
+        word = t.emit.select(this, *candidate, word);
+    }
+    let shifted = t.emit.op(Ir::UShr, &[word, index]);
+    let bit = t.emit.op(Ir::And, &[shifted, one]);
+    t.emit.op(Ir::INe, &[bit, zero])
+}
+
+/// A ballot's words without the bits above the subgroup's.
+fn ballot_of_subgroup(t: &mut Translator, it: &Instruction, index: usize) -> Result<[Reg; 4]> {
+    let mut words = ballot_operand(t, it, index)?;
+    for (first, word) in (0..).step_by(32).zip(&mut words) {
+        let bits = t.options.subgroup_size.saturating_sub(first).min(32);
+        if bits < 32 {
+            let mask = t.emit.u32((1 << bits) - 1);
+            *word = t.emit.op(Ir::And, &[*word, mask]);
+        }
+    }
+    Ok(words)
+}
+
+fn ballot_count(t: &mut Translator, it: &Instruction) -> Result<()> {
+    let Some(group) = it.enumerant(1, GroupOperation::from_u32) else {
+        return malformed("there is no group operation");
+    };
+    let words = ballot_of_subgroup(t, it, 2)?;
+    let mut sum = t.emit.u32(0);
+    for (index, word) in (0..).zip(words) {
+        let mask = match group {
+            GroupOperation::Reduce => None,
+            GroupOperation::InclusiveScan => Some(spirv::BuiltIn::SubgroupLeMask),
+            GroupOperation::ExclusiveScan => Some(spirv::BuiltIn::SubgroupLtMask),
+            _ => return unsupported("this group operation"),
+        };
+        let word = match mask {
+            Some(mask) => {
+                let mask = t.io.lane_mask(&mut t.emit, mask, index);
+                t.emit.op(Ir::And, &[word, mask])
+            }
+            None => word,
+        };
+        let count = t.emit.op(Ir::BitCount, &[word]);
+        sum = t.emit.op(Ir::IAdd, &[sum, count]);
+    }
+    t.define(it, vec![sum])
+}
+
+fn ballot_find(t: &mut Translator, it: &Instruction) -> Result<()> {
+    let lowest = it.opcode == Op::GroupNonUniformBallotFindLSB;
+    let words = ballot_of_subgroup(t, it, 1)?;
+    let zero = t.emit.u32(0);
+    let mut found = t.emit.u32(u32::MAX);
+    let order: [u32; 4] = if lowest { [3, 2, 1, 0] } else { [0, 1, 2, 3] };
+    for index in order {
+        let word = words[index as usize];
+        let find = if lowest { Ir::FindLsb } else { Ir::FindUMsb };
+        let bit = t.emit.op(find, &[word]);
+        let first = t.emit.u32(32 * index);
+        let bit = t.emit.op(Ir::IAdd, &[bit, first]);
+        let any = t.emit.op(Ir::INe, &[word, zero]);
+        found = t.emit.select(any, bit, found);
+    }
+    t.define(it, vec![found])
+}
+
+/// Reductions and scans.
+fn group_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
+    let (scalar, regs) = t.vector(it.id(2)?)?;
+    let Some(op) = group_op(it.opcode, scalar).filter(|op| is_reducible(*op)) else {
+        return unsupported(format!("Op{:?}", it.opcode));
+    };
+    let Some(group) = it.enumerant(1, GroupOperation::from_u32) else {
+        return malformed("there is no group operation");
+    };
+    let operation = match group {
+        GroupOperation::Reduce => SubgroupOp::Reduce {
+            op,
+            cluster: t.options.subgroup_size,
+        },
+        GroupOperation::InclusiveScan => SubgroupOp::InclusiveScan(op),
+        GroupOperation::ExclusiveScan => SubgroupOp::ExclusiveScan(op),
+        GroupOperation::ClusteredReduce => SubgroupOp::Reduce {
+            op,
+            cluster: match t.literal(it.id(3)?)? {
+                cluster if cluster.is_power_of_two() => cluster,
+                _ => return malformed("the cluster size isn't a power of two"),
+            },
+        },
+        _ => return unsupported("this group operation"),
+    };
+    let signed = matches!(op, Ir::SMin | Ir::SMax);
+    let unsigned = matches!(op, Ir::UMin | Ir::UMax);
+    let reduced = regs
+        .iter()
+        .map(|reg| {
+            let reg = match (signed, unsigned) {
+                (true, _) => t.emit.sign_extend(scalar, *reg),
+                (_, true) => t.emit.zero_extend(scalar, *reg),
+                _ => *reg,
+            };
+            let reg = t.emit.builder.subgroup(operation, Some(reg), None);
+            let reg = if signed {
+                clamped(t, scalar, op, reg)
+            } else {
+                reg
+            };
+            t.emit.wrap_to_width(scalar, reg)
+        })
+        .collect();
+    t.define(it, reduced)
+}
+
+/// The least or greatest of no narrow integers: what 32 bits have for it, brought to the type's range.
+fn clamped(t: &mut Translator, scalar: Scalar, op: Ir, reg: Reg) -> Reg {
+    let Scalar::Int {
+        width: width @ (8 | 16),
+        ..
+    } = scalar
+    else {
+        return reg;
+    };
+    let most = (1 << (width - 1)) - 1;
+    let limit = t.emit.u32(if op == Ir::SMin { most } else { !most });
+    t.emit.op(op, &[reg, limit])
+}

@@ -1,0 +1,241 @@
+//! Interfaces of translated shaders: inputs, outputs, descriptors, push constants; and the entry point that
+//! spirv-reflect sees.
+
+use std::sync::Arc;
+
+use crate::common::{folder, translated, words_of};
+use fearless_simd::Level;
+use gaurast_spirv::{
+    BuiltIn, DepthMode, DescriptorKind, InputSource, Interface, Interpolation, Module,
+    OutputTarget, Sampling, ScalarType, Specialization,
+};
+use isa::exec::{Executable, LaneMask, Machine, Options as ExecOptions, Watchdog};
+use isa::resources::{Resources, words};
+
+const FLOAT: ScalarType = ScalarType::Float { width: 32 };
+
+fn interface(name: &str) -> Interface {
+    translated(name, &Specialization::default()).interface
+}
+
+fn outputs(interface: &Interface) -> Vec<OutputTarget> {
+    interface
+        .outputs
+        .iter()
+        .map(|output| output.target)
+        .collect()
+}
+
+fn location(location: u32, component: u32) -> OutputTarget {
+    OutputTarget::Location {
+        location,
+        component,
+        index: 0,
+    }
+}
+
+#[gaurast_runner::test]
+fn a_vertex_shader_reads_only_what_it_uses() {
+    let found = interface("triangle.vert");
+    assert_eq!(found.locations_read(), [(0, FLOAT), (1, FLOAT)]);
+    assert_eq!(found.push_constants, Some(16..80));
+    let position = |component| OutputTarget::BuiltIn {
+        built_in: BuiltIn::Position,
+        component,
+    };
+    // Of the block of built-ins, only the position is written.
+    let mut written = outputs(&found);
+    written.sort_by_key(|target| format!("{target:?}"));
+    let mut expected: Vec<_> = (0..4).map(position).collect();
+    expected.extend((0..3).map(|component| location(0, component)));
+    assert_eq!(written, expected);
+}
+
+#[gaurast_runner::test]
+fn matrices_arrays_and_blocks_take_consecutive_locations() {
+    let found = interface("block.vert");
+    let read: Vec<u32> = found
+        .locations_read()
+        .iter()
+        .map(|(location, _)| *location)
+        .collect();
+    assert_eq!(read, [0, 1, 2, 4]);
+    let packed = found.inputs.iter().any(|input| {
+        matches!(
+            input.source,
+            InputSource::Location {
+                location: 4,
+                component: 2,
+                ..
+            }
+        )
+    });
+    assert!(packed, "component 1 and 2 of location 4");
+    let written = outputs(&found);
+    for expected in [(2, 0), (2, 2), (3, 0), (4, 0), (5, 0)] {
+        assert!(
+            written.contains(&location(expected.0, expected.1)),
+            "{expected:?}"
+        );
+    }
+    let distance = |component| OutputTarget::BuiltIn {
+        built_in: BuiltIn::ClipDistance,
+        component,
+    };
+    assert!(written.contains(&distance(1)) && !written.contains(&distance(0)));
+}
+
+#[gaurast_runner::test]
+fn a_fragment_shader_says_how_its_inputs_are_interpolated() {
+    let found = interface("textured.frag");
+    let of = |at: u32| {
+        found
+            .inputs
+            .iter()
+            .find_map(|input| match input.source {
+                InputSource::Location {
+                    location,
+                    interpolation,
+                    sampling,
+                    ..
+                } if location == at => Some((interpolation, sampling)),
+                _ => None,
+            })
+            .unwrap()
+    };
+    assert_eq!(of(1), (Interpolation::Perspective, Sampling::Center));
+    assert_eq!(of(2), (Interpolation::Flat, Sampling::Center));
+    assert_eq!(of(3), (Interpolation::Linear, Sampling::Centroid));
+    assert!(found.discards && !found.has_side_effects && !found.early_fragment_tests);
+    assert_eq!(found.depth, DepthMode::Replacing);
+    assert_eq!(found.descriptors.len(), 1);
+    assert_eq!(
+        found.descriptors[0].kind,
+        DescriptorKind::CombinedImageSampler
+    );
+    assert_eq!(found.descriptors[0].name.as_deref(), Some("textures"));
+    let id = found
+        .outputs
+        .iter()
+        .find(|output| output.target == location(1, 0));
+    assert_eq!(
+        id.map(|output| output.numeric),
+        Some(ScalarType::Uint { width: 32 })
+    );
+
+    let found = interface("interpolation.frag");
+    assert!(found.early_fragment_tests);
+    assert_eq!(found.descriptors[0].attachment, Some(1));
+    let samplings: Vec<Sampling> = found
+        .inputs
+        .iter()
+        .filter_map(|input| match input.source {
+            InputSource::Location {
+                location: 0,
+                sampling,
+                ..
+            } => Some(sampling),
+            _ => None,
+        })
+        .collect();
+    assert!(samplings.contains(&Sampling::Centroid) && samplings.contains(&Sampling::Center));
+}
+
+#[gaurast_runner::test]
+fn descriptors_have_their_kinds_and_resource_slots() {
+    use DescriptorKind::*;
+    let found = interface("images.comp");
+    let kinds: Vec<(u32, DescriptorKind, bool)> = found
+        .descriptors
+        .iter()
+        .map(|it| (it.binding, it.kind, it.writable))
+        .collect();
+    let expected = [
+        (0, StorageImage, false),
+        (1, StorageImage, true),
+        (2, CombinedImageSampler, false),
+        (3, SampledImage, false),
+        (4, Sampler, false),
+        (5, StorageImage, true),
+        (6, UniformTexelBuffer, false),
+        (8, CombinedImageSampler, false),
+    ];
+    assert_eq!(kinds, expected);
+    let found = interface("descriptor_arrays.comp");
+    let points: Vec<(u32, u32, u32)> = found
+        .descriptors
+        .iter()
+        .map(|it| (it.set, it.slot, it.count))
+        .collect();
+    assert_eq!(points, [(0, 0, 1), (1, 1, 4)]);
+    assert_eq!(found.descriptors[1].size, 4);
+}
+
+#[gaurast_runner::test]
+fn spirv_reflect_sees_the_same_entry_point() {
+    use spirv_reflect::types::ReflectShaderStageFlags as Flags;
+    let name = "block.vert";
+    let bytes = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
+    let theirs = spirv_reflect::ShaderModule::load_u8_data(&bytes).unwrap();
+    let ours = Module::parse(&words_of(name)).unwrap().entry_points();
+    assert_eq!(ours.len(), 1);
+    assert_eq!(ours[0].0, theirs.get_entry_point_name());
+    assert_eq!(theirs.get_shader_stage(), Flags::VERTEX);
+}
+
+#[gaurast_runner::test]
+fn a_vertex_shader_transforms() {
+    let shader = translated("triangle.vert", &Specialization::default());
+    let options = ExecOptions {
+        lanes: 16,
+        subgroup_size: 16,
+        ..ExecOptions::new(Level::new())
+    };
+    let executable = Executable::new(shader.program.clone(), &options).unwrap();
+    let mut machine = Machine::new(Arc::new(executable));
+    for (slot, input) in (0..).zip(&shader.interface.inputs) {
+        for lane in 0..16 {
+            let value = match input.source {
+                InputSource::Location {
+                    location,
+                    component,
+                    ..
+                } => (10 * location + component + 100 * lane as u32) as f32,
+                InputSource::BuiltIn { .. } => {
+                    machine.set_input(slot, lane, 7);
+                    continue;
+                }
+            };
+            machine.set_input(slot, lane, value.to_bits());
+        }
+    }
+    // A matrix whose column c, row r is 4 c + r.
+    let mut push = vec![0_u8; 16];
+    push.extend((0..16).flat_map(|n| (n as f32).to_le_bytes()));
+    let push = words(&push);
+    let resources = Resources {
+        push_constants: &push,
+        ..Resources::default()
+    };
+    let all = LaneMask::first(16);
+    machine
+        .run(&all, &LaneMask::none(), &resources, Watchdog::default())
+        .unwrap();
+    for (slot, output) in (0..).zip(&shader.interface.outputs) {
+        for lane in 0..16 {
+            let x = 100.0 * lane as f32;
+            let expected = match output.target {
+                OutputTarget::Location { component, .. } => 10.0 + component as f32 + x,
+                OutputTarget::BuiltIn { component, .. } => {
+                    let column = |c: u32| (4 * c + component) as f32;
+                    column(0) * x + column(1) * (x + 1.0) + column(2) * 7.0 + column(3)
+                }
+            };
+            assert_eq!(
+                f32::from_bits(machine.output(slot, lane)),
+                expected,
+                "{output:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! All kept shaders translate; what is kept is what their sources compile to.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::common::{all_shaders, folder, translated};
+use gaurast_runner::{Missing, Need, ignore};
+use gaurast_spirv::Specialization;
+
+#[gaurast_runner::test]
+fn every_kept_shader_translates() {
+    let names = all_shaders();
+    assert!(names.len() >= 18);
+    for name in names {
+        let shader = translated(&name, &Specialization::default());
+        assert!(!shader.program.body.is_empty(), "{name}");
+    }
+}
+
+/// Everything but the header's generator word, which changes with glslang's version.
+fn comparable(bytes: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    if let Some(generator) = bytes.get_mut(8..12) {
+        generator.fill(0);
+    }
+    bytes
+}
+
+/// A program that made the kept binaries, and how it names the version that made them.
+struct Tool {
+    program: &'static str,
+    version: &'static str,
+}
+
+const COMPILER: Tool = Tool {
+    program: "glslangValidator",
+    version: "Glslang Version: 11:12.",
+};
+const OPTIMIZER: Tool = Tool {
+    program: "spirv-opt",
+    version: "SPIRV-Tools v2023.1",
+};
+
+impl Tool {
+    const fn need(&self) -> Need {
+        Need::Program(self.program)
+    }
+
+    /// Ends the test as ignored where the program is of another version, which may compile otherwise.
+    fn require_version(&self) {
+        let output = Command::new(self.program)
+            .arg("--version")
+            .output()
+            .unwrap();
+        // spirv-opt tells it on the standard error.
+        let text =
+            String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        if !text.contains(self.version) {
+            let found = text.lines().next().unwrap_or_default();
+            let reason = format!("the kept binaries are of \"{}\", not {found}", self.version);
+            ignore(Missing::Capability, reason);
+        }
+    }
+
+    /// Runs the program, which must succeed, and returns what it wrote to a file of its own.
+    fn output(&self, arguments: &[&str], input: &Path) -> Vec<u8> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let output = Command::new(self.program)
+            .args(arguments)
+            .arg(input)
+            .arg("-o")
+            .arg(file.path())
+            .output()
+            .unwrap();
+        let message = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{}: {message}", input.display());
+        std::fs::read(file.path()).unwrap()
+    }
+}
+
+/// Compiles a shader's source to SPIR-V.
+fn compiled(name: &str) -> Vec<u8> {
+    COMPILER.output(&["-V", "--target-env", "vulkan1.3"], &folder().join(name))
+}
+
+/// Asserts that a kept binary is `fresh`.
+fn assert_kept(name: &str, fresh: &[u8]) {
+    let kept = std::fs::read(folder().join(format!("{name}.spv"))).unwrap();
+    assert!(
+        comparable(&kept) == comparable(fresh),
+        "{name}.spv isn't what its source compiles to"
+    );
+}
+
+#[gaurast_runner::test(needs = [COMPILER.need()])]
+fn kept_binaries_match_their_sources() {
+    COMPILER.require_version();
+    for name in all_shaders() {
+        if !name.ends_with(".opt") {
+            assert_kept(&name, &compiled(&name));
+        }
+    }
+}
+
+#[gaurast_runner::test(needs = [COMPILER.need(), OPTIMIZER.need()])]
+fn kept_optimized_binaries_match_their_sources() {
+    COMPILER.require_version();
+    OPTIMIZER.require_version();
+    let folder = tempfile::tempdir().unwrap();
+    let binary = folder.path().join("compiled.spv");
+    for name in all_shaders() {
+        if let Some(source) = name.strip_suffix(".opt") {
+            std::fs::write(&binary, compiled(source)).unwrap();
+            let arguments = ["-O", "--target-env=vulkan1.3"];
+            assert_kept(&name, &OPTIMIZER.output(&arguments, &binary));
+        }
+    }
+}
+
+/// Disassemblies that are kept, to be looked at when the translation changes.
+const KEPT: [&str; 3] = ["triangle.vert", "mandelbrot.comp", "matrix_product.comp"];
+
+#[gaurast_runner::test]
+fn disassemblies_are_as_kept() {
+    for name in KEPT {
+        let text = translated(name, &Specialization::default())
+            .program
+            .to_string();
+        let path = folder().join(format!("{name}.ir"));
+        if std::env::var_os("GAURAST_BLESS").is_some() {
+            std::fs::write(&path, &text).unwrap();
+        }
+        let kept = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(
+            text, kept,
+            "{name}: run with GAURAST_BLESS=1 to keep the new disassembly"
+        );
+    }
+}

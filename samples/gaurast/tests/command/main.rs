@@ -1,0 +1,12 @@
+//! The `gaurast` command, the renderer, and the C sample.
+
+mod c_program;
+mod command_line;
+mod given_files;
+#[cfg(target_os = "linux")]
+mod interruptions;
+mod renderer;
+
+fn main() -> std::process::ExitCode {
+    gaurast_runner::main()
+}
