@@ -15,7 +15,7 @@ use simdevice::packet::{
     GaussianBegin, LoadOp, ModelAttributes, Rendering, StoreOp, SubresourceLayers,
     SubresourceRange,
 };
-use simdevice::packet::{Dispatch, Draw, draw};
+use simdevice::packet::{Dispatch, Draw};
 use simdevice::program::bindings::Bindings;
 use simdevice::program::compute::ComputeProgram;
 use simdevice::program::interface::{
@@ -26,7 +26,7 @@ use simdevice::program::vertex::DrawPipeline;
 use simdevice::runtime::{FlushPolicy, SimdLevel};
 use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
 use simdevice::state::{
-    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, DrawState,
+    self, BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DrawState,
     Rect, Topology, Viewport,
 };
 use simdevice::stats::recorder::Recorder;
@@ -211,7 +211,7 @@ fn depth_clear(depth: f32) -> ClearValue {
 
 fn depth_stencil(test: DepthTest) -> DepthStencil {
     DepthStencil {
-        depth: test.map(|(op, write)| DepthTest {
+        depth: test.map(|(op, write)| state::DepthTest {
             compare: match op {
                 vk::CompareOp::LESS => CompareOp::Less,
                 vk::CompareOp::LESS_OR_EQUAL => CompareOp::LessOrEqual,
