@@ -5,7 +5,7 @@
 //! - `GAURAST_THREADS`: how many worker threads a device has; 0 (the default) means one per processor.
 //! - `GAURAST_TIMEOUT_MS`: how many milliseconds one batch of shader invocations may take before the device is lost; a
 //!   loop without end is stopped so. A batch is a workgroup, or some 64 vertices or fragments.
-//! - `GAURAST_SKIP`: the work that is left out where it changes no image: all (the default), none, or names separated by
+//! - `GAURAST_OPTIMIZATIONS`: the work that is left out where it changes no image: all (the default), none, or names separated by
 //!   commas (see [`simdevice::stats::optimizations`]).
 //! - `GAURAST_TRACE`: a file that the work of a device's last 64 render passes is written to, as JSON, when the device is
 //!   gone; `gaurast simulate` reads it. It costs a little time and changes no image.
@@ -19,19 +19,19 @@
 use crate::capabilities::memory;
 use crate::error::Error;
 use simdevice::runtime::{Config, SimdLevel};
-use simdevice::stats::optimizations::UnknownSkip;
+use simdevice::stats::optimizations::UnknownOptimization;
 use simdevice::stats::recorder::{Recorder, Trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 /// The heap's size is so many times what chunks of Gaussians may take of host memory beside it.
-const HEAP_PER_CHUNK_BUDGET: u64 = 8;
+const HEAP_PER_CLUSTER_BUDGET: u64 = 8;
 
 const SIMD: &str = "GAURAST_SIMD";
 const THREADS: &str = "GAURAST_THREADS";
 const TIMEOUT: &str = "GAURAST_TIMEOUT_MS";
-const SKIP: &str = "GAURAST_SKIP";
+const OPTIMIZATIONS: &str = "GAURAST_OPTIMIZATIONS";
 const TRACE: &str = "GAURAST_TRACE";
 const TIMESTAMPS: &str = "GAURAST_TIMESTAMPS";
 const DUMP: &str = "GAURAST_DUMP";
@@ -45,7 +45,7 @@ pub(crate) fn open_device() -> Result<simdevice::Device, Error> {
         variable(SIMD)?.as_deref(),
         variable(THREADS)?.as_deref(),
         variable(TIMEOUT)?.as_deref(),
-        variable(SKIP)?.as_deref(),
+        variable(OPTIMIZATIONS)?.as_deref(),
     )?;
     config.simulated_timestamps =
         simulated_timestamps(variable(TIMESTAMPS)?.as_deref().unwrap_or_default())?;
@@ -123,10 +123,10 @@ fn config(
     simd: Option<&str>,
     threads: Option<&str>,
     timeout: Option<&str>,
-    skip: Option<&str>,
+    optimizations: Option<&str>,
 ) -> Result<Config, Error> {
     let mut config = Config {
-        chunk_budget_bytes: memory::heap_size() / HEAP_PER_CHUNK_BUDGET,
+        cluster_budget_bytes: memory::heap_size() / HEAP_PER_CLUSTER_BUDGET,
         ..Config::default()
     };
     if let Some(name) = simd {
@@ -146,10 +146,11 @@ fn config(
         })?;
         config.shader_timeout = Duration::from_millis(milliseconds);
     }
-    if let Some(names) = skip {
-        let unknown =
-            |error: UnknownSkip| Error::InitializationFailed(format!("{SKIP}={names}: {error}"));
-        config.skips = names.parse().map_err(unknown)?;
+    if let Some(names) = optimizations {
+        let unknown = |error: UnknownOptimization| {
+            Error::InitializationFailed(format!("{OPTIMIZATIONS}={names}: {error}"))
+        };
+        config.optimizations = names.parse().map_err(unknown)?;
     }
     Ok(config)
 }
@@ -157,7 +158,7 @@ fn config(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use simdevice::stats::optimizations::Skip;
+    use simdevice::stats::optimizations::Optimization;
 
     #[test]
     fn values_are_understood_or_refused() {
@@ -170,12 +171,15 @@ mod tests {
         assert!(error.to_string().contains("GAURAST_SIMD=mmx"));
         assert!(config(None, Some("-1"), None, None).is_err());
         assert!(config(None, None, Some("soon"), None).is_err());
-        assert!(chosen.skips.has(Skip::Bounds) && !chosen.skips.has(Skip::Ellipse));
+        assert!(
+            chosen.optimizations.has(Optimization::Bounds)
+                && !chosen.optimizations.has(Optimization::Ellipse)
+        );
         let error = config(None, None, None, Some("blocks,much")).unwrap_err();
         assert!(
             error
                 .to_string()
-                .contains("GAURAST_SKIP=blocks,much: \"much\" is"),
+                .contains("GAURAST_OPTIMIZATIONS=blocks,much: \"much\" is"),
             "{error}"
         );
         assert!(simulated_timestamps("simulated").unwrap());

@@ -8,7 +8,7 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::gaussian::{GaussianDraw, GaussianSet, sort};
+use simdevice::gaussian::{BinnedDraw, GaussianSet, sort, sort_and_bin};
 use simdevice::packet::*;
 use simdevice::raster::gaussian::GaussianTile;
 use simdevice::runtime::SimdLevel;
@@ -156,11 +156,11 @@ fn begin(degree: u32) -> GaussianBegin {
     }
 }
 
-fn resolve(device: &Device, begin: &GaussianBegin, append: &GaussianAppend) -> GaussianDraw {
+fn resolve(device: &Device, begin: &GaussianBegin, append: &GaussianAppend) -> BinnedDraw {
     let mut set = GaussianSet::begin(begin, area(), None);
     set.append(append);
-    set.resolve(device.runtime(), device.caches(), &mut Counters::default())
-        .expect("not too many")
+    let mut counters = Counters::default();
+    sort_and_bin(set, device.runtime(), device.caches(), &mut counters).expect("not too many")
 }
 
 const COUNT: usize = 50_000;

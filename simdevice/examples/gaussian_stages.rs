@@ -9,7 +9,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::format::ClearValue;
-use simdevice::gaussian::GaussianSet;
+use simdevice::gaussian::{GaussianSet, sort_and_bin};
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::*;
 use simdevice::pass::{Pass, PassDraw};
@@ -238,7 +238,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut counters = Counters::default();
         let mut set = GaussianSet::begin(&begin, area, Some(Format::D32Sfloat));
         set.append(&append);
-        let draw = set.resolve(device.runtime(), device.caches(), &mut counters)?;
+        let draw = sort_and_bin(set, device.runtime(), device.caches(), &mut counters)?;
         let started = Instant::now();
         let mut pass = Pass::begin(&rendering)?;
         pass.push(

@@ -2,7 +2,7 @@
 
 use crate::compute;
 use crate::device::Device;
-use crate::gaussian::{GaussianSet, TooManyGaussians, Unresolved};
+use crate::gaussian::{self, GaussianSet, SortError};
 use crate::geometry::{FrontEnd, Surface};
 use crate::hardware_model::HardwareModel;
 use crate::packet::{Draw, Packet};
@@ -39,7 +39,7 @@ pub enum ExecutionError {
     Attachment(#[from] AttachmentError),
     /// A set is too large.
     #[error(transparent)]
-    TooManyGaussians(#[from] TooManyGaussians),
+    TooManyGaussians(SortError),
     /// A program ran for too long; what it wrote until then stays written.
     #[error(transparent)]
     Stopped(#[from] Stopped),
@@ -49,11 +49,11 @@ pub enum ExecutionError {
     OutOfMemory(#[from] OutOfMemory),
 }
 
-impl From<Unresolved> for ExecutionError {
-    fn from(why: Unresolved) -> Self {
+impl From<SortError> for ExecutionError {
+    fn from(why: SortError) -> Self {
         match why {
-            Unresolved::TooManyGaussians(too_many) => too_many.into(),
-            Unresolved::Stopped(stopped) => stopped.into(),
+            SortError::TooManyGaussians { .. } => Self::TooManyGaussians(why),
+            SortError::Stopped(stopped) => stopped.into(),
         }
     }
 }
@@ -165,7 +165,8 @@ impl CommandProcessor {
             }
             Packet::GaussianResolve => {
                 let set = self.gaussians.take().ok_or(ExecutionError::NoGaussianSet)?;
-                let draw = set.resolve(
+                let draw = gaussian::sort_and_bin(
+                    set,
                     self.device.runtime(),
                     self.device.caches(),
                     &mut self.counters,

@@ -10,7 +10,6 @@
 //! [`compute`] and [`transfer`]; [`gaussian`]; [`raster`]; [`pass`]; [`command_processor`].
 #![forbid(unsafe_code)]
 
-mod binning;
 pub mod command_processor;
 pub mod compute;
 pub mod device;

@@ -4,13 +4,13 @@
 //! that the image depends neither on the number of workers nor on when the pass is flushed.
 
 use crate::format::{Aspect, ClearValue, Format};
-use crate::gaussian::GaussianDraw;
+use crate::gaussian::BinnedDraw;
 use crate::geometry::PrimitiveDraw;
 use crate::image::ImageView;
 use crate::limits::{MAX_FRAMEBUFFER_LAYERS, MAX_FRAMEBUFFER_SIZE};
 use crate::packet::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
 use crate::raster::gaussian::GaussianTile;
-use crate::raster::gaussian::tile_draw::GaussianTileDraw;
+use crate::raster::gaussian::GaussianTileDraw;
 use crate::raster::output::{Buffers, Targets};
 use crate::raster::prepared::TileDraw;
 use crate::raster::primitives::{Place, Scratch};
@@ -19,7 +19,7 @@ use crate::raster::{Plane, primitives};
 use crate::runtime::{FlushPolicy, Runtime};
 use crate::state::{Rect, ResolveMode};
 use crate::stats::counters::{Counter, Counters};
-use crate::stats::optimizations::Skip;
+use crate::stats::optimizations::Optimization;
 use devmem::host;
 use isa::exec::Stopped;
 use std::sync::atomic::AtomicBool;
@@ -31,7 +31,7 @@ pub enum PassDraw {
     /// Rectangles of attachments to clear.
     Clear(ClearAttachments),
     /// A sorted and binned set of Gaussians.
-    Gaussians(Box<GaussianDraw>),
+    Gaussians(Box<BinnedDraw>),
     /// Points, lines or triangles.
     Primitives(Box<PrimitiveDraw>),
 }
@@ -450,7 +450,12 @@ impl Flush<'_> {
                 )?,
             }
         }
-        if !self.runtime.config().skips.has(Skip::EmptyTiles) {
+        if !self
+            .runtime
+            .config()
+            .optimizations
+            .has(Optimization::EmptyTiles)
+        {
             tiles().for_each(|tile| self.touch_all(worker, layer, &tile));
         }
         for tile in tiles() {

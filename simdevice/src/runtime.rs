@@ -1,7 +1,7 @@
 //! The runtime: workers, the SIMD level and the configuration, chosen once when a device is created.
 
 use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
-use crate::stats::optimizations::Skips;
+use crate::stats::optimizations::Optimizations;
 use crate::stats::recorder::Recorder;
 use fearless_simd::Level;
 use isa::exec::Stopped;
@@ -27,15 +27,15 @@ pub struct Config {
     /// A pass is flushed early when its bins exceed this many bytes.
     pub bin_budget_bytes: u64,
     /// How many bytes of host memory may hold Gaussians in an order that is faster to read (see
-    /// [`Skip::Chunks`](crate::stats::optimizations::Skip::Chunks)): 48 for each, and 192 for spherical harmonics
+    /// [`Optimization::ClusterCulling`](crate::stats::optimizations::Optimization::ClusterCulling)): 48 for each, and 192 for spherical harmonics
     /// of degree 3 if there is room for them.
-    pub chunk_budget_bytes: u64,
+    pub cluster_budget_bytes: u64,
     /// When a pass is flushed.
     pub flush: FlushPolicy,
     /// The longest time that one batch of shader invocations may take.
     pub shader_timeout: Duration,
     /// The work that is left out where it changes no pixel.
-    pub skips: Skips,
+    pub optimizations: Optimizations,
     /// Gathers what draws do in tiles, if anybody wants to know. It never changes an image.
     pub recorder: Option<Arc<Recorder>>,
     /// Timestamps count the simulated hardware's nanoseconds instead of the host's.
@@ -60,10 +60,10 @@ impl Default for Config {
             simd: SimdLevel::Best,
             macro_tile_size: 64,
             bin_budget_bytes: 256 << 20,
-            chunk_budget_bytes: 512 << 20,
+            cluster_budget_bytes: 512 << 20,
             flush: FlushPolicy::WhenFull,
             shader_timeout: Duration::from_secs(5),
-            skips: Skips::default(),
+            optimizations: Optimizations::default(),
             recorder: None,
             simulated_timestamps: false,
         }

@@ -41,7 +41,7 @@ use ash::vk;
 use thiserror::Error;
 
 use device::{Device, Purpose};
-use draw::{Far, Recorder};
+use draw::Recorder;
 use gaurast::gaussian_primitive_topology;
 use gaurast_picture::Picture;
 use gaurast_scene::{Camera, GaussianShape, MAX_SH_DEGREE, Scene};
@@ -151,8 +151,6 @@ pub struct Settings {
     pub exponential_error: f32,
     /// What the contributions that are left out at a pixel may add up to.
     pub contribution_budget: f32,
-    /// Gaussians of this view depth or more are drawn at half size.
-    pub far_half: Option<f32>,
 }
 
 impl Default for Settings {
@@ -167,7 +165,6 @@ impl Default for Settings {
             precision: Precision::Fp32,
             exponential_error: 0.0,
             contribution_budget: 0.0,
-            far_half: None,
         }
     }
 }
@@ -178,8 +175,6 @@ pub struct DeviceScene {
     strides: [u32; BINDINGS],
     stored_degree: u32,
     pipeline: GaussianPipeline,
-    /// How what is far is drawn, if otherwise.
-    far: Option<Far>,
     /// One for each of [`BINDINGS`].
     buffers: [Buffer; BINDINGS],
 }
@@ -201,8 +196,6 @@ pub struct Frame {
 pub struct Target {
     /// The colour attachment.
     pub image: Image,
-    /// Half as wide and high, if anything was drawn at half size.
-    half: Option<Image>,
     /// Room for the pixels in memory of the host.
     pub readback: Buffer,
 }
@@ -268,8 +261,7 @@ impl Renderer {
             count: count as u32,
             strides,
             stored_degree: scene.sh_degree(),
-            pipeline: self.pipeline(strides, scene.sh_degree(), settings, false)?,
-            far: None,
+            pipeline: self.pipeline(strides, scene.sh_degree(), settings)?,
             buffers: [
                 self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
                 self.upload_bytes(bytemuck::cast_slice(scene.shapes()))?,
@@ -292,12 +284,7 @@ impl Renderer {
     /// # Errors
     /// If Vulkan fails.
     pub fn set(&self, scene: &mut DeviceScene, settings: Settings) -> Result<(), RenderError> {
-        let pipeline = |over| self.pipeline(scene.strides, scene.stored_degree, settings, over);
-        let (whole, far) = match settings.far_half {
-            Some(depth) => (pipeline(false)?, Some(Far::new(depth, pipeline(true)?))),
-            None => (pipeline(false)?, None),
-        };
-        (scene.pipeline, scene.far) = (whole, far);
+        scene.pipeline = self.pipeline(scene.strides, scene.stored_degree, settings)?;
         Ok(())
     }
 
@@ -306,13 +293,12 @@ impl Renderer {
         strides: [u32; BINDINGS],
         stored_degree: u32,
         mut settings: Settings,
-        over: bool,
     ) -> Result<GaussianPipeline, RenderError> {
         settings.sh_degree = settings
             .sh_degree
             .min(stored_degree)
             .min(self.device.max_sh_degree());
-        GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT, over)
+        GaussianPipeline::new(&self.device, strides, settings, COLOR_FORMAT)
     }
 
     /// A device-local vertex buffer of `bytes`, by way of a staging buffer.
@@ -376,9 +362,6 @@ impl Renderer {
             _ => Target::new(&self.device, width, height)?,
         };
         let target = self.target.insert(target);
-        if scene.far.is_some() && target.half.is_none() {
-            target.half = Some(draw::half_of(&self.device, &target.image)?);
-        }
 
         // A query is not reset in the submission that it begins in, and it spans a whole command
         // buffer, so that counters of any scope will do.
@@ -452,7 +435,6 @@ impl Target {
                     | vk::ImageUsageFlags::TRANSFER_SRC
                     | vk::ImageUsageFlags::TRANSFER_DST,
             )?,
-            half: None,
             readback: Buffer::new(
                 device,
                 bytes,

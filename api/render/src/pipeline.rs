@@ -28,13 +28,12 @@ pub(super) struct GaussianPipeline {
 
 impl GaussianPipeline {
     /// A pipeline for vertex buffers of `strides`, that draws by `settings` (with a degree that is
-    /// stored) into an attachment of `format`, over what it holds or in its place.
+    /// stored) into an attachment of `format`, in place of what it holds.
     pub(super) fn new(
         device: &Arc<Device>,
         strides: [u32; BINDINGS],
         settings: Settings,
         format: vk::Format,
-        over: bool,
     ) -> Result<Self, RenderError> {
         let raw = device.raw();
         // SAFETY: the structure is valid.
@@ -65,11 +64,6 @@ impl GaussianPipeline {
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         // Without blending the attachment takes (C, 1 - T) itself.
         let attachments = [vk::PipelineColorBlendAttachmentState::default()
-            .blend_enable(over)
-            .src_color_blend_factor(vk::BlendFactor::ONE)
-            .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
-            .src_alpha_blend_factor(vk::BlendFactor::ONE)
-            .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
             .color_write_mask(vk::ColorComponentFlags::RGBA)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];

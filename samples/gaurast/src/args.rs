@@ -126,10 +126,6 @@ pub struct RenderArguments {
     #[arg(long, value_name = "B", default_value_t = 0.0, value_parser = part)]
     pub contribution_budget: f32,
 
-    /// Draw what is this far away or farther at half size
-    #[arg(long, value_name = "DEPTH", value_parser = depth)]
-    pub far_half: Option<f32>,
-
     /// Count also what the simulated hardware would spend: cycles, stalls, energy
     ///
     /// `gaurast simulate` tells more, of any hardware.
@@ -242,7 +238,6 @@ impl Default for RenderArguments {
             precision: Precision::default(),
             exponential_error: 0.0,
             contribution_budget: 0.0,
-            far_half: None,
             counters: false,
             quiet: false,
             output: vec![DEFAULT_OUTPUT.into()],
@@ -274,13 +269,6 @@ fn part(text: &str) -> Result<f32, &'static str> {
         .ok()
         .filter(|part| (0.0..=1.0).contains(part))
         .ok_or("it is at least 0 and at most 1")
-}
-
-fn depth(text: &str) -> Result<f32, &'static str> {
-    text.parse()
-        .ok()
-        .filter(|depth: &f32| depth.is_finite() && *depth > 0.0)
-        .ok_or("it is more than 0")
 }
 
 fn field_of_view(text: &str) -> Result<f64, &'static str> {

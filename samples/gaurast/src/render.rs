@@ -89,7 +89,6 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         precision: arguments.precision.into(),
         exponential_error: arguments.exponential_error,
         contribution_budget: arguments.contribution_budget,
-        far_half: arguments.far_half,
         ..Settings::default()
     };
     renderer.set(&mut uploaded, settings)?;

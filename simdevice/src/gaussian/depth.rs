@@ -7,7 +7,7 @@ use crate::state::gaussian::{Camera, CameraModel};
 
 /// How depths follow one another where depth variables ascend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Trend {
+pub(crate) enum DepthTrend {
     /// No later one is less.
     Rising,
     /// No later one is greater.
@@ -68,14 +68,14 @@ impl CenterDepth {
 
     /// How [`CenterDepth::code`] changes as z grows; every operation in it is monotonic, its rounding included. Only
     /// a linear depth may have z of either sign.
-    pub(crate) fn trend(&self) -> Trend {
+    pub(crate) fn trend(&self) -> DepthTrend {
         let [near, far] = self.range;
         let slope = self.coefficients[1] * (far - near);
         let slope = if self.is_linear { slope } else { -slope };
         if slope < 0.0 {
-            Trend::Falling
+            DepthTrend::Falling
         } else {
-            Trend::Rising
+            DepthTrend::Rising
         }
     }
 }
@@ -144,21 +144,31 @@ mod tests {
                 CameraModel::Pinhole,
                 [1.0, -1.0],
                 [0.25, 0.75],
-                Trend::Rising,
+                DepthTrend::Rising,
             ),
-            (CameraModel::Pinhole, [0.0, 1.0], [0.0, 1.0], Trend::Falling),
-            (CameraModel::Fisheye, [0.0, 1.0], [1.0, 0.5], Trend::Rising),
+            (
+                CameraModel::Pinhole,
+                [0.0, 1.0],
+                [0.0, 1.0],
+                DepthTrend::Falling,
+            ),
+            (
+                CameraModel::Fisheye,
+                [0.0, 1.0],
+                [1.0, 0.5],
+                DepthTrend::Rising,
+            ),
             (
                 CameraModel::Orthographic,
                 [0.5, 0.01],
                 [0.0, 1.0],
-                Trend::Rising,
+                DepthTrend::Rising,
             ),
             (
                 CameraModel::Orthographic,
                 [0.5, 0.01],
                 [1.0, 0.0],
-                Trend::Falling,
+                DepthTrend::Falling,
             ),
         ];
         for (model, coefficients, range, trend) in cases {
@@ -176,7 +186,7 @@ mod tests {
                 };
                 let codes: Vec<u32> = (first..200).map(|z| depth.code(0.3 * z as f32)).collect();
                 let ordered = match trend {
-                    Trend::Falling => codes.is_sorted_by(|a, b| a >= b),
+                    DepthTrend::Falling => codes.is_sorted_by(|a, b| a >= b),
                     _ => codes.is_sorted(),
                 };
                 assert!(

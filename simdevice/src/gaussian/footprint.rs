@@ -7,14 +7,14 @@ use devmem::host;
 
 /// A run of tiles in one row of tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Span {
+pub(crate) struct TileSpan {
     /// The first tile.
     pub first: u16,
     /// One past the last tile.
     pub end: u16,
 }
 
-impl Span {
+impl TileSpan {
     /// How many tiles it has.
     #[inline(always)]
     pub(crate) fn len(self) -> usize {
@@ -22,38 +22,38 @@ impl Span {
     }
 }
 
-/// Rows of tiles that a [`Reach`] holds itself.
+/// Rows of tiles that a [`TileFootprint`] holds itself.
 pub(crate) const HELD_ROWS: usize = 3;
 
 /// The tiles that a Gaussian reaches: a span for each of some rows of tiles that follow one another. Small, since most
 /// reach few tiles, and all of them are read in the order of their depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Reach {
+pub(crate) struct TileFootprint {
     /// The first row (low half) and how many rows.
     rows: u32,
-    /// The rows' spans (first and end), if they fit; otherwise they lie among those of the batch, at the first one's index.
+    /// The rows' spans (first and end), if they fit; otherwise they lie among those of the group, at the first one's index.
     held: [u32; HELD_ROWS],
 }
 
-/// The number that a [`Reach`] holds for a span.
+/// The number that a [`TileFootprint`] holds for a span.
 #[inline(always)]
-fn pack(span: Span) -> u32 {
+fn pack(span: TileSpan) -> u32 {
     u32::from(span.first) | u32::from(span.end) << 16
 }
 
 /// The span of such a number.
 #[inline(always)]
-fn unpack(bits: u32) -> Span {
-    Span {
+fn unpack(bits: u32) -> TileSpan {
+    TileSpan {
         first: bits as u16,
         end: (bits >> 16) as u16,
     }
 }
 
-impl Reach {
+impl TileFootprint {
     /// Empty spans of `rows` rows of tiles from `row` on; `others` makes room for what does not fit.
     #[inline(always)]
-    pub(crate) fn new(row: u16, rows: u16, others: &mut Vec<Span>) -> Self {
+    pub(crate) fn new(row: u16, rows: u16, others: &mut Vec<TileSpan>) -> Self {
         let mut reach = Self {
             rows: u32::from(row) | u32::from(rows) << 16,
             held: [0; HELD_ROWS],
@@ -61,7 +61,7 @@ impl Reach {
         if usize::from(rows) > HELD_ROWS {
             reach.held[0] = others.len() as u32;
             let len = others.len() + usize::from(rows);
-            host::resize(others, len, Span::default());
+            host::resize(others, len, TileSpan::default());
         }
         reach
     }
@@ -98,7 +98,7 @@ impl Reach {
 
     /// Sets the span of row `number` of its rows.
     #[inline(always)]
-    pub(crate) fn set(&mut self, others: &mut [Span], number: u16, span: Span) {
+    pub(crate) fn set(&mut self, others: &mut [TileSpan], number: u16, span: TileSpan) {
         let at = usize::from(number);
         if self.len() > HELD_ROWS {
             others[self.held[0] as usize + at] = span;
@@ -109,13 +109,16 @@ impl Reach {
 
     /// Its rows, each with its span, which may be empty.
     #[inline(always)]
-    pub(crate) fn spans<'a>(&'a self, others: &'a [Span]) -> impl Iterator<Item = (u32, Span)> {
+    pub(crate) fn spans<'a>(
+        &'a self,
+        others: &'a [TileSpan],
+    ) -> impl Iterator<Item = (u32, TileSpan)> {
         (self.row()..).zip((0..self.len()).map(|number| self.span(others, number)))
     }
 
     /// The span of row `number` of its rows.
     #[inline(always)]
-    fn span(&self, others: &[Span], number: usize) -> Span {
+    fn span(&self, others: &[TileSpan], number: usize) -> TileSpan {
         if self.len() > HELD_ROWS {
             others[self.held[0] as usize + number]
         } else {
@@ -125,7 +128,7 @@ impl Reach {
 
     /// Whether it has a tile.
     #[inline(always)]
-    pub(crate) fn covers(&self, others: &[Span], column: u32, row: u32) -> bool {
+    pub(crate) fn covers(&self, others: &[TileSpan], column: u32, row: u32) -> bool {
         let number = row.wrapping_sub(self.row()) as usize;
         if number >= self.len() {
             return false;
@@ -137,7 +140,7 @@ impl Reach {
     /// The rows that it holds itself and, so that there are always as many, rows without tiles that may lie anywhere;
     /// `None` if its spans lie elsewhere.
     #[inline(always)]
-    pub(crate) fn held(&self) -> Option<[(u32, Span); HELD_ROWS]> {
+    pub(crate) fn held(&self) -> Option<[(u32, TileSpan); HELD_ROWS]> {
         let row = self.row();
         let [first, second, third] = self.held;
         let rows = [
@@ -237,9 +240,9 @@ impl Ellipse {
     pub(crate) fn reach(
         &self,
         visible: &Visible,
-        others: &mut Vec<Span>,
+        others: &mut Vec<TileSpan>,
         beside: Option<&mut u64>,
-    ) -> Option<Reach> {
+    ) -> Option<TileFootprint> {
         let [x, y] = self.mean;
         let [half_x, half_y] = self.half;
         let ([first_x, last_x], [first_y, last_y]) = (visible.pixels(0), visible.pixels(1));
@@ -249,7 +252,7 @@ impl Ellipse {
             return None;
         };
         // Visible pixels are few enough for 16 bits of tiles.
-        let span = |[left, right]: [f64; 2]| Span {
+        let span = |[left, right]: [f64; 2]| TileSpan {
             first: tile_of(left),
             end: tile_of(right) + 1,
         };
@@ -258,7 +261,7 @@ impl Ellipse {
         let clipped = left == first_x || right == last_x || top == first_y || bottom == last_y;
         let boxed = span([left, right]);
         let one = boxed.end - boxed.first == 1 && rows == 1 && !clipped;
-        let mut reach = Reach::new(row, rows, others);
+        let mut reach = TileFootprint::new(row, rows, others);
         let Some(beside) = beside.filter(|_| !one) else {
             for number in 0..rows {
                 reach.set(others, number, boxed);
@@ -354,8 +357,8 @@ mod tests {
 
         /// Row, first tile and one past the last tile of each row.
         fn spans(&self) -> Vec<(u32, u16, u16)> {
-            // Not the first of its batch.
-            let mut others = vec![Span::default(); 70_000];
+            // Not the first of its group.
+            let mut others = vec![TileSpan::default(); 70_000];
             let reach = self.ellipse().reach(&VISIBLE, &mut others, Some(&mut 0));
             let spans = reach.iter().flat_map(|reach| reach.spans(&others));
             spans

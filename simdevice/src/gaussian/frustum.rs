@@ -1,17 +1,17 @@
-//! What of space a picture can show. Planes bound it, and tell in a few operations of Gaussians, alone or in a chunk,
+//! What of space a picture can show. Planes bound it, and tell in a few operations of Gaussians, alone or in a cluster,
 //! that they are off the screen. The answer is conservative: what is not surely outside is inside.
 
 mod reach;
 #[cfg(test)]
 mod tests;
 
-use super::chunks::Bounds;
+use super::attributes::Attributes;
+use super::camera::ViewConstants;
 use super::instances::{Linear, inverse};
 use super::lanes::{Bits, F32_LANES};
-use super::project::Projection;
-use super::scratch::Attributes;
 use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, prelude::*};
+use reach::{Plane, dot};
 
 /// Bounds of binary32's error relative to the sum of the magnitudes of what is summed.
 const ERROR: f64 = 1.0 / 1_048_576.0;
@@ -19,13 +19,17 @@ const ERROR: f64 = 1.0 / 1_048_576.0;
 /// The greatest condition of a matrix by which planes are taken to another space.
 const MAX_CONDITION: f64 = 1e5;
 
-/// A Gaussian at `d` from the eye whose largest scale is `s` is outside where
-/// `normal . d + per_scale s + offset < 0`.
-#[derive(Clone, Copy, Debug, Default)]
-struct Plane {
-    normal: [f64; 3],
-    per_scale: f64,
-    offset: f64,
+/// Bounds of the Gaussians of a cluster that can be drawn at all.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    /// The least coordinates of the means.
+    pub(super) low: [f32; 3],
+    /// The greatest.
+    pub(super) high: [f32; 3],
+    /// The greatest scale.
+    pub(super) scale: f32,
+    /// The greatest opacity.
+    pub(super) opacity: f32,
 }
 
 /// The planes of a camera.
@@ -61,20 +65,12 @@ pub(super) enum Outside {
     Beside,
 }
 
-/// Lanes that are not in a picture, by the first reason that is found.
+/// GroupF64 that are not in a picture, by the first reason that is found.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct OutsideLanes {
     pub(super) near: Bits,
     pub(super) far: Bits,
     pub(super) beside: Bits,
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn length(v: [f64; 3]) -> f64 {
-    dot(v, v).sqrt()
 }
 
 fn magnitude(v: [f64; 3]) -> f64 {
@@ -83,7 +79,7 @@ fn magnitude(v: [f64; 3]) -> f64 {
 
 impl Frustum {
     /// The frustum of Gaussians whose opacities are at most `opacity`.
-    pub(super) fn new(projection: &Projection, opacity: f32) -> Self {
+    pub(super) fn new(projection: &ViewConstants, opacity: f32) -> Self {
         let r = &projection.rotation;
         let depth = ([r[6], r[7], r[8]], projection.near, projection.far);
         let is_along_axis = !matches!(
@@ -132,7 +128,7 @@ impl Frustum {
         })
     }
 
-    /// Why a whole chunk is outside, if it is.
+    /// Why a whole cluster is outside, if it is.
     pub(super) fn excludes(&self, bounds: &Bounds) -> Option<Outside> {
         if f64::from(bounds.opacity) < self.alpha_floor {
             return Some(Outside::Faint);
@@ -220,5 +216,22 @@ impl Frustum {
             outside.beside = outside.beside.and(&small);
         }
         outside
+    }
+
+    /// Those of the lanes whose Gaussians are so small that the sides hold for them.
+    fn small_lanes(&self, attributes: &Attributes, len: usize) -> Option<Bits> {
+        let small = self.small?;
+        let mut lanes = Bits::default();
+        for lane in 0..len.min(attributes.opacity.len()) {
+            let at = |of: &[f32; F32_LANES]| f64::from(of[lane]);
+            let position = attributes.position.each_ref().map(at);
+            let scale = attributes.scale.each_ref().map(at);
+            let d = [0, 1, 2].map(|axis| position[axis] - self.eye[axis]);
+            let scale = scale.into_iter().fold(0.0, f64::max);
+            // Binary64's errors are far below the margins.
+            let value = dot(small.normal, d) + small.per_scale * scale + small.offset;
+            lanes.set_one(lane, value < 0.0);
+        }
+        Some(lanes)
     }
 }

@@ -4,16 +4,14 @@
 //! direction from which it is seen is turned back by the inverse of A, so that what was trained in its own space is seen
 //! there by an eye that moved with it.
 
-use super::fetch::{BATCH, Batch, Fetcher};
-use super::lanes::{Bits, F32_LANES, Lanes, NO_LANES};
-use super::project::Projection;
-use super::scratch::Scratch;
+use super::attributes::{Fetcher, Group};
+use super::lanes::{Bits, F32_LANES, GROUP, GroupF64};
 use crate::packet::{AttributeStream, GaussianAppend};
 
 /// Matrices by lane, as they are read.
 #[derive(Clone, Debug)]
 pub(super) struct Matrices {
-    rows: [[[f32; F32_LANES]; 4]; 3],
+    pub(super) rows: [[[f32; F32_LANES]; 4]; 3],
     /// Whether all lanes have the same.
     is_uniform: bool,
 }
@@ -21,36 +19,36 @@ pub(super) struct Matrices {
 /// Rows of a matrix, without the translation.
 pub(super) type Linear = [[f64; 3]; 3];
 
-/// What matrices make of the kept Gaussians of a batch.
+/// What matrices make of the kept Gaussians of a group.
 #[derive(Clone, Debug)]
 pub(super) struct Placed {
-    matrix: [[Lanes; 4]; 3],
+    pub(super) matrix: [[GroupF64; 4]; 3],
     /// A vector from the eye in the Gaussians' space, of any length.
-    pub(super) toward: [Lanes; 3],
+    pub(super) toward: [GroupF64; 3],
 }
 
 /// What a model does to all Gaussians of an instance.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Model {
+pub(super) struct InstanceTransform {
     /// The matrix that places them and its translation.
     pub(super) matrix: Option<(Linear, [f64; 3])>,
     opacity: Option<f32>,
 }
 
-impl Model {
+impl InstanceTransform {
     /// Reads an instance's, whose attributes are by instance.
     pub(super) fn read(append: &GaussianAppend, instance: u32) -> Self {
         let mut fetcher = Fetcher::default();
-        let batch = Batch::new(append, instance, 0, 1);
+        let group = Group::new(append, instance, 0, 1);
         let model = &append.attributes.model;
         let matrix = model.matrix.as_ref().and_then(|rows| {
             let mut matrices = Matrices::default();
-            matrices.read(&mut fetcher, rows, &batch);
+            matrices.read(&mut fetcher, rows, &group);
             matrices.uniform()
         });
         let opacity = model.opacity.as_ref().map(|stream| {
             let mut factor = [0.0; F32_LANES];
-            fetcher.read(stream, &batch, [&mut factor]);
+            fetcher.read(stream, &group, [&mut factor]);
             factor[0]
         });
         Self { matrix, opacity }
@@ -80,16 +78,16 @@ impl Default for Matrices {
 }
 
 impl Matrices {
-    /// Reads a batch's.
+    /// Reads a group's.
     pub(super) fn read(
         &mut self,
         fetcher: &mut Fetcher,
         rows: &[AttributeStream; 3],
-        batch: &Batch<'_>,
+        group: &Group<'_>,
     ) {
         self.is_uniform = rows.iter().all(|stream| stream.instance_divisor.is_some());
         for (stream, row) in rows.iter().zip(&mut self.rows) {
-            fetcher.read(stream, batch, row.each_mut());
+            fetcher.read(stream, group, row.each_mut());
         }
     }
 
@@ -104,7 +102,7 @@ impl Matrices {
     /// Which of the first `len` lanes are finite.
     pub(super) fn find_finite(&self, len: usize) -> Bits {
         let mut finite = Bits::default();
-        for lane in 0..len.min(BATCH) {
+        for lane in 0..len.min(GROUP) {
             let elements = self.rows.as_flattened();
             finite.set_one(lane, elements.iter().all(|lanes| lanes[lane].is_finite()));
         }
@@ -112,55 +110,9 @@ impl Matrices {
     }
 }
 
-impl Scratch {
-    /// Packs the kept lanes' matrices densely.
-    pub(super) fn gather_matrices(&mut self, matrices: &Matrices) {
-        let placed = self.placed.get_or_insert_with(|| {
-            Box::new(Placed {
-                matrix: [[NO_LANES; 4]; 3],
-                toward: [NO_LANES; 3],
-            })
-        });
-        let to = placed.matrix.as_flattened_mut().iter_mut();
-        for (from, to) in matrices.rows.as_flattened().iter().zip(to) {
-            for (to, &lane) in to.iter_mut().zip(&self.lanes) {
-                *to = from[lane % BATCH].into();
-            }
-        }
-    }
-}
-
-impl Projection {
-    /// Finds the place of the kept Gaussians in camera space, and from where they are seen in their own.
-    pub(super) fn place_by_matrices(&self, scratch: &mut Scratch) {
-        let Some(placed) = &mut scratch.placed else {
-            return;
-        };
-        let r = &self.rotation;
-        for at in 0..scratch.lanes.len().min(BATCH) {
-            let a = placed.linear(at);
-            let p = scratch.position.each_ref().map(|lanes| lanes[at]);
-            let d = [0, 1, 2]
-                .map(|axis| dot(a[axis], p) + (placed.matrix[axis][3][at] - self.eye[axis]));
-            let t = [0, 3, 6].map(|row| d[0] * r[row] + d[1] * r[row + 1] + d[2] * r[row + 2]);
-            // The columns of the inverse, but for the determinant's magnitude.
-            let columns = cofactors(a);
-            let sign = dot(a[0], columns[0]).signum();
-            for axis in 0..3 {
-                scratch.offset[axis][at] = d[axis];
-                scratch.camera[axis][at] = t[axis];
-                let sum =
-                    d[0] * columns[0][axis] + d[1] * columns[1][axis] + d[2] * columns[2][axis];
-                placed.toward[axis][at] = sign * sum;
-            }
-            scratch.depth[at] = t[2];
-        }
-    }
-}
-
 impl Placed {
     /// A kept Gaussian's matrix, without the translation.
-    fn linear(&self, at: usize) -> Linear {
+    pub(super) fn linear(&self, at: usize) -> Linear {
         [0, 1, 2].map(|row| [0, 1, 2].map(|column| self.matrix[row][column][at]))
     }
 
@@ -198,11 +150,11 @@ pub(super) fn inverse(a: Linear) -> (Linear, f64) {
 }
 
 /// The columns of the inverse, times the determinant.
-fn cofactors(a: Linear) -> Linear {
+pub(super) fn cofactors(a: Linear) -> Linear {
     [cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])]
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

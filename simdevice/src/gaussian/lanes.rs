@@ -1,28 +1,30 @@
-//! A batch's lanes: numbers, sets of lanes, and the logarithm.
+//! A group's lanes: numbers, sets of lanes, and the logarithm.
 
-use super::fetch::BATCH;
 use fearless_simd::{Simd, prelude::*};
 
-/// A number for each Gaussian of a batch.
+/// Gaussians per group: what preprocessing holds in its caches at a time.
+pub(super) const GROUP: usize = 256;
+
+/// A number for each Gaussian of a group.
 ///
 /// Some thirty of these are walked side by side: a cache line more than a power of two keeps them from
 /// competing for the same few sets of the first-level cache.
-pub(super) type Lanes = [f64; BATCH + 8];
+pub(super) type GroupF64 = [f64; GROUP + 8];
 
-/// Lanes before anything is known of them.
-pub(super) const NO_LANES: Lanes = [0.0; BATCH + 8];
+/// GroupF64 before anything is known of them.
+pub(super) const NO_GROUP_F64: GroupF64 = [0.0; GROUP + 8];
 
-/// Lanes of what is read: attributes as they are, which their readers walk one after the other.
-pub(super) const F32_LANES: usize = BATCH;
+/// GroupF64 of what is read: attributes as they are, which their readers walk one after the other.
+pub(super) const F32_LANES: usize = GROUP;
 
-const WORDS: usize = BATCH / 64;
+const WORDS: usize = GROUP / 64;
 
-/// A set of lanes of a batch.
+/// A set of lanes of a group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Bits([u64; WORDS]);
 
 impl Bits {
-    /// Lanes `0..len`.
+    /// GroupF64 `0..len`.
     pub(super) fn first(len: usize) -> Self {
         let mut bits = Self::default();
         for (number, word) in bits.0.iter_mut().enumerate() {
@@ -142,10 +144,10 @@ mod tests {
     #[test]
     fn sets_of_lanes_are_sets() {
         let mut odd = Bits::default();
-        (0..BATCH).for_each(|lane| odd.set_one(lane, lane % 2 == 1));
+        (0..GROUP).for_each(|lane| odd.set_one(lane, lane % 2 == 1));
         let some = Bits::first(70);
         assert_eq!(some.count(), 70);
-        assert_eq!(Bits::first(BATCH).count(), BATCH as u64);
+        assert_eq!(Bits::first(GROUP).count(), GROUP as u64);
         assert_eq!(some.and(&odd).count(), 35);
         let mut lanes = Vec::new();
         some.without(&odd).for_each(|lane| lanes.push(lane));

@@ -6,19 +6,12 @@
 //!
 //! [`Splat::wide`]: super::project::Splat::wide
 
-use super::footprint::{Ellipse, Reach, Visible};
-use super::splat::Projected;
-use crate::state::gaussian::{Camera, CameraModel};
+use super::footprint::{Ellipse, TileFootprint, Visible};
+use super::splat::ProjectedGroup;
 use devmem::host;
 
 /// The sides to which Gaussians are copied: right and left.
 const SIDES: [f64; 2] = [1.0, -1.0];
-
-/// After how many pixels a camera's picture repeats to the right and to the left, if it does.
-pub(super) fn period(camera: &Camera) -> Option<f64> {
-    let focal = f64::from(camera.focal_length[0]);
-    (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
-}
 
 /// What lies within half a period of a mean at `x`, with a pixel to spare.
 fn near(visible: &Visible, x: f64, period: f64) -> Visible {
@@ -39,11 +32,11 @@ pub(super) fn reach(
     ellipse: &Ellipse,
     period: f64,
     visible: &Visible,
-    copies: &mut Vec<(usize, usize, Reach)>,
-    out: &mut Projected,
+    copies: &mut Vec<(usize, usize, TileFootprint)>,
+    out: &mut ProjectedGroup,
     mut beside: Option<&mut u64>,
-) -> Option<Reach> {
-    out.copies.resize_with(SIDES.len(), Projected::default);
+) -> Option<TileFootprint> {
+    out.copies.resize_with(SIDES.len(), ProjectedGroup::default);
     let [x, y] = ellipse.mean;
     let before = copies.len();
     for (side, direction) in SIDES.into_iter().enumerate() {
@@ -59,7 +52,7 @@ pub(super) fn reach(
         }
     }
     let reach = ellipse.reach(&near(visible, x, period), &mut out.spans, beside);
-    let by_copies = (copies.len() > before).then(Reach::default);
+    let by_copies = (copies.len() > before).then(TileFootprint::default);
     reach.or(by_copies)
 }
 
@@ -68,8 +61,8 @@ pub(super) fn reach(
 pub(super) fn copy_last(
     at: usize,
     period: f64,
-    copies: &mut &[(usize, usize, Reach)],
-    out: &mut Projected,
+    copies: &mut &[(usize, usize, TileFootprint)],
+    out: &mut ProjectedGroup,
 ) {
     while let Some((&(of, side, reach), rest)) = copies.split_first().filter(|(c, _)| c.0 <= at) {
         *copies = rest;
@@ -88,16 +81,16 @@ pub(super) fn copy_last(
     }
 }
 
-/// Makes batches of the copies, behind all others. Copies have the keys and the places in the order of what they are
+/// Makes groups of the copies, behind all others. Copies have the keys and the places in the order of what they are
 /// copies of; since no pixel counts two of them, their order among themselves is of no account.
-pub(super) fn append_copies(batches: &mut Vec<Projected>) {
-    let copies = batches
+pub(super) fn append_copies(groups: &mut Vec<ProjectedGroup>) {
+    let copies = groups
         .iter_mut()
-        .flat_map(|batch| std::mem::take(&mut batch.copies))
+        .flat_map(|group| std::mem::take(&mut group.copies))
         .filter(|copies| !copies.splats.is_empty());
     let copies = host::collect(copies);
-    host::reserve(batches, copies.len());
-    batches.extend(copies);
+    host::reserve(groups, copies.len());
+    groups.extend(copies);
 }
 
 #[cfg(test)]
@@ -119,7 +112,7 @@ mod tests {
             narrowing: (half / 2.0).powi(2),
             peak: 0.0,
         };
-        let (mut out, mut copies) = (Projected::default(), Vec::new());
+        let (mut out, mut copies) = (ProjectedGroup::default(), Vec::new());
         let reach = reach(
             0,
             &ellipse,
@@ -129,7 +122,7 @@ mod tests {
             &mut out,
             Some(&mut 0),
         );
-        let columns = |reach: &Reach, spans: &[_]| {
+        let columns = |reach: &TileFootprint, spans: &[_]| {
             let spans = reach.spans(spans);
             spans
                 .flat_map(|(_, span)| span.first.into()..span.end.into())

@@ -1,111 +1,90 @@
-//! What a worker needs to project a batch of Gaussians.
+//! What a worker needs to project a group of Gaussians.
 
-use super::fetch::BATCH;
-use super::footprint::Reach;
-use super::instances::Placed;
-use super::lanes::{Bits, F32_LANES, Lanes, NO_LANES};
-use super::tiles::Reaches;
+use super::attributes::Attributes;
+use super::footprint::TileFootprint;
+use super::instances::{Matrices, Placed};
+use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, NO_GROUP_F64};
 
-/// Vertex attributes by lane, as they are read.
-#[derive(Clone, Debug)]
-pub(super) struct Attributes {
-    pub(super) position: [[f32; F32_LANES]; 3],
-    pub(super) scale: [[f32; F32_LANES]; 3],
-    pub(super) rotation: [[f32; F32_LANES]; 4],
-    pub(super) opacity: [f32; F32_LANES],
+/// The reach of each lane, as the two words of [`TileFootprint::words`].
+pub(super) struct TileFootprints(pub(super) [[u64; GROUP + 8]; 2]);
+
+impl Default for TileFootprints {
+    fn default() -> Self {
+        Self([[0; GROUP + 8]; 2])
+    }
 }
 
-/// What becomes of a batch's Gaussians: of those that were kept, densely, in structures of arrays.
+impl TileFootprints {
+    /// A lane's.
+    #[inline(always)]
+    pub(super) fn get(&self, at: usize) -> TileFootprint {
+        TileFootprint::from_words([self.0[0][at], self.0[1][at]])
+    }
+
+    pub(super) fn set(&mut self, at: usize, reach: &TileFootprint) {
+        let [first, second] = reach.words();
+        self.0[0][at] = first;
+        self.0[1][at] = second;
+    }
+}
+
+/// What becomes of a group's Gaussians: of those that were kept, densely, in structures of arrays.
 pub(crate) struct Scratch {
     /// The lanes that were kept; what follows is in their order.
     pub(super) lanes: Vec<usize>,
-    pub(super) position: Box<[Lanes; 3]>,
-    pub(super) scale: Box<[Lanes; 3]>,
-    pub(super) rotation: Box<[Lanes; 4]>,
-    pub(super) opacity: Box<Lanes>,
+    pub(super) position: Box<[GroupF64; 3]>,
+    pub(super) scale: Box<[GroupF64; 3]>,
+    pub(super) rotation: Box<[GroupF64; 4]>,
+    pub(super) opacity: Box<GroupF64>,
     /// The mean from the eye, in world axes.
-    pub(super) offset: Box<[Lanes; 3]>,
+    pub(super) offset: Box<[GroupF64; 3]>,
     /// The mean from the eye, in camera axes.
-    pub(super) camera: Box<[Lanes; 3]>,
+    pub(super) camera: Box<[GroupF64; 3]>,
     /// The depth variable.
-    pub(super) depth: Box<Lanes>,
+    pub(super) depth: Box<GroupF64>,
     /// What model matrices make of them, if there are any.
     pub(super) placed: Option<Box<Placed>>,
     /// The Jacobian's rows in the axes of the Gaussians' space, unless a pinhole sees the world itself.
-    pub(super) jacobian: Box<[[Lanes; 3]; 2]>,
+    pub(super) jacobian: Box<[[GroupF64; 3]; 2]>,
     /// Of covariances in the picture: xx, xy, yy and the determinant, where the unscented transform finds them.
-    pub(super) moments: Box<[Lanes; 4]>,
-    pub(super) flat: Box<Flat>,
+    pub(super) moments: Box<[GroupF64; 4]>,
+    pub(super) flat: Box<ScreenGaussians>,
     /// Which of them reach tiles.
     pub(super) reached: Vec<usize>,
     /// Which tiles, of those that do.
-    pub(super) reaches: Box<Reaches>,
+    pub(super) reaches: Box<TileFootprints>,
     /// The same of their copies a period beside, in the same order: which side's, 0 or 1, in the middle.
-    pub(super) copies: Vec<(usize, usize, Reach)>,
+    pub(super) copies: Vec<(usize, usize, TileFootprint)>,
 }
 
 /// Gaussians on the screen.
-pub(super) struct Flat {
-    pub(super) mean: [Lanes; 2],
-    pub(super) determinant: Lanes,
-    pub(super) log2_opacity: Lanes,
+pub(super) struct ScreenGaussians {
+    pub(super) mean: [GroupF64; 2],
+    pub(super) determinant: GroupF64,
+    pub(super) log2_opacity: GroupF64,
     /// See [`Splat::factor`](super::project::Splat::factor).
-    pub(super) factor: [Lanes; 3],
+    pub(super) factor: [GroupF64; 3],
     /// See [`Ellipse`](super::footprint::Ellipse).
-    pub(super) half: [Lanes; 2],
-    pub(super) slope: Lanes,
-    pub(super) narrowing: Lanes,
-    pub(super) peak: Lanes,
+    pub(super) half: [GroupF64; 2],
+    pub(super) slope: GroupF64,
+    pub(super) narrowing: GroupF64,
+    pub(super) peak: GroupF64,
     /// The unit vector from the eye, in the axes of the Gaussians' space.
-    pub(super) direction: [Lanes; 3],
+    pub(super) direction: [GroupF64; 3],
 }
 
-impl Default for Attributes {
+impl Default for ScreenGaussians {
     fn default() -> Self {
         Self {
-            position: [[0.0; F32_LANES]; 3],
-            scale: [[0.0; F32_LANES]; 3],
-            rotation: [[0.0; F32_LANES]; 4],
-            opacity: [0.0; F32_LANES],
-        }
-    }
-}
-
-impl Attributes {
-    /// The second largest scale of a lane.
-    pub(super) fn second_scale(&self, lane: usize) -> f32 {
-        let [a, b, c] = self.scale.each_ref().map(|scale| scale[lane]);
-        a.max(b).min(a.max(c)).min(b.max(c))
-    }
-
-    /// Makes a lane what a lane of others is.
-    pub(super) fn copy_lane(&mut self, to: usize, others: &Self, from: usize) {
-        let copy = |own: &mut [f32; F32_LANES], other: &[f32; F32_LANES]| own[to] = other[from];
-        for (own, other) in self.position.iter_mut().zip(&others.position) {
-            copy(own, other);
-        }
-        for (own, other) in self.scale.iter_mut().zip(&others.scale) {
-            copy(own, other);
-        }
-        for (own, other) in self.rotation.iter_mut().zip(&others.rotation) {
-            copy(own, other);
-        }
-        copy(&mut self.opacity, &others.opacity);
-    }
-}
-
-impl Default for Flat {
-    fn default() -> Self {
-        Self {
-            mean: [NO_LANES; 2],
-            determinant: NO_LANES,
-            log2_opacity: NO_LANES,
-            factor: [NO_LANES; 3],
-            half: [NO_LANES; 2],
-            slope: NO_LANES,
-            narrowing: NO_LANES,
-            peak: NO_LANES,
-            direction: [NO_LANES; 3],
+            mean: [NO_GROUP_F64; 2],
+            determinant: NO_GROUP_F64,
+            log2_opacity: NO_GROUP_F64,
+            factor: [NO_GROUP_F64; 3],
+            half: [NO_GROUP_F64; 2],
+            slope: NO_GROUP_F64,
+            narrowing: NO_GROUP_F64,
+            peak: NO_GROUP_F64,
+            direction: [NO_GROUP_F64; 3],
         }
     }
 }
@@ -114,19 +93,19 @@ impl Scratch {
     /// Scratch for one worker.
     pub(crate) fn new() -> Self {
         Self {
-            lanes: Vec::with_capacity(BATCH),
-            position: Box::new([NO_LANES; 3]),
-            scale: Box::new([NO_LANES; 3]),
-            rotation: Box::new([NO_LANES; 4]),
-            opacity: Box::new(NO_LANES),
-            offset: Box::new([NO_LANES; 3]),
-            camera: Box::new([NO_LANES; 3]),
-            depth: Box::new(NO_LANES),
+            lanes: Vec::with_capacity(GROUP),
+            position: Box::new([NO_GROUP_F64; 3]),
+            scale: Box::new([NO_GROUP_F64; 3]),
+            rotation: Box::new([NO_GROUP_F64; 4]),
+            opacity: Box::new(NO_GROUP_F64),
+            offset: Box::new([NO_GROUP_F64; 3]),
+            camera: Box::new([NO_GROUP_F64; 3]),
+            depth: Box::new(NO_GROUP_F64),
             placed: None,
-            jacobian: Box::new([[NO_LANES; 3]; 2]),
-            moments: Box::new([NO_LANES; 4]),
+            jacobian: Box::new([[NO_GROUP_F64; 3]; 2]),
+            moments: Box::new([NO_GROUP_F64; 4]),
             flat: Box::default(),
-            reached: Vec::with_capacity(BATCH),
+            reached: Vec::with_capacity(GROUP),
             reaches: Box::default(),
             copies: Vec::new(),
         }
@@ -138,8 +117,8 @@ impl Scratch {
         self.lanes.clear();
         kept.for_each(|lane| self.lanes.push(lane));
         let lanes = &*self.lanes;
-        let whole = lanes.len() == BATCH;
-        let pack = |from: &[f32; F32_LANES], to: &mut Lanes| {
+        let whole = lanes.len() == GROUP;
+        let pack = |from: &[f32; F32_LANES], to: &mut GroupF64| {
             if whole {
                 for (to, &from) in to.iter_mut().zip(from) {
                     *to = from.into();
@@ -147,7 +126,7 @@ impl Scratch {
                 return;
             }
             for (to, &lane) in to.iter_mut().zip(lanes) {
-                *to = from[lane % BATCH].into();
+                *to = from[lane % GROUP].into();
             }
         };
         for (from, to) in attributes.position.iter().zip(&mut *self.position) {
@@ -160,5 +139,21 @@ impl Scratch {
             pack(from, to);
         }
         pack(&attributes.opacity, &mut self.opacity);
+    }
+
+    /// Packs the kept lanes' matrices densely.
+    pub(super) fn gather_matrices(&mut self, matrices: &Matrices) {
+        let placed = self.placed.get_or_insert_with(|| {
+            Box::new(Placed {
+                matrix: [[NO_GROUP_F64; 4]; 3],
+                toward: [NO_GROUP_F64; 3],
+            })
+        });
+        let to = placed.matrix.as_flattened_mut().iter_mut();
+        for (from, to) in matrices.rows.as_flattened().iter().zip(to) {
+            for (to, &lane) in to.iter_mut().zip(&self.lanes) {
+                *to = from[lane % GROUP].into();
+            }
+        }
     }
 }

@@ -5,7 +5,7 @@ use devmem::host;
 use rayon::prelude::*;
 
 /// A key and what goes with it.
-type Pair = (u32, u32);
+type SortEntry = (u32, u32);
 
 /// Maps a binary32 number to an integer that orders alike (negative zero before zero).
 pub(super) fn ordered_bits(value: f32) -> u32 {
@@ -49,7 +49,7 @@ const INTERVALS: usize = 1 << 12;
 const GROUPS_PER_WORKER: usize = 4;
 
 /// Sorts `(key, payload)` pairs by ascending key; equal keys keep their order.
-pub fn sort_by_key(pairs: &mut Vec<Pair>) {
+pub fn sort_by_key(pairs: &mut Vec<SortEntry>) {
     let mut sorted = host::zeroed(pairs.len());
     sort_into(&[pairs], &mut Vec::new(), &mut sorted);
     *pairs = sorted;
@@ -66,7 +66,7 @@ struct Digits {
 
 impl Digits {
     /// `None` if all keys are the same.
-    fn of(slices: &[&[Pair]]) -> Option<Self> {
+    fn of(slices: &[&[SortEntry]]) -> Option<Self> {
         let (mut least, mut greatest, mut all, mut any) = (u32::MAX, 0, u32::MAX, 0);
         for slice in slices {
             for &(key, _) in *slice {
@@ -85,7 +85,7 @@ impl Digits {
 }
 
 /// Sorts the pairs of all slices, one after the other, into `sorted`, which has as many; `other` is scratch.
-fn sort_into(slices: &[&[Pair]], other: &mut Vec<Pair>, sorted: &mut [Pair]) {
+fn sort_into(slices: &[&[SortEntry]], other: &mut Vec<SortEntry>, sorted: &mut [SortEntry]) {
     let Some(digits) = Digits::of(slices) else {
         let mut rest = sorted;
         for slice in slices {
@@ -125,8 +125,8 @@ pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
     lists: &[L],
     stride: u32,
     workers: usize,
-    settle: impl Fn(&mut [Pair]) + Sync,
-) -> Vec<Pair> {
+    settle: impl Fn(&mut [SortEntry]) + Sync,
+) -> Vec<SortEntry> {
     let count = lists.iter().map(|list| list.as_ref().len()).sum();
     if count < MANY {
         let mut pairs = host::with_capacity(count);
@@ -137,16 +137,16 @@ pub fn sort_lists<L: AsRef<[[u32; 2]]> + Sync>(
     }
     let parts = Parts::new(lists, count);
     let in_group = lists.len().div_ceil(GROUPS_PER_WORKER * workers.max(1));
-    let groups: Vec<Group> = lists
+    let groups: Vec<Partition> = lists
         .par_chunks(in_group)
         .enumerate()
-        .map(|(number, lists)| Group::new(&parts, lists, number * in_group, stride))
+        .map(|(number, lists)| Partition::new(&parts, lists, number * in_group, stride))
         .collect();
-    let mut pairs: Vec<Pair> = host::zeroed(count);
+    let mut pairs: Vec<SortEntry> = host::zeroed(count);
     let mut rest = &mut pairs[..];
     let mut tasks = Vec::with_capacity(parts.count);
     for part in 0..parts.count {
-        let slices: Vec<&[Pair]> = groups.iter().map(|group| group.part(part)).collect();
+        let slices: Vec<&[SortEntry]> = groups.iter().map(|group| group.part(part)).collect();
         let len = slices.iter().map(|slice| slice.len()).sum();
         let (sorted, after) = rest.split_at_mut(len);
         rest = after;
@@ -167,7 +167,7 @@ fn for_pairs<L: AsRef<[[u32; 2]]>>(
     lists: &[L],
     first: usize,
     stride: u32,
-    mut each: impl FnMut(Pair),
+    mut each: impl FnMut(SortEntry),
 ) {
     for (number, list) in lists.iter().enumerate() {
         let first = (first + number) as u32 * stride;
@@ -231,13 +231,13 @@ impl Parts {
 }
 
 /// The pairs of some lists by part, each in the lists' order.
-struct Group {
-    pairs: Vec<Pair>,
+struct Partition {
+    pairs: Vec<SortEntry>,
     /// Where each part ends.
     ends: Box<[u32; MAX_PARTS]>,
 }
 
-impl Group {
+impl Partition {
     /// Of lists of which the first has number `first`.
     fn new<L: AsRef<[[u32; 2]]>>(parts: &Parts, lists: &[L], first: usize, stride: u32) -> Self {
         let mut ends = Box::new([0; MAX_PARTS]);
@@ -246,7 +246,7 @@ impl Group {
         }
         start_after_each_other(&mut *ends);
         let count = lists.iter().map(|list| list.as_ref().len()).sum();
-        let mut pairs: Vec<Pair> = host::zeroed(count);
+        let mut pairs: Vec<SortEntry> = host::zeroed(count);
         for_pairs(lists, first, stride, |pair| {
             let end = &mut ends[parts.of(pair.0) % MAX_PARTS];
             pairs[*end as usize] = pair;
@@ -255,7 +255,7 @@ impl Group {
         Self { pairs, ends }
     }
 
-    fn part(&self, part: usize) -> &[Pair] {
+    fn part(&self, part: usize) -> &[SortEntry] {
         let start = part.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.pairs[start as usize..self.ends[part] as usize]
     }
@@ -270,7 +270,7 @@ fn start_after_each_other(counts: &mut [u32]) {
 }
 
 /// One counting-sort pass over the digit of so many bits at `shift`.
-fn scatter(from: &[&[Pair]], to: &mut [Pair], digits: &Digits, shift: u32, bits: u32) {
+fn scatter(from: &[&[SortEntry]], to: &mut [SortEntry], digits: &Digits, shift: u32, bits: u32) {
     let (least, mask) = (digits.least, (1u32 << bits) - 1);
     let digit = |key: u32| (((key - least) >> shift) & mask) as usize % DIGITS;
     let mut next = [0u32; DIGITS];

@@ -1,7 +1,12 @@
 //! Spherical harmonics: the view-dependent colour of a Gaussian, with the signs and order of 3DGS.
 
-use super::fetch::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
 use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
+
+/// The coefficients of all degrees up to 4.
+pub(super) const MAX_COEFFICIENTS: usize = 25;
+
+/// Three components of each, and what makes it whole vectors.
+pub(super) const COEFFICIENT_FLOATS: usize = 80;
 
 const C0: f32 = 0.282_094_79;
 const C1: f32 = 0.488_602_51;
@@ -37,12 +42,6 @@ const C4: [f32; 9] = [
 /// How many coefficients degrees 0 to `degree` have.
 pub fn coefficient_count(degree: u32) -> usize {
     (degree as usize + 1).pow(2)
-}
-
-/// The least degree whose coefficients, and those of lower ones, are all that is not zero.
-pub(super) fn degree_of(coefficients: &[f32; COEFFICIENT_FLOATS]) -> u32 {
-    let last = coefficients.iter().rposition(|&k| k != 0.0);
-    last.map_or(0, |last| (last / 3).isqrt() as u32)
 }
 
 /// Directions whose basis functions are found together.

@@ -1,8 +1,9 @@
 //! What projection makes of Gaussians: the rasterizer's nine numbers, and what goes with them.
 
-use super::footprint::{Reach, Span};
-use super::rays::RayDepth;
-use super::scratch::Flat;
+use super::footprint::{TileFootprint, TileSpan};
+use super::lanes::GROUP;
+use super::ray_depth::RayDepth;
+use super::scratch::ScreenGaussians;
 use super::surfel::Surfel;
 use crate::stats::counters::Counters;
 use devmem::host;
@@ -25,16 +26,16 @@ pub(crate) struct Splat {
     /// The centre's depth as the depth attachment holds it, if the draw tests or writes depth.
     pub depth: u32,
     /// Whether its exponent is a difference of numbers so large that binary32 would lose it.
-    pub steep: bool,
+    pub needs_f64: bool,
     /// Whether it is wider than the period of a panorama: it then counts within half a period of its mean only, where
     /// its copies do not. Such a one is steep.
-    pub wide: bool,
+    pub exceeds_period: bool,
 }
 
 impl Splat {
     /// A lane's.
     #[inline(always)]
-    pub(super) fn new(flat: &Flat, at: usize, color: [f32; 3], depth: u32) -> Self {
+    pub(super) fn new(flat: &ScreenGaussians, at: usize, color: [f32; 3], depth: u32) -> Self {
         let factor = [flat.factor[0][at], flat.factor[1][at], flat.factor[2][at]];
         Self {
             mean: [flat.mean[0][at], flat.mean[1][at]],
@@ -42,8 +43,8 @@ impl Splat {
             log2_opacity: flat.log2_opacity[at] as f32,
             color,
             depth,
-            steep: is_steep(factor, flat.log2_opacity[at]),
-            wide: false,
+            needs_f64: is_steep(factor, flat.log2_opacity[at]),
+            exceeds_period: false,
         }
     }
 }
@@ -70,7 +71,7 @@ pub(super) const LEAST_HALF_FACTOR: f64 = 1.0 / 16384.0;
 /// With a unit roundoff of 2^-11, `u` and the two terms of `v` err by three units each, and `v` by one more. The terms of
 /// `v` are at most `|v| + 2 |factor[1] / factor[0]| |u|`, so that needles, where they cancel, err most. Sums, exponent,
 /// logarithm, power and floor add less than a quarter.
-pub(crate) fn half_room(factor: [f64; 3], room: f64) -> f64 {
+pub(crate) fn binary16_headroom(factor: [f64; 3], room: f64) -> f64 {
     const UNIT: f64 = 1.0 / 2048.0;
     let [a, b, c] = factor.map(f64::abs);
     // What is not a number is bounded by nothing.
@@ -82,9 +83,15 @@ pub(crate) fn half_room(factor: [f64; 3], room: f64) -> f64 {
     }
 }
 
-/// What came of a batch.
+/// The group of a survivor's name, and its place there.
+#[inline(always)]
+pub(crate) fn locate(name: u32) -> (usize, usize) {
+    (name as usize / GROUP, name as usize % GROUP)
+}
+
+/// What came of a group.
 #[derive(Debug, Default)]
-pub(crate) struct Projected {
+pub(crate) struct ProjectedGroup {
     /// What is drawn, in the order of the draw.
     pub splats: Vec<Splat>,
     /// The depth key of each, and its place in the set, which decides between equal keys.
@@ -94,16 +101,16 @@ pub(crate) struct Projected {
     /// What each is on the screen, if they are 2D Gaussians.
     pub surfels: Vec<Surfel>,
     /// The tiles of each.
-    pub reaches: Vec<Reach>,
+    pub reaches: Vec<TileFootprint>,
     /// The tiles of those that reach many.
-    pub spans: Vec<Span>,
+    pub spans: Vec<TileSpan>,
     /// What was skipped and why.
     pub counters: Counters,
     /// What is drawn a period to the right or to the left of where it is, by side.
-    pub copies: Vec<Projected>,
+    pub copies: Vec<ProjectedGroup>,
 }
 
-impl Projected {
+impl ProjectedGroup {
     pub(super) fn reserve(&mut self, count: usize) {
         host::reserve(&mut self.splats, count);
         host::reserve(&mut self.keys, count);

@@ -5,7 +5,10 @@
 //! `[a b t]`. With `r` at `d` pixels from the mean, the numerators are linear in `d` and zero at the mean, where they lose
 //! nothing; `w` is linear, too. Everything is binary64, without fused operations.
 
-use super::footprint::{Ellipse, Reach, Span, Visible};
+use super::camera::{LN_2, ViewConstants};
+use super::footprint::{Ellipse, TileFootprint, TileSpan, Visible};
+use super::ray_depth;
+use super::scratch::Scratch;
 use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, f64x8, prelude::*};
 
@@ -143,8 +146,8 @@ impl Surfel {
         mean: [f64; 2],
         (extent, low_pass): (f64, f64),
         visible: &Visible,
-        others: &mut Vec<Span>,
-    ) -> Option<Reach> {
+        others: &mut Vec<TileSpan>,
+    ) -> Option<TileFootprint> {
         // What is not a number reaches nothing.
         if !(extent >= 0.0 && mean[0].is_finite() && mean[1].is_finite()) {
             return None;
@@ -166,7 +169,7 @@ impl Surfel {
             f64::NEG_INFINITY,
         ];
         // Both hold the mean, so that what they reach in a row of tiles is one span but for tiles between them.
-        let mut rows: Vec<(u32, Span)> = Vec::new();
+        let mut rows: Vec<(u32, TileSpan)> = Vec::new();
         for shape in shapes.into_iter().flatten() {
             for axis in 0..2 {
                 let (middle, half) = (shape.mean[axis], shape.half[axis]);
@@ -190,7 +193,7 @@ impl Surfel {
         }
         let first = rows.iter().map(|(row, _)| *row).min()?;
         let last = rows.iter().map(|(row, _)| *row).max()?;
-        let mut reach = Reach::new(first as u16, (last - first + 1) as u16, others);
+        let mut reach = TileFootprint::new(first as u16, (last - first + 1) as u16, others);
         for (row, span) in rows {
             reach.set(others, (row - first) as u16, span);
         }
@@ -245,6 +248,37 @@ impl Surfel {
         }
         distance * UNIT
     }
+}
+
+/// A kept lane as a 2D Gaussian, and the tiles that it reaches, if there are any.
+pub(super) fn surfel_of(
+    view: &ViewConstants,
+    at: usize,
+    scratch: &Scratch,
+    spans: &mut Vec<TileSpan>,
+) -> (Surfel, Option<TileFootprint>) {
+    let [w, x, y, z] = &*scratch.rotation;
+    let axes = ray_depth::axes([w[at], x[at], y[at], z[at]]);
+    let r = &view.rotation;
+    let placed = |axis: usize| {
+        let [x, y, z] = axes[axis].map(|c| c * scratch.scale[axis][at]);
+        [0, 1, 2].map(|row| x * r[3 * row] + y * r[3 * row + 1] + z * r[3 * row + 2])
+    };
+    let [x, y, z] = &*scratch.camera;
+    let mut surfel = Surfel::new(&Placed {
+        model: view.model,
+        focal: view.focal,
+        near: view.near.into(),
+        axes: [placed(0), placed(1)],
+        centre: [x[at], y[at], z[at]],
+    });
+    let flat = &*scratch.flat;
+    // As wide as for volumes: see there.
+    let room = flat.log2_opacity[at] - view.log2_floor;
+    let extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+    let mean = [flat.mean[0][at], flat.mean[1][at]];
+    let reach = surfel.reach(mean, (extent, view.low_pass), &view.visible, spans);
+    (surfel, reach)
 }
 
 #[cfg(test)]

@@ -1,42 +1,20 @@
-//! Which of a batch's kept Gaussians reach tiles, and which tiles: for several at once where they are small, which most
+//! Which of a group's kept Gaussians reach tiles, and which tiles: for several at once where they are small, which most
 //! are, and one at a time for the others.
 
-use super::fetch::BATCH;
-use super::footprint::{Ellipse, HELD_ROWS, Reach};
-use super::lanes::{Bits, Lanes};
+use super::camera::ViewConstants;
+use super::footprint::{Ellipse, HELD_ROWS, TileFootprint};
+use super::lanes::{Bits, GroupF64};
 use super::panorama;
-use super::project::Projection;
-use super::scratch::{Flat, Scratch};
-use super::splat::Projected;
+use super::scratch::{Scratch, ScreenGaussians};
+use super::splat::ProjectedGroup;
+use super::surfel::surfel_of;
 use crate::limits::TILE_SIZE;
 use crate::simd::both;
 use crate::state::gaussian::GaussianGeometry;
-use crate::stats::counters::{Counter, Counters};
-use crate::stats::optimizations::Skip;
+use crate::stats::counters::Counter;
+use crate::stats::counters::Counters;
+use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, prelude::*};
-
-/// The reach of each lane, as the two words of [`Reach::words`].
-pub(super) struct Reaches([[u64; BATCH + 8]; 2]);
-
-impl Default for Reaches {
-    fn default() -> Self {
-        Self([[0; BATCH + 8]; 2])
-    }
-}
-
-impl Reaches {
-    /// A lane's.
-    #[inline(always)]
-    pub(super) fn get(&self, at: usize) -> Reach {
-        Reach::from_words([self.0[0][at], self.0[1][at]])
-    }
-
-    fn set(&mut self, at: usize, reach: &Reach) {
-        let [first, second] = reach.words();
-        self.0[0][at] = first;
-        self.0[1][at] = second;
-    }
-}
 
 /// Added to a whole number below 2^52, this makes its bits the lowest ones.
 const POINT: f64 = (1u64 << 52) as f64;
@@ -46,7 +24,7 @@ const MODERATE: f64 = 1e100;
 
 /// What can be told of several lanes at once.
 struct Found {
-    /// Those that reach tiles; [`Reaches`] holds which.
+    /// Those that reach tiles; [`TileFootprints`] holds which.
     reached: Bits,
     /// Those of which nothing is told.
     left: Bits,
@@ -112,211 +90,221 @@ fn last_rounded_to(value: f32) -> f64 {
     }
 }
 
-impl Projection {
-    /// Finds the kept Gaussians that reach a tile.
-    #[inline(always)]
-    pub(super) fn find_tiles<S: Simd>(&self, simd: S, scratch: &mut Scratch, out: &mut Projected) {
-        let by_lanes = self.skips.has(Skip::Ellipse)
-            && self.period.is_none()
-            && self.geometry == GaussianGeometry::Volume;
-        self.find_tiles_by(simd, by_lanes, scratch, out);
-    }
+/// Finds the kept Gaussians that reach a tile.
+#[inline(always)]
+pub(super) fn find_tiles<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    scratch: &mut Scratch,
+    out: &mut ProjectedGroup,
+) {
+    let by_lanes = view.optimizations.has(Optimization::Ellipse)
+        && view.period.is_none()
+        && view.geometry == GaussianGeometry::Volume;
+    find_tiles_by(view, simd, by_lanes, scratch, out);
+}
 
-    /// The same; if not `by_lanes`, one at a time.
-    #[inline(always)]
-    fn find_tiles_by<S: Simd>(
-        &self,
-        simd: S,
-        by_lanes: bool,
-        scratch: &mut Scratch,
-        out: &mut Projected,
-    ) {
-        let drawn = self.find_drawn(simd, scratch, &mut out.counters);
-        let mut beside = 0;
-        let Found { mut reached, left } = if by_lanes {
-            self.reach_in_lanes(simd, &drawn, scratch, &mut beside)
-        } else {
-            Found {
-                reached: Bits::default(),
-                left: drawn,
-            }
-        };
-        scratch.copies.clear();
-        left.for_each(|at| {
-            if let Some(reach) = self.reach_of_one(at, scratch, out, &mut beside) {
-                scratch.reaches.set(at, &reach);
-                reached.set_one(at, true);
-            }
-        });
-        scratch.reached.clear();
-        reached.for_each(|at| scratch.reached.push(at));
-        let off_screen = drawn.without(&reached).count();
-        out.counters.add(Counter::SkippedOffScreen, off_screen);
-        out.counters.add(Counter::TilesBesideEllipse, beside);
-    }
-
-    /// Finds which lanes nothing but tiles and colours can speak against, and counts why the others are skipped.
-    #[inline(always)]
-    fn find_drawn<S: Simd>(&self, simd: S, scratch: &Scratch, counters: &mut Counters) -> Bits {
-        let len = scratch.lanes.len();
-        let number = |value: f64| S::f64s::splat(simd, value);
-        let near = number(last_rounded_to(self.near));
-        let before_far = number(last_rounded_to(self.far.next_down()));
-        let (least, greatest) = (number(0.0), number(f64::MAX));
-        let is_flat = self.geometry == GaussianGeometry::Surfel;
-        let [mut beyond_near, mut beyond_far, mut definite] = [Bits::default(); 3];
-        for at in (0..len).step_by(S::f64s::LEN) {
-            let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
-            let depth = load(&scratch.depth);
-            let determinant = load(&scratch.flat.determinant);
-            // What is not a number is nowhere.
-            beyond_near.set(at, depth.simd_gt(near));
-            beyond_far.set(at, depth.simd_gt(before_far));
-            definite.set(
-                at,
-                determinant.simd_gt(least) & determinant.simd_le(greatest),
-            );
-        }
-        if is_flat {
-            definite = Bits::first(len);
-        }
-        let kept = Bits::first(len);
-        let seen = kept.and(&beyond_near);
-        counters.add(Counter::SkippedNear, kept.without(&seen).count());
-        counters.add(Counter::SkippedFar, seen.and(&beyond_far).count());
-        let seen = seen.without(&beyond_far);
-        counters.add(Counter::SkippedDegenerate, seen.without(&definite).count());
-        seen.and(&definite)
-    }
-
-    /// The tiles of the lanes of `drawn` that reach but few rows of tiles: what [`Ellipse::reach`] finds, in the same
-    /// steps. Adds what it adds to `beside`.
-    #[inline(always)]
-    fn reach_in_lanes<S: Simd>(
-        &self,
-        simd: S,
-        drawn: &Bits,
-        scratch: &mut Scratch,
-        beside: &mut u64,
-    ) -> Found {
-        let number = |value: f64| S::f64s::splat(simd, value);
-        let columns = both(self.visible.pixels(0), number);
-        let rows = both(self.visible.pixels(1), number);
-        let (zero, one, tile) = (number(0.0), number(1.0), number(TILE_SIZE.into()));
-        let mut found = Found {
+/// The same; if not `by_lanes`, one at a time.
+#[inline(always)]
+fn find_tiles_by<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    by_lanes: bool,
+    scratch: &mut Scratch,
+    out: &mut ProjectedGroup,
+) {
+    let drawn = find_drawn(view, simd, scratch, &mut out.counters);
+    let mut beside = 0;
+    let Found { mut reached, left } = if by_lanes {
+        reach_in_lanes(view, simd, &drawn, scratch, &mut beside)
+    } else {
+        Found {
             reached: Bits::default(),
-            left: Bits::default(),
-        };
-        let mut apart = zero;
-        for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
-            let load = |lanes: &Lanes| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
-            let Flat {
-                mean,
-                half,
-                slope,
-                narrowing,
-                peak,
-                ..
-            } = &*scratch.flat;
-            let (x, y) = (load(&mean[0]), load(&mean[1]));
-            let (half_x, half_y) = (load(&half[0]), load(&half[1]));
-            let (slope, narrowing, peak) = (load(slope), load(narrowing), load(peak));
-            let drawn = S::mask64s::from_bitmask(simd, drawn.group(at, S::f64s::LEN));
-            // The square root of a negative extent is not a number.
-            let drawn = drawn & half_y.simd_ge(zero);
-            let size = x.abs() + y.abs() + half_x + half_y + slope.abs() + narrowing + peak.abs();
-            let moderate = size.simd_le(number(MODERATE));
-
-            let across = Range::<S>::new(x - half_x, x + half_x, columns);
-            let along = Range::<S>::new(y - half_y, y + half_y, rows);
-            let inside = drawn & moderate & across.any & along.any;
-            let (wide, tall) = (across.tiles(), along.tiles());
-            let short = tall.simd_le(number(HELD_ROWS as f64));
-            found.left.set(at, (drawn & !moderate) | (inside & !short));
-            let clipped = across.low.simd_eq(columns[0])
-                | across.high.simd_eq(columns[1])
-                | along.low.simd_eq(rows[0])
-                | along.high.simd_eq(rows[1]);
-            let single = wide.simd_eq(one) & tall.simd_eq(one) & !clipped;
-
-            let square = half_y * half_y;
-            let mut row = along.first;
-            let mut reached = zero;
-            let mut spans = [zero; HELD_ROWS];
-            for (number, span) in spans.iter_mut().enumerate() {
-                let row_top = row * tile;
-                let above = along.low.max(row_top) + 0.5 - y;
-                let below = along.high.min(row_top + (tile - 1.0)) + 0.5 - y;
-                // See [`Ellipse::sides`].
-                let to_left = (zero - peak).max(above).min(below);
-                let to_right = peak.max(above).min(below);
-                let width =
-                    |height: S::f64s| (narrowing * (square - height * height).max(zero)).sqrt();
-                let low = x + (slope * to_left - width(to_left));
-                let high = x + (slope * to_right + width(to_right));
-                let across_row = Range::<S>::new(low, high, columns);
-                let within = across_row.any & row.simd_le(along.last);
-                *span = within.select(across_row.span(), zero);
-                reached += within.select(across_row.tiles(), zero);
-                if number == 0 {
-                    *span = single.select(across.span(), *span);
-                    reached = single.select(one, reached);
-                }
-                row += 1.0;
-            }
-            let told = inside & short;
-            let any = told & reached.simd_gt(zero);
-            found.reached.set(at, any);
-            let more = (wide * tall - reached).max(zero);
-            apart += (told & !single).select(more, zero);
-
-            let head = along.first + tall * 65536.0;
-            let bits = |value: S::f64s| -> S::u64s { (value + POINT).bitcast() };
-            let point: S::u64s = number(POINT).bitcast();
-            let [first, second, third] = spans;
-            let [words, more_words] = &mut scratch.reaches.0;
-            let word = (bits(head) - point) | (bits(first) << 32);
-            word.store_slice(&mut words[at..at + S::f64s::LEN]);
-            let word = (bits(second) - point) | (bits(third) << 32);
-            word.store_slice(&mut more_words[at..at + S::f64s::LEN]);
+            left: drawn,
         }
-        for lane in 0..S::f64s::LEN {
-            *beside += apart.as_slice()[lane] as u64;
+    };
+    scratch.copies.clear();
+    left.for_each(|at| {
+        if let Some(reach) = reach_of_one(view, at, scratch, out, &mut beside) {
+            scratch.reaches.set(at, &reach);
+            reached.set_one(at, true);
         }
-        found
+    });
+    scratch.reached.clear();
+    reached.for_each(|at| scratch.reached.push(at));
+    let off_screen = drawn.without(&reached).count();
+    out.counters.add(Counter::SkippedOffScreen, off_screen);
+    out.counters.add(Counter::TilesBesideEllipse, beside);
+}
+
+/// Finds which lanes nothing but tiles and colours can speak against, and counts why the others are skipped.
+#[inline(always)]
+fn find_drawn<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    scratch: &Scratch,
+    counters: &mut Counters,
+) -> Bits {
+    let len = scratch.lanes.len();
+    let number = |value: f64| S::f64s::splat(simd, value);
+    let near = number(last_rounded_to(view.near));
+    let before_far = number(last_rounded_to(view.far.next_down()));
+    let (least, greatest) = (number(0.0), number(f64::MAX));
+    let is_flat = view.geometry == GaussianGeometry::Surfel;
+    let [mut beyond_near, mut beyond_far, mut definite] = [Bits::default(); 3];
+    for at in (0..len).step_by(S::f64s::LEN) {
+        let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+        let depth = load(&scratch.depth);
+        let determinant = load(&scratch.flat.determinant);
+        // What is not a number is nowhere.
+        beyond_near.set(at, depth.simd_gt(near));
+        beyond_far.set(at, depth.simd_gt(before_far));
+        definite.set(
+            at,
+            determinant.simd_gt(least) & determinant.simd_le(greatest),
+        );
     }
+    if is_flat {
+        definite = Bits::first(len);
+    }
+    let kept = Bits::first(len);
+    let seen = kept.and(&beyond_near);
+    counters.add(Counter::SkippedNear, kept.without(&seen).count());
+    counters.add(Counter::SkippedFar, seen.and(&beyond_far).count());
+    let seen = seen.without(&beyond_far);
+    counters.add(Counter::SkippedDegenerate, seen.without(&definite).count());
+    seen.and(&definite)
+}
 
-    /// The tiles of a lane, if it reaches some.
-    #[inline(never)]
-    fn reach_of_one(
-        &self,
-        at: usize,
-        scratch: &mut Scratch,
-        out: &mut Projected,
-        beside: &mut u64,
-    ) -> Option<Reach> {
-        if self.geometry == GaussianGeometry::Surfel {
-            return self.surfel(at, scratch, &mut out.spans).1;
-        }
-        let flat = &*scratch.flat;
-        let ellipse = Ellipse {
-            mean: [flat.mean[0][at], flat.mean[1][at]],
-            half: [flat.half[0][at], flat.half[1][at]],
-            slope: flat.slope[at],
-            narrowing: flat.narrowing[at],
-            peak: flat.peak[at],
-        };
+/// The tiles of the lanes of `drawn` that reach but few rows of tiles: what [`Ellipse::reach`] finds, in the same
+/// steps. Adds what it adds to `beside`.
+#[inline(always)]
+fn reach_in_lanes<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    drawn: &Bits,
+    scratch: &mut Scratch,
+    beside: &mut u64,
+) -> Found {
+    let number = |value: f64| S::f64s::splat(simd, value);
+    let columns = both(view.visible.pixels(0), number);
+    let rows = both(view.visible.pixels(1), number);
+    let (zero, one, tile) = (number(0.0), number(1.0), number(TILE_SIZE.into()));
+    let mut found = Found {
+        reached: Bits::default(),
+        left: Bits::default(),
+    };
+    let mut apart = zero;
+    for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
+        let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+        let ScreenGaussians {
+            mean,
+            half,
+            slope,
+            narrowing,
+            peak,
+            ..
+        } = &*scratch.flat;
+        let (x, y) = (load(&mean[0]), load(&mean[1]));
+        let (half_x, half_y) = (load(&half[0]), load(&half[1]));
+        let (slope, narrowing, peak) = (load(slope), load(narrowing), load(peak));
+        let drawn = S::mask64s::from_bitmask(simd, drawn.group(at, S::f64s::LEN));
         // The square root of a negative extent is not a number.
-        if ellipse.half[1].is_nan() {
-            return None;
-        }
-        let beside = self.skips.has(Skip::Ellipse).then_some(beside);
-        match self.period {
-            None => ellipse.reach(&self.visible, &mut out.spans, beside),
-            Some(period) => {
-                let (visible, copies) = (&self.visible, &mut scratch.copies);
-                panorama::reach(at, &ellipse, period, visible, copies, out, beside)
+        let drawn = drawn & half_y.simd_ge(zero);
+        let size = x.abs() + y.abs() + half_x + half_y + slope.abs() + narrowing + peak.abs();
+        let moderate = size.simd_le(number(MODERATE));
+
+        let across = Range::<S>::new(x - half_x, x + half_x, columns);
+        let along = Range::<S>::new(y - half_y, y + half_y, rows);
+        let inside = drawn & moderate & across.any & along.any;
+        let (wide, tall) = (across.tiles(), along.tiles());
+        let short = tall.simd_le(number(HELD_ROWS as f64));
+        found.left.set(at, (drawn & !moderate) | (inside & !short));
+        let clipped = across.low.simd_eq(columns[0])
+            | across.high.simd_eq(columns[1])
+            | along.low.simd_eq(rows[0])
+            | along.high.simd_eq(rows[1]);
+        let single = wide.simd_eq(one) & tall.simd_eq(one) & !clipped;
+
+        let square = half_y * half_y;
+        let mut row = along.first;
+        let mut reached = zero;
+        let mut spans = [zero; HELD_ROWS];
+        for (number, span) in spans.iter_mut().enumerate() {
+            let row_top = row * tile;
+            let above = along.low.max(row_top) + 0.5 - y;
+            let below = along.high.min(row_top + (tile - 1.0)) + 0.5 - y;
+            // See [`Ellipse::sides`].
+            let to_left = (zero - peak).max(above).min(below);
+            let to_right = peak.max(above).min(below);
+            let width = |height: S::f64s| (narrowing * (square - height * height).max(zero)).sqrt();
+            let low = x + (slope * to_left - width(to_left));
+            let high = x + (slope * to_right + width(to_right));
+            let across_row = Range::<S>::new(low, high, columns);
+            let within = across_row.any & row.simd_le(along.last);
+            *span = within.select(across_row.span(), zero);
+            reached += within.select(across_row.tiles(), zero);
+            if number == 0 {
+                *span = single.select(across.span(), *span);
+                reached = single.select(one, reached);
             }
+            row += 1.0;
+        }
+        let told = inside & short;
+        let any = told & reached.simd_gt(zero);
+        found.reached.set(at, any);
+        let more = (wide * tall - reached).max(zero);
+        apart += (told & !single).select(more, zero);
+
+        let head = along.first + tall * 65536.0;
+        let bits = |value: S::f64s| -> S::u64s { (value + POINT).bitcast() };
+        let point: S::u64s = number(POINT).bitcast();
+        let [first, second, third] = spans;
+        let [words, more_words] = &mut scratch.reaches.0;
+        let word = (bits(head) - point) | (bits(first) << 32);
+        word.store_slice(&mut words[at..at + S::f64s::LEN]);
+        let word = (bits(second) - point) | (bits(third) << 32);
+        word.store_slice(&mut more_words[at..at + S::f64s::LEN]);
+    }
+    for lane in 0..S::f64s::LEN {
+        *beside += apart.as_slice()[lane] as u64;
+    }
+    found
+}
+
+/// The tiles of a lane, if it reaches some.
+#[inline(never)]
+fn reach_of_one(
+    view: &ViewConstants,
+    at: usize,
+    scratch: &mut Scratch,
+    out: &mut ProjectedGroup,
+    beside: &mut u64,
+) -> Option<TileFootprint> {
+    if view.geometry == GaussianGeometry::Surfel {
+        return surfel_of(view, at, scratch, &mut out.spans).1;
+    }
+    let flat = &*scratch.flat;
+    let ellipse = Ellipse {
+        mean: [flat.mean[0][at], flat.mean[1][at]],
+        half: [flat.half[0][at], flat.half[1][at]],
+        slope: flat.slope[at],
+        narrowing: flat.narrowing[at],
+        peak: flat.peak[at],
+    };
+    // The square root of a negative extent is not a number.
+    if ellipse.half[1].is_nan() {
+        return None;
+    }
+    let beside = view
+        .optimizations
+        .has(Optimization::Ellipse)
+        .then_some(beside);
+    match view.period {
+        None => ellipse.reach(&view.visible, &mut out.spans, beside),
+        Some(period) => {
+            let (visible, copies) = (&view.visible, &mut scratch.copies);
+            panorama::reach(at, &ellipse, period, visible, copies, out, beside)
         }
     }
 }
@@ -328,21 +316,21 @@ mod tests {
     use crate::runtime::SimdLevel;
     use crate::state::Viewport;
     use crate::state::gaussian::{Camera, GaussianState};
-    use crate::stats::optimizations::Skips;
+    use crate::stats::optimizations::Optimizations;
     use devmem::dispatch;
     use proptest::prelude::*;
 
     /// Rows, each with its first tile and one past its last.
     type Spans = Vec<(u32, u16, u16)>;
 
-    /// What is found of a batch: the spans of each lane that is reached, and counters.
+    /// What is found of a group: the spans of each lane that is reached, and counters.
     #[derive(Debug, PartialEq)]
     struct Tiles {
         reached: Vec<(usize, Spans)>,
         counters: Vec<u64>,
     }
 
-    fn projection() -> Projection {
+    fn projection() -> ViewConstants {
         let visible = Visible {
             left: 3,
             top: 0,
@@ -362,12 +350,19 @@ mod tests {
             max_depth: 1.0,
         };
         let state = GaussianState::default();
-        Projection::new(&state, &camera, &viewport, visible, None, Skips::ALL)
+        ViewConstants::new(
+            &state,
+            &camera,
+            &viewport,
+            visible,
+            None,
+            Optimizations::ALL,
+        )
     }
 
     fn tiles<S: Simd>(simd: S, by_lanes: bool, scratch: &mut Scratch) -> Tiles {
-        let mut out = Projected::default();
-        projection().find_tiles_by(simd, by_lanes, scratch, &mut out);
+        let mut out = ProjectedGroup::default();
+        find_tiles_by(&projection(), simd, by_lanes, scratch, &mut out);
         let spans = |at: usize| {
             let reach = scratch.reaches.get(at);
             let spans = reach.spans(&out.spans);

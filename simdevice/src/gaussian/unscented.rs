@@ -5,10 +5,9 @@
 //! the usual terms alpha is 1, beta 2 and kappa 0, so that the weights are 0 and 1/6 in the mean, 2 and 1/6 in the
 //! covariance: none is negative, and the covariance is one.
 
-use super::fetch::BATCH;
-use super::linearize::linearize;
-use super::project::Projection;
-use super::rays;
+use super::camera::{ViewConstants, linearize};
+use super::lanes::GROUP;
+use super::ray_depth;
 use super::scratch::Scratch;
 use crate::state::gaussian::CameraModel;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -33,56 +32,54 @@ struct Moments {
     determinant: f64,
 }
 
-impl Projection {
-    /// Means and covariances of the kept Gaussians, whose Jacobians were found: they stand in where some point is not seen.
-    pub(super) fn transform(&self, by_matrices: bool, scratch: &mut Scratch) {
-        let r = &self.rotation;
-        let placed = scratch.placed.as_deref().filter(|_| by_matrices);
-        let [fx, fy] = self.focal;
-        for at in 0..scratch.lanes.len().min(BATCH) {
-            let quaternion = scratch.rotation.each_ref().map(|lanes| lanes[at]);
-            let scale = scratch.scale.each_ref().map(|lanes| lanes[at]);
-            let own = axes(quaternion, scale);
-            let rows = scratch
-                .jacobian
-                .each_ref()
-                .map(|row| row.each_ref().map(|lanes| lanes[at]));
-            let t = scratch.camera.each_ref().map(|lanes| lanes[at]);
-            let to_camera = |axis: [f64; 3]| {
-                let axis = placed.map_or(axis, |placed| placed.to_world(at, axis));
-                [0, 3, 6].map(|row| r[row] * axis[0] + r[row + 1] * axis[1] + r[row + 2] * axis[2])
-            };
-            let has_place = !rows[0][0].is_nan();
-            let seen = has_place.then(|| own.map(to_camera));
-            let seen = seen.and_then(|axes| of_points(self.model, self.near.into(), t, axes));
-            let moments = match seen {
-                Some(moments) => {
-                    for (axis, place) in moments.mean.into_iter().enumerate() {
-                        scratch.flat.mean[axis][at] = place * self.focal[axis] + self.center[axis];
-                    }
-                    [
-                        fx * fx * moments.xx,
-                        fx * fy * moments.xy,
-                        fy * fy * moments.yy,
-                        fx * fx * fy * fy * moments.determinant,
-                    ]
+/// Means and covariances of the kept Gaussians, whose Jacobians were found: they stand in where some point is not seen.
+pub(super) fn transform(view: &ViewConstants, by_matrices: bool, scratch: &mut Scratch) {
+    let r = &view.rotation;
+    let placed = scratch.placed.as_deref().filter(|_| by_matrices);
+    let [fx, fy] = view.focal;
+    for at in 0..scratch.lanes.len().min(GROUP) {
+        let quaternion = scratch.rotation.each_ref().map(|lanes| lanes[at]);
+        let scale = scratch.scale.each_ref().map(|lanes| lanes[at]);
+        let own = axes(quaternion, scale);
+        let rows = scratch
+            .jacobian
+            .each_ref()
+            .map(|row| row.each_ref().map(|lanes| lanes[at]));
+        let t = scratch.camera.each_ref().map(|lanes| lanes[at]);
+        let to_camera = |axis: [f64; 3]| {
+            let axis = placed.map_or(axis, |placed| placed.to_world(at, axis));
+            [0, 3, 6].map(|row| r[row] * axis[0] + r[row + 1] * axis[1] + r[row + 2] * axis[2])
+        };
+        let has_place = !rows[0][0].is_nan();
+        let seen = has_place.then(|| own.map(to_camera));
+        let seen = seen.and_then(|axes| of_points(view.model, view.near.into(), t, axes));
+        let moments = match seen {
+            Some(moments) => {
+                for (axis, place) in moments.mean.into_iter().enumerate() {
+                    scratch.flat.mean[axis][at] = place * view.focal[axis] + view.center[axis];
                 }
-                None => {
-                    let deviations = own.map(|axis| rows.map(|row| dot(row, axis)));
-                    let (xx, xy, yy, determinant) = sums(&deviations);
-                    [xx, xy, yy, determinant]
-                }
-            };
-            for (lanes, moment) in scratch.moments.iter_mut().zip(moments) {
-                lanes[at] = moment;
+                [
+                    fx * fx * moments.xx,
+                    fx * fy * moments.xy,
+                    fy * fy * moments.yy,
+                    fx * fx * fy * fy * moments.determinant,
+                ]
             }
+            None => {
+                let deviations = own.map(|axis| rows.map(|row| dot(row, axis)));
+                let (xx, xy, yy, determinant) = sums(&deviations);
+                [xx, xy, yy, determinant]
+            }
+        };
+        for (lanes, moment) in scratch.moments.iter_mut().zip(moments) {
+            lanes[at] = moment;
         }
     }
 }
 
 /// The axes of a Gaussian, as long as its standard deviations.
 fn axes(quaternion: [f64; 4], scale: [f64; 3]) -> [[f64; 3]; 3] {
-    let columns = rays::axes(quaternion);
+    let columns = ray_depth::axes(quaternion);
     [0, 1, 2].map(|axis| columns[axis].map(|c| c * scale[axis]))
 }
 

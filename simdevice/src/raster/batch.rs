@@ -9,7 +9,7 @@ use crate::program::fragment::{BATCH_LANES, Interface};
 use crate::program::interface::{FragmentInput, Interpolation, Sampling};
 use crate::raster::setup::Needs;
 use crate::simd::{bits_of, both, three};
-use crate::stats::optimizations::{Skip, Skips};
+use crate::stats::optimizations::{Optimization, Optimizations};
 use fearless_simd::f32x4;
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::{Chunk, LaneMask, Machine};
@@ -174,9 +174,9 @@ impl<S: Simd> BlockValues<S> {
 impl Batch {
     /// Empties it, for a draw whose fragments need this, within a macro-tile: its column and row, and its side in
     /// pixels.
-    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32, skips: Skips) {
+    pub fn begin(&mut self, needs: Needs, at: [u32; 2], size: u32, optimizations: Optimizations) {
         self.needs = needs;
-        self.detects_affine = skips.has(Skip::Affine);
+        self.detects_affine = optimizations.has(Optimization::Affine);
         self.corner = at.map(|at| at * size);
         self.side = size / TILE_SIZE;
         self.clear();

@@ -13,7 +13,7 @@ use crate::raster::output::{Targets, color_outputs};
 use crate::raster::setup::Needs;
 use crate::runtime::Runtime;
 use crate::state::Rect;
-use crate::stats::optimizations::{Skip, Skips};
+use crate::stats::optimizations::{Optimization, Optimizations};
 use fearless_simd::Level;
 use std::time::Duration;
 
@@ -58,7 +58,7 @@ pub struct TileDraw<'a> {
     /// What fragments need.
     pub(super) needs: Needs,
     /// What is left out in its tiles.
-    pub(super) skips: Skips,
+    pub(super) optimizations: Optimizations,
     pub(super) level: Level,
     pub(super) limit: Duration,
 }
@@ -125,7 +125,10 @@ impl<'a> TileDraw<'a> {
         let viewports = state.viewports.iter();
         let plain = plain && !state.alpha_to_one;
         // What was recorded is what hardware without this does.
-        let defers = runtime.config().skips.has(Skip::OverwrittenQuads)
+        let defers = runtime
+            .config()
+            .optimizations
+            .has(Optimization::OverwrittenQuads)
             && plain
             && !multisampled
             && state.sample_mask & 1 == 1
@@ -183,7 +186,7 @@ impl<'a> TileDraw<'a> {
                     )
                 }),
             },
-            skips: runtime.config().skips,
+            optimizations: runtime.config().optimizations,
             level: runtime.level(),
             limit: runtime.config().shader_timeout,
         }

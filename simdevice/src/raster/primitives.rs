@@ -23,7 +23,7 @@ use crate::raster::write::{test, write};
 use crate::simd::both;
 use crate::state::Rect;
 use crate::stats::counters::{Counter, Counters};
-use crate::stats::optimizations::Skip;
+use crate::stats::optimizations::Optimization;
 use devmem::dispatch;
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
@@ -91,7 +91,7 @@ pub fn render(
     };
     renderer
         .batch
-        .begin(draw.needs, place.at, place.size, draw.skips);
+        .begin(draw.needs, place.at, place.size, draw.optimizations);
     let level = draw.level;
     let pending = &mut *scratch.pending;
     pending.clear();
@@ -104,7 +104,7 @@ pub fn render(
     let (passed, masked) = (renderer.samples_passed, renderer.quads_masked);
     let work = renderer.work;
     counters.add(Counter::SamplesPassed, passed);
-    if draw.skips.has(Skip::MaskedQuads) {
+    if draw.optimizations.has(Optimization::MaskedQuads) {
         counters.add(Counter::QuadsMasked, masked);
     }
     if let Some(machines) = machines {
@@ -276,7 +276,7 @@ impl Renderer<'_, '_> {
         if let Some(tests) = early
             && coverage.blocks.count_ones() >= HIDDEN_BLOCKS
             && tests.stencil.is_none()
-            && draw.skips.has(Skip::HiddenTiles)
+            && draw.optimizations.has(Optimization::HierarchicalDepth)
             && self.is_hidden(simd, tests, current, tile, at)
         {
             if let Some(work) = &mut self.work {
@@ -296,7 +296,7 @@ impl Renderer<'_, '_> {
         }
         let state = &draw.draw.state;
         let masked = state.sample_mask & ((1 << N) - 1) != (1 << N) - 1;
-        let skips_masked = draw.skips.has(Skip::MaskedQuads);
+        let skips_masked = draw.optimizations.has(Optimization::MaskedQuads);
         let mut touched = false;
         for block in bits(coverage.blocks) {
             let mut lanes = coverage.lanes[block];
@@ -409,7 +409,7 @@ impl Renderer<'_, '_> {
             return Ok(());
         }
         let values = values.lanes();
-        let skips_masked = self.draw.skips.has(Skip::MaskedQuads);
+        let skips_masked = self.draw.optimizations.has(Optimization::MaskedQuads);
         for number in 0..4 {
             let mut cover = 0;
             for (sample, lanes) in lanes.iter().enumerate() {
@@ -595,7 +595,7 @@ impl Renderer<'_, '_> {
                 && output.overwrites()
                 && coverage.is_whole()
                 && state.sample_mask & 15 == 15
-                && self.draw.skips.has(Skip::OverwrittenTiles)
+                && self.draw.optimizations.has(Optimization::OverwrittenTiles)
             {
                 self.buffers.color[index].touch_unread(tile);
                 self.counters.add(Counter::TilesOverwritten, 1);
@@ -630,7 +630,7 @@ impl Renderer<'_, '_> {
 
     /// Makes sure that a tile of the colours written is there, of which nothing will be left.
     fn touch_unread(&mut self, tile: usize) {
-        if !self.draw.skips.has(Skip::OverwrittenTiles) {
+        if !self.draw.optimizations.has(Optimization::OverwrittenTiles) {
             return self.touch_read(tile);
         }
         for (index, output) in self.draw.colors.iter().enumerate() {
@@ -758,7 +758,7 @@ impl Renderer<'_, '_> {
         let needs = self.draw.needs;
         let mut touched = false;
         for (block, &lanes) in lanes.iter().enumerate() {
-            if lanes == 0 && self.draw.skips.has(Skip::MaskedQuads) {
+            if lanes == 0 && self.draw.optimizations.has(Optimization::MaskedQuads) {
                 self.quads_masked += 4;
                 continue;
             }
@@ -802,7 +802,7 @@ impl Renderer<'_, '_> {
         full.attributes.clear();
         let (primitive, varyings) = (current.primitive, current.varyings);
         add_attributes(primitive, interface, varyings, &mut full.attributes);
-        let affine = current.setup.affine && draw.skips.has(Skip::Affine);
+        let affine = current.setup.affine && draw.optimizations.has(Optimization::Affine);
         let divides = draw.needs.inverse_w && !affine;
         if draw.needs.barycentrics {
             let needs = Needs {

@@ -65,7 +65,7 @@ macro_rules! counters {
 
 counters! {
     GaussiansRead: "gaussians", "gaussians read", Count, "Gaussians that draws named";
-    ChunksBuilt: "gaussians", "chunks built", Count, "Chunks of up to 256 Gaussians that were made of memory that is drawn again";
+    ClustersBuilt: "gaussians", "clusters built", Count, "Clusters of up to 256 Gaussians that were made of memory that is drawn again";
     GaussiansDrawn: "gaussians", "gaussians drawn", Count, "Gaussians that reached at least one tile";
     SkippedNonFinite: "gaussians skipped", "non-finite", Count, "Gaussians with a non-finite attribute";
     SkippedZeroRotation: "gaussians skipped", "zero quaternion", Count, "Gaussians whose quaternion is all zero";
@@ -75,21 +75,19 @@ counters! {
     SkippedFar: "gaussians skipped", "beyond far plane", Count, "Gaussians not before the far plane";
     SkippedDegenerate: "gaussians skipped", "degenerate covariance", Count, "Gaussians whose screen-space covariance is not positive and finite";
     SkippedOffScreen: "gaussians skipped", "off screen", Count, "Gaussians that reach no pixel of the scissored viewport at the alpha floor";
-    OutsideByChunks: "skips", "outside by chunks", Count, "Gaussians that were not read because the bounds of their chunk are outside the picture";
-    HiddenByOthers: "skips", "hidden by others", Count, "Gaussians that were not read because others before their chunk finish all pixels that it reaches";
-    SetsUnchanged: "skips", "sets unchanged", Count, "sets of Gaussians that were drawn as they had been projected, sorted and binned before";
-    OrdersRepaired: "skips", "orders repaired", Count, "sets of Gaussians whose order is that of their last picture, repaired instead of sorted anew";
-    OutsideByBounds: "skips", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
-    TilesBesideEllipse: "skips", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
-    HarmonicsUnread: "skips", "harmonics unread", Count, "Gaussians whose spherical harmonics were not read";
-    BandsOfZeros: "skips", "bands of zeros", Count, "directions in which spherical harmonics were evaluated without the higher degrees, whose coefficients are zero";
-    BlocksBesideEllipse: "skips", "blocks beside ellipse", Count, "Pairs of an unfinished 4x4 block and a Gaussian of its tile that does not reach the block";
-    BlocksSaturated: "skips", "blocks saturated", Count, "Pairs of a finished 4x4 block and a Gaussian of its tile";
-    TilesUntouched: "skips", "tiles untouched", Count, "Tiles of attachments that were not loaded, because nothing was drawn to them";
-    TilesOverwritten: "skips", "tiles overwritten", Count, "Tiles of colour attachments that were neither loaded nor cleared, because a primitive overwrote them as a whole";
-    QuadsOverwritten: "skips", "quads overwritten", Count, "Quads of tiles that were not shaded, because a later primitive of the draw overwrote the tile as a whole";
-    QuadsMasked: "skips", "quads masked", Count, "Quads of primitives' blocks that were not shaded, because no sample of them was left";
-    BatchesAffine: "skips", "batches affine", Count, "Batches of fragments whose perspective-correct inputs needed no division";
+    OutsideByClusters: "optimizations", "outside by clusters", Count, "Gaussians that were not read because the bounds of their cluster are outside the picture";
+    HiddenByOthers: "optimizations", "hidden by others", Count, "Gaussians that were not read because others before their cluster finish all pixels that it reaches";
+    SetsUnchanged: "optimizations", "sets unchanged", Count, "sets of Gaussians that were drawn as they had been projected, sorted and binned before";
+    OutsideByBounds: "optimizations", "outside by bounds", Count, "Gaussians off screen by a sphere about them, and so not projected further";
+    TilesBesideEllipse: "optimizations", "tiles beside ellipse", Count, "Tiles of Gaussians' boxes that their ellipses do not reach";
+    HarmonicsUnread: "optimizations", "harmonics unread", Count, "Gaussians whose spherical harmonics were not read";
+    BlocksBesideEllipse: "optimizations", "blocks beside ellipse", Count, "Pairs of an unfinished 4x4 block and a Gaussian of its tile that does not reach the block";
+    BlocksSaturated: "optimizations", "blocks saturated", Count, "Pairs of a finished 4x4 block and a Gaussian of its tile";
+    TilesUntouched: "optimizations", "tiles untouched", Count, "Tiles of attachments that were not loaded, because nothing was drawn to them";
+    TilesOverwritten: "optimizations", "tiles overwritten", Count, "Tiles of colour attachments that were neither loaded nor cleared, because a primitive overwrote them as a whole";
+    QuadsOverwritten: "optimizations", "quads overwritten", Count, "Quads of tiles that were not shaded, because a later primitive of the draw overwrote the tile as a whole";
+    QuadsMasked: "optimizations", "quads masked", Count, "Quads of primitives' blocks that were not shaded, because no sample of them was left";
+    BatchesAffine: "optimizations", "batches affine", Count, "Batches of fragments whose perspective-correct inputs needed no division";
     InputVertices: "geometry", "input vertices", Count, "Vertices or indices of draws of points, lines and triangles";
     InputPrimitives: "geometry", "input primitives", Count, "Points, lines and triangles that were assembled";
     VertexInvocations: "geometry", "vertex invocations", Count, "Vertices shaded";
@@ -124,7 +122,7 @@ counters! {
     ShaderLanes: "shader cores", "lanes", Count, "Lanes that could have been active, summed alike; active lanes by it is the lane occupancy";
     GeometryTime: "time", "geometry", Nanoseconds, "All of points, lines and triangles before tiles: vertices, set-up, binning";
     PreprocessTime: "time", "preprocess", Nanoseconds, "Reading, culling, projecting and colouring Gaussians";
-    ChunkTime: "time", "chunks", Nanoseconds, "Putting Gaussians that are drawn again into chunks; not part of preprocess";
+    ClusterTime: "time", "clusters", Nanoseconds, "Putting Gaussians that are drawn again into clusters; not part of preprocess";
     SortTime: "time", "sort", Nanoseconds, "Sorting by depth";
     BinningTime: "time", "binning", Nanoseconds, "Placing Gaussians and primitives in the lists of their tiles";
     ShaderTime: "time", "dispatches", Nanoseconds, "Running the workgroups of compute programs";

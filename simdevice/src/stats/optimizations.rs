@@ -1,19 +1,19 @@
-//! Skips: work that the device leaves out because it changes no pixel. Each has a name, a counter of what it saved and a
+//! Optimizations: work that the device leaves out because it changes no pixel. Each has a name, a counter of what it saved and a
 //! switch, so that tests prove that the image is the same without it.
 
 use crate::stats::counters::Counter;
 use std::str::FromStr;
 
-macro_rules! skips {
+macro_rules! optimizations {
     ($($variant:ident: $name:literal, $counter:ident, $description:literal;)*) => {
         /// A kind of work that may be left out.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        pub enum Skip {
+        pub enum Optimization {
             $(#[doc = $description] $variant,)*
         }
 
-        impl Skip {
-            /// Every skip.
+        impl Optimization {
+            /// Every optimization.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
             /// The name that switches know it by.
@@ -33,92 +33,102 @@ macro_rules! skips {
     };
 }
 
-skips! {
-    Chunks: "chunks", OutsideByChunks, "Gaussians that are drawn again are in chunks, of which those outside the picture are not read.";
-    HiddenChunks: "hidden-chunks", HiddenByOthers, "Gaussians that are drawn again are not read in chunks that others hide.";
-    Unchanged: "unchanged", SetsUnchanged, "Gaussians in memory that only the device writes are not projected, sorted and binned again while neither they nor the view change.";
-    LastOrder: "last-order", OrdersRepaired, "Gaussians in memory that only the device writes are not sorted where the order of their last picture needs little repair.";
+optimizations! {
+    ClusterCulling: "cluster-culling", OutsideByClusters, "Gaussians that are drawn again are in clusters, of which those outside the picture are not read.";
+    OcclusionCulling: "occlusion-culling", HiddenByOthers, "Gaussians that are drawn again are not read in clusters that others hide.";
+    TemporalReuse: "temporal-reuse", SetsUnchanged, "Gaussians in memory that only the device writes are not projected, sorted and binned again while neither they nor the view change.";
     Bounds: "bounds", OutsideByBounds, "A Gaussian whose bounding sphere is off the screen is not projected further.";
     Ellipse: "ellipse", TilesBesideEllipse, "A Gaussian is listed only in tiles that its ellipse reaches, not in all of its box.";
     Harmonics: "harmonics", HarmonicsUnread, "Spherical harmonics are read only for Gaussians that reach a tile.";
-    Bands: "bands", BandsOfZeros, "Degrees of spherical harmonics whose coefficients are zero are not evaluated for Gaussians that are drawn again.";
     Blocks: "blocks", BlocksBesideEllipse, "A Gaussian is evaluated only in blocks of 4x4 pixels that it may reach.";
-    Saturated: "saturated", BlocksSaturated, "Nothing is evaluated in blocks and tiles whose pixels are all finished.";
+    EarlyTermination: "early-termination", BlocksSaturated, "Nothing is evaluated in blocks and tiles whose pixels are all finished.";
     EmptyTiles: "empty-tiles", TilesUntouched, "Tiles that nothing draws to are neither loaded nor stored.";
     OverwrittenTiles: "overwritten-tiles", TilesOverwritten, "Tiles of colour attachments are neither loaded nor cleared where the first primitive overwrites them as a whole.";
     OverwrittenQuads: "overwritten-quads", QuadsOverwritten, "Quads of tiles that one primitive covers and another of the draw overwrites are not shaded.";
-    HiddenTiles: "hidden-tiles", TilesHidden, "A primitive that all depths of a tile hide is not tested there pixel by pixel.";
+    HierarchicalDepth: "hierarchical-depth", TilesHidden, "A primitive that all depths of a tile hide is not tested there pixel by pixel.";
     MaskedQuads: "masked-quads", QuadsMasked, "Quads of which coverage and early tests leave nothing are not shaded.";
     Affine: "affine", BatchesAffine, "Barycentrics are not divided by 1 / w where that is the same all over each primitive.";
 }
 
-/// The skips that a device uses.
+/// The optimizations that a device uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Skips(u32);
+pub struct Optimizations(u32);
 
-/// A name is none of a skip's.
+/// A name is none of an optimization's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{name:?} is neither all nor none nor a skip, which are {}", names())]
-pub struct UnknownSkip {
+#[error(
+    "{name:?} is neither all nor none nor an optimization, which are {}",
+    names()
+)]
+pub struct UnknownOptimization {
     /// The name.
     pub name: String,
 }
 
 fn names() -> String {
-    let names: Vec<_> = Skip::ALL.iter().map(|skip| skip.name()).collect();
+    let names: Vec<_> = Optimization::ALL
+        .iter()
+        .map(|optimization| optimization.name())
+        .collect();
     names.join(", ")
 }
 
-impl Skips {
-    /// Every skip.
-    pub const ALL: Self = Self((1 << Skip::ALL.len()) - 1);
-    /// No skip.
+impl Optimizations {
+    /// Every optimization.
+    pub const ALL: Self = Self((1 << Optimization::ALL.len()) - 1);
+    /// No optimization.
     pub const NONE: Self = Self(0);
 
-    /// Whether `skip` is used.
+    /// Whether `optimization` is used.
     #[inline(always)]
-    pub fn has(self, skip: Skip) -> bool {
-        self.0 >> skip as u32 & 1 == 1
+    pub fn has(self, optimization: Optimization) -> bool {
+        self.0 >> optimization as u32 & 1 == 1
     }
 
-    /// These and `skip`.
-    pub fn with(self, skip: Skip) -> Self {
-        Self(self.0 | 1 << skip as u32)
+    /// These and `optimization`.
+    pub fn with(self, optimization: Optimization) -> Self {
+        Self(self.0 | 1 << optimization as u32)
     }
 
-    /// These but `skip`.
-    pub fn without(self, skip: Skip) -> Self {
-        Self(self.0 & !(1 << skip as u32))
+    /// These but `optimization`.
+    pub fn without(self, optimization: Optimization) -> Self {
+        Self(self.0 & !(1 << optimization as u32))
     }
 }
 
-impl Default for Skips {
+impl Default for Optimizations {
     fn default() -> Self {
         Self::ALL
     }
 }
 
-impl FromStr for Skips {
-    type Err = UnknownSkip;
+impl FromStr for Optimizations {
+    type Err = UnknownOptimization;
 
-    /// `all`, `none`, or names of skips, separated by commas; or `all` without some, each after a minus: `all,-blocks`.
-    fn from_str(text: &str) -> Result<Self, UnknownSkip> {
+    /// `all`, `none`, or names of optimizations, separated by commas; or `all` without some, each after a minus: `all,-blocks`.
+    fn from_str(text: &str) -> Result<Self, UnknownOptimization> {
         let known = |name: &str| {
-            let skip = Skip::ALL.iter().find(|skip| skip.name() == name);
-            skip.copied().ok_or_else(|| UnknownSkip {
+            let optimization = Optimization::ALL
+                .iter()
+                .find(|optimization| optimization.name() == name);
+            optimization.copied().ok_or_else(|| UnknownOptimization {
                 name: name.to_owned(),
             })
         };
         match text.split_once(',') {
             None if text == "all" => Ok(Self::ALL),
             None if text == "none" => Ok(Self::NONE),
-            Some(("all", without)) => without.split(',').try_fold(Self::ALL, |skips, name| {
-                let name = name.strip_prefix('-').unwrap_or("");
-                Ok(skips.without(known(name)?))
+            Some(("all", without)) => {
+                without
+                    .split(',')
+                    .try_fold(Self::ALL, |optimizations, name| {
+                        let name = name.strip_prefix('-').unwrap_or("");
+                        Ok(optimizations.without(known(name)?))
+                    })
+            }
+            _ => text.split(',').try_fold(Self::NONE, |optimizations, name| {
+                Ok(optimizations.with(known(name)?))
             }),
-            _ => text
-                .split(',')
-                .try_fold(Self::NONE, |skips, name| Ok(skips.with(known(name)?))),
         }
     }
 }
@@ -129,18 +139,23 @@ mod tests {
 
     #[test]
     fn sets_are_read_from_their_names() {
-        assert_eq!("all".parse(), Ok(Skips::ALL));
-        assert_eq!("none".parse(), Ok(Skips::NONE));
-        let some: Skips = "blocks,ellipse".parse().unwrap();
-        for &skip in Skip::ALL {
-            let named = matches!(skip, Skip::Blocks | Skip::Ellipse);
-            assert_eq!(some.has(skip), named, "{skip:?}");
-            assert!(Skips::default().has(skip));
-            assert!(!Skips::ALL.without(skip).has(skip));
-            assert_eq!(skip.name().parse(), Ok(Skips::NONE.with(skip)));
+        assert_eq!("all".parse(), Ok(Optimizations::ALL));
+        assert_eq!("none".parse(), Ok(Optimizations::NONE));
+        let some: Optimizations = "blocks,ellipse".parse().unwrap();
+        for &optimization in Optimization::ALL {
+            let named = matches!(optimization, Optimization::Blocks | Optimization::Ellipse);
+            assert_eq!(some.has(optimization), named, "{optimization:?}");
+            assert!(Optimizations::default().has(optimization));
+            assert!(!Optimizations::ALL.without(optimization).has(optimization));
+            assert_eq!(
+                optimization.name().parse(),
+                Ok(Optimizations::NONE.with(optimization))
+            );
         }
-        let most = Skips::ALL.without(Skip::Blocks).without(Skip::Bands);
-        assert_eq!("all,-blocks,-bands".parse(), Ok(most));
+        let most = Optimizations::ALL
+            .without(Optimization::Blocks)
+            .without(Optimization::Affine);
+        assert_eq!("all,-blocks,-affine".parse(), Ok(most));
     }
 
     #[test]
@@ -154,16 +169,16 @@ mod tests {
             "all,",
             "-blocks",
         ] {
-            let error = text.parse::<Skips>().unwrap_err();
+            let error = text.parse::<Optimizations>().unwrap_err();
             assert!(error.to_string().contains("empty-tiles"), "{error}");
         }
         assert_eq!(
             "blocks,everything"
-                .parse::<Skips>()
+                .parse::<Optimizations>()
                 .unwrap_err()
                 .to_string(),
-            "\"everything\" is neither all nor none nor a skip, which are chunks, hidden-chunks, unchanged, last-order, bounds, ellipse, harmonics, bands, blocks, saturated, \
-             empty-tiles, overwritten-tiles, overwritten-quads, hidden-tiles, masked-quads, affine"
+            "\"everything\" is neither all nor none nor an optimization, which are cluster-culling, occlusion-culling, temporal-reuse, bounds, ellipse, harmonics, blocks, early-termination, \
+             empty-tiles, overwritten-tiles, overwritten-quads, hierarchical-depth, masked-quads, affine"
         );
     }
 }

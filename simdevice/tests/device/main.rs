@@ -5,10 +5,10 @@ mod command_processor;
 mod common;
 mod compute;
 mod levels;
+mod optimizations;
 mod render_pass;
 #[path = "../common/scenes.rs"]
 mod scenes;
-mod skips;
 mod timing;
 
 fn main() -> std::process::ExitCode {

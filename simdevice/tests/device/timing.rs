@@ -4,7 +4,7 @@
 use crate::common::{HEIGHT, WIDTH};
 use crate::scenes::{KINDS, Kind, draw, draw_on, recording};
 use simdevice::stats::counters::{Counter, Counters};
-use simdevice::stats::optimizations::{Skip, Skips};
+use simdevice::stats::optimizations::{Optimization, Optimizations};
 use simdevice::stats::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::timing::config::{Config as Hardware, preset_names};
 use simdevice::timing::raster::RasterReport;
@@ -72,7 +72,7 @@ fn nobody_sees_in_the_image_that_work_is_recorded() {
 fn the_trace_of_triangles_agrees_with_the_counters() {
     // The trace tells of hardware that shades what is overwritten later.
     let config = Config {
-        skips: Skips::ALL.without(Skip::OverwrittenQuads),
+        optimizations: Optimizations::ALL.without(Optimization::OverwrittenQuads),
         ..Config::default()
     };
     let counters = counted(Kind::Triangles, QueryKind::Performance, &config);

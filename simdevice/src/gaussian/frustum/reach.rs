@@ -1,13 +1,27 @@
 //! How far from their means' places Gaussians reach in a picture, by what they are and how they are projected: what the
 //! sides of a frustum are moved out by.
 
-use super::{Frustum, Plane, dot, length};
-use crate::gaussian::lanes::{Bits, F32_LANES};
-use crate::gaussian::project::Projection;
-use crate::gaussian::scratch::Attributes;
-use crate::gaussian::splat::{LEAST_HALF_FACTOR, half_room};
+use crate::gaussian::camera::ViewConstants;
+use crate::gaussian::splat::{LEAST_HALF_FACTOR, binary16_headroom};
 use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianPrecision};
 use std::f64::consts::LN_2;
+
+/// A Gaussian at `d` from the eye whose largest scale is `s` is outside where
+/// `normal . d + per_scale s + offset < 0`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Plane {
+    pub(super) normal: [f64; 3],
+    pub(super) per_scale: f64,
+    pub(super) offset: f64,
+}
+
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(super) fn length(v: [f64; 3]) -> f64 {
+    dot(v, v).sqrt()
+}
 
 /// How much wider than exact bounds are, so that rounding loses nothing.
 const MARGIN: f64 = 1e-5;
@@ -26,7 +40,7 @@ const UNSCENTED_SHARE: f64 = 0.25;
 /// A Gaussian whose deviation in the picture is `d` pixels reaches no farther than `pixels + per_deviation d` from the place
 /// of its mean, if `d` is at most `greatest`.
 #[derive(Clone, Copy, Debug)]
-struct Reach {
+struct ScreenExtent {
     pixels: f64,
     per_deviation: f64,
     greatest: f64,
@@ -34,13 +48,13 @@ struct Reach {
 
 /// The sides of a camera's frustum, for Gaussians whose opacities are at most `opacity`, and the plane that says for which of
 /// them they hold.
-pub(super) fn sides(projection: &Projection, opacity: f32) -> (Vec<Plane>, Option<Plane>) {
+pub(super) fn sides(projection: &ViewConstants, opacity: f32) -> (Vec<Plane>, Option<Plane>) {
     let room = f64::from(opacity.max(1.0)).log2() - projection.log2_floor;
     let is_half = projection.precision == GaussianPrecision::Float16;
     let reach = if is_half {
-        Reach::in_half(room, projection.low_pass)
+        ScreenExtent::in_half(room, projection.low_pass)
     } else {
-        Some(Reach::exact(room, projection.low_pass))
+        Some(ScreenExtent::exact(room, projection.low_pass))
     };
     let none = (Vec::new(), None);
     let Some(reach) = reach else { return none };
@@ -65,7 +79,7 @@ pub(super) fn sides(projection: &Projection, opacity: f32) -> (Vec<Plane>, Optio
     (sides.collect(), Some(small))
 }
 
-impl Reach {
+impl ScreenExtent {
     fn exact(room: f64, low_pass: f64) -> Self {
         // Wider than the ellipse that the tile engine's margins ask for.
         let sigmas = (2.0 * LN_2 * (1.01 * room + 2e-3)).sqrt();
@@ -89,7 +103,7 @@ impl Reach {
         // The ratio of the factors of the binary16 form is at most the ratio of deviation and filter, so that the reach is a
         // convex function of the deviation: the chord is above it.
         let reach_of = |deviation: f64| {
-            let room = half_room([1.0, deviation / filter, 1.0], room);
+            let room = binary16_headroom([1.0, deviation / filter, 1.0], room);
             (2.0 * LN_2 * (1.01 * room + 2e-3)).sqrt() * (deviation + filter)
         };
         let (least, most) = (reach_of(0.0), reach_of(greatest));
@@ -116,7 +130,7 @@ struct Side {
 
 impl Side {
     /// The side along `axis` that `sign` (1: the lower coordinates) names.
-    fn new(projection: &Projection, axis: usize, sign: f64, reach: &Reach) -> Self {
+    fn new(projection: &ViewConstants, axis: usize, sign: f64, reach: &ScreenExtent) -> Self {
         let (across, forward) = (row(projection, axis), row(projection, 2));
         let focal = projection.focal[axis];
         let [first, end] = projection.visible_range(axis);
@@ -145,7 +159,7 @@ impl Side {
     }
 
     /// The plane for what is linearized, and for discs.
-    fn plane(&self, reach: &Reach) -> Plane {
+    fn plane(&self, reach: &ScreenExtent) -> Plane {
         Plane {
             normal: self.normal,
             per_scale: reach.per_deviation * self.deviation * (1.0 + MARGIN),
@@ -159,7 +173,7 @@ impl Side {
     /// D from the mean, with `f D z <= f r (1 + |u|) / (1 - Q)`, r the points' distance and `r <= Q z`. Neither does the
     /// transform's mean, and of its variance the middle point makes `2 D^2` at most and the others one more. All that reaches
     /// `share = Q reach` of `f |u| z <= |A| + |c| z` toward the edge, and `f r reach` besides.
-    fn unscented(&self, projection: &Projection, reach: &Reach) -> Plane {
+    fn unscented(&self, projection: &ViewConstants, reach: &ScreenExtent) -> Plane {
         let points = Points::new(projection, reach);
         let straight = self.plane(reach);
         let of_points = self.focal * points.reach * points.per_scale * (1.0 + MARGIN);
@@ -189,7 +203,7 @@ struct Points {
 }
 
 impl Points {
-    fn new(projection: &Projection, reach: &Reach) -> Self {
+    fn new(projection: &ViewConstants, reach: &ScreenExtent) -> Self {
         let growth = (0..3).map(|axis| length(row(projection, axis)));
         let of_places = 1.0 + 3.0f64.sqrt() * reach.per_deviation;
         let nearness = UNSCENTED_SHARE / (of_places + UNSCENTED_SHARE);
@@ -201,7 +215,7 @@ impl Points {
     }
 
     /// Outside of this plane Gaussians are small.
-    fn small(&self, projection: &Projection) -> Plane {
+    fn small(&self, projection: &ViewConstants) -> Plane {
         Plane {
             normal: row(projection, 2).map(|forward| -self.nearness * forward),
             per_scale: self.per_scale,
@@ -212,7 +226,7 @@ impl Points {
 
 /// Outside of this plane Gaussians whose deviations are at most `deviation` for each unit of scale have those that `reach`
 /// asks for.
-fn small_deviations(projection: &Projection, deviation: f64, reach: &Reach) -> Plane {
+fn small_deviations(projection: &ViewConstants, deviation: f64, reach: &ScreenExtent) -> Plane {
     let (normal, offset) = match projection.model {
         CameraModel::Orthographic => ([0.0; 3], -reach.greatest),
         _ => (
@@ -228,30 +242,11 @@ fn small_deviations(projection: &Projection, deviation: f64, reach: &Reach) -> P
 }
 
 /// A row of the camera's rotation.
-fn row(projection: &Projection, axis: usize) -> [f64; 3] {
+fn row(projection: &ViewConstants, axis: usize) -> [f64; 3] {
     [0, 1, 2].map(|i| projection.rotation[3 * axis + i])
 }
 
 /// `p a + q b`.
 fn add(a: [f64; 3], p: f64, b: [f64; 3], q: f64) -> [f64; 3] {
     [0, 1, 2].map(|i| p * a[i] + q * b[i])
-}
-
-impl Frustum {
-    /// Those of the lanes whose Gaussians are so small that the sides hold for them.
-    pub(super) fn small_lanes(&self, attributes: &Attributes, len: usize) -> Option<Bits> {
-        let small = self.small?;
-        let mut lanes = Bits::default();
-        for lane in 0..len.min(attributes.opacity.len()) {
-            let at = |of: &[f32; F32_LANES]| f64::from(of[lane]);
-            let position = attributes.position.each_ref().map(at);
-            let scale = attributes.scale.each_ref().map(at);
-            let d = [0, 1, 2].map(|axis| position[axis] - self.eye[axis]);
-            let scale = scale.into_iter().fold(0.0, f64::max);
-            // Binary64's errors are far below the margins.
-            let value = dot(small.normal, d) + small.per_scale * scale + small.offset;
-            lanes.set_one(lane, value < 0.0);
-        }
-        Some(lanes)
-    }
 }

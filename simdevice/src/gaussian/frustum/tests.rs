@@ -2,12 +2,12 @@
 
 use super::*;
 use crate::format::Format;
-use crate::gaussian::chunks::Harmonics;
-use crate::gaussian::fetch::{BATCH, Batch, CoefficientReader};
+use crate::gaussian::attributes::{CoefficientReader, Group, Harmonics};
 use crate::gaussian::footprint::Visible;
-use crate::gaussian::project::Source;
+use crate::gaussian::lanes::GROUP;
+use crate::gaussian::preprocess::{Source, project};
 use crate::gaussian::scratch::Scratch;
-use crate::gaussian::splat::Projected;
+use crate::gaussian::splat::ProjectedGroup;
 use crate::gaussian::surfel::Surfel;
 use crate::packet::{
     AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, ModelAttributes,
@@ -17,7 +17,7 @@ use crate::state::Viewport;
 use crate::state::gaussian::{
     Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState,
 };
-use crate::stats::optimizations::Skips;
+use crate::stats::optimizations::Optimizations;
 use devmem::Allocation;
 use devmem::dispatch;
 use rand::{Rng, SeedableRng};
@@ -50,7 +50,7 @@ fn append() -> GaussianAppend {
         },
         indices: None,
         first: 0,
-        count: BATCH as u32,
+        count: GROUP as u32,
         first_instance: 0,
         instance_count: 1,
     }
@@ -59,7 +59,7 @@ fn append() -> GaussianAppend {
 /// Gaussians all around the edges of what a camera at the origin sees, of all sizes.
 fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
     let mut attributes = Attributes::default();
-    for lane in 0..BATCH {
+    for lane in 0..GROUP {
         let z =
             rng.random_range(-0.5..4.0f32).exp() * if rng.random_bool(0.05) { -1.0 } else { 1.0 };
         let slope = |rng: &mut ChaCha8Rng| rng.random_range(-2.5..2.5f32);
@@ -83,7 +83,7 @@ fn around_edges(rng: &mut ChaCha8Rng, is_flat: bool) -> Attributes {
 /// The corner of a tile that no picture has.
 const FAR_OFF: [u32; 2] = [1 << 24; 2];
 
-/// A lane as a chunk of one.
+/// A lane as a cluster of one.
 fn bounds(attributes: &Attributes, lane: usize) -> Bounds {
     let at = |of: &[f32; F32_LANES]| of[lane];
     let position = attributes.position.each_ref().map(at);
@@ -165,36 +165,41 @@ fn what_is_outside_is_drawn_nowhere() {
                     right: 400,
                     bottom: 400,
                 };
-                let projection =
-                    Projection::new(&state, &camera, &viewport, visible, None, Skips::NONE);
-                let frustum = Frustum::new(&projection, 1.0);
+                let constants = ViewConstants::new(
+                    &state,
+                    &camera,
+                    &viewport,
+                    visible,
+                    None,
+                    Optimizations::NONE,
+                );
+                let frustum = Frustum::new(&constants, 1.0);
                 let attributes = around_edges(&mut rng, geometry == GaussianGeometry::Surfel);
                 let source = Source {
                     reader: CoefficientReader::new(&append.attributes.spherical_harmonics),
-                    batch: Batch::new(&append, 0, 0, BATCH),
+                    group: Group::new(&append, 0, 0, GROUP),
                     attributes: &attributes,
                     matrices: None,
                     is_sound: false,
                     harmonics: Harmonics::default(),
-                    degree: u32::MAX,
                     frustum: None,
                 };
-                let mut out = Projected::default();
+                let mut out = ProjectedGroup::default();
                 let mut scratch = Scratch::new();
                 let outside = dispatch!(level, simd => {
                     let lane = |lane: usize| lane as u32;
-                    projection.run(simd, &source, &mut scratch, lane, &mut out);
-                    frustum.lanes_outside(simd, &attributes, BATCH)
+                    project(&constants, simd, &source, &mut scratch, lane, &mut out);
+                    frustum.lanes_outside(simd, &attributes, GROUP)
                 });
                 drawn += out.keys.len();
                 beside += outside.beside.count();
-                let mut is_drawn = [false; BATCH];
+                let mut is_drawn = [false; GROUP];
                 for (at, &[_, lane]) in out.keys.iter().enumerate() {
                     // Discs that reach the eye's plane are listed everywhere, wherever they are.
                     let everywhere = |surfel: &Surfel| surfel.blocks(FAR_OFF) != 0;
                     is_drawn[lane as usize] = !out.surfels.get(at).is_some_and(everywhere);
                 }
-                let all = Bits::first(BATCH);
+                let all = Bits::first(GROUP);
                 for (of, what) in [
                     (outside.near, "near"),
                     (outside.far, "far"),

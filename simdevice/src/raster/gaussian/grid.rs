@@ -1,15 +1,29 @@
 //! Where the pixels of a block and the blocks of a tile are.
 
-use super::{BLOCK, BLOCKS, LANES};
+use crate::limits::TILE_SIZE;
 use crate::raster::tile::place;
+use crate::state::Rect;
+
+/// Pixels along a tile's side.
+pub(super) const TILE: usize = TILE_SIZE as usize;
+/// Pixels of a block, which are the lanes of a vector.
+pub(super) const BLOCK_PIXELS: usize = 16;
+/// The side of a block in pixels.
+pub(super) const BLOCK: usize = 4;
+/// Blocks of a tile.
+pub(super) const BLOCKS: usize = 16;
+/// A bit for each of them.
+pub(super) const ALL_BLOCKS: u64 = (1 << BLOCKS) - 1;
+/// Gaussians of a round: as many as phases pass on through the first-level cache, and a word has bits.
+pub(super) const ROUND: usize = 32;
 
 /// Half of the distance between a block's first and last pixel centres.
 pub(super) const HALF: f32 = (BLOCK as f32 - 1.0) / 2.0;
 /// The offset of each lane's pixel from the middle of its block.
-pub(super) const LANE_X: [f32; LANES] = grid(true);
-pub(super) const LANE_Y: [f32; LANES] = grid(false);
-pub(super) const LANE_X_64: [f64; LANES] = widened(LANE_X);
-pub(super) const LANE_Y_64: [f64; LANES] = widened(LANE_Y);
+pub(super) const LANE_X: [f32; BLOCK_PIXELS] = grid(true);
+pub(super) const LANE_Y: [f32; BLOCK_PIXELS] = grid(false);
+pub(super) const LANE_X_64: [f64; BLOCK_PIXELS] = widened(LANE_X);
+pub(super) const LANE_Y_64: [f64; BLOCK_PIXELS] = widened(LANE_Y);
 /// Blocks in a row of them, and rows.
 pub(super) const BLOCKS_ACROSS: usize = 4;
 /// The offsets of the middles of columns of blocks from their tile's corner, and of rows.
@@ -22,22 +36,22 @@ pub(super) const BLOCK_X: [f64; BLOCKS] = middles(true);
 pub(super) const BLOCK_Y: [f64; BLOCKS] = middles(false);
 
 /// The column or row of each lane's pixel, from the block's middle.
-const fn grid(column: bool) -> [f32; LANES] {
-    let mut out = [0.0; LANES];
+const fn grid(column: bool) -> [f32; BLOCK_PIXELS] {
+    let mut out = [0.0; BLOCK_PIXELS];
     let mut pixel = 0;
-    while pixel < LANES {
+    while pixel < BLOCK_PIXELS {
         let (x, y) = (pixel % BLOCK, pixel / BLOCK);
-        out[place(x, y) % LANES] = (if column { x } else { y }) as f32 - HALF;
+        out[place(x, y) % BLOCK_PIXELS] = (if column { x } else { y }) as f32 - HALF;
         pixel += 1;
     }
     out
 }
 
 /// The same numbers in binary64.
-const fn widened(lanes: [f32; LANES]) -> [f64; LANES] {
-    let mut out = [0.0; LANES];
+const fn widened(lanes: [f32; BLOCK_PIXELS]) -> [f64; BLOCK_PIXELS] {
+    let mut out = [0.0; BLOCK_PIXELS];
     let mut lane = 0;
-    while lane < LANES {
+    while lane < BLOCK_PIXELS {
         out[lane] = lanes[lane] as f64;
         lane += 1;
     }
@@ -58,4 +72,47 @@ const fn middles(column: bool) -> [f64; BLOCKS] {
         block += 1;
     }
     out
+}
+
+/// PixelMask by block.
+pub(super) type PixelMask = [u32; BLOCKS];
+
+/// Every lane of a block.
+pub(super) const ALL_LANES: u32 = (1 << BLOCK_PIXELS) - 1;
+
+/// The block of a pixel of a tile, and the lane in it.
+pub(super) fn block_and_lane(x: usize, y: usize) -> (usize, usize) {
+    let place = place(x, y);
+    (place / BLOCK_PIXELS % BLOCKS, place % BLOCK_PIXELS)
+}
+
+/// How many pixels `lanes` has.
+pub(super) fn count(lanes: &PixelMask) -> u32 {
+    lanes.iter().map(|lanes| lanes.count_ones()).sum()
+}
+
+/// The pixels of `bounds` in the tile at `corner`.
+pub(super) fn lanes_within(bounds: Rect, corner: [u32; 2]) -> PixelMask {
+    let tile = Rect {
+        x: corner[0] as i32,
+        y: corner[1] as i32,
+        width: TILE_SIZE,
+        height: TILE_SIZE,
+    };
+    let inside = bounds.intersect(tile);
+    if [inside.width, inside.height] == [TILE_SIZE; 2] {
+        return [ALL_LANES; BLOCKS];
+    }
+    let mut lanes = [0; BLOCKS];
+    if inside.is_empty() {
+        return lanes;
+    }
+    let first = [inside.x as u32 - corner[0], inside.y as u32 - corner[1]];
+    for y in first[1]..first[1] + inside.height {
+        for x in first[0]..first[0] + inside.width {
+            let (block, lane) = block_and_lane(x as usize, y as usize);
+            lanes[block] |= 1 << lane;
+        }
+    }
+    lanes
 }

@@ -5,11 +5,15 @@
 //! the nearest [`HELD`] at a time: memory is bounded whatever a scene stacks up, and what a pass leaves out is gathered by
 //! the next, so that time stays near linear.
 
-use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
-use super::layer::Layer;
-use super::{BLOCKS, FIND_MEDIAN, GaussianTile, LANES, NO_DEPTH, Task, Work};
-use crate::gaussian::locate;
-use crate::gaussian::rays::{PixelRays, RayDepths, Rays, ordered_key};
+use super::accumulator::Accumulator;
+use super::block_lists::{BlockLists, part};
+use super::depth_ranges::DepthRanges;
+use super::exact::falls;
+use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64};
+use super::inputs::{FIND_MEDIAN, NO_DEPTH, TileCounts, TileInputs};
+use crate::gaussian::ray_depth::{PixelRays, RayDepths, Rays, ordered_key};
+use crate::gaussian::splat::locate;
+use crate::simd::exp2::exp2_of_negated;
 use crate::stats::recorder::Run;
 use devmem::host;
 use fearless_simd::{Simd, f32x16, prelude::*};
@@ -114,57 +118,66 @@ impl Sum {
 /// A worker's scratch for tiles in the per-pixel order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PerPixel {
-    pixels: [Gathered; LANES],
+    pixels: [Gathered; BLOCK_PIXELS],
 }
 
-impl GaussianTile {
-    /// Composites a tile in the per-pixel order.
-    #[inline(always)]
-    pub(super) fn composite_per_pixel<S: Simd>(
-        &mut self,
-        simd: S,
-        task: &Task<'_>,
-        depths: RayDepths<'_>,
-        layer: usize,
-        runs: Option<&mut Vec<Run>>,
-    ) -> Work {
-        let mut work = self.part(simd, task, layer, runs);
-        for block in 0..BLOCKS {
-            if self.lists[block].is_empty() {
-                continue;
-            }
-            work.contributions += self.composite_block(simd, task, depths, (layer, block));
+/// Composites a tile in the per-pixel order.
+#[inline(always)]
+pub(super) fn composite_per_pixel<S: Simd>(
+    scratch: &mut PerPixel,
+    simd: S,
+    task: &TileInputs<'_>,
+    depths: RayDepths<'_>,
+    lists: &mut BlockLists,
+    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
+    runs: Option<&mut Vec<Run>>,
+) -> TileCounts {
+    let mut work = part(simd, task, lists, (accumulator, ranges), runs);
+    for block in 0..BLOCKS {
+        if lists[block].is_empty() {
+            continue;
         }
-        work
+        work.contributions += scratch.composite_block(
+            simd,
+            task,
+            depths,
+            &lists[block],
+            (&mut *accumulator, block),
+            ranges,
+        );
     }
+    work
+}
 
-    /// Composites a block of a layer; returns how many Gaussians its pixels accepted.
+impl PerPixel {
+    /// Composites a block of a accumulator; returns how many Gaussians its pixels accepted.
     #[inline(always)]
     fn composite_block<S: Simd>(
         &mut self,
         simd: S,
-        task: &Task<'_>,
+        task: &TileInputs<'_>,
         depths: RayDepths<'_>,
-        (layer, block): (usize, usize),
+        names: &[u32],
+        (accumulator, block): (&mut Accumulator, usize),
+        ranges: &DepthRanges,
     ) -> u64 {
-        let layer = &mut self.layers[layer];
-        let mut open = layer.open_lanes(block);
+        let mut open = accumulator.open_lanes(block);
         let rays = block_rays(&depths.rays, task.corner, block);
-        let mut sums = [Sum::EMPTY; LANES];
-        for pixel in &mut self.per_pixel.pixels {
+        let mut sums = [Sum::EMPTY; BLOCK_PIXELS];
+        for pixel in &mut self.pixels {
             pixel.clear();
         }
         let mut contributions = 0;
         while open != 0 {
-            for (number, &primitive) in (0..).zip(&self.lists[block]) {
+            for (number, &primitive) in (0..).zip(names) {
                 let (batch, place) = locate(primitive);
                 let splat = &task.splats[batch][place];
-                let fall = task.falls(simd, (batch, place), block);
+                let fall = falls(simd, task, (batch, place), block);
                 let ceiling = f32x16::splat(simd, task.thresholds.alpha_ceiling);
-                let alpha = crate::simd::exp2::exp2_of_negated(simd, fall).min(ceiling);
+                let alpha = exp2_of_negated(simd, fall).min(ceiling);
                 let mut reached = fall.simd_le(task.thresholds.most_fall);
                 if task.thresholds.depth_mode > NO_DEPTH {
-                    reached &= self.passing.pixels(simd, block, splat.depth);
+                    reached &= ranges.pixels(simd, block, splat.depth);
                 }
                 let mut reached = reached.to_bitmask() as u32 & open;
                 if reached == 0 {
@@ -172,39 +185,43 @@ impl GaussianTile {
                 }
                 let (alpha, along) = (alpha.to_array(), {
                     let depth = &depths.of[batch][place];
-                    let mut along = [0.0; LANES];
+                    let mut along = [0.0; BLOCK_PIXELS];
                     depth.along(simd, &rays, 0).store_slice(&mut along[..8]);
                     depth.along(simd, &rays, 8).store_slice(&mut along[8..]);
                     along
                 });
                 while reached != 0 {
-                    let lane = reached.trailing_zeros() as usize % LANES;
-                    self.per_pixel.pixels[lane].add(Contribution {
+                    let lane = reached.trailing_zeros() as usize % BLOCK_PIXELS;
+                    self.pixels[lane].add(Contribution {
                         place: (ordered_key(along[lane]), number),
                         alpha: alpha[lane].to_bits(),
                     });
                     reached &= reached - 1;
                 }
             }
-            let pixels = sums.iter_mut().zip(&mut self.per_pixel.pixels);
+            let pixels = sums.iter_mut().zip(&mut self.pixels);
             for (lane, (sum, pixel)) in pixels.enumerate() {
                 if open >> lane & 1 == 0 {
                     continue;
                 }
-                let names = &self.lists[block];
                 contributions += composite_pixel(sum, pixel, names, task);
                 if sum.finished || !pixel.advance() {
                     open &= !(1 << lane);
                 }
             }
         }
-        layer.store(block, &sums);
+        store(accumulator, block, &sums);
         contributions
     }
 }
 
 /// Composites what a pixel gathered, front to back; returns how many it accepted.
-fn composite_pixel(sum: &mut Sum, pixel: &mut Gathered, names: &[u32], task: &Task<'_>) -> u64 {
+fn composite_pixel(
+    sum: &mut Sum,
+    pixel: &mut Gathered,
+    names: &[u32],
+    task: &TileInputs<'_>,
+) -> u64 {
     let floor = f64::from(task.thresholds.transmittance_floor);
     let mut accepted = 0;
     for contribution in pixel.sorted() {
@@ -242,30 +259,20 @@ fn block_rays(rays: &PixelRays, corner: [u32; 2], block: usize) -> Rays {
     )
 }
 
-impl Layer {
-    /// The pixels of a block that are not finished.
-    pub(super) fn open_lanes(&self, block: usize) -> u32 {
-        let lanes = self.transmittance[block].iter().enumerate();
-        lanes.fold(0, |open, (lane, t)| {
-            open | u32::from(t.is_sign_positive()) << lane
-        })
-    }
-
-    /// Takes what the open pixels of a block accumulated.
-    fn store(&mut self, block: usize, sums: &[Sum; LANES]) {
-        let open = self.open_lanes(block);
-        for (lane, sum) in sums.iter().enumerate() {
-            if open >> lane & 1 == 0 {
-                continue;
-            }
-            let t = sum.transmittance as f32;
-            self.transmittance[block][lane] = if sum.finished { -t } else { t };
-            for (channel, &color) in self.color.iter_mut().zip(&sum.color) {
-                channel[block][lane] = color as f32;
-            }
-            self.median[block][lane] = sum.median;
-            self.covered[block] |= u32::from(sum.covered) << lane;
+/// Takes what the open pixels of a block accumulated.
+fn store(accumulator: &mut Accumulator, block: usize, sums: &[Sum; BLOCK_PIXELS]) {
+    let open = accumulator.open_lanes(block);
+    for (lane, sum) in sums.iter().enumerate() {
+        if open >> lane & 1 == 0 {
+            continue;
         }
+        let t = sum.transmittance as f32;
+        accumulator.transmittance[block][lane] = if sum.finished { -t } else { t };
+        for (channel, &color) in accumulator.color.iter_mut().zip(&sum.color) {
+            channel[block][lane] = color as f32;
+        }
+        accumulator.median[block][lane] = sum.median;
+        accumulator.covered[block] |= u32::from(sum.covered) << lane;
     }
 }
 

@@ -1,19 +1,17 @@
 //! Phases 2 and 3 of the tile kernel: the alphas of Gaussians in blocks, and those through the pixels of a block, which stay in
 //! registers.
 
-use super::approximation::power;
-use super::chunk::{Chunk, Reaching, Record};
-use super::grid::{BLOCK_X, BLOCK_Y, BLOCKS_ACROSS, LANE_X_64, LANE_Y_64};
-use super::layer::Layer;
-use super::masks::{Tally, only};
-use super::passing::Passing;
-use super::{
-    BLOCKS, CHUNK, DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, LANES, NO_DEPTH, Task,
-    Thresholds,
+use super::accumulator::Accumulator;
+use super::depth_ranges::DepthRanges;
+use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64, ROUND};
+use super::inputs::{
+    DepthMode, FIND_MEAN, FIND_MEDIAN, FIND_REACHED, NO_DEPTH, Thresholds, TileInputs, power,
 };
+use super::masks::{Tally, only};
+use super::staging::{Reaching, StagedRound};
 use crate::gaussian::splat::Splat;
 use crate::simd::bits_of;
-use fearless_simd::{Simd, f32x8, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
 
 /// What a block's pixels have accumulated.
 ///
@@ -34,21 +32,21 @@ struct Passed<S: Simd> {
     rest: f32x16<S>,
 }
 
-/// No pixel of more transmittance than this, in units of the floor, is looked out for while a chunk's Gaussians are
-/// composited: it is seldom finished by one chunk, and where it is, that chunk is composited again.
+/// No pixel of more transmittance than this, in units of the floor, is looked out for while a round's Gaussians are
+/// composited: it is seldom finished by one round, and where it is, that round is composited again.
 const FAR_FROM_FLOOR: f32 = 8.0;
 
-/// The alphas of a chunk's Gaussians in the blocks that they may reach, by block and then in the order of the list.
+/// The alphas of a round's Gaussians in the blocks that they may reach, by block and then in the order of the list.
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub(super) struct Alphas {
-    alphas: [[f32; LANES]; BLOCKS * CHUNK],
+    alphas: [[f32; BLOCK_PIXELS]; BLOCKS * ROUND],
 }
 
 impl Default for Alphas {
     fn default() -> Self {
         Self {
-            alphas: [[0.0; LANES]; BLOCKS * CHUNK],
+            alphas: [[0.0; BLOCK_PIXELS]; BLOCKS * ROUND],
         }
     }
 }
@@ -63,8 +61,8 @@ impl Alphas {
         &mut self,
         simd: S,
         reaching: &Reaching,
-        (chunk, most_fall): (&Chunk, &[[f32; LANES]; BLOCKS]),
-        passing: &Passing,
+        (round, most_fall): (&StagedRound, &[[f32; BLOCK_PIXELS]; BLOCKS]),
+        ranges: &DepthRanges,
         thresholds: Thresholds,
     ) -> u64 {
         simd.vectorize(
@@ -75,15 +73,15 @@ impl Alphas {
                 let mut items = self.alphas.iter_mut();
                 // Two blocks at a time, so that half as many loops end where nobody can foresee it.
                 for (pair, words) in reaching.as_chunks::<2>().0.iter().enumerate() {
-                    let mut rest = u64::from(words[0]) | u64::from(words[1]) << CHUNK;
+                    let mut rest = u64::from(words[0]) | u64::from(words[1]) << ROUND;
                     while rest != 0 {
                         let bit = rest.trailing_zeros() as usize;
                         rest &= rest - 1;
-                        let (block, number) = ((2 * pair + bit / CHUNK) % BLOCKS, bit % CHUNK);
-                        let fall = chunk.records[number].falls(simd, block);
+                        let (block, number) = ((2 * pair + bit / ROUND) % BLOCKS, bit % ROUND);
+                        let fall = round.records[number].falls(simd, block);
                         let most_fall = f32x16::from_slice(simd, &most_fall[block]);
-                        let at = (block, chunk.looks[number].depth);
-                        let reached = reached(simd, DEPTH, at, fall, passing, most_fall);
+                        let at = (block, round.looks[number].depth);
+                        let reached = reached(simd, DEPTH, at, fall, ranges, most_fall);
                         pixels.add(reached);
                         let alpha = alpha(simd, DEPTH, reached, fall, ceiling);
                         if let Some(to) = items.next() {
@@ -104,12 +102,12 @@ fn reached<S: Simd>(
     mode: DepthMode,
     (block, depth): (usize, u32),
     fall: f32x16<S>,
-    passing: &Passing,
+    ranges: &DepthRanges,
     most_fall: f32x16<S>,
 ) -> mask32x16<S> {
     let reached = fall.simd_le(most_fall);
     if mode > NO_DEPTH {
-        reached & passing.pixels(simd, block, depth)
+        reached & ranges.pixels(simd, block, depth)
     } else {
         reached
     }
@@ -127,259 +125,247 @@ fn alpha<S: Simd>(
     only(simd, reached, power(simd, mode, fall).min(ceiling))
 }
 
-impl Layer {
-    /// Composites those of `chunk` that reach a block in it, for each block; returns how many pixels accepted one.
-    #[inline(always)]
-    pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
-        &mut self,
-        simd: S,
-        reaching: &Reaching,
-        (chunk, alphas): (&Chunk, &mut Alphas),
-        passing: &Passing,
-        thresholds: Thresholds,
-    ) -> u64 {
-        let to = (chunk, &self.most_fall);
-        let reached = alphas.find::<_, DEPTH>(simd, reaching, to, passing, thresholds);
-        let refused = self.composite_all::<_, DEPTH>(simd, reaching, (chunk, alphas), thresholds);
-        reached.saturating_sub(refused)
-    }
+/// Composites those of `round` that reach a block in it, for each block; returns how many pixels accepted one.
+#[inline(always)]
+pub(super) fn evaluate<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    reaching: &Reaching,
+    (round, alphas): (&StagedRound, &mut Alphas),
+    ranges: &DepthRanges,
+    thresholds: Thresholds,
+) -> u64 {
+    let to = (round, &accumulator.most_fall);
+    let reached = alphas.find::<_, DEPTH>(simd, reaching, to, ranges, thresholds);
+    let refused =
+        composite_all::<_, DEPTH>(accumulator, simd, reaching, (round, alphas), thresholds);
+    reached.saturating_sub(refused)
+}
 
-    /// Composites the alphas of a chunk; returns how many pixels refused one, since they are finished. A function of its own,
-    /// as [`Alphas::find`].
-    #[inline(never)]
-    fn composite_all<S: Simd, const DEPTH: DepthMode>(
-        &mut self,
-        simd: S,
-        reaching: &Reaching,
-        (chunk, alphas): (&Chunk, &Alphas),
-        thresholds: Thresholds,
-    ) -> u64 {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let mut refused = 0;
-                let mut rest = &alphas.alphas[..];
-                for (block, &reaching) in reaching.iter().enumerate() {
-                    let count = reaching.count_ones() as usize;
-                    let Some((alphas, others)) = rest.split_at_checked(count) else {
-                        break;
-                    };
-                    rest = others;
-                    if reaching == 0 {
-                        continue;
-                    }
-                    let of_block = (block, reaching, alphas);
-                    if DEPTH == FIND_REACHED
-                        || DEPTH >= FIND_MEDIAN
-                        || !self.composite_far_from_floor(simd, of_block, chunk, thresholds)
-                    {
-                        refused +=
-                            self.composite_carefully::<_, DEPTH>(simd, of_block, chunk, thresholds);
-                    }
+/// Composites the alphas of a round; returns how many pixels refused one, since they are finished. A function of its own,
+/// as [`Alphas::find`].
+#[inline(never)]
+fn composite_all<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    reaching: &Reaching,
+    (round, alphas): (&StagedRound, &Alphas),
+    thresholds: Thresholds,
+) -> u64 {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let mut refused = 0;
+            let mut rest = &alphas.alphas[..];
+            for (block, &reaching) in reaching.iter().enumerate() {
+                let count = reaching.count_ones() as usize;
+                let Some((alphas, others)) = rest.split_at_checked(count) else {
+                    break;
+                };
+                rest = others;
+                if reaching == 0 {
+                    continue;
                 }
-                refused
-            },
-        )
-    }
+                let of_block = (block, reaching, alphas);
+                if DEPTH == FIND_REACHED
+                    || DEPTH >= FIND_MEDIAN
+                    || !composite_far_from_floor(accumulator, simd, of_block, round, thresholds)
+                {
+                    refused += composite_carefully::<_, DEPTH>(
+                        accumulator,
+                        simd,
+                        of_block,
+                        round,
+                        thresholds,
+                    );
+                }
+            }
+            refused
+        },
+    )
+}
 
-    /// Composites a block's alphas, if no pixel comes so near the floor that it is finished; else it changes nothing. Returns
-    /// whether it did.
-    #[inline(always)]
-    fn composite_far_from_floor<S: Simd>(
-        &mut self,
-        simd: S,
-        (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
-        chunk: &Chunk,
-        thresholds: Thresholds,
-    ) -> bool {
-        let floor = thresholds.transmittance_floor;
-        let mut pixels = self.pixels(simd, block);
-        let before = pixels.transmittance;
-        // As whole numbers, transmittances are in the order of what they stand for, and greater than all where a pixel is
-        // finished. (Masks are not combined here: that would be calls, before which the pixels leave their registers.)
-        let near = f32x16::splat(simd, FAR_FROM_FLOOR * floor);
-        if bits_of(before).simd_lt(bits_of(near)).any_true() {
-            return false;
-        }
-        // What is finished has alphas of zero.
-        pixels.transmittance = before.max(0.0);
-        for alpha in alphas {
-            let look = &chunk.looks[reaching.trailing_zeros() as usize % CHUNK];
-            reaching &= reaching.wrapping_sub(1);
-            let passed = pixels.pass(f32x16::from_slice(simd, alpha));
-            pixels.transmittance = passed.rest;
-            pixels.add(simd, passed.weight, look.color);
-        }
-        let signs: i32x16<S> = before.bitcast();
-        let below = pixels.transmittance.simd_lt(floor).to_vector();
-        // What is finished has a sign, and is none of those.
-        if (below & (signs ^ -1)).simd_lt(0).any_true() {
-            return false;
-        }
-        pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
-        self.keep(block, pixels);
-        true
+/// Composites a block's alphas, if no pixel comes so near the floor that it is finished; else it changes nothing. Returns
+/// whether it did.
+#[inline(always)]
+fn composite_far_from_floor<S: Simd>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) -> bool {
+    let floor = thresholds.transmittance_floor;
+    let mut pixels = pixels(accumulator, simd, block);
+    let before = pixels.transmittance;
+    // As whole numbers, transmittances are in the order of what they stand for, and greater than all where a pixel is
+    // finished. (Masks are not combined here: that would be calls, before which the pixels leave their registers.)
+    let near = f32x16::splat(simd, FAR_FROM_FLOOR * floor);
+    if bits_of(before).simd_lt(bits_of(near)).any_true() {
+        return false;
     }
+    // What is finished has alphas of zero.
+    pixels.transmittance = before.max(0.0);
+    for alpha in alphas {
+        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        reaching &= reaching.wrapping_sub(1);
+        let passed = pixels.pass(f32x16::from_slice(simd, alpha));
+        pixels.transmittance = passed.rest;
+        pixels.add(simd, passed.weight, look.color);
+    }
+    let signs: i32x16<S> = before.bitcast();
+    let below = pixels.transmittance.simd_lt(floor).to_vector();
+    // What is finished has a sign, and is none of those.
+    if (below & (signs ^ -1)).simd_lt(0).any_true() {
+        return false;
+    }
+    pixels.transmittance = signs.simd_lt(0).select(before, pixels.transmittance);
+    keep(accumulator, block, pixels);
+    true
+}
 
-    /// Composites a block's alphas; returns how many pixels refused one.
-    #[inline(always)]
-    fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
-        &mut self,
-        simd: S,
-        (block, mut reaching, alphas): (usize, u32, &[[f32; LANES]]),
-        chunk: &Chunk,
-        thresholds: Thresholds,
-    ) -> u64 {
-        let thresholds = Thresholds {
-            depth_mode: DEPTH,
-            ..thresholds
-        };
-        let mut pixels = self.pixels(simd, block);
-        let mut refused = Tally::new(simd);
-        for alpha in alphas {
-            let look = &chunk.looks[reaching.trailing_zeros() as usize % CHUNK];
-            reaching &= reaching.wrapping_sub(1);
-            let alpha = f32x16::from_slice(simd, alpha);
-            let (to, look) = ((block, &mut pixels), (look.color, look.depth));
-            let goes_on = self.composite(simd, to, alpha, look, thresholds);
-            refused.add_without(alpha.simd_gt(0.0), goes_on);
-        }
-        self.keep(block, pixels);
-        self.find_most_fall(simd, block, thresholds);
-        refused.total()
+/// Composites a block's alphas; returns how many pixels refused one.
+#[inline(always)]
+fn composite_carefully<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, mut reaching, alphas): (usize, u32, &[[f32; BLOCK_PIXELS]]),
+    round: &StagedRound,
+    thresholds: Thresholds,
+) -> u64 {
+    let thresholds = Thresholds {
+        depth_mode: DEPTH,
+        ..thresholds
+    };
+    let mut pixels = pixels(accumulator, simd, block);
+    let mut refused = Tally::new(simd);
+    for alpha in alphas {
+        let look = &round.looks[reaching.trailing_zeros() as usize % ROUND];
+        reaching &= reaching.wrapping_sub(1);
+        let alpha = f32x16::from_slice(simd, alpha);
+        let (to, look) = ((block, &mut pixels), (look.color, look.depth));
+        let goes_on = composite_one(accumulator, simd, to, alpha, look, thresholds);
+        refused.add_without(alpha.simd_gt(0.0), goes_on);
     }
+    keep(accumulator, block, pixels);
+    accumulator.find_most_fall(simd, block, thresholds.most_fall);
+    refused.total()
+}
 
-    /// Finds how far alphas may fall at a block's pixels.
-    #[inline(always)]
-    pub(super) fn find_most_fall<S: Simd>(
-        &mut self,
-        simd: S,
-        block: usize,
-        thresholds: Thresholds,
-    ) {
-        let t = f32x16::from_slice(simd, &self.transmittance[block]);
-        let open = t.bitcast::<i32x16<S>>().simd_ge(i32x16::splat(simd, 0));
-        let most_fall = f32x16::splat(simd, thresholds.most_fall);
-        let none = f32x16::splat(simd, f32::NEG_INFINITY);
-        open.select(most_fall, none)
-            .store_slice(&mut self.most_fall[block]);
+/// As [`evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
+#[inline(always)]
+pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    splat: &Splat,
+    blocks: u64,
+    ranges: &DepthRanges,
+    task: &TileInputs<'_>,
+) -> u64 {
+    let thresholds = Thresholds {
+        depth_mode: DEPTH,
+        ..task.thresholds
+    };
+    let mut contributions = 0;
+    for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
+        let fall = falls_64(simd, splat, task, block);
+        let look = (splat.color, splat.depth);
+        contributions += accumulate(accumulator, simd, block, fall, look, ranges, thresholds);
+        accumulator.find_most_fall(simd, block, thresholds.most_fall);
     }
+    contributions
+}
 
-    /// As [`Layer::evaluate`], of one steep Gaussian in `blocks`: exponents are formed in binary64.
-    #[inline(always)]
-    pub(super) fn evaluate_steep<S: Simd, const DEPTH: DepthMode>(
-        &mut self,
-        simd: S,
-        splat: &Splat,
-        blocks: u64,
-        passing: &Passing,
-        task: &Task<'_>,
-    ) -> u64 {
-        let thresholds = Thresholds {
-            depth_mode: DEPTH,
-            ..task.thresholds
-        };
-        let mut contributions = 0;
-        for block in (0..BLOCKS).filter(|block| blocks >> block & 1 == 1) {
-            let fall = falls_64(simd, splat, task, block);
-            let look = (splat.color, splat.depth);
-            contributions += self.accumulate(simd, block, fall, look, passing, thresholds);
-            self.find_most_fall(simd, block, thresholds);
-        }
-        contributions
-    }
+/// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `-fall`; returns
+/// how many pixels accepted it.
+#[inline(always)]
+pub(super) fn accumulate<S: Simd>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    block: usize,
+    fall: f32x16<S>,
+    look: ([f32; 3], u32),
+    ranges: &DepthRanges,
+    thresholds: Thresholds,
+) -> u64 {
+    let mut pixels = pixels(accumulator, simd, block);
+    let most_fall = f32x16::splat(simd, thresholds.most_fall);
+    let mode = thresholds.depth_mode;
+    let reached = reached(simd, mode, (block, look.1), fall, ranges, most_fall);
+    let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
+    let alpha = alpha(simd, mode, reached, fall, ceiling);
+    let at = (block, &mut pixels);
+    let goes_on = composite_one(accumulator, simd, at, alpha, look, thresholds);
+    keep(accumulator, block, pixels);
+    let accepted = goes_on.to_bitmask() & reached.to_bitmask();
+    accepted.count_ones().into()
+}
 
-    /// Composites a Gaussian of a colour and a depth in a block, where alpha is 2 to the power of `-fall`; returns
-    /// how many pixels accepted it.
-    #[inline(always)]
-    pub(super) fn accumulate<S: Simd>(
-        &mut self,
-        simd: S,
-        block: usize,
-        fall: f32x16<S>,
-        look: ([f32; 3], u32),
-        passing: &Passing,
-        thresholds: Thresholds,
-    ) -> u64 {
-        let mut pixels = self.pixels(simd, block);
-        let most_fall = f32x16::splat(simd, thresholds.most_fall);
-        let mode = thresholds.depth_mode;
-        let reached = reached(simd, mode, (block, look.1), fall, passing, most_fall);
-        let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
-        let alpha = alpha(simd, mode, reached, fall, ceiling);
-        let at = (block, &mut pixels);
-        let goes_on = self.composite(simd, at, alpha, look, thresholds);
-        self.keep(block, pixels);
-        let accepted = goes_on.to_bitmask() & reached.to_bitmask();
-        accepted.count_ones().into()
+/// A block's pixels as they are, before any of a round.
+#[inline(always)]
+fn pixels<S: Simd>(accumulator: &Accumulator, simd: S, block: usize) -> Pixels<S> {
+    let [r, g, b] = &accumulator.color;
+    Pixels {
+        red: f32x16::from_slice(simd, &r[block]),
+        green: f32x16::from_slice(simd, &g[block]),
+        blue: f32x16::from_slice(simd, &b[block]),
+        transmittance: f32x16::from_slice(simd, &accumulator.transmittance[block]),
     }
+}
 
-    /// A block's pixels as they are, before any of a chunk.
-    #[inline(always)]
-    fn pixels<S: Simd>(&self, simd: S, block: usize) -> Pixels<S> {
-        let [r, g, b] = &self.color;
-        Pixels {
-            red: f32x16::from_slice(simd, &r[block]),
-            green: f32x16::from_slice(simd, &g[block]),
-            blue: f32x16::from_slice(simd, &b[block]),
-            transmittance: f32x16::from_slice(simd, &self.transmittance[block]),
-        }
-    }
+/// Puts a block's pixels back.
+#[inline(always)]
+fn keep<S: Simd>(accumulator: &mut Accumulator, block: usize, pixels: Pixels<S>) {
+    let [r, g, b] = &mut accumulator.color;
+    pixels.red.store_slice(&mut r[block]);
+    pixels.green.store_slice(&mut g[block]);
+    pixels.blue.store_slice(&mut b[block]);
+    pixels
+        .transmittance
+        .store_slice(&mut accumulator.transmittance[block]);
+}
 
-    /// Puts a block's pixels back.
-    #[inline(always)]
-    fn keep<S: Simd>(&mut self, block: usize, pixels: Pixels<S>) {
-        let [r, g, b] = &mut self.color;
-        pixels.red.store_slice(&mut r[block]);
-        pixels.green.store_slice(&mut g[block]);
-        pixels.blue.store_slice(&mut b[block]);
-        pixels
-            .transmittance
-            .store_slice(&mut self.transmittance[block]);
+/// Composites a Gaussian of a colour and a depth in a block; returns which pixels it does not finish.
+///
+/// What does not reach a pixel is composited with an alpha of zero, which changes nothing: to leave it out would take
+/// longer.
+#[inline(always)]
+fn composite_one<S: Simd>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, pixels): (usize, &mut Pixels<S>),
+    alpha: f32x16<S>,
+    (color, depth): ([f32; 3], u32),
+    thresholds: Thresholds,
+) -> mask32x16<S> {
+    let t = pixels.transmittance;
+    let finished = -t.abs();
+    if thresholds.depth_mode == FIND_REACHED {
+        let reached = alpha.simd_gt(0.0);
+        pixels.transmittance = reached.select(finished, t);
+        return !reached;
     }
-
-    /// Composites a Gaussian of a colour and a depth in a block; returns which pixels it does not finish.
-    ///
-    /// What does not reach a pixel is composited with an alpha of zero, which changes nothing: to leave it out would take
-    /// longer.
-    #[inline(always)]
-    fn composite<S: Simd>(
-        &mut self,
-        simd: S,
-        (block, pixels): (usize, &mut Pixels<S>),
-        alpha: f32x16<S>,
-        (color, depth): ([f32; 3], u32),
-        thresholds: Thresholds,
-    ) -> mask32x16<S> {
-        let t = pixels.transmittance;
-        let finished = -t.abs();
-        if thresholds.depth_mode == FIND_REACHED {
-            let reached = alpha.simd_gt(0.0);
-            pixels.transmittance = reached.select(finished, t);
-            return !reached;
-        }
-        let Passed { weight, rest } = pixels.pass(alpha);
-        // A finished pixel's transmittance is negative, and what is left of it fails like one below the floor.
-        let goes_on = rest.simd_ge(f32x16::splat(simd, thresholds.transmittance_floor));
-        pixels.transmittance = goes_on.select(rest, finished);
-        let weight = only(simd, goes_on, weight);
-        if thresholds.depth_mode >= FIND_MEDIAN {
-            let median = u32x16::from_slice(simd, &self.median[block]);
-            let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
-            let median = first_half.select(u32x16::splat(simd, depth), median);
-            median.store_slice(&mut self.median[block]);
-        }
-        if thresholds.depth_mode == FIND_MEAN {
-            let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
-            let [depths, weights] = &mut self.means;
-            let sum = f32x16::from_slice(simd, &depths[block]);
-            weight.mul_add(depth, sum).store_slice(&mut depths[block]);
-            let sum = f32x16::from_slice(simd, &weights[block]) + weight;
-            sum.store_slice(&mut weights[block]);
-        }
-        pixels.add(simd, weight, color);
-        goes_on
+    let Passed { weight, rest } = pixels.pass(alpha);
+    // A finished pixel's transmittance is negative, and what is left of it fails like one below the floor.
+    let goes_on = rest.simd_ge(f32x16::splat(simd, thresholds.transmittance_floor));
+    pixels.transmittance = goes_on.select(rest, finished);
+    let weight = only(simd, goes_on, weight);
+    if thresholds.depth_mode >= FIND_MEDIAN {
+        let median = u32x16::from_slice(simd, &accumulator.median[block]);
+        let first_half = weight.simd_gt(0.0) & t.simd_ge(0.5);
+        let median = first_half.select(u32x16::splat(simd, depth), median);
+        median.store_slice(&mut accumulator.median[block]);
     }
+    if thresholds.depth_mode == FIND_MEAN {
+        let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
+        let [depths, weights] = &mut accumulator.means;
+        let sum = f32x16::from_slice(simd, &depths[block]);
+        weight.mul_add(depth, sum).store_slice(&mut depths[block]);
+        let sum = f32x16::from_slice(simd, &weights[block]) + weight;
+        sum.store_slice(&mut weights[block]);
+    }
+    pixels.add(simd, weight, color);
+    goes_on
 }
 
 impl<S: Simd> Pixels<S> {
@@ -402,16 +388,6 @@ impl<S: Simd> Pixels<S> {
     }
 }
 
-impl Record {
-    /// How far alpha has fallen at a block's pixels: minus its base-2 logarithm.
-    #[inline(always)]
-    fn falls<S: Simd>(&self, simd: S, block: usize) -> f32x16<S> {
-        let from_u = f32x8::from_slice(simd, &self.from_u[block % BLOCKS_ACROSS]);
-        let v = f32x16::from_slice(simd, &self.along) + self.v[block];
-        v.mul_add(v, from_u.combine(from_u))
-    }
-}
-
 /// How far a Gaussian's alpha has fallen at a block's pixels, formed in binary64: minus its base-2 logarithm, but no less
 /// than -1, which is more than any ceiling, and still a power that is formed.
 ///
@@ -420,13 +396,13 @@ impl Record {
 pub(super) fn falls_64<S: Simd>(
     simd: S,
     splat: &Splat,
-    task: &Task<'_>,
+    task: &TileInputs<'_>,
     block: usize,
 ) -> f32x16<S> {
     let [a, b, c] = splat.factor;
     let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
     let opacity = f64x8::splat(simd, splat.log2_opacity.into());
-    let half_period = if splat.wide {
+    let half_period = if splat.exceeds_period {
         task.half_period
     } else {
         f64::INFINITY

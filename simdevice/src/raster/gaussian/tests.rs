@@ -4,17 +4,24 @@ mod per_pixel;
 mod streamed;
 mod whole_draws;
 
+use super::grid::TILE;
+use super::inputs::needs_f64_sums;
 use super::*;
 use crate::device::Device;
 use crate::format::Format;
-use crate::gaussian::GaussianSet;
+use crate::gaussian::splat::{Splat, locate};
+use crate::gaussian::{GaussianSet, sort_and_bin};
 use crate::packet::*;
 use crate::runtime::{Config, SimdLevel};
 use crate::simd::exp2::{
     CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
 };
-use crate::state::gaussian::{Camera, CameraModel, GaussianPrecision, GaussianState};
+use crate::state::gaussian::{
+    Camera, CameraModel, GaussianOrder, GaussianPrecision, GaussianState,
+};
 use crate::state::{Rect, Viewport};
+use crate::stats::optimizations::Optimizations;
+use crate::stats::recorder::TileWork;
 use devmem::Allocation;
 use fearless_simd::f32x16;
 use rand::{Rng, SeedableRng};
@@ -22,7 +29,7 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 /// A vector's worth of one value, its power at a level, and that level's name.
-fn exp2_at(level: Level, x: [f32; LANES]) -> [f32; LANES] {
+fn exp2_at(level: Level, x: [f32; BLOCK_PIXELS]) -> [f32; BLOCK_PIXELS] {
     dispatch!(level, simd => exp2_of_negated(simd, -f32x16::simd_from(simd, x)).to_array())
 }
 
@@ -33,7 +40,7 @@ fn powers_of_two_are_within_their_bound_at_every_level() {
         let mut worst = 0.0f64;
         let mut x = -126.0f32;
         while x <= 4.0 {
-            let steps: [f32; LANES] = std::array::from_fn(|lane| x + lane as f32 / 1024.0);
+            let steps: [f32; BLOCK_PIXELS] = std::array::from_fn(|lane| x + lane as f32 / 1024.0);
             for (x, power) in steps.into_iter().zip(exp2_at(level, steps)) {
                 let exact = f64::from(x).exp2();
                 let ulp = f64::from((exact as f32).next_up()) - f64::from(exact as f32);
@@ -51,13 +58,7 @@ fn powers_of_two_are_within_their_bound_at_every_level() {
 }
 
 /// A scene of `count` Gaussians before a camera at the origin, from dust to ones that fill the screen.
-fn draw(
-    seed: u64,
-    count: u32,
-    state: GaussianState,
-    device: &Device,
-    bounds: Rect,
-) -> GaussianDraw {
+fn draw(seed: u64, count: u32, state: GaussianState, device: &Device, bounds: Rect) -> BinnedDraw {
     draw_with_depth(seed, count, state, device, bounds, None)
 }
 
@@ -69,7 +70,7 @@ fn draw_with_depth(
     device: &Device,
     bounds: Rect,
     depth: Option<(Format, [f32; 2])>,
-) -> GaussianDraw {
+) -> BinnedDraw {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut floats = Vec::new();
     for _ in 0..count {
@@ -143,8 +144,8 @@ fn draw_with_depth(
     };
     let mut set = GaussianSet::begin(&begin, bounds, depth.map(|(format, _)| format));
     set.append(&append);
-    set.resolve(device.runtime(), device.caches(), &mut Counters::default())
-        .unwrap()
+    let mut counters = Counters::default();
+    sort_and_bin(set, device.runtime(), device.caches(), &mut counters).unwrap()
 }
 
 fn defaults() -> GaussianState {
@@ -153,7 +154,7 @@ fn defaults() -> GaussianState {
 
 /// The tile kernel's naive twin: one pixel at a time through the whole list, no blocks, no saturation.
 fn naive_pixel(
-    draw: &GaussianDraw,
+    draw: &BinnedDraw,
     tile: [u32; 2],
     x: usize,
     y: usize,
@@ -185,7 +186,7 @@ fn by_table<const PLACES: usize, const TERMS: usize>(x: f32, table: &Table<PLACE
 
 /// As [`naive_pixel`], of the Gaussians whose depth passes.
 fn naive_sample(
-    draw: &GaussianDraw,
+    draw: &BinnedDraw,
     tile: [u32; 2],
     [x, y]: [usize; 2],
     level: Level,
@@ -242,10 +243,10 @@ fn naive_sample(
         let (dx, dy) = ((x % 4) as f32 - 1.5, (y % 4) as f32 - 1.5);
         let u = u + dx * f[0] as f32;
         let v = v + mul_add(dy, f[2] as f32, dx * f[1] as f32);
-        let fall = if g.steep || wide_sums::pays(state) {
+        let fall = if g.needs_f64 || needs_f64_sums(state) {
             let (dx, dy) = (f64::from(dx) + mx, f64::from(dy) + my);
             let (u, v) = (dx * f[0], dx * f[1] + dy * f[2]);
-            if g.wide && !(-draw.half_period..draw.half_period).contains(&dx) {
+            if g.exceeds_period && !(-draw.half_period..draw.half_period).contains(&dx) {
                 1e3
             } else {
                 ((u * u + v * v - f64::from(g.log2_opacity)) as f32).max(-1.0)
@@ -261,7 +262,7 @@ fn naive_sample(
         if !passes(g.depth) {
             continue;
         }
-        if wide_sums::pays(state) {
+        if needs_f64_sums(state) {
             let weight = wide_t * f64::from(alpha);
             if wide_t - weight < f64::from(state.transmittance_floor) {
                 break;
@@ -306,7 +307,7 @@ fn check_changed(
     count: u32,
     state: &GaussianState,
     bounds: Rect,
-    change: impl Fn(&mut GaussianDraw),
+    change: impl Fn(&mut BinnedDraw),
 ) {
     for (name, simd) in SimdLevel::supported() {
         let device = Device::new(&Config {
@@ -388,7 +389,7 @@ fn it_does_so_where_gaussians_are_wider_than_a_period() {
         draw.half_period = 2.25;
         let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
         for splat in sorted.splats.iter_mut().flatten().step_by(3) {
-            (splat.wide, splat.steep) = (true, true);
+            (splat.exceeds_period, splat.needs_f64) = (true, true);
         }
     });
 }
@@ -407,7 +408,7 @@ fn it_does_so_where_gaussians_are_steep() {
         .splats
         .iter()
         .flatten()
-        .filter(|splat| splat.steep);
+        .filter(|splat| splat.needs_f64);
     assert!(steep.count() > 10);
     check(5, 3000, &state, WHOLE);
 }

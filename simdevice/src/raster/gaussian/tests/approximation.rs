@@ -9,7 +9,7 @@ fn worst_error<const TERMS: usize>(powers: &Powers<TERMS>, level: Level) -> f64 
     let mut worst = 0.0f64;
     let mut first = -4.0f32;
     while first < 125.9 {
-        let falls: [f32; LANES] = std::array::from_fn(|lane| first + lane as f32 / 4096.0);
+        let falls: [f32; BLOCK_PIXELS] = std::array::from_fn(|lane| first + lane as f32 / 4096.0);
         let found = dispatch!(level, simd =>
             powers.of_negated(simd, f32x16::simd_from(simd, falls)).to_array());
         for (fall, power) in falls.into_iter().zip(found) {
@@ -111,7 +111,7 @@ fn what_is_left_out_is_within_the_budget() {
 #[test]
 fn skips_that_are_off_leave_nothing_out() {
     let device = Device::new(&Config {
-        skips: Skips::NONE,
+        optimizations: Optimizations::NONE,
         ..Config::default()
     })
     .unwrap();

@@ -1,11 +1,11 @@
 //! binary16 rasterization against its definition, one number at a time.
 
 use super::*;
-use crate::raster::gaussian::half::scalar::{self, Splat16};
+use crate::raster::gaussian::binary16::scalar::{self, Splat16};
 
 /// As [`naive_sample`](super::naive_sample), in binary16.
 pub(super) fn naive_sample(
-    draw: &GaussianDraw,
+    draw: &BinnedDraw,
     tile: [u32; 2],
     [x, y]: [usize; 2],
     passes: impl Fn(u32) -> bool,
@@ -36,7 +36,7 @@ pub(super) fn naive_sample(
 }
 
 /// A Gaussian's alpha at a pixel of the framebuffer.
-fn alpha_at(draw: &GaussianDraw, g: &Splat, at: [usize; 2]) -> f32 {
+fn alpha_at(draw: &BinnedDraw, g: &Splat, at: [usize; 2]) -> f32 {
     let d = [0, 1].map(|axis| {
         // The kernel's roundings: from the tile's corner to the mean, to the middle of the block, to the pixel.
         let corner = (at[axis] / TILE * TILE) as f64;

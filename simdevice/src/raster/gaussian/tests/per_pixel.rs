@@ -1,12 +1,11 @@
 //! The per-pixel order against a twin that takes one pixel at a time.
 
 use super::*;
-use crate::gaussian::rays::ordered_key;
-use crate::state::gaussian::GaussianOrder;
+use crate::gaussian::ray_depth::ordered_key;
 
 /// As [`naive_sample`](super::naive_sample), in the per-pixel order.
 pub(super) fn naive_sample(
-    draw: &GaussianDraw,
+    draw: &BinnedDraw,
     tile: [u32; 2],
     [x, y]: [usize; 2],
     power: impl Fn(f32) -> f32,

@@ -32,7 +32,7 @@ fn lists_and_streams_agree_at_every_level() {
                 })
                 .unwrap();
                 let draw = draw(seed, 4000, state.clone(), &device, WHOLE);
-                assert_eq!(draw.sorted.tiles.stream().is_some(), budget == 100);
+                assert_eq!(draw.sorted.tiles.walk().is_some(), budget == 100);
                 let mut tile = Box::new(GaussianTile::default());
                 let mut counters = Counters::default();
                 let mut pixels = Vec::new();

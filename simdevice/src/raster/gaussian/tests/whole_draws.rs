@@ -214,7 +214,7 @@ fn random_scene(seed: u64) -> Scene {
 }
 
 impl Scene {
-    fn draw(&self, device: &Device) -> GaussianDraw {
+    fn draw(&self, device: &Device) -> BinnedDraw {
         let depth = Some((self.depth.plane(Aspect::Depth).unwrap(), self.coefficients));
         draw_with_depth(
             self.seed,
@@ -227,7 +227,7 @@ impl Scene {
     }
 
     /// Each sample for itself.
-    fn naive(&self, draw: &GaussianDraw, level: Level) -> Picture {
+    fn naive(&self, draw: &BinnedDraw, level: Level) -> Picture {
         let mut picture = self.before.clone();
         let state = &self.state;
         let blender = Blender::new(&state.blend[0], state.blend_constants, self.color);
@@ -441,7 +441,7 @@ fn hidden_work(
     compare: CompareOp,
     stored: [f32; 256],
     recorder: Option<Arc<Recorder>>,
-    change: impl Fn(&mut GaussianDraw),
+    change: impl Fn(&mut BinnedDraw),
 ) -> Counters {
     let device = Device::new(&Config {
         recorder,
@@ -478,7 +478,7 @@ fn hidden_work(
     let mut tile = Box::new(GaussianTile::default());
     let mut counters = Counters::default();
     let lanes = [u32::from(u16::MAX); BLOCKS];
-    tile.passing.set(compare, &stored.map(f32::to_bits), &lanes);
+    tile.ranges.set(compare, &stored.map(f32::to_bits), &lanes);
     tile.run::<TEST_DEPTH>(&draw, device.level(), [2, 2], 0, &lanes, &mut counters);
     let pairs = counters.get(Counter::TilePairsEvaluated);
     assert!(pairs <= draw.sorted.tiles.list(2, 2).len() as u64);
@@ -513,14 +513,14 @@ fn what_is_behind_a_whole_tile_is_not_even_fetched() {
 #[test]
 fn steep_gaussians_behind_a_whole_tile_are_not_fetched_either() {
     // The nearer ones fail, so that no list's end is hidden at once.
-    let hidden = |change: fn(&mut GaussianDraw)| {
+    let hidden = |change: fn(&mut BinnedDraw)| {
         let counters = hidden_work(FORWARD, CompareOp::Greater, [0.3; 256], None, change);
         counters.get(Counter::GaussianTilesHidden)
     };
     let steep = hidden(|draw| {
         let sorted = Arc::get_mut(&mut draw.sorted).unwrap();
         for splat in sorted.splats.iter_mut().flatten() {
-            splat.steep = true;
+            splat.needs_f64 = true;
         }
     });
     assert!(steep > 0);

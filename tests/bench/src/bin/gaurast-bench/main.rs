@@ -1,16 +1,17 @@
 //! `gaurast-bench`: run time against error, beside what a machine without a GPU offers otherwise.
 
+mod callgrind;
 mod counts;
 mod frames;
 mod growth;
 mod judge;
 mod machine;
+mod optimizations;
 mod output;
 mod pair;
 mod pareto;
 mod plot;
 mod roofline;
-mod skips;
 mod worker;
 mod workload;
 
@@ -46,6 +47,8 @@ pub(crate) enum BenchError {
     Quads(#[from] QuadError),
     #[error(transparent)]
     Counts(#[from] CountsError),
+    #[error(transparent)]
+    Callgrind(#[from] callgrind::CallgrindError),
     #[error("a worker failed: {0}")]
     Worker(String),
     #[error("a worker could not be spoken to: {0}")]
@@ -83,8 +86,8 @@ enum Command {
     Pareto(ParetoArguments),
     /// How time and memory grow with Gaussians, pixels, overlap and the share off the screen.
     Growth(SweepArguments),
-    /// What each skip saves, and what Gaussians cost that nobody sees.
-    Skips(SweepArguments),
+    /// What each optimization saves, and what Gaussians cost that nobody sees.
+    Optimizations(OptimizationsArguments),
     /// Holds instructions, hashes of pictures and sizes of functions against stored ones.
     Counts(CountsArguments),
     /// Draws for the other commands, which start it.
@@ -155,6 +158,21 @@ struct SweepArguments {
     threads: usize,
 }
 
+/// Arguments of the comparison of optimizations.
+#[derive(Args)]
+struct OptimizationsArguments {
+    #[command(flatten)]
+    sweep: SweepArguments,
+
+    /// Counts instructions of a frame with and without each, by Callgrind, instead of measuring time
+    #[arg(long)]
+    instructions: bool,
+
+    /// Counts for optimizations of these names only
+    #[arg(long, value_name = "NAME", requires = "instructions")]
+    only: Vec<String>,
+}
+
 /// What the sweep over settings takes.
 #[derive(Args)]
 struct ParetoArguments {
@@ -200,7 +218,7 @@ fn run(command: &Command) -> Result<(), BenchError> {
         Command::Frames(arguments) => frames::run(arguments),
         Command::Pareto(arguments) => pareto::run(arguments),
         Command::Growth(arguments) => growth::run(arguments),
-        Command::Skips(arguments) => skips::run(arguments),
+        Command::Optimizations(arguments) => optimizations::run(arguments),
         Command::Counts(arguments) => Ok(counts::run(arguments)?),
         Command::Worker => worker::run(),
         Command::CountsWorker(arguments) => Ok(counts::work(arguments)?),

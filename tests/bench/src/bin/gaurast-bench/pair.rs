@@ -33,8 +33,8 @@ impl Pair {
         views: &[Camera],
         how: Draws,
     ) -> Result<Self, BenchError> {
-        let start = |(workload, skips): (&Workload, &str)| {
-            Worker::with_skips(Contender::Gaurast, workload, threads, skips)?
+        let start = |(workload, optimizations): (&Workload, &str)| {
+            Worker::with_optimizations(Contender::Gaurast, workload, threads, optimizations)?
                 .ok_or_else(|| BenchError::Worker("this driver is not there".to_owned()))
         };
         let mut draws = [0, 1].map(|_| vec![[Vec::new(), Vec::new()]; views.len()]);

@@ -4,7 +4,6 @@ use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
 
 use gaurast_render::{Precision, Settings};
-use gaurast_scene::Scene;
 use gaurast_scene::camera::Camera;
 use serde::Serialize;
 
@@ -23,48 +22,6 @@ struct Variant {
     settings: Settings,
     /// Width and height are divided by this; the picture is stretched back before it is judged.
     divisor: u32,
-    /// The part of what a view shows that is near, if what is beyond is drawn at half size.
-    near: Option<f64>,
-}
-
-impl Variant {
-    /// Its settings for a view.
-    fn settings(&self, depths: &Depths) -> Settings {
-        Settings {
-            far_half: self.near.map(|part| depths.quantile(part)),
-            ..self.settings
-        }
-    }
-}
-
-/// The view depths of what a view shows, ascending.
-struct Depths(Vec<f32>);
-
-impl Depths {
-    fn new(scene: &Scene, view: &Camera) -> Self {
-        let mut depths: Vec<f32> = scene
-            .positions()
-            .iter()
-            .filter_map(|position| {
-                let position = position.map(f64::from);
-                let [x, y] = view.project(position)?;
-                let inside = (0.0..f64::from(view.width)).contains(&x)
-                    && (0.0..f64::from(view.height)).contains(&y);
-                let along =
-                    |axis: usize| view.rotation[2][axis] * (position[axis] - view.eye[axis]);
-                inside.then(|| (along(0) + along(1) + along(2)) as f32)
-            })
-            .collect();
-        depths.sort_by(f32::total_cmp);
-        Self(depths)
-    }
-
-    /// What a part of them is below; infinity if there are none.
-    fn quantile(&self, part: f64) -> f32 {
-        let index = (part * self.0.len() as f64) as usize;
-        let found = self.0.get(index).or(self.0.last());
-        found.copied().unwrap_or(f32::INFINITY)
-    }
 }
 
 /// What a variant takes and misses.
@@ -299,36 +256,13 @@ fn all_variants() -> Vec<Variant> {
                     name: name.to_owned(),
                     settings,
                     divisor,
-                    near: None,
                 })
         })
-        .chain(far_at_half_size())
         // Beside lavapipe, our triangles need no sweep of their own.
         .filter(|variant| {
             variant.contender != Contender::QuadsOnGaurast || variant.name == "as meant"
         })
         .collect()
-}
-
-/// What is beyond the median depth at half size, alone and with what else saves.
-fn far_at_half_size() -> impl Iterator<Item = Variant> {
-    let exact = Settings::default();
-    let cheap = Settings {
-        contribution_budget: 4.0 / 255.0,
-        sh_degree: 1,
-        ..exact
-    };
-    let all = [
-        ("far half at half size", exact),
-        ("far half at half size, budget 4/255, degree 1", cheap),
-    ];
-    all.into_iter().map(|(name, settings)| Variant {
-        contender: Contender::Gaurast,
-        name: name.to_owned(),
-        settings,
-        divisor: 1,
-        near: Some(0.5),
-    })
 }
 
 fn measure(
@@ -337,11 +271,10 @@ fn measure(
     runs: usize,
     variants: &[Variant],
 ) -> Result<SceneResults, BenchError> {
-    let (judge, views, depths, gaussians) = {
+    let (judge, views, gaussians) = {
         let scene = workload.scene()?;
         let views = workload.views(&scene, runs)?;
-        let depths: Vec<Depths> = (views.iter().map(|view| Depths::new(&scene, view))).collect();
-        (Judge::new(&scene), views, depths, scene.len())
+        (Judge::new(&scene), views, scene.len())
     };
     let mut workers = Vec::new();
     let contenders = CONTENDERS
@@ -367,12 +300,10 @@ fn measure(
         view.resized([view.width, view.height].map(|side| (side / divisor).max(1)))
     };
     // One view of each warms up; then all take turns.
-    let with_depths = || views.iter().zip(&depths);
-    for (index, (view, depths)) in with_depths().take(1).chain(with_depths()).enumerate() {
+    for (index, view) in views.iter().take(1).chain(&views).enumerate() {
         for (variant, worker, frames) in &mut draws {
             let camera = smaller(view, variant.divisor);
-            let settings = variant.settings(depths);
-            let drawn = workers[*worker].1.draw(&camera, settings, None)?;
+            let drawn = workers[*worker].1.draw(&camera, variant.settings, None)?;
             if index > 0 {
                 frames.push(drawn);
             }
@@ -383,11 +314,9 @@ fn measure(
     let mut points = Vec::new();
     for (variant, worker, frames) in draws {
         let camera = smaller(view, variant.divisor);
-        workers[worker].1.draw(
-            &camera,
-            variant.settings(&depths[runs / 2]),
-            Some(&file.path()),
-        )?;
+        workers[worker]
+            .1
+            .draw(&camera, variant.settings, Some(&file.path()))?;
         points.push(Point {
             wall: median(frames.iter().map(|frame| frame.wall)),
             processor: median(frames.iter().filter_map(|frame| frame.processor)),

@@ -17,7 +17,7 @@ use super::BenchError;
 use super::workload::Workload;
 
 /// The hidden command that makes a process a worker.
-const COMMAND: &str = "worker";
+pub const COMMAND: &str = "worker";
 
 /// lavapipe's manifest, where distributions put it.
 const LAVAPIPE_FOLDERS: [&str; 3] = ["/usr/share", "/etc", "/usr/local/share"];
@@ -104,6 +104,43 @@ impl Drawn {
     }
 }
 
+/// The whole input of a worker that draws `views` one after the other and ends.
+///
+/// # Errors
+/// If it cannot be written as JSON.
+pub fn input(workload: &Workload, views: &[Camera]) -> Result<Vec<u8>, BenchError> {
+    let mut input = Vec::new();
+    let setup = Setup {
+        contender: Contender::Gaurast,
+        workload: workload.clone(),
+        threads: 1,
+    };
+    say(&mut input, &setup)?;
+    for camera in views {
+        let request = Request {
+            camera: camera.clone(),
+            settings: Settings::default(),
+            picture: None,
+            is_independent: false,
+        };
+        say(&mut input, &request)?;
+    }
+    Ok(input)
+}
+
+/// Checks that a worker with this output drew all that it was asked to.
+///
+/// # Errors
+/// If it did not.
+pub fn check(output: &str) -> Result<(), BenchError> {
+    for line in output.lines() {
+        if let Reply::Failed(reason) = serde_json::from_str(line)? {
+            return Err(BenchError::Worker(reason));
+        }
+    }
+    Ok(())
+}
+
 /// A worker as its parent sees it.
 pub struct Worker {
     child: Child,
@@ -116,8 +153,8 @@ pub struct Worker {
 /// A worker that was not asked for so long is warmed up again.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same or nearly so.
-pub const SKIPS: &str = "all,-unchanged,-last-order";
+/// What this driver leaves out in benchmarks: all but what only saves where two frames are the same.
+pub const OPTIMIZATIONS: &str = "all,-temporal-reuse";
 
 impl Worker {
     /// Starts a worker that shares its work among `threads`; `None` if its device is not there.
@@ -126,22 +163,22 @@ impl Worker {
         workload: &Workload,
         threads: usize,
     ) -> Result<Option<Self>, BenchError> {
-        let skips = std::env::var("GAURAST_SKIP");
-        let skips = skips.unwrap_or_else(|_| SKIPS.to_owned());
-        Self::with_skips(contender, workload, threads, &skips)
+        let optimizations = std::env::var("GAURAST_OPTIMIZATIONS");
+        let optimizations = optimizations.unwrap_or_else(|_| OPTIMIZATIONS.to_owned());
+        Self::with_optimizations(contender, workload, threads, &optimizations)
     }
 
-    /// As [`Worker::start`]; `skips` says what this driver leaves out.
-    pub fn with_skips(
+    /// As [`Worker::start`]; `optimizations` says what this driver leaves out.
+    pub fn with_optimizations(
         contender: Contender,
         workload: &Workload,
         threads: usize,
-        skips: &str,
+        optimizations: &str,
     ) -> Result<Option<Self>, BenchError> {
         let mut command = Command::new(std::env::current_exe()?);
         command
             .arg(COMMAND)
-            .env("GAURAST_SKIP", skips)
+            .env("GAURAST_OPTIMIZATIONS", optimizations)
             .env("GAURAST_THREADS", threads.to_string())
             // The threads that rasterize; the queue has one more, for vertices.
             .env("LP_NUM_THREADS", threads.to_string())

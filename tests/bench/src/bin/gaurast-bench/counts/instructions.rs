@@ -1,4 +1,4 @@
-//! Instructions of a frame, counted by Callgrind: a figure that does not depend on what else the machine does.
+//! Instructions of a frame, held against stored ones.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -10,17 +10,15 @@ use super::pictures;
 use super::stored::{Table, percent};
 use super::workload::Workload;
 use super::{CountsError, Report, WORKER};
+use crate::callgrind::{self, LEVEL};
 use crate::output::Rows;
-use crate::worker::SKIPS;
+use crate::worker::OPTIMIZATIONS;
 
 /// Percent by which a count may differ from the stored one.
 const TOLERANCE: f64 = 1.0;
 
 /// The frame that is counted: the first one is cold, and the second one makes chunks of Gaussians.
 const FRAMES: u32 = 3;
-
-/// The SIMD level, the highest that Valgrind knows.
-const LEVEL: &str = "avx2";
 
 /// Why instructions cannot be counted here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
@@ -129,43 +127,17 @@ fn count(workload: Workload, manifest: Option<&Path>) -> Result<u64, CountsError
 
 /// The instructions of a process that draws so many frames of a workload.
 fn process(workload: Workload, frames: u32, manifest: Option<&Path>) -> Result<u64, CountsError> {
-    let mut command = Command::new("valgrind");
-    command
-        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
-        .arg(std::env::current_exe()?)
-        .args([WORKER, "--frames", &frames.to_string(), &workload.name()])
-        .env("GAURAST_SIMD", LEVEL)
-        .env("GAURAST_THREADS", "1")
-        .env("GAURAST_SKIP", SKIPS);
-    if let Some(manifest) = manifest {
-        let manifest = manifest.canonicalize()?;
-        command
-            .arg("--through-the-loader")
-            .env("VK_DRIVER_FILES", &manifest)
-            .env("VK_ICD_FILENAMES", &manifest);
+    let (frames, name) = (frames.to_string(), workload.name());
+    let mut arguments = vec![WORKER, "--frames", &frames, &name];
+    let mut environment = vec![("GAURAST_OPTIMIZATIONS", OPTIMIZATIONS)];
+    let manifest = manifest.map(Path::canonicalize).transpose()?;
+    let manifest = manifest.map(|path| path.to_string_lossy().into_owned());
+    if let Some(manifest) = &manifest {
+        arguments.push("--through-the-loader");
+        environment.extend([
+            ("VK_DRIVER_FILES", &**manifest),
+            ("VK_ICD_FILENAMES", manifest),
+        ]);
     }
-    let output = command.output()?;
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    if !output.status.success() {
-        return Err(CountsError::Worker(said));
-    }
-    collected(&said).ok_or(CountsError::Worker(said))
-}
-
-/// The instructions that Callgrind says it collected.
-fn collected(said: &str) -> Option<u64> {
-    let count = |line: &str| line.split_once("Collected : ")?.1.trim().parse().ok();
-    said.lines().find_map(count)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn callgrinds_count_is_found() {
-        let said = "==7== Events    : Ir\n==7== Collected : 1234\n==7== \n";
-        assert_eq!(collected(said), Some(1234));
-        assert_eq!(collected("==7== Events    : Ir\n"), None);
-    }
+    Ok(callgrind::count(&arguments, &environment, &[])?.instructions)
 }

@@ -16,11 +16,12 @@ use gaurast_bench::quads::QuadError;
 use gaurast_render::RenderError;
 use thiserror::Error;
 
+use crate::callgrind::CallgrindError;
 use instructions::Obstacle;
 use workload::Workload;
 
 /// The hidden command that makes a process a worker.
-const WORKER: &str = "counts-worker";
+pub const WORKER: &str = "counts-worker";
 
 /// The variable that makes a missing program a failure: `programs` or `all`.
 const REQUIRE: &str = "GAURAST_TEST_REQUIRE";
@@ -38,6 +39,8 @@ pub enum CountsError {
     Io(#[from] std::io::Error),
     #[error("a worker failed: {0}")]
     Worker(String),
+    #[error(transparent)]
+    Callgrind(#[from] CallgrindError),
     #[error("the stored row \"{0}\" has too few or too many cells")]
     Stored(String),
     #[error("the program's symbols cannot be read: {0}")]

@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use super::stored::Table;
 use super::workload::Workload;
 use super::{CountsError, Report, WORKER};
-use crate::worker::SKIPS;
+use crate::worker::OPTIMIZATIONS;
 
 /// The SIMD levels of `GAURAST_SIMD`.
 const LEVELS: [&str; 3] = ["sse2", "avx2", "avx512"];
@@ -77,7 +77,7 @@ fn hashes(level: &str, threads: usize) -> Result<BTreeMap<String, String>, Count
         .args(workloads)
         .env("GAURAST_SIMD", level)
         .env("GAURAST_THREADS", threads.to_string())
-        .env("GAURAST_SKIP", SKIPS)
+        .env("GAURAST_OPTIMIZATIONS", OPTIMIZATIONS)
         .output()?;
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();

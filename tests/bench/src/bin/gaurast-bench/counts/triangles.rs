@@ -15,6 +15,9 @@ use super::objects::{Objects, begin_image};
 /// Triangles of [`Triangles::small`].
 const SMALL: usize = 15_000;
 
+/// Layers of [`Triangles::layered`].
+const LAYERS: u32 = 8;
+
 /// Width and height of the texture's first level.
 const TEXTURE: u32 = 256;
 
@@ -54,6 +57,13 @@ impl Triangles {
     pub(super) fn textured(entry: ash::Entry, size: [u32; 2]) -> Result<Self, RenderError> {
         let fragment = include_bytes!("shaders/textured.frag.spv");
         Self::new(entry, size, &floor(), fragment)
+    }
+
+    /// Layers that fill the picture, of one colour each: those of its left half come from back to front, those of its right
+    /// half from front to back.
+    pub(super) fn layered(entry: ash::Entry, size: [u32; 2]) -> Result<Self, RenderError> {
+        let fragment = include_bytes!("shaders/plain.frag.spv");
+        Self::new(entry, size, &layers(), fragment)
     }
 
     fn new(
@@ -343,6 +353,24 @@ fn small(size: [u32; 2]) -> Vec<Vertex> {
                 position: [x, y, z, 1.0],
                 color: [x, y, z, 1.0],
             });
+        }
+    }
+    vertices
+}
+
+/// Two triangles for each layer of each half of the picture.
+fn layers() -> Vec<Vertex> {
+    let mut vertices = Vec::new();
+    for layer in 0..LAYERS {
+        let far = (LAYERS - layer) as f32 / (LAYERS + 1) as f32;
+        let near = (layer + 1) as f32 / (LAYERS + 1) as f32;
+        for (left, right, z) in [(-1.0, 0.0, far), (0.0, 1.0, near)] {
+            let corners = [[left, -1.0], [right, -1.0], [left, 1.0], [right, 1.0]];
+            let corners = corners.map(|[x, y]: [f32; 2]| Vertex {
+                position: [x, y, z, 1.0],
+                color: [z, 0.5, 1.0 - z, 1.0],
+            });
+            vertices.extend([0, 1, 2, 2, 1, 3].map(|index: usize| corners[index]));
         }
     }
     vertices

@@ -38,6 +38,8 @@ pub(super) enum Workload {
     SmallTriangles,
     /// A floor with a filtered texture of several levels
     TexturedTriangles,
+    /// Layers that hide one another
+    LayeredTriangles,
     /// A smaller synthetic scene as sorted, blended quads
     BlendedQuads,
     /// A dispatch with workgroup memory
@@ -70,6 +72,7 @@ impl Workload {
             }
             Self::SmallTriangles => triangles(Triangles::small(entry, SIZE)?, frames),
             Self::TexturedTriangles => triangles(Triangles::textured(entry, SIZE)?, frames),
+            Self::LayeredTriangles => triangles(Triangles::layered(entry, SIZE)?, frames),
             Self::BlendedQuads => quads(entry, frames),
             Self::Compute => {
                 let mut bodies = Bodies::new(entry)?;

@@ -1,0 +1,436 @@
+//! Attributes: vertex fetch for Gaussians, from streams to structures of arrays.
+
+use super::lanes::F32_LANES;
+use super::spherical_harmonics::{COEFFICIENT_FLOATS, MAX_COEFFICIENTS};
+use crate::format::Format;
+use crate::packet::{AttributeStream, GaussianAppend, GaussianAttributes, IndexStream};
+use devmem::Allocation;
+use std::sync::{Arc, Weak};
+
+/// Vertex attributes by lane, as they are read.
+#[derive(Clone, Debug)]
+pub(super) struct Attributes {
+    pub(super) position: [[f32; F32_LANES]; 3],
+    pub(super) scale: [[f32; F32_LANES]; 3],
+    pub(super) rotation: [[f32; F32_LANES]; 4],
+    pub(super) opacity: [f32; F32_LANES],
+}
+
+impl Default for Attributes {
+    fn default() -> Self {
+        Self {
+            position: [[0.0; F32_LANES]; 3],
+            scale: [[0.0; F32_LANES]; 3],
+            rotation: [[0.0; F32_LANES]; 4],
+            opacity: [0.0; F32_LANES],
+        }
+    }
+}
+
+impl Attributes {
+    /// The second largest scale of a lane.
+    pub(super) fn second_scale(&self, lane: usize) -> f32 {
+        let [a, b, c] = self.scale.each_ref().map(|scale| scale[lane]);
+        a.max(b).min(a.max(c)).min(b.max(c))
+    }
+
+    /// Makes a lane what a lane of others is.
+    pub(super) fn copy_lane(&mut self, to: usize, others: &Self, from: usize) {
+        let copy = |own: &mut [f32; F32_LANES], other: &[f32; F32_LANES]| own[to] = other[from];
+        for (own, other) in self.position.iter_mut().zip(&others.position) {
+            copy(own, other);
+        }
+        for (own, other) in self.scale.iter_mut().zip(&others.scale) {
+            copy(own, other);
+        }
+        for (own, other) in self.rotation.iter_mut().zip(&others.rotation) {
+            copy(own, other);
+        }
+        copy(&mut self.opacity, &others.opacity);
+    }
+}
+
+/// A contiguous span is read whole where vertices lie at most this far apart, and piecewise beyond.
+const WHOLE_SPAN_STRIDE: u32 = 64;
+
+/// The vertices of one group of one instance.
+pub(super) struct Group<'a> {
+    /// The vertices, as many as the group has.
+    vertices: Vertices<'a>,
+    pub(super) instance: u32,
+    pub(super) first_instance: u32,
+    pub(super) len: usize,
+}
+
+enum Vertices<'a> {
+    /// Consecutive from this one on.
+    From(u64),
+    /// Picked by an index buffer.
+    Listed(Vec<u64>),
+    /// The first one of a draw and, from there, each of a cluster.
+    Cluster(u64, &'a [u32]),
+}
+
+impl<'a> Group<'a> {
+    /// Vertices `start..start + len` of `append`'s count, for `instance`.
+    pub(super) fn new(append: &GaussianAppend, instance: u32, start: u32, len: usize) -> Self {
+        let first = u64::from(append.first) + u64::from(start);
+        let vertices = match &append.indices {
+            None => Vertices::From(first),
+            Some(stream) => Vertices::Listed(read_indices(stream, first, len)),
+        };
+        Self {
+            vertices,
+            instance,
+            first_instance: append.first_instance,
+            len,
+        }
+    }
+
+    /// The vertices of `append`'s count whose numbers are `numbers`, for `instance`.
+    pub(super) fn of_cluster(append: &GaussianAppend, instance: u32, numbers: &'a [u32]) -> Self {
+        Self {
+            vertices: Vertices::Cluster(append.first.into(), numbers),
+            instance,
+            first_instance: append.first_instance,
+            len: numbers.len(),
+        }
+    }
+
+    /// The element of `stream` that lane `lane` reads.
+    fn element(&self, stream: &AttributeStream, lane: usize) -> u64 {
+        match stream.instance_divisor {
+            Some(0) => u64::from(self.first_instance),
+            Some(divisor) => {
+                u64::from(self.first_instance)
+                    + u64::from((self.instance - self.first_instance) / divisor)
+            }
+            None => match &self.vertices {
+                Vertices::From(first) => first + lane as u64,
+                Vertices::Listed(list) => list[lane],
+                Vertices::Cluster(first, numbers) => first + u64::from(numbers[lane]),
+            },
+        }
+    }
+
+    /// Whether lanes read elements that follow one another.
+    fn is_consecutive(&self, stream: &AttributeStream) -> bool {
+        stream.instance_divisor.is_none() && matches!(self.vertices, Vertices::From(_))
+    }
+}
+
+/// Reads `len` indices from number `first` on; those outside the buffer read as zero.
+fn read_indices(stream: &IndexStream, first: u64, len: usize) -> Vec<u64> {
+    let size = u64::from(stream.index_size);
+    (first..first + len as u64)
+        .map(|number| {
+            let mut bytes = [0u8; 4];
+            read_clipped(
+                &stream.buffer,
+                number.saturating_mul(size),
+                &mut bytes[..stream.index_size.min(4) as usize],
+            );
+            let index = i64::from(u32::from_le_bytes(bytes)) + i64::from(stream.vertex_offset);
+            // A negative sum names no vertex; the largest one lies outside every buffer, which reads zero.
+            u64::try_from(index).unwrap_or(u64::from(u32::MAX))
+        })
+        .collect()
+}
+
+/// Reads bytes at `offset` of the range; zeros unless all of them lie inside it.
+fn read_clipped(buffer: &crate::packet::BufferRange, offset: u64, out: &mut [u8]) {
+    let inside = offset
+        .checked_add(out.len() as u64)
+        .is_some_and(|end| end <= buffer.size);
+    let read = inside
+        && buffer
+            .offset
+            .checked_add(offset)
+            .is_some_and(|start| buffer.memory.read(start, out).is_ok());
+    if !read {
+        out.fill(0);
+    }
+}
+
+/// Bytes of the attribute format, and whether it is 32-bit floats.
+fn layout(format: Format) -> (usize, bool) {
+    let floats = matches!(
+        format,
+        Format::R32Sfloat
+            | Format::R32G32Sfloat
+            | Format::R32G32B32Sfloat
+            | Format::R32G32B32A32Sfloat
+    );
+    (format.texel_size(), floats)
+}
+
+/// Reads attribute elements; holds the scratch that this needs.
+#[derive(Default)]
+pub(super) struct Fetcher {
+    bytes: Vec<u8>,
+}
+
+impl Fetcher {
+    /// Reads lanes `0..group.len` of `stream` into `out[component][lane]`.
+    pub(super) fn read<const COMPONENTS: usize>(
+        &mut self,
+        stream: &AttributeStream,
+        group: &Group<'_>,
+        mut out: [&mut [f32; F32_LANES]; COMPONENTS],
+    ) {
+        let (size, floats) = layout(stream.format);
+        if stream.instance_divisor.is_some() && group.len > 0 {
+            let element = self.read_element(stream, group.element(stream, 0), size);
+            let value = stream.format.decode(element);
+            for (component, out) in out.iter_mut().enumerate() {
+                out[..group.len].fill(value[component]);
+            }
+            return;
+        }
+        let step = self.read_bytes(stream, group, size);
+        let elements = self.bytes.chunks(step).take(group.len).enumerate();
+        if floats && size >= 4 * COMPONENTS {
+            for (lane, bytes) in elements {
+                let words = bytes.as_chunks::<4>().0;
+                for (out, &word) in out.iter_mut().zip(words) {
+                    out[lane] = f32::from_le_bytes(word);
+                }
+            }
+            return;
+        }
+        for (lane, bytes) in elements {
+            let value = stream.format.decode(&bytes[..size]);
+            for (component, out) in out.iter_mut().enumerate() {
+                out[lane] = value[component];
+            }
+        }
+    }
+
+    /// Reads what a group's Gaussians are in their own space, but for their colours.
+    pub(super) fn read_own(
+        &mut self,
+        streams: &GaussianAttributes,
+        group: &Group<'_>,
+        out: &mut Attributes,
+    ) {
+        self.read(&streams.position, group, out.position.each_mut());
+        self.read(&streams.scale, group, out.scale.each_mut());
+        self.read(&streams.rotation, group, out.rotation.each_mut());
+        self.read(&streams.opacity, group, [&mut out.opacity]);
+    }
+
+    /// Multiplies a group's opacities by the model's, if it has some.
+    pub(super) fn fade(
+        &mut self,
+        streams: &GaussianAttributes,
+        group: &Group<'_>,
+        out: &mut Attributes,
+    ) {
+        if let Some(stream) = &streams.model.opacity {
+            let mut factor = [0.0; F32_LANES];
+            self.read(stream, group, [&mut factor]);
+            for (opacity, factor) in out.opacity.iter_mut().zip(factor) {
+                *opacity *= factor;
+            }
+        }
+    }
+
+    /// Reads an element of `size` bytes.
+    fn read_element(&mut self, stream: &AttributeStream, element: u64, size: usize) -> &[u8] {
+        self.grow(size);
+        let offset = element
+            .saturating_mul(u64::from(stream.stride))
+            .saturating_add(u64::from(stream.offset));
+        let bytes = &mut self.bytes[..size];
+        read_clipped(&stream.buffer, offset, bytes);
+        bytes
+    }
+
+    /// Fills the scratch with one element every returned number of bytes.
+    fn read_bytes(&mut self, stream: &AttributeStream, group: &Group<'_>, size: usize) -> usize {
+        let stride = stream.stride as usize;
+        let at = |lane| at(stream, group, lane);
+        if group.is_consecutive(stream)
+            && stream.stride <= WHOLE_SPAN_STRIDE
+            && stride >= size
+            && group.len > 0
+        {
+            let span = stride * (group.len - 1) + size;
+            self.grow(span);
+            let start = at(0);
+            if start.saturating_add(span as u64) <= stream.buffer.size {
+                read_clipped(&stream.buffer, start, &mut self.bytes[..span]);
+                return stride;
+            }
+        }
+        self.grow(size * group.len);
+        let elements = self.bytes.chunks_exact_mut(size).take(group.len);
+        for (lane, element) in elements.enumerate() {
+            read_clipped(&stream.buffer, at(lane), element);
+        }
+        size
+    }
+
+    /// Makes room for `bytes`.
+    fn grow(&mut self, bytes: usize) {
+        if self.bytes.len() < bytes {
+            self.bytes.resize(bytes, 0);
+        }
+    }
+}
+
+/// Where in `stream`'s buffer the element that lane `lane` reads is.
+fn at(stream: &AttributeStream, group: &Group<'_>, lane: usize) -> u64 {
+    group
+        .element(stream, lane)
+        .saturating_mul(u64::from(stream.stride))
+        .saturating_add(u64::from(stream.offset))
+}
+
+/// Reads the spherical harmonics of single lanes.
+pub(super) struct CoefficientReader<'a> {
+    streams: &'a [AttributeStream],
+    /// The coefficients of a vertex follow one another as 32-bit floats.
+    packed: bool,
+}
+
+impl<'a> CoefficientReader<'a> {
+    /// A reader of these streams, one per coefficient.
+    pub(super) fn new(streams: &'a [AttributeStream]) -> Self {
+        let follows = |a: &AttributeStream, b: &AttributeStream| {
+            Arc::ptr_eq(&a.buffer.memory, &b.buffer.memory)
+                && a.buffer.offset == b.buffer.offset
+                && a.buffer.size == b.buffer.size
+                && a.stride == b.stride
+                && a.instance_divisor == b.instance_divisor
+                && b.format == Format::R32G32B32Sfloat
+                && a.offset.checked_add(12) == Some(b.offset)
+        };
+        let packed = streams
+            .first()
+            .is_some_and(|s| s.format == Format::R32G32B32Sfloat)
+            && streams.windows(2).all(|pair| follows(&pair[0], &pair[1]));
+        Self { streams, packed }
+    }
+
+    /// How many numbers a vertex's coefficients are.
+    pub(super) fn floats(&self) -> usize {
+        3 * self.streams.len().min(MAX_COEFFICIENTS)
+    }
+
+    /// Has the first `count` coefficients of `lane` on their way while other things are computed, if they are packed.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, group: &Group<'_>, lane: usize, count: usize) {
+        if let Some(stream) = self.streams.first().filter(|_| self.packed) {
+            let start = stream.buffer.offset.saturating_add(at(stream, group, lane));
+            let count = count.min(self.streams.len());
+            stream.buffer.memory.prefetch(start, 12 * count);
+        }
+    }
+
+    /// Reads the coefficients of `lane`: red, green, blue of each in turn.
+    pub(super) fn read(&self, group: &Group<'_>, lane: usize, out: &mut [f32; COEFFICIENT_FLOATS]) {
+        let at = |stream| at(stream, group, lane);
+        let count = self.streams.len().min(MAX_COEFFICIENTS);
+        let out = &mut out[..3 * count];
+        if self.packed {
+            let stream = &self.streams[0];
+            let start = at(stream);
+            let size = size_of_val(out) as u64;
+            let inside = start
+                .checked_add(size)
+                .is_some_and(|end| end <= stream.buffer.size);
+            if inside
+                && stream
+                    .buffer
+                    .memory
+                    .read(stream.buffer.offset.saturating_add(start), out)
+                    .is_ok()
+            {
+                return;
+            }
+        }
+        for (stream, out) in self.streams.iter().zip(out.chunks_exact_mut(3)) {
+            let mut bytes = [0u8; 16];
+            let bytes = &mut bytes[..layout(stream.format).0.min(16)];
+            read_clipped(&stream.buffer, at(stream), bytes);
+            out.copy_from_slice(&stream.format.decode(bytes)[..3]);
+        }
+    }
+}
+
+/// Spherical harmonics that were read already: those of all lanes, one after the other, or none.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Harmonics<'a> {
+    floats: &'a [f32],
+    /// How many floats a lane has, of which a draw of a lower degree takes the first.
+    stride: usize,
+}
+
+impl<'a> Harmonics<'a> {
+    /// Those of lanes of `stride` floats each.
+    pub(super) fn new(floats: &'a [f32], stride: usize) -> Self {
+        Self { floats, stride }
+    }
+
+    /// The floats of a lane, and what follows them; none if there are none.
+    #[inline(always)]
+    pub(super) fn from(&self, lane: usize) -> &'a [f32] {
+        self.floats.get(lane * self.stride..).unwrap_or_default()
+    }
+}
+
+/// What an attribute is read from.
+#[derive(Debug)]
+pub(super) struct SourceFingerprint {
+    memory: Weak<Allocation>,
+    generation: u64,
+    /// Offset and size of the buffer, stride and offset of the attribute.
+    place: [u64; 4],
+    format: Format,
+    instance_divisor: Option<u32>,
+}
+
+impl SourceFingerprint {
+    pub(super) fn new(stream: &AttributeStream) -> Self {
+        let buffer = &stream.buffer;
+        Self {
+            memory: Arc::downgrade(&buffer.memory),
+            generation: buffer.memory.generation(),
+            place: [
+                buffer.offset,
+                buffer.size,
+                stream.stride.into(),
+                stream.offset.into(),
+            ],
+            format: stream.format,
+            instance_divisor: stream.instance_divisor,
+        }
+    }
+
+    /// The memory, while it is there.
+    pub(super) fn memory(&self) -> Option<Arc<Allocation>> {
+        self.memory.upgrade()
+    }
+
+    /// Whether the memory still holds what it held.
+    pub(super) fn is_current(&self) -> bool {
+        let memory = self.memory.upgrade();
+        memory.is_some_and(|memory| memory.generation() == self.generation)
+    }
+
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        let how = |own: &Self| (own.generation, own.format, own.instance_divisor);
+        self.is_same_buffer(other) && how(self) == how(other)
+    }
+
+    /// Whether both are read from the same place, whatever is there.
+    pub(super) fn is_same_buffer(&self, other: &Self) -> bool {
+        self.memory.ptr_eq(&other.memory) && self.place == other.place
+    }
+}
+
+/// Whether an attribute is in memory that only the device writes.
+pub(super) fn is_device_local(stream: &AttributeStream) -> bool {
+    !stream.buffer.memory.is_host_visible()
+}

@@ -1,0 +1,276 @@
+//! Cameras: what is the same for all Gaussians of a view, where a point appears, and how it moves in the picture as it moves
+//! in space.
+
+use super::depth::CenterDepth;
+use super::footprint::Visible;
+use crate::state::Viewport;
+use crate::state::gaussian::{
+    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
+    GaussianState,
+};
+use crate::stats::optimizations::Optimizations;
+
+/// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
+/// underflows binary32.
+const LEAST_LOG2_ALPHA: f64 = -150.0;
+
+/// `q / 2` in units of natural exponents is this times `u^2 + v^2`: `ln 2`.
+pub(super) const LN_2: f64 = std::f64::consts::LN_2;
+
+/// What is the same for all Gaussians of a draw.
+#[derive(Clone, Debug)]
+pub(crate) struct ViewConstants {
+    pub(super) model: CameraModel,
+    /// Whether covariances are those of projected points.
+    pub(super) unscented: bool,
+    pub(super) order: GaussianOrder,
+    pub(super) geometry: GaussianGeometry,
+    pub(super) precision: GaussianPrecision,
+    pub(super) rotation: [f64; 9],
+    pub(super) eye: [f64; 3],
+    pub(super) focal: [f64; 2],
+    /// The principal point in framebuffer pixels.
+    pub(super) center: [f64; 2],
+    /// After how many pixels the picture repeats to the right and to the left, if it does.
+    pub(super) period: Option<f64>,
+    /// Bounds of `t.x / t.z` and `t.y / t.z` in the Jacobian.
+    pub(super) slope_min: [f64; 2],
+    pub(super) slope_max: [f64; 2],
+    pub(super) near: f32,
+    pub(super) far: f32,
+    pub(super) low_pass: f64,
+    pub(super) compensated: bool,
+    pub(super) alpha_floor: f64,
+    pub(super) log2_floor: f64,
+    pub(super) sh_degree: u32,
+    pub(super) visible: Visible,
+    pub(super) optimizations: Optimizations,
+    /// How centres become depths, if the draw needs to know.
+    pub(super) depth: Option<CenterDepth>,
+}
+
+impl ViewConstants {
+    /// The constants of a draw that may touch the pixels of `visible`.
+    pub(crate) fn new(
+        state: &GaussianState,
+        camera: &Camera,
+        viewport: &Viewport,
+        visible: Visible,
+        depth: Option<CenterDepth>,
+        optimizations: Optimizations,
+    ) -> Self {
+        let focal = camera.focal_length.map(f64::from);
+        let principal = camera.principal_point.map(f64::from);
+        let size = [viewport.width, viewport.height].map(f64::from);
+        let margin = [0, 1].map(|axis| 0.15 * size[axis] / focal[axis]);
+        Self {
+            model: camera.model,
+            unscented: state.linearization == GaussianLinearization::Unscented,
+            order: state.order,
+            geometry: state.geometry,
+            precision: state.precision,
+            rotation: camera.rotation.map(f64::from),
+            eye: camera.eye,
+            focal,
+            center: [
+                principal[0] + f64::from(viewport.x),
+                principal[1] + f64::from(viewport.y),
+            ],
+            // Discs are not drawn by panoramas.
+            period: period(camera).filter(|_| state.geometry == GaussianGeometry::Volume),
+            slope_min: [0, 1].map(|axis| -(principal[axis] / focal[axis] + margin[axis])),
+            slope_max: [0, 1]
+                .map(|axis| (size[axis] - principal[axis]) / focal[axis] + margin[axis]),
+            near: camera.near_plane,
+            far: camera.far_plane,
+            low_pass: f64::from(state.low_pass_variance),
+            compensated: state.opacity_compensated,
+            alpha_floor: state.alpha_floor.into(),
+            log2_floor: f64::from(state.alpha_floor).log2().max(LEAST_LOG2_ALPHA),
+            sh_degree: state.sh_degree,
+            visible,
+            depth,
+            optimizations,
+        }
+    }
+
+    /// The bounds of slopes in a pinhole's Jacobian: the least ones and the greatest.
+    pub(super) fn slopes(&self) -> [[f64; 2]; 2] {
+        [self.slope_min, self.slope_max]
+    }
+
+    /// Bounds of the visible pixels' centres along an axis, with a pixel to spare.
+    pub(super) fn visible_range(&self, axis: usize) -> [f64; 2] {
+        let [first, last] = self.visible.pixels(axis);
+        [first - 1.0, last + 2.0]
+    }
+}
+
+/// After how many pixels a camera's picture repeats to the right and to the left, if it does.
+pub(super) fn period(camera: &Camera) -> Option<f64> {
+    let focal = f64::from(camera.focal_length[0]);
+    (camera.model == CameraModel::Equirectangular).then_some(std::f64::consts::TAU * focal)
+}
+
+/// A point's place in the picture relative to the principal point, and the two rows of the place's Jacobian, both
+/// for focal lengths of 1. `t` is in camera axes. A pinhole's Jacobian is taken at a slope that is clamped to the least and the
+/// greatest of `slopes`. What has no place is not a number.
+pub(super) fn linearize(
+    model: CameraModel,
+    slopes: [[f64; 2]; 2],
+    t: [f64; 3],
+) -> ([f64; 2], [[f64; 3]; 2]) {
+    match model {
+        CameraModel::Pinhole => pinhole(slopes, t),
+        CameraModel::Orthographic => ([t[0], t[1]], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        CameraModel::Fisheye => fisheye(t),
+        CameraModel::Equirectangular => equirectangular(t),
+    }
+}
+
+fn pinhole([least, greatest]: [[f64; 2]; 2], [x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let place = [x / z, y / z];
+    let [u, v] = [0, 1].map(|axis| place[axis].max(least[axis]).min(greatest[axis]));
+    (place, [[1.0 / z, 0.0, -u / z], [0.0, 1.0 / z, -v / z]])
+}
+
+/// Equidistant: the distance from the principal point is the angle from the axis.
+fn fisheye([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let r = x.hypot(y);
+    if r == 0.0 {
+        // Straight behind, the picture of a point is a circle.
+        let scale = if z > 0.0 { 1.0 / z } else { f64::NAN };
+        return ([0.0; 2], [[scale, 0.0, 0.0], [0.0, scale, 0.0]]);
+    }
+    // Along the radius a point moves by z / |t|^2, across it by angle / r, and along the axis by -r / |t|^2.
+    let (cos, sin) = (x / r, y / r);
+    let length = r.hypot(z);
+    let (along, across, axial) = (z / length / length, r.atan2(z) / r, -(r / length / length));
+    let mixed = (along - across) * cos * sin;
+    (
+        [across * x, across * y],
+        [
+            [along * cos * cos + across * sin * sin, mixed, axial * cos],
+            [mixed, along * sin * sin + across * cos * cos, axial * sin],
+        ],
+    )
+}
+
+/// How near to a pole, as the cosine of the latitude, a panorama's Jacobian is taken at most: beyond, meridians run so
+/// close together that it would be infinite at the pole.
+const POLE: f64 = 1.0 / 1024.0;
+
+/// Longitude, from straight ahead to the right, and latitude, downwards.
+fn equirectangular([x, y, z]: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
+    let r = x.hypot(z);
+    let length = r.hypot(y);
+    // At a pole every longitude is as good; that of straight ahead is taken.
+    let (sin, cos) = if r > 0.0 { (x / r, z / r) } else { (0.0, 1.0) };
+    let across = 1.0 / r.max(POLE * length);
+    let (rise, run) = (y / length, r / length);
+    (
+        [x.atan2(z), y.atan2(r)],
+        [
+            [cos * across, 0.0, -sin * across],
+            [-sin * rise / length, run / length, -cos * rise / length],
+        ],
+    )
+}
+
+/// The depth variable: what near and far plane, fragment depth and the view-depth order go by.
+pub(super) fn depth(model: CameraModel, [x, y, z]: [f64; 3]) -> f64 {
+    match model {
+        CameraModel::Pinhole | CameraModel::Orthographic => z,
+        CameraModel::Fisheye | CameraModel::Equirectangular => (x * x + y * y + z * z).sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Wider than any slope here.
+    const SLOPES: [[f64; 2]; 2] = [[-1e3; 2], [1e3; 2]];
+
+    const MODELS: [CameraModel; 4] = [
+        CameraModel::Pinhole,
+        CameraModel::Orthographic,
+        CameraModel::Fisheye,
+        CameraModel::Equirectangular,
+    ];
+
+    /// Central differences.
+    fn jacobian(model: CameraModel, t: [f64; 3]) -> [[f64; 3]; 2] {
+        let step = 1e-5 * (t[0].abs() + t[1].abs() + t[2].abs());
+        let mut rows = [[0.0; 3]; 2];
+        for axis in 0..3 {
+            let moved = |by: f64| {
+                let mut t = t;
+                t[axis] += by;
+                linearize(model, SLOPES, t).0
+            };
+            let (ahead, behind) = (moved(step), moved(-step));
+            for (row, (a, b)) in rows.iter_mut().zip(ahead.into_iter().zip(behind)) {
+                row[axis] = (a - b) / (2.0 * step);
+            }
+        }
+        rows
+    }
+
+    proptest! {
+        #[test]
+        fn the_jacobian_is_the_derivative(x in -3.0..3.0f64, y in -3.0..3.0f64, z in 0.5..9.0f64, behind: bool) {
+            for model in MODELS {
+                // Fisheyes and panoramas see what is beside and behind them; a fisheye not what is straight behind.
+                let t = match model {
+                    CameraModel::Fisheye | CameraModel::Equirectangular if behind => [x + x.signum(), y, -z],
+                    _ => [x, y, z],
+                };
+                let (_, rows) = linearize(model, SLOPES, t);
+                for (row, expected) in rows.iter().zip(jacobian(model, t)) {
+                    for (a, b) in row.iter().zip(expected) {
+                        prop_assert!((a - b).abs() < 1e-6, "{model:?} {t:?}: {rows:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn on_the_axis_a_fisheye_is_a_pinhole_and_behind_it_nothing() {
+        let (place, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, 4.0]);
+        assert_eq!(
+            (place, rows),
+            linearize(CameraModel::Pinhole, SLOPES, [0.0, 0.0, 4.0])
+        );
+        let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [1e-9, 0.0, 4.0]);
+        assert!((rows[1][1] - 0.25).abs() < 1e-12);
+        let (_, rows) = linearize(CameraModel::Fisheye, SLOPES, [0.0, 0.0, -4.0]);
+        assert!(rows[0][0].is_nan());
+    }
+
+    #[test]
+    fn a_panorama_sees_all_directions() {
+        let place = |t| linearize(CameraModel::Equirectangular, SLOPES, t).0;
+        let right = std::f64::consts::FRAC_PI_2;
+        assert_eq!(place([0.0, 0.0, 3.0]), [0.0, 0.0]);
+        assert_eq!(place([2.0, 0.0, 0.0]), [right, 0.0]);
+        assert_eq!(place([0.0, 0.0, -1.0]), [2.0 * right, 0.0]);
+        assert_eq!(place([0.0, 5.0, 0.0]), [0.0, right]);
+        assert_eq!(place([0.0, -5.0, 0.0]), [0.0, -right]);
+        // At a pole, and a little beside it, a point moves no faster than the stated limit.
+        for x in [0.0, 1e-9] {
+            let (_, rows) = linearize(CameraModel::Equirectangular, SLOPES, [0.0, 2.0, x]);
+            assert_eq!(rows[0], [512.0, 0.0, 0.0]);
+            assert!((rows[1][2] + 0.5).abs() < 1e-9, "{rows:?}");
+        }
+    }
+
+    #[test]
+    fn the_depth_of_what_sees_all_around_is_the_distance() {
+        assert_eq!(depth(CameraModel::Fisheye, [2.0, 3.0, -6.0]), 7.0);
+        assert_eq!(depth(CameraModel::Equirectangular, [2.0, 3.0, -6.0]), 7.0);
+        assert_eq!(depth(CameraModel::Orthographic, [2.0, 3.0, -6.0]), -6.0);
+    }
+}

@@ -1,0 +1,308 @@
+//! Clusters: the Gaussians of a buffer that is drawn again and again, in an order in which neighbours in space are
+//! neighbours in memory. Bounds tell of a whole cluster that no picture needs it; what is left is read in one go.
+//!
+//! They are derived from memory that only the device can write, and never change an image.
+
+use super::attributes::{
+    Attributes, CoefficientReader, Fetcher, Group, Harmonics, SourceFingerprint,
+};
+use super::frustum::Bounds;
+use super::lanes::GROUP;
+use super::sort;
+use super::spherical_harmonics::COEFFICIENT_FLOATS;
+use crate::packet::GaussianAppend;
+use devmem::host;
+use rayon::prelude::*;
+
+/// Some Gaussians that are near one another.
+#[derive(Debug)]
+pub(super) struct Cluster {
+    /// The vertices' numbers in the draw.
+    pub(super) numbers: Vec<u32>,
+    pub(super) attributes: Attributes,
+    /// Spherical harmonics, if there was room for them: as many floats for each as [`CoefficientReader::floats`] says.
+    harmonics: Vec<f32>,
+    pub(super) bounds: Bounds,
+    /// No Gaussian of it is skipped for what its attributes are.
+    pub(super) is_sound: bool,
+}
+
+/// All Gaussians of a draw without indices.
+#[derive(Debug)]
+pub(super) struct Clusters {
+    /// Where the spherical harmonics in them are from, in their order.
+    harmonics: Vec<SourceFingerprint>,
+    pub(super) clusters: Vec<Cluster>,
+    /// Those among them that hide others best: large and opaque.
+    pub(super) occluders: Vec<Cluster>,
+    /// The greatest opacity.
+    pub(super) opacity: f32,
+}
+
+/// The least opacity of an occluder.
+const OCCLUDER_OPACITY: f32 = 0.5;
+
+/// The most occluders of a draw of so many Gaussians: looking for large ones among them must not cost what it saves.
+fn max_occluders(count: usize) -> usize {
+    (count / 16).min(8 * 1024)
+}
+
+/// Bits of an axis in a Morton code.
+const AXIS_BITS: u32 = 10;
+
+/// Bytes of host memory that clusters of what `append` draws take, with and without spherical harmonics.
+pub(super) fn memory_bytes(append: &GaussianAppend, with_harmonics: bool) -> u64 {
+    let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
+    let floats = if with_harmonics { reader.floats() } else { 0 };
+    let cluster = size_of::<Cluster>() + 4 * GROUP * (1 + floats);
+    let occluder = size_of::<Cluster>() + 4 * GROUP;
+    let clusters = |count: u64| count.div_ceil(GROUP as u64);
+    let occluders = clusters(max_occluders(append.count as usize) as u64);
+    clusters(append.count.into()) * cluster as u64 + occluders * occluder as u64
+}
+
+impl Clusters {
+    /// The clusters of what `append` draws, without what its model does to it. It has no indices, and of a model none by vertex.
+    /// 2D Gaussians' third scales are zero.
+    pub(super) fn build(append: &GaussianAppend, is_flat: bool, with_harmonics: bool) -> Self {
+        let order = morton_order(append);
+        let mut clusters = host::with_capacity(order.len().div_ceil(GROUP));
+        order
+            .par_chunks(GROUP)
+            .map_init(Fetcher::default, |fetcher, numbers| {
+                Cluster::read(append, fetcher, numbers, (is_flat, with_harmonics))
+            })
+            .collect_into_vec(&mut clusters);
+        let opacities = clusters.iter().map(|cluster| cluster.bounds.opacity);
+        let occluders = occluders(&clusters, max_occluders(order.len()));
+        let occluders = occluders.chunks(GROUP).map(|numbers| {
+            Cluster::read(append, &mut Fetcher::default(), numbers, (is_flat, false))
+        });
+        let harmonics = &append.attributes.spherical_harmonics;
+        Self {
+            harmonics: match with_harmonics {
+                true => harmonics.iter().map(SourceFingerprint::new).collect(),
+                false => Vec::new(),
+            },
+            opacity: opacities.fold(0.0, f32::max),
+            occluders: host::collect(occluders),
+            clusters,
+        }
+    }
+}
+
+impl Clusters {
+    /// Whether the spherical harmonics of what `append` draws are in them, perhaps with those of higher degrees.
+    pub(super) fn have_harmonics_of(&self, append: &GaussianAppend) -> bool {
+        let drawn = &append.attributes.spherical_harmonics;
+        let mut both = drawn.iter().zip(&self.harmonics);
+        drawn.len() <= self.harmonics.len()
+            && both.all(|(a, b)| SourceFingerprint::new(a).is_same(b))
+    }
+}
+
+/// The numbers of at most so many Gaussians that may hide others: of the opaque ones those whose second largest scale is
+/// greatest, in the order of clusters.
+fn occluders(clusters: &[Cluster], most: usize) -> Vec<u32> {
+    let opaque = || {
+        clusters.iter().flat_map(|cluster| {
+            (0..cluster.numbers.len())
+                .filter(|&lane| cluster.attributes.opacity[lane] >= OCCLUDER_OPACITY)
+                .map(|lane| (cluster.attributes.second_scale(lane), cluster.numbers[lane]))
+        })
+    };
+    let mut seconds: Vec<f32> = host::collect(opaque().map(|(second, _)| second));
+    let mut least = 0.0;
+    if let Some(rest) = seconds.len().checked_sub(most).filter(|_| most > 0) {
+        least = *seconds.select_nth_unstable_by(rest, f32::total_cmp).1;
+    }
+    let large = opaque().filter(|(second, _)| *second >= least);
+    host::collect(large.take(most).map(|(_, number)| number))
+}
+
+impl Cluster {
+    fn read(
+        append: &GaussianAppend,
+        fetcher: &mut Fetcher,
+        numbers: &[u32],
+        (is_flat, with_harmonics): (bool, bool),
+    ) -> Self {
+        let group = Group::of_cluster(append, append.first_instance, numbers);
+        let mut attributes = Attributes::default();
+        fetcher.read_own(&append.attributes, &group, &mut attributes);
+        if is_flat {
+            attributes.scale[2].fill(0.0);
+        }
+        let mut bounds = Bounds {
+            low: [f32::INFINITY; 3],
+            high: [f32::NEG_INFINITY; 3],
+            scale: 0.0,
+            opacity: 0.0,
+        };
+        let mut is_sound = true;
+        for lane in 0..numbers.len() {
+            let at = |lanes: &[f32; GROUP]| lanes[lane];
+            let position = attributes.position.each_ref().map(at);
+            let scale = attributes.scale.each_ref().map(at);
+            let rotation = attributes.rotation.each_ref().map(at);
+            let opacity = attributes.opacity[lane];
+            let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
+            let sound = finite(&position)
+                && finite(&scale)
+                && finite(&rotation)
+                && opacity.is_finite()
+                && rotation.iter().any(|&part| part != 0.0)
+                && scale.iter().all(|&scale| scale >= 0.0);
+            if !sound {
+                is_sound = false;
+                continue;
+            }
+            for (axis, position) in position.into_iter().enumerate() {
+                bounds.low[axis] = bounds.low[axis].min(position);
+                bounds.high[axis] = bounds.high[axis].max(position);
+            }
+            bounds.scale = scale.into_iter().fold(bounds.scale, f32::max);
+            bounds.opacity = bounds.opacity.max(opacity);
+        }
+        let mut harmonics = Vec::new();
+        if with_harmonics {
+            let reader = CoefficientReader::new(&append.attributes.spherical_harmonics);
+            let mut coefficients = [0.0; COEFFICIENT_FLOATS];
+            host::reserve(&mut harmonics, reader.floats() * numbers.len());
+            for lane in 0..numbers.len() {
+                reader.read(&group, lane, &mut coefficients);
+                harmonics.extend(&coefficients[..reader.floats()]);
+            }
+        }
+        Self {
+            numbers: numbers.to_vec(),
+            attributes,
+            harmonics,
+            bounds,
+            is_sound,
+        }
+    }
+}
+
+impl Cluster {
+    /// Spherical harmonics of all lanes, if it holds them.
+    pub(super) fn harmonics(&self) -> Harmonics<'_> {
+        let stride = self.harmonics.len() / self.numbers.len().max(1);
+        Harmonics::new(&self.harmonics, stride)
+    }
+
+    /// A cluster of one lane of another, without harmonics.
+    pub(super) fn of_one(from: &Self, lane: usize) -> Self {
+        let mut cluster = Self {
+            numbers: host::with_capacity(GROUP),
+            attributes: Attributes::default(),
+            harmonics: Vec::new(),
+            bounds: from.bounds,
+            is_sound: true,
+        };
+        cluster.push(from, lane);
+        cluster
+    }
+
+    /// Adds a lane of another cluster; `bounds` stays as it is.
+    pub(super) fn push(&mut self, from: &Self, lane: usize) {
+        self.attributes
+            .copy_lane(self.numbers.len(), &from.attributes, lane);
+        host::push(&mut self.numbers, from.numbers[lane]);
+        self.is_sound &= from.is_sound;
+    }
+}
+
+/// The numbers of the draw's vertices in an order in which neighbours are mostly near one another.
+fn morton_order(append: &GaussianAppend) -> Vec<u32> {
+    let mut positions: Vec<[f32; 3]> = host::zeroed(append.count as usize);
+    positions
+        .par_chunks_mut(GROUP)
+        .zip((0..append.count).into_par_iter().step_by(GROUP))
+        .for_each_init(
+            || (Fetcher::default(), Attributes::default()),
+            |(fetcher, attributes), (positions, start)| {
+                let group = Group::new(append, append.first_instance, start, positions.len());
+                let streams = &append.attributes;
+                fetcher.read(&streams.position, &group, attributes.position.each_mut());
+                let [x, y, z] = &attributes.position;
+                for (at, position) in positions.iter_mut().enumerate() {
+                    *position = [x[at], y[at], z[at]];
+                }
+            },
+        );
+    let (low, per_cell) = grid(&positions);
+    let code = |position: &[f32; 3]| {
+        [0, 1, 2]
+            .into_iter()
+            .map(|axis| {
+                // What is not a number becomes zero.
+                let cell = (f64::from(position[axis]) - low[axis]) / per_cell;
+                spread(cell.clamp(0.0, f64::from((1u32 << AXIS_BITS) - 1)) as u32) << axis
+            })
+            .sum()
+    };
+    let mut order: Vec<(u32, u32)> = host::collect(positions.iter().map(code).zip(0..));
+    sort::sort_by_key(&mut order);
+    host::collect(order.into_iter().map(|(_, number)| number))
+}
+
+/// The corner and the cells' side of a grid that holds most positions, whatever lies far off.
+fn grid(positions: &[[f32; 3]]) -> ([f64; 3], f64) {
+    let finite = || {
+        let all = positions.iter();
+        all.filter(|position| position.iter().all(|value| value.is_finite()))
+    };
+    let count = finite().count().max(1) as f64;
+    let [mut mean, mut variance] = [[0.0; 3]; 2];
+    for position in finite() {
+        for axis in 0..3 {
+            mean[axis] += f64::from(position[axis]) / count;
+        }
+    }
+    for position in finite() {
+        for axis in 0..3 {
+            variance[axis] += (f64::from(position[axis]) - mean[axis]).powi(2) / count;
+        }
+    }
+    let deviation = variance.into_iter().fold(0.0, f64::max).sqrt();
+    let half = (3.0 * deviation).clamp(f64::MIN_POSITIVE * 1e9, f64::MAX / 4.0);
+    (
+        mean.map(|mean| mean - half),
+        2.0 * half / f64::from(1u32 << AXIS_BITS),
+    )
+}
+
+/// Puts two zeros between the bits of a number of [`AXIS_BITS`].
+fn spread(value: u32) -> u32 {
+    let value = (value | value << 16) & 0x030_000FF;
+    let value = (value | value << 8) & 0x0300_F00F;
+    let value = (value | value << 4) & 0x030C_30C3;
+    (value | value << 2) & 0x0924_9249
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_are_spread() {
+        for value in 0..1 << AXIS_BITS {
+            let expected: u32 = (0..AXIS_BITS)
+                .map(|bit| (value >> bit & 1) << (3 * bit))
+                .sum();
+            assert_eq!(spread(value), expected, "{value:#b}");
+        }
+    }
+
+    #[test]
+    fn a_few_far_off_do_not_spoil_the_grid() {
+        let mut positions = vec![[0.0, 0.0, 0.0]; 500];
+        positions.extend(vec![[1.0, 0.0, 0.0]; 500]);
+        positions.push([f32::NAN, 0.0, 0.0]);
+        positions.push([5.0, 0.0, f32::INFINITY]);
+        let (low, per_cell) = grid(&positions);
+        assert!((low[0] - (0.5 - 1.5)).abs() < 1e-9, "{low:?}");
+        assert!((per_cell - 3.0 / 1024.0).abs() < 1e-9, "{per_cell}");
+    }
+}

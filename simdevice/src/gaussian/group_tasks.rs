@@ -1,0 +1,154 @@
+//! What there is to project: groups of vertices and clusters, without the clusters that no picture needs.
+
+use super::camera::ViewConstants;
+use super::clusters::{Cluster, Clusters};
+use super::frustum::{Frustum, Outside};
+use super::instances::InstanceTransform;
+use super::lanes::GROUP;
+use super::occlusion::OcclusionMap;
+use super::preprocess::{GroupSource, GroupTask};
+use super::set::{GaussianSet, MAX_GROUPS, SortError};
+use super::vertex_projection;
+use crate::packet::GaussianAppend;
+use crate::stats::counters::Counter;
+use crate::stats::counters::Counters;
+use devmem::host;
+use std::sync::Arc;
+
+/// What is to be projected, in the order of draw, instance and, but for clusters, position in the draw. What is left
+/// out already is counted.
+pub(super) fn group_tasks<'a>(
+    set: &'a GaussianSet,
+    clusters: &'a [Option<Arc<Clusters>>],
+    constants: &ViewConstants,
+    occlusion: Option<&OcclusionMap>,
+    counters: &mut Counters,
+) -> Result<Vec<GroupTask<'a>>, SortError> {
+    let groups = |append: &GaussianAppend| {
+        let per_instance = append.count.div_ceil(GROUP as u32);
+        u64::from(per_instance) * u64::from(append.instance_count)
+    };
+    let groups = set.appends.iter().map(groups);
+    let groups = groups.chain(set.draws.iter().map(vertex_projection::groups));
+    let groups = groups.fold(0, u64::saturating_add);
+    // A picture that repeats has copies on both sides.
+    let sides = if constants.period.is_some() { 3 } else { 1 };
+    let groups = groups.saturating_mul(sides);
+    if groups > MAX_GROUPS {
+        return Err(SortError::TooManyGaussians { groups });
+    }
+    let mut tasks = Vec::new();
+    // There are no more Gaussians than places in groups, so that this stays within 32 bits but at the very end.
+    let mut sequence = 0u32;
+    for (append, clusters) in set.appends.iter().zip(clusters) {
+        let opacity = clusters.as_ref().map_or(1.0, |clusters| clusters.opacity);
+        let view = InstanceView::new(constants, opacity);
+        let has_harmonics = clusters.as_ref().map(|all| all.have_harmonics_of(append));
+        for instance in 0..append.instance_count {
+            let instance = append.first_instance.saturating_add(instance);
+            let of_instance;
+            let mut view = &view;
+            let occlusion = occlusion.filter(|_| !append.attributes.model.is_some());
+            if clusters.is_some() && append.attributes.model.is_some() {
+                of_instance = InstanceView::of_instance(constants, append, instance, opacity);
+                view = &of_instance;
+            }
+            let task = GroupTask {
+                append,
+                instance,
+                sequence,
+                part: GroupSource::From(0),
+                has_harmonics: has_harmonics.unwrap_or(false),
+                frustum: Arc::clone(&view.frustum),
+            };
+            let groups = match clusters {
+                None => append.count.div_ceil(GROUP as u32) as usize,
+                Some(clusters) => clusters.clusters.len(),
+            };
+            host::reserve(&mut tasks, groups);
+            match clusters {
+                None => {
+                    let starts = (0..append.count).step_by(GROUP);
+                    tasks.extend(starts.map(|start| GroupTask {
+                        part: GroupSource::From(start),
+                        ..task.clone()
+                    }));
+                }
+                Some(clusters) => tasks.extend(
+                    clusters
+                        .clusters
+                        .iter()
+                        .filter(|cluster| {
+                            !view.cull_cluster(cluster, counters)
+                                && !occlusion.is_some_and(|map| map.cull_cluster(cluster, counters))
+                        })
+                        .map(|cluster| GroupTask {
+                            part: GroupSource::Cluster(cluster),
+                            ..task.clone()
+                        }),
+                ),
+            }
+            sequence = sequence.wrapping_add(append.count);
+        }
+    }
+    Ok(tasks)
+}
+
+/// How an instance is seen.
+struct InstanceView {
+    frustum: Arc<Frustum>,
+    /// The same in the instance's own space, unless nothing is certain there.
+    own: Option<Arc<Frustum>>,
+    model: InstanceTransform,
+}
+
+impl InstanceView {
+    /// Of instances whose opacities are at most `opacity`.
+    fn new(constants: &ViewConstants, opacity: f32) -> Self {
+        let frustum = Arc::new(Frustum::new(constants, opacity));
+        Self {
+            own: Some(Arc::clone(&frustum)),
+            frustum,
+            model: InstanceTransform::default(),
+        }
+    }
+
+    /// Of an instance that a model places and fades.
+    fn of_instance(
+        constants: &ViewConstants,
+        append: &GaussianAppend,
+        instance: u32,
+        opacity: f32,
+    ) -> Self {
+        let model = InstanceTransform::read(append, instance);
+        let frustum = Arc::new(Frustum::new(constants, model.greatest_opacity(opacity)));
+        let own = match model.matrix {
+            None => Some(Arc::clone(&frustum)),
+            Some(matrix) => frustum.within(matrix).map(Arc::new),
+        };
+        Self {
+            frustum,
+            own,
+            model,
+        }
+    }
+
+    /// Whether a whole cluster is outside; its Gaussians are counted then.
+    fn cull_cluster(&self, cluster: &Cluster, counters: &mut Counters) -> bool {
+        let mut bounds = cluster.bounds;
+        bounds.opacity = self.model.greatest_opacity(bounds.opacity);
+        let Some(reason) = self.own.as_ref().and_then(|own| own.excludes(&bounds)) else {
+            return false;
+        };
+        let reason = match reason {
+            Outside::Faint => Counter::SkippedFaint,
+            Outside::Near => Counter::SkippedNear,
+            Outside::Far => Counter::SkippedFar,
+            Outside::Beside => Counter::SkippedOffScreen,
+        };
+        for counter in [reason, Counter::GaussiansRead, Counter::OutsideByClusters] {
+            counters.add(counter, cluster.numbers.len() as u64);
+        }
+        true
+    }
+}

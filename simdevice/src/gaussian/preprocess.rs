@@ -1,0 +1,768 @@
+//! Preprocessing: Gaussians of a group to the rasterizer's nine numbers, with their tiles, colours and keys.
+//!
+//! Everything from the camera-space mean to the conic is computed in binary64 and rounded once at the end: in
+//! binary32 the determinant of a needle and the depth of neighbours are wrong in the fourth digit. What is
+//! culled leaves before the covariance is computed, and spherical harmonics are read only for what reaches a
+//! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
+
+use super::attributes::{Attributes, CoefficientReader, Fetcher, Group, Harmonics};
+use super::camera::{self, LN_2, ViewConstants};
+use super::clusters::Cluster;
+use super::frustum::Frustum;
+use super::instances::{Matrices, cofactors, dot};
+use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, log2};
+use super::panorama;
+use super::ray_depth::RayDepth;
+use super::scratch::{Scratch, ScreenGaussians};
+use super::sort::ordered_bits;
+use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, coefficient_count};
+use super::splat::{ProjectedGroup, Splat, binary16_headroom};
+use super::surfel::surfel_of;
+use super::tiles::find_tiles;
+use super::unscented;
+use crate::packet::GaussianAppend;
+use crate::runtime::Runtime;
+use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision};
+use crate::stats::counters::Counter;
+use crate::stats::counters::Counters;
+use crate::stats::optimizations::Optimization;
+use devmem::{dispatch, host};
+use fearless_simd::{Simd, prelude::*};
+use rayon::prelude::*;
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The most groups that a worker takes at a time: the last ones are waited for.
+const GROUPS_PER_TASK: usize = 4;
+
+/// A group of Gaussians that were read.
+pub(super) struct Source<'a> {
+    /// What reads their colours.
+    pub(super) reader: CoefficientReader<'a>,
+    pub(super) group: Group<'a>,
+    pub(super) attributes: &'a Attributes,
+    /// Matrices that place them in the world, if it is not their own space.
+    pub(super) matrices: Option<&'a Matrices>,
+    /// None is skipped for what its attributes are.
+    pub(super) is_sound: bool,
+    /// Their spherical harmonics, if they were read already.
+    pub(super) harmonics: Harmonics<'a>,
+    /// What bounds those that can be seen; `None` tells nothing of them.
+    pub(super) frustum: Option<&'a Frustum>,
+}
+
+impl Source<'_> {
+    /// Has the spherical harmonics of degrees 0 to `degree` of some lanes on their way while other things are computed.
+    #[inline(always)]
+    fn prefetch_harmonics(&self, degree: u32, lanes: &[usize]) {
+        let count = coefficient_count(degree);
+        for &lane in lanes {
+            match self.harmonics.from(lane) {
+                [] => self.reader.prefetch(&self.group, lane, count),
+                floats => devmem::prefetch(&floats[..floats.len().min(3 * count)]),
+            }
+        }
+    }
+}
+
+/// Projects a group. `sequence` tells of each of its Gaussians which of the set it is.
+#[inline(always)]
+pub(super) fn project<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    source: &Source<'_>,
+    scratch: &mut Scratch,
+    sequence: impl Fn(usize) -> u32,
+    out: &mut ProjectedGroup,
+) {
+    let counters = &mut out.counters;
+    counters.add(Counter::GaussiansRead, source.group.len as u64);
+    let kept = cull(view, simd, source, counters);
+    scratch.gather(source.attributes, &kept);
+    if let Some(matrices) = source.matrices {
+        scratch.gather_matrices(matrices);
+    }
+    flatten(view, simd, source, scratch);
+    emit(view, simd, source, scratch, sequence, out);
+}
+
+/// Finds which lanes have finite spherical harmonics, of all that the group holds.
+#[inline(always)]
+fn find_colored<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>) -> Bits {
+    let reader = &source.reader;
+    let mut coefficients = [0.0; COEFFICIENT_FLOATS];
+    let anywhere = Bases::default();
+    let mut colored = Bits::default();
+    for lane in 0..source.group.len {
+        reader.read(&source.group, lane, &mut coefficients);
+        let color = anywhere.color(simd, view.sh_degree, 0, &coefficients);
+        colored.set_one(lane, color.is_some());
+    }
+    colored
+}
+
+/// Finds which lanes nothing is known against yet, and counts the first reason to skip the others.
+#[inline(always)]
+fn cull<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    source: &Source<'_>,
+    counters: &mut Counters,
+) -> Bits {
+    let len = source.group.len;
+    let mut kept = Bits::first(len);
+    let mut keep = |passed: &Bits, counter: Counter| {
+        let skipped = kept.without(passed).count();
+        counters.add(counter, skipped);
+        kept = kept.and(passed);
+        skipped
+    };
+    if !view.optimizations.has(Optimization::Harmonics) {
+        let colored = find_colored(view, simd, source);
+        keep(&colored, Counter::SkippedNonFinite);
+    }
+    if let Some(matrices) = source.matrices {
+        keep(&matrices.find_finite(len), Counter::SkippedNonFinite);
+    }
+    if !source.is_sound {
+        let [finite, rotated, positive] = find_sound(simd, source.attributes, len);
+        keep(&finite, Counter::SkippedNonFinite);
+        keep(&rotated, Counter::SkippedZeroRotation);
+        keep(&positive, Counter::SkippedNegativeScale);
+    }
+    let bright = find_bright(view, simd, source.attributes, len);
+    keep(&bright, Counter::SkippedFaint);
+    if let Some(frustum) = source.frustum {
+        let outside = frustum.lanes_outside(simd, source.attributes, len);
+        let all = Bits::first(len);
+        keep(&all.without(&outside.near), Counter::SkippedNear);
+        keep(&all.without(&outside.far), Counter::SkippedFar);
+        let beside = all.without(&outside.beside);
+        let skipped = keep(&beside, Counter::SkippedOffScreen);
+        counters.add(Counter::OutsideByBounds, skipped);
+    }
+    kept
+}
+
+/// Which lanes' opacities reach the alpha floor.
+#[inline(always)]
+fn find_bright<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    attributes: &Attributes,
+    len: usize,
+) -> Bits {
+    let mut bright = Bits::default();
+    // The floor is binary32 in the first place.
+    let floor = S::f32s::splat(simd, view.alpha_floor as f32);
+    for at in (0..len).step_by(S::f32s::LEN) {
+        let o = S::f32s::from_slice(simd, &attributes.opacity[at..at + S::f32s::LEN]);
+        bright.set(at, o.simd_ge(floor));
+    }
+    bright
+}
+
+/// Finds the place of the kept Gaussians in camera space.
+#[inline(always)]
+fn place<S: Simd>(view: &ViewConstants, simd: S, scratch: &mut Scratch) {
+    let r = view.rotation;
+    for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
+        let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+        let store = |value: S::f64s, lanes: &mut GroupF64| {
+            value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
+        };
+        let [px, py, pz] = &*scratch.position;
+        let dx = load(px) - view.eye[0];
+        let dy = load(py) - view.eye[1];
+        let dz = load(pz) - view.eye[2];
+        let [x, y, z] = &mut *scratch.offset;
+        store(dx, x);
+        store(dy, y);
+        store(dz, z);
+        let tz = dx * r[6] + dy * r[7] + dz * r[8];
+        let [x, y, z] = &mut *scratch.camera;
+        store(dx * r[0] + dy * r[1] + dz * r[2], x);
+        store(dx * r[3] + dy * r[4] + dz * r[5], y);
+        store(tz, z);
+        store(tz, &mut scratch.depth);
+    }
+}
+
+/// Computes mean, covariance and opacity on the screen of the kept Gaussians.
+#[inline(always)]
+fn flatten<S: Simd>(view: &ViewConstants, simd: S, source: &Source<'_>, scratch: &mut Scratch) {
+    let by_matrices = source.matrices.is_some();
+    if by_matrices {
+        place_by_matrices(view, scratch);
+    } else {
+        place(view, simd, scratch);
+    }
+    let unscented = view.unscented;
+    let is_pinhole = view.model == CameraModel::Pinhole && !by_matrices && !unscented;
+    if !is_pinhole {
+        linearize_group(view, by_matrices, scratch);
+    }
+    if unscented {
+        unscented::transform(view, by_matrices, scratch);
+    }
+    let moments = &*scratch.moments;
+    let toward = match &scratch.placed {
+        Some(placed) if by_matrices => &placed.toward,
+        _ => &*scratch.offset,
+    };
+    let number = |value: f64| S::f64s::splat(simd, value);
+    let load =
+        |lanes: &GroupF64, at: usize| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+    let (scale, rotation, opacity) = (&*scratch.scale, &*scratch.rotation, &*scratch.opacity);
+    let flat = &mut *scratch.flat;
+    let r = view.rotation;
+    let (one, two) = (number(1.0), number(2.0));
+    for at in (0..scratch.lanes.len()).step_by(S::f64s::LEN) {
+        let store = |value: S::f64s, lanes: &mut GroupF64| {
+            value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
+        };
+        let end = scratch.lanes.len().min(at + S::f64s::LEN);
+        source.prefetch_harmonics(view.sh_degree, &scratch.lanes[at..end]);
+        let [w, x] = [load(&rotation[0], at), load(&rotation[1], at)];
+        let [y, z] = [load(&rotation[2], at), load(&rotation[3], at)];
+        // What was binary32 can be squared in binary64, whatever its size.
+        let double = two / (w * w + x * x + y * y + z * z);
+        let [dx, dy, dz] = [double * x, double * y, double * z];
+        let (xx, yy, zz) = (dx * x, dy * y, dz * z);
+        let (xy, xz, yz) = (dx * y, dx * z, dy * z);
+        let (wx, wy, wz) = (dx * w, dy * w, dz * w);
+        let columns = [
+            [one - (yy + zz), xy + wz, xz - wy],
+            [xy - wz, one - (xx + zz), yz + wx],
+            [xz + wy, yz - wx, one - (xx + yy)],
+        ];
+        let scale = [
+            load(&scale[0], at),
+            load(&scale[1], at),
+            load(&scale[2], at),
+        ];
+        let per_depth = one / load(&scratch.camera[2], at);
+        let mut m = [[one; 3]; 2];
+        for axis in 0..2 {
+            let [kx, ky, kz] = if is_pinhole {
+                let slope = load(&scratch.camera[axis], at) * per_depth;
+                let focal = number(view.focal[axis]);
+                store(slope * focal + view.center[axis], &mut flat.mean[axis]);
+                let clamped = slope.max(view.slope_min[axis]).min(view.slope_max[axis]);
+                let to_screen = focal * per_depth;
+                [
+                    to_screen * (number(r[3 * axis]) - clamped * r[6]),
+                    to_screen * (number(r[3 * axis + 1]) - clamped * r[7]),
+                    to_screen * (number(r[3 * axis + 2]) - clamped * r[8]),
+                ]
+            } else {
+                let row = &scratch.jacobian[axis];
+                [load(&row[0], at), load(&row[1], at), load(&row[2], at)]
+            };
+            for part in 0..3 {
+                let [cx, cy, cz] = columns[part];
+                m[axis][part] = scale[part] * (kx * cx + ky * cy + kz * cz);
+            }
+        }
+        let [[ax, ay, az], [bx, by, bz]] = m;
+        let [cx, cy, cz] = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
+        let mut area2 = cx * cx + cy * cy + cz * cz;
+        let mut covariance = [
+            ax * ax + ay * ay + az * az,
+            ax * bx + ay * by + az * bz,
+            bx * bx + by * by + bz * bz,
+        ];
+        if unscented {
+            covariance = [
+                load(&moments[0], at),
+                load(&moments[1], at),
+                load(&moments[2], at),
+            ];
+            area2 = load(&moments[3], at);
+        }
+        shape(view, simd, at, covariance, area2, load(opacity, at), flat);
+
+        let [dx, dy, dz] = toward;
+        let [dx, dy, dz] = [load(dx, at), load(dy, at), load(dz, at)];
+        let unit = one / dx.abs().max(dy.abs()).max(dz.abs());
+        let [dx, dy, dz] = [dx * unit, dy * unit, dz * unit];
+        let per_norm = one / (dx * dx + dy * dy + dz * dz).sqrt();
+        for (lanes, d) in flat.direction.iter_mut().zip([dx, dy, dz]) {
+            store(d * per_norm, lanes);
+        }
+    }
+}
+
+/// What the tile engine and the search for tiles need of Gaussians from lane `at` on, given their covariances on the
+/// screen before the low-pass filter (xx, xy, yy), the determinants of those, and opacities.
+#[inline(always)]
+pub(super) fn shape<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    at: usize,
+    [xx, xy, yy]: [S::f64s; 3],
+    area2: S::f64s,
+    mut o: S::f64s,
+    flat: &mut ScreenGaussians,
+) {
+    let number = |value: f64| S::f64s::splat(simd, value);
+    let store = |value: S::f64s, lanes: &mut GroupF64| {
+        value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
+    };
+    let low_pass = number(view.low_pass);
+    let determinant = area2 + low_pass * (xx + yy) + low_pass * low_pass;
+    store(determinant, &mut flat.determinant);
+    if view.compensated {
+        o *= (area2 / determinant).sqrt();
+    }
+    let log2_opacity = log2(simd, o);
+    store(log2_opacity, &mut flat.log2_opacity);
+
+    let (a, b, c) = (xx + low_pass, xy, yy + low_pass);
+    // alpha = opacity exp(-q / 2) = 2^(log2 opacity - q / (2 ln 2)), and
+    // q = d.x^2 / a + (a / det) (d.y - (b / a) d.x)^2.
+    let unit = (0.5 / LN_2).sqrt();
+    let (per_a, per_c) = (number(1.0) / a, number(1.0) / c);
+    let vertical = (a / determinant).sqrt() * unit;
+    store(per_a.sqrt() * unit, &mut flat.factor[0]);
+    store(-(b * per_a) * vertical, &mut flat.factor[1]);
+    store(vertical, &mut flat.factor[2]);
+    // The tile engine evaluates the exponent in binary32: a margin wider than its error keeps every
+    // pixel that it would accept. What cannot reach the floor even so has a negative extent.
+    let room = log2_opacity - view.log2_floor;
+    let mut extent = (room + room.abs() * 1e-5 + 1e-3) * (2.0 * LN_2);
+    if view.precision == GaussianPrecision::Float16 {
+        for lane in at..at + S::f64s::LEN {
+            let factor = [0, 1, 2].map(|element| flat.factor[element][lane]);
+            let room = flat.log2_opacity[lane] - view.log2_floor;
+            flat.half[0][lane] = binary16_headroom(factor, room) * (2.0 * LN_2);
+        }
+        extent = S::f64s::from_slice(simd, &flat.half[0][at..at + S::f64s::LEN]);
+    }
+    let half_x = (a * extent).sqrt();
+    store(half_x, &mut flat.half[0]);
+    store((c * extent).sqrt(), &mut flat.half[1]);
+    store(b * per_c, &mut flat.slope);
+    store(determinant * per_c * per_c, &mut flat.narrowing);
+    store(b * per_a * half_x, &mut flat.peak);
+}
+
+/// Finds the place of the kept Gaussians in camera space, and from where they are seen in their own.
+pub(super) fn place_by_matrices(view: &ViewConstants, scratch: &mut Scratch) {
+    let Some(placed) = &mut scratch.placed else {
+        return;
+    };
+    let r = &view.rotation;
+    for at in 0..scratch.lanes.len().min(GROUP) {
+        let a = placed.linear(at);
+        let p = scratch.position.each_ref().map(|lanes| lanes[at]);
+        let d =
+            [0, 1, 2].map(|axis| dot(a[axis], p) + (placed.matrix[axis][3][at] - view.eye[axis]));
+        let t = [0, 3, 6].map(|row| d[0] * r[row] + d[1] * r[row + 1] + d[2] * r[row + 2]);
+        // The columns of the inverse, but for the determinant's magnitude.
+        let columns = cofactors(a);
+        let sign = dot(a[0], columns[0]).signum();
+        for axis in 0..3 {
+            scratch.offset[axis][at] = d[axis];
+            scratch.camera[axis][at] = t[axis];
+            let sum = d[0] * columns[0][axis] + d[1] * columns[1][axis] + d[2] * columns[2][axis];
+            placed.toward[axis][at] = sign * sum;
+        }
+        scratch.depth[at] = t[2];
+    }
+}
+
+/// Depths, means and Jacobians of the kept Gaussians, unless a pinhole sees the world itself.
+pub(super) fn linearize_group(view: &ViewConstants, by_matrices: bool, scratch: &mut Scratch) {
+    let [x, y, z] = &*scratch.camera;
+    let placed = scratch.placed.as_deref().filter(|_| by_matrices);
+    let r = &view.rotation;
+    for at in 0..scratch.lanes.len().min(GROUP) {
+        let t = [x[at], y[at], z[at]];
+        scratch.depth[at] = camera::depth(view.model, t);
+        let (place, rows) = camera::linearize(view.model, view.slopes(), t);
+        for (axis, row) in rows.iter().enumerate() {
+            scratch.flat.mean[axis][at] = place[axis] * view.focal[axis] + view.center[axis];
+            let j = row.map(|element| element * view.focal[axis]);
+            let of_column = |column| j[0] * r[column] + j[1] * r[3 + column] + j[2] * r[6 + column];
+            let mut row = [0, 1, 2].map(of_column);
+            if let Some(placed) = placed {
+                row = placed.row_from_world(at, row);
+            }
+            for (lanes, element) in scratch.jacobian[axis].iter_mut().zip(row) {
+                lanes[at] = element;
+            }
+        }
+    }
+}
+
+/// A kept lane's depth as the attachment holds it.
+#[inline(always)]
+fn center_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> u32 {
+    view.depth
+        .map_or(0, |depth| depth.code(scratch.depth[at] as f32))
+}
+
+/// What a kept lane is sorted by.
+#[inline(always)]
+fn key(view: &ViewConstants, at: usize, sequence: u32, scratch: &Scratch) -> u32 {
+    let depth = match view.order {
+        GaussianOrder::ViewDepth => scratch.depth[at],
+        GaussianOrder::RadialDistance => {
+            let [x, y, z] = &*scratch.offset;
+            (x[at] * x[at] + y[at] * y[at] + z[at] * z[at]).sqrt()
+        }
+        // Pixels sort later, and take the order of the draw for equal depths.
+        GaussianOrder::Primitive | GaussianOrder::PerPixel => return sequence,
+    };
+    ordered_bits(depth as f32)
+}
+
+/// What a kept lane is sorted by at a pixel.
+fn ray_depth(view: &ViewConstants, at: usize, scratch: &Scratch) -> RayDepth {
+    let [w, x, y, z] = &*scratch.rotation;
+    let [sx, sy, sz] = &*scratch.scale;
+    let [dx, dy, dz] = &*scratch.offset;
+    RayDepth::new(
+        &view.rotation,
+        [w[at], x[at], y[at], z[at]],
+        [sx[at], sy[at], sz[at]],
+        [dx[at], dy[at], dz[at]],
+    )
+}
+
+/// Finds the tiles and the colour of the kept Gaussians and appends what reaches a tile to `out`.
+#[inline(always)]
+pub(super) fn emit<S: Simd>(
+    view: &ViewConstants,
+    simd: S,
+    source: &Source<'_>,
+    scratch: &mut Scratch,
+    sequence: impl Fn(usize) -> u32,
+    out: &mut ProjectedGroup,
+) {
+    out.reserve(scratch.lanes.len());
+    find_tiles(view, simd, scratch, out);
+    let reader = &source.reader;
+    let degree = view.sh_degree;
+    let floats = reader.floats();
+    let mut read = [0.0; COEFFICIENT_FLOATS];
+    let (mut directions, mut bases) = ([[0.0; DIRECTIONS]; 3], Bases::default());
+    let mut copies = &*scratch.copies;
+    for group in scratch.reached.chunks(DIRECTIONS) {
+        for (parts, lanes) in directions.iter_mut().zip(&scratch.flat.direction) {
+            for (part, &at) in parts.iter_mut().zip(group) {
+                *part = lanes[at % GROUP] as f32;
+            }
+        }
+        bases.find(simd, degree, &directions);
+        let needed = 3 * coefficient_count(degree) + 1;
+        let is_whole = floats + 1 >= needed;
+        // All colours come first: what they wait for memory overlaps then.
+        let mut colored = Colored::default();
+        for (number, &at) in group.iter().enumerate() {
+            let lane = scratch.lanes[at % GROUP];
+            let rest = source.harmonics.from(lane);
+            let coefficients = if is_whole && rest.len() >= needed {
+                rest
+            } else {
+                match rest.get(..floats) {
+                    Some(last) if floats > 0 => read[..floats].copy_from_slice(last),
+                    _ => reader.read(&source.group, lane, &mut read),
+                }
+                &read
+            };
+            match bases.color(simd, degree, number, coefficients) {
+                Some(color) => colored.push(at, color),
+                None => out.counters.add(Counter::SkippedNonFinite, 1),
+            }
+        }
+        let Some(period) = view.period else {
+            append(view, colored.all(), scratch, &sequence, out);
+            continue;
+        };
+        for one in colored.all() {
+            append(view, std::slice::from_ref(one), scratch, &sequence, out);
+            panorama::copy_last(one.at, period, &mut copies, out);
+        }
+    }
+    let counters = &mut out.counters;
+    counters.add(Counter::GaussiansDrawn, out.splats.len() as u64);
+    if view.optimizations.has(Optimization::Harmonics) {
+        let unread = source.group.len - scratch.reached.len();
+        counters.add(Counter::HarmonicsUnread, unread as u64);
+    }
+}
+
+/// Appends kept lanes and their colours to `out`.
+#[inline(always)]
+fn append(
+    view: &ViewConstants,
+    lanes: &[ColoredLane],
+    scratch: &Scratch,
+    sequence: &impl Fn(usize) -> u32,
+    out: &mut ProjectedGroup,
+) {
+    // Iterators that know their lengths write without a look at the room that there is.
+    out.keys.extend(lanes.iter().map(|one| {
+        let sequence = sequence(scratch.lanes[one.at % GROUP]);
+        [key(view, one.at, sequence, scratch), sequence]
+    }));
+    out.splats.extend(lanes.iter().map(|one| {
+        let depth = center_depth(view, one.at, scratch);
+        let wide = view
+            .period
+            .is_some_and(|period| 2.0 * scratch.flat.half[0][one.at] >= period);
+        let splat = Splat::new(&scratch.flat, one.at, one.color, depth);
+        Splat {
+            needs_f64: wide || splat.needs_f64,
+            exceeds_period: wide,
+            ..splat
+        }
+    }));
+    let reaches = lanes.iter().map(|one| scratch.reaches.get(one.at));
+    out.reaches.extend(reaches);
+    if view.geometry == GaussianGeometry::Surfel {
+        let surfels = lanes
+            .iter()
+            .map(|one| surfel_of(view, one.at, scratch, &mut Vec::new()).0);
+        out.surfels.extend(surfels);
+    }
+    if view.order == GaussianOrder::PerPixel {
+        let depths = lanes.iter().map(|one| ray_depth(view, one.at, scratch));
+        out.ray_depths.extend(depths);
+    }
+}
+
+/// A kept lane and its colour.
+#[derive(Clone, Copy, Debug, Default)]
+struct ColoredLane {
+    at: usize,
+    color: [f32; 3],
+}
+
+/// Those of some directions.
+#[derive(Default)]
+struct Colored {
+    lanes: [ColoredLane; DIRECTIONS],
+    len: usize,
+}
+
+impl Colored {
+    #[inline(always)]
+    fn push(&mut self, at: usize, color: [f32; 3]) {
+        self.lanes[self.len % DIRECTIONS] = ColoredLane {
+            at: at % GROUP,
+            color,
+        };
+        self.len += 1;
+    }
+
+    #[inline(always)]
+    fn all(&self) -> &[ColoredLane] {
+        &self.lanes[..self.len.min(DIRECTIONS)]
+    }
+}
+
+/// Which lanes are finite, which have a rotation, and which have no negative scale.
+#[inline(always)]
+fn find_sound<S: Simd>(simd: S, attributes: &Attributes, len: usize) -> [Bits; 3] {
+    let mut sound = [Bits::default(); 3];
+    let zero = S::f32s::splat(simd, 0.0);
+    for at in (0..len).step_by(S::f32s::LEN) {
+        let load =
+            |lanes: &[f32; F32_LANES]| S::f32s::from_slice(simd, &lanes[at..at + S::f32s::LEN]);
+        // Multiplied by zero, what is not finite becomes NaN, and stays it.
+        let mut nothing = load(&attributes.opacity) * zero;
+        let mut least = zero;
+        for lanes in &attributes.scale {
+            least = least.min(load(lanes));
+        }
+        let mut largest = zero;
+        for lanes in &attributes.rotation {
+            let part = load(lanes);
+            nothing += part * zero;
+            largest = largest.max(part.abs());
+        }
+        for lanes in attributes.position.iter().chain(&attributes.scale) {
+            nothing += load(lanes) * zero;
+        }
+        let [finite, rotated, positive] = &mut sound;
+        finite.set(at, nothing.simd_eq(zero));
+        rotated.set(at, largest.simd_gt(zero));
+        positive.set(at, least.simd_ge(zero));
+    }
+    sound
+}
+
+/// A group to project.
+#[derive(Clone)]
+pub(super) struct GroupTask<'a> {
+    pub(super) append: &'a GaussianAppend,
+    pub(super) instance: u32,
+    /// Which Gaussian of the set the instance's first is.
+    pub(super) sequence: u32,
+    pub(super) part: GroupSource<'a>,
+    /// Whether the cluster holds its spherical harmonics.
+    pub(super) has_harmonics: bool,
+    pub(super) frustum: Arc<Frustum>,
+}
+
+#[derive(Clone, Copy)]
+pub(super) enum GroupSource<'a> {
+    /// The vertices from this one on.
+    From(u32),
+    Cluster(&'a Cluster),
+}
+
+impl<'a> GroupTask<'a> {
+    /// Reads the group, if it lies in no cluster, and what its model does to it.
+    pub(super) fn read<'b>(
+        &'b self,
+        fetcher: &mut Fetcher,
+        attributes: &'b mut Attributes,
+        matrices: &'b mut Option<Box<Matrices>>,
+        is_flat: bool,
+    ) -> Source<'b> {
+        let streams = &self.append.attributes;
+        let group = match self.part {
+            GroupSource::From(start) => {
+                let len = (self.append.count - start).min(GROUP as u32) as usize;
+                Group::new(self.append, self.instance, start, len)
+            }
+            GroupSource::Cluster(cluster) => {
+                Group::of_cluster(self.append, self.instance, &cluster.numbers)
+            }
+        };
+        let matrices = streams.model.matrix.as_ref().map(|rows| {
+            let matrices = matrices.get_or_insert_default();
+            matrices.read(fetcher, rows, &group);
+            &**matrices
+        });
+        let is_faded = streams.model.opacity.is_some();
+        let harmonics = match self.part {
+            GroupSource::Cluster(cluster) if self.has_harmonics => cluster.harmonics(),
+            _ => Harmonics::default(),
+        };
+        let (attributes, is_sound) = match self.part {
+            GroupSource::Cluster(cluster) if !is_faded => (&cluster.attributes, cluster.is_sound),
+            GroupSource::Cluster(cluster) => {
+                attributes.clone_from(&cluster.attributes);
+                fetcher.fade(streams, &group, attributes);
+                // Products need not be finite.
+                (&*attributes, false)
+            }
+            GroupSource::From(_) => {
+                fetcher.read_own(streams, &group, attributes);
+                fetcher.fade(streams, &group, attributes);
+                if is_flat {
+                    attributes.scale[2][..group.len].fill(0.0);
+                }
+                (&*attributes, false)
+            }
+        };
+        Source {
+            reader: CoefficientReader::new(&streams.spherical_harmonics),
+            group,
+            attributes,
+            matrices,
+            is_sound,
+            harmonics,
+            frustum: None,
+        }
+    }
+}
+
+/// What projects tasks.
+pub(super) struct Preprocessor<'a> {
+    pub(super) runtime: &'a Runtime,
+    pub(super) constants: &'a ViewConstants,
+    pub(super) is_flat: bool,
+}
+
+impl Preprocessor<'_> {
+    /// Does all tasks.
+    pub(super) fn run(&self, tasks: &[GroupTask<'_>]) -> Vec<ProjectedGroup> {
+        // Each thread makes its scratch once. Nobody else asks for its lock, and no task waits for others, so that none is
+        // begun within another.
+        let workers = (0..rayon::current_num_threads()).map(|_| Mutex::new(None));
+        let workers: Vec<Mutex<Option<Worker>>> = workers.collect();
+        let one = |task| {
+            let own = rayon::current_thread_index().unwrap_or(0) % workers.len();
+            let mut worker = workers[own].lock().unwrap_or_else(PoisonError::into_inner);
+            self.task(worker.get_or_insert_with(Worker::new), task)
+        };
+        let mut groups = host::with_capacity(tasks.len());
+        tasks
+            .par_iter()
+            .with_max_len(GROUPS_PER_TASK)
+            .map(one)
+            .collect_into_vec(&mut groups);
+        groups
+    }
+
+    /// Does a task.
+    fn task(&self, worker: &mut Worker, task: &GroupTask<'_>) -> ProjectedGroup {
+        let Worker {
+            fetcher,
+            attributes,
+            matrices,
+            scratch,
+        } = worker;
+        let mut out = ProjectedGroup::default();
+        let constants = self.constants;
+        let source = task.read(fetcher, attributes, matrices, self.is_flat);
+        // A frustum is for opacities that it was told of.
+        let wider;
+        let mut frustum = &*task.frustum;
+        if let GroupSource::From(_) = task.part {
+            let opacities = &source.attributes.opacity[..source.group.len];
+            let opacity = opacities.iter().copied().fold(1.0, f32::max);
+            if opacity > 1.0 {
+                wider = Frustum::new(constants, opacity);
+                frustum = &wider;
+            }
+        }
+        let placed;
+        let mut bounds = constants
+            .optimizations
+            .has(Optimization::Bounds)
+            .then_some(frustum);
+        if let Some(matrices) = source.matrices {
+            // What is yet to be placed in the world by the same matrix sees the planes where they are for it.
+            let uniform = bounds.and(matrices.uniform());
+            placed = uniform.and_then(|matrix| frustum.within(matrix));
+            bounds = placed.as_ref();
+        }
+        let source = Source {
+            frustum: bounds,
+            ..source
+        };
+        let sequence = |lane: usize| match &task.part {
+            GroupSource::From(start) => task.sequence + start + lane as u32,
+            GroupSource::Cluster(cluster) => task.sequence + cluster.numbers[lane],
+        };
+        dispatch!(self.runtime.level(), simd => project(constants, simd, &source, scratch, sequence, &mut out));
+        out
+    }
+}
+
+/// What a worker keeps from one group to the next.
+struct Worker {
+    fetcher: Fetcher,
+    attributes: Box<Attributes>,
+    /// Made when they are needed.
+    matrices: Option<Box<Matrices>>,
+    scratch: Scratch,
+}
+
+impl Worker {
+    fn new() -> Self {
+        Self {
+            fetcher: Fetcher::default(),
+            attributes: Box::default(),
+            matrices: None,
+            scratch: Scratch::new(),
+        }
+    }
+}

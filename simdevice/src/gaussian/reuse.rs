@@ -1,0 +1,190 @@
+//! Sets that are drawn again as they were: where neither what was read nor the view has changed since, they are still
+//! projected, sorted and binned.
+//!
+//! A set lives in the memory of the positions that it was made from, like clusters: it is gone when that is freed or
+//! written. A buffer has one, that of its last picture, which goes before another is made, so that there are never two.
+
+use super::attributes::{SourceFingerprint, is_device_local};
+use super::clusters::Clusters;
+use super::set::GaussianSet;
+use super::sorted_set::SortedSet;
+use crate::format::Format;
+use crate::packet::{AttributeStream, GaussianAppend};
+use crate::state::gaussian::{Camera, GaussianState};
+use crate::state::{Rect, Viewport};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+/// Everything that a sorted set depends on.
+#[derive(Debug)]
+pub(super) struct Key {
+    /// Those of all attributes of all draws, positions of the first one first.
+    streams: Vec<SourceFingerprint>,
+    /// First vertex, vertices, first instance, instances of each draw.
+    ranges: Vec<[u32; 4]>,
+    /// The clusters of each, which its accounts depend on.
+    clusters: Vec<Weak<Clusters>>,
+    state: Arc<GaussianState>,
+    camera: Camera,
+    viewport: Viewport,
+    bounds: Rect,
+    /// The depth attachment's format, if centres have depths.
+    depth: Option<Format>,
+    /// Whether a fragment program makes the colours, which what is hidden depends on.
+    is_resolved: bool,
+}
+
+#[derive(Debug)]
+struct Entry {
+    key: Key,
+    set: Weak<SortedSet>,
+    bytes: u64,
+}
+
+/// The last sets of a device's buffers, the oldest first.
+#[derive(Debug, Default)]
+pub(crate) struct ReuseCache(Mutex<Vec<Entry>>);
+
+impl Key {
+    /// What `set` depends on; `None` if something of it may change unseen.
+    pub(super) fn new(set: &GaussianSet, clusters: &[Option<Arc<Clusters>>]) -> Option<Self> {
+        let seen = |append: &GaussianAppend| {
+            append.indices.is_none() && attributes(append).all(is_device_local)
+        };
+        if set.appends.is_empty() || !set.draws.is_empty() || !set.appends.iter().all(seen) {
+            return None;
+        }
+        let ranges = set.appends.iter().map(|append| {
+            [
+                append.first,
+                append.count,
+                append.first_instance,
+                append.instance_count,
+            ]
+        });
+        let begin = &set.begin;
+        Some(Self {
+            streams: set
+                .appends
+                .iter()
+                .flat_map(attributes)
+                .map(SourceFingerprint::new)
+                .collect(),
+            ranges: ranges.collect(),
+            clusters: clusters
+                .iter()
+                .map(|clusters| clusters.as_ref().map_or(Weak::new(), Arc::downgrade))
+                .collect(),
+            state: Arc::clone(&begin.state),
+            camera: begin.camera,
+            viewport: begin.viewport,
+            bounds: set.bounds,
+            depth: set.depth.as_ref().map(|_| set.depth_format),
+            is_resolved: set.resolve.is_some(),
+        })
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        let all = |a: &[SourceFingerprint], b: &[SourceFingerprint]| {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.is_same(b))
+        };
+        let view = |key: &Self| {
+            let depths = (key.depth, key.is_resolved);
+            (key.camera, key.viewport, key.bounds, depths)
+        };
+        view(self) == view(other)
+            && self.state == other.state
+            && all(&self.streams, &other.streams)
+            && self.has_same_batches(other)
+    }
+
+    /// Whether the same places in the set are in the same groups of both.
+    fn has_same_batches(&self, other: &Self) -> bool {
+        let mut clusters = self.clusters.iter().zip(&other.clusters);
+        self.ranges == other.ranges && clusters.all(|(a, b)| a.ptr_eq(b))
+    }
+
+    /// Whether both draw the same buffer first.
+    fn is_of_same_buffer(&self, other: &Self) -> bool {
+        let mut first = self.streams.iter().zip(&other.streams).take(1);
+        first.all(|(a, b)| a.is_same_buffer(b))
+    }
+}
+
+impl Entry {
+    fn is_current(&self) -> bool {
+        self.set.strong_count() > 0 && self.key.streams.iter().all(SourceFingerprint::is_current)
+    }
+
+    /// Frees the set.
+    fn release(self) {
+        let positions = self.key.streams.first();
+        let memory = positions.and_then(SourceFingerprint::memory);
+        if let Some((memory, set)) = memory.zip(self.set.upgrade()) {
+            memory.drop_derived(&(set as _));
+        }
+    }
+}
+
+impl ReuseCache {
+    fn lock(&self) -> MutexGuard<'_, Vec<Entry>> {
+        // What a panic left behind is only forgotten sooner.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The set that was made from what has this key. If there is none, what the same buffer last made is freed.
+    pub(super) fn find(&self, key: &Key) -> Option<Arc<SortedSet>> {
+        let mut entries = self.lock();
+        let is_old = |entry: &mut Entry| {
+            let is_other = || entry.key.is_of_same_buffer(key) && !entry.key.is_same(key);
+            !entry.is_current() || is_other()
+        };
+        for entry in entries.extract_if(.., is_old) {
+            entry.release();
+        }
+        let found = entries.iter().find(|entry| entry.key.is_same(key));
+        found.and_then(|found| found.set.upgrade())
+    }
+
+    /// Keeps a set of `bytes`, in place of older ones where all together would take more than `budget`.
+    pub(super) fn keep(&self, key: Key, set: &Arc<SortedSet>, bytes: u64, budget: u64) {
+        if bytes > budget {
+            return;
+        }
+        let Some(memory) = key.streams.first().and_then(SourceFingerprint::memory) else {
+            return;
+        };
+        let mut entries = self.lock();
+        let mut held: u64 = entries.iter().map(|entry| entry.bytes).sum();
+        let goes = |entry: &mut Entry| {
+            let goes = held.saturating_add(bytes) > budget;
+            held -= if goes { entry.bytes } else { 0 };
+            goes
+        };
+        for entry in entries.extract_if(.., goes) {
+            entry.release();
+        }
+        memory.keep_derived(Arc::clone(set) as _);
+        entries.push(Entry {
+            key,
+            set: Arc::downgrade(set),
+            bytes,
+        });
+    }
+}
+
+/// Everything that is read from memory, positions first.
+fn attributes(append: &GaussianAppend) -> impl Iterator<Item = &AttributeStream> {
+    let attributes = &append.attributes;
+    let model = &attributes.model;
+    let shapes = [
+        &attributes.position,
+        &attributes.scale,
+        &attributes.rotation,
+        &attributes.opacity,
+    ];
+    shapes
+        .into_iter()
+        .chain(&attributes.spherical_harmonics)
+        .chain(model.matrix.iter().flat_map(|rows| rows.iter()))
+        .chain(&model.opacity)
+}

@@ -1,0 +1,116 @@
+//! A set of Gaussians that are sorted and drawn together, as packets describe it.
+
+use super::depth::CenterDepth;
+use super::lanes::GROUP;
+use crate::format::Format;
+use crate::packet::Draw;
+use crate::packet::ResolveShader;
+use crate::packet::{GaussianAppend, GaussianBegin};
+use crate::state::gaussian::GaussianGeometry;
+use crate::state::{Rect, Viewport};
+use devmem::host;
+use isa::exec::Stopped;
+
+/// The most groups of a set: a survivor is named by its group and its place there, in 32 bits.
+pub(super) const MAX_GROUPS: u64 = (1 << 32) / GROUP as u64;
+
+/// A set of Gaussians that are sorted and drawn together.
+#[derive(Debug)]
+pub struct GaussianSet {
+    pub(super) begin: GaussianBegin,
+    pub(super) bounds: Rect,
+    pub(super) depth: Option<CenterDepth>,
+    /// What depths are rounded to.
+    pub(super) depth_format: Format,
+    pub(super) resolve: Option<ResolveShader>,
+    pub(super) appends: Vec<GaussianAppend>,
+    /// Those that a vertex program projects, which come after the others.
+    pub(super) draws: Vec<Draw>,
+}
+
+/// A set cannot be drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SortError {
+    /// It has more Gaussians than one draw can sort.
+    #[error(
+        "a sorted set of {groups} groups of Gaussians exceeds the {MAX_GROUPS} that a draw can hold"
+    )]
+    TooManyGaussians {
+        /// How many groups it would take.
+        groups: u64,
+    },
+    /// A vertex program ran for too long.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
+/// The pixels whose centres lie in the viewport.
+fn viewport_pixels(viewport: &Viewport) -> Rect {
+    let span = |start: f32, size: f32| {
+        let (start, end) = (f64::from(start), f64::from(start) + f64::from(size));
+        let first = (start - 0.5).ceil();
+        let last = (end - 0.5).ceil();
+        (first as i32, (last - first).max(0.0) as u32)
+    };
+    let (x, width) = span(viewport.x, viewport.width);
+    let (y, height) = span(viewport.y, viewport.height);
+    Rect {
+        x,
+        y,
+        width,
+        height,
+    }
+}
+
+impl GaussianSet {
+    /// Starts a set that may touch the pixels of `area` which lie in its scissor and its viewport. `depth` is the
+    /// depth attachment's format, if there is one.
+    pub fn begin(begin: &GaussianBegin, area: Rect, depth: Option<Format>) -> Self {
+        let visible = area
+            .intersect(begin.scissor)
+            .intersect(viewport_pixels(&begin.viewport));
+        Self {
+            begin: begin.clone(),
+            bounds: visible,
+            depth: depth
+                .filter(|_| begin.state.depth_stencil.depth.is_some())
+                .map(|format| CenterDepth::new(&begin.camera, &begin.viewport, format)),
+            depth_format: depth.unwrap_or(Format::D32Sfloat),
+            resolve: None,
+            appends: Vec::new(),
+            draws: Vec::new(),
+        }
+    }
+
+    /// Adds Gaussians.
+    pub fn append(&mut self, append: &GaussianAppend) {
+        if append.count > 0 && append.instance_count > 0 {
+            host::push(&mut self.appends, append.clone());
+        }
+    }
+
+    /// Has a fragment program make the colours of the set's fragments.
+    pub fn shade_fragments(&mut self, shader: &ResolveShader) {
+        if shader.program.reads_depth() {
+            let begin = &self.begin;
+            self.depth = Some(CenterDepth::new(
+                &begin.camera,
+                &begin.viewport,
+                self.depth_format,
+            ));
+        }
+        self.resolve = Some(shader.clone());
+    }
+
+    /// Adds Gaussians that a vertex program projects.
+    pub fn append_draw(&mut self, draw: &Draw) {
+        if draw.count > 0 && draw.instance_count > 0 {
+            self.draws.push(draw.clone());
+        }
+    }
+
+    /// Whether it is of 2D Gaussians.
+    pub(super) fn is_flat(&self) -> bool {
+        self.begin.state.geometry == GaussianGeometry::Surfel
+    }
+}

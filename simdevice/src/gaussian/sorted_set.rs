@@ -1,0 +1,153 @@
+//! A sorted set: what preprocessing, sort and binning make of Gaussians, and what the tile engine draws.
+
+use super::camera::period;
+use super::depth::DepthTrend;
+use super::ray_depth::{PixelRays, RayDepth, RayDepths};
+use super::set::GaussianSet;
+use super::splat::{ProjectedGroup, Splat};
+use super::surfel::Surfel;
+use super::tile_lists::TileLists;
+use crate::format::depth::DepthEncoding;
+use crate::packet::ResolveShader;
+use crate::runtime::Runtime;
+use crate::state::Rect;
+use crate::state::gaussian::{GaussianOrder, GaussianState};
+use crate::stats::counters::Counters;
+use crate::stats::optimizations::Optimizations;
+use crate::stats::recorder::DrawRecord;
+use devmem::host;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// The least groups that a worker takes where little is done for each.
+const LEAST_GROUPS: usize = 64;
+
+/// What projection, sort and binning make of a set. Rasterization changes nothing of it.
+#[derive(Debug)]
+pub(crate) struct SortedSet {
+    /// By group; [`locate`](super::splat::locate) finds a primitive's.
+    pub(crate) splats: Vec<Vec<Splat>>,
+    pub(crate) tiles: TileLists,
+    /// By group, as the splats, if they are 2D Gaussians.
+    pub(super) surfels: Option<Vec<Vec<Surfel>>>,
+    /// By group, as the splats, if each pixel sorts for itself.
+    pub(super) ray_depths: Option<Vec<Vec<RayDepth>>>,
+    /// What became of the set's Gaussians.
+    pub(super) counters: Counters,
+}
+
+/// A set that is sorted, binned and immutable, as it is drawn.
+#[derive(Debug)]
+pub struct BinnedDraw {
+    /// What the pipeline fixes.
+    pub state: Arc<GaussianState>,
+    /// The pixels that it may touch.
+    pub bounds: Rect,
+    pub(crate) sorted: Arc<SortedSet>,
+    /// What is left out in its tiles.
+    pub(crate) optimizations: Optimizations,
+    /// What makes the colours of its fragments.
+    pub(crate) resolve: Option<ResolveShader>,
+    /// How its depths are numbers.
+    pub(crate) depth_unit: DepthEncoding,
+    /// How the depths of a tile's list follow one another.
+    pub(crate) depth_trend: DepthTrend,
+    /// Half the pixels after which the picture repeats, or infinity.
+    pub(crate) half_period: f64,
+    /// The pixels' rays.
+    rays: PixelRays,
+    /// Where the work of its tiles goes, if anybody wants to know.
+    pub(crate) record: Option<Arc<DrawRecord>>,
+}
+
+impl SortedSet {
+    /// What the tile engine needs of the groups of `set`, which `tiles` holds; nothing is counted yet.
+    pub(super) fn new(set: &GaussianSet, groups: Vec<ProjectedGroup>, tiles: TileLists) -> Self {
+        let mut splats = host::with_capacity(groups.len());
+        let mut others = host::with_capacity(groups.len());
+        // What else there is of groups goes here; with many, that takes a while.
+        groups
+            .into_par_iter()
+            .with_min_len(LEAST_GROUPS)
+            .map(|group| (group.splats, (group.surfels, group.ray_depths)))
+            .unzip_into_vecs(&mut splats, &mut others);
+        let surfels = others
+            .iter_mut()
+            .map(|others| std::mem::take(&mut others.0));
+        let surfels = set.is_flat().then(|| host::collect(surfels));
+        let is_per_pixel = set.begin.state.order == GaussianOrder::PerPixel;
+        let depths = others.into_iter().map(|others| others.1);
+        let ray_depths = is_per_pixel.then(|| host::collect(depths));
+        Self {
+            splats,
+            tiles,
+            surfels,
+            ray_depths,
+            counters: Counters::default(),
+        }
+    }
+
+    /// Bytes of host memory that it holds.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        let splats = self.splats.iter().map(|group| size_of_val(&**group) as u64);
+        let depths = self.ray_depths.iter().flatten();
+        let depths = depths.map(|group| size_of_val(&**group) as u64);
+        let surfels = self.surfels.iter().flatten();
+        let surfels = surfels.map(|group| size_of_val(&**group) as u64);
+        let lists = self.tiles.memory_bytes();
+        splats.sum::<u64>() + depths.sum::<u64>() + surfels.sum::<u64>() + lists
+    }
+}
+
+impl BinnedDraw {
+    /// What is drawn of `set`, which became `sorted`.
+    pub(super) fn new(
+        set: GaussianSet,
+        sorted: Arc<SortedSet>,
+        record: Option<Arc<DrawRecord>>,
+        runtime: &Runtime,
+    ) -> Self {
+        let begin = set.begin;
+        Self {
+            depth_trend: match (set.depth, begin.state.order) {
+                // What a program sorts by need not follow its depths.
+                (Some(depth), GaussianOrder::ViewDepth) if set.draws.is_empty() => depth.trend(),
+                _ => DepthTrend::None,
+            },
+            depth_unit: set.depth.map_or(DepthEncoding::Float, |depth| depth.unit()),
+            resolve: set.resolve,
+            half_period: period(&begin.camera).map_or(f64::INFINITY, |p| 0.5 * p),
+            rays: PixelRays::new(&begin.camera, &begin.viewport),
+            state: begin.state,
+            bounds: set.bounds,
+            sorted,
+            optimizations: runtime.config().optimizations,
+            record,
+        }
+    }
+
+    /// Bytes of host memory that it holds while it waits to be rendered.
+    pub fn memory_bytes(&self) -> u64 {
+        self.sorted.memory_bytes()
+    }
+
+    /// What the splats are, if they are 2D Gaussians.
+    pub(crate) fn surfels(&self) -> Option<&[Vec<Surfel>]> {
+        self.sorted.surfels.as_deref()
+    }
+
+    /// What pixels sort by, if each does so for itself.
+    pub(crate) fn ray_depths(&self) -> Option<RayDepths<'_>> {
+        let of = self.sorted.ray_depths.as_ref()?;
+        Some(RayDepths {
+            of,
+            rays: self.rays,
+        })
+    }
+
+    /// Whether it may touch a pixel of `rect`.
+    pub fn touches(&self, rect: Rect) -> bool {
+        let shared = self.bounds.intersect(rect);
+        !shared.is_empty() && self.sorted.tiles.any_in(shared)
+    }
+}

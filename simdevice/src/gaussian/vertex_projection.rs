@@ -1,0 +1,366 @@
+//! Gaussians that a vertex program projects: it writes centre, covariance, opacity, colour and perhaps the depth key of
+//! each, and what follows is as with fixed-function projection.
+
+use super::camera::ViewConstants;
+use super::depth::CenterDepth;
+use super::footprint::Visible;
+use super::lanes::{GROUP, GroupF64, NO_GROUP_F64};
+use super::preprocess::shape;
+use super::scratch::Scratch;
+use super::set::GaussianSet;
+use super::sort::ordered_bits;
+use super::splat::{ProjectedGroup, Splat};
+use super::tiles::find_tiles;
+use crate::geometry::points::PointShader;
+use crate::packet::Draw;
+use crate::program::interface::gaussian;
+use crate::runtime::Runtime;
+use crate::stats::counters::Counter;
+use rayon::prelude::*;
+
+use crate::state::Viewport;
+use crate::state::gaussian::{Camera, GaussianOrder};
+
+use devmem::dispatch;
+use devmem::host;
+use fearless_simd::{Level, Simd, prelude::*};
+use isa::exec::Stopped;
+
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// Groups that a worker takes at a time, so that its shader is made rarely.
+const GROUPS_PER_TASK: usize = 16;
+
+/// How what the program writes becomes a Gaussian on the screen.
+struct Shading {
+    /// What is the same for Gaussians of any origin.
+    constants: ViewConstants,
+    /// Half the viewport's extent and its middle, in framebuffer pixels.
+    half: [f64; 2],
+    middle: [f64; 2],
+    order: GaussianOrder,
+    /// Where the depth key is among the varyings, if it is there.
+    writes_key: bool,
+    depth: Option<CenterDepth>,
+}
+
+/// Gaussians of a group that were kept, densely: what the program wrote of each.
+struct Outputs {
+    /// In clip space.
+    position: [GroupF64; 4],
+    covariance: [GroupF64; 3],
+    opacity: GroupF64,
+    color: [[f32; 3]; GROUP],
+    key: [f32; GROUP],
+}
+
+/// A group to shade: of which instance, and the place of its first Gaussian in that and in the set.
+#[derive(Clone, Copy)]
+struct GroupTask {
+    instance: u32,
+    first: u32,
+    sequence: u32,
+}
+
+/// What a worker keeps from one group to the next.
+struct Worker<'a> {
+    shader: PointShader<'a>,
+    shading: Shading,
+    outputs: Box<Outputs>,
+    scratch: Scratch,
+}
+
+/// How many groups a draw takes.
+pub(super) fn groups(draw: &Draw) -> u64 {
+    let per_instance = draw.count.div_ceil(GROUP as u32);
+    u64::from(per_instance) * u64::from(draw.instance_count)
+}
+
+/// Bytes that a draw's vertices take as they are read, and as the Gaussians that the program writes.
+pub(super) fn vertex_bytes(draw: &Draw) -> u64 {
+    let attributes = draw.attributes.iter();
+    let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
+    let index = draw
+        .indices
+        .as_ref()
+        .map_or(0, |indices| indices.index_size);
+    let written = 4 * (4 + u64::from(gaussian::VARYINGS));
+    let vertices = u64::from(draw.count) * u64::from(draw.instance_count);
+    vertices * (read as u64 + u64::from(index) + written)
+}
+
+/// Shades and projects what vertex programs project of a set.
+///
+/// # Errors
+/// [`Stopped`] if a program ran for too long.
+pub(super) fn project_all(
+    set: &GaussianSet,
+    runtime: &Runtime,
+) -> Result<Vec<ProjectedGroup>, Stopped> {
+    let mut sequence = 0u32;
+    for append in &set.appends {
+        let gaussians = append.count.wrapping_mul(append.instance_count);
+        sequence = sequence.wrapping_add(gaussians);
+    }
+    let mut groups = Vec::new();
+    for draw in &set.draws {
+        let shaded = project(set, draw, sequence, runtime)?;
+        host::reserve(&mut groups, shaded.len());
+        groups.extend(shaded);
+        let gaussians = draw.count.wrapping_mul(draw.instance_count);
+        sequence = sequence.wrapping_add(gaussians);
+    }
+    Ok(groups)
+}
+
+/// Shades and projects a draw whose first Gaussian is number `sequence` of the set.
+///
+/// # Errors
+/// [`Stopped`] if the program ran for too long.
+fn project(
+    set: &GaussianSet,
+    draw: &Draw,
+    sequence: u32,
+    runtime: &Runtime,
+) -> Result<Vec<ProjectedGroup>, Stopped> {
+    let Some(viewport) = draw.state.viewports.first() else {
+        return Ok(Vec::new());
+    };
+    let tasks = (0..draw.instance_count).flat_map(|instance| {
+        let start = sequence.wrapping_add(instance.wrapping_mul(draw.count));
+        (0..draw.count).step_by(GROUP).map(move |first| GroupTask {
+            instance,
+            first,
+            sequence: start.wrapping_add(first),
+        })
+    });
+    let tasks = host::collect(tasks);
+    let prepared = draw.vertex_bindings.bind(runtime.level());
+    let (resources, cancel) = (prepared.resources(), AtomicBool::new(false));
+    let worker = || {
+        let shader = PointShader::new(draw, runtime, &resources, &cancel);
+        Worker {
+            shading: Shading::new(set, viewport, &shader, runtime),
+            shader,
+            outputs: Box::default(),
+            scratch: Scratch::new(),
+        }
+    };
+    let one = |worker: &mut Worker<'_>, task: &GroupTask| {
+        if cancel.load(Relaxed) {
+            return Err(Stopped::Cancelled);
+        }
+        let end = draw.count.min(task.first.saturating_add(GROUP as u32));
+        let done = worker.run(task, end, runtime.level());
+        if done.is_err() {
+            cancel.store(true, Relaxed);
+        }
+        done
+    };
+    let mut done = host::with_capacity(tasks.len());
+    runtime.install(|| {
+        tasks
+            .par_iter()
+            .with_min_len(GROUPS_PER_TASK)
+            .map_init(worker, one)
+            .collect_into_vec(&mut done);
+    });
+    draw.vertex_bindings.bump_generations();
+    // That others were cancelled tells nothing.
+    let failures = done.iter().filter_map(|done| done.as_ref().err());
+    match failures.min_by_key(|stopped| **stopped == Stopped::Cancelled) {
+        Some(stopped) => Err(*stopped),
+        None => Ok(host::collect(done.into_iter().flatten())),
+    }
+}
+
+impl Worker<'_> {
+    /// Shades and projects the Gaussians of a group up to `end`.
+    fn run(&mut self, task: &GroupTask, end: u32, level: Level) -> Result<ProjectedGroup, Stopped> {
+        let mut out = ProjectedGroup::default();
+        let (shading, outputs, scratch) = (&self.shading, &mut *self.outputs, &mut self.scratch);
+        self.shader
+            .shade(task.instance, task.first, end, &mut out.counters)?;
+        shading.keep(&self.shader, outputs, scratch, &mut out);
+        dispatch!(level, simd => shading.flatten(simd, outputs, scratch));
+        shading.emit(level, outputs, scratch, task.sequence, &mut out);
+        Ok(out)
+    }
+}
+
+impl Default for Outputs {
+    fn default() -> Self {
+        Self {
+            position: [NO_GROUP_F64; 4],
+            covariance: [NO_GROUP_F64; 3],
+            opacity: NO_GROUP_F64,
+            color: [[0.0; 3]; GROUP],
+            key: [0.0; GROUP],
+        }
+    }
+}
+
+impl Shading {
+    fn new(
+        set: &GaussianSet,
+        viewport: &Viewport,
+        shader: &PointShader<'_>,
+        runtime: &Runtime,
+    ) -> Self {
+        let state = &set.begin.state;
+        let visible = Visible::from(set.bounds);
+        let optimizations = runtime.config().optimizations;
+        // The clip volume takes the place of the camera's planes.
+        let camera = Camera {
+            near_plane: f32::NEG_INFINITY,
+            ..Camera::default()
+        };
+        let half = [viewport.width, viewport.height].map(|size| 0.5 * f64::from(size));
+        Self {
+            constants: ViewConstants::new(state, &camera, viewport, visible, None, optimizations),
+            half,
+            middle: [
+                half[0] + f64::from(viewport.x),
+                half[1] + f64::from(viewport.y),
+            ],
+            order: state.order,
+            writes_key: shader.writes(gaussian::DEPTH_KEY),
+            depth: set.depth,
+        }
+    }
+
+    /// Packs the Gaussians that nothing is known against yet, and counts the first reason to skip the others.
+    fn keep(
+        &self,
+        shader: &PointShader<'_>,
+        kept: &mut Outputs,
+        scratch: &mut Scratch,
+        out: &mut ProjectedGroup,
+    ) {
+        scratch.lanes.clear();
+        let counters = &mut out.counters;
+        for (lane, (position, varyings)) in shader.points().enumerate() {
+            counters.add(Counter::GaussiansRead, 1);
+            let value = |number: u32| {
+                let bits = varyings.get(number as usize).copied().unwrap_or(0);
+                f32::from_bits(bits)
+            };
+            let three = |first: u32| [0, 1, 2].map(|part| value(first + part));
+            let (covariance, color) = (three(gaussian::COVARIANCE), three(gaussian::COLOR));
+            let opacity = value(gaussian::OPACITY);
+            let [_, _, z, w] = position;
+            let key = if self.writes_key {
+                value(gaussian::DEPTH_KEY)
+            } else {
+                w
+            };
+            let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
+            let all_finite = finite(&position)
+                && finite(&covariance)
+                && finite(&color)
+                && finite(&[opacity, key]);
+            let skipped = if !all_finite {
+                Some(Counter::SkippedNonFinite)
+            } else if f64::from(opacity) < self.constants.alpha_floor {
+                Some(Counter::SkippedFaint)
+            } else if w <= 0.0 || z < 0.0 {
+                Some(Counter::SkippedNear)
+            } else if z > w {
+                Some(Counter::SkippedFar)
+            } else {
+                None
+            };
+            if let Some(reason) = skipped {
+                counters.add(reason, 1);
+                continue;
+            }
+            let at = scratch.lanes.len() % GROUP;
+            for (lanes, value) in kept.position.iter_mut().zip(position) {
+                lanes[at] = value.into();
+            }
+            for (lanes, value) in kept.covariance.iter_mut().zip(covariance) {
+                lanes[at] = value.into();
+            }
+            kept.opacity[at] = opacity.into();
+            kept.color[at] = color;
+            // Zero has no sign where depths are compared.
+            kept.key[at] = key + 0.0;
+            scratch.lanes.push(lane);
+        }
+    }
+
+    /// Finds mean, covariance and opacity on the screen of the kept Gaussians.
+    #[inline(always)]
+    fn flatten<S: Simd>(&self, simd: S, kept: &Outputs, scratch: &mut Scratch) {
+        let count = scratch.lanes.len();
+        let (flat, depth) = (&mut *scratch.flat, &mut scratch.depth);
+        let zero = S::f64s::splat(simd, 0.0);
+        for at in (0..count).step_by(S::f64s::LEN) {
+            let load = |lanes: &GroupF64| S::f64s::from_slice(simd, &lanes[at..at + S::f64s::LEN]);
+            let store = |value: S::f64s, lanes: &mut GroupF64| {
+                value.store_slice(&mut lanes[at..at + S::f64s::LEN]);
+            };
+            let w = load(&kept.position[3]);
+            for axis in 0..2 {
+                let place = load(&kept.position[axis]) / w;
+                store(
+                    place * self.half[axis] + self.middle[axis],
+                    &mut flat.mean[axis],
+                );
+            }
+            let [xx, xy, yy] = &kept.covariance;
+            let (xx, xy, yy) = (load(xx), load(xy), load(yy));
+            // Products of binary32 numbers are exact in binary64. Rounding in the program may have left less than
+            // nothing, of which there is no root, and a logarithm of what is no number is that of zero.
+            let area2 = xx * yy - xy * xy;
+            let constants = &self.constants;
+            shape(
+                constants,
+                simd,
+                at,
+                [xx, xy, yy],
+                area2,
+                load(&kept.opacity),
+                flat,
+            );
+            let determinant = load(&flat.determinant);
+            // Both diagonal elements are positive, or neither is, where the determinant is positive.
+            let definite = (xx + constants.low_pass).simd_gt(zero);
+            store(definite.select(determinant, zero), &mut flat.determinant);
+            // In front of no plane that is left.
+            store(zero, depth);
+        }
+    }
+
+    /// Finds the tiles of the kept Gaussians and appends what reaches some to `out`.
+    fn emit(
+        &self,
+        level: Level,
+        kept: &Outputs,
+        scratch: &mut Scratch,
+        sequence: u32,
+        out: &mut ProjectedGroup,
+    ) {
+        out.reserve(scratch.lanes.len());
+        let constants = &self.constants;
+        dispatch!(level, simd => find_tiles(constants, simd, scratch, out));
+        for &at in &scratch.reached {
+            let at = at % GROUP;
+            let sequence = sequence.wrapping_add(scratch.lanes[at] as u32);
+            let key = match self.order {
+                GaussianOrder::ViewDepth | GaussianOrder::RadialDistance => {
+                    ordered_bits(kept.key[at])
+                }
+                GaussianOrder::Primitive | GaussianOrder::PerPixel => sequence,
+            };
+            let [_, _, z, w] = &kept.position;
+            let depth = self.depth.map_or(0, |depth| depth.encode(z[at] / w[at]));
+            out.keys.push([key, sequence]);
+            let splat = Splat::new(&scratch.flat, at, kept.color[at], depth);
+            out.splats.push(splat);
+            out.reaches.push(scratch.reaches.get(at));
+        }
+        let drawn = out.splats.len() as u64;
+        out.counters.add(Counter::GaussiansDrawn, drawn);
+    }
+}

@@ -1,0 +1,151 @@
+//! A tile's list parted by blocks of pixels, for kernels that work off one block after the other.
+
+use super::accumulator::Accumulator;
+use super::depth_ranges::DepthRanges;
+use super::grid::{BLOCKS, ROUND};
+use super::inputs::{Kernel, NO_DEPTH, TileCounts, TileInputs};
+use super::staging::StagedSplat;
+use crate::gaussian::splat::{Splat, binary16_headroom, locate};
+use crate::stats::optimizations::Optimization;
+use crate::stats::recorder;
+use crate::stats::recorder::Run;
+use devmem::host;
+use fearless_simd::{Simd, mask32x16, prelude::*};
+
+/// What may reach each block, in the order of the tile's list.
+pub(super) type BlockLists = [Vec<u32>; BLOCKS];
+
+/// A kernel that composites a block's list, one Gaussian after the other.
+pub(super) trait BlockKernel {
+    /// Begins with a block.
+    fn begin(&mut self, _layer: &Accumulator, _block: usize) {}
+
+    /// Reports whether a pixel of the block is not finished.
+    fn is_open(&self, accumulator: &Accumulator, block: usize) -> bool {
+        accumulator.open_lanes(block) != 0
+    }
+
+    /// Composites the Gaussian at a batch and a place there; returns how many pixels accepted it.
+    fn composite<S: Simd>(
+        &mut self,
+        simd: S,
+        task: &TileInputs<'_>,
+        at: (usize, usize),
+        to: (&mut Accumulator, usize),
+        ranges: &DepthRanges,
+    ) -> u64;
+
+    /// Ends with a block.
+    fn end(&mut self, _layer: &mut Accumulator, _block: usize) {}
+}
+
+/// Composites a tile by a kernel, in the order of its list.
+#[inline(always)]
+pub(super) fn composite_by_block<S: Simd, K: BlockKernel>(
+    simd: S,
+    mut kernel: K,
+    task: &TileInputs<'_>,
+    lists: &mut BlockLists,
+    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
+    runs: Option<&mut Vec<Run>>,
+) -> TileCounts {
+    let mut work = part(simd, task, lists, (accumulator, ranges), runs);
+    let ends_early = task.optimizations.has(Optimization::EarlyTermination);
+    for (block, list) in lists.iter().enumerate() {
+        kernel.begin(accumulator, block);
+        for round in list.chunks(ROUND) {
+            if ends_early && !kernel.is_open(accumulator, block) {
+                break;
+            }
+            for &primitive in round {
+                let at = locate(primitive);
+                work.contributions +=
+                    kernel.composite(simd, task, at, (&mut *accumulator, block), ranges);
+            }
+        }
+        kernel.end(accumulator, block);
+    }
+    work
+}
+
+/// How far alpha may fall in exact arithmetic where binary16 does not put it below `most_fall`.
+fn half_most_fall(splat: &Splat, most_fall: f32) -> f32 {
+    let opacity = f64::from(splat.log2_opacity);
+    (binary16_headroom(splat.factor, opacity + f64::from(most_fall)) - opacity) as f32
+}
+
+/// Parts a tile's list by blocks: what may reach each, in the order of the list.
+#[inline(always)]
+pub(super) fn part<S: Simd>(
+    simd: S,
+    task: &TileInputs<'_>,
+    lists: &mut BlockLists,
+    (accumulator, ranges): (&Accumulator, &DepthRanges),
+    runs: Option<&mut Vec<Run>>,
+) -> TileCounts {
+    let mut work = TileCounts {
+        pairs: task.list.len() as u64,
+        ..TileCounts::default()
+    };
+    let all = mask32x16::splat(simd, true);
+    let bounded = task.optimizations.has(Optimization::Blocks);
+    let tests_depth = task.thresholds.depth_mode > NO_DEPTH;
+    for list in &mut *lists {
+        list.clear();
+    }
+    let mut record = StagedSplat::default();
+    let (mut hidden_alone, recorded) = (0, runs.is_some());
+    for &primitive in task.list {
+        let (batch, place) = locate(primitive);
+        let splat = &task.splats[batch][place];
+        let hidden = tests_depth && ranges.hides(splat.depth);
+        if hidden {
+            work.tiles_hidden += 1;
+            if !recorded {
+                continue;
+            }
+        } else {
+            work.open += BLOCKS as u64;
+        }
+        let most_fall = match task.mode {
+            Kernel::Half => half_most_fall(splat, task.thresholds.most_fall),
+            _ => task.thresholds.most_fall,
+        };
+        let mut reached = match task.mode.surfel((batch, place)) {
+            _ if !bounded => all,
+            Some(surfel) => mask32x16::from_bitmask(simd, surfel.blocks(task.corner)),
+            None if splat.needs_f64 => all,
+            None => record.place(simd, splat, task.corner.map(f64::from), most_fall),
+        };
+        if hidden {
+            hidden_alone += reached.to_bitmask().count_ones();
+            continue;
+        }
+        if tests_depth {
+            let shown = ranges.blocks(simd, splat.depth);
+            work.blocks_hidden += u64::from((reached & !shown).to_bitmask().count_ones());
+            reached &= shown;
+        }
+        let mut reached = reached.to_bitmask();
+        work.items += u64::from(reached.count_ones());
+        while reached != 0 {
+            let list = &mut lists[reached.trailing_zeros() as usize % BLOCKS];
+            host::push(list, primitive);
+            reached &= reached - 1;
+        }
+    }
+    if let Some(runs) = runs {
+        recorder::push_run(
+            runs,
+            Run {
+                primitives: task.list.len() as u32,
+                rows: accumulator.open_rows(),
+                blocks: BLOCKS as u8,
+                reached: work.items as u32,
+                hidden: work.tiles_hidden as u32,
+                hidden_blocks: hidden_alone + work.blocks_hidden as u32,
+            },
+        );
+    }
+    work
+}

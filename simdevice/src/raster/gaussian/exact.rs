@@ -1,0 +1,238 @@
+//! Kernels for what the fast one cannot do in the order of a list: exponents in binary64 at every pixel, and sums in
+//! binary64.
+//!
+//! Sums are in binary64 for draws whose floors let more accumulators be seen through each other than the usual ones do.
+//!
+//! Each accumulator rounds the transmittance and the colour of a pixel. With the usual floors a pixel ends before that is
+//! worth much; without them errors of thousands of accumulators add up beyond the contract. A block's whole list is worked off
+//! at once here, so that its sums stay at hand and are rounded to binary32 only in the end.
+
+use super::accumulator::Accumulator;
+use super::block_lists::BlockKernel;
+use super::depth_ranges::DepthRanges;
+use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
+use super::inputs::{FIND_MEAN, FIND_MEDIAN, Kernel, NO_DEPTH, Thresholds, TileInputs};
+use super::pixels::{accumulate, falls_64};
+use crate::simd::exp2::exp2_of_negated;
+use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
+
+/// What the pixels of a block accumulate; signs of transmittances as in [`Accumulator`].
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Sums {
+    color: [[f64; BLOCK_PIXELS]; 3],
+    transmittance: [f64; BLOCK_PIXELS],
+}
+
+impl Sums {
+    fn load(accumulator: &Accumulator, block: usize) -> Self {
+        Self {
+            color: [0, 1, 2].map(|channel| accumulator.color[channel][block].map(f64::from)),
+            transmittance: accumulator.transmittance[block].map(f64::from),
+        }
+    }
+
+    fn store(&self, accumulator: &mut Accumulator, block: usize) {
+        for (channel, color) in accumulator.color.iter_mut().zip(&self.color) {
+            channel[block] = color.map(|color| color as f32);
+        }
+        accumulator.transmittance[block] = self.transmittance.map(|t| t as f32);
+    }
+
+    /// Whether a pixel is not finished.
+    fn is_open(&self) -> bool {
+        self.transmittance.iter().any(|t| t.is_sign_positive())
+    }
+
+    /// Composites what has an alpha and a colour in the lanes of `reached`, and marks those that it finishes. Returns
+    /// the weights, and in which lanes it is accepted.
+    #[inline(always)]
+    fn add<S: Simd>(
+        &mut self,
+        simd: S,
+        alpha: f32x16<S>,
+        color: [f32; 3],
+        reached: u64,
+        floor: f32,
+    ) -> (f32x16<S>, u64) {
+        let alphas = alpha.widen();
+        let low = self.add_half(simd, 0, alphas.0, color, reached, floor);
+        let high = self.add_half(simd, BLOCK_PIXELS / 2, alphas.1, color, reached, floor);
+        (low.0.narrow(high.0), low.1 | high.1)
+    }
+
+    /// As [`Sums::add`], in half of the lanes.
+    #[inline(always)]
+    fn add_half<S: Simd>(
+        &mut self,
+        simd: S,
+        first: usize,
+        alpha: f64x8<S>,
+        color: [f32; 3],
+        reached: u64,
+        floor: f32,
+    ) -> (f64x8<S>, u64) {
+        let lanes = first..first + BLOCK_PIXELS / 2;
+        let reached = mask64x8::from_bitmask(simd, reached >> first & 0xff);
+        let t = f64x8::from_slice(simd, &self.transmittance[lanes.clone()]);
+        let weight = t * alpha;
+        let rest = t - weight;
+        // As in the fast kernel: a finished pixel's transmittance is negative, and what is left of it fails.
+        let accepted = reached & rest.simd_ge(f64x8::splat(simd, floor.into()));
+        let t = accepted.select(rest, reached.select(-t.abs(), t));
+        t.store_slice(&mut self.transmittance[lanes.clone()]);
+        let weight = accepted.select(weight, f64x8::splat(simd, 0.0));
+        for (sum, color) in self.color.iter_mut().zip(color) {
+            // Not fused, so that all levels agree.
+            let part = weight * f64::from(color);
+            let all = f64x8::from_slice(simd, &sum[lanes.clone()]) + part;
+            all.store_slice(&mut sum[lanes.clone()]);
+        }
+        (weight, accepted.to_bitmask() << first)
+    }
+}
+
+/// Compositing in the order of the list, by sums in binary32.
+pub(super) struct InOrder;
+
+impl BlockKernel for InOrder {
+    #[inline(always)]
+    fn composite<S: Simd>(
+        &mut self,
+        simd: S,
+        task: &TileInputs<'_>,
+        (batch, place): (usize, usize),
+        (accumulator, block): (&mut Accumulator, usize),
+        ranges: &DepthRanges,
+    ) -> u64 {
+        let splat = &task.splats[batch][place];
+        let fall = falls(simd, task, (batch, place), block);
+        let look = (splat.color, splat.depth);
+        accumulate(
+            accumulator,
+            simd,
+            block,
+            fall,
+            look,
+            ranges,
+            task.thresholds,
+        )
+    }
+}
+
+/// Compositing in the order of the list, by sums in binary64.
+pub(super) struct WideSums(Sums);
+
+impl WideSums {
+    /// Sums of no block yet.
+    pub(super) fn new() -> Self {
+        Self(Sums {
+            color: [[0.0; BLOCK_PIXELS]; 3],
+            transmittance: [0.0; BLOCK_PIXELS],
+        })
+    }
+}
+
+impl BlockKernel for WideSums {
+    #[inline(always)]
+    fn begin(&mut self, accumulator: &Accumulator, block: usize) {
+        self.0 = Sums::load(accumulator, block);
+    }
+
+    #[inline(always)]
+    fn is_open(&self, _: &Accumulator, _: usize) -> bool {
+        self.0.is_open()
+    }
+
+    #[inline(always)]
+    fn composite<S: Simd>(
+        &mut self,
+        simd: S,
+        task: &TileInputs<'_>,
+        (batch, place): (usize, usize),
+        (accumulator, block): (&mut Accumulator, usize),
+        ranges: &DepthRanges,
+    ) -> u64 {
+        let splat = &task.splats[batch][place];
+        let fall = falls(simd, task, (batch, place), block);
+        let look = (splat.color, splat.depth);
+        let to = (block, &mut self.0);
+        accumulate_wide(accumulator, simd, to, fall, look, ranges, task.thresholds)
+    }
+
+    #[inline(always)]
+    fn end(&mut self, accumulator: &mut Accumulator, block: usize) {
+        self.0.store(accumulator, block);
+    }
+}
+
+/// As [`accumulate`], to sums that are kept elsewhere.
+#[inline(always)]
+fn accumulate_wide<S: Simd>(
+    accumulator: &mut Accumulator,
+    simd: S,
+    (block, sums): (usize, &mut Sums),
+    fall: f32x16<S>,
+    (color, depth): ([f32; 3], u32),
+    ranges: &DepthRanges,
+    thresholds: Thresholds,
+) -> u64 {
+    let ceiling = f32x16::splat(simd, thresholds.alpha_ceiling);
+    let alpha = exp2_of_negated(simd, fall).min(ceiling);
+    let mut reached = fall.simd_le(f32x16::splat(simd, thresholds.most_fall));
+    if thresholds.depth_mode > NO_DEPTH {
+        reached &= ranges.pixels(simd, block, depth);
+    }
+    // What has fallen too far has no meaning, and may be anything.
+    let alpha = reached.select(alpha, f32x16::splat(simd, 0.0));
+    let before = sums.transmittance;
+    let floor = thresholds.transmittance_floor;
+    let (weight, accepted) = sums.add(simd, alpha, color, reached.to_bitmask(), floor);
+    if thresholds.depth_mode >= FIND_MEDIAN {
+        for (lane, (median, t)) in accumulator.median[block].iter_mut().zip(before).enumerate() {
+            if accepted >> lane & 1 == 1 && t >= 0.5 {
+                *median = depth;
+            }
+        }
+    }
+    if thresholds.depth_mode == FIND_MEAN {
+        let depth = f32x16::splat(simd, thresholds.depth_unit.decode(depth));
+        let [depths, weights] = &mut accumulator.means;
+        let sum = f32x16::from_slice(simd, &depths[block]);
+        weight.mul_add(depth, sum).store_slice(&mut depths[block]);
+        let sum = f32x16::from_slice(simd, &weights[block]) + weight;
+        sum.store_slice(&mut weights[block]);
+    }
+    accumulator.covered[block] |= accepted as u32;
+    u64::from(accepted.count_ones())
+}
+
+/// How far a primitive's alpha has fallen at a block's pixels.
+#[inline(always)]
+pub(super) fn falls<S: Simd>(
+    simd: S,
+    task: &TileInputs<'_>,
+    (batch, place): (usize, usize),
+    block: usize,
+) -> f32x16<S> {
+    let splat = &task.splats[batch][place];
+    let Kernel::Exact {
+        surfels: Some(surfels),
+        inverse_low_pass,
+        ..
+    } = task.mode
+    else {
+        return falls_64(simd, splat, task, block);
+    };
+    let surfel = &surfels[batch][place];
+    let from_mean = |axis: usize| f64::from(task.corner[axis]) - splat.mean[axis];
+    let middle = [BLOCK_X[block] + from_mean(0), BLOCK_Y[block] + from_mean(1)];
+    let opacity = f64x8::splat(simd, splat.log2_opacity.into());
+    let fall = |first: usize| {
+        let dx = f64x8::from_slice(simd, &LANE_X_64[first..first + 8]) + middle[0];
+        let dy = f64x8::from_slice(simd, &LANE_Y_64[first..first + 8]) + middle[1];
+        surfel.falloff(simd, dx, dy, inverse_low_pass) - opacity
+    };
+    let fall: f32x16<S> = fall(0).narrow(fall(8));
+    fall.max(-1.0)
+}

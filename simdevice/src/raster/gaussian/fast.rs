@@ -1,0 +1,235 @@
+//! The fast kernel: volumes in the order of a tile's list, a round of 32 after the other. Each round is staged ([`staging`]):
+//! what the others need of its Gaussians, and which blocks each may reach. Then the alphas of all that are reached are found,
+//! and then blended, block by block ([`pixels`]).
+//!
+//! [`staging`]: super::staging
+//! [`pixels`]: super::pixels
+
+use super::accumulator::{Accumulator, NOT_TERMINATED};
+use super::depth_ranges::DepthRanges;
+use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
+use super::inputs::{DepthMode, NO_DEPTH, TileCounts, TileInputs};
+use super::pixels::{Alphas, evaluate, evaluate_steep};
+use super::staging::{Reaching, StagedRound, hidden_blocks};
+use crate::stats::optimizations::Optimization;
+use crate::stats::recorder;
+use crate::stats::recorder::Run;
+use fearless_simd::{Simd, mask32x16, prelude::*};
+
+/// What the kernel needs besides the pixels.
+#[derive(Debug, Default)]
+pub(super) struct FastScratch {
+    staged: StagedRound,
+    /// Apart, so that both are small enough never to be wanting.
+    alphas: Box<Alphas>,
+}
+
+/// The blocks of a tile that are not finished before a round.
+#[derive(Clone, Copy)]
+struct Open {
+    /// A bit for each.
+    bits: u64,
+    /// How many they are.
+    blocks: u8,
+    /// Rows of pixels with an unfinished one, if work is recorded.
+    rows: u8,
+}
+
+/// Gaussians that are composited together.
+struct Round<'a> {
+    primitives: &'a [u32],
+    /// Those of the round after.
+    next: &'a [u32],
+    open: Open,
+    is_recorded: bool,
+}
+
+/// Composites a task's list.
+#[inline(always)]
+pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
+    scratch: &mut FastScratch,
+    simd: S,
+    task: &TileInputs<'_>,
+    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
+    mut runs: Option<&mut Vec<Run>>,
+) -> TileCounts {
+    let mut work = TileCounts::default();
+    for block in 0..BLOCKS {
+        accumulator.find_most_fall(simd, block, task.thresholds.most_fall);
+    }
+    for primitive in task.list.iter().take(ROUND) {
+        task.prefetch(Some(primitive));
+    }
+    for (number, primitives) in task.list.chunks(ROUND).enumerate() {
+        let rest = &task.list[number * ROUND..];
+        let bits = open_blocks::<_, DEPTH>(simd, task, accumulator, rest, &mut work);
+        if bits == 0 {
+            break;
+        }
+        let open = Open {
+            bits,
+            blocks: bits.count_ones() as u8,
+            rows: if runs.is_some() {
+                accumulator.open_rows()
+            } else {
+                0
+            },
+        };
+        if DEPTH > NO_DEPTH && ranges.rejects_rest(task.splat(primitives[0]).depth, task.trend) {
+            work.tiles_hidden += rest.len() as u64;
+            if let Some(runs) = &mut runs {
+                work.hidden_rest = rest.len() as u32;
+                recorder::push_run(runs, hidden_run(simd, task, rest, open));
+            }
+            break;
+        }
+        let next = rest.get(ROUND..).unwrap_or_default();
+        let before = work;
+        let round = Round {
+            primitives,
+            next,
+            open,
+            is_recorded: runs.is_some(),
+        };
+        let blocks_of_hidden = composite_round::<_, DEPTH>(
+            scratch,
+            simd,
+            task,
+            (&mut *accumulator, ranges),
+            &round,
+            &mut work,
+        );
+        if let Some(runs) = &mut runs {
+            let run = Run {
+                primitives: primitives.len() as u32,
+                rows: open.rows,
+                blocks: open.blocks,
+                reached: (work.items - before.items) as u32,
+                hidden: (work.tiles_hidden - before.tiles_hidden) as u32,
+                hidden_blocks: blocks_of_hidden
+                    + (work.blocks_hidden - before.blocks_hidden) as u32,
+            };
+            recorder::push_run(runs, run);
+        }
+    }
+    accumulator.find_covered(simd);
+    work
+}
+
+/// The blocks that are not finished, a bit for each, before the `rest` of a list. Counts those that are left out since they
+/// have too little light.
+#[inline(always)]
+fn open_blocks<S: Simd, const DEPTH: DepthMode>(
+    simd: S,
+    task: &TileInputs<'_>,
+    accumulator: &Accumulator,
+    rest: &[u32],
+    work: &mut TileCounts,
+) -> u64 {
+    if !task.optimizations.has(Optimization::EarlyTermination) {
+        return ALL_BLOCKS;
+    }
+    let open = accumulator.open_blocks(simd, task.way.light);
+    if DEPTH <= NO_DEPTH && task.way.light != NOT_TERMINATED {
+        let left_out = accumulator.open_blocks(simd, NOT_TERMINATED) & !open;
+        // If no block is open, none will be.
+        let of = if open == 0 {
+            rest.len()
+        } else {
+            rest.len().min(ROUND)
+        };
+        work.blocks_left_out += u64::from(left_out.count_ones()) * of as u64;
+    }
+    open
+}
+
+/// Composites a round. Returns how many blocks those would reach that depths hide in all of the tile, if work is recorded.
+#[inline(always)]
+fn composite_round<S: Simd, const DEPTH: DepthMode>(
+    scratch: &mut FastScratch,
+    simd: S,
+    task: &TileInputs<'_>,
+    (accumulator, ranges): (&mut Accumulator, &DepthRanges),
+    round: &Round<'_>,
+    work: &mut TileCounts,
+) -> u32 {
+    let (open, blocks) = (round.open.bits, u64::from(round.open.blocks));
+    let (mut blocks_of_hidden, mut from) = (0, 0);
+    let reaching = loop {
+        let placed = scratch.staged.place::<_, DEPTH>(
+            simd,
+            task,
+            (round.primitives, from, round.next),
+            (open, ranges),
+            round.is_recorded,
+        );
+        work.open += placed.count * blocks;
+        work.tiles_hidden += placed.tiles_hidden;
+        work.blocks_hidden += placed.blocks_hidden;
+        blocks_of_hidden += placed.blocks_of_hidden;
+        let Some(&primitive) = round.primitives.get(placed.end) else {
+            break placed.reaching;
+        };
+        // It is steep; what is before it is composited first.
+        work.items += count_bits(&placed.reaching);
+        let staged = (&scratch.staged, &mut *scratch.alphas);
+        work.contributions += evaluate::<_, DEPTH>(
+            accumulator,
+            simd,
+            &placed.reaching,
+            staged,
+            ranges,
+            task.thresholds,
+        );
+        let splat = task.splat(primitive);
+        let shown = if DEPTH <= NO_DEPTH {
+            open
+        } else {
+            open & ranges.blocks(simd, splat.depth).to_bitmask()
+        };
+        let exact = u64::from(shown.count_ones());
+        work.open += blocks;
+        work.blocks_hidden += blocks - exact;
+        work.items += exact;
+        work.contributions +=
+            evaluate_steep::<_, DEPTH>(accumulator, simd, splat, shown, ranges, task);
+        from = placed.end + 1;
+    };
+    work.pairs += round.primitives.len() as u64;
+    work.items += count_bits(&reaching);
+    let staged = (&scratch.staged, &mut *scratch.alphas);
+    work.contributions += evaluate::<_, DEPTH>(
+        accumulator,
+        simd,
+        &reaching,
+        staged,
+        ranges,
+        task.thresholds,
+    );
+    blocks_of_hidden
+}
+
+/// What a trace tells of the Gaussians at a list's end that depths hide in all of the tile.
+#[inline(always)]
+fn hidden_run<S: Simd>(simd: S, task: &TileInputs<'_>, rest: &[u32], open: Open) -> Run {
+    let mut run = Run {
+        primitives: rest.len() as u32,
+        rows: open.rows,
+        blocks: open.blocks,
+        hidden: rest.len() as u32,
+        ..Run::default()
+    };
+    let open = mask32x16::from_bitmask(simd, open.bits);
+    for &primitive in rest {
+        run.hidden_blocks += hidden_blocks(simd, task.splat(primitive), task, open);
+    }
+    run
+}
+
+/// How many pairs of a block and a Gaussian there are.
+fn count_bits(reaching: &Reaching) -> u64 {
+    reaching
+        .iter()
+        .map(|bits| u64::from(bits.count_ones()))
+        .sum()
+}

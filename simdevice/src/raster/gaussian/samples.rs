@@ -1,0 +1,29 @@
+//! What becomes of a tile's samples.
+
+use super::grid::{BLOCKS, PixelMask};
+use crate::limits::MAX_SAMPLES;
+
+pub(super) const SAMPLES: usize = MAX_SAMPLES as usize;
+
+/// What becomes of a tile's samples: lanes by sample and block.
+#[derive(Debug, Default)]
+pub(super) struct Samples {
+    /// Those that the draw may touch, and whose stored depth lies within bounds.
+    pub(super) candidates: [PixelMask; SAMPLES],
+    /// Those of them that pass the stencil test.
+    pub(super) tested: [PixelMask; SAMPLES],
+    /// The accumulator that a sample's block is composited in.
+    pub(super) accumulators: [[usize; BLOCKS]; SAMPLES],
+}
+
+impl Samples {
+    /// Leaves alone what was covered and then discarded, as if nothing had reached it.
+    pub(super) fn leave(&mut self, covered: &[PixelMask; SAMPLES], kept: &[PixelMask; SAMPLES]) {
+        let lanes = covered.iter().zip(kept);
+        for (candidates, (covered, kept)) in self.candidates.iter_mut().zip(lanes) {
+            for (block, candidates) in candidates.iter_mut().enumerate() {
+                *candidates &= !(covered[block] & !kept[block]);
+            }
+        }
+    }
+}

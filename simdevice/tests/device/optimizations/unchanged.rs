@@ -1,0 +1,213 @@
+//! What is drawn again as it was is not projected again, and whatever changes is seen.
+
+use super::*;
+use simdevice::program::fragment::GaussianFragmentProgram;
+use simdevice::program::interface::resolve;
+
+/// What changes packets before they are drawn again.
+pub(super) type Edit = Box<dyn FnMut(&mut [Packet])>;
+
+/// Draws `packets` as they are again and again, with a change before each pass but the first; says in which passes sets were
+/// drawn as they had been. Every picture is that of a device without optimizations.
+fn reused(packets: &mut [Packet], mut changes: Vec<Edit>) -> Vec<u64> {
+    let device = Arc::new(Device::new(&single()).unwrap());
+    let mut processor = CommandProcessor::new(device);
+    let mut reused = Vec::new();
+    for pass in 0..=changes.len() {
+        if let Some(change) = pass.checked_sub(1).map(|before| &mut changes[before]) {
+            change(packets);
+        }
+        let counters = draw_as_without_skips(&mut processor, packets);
+        reused.push(counters.get(Counter::SetsUnchanged));
+        assert!(counters.get(Counter::GaussiansDrawn) > 0, "{pass}");
+    }
+    reused
+}
+
+fn nothing() -> Edit {
+    Box::new(|_| {})
+}
+
+pub(super) fn of_begin(mut change: impl FnMut(&mut GaussianBegin) + 'static) -> Edit {
+    Box::new(move |packets| {
+        if let Packet::GaussianBegin(begin) = &mut packets[0] {
+            change(begin);
+        }
+    })
+}
+
+pub(super) fn of_append(mut change: impl FnMut(&mut GaussianAppend) + 'static) -> Edit {
+    Box::new(move |packets| {
+        if let Packet::GaussianAppend(append) = &mut packets[1] {
+            change(append);
+        }
+    })
+}
+
+/// In what only the device writes, without chunks.
+fn few() -> Vec<Packet> {
+    gaussians_in(false, 41, 300, OVER)
+}
+
+#[gaurast_runner::test]
+fn what_has_not_changed_is_drawn_as_it_was() {
+    assert_eq!(reused(&mut few(), vec![nothing(), nothing()]), [0, 1, 1]);
+    // Chunks are made for the second picture, and tell more of what is left out.
+    let mut many = gaussians_in(false, 42, 3000, OVER);
+    let changes = vec![nothing(), nothing(), nothing()];
+    assert_eq!(reused(&mut many, changes), [0, 0, 1, 1]);
+    assert_eq!(reused(&mut placed_in_the_device(), vec![nothing()]), [0, 1]);
+}
+
+#[gaurast_runner::test]
+fn what_the_host_may_write_is_read_again() {
+    let mut packets = gaussians_in(true, 43, 300, OVER);
+    assert_eq!(reused(&mut packets, vec![nothing(), nothing()]), [0, 0, 0]);
+}
+
+#[gaurast_runner::test]
+fn every_change_is_seen() {
+    let state = |change: fn(&mut GaussianState)| {
+        of_begin(move |begin| change(Arc::make_mut(&mut begin.state)))
+    };
+    let changes = vec![
+        of_begin(|begin| begin.camera.eye[0] += 1e-9),
+        of_begin(|begin| begin.viewport.width -= 1.0),
+        of_begin(|begin| begin.scissor.width -= 3),
+        state(|state| state.alpha_floor = 0.1),
+        state(|state| state.low_pass_variance = 0.5),
+        state(|state| state.order = GaussianOrder::PerPixel),
+        state(|state| state.geometry = GaussianGeometry::Surfel),
+        of_append(|append| append.count -= 1),
+        of_append(|append| append.first += 1),
+        of_append(|append| append.attributes.scale.offset += 4),
+        of_append(|append| append.instance_count = 2),
+        of_append(|append| {
+            let memory = &append.attributes.opacity.buffer.memory;
+            memory.write(40, &[0.9f32]).unwrap();
+            memory.bump_generation();
+        }),
+        nothing(),
+    ];
+    let mut expected = vec![0; changes.len()];
+    expected.push(1);
+    assert_eq!(reused(&mut few(), changes), expected);
+}
+
+#[gaurast_runner::test]
+fn what_a_program_resolves_is_a_set_of_its_own() {
+    let device = Arc::new(Device::new(&single()).unwrap());
+    let mut processor = CommandProcessor::new(Arc::clone(&device));
+    let input = |number| {
+        Some(FragmentInput::Varying {
+            index: resolve::ACCUMULATED + number,
+            interpolation: Interpolation::Flat,
+            sampling: Sampling::Center,
+        })
+    };
+    let program = FragmentPrograms {
+        inputs: (0..4).map(input).collect(),
+        ..programs().fragment.unwrap()
+    };
+    let shader = Packet::GaussianResolveShader(Box::new(ResolveShader {
+        program: Arc::new(GaussianFragmentProgram::new(device.level(), &program).unwrap()),
+        bindings: Bindings::default(),
+        sample_shading: false,
+        alpha_to_coverage: false,
+        alpha_to_one: false,
+    }));
+    let packets = few();
+    let target = image(Format::R32G32B32A32Sfloat, 1, 0);
+    let clear = LoadOp::Clear(ClearValue::Float([0.0; 4]));
+    let begin = Packet::BeginRendering(Box::new(rendering(attachment(&target, clear))));
+    let reused = [false, true, true, false, false].map(|is_resolved| {
+        let before = processor.counters().clone();
+        let shader = is_resolved.then_some(&shader);
+        let all = [&begin, &packets[0]].into_iter().chain(shader);
+        for packet in all.chain(&packets[1..]).chain([&Packet::EndRendering]) {
+            processor.execute(packet).unwrap();
+        }
+        let counters = processor.counters().since(&before);
+        counters.get(Counter::SetsUnchanged)
+    });
+    // What is behind others may be left out of the one, and not of the other.
+    assert_eq!(reused, [0, 0, 1, 0, 1]);
+}
+
+/// Two instances, placed by matrices that only the device writes.
+fn placed_in_the_device() -> Vec<Packet> {
+    let mut packets = few();
+    let rows = [
+        [1.0f32, 0.0, 0.0, 0.5],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 0.3],
+    ];
+    let memory = Allocation::new(96, false).unwrap();
+    memory.write(0, rows.as_flattened()).unwrap();
+    memory.write(48, rows.as_flattened()).unwrap();
+    let stream = |row: u32| AttributeStream {
+        buffer: BufferRange {
+            memory: memory.clone(),
+            offset: 0,
+            size: 96,
+        },
+        stride: 48,
+        offset: 16 * row,
+        format: Format::R32G32B32A32Sfloat,
+        instance_divisor: Some(1),
+    };
+    if let Packet::GaussianAppend(append) = &mut packets[1] {
+        append.instance_count = 2;
+        append.attributes.model.matrix = Some(Box::new([stream(0), stream(1), stream(2)]));
+    }
+    packets
+}
+
+/// Gaussians with coefficients of three degrees, of which the second and the third are zero in parts of space.
+pub(super) fn with_bands_of_zeros() -> Vec<Packet> {
+    let mut packets = gaussians_in(false, 44, 4000, OVER);
+    let Packet::GaussianAppend(append) = &mut packets[1] else {
+        panic!("what follows the beginning of a set");
+    };
+    const FLOATS: u32 = 27;
+    let size = 4 * u64::from(FLOATS * append.count);
+    let memory = Allocation::new(size, false).unwrap();
+    for vertex in 0..append.count {
+        let position = &append.attributes.position;
+        let at = u64::from(vertex * position.stride + position.offset);
+        let mut place = [0.0f32; 3];
+        position.buffer.memory.read(at, &mut place).unwrap();
+        let degree = if place[0] > 0.5 {
+            2
+        } else if place[1] > 0.0 {
+            1
+        } else {
+            0
+        };
+        let mut coefficients = [0.0f32; FLOATS as usize];
+        for (k, value) in coefficients.iter_mut().enumerate() {
+            if k < 3 * (degree + 1) * (degree + 1) {
+                *value = ((vertex as usize * 31 + k * 17) % 23) as f32 * 0.04 - 0.3;
+            }
+        }
+        let at = u64::from(4 * FLOATS * vertex);
+        memory.write(at, &coefficients).unwrap();
+    }
+    append.attributes.spherical_harmonics = (0..9)
+        .map(|k| AttributeStream {
+            buffer: BufferRange {
+                memory: memory.clone(),
+                offset: 0,
+                size,
+            },
+            stride: 4 * FLOATS,
+            offset: 12 * k,
+            format: Format::R32G32B32Sfloat,
+            instance_divisor: None,
+        })
+        .collect();
+    if let Packet::GaussianBegin(begin) = &mut packets[0] {
+        Arc::make_mut(&mut begin.state).sh_degree = 2;
+    }
+    packets
+}

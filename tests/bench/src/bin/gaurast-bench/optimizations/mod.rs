@@ -1,0 +1,347 @@
+//! `gaurast-bench optimizations`: what each optimization saves, and what Gaussians cost that nobody sees.
+
+mod instructions;
+
+use std::io::{Write, stdout};
+
+use gaurast_scene::camera::Camera;
+use serde::Serialize;
+
+use super::machine::Machine;
+use super::output::{self, Rows, number};
+use super::pair::{Draws, Pair, time};
+use super::worker::OPTIMIZATIONS;
+use super::{BenchError, Extra, OptimizationsArguments, Source, Workload};
+
+/// Optimizations of Gaussian draws, and the counter of each, as the device has them.
+const COUNTERS: [(&str, &str); 9] = [
+    ("cluster-culling", "outside by clusters"),
+    ("occlusion-culling", "hidden by others"),
+    ("bounds", "outside by bounds"),
+    ("ellipse", "tiles beside ellipse"),
+    ("harmonics", "harmonics unread"),
+    ("blocks", "blocks beside ellipse"),
+    ("early-termination", "blocks saturated"),
+    ("empty-tiles", "tiles untouched"),
+    (TEMPORAL_REUSE, "sets unchanged"),
+];
+
+/// What only a still camera shows.
+const TEMPORAL_REUSE: &str = "temporal-reuse";
+
+/// How a camera goes from frame to frame.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Path {
+    /// As the workload says, which is far enough for nothing of the last frame to help.
+    Own,
+    Still,
+    /// The workload's, five times as far away.
+    Afar,
+}
+
+impl Path {
+    /// The one that shows an optimization.
+    fn of(optimization: &str) -> Self {
+        match optimization {
+            TEMPORAL_REUSE => Self::Still,
+            _ => Self::Own,
+        }
+    }
+
+    /// The views of so many frames.
+    fn views(self, workload: &Workload, frames: usize) -> Result<Vec<Camera>, BenchError> {
+        let own = workload.views(&workload.scene()?, frames)?;
+        let view = |frame: usize| {
+            let goes_on = matches!(self, Self::Own | Self::Afar);
+            let mut view = own[if goes_on { frame } else { 0 }].clone();
+            if self == Self::Afar {
+                view.eye = view.eye.map(|part| 5.0 * part);
+            }
+            view
+        };
+        Ok((0..frames).map(view).collect())
+    }
+
+    /// How its views are drawn.
+    fn draws(self) -> Draws {
+        match self {
+            Self::Own | Self::Afar => Draws::Again(DRAWS),
+            Self::Still => Draws::Once,
+        }
+    }
+}
+
+/// The pictures' size.
+const SIZE: [u32; 2] = [1280, 720];
+
+#[derive(Serialize)]
+struct Results {
+    machine: Machine,
+    threads: usize,
+    runs: usize,
+    /// Each optimization in each scene.
+    optimizations: Vec<Saved>,
+    unseen: Vec<Unseen>,
+}
+
+/// What an optimization saves.
+#[derive(Serialize)]
+struct Saved {
+    scene: String,
+    optimization: &'static str,
+    /// What its counter says of a frame.
+    counter: f64,
+    /// Milliseconds of a frame with all optimizations, but those from frame to frame, of which this one alone is on.
+    with: f64,
+    /// Milliseconds of a frame with this one off, too.
+    without: f64,
+    /// Percent of the latter that it saves: the lower quartile of views, the median and the upper quartile.
+    share: [f64; 3],
+}
+
+/// What Gaussians cost that nobody sees.
+#[derive(Serialize)]
+struct Unseen {
+    kind: &'static str,
+    /// How many.
+    count: usize,
+    /// Milliseconds of a frame with them, and without.
+    with: f64,
+    without: f64,
+    /// Nanoseconds of each in a frame: the lower quartile of views, the median and the upper quartile.
+    each: [f64; 3],
+    /// Of these, what preprocessing takes, which varies less than a frame.
+    to_preprocess: [f64; 3],
+    /// Milliseconds to build chunks, once.
+    chunks: f64,
+}
+
+/// How many times as many Gaussians are unseen as there are in the scene: what one costs is far less than what a frame's time
+/// varies by.
+const UNSEEN_PER_SEEN: usize = 10;
+
+/// How many times as many views their cost is found from as what an optimization saves.
+const UNSEEN_VIEWS_PER_RUN: usize = 2;
+
+/// How often a view is drawn, if that changes nothing.
+const DRAWS: usize = 3;
+
+/// Runs the comparison.
+pub(super) fn run(arguments: &OptimizationsArguments) -> Result<(), BenchError> {
+    if arguments.instructions {
+        return instructions::run(arguments);
+    }
+    let arguments = &arguments.sweep;
+    let runs = arguments
+        .runs
+        .unwrap_or(if arguments.quick { 3 } else { 9 }) as usize;
+    let count = if arguments.quick { 100_000 } else { 300_000 };
+    let mut results = Results {
+        machine: Machine::this(),
+        threads: arguments.threads,
+        runs,
+        optimizations: Vec::new(),
+        unseen: Vec::new(),
+    };
+    let base = Workload::new(Source::Benchmark { count }, SIZE);
+    let with = |extra| Workload {
+        extra: Some(extra),
+        ..base.clone()
+    };
+    let wall = Workload::new(Source::Wall, SIZE);
+    let behind = |count| Workload {
+        extra: Some(Extra::Behind { count }),
+        ..wall.clone()
+    };
+    let plain = Workload {
+        plain: true,
+        ..base.clone()
+    };
+    let scenes = [
+        (base.source.to_string(), base.clone()),
+        (format!("{}, plain colours", base.source), plain),
+        (
+            format!("{}, as many beside the screen", base.source),
+            with(Extra::Beside { count }),
+        ),
+        (format!("{count} behind a wall"), behind(count)),
+    ];
+    for (name, workload) in scenes {
+        results
+            .optimizations
+            .extend(saved(&name, &workload, arguments.threads, runs)?);
+    }
+    let name = format!("{}, still camera", base.source);
+    let saved = saved_by(TEMPORAL_REUSE, &name, &base, arguments.threads, runs)?;
+    results.optimizations.push(saved);
+    let (count, runs) = (UNSEEN_PER_SEEN * count, UNSEEN_VIEWS_PER_RUN * runs);
+    let beside = with(Extra::Beside { count });
+    let pairs = [
+        ("off the screen", beside, base),
+        ("behind a wall", behind(count), wall.clone()),
+    ];
+    for (kind, with, without) in pairs {
+        let unseen = unseen(kind, count, [&with, &without], arguments.threads, runs)?;
+        results.unseen.push(unseen);
+    }
+    let line = results.machine.line();
+    let _ = writeln!(
+        stdout(),
+        "{line}\n{}\n{}",
+        optimization_rows(&results).table(),
+        unseen_rows(&results).table()
+    );
+    let folder = &arguments.output;
+    let about = |views: usize| {
+        let threads = results.threads;
+        format!("{line}; {threads} threads, medians of {views} views; processor time")
+    };
+    let optimizations = optimization_rows(&results).csv(&about(results.runs));
+    output::write(&folder.join("optimizations.csv"), &optimizations)?;
+    let unseen = unseen_rows(&results).csv(&about(runs));
+    output::write(&folder.join("unseen.csv"), &unseen)?;
+    output::write_json(&folder.join("optimizations.json"), &results)
+}
+
+/// What each optimization saves while the camera moves.
+fn saved(
+    scene: &str,
+    workload: &Workload,
+    threads: usize,
+    runs: usize,
+) -> Result<Vec<Saved>, BenchError> {
+    let names = COUNTERS.iter().map(|(name, _)| *name);
+    names
+        .filter(|&name| Path::of(name) == Path::Own)
+        .map(|name| saved_by(name, scene, workload, threads, runs))
+        .collect()
+}
+
+/// What an optimization saves, on the path that shows it.
+fn saved_by(
+    optimization: &'static str,
+    scene: &str,
+    workload: &Workload,
+    threads: usize,
+    runs: usize,
+) -> Result<Saved, BenchError> {
+    let counter = COUNTERS.iter().find(|(name, _)| *name == optimization);
+    let counter = counter.map_or("", |(_, counter)| *counter);
+    let path = Path::of(optimization);
+    let [with, without] = settings(optimization);
+    let setups = [(workload, &*with), (workload, &*without)];
+    let pair = Pair::draw(
+        setups,
+        threads,
+        &path.views(workload, runs + 1)?,
+        path.draws(),
+    )?;
+    let [with, without] = pair.medians(time);
+    let [counted, _] = pair.medians(|frame| frame.counter(counter));
+    Ok(Saved {
+        scene: scene.to_owned(),
+        optimization,
+        counter: counted,
+        with,
+        without,
+        share: pair.quartiles(time, |with, without| 100.0 * (1.0 - with / without)),
+    })
+}
+
+/// What the driver leaves out with an optimization and without it. What saves from frame to frame is on alone, where that is asked
+/// for: it would hide what others save.
+fn settings(optimization: &str) -> [String; 2] {
+    match Path::of(optimization) {
+        Path::Own | Path::Afar => [
+            OPTIMIZATIONS.to_owned(),
+            format!("{OPTIMIZATIONS},-{optimization}"),
+        ],
+        Path::Still => [
+            OPTIMIZATIONS.replace(&format!(",-{optimization}"), ""),
+            OPTIMIZATIONS.to_owned(),
+        ],
+    }
+}
+
+fn unseen(
+    kind: &'static str,
+    count: usize,
+    workloads: [&Workload; 2],
+    threads: usize,
+    runs: usize,
+) -> Result<Unseen, BenchError> {
+    let views = Path::Own.views(workloads[1], runs + 1)?;
+    let setups = workloads.map(|workload| (workload, OPTIMIZATIONS));
+    let pair = Pair::draw(setups, threads, &views, Draws::Again(DRAWS))?;
+    let each = |with: f64, without: f64| (with - without) * 1e6 / count as f64;
+    let [with, without] = pair.medians(time);
+    Ok(Unseen {
+        kind,
+        count,
+        with,
+        without,
+        each: pair.quartiles(time, each),
+        to_preprocess: pair.quartiles(|frame| frame.counter("preprocess"), each),
+        chunks: pair.most(|frame| frame.counter("clusters")),
+    })
+}
+
+fn middle([_, median, _]: [f64; 3]) -> String {
+    format!("{median:.2}")
+}
+
+fn spread([lower, _, upper]: [f64; 3]) -> String {
+    format!("{lower:.2} to {upper:.2}")
+}
+
+fn optimization_rows(results: &Results) -> Rows {
+    let mut rows = Rows::new(&[
+        "scene",
+        "optimization",
+        "counted",
+        "ms with",
+        "ms without",
+        "saved %",
+        "quartiles",
+    ]);
+    for saved in &results.optimizations {
+        rows.rows.push(vec![
+            saved.scene.clone(),
+            saved.optimization.to_owned(),
+            number(saved.counter),
+            number(saved.with),
+            number(saved.without),
+            middle(saved.share),
+            spread(saved.share),
+        ]);
+    }
+    rows
+}
+
+fn unseen_rows(results: &Results) -> Rows {
+    let mut rows = Rows::new(&[
+        "Gaussians",
+        "count",
+        "ms with",
+        "ms without",
+        "ns each",
+        "quartiles",
+        "to preprocess",
+        "their quartiles",
+        "ms for chunks, once",
+    ]);
+    for unseen in &results.unseen {
+        rows.rows.push(vec![
+            unseen.kind.to_owned(),
+            unseen.count.to_string(),
+            number(unseen.with),
+            number(unseen.without),
+            middle(unseen.each),
+            spread(unseen.each),
+            middle(unseen.to_preprocess),
+            spread(unseen.to_preprocess),
+            number(unseen.chunks),
+        ]);
+    }
+    rows
+}
