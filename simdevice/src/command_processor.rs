@@ -114,10 +114,10 @@ impl CommandProcessor {
         match packet {
             Packet::CopyBuffer(copy) => self.transfer(|| transfer::copy_buffer(copy)),
             Packet::CopyBufferToImage(copy) => self.transfer(|| {
-                transfer::copy_buffer_image(copy, Direction::ToImage, self.device.runtime())
+                transfer::copy_buffer_image(copy, Direction::ToImage, self.device.runtime());
             }),
             Packet::CopyImageToBuffer(copy) => self.transfer(|| {
-                transfer::copy_buffer_image(copy, Direction::ToBuffer, self.device.runtime())
+                transfer::copy_buffer_image(copy, Direction::ToBuffer, self.device.runtime());
             }),
             Packet::CopyImage(copy) => self.transfer(|| transfer::copy_image(copy)),
             Packet::BlitImage(blit) => self.transfer(|| transfer::blit_image(blit)),

@@ -3,12 +3,12 @@
 //! they are gone.
 
 use super::attributes::{SourceFingerprint, is_device_local};
-use super::clusters::{self, Clusters};
+use super::clusters;
+use super::clusters::Clusters;
 use super::set::GaussianSet;
 use crate::packet::{AttributeStream, GaussianAppend};
 use crate::runtime::Runtime;
-use crate::stats::counters::Counter;
-use crate::stats::counters::Counters;
+use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Instant;

@@ -10,8 +10,7 @@ use super::preprocess::{GroupSource, GroupTask};
 use super::set::{GaussianSet, MAX_GROUPS, SortError};
 use super::vertex_projection;
 use crate::packet::GaussianAppend;
-use crate::stats::counters::Counter;
-use crate::stats::counters::Counters;
+use crate::stats::counters::{Counter, Counters};
 use devmem::host;
 use std::sync::Arc;
 

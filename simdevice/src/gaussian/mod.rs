@@ -40,8 +40,7 @@ pub use set::{GaussianSet, SortError};
 pub use sorted_set::BinnedDraw;
 
 use crate::runtime::Runtime;
-use crate::stats::counters::Counter;
-use crate::stats::counters::Counters;
+use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use crate::stats::recorder::DrawRecord;
 use caches::Caches;

@@ -14,13 +14,11 @@ use super::set::GaussianSet;
 use super::sort;
 use super::splat::{ProjectedGroup, Splat};
 use crate::limits::TILE_SIZE;
-use crate::state::DepthStencil;
-use crate::state::Rect;
 use crate::state::gaussian::{
     CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState,
 };
-use crate::stats::counters::Counter;
-use crate::stats::counters::Counters;
+use crate::state::{DepthStencil, Rect};
+use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use devmem::host;
 use std::sync::Arc;

@@ -6,12 +6,11 @@
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
 use super::attributes::{Attributes, CoefficientReader, Fetcher, Group, Harmonics};
-use super::camera::{self, LN_2, ViewConstants};
+use super::camera::{LN_2, ViewConstants};
 use super::clusters::Cluster;
 use super::frustum::Frustum;
 use super::instances::{Matrices, cofactors, dot};
 use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, log2};
-use super::panorama;
 use super::ray_depth::RayDepth;
 use super::scratch::{Scratch, ScreenGaussians};
 use super::sort::ordered_bits;
@@ -19,17 +18,15 @@ use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, coeffici
 use super::splat::{ProjectedGroup, Splat, binary16_headroom};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
-use super::unscented;
+use super::{camera, panorama, unscented};
 use crate::packet::GaussianAppend;
 use crate::runtime::Runtime;
 use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision};
-use crate::stats::counters::Counter;
-use crate::stats::counters::Counters;
+use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use devmem::{dispatch, host};
 use fearless_simd::{Simd, prelude::*};
 use rayon::prelude::*;
-
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The most groups that a worker takes at a time: the last ones are waited for.

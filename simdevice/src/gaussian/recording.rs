@@ -37,7 +37,7 @@ impl Projected<'_> {
     }
 
     fn drawn(&self) -> u64 {
-        self.splats.iter().map(|batch| batch.len() as u64).sum()
+        self.splats.iter().map(|group| group.len() as u64).sum()
     }
 }
 

@@ -3,9 +3,7 @@
 use super::depth::CenterDepth;
 use super::lanes::GROUP;
 use crate::format::Format;
-use crate::packet::Draw;
-use crate::packet::ResolveShader;
-use crate::packet::{GaussianAppend, GaussianBegin};
+use crate::packet::{Draw, GaussianAppend, GaussianBegin, ResolveShader};
 use crate::state::gaussian::GaussianGeometry;
 use crate::state::{Rect, Viewport};
 use devmem::host;

@@ -15,7 +15,8 @@ use crate::simd::three;
 use crate::state::Rect;
 use devmem::host;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// The lists of some rows of tiles.
 #[derive(Debug, Default)]

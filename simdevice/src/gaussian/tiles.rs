@@ -11,8 +11,7 @@ use super::surfel::surfel_of;
 use crate::limits::TILE_SIZE;
 use crate::simd::both;
 use crate::state::gaussian::GaussianGeometry;
-use crate::stats::counters::Counter;
-use crate::stats::counters::Counters;
+use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, prelude::*};
 

@@ -15,18 +15,15 @@ use crate::geometry::points::PointShader;
 use crate::packet::Draw;
 use crate::program::interface::gaussian;
 use crate::runtime::Runtime;
-use crate::stats::counters::Counter;
-use rayon::prelude::*;
-
 use crate::state::Viewport;
 use crate::state::gaussian::{Camera, GaussianOrder};
-
-use devmem::dispatch;
-use devmem::host;
+use crate::stats::counters::Counter;
+use devmem::{dispatch, host};
 use fearless_simd::{Level, Simd, prelude::*};
 use isa::exec::Stopped;
-
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Groups that a worker takes at a time, so that its shader is made rarely.
 const GROUPS_PER_TASK: usize = 16;

@@ -18,8 +18,7 @@ use crate::state::gaussian::{
     Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState,
 };
 use crate::stats::optimizations::Optimizations;
-use devmem::Allocation;
-use devmem::dispatch;
+use devmem::{Allocation, dispatch};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -3,14 +3,11 @@
 use super::*;
 use crate::format::Aspect;
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
-
 use crate::packet::*;
 use crate::pass::{Pass, PassDraw};
-
 use crate::raster::blend::Blender;
 use crate::raster::depth::{apply, compare};
 use crate::state::gaussian::{GaussianOrder, GaussianPrecision, GaussianState};
-
 use crate::state::{
     BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, Rect,
     StencilFace, StencilOp,
