@@ -2,16 +2,15 @@
 
 use crate::abi::error::Error;
 use ash::vk;
-use simdevice::Format;
-use simdevice::format::{Channel, Numeric};
-use simdevice::packet::draw::{CompareOp, LogicOp, PolygonMode, StencilFace, StencilOp, Topology};
-use simdevice::packet::{
-    Aspect, BlendEquation, BlendFactor, BlendOp, BlendState, ClearValue, Rect, ResolveMode,
-    Viewport,
+use simdevice::format::{Aspect, Channel, ClearValue, Numeric};
+use simdevice::state::{
+    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, LogicOp, PolygonMode, Rect,
+    ResolveMode, StencilFace, StencilOp, Topology, Viewport,
 };
 use simdevice::texture::{
-    self, AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Swizzle,
+    AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Swizzle,
 };
+use simdevice::{Format, texture};
 use std::ffi::{CStr, c_char};
 
 /// A value that is none of an enumeration's.

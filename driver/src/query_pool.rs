@@ -7,8 +7,9 @@ use crate::device::Device;
 use crate::device_sync::DeviceSync;
 use ash::vk;
 use ash::vk::{QueryPipelineStatisticFlags as Statistic, QueryResultFlags};
-use simdevice::counters::Counter;
-use simdevice::query::{self, QueryKind, QueryResult};
+use simdevice::stats::counters::Counter;
+use simdevice::stats::query;
+use simdevice::stats::query::{QueryKind, QueryResult};
 use std::mem::MaybeUninit;
 use std::sync::Arc;
 use std::time::Duration;
@@ -327,7 +328,7 @@ pub(crate) fn get_query_pool_results(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use simdevice::counters::Counters;
+    use simdevice::stats::counters::Counters;
 
     #[test]
     fn counters_come_in_the_pools_order() {

@@ -6,7 +6,7 @@ use crate::abi::valid;
 use crate::convert;
 use crate::resource::image::ImageView;
 use ash::vk;
-use simdevice::packet::ResolveMode;
+use simdevice::state::ResolveMode;
 use std::sync::Arc;
 
 /// A render pass. Subpasses are rendered one after another; between them attachments are in memory.

@@ -8,11 +8,13 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::counters::{Counter, Counters};
-use simdevice::device::SimdLevel;
 use simdevice::gaussian::{BinnedDraw, GaussianSet, sort, sort_and_bin};
 use simdevice::packet::*;
 use simdevice::raster::gaussian::GaussianTile;
+use simdevice::runtime::SimdLevel;
+use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
+use simdevice::state::{Rect, Viewport};
+use simdevice::stats::counters::{Counter, Counters};
 use simdevice::{Allocation, Config, Device, Format};
 use std::sync::Arc;
 
@@ -157,7 +159,8 @@ fn begin(degree: u32) -> GaussianBegin {
 fn resolve(device: &Device, begin: &GaussianBegin, append: &GaussianAppend) -> BinnedDraw {
     let mut set = GaussianSet::begin(begin, area(), None);
     set.append(append);
-    sort_and_bin(set, device, &mut Counters::default()).expect("not too many")
+    let mut counters = Counters::default();
+    sort_and_bin(set, device.runtime(), device.caches(), &mut counters).expect("not too many")
 }
 
 const COUNT: usize = 50_000;

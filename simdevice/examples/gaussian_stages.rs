@@ -8,13 +8,15 @@
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::counters::{Counter, Counters};
-use simdevice::device::SimdLevel;
+use simdevice::format::ClearValue;
 use simdevice::gaussian::{GaussianSet, sort_and_bin};
 use simdevice::image::{ImageDesc, ImageKind};
-use simdevice::packet::draw::{CompareOp, DepthStencil, DepthTest};
 use simdevice::packet::*;
 use simdevice::pass::{Pass, PassDraw};
+use simdevice::runtime::SimdLevel;
+use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
+use simdevice::state::{CompareOp, DepthStencil, DepthTest, Rect, Viewport};
+use simdevice::stats::counters::{Counter, Counters};
 use simdevice::{Allocation, Config, Device, Format, Image, ImageView};
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -236,11 +238,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut counters = Counters::default();
         let mut set = GaussianSet::begin(&begin, area, Some(Format::D32Sfloat));
         set.append(&append);
-        let draw = sort_and_bin(set, &device, &mut counters)?;
+        let draw = sort_and_bin(set, device.runtime(), device.caches(), &mut counters)?;
         let started = Instant::now();
         let mut pass = Pass::begin(&rendering)?;
-        pass.push(PassDraw::Gaussians(Box::new(draw)), &device, &mut counters)?;
-        pass.end(&device, &mut counters)?;
+        pass.push(
+            PassDraw::Gaussians(Box::new(draw)),
+            device.runtime(),
+            &mut counters,
+        )?;
+        pass.end(device.runtime(), &mut counters)?;
         let raster = started.elapsed().as_secs_f64() * 1e3;
         let ms = |counter| counters.get(counter) as f64 / 1e6;
         times.push([

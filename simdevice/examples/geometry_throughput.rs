@@ -2,15 +2,19 @@
 //!
 //! `cargo run --release -p simdevice --example geometry_throughput`
 
-use simdevice::bindings::Bindings;
-use simdevice::counters::Counter;
-use simdevice::geometry::DrawPipeline;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Address, Format as Element, Program, Rate, Space, Type};
 use simdevice::isa::op::Op;
-use simdevice::packet::draw::*;
 use simdevice::packet::*;
+use simdevice::program::bindings::Bindings;
+use simdevice::program::interface::{
+    DrawPrograms, FragmentInput, FragmentPrograms, Interpolation, Sampling, VertexInput,
+    VertexOutput,
+};
+use simdevice::program::vertex::DrawPipeline;
+use simdevice::state::{BlendState, DrawState, Topology};
+use simdevice::stats::counters::Counter;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
@@ -136,8 +140,9 @@ fn main() {
         ..Config::default()
     };
     let device = Arc::new(Device::new(&config).expect("a device"));
-    println!("{} workers", device.threads());
-    let pipeline = Arc::new(DrawPipeline::new(&device, &programs()).expect("valid programs"));
+    println!("{} workers", device.runtime().threads());
+    let pipeline =
+        Arc::new(DrawPipeline::new(device.level(), &programs()).expect("valid programs"));
     let identity: Vec<u8> = (0..16)
         .flat_map(|at| f32::to_le_bytes(if at % 5 == 0 { 1.0 } else { 0.0 }))
         .collect();

@@ -2,15 +2,23 @@
 //!
 //! `cargo run --release -p simdevice --example raster_throughput [workers [words of a scene's name]]`
 
-use simdevice::bindings::Bindings;
-use simdevice::counters::Counter;
-use simdevice::geometry::DrawPipeline;
+use simdevice::format::ClearValue;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
 use simdevice::isa::op::Op;
-use simdevice::packet::draw::*;
 use simdevice::packet::*;
+use simdevice::program::bindings::Bindings;
+use simdevice::program::interface::{
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+    VertexInput, VertexOutput,
+};
+use simdevice::program::vertex::DrawPipeline;
+use simdevice::state::{
+    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, DrawState,
+    Rect, Topology,
+};
+use simdevice::stats::counters::Counter;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
@@ -237,7 +245,7 @@ fn main() {
         ..Config::default()
     };
     let device = Arc::new(Device::new(&config).expect("a device"));
-    println!("{} workers", device.threads());
+    println!("{} workers", device.runtime().threads());
     for scene in scenes() {
         if wanted.iter().all(|word| scene.name.contains(word.as_str())) {
             measure(&device, &scene);
@@ -247,7 +255,8 @@ fn main() {
 
 /// Draws a scene a few times, and prints the best time of the tile engine.
 fn measure(device: &Arc<Device>, scene: &Scene) {
-    let pipeline = DrawPipeline::new(device, &programs(scene.rounds)).expect("valid programs");
+    let pipeline =
+        DrawPipeline::new(device.level(), &programs(scene.rounds)).expect("valid programs");
     let vertices = buffer(&scene.vertices);
     let stream = |offset| AttributeStream {
         buffer: vertices.clone(),

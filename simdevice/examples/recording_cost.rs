@@ -9,7 +9,7 @@ mod common;
 #[allow(dead_code, missing_docs)]
 mod scenes;
 
-use simdevice::device::SimdLevel;
+use simdevice::runtime::SimdLevel;
 use simdevice::{Config, Device};
 use std::sync::Arc;
 

@@ -7,11 +7,11 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use simdevice::device::SimdLevel;
+use simdevice::format::Aspect;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::ir::{Dimension, ImageShape};
 use simdevice::isa::resources::{ImageUnit, LodRequest, SampleRequest};
-use simdevice::packet::Aspect;
+use simdevice::runtime::SimdLevel;
 use simdevice::texture::{
     AddressMode, CompareOp, Filter, IDENTITY, ImageBinding, ImageTable, MipmapMode, SampledImage,
     Sampler,

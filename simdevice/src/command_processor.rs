@@ -1,17 +1,17 @@
 //! The command processor: the one match over [`Packet`].
 
 use crate::compute;
-use crate::counters::{Counter, Counters};
 use crate::device::Device;
 use crate::gaussian::{self, GaussianSet, SortError};
 use crate::geometry::{FrontEnd, Surface};
-use crate::model::Model;
-use crate::packet::Packet;
-use crate::packet::draw::Draw;
+use crate::hardware_model::HardwareModel;
+use crate::packet::{Draw, Packet};
 use crate::pass::{Pass, PassDraw};
-use crate::query::{QueryKind, host_time};
+use crate::raster::recording;
 use crate::raster::tile::AttachmentError;
-use crate::trace::{DrawRecord, Owner};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::query::{QueryKind, host_time};
+use crate::stats::recorder::{DrawRecord, Owner};
 use crate::transfer::{self, Direction};
 use devmem::host::{self, OutOfMemory};
 use isa::exec::Stopped;
@@ -67,7 +67,7 @@ pub struct CommandProcessor {
     counters: Counters,
     pass: Option<Pass>,
     gaussians: Option<GaussianSet>,
-    model: Model,
+    model: HardwareModel,
 }
 
 impl CommandProcessor {
@@ -81,7 +81,7 @@ impl CommandProcessor {
             counters: Counters::default(),
             pass: None,
             gaussians: None,
-            model: Model::new(owner),
+            model: HardwareModel::new(owner),
         }
     }
 
@@ -113,10 +113,12 @@ impl CommandProcessor {
     fn try_execute(&mut self, packet: &Packet) -> Result<(), ExecutionError> {
         match packet {
             Packet::CopyBuffer(copy) => self.transfer(|| transfer::copy_buffer(copy)),
-            Packet::CopyBufferToImage(copy) => self
-                .transfer(|| transfer::copy_buffer_image(copy, Direction::ToImage, &self.device)),
-            Packet::CopyImageToBuffer(copy) => self
-                .transfer(|| transfer::copy_buffer_image(copy, Direction::ToBuffer, &self.device)),
+            Packet::CopyBufferToImage(copy) => self.transfer(|| {
+                transfer::copy_buffer_image(copy, Direction::ToImage, self.device.runtime());
+            }),
+            Packet::CopyImageToBuffer(copy) => self.transfer(|| {
+                transfer::copy_buffer_image(copy, Direction::ToBuffer, self.device.runtime());
+            }),
             Packet::CopyImage(copy) => self.transfer(|| transfer::copy_image(copy)),
             Packet::BlitImage(blit) => self.transfer(|| transfer::blit_image(blit)),
             Packet::ResolveImage(resolve) => self.transfer(|| transfer::resolve_image(resolve)),
@@ -132,7 +134,7 @@ impl CommandProcessor {
                     return Err(ExecutionError::InsidePass);
                 }
                 let pass = Pass::begin(rendering)?;
-                if let Some(recorder) = self.device.recorder() {
+                if let Some(recorder) = self.device.runtime().recorder() {
                     recorder.begin_frame(self.owner, pass.area());
                 }
                 self.pass = Some(pass);
@@ -163,8 +165,15 @@ impl CommandProcessor {
             }
             Packet::GaussianResolve => {
                 let set = self.gaussians.take().ok_or(ExecutionError::NoGaussianSet)?;
-                let draw = gaussian::sort_and_bin(set, &self.device, &mut self.counters)?;
-                if let Some((recorder, record)) = self.device.recorder().zip(draw.record.as_ref()) {
+                let draw = gaussian::sort_and_bin(
+                    set,
+                    self.device.runtime(),
+                    self.device.caches(),
+                    &mut self.counters,
+                )?;
+                if let Some((recorder, record)) =
+                    self.device.runtime().recorder().zip(draw.record.as_ref())
+                {
                     recorder.add_draw(self.owner, record);
                 }
                 self.draw(PassDraw::Gaussians(Box::new(draw)))
@@ -173,9 +182,9 @@ impl CommandProcessor {
                 if self.pass.is_some() {
                     return Err(ExecutionError::InsidePass);
                 }
-                let recorder = self.device.recorder();
+                let recorder = self.device.runtime().recorder();
                 let before = recorder.map(|_| self.counters.clone());
-                compute::dispatch(dispatch, &self.device, &mut self.counters)?;
+                compute::dispatch(dispatch, self.device.runtime(), &mut self.counters)?;
                 if let (Some(recorder), Some(before)) = (recorder, before) {
                     recorder.add_dispatch(self.owner, &self.counters.since(&before));
                 }
@@ -188,8 +197,9 @@ impl CommandProcessor {
                 if self.gaussians.take().is_some() {
                     return Err(ExecutionError::GaussianSetOpen);
                 }
-                pass.end(&self.device, &mut self.counters)?;
-                self.model.account(&self.device, &mut self.counters, None);
+                pass.end(self.device.runtime(), &mut self.counters)?;
+                self.model
+                    .account(self.device.runtime(), &mut self.counters, None);
                 Ok(())
             }
             // What a query measures is what was done, not what waits.
@@ -197,7 +207,8 @@ impl CommandProcessor {
                 self.flush()?;
                 if pool.kind() == QueryKind::Simulated {
                     let area = self.pass.as_ref().map(Pass::area);
-                    self.model.begin(&self.device, &mut self.counters, area);
+                    self.model
+                        .begin(self.device.runtime(), &mut self.counters, area);
                 }
                 pool.begin(*index, &self.counters);
                 Ok(())
@@ -206,7 +217,8 @@ impl CommandProcessor {
                 self.flush()?;
                 if pool.kind() == QueryKind::Simulated {
                     let area = self.pass.as_ref().map(Pass::area);
-                    self.model.end(&self.device, &mut self.counters, area);
+                    self.model
+                        .end(self.device.runtime(), &mut self.counters, area);
                 }
                 pool.end(*index, &self.counters);
                 Ok(())
@@ -244,7 +256,7 @@ impl CommandProcessor {
     fn draw(&mut self, draw: PassDraw) -> Result<(), ExecutionError> {
         self.outside_gaussian_set()?;
         let pass = self.pass.as_mut().ok_or(ExecutionError::OutsidePass)?;
-        Ok(pass.push(draw, &self.device, &mut self.counters)?)
+        Ok(pass.push(draw, self.device.runtime(), &mut self.counters)?)
     }
 
     /// Points, lines or triangles, part by part.
@@ -257,17 +269,17 @@ impl CommandProcessor {
             depth: pass.depth_format(),
         };
         let device = Arc::clone(&self.device);
-        let recorder = device.recorder();
+        let recorder = device.runtime().recorder();
         let record = recorder.map(|recorder| {
-            let record = DrawRecord::new(DrawRecord::primitives());
+            let record = DrawRecord::new(recording::no_primitives());
             recorder.add_draw(self.owner, &record);
             record
         });
         let mut before = recorder.map(|_| self.counters.clone());
-        let mut front = FrontEnd::new(draw, surface, &device, &mut self.counters);
+        let mut front = FrontEnd::new(draw, surface, device.runtime(), &mut self.counters);
         while let Some(mut part) = front.next_part(&mut self.counters)? {
             if let (Some(record), Some(before)) = (&record, &before) {
-                record.add_front_end(&self.counters.since(before), draw, &part);
+                recording::add_front_end(record, &self.counters.since(before), draw, &part);
             }
             part.record = record.clone();
             self.draw(PassDraw::Primitives(Box::new(part)))?;
@@ -278,18 +290,19 @@ impl CommandProcessor {
 
     /// The time of a timestamp in nanoseconds.
     fn now(&mut self) -> u64 {
-        if !self.device.config().simulated_timestamps {
+        if !self.device.runtime().config().simulated_timestamps {
             return host_time();
         }
         let area = self.pass.as_ref().map(Pass::area);
-        self.model.account(&self.device, &mut self.counters, area);
+        self.model
+            .account(self.device.runtime(), &mut self.counters, area);
         self.counters.get(Counter::SimulatedTime)
     }
 
     /// Renders what waits in the pass, if there is one.
     fn flush(&mut self) -> Result<(), ExecutionError> {
         if let Some(pass) = &mut self.pass {
-            pass.flush(&self.device, &mut self.counters)?;
+            pass.flush(self.device.runtime(), &mut self.counters)?;
         }
         Ok(())
     }

@@ -1,100 +1,17 @@
 //! Dispatches: workgroups of a compute program, a batch each, run in any order by the device's workers.
 
-use crate::bindings::Bindings;
-use crate::counters::{Counter, Counters};
-use crate::device::Device;
-use isa::exec::{Executable, LaneMask, Machine, Options, Stopped, Watchdog, Work};
-use isa::ir::{CHUNK_LANES, Program};
+use crate::packet::Dispatch;
+use crate::program::interface::ComputeInput;
+use crate::program::pool::PooledMachine;
+use crate::runtime::Runtime;
+use crate::stats::counters::{Counter, Counters};
+use isa::exec::{LaneMask, Machine, Stopped, Watchdog};
 use isa::resources::Resources;
-use isa::validate::InvalidProgram;
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
-
-/// The most invocations of a workgroup.
-pub const MAX_WORKGROUP_INVOCATIONS: u32 = 1024;
-
-/// The most bytes of workgroup memory that a program should ask for.
-pub const MAX_SHARED_BYTES: u32 = 64 << 10;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
 /// How many pieces each worker's share of a dispatch is cut into, so that workers end together.
 const PIECES_PER_WORKER: u64 = 16;
-
-/// What the device puts into a program's input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ComputeInput {
-    /// The workgroup's number along an axis: 0 to 2.
-    WorkgroupId(usize),
-    /// How many workgroups the dispatch has along an axis: 0 to 2.
-    WorkgroupCount(usize),
-}
-
-/// A program ready to be dispatched on one device.
-#[derive(Debug)]
-pub struct ComputeProgram {
-    executable: Arc<Executable>,
-    inputs: Vec<Option<ComputeInput>>,
-    invocations: usize,
-    /// Machines of earlier dispatches, to be used again.
-    idle: Mutex<Vec<Machine>>,
-}
-
-/// See [`Packet::Dispatch`](crate::Packet::Dispatch).
-#[derive(Clone, Debug)]
-pub struct Dispatch {
-    /// What each workgroup runs.
-    pub program: Arc<ComputeProgram>,
-    /// The first workgroup's number in x, y and z.
-    pub base: [u32; 3],
-    /// How many workgroups there are in x, y and z.
-    pub count: [u32; 3],
-    /// What the program is bound to.
-    pub bindings: Bindings,
-}
-
-impl ComputeProgram {
-    /// Makes a program ready. A workgroup has `invocations`, which are the batch's first lanes in order of their
-    /// index; `inputs` says by slot what the program's inputs are.
-    ///
-    /// # Errors
-    /// [`InvalidProgram`] if the program cannot run on the device, be it for the size of its workgroups.
-    pub fn new(
-        device: &Device,
-        program: Program,
-        invocations: u32,
-        subgroup_size: u32,
-        inputs: Vec<Option<ComputeInput>>,
-    ) -> Result<Self, InvalidProgram> {
-        let invocations = invocations as usize;
-        let options = Options {
-            lanes: invocations.next_multiple_of(CHUNK_LANES),
-            subgroup_size: subgroup_size as usize,
-            count_work: true,
-            level: device.level(),
-        };
-        Ok(Self {
-            executable: Arc::new(Executable::new(program, &options)?),
-            inputs,
-            invocations,
-            idle: Mutex::default(),
-        })
-    }
-
-    fn machine(&self) -> Machine {
-        let idle = self
-            .idle
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .pop();
-        idle.unwrap_or_else(|| Machine::new(Arc::clone(&self.executable)))
-    }
-
-    fn put_back(&self, machine: Machine) {
-        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        idle.push(machine);
-    }
-}
 
 /// Runs all workgroups of a dispatch.
 ///
@@ -102,39 +19,44 @@ impl ComputeProgram {
 /// [`Stopped`] if one ran for too long. What was written until then stays written.
 pub(crate) fn dispatch(
     dispatch: &Dispatch,
-    device: &Device,
+    runtime: &Runtime,
     counters: &mut Counters,
 ) -> Result<(), Stopped> {
     let Some(groups) = group_count(dispatch.count).filter(|&groups| groups > 0) else {
         return Ok(());
     };
-    let prepared = dispatch.bindings.prepare(device.level());
-    let threads = device.threads() as u64;
-    let job = Job {
+    let prepared = dispatch.bindings.bind(runtime.level());
+    let piece = groups / (runtime.threads() as u64 * PIECES_PER_WORKER);
+    let cancel = AtomicBool::new(false);
+    let run = DispatchRun {
         dispatch,
-        groups,
-        piece: (groups / (threads * PIECES_PER_WORKER)).max(1),
-        next: AtomicU64::new(0),
-        cancel: AtomicBool::new(false),
         resources: prepared.resources(),
-        limit: device.config().shader_timeout,
+        watchdog: Watchdog {
+            limit: runtime.config().shader_timeout,
+            cancel: Some(&cancel),
+        },
     };
     let started = Instant::now();
-    let ran = match groups.min(threads) {
-        1 => job.work(),
-        workers => device.install(|| {
-            let results = (0..workers).into_par_iter().map(|_| job.work());
-            results.reduce(|| Ok(Work::default()), merge)
-        }),
-    };
+    let (machines, ran) = runtime.share(
+        0..groups,
+        piece.max(1),
+        &cancel,
+        || run.machine(),
+        |machine, group| run.run_group(machine, group),
+    );
     dispatch.bindings.bump_generations();
     counters.add(Counter::ShaderTime, started.elapsed().as_nanos() as u64);
     counters.add(
         Counter::ComputeInvocations,
         groups.saturating_mul(dispatch.program.invocations as u64),
     );
-    counters.add_work(&ran?);
-    Ok(())
+    for mut machine in machines {
+        let work = machine.take_work();
+        if ran.is_ok() {
+            counters.add_work(&work);
+        }
+    }
+    ran
 }
 
 /// How many workgroups a dispatch has; `None` if nobody could count them.
@@ -144,58 +66,25 @@ fn group_count(count: [u32; 3]) -> Option<u64> {
         .try_fold(1u64, |product, count| product.checked_mul(count.into()))
 }
 
-/// Both results' work, or the first reason why one stopped; that others were cancelled then tells nothing.
-fn merge(a: Result<Work, Stopped>, b: Result<Work, Stopped>) -> Result<Work, Stopped> {
-    match (a, b) {
-        (Ok(mut a), Ok(b)) => {
-            a.add(&b);
-            Ok(a)
-        }
-        (Err(Stopped::Cancelled), Err(stopped)) | (Err(stopped), _) | (_, Err(stopped)) => {
-            Err(stopped)
-        }
-    }
-}
-
 /// A dispatch while workers share it.
-struct Job<'a> {
+struct DispatchRun<'a> {
     dispatch: &'a Dispatch,
-    groups: u64,
-    /// Workgroups that a worker takes at a time.
-    piece: u64,
-    /// The first workgroup that nobody took.
-    next: AtomicU64,
-    /// Set when one worker stopped, so that the others do, too.
-    cancel: AtomicBool,
     resources: Resources<'a>,
-    limit: Duration,
+    watchdog: Watchdog<'a>,
 }
 
-impl Job<'_> {
-    /// One worker's share: takes workgroups until none is left.
-    fn work(&self) -> Result<Work, Stopped> {
-        let program = &self.dispatch.program;
-        let mut machine = program.machine();
+impl DispatchRun<'_> {
+    /// A machine with what is the same for all workgroups.
+    fn machine(&self) -> PooledMachine<'_> {
+        let mut machine = self.dispatch.program.machines.lend();
         self.set_inputs(&mut machine, |input| match input {
             ComputeInput::WorkgroupCount(axis) => Some(self.dispatch.count[axis]),
             ComputeInput::WorkgroupId(_) => None,
         });
-        let mut ran = Ok(());
-        while ran.is_ok() {
-            let first = self.next.fetch_add(self.piece, Relaxed);
-            if first >= self.groups || self.cancel.load(Relaxed) {
-                break;
-            }
-            let last = (first + self.piece).min(self.groups);
-            ran = (first..last).try_for_each(|group| self.run(&mut machine, group));
-        }
-        let work = machine.take_work();
-        program.put_back(machine);
-        ran.inspect_err(|_| self.cancel.store(true, Relaxed))?;
-        Ok(work)
+        machine
     }
 
-    fn run(&self, machine: &mut Machine, group: u64) -> Result<(), Stopped> {
+    fn run_group(&self, machine: &mut Machine, group: u64) -> Result<(), Stopped> {
         let [width, height, _] = self.dispatch.count.map(u64::from);
         let number = [
             group % width,
@@ -211,10 +100,7 @@ impl Job<'_> {
             &LaneMask::first(self.dispatch.program.invocations),
             &LaneMask::none(),
             &self.resources,
-            Watchdog {
-                limit: self.limit,
-                cancel: Some(&self.cancel),
-            },
+            self.watchdog,
         )
     }
 

@@ -5,35 +5,37 @@
 //! the driver lowers Vulkan state to packets.
 //!
 //! Data flows one way: packets -> geometry and Gaussian preprocessing -> binning -> the tile engine -> memory.
-//! [`counters`] records the work that was done.
+//! [`stats::counters`] records the work that was done. A module imports only those before it: [`limits`], [`state`] and the
+//! vector helpers; [`format`] and [`stats`]; [`image`] and [`runtime`]; [`texture`]; [`program`]; [`packet`]; [`geometry`],
+//! [`compute`] and [`transfer`]; [`gaussian`]; [`raster`]; [`pass`]; [`command_processor`].
 #![forbid(unsafe_code)]
 
-pub mod bindings;
 pub mod command_processor;
 pub mod compute;
-pub mod counters;
 pub mod device;
 pub mod format;
 pub mod gaussian;
 pub mod geometry;
+mod hardware_model;
 pub mod image;
-mod lanes;
-mod model;
-pub mod optimizations;
+pub mod limits;
 pub mod packet;
 pub mod pass;
-pub mod query;
+pub mod program;
 pub mod raster;
+pub mod runtime;
+mod simd;
+pub mod state;
+pub mod stats;
 pub mod texture;
-pub mod trace;
 pub mod transfer;
-mod workers;
 
 pub use command_processor::CommandProcessor;
-pub use device::{Config, Device};
+pub use device::Device;
 pub use devmem::{Allocation, host};
 pub use format::Format;
 pub use image::{Image, ImageView};
 pub use isa;
 pub use packet::Packet;
+pub use runtime::Config;
 pub use timing;

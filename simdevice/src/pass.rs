@@ -3,25 +3,26 @@
 //! Every macro-tile is rendered by one worker that runs all draws in submission order against its tile buffers, so
 //! that the image depends neither on the number of workers nor on when the pass is flushed.
 
-use crate::counters::{Counter, Counters};
-use crate::device::{Device, FlushPolicy};
-use crate::format::Format;
+use crate::format::{Aspect, ClearValue, Format};
 use crate::gaussian::BinnedDraw;
 use crate::geometry::PrimitiveDraw;
 use crate::image::ImageView;
-use crate::optimizations::Optimization;
-use crate::packet::{
-    Aspect, Attachment, AttachmentClear, ClearAttachments, ClearValue, LoadOp, Rect, Rendering,
-    ResolveMode, StoreOp,
-};
-use crate::raster::Plane;
+use crate::limits::{MAX_FRAMEBUFFER_LAYERS, MAX_FRAMEBUFFER_SIZE};
+use crate::packet::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
 use crate::raster::gaussian::GaussianTile;
 use crate::raster::gaussian::GaussianTileDraw;
-use crate::raster::primitives::{Buffers, Place, Scratch, Targets, TileDraw};
-use crate::raster::tile::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target, Tile};
+use crate::raster::output::{Buffers, Targets};
+use crate::raster::prepared::TileDraw;
+use crate::raster::primitives::{Place, Scratch};
+use crate::raster::tile::{AttachmentError, Target, Tile};
+use crate::raster::{Plane, primitives};
+use crate::runtime::{FlushPolicy, Runtime};
+use crate::state::{Rect, ResolveMode};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Optimization;
 use devmem::host;
 use isa::exec::Stopped;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// A draw that waits in a pass.
@@ -56,9 +57,6 @@ struct Resolves {
 
 /// What an attachment is resolved to, and how.
 type Resolve = (Target, ResolveMode);
-
-/// Layers of a pass at most, where no attachment has fewer.
-const MAX_FRAMEBUFFER_LAYERS: u32 = 2048;
 
 /// A render pass between its beginning and its end.
 #[derive(Debug)]
@@ -180,20 +178,20 @@ impl Pass {
     pub fn push(
         &mut self,
         draw: PassDraw,
-        device: &Device,
+        runtime: &Runtime,
         counters: &mut Counters,
     ) -> Result<(), Stopped> {
         self.bin_bytes = self.bin_bytes.saturating_add(draw.memory_bytes());
         host::push(&mut self.draws, draw);
         self.pushed += 1;
-        let config = device.config();
+        let config = runtime.config();
         let full = match config.flush {
             FlushPolicy::WhenFull => self.bin_bytes > config.bin_budget_bytes,
             FlushPolicy::EveryDraw => true,
             FlushPolicy::SomeDraws(seed) => flushes(seed, self.pushed),
         };
         if full {
-            self.flush(device, counters)?;
+            self.flush(runtime, counters)?;
         }
         Ok(())
     }
@@ -202,16 +200,16 @@ impl Pass {
     ///
     /// # Errors
     /// [`Stopped`] if a fragment program ran for too long; the image is then undefined.
-    pub fn flush(&mut self, device: &Device, counters: &mut Counters) -> Result<(), Stopped> {
-        self.render(device, counters, false)
+    pub fn flush(&mut self, runtime: &Runtime, counters: &mut Counters) -> Result<(), Stopped> {
+        self.render(runtime, counters, false)
     }
 
     /// Renders all draws that wait, and stores and resolves the attachments as they are to be.
     ///
     /// # Errors
     /// As [`Pass::flush`].
-    pub fn end(mut self, device: &Device, counters: &mut Counters) -> Result<(), Stopped> {
-        self.render(device, counters, true)
+    pub fn end(mut self, runtime: &Runtime, counters: &mut Counters) -> Result<(), Stopped> {
+        self.render(runtime, counters, true)
     }
 
     fn resolve_targets(&self) -> impl Iterator<Item = &Target> {
@@ -232,7 +230,7 @@ impl Pass {
 
     fn render(
         &mut self,
-        device: &Device,
+        runtime: &Runtime,
         counters: &mut Counters,
         last: bool,
     ) -> Result<(), Stopped> {
@@ -241,14 +239,7 @@ impl Pass {
         let mut done = Ok(());
         if !self.area.is_empty() && (pending || !self.draws.is_empty()) {
             let started = Instant::now();
-            for (work, result) in self.render_macro_tiles(device, last) {
-                counters.add_all(&work);
-                done = match (done, result) {
-                    // That others were cancelled when one stopped tells nothing.
-                    (Err(Stopped::Cancelled), Err(stopped)) | (Err(stopped), _) => Err(stopped),
-                    (Ok(()), result) => result,
-                };
-            }
+            done = self.render_macro_tiles(runtime, counters, last);
             for target in self.targets().chain(self.resolve_targets()) {
                 target.bump_generation();
             }
@@ -264,14 +255,14 @@ impl Pass {
         done
     }
 
-    /// Renders all macro-tiles, each by whichever worker is free; returns what every worker counted, and whether it
-    /// was stopped.
+    /// Renders all macro-tiles, each by whichever worker is free.
     fn render_macro_tiles(
         &self,
-        device: &Device,
+        runtime: &Runtime,
+        counters: &mut Counters,
         last: bool,
-    ) -> Vec<(Counters, Result<(), Stopped>)> {
-        let size = device.config().macro_tile_size;
+    ) -> Result<(), Stopped> {
+        let size = runtime.config().macro_tile_size;
         // The area begins at or after the framebuffer's corner.
         let range = |start: i32, length: u32| {
             let start = start as u32;
@@ -281,34 +272,31 @@ impl Pass {
         let rows = range(self.area.y, self.area.height);
         let (width, height) = (columns.len() as u64, rows.len() as u64);
         let count = width * height * u64::from(self.layer_count);
-        let frame = Frame {
+        let flush = Flush {
             pass: self,
-            device,
+            runtime,
             last,
-            draws: self.tile_draws(device),
+            draws: self.tile_draws(runtime),
             cancel: AtomicBool::new(false),
         };
-        let next = AtomicU64::new(0);
-        let work = || {
-            let mut worker = Worker::new(self, size);
-            loop {
-                let job = next.fetch_add(1, Ordering::Relaxed);
-                if job >= count || frame.cancel.load(Ordering::Relaxed) {
-                    return (worker.counters, Ok(()));
-                }
-                let (layer, place) = (job / (width * height), job % (width * height));
+        let (workers, done) = runtime.share(
+            0..count,
+            1,
+            &flush.cancel,
+            || Worker::new(self, size),
+            |worker, task| {
+                let (layer, place) = (task / (width * height), task % (width * height));
                 let at = [
                     columns.start + (place % width) as u32,
                     rows.start + (place / width) as u32,
                 ];
-                if let Err(stopped) = frame.render_macro_tile(&mut worker, layer as u32, at) {
-                    frame.cancel.store(true, Ordering::Relaxed);
-                    return (worker.counters, Err(stopped));
-                }
-            }
-        };
-        let done = device.install(|| rayon::broadcast(|_| work()));
-        for draw in &frame.draws {
+                flush.render_macro_tile(worker, layer as u32, at)
+            },
+        );
+        for worker in &workers {
+            counters.add_all(&worker.counters);
+        }
+        for draw in &flush.draws {
             match draw {
                 Ready::Primitives(draw) => draw.finish(),
                 Ready::Gaussians(draw) => draw.finish(),
@@ -319,7 +307,7 @@ impl Pass {
     }
 
     /// The waiting draws made ready for tiles.
-    fn tile_draws<'a>(&'a self, device: &Device) -> Vec<Ready<'a>> {
+    fn tile_draws<'a>(&'a self, runtime: &Runtime) -> Vec<Ready<'a>> {
         let targets = Targets {
             color: &self.color,
             depth: self.depth.as_ref(),
@@ -331,7 +319,7 @@ impl Pass {
                 draw,
                 targets,
                 self.samples,
-                device,
+                runtime,
             ))),
             PassDraw::Primitives(draw) if draw.chunks.is_empty() => Ready::Nothing,
             PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TileDraw::new(
@@ -339,7 +327,7 @@ impl Pass {
                 targets,
                 self.samples,
                 self.area,
-                device,
+                runtime,
             ))),
         };
         host::collect(self.draws.iter().map(ready))
@@ -416,9 +404,9 @@ impl Worker {
 }
 
 /// What the workers of a flush share.
-struct Frame<'a> {
+struct Flush<'a> {
     pass: &'a Pass,
-    device: &'a Device,
+    runtime: &'a Runtime,
     /// Whether the pass ends, so that only what is to be stored is kept.
     last: bool,
     draws: Vec<Ready<'a>>,
@@ -426,7 +414,7 @@ struct Frame<'a> {
     cancel: AtomicBool,
 }
 
-impl Frame<'_> {
+impl Flush<'_> {
     /// Runs all draws in one macro-tile, then stores its tiles.
     fn render_macro_tile(
         &self,
@@ -435,7 +423,7 @@ impl Frame<'_> {
         at: [u32; 2],
     ) -> Result<(), Stopped> {
         let pass = self.pass;
-        let size = self.device.config().macro_tile_size;
+        let size = self.runtime.config().macro_tile_size;
         let tiles = || Tile::of_macro_tile(size, at, pass.area);
         for draw in &self.draws {
             match draw {
@@ -452,7 +440,8 @@ impl Frame<'_> {
                     }
                 }
                 Ready::Gaussians(_) => {}
-                Ready::Primitives(draw) => draw.render(
+                Ready::Primitives(draw) => primitives::render(
+                    draw,
                     Place { layer, at, size },
                     &mut worker.buffers,
                     &mut worker.scratch,
@@ -462,7 +451,7 @@ impl Frame<'_> {
             }
         }
         if !self
-            .device
+            .runtime
             .config()
             .optimizations
             .has(Optimization::EmptyTiles)
@@ -517,7 +506,7 @@ impl Frame<'_> {
                 .add(Counter::TilesUntouched, untouched.into());
             if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
                 plane.touch(target, layer, tile);
-                let level = self.device.level();
+                let level = self.runtime.level();
                 plane.resolve(level, target, (resolve, *mode), layer, tile);
             }
             let keep = !self.last || target.store == StoreOp::Store;

@@ -4,7 +4,8 @@ use super::Command;
 use super::buffer::Recorder;
 use crate::abi::error::Error;
 use gaurast::vk::{GaussianCameraDataGAURAST, GaussianCameraGAURAST, GaussianCameraModelGAURAST};
-use simdevice::packet::{BufferRange, Camera, CameraModel};
+use simdevice::packet::BufferRange;
+use simdevice::state::gaussian::{Camera, CameraModel};
 
 /// A camera for the device.
 ///

@@ -8,7 +8,7 @@ use crate::physical_device::limits;
 use crate::pipeline::dynamic_state::{DynamicState, Face, faces};
 use ash::vk;
 use gaurast::vk::PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST;
-use simdevice::packet::draw::DepthBias;
+use simdevice::state::DepthBias;
 
 /// Records a state.
 fn set(recorder: &mut Recorder, state: DynamicState) -> Result<(), Error> {

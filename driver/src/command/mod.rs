@@ -28,7 +28,9 @@ use crate::query_pool::QueryPool;
 use crate::sync::Event;
 use ash::vk;
 use simdevice::Packet;
-use simdevice::packet::{BufferRange, Camera, Rect, Viewport};
+use simdevice::packet::BufferRange;
+use simdevice::state::gaussian::Camera;
+use simdevice::state::{Rect, Viewport};
 use std::sync::Arc;
 
 /// A recorded command.

@@ -10,7 +10,7 @@ use crate::abi::valid;
 use crate::convert::{self, rect};
 use ash::vk;
 use simdevice::Packet;
-use simdevice::packet::Rect;
+use simdevice::state::Rect;
 use std::sync::Arc;
 
 /// # Safety

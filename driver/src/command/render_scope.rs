@@ -9,9 +9,9 @@ use crate::convert::{clear_value, rect};
 use crate::render_pass::{AttachmentDescription, RenderPass};
 use crate::resource::image::ImageView;
 use ash::vk;
-use simdevice::packet::{
-    Aspect, Attachment, ClearValue, LoadOp, Rect, Rendering, ResolveMode, StoreOp,
-};
+use simdevice::format::{Aspect, ClearValue};
+use simdevice::packet::{Attachment, LoadOp, Rendering, StoreOp};
+use simdevice::state::{Rect, ResolveMode};
 use simdevice::{Format, Packet};
 use std::sync::Arc;
 

@@ -233,9 +233,10 @@ mod tests {
     use super::*;
     use crate::device_sync::WaitResult;
     use crate::queue::Queue;
+    use simdevice::Allocation;
+    use simdevice::Device;
     use simdevice::Packet;
     use simdevice::packet::BufferRange;
-    use simdevice::{Allocation, Device};
 
     struct Fixture {
         sync: Arc<DeviceSync>,

@@ -9,13 +9,13 @@ use crate::convert;
 use crate::resource::buffer::{Buffer, BufferRules};
 use crate::resource::image::{Image, count};
 use ash::vk;
-use simdevice::format::Numeric;
+use simdevice::format::{Aspect, ClearValue, Numeric};
 use simdevice::packet::{
-    Aspect, AttachmentClear, BlitImage, BufferCopyRegion, BufferImageRegion, BufferRange,
-    ClearAttachments, ClearImage, ClearValue, CopyBuffer, CopyBufferImage, CopyImage,
-    ImageBlitRegion, ImageCopyRegion, ResolveImage, ResolveMode, SubresourceLayers,
-    SubresourceRange,
+    AttachmentClear, BlitImage, BufferCopyRegion, BufferImageRegion, BufferRange, ClearAttachments,
+    ClearImage, CopyBuffer, CopyBufferImage, CopyImage, ImageBlitRegion, ImageCopyRegion,
+    ResolveImage, SubresourceLayers, SubresourceRange,
 };
+use simdevice::state::ResolveMode;
 use simdevice::{Format, Packet};
 use std::ffi::c_void;
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 
 use crate::convert;
 use ash::vk;
-use simdevice::counters::{Counter, Unit};
+use simdevice::stats::counters::{Counter, Unit};
 use std::ffi::{CString, c_char};
 
 /// The number of counters that there are.

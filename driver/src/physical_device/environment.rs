@@ -6,7 +6,7 @@
 //! - `GAURAST_TIMEOUT_MS`: how many milliseconds one batch of shader invocations may take before the device is lost; a
 //!   loop without end is stopped so. A batch is a workgroup, 128 vertices, or 64 or 256 fragments.
 //! - `GAURAST_OPTIMIZATIONS`: the work that is left out where it changes no image: all (the default), none, or names separated by
-//!   commas (see [`simdevice::optimizations`]).
+//!   commas (see [`simdevice::stats::optimizations`]).
 //! - `GAURAST_TRACE`: a file that the work of a device's last 64 render passes is written to, as JSON, when the device is
 //!   gone; `gaurast simulate` reads it. It costs a little time and changes no image.
 //! - `GAURAST_TIMESTAMPS`: whose nanoseconds timestamps count: host (the default) or simulated, those that the paper's
@@ -18,9 +18,10 @@
 
 use super::memory;
 use crate::abi::error::Error;
-use simdevice::device::{Config, SimdLevel};
-use simdevice::optimizations::UnknownOptimization;
-use simdevice::trace::{Recorder, Trace};
+use simdevice::Config;
+use simdevice::runtime::SimdLevel;
+use simdevice::stats::optimizations::UnknownOptimization;
+use simdevice::stats::recorder::{Recorder, Trace};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -158,7 +159,7 @@ fn config(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use simdevice::optimizations::Optimization;
+    use simdevice::stats::optimizations::Optimization;
 
     #[test]
     fn values_are_understood_or_refused() {

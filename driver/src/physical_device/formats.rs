@@ -9,8 +9,7 @@ use super::{limits, memory};
 use crate::abi::error::Error;
 use ash::vk;
 use simdevice::Format;
-use simdevice::format::{Channel, Numeric};
-use simdevice::packet::Aspect;
+use simdevice::format::{Aspect, Channel, Numeric};
 use std::sync::LazyLock;
 
 /// The device's format of the same name, if it has one.

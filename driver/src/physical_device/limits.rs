@@ -8,7 +8,7 @@ use crate::convert;
 use crate::instance::API_VERSION;
 use crate::registry::properties::Properties;
 use ash::vk;
-use simdevice::geometry;
+use simdevice::limits::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
 use std::ffi::{CStr, c_char};
 use std::sync::LazyLock;
 
@@ -51,7 +51,7 @@ pub(crate) const MAX_LAYERS: u32 = 2048;
 const SIZE_GRANULARITY: f32 = 1.0 / 256.0;
 
 /// The most clip and cull distances, together and each.
-const MAX_CLIP_CULL_DISTANCES: u32 = simdevice::packet::draw::MAX_CLIP_CULL_DISTANCES as u32;
+const MAX_CLIP_CULL_DISTANCES: u32 = simdevice::limits::MAX_CLIP_CULL_DISTANCES as u32;
 
 /// The samples that texels of attachments may have.
 pub(crate) const SAMPLE_COUNTS: vk::SampleCountFlags = vk::SampleCountFlags::from_raw(
@@ -62,7 +62,7 @@ pub(crate) const SAMPLE_COUNTS: vk::SampleCountFlags = vk::SampleCountFlags::fro
 pub(crate) const MAX_COLOR_ATTACHMENTS: u32 = 8;
 
 /// The greatest magnitude of a sampler's bias of the level of detail.
-pub(crate) const MAX_SAMPLER_LOD_BIAS: f32 = simdevice::texture::MAX_LOD_BIAS;
+pub(crate) const MAX_SAMPLER_LOD_BIAS: f32 = simdevice::limits::MAX_LOD_BIAS;
 
 /// The bytes of push constants.
 pub(crate) const MAX_PUSH_CONSTANTS_SIZE: u32 = 256;
@@ -86,10 +86,10 @@ pub(crate) const MIN_BUFFER_OFFSET_ALIGNMENT: u64 = 16;
 pub(crate) const MAX_WORKGROUP_SIZE: [u32; 3] = [MAX_WORKGROUP_INVOCATIONS; 3];
 
 /// The most invocations of a workgroup.
-pub(crate) const MAX_WORKGROUP_INVOCATIONS: u32 = simdevice::compute::MAX_WORKGROUP_INVOCATIONS;
+pub(crate) const MAX_WORKGROUP_INVOCATIONS: u32 = simdevice::limits::MAX_WORKGROUP_INVOCATIONS;
 
 /// The most bytes of a workgroup's shared memory.
-pub(crate) const MAX_SHARED_BYTES: u32 = simdevice::compute::MAX_SHARED_BYTES;
+pub(crate) const MAX_SHARED_BYTES: u32 = simdevice::limits::MAX_SHARED_BYTES;
 
 /// Invocations of a subgroup, unless a pipeline requires another size.
 pub(crate) const SUBGROUP_SIZE: u32 = 32;
@@ -195,7 +195,7 @@ fn find_properties() -> Properties {
         max_draw_indirect_count: u32::MAX,
         max_sampler_lod_bias: MAX_SAMPLER_LOD_BIAS,
         max_sampler_anisotropy: 1.0,
-        max_viewports: simdevice::packet::draw::MAX_VIEWPORTS as u32,
+        max_viewports: simdevice::limits::MAX_VIEWPORTS as u32,
         max_viewport_dimensions: [MAX_IMAGE_DIMENSION; 2],
         viewport_bounds_range: [
             -2.0 * MAX_IMAGE_DIMENSION as f32,
@@ -234,8 +234,8 @@ fn find_properties() -> Properties {
         max_cull_distances: MAX_CLIP_CULL_DISTANCES,
         max_combined_clip_and_cull_distances: MAX_CLIP_CULL_DISTANCES,
         discrete_queue_priorities: 2,
-        point_size_range: [1.0, geometry::MAX_POINT_SIZE],
-        line_width_range: [1.0, geometry::MAX_LINE_WIDTH],
+        point_size_range: [1.0, MAX_POINT_SIZE],
+        line_width_range: [1.0, MAX_LINE_WIDTH],
         point_size_granularity: SIZE_GRANULARITY,
         line_width_granularity: SIZE_GRANULARITY,
         strict_lines: true,

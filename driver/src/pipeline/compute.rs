@@ -6,7 +6,8 @@ use crate::device::Device;
 use crate::physical_device::limits;
 use crate::shader_module::ShaderStage;
 use gaurast_spirv::{BuiltIn, Input, InputSource, Interface, Options, ShaderBinding, Stage};
-use simdevice::compute::{ComputeInput, ComputeProgram};
+use simdevice::program::compute::ComputeProgram;
+use simdevice::program::interface::ComputeInput;
 use std::sync::Arc;
 
 /// A compute pipeline.
@@ -56,7 +57,7 @@ impl ComputePipeline {
         }
         let inputs = inputs(interface);
         let program = ComputeProgram::new(
-            device.simulated(),
+            device.simulated().level(),
             shader.program,
             invocations,
             subgroup_size,

@@ -3,7 +3,7 @@
 use super::state::FixedFunctionState as Fixed;
 use crate::convert::StencilOps;
 use ash::vk;
-use simdevice::packet::draw::{CompareOp, DepthBias, Topology};
+use simdevice::state::{CompareOp, DepthBias, Topology};
 
 /// The face that a stencil state is for: 0 is the front, 1 the back.
 pub(crate) type Face = usize;

@@ -9,8 +9,9 @@ use gaurast_spirv::{
     Sampling, ScalarType, Shader,
 };
 use simdevice::isa::ir::{Constant, Program};
-use simdevice::packet::draw::{
-    self, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, VertexInput, VertexOutput,
+use simdevice::program::interface;
+use simdevice::program::interface::{
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, VertexInput, VertexOutput,
 };
 use std::collections::HashMap;
 
@@ -296,14 +297,14 @@ fn fragment_input(input: &Input, varyings: &Varyings) -> Option<FragmentInput> {
             .map(|&index| FragmentInput::Varying {
                 index,
                 interpolation: match interpolation {
-                    Interpolation::Perspective => draw::Interpolation::Perspective,
-                    Interpolation::Linear => draw::Interpolation::Linear,
-                    Interpolation::Flat => draw::Interpolation::Flat,
+                    Interpolation::Perspective => interface::Interpolation::Perspective,
+                    Interpolation::Linear => interface::Interpolation::Linear,
+                    Interpolation::Flat => interface::Interpolation::Flat,
                 },
                 sampling: match sampling {
-                    Sampling::Center => draw::Sampling::Center,
-                    Sampling::Centroid => draw::Sampling::Centroid,
-                    Sampling::Sample => draw::Sampling::Sample,
+                    Sampling::Center => interface::Sampling::Center,
+                    Sampling::Centroid => interface::Sampling::Centroid,
+                    Sampling::Sample => interface::Sampling::Sample,
                 },
             }),
         InputSource::BuiltIn {
@@ -359,7 +360,8 @@ mod tests {
     use super::*;
     use gaurast_spirv::Stage;
     use simdevice::isa::builder::Builder;
-    use simdevice::isa::ir::{Rate, Type};
+    use simdevice::isa::ir::Rate;
+    use simdevice::isa::ir::Type;
 
     const FLOAT: ScalarType = ScalarType::Float { width: 32 };
 
@@ -484,8 +486,8 @@ mod tests {
         let varying = |index| {
             Some(FragmentInput::Varying {
                 index,
-                interpolation: draw::Interpolation::Linear,
-                sampling: draw::Sampling::Center,
+                interpolation: interface::Interpolation::Linear,
+                sampling: interface::Sampling::Center,
             })
         };
         assert_eq!(fragment.inputs, [varying(1), None, varying(0)]);

@@ -12,7 +12,8 @@ use crate::device::Device;
 use crate::shader_module::ShaderStage;
 use ash::vk;
 use gaurast_spirv::{ShaderBinding, Stage};
-use simdevice::packet::draw::{DrawPipeline, DrawState, PolygonMode};
+use simdevice::program::vertex::DrawPipeline;
+use simdevice::state::{DrawState, PolygonMode};
 use std::sync::Arc;
 
 /// A pipeline of points, lines or triangles.
@@ -89,7 +90,7 @@ impl PrimitivePipeline {
         };
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link(vertex, fragment, stream, live_outputs)?;
-        let programs = DrawPipeline::new(device.simulated(), &programs)
+        let programs = DrawPipeline::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         let is_static = dynamic.is_empty()
             && viewports == ViewportSource::Static

@@ -14,11 +14,10 @@ use gaurast::vk::{
     PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::Format;
-use simdevice::packet::draw::{
-    CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, PolygonMode, StencilFace, StencilOp,
-    Topology,
+use simdevice::state::{
+    BlendFactor, BlendState, CompareOp, DepthBias, DepthStencil, DepthTest, DrawState, PolygonMode,
+    StencilFace, StencilOp, Topology,
 };
-use simdevice::packet::{BlendFactor, BlendState};
 use std::sync::Arc;
 
 /// The state of a graphics pipeline: a `VkGraphicsPipelineCreateInfo` with its pointers followed, in the four parts of a

@@ -8,10 +8,10 @@ use crate::abi::valid::{self, OutputChain, Structures};
 use crate::convert;
 use crate::physical_device::formats::{self, ImageQuery};
 use ash::vk;
-use simdevice::Allocation;
-use simdevice::image::{self, ImageDesc, ImageKind};
-use simdevice::packet::Aspect;
+use simdevice::format::Aspect;
+use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::texture::Swizzle;
+use simdevice::{Allocation, image};
 use std::sync::{Arc, OnceLock};
 
 /// An image.

@@ -3,7 +3,7 @@
 use crate::gpu::{Gpu, MAPPABLE};
 use crate::scene::{PipelineRequest, Scene, splat};
 use ash::vk;
-use simdevice::counters::Counter;
+use simdevice::stats::counters::Counter;
 
 #[gaurast_runner::test]
 fn counters_are_read_in_the_order_that_the_pool_chose() {

@@ -1,10 +1,9 @@
 //! Compressed formats: blocks of 4x4 texels (BC1 to BC7, also known as DXT, RGTC and BPTC).
 
-use super::Format;
 use half::f16;
 
 /// Texels along a block's side.
-const SIDE: usize = 4;
+pub(super) const SIDE: usize = 4;
 
 /// Texels of a block.
 const TEXELS: usize = SIDE * SIDE;
@@ -32,85 +31,72 @@ impl Block {
         let pitch = SIDE * self.texel_size;
         &self.bytes[row * pitch..][..pitch]
     }
+
+    /// The block with the alpha of all its texels, of four bytes each, at its greatest.
+    pub(super) fn opaque(mut self) -> Self {
+        for texel in self.bytes[..4 * TEXELS].as_chunks_mut::<4>().0 {
+            texel[3] = u8::MAX;
+        }
+        self
+    }
 }
 
-impl Format {
-    /// Texels along the side of what is stored as a unit: 4, or 1 for formats without compression.
-    pub const fn block_side(self) -> u32 {
-        if self.decompressed().is_some() {
-            SIDE as u32
-        } else {
-            1
-        }
-    }
+/// A block of texels of four bytes each, by a decoder that takes the bytes from one row to the next.
+fn rgba(bytes: &[u8; 16], decode: impl Fn(&[u8], &mut [u8], usize)) -> Block {
+    let mut rgba = [0u8; 4 * TEXELS];
+    decode(bytes, &mut rgba, 4 * SIDE);
+    Block::of(&rgba)
+}
 
-    /// The format that holds a compressed format's texels one by one, without loss.
-    pub const fn decompressed(self) -> Option<Self> {
-        Some(match self {
-            Self::Bc1RgbUnormBlock
-            | Self::Bc1RgbaUnormBlock
-            | Self::Bc2UnormBlock
-            | Self::Bc3UnormBlock
-            | Self::Bc7UnormBlock => Self::R8G8B8A8Unorm,
-            Self::Bc1RgbSrgbBlock
-            | Self::Bc1RgbaSrgbBlock
-            | Self::Bc2SrgbBlock
-            | Self::Bc3SrgbBlock
-            | Self::Bc7SrgbBlock => Self::R8G8B8A8Srgb,
-            Self::Bc4UnormBlock | Self::Bc4SnormBlock => Self::R32Sfloat,
-            Self::Bc5UnormBlock | Self::Bc5SnormBlock => Self::R32G32Sfloat,
-            Self::Bc6hUfloatBlock | Self::Bc6hSfloatBlock => Self::R16G16B16A16Sfloat,
-            _ => return None,
-        })
-    }
+/// Two colours and a palette of them, perhaps with transparent black.
+pub(super) fn bc1(bytes: &[u8; 16]) -> Block {
+    rgba(bytes, bcdec_rs::bc1)
+}
 
-    /// The texels of a block, in the format of [`Format::decompressed`]; `None` if this format is not compressed.
-    pub(crate) fn decode_block(self, block: &[u8; 16]) -> Option<Block> {
-        let mut rgba = [0u8; 4 * TEXELS];
-        let pitch = 4 * SIDE;
-        match self {
-            Self::Bc1RgbUnormBlock | Self::Bc1RgbSrgbBlock => {
-                bcdec_rs::bc1(block, &mut rgba, pitch);
-                // What would be transparent with alpha is opaque without.
-                for texel in rgba.as_chunks_mut::<4>().0 {
-                    texel[3] = u8::MAX;
-                }
-            }
-            Self::Bc1RgbaUnormBlock | Self::Bc1RgbaSrgbBlock => {
-                bcdec_rs::bc1(block, &mut rgba, pitch);
-            }
-            Self::Bc2UnormBlock | Self::Bc2SrgbBlock => bcdec_rs::bc2(block, &mut rgba, pitch),
-            Self::Bc3UnormBlock | Self::Bc3SrgbBlock => bcdec_rs::bc3(block, &mut rgba, pitch),
-            Self::Bc7UnormBlock | Self::Bc7SrgbBlock => bcdec_rs::bc7(block, &mut rgba, pitch),
-            Self::Bc4UnormBlock | Self::Bc4SnormBlock => {
-                let mut red = [0f32; TEXELS];
-                bcdec_rs::bc4_float(block, &mut red, SIDE, self == Self::Bc4SnormBlock);
-                return Some(Block::of(&red));
-            }
-            Self::Bc5UnormBlock | Self::Bc5SnormBlock => {
-                let mut both = [0f32; 2 * TEXELS];
-                bcdec_rs::bc5_float(block, &mut both, 2 * SIDE, self == Self::Bc5SnormBlock);
-                return Some(Block::of(&both));
-            }
-            Self::Bc6hUfloatBlock | Self::Bc6hSfloatBlock => {
-                let mut rgb = [0u16; 3 * TEXELS];
-                bcdec_rs::bc6h_half(block, &mut rgb, 3 * SIDE, self == Self::Bc6hSfloatBlock);
-                let mut halves = [f16::ONE.to_bits(); 4 * TEXELS];
-                let texels = halves.as_chunks_mut::<4>().0.iter_mut();
-                for (texel, rgb) in texels.zip(rgb.as_chunks::<3>().0) {
-                    texel[..3].copy_from_slice(rgb);
-                }
-                return Some(Block::of(&halves));
-            }
-            _ => return None,
-        }
-        Some(Block::of(&rgba))
+/// As [`bc1`], with four bits of alpha for each texel.
+pub(super) fn bc2(bytes: &[u8; 16]) -> Block {
+    rgba(bytes, bcdec_rs::bc2)
+}
+
+/// As [`bc1`], with a palette of alphas.
+pub(super) fn bc3(bytes: &[u8; 16]) -> Block {
+    rgba(bytes, bcdec_rs::bc3)
+}
+
+/// Red by a palette, as a float.
+pub(super) fn bc4(bytes: &[u8; 16], signed: bool) -> Block {
+    let mut red = [0f32; TEXELS];
+    bcdec_rs::bc4_float(bytes, &mut red, SIDE, signed);
+    Block::of(&red)
+}
+
+/// Red and green by a palette each, as floats.
+pub(super) fn bc5(bytes: &[u8; 16], signed: bool) -> Block {
+    let mut both = [0f32; 2 * TEXELS];
+    bcdec_rs::bc5_float(bytes, &mut both, 2 * SIDE, signed);
+    Block::of(&both)
+}
+
+/// Halves of red, green and blue, with an alpha of 1.
+pub(super) fn bc6h(bytes: &[u8; 16], signed: bool) -> Block {
+    let mut rgb = [0u16; 3 * TEXELS];
+    bcdec_rs::bc6h_half(bytes, &mut rgb, 3 * SIDE, signed);
+    let mut halves = [f16::ONE.to_bits(); 4 * TEXELS];
+    let texels = halves.as_chunks_mut::<4>().0.iter_mut();
+    for (texel, rgb) in texels.zip(rgb.as_chunks::<3>().0) {
+        texel[..3].copy_from_slice(rgb);
     }
+    Block::of(&halves)
+}
+
+/// Red, green, blue and alpha by up to three palettes.
+pub(super) fn bc7(bytes: &[u8; 16]) -> Block {
+    rgba(bytes, bcdec_rs::bc7)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::Format;
 
     /// The registers of each texel of a block.
     fn texels(format: Format, block: &[u8]) -> Vec<[f32; 4]> {

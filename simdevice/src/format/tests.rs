@@ -1,5 +1,6 @@
+use super::table::{decode_components, encode_components};
 use super::*;
-use crate::packet::Aspect;
+use crate::format::Aspect;
 
 /// The first bytes of a texel.
 fn first<const N: usize>(texel: &[u8; MAX_TEXEL_SIZE]) -> [u8; N] {

@@ -3,11 +3,12 @@
 
 use super::depth::CenterDepth;
 use super::footprint::Visible;
-use crate::optimizations::Optimizations;
-use crate::packet::{
+use crate::state::Viewport;
+use crate::state::gaussian::{
     Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
-    GaussianState, Viewport,
+    GaussianState,
 };
+use crate::stats::optimizations::Optimizations;
 
 /// `log2_opacity` less this is how far the exponent may fall where the alpha floor is zero: beyond, alpha
 /// underflows binary32.

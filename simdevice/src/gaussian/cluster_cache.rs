@@ -3,12 +3,13 @@
 //! they are gone.
 
 use super::attributes::{SourceFingerprint, is_device_local};
-use super::clusters::{self, Clusters};
+use super::clusters;
+use super::clusters::Clusters;
 use super::set::GaussianSet;
-use crate::counters::{Counter, Counters};
-use crate::device::Device;
-use crate::optimizations::Optimization;
 use crate::packet::{AttributeStream, GaussianAppend};
+use crate::runtime::Runtime;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Optimization;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Instant;
 
@@ -191,10 +192,11 @@ impl ClusterCache {
 /// The clusters of each append that has some.
 pub(super) fn find(
     set: &GaussianSet,
-    device: &Device,
+    cache: &ClusterCache,
+    runtime: &Runtime,
     counters: &mut Counters,
 ) -> Vec<Option<Arc<Clusters>>> {
-    let config = device.config();
+    let config = runtime.config();
     let mut found = vec![None; set.appends.len()];
     if !config.optimizations.has(Optimization::ClusterCulling) {
         return found;
@@ -203,12 +205,11 @@ pub(super) fn find(
     for (append, found) in set.appends.iter().zip(&mut found) {
         let build = |with_harmonics| {
             let started = Instant::now();
-            let clusters = device.install(|| Clusters::build(append, is_flat, with_harmonics));
+            let clusters = runtime.install(|| Clusters::build(append, is_flat, with_harmonics));
             counters.add(Counter::ClustersBuilt, clusters.clusters.len() as u64);
             counters.add(Counter::ClusterTime, started.elapsed().as_nanos() as u64);
             clusters
         };
-        let cache = device.clusters();
         *found = cache.get(append, is_flat, config.cluster_budget_bytes, build);
     }
     found

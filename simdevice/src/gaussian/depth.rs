@@ -1,8 +1,9 @@
 //! The depth of a Gaussian's centre, as the depth attachment holds it.
 
 use crate::format::Format;
-use crate::packet::{Camera, CameraModel, Viewport};
-use crate::raster::DepthCode;
+use crate::format::depth::DepthEncoding;
+use crate::state::Viewport;
+use crate::state::gaussian::{Camera, CameraModel};
 
 /// How depths follow one another where depth variables ascend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +24,7 @@ pub(crate) struct CenterDepth {
     coefficients: [f64; 2],
     /// The viewport's depths of 0 and 1.
     range: [f64; 2],
-    code: DepthCode,
+    code: DepthEncoding,
 }
 
 impl CenterDepth {
@@ -33,7 +34,7 @@ impl CenterDepth {
             is_linear: camera.model == CameraModel::Orthographic,
             coefficients: camera.depth_coefficients.map(f64::from),
             range: [viewport.min_depth, viewport.max_depth].map(f64::from),
-            code: DepthCode::of(format),
+            code: DepthEncoding::of(format),
         }
     }
 
@@ -52,8 +53,8 @@ impl CenterDepth {
         let [near, far] = self.range;
         let depth = clamp(near + clamp(depth) * (far - near));
         match self.code {
-            DepthCode::Float => (depth as f32).to_bits(),
-            DepthCode::Unorm(bits) => {
+            DepthEncoding::Float => (depth as f32).to_bits(),
+            DepthEncoding::Unorm(bits) => {
                 let greatest = f64::from((1u32 << bits) - 1);
                 (depth * greatest).round_ties_even() as u32
             }
@@ -61,7 +62,7 @@ impl CenterDepth {
     }
 
     /// How the numbers mean depths.
-    pub(crate) fn unit(&self) -> DepthCode {
+    pub(crate) fn unit(&self) -> DepthEncoding {
         self.code
     }
 

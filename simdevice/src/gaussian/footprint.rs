@@ -1,11 +1,9 @@
 //! Which tiles a projected Gaussian reaches: exact tests of its alpha-floor ellipse against rectangles of
 //! pixel centres.
 
-use crate::packet::Rect;
+use crate::limits::TILE_SIZE;
+use crate::state::Rect;
 use devmem::host;
-
-/// The side in pixels of the tiles that hold Gaussian lists, as in the paper.
-pub const TILE_SIZE: u32 = 16;
 
 /// A run of tiles in one row of tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use super::attributes::Attributes;
 use super::camera::ViewConstants;
 use super::instances::{Linear, inverse};
 use super::lanes::{Bits, F32_LANES};
-use crate::packet::CameraModel;
+use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, prelude::*};
 use reach::{Plane, dot};
 

@@ -9,8 +9,8 @@ use super::occlusion::OcclusionMap;
 use super::preprocess::{GroupSource, GroupTask};
 use super::set::{GaussianSet, MAX_GROUPS, SortError};
 use super::vertex_projection;
-use crate::counters::{Counter, Counters};
 use crate::packet::GaussianAppend;
+use crate::stats::counters::{Counter, Counters};
 use devmem::host;
 use std::sync::Arc;
 

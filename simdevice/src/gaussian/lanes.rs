@@ -119,7 +119,7 @@ pub(super) fn log2<S: Simd>(simd: S, x: S::f64s) -> S::f64s {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::SimdLevel;
+    use crate::runtime::SimdLevel;
     use devmem::dispatch;
 
     #[test]

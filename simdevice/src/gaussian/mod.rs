@@ -6,6 +6,7 @@
 //! vertex program does it), [`depth_order`], [`tile_lists`], [`sorted_set`] (what is drawn).
 
 mod attributes;
+pub mod caches;
 mod camera;
 pub(crate) mod cluster_cache;
 mod clusters;
@@ -20,6 +21,7 @@ mod occlusion;
 mod panorama;
 mod preprocess;
 pub(crate) mod ray_depth;
+mod recording;
 pub(crate) mod reuse;
 mod scratch;
 mod set;
@@ -34,14 +36,14 @@ mod tiles;
 mod unscented;
 mod vertex_projection;
 
-pub use footprint::TILE_SIZE;
 pub use set::{GaussianSet, SortError};
 pub use sorted_set::BinnedDraw;
 
-use crate::counters::{Counter, Counters};
-use crate::device::Device;
-use crate::optimizations::Optimization;
-use crate::trace::{self, DrawRecord};
+use crate::runtime::Runtime;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Optimization;
+use crate::stats::recorder::DrawRecord;
+use caches::Caches;
 use camera::ViewConstants;
 use clusters::Clusters;
 use devmem::host;
@@ -64,30 +66,31 @@ const LEAST_GROUPS: usize = 64;
 /// [`SortError`] if the set exceeds what 32 bits can name, or a vertex program runs for too long.
 pub fn sort_and_bin(
     set: GaussianSet,
-    device: &Device,
+    runtime: &Runtime,
+    caches: &Caches,
     counters: &mut Counters,
 ) -> Result<BinnedDraw, SortError> {
-    let clusters = cluster_cache::find(&set, device, counters);
-    let config = device.config();
+    let clusters = cluster_cache::find(&set, &caches.clusters, runtime, counters);
+    let config = runtime.config();
     let is_kept = config.optimizations.has(Optimization::TemporalReuse);
-    let is_kept = is_kept && device.recorder().is_none();
+    let is_kept = is_kept && runtime.recorder().is_none();
     let key = Key::new(&set, &clusters).filter(|_| is_kept);
     if let Some(key) = &key
-        && let Some(sorted) = device.last_sets().find(key)
+        && let Some(sorted) = caches.last_sets.find(key)
     {
         counters.add_all(&sorted.counters);
         counters.add(Counter::SetsUnchanged, 1);
-        return Ok(BinnedDraw::new(set, sorted, None, device));
+        return Ok(BinnedDraw::new(set, sorted, None, runtime));
     }
     // All of it by workers: for each way from this thread to them and back, threads fall asleep and are woken.
-    let (sorted, record) = device.install(|| sort(&set, &clusters, device, counters))?;
+    let (sorted, record) = runtime.install(|| sort(&set, &clusters, runtime, counters))?;
     let sorted = Arc::new(sorted);
     if let Some(key) = key {
         let bytes = sorted.memory_bytes();
-        let sets = device.last_sets();
+        let sets = &caches.last_sets;
         sets.keep(key, &sorted, bytes, config.cluster_budget_bytes);
     }
-    Ok(BinnedDraw::new(set, sorted, record, device))
+    Ok(BinnedDraw::new(set, sorted, record, runtime))
 }
 
 /// What preprocessing makes of a set.
@@ -106,36 +109,36 @@ struct Preprocessed {
 fn sort(
     set: &GaussianSet,
     clusters: &[Option<Arc<Clusters>>],
-    device: &Device,
+    runtime: &Runtime,
     counters: &mut Counters,
 ) -> Result<(SortedSet, Option<Arc<DrawRecord>>), SortError> {
     let started = Instant::now();
-    let mut preprocessed = preprocess_set(set, clusters, device)?;
+    let mut preprocessed = preprocess_set(set, clusters, runtime)?;
     let projected = Instant::now();
-    let threads = device.threads();
+    let threads = runtime.threads();
     let pairs = depth_order::sorted(&preprocessed.groups, threads);
     let sorted = Instant::now();
     // Twelve bytes a pair while lists are made: four times the budget of all lists of a pass.
-    let most_pairs = device.config().bin_budget_bytes / 3;
+    let most_pairs = runtime.config().bin_budget_bytes / 3;
     let groups = &mut preprocessed.groups;
     let tiles = TileLists::build(groups, &pairs, set.bounds, threads, most_pairs);
     let binned = Instant::now();
     let fixed = preprocessed.fixed;
     let (by_device, by_programs) = (preprocessed.by_device, preprocessed.by_programs);
     let mut sorted_set = SortedSet::new(set, preprocessed.groups, tiles);
-    let record = device.recorder().map(|_| {
+    let record = runtime.recorder().map(|_| {
         let (of_device, of_programs) = sorted_set.splats.split_at(fixed);
-        let of_device = trace::Projected {
+        let of_device = recording::Projected {
             counters: &by_device,
             splats: of_device,
         };
-        let of_programs = trace::Projected {
+        let of_programs = recording::Projected {
             counters: &by_programs,
             splats: of_programs,
         };
         let bytes = set.draws.iter().map(vertex_projection::vertex_bytes).sum();
         let (pairs, degree) = (sorted_set.tiles.pairs(), set.begin.state.sh_degree);
-        DrawRecord::new(trace::gaussian_draw(
+        DrawRecord::new(recording::gaussian_draw(
             &of_device,
             &of_programs,
             bytes,
@@ -160,10 +163,10 @@ fn sort(
 fn preprocess_set(
     set: &GaussianSet,
     clusters: &[Option<Arc<Clusters>>],
-    device: &Device,
+    runtime: &Runtime,
 ) -> Result<Preprocessed, SortError> {
     let begin = &set.begin;
-    let optimizations = device.config().optimizations;
+    let optimizations = runtime.config().optimizations;
     let constants = ViewConstants::new(
         &begin.state,
         &begin.camera,
@@ -173,7 +176,7 @@ fn preprocess_set(
         optimizations,
     );
     let preprocessor = Preprocessor {
-        device,
+        runtime,
         constants: &constants,
         is_flat: set.is_flat(),
     };
@@ -188,7 +191,7 @@ fn preprocess_set(
     let mut groups = preprocessor.run(&tasks);
     panorama::append_copies(&mut groups);
     let fixed = groups.len();
-    let shaded = vertex_projection::project_all(set, device)?;
+    let shaded = vertex_projection::project_all(set, runtime)?;
     host::reserve(&mut groups, shaded.len());
     groups.extend(shaded);
     by_device.add_all(&counted(&groups[..fixed]));

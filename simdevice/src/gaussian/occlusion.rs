@@ -6,19 +6,20 @@
 use super::attributes::Attributes;
 use super::camera::ViewConstants;
 use super::clusters::{Cluster, Clusters};
-use super::footprint::{TILE_SIZE, Visible};
+use super::footprint::Visible;
 use super::frustum::{Bounds, Frustum};
 use super::lanes::GROUP;
 use super::preprocess::{GroupSource, GroupTask, Preprocessor};
 use super::set::GaussianSet;
 use super::sort;
 use super::splat::{ProjectedGroup, Splat};
-use crate::counters::{Counter, Counters};
-use crate::optimizations::Optimization;
-use crate::packet::draw::DepthStencil;
-use crate::packet::{
-    CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState, Rect,
+use crate::limits::TILE_SIZE;
+use crate::state::gaussian::{
+    CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision, GaussianState,
 };
+use crate::state::{DepthStencil, Rect};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Optimization;
 use devmem::host;
 use std::sync::Arc;
 
@@ -114,7 +115,7 @@ fn may_hide(set: &GaussianSet, preprocessor: &Preprocessor<'_>) -> bool {
     );
     preprocessor.constants.optimizations.has(Optimization::OcclusionCulling)
         // What was recorded is what hardware without this does.
-        && preprocessor.device.recorder().is_none()
+        && preprocessor.runtime.recorder().is_none()
         && is_along_axis
         && state.order == GaussianOrder::ViewDepth
         && state.geometry == GaussianGeometry::Volume

@@ -6,12 +6,11 @@
 //! tile. No fused operations are used, so that keys and means are the same bits at every SIMD level.
 
 use super::attributes::{Attributes, CoefficientReader, Fetcher, Group, Harmonics};
-use super::camera::{self, LN_2, ViewConstants};
+use super::camera::{LN_2, ViewConstants};
 use super::clusters::Cluster;
 use super::frustum::Frustum;
 use super::instances::{Matrices, cofactors, dot};
 use super::lanes::{Bits, F32_LANES, GROUP, GroupF64, log2};
-use super::panorama;
 use super::ray_depth::RayDepth;
 use super::scratch::{Scratch, ScreenGaussians};
 use super::sort::ordered_bits;
@@ -19,13 +18,12 @@ use super::spherical_harmonics::{Bases, COEFFICIENT_FLOATS, DIRECTIONS, coeffici
 use super::splat::{ProjectedGroup, Splat, binary16_headroom};
 use super::surfel::surfel_of;
 use super::tiles::find_tiles;
-use super::unscented;
-use crate::counters::{Counter, Counters};
-use crate::device::Device;
-use crate::optimizations::Optimization;
-use crate::packet::{
-    CameraModel, GaussianAppend, GaussianGeometry, GaussianOrder, GaussianPrecision,
-};
+use super::{camera, panorama, unscented};
+use crate::packet::GaussianAppend;
+use crate::runtime::Runtime;
+use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianOrder, GaussianPrecision};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Optimization;
 use devmem::{dispatch, host};
 use fearless_simd::{Simd, prelude::*};
 use rayon::prelude::*;
@@ -674,7 +672,7 @@ impl<'a> GroupTask<'a> {
 
 /// What projects tasks.
 pub(super) struct Preprocessor<'a> {
-    pub(super) device: &'a Device,
+    pub(super) runtime: &'a Runtime,
     pub(super) constants: &'a ViewConstants,
     pub(super) is_flat: bool,
 }
@@ -741,7 +739,7 @@ impl Preprocessor<'_> {
             GroupSource::From(start) => task.sequence + start + lane as u32,
             GroupSource::Cluster(cluster) => task.sequence + cluster.numbers[lane],
         };
-        dispatch!(self.device.level(), simd => project(constants, simd, &source, scratch, sequence, &mut out));
+        dispatch!(self.runtime.level(), simd => project(constants, simd, &source, scratch, sequence, &mut out));
         out
     }
 }

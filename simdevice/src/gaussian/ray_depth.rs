@@ -6,7 +6,8 @@
 //! are raised to that, so that `a` is never zero and `tau` is never lost to rounding. Everything is binary64 without fused
 //! operations, and the same bits at every SIMD level.
 
-use crate::packet::{Camera, CameraModel, Viewport};
+use crate::state::Viewport;
+use crate::state::gaussian::{Camera, CameraModel};
 use fearless_simd::{Simd, f64x8, prelude::*};
 
 /// The least standard deviation, as a share of the Gaussian's greatest.
@@ -209,7 +210,7 @@ impl PixelRays {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::SimdLevel;
+    use crate::runtime::SimdLevel;
     use devmem::dispatch;
     use proptest::prelude::*;
 

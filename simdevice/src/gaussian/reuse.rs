@@ -9,7 +9,9 @@ use super::clusters::Clusters;
 use super::set::GaussianSet;
 use super::sorted_set::SortedSet;
 use crate::format::Format;
-use crate::packet::{AttributeStream, Camera, GaussianAppend, GaussianState, Rect, Viewport};
+use crate::packet::{AttributeStream, GaussianAppend};
+use crate::state::gaussian::{Camera, GaussianState};
+use crate::state::{Rect, Viewport};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 /// Everything that a sorted set depends on.

@@ -3,8 +3,9 @@
 use super::depth::CenterDepth;
 use super::lanes::GROUP;
 use crate::format::Format;
-use crate::packet::draw::{Draw, ResolveShader};
-use crate::packet::{GaussianAppend, GaussianBegin, GaussianGeometry, Rect, Viewport};
+use crate::packet::{Draw, GaussianAppend, GaussianBegin, ResolveShader};
+use crate::state::gaussian::GaussianGeometry;
+use crate::state::{Rect, Viewport};
 use devmem::host;
 use isa::exec::Stopped;
 

@@ -7,13 +7,14 @@ use super::set::GaussianSet;
 use super::splat::{ProjectedGroup, Splat};
 use super::surfel::Surfel;
 use super::tile_lists::TileLists;
-use crate::counters::Counters;
-use crate::device::Device;
-use crate::optimizations::Optimizations;
-use crate::packet::draw::ResolveShader;
-use crate::packet::{GaussianOrder, GaussianState, Rect};
-use crate::raster::DepthCode;
-use crate::trace::DrawRecord;
+use crate::format::depth::DepthEncoding;
+use crate::packet::ResolveShader;
+use crate::runtime::Runtime;
+use crate::state::Rect;
+use crate::state::gaussian::{GaussianOrder, GaussianState};
+use crate::stats::counters::Counters;
+use crate::stats::optimizations::Optimizations;
+use crate::stats::recorder::DrawRecord;
 use devmem::host;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -48,7 +49,7 @@ pub struct BinnedDraw {
     /// What makes the colours of its fragments.
     pub(crate) resolve: Option<ResolveShader>,
     /// How its depths are numbers.
-    pub(crate) depth_unit: DepthCode,
+    pub(crate) depth_unit: DepthEncoding,
     /// How the depths of a tile's list follow one another.
     pub(crate) depth_trend: DepthTrend,
     /// Half the pixels after which the picture repeats, or infinity.
@@ -104,7 +105,7 @@ impl BinnedDraw {
         set: GaussianSet,
         sorted: Arc<SortedSet>,
         record: Option<Arc<DrawRecord>>,
-        device: &Device,
+        runtime: &Runtime,
     ) -> Self {
         let begin = set.begin;
         Self {
@@ -113,14 +114,14 @@ impl BinnedDraw {
                 (Some(depth), GaussianOrder::ViewDepth) if set.draws.is_empty() => depth.trend(),
                 _ => DepthTrend::None,
             },
-            depth_unit: set.depth.map_or(DepthCode::Float, |depth| depth.unit()),
+            depth_unit: set.depth.map_or(DepthEncoding::Float, |depth| depth.unit()),
             resolve: set.resolve,
             half_period: period(&begin.camera).map_or(f64::INFINITY, |p| 0.5 * p),
             rays: PixelRays::new(&begin.camera, &begin.viewport),
             state: begin.state,
             bounds: set.bounds,
             sorted,
-            optimizations: device.config().optimizations,
+            optimizations: runtime.config().optimizations,
             record,
         }
     }

@@ -5,7 +5,7 @@ use super::lanes::GROUP;
 use super::ray_depth::RayDepth;
 use super::scratch::ScreenGaussians;
 use super::surfel::Surfel;
-use crate::counters::Counters;
+use crate::stats::counters::Counters;
 use devmem::host;
 
 /// A projected Gaussian: what the tile engine needs of it, in one cache line.

@@ -9,7 +9,7 @@ use super::camera::{LN_2, ViewConstants};
 use super::footprint::{Ellipse, TileFootprint, TileSpan, Visible};
 use super::ray_depth;
 use super::scratch::Scratch;
-use crate::packet::CameraModel;
+use crate::state::gaussian::CameraModel;
 use fearless_simd::{Simd, f64x8, prelude::*};
 
 /// What a squared distance of 1 takes off an exponent of 2.
@@ -284,7 +284,7 @@ pub(super) fn surfel_of(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::SimdLevel;
+    use crate::runtime::SimdLevel;
     use devmem::dispatch;
     use proptest::prelude::*;
 

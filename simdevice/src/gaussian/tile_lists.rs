@@ -8,13 +8,15 @@
 //! Where lists would outgrow their budget, as those of a million Gaussians that fill a large screen do, there are none:
 //! each tile then walks the sorted sequence itself, a piece at a time, until it is saturated.
 
-use super::footprint::{HELD_ROWS, TILE_SIZE, TileFootprint, TileSpan};
+use super::footprint::{HELD_ROWS, TileFootprint, TileSpan};
 use super::splat::{ProjectedGroup, locate};
-use crate::lanes::three;
-use crate::packet::Rect;
+use crate::limits::TILE_SIZE;
+use crate::simd::three;
+use crate::state::Rect;
 use devmem::host;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::AtomicU64;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// The lists of some rows of tiles.
 #[derive(Debug, Default)]

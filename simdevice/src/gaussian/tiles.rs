@@ -2,16 +2,17 @@
 //! are, and one at a time for the others.
 
 use super::camera::ViewConstants;
-use super::footprint::{Ellipse, HELD_ROWS, TILE_SIZE, TileFootprint};
+use super::footprint::{Ellipse, HELD_ROWS, TileFootprint};
 use super::lanes::{Bits, GroupF64};
 use super::panorama;
 use super::scratch::{Scratch, ScreenGaussians};
 use super::splat::ProjectedGroup;
 use super::surfel::surfel_of;
-use crate::counters::{Counter, Counters};
-use crate::lanes::both;
-use crate::optimizations::Optimization;
-use crate::packet::GaussianGeometry;
+use crate::limits::TILE_SIZE;
+use crate::simd::both;
+use crate::state::gaussian::GaussianGeometry;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, prelude::*};
 
 /// Added to a whole number below 2^52, this makes its bits the lowest ones.
@@ -311,9 +312,10 @@ fn reach_of_one(
 mod tests {
     use super::super::footprint::Visible;
     use super::*;
-    use crate::device::SimdLevel;
-    use crate::optimizations::Optimizations;
-    use crate::packet::{Camera, GaussianState, Viewport};
+    use crate::runtime::SimdLevel;
+    use crate::state::Viewport;
+    use crate::state::gaussian::{Camera, GaussianState};
+    use crate::stats::optimizations::Optimizations;
     use devmem::dispatch;
     use proptest::prelude::*;
 

@@ -9,7 +9,7 @@ use super::camera::{ViewConstants, linearize};
 use super::lanes::GROUP;
 use super::ray_depth;
 use super::scratch::Scratch;
-use crate::packet::CameraModel;
+use crate::state::gaussian::CameraModel;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// The distance of the points from the mean, in standard deviations: the root of the number of dimensions.

@@ -11,17 +11,19 @@ use super::set::GaussianSet;
 use super::sort::ordered_bits;
 use super::splat::{ProjectedGroup, Splat};
 use super::tiles::find_tiles;
-use crate::counters::Counter;
-use crate::device::Device;
 use crate::geometry::points::PointShader;
-use crate::packet::draw::{Draw, gaussian};
-use crate::packet::{Camera, GaussianOrder, Viewport};
-use devmem::dispatch;
-use devmem::host;
+use crate::packet::Draw;
+use crate::program::interface::gaussian;
+use crate::runtime::Runtime;
+use crate::state::Viewport;
+use crate::state::gaussian::{Camera, GaussianOrder};
+use crate::stats::counters::Counter;
+use devmem::{dispatch, host};
 use fearless_simd::{Level, Simd, prelude::*};
 use isa::exec::Stopped;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Groups that a worker takes at a time, so that its shader is made rarely.
 const GROUPS_PER_TASK: usize = 16;
@@ -90,7 +92,7 @@ pub(super) fn vertex_bytes(draw: &Draw) -> u64 {
 /// [`Stopped`] if a program ran for too long.
 pub(super) fn project_all(
     set: &GaussianSet,
-    device: &Device,
+    runtime: &Runtime,
 ) -> Result<Vec<ProjectedGroup>, Stopped> {
     let mut sequence = 0u32;
     for append in &set.appends {
@@ -99,7 +101,7 @@ pub(super) fn project_all(
     }
     let mut groups = Vec::new();
     for draw in &set.draws {
-        let shaded = project(set, draw, sequence, device)?;
+        let shaded = project(set, draw, sequence, runtime)?;
         host::reserve(&mut groups, shaded.len());
         groups.extend(shaded);
         let gaussians = draw.count.wrapping_mul(draw.instance_count);
@@ -116,7 +118,7 @@ fn project(
     set: &GaussianSet,
     draw: &Draw,
     sequence: u32,
-    device: &Device,
+    runtime: &Runtime,
 ) -> Result<Vec<ProjectedGroup>, Stopped> {
     let Some(viewport) = draw.state.viewports.first() else {
         return Ok(Vec::new());
@@ -130,12 +132,12 @@ fn project(
         })
     });
     let tasks = host::collect(tasks);
-    let prepared = draw.vertex_bindings.prepare(device.level());
+    let prepared = draw.vertex_bindings.bind(runtime.level());
     let (resources, cancel) = (prepared.resources(), AtomicBool::new(false));
     let worker = || {
-        let shader = PointShader::new(draw, device, &resources, &cancel);
+        let shader = PointShader::new(draw, runtime, &resources, &cancel);
         Worker {
-            shading: Shading::new(set, viewport, &shader, device),
+            shading: Shading::new(set, viewport, &shader, runtime),
             shader,
             outputs: Box::default(),
             scratch: Scratch::new(),
@@ -146,14 +148,14 @@ fn project(
             return Err(Stopped::Cancelled);
         }
         let end = draw.count.min(task.first.saturating_add(GROUP as u32));
-        let done = worker.run(task, end, device.level());
+        let done = worker.run(task, end, runtime.level());
         if done.is_err() {
             cancel.store(true, Relaxed);
         }
         done
     };
     let mut done = host::with_capacity(tasks.len());
-    device.install(|| {
+    runtime.install(|| {
         tasks
             .par_iter()
             .with_min_len(GROUPS_PER_TASK)
@@ -200,11 +202,11 @@ impl Shading {
         set: &GaussianSet,
         viewport: &Viewport,
         shader: &PointShader<'_>,
-        device: &Device,
+        runtime: &Runtime,
     ) -> Self {
         let state = &set.begin.state;
         let visible = Visible::from(set.bounds);
-        let optimizations = device.config().optimizations;
+        let optimizations = runtime.config().optimizations;
         // The clip volume takes the place of the camera's planes.
         let camera = Camera {
             near_plane: f32::NEG_INFINITY,

@@ -1,6 +1,6 @@
 //! Primitive assembly: which vertices of a run make each primitive (Vulkan 1.3, "Primitive Topologies").
 
-use crate::packet::draw::Topology;
+use crate::state::Topology;
 
 /// A primitive's vertices by their place in the run of vertices that is not interrupted by a restart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

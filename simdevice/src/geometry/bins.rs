@@ -1,8 +1,8 @@
 //! Binning: which primitives each macro-tile has to look at.
 
 use super::primitive::Primitive;
-use crate::lanes::{both, three};
-use crate::packet::Rect;
+use crate::simd::{both, three};
+use crate::state::Rect;
 use devmem::host;
 
 /// The macro-tiles that a pass's area touches.

@@ -3,7 +3,7 @@
 //! for bit; and from products that are exact, so that an edge whose corners are ever so far outside stays where it is.
 
 use super::viewport::{LEAST_W, Transform};
-use crate::packet::draw::MAX_CLIP_CULL_DISTANCES;
+use crate::limits::MAX_CLIP_CULL_DISTANCES;
 
 /// A vertex while its polygon is clipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::viewport::Projected;
 use crate::format::{Channel, Format, Numeric};
-use crate::packet::draw::DepthBias;
+use crate::state::DepthBias;
 
 /// The least difference of depths that a depth attachment is sure to tell apart.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,8 +2,8 @@
 //! vertices of a chunk of primitives.
 
 use super::assemble::{places, primitive_count, uses_pivot};
-use crate::packet::IndexStream;
-use crate::packet::draw::{Draw, Topology};
+use crate::packet::{Draw, IndexStream};
+use crate::state::Topology;
 use devmem::host;
 
 /// Vertices that no restart interrupts.

@@ -1,9 +1,9 @@
 //! Vertex fetch: attributes of a batch of vertices, from device memory to the inputs of a machine.
 
-use super::pipeline::LANES;
 use crate::format::{Format, Numeric};
-use crate::packet::AttributeStream;
-use crate::packet::draw::{Draw, VertexInput};
+use crate::packet::{AttributeStream, Draw};
+use crate::program::interface::VertexInput;
+use crate::program::vertex::VERTEX_BATCH;
 use isa::exec::{Chunk, Machine};
 
 /// A span of vertices is read whole where it has at most this many bytes for each vertex wanted.
@@ -69,7 +69,7 @@ impl<'a> Fetcher<'a> {
     pub(super) fn fetch(&mut self, machine: &mut Machine, vertices: &[i64], instances: &[u32]) {
         let one_instance = instances.windows(2).all(|pair| pair[0] == pair[1]);
         self.set_numbers(machine, vertices, instances);
-        let mut elements = [0; LANES];
+        let mut elements = [0; VERTEX_BATCH];
         for attribute in &self.attributes {
             let stream = attribute.stream;
             let first = i64::from(self.draw.first_instance);
@@ -159,14 +159,14 @@ fn is_words(format: Format) -> bool {
 struct Source<'a> {
     bytes: &'a [u8],
     /// Where each element begins, in bytes.
-    starts: [u32; LANES],
+    starts: [u32; VERTEX_BATCH],
 }
 
 impl<'a> Source<'a> {
     /// Reads elements; those that don't lie inside the buffer are zero.
     fn read(stream: &AttributeStream, elements: &[i64], scratch: &'a mut Vec<u8>) -> Self {
         let size = stream.format.texel_size();
-        let mut starts = [0; LANES];
+        let mut starts = [0; VERTEX_BATCH];
         let least = elements.iter().copied().min().unwrap_or(0);
         let greatest = elements.iter().copied().max().unwrap_or(0);
         let stride = u64::from(stream.stride);
@@ -204,7 +204,7 @@ impl<'a> Source<'a> {
     }
 
     /// The words of elements of `N` words each, component by component.
-    fn words<const N: usize>(&self, starts: &[u32], words: &mut [[u32; LANES]; 4]) {
+    fn words<const N: usize>(&self, starts: &[u32], words: &mut [[u32; VERTEX_BATCH]; 4]) {
         for (lane, &start) in starts.iter().enumerate() {
             let bytes = &self.bytes[start as usize..][..4 * N];
             for (component, word) in words.iter_mut().zip(bytes.as_chunks::<4>().0) {
@@ -252,7 +252,7 @@ impl Out<'_> {
             1f32.to_bits()
         };
         let components = format.components();
-        let mut words = [[0; LANES]; 4];
+        let mut words = [[0; VERTEX_BATCH]; 4];
         let starts = &source.starts[..count];
         match components.len() {
             1 => source.words::<1>(starts, &mut words),
@@ -286,7 +286,7 @@ impl Out<'_> {
 
     /// Components that have to be decoded from packed elements.
     fn decoded(self, format: Format, packed: &[u8], count: usize) {
-        let mut texels = [[0.0; 4]; LANES];
+        let mut texels = [[0.0; 4]; VERTEX_BATCH];
         let texels = &mut texels[..count];
         format.decode_row(packed, texels);
         for &(slot, component) in self.inputs {

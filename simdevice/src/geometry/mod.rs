@@ -11,11 +11,10 @@ mod assemble;
 mod bins;
 mod clip;
 mod depth_bias;
+mod draw;
 mod elements;
-mod emit;
 mod fetch;
 mod order;
-mod pipeline;
 pub(crate) mod points;
 mod primitive;
 mod setup;
@@ -25,16 +24,16 @@ mod tests;
 mod viewport;
 
 pub use bins::Bins;
-pub use emit::{MAX_LINE_WIDTH, MAX_POINT_SIZE};
-pub use pipeline::DrawPipeline;
-pub use primitive::{Primitive, PrimitiveChunk, PrimitiveDraw, PrimitiveKind, Varyings};
+pub use draw::{PrimitiveChunk, PrimitiveDraw};
+pub use primitive::{Primitive, PrimitiveKind, Varyings};
 
-use crate::bindings::Prepared;
-use crate::counters::{Counter, Counters};
-use crate::device::Device;
 use crate::format::Format;
-use crate::packet::Rect;
-use crate::packet::draw::{Draw, DrawState, PolygonMode, VertexInput};
+use crate::packet::Draw;
+use crate::program::bindings::BoundResources;
+use crate::program::interface::VertexInput;
+use crate::runtime::Runtime;
+use crate::state::{DrawState, PolygonMode, Rect};
+use crate::stats::counters::{Counter, Counters};
 use assemble::corner_count;
 use bins::Grid;
 use depth_bias::DepthUnit;
@@ -44,10 +43,9 @@ use fetch::Fetcher;
 use isa::exec::{Stopped, Watchdog};
 use isa::ir::Rate;
 use isa::resources::Resources;
-use rayon::prelude::*;
 use setup::{Job, Output, Setup};
 use shade::{Shaded, Shader};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use viewport::Transform;
 
@@ -71,9 +69,9 @@ pub(crate) struct Surface {
 /// A draw on its way to the rasterizer, part by part.
 pub(crate) struct FrontEnd<'a> {
     draw: &'a Draw,
-    device: &'a Device,
+    runtime: &'a Runtime,
     surface: Surface,
-    prepared: Prepared<'a>,
+    prepared: BoundResources<'a>,
     runs: Vec<Run>,
     transforms: Vec<Transform>,
     regions: Vec<Rect>,
@@ -91,7 +89,7 @@ impl<'a> FrontEnd<'a> {
     pub(crate) fn new(
         draw: &'a Draw,
         surface: Surface,
-        device: &'a Device,
+        runtime: &'a Runtime,
         counters: &mut Counters,
     ) -> Self {
         let state = &draw.state;
@@ -124,9 +122,9 @@ impl<'a> FrontEnd<'a> {
             .map(|(region, viewport)| region.intersect(viewport::pixels(viewport)));
         Self {
             draw,
-            device,
+            runtime,
             surface,
-            prepared: draw.vertex_bindings.prepare(device.level()),
+            prepared: draw.vertex_bindings.bind(runtime.level()),
             runs,
             transforms: transforms.take(state.scissors.len()).collect(),
             regions: regions.collect(),
@@ -179,24 +177,14 @@ impl<'a> FrontEnd<'a> {
         };
         let resources = self.prepared.resources();
         let cancel = AtomicBool::new(false);
-        let count = (range.end - range.start).min(self.device.threads() as u64);
-        let mut workers: Vec<_> = (0..count)
-            .map(|_| Worker::new(self, &setup, &resources, &cancel))
-            .collect();
-        let next = AtomicU64::new(range.start);
-        match &mut workers[..] {
-            [worker] => worker.run(&next, range.end),
-            workers => self.device.install(|| {
-                workers
-                    .par_iter_mut()
-                    .for_each(|worker| worker.run(&next, range.end));
-            }),
-        }
-        let failures = workers.iter().filter_map(|worker| worker.stopped);
-        // That others were cancelled tells nothing.
-        if let Some(stopped) = failures.min_by_key(|stopped| *stopped == Stopped::Cancelled) {
-            return Err(stopped);
-        }
+        let (workers, ran) = self.runtime.share(
+            range,
+            1,
+            &cancel,
+            || Worker::new(self, &setup, &resources, &cancel),
+            Worker::run_chunk,
+        );
+        ran?;
         let mut done = Vec::new();
         for worker in workers {
             counters.add_all(&worker.counters);
@@ -208,7 +196,7 @@ impl<'a> FrontEnd<'a> {
     }
 
     fn grid(&self) -> Grid {
-        Grid::new(self.surface.area, self.device.config().macro_tile_size)
+        Grid::new(self.surface.area, self.runtime.config().macro_tile_size)
     }
 
     /// Calls `each` with the runs, instances and primitives (first and end) of a chunk, in order.
@@ -265,7 +253,6 @@ struct Worker<'a> {
     front: &'a FrontEnd<'a>,
     setup: &'a Setup<'a>,
     shader: Shader<'a>,
-    cancel: &'a AtomicBool,
     elements: Elements,
     shaded: Shaded,
     numbers: Vec<u32>,
@@ -273,8 +260,6 @@ struct Worker<'a> {
     counters: Counters,
     /// What became of the chunks that left anything, with their numbers.
     done: Vec<(u64, PrimitiveChunk)>,
-    /// Why it could not go on.
-    stopped: Option<Stopped>,
 }
 
 impl<'a> Worker<'a> {
@@ -284,17 +269,17 @@ impl<'a> Worker<'a> {
         resources: &'a Resources<'a>,
         cancel: &'a AtomicBool,
     ) -> Self {
-        let mut machine = front.draw.pipeline.vertex.lease();
+        let mut machine = front.draw.pipeline.vertex.machines.lend();
         let shader = Shader {
             fetcher: Fetcher::new(front.draw, &mut machine),
             machine,
             outputs: setup.outputs,
             takes_extras: setup.outputs.has_extras(draws_points(setup.state)),
-            level: front.device.level(),
+            level: front.runtime.level(),
             transform: front.transforms.first().copied().unwrap_or(Transform::NONE),
             resources,
             watchdog: Watchdog {
-                limit: front.device.config().shader_timeout,
+                limit: front.runtime.config().shader_timeout,
                 cancel: Some(cancel),
             },
         };
@@ -302,37 +287,17 @@ impl<'a> Worker<'a> {
             front,
             setup,
             shader,
-            cancel,
             elements: Elements::default(),
             shaded: Shaded::default(),
             numbers: Vec::new(),
             output: Output::default(),
             counters: Counters::default(),
             done: Vec::new(),
-            stopped: None,
-        }
-    }
-
-    /// Takes chunks up to `end` that nobody else took.
-    fn run(&mut self, next: &AtomicU64, end: u64) {
-        loop {
-            let chunk = next.fetch_add(1, Relaxed);
-            if chunk >= end {
-                return;
-            }
-            if let Err(stopped) = self.run_chunk(chunk) {
-                self.cancel.store(true, Relaxed);
-                self.stopped = Some(stopped);
-                return;
-            }
         }
     }
 
     /// Takes a chunk through all stages.
     fn run_chunk(&mut self, chunk: u64) -> Result<(), Stopped> {
-        if self.cancel.load(Relaxed) {
-            return Err(Stopped::Cancelled);
-        }
         let (front, elements) = (self.front, &mut self.elements);
         elements.clear();
         front.pieces(chunk, |run, instance, first, end| {

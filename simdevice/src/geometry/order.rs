@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::geometry::bins::Grid;
     use crate::geometry::{PrimitiveKind, Varyings};
-    use crate::packet::Rect;
+    use crate::state::Rect;
 
     /// A primitive of three vertices, which are given.
     fn primitive(id: u32, vertices: [u32; 3]) -> Primitive {

@@ -5,9 +5,9 @@ use super::elements::{Elements, Run};
 use super::fetch::Fetcher;
 use super::shade::{Shaded, Shader};
 use super::viewport::Transform;
-use crate::counters::{Counter, Counters};
-use crate::device::Device;
-use crate::packet::draw::Draw;
+use crate::packet::Draw;
+use crate::runtime::Runtime;
+use crate::stats::counters::{Counter, Counters};
 use isa::exec::{Stopped, Watchdog};
 use isa::resources::Resources;
 use std::sync::atomic::AtomicBool;
@@ -24,12 +24,12 @@ impl<'a> PointShader<'a> {
     /// Makes a machine ready. `cancel` stops it.
     pub(crate) fn new(
         draw: &'a Draw,
-        device: &Device,
+        runtime: &Runtime,
         resources: &'a Resources<'a>,
         cancel: &'a AtomicBool,
     ) -> Self {
         let program = &draw.pipeline.vertex;
-        let mut machine = program.lease();
+        let mut machine = program.machines.lend();
         Self {
             draw,
             shader: Shader {
@@ -37,11 +37,11 @@ impl<'a> PointShader<'a> {
                 machine,
                 outputs: &program.outputs,
                 takes_extras: false,
-                level: device.level(),
+                level: runtime.level(),
                 transform: Transform::NONE,
                 resources,
                 watchdog: Watchdog {
-                    limit: device.config().shader_timeout,
+                    limit: runtime.config().shader_timeout,
                     cancel: Some(cancel),
                 },
             },

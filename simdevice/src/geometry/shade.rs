@@ -2,9 +2,10 @@
 
 use super::elements::Elements;
 use super::fetch::Fetcher;
-use super::pipeline::{LANES, Lease, VertexOutputs};
 use super::viewport::{Projected, Projections, Transform, code};
-use crate::packet::draw::MAX_CLIP_CULL_DISTANCES;
+use crate::limits::MAX_CLIP_CULL_DISTANCES;
+use crate::program::pool::PooledMachine;
+use crate::program::vertex::{VERTEX_BATCH, VertexOutputs};
 use devmem::dispatch;
 use devmem::host;
 use fearless_simd::Level;
@@ -52,7 +53,7 @@ pub(super) struct Shaded {
 
 /// Where batches run.
 pub(super) struct Shader<'a> {
-    pub machine: Lease<'a>,
+    pub machine: PooledMachine<'a>,
     pub fetcher: Fetcher<'a>,
     pub outputs: &'a VertexOutputs,
     /// Whether more than positions and varyings is looked at.
@@ -75,8 +76,8 @@ impl Shader<'_> {
         shaded.varyings.clear();
         let batches = elements
             .vertices
-            .chunks(LANES)
-            .zip(elements.instances.chunks(LANES));
+            .chunks(VERTEX_BATCH)
+            .zip(elements.instances.chunks(VERTEX_BATCH));
         for (vertices, instances) in batches {
             self.fetcher.fetch(&mut self.machine, vertices, instances);
             self.machine.run(

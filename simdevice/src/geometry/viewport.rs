@@ -1,6 +1,6 @@
 //! From clip space to the framebuffer: the viewport transform, snapping to 1/256 pixels, and clip codes.
 
-use crate::packet::{Rect, Viewport};
+use crate::state::{Rect, Viewport};
 
 /// Sub-pixel units of a pixel.
 pub(super) const ONE: i32 = 256;

@@ -1,15 +1,17 @@
 //! Packets for people: a line each, with the state that matters.
 
-use super::draw::{CompareOp, DepthStencil, Draw, LogicOp};
 use super::{
-    Aspect, Attachment, AttachmentClear, BlendState, BufferRange, ClearAttachments, ClearValue,
-    GaussianAppend, GaussianBegin, LoadOp, Packet, Rect, Rendering, SubresourceLayers,
+    Attachment, AttachmentClear, BufferRange, ClearAttachments, GaussianAppend, GaussianBegin,
+    LoadOp, Rendering, SubresourceLayers,
 };
+use crate::format::Aspect;
 use crate::image::{Image, ImageView};
+use crate::packet::Draw;
+use crate::state::{BlendState, CompareOp, DepthStencil, LogicOp};
 use std::fmt::{self, Display, Formatter};
 
 /// Displays a value by a function.
-struct By<F>(F);
+pub(super) struct By<F>(pub(super) F);
 
 impl<F: Fn(&mut Formatter<'_>) -> fmt::Result> Display for By<F> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
@@ -18,7 +20,10 @@ impl<F: Fn(&mut Formatter<'_>) -> fmt::Result> Display for By<F> {
 }
 
 /// `separator` between the items.
-fn joined<T: Display>(items: impl IntoIterator<Item = T> + Clone, separator: &str) -> impl Display {
+pub(super) fn joined<T: Display>(
+    items: impl IntoIterator<Item = T> + Clone,
+    separator: &str,
+) -> impl Display {
     By(move |f: &mut Formatter<'_>| {
         for (index, item) in items.clone().into_iter().enumerate() {
             if index > 0 {
@@ -30,32 +35,8 @@ fn joined<T: Display>(items: impl IntoIterator<Item = T> + Clone, separator: &st
     })
 }
 
-impl Display for Rect {
-    /// `widthxheight+x+y`.
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self {
-            x,
-            y,
-            width,
-            height,
-        } = self;
-        write!(f, "{width}x{height}{x:+}{y:+}")
-    }
-}
-
-impl Display for ClearValue {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Float(value) => write!(f, "{value:?}"),
-            Self::Int(value) => write!(f, "{value:?}"),
-            Self::Uint(value) => write!(f, "{value:?}"),
-            Self::DepthStencil { depth, stencil } => write!(f, "depth {depth}, stencil {stencil}"),
-        }
-    }
-}
-
 /// An image's format and size.
-fn image(image: &Image) -> impl Display + '_ {
+pub(super) fn image(image: &Image) -> impl Display + '_ {
     By(|f: &mut Formatter<'_>| {
         let desc = &image.desc;
         let [width, height, _] = desc.extent;
@@ -67,16 +48,16 @@ fn image(image: &Image) -> impl Display + '_ {
     })
 }
 
-fn view(view: &ImageView) -> impl Display + '_ {
+pub(super) fn view(view: &ImageView) -> impl Display + '_ {
     image(&view.image)
 }
 
-fn buffer(range: &BufferRange) -> impl Display {
+pub(super) fn buffer(range: &BufferRange) -> impl Display {
     let (offset, size) = (range.offset, range.size);
     By(move |f: &mut Formatter<'_>| write!(f, "buffer {offset}..{}", offset + size))
 }
 
-fn layers(layers: SubresourceLayers) -> impl Display {
+pub(super) fn layers(layers: SubresourceLayers) -> impl Display {
     By(move |f: &mut Formatter<'_>| {
         let SubresourceLayers {
             aspect,
@@ -95,7 +76,7 @@ fn layers(layers: SubresourceLayers) -> impl Display {
     })
 }
 
-fn attachment<'a>(name: &'a str, attachment: &'a Attachment) -> impl Display + 'a {
+pub(super) fn attachment<'a>(name: &'a str, attachment: &'a Attachment) -> impl Display + 'a {
     By(move |f: &mut Formatter<'_>| {
         write!(f, ", {name} {}", view(&attachment.view))?;
         match attachment.load {
@@ -111,7 +92,7 @@ fn attachment<'a>(name: &'a str, attachment: &'a Attachment) -> impl Display + '
     })
 }
 
-fn rendering(rendering: &Rendering) -> impl Display + '_ {
+pub(super) fn rendering(rendering: &Rendering) -> impl Display + '_ {
     By(|f: &mut Formatter<'_>| {
         write!(f, "begin rendering {}", rendering.area)?;
         if rendering.layer_count > 1 {
@@ -131,7 +112,7 @@ fn rendering(rendering: &Rendering) -> impl Display + '_ {
     })
 }
 
-fn clear_attachments(clear: &ClearAttachments) -> impl Display + '_ {
+pub(super) fn clear_attachments(clear: &ClearAttachments) -> impl Display + '_ {
     By(|f: &mut Formatter<'_>| {
         let what = clear.clears.iter().map(|clear| {
             By(move |f: &mut Formatter<'_>| match clear {
@@ -150,7 +131,7 @@ fn clear_attachments(clear: &ClearAttachments) -> impl Display + '_ {
     })
 }
 
-fn compare(op: CompareOp) -> &'static str {
+pub(super) fn compare(op: CompareOp) -> &'static str {
     match op {
         CompareOp::Never => "never",
         CompareOp::Less => "<",
@@ -164,7 +145,7 @@ fn compare(op: CompareOp) -> &'static str {
 }
 
 /// The fixed-function state of fragments.
-fn output<'a>(
+pub(super) fn output<'a>(
     tests: &'a DepthStencil,
     logic: Option<LogicOp>,
     blend: &'a [BlendState],
@@ -215,7 +196,7 @@ fn output<'a>(
     })
 }
 
-fn draw(draw: &Draw) -> impl Display + '_ {
+pub(super) fn draw(draw: &Draw) -> impl Display + '_ {
     By(|f: &mut Formatter<'_>| {
         let state = &draw.state;
         write!(f, "draw {:?}", state.topology)?;
@@ -243,7 +224,7 @@ fn draw(draw: &Draw) -> impl Display + '_ {
     })
 }
 
-fn gaussian_begin(begin: &GaussianBegin) -> impl Display + '_ {
+pub(super) fn gaussian_begin(begin: &GaussianBegin) -> impl Display + '_ {
     By(|f: &mut Formatter<'_>| {
         let state = &begin.state;
         write!(
@@ -259,7 +240,7 @@ fn gaussian_begin(begin: &GaussianBegin) -> impl Display + '_ {
     })
 }
 
-fn gaussian_append(append: &GaussianAppend) -> impl Display {
+pub(super) fn gaussian_append(append: &GaussianAppend) -> impl Display {
     let (vertices, instances) = (
         [append.first, append.count],
         [append.first_instance, append.instance_count],
@@ -267,7 +248,7 @@ fn gaussian_append(append: &GaussianAppend) -> impl Display {
     appended(append.indices.is_some(), vertices, instances)
 }
 
-fn gaussian_append_draw(draw: &Draw) -> impl Display {
+pub(super) fn gaussian_append_draw(draw: &Draw) -> impl Display {
     let (vertices, instances) = (
         [draw.first, draw.count],
         [draw.first_instance, draw.instance_count],
@@ -277,7 +258,11 @@ fn gaussian_append_draw(draw: &Draw) -> impl Display {
 }
 
 /// First and count of vertices and of instances.
-fn appended(indexed: bool, [first, count]: [u32; 2], instances: [u32; 2]) -> impl Display {
+pub(super) fn appended(
+    indexed: bool,
+    [first, count]: [u32; 2],
+    instances: [u32; 2],
+) -> impl Display {
     By(move |f: &mut Formatter<'_>| {
         let what = if indexed { "indices" } else { "gaussians" };
         let end = u64::from(first) + u64::from(count);
@@ -289,101 +274,4 @@ fn appended(indexed: bool, [first, count]: [u32; 2], instances: [u32; 2]) -> imp
         }
         Ok(())
     })
-}
-
-/// A line without its end. What a packet is bound to is named by format, size or place, not by which it is.
-impl Display for Packet {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let boxed = |[x, y, z]: [i32; 3], [width, height, depth]: [u32; 3]| {
-            By(move |f: &mut Formatter<'_>| write!(f, "{width}x{height}x{depth}{x:+}{y:+}{z:+}"))
-        };
-        match self {
-            Self::CopyBuffer(copy) => write!(
-                f,
-                "copy {} to {}: {} regions",
-                buffer(&copy.source),
-                buffer(&copy.target),
-                copy.regions.len()
-            ),
-            Self::CopyBufferToImage(copy) | Self::CopyImageToBuffer(copy) => {
-                let (buffer, image) = (buffer(&copy.buffer), image(&copy.image));
-                match self {
-                    Self::CopyBufferToImage(_) => write!(f, "copy {buffer} to {image}")?,
-                    _ => write!(f, "copy {image} to {buffer}")?,
-                }
-                for region in &copy.regions {
-                    let place = boxed(region.image_offset, region.image_extent);
-                    write!(
-                        f,
-                        ", {place} {} at {}",
-                        layers(region.subresource),
-                        region.buffer_offset
-                    )?;
-                }
-                Ok(())
-            }
-            Self::CopyImage(copy) => {
-                write!(f, "copy {} to {}", image(&copy.source), image(&copy.target))?;
-                for region in &copy.regions {
-                    let [x, y, z] = region.target_offset;
-                    let from = boxed(region.source_offset, region.extent);
-                    write!(f, ", {from} {} to {x:+}{y:+}{z:+}", layers(region.source))?;
-                }
-                Ok(())
-            }
-            Self::BlitImage(blit) => write!(
-                f,
-                "blit {} to {} {:?}: {} regions",
-                image(&blit.source),
-                image(&blit.target),
-                blit.filter,
-                blit.regions.len()
-            ),
-            Self::ResolveImage(resolve) => write!(
-                f,
-                "resolve {} to {} by {:?}: {} regions",
-                image(&resolve.source),
-                image(&resolve.target),
-                resolve.mode,
-                resolve.regions.len()
-            ),
-            Self::FillBuffer { target, word } => {
-                write!(f, "fill {} with {word:#010x}", buffer(target))
-            }
-            Self::UpdateBuffer { target, data } => {
-                write!(f, "update {} with {} bytes", buffer(target), data.len())
-            }
-            Self::ClearImage(clear) => {
-                write!(f, "clear {} to {}", image(&clear.image), clear.value)
-            }
-            Self::BeginRendering(it) => write!(f, "{}", rendering(it)),
-            Self::ClearAttachments(clear) => write!(f, "{}", clear_attachments(clear)),
-            Self::GaussianBegin(begin) => write!(f, "{}", gaussian_begin(begin)),
-            Self::GaussianAppend(append) => write!(f, "{}", gaussian_append(append)),
-            Self::GaussianAppendDraw(draw) => write!(f, "{}", gaussian_append_draw(draw)),
-            Self::GaussianResolveShader(_) => f.write_str("shade the fragments of gaussians"),
-            Self::GaussianResolve => f.write_str("resolve gaussians"),
-            Self::Dispatch(dispatch) => {
-                let [x, y, z] = dispatch.count;
-                write!(f, "dispatch {x}x{y}x{z} workgroups")?;
-                if dispatch.base != [0; 3] {
-                    write!(f, " from {:?}", dispatch.base)?;
-                }
-                Ok(())
-            }
-            Self::Draw(it) => write!(f, "{}", draw(it)),
-            Self::Barrier => f.write_str("barrier"),
-            Self::EndRendering => f.write_str("end rendering"),
-            Self::BeginQuery { index, .. } => write!(f, "begin query {index}"),
-            Self::EndQuery { index, .. } => write!(f, "end query {index}"),
-            Self::ResetQueries { first, count, .. } => {
-                write!(
-                    f,
-                    "reset queries {first}..{}",
-                    u64::from(*first) + u64::from(*count)
-                )
-            }
-            Self::WriteTimestamp { index, .. } => write!(f, "write timestamp {index}"),
-        }
-    }
 }

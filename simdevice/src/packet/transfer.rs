@@ -1,8 +1,10 @@
 //! What packets of copies, blits, resolves and clears say. Where an image is compressed, copies count its blocks of
 //! texels in place of texels; blits count texels always.
 
-use super::{Aspect, BufferRange, ClearValue, ResolveMode};
+use super::BufferRange;
+use crate::format::{Aspect, ClearValue};
 use crate::image::Image;
+use crate::state::ResolveMode;
 use crate::texture::Filter;
 use std::sync::Arc;
 

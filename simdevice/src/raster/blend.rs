@@ -1,7 +1,7 @@
 //! Blending: what a fragment's colour makes of an attachment's (Vulkan 1.3, 29.1).
 
 use crate::format::{Format, Numeric};
-use crate::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
+use crate::state::{BlendEquation, BlendFactor, BlendOp, BlendState};
 
 /// Premultiplied "over", the equation of most Gaussian draws.
 const OVER: BlendEquation = BlendEquation {

@@ -4,20 +4,12 @@
 use super::blend::clamp_range;
 use super::quads::Quads;
 use super::tile::AREA;
+use crate::format::unorm8::{Colors, clamp, pack_unorm8, pack_unorm8_in_range, unpack_unorm8};
 use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
-use crate::lanes::{as_floats, bits_of, floats_of};
-use crate::packet::draw::LogicOp;
-use crate::packet::{BlendEquation, BlendFactor, BlendOp, BlendState};
+use crate::simd::{as_floats, bits_of, floats_of};
+use crate::state::{BlendEquation, BlendFactor, BlendOp, BlendState, LogicOp};
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::exec::Chunk;
-use unorm8::{pack_unorm8_in_range, unpack_unorm8};
-
-mod unorm8;
-
-pub use unorm8::pack_unorm8;
-
-/// Colours of 16 fragments, by component.
-pub type Colors<S> = [f32x16<S>; 4];
 
 /// A colour attachment as a draw writes it.
 #[derive(Clone, Debug)]
@@ -524,13 +516,6 @@ fn blend_over<S: Simd>(
         };
     }
     blended
-}
-
-/// Clamps; NaN becomes the least.
-#[inline(always)]
-fn clamp<S: Simd>(simd: S, value: f32x16<S>, low: f32, high: f32) -> f32x16<S> {
-    let (low, high) = (f32x16::splat(simd, low), f32x16::splat(simd, high));
-    value.max_precise(low).min(high)
 }
 
 /// The texels of 16 lanes.

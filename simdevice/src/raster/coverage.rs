@@ -3,29 +3,9 @@
 
 use super::setup::{Edge, Setup};
 use super::tile::SIDE;
-use crate::packet::Rect;
+use crate::raster::tile::{BLOCK_X, BLOCK_Y, LANE_X, LANE_Y};
+use crate::state::Rect;
 use fearless_simd::{Simd, i32x16, mask32x16, prelude::*};
-
-/// The column of each lane of a block.
-pub const LANE_X: [i32; 16] = lanes(0);
-/// The row of each lane of a block.
-pub const LANE_Y: [i32; 16] = lanes(1);
-
-/// The pixels of a block lane by lane: bits 0 and 2 of a lane are its column, 1 and 3 its row.
-const fn lanes(axis: usize) -> [i32; 16] {
-    let mut out = [0; 16];
-    let mut lane = 0;
-    while lane < 16 {
-        let bits = lane >> axis;
-        out[lane] = (bits & 1 | (bits >> 1) & 2) as i32;
-        lane += 1;
-    }
-    out
-}
-
-/// The column and row in pixels of each block of a tile.
-const BLOCK_X: [i32; 16] = [0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12];
-const BLOCK_Y: [i32; 16] = [0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12];
 
 /// Lanes of a block whose column (or row) is less than the index.
 const COLUMNS_BELOW: [u16; 5] = below(LANE_X);

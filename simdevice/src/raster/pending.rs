@@ -2,7 +2,7 @@
 //! them: then the earlier one is never shaded there.
 
 use super::setup::Setup;
-use super::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
 
 /// Tiles of the largest macro-tile.
 const MAX_TILES: usize = (MAX_MACRO_TILE_SIZE / TILE_SIZE).pow(2) as usize;

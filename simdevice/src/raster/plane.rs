@@ -6,13 +6,12 @@
 //! holds (see [`super::depth`]). Tiles rather than macro-tiles are loaded and stored, so that the size of a macro-tile
 //! changes nothing either.
 
-use super::TILE_SIZE;
-use super::color::pack_unorm8;
 use super::tile::{AREA, SIDE, Target, Tile, place};
+use crate::format::unorm8::{pack_unorm8, unorm8_fraction};
 use crate::format::{Format, MAX_TEXEL_SIZE};
-use crate::packet::{Rect, ResolveMode};
-use crate::texture::unorm8_fraction;
-use crate::transfer::resolve_row;
+use crate::image::resolve::resolve_row;
+use crate::limits::TILE_SIZE;
+use crate::state::{Rect, ResolveMode};
 use devmem::dispatch;
 use devmem::host;
 use fearless_simd::{Level, Simd, f32x16, prelude::*, u32x16};

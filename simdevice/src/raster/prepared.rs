@@ -1,28 +1,21 @@
 //! A draw's state made ready for tiles, once for all workers: what its fragments need, when they are tested, and where
 //! they go.
 
-use super::batch::Needs;
 use super::color::ColorOutput;
 use super::depth::Tests;
-use super::fragment::{FragmentStage, Interface};
 use super::setup::{CENTER, SAMPLES_4};
 use super::tile::Target;
-use crate::bindings::Prepared;
-use crate::device::Device;
 use crate::geometry::PrimitiveDraw;
-use crate::optimizations::{Optimization, Optimizations};
-use crate::packet::draw::{FragmentInput, Interpolation, LogicOp};
-use crate::packet::{BlendState, Rect};
+use crate::program::bindings::BoundResources;
+use crate::program::fragment::{FragmentStage, Interface};
+use crate::program::interface::{FragmentInput, Interpolation};
+use crate::raster::output::{Targets, color_outputs};
+use crate::raster::setup::Needs;
+use crate::runtime::Runtime;
+use crate::state::Rect;
+use crate::stats::optimizations::{Optimization, Optimizations};
 use fearless_simd::Level;
 use std::time::Duration;
-
-/// The attachments of a pass.
-#[derive(Clone, Copy, Debug)]
-pub struct Targets<'a> {
-    pub color: &'a [Option<Target>],
-    pub depth: Option<&'a Target>,
-    pub stencil: Option<&'a Target>,
-}
 
 /// When depth and stencil are tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +31,7 @@ pub struct TileDraw<'a> {
     pub(super) draw: &'a PrimitiveDraw,
     /// The program, if it must run.
     pub(super) stage: Option<&'a FragmentStage>,
-    pub(super) bindings: Prepared<'a>,
+    pub(super) bindings: BoundResources<'a>,
     pub(super) targets: Targets<'a>,
     pub(super) colors: Vec<Option<ColorOutput>>,
     pub(super) tests: Tests,
@@ -77,7 +70,7 @@ impl<'a> TileDraw<'a> {
         targets: Targets<'a>,
         samples: Option<u32>,
         area: Rect,
-        device: &Device,
+        runtime: &Runtime,
     ) -> Self {
         let state = &*draw.state;
         let multisampled = samples.unwrap_or(state.samples) > 1;
@@ -132,7 +125,7 @@ impl<'a> TileDraw<'a> {
         let viewports = state.viewports.iter();
         let plain = plain && !state.alpha_to_one;
         // What was recorded is what hardware without this does.
-        let defers = device
+        let defers = runtime
             .config()
             .optimizations
             .has(Optimization::OverwrittenQuads)
@@ -150,7 +143,7 @@ impl<'a> TileDraw<'a> {
         Self {
             draw,
             stage,
-            bindings: draw.bindings.prepare(device.level()),
+            bindings: draw.bindings.bind(runtime.level()),
             targets,
             colors,
             tests,
@@ -193,9 +186,9 @@ impl<'a> TileDraw<'a> {
                     )
                 }),
             },
-            optimizations: device.config().optimizations,
-            level: device.level(),
-            limit: device.config().shader_timeout,
+            optimizations: runtime.config().optimizations,
+            level: runtime.level(),
+            limit: runtime.config().shader_timeout,
         }
     }
 
@@ -205,25 +198,4 @@ impl<'a> TileDraw<'a> {
             self.draw.bindings.bump_generations();
         }
     }
-}
-
-/// What becomes of the attachments that a program writes to.
-pub(super) fn color_outputs(
-    stage: Option<&FragmentStage>,
-    targets: &[Option<Target>],
-    blend: &[BlendState],
-    logic: Option<LogicOp>,
-    constants: [f32; 4],
-) -> Vec<Option<ColorOutput>> {
-    const REPLACE: BlendState = BlendState {
-        equations: None,
-        write_mask: 0xF,
-    };
-    let color = |(index, target): (usize, &Option<Target>)| {
-        let written = stage?.interface.colors.get(index)?;
-        written.iter().flatten().flatten().next()?;
-        let blend = blend.get(index).unwrap_or(&REPLACE);
-        ColorOutput::new(blend, logic, constants, target.as_ref()?.format())
-    };
-    targets.iter().enumerate().map(color).collect()
 }

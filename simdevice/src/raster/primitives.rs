@@ -1,42 +1,37 @@
 //! Triangle mode of the tile engine: the primitives of a draw, one after another, through coverage, early tests and
 //! shading.
 
-use super::batch::{Batch, BlockValues, Needs, QUADS, Quad, Samples, at_sample, offset};
+use super::batch::{Batch, BlockValues, QUADS, Quad, Samples, at_sample, offset};
 use super::coverage::{Coverage, bits};
 use super::depth::Tests;
-use super::fragment::{FragmentStage, Machines};
-use super::output;
 use super::pending::Pending;
+use super::prepared::TileDraw;
 use super::prepared::Timing;
-pub use super::prepared::{Targets, TileDraw};
 use super::quads::Quads;
+use super::recording::{self, MacroTileWork};
 use super::setup::Setup;
 use super::tile::{AREA, SIDE};
-use super::{Plane, TILE_SIZE};
-use crate::counters::{Counter, Counters};
 use crate::geometry::{Primitive, Varyings};
-use crate::lanes::both;
-use crate::optimizations::Optimization;
-use crate::packet::Rect;
-use crate::trace::MacroTileWork;
+use crate::limits::TILE_SIZE;
+use crate::program::fragment::{FragmentMachines, FragmentStage};
+use crate::program::interface::FragmentInput;
+use crate::raster::batch::add_attributes;
+use crate::raster::output::{Buffers, lanes_of};
+use crate::raster::setup::Needs;
+use crate::raster::tile::{BLOCKS, Tile, block_corner};
+use crate::raster::write::{test, write};
+use crate::simd::both;
+use crate::state::Rect;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::Optimization;
 use devmem::dispatch;
 use fearless_simd::{Simd, f32x16, prelude::*};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
 
 mod full_tile;
-mod touch;
-mod whole;
 
 use full_tile::FullTile;
-
-/// The tile buffers of a worker.
-#[derive(Debug)]
-pub struct Buffers {
-    pub color: Vec<Plane>,
-    pub depth: Plane,
-    pub stencil: Plane,
-}
 
 /// What a worker needs besides.
 #[derive(Debug, Default)]
@@ -59,71 +54,66 @@ pub struct Place {
     pub size: u32,
 }
 
-impl TileDraw<'_> {
-    /// Renders what it covers of a macro-tile.
-    ///
-    /// # Errors
-    /// [`Stopped`] if its program ran for too long, or `cancel` was set.
-    pub fn render(
-        &self,
-        place: Place,
-        buffers: &mut Buffers,
-        scratch: &mut Scratch,
-        counters: &mut Counters,
-        cancel: &AtomicBool,
-    ) -> Result<(), Stopped> {
-        let chunks = &self.draw.chunks;
-        if chunks
-            .iter()
-            .all(|chunk| chunk.bins.of(place.at, place.layer).is_empty())
-        {
-            return Ok(());
-        }
-        let record = self.draw.record.as_ref();
-        let before = record.map(|_| counters.clone());
-        let mut machines = self
-            .stage
-            .map(FragmentStage::take_machines)
-            .unwrap_or_default();
-        let mut renderer = Renderer {
-            draw: self,
-            place,
-            buffers,
-            batch: &mut scratch.batch,
-            full: &mut scratch.full,
-            machines: &mut machines,
-            counters,
-            cancel,
-            samples_passed: 0,
-            quads_masked: 0,
-            work: record.map(|_| MacroTileWork::default()),
-        };
-        renderer
-            .batch
-            .begin(self.needs, place.at, place.size, self.optimizations);
-        let level = self.level;
-        let pending = &mut *scratch.pending;
-        pending.clear();
-        let done = if self.positions.len() == 1 {
-            dispatch!(level, simd => renderer.run::<_, 1>(simd, pending))
-        } else {
-            dispatch!(level, simd => renderer.run::<_, 4>(simd, pending))
-        };
-        let done = done.and_then(|()| renderer.flush());
-        let (passed, masked) = (renderer.samples_passed, renderer.quads_masked);
-        let work = renderer.work;
-        counters.add(Counter::SamplesPassed, passed);
-        if self.optimizations.has(Optimization::MaskedQuads) {
-            counters.add(Counter::QuadsMasked, masked);
-        }
-        if let Some(stage) = self.stage {
-            stage.put_back(machines, counters);
-        }
-        if let (Some(record), Some(before), Some(work)) = (record, before, work) {
-            record.add_macro_tile(place.at, place.size, work, &counters.since(&before));
-        }
-        done
+/// Renders what a draw covers of a macro-tile.
+///
+/// # Errors
+/// [`Stopped`] if its program ran for too long, or `cancel` was set.
+pub fn render(
+    draw: &TileDraw<'_>,
+    place: Place,
+    buffers: &mut Buffers,
+    scratch: &mut Scratch,
+    counters: &mut Counters,
+    cancel: &AtomicBool,
+) -> Result<(), Stopped> {
+    let chunks = &draw.draw.chunks;
+    if chunks
+        .iter()
+        .all(|chunk| chunk.bins.of(place.at, place.layer).is_empty())
+    {
+        return Ok(());
     }
+    let record = draw.draw.record.as_ref();
+    let before = record.map(|_| counters.clone());
+    let mut machines = draw.stage.map(FragmentStage::machines);
+    let mut renderer = Renderer {
+        draw,
+        place,
+        buffers,
+        batch: &mut scratch.batch,
+        full: &mut scratch.full,
+        machines: machines.as_mut(),
+        counters,
+        cancel,
+        samples_passed: 0,
+        quads_masked: 0,
+        work: record.map(|_| MacroTileWork::default()),
+    };
+    renderer
+        .batch
+        .begin(draw.needs, place.at, place.size, draw.optimizations);
+    let level = draw.level;
+    let pending = &mut *scratch.pending;
+    pending.clear();
+    let done = if draw.positions.len() == 1 {
+        dispatch!(level, simd => renderer.run::<_, 1>(simd, pending))
+    } else {
+        dispatch!(level, simd => renderer.run::<_, 4>(simd, pending))
+    };
+    let done = done.and_then(|()| renderer.flush());
+    let (passed, masked) = (renderer.samples_passed, renderer.quads_masked);
+    let work = renderer.work;
+    counters.add(Counter::SamplesPassed, passed);
+    if draw.optimizations.has(Optimization::MaskedQuads) {
+        counters.add(Counter::QuadsMasked, masked);
+    }
+    if let Some(machines) = machines {
+        machines.give_back(counters);
+    }
+    if let (Some(record), Some(before), Some(work)) = (record, before, work) {
+        recording::add_macro_tile(record, place.at, place.size, work, &counters.since(&before));
+    }
+    done
 }
 
 /// A draw in a macro-tile.
@@ -133,7 +123,7 @@ pub(super) struct Renderer<'a, 'd> {
     pub buffers: &'a mut Buffers,
     pub batch: &'a mut Batch,
     full: &'a mut FullTile,
-    pub machines: &'a mut Machines,
+    pub machines: Option<&'a mut FragmentMachines<'d>>,
     pub counters: &'a mut Counters,
     pub cancel: &'a AtomicBool,
     pub samples_passed: u64,
@@ -487,7 +477,7 @@ impl Renderer<'_, '_> {
             let code = tests.code.encode(simd, depth, current.range);
             let first = (tile * N + sample) * AREA + 16 * block;
             let quads = Quads::block(first);
-            *lanes = output::test(
+            *lanes = test(
                 simd,
                 tests,
                 *lanes,
@@ -524,12 +514,13 @@ impl Renderer<'_, '_> {
     /// Shades what the batch has.
     #[inline(never)]
     pub fn flush(&mut self) -> Result<(), Stopped> {
-        let Some(stage) = self.draw.stage.filter(|_| self.batch.count > 0) else {
+        let programs = self.draw.stage.zip(self.machines.as_mut());
+        let Some((stage, machines)) = programs.filter(|_| self.batch.count > 0) else {
             return Ok(());
         };
-        let size = usize::from(4 * self.batch.count > super::fragment::BATCH_LANES[0]);
+        let size = usize::from(4 * self.batch.count > crate::program::fragment::BATCH_LANES[0]);
         let (level, draw) = (self.draw.level, self.draw);
-        let machine = stage.machine(self.machines, size);
+        let machine = machines.of_size(size);
         let batch = &mut *self.batch;
         batch.prepare();
         let samples = Samples {
@@ -559,7 +550,7 @@ impl Renderer<'_, '_> {
         };
         let buffers = &mut *self.buffers;
         let passed = dispatch!(level, simd => {
-            output::write(simd, draw, &stage.interface, batch, machine, &killed, buffers)
+            write(simd, draw, &stage.interface, batch, machine, &killed, buffers)
         });
         self.samples_passed += passed;
         self.batch.clear();
@@ -569,3 +560,285 @@ impl Renderer<'_, '_> {
 
 #[cfg(test)]
 mod tests;
+
+impl Renderer<'_, '_> {
+    /// Makes sure that depth and stencil of a tile are there.
+    fn touch_tests(&mut self, tile: usize) {
+        let (targets, layer) = (self.draw.targets, self.place.layer);
+        if let Some(target) = targets
+            .depth
+            .filter(|_| !self.buffers.depth.is_touched(tile))
+        {
+            let tile = self.tile_of(tile);
+            self.buffers.depth.touch(target, layer, &tile);
+        }
+        if let Some(target) = targets
+            .stencil
+            .filter(|_| !self.buffers.stencil.is_touched(tile))
+        {
+            let tile = self.tile_of(tile);
+            self.buffers.stencil.touch(target, layer, &tile);
+        }
+    }
+
+    /// Makes sure that a tile of the colours written is there.
+    #[inline(always)]
+    fn touch_colors<const N: usize>(&mut self, tile: usize, coverage: &Coverage<N>) {
+        for (index, output) in self.draw.colors.iter().enumerate() {
+            let Some(output) = output else { continue };
+            if self.buffers.color[index].is_touched(tile) {
+                continue;
+            }
+            // What is overwritten as a whole need not be loaded or cleared.
+            let state = &self.draw.draw.state;
+            if self.draw.keeps_all
+                && output.overwrites()
+                && coverage.is_whole()
+                && state.sample_mask & 15 == 15
+                && self.draw.optimizations.has(Optimization::OverwrittenTiles)
+            {
+                self.buffers.color[index].touch_unread(tile);
+                self.counters.add(Counter::TilesOverwritten, 1);
+            } else if let Some(target) = &self.draw.targets.color[index] {
+                let tile = self.tile_of(tile);
+                self.buffers.color[index].touch(target, self.place.layer, &tile);
+            }
+        }
+    }
+
+    /// A tile of the macro-tile.
+    #[cold]
+    fn tile_of(&self, index: usize) -> Tile {
+        let side = self.place.size / TILE_SIZE;
+        let [column, row] = self.place.at;
+        let at = [
+            column * side + index as u32 % side,
+            row * side + index as u32 / side,
+        ];
+        let whole = Rect {
+            x: (at[0] * TILE_SIZE) as i32,
+            y: (at[1] * TILE_SIZE) as i32,
+            width: TILE_SIZE,
+            height: TILE_SIZE,
+        };
+        Tile {
+            index,
+            at,
+            pixels: whole.intersect(self.draw.area),
+        }
+    }
+
+    /// Makes sure that a tile of the colours written is there, of which nothing will be left.
+    fn touch_unread(&mut self, tile: usize) {
+        if !self.draw.optimizations.has(Optimization::OverwrittenTiles) {
+            return self.touch_read(tile);
+        }
+        for (index, output) in self.draw.colors.iter().enumerate() {
+            if output.is_some() && !self.buffers.color[index].is_touched(tile) {
+                self.buffers.color[index].touch_unread(tile);
+                self.counters.add(Counter::TilesOverwritten, 1);
+            }
+        }
+    }
+
+    /// Makes sure that a tile of the colours written is there, with what it holds.
+    fn touch_read(&mut self, tile: usize) {
+        for (index, output) in self.draw.colors.iter().enumerate() {
+            if output.is_some()
+                && !self.buffers.color[index].is_touched(tile)
+                && let Some(target) = &self.draw.targets.color[index]
+            {
+                let tile = self.tile_of(tile);
+                self.buffers.color[index].touch(target, self.place.layer, &tile);
+            }
+        }
+    }
+}
+
+impl Renderer<'_, '_> {
+    /// A tile at pixel `at` that a primitive covers as a whole, in a draw with one sample a pixel.
+    #[inline(always)]
+    fn whole_tile<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        current: &mut Current<'_>,
+        coverage: &Coverage<N>,
+        pending: &mut Pending,
+        (tile, at): (usize, [i32; 2]),
+    ) -> Result<(), Stopped> {
+        let draw = self.draw;
+        let (mut lanes, mut passed) = ([u16::MAX; BLOCKS], AREA as u64);
+        if draw.tests.any() {
+            passed = 0;
+            for (block, lanes) in lanes.iter_mut().enumerate() {
+                let [x, y] = block_corner(at, block);
+                let setup = current.setup;
+                let base = setup.depth(setup.barycentrics(x, y));
+                let depth = f32x16::simd_from(simd, setup.lane_depth) + base;
+                let mut only = [*lanes];
+                self.test(simd, &draw.tests, current, depth, &mut only, (tile, block));
+                *lanes = only[0];
+                passed += u64::from(lanes.count_ones());
+            }
+        }
+        self.samples_passed += passed;
+        if passed == AREA as u64 && !draw.defers {
+            self.touch_colors(tile, coverage);
+        } else if passed == AREA as u64 {
+            self.touch_unread(tile);
+            let slot = match current.kept {
+                Some(slot) => slot,
+                None => {
+                    let (chunk, primitive) = current.place;
+                    *current
+                        .kept
+                        .insert(pending.keep(current.setup, chunk, primitive))
+                }
+            };
+            if pending.cover(tile, slot) {
+                self.counters
+                    .add(Counter::QuadsOverwritten, AREA as u64 / 4);
+            }
+            return Ok(());
+        }
+        if pending.waits(tile) {
+            self.shade_pending(simd, pending, tile)?;
+            // The batch may have begun anew.
+            current.record = None;
+        }
+        self.shade_tile(simd, current, (tile, at), &lanes)
+    }
+
+    /// Shades a tile that waits, if it does.
+    fn shade_pending<S: Simd>(
+        &mut self,
+        simd: S,
+        pending: &mut Pending,
+        tile: usize,
+    ) -> Result<(), Stopped> {
+        let Some(kept) = pending.take(tile) else {
+            return Ok(());
+        };
+        let draw = self.draw;
+        let chunk = &draw.draw.chunks[kept.chunk];
+        let primitive = &chunk.primitives[kept.primitive as usize];
+        let mut current = Current {
+            primitive,
+            varyings: &chunk.varyings,
+            setup: &kept.setup,
+            place: (kept.chunk, kept.primitive),
+            record: None,
+            kept: None,
+            range: self.depth_range(primitive),
+        };
+        let side = (self.place.size / TILE_SIZE) as usize;
+        let place = [tile % side, tile / side];
+        let corner = [0, 1].map(|axis| {
+            (self.place.at[axis] * self.place.size) as i32 + (place[axis] * SIDE) as i32
+        });
+        simd.vectorize(
+            #[inline(always)]
+            || self.shade_tile(simd, &mut current, (tile, corner), &[u16::MAX; BLOCKS]),
+        )
+    }
+
+    /// Shades lanes of a tile's blocks, of which nothing is left to be tested, in a draw with one sample a pixel.
+    #[inline(always)]
+    fn shade_tile<S: Simd>(
+        &mut self,
+        simd: S,
+        current: &mut Current<'_>,
+        (tile, at): (usize, [i32; 2]),
+        lanes: &[u16; BLOCKS],
+    ) -> Result<(), Stopped> {
+        if self.draw.takes_tiles && *lanes == [u16::MAX; BLOCKS] {
+            self.touch_read(tile);
+            return self.shade_full_tile(simd, current, (tile, at));
+        }
+        let needs = self.draw.needs;
+        let mut touched = false;
+        for (block, &lanes) in lanes.iter().enumerate() {
+            if lanes == 0 && self.draw.optimizations.has(Optimization::MaskedQuads) {
+                self.quads_masked += 4;
+                continue;
+            }
+            let corner = block_corner(at, block);
+            let values = BlockValues::new(simd, current.setup, corner, needs);
+            if !touched {
+                self.touch_read(tile);
+                touched = true;
+            }
+            let quad = Quad {
+                tile: tile as u8,
+                place: (block * 16) as u8,
+                ..Quad::default()
+            };
+            self.append(current, quad, &[lanes], &values)?;
+        }
+        Ok(())
+    }
+}
+
+impl Renderer<'_, '_> {
+    /// Shades the tile at pixel `at`, which is there, in a draw that takes tiles at once.
+    #[inline(always)]
+    fn shade_full_tile<S: Simd>(
+        &mut self,
+        simd: S,
+        current: &mut Current<'_>,
+        (tile, at): (usize, [i32; 2]),
+    ) -> Result<(), Stopped> {
+        let draw = self.draw;
+        let Some(stage) = draw.stage else {
+            return Ok(());
+        };
+        // Earlier fragments of the tile come first.
+        if self.batch.has_tile(tile) {
+            self.flush()?;
+            current.record = None;
+        }
+        let interface = &stage.interface;
+        let full = &mut *self.full;
+        full.attributes.clear();
+        let (primitive, varyings) = (current.primitive, current.varyings);
+        add_attributes(primitive, interface, varyings, &mut full.attributes);
+        let affine = current.setup.affine && draw.optimizations.has(Optimization::Affine);
+        let divides = draw.needs.inverse_w && !affine;
+        if draw.needs.barycentrics {
+            let needs = Needs {
+                inverse_w: divides,
+                ..draw.needs
+            };
+            full.find_barycentrics(simd, current.setup, at, needs);
+        }
+        let Some(machines) = self.machines.as_mut() else {
+            return Ok(());
+        };
+        let machine = machines.of_size(1);
+        for &(slot, kind, place) in &interface.inputs {
+            if let FragmentInput::Varying { interpolation, .. } = kind {
+                let attribute = full.attributes[place];
+                let lanes = machine.input_mut(slot);
+                full.interpolate(simd, interpolation, divides, attribute, lanes);
+            }
+        }
+        let undivided = draw.needs.inverse_w && !divides;
+        self.counters.add(Counter::BatchesAffine, undivided.into());
+        let watchdog = Watchdog {
+            limit: draw.limit,
+            cancel: Some(self.cancel),
+        };
+        let resources = draw.bindings.resources();
+        machine.run(&full.all, &full.none, &resources, watchdog)?;
+        self.counters.add(Counter::FragmentInvocations, AREA as u64);
+        for (index, output) in draw.colors.iter().enumerate() {
+            if let (Some(output), Some(slots)) = (output, interface.colors.get(index)) {
+                let sources = both(*slots, |slots| slots.map(|slot| lanes_of(machine, slot)));
+                let plane = &mut self.buffers.color[index];
+                let first = plane.start(tile, 0);
+                output.write_tile(simd, &sources, first, plane.words_mut());
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,10 +1,9 @@
 //! A primitive made ready for tiles: its edges as exact integers, and what varies over it as planes.
 
-use super::batch::Needs;
-use super::coverage::{LANE_X, LANE_Y};
 use crate::geometry::{Primitive, PrimitiveKind};
-use crate::lanes::{both, three};
-use crate::packet::Rect;
+use crate::raster::tile::{LANE_X, LANE_Y};
+use crate::simd::{both, three};
+use crate::state::Rect;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 /// Primitives reach at most this far from the framebuffer's corner, in 1/256 pixels, so that edge functions fit 64 bits;
@@ -326,4 +325,14 @@ impl Edge {
             lanes: (x + y).into(),
         }
     }
+}
+
+/// What fragments need of their primitive's planes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Needs {
+    pub barycentrics: bool,
+    /// After the early tests.
+    pub depth: bool,
+    /// 1 / w.
+    pub inverse_w: bool,
 }

@@ -1,9 +1,9 @@
 //! Attachments: where the texels of a pass's images are.
 
-use super::MAX_SAMPLES;
-use crate::format::{Format, MAX_TEXEL_SIZE};
+use crate::format::{Aspect, Format, MAX_TEXEL_SIZE};
 use crate::image::{Image, ImageKind, ImageView, SubresourceLayout};
-use crate::packet::{Aspect, StoreOp};
+use crate::limits::{MAX_FRAMEBUFFER_SIZE, MAX_SAMPLES};
+use crate::packet::StoreOp;
 use std::sync::Arc;
 
 /// An attachment's view cannot be rendered to.
@@ -27,9 +27,6 @@ pub enum AttachmentError {
     #[error("an attachment of {0}x{1} pixels is too large")]
     Extent(u32, u32),
 }
-
-/// The greatest width and height of an attachment in pixels.
-pub const MAX_FRAMEBUFFER_SIZE: u32 = 1 << 16;
 
 /// One aspect of an attachment: where its texels are, and what a tile begins with.
 #[derive(Clone, Debug)]

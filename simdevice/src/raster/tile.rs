@@ -3,10 +3,10 @@
 //! Pixels are kept in an order in which 2x2 quads are consecutive, then 4x4 blocks, then rows of blocks, so that a quad
 //! is four lanes of a vector and a block all sixteen.
 
-use crate::packet::Rect;
-use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
-
-pub use super::target::{AttachmentError, MAX_FRAMEBUFFER_SIZE, Target};
+pub use super::target::{AttachmentError, Target};
+pub use crate::limits::MAX_FRAMEBUFFER_SIZE;
+use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::state::Rect;
 
 /// The side of a tile in pixels.
 pub const SIDE: usize = TILE_SIZE as usize;
@@ -73,6 +73,39 @@ impl Tile {
             self.at[1] * TILE_SIZE + y as u32,
         ]
     }
+}
+
+/// The column of each lane of a block.
+pub const LANE_X: [i32; 16] = lanes(0);
+
+/// The row of each lane of a block.
+pub const LANE_Y: [i32; 16] = lanes(1);
+
+/// The pixels of a block lane by lane: bits 0 and 2 of a lane are its column, 1 and 3 its row.
+const fn lanes(axis: usize) -> [i32; 16] {
+    let mut out = [0; 16];
+    let mut lane = 0;
+    while lane < 16 {
+        let bits = lane >> axis;
+        out[lane] = (bits & 1 | (bits >> 1) & 2) as i32;
+        lane += 1;
+    }
+    out
+}
+
+/// The column of the first pixel of each block of a tile, from the tile's corner.
+pub const BLOCK_X: [i32; 16] = [0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12];
+
+/// The row of the first pixel of each block of a tile, from the tile's corner.
+pub const BLOCK_Y: [i32; 16] = [0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12];
+
+/// Blocks of a tile.
+pub(super) const BLOCKS: usize = 16;
+
+/// The first pixel of a block of the tile at pixel `at`.
+#[inline(always)]
+pub(super) fn block_corner([x, y]: [i32; 2], block: usize) -> [i32; 2] {
+    [x + (block % 4 * 4) as i32, y + (block / 4 * 4) as i32]
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 
 use super::address::{FAR, MAX_OFFSET, WHOLE};
-use super::lod::Floats;
 use super::sampler::{AddressMode, Filter};
+use crate::texture::packing::Floats;
 use isa::ir::CHUNK_LANES;
 use isa::resources::Lanes;
 

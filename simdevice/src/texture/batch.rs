@@ -12,11 +12,13 @@ use super::address;
 use super::axis::{Axis, axis};
 use super::cube;
 use super::filter::{border_texel, reference_value};
-use super::lod::{self, Floats, Selection};
+use super::lod;
+use super::lod::Selection;
 use super::packing::{PackedLevel, Packing, Rows};
 use super::sampler::{AddressMode, CompareOp, Filter, Sampler};
 use super::surface::Surface;
 use crate::format::Numeric;
+use crate::texture::packing::Floats;
 use isa::ir::{CHUNK_LANES, Dimension};
 use isa::resources::{Lanes, SampleRequest};
 
@@ -277,7 +279,7 @@ impl<S: Simd> Batch<'_, S> {
         filter: Filter,
     ) -> Texels {
         let dimension = self.request.shape.dimension;
-        let words = self.packing.words(self.surface);
+        let words = self.packing.words(&self.surface.memory);
         let bordered = x.has_outside || y.has_outside || within[0] != u16::MAX;
         // A cube's outside is that of lanes that nobody asks for.
         let plain = self.reference.is_none() && (!bordered || dimension == Dimension::Cube);

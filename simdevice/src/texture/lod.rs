@@ -4,13 +4,12 @@
 //! four quads, without fused operations, so that every SIMD level chooses the same levels.
 
 use super::cube::Hit;
-use super::sampler::{Filter, MAX_LOD_BIAS, MipmapMode, Sampler};
+use super::sampler::{Filter, MipmapMode, Sampler};
 use super::surface::Surface;
+use crate::limits::MAX_LOD_BIAS;
+use crate::texture::packing::Floats;
 use isa::ir::{CHUNK_LANES, Dimension};
 use isa::resources::{Lanes, LodRequest, SampleRequest};
-
-/// A float for each of 16 lanes.
-pub(super) type Floats = [f32; CHUNK_LANES];
 
 /// Quads of a chunk.
 pub(super) const QUADS: usize = CHUNK_LANES / 4;

@@ -24,8 +24,7 @@ mod table;
 mod tests;
 mod view;
 
-pub(crate) use packing::unorm8_fraction;
-pub use sampler::{AddressMode, BorderColor, CompareOp, Filter, MAX_LOD_BIAS, MipmapMode, Sampler};
+pub use sampler::{AddressMode, BorderColor, CompareOp, Filter, MipmapMode, Sampler};
 pub use table::ImageTable;
 pub use view::{
     ComponentSwizzle, IDENTITY, ImageBinding, SampledImage, StorageImage, Swizzle, TexelBuffer,

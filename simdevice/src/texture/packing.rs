@@ -7,12 +7,12 @@ use std::ops::Range;
 use std::sync::LazyLock;
 use std::sync::atomic::AtomicU32;
 
-use devmem::gather;
-use fearless_simd::{Simd, f32x8, f32x16, i32x8, i32x16, prelude::*, u32x8, u32x16};
+use devmem::{Allocation, gather};
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, f32x16, i32x8, u32x8, u32x16};
 
-use super::lod::Floats;
-use super::surface::Surface;
-use crate::format::{Channel, Format};
+use crate::format::Format;
+use crate::format::unorm8::unorm8_fraction_8;
 use isa::ir::CHUNK_LANES;
 use isa::resources::Lanes;
 
@@ -50,88 +50,32 @@ pub(super) struct Packing {
     pub order: [usize; 4],
 }
 
-/// Larger images are read lane by lane: up to here, texel indices are exact as floats.
-const MAX_EXTENT: u32 = 1 << 16;
-
-/// Every image begins at a multiple of as many bytes as the largest texel has.
-const ALIGNMENT: u64 = 16;
-
 impl Packing {
-    /// The packing of a surface; None if its texels are to be read one by one.
-    pub fn of(surface: &Surface) -> Option<Self> {
-        let kind = match surface.format {
-            Format::R8Unorm => Kind::Unorm8,
-            Format::R8G8Unorm => Kind::Unorm8x2,
+    /// The words that texels are read from, of the memory of the surface.
+    #[inline]
+    pub fn words<'a>(&self, memory: &'a Allocation) -> &'a [AtomicU32] {
+        memory.words().get(self.words.clone()).unwrap_or_default()
+    }
+}
+
+impl Kind {
+    /// The kind of a format; None if its texels are to be read one by one.
+    pub fn of(format: Format) -> Option<Self> {
+        Some(match format {
+            Format::R8Unorm => Self::Unorm8,
+            Format::R8G8Unorm => Self::Unorm8x2,
             Format::R8G8B8A8Unorm | Format::B8G8R8A8Unorm | Format::A8B8G8R8UnormPack32 => {
-                Kind::Unorm8x4
+                Self::Unorm8x4
             }
             Format::R8G8B8A8Srgb | Format::B8G8R8A8Srgb | Format::A8B8G8R8SrgbPack32 => {
-                Kind::Srgb8x4
+                Self::Srgb8x4
             }
-            Format::R16Unorm | Format::D16Unorm => Kind::Unorm16,
-            Format::R16G16B16A16Sfloat => Kind::Float16x4,
-            Format::R32Sfloat | Format::D32Sfloat => Kind::Float32,
-            Format::R32G32B32A32Sfloat => Kind::Float32x4,
+            Format::R16Unorm | Format::D16Unorm => Self::Unorm16,
+            Format::R16G16B16A16Sfloat => Self::Float16x4,
+            Format::R32Sfloat | Format::D32Sfloat => Self::Float32,
+            Format::R32G32B32A32Sfloat => Self::Float32x4,
             _ => return None,
-        };
-        let begin = surface.levels.iter().map(|level| level.offset).min()?;
-        let end = surface
-            .levels
-            .iter()
-            .map(|level| {
-                let [_, height, depth] = level.extent.map(u64::from);
-                level.offset
-                    + level.layer_pitch * u64::from(surface.layers - 1)
-                    + level.depth_pitch * depth.max(1)
-                    + level.row_pitch * height
-            })
-            .max()?;
-        let size = surface.texel_size as u64;
-        let texels = |bytes: u64| u32::try_from(bytes / size).ok();
-        let exact = |level: &super::surface::Level| {
-            level.offset.is_multiple_of(ALIGNMENT)
-                && level.extent.iter().all(|texels| *texels <= MAX_EXTENT)
-        };
-        if surface.samples != 1
-            || !surface.levels.iter().all(exact)
-            || texels(end - begin).is_none()
-        {
-            return None;
-        }
-        let levels = surface.levels.iter().map(|level| {
-            Some(PackedLevel {
-                extent: level.extent,
-                base: texels(level.offset - begin)?,
-                row_pitch: texels(level.row_pitch)?,
-                depth_pitch: texels(level.depth_pitch)?,
-                layer_pitch: texels(level.layer_pitch)?,
-            })
-        });
-        let components = surface.format.components();
-        let position = |channel: Channel, otherwise: usize| {
-            let found = components.iter().position(|c| c.channel == channel);
-            found.unwrap_or(otherwise)
-        };
-        Some(Self {
-            kind,
-            words: (begin / 4) as usize..(end.min(surface.memory.len()) / 4) as usize,
-            levels: levels.collect::<Option<_>>()?,
-            order: [
-                position(Channel::R, 0),
-                position(Channel::G, 1),
-                position(Channel::B, 2),
-                position(Channel::A, 3),
-            ],
         })
-    }
-
-    /// The words that texels are read from.
-    pub fn words<'a>(&self, surface: &'a Surface) -> &'a [AtomicU32] {
-        surface
-            .memory
-            .words()
-            .get(self.words.clone())
-            .unwrap_or_default()
     }
 }
 
@@ -346,33 +290,6 @@ fn gather_narrow<S: Simd>(
     word >> shift
 }
 
-/// 1/255 as the sum of a number of 16 bits, whose product with a code is exact, and the rest: the sum of the two
-/// products rounds as the quotient does.
-const INV_255: [f32; 2] = {
-    let high = f32::from_bits((1f32 / 255.0).to_bits() & !0xFF);
-    [high, (1.0 / 255.0 - high as f64) as f32]
-};
-
-/// Defines how one byte of each word is a fraction of 255, as its quotient rounds.
-macro_rules! unorm8_fraction {
-    ($name:ident, $words:ident, $integers:ident, $floats:ident) => {
-        /// One byte of each word as a fraction of 255, as its quotient rounds.
-        #[inline(always)]
-        pub(crate) fn $name<S: Simd>(word: $words<S>, shift: u32) -> $floats<S> {
-            let code = if shift == 24 {
-                word >> 24
-            } else {
-                (word >> shift) & 0xFF
-            };
-            let code = $floats::float_from(code.bitcast::<$integers<S>>());
-            code * INV_255[0] + code * INV_255[1]
-        }
-    };
-}
-
-unorm8_fraction!(unorm8_fraction, u32x16, i32x16, f32x16);
-unorm8_fraction!(unorm8_fraction_8, u32x8, i32x8, f32x8);
-
 /// Linear values of sRGB codes.
 static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| Format::R8Srgb.decode(&[code as u8])[0]));
@@ -535,10 +452,13 @@ impl Texels for Float32x4 {
     }
 }
 
+/// A float for each of 16 lanes.
+pub(super) type Floats = [f32; CHUNK_LANES];
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::SimdLevel;
+    use crate::runtime::SimdLevel;
     use devmem::dispatch;
 
     /// Texels 0.. of these words, as a packing and as their format decodes them.

@@ -68,7 +68,7 @@ fn filter<S: Simd, T: Texels>(
     sampler: &Sampler,
     request: &SampleRequest,
 ) -> [Lanes; 4] {
-    let words = packing.words(surface);
+    let words = packing.words(&surface.memory);
     let selection = lod::select_quads(surface, sampler, request);
     let mut texel = level::<S, T>(simd, words, packing, sampler, request, &selection.high);
     if selection.weight != [0.0; QUADS] {

@@ -97,9 +97,6 @@ impl BorderColor {
     }
 }
 
-/// The greatest magnitude of the sum of a sampler's and an instruction's bias.
-pub const MAX_LOD_BIAS: f32 = 16.0;
-
 /// A sampler. Anisotropic filtering is not done: such a sampler is read as an isotropic one, which minifies along the
 /// longer axis of a pixel's footprint.
 #[derive(Clone, Copy, Debug, PartialEq)]

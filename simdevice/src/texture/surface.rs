@@ -3,11 +3,16 @@
 use devmem::Allocation;
 use std::sync::Arc;
 
-use super::packing::Packing;
+use super::packing::{Kind, PackedLevel, Packing};
 use super::view::{ComponentSwizzle, IDENTITY, SampledImage, StorageImage, Swizzle, TexelBuffer};
-use crate::format::{Format, MAX_TEXEL_SIZE};
+use crate::format::{Aspect, Channel, Format, MAX_TEXEL_SIZE};
 use crate::image::ImageView;
-use crate::packet::Aspect;
+
+/// Larger images are read lane by lane: up to here, texel indices are exact as floats.
+const MAX_EXTENT: u32 = 1 << 16;
+
+/// Every image begins at a multiple of as many bytes as the largest texel has.
+const ALIGNMENT: u64 = 16;
 
 /// A mip level of a view: extents in texels, places and pitches in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,8 +106,59 @@ impl Surface {
             packing: None,
             writable: false,
         };
-        surface.packing = Packing::of(&surface);
+        surface.packing = surface.find_packing();
         Some(surface)
+    }
+
+    /// How its texels are read 16 at a time; None if they are to be read one by one.
+    fn find_packing(&self) -> Option<Packing> {
+        let kind = Kind::of(self.format)?;
+        let begin = self.levels.iter().map(|level| level.offset).min()?;
+        let end = self
+            .levels
+            .iter()
+            .map(|level| {
+                let [_, height, depth] = level.extent.map(u64::from);
+                level.offset
+                    + level.layer_pitch * u64::from(self.layers - 1)
+                    + level.depth_pitch * depth.max(1)
+                    + level.row_pitch * height
+            })
+            .max()?;
+        let size = self.texel_size as u64;
+        let texels = |bytes: u64| u32::try_from(bytes / size).ok();
+        let exact = |level: &Level| {
+            level.offset.is_multiple_of(ALIGNMENT)
+                && level.extent.iter().all(|texels| *texels <= MAX_EXTENT)
+        };
+        if self.samples != 1 || !self.levels.iter().all(exact) || texels(end - begin).is_none() {
+            return None;
+        }
+        let levels = self.levels.iter().map(|level| {
+            Some(PackedLevel {
+                extent: level.extent,
+                base: texels(level.offset - begin)?,
+                row_pitch: texels(level.row_pitch)?,
+                depth_pitch: texels(level.depth_pitch)?,
+                layer_pitch: texels(level.layer_pitch)?,
+            })
+        });
+        let components = self.format.components();
+        let position = |channel: Channel, otherwise: usize| {
+            let found = components.iter().position(|c| c.channel == channel);
+            found.unwrap_or(otherwise)
+        };
+        Some(Packing {
+            kind,
+            words: (begin / 4) as usize..(end.min(self.memory.len()) / 4) as usize,
+            levels: levels.collect::<Option<_>>()?,
+            order: [
+                position(Channel::R, 0),
+                position(Channel::G, 1),
+                position(Channel::B, 2),
+                position(Channel::A, 3),
+            ],
+        })
     }
 
     /// A texel buffer: one row. None if the range doesn't lie within its memory.

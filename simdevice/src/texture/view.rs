@@ -1,8 +1,8 @@
 //! What an image bind point may hold: plain data, as a descriptor set has it.
 
-use crate::format::Format;
+use crate::format::{Aspect, Format};
 use crate::image::ImageView;
-use crate::packet::{Aspect, BufferRange};
+use crate::packet::BufferRange;
 
 /// Where a component that a program reads comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

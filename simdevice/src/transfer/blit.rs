@@ -6,9 +6,9 @@
 #[cfg(test)]
 mod tests;
 
-use crate::format::Format;
+use crate::format::{Aspect, Format};
 use crate::image::{Image, SubresourceLayout};
-use crate::packet::{Aspect, BlitImage, ImageBlitRegion};
+use crate::packet::{BlitImage, ImageBlitRegion};
 use crate::texture::Filter;
 use devmem::host;
 use std::ops::Range;

@@ -1,8 +1,8 @@
 //! Copies between images of texels of the same size.
 
-use super::clip;
 use crate::image::{Image, ImageKind, SubresourceLayout};
 use crate::packet::{CopyImage, ImageCopyRegion, SubresourceLayers};
+use crate::transfer::region::clip;
 
 /// Executes [`Packet::CopyImage`](crate::Packet::CopyImage).
 pub fn copy_image(copy: &CopyImage) {

@@ -1,11 +1,11 @@
 use super::*;
 use crate::Format;
-use crate::device::Config;
+use crate::format::{Aspect, ClearValue};
 use crate::image::{ImageDesc, ImageKind};
 use crate::packet::{
-    Aspect, BufferCopyRegion, ClearValue, CopyImage, ImageCopyRegion, SubresourceLayers,
-    SubresourceRange,
+    BufferCopyRegion, CopyImage, ImageCopyRegion, SubresourceLayers, SubresourceRange,
 };
+use crate::runtime::Config;
 use devmem::Allocation;
 use std::sync::Arc;
 
@@ -68,7 +68,7 @@ fn texels(image: &Arc<Image>) -> Vec<u8> {
             regions: vec![region],
         },
         Direction::ToBuffer,
-        &device(1),
+        &runtime(1),
     );
     contents(&out)
 }
@@ -162,7 +162,7 @@ fn rows_slices_and_layers_find_their_place() {
         image: image.clone(),
         regions: vec![region],
     };
-    copy_buffer_image(&copy, Direction::ToImage, &device(1));
+    copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
     let expected = [
         [0, 0, 0, 0, 0, 2, 3, 4, 0, 7, 8, 9],
         [0, 0, 0, 0, 0, 22, 23, 24, 0, 27, 28, 29],
@@ -187,7 +187,7 @@ fn what_lies_outside_the_image_is_clipped() {
         image: image.clone(),
         regions: vec![region],
     };
-    copy_buffer_image(&copy, Direction::ToImage, &device(1));
+    copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
     assert_eq!(texels(&image), [17, 18, 19, 20, 25, 26, 27, 28, 0, 0, 0, 0]);
 }
 
@@ -219,8 +219,8 @@ fn hostile_regions_do_no_harm() {
                         image: image.clone(),
                         regions: vec![region],
                     };
-                    copy_buffer_image(&copy, Direction::ToImage, &device(1));
-                    copy_buffer_image(&copy, Direction::ToBuffer, &device(1));
+                    copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
+                    copy_buffer_image(&copy, Direction::ToBuffer, &runtime(1));
                     let region = ImageCopyRegion {
                         source: subresource,
                         source_offset: [offset, 0, 0],
@@ -258,7 +258,7 @@ fn layers_of_one_image_become_slices_of_another() {
         image: layered.clone(),
         regions: vec![region],
     };
-    copy_buffer_image(&copy, Direction::ToImage, &device(1));
+    copy_buffer_image(&copy, Direction::ToImage, &runtime(1));
     let region = ImageCopyRegion {
         source: color(1, 2),
         source_offset: [0; 3],
@@ -312,12 +312,12 @@ fn clears_write_the_aspect_that_they_name() {
     assert_eq!(out, [9; 3]);
 }
 
-fn device(threads: usize) -> Device {
+fn runtime(threads: usize) -> Runtime {
     let config = Config {
         threads,
         ..Config::default()
     };
-    Device::new(&config).unwrap()
+    Runtime::new(&config).unwrap()
 }
 
 #[test]
@@ -345,7 +345,7 @@ fn workers_copy_what_one_thread_does() {
                 image: image.clone(),
                 regions: vec![region],
             };
-            copy_buffer_image(&copy, direction, &device(threads));
+            copy_buffer_image(&copy, direction, &runtime(threads));
         };
         copy(&source, Direction::ToImage, 3);
         let [alone, shared] = [1, 3].map(|threads| {

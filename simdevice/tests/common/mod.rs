@@ -4,6 +4,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::*;
+use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
+use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, Rect, Viewport};
 use simdevice::{Allocation, Config, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 

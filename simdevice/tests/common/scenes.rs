@@ -3,14 +3,23 @@
 use super::common::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::bindings::Bindings;
-use simdevice::compute::{ComputeProgram, Dispatch};
+use simdevice::format::ClearValue;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
 use simdevice::isa::op::Op;
-use simdevice::packet::draw::*;
+use simdevice::packet::Dispatch;
 use simdevice::packet::*;
-use simdevice::trace::Recorder;
+use simdevice::program::bindings::Bindings;
+use simdevice::program::compute::ComputeProgram;
+use simdevice::program::fragment::GaussianFragmentProgram;
+use simdevice::program::interface::{
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+    VertexInput, VertexOutput, gaussian, resolve,
+};
+use simdevice::program::vertex::DrawPipeline;
+use simdevice::state::gaussian::GaussianState;
+use simdevice::state::{CompareOp, DepthStencil, DepthTest, DrawState, Topology};
+use simdevice::stats::recorder::Recorder;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 
@@ -148,7 +157,9 @@ fn dispatch(device: &Device) -> Packet {
     b.assign(output, value);
     let program = b.finish().unwrap();
     Packet::Dispatch(Box::new(Dispatch {
-        program: Arc::new(ComputeProgram::new(device, program, 64, 32, Vec::new()).unwrap()),
+        program: Arc::new(
+            ComputeProgram::new(device.level(), program, 64, 32, Vec::new()).unwrap(),
+        ),
         base: [0; 3],
         count: [40, 2, 1],
         bindings: Bindings::default(),
@@ -225,14 +236,14 @@ fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
     vec![
         Packet::GaussianBegin(Box::new(begin(OVER))),
         Packet::GaussianResolveShader(Box::new(ResolveShader {
-            program: Arc::new(ResolveProgram::new(device, &resolved).unwrap()),
+            program: Arc::new(GaussianFragmentProgram::new(device.level(), &resolved).unwrap()),
             bindings: Bindings::default(),
             sample_shading: false,
             alpha_to_coverage: false,
             alpha_to_one: false,
         })),
         Packet::GaussianAppendDraw(Box::new(Draw {
-            pipeline: Arc::new(DrawPipeline::of_gaussians(device, &programs).unwrap()),
+            pipeline: Arc::new(DrawPipeline::of_gaussians(device.level(), &programs).unwrap()),
             state: Arc::new(DrawState::new(Topology::PointList, [WIDTH, HEIGHT])),
             attributes: vec![stream(0), stream(16), stream(32)],
             vertex_bindings: Bindings::default(),
@@ -318,7 +329,7 @@ fn triangles(device: &Device, seed: u64, count: u32) -> Packet {
         ..DrawState::new(Topology::TriangleList, [WIDTH, HEIGHT])
     };
     Packet::Draw(Box::new(Draw {
-        pipeline: Arc::new(DrawPipeline::new(device, &programs).unwrap()),
+        pipeline: Arc::new(DrawPipeline::new(device.level(), &programs).unwrap()),
         state: Arc::new(state),
         attributes: vec![stream(0), stream(16)],
         vertex_bindings: Bindings::default(),

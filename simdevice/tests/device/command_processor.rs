@@ -3,7 +3,7 @@
 use crate::common::*;
 use simdevice::command_processor::ExecutionError;
 use simdevice::packet::*;
-use simdevice::query::{QueryKind, QueryPool, QueryResult, host_time};
+use simdevice::stats::query::{QueryKind, QueryPool, QueryResult, host_time};
 use simdevice::{CommandProcessor, Device, Format, Packet};
 use std::sync::Arc;
 

@@ -1,14 +1,15 @@
 //! Dispatches through the command processor: every workgroup runs, work is counted, and nothing runs for ever.
 
-use simdevice::bindings::Bindings;
 use simdevice::command_processor::ExecutionError;
-use simdevice::compute::{ComputeInput, ComputeProgram, Dispatch};
-use simdevice::counters::Counter;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::exec::Stopped;
 use simdevice::isa::ir::{Address, Binding, Format, Label, Program, Rate, Space, Statement, Type};
 use simdevice::isa::op::Op;
-use simdevice::packet::BufferRange;
+use simdevice::packet::{BufferRange, Dispatch};
+use simdevice::program::bindings::Bindings;
+use simdevice::program::compute::ComputeProgram;
+use simdevice::program::interface::ComputeInput;
+use simdevice::stats::counters::Counter;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Packet};
 use std::sync::Arc;
 use std::time::Duration;
@@ -64,7 +65,7 @@ fn dispatch(program: &Arc<ComputeProgram>, memory: &Arc<Allocation>, count: [u32
 fn every_workgroup_runs_and_its_work_is_counted() {
     let device = device();
     let inputs = vec![Some(ComputeInput::WorkgroupId(0))];
-    let program = ComputeProgram::new(&device, numbering(), 20, 32, inputs).unwrap();
+    let program = ComputeProgram::new(device.level(), numbering(), 20, 32, inputs).unwrap();
     let (program, memory) = (Arc::new(program), Allocation::new_zeroed(80 * 400).unwrap());
     let mut processor = CommandProcessor::new(device);
     processor
@@ -108,9 +109,10 @@ fn a_program_without_end_is_stopped() {
         body: Vec::new(),
         continuing: Vec::new(),
     });
-    let endless = Arc::new(ComputeProgram::new(&device, endless, 16, 32, Vec::new()).unwrap());
+    let endless =
+        Arc::new(ComputeProgram::new(device.level(), endless, 16, 32, Vec::new()).unwrap());
     let inputs = vec![Some(ComputeInput::WorkgroupId(0))];
-    let honest = ComputeProgram::new(&device, numbering(), 20, 32, inputs).unwrap();
+    let honest = ComputeProgram::new(device.level(), numbering(), 20, 32, inputs).unwrap();
     let memory = Allocation::new_zeroed(80 * 8).unwrap();
     let mut processor = CommandProcessor::new(device);
     let error = processor

@@ -3,7 +3,7 @@
 use crate::scenes::{KINDS, draw};
 use gaurast_runner::{Case, simd_levels};
 use simdevice::Config;
-use simdevice::device::SimdLevel;
+use simdevice::runtime::SimdLevel;
 
 #[gaurast_runner::test(each = simd_levels())]
 fn every_level_draws_what_the_simplest_draws(case: &Case) {

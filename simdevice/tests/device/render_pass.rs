@@ -1,11 +1,13 @@
 //! Render passes: the image depends on the draws alone, not on how the device goes about them.
 
 use crate::common::*;
-use simdevice::counters::{Counter, Counters};
-use simdevice::device::FlushPolicy;
+use simdevice::format::{Aspect, ClearValue};
 use simdevice::packet::*;
-use simdevice::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::raster::blend::Blender;
+use simdevice::runtime::FlushPolicy;
+use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, Rect};
+use simdevice::stats::counters::{Counter, Counters};
+use simdevice::stats::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::{CommandProcessor, Config, Device, Format, ImageView, Packet};
 use std::sync::Arc;
 

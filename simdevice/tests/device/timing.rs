@@ -3,9 +3,9 @@
 
 use crate::common::{HEIGHT, WIDTH};
 use crate::scenes::{KINDS, Kind, draw, draw_on, recording};
-use simdevice::counters::{Counter, Counters};
-use simdevice::optimizations::{Optimization, Optimizations};
-use simdevice::query::{QueryKind, QueryPool, QueryResult};
+use simdevice::stats::counters::{Counter, Counters};
+use simdevice::stats::optimizations::{Optimization, Optimizations};
+use simdevice::stats::query::{QueryKind, QueryPool, QueryResult};
 use simdevice::timing::config::{Config as Hardware, preset_names};
 use simdevice::timing::raster::RasterReport;
 use simdevice::timing::stages::{self, GaussianCounts};

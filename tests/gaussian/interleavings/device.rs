@@ -4,25 +4,32 @@ use super::{Area, DepthTest, Interleaving, Picture, SIZE, Step};
 use ash::vk;
 use gaurast_tests::scenes::SceneBuffers;
 use gaurast_tests::triangles::edges::to_clip;
-use simdevice::bindings::Bindings;
-use simdevice::compute::{ComputeInput, ComputeProgram, Dispatch};
-use simdevice::device::{FlushPolicy, SimdLevel};
+use simdevice::format::{Aspect, ClearValue};
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Address, Binding, Format as Word, Program, Rate, Space, Type};
 use simdevice::isa::op::Op;
-use simdevice::packet::draw::{
-    self, CompareOp, DepthStencil, DrawPipeline, DrawPrograms, DrawState, FragmentInput,
-    FragmentOutput, FragmentPrograms, Interpolation, Sampling, Topology, VertexInput, VertexOutput,
-};
 use simdevice::packet::{
-    Aspect, Attachment, AttachmentClear, AttributeStream, BlendEquation, BlendFactor, BlendOp,
-    BlendState, BufferCopyRegion, BufferImageRegion, BufferRange, Camera, CameraModel,
-    ClearAttachments, ClearImage, ClearValue, CopyBuffer, CopyBufferImage, GaussianAppend,
-    GaussianAttributes, GaussianBegin, GaussianState, LoadOp, ModelAttributes, Rect, Rendering,
-    StoreOp, SubresourceLayers, SubresourceRange, Viewport,
+    Attachment, AttachmentClear, AttributeStream, BufferCopyRegion, BufferImageRegion, BufferRange,
+    ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage, GaussianAppend, GaussianAttributes,
+    GaussianBegin, LoadOp, ModelAttributes, Rendering, StoreOp, SubresourceLayers,
+    SubresourceRange,
 };
-use simdevice::trace::Recorder;
+use simdevice::packet::{Dispatch, Draw};
+use simdevice::program::bindings::Bindings;
+use simdevice::program::compute::ComputeProgram;
+use simdevice::program::interface::{
+    ComputeInput, DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation,
+    Sampling, VertexInput, VertexOutput,
+};
+use simdevice::program::vertex::DrawPipeline;
+use simdevice::runtime::{FlushPolicy, SimdLevel};
+use simdevice::state::gaussian::{Camera, CameraModel, GaussianState};
+use simdevice::state::{
+    self, BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DrawState,
+    Rect, Topology, Viewport,
+};
+use simdevice::stats::recorder::Recorder;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
@@ -204,7 +211,7 @@ fn depth_clear(depth: f32) -> ClearValue {
 
 fn depth_stencil(test: DepthTest) -> DepthStencil {
     DepthStencil {
-        depth: test.map(|(op, write)| draw::DepthTest {
+        depth: test.map(|(op, write)| state::DepthTest {
             compare: match op {
                 vk::CompareOp::LESS => CompareOp::Less,
                 vk::CompareOp::LESS_OR_EQUAL => CompareOp::LessOrEqual,
@@ -292,9 +299,9 @@ impl Player {
         };
         let device = Arc::new(Device::new(&config).expect("a device"));
         let inputs = vec![Some(ComputeInput::WorkgroupId(0))];
-        let recolor = ComputeProgram::new(&device, recolor(), GROUP, 32, inputs);
+        let recolor = ComputeProgram::new(device.level(), recolor(), GROUP, 32, inputs);
         Self {
-            pipeline: Arc::new(DrawPipeline::new(&device, &programs()).expect("a pipeline")),
+            pipeline: Arc::new(DrawPipeline::new(device.level(), &programs()).expect("a pipeline")),
             recolor: Arc::new(recolor.expect("a program")),
             device,
         }
@@ -426,7 +433,7 @@ impl Player {
                 Format::R32G32B32A32Sfloat,
             )
         };
-        Packet::Draw(Box::new(draw::Draw {
+        Packet::Draw(Box::new(Draw {
             pipeline: Arc::clone(&self.pipeline),
             state: Arc::new(state),
             attributes: vec![attribute(0), attribute(16)],

@@ -19,8 +19,8 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use simdevice::device::FlushPolicy;
-use simdevice::trace::{Recorder, Trace};
+use simdevice::runtime::FlushPolicy;
+use simdevice::stats::recorder::{Recorder, Trace};
 
 /// The side of the framebuffer in pixels, so that units of a position are halves of a pixel.
 const SIZE: u32 = 64;

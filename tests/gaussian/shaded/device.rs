@@ -4,21 +4,24 @@ use gaurast_tests::compare::{Limits, assert_contract};
 use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, render_shaded};
 use gaurast_tests::oracle::{OracleOrder, OracleState};
 use gaurast_tests::scenes::SceneBuffers;
-use simdevice::bindings::Bindings;
-use simdevice::counters::Counters;
-use simdevice::device::SimdLevel;
+use simdevice::format::{Aspect, ClearValue};
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
-use simdevice::packet::draw::{
-    CompareOp, DepthStencil, DepthTest, Draw, DrawPipeline, DrawPrograms, DrawState, ResolveShader,
-    Topology, VertexInput, VertexOutput, gaussian,
-};
 use simdevice::packet::{
-    Aspect, Attachment, AttributeStream, BlendState, BufferRange, Camera, ClearValue,
-    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianOrder, GaussianState, LoadOp,
-    ModelAttributes, Rect, Rendering, ResolveMode, StoreOp, Viewport,
+    Attachment, AttributeStream, BufferRange, Draw, GaussianAppend, GaussianAttributes,
+    GaussianBegin, LoadOp, ModelAttributes, Rendering, ResolveShader, StoreOp,
 };
+use simdevice::program::bindings::Bindings;
+use simdevice::program::interface::{DrawPrograms, VertexInput, VertexOutput, gaussian};
+use simdevice::program::vertex::DrawPipeline;
+use simdevice::runtime::SimdLevel;
+use simdevice::state::gaussian::{Camera, GaussianOrder, GaussianState};
+use simdevice::state::{
+    BlendState, CompareOp, DepthStencil, DepthTest, DrawState, Rect, ResolveMode, Topology,
+    Viewport,
+};
+use simdevice::stats::counters::Counters;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 use std::sync::Arc;
 
@@ -83,7 +86,7 @@ pub fn triangle(device: &Device, samples: u32) -> Draw {
         ..DrawState::new(Topology::TriangleList, SIZE)
     };
     Draw {
-        pipeline: Arc::new(DrawPipeline::new(device, &programs).expect("a pipeline")),
+        pipeline: Arc::new(DrawPipeline::new(device.level(), &programs).expect("a pipeline")),
         state: Arc::new(state),
         attributes: vec![AttributeStream {
             buffer: buffer(&corners),
@@ -162,7 +165,7 @@ fn pipeline(device: &Device, with_key: bool) -> Arc<DrawPipeline> {
         varyings,
         fragment: None,
     };
-    Arc::new(DrawPipeline::of_gaussians(device, &programs).expect("a pipeline"))
+    Arc::new(DrawPipeline::of_gaussians(device.level(), &programs).expect("a pipeline"))
 }
 
 /// A fragment replaces what the attachment holds.

@@ -11,10 +11,10 @@ use gaurast_tests::oracle::shaded::{OracleOutputs, OracleViewport, project, rend
 use gaurast_tests::oracle::{OracleOrder, OracleState, SkipReason};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simdevice::counters::Counter;
-use simdevice::device::{FlushPolicy, SimdLevel};
-use simdevice::packet::IndexStream;
-use simdevice::packet::draw::{CompareOp, Draw};
+use simdevice::packet::{Draw, IndexStream};
+use simdevice::runtime::{FlushPolicy, SimdLevel};
+use simdevice::state::CompareOp;
+use simdevice::stats::counters::Counter;
 use simdevice::{Config, Device};
 use std::sync::Arc;
 

@@ -7,16 +7,18 @@ use gaurast_tests::oracle::resolve::{Resolved, resolve_scene, resolve_shaded};
 use gaurast_tests::oracle::{OracleDepthFormat, OracleState, OracleTests};
 use gaurast_tests::scenes;
 use simdevice::Format;
-use simdevice::bindings::Bindings;
-use simdevice::counters::Counter;
-use simdevice::device::SimdLevel;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
-use simdevice::packet::draw::{
-    CompareOp, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, ResolveProgram,
-    ResolveShader, Sampling, resolve,
+use simdevice::packet::ResolveShader;
+use simdevice::program::bindings::Bindings;
+use simdevice::program::fragment::GaussianFragmentProgram;
+use simdevice::program::interface::{
+    FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, resolve,
 };
-use simdevice::packet::{BlendEquation, BlendFactor, BlendOp, BlendState, Camera};
+use simdevice::runtime::SimdLevel;
+use simdevice::state::gaussian::Camera;
+use simdevice::state::{BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp};
+use simdevice::stats::counters::Counter;
 use std::sync::Arc;
 
 /// Passes its inputs on: four to each attachment in turn.
@@ -42,7 +44,9 @@ fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> ResolveSh
         has_side_effects: false,
     };
     ResolveShader {
-        program: Arc::new(ResolveProgram::new(device, &programs).expect("a program")),
+        program: Arc::new(
+            GaussianFragmentProgram::new(device.level(), &programs).expect("a program"),
+        ),
         bindings: Bindings::default(),
         sample_shading: false,
         alpha_to_coverage: false,

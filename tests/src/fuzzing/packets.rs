@@ -3,16 +3,21 @@
 
 use std::sync::Arc;
 
+use simdevice::format::{Aspect, ClearValue};
 use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::packet::{
-    Aspect, Attachment, AttachmentClear, AttributeStream, BlitImage, BufferCopyRegion,
-    BufferImageRegion, BufferRange, Camera, CameraModel, ClearAttachments, ClearImage, ClearValue,
-    CopyBuffer, CopyBufferImage, CopyImage, GaussianAppend, GaussianAttributes, GaussianBegin,
-    GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision, GaussianState,
-    ImageBlitRegion, ImageCopyRegion, IndexStream, LoadOp, ModelAttributes, Rect, Rendering,
-    ResolveImage, ResolveMode, StoreOp, SubresourceLayers, SubresourceRange, Viewport,
+    Attachment, AttachmentClear, AttributeStream, BlitImage, BufferCopyRegion, BufferImageRegion,
+    BufferRange, ClearAttachments, ClearImage, CopyBuffer, CopyBufferImage, CopyImage,
+    GaussianAppend, GaussianAttributes, GaussianBegin, ImageBlitRegion, ImageCopyRegion,
+    IndexStream, LoadOp, ModelAttributes, Rendering, ResolveImage, StoreOp, SubresourceLayers,
+    SubresourceRange,
 };
-use simdevice::query::{QueryKind, QueryPool};
+use simdevice::state::gaussian::{
+    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
+    GaussianState,
+};
+use simdevice::state::{Rect, ResolveMode, Viewport};
+use simdevice::stats::query::{QueryKind, QueryPool};
 use simdevice::texture::Filter;
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Image, ImageView, Packet};
 

@@ -1,8 +1,8 @@
 use super::*;
 use crate::render_pass::{DepthStencilResolve, Subpass};
-use simdevice::Allocation;
-use simdevice::image::{self, ImageDesc, ImageKind};
+use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::texture::IDENTITY;
+use simdevice::{Allocation, image};
 
 fn view(format: Format, samples: u32) -> Arc<ImageView> {
     let desc = ImageDesc {

@@ -6,11 +6,10 @@ use crate::descriptor::layout::LayoutBinding;
 use crate::descriptor::set::Descriptor;
 use crate::resource::image::ImageView;
 use gaurast_spirv::{DescriptorKind, ShaderBinding};
-use simdevice::bindings::Bindings;
-use simdevice::compute::Dispatch;
-use simdevice::host;
+use simdevice::packet::Dispatch;
+use simdevice::program::bindings::Bindings;
 use simdevice::texture::{ImageBinding, SampledImage, StorageImage, TexelBuffer};
-use simdevice::{Allocation, Packet};
+use simdevice::{Allocation, Packet, host};
 use std::sync::Arc;
 
 /// A set that is not bound.

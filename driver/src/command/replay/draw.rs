@@ -9,8 +9,9 @@ use crate::pipeline::primitives::{PrimitivePipeline, ViewportSource};
 use crate::pipeline::state::AttributeSource;
 use ash::vk;
 use simdevice::Packet;
-use simdevice::packet::draw::{self, DrawState};
-use simdevice::packet::{AttributeStream, BufferRange, CameraModel, IndexStream};
+use simdevice::packet::{AttributeStream, BufferRange, IndexStream};
+use simdevice::state::DrawState;
+use simdevice::state::gaussian::CameraModel;
 use std::sync::Arc;
 
 /// The reason that a draw draws nothing: state that it needs is undefined.
@@ -133,7 +134,7 @@ pub(super) fn primitives(
     let bindings = |descriptors| {
         descriptors::bindings(descriptors, &state.graphics_sets, &state.push_constants)
     };
-    Ok(Packet::Draw(Box::new(draw::Draw {
+    Ok(Packet::Draw(Box::new(simdevice::packet::Draw {
         pipeline: Arc::clone(&primitives.programs),
         attributes: attributes.collect::<Result<_, _>>()?,
         vertex_bindings: bindings(&primitives.vertex_descriptors)?,

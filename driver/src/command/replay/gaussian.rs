@@ -11,12 +11,14 @@ use crate::pipeline::gaussian::{
 };
 use crate::pipeline::state::AttributeSource;
 use simdevice::Packet;
-use simdevice::bindings::Bindings;
-use simdevice::packet::draw::{self, DrawState, ResolveShader, Topology};
 use simdevice::packet::{
-    Camera, CameraModel, GaussianAppend, GaussianAttributes, GaussianBegin, GaussianGeometry,
-    GaussianPrecision, GaussianState, ModelAttributes, Viewport,
+    GaussianAppend, GaussianAttributes, GaussianBegin, ModelAttributes, ResolveShader,
 };
+use simdevice::program::bindings::Bindings;
+use simdevice::state::gaussian::{
+    Camera, CameraModel, GaussianGeometry, GaussianPrecision, GaussianState,
+};
+use simdevice::state::{DrawState, Topology, Viewport};
 use std::sync::Arc;
 
 /// The packets that begin a sorted set.
@@ -89,22 +91,24 @@ fn shaded(
         &state.push_constants,
     )?;
     let viewport = state.viewport(gaussian).ok_or(DrawError::Viewport)?;
-    Ok(Packet::GaussianAppendDraw(Box::new(draw::Draw {
-        pipeline: Arc::clone(&projection.programs),
-        attributes: attributes.collect::<Result<_, _>>()?,
-        vertex_bindings: bindings,
-        fragment_bindings: Bindings::default(),
-        indices: indices(state, parameters)?,
-        first: parameters.first,
-        count: parameters.count,
-        first_instance: parameters.first_instance,
-        instance_count: parameters.instance_count,
-        draw_index,
-        state: Arc::new(DrawState {
-            viewports: vec![viewport],
-            ..DrawState::new(Topology::PointList, [0; 2])
-        }),
-    })))
+    Ok(Packet::GaussianAppendDraw(Box::new(
+        simdevice::packet::Draw {
+            pipeline: Arc::clone(&projection.programs),
+            attributes: attributes.collect::<Result<_, _>>()?,
+            vertex_bindings: bindings,
+            fragment_bindings: Bindings::default(),
+            indices: indices(state, parameters)?,
+            first: parameters.first,
+            count: parameters.count,
+            first_instance: parameters.first_instance,
+            instance_count: parameters.instance_count,
+            draw_index,
+            state: Arc::new(DrawState {
+                viewports: vec![viewport],
+                ..DrawState::new(Topology::PointList, [0; 2])
+            }),
+        },
+    )))
 }
 
 /// The camera that a draw sees with, if its model's feature is enabled.

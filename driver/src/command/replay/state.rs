@@ -8,8 +8,8 @@ use crate::pipeline::compute::ComputePipeline;
 use crate::pipeline::dynamic_state::DynamicStates;
 use crate::pipeline::gaussian::{GaussianPipeline, GaussianSource};
 use crate::pipeline::{GraphicsPipeline, PipelineKind};
-use simdevice::packet::draw::DrawState;
-use simdevice::packet::{Camera, Rect, Viewport};
+use simdevice::state::gaussian::Camera;
+use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
 
 /// Bound state. All of it is undefined when a command buffer begins; here "undefined" is `None`.

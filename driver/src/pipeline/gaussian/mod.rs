@@ -19,11 +19,11 @@ use gaurast::vk::{
     GaussianPrecisionGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
-use simdevice::packet::draw::DrawState;
-use simdevice::packet::{
+use simdevice::state::gaussian::{
     CameraModel, GaussianApproximation, GaussianGeometry, GaussianLinearization, GaussianOrder,
-    GaussianPrecision, GaussianState, Rect, Viewport,
+    GaussianPrecision, GaussianState,
 };
+use simdevice::state::{DrawState, Rect, Viewport};
 use std::sync::Arc;
 
 /// The Gaussian part of a pipeline.

@@ -18,10 +18,11 @@ use gaurast_spirv::{
 };
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
-use simdevice::packet::draw::{
-    DrawPipeline, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, ResolveProgram,
-    Sampling, gaussian, resolve,
+use simdevice::program::fragment::GaussianFragmentProgram;
+use simdevice::program::interface::{
+    FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, gaussian, resolve,
 };
+use simdevice::program::vertex::DrawPipeline;
 use std::sync::Arc;
 
 /// A vertex shader that projects Gaussians.
@@ -61,7 +62,7 @@ impl VertexProjection {
         let descriptors = vertex.interface.descriptors.clone();
         let stream = |location| locations.iter().position(|(read, _)| *read == location);
         let programs = link::link_projection(vertex, stream, &components)?;
-        let programs = DrawPipeline::of_gaussians(device.simulated(), &programs)
+        let programs = DrawPipeline::of_gaussians(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Self {
             programs: Arc::new(programs),
@@ -92,7 +93,7 @@ fn check_order(state: &PipelineGaussianStateCreateInfoGAURAST) -> Result<(), Err
 #[derive(Debug)]
 pub(crate) struct ResolveStage {
     /// The program.
-    pub(crate) program: Arc<ResolveProgram>,
+    pub(crate) program: Arc<GaussianFragmentProgram>,
     /// The descriptors that it is bound to.
     pub(crate) descriptors: Vec<ShaderBinding>,
     /// True if every sample is shaded for itself.
@@ -131,7 +132,7 @@ impl ResolveStage {
             points: false,
         };
         let programs = link::link_resolve(fragment, &varyings, live_outputs)?;
-        let program = ResolveProgram::new(device.simulated(), &programs)
+        let program = GaussianFragmentProgram::new(device.simulated().level(), &programs)
             .map_err(|error| Error::InvalidShader(error.to_string()))?;
         Ok(Some(Self {
             program: Arc::new(program),
@@ -176,7 +177,7 @@ impl ResolveStage {
             per_sample: false,
             has_side_effects: false,
         };
-        let program = ResolveProgram::new(device.simulated(), &programs);
+        let program = GaussianFragmentProgram::new(device.simulated().level(), &programs);
         Ok(Self {
             program: Arc::new(program.map_err(|error| invalid(&error))?),
             descriptors: Vec::new(),

@@ -12,7 +12,7 @@ use gaurast::vk::{
     GaussianProjectionModeGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
     PipelineGaussianStateCreateInfoGAURAST,
 };
-use simdevice::packet::GaussianApproximation;
+use simdevice::state::gaussian::GaussianApproximation;
 
 pub(super) const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
 

@@ -11,8 +11,7 @@ use super::texels::{Noise, distance};
 use ash::vk;
 use gaurast_runner::{Case, Missing, Need, Variant, ignore, shards};
 use simdevice::Format;
-use simdevice::format::Numeric;
-use simdevice::packet::Aspect;
+use simdevice::format::{Aspect, Numeric};
 
 /// A blit between two images.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use ash::vk;
 use gaurast_runner::{Case, Missing, ignore};
 use simdevice::Format;
-use simdevice::packet::Aspect;
+use simdevice::format::Aspect;
 
 pub const GENERAL: vk::ImageLayout = vk::ImageLayout::GENERAL;
 

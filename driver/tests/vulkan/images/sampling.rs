@@ -10,7 +10,7 @@ use super::device::{
 use super::texels::Noise;
 use ash::vk;
 use gaurast_runner::{Case, Need, shards};
-use simdevice::packet::Aspect;
+use simdevice::format::Aspect;
 
 /// The bindings of the images, in the shader's order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

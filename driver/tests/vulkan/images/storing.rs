@@ -6,8 +6,7 @@ use super::texels::{Noise, distance};
 use ash::vk;
 use gaurast_runner::{Case, Need};
 use simdevice::Format;
-use simdevice::format::Numeric;
-use simdevice::packet::Aspect;
+use simdevice::format::{Aspect, Numeric};
 use vk::FormatFeatureFlags as Feature;
 
 /// The type of a format's components in shaders.

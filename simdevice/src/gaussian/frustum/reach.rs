@@ -3,7 +3,7 @@
 
 use crate::gaussian::camera::ViewConstants;
 use crate::gaussian::splat::{LEAST_HALF_FACTOR, binary16_headroom};
-use crate::packet::{CameraModel, GaussianGeometry, GaussianPrecision};
+use crate::state::gaussian::{CameraModel, GaussianGeometry, GaussianPrecision};
 use std::f64::consts::LN_2;
 
 /// A Gaussian at `d` from the eye whose largest scale is `s` is outside where

@@ -1,7 +1,6 @@
 //! What is found to be outside is drawn nowhere, in any mode.
 
 use super::*;
-use crate::device::SimdLevel;
 use crate::format::Format;
 use crate::gaussian::attributes::{CoefficientReader, Group, Harmonics};
 use crate::gaussian::footprint::Visible;
@@ -10,13 +9,16 @@ use crate::gaussian::preprocess::{Source, project};
 use crate::gaussian::scratch::Scratch;
 use crate::gaussian::splat::ProjectedGroup;
 use crate::gaussian::surfel::Surfel;
-use crate::optimizations::Optimizations;
 use crate::packet::{
-    AttributeStream, BufferRange, Camera, GaussianAppend, GaussianAttributes, GaussianGeometry,
-    GaussianLinearization, GaussianPrecision, GaussianState, ModelAttributes, Viewport,
+    AttributeStream, BufferRange, GaussianAppend, GaussianAttributes, ModelAttributes,
 };
-use devmem::Allocation;
-use devmem::dispatch;
+use crate::runtime::SimdLevel;
+use crate::state::Viewport;
+use crate::state::gaussian::{
+    Camera, GaussianGeometry, GaussianLinearization, GaussianPrecision, GaussianState,
+};
+use crate::stats::optimizations::Optimizations;
+use devmem::{Allocation, dispatch};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -2,7 +2,8 @@
 
 use super::scene::*;
 use crate::packet::IndexStream;
-use crate::packet::draw::Topology::{self, *};
+use crate::state::Topology;
+use crate::state::Topology::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -2,10 +2,11 @@
 
 use super::super::{FrontEnd, Primitive, PrimitiveKind, Surface};
 use super::scene::*;
-use crate::counters::Counters;
-use crate::device::{Config, Device};
-use crate::packet::Rect;
-use crate::packet::draw::{Topology, VertexOutput};
+use crate::device::Device;
+use crate::program::interface::VertexOutput;
+use crate::runtime::Config;
+use crate::state::{Rect, Topology};
+use crate::stats::counters::Counters;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -75,7 +76,7 @@ fn macro_tiles_have_what_touches_them_in_order() {
             depth: None,
         };
         let mut counters = Counters::default();
-        let mut front = FrontEnd::new(&draw, surface, &device, &mut counters);
+        let mut front = FrontEnd::new(&draw, surface, device.runtime(), &mut counters);
         let found = Found::new(front.next_part(&mut counters).unwrap().unwrap());
         let mut pairs = 0;
         for layer in 0..5 {

@@ -1,7 +1,8 @@
 //! Clipping against an oracle that does not clip: a pixel's ray is intersected with the triangle in clip space.
 
 use super::scene::*;
-use crate::packet::draw::{Topology, VertexOutput};
+use crate::program::interface::VertexOutput;
+use crate::state::Topology;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,9 +1,9 @@
 //! Facing, culling, and what is dropped because it covers nothing.
 
 use super::scene::*;
-use crate::counters::Counter;
-use crate::packet::draw::{Topology, VertexOutput};
-use crate::packet::{Rect, Viewport};
+use crate::program::interface::VertexOutput;
+use crate::state::{Rect, Topology, Viewport};
+use crate::stats::counters::Counter;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

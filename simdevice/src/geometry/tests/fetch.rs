@@ -2,8 +2,9 @@
 
 use super::scene::*;
 use crate::format::{Channel, Format};
-use crate::packet::draw::{DrawPrograms, Topology, VertexInput, VertexOutput};
 use crate::packet::{AttributeStream, BufferRange};
+use crate::program::interface::{DrawPrograms, VertexInput, VertexOutput};
+use crate::state::Topology;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -19,7 +20,9 @@ fn pass_through() -> DrawPrograms {
         vertex_inputs: inputs,
         vertex_outputs: outputs,
         varyings: 4,
-        fragment: Some(fragment(&[crate::packet::draw::Interpolation::Flat; 4])),
+        fragment: Some(fragment(
+            &[crate::program::interface::Interpolation::Flat; 4],
+        )),
     }
 }
 
@@ -152,7 +155,7 @@ fn built_in_inputs_are_what_vulkan_says() {
         &[[0.0, 0.0, 0.5, 1.0]; 20],
     );
     (draw.first, draw.count, draw.first_instance, draw.draw_index) = (3, 4, 11, 6);
-    let of = |draw: &crate::packet::draw::Draw| {
+    let of = |draw: &crate::packet::Draw| {
         let found = run(&device, draw);
         let vertex = found.primitives[1].provoking;
         [0, 1, 2, 3].map(|number| varying_bits(&found, vertex, number))

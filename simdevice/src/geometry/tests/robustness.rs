@@ -1,8 +1,11 @@
 //! Nothing that a draw says may panic, and nothing depends on the number of workers.
 
 use super::scene::*;
-use crate::packet::Viewport;
-use crate::packet::draw::*;
+
+use crate::packet::*;
+use crate::program::interface::VertexOutput;
+
+use crate::state::{DepthBias, DrawState, PolygonMode, Topology, Viewport};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -185,7 +188,7 @@ fn the_number_of_workers_changes_nothing() {
 #[test]
 fn a_vertex_program_without_end_is_stopped() {
     use super::super::{FrontEnd, Surface};
-    use crate::device::{Config, Device};
+    use crate::{Config, Device};
     use isa::ir::{Label, Program, Statement};
     let config = Config {
         threads: 2,
@@ -207,8 +210,8 @@ fn a_vertex_program_without_end_is_stopped() {
         layers: 1,
         depth: None,
     };
-    let mut counters = crate::counters::Counters::default();
-    let mut front = FrontEnd::new(&draw, surface, &device, &mut counters);
+    let mut counters = crate::stats::counters::Counters::default();
+    let mut front = FrontEnd::new(&draw, surface, device.runtime(), &mut counters);
     let stopped = front.next_part(&mut counters).unwrap_err();
     assert!(matches!(stopped, isa::exec::Stopped::TimedOut { .. }));
 }

@@ -1,12 +1,22 @@
 //! Draws that the tests share.
 
-use super::super::{Bins, DrawPipeline, FrontEnd, Primitive, PrimitiveDraw, Surface, Varyings};
-use crate::bindings::Bindings;
-use crate::counters::Counters;
-use crate::device::{Config, Device};
+use super::super::{Bins, FrontEnd, Primitive, PrimitiveDraw, Surface, Varyings};
+use crate::device::Device;
 use crate::format::Format;
-use crate::packet::draw::*;
-use crate::packet::{AttributeStream, BufferRange, IndexStream, Rect};
+use crate::program::bindings::Bindings;
+use crate::program::vertex::DrawPipeline;
+use crate::runtime::Config;
+
+use crate::packet::*;
+use crate::packet::{AttributeStream, BufferRange, IndexStream};
+
+use crate::program::interface::{
+    DrawPrograms, FragmentInput, FragmentPrograms, Interpolation, Sampling, VertexInput,
+    VertexOutput,
+};
+
+use crate::state::{DrawState, Rect, Topology};
+use crate::stats::counters::Counters;
 use devmem::Allocation;
 use isa::builder::Builder;
 use isa::ir::{Program, Rate, Type};
@@ -166,7 +176,7 @@ pub fn draw_with(
 ) -> Draw {
     let values: Vec<f32> = (0..positions.len()).map(|vertex| vertex as f32).collect();
     Draw {
-        pipeline: Arc::new(DrawPipeline::new(device, &programs).unwrap()),
+        pipeline: Arc::new(DrawPipeline::new(device.level(), &programs).unwrap()),
         state: Arc::new(state),
         attributes: vec![
             stream(positions, Format::R32G32B32A32Sfloat),
@@ -239,7 +249,7 @@ pub fn parts(device: &Device, draw: &Draw) -> (Vec<Found>, Counters) {
         depth: Some(Format::D32Sfloat),
     };
     let mut counters = Counters::default();
-    let mut front = FrontEnd::new(draw, surface, device, &mut counters);
+    let mut front = FrontEnd::new(draw, surface, device.runtime(), &mut counters);
     let mut parts = Vec::new();
     while let Some(part) = front.next_part(&mut counters).unwrap() {
         parts.push(Found::new(part));

@@ -1,9 +1,10 @@
 //! Points, lines, polygon modes and depth bias.
 
 use super::super::PrimitiveKind;
+use crate::program::interface::VertexOutput;
+use crate::state::{DepthBias, PolygonMode, Topology};
 
 use super::scene::*;
-use crate::packet::draw::{DepthBias, PolygonMode, Topology, VertexOutput};
 
 /// The parallelogram's corners, the fourth included.
 fn corners(draw: &Found, number: usize) -> Vec<[i32; 2]> {

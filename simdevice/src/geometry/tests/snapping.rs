@@ -2,8 +2,7 @@
 
 use super::super::viewport::{Transform, pixels, snap, snap_away};
 use super::scene::*;
-use crate::packet::draw::Topology;
-use crate::packet::{Rect, Viewport};
+use crate::state::{Rect, Topology, Viewport};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

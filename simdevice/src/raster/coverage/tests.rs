@@ -1,7 +1,6 @@
-use super::super::batch::Needs;
 use super::*;
 use crate::geometry::{Primitive, PrimitiveKind};
-use crate::raster::setup::{CENTER, SAMPLES_4};
+use crate::raster::setup::{CENTER, Needs, SAMPLES_4};
 use devmem::dispatch;
 use fearless_simd::Level;
 use isa::level::SimdLevel;

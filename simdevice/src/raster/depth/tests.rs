@@ -1,5 +1,6 @@
 use super::*;
 use devmem::dispatch;
+use fearless_simd::f32x16;
 use isa::level::SimdLevel;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -43,7 +44,7 @@ fn depths_become_the_nearest_numbers_of_their_format() {
             Format::X8D24UnormPack32,
             Format::D32Sfloat,
         ] {
-            let code = DepthCode::of(format);
+            let code = DepthEncoding::of(format);
             for chunk in depths.as_chunks::<16>().0 {
                 let codes: [u32; 16] = dispatch!(level, simd => {
                     code.encode(simd, f32x16::simd_from(simd, *chunk), (0.0, 1.0)).into()
@@ -63,7 +64,7 @@ fn depth_is_clamped_to_the_viewports_range() {
     let level = SimdLevel::Best.resolve().unwrap();
     let depths = std::array::from_fn(|lane| lane as f32 / 10.0 - 0.2);
     let codes: [u32; 16] = dispatch!(level, simd => {
-        DepthCode::Float.encode(simd, f32x16::simd_from(simd, depths), (0.25, 0.5)).into()
+        DepthEncoding::Float.encode(simd, f32x16::simd_from(simd, depths), (0.25, 0.5)).into()
     });
     for (depth, code) in depths.into_iter().zip(codes) {
         assert_eq!(f32::from_bits(code), depth.clamp(0.25, 0.5));

@@ -1,7 +1,7 @@
 //! What Gaussian mode accumulates for a tile's pixels, or for one sample of each.
 
 use super::grid::{ALL_LANES, BLOCK_PIXELS, BLOCKS, PixelMask, TILE, block_and_lane};
-use crate::raster::DepthCode;
+use crate::format::depth::DepthEncoding;
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 /// Accumulated colour and transmittance of a tile's pixels, or of one sample of each.
@@ -80,7 +80,7 @@ impl Accumulator {
     }
 
     /// The expected and the median depth of a block's lanes; zero where nothing is covered.
-    pub(super) fn depths(&self, block: usize, unit: DepthCode) -> [[f32; BLOCK_PIXELS]; 2] {
+    pub(super) fn depths(&self, block: usize, unit: DepthEncoding) -> [[f32; BLOCK_PIXELS]; 2] {
         let mut out = [[0.0; BLOCK_PIXELS]; 2];
         let [depths, weights] = &self.means;
         for lane in 0..BLOCK_PIXELS {

@@ -8,11 +8,11 @@
 use super::accumulator::Accumulator;
 use super::block_lists::BlockKernel;
 use super::depth_ranges::DepthRanges;
-use super::exp2::POWER_OF_TWO;
 use super::grid::{BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::inputs::{FIND_MEDIAN, NO_DEPTH, Thresholds, TileInputs};
 use crate::gaussian::splat::Splat;
-use crate::lanes::{bits_of, floats_of};
+use crate::simd::exp2::POWER_OF_TWO;
+use crate::simd::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, prelude::*, u32x16};
 use scalar::Splat16;
 
@@ -161,7 +161,7 @@ fn rounded(thresholds: &Thresholds) -> Thresholds {
 
 /// What binary16 rasterization is, one number at a time.
 pub(super) mod scalar {
-    use super::Splat;
+    use crate::gaussian::splat::Splat;
 
     /// The nearest binary16 number, ties to even; infinite from 65520 on.
     pub(in super::super) fn round(x: f32) -> f32 {
@@ -208,9 +208,9 @@ pub(super) mod scalar {
     /// What vectors are tested against.
     #[cfg(test)]
     mod definition {
-        use super::super::POWER_OF_TWO;
         use super::{Splat16, round};
-        use crate::packet::GaussianState;
+        use crate::simd::exp2::POWER_OF_TWO;
+        use crate::state::gaussian::GaussianState;
 
         pub(crate) fn exp2(x: f32) -> f32 {
             let x = x.clamp(-126.0, 1.0);

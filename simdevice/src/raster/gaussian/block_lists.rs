@@ -6,8 +6,9 @@ use super::grid::{BLOCKS, ROUND};
 use super::inputs::{Kernel, NO_DEPTH, TileCounts, TileInputs};
 use super::staging::StagedSplat;
 use crate::gaussian::splat::{Splat, binary16_headroom, locate};
-use crate::optimizations::Optimization;
-use crate::trace::{self, Run};
+use crate::stats::optimizations::Optimization;
+use crate::stats::recorder;
+use crate::stats::recorder::Run;
 use devmem::host;
 use fearless_simd::{Simd, mask32x16, prelude::*};
 
@@ -134,7 +135,7 @@ pub(super) fn part<S: Simd>(
         }
     }
     if let Some(runs) = runs {
-        trace::push_run(
+        recorder::push_run(
             runs,
             Run {
                 primitives: task.list.len() as u32,

@@ -24,20 +24,21 @@ use super::binary16::Half;
 use super::block_lists::{BlockLists, composite_by_block};
 use super::depth_ranges::DepthRanges;
 use super::exact::{InOrder, WideSums};
-use super::fast::{self, FastScratch};
+use super::fast;
+use super::fast::FastScratch;
 use super::grid::{BLOCKS, PixelMask, block_and_lane, count, lanes_within};
 use super::inputs::{
     Approximation, DepthMode, FAST_POWERS, FASTER_POWERS, FIND_MEAN, FIND_REACHED, Kernel,
     NO_DEPTH, Thresholds, TileCounts, TileInputs,
 };
 use super::per_pixel::{PerPixel, composite_per_pixel};
-use crate::counters::{Counter, Counters};
+use crate::gaussian::BinnedDraw;
 use crate::gaussian::depth::DepthTrend;
 use crate::gaussian::tile_lists::SortedWalk;
-use crate::gaussian::{BinnedDraw, TILE_SIZE};
-use crate::optimizations::{Optimization, Optimizations};
-use crate::raster::MAX_SAMPLES;
-use crate::trace::{Run, TileWork};
+use crate::limits::{MAX_SAMPLES, TILE_SIZE};
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::optimizations::{Optimization, Optimizations};
+use crate::stats::recorder::{Run, TileWork};
 use devmem::dispatch;
 use fearless_simd::Level;
 

@@ -6,7 +6,7 @@
 
 use super::grid::{BLOCK_PIXELS, BLOCKS, PixelMask};
 use crate::gaussian::depth::DepthTrend;
-use crate::packet::draw::CompareOp;
+use crate::state::CompareOp;
 use fearless_simd::{Simd, mask32x16, prelude::*, u32x16};
 
 /// No depth has this number or a greater one.

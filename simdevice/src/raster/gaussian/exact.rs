@@ -10,10 +10,10 @@
 use super::accumulator::Accumulator;
 use super::block_lists::BlockKernel;
 use super::depth_ranges::DepthRanges;
-use super::exp2::exp2_of_negated;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::inputs::{FIND_MEAN, FIND_MEDIAN, Kernel, NO_DEPTH, Thresholds, TileInputs};
 use super::pixels::{accumulate, falls_64};
+use crate::simd::exp2::exp2_of_negated;
 use fearless_simd::{Simd, f32x16, f64x8, mask64x8, prelude::*};
 
 /// What the pixels of a block accumulate; signs of transmittances as in [`Accumulator`].

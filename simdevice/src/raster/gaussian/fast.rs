@@ -11,8 +11,9 @@ use super::grid::{ALL_BLOCKS, BLOCKS, ROUND};
 use super::inputs::{DepthMode, NO_DEPTH, TileCounts, TileInputs};
 use super::pixels::{Alphas, evaluate, evaluate_steep};
 use super::staging::{Reaching, StagedRound, hidden_blocks};
-use crate::optimizations::Optimization;
-use crate::trace::{self, Run};
+use crate::stats::optimizations::Optimization;
+use crate::stats::recorder;
+use crate::stats::recorder::Run;
 use fearless_simd::{Simd, mask32x16, prelude::*};
 
 /// What the kernel needs besides the pixels.
@@ -78,7 +79,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
             work.tiles_hidden += rest.len() as u64;
             if let Some(runs) = &mut runs {
                 work.hidden_rest = rest.len() as u32;
-                trace::push_run(runs, hidden_run(simd, task, rest, open));
+                recorder::push_run(runs, hidden_run(simd, task, rest, open));
             }
             break;
         }
@@ -108,7 +109,7 @@ pub(super) fn composite<S: Simd, const DEPTH: DepthMode>(
                 hidden_blocks: blocks_of_hidden
                     + (work.blocks_hidden - before.blocks_hidden) as u32,
             };
-            trace::push_run(runs, run);
+            recorder::push_run(runs, run);
         }
     }
     accumulator.find_covered(simd);

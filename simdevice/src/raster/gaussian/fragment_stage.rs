@@ -1,71 +1,37 @@
 //! The resolve shader: a fragment program that makes the colours of a Gaussian draw's fragments from what was
 //! accumulated. It runs once for all samples of a pixel that accumulated alike, or for each sample if it asks for that.
 //!
-//! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. PixelMask that are not covered
+//! Blocks of 4x4 pixels are quads in the order of lanes, so a tile is one batch of a lane each. Lanes that are not covered
 //! help with derivatives: they hold what their own pixels accumulated.
 
 use super::compositor::GaussianTile;
 use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, PixelMask};
 use super::samples::{SAMPLES, Samples};
-use crate::bindings::Prepared;
-use crate::counters::{Counter, Counters};
-use crate::device::Device;
-use crate::gaussian::{BinnedDraw, TILE_SIZE};
-use crate::packet::draw::{FragmentInput, FragmentPrograms, ResolveShader, resolve};
-use crate::raster::color::ColorOutput;
-use crate::raster::color::load;
-use crate::raster::fragment::{FragmentStage, Machines};
-use crate::raster::output::{Sources, covered_by_alpha, lanes_of};
-use crate::raster::prepared::color_outputs;
-use crate::raster::primitives::{Buffers, Targets};
+use crate::gaussian::BinnedDraw;
+use crate::limits::TILE_SIZE;
+use crate::packet::ResolveShader;
+use crate::program::bindings::BoundResources;
+use crate::program::fragment::{FragmentMachines, FragmentStage};
+use crate::program::interface::{FragmentInput, resolve};
+use crate::raster::color::{ColorOutput, load};
+use crate::raster::output::{Buffers, Sources, Targets, color_outputs, covered_by_alpha, lanes_of};
 use crate::raster::quads::Quads;
 use crate::raster::setup::{CENTER, SAMPLES_4};
 use crate::raster::tile::Tile;
+use crate::runtime::Runtime;
+use crate::stats::counters::{Counter, Counters};
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
 use isa::exec::{Chunk, LaneMask, Machine, Stopped, Watchdog};
-use isa::validate::InvalidProgram;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-
-/// A resolve shader's program, ready for one device. Its varyings are those of [`resolve`].
-#[derive(Debug)]
-pub struct ResolveProgram {
-    stage: FragmentStage,
-    reads_depth: bool,
-}
-
-impl ResolveProgram {
-    /// Makes a program ready.
-    ///
-    /// # Errors
-    /// [`InvalidProgram`] if it cannot run on the device.
-    pub fn new(device: &Device, programs: &FragmentPrograms) -> Result<Self, InvalidProgram> {
-        let stage = FragmentStage::new(device.level(), programs)?;
-        let is_depth = |input: FragmentInput| match input {
-            FragmentInput::Varying { index, .. } => index >= resolve::EXPECTED_DEPTH,
-            FragmentInput::FragCoord(axis) => axis == 2,
-            _ => false,
-        };
-        let inputs = &stage.interface.inputs;
-        Ok(Self {
-            reads_depth: inputs.iter().any(|&(_, input, _)| is_depth(input)),
-            stage,
-        })
-    }
-
-    /// Whether it reads a depth.
-    pub fn reads_depth(&self) -> bool {
-        self.reads_depth
-    }
-}
 
 /// A resolve shader made ready for tiles, which all workers share.
 pub(super) struct FragmentStageDraw<'a> {
     draw: &'a BinnedDraw,
     shader: &'a ResolveShader,
     stage: &'a FragmentStage,
-    bindings: Prepared<'a>,
+    bindings: BoundResources<'a>,
     targets: Targets<'a>,
     colors: Vec<Option<ColorOutput>>,
     samples: usize,
@@ -96,7 +62,7 @@ impl<'a> FragmentStageDraw<'a> {
         shader: &'a ResolveShader,
         targets: Targets<'a>,
         samples: usize,
-        device: &Device,
+        runtime: &Runtime,
     ) -> Self {
         let stage = &shader.program.stage;
         let state = &*draw.state;
@@ -106,13 +72,13 @@ impl<'a> FragmentStageDraw<'a> {
             draw,
             shader,
             stage,
-            bindings: shader.bindings.prepare(device.level()),
+            bindings: shader.bindings.bind(runtime.level()),
             targets,
             colors: color_outputs(Some(stage), targets.color, blend, logic, constants),
             samples,
             per_sample: shader.sample_shading || stage.interface.per_sample,
-            level: device.level(),
-            limit: device.config().shader_timeout,
+            level: runtime.level(),
+            limit: runtime.config().shader_timeout,
         }
     }
 
@@ -151,11 +117,11 @@ impl<'a> FragmentStageDraw<'a> {
             .map(|leader| self.group(leader, samples, covered))
             .filter(|group| !group.blocks.is_empty())
             .collect();
-        let mut machines = self.stage.take_machines();
+        let mut machines = self.stage.machines();
         let done = groups
             .iter()
             .try_for_each(|group| self.shade(tile, group, samples, covered, tools, &mut machines));
-        self.stage.put_back(machines, tools.counters);
+        machines.give_back(tools.counters);
         for (index, output) in self.colors.iter().enumerate() {
             if output.is_some() {
                 tools.buffers.color[index].changed(tile.index);
@@ -206,11 +172,11 @@ impl<'a> FragmentStageDraw<'a> {
         samples: &Samples,
         covered: &mut [PixelMask; SAMPLES],
         tools: &mut Tools<'_>,
-        machines: &mut Machines,
+        machines: &mut FragmentMachines<'_>,
     ) -> Result<(), Stopped> {
         let lanes = BLOCK_PIXELS * group.blocks.len();
-        let size = usize::from(lanes > crate::raster::fragment::BATCH_LANES[0]);
-        let machine = self.stage.machine(machines, size);
+        let size = usize::from(lanes > crate::program::fragment::BATCH_LANES[0]);
+        let machine = machines.of_size(size);
         let mut helpers = LaneMask::none();
         for (number, &block) in group.blocks.iter().enumerate() {
             let mut any = 0;

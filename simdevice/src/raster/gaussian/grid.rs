@@ -1,8 +1,8 @@
 //! Where the pixels of a block and the blocks of a tile are.
 
-use crate::gaussian::TILE_SIZE;
-use crate::packet::Rect;
+use crate::limits::TILE_SIZE;
 use crate::raster::tile::place;
+use crate::state::Rect;
 
 /// Pixels along a tile's side.
 pub(super) const TILE: usize = TILE_SIZE as usize;

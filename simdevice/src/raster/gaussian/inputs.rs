@@ -10,15 +10,15 @@
 //! a sum for each block and a bound of each Gaussian's alpha in it; that took as long as it saved.)
 
 use super::accumulator::{NOT_TERMINATED, TransmittanceBits};
-use super::exp2::{CUBIC, QUADRATIC, exp2_of_negated};
+use crate::format::depth::DepthEncoding;
 use crate::gaussian::BinnedDraw;
 use crate::gaussian::depth::DepthTrend;
 use crate::gaussian::ray_depth::RayDepths;
 use crate::gaussian::splat::{Splat, locate};
 use crate::gaussian::surfel::Surfel;
-use crate::optimizations::Optimizations;
-use crate::packet::{GaussianApproximation, GaussianPrecision, GaussianState};
-use crate::raster::DepthCode;
+use crate::simd::exp2::{CUBIC, QUADRATIC, exp2_of_negated};
+use crate::state::gaussian::{GaussianApproximation, GaussianPrecision, GaussianState};
+use crate::stats::optimizations::Optimizations;
 use fearless_simd::{Simd, f32x16};
 use std::slice;
 
@@ -49,7 +49,7 @@ pub(super) struct Thresholds {
     pub(super) alpha_ceiling: f32,
     pub(super) transmittance_floor: f32,
     /// What numbers of depths mean.
-    pub(super) depth_unit: DepthCode,
+    pub(super) depth_unit: DepthEncoding,
     /// The mode, for code that is the same for all of them: where time matters it is a constant.
     pub(super) depth_mode: DepthMode,
 }

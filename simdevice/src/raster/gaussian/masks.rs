@@ -73,7 +73,7 @@ impl<S: Simd> Tally<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::SimdLevel;
+    use crate::runtime::SimdLevel;
     use devmem::dispatch;
 
     #[test]

@@ -10,7 +10,6 @@ mod block_lists;
 mod compositor;
 mod depth_ranges;
 mod exact;
-mod exp2;
 mod fast;
 mod fragment_stage;
 mod grid;
@@ -22,18 +21,17 @@ mod samples;
 mod staging;
 
 pub use compositor::GaussianTile;
-pub use fragment_stage::ResolveProgram;
 
-use crate::counters::{Counter, Counters};
-use crate::device::Device;
-use crate::gaussian::{BinnedDraw, TILE_SIZE};
-use crate::packet::BlendState;
-use crate::packet::draw::{StencilFace, StencilOp};
+use crate::gaussian::BinnedDraw;
+use crate::limits::TILE_SIZE;
 use crate::raster::color::ColorOutput;
 use crate::raster::depth::{Tests, apply, compare};
-use crate::raster::primitives::{Buffers, Targets};
+use crate::raster::output::{Buffers, Targets};
 use crate::raster::quads::Quads;
 use crate::raster::tile::{AREA, Target, Tile};
+use crate::runtime::Runtime;
+use crate::state::{BlendState, StencilFace, StencilOp};
+use crate::stats::counters::{Counter, Counters};
 use depth_ranges::DepthRanges;
 use devmem::dispatch;
 use fearless_simd::{Level, Simd, f32x16, prelude::*};
@@ -64,7 +62,7 @@ impl<'a> GaussianTileDraw<'a> {
         draw: &'a BinnedDraw,
         targets: Targets<'a>,
         samples: Option<u32>,
-        device: &Device,
+        runtime: &Runtime,
     ) -> Self {
         const REPLACE: BlendState = BlendState {
             equations: None,
@@ -88,10 +86,10 @@ impl<'a> GaussianTileDraw<'a> {
             targets,
             color,
             resolve: resolve
-                .map(|shader| FragmentStageDraw::new(draw, shader, targets, samples, device)),
+                .map(|shader| FragmentStageDraw::new(draw, shader, targets, samples, runtime)),
             tests: Tests::new(&state.depth_stencil, depth, targets.stencil.is_some()),
             samples,
-            level: device.level(),
+            level: runtime.level(),
         }
     }
 

@@ -9,12 +9,12 @@ use super::accumulator::Accumulator;
 use super::block_lists::{BlockLists, part};
 use super::depth_ranges::DepthRanges;
 use super::exact::falls;
-use super::exp2::exp2_of_negated;
-use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X_64, LANE_Y_64};
+use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, LANE_X_64, LANE_Y_64};
 use super::inputs::{FIND_MEDIAN, NO_DEPTH, TileCounts, TileInputs};
 use crate::gaussian::ray_depth::{PixelRays, RayDepths, Rays, ordered_key};
 use crate::gaussian::splat::locate;
-use crate::trace::Run;
+use crate::simd::exp2::exp2_of_negated;
+use crate::stats::recorder::Run;
 use devmem::host;
 use fearless_simd::{Simd, f32x16, prelude::*};
 
@@ -133,15 +133,15 @@ pub(super) fn composite_per_pixel<S: Simd>(
     runs: Option<&mut Vec<Run>>,
 ) -> TileCounts {
     let mut work = part(simd, task, lists, (accumulator, ranges), runs);
-    for block in 0..BLOCKS {
-        if lists[block].is_empty() {
+    for (block, names) in lists.iter().enumerate() {
+        if names.is_empty() {
             continue;
         }
         work.contributions += scratch.composite_block(
             simd,
             task,
             depths,
-            &lists[block],
+            names,
             (&mut *accumulator, block),
             ranges,
         );

@@ -10,7 +10,7 @@ use super::inputs::{
 use super::masks::{Tally, only};
 use super::staging::{Reaching, StagedRound};
 use crate::gaussian::splat::Splat;
-use crate::lanes::bits_of;
+use crate::simd::bits_of;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, prelude::*, u32x16};
 
 /// What a block's pixels have accumulated.

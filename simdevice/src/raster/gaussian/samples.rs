@@ -1,7 +1,7 @@
 //! What becomes of a tile's samples.
 
 use super::grid::{BLOCKS, PixelMask};
-use crate::raster::MAX_SAMPLES;
+use crate::limits::MAX_SAMPLES;
 
 pub(super) const SAMPLES: usize = MAX_SAMPLES as usize;
 

@@ -6,7 +6,7 @@ use super::grid::{
 };
 use super::inputs::{DepthMode, NO_DEPTH, TileInputs};
 use crate::gaussian::splat::Splat;
-use crate::optimizations::Optimization;
+use crate::stats::optimizations::Optimization;
 use fearless_simd::{Simd, f32x8, f32x16, f64x4, i32x16, mask32x16, prelude::*, u32x16};
 
 /// What rounding may do to exponents, relative to them.

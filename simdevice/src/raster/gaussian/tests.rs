@@ -4,19 +4,24 @@ mod per_pixel;
 mod streamed;
 mod whole_draws;
 
-use super::exp2::{
-    CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
-};
 use super::grid::TILE;
 use super::inputs::needs_f64_sums;
 use super::*;
-use crate::device::{Config, Device, SimdLevel};
+use crate::device::Device;
 use crate::format::Format;
 use crate::gaussian::splat::{Splat, locate};
 use crate::gaussian::{GaussianSet, sort_and_bin};
-use crate::optimizations::Optimizations;
 use crate::packet::*;
-use crate::trace::TileWork;
+use crate::runtime::{Config, SimdLevel};
+use crate::simd::exp2::{
+    CUBIC, EIGHTHS, POWER_OF_TWO, QUADRATIC, THIRTY_SECONDS, Table, exp2_of_negated,
+};
+use crate::state::gaussian::{
+    Camera, CameraModel, GaussianOrder, GaussianPrecision, GaussianState,
+};
+use crate::state::{Rect, Viewport};
+use crate::stats::optimizations::Optimizations;
+use crate::stats::recorder::TileWork;
 use devmem::Allocation;
 use fearless_simd::f32x16;
 use rand::{Rng, SeedableRng};
@@ -139,7 +144,8 @@ fn draw_with_depth(
     };
     let mut set = GaussianSet::begin(&begin, bounds, depth.map(|(format, _)| format));
     set.append(&append);
-    sort_and_bin(set, device, &mut Counters::default()).unwrap()
+    let mut counters = Counters::default();
+    sort_and_bin(set, device.runtime(), device.caches(), &mut counters).unwrap()
 }
 
 fn defaults() -> GaussianState {
@@ -449,7 +455,7 @@ fn a_saturated_tile_fetches_no_more() {
 
 #[test]
 fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
-    use crate::trace::{DrawWork, Recorder};
+    use crate::stats::recorder::{DrawWork, Recorder};
     let quiet = Device::new(&Config::default()).unwrap();
     for (seed, bounds) in [
         (40, WHOLE),
@@ -472,8 +478,12 @@ fn recording_work_changes_no_bit_and_agrees_with_the_counters() {
         recorder.begin_frame(0, bounds);
         let pictures = [&quiet, &recording].map(|device| {
             let draw = draw(seed, 3000, defaults(), device, bounds);
-            assert_eq!(draw.record.is_some(), device.config().recorder.is_some());
-            if let Some((recorder, record)) = device.recorder().zip(draw.record.as_ref()) {
+            assert_eq!(
+                draw.record.is_some(),
+                device.runtime().config().recorder.is_some()
+            );
+            if let Some((recorder, record)) = device.runtime().recorder().zip(draw.record.as_ref())
+            {
                 recorder.add_draw(0, record);
             }
             let mut tile = Box::new(GaussianTile::default());

@@ -1,6 +1,7 @@
 use super::*;
+use crate::format::Aspect;
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
-use crate::packet::{Aspect, StoreOp};
+use crate::packet::StoreOp;
 use crate::raster::tile::AttachmentError;
 use devmem::Allocation;
 use isa::level::SimdLevel;

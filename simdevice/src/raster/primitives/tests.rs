@@ -4,17 +4,24 @@ mod special;
 mod twin;
 
 use super::*;
-use crate::bindings::Bindings;
 use crate::device::Device;
-use crate::device::{Config, FlushPolicy};
-use crate::format::Format;
-use crate::geometry::{Bins, DrawPipeline, PrimitiveKind, Varyings};
+use crate::format::{Aspect, ClearValue, Format};
+use crate::geometry::{Bins, PrimitiveKind, Varyings};
 use crate::geometry::{PrimitiveChunk, PrimitiveDraw};
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
-use crate::packet::draw::*;
-use crate::packet::*;
+use crate::packet::{Attachment, LoadOp, Rendering, StoreOp};
+use crate::program::bindings::Bindings;
+use crate::program::vertex::DrawPipeline;
+use crate::runtime::{Config, FlushPolicy};
+
 use crate::pass::{Pass, PassDraw};
+
+use crate::program::interface::{
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+};
 use crate::raster::setup::{CENTER, SAMPLES_4};
+use crate::state::*;
+use crate::state::{DrawState, Rect, Topology};
 use devmem::Allocation;
 use isa::builder::Builder;
 use isa::ir::{Program, Rate, Statement, Type};
@@ -167,7 +174,7 @@ fn draw(
     let state = Arc::new(state);
     let scissors = state.scissors.clone().into_iter();
     PrimitiveDraw {
-        pipeline: Arc::new(DrawPipeline::new(device, &programs).unwrap()),
+        pipeline: Arc::new(DrawPipeline::new(device.level(), &programs).unwrap()),
         state,
         bindings: Bindings::default(),
         regions: scissors.map(|scissor| scissor.intersect(area)).collect(),
@@ -175,7 +182,7 @@ fn draw(
             bins: Bins::everywhere(
                 &primitives,
                 area,
-                device.config().macro_tile_size,
+                device.runtime().config().macro_tile_size,
                 layers.unwrap_or(1),
             ),
             primitives,
@@ -226,10 +233,14 @@ fn run(
     let mut counters = Counters::default();
     let mut pass = Pass::begin(rendering).unwrap();
     for draw in draws(&device) {
-        pass.push(PassDraw::Primitives(Box::new(draw)), &device, &mut counters)
-            .unwrap();
+        pass.push(
+            PassDraw::Primitives(Box::new(draw)),
+            device.runtime(),
+            &mut counters,
+        )
+        .unwrap();
     }
-    pass.end(&device, &mut counters).unwrap();
+    pass.end(device.runtime(), &mut counters).unwrap();
     counters
 }
 

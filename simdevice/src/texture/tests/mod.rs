@@ -8,9 +8,9 @@ mod texels;
 use std::sync::Arc;
 
 use super::*;
-use crate::device::SimdLevel;
+use crate::format::Aspect;
 use crate::image::{ImageDesc, ImageKind};
-use crate::packet::Aspect;
+use crate::runtime::SimdLevel;
 use crate::{Allocation, Format, Image, ImageView};
 use isa::ir::{Dimension, ImageShape};
 use isa::resources::{ImageUnit, Lanes, LodRequest, SampleRequest, TexelRequest};

@@ -1,6 +1,8 @@
 use super::*;
+use crate::format::{Aspect, Format};
 use crate::image::{Image, ImageDesc, ImageKind};
-use crate::packet::{Aspect, ImageCopyRegion, SubresourceLayers};
+use crate::packet::{ImageCopyRegion, SubresourceLayers};
+use crate::state::ResolveMode;
 use devmem::Allocation;
 use std::sync::Arc;
 

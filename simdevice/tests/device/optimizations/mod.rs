@@ -7,14 +7,23 @@ mod hidden;
 mod unchanged;
 
 use crate::common::*;
-use simdevice::bindings::Bindings;
-use simdevice::counters::{Counter, Counters};
-use simdevice::geometry::DrawPipeline;
+use simdevice::format::ClearValue;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Program, Rate, Type};
-use simdevice::optimizations::{Optimization, Optimizations};
-use simdevice::packet::draw::*;
 use simdevice::packet::*;
+use simdevice::program::bindings::Bindings;
+use simdevice::program::interface::{
+    DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+    VertexInput, VertexOutput,
+};
+use simdevice::program::vertex::DrawPipeline;
+use simdevice::state::gaussian::{
+    Camera, CameraModel, GaussianGeometry, GaussianLinearization, GaussianOrder, GaussianPrecision,
+    GaussianState,
+};
+use simdevice::state::{CompareOp, DepthTest, DrawState, Rect, Topology};
+use simdevice::stats::counters::{Counter, Counters};
+use simdevice::stats::optimizations::{Optimization, Optimizations};
 use simdevice::{Allocation, CommandProcessor, Config, Device, Format, Packet};
 use std::sync::Arc;
 
@@ -91,7 +100,7 @@ fn triangles(device: &Device, corners: &[[f32; 4]], tested: bool) -> Packet {
         write: true,
     });
     Packet::Draw(Box::new(Draw {
-        pipeline: Arc::new(DrawPipeline::new(device, &programs()).unwrap()),
+        pipeline: Arc::new(DrawPipeline::new(device.level(), &programs()).unwrap()),
         state: Arc::new(state),
         attributes: vec![stream(0), stream(16)],
         vertex_bindings: Bindings::default(),

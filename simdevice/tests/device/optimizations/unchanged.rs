@@ -1,6 +1,8 @@
 //! What is drawn again as it was is not projected again, and whatever changes is seen.
 
 use super::*;
+use simdevice::program::fragment::GaussianFragmentProgram;
+use simdevice::program::interface::resolve;
 
 /// What changes packets before they are drawn again.
 pub(super) type Edit = Box<dyn FnMut(&mut [Packet])>;
@@ -108,7 +110,7 @@ fn what_a_program_resolves_is_a_set_of_its_own() {
         ..programs().fragment.unwrap()
     };
     let shader = Packet::GaussianResolveShader(Box::new(ResolveShader {
-        program: Arc::new(ResolveProgram::new(&device, &program).unwrap()),
+        program: Arc::new(GaussianFragmentProgram::new(device.level(), &program).unwrap()),
         bindings: Bindings::default(),
         sample_shading: false,
         alpha_to_coverage: false,

@@ -1,7 +1,8 @@
 //! What a draw lets the kernel leave inexact stays within what it says.
 
-use super::exp2::{CUBIC, Powers, QUADRATIC};
 use super::*;
+use crate::simd::exp2::{CUBIC, Powers, QUADRATIC};
+use crate::state::gaussian::GaussianApproximation;
 
 /// The worst relative error of a polynomial's powers of two at a level, over all falls that it is for.
 fn worst_error<const TERMS: usize>(powers: &Powers<TERMS>, level: Level) -> f64 {

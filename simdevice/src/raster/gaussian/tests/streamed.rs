@@ -1,6 +1,7 @@
 //! Draws without lists, since those would be too long.
 
 use super::*;
+use crate::state::gaussian::GaussianOrder;
 
 /// Every pixel is the same, bit for bit, whether tiles have lists or find theirs in the sorted sequence.
 #[test]

@@ -1,12 +1,18 @@
 //! Whole draws with random tests against a twin that takes each sample for itself.
 
 use super::*;
+use crate::format::Aspect;
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
-use crate::packet::draw::*;
+use crate::packet::*;
 use crate::pass::{Pass, PassDraw};
 use crate::raster::blend::Blender;
 use crate::raster::depth::{apply, compare};
-use crate::trace::Recorder;
+use crate::state::gaussian::{GaussianOrder, GaussianPrecision, GaussianState};
+use crate::state::{
+    BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, Rect,
+    StencilFace, StencilOp,
+};
+use crate::stats::recorder::Recorder;
 use rand::seq::IndexedRandom;
 use timing::work::Saturation;
 
@@ -359,8 +365,8 @@ impl Scene {
         .unwrap();
         let mut counters = Counters::default();
         let draw = PassDraw::Gaussians(Box::new(self.draw(device)));
-        pass.push(draw, device, &mut counters).unwrap();
-        pass.end(device, &mut counters).unwrap();
+        pass.push(draw, device.runtime(), &mut counters).unwrap();
+        pass.end(device.runtime(), &mut counters).unwrap();
         let read = |view: &ImageView, aspect| {
             let mut texels = Vec::new();
             self.each(view, aspect, |_, layout, place, size| {
@@ -439,7 +445,7 @@ fn hidden_work(
         ..Config::default()
     })
     .unwrap();
-    if let Some(recorder) = &device.config().recorder {
+    if let Some(recorder) = &device.runtime().config().recorder {
         recorder.begin_frame(0, WHOLE);
     }
     let state = GaussianState {
@@ -463,7 +469,7 @@ fn hidden_work(
         Some((Format::D32Sfloat, coefficients)),
     );
     change(&mut draw);
-    if let Some((recorder, record)) = device.recorder().zip(draw.record.as_ref()) {
+    if let Some((recorder, record)) = device.runtime().recorder().zip(draw.record.as_ref()) {
         recorder.add_draw(0, record);
     }
     let mut tile = Box::new(GaussianTile::default());

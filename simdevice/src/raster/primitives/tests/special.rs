@@ -1,6 +1,7 @@
 //! What random states do not reach: samples, layers, resolves, side effects, programs that do not end.
 
 use super::*;
+use crate::packet::{Attachment, BufferRange, Rendering};
 use isa::exec::Stopped;
 use isa::ir::{Address, AtomicOp, Binding, Format as Element, Space};
 use std::time::Duration;
@@ -258,10 +259,14 @@ fn a_program_that_does_not_end_is_stopped() {
     let mut counters = Counters::default();
     let primitives = vec![over(LARGE, 0)];
     let draw = draw(&device, Some(endless), state(1), primitives, Vec::new(), 0);
-    pass.push(PassDraw::Primitives(Box::new(draw)), &device, &mut counters)
-        .unwrap();
+    pass.push(
+        PassDraw::Primitives(Box::new(draw)),
+        device.runtime(),
+        &mut counters,
+    )
+    .unwrap();
     assert!(matches!(
-        pass.end(&device, &mut counters),
+        pass.end(device.runtime(), &mut counters),
         Err(Stopped::TimedOut { .. })
     ));
 }

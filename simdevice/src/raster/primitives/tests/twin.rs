@@ -1,6 +1,7 @@
 //! Random states against the twin.
 
 use super::*;
+use crate::packet::Rendering;
 use crate::raster::blend::Blender;
 use crate::raster::coverage::tests::covers;
 use crate::raster::depth::{apply, compare};

@@ -1,16 +1,16 @@
 //! The model of the hardware beside the command processor: what was recorded becomes counters.
 
-use crate::counters::{Counter, Counters};
-use crate::device::Device;
-use crate::packet::Rect;
-use crate::trace::Owner;
+use crate::runtime::Runtime;
+use crate::state::Rect;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::recorder::Owner;
 use timing::FrameWork;
 use timing::config::{Config, DEFAULT_PRESET};
 use timing::simulate::simulate;
 
 /// A command processor's view of the simulated hardware, which is the paper's.
 #[derive(Debug)]
-pub(crate) struct Model {
+pub(crate) struct HardwareModel {
     /// Whose work it accounts for: other command processors' queries have models of their own.
     owner: Owner,
     /// Read when it is first needed.
@@ -21,7 +21,7 @@ pub(crate) struct Model {
     next: u64,
 }
 
-impl Model {
+impl HardwareModel {
     /// What accounts for an owner's work.
     pub(crate) fn new(owner: Owner) -> Self {
         Self {
@@ -33,16 +33,16 @@ impl Model {
     }
 
     /// Whether what is done is accounted for.
-    fn is_on(&self, device: &Device) -> bool {
-        self.queries > 0 || device.config().simulated_timestamps
+    fn is_on(&self, runtime: &Runtime) -> bool {
+        self.queries > 0 || runtime.config().simulated_timestamps
     }
 
     /// Begins to account for what is done; `area` is the current pass's, if there is one.
-    pub(crate) fn begin(&mut self, device: &Device, counters: &mut Counters, area: Option<Rect>) {
-        self.account(device, counters, area);
-        let recorder = device.listened_recorder();
+    pub(crate) fn begin(&mut self, runtime: &Runtime, counters: &mut Counters, area: Option<Rect>) {
+        self.account(runtime, counters, area);
+        let recorder = runtime.query_recorder();
         recorder.listen();
-        if !self.is_on(device) {
+        if !self.is_on(runtime) {
             // What others recorded before is none of this query's.
             recorder.work_since(self.owner, &mut self.next);
         }
@@ -52,24 +52,29 @@ impl Model {
         }
     }
 
-    /// Ends what [`Model::begin`] began.
-    pub(crate) fn end(&mut self, device: &Device, counters: &mut Counters, area: Option<Rect>) {
-        self.account(device, counters, area);
+    /// Ends what [`HardwareModel::begin`] began.
+    pub(crate) fn end(&mut self, runtime: &Runtime, counters: &mut Counters, area: Option<Rect>) {
+        self.account(runtime, counters, area);
         if self.queries > 0 {
             self.queries -= 1;
-            device.listened_recorder().stop_listening();
+            runtime.query_recorder().stop_listening();
         }
     }
 
     /// Counts what was recorded since the last time. What a pass does from here on is a frame of its own, as its
     /// tiles have been written: `area` is that pass's.
-    pub(crate) fn account(&mut self, device: &Device, counters: &mut Counters, area: Option<Rect>) {
-        if !self.is_on(device) {
+    pub(crate) fn account(
+        &mut self,
+        runtime: &Runtime,
+        counters: &mut Counters,
+        area: Option<Rect>,
+    ) {
+        if !self.is_on(runtime) {
             return;
         }
-        let recorder = device.listened_recorder();
+        let recorder = runtime.query_recorder();
         let frames = recorder.work_since(self.owner, &mut self.next);
-        if device.config().recorder.is_none() {
+        if runtime.config().recorder.is_none() {
             recorder.clear(self.owner);
         }
         if let Some(area) = area {

@@ -1,11 +1,10 @@
-//! Points, lines and triangles in the trace.
+//! The account of points, lines and triangles: what came before their tiles, and what they did in each.
 
-use super::{DrawRecord, ShaderWork, shader_work, sized_tiles};
-use crate::counters::{Counter, Counters};
 use crate::geometry::PrimitiveDraw;
-use crate::packet::draw::Draw;
-use crate::raster::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
-use std::sync::PoisonError;
+use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
+use crate::packet::Draw;
+use crate::stats::counters::{Counter, Counters};
+use crate::stats::recorder::{DrawRecord, ShaderWork, shader_work, sized_tiles};
 use timing::work::{DrawWork, Mode, Run, TILE_GROUPS, TileWork};
 
 /// Numbers of a primitive that the rasterizer takes; GauRast, Table II.
@@ -74,50 +73,54 @@ impl MacroTileWork {
     }
 }
 
-impl DrawRecord {
-    /// A draw of primitives of which nothing is known yet.
-    pub(crate) fn primitives() -> DrawWork {
-        DrawWork {
-            mode: Mode::Triangle,
-            ..DrawWork::default()
+/// A draw of primitives of which nothing is known yet.
+pub(crate) fn no_primitives() -> DrawWork {
+    DrawWork {
+        mode: Mode::Triangle,
+        ..DrawWork::default()
+    }
+}
+
+/// Adds what came before the tiles of a part of a draw; `counters` are those of it alone.
+pub(crate) fn add_front_end(
+    record: &DrawRecord,
+    counters: &Counters,
+    draw: &Draw,
+    part: &PrimitiveDraw,
+) {
+    let shaded = counters.get(Counter::VertexInvocations);
+    let drawn = counters.get(Counter::PrimitivesDrawn);
+    let attributes = draw.attributes.iter();
+    let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
+    // A position and the varyings.
+    let written = 4 * (4 + part.varyings_per_vertex() as u64);
+    let index = draw
+        .indices
+        .as_ref()
+        .map_or(0, |indices| indices.index_size);
+    let bytes = shaded * (read as u64 + written)
+        + counters.get(Counter::InputVertices) * u64::from(index)
+        + drawn * 4 * NUMBERS_IN;
+    let mut preprocess = shader_work(counters);
+    preprocess.bytes += bytes as f64;
+    let mut sized = [0; 4];
+    for primitive in part.chunks.iter().flat_map(|chunk| &chunk.primitives) {
+        let Some(&region) = part.regions.get(usize::from(primitive.viewport)) else {
+            continue;
+        };
+        let side = |axis: usize, of: fn(i32, i32) -> i32| {
+            let at = primitive.corners.map(|corner| corner[axis]);
+            f64::from(of(of(at[0], at[1]), at[2])) / 256.0
+        };
+        let (low, high) = (
+            [0, 1].map(|k| side(k, i32::min)),
+            [0, 1].map(|k| side(k, i32::max)),
+        );
+        for (sum, tiles) in sized.iter_mut().zip(sized_tiles(low, high, region)) {
+            *sum += tiles;
         }
     }
-
-    /// Adds what came before the tiles of a part of a draw; `counters` are those of it alone.
-    pub(crate) fn add_front_end(&self, counters: &Counters, draw: &Draw, part: &PrimitiveDraw) {
-        let shaded = counters.get(Counter::VertexInvocations);
-        let drawn = counters.get(Counter::PrimitivesDrawn);
-        let attributes = draw.attributes.iter();
-        let read: usize = attributes.map(|stream| stream.format.texel_size()).sum();
-        // A position and the varyings.
-        let written = 4 * (4 + part.varyings_per_vertex() as u64);
-        let index = draw
-            .indices
-            .as_ref()
-            .map_or(0, |indices| indices.index_size);
-        let bytes = shaded * (read as u64 + written)
-            + counters.get(Counter::InputVertices) * u64::from(index)
-            + drawn * 4 * NUMBERS_IN;
-        let mut preprocess = shader_work(counters);
-        preprocess.bytes += bytes as f64;
-        let mut sized = [0; 4];
-        for primitive in part.chunks.iter().flat_map(|chunk| &chunk.primitives) {
-            let Some(&region) = part.regions.get(usize::from(primitive.viewport)) else {
-                continue;
-            };
-            let side = |axis: usize, of: fn(i32, i32) -> i32| {
-                let at = primitive.corners.map(|corner| corner[axis]);
-                f64::from(of(of(at[0], at[1]), at[2])) / 256.0
-            };
-            let (low, high) = (
-                [0, 1].map(|k| side(k, i32::min)),
-                [0, 1].map(|k| side(k, i32::max)),
-            );
-            for (sum, tiles) in sized.iter_mut().zip(sized_tiles(low, high, region)) {
-                *sum += tiles;
-            }
-        }
-        let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+    record.update(|work| {
         work.primitives += counters.get(Counter::InputPrimitives);
         work.drawn += drawn;
         work.preprocess = work.preprocess.plus(&preprocess);
@@ -126,21 +129,22 @@ impl DrawRecord {
         for (sum, tiles) in work.sized_pairs.iter_mut().zip(sized) {
             *sum += tiles;
         }
-    }
+    });
+}
 
-    /// Adds what was done in macro-tile `at` of `size` pixels; `counters` are those of it alone.
-    pub(crate) fn add_macro_tile(
-        &self,
-        at: [u32; 2],
-        size: u32,
-        done: MacroTileWork,
-        counters: &Counters,
-    ) {
-        let side = size / TILE_SIZE;
-        let listed = done.tiles.into_iter().enumerate();
-        let listed = listed.filter(|(_, tile)| tile.listed > 0);
-        let shade: ShaderWork = shader_work(counters);
-        let mut work = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+/// Adds what was done in macro-tile `at` of `size` pixels; `counters` are those of it alone.
+pub(crate) fn add_macro_tile(
+    record: &DrawRecord,
+    at: [u32; 2],
+    size: u32,
+    done: MacroTileWork,
+    counters: &Counters,
+) {
+    let side = size / TILE_SIZE;
+    let listed = done.tiles.into_iter().enumerate();
+    let listed = listed.filter(|(_, tile)| tile.listed > 0);
+    let shade: ShaderWork = shader_work(counters);
+    record.update(|work| {
         work.shade = work.shade.plus(&shade);
         work.tiles.extend(listed.map(|(index, tile)| TileWork {
             at: [
@@ -149,11 +153,12 @@ impl DrawRecord {
             ],
             ..tile
         }));
-    }
+    });
 }
 
 #[cfg(test)]
 mod tests {
+
     use super::*;
 
     #[test]

@@ -1,7 +1,7 @@
 //! Optimizations: work that the device leaves out because it changes no pixel. Each has a name, a counter of what it saved and a
 //! switch, so that tests prove that the image is the same without it.
 
-use crate::counters::Counter;
+use crate::stats::counters::Counter;
 use std::str::FromStr;
 
 macro_rules! optimizations {

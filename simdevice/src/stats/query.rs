@@ -1,6 +1,6 @@
 //! Query pools: results that packets write and the host reads.
 
-use crate::counters::Counters;
+use crate::stats::counters::Counters;
 use devmem::host;
 use std::sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -142,7 +142,7 @@ impl QueryPool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::counters::Counter;
+    use crate::stats::counters::Counter;
 
     #[test]
     fn a_query_is_available_only_between_its_end_and_a_reset() {

@@ -1,40 +1,38 @@
-//! Programs made ready for draws.
+//! Vertex programs made ready for draws, alone or with a fragment program.
 
-use crate::device::Device;
-use crate::packet::draw::{
-    DrawPrograms, FragmentInput, Interpolation, MAX_CLIP_CULL_DISTANCES, VertexInput, VertexOutput,
+use super::pool::MachinePool;
+use crate::limits::MAX_CLIP_CULL_DISTANCES;
+use crate::program::fragment::FragmentStage;
+use crate::program::interface::{
+    DrawPrograms, FragmentInput, Interpolation, VertexInput, VertexOutput,
 };
-use crate::raster::fragment::FragmentStage;
-use isa::exec::{Executable, Machine, Options};
+use fearless_simd::Level;
+use isa::exec::{Executable, Options};
 use isa::ir::{Rate, Type};
 use isa::validate::InvalidProgram;
-use std::ops::{Deref, DerefMut};
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// Vertices of a batch.
-pub(super) const LANES: usize = 128;
+pub(crate) const VERTEX_BATCH: usize = 128;
 
 /// A vertex and a fragment program ready for one device.
 #[derive(Debug)]
 pub struct DrawPipeline {
-    pub(super) vertex: VertexProgram,
+    pub(crate) vertex: VertexProgram,
     /// The fragment program.
     pub(crate) fragment: Option<FragmentStage>,
 }
 
 /// The vertex program, and what its slots mean.
 #[derive(Debug)]
-pub(super) struct VertexProgram {
-    executable: Arc<Executable>,
+pub(crate) struct VertexProgram {
+    pub machines: MachinePool,
     pub inputs: Vec<(u32, Rate, VertexInput)>,
     pub outputs: VertexOutputs,
-    /// Machines of earlier draws, to be used again.
-    idle: Mutex<Vec<Machine>>,
 }
 
 /// The slots of a vertex program's outputs; `None` was not written.
 #[derive(Debug, Default)]
-pub(super) struct VertexOutputs {
+pub(crate) struct VertexOutputs {
     pub position: [Option<u32>; 4],
     pub point_size: Option<u32>,
     pub clip: [Option<u32>; MAX_CLIP_CULL_DISTANCES],
@@ -52,24 +50,24 @@ impl DrawPipeline {
     ///
     /// # Errors
     /// [`InvalidProgram`] if one of them cannot run on the device.
-    pub fn new(device: &Device, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
+    pub fn new(level: Level, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
         // Without a fragment stage nobody reads varyings.
         let varyings = programs.fragment.as_ref().map_or(0, |_| programs.varyings);
-        let vertex = VertexProgram::new(device, programs, varyings)?;
+        let vertex = VertexProgram::new(level, programs, varyings)?;
         let fragment = programs.fragment.as_ref();
         let fragment = fragment
-            .map(|fragment| FragmentStage::new(device.level(), fragment))
+            .map(|fragment| FragmentStage::new(level, fragment))
             .transpose()?;
         Ok(Self { vertex, fragment })
     }
 
-    /// Makes a vertex program ready that projects Gaussians; see [`gaussian`](crate::packet::draw::gaussian).
+    /// Makes a vertex program ready that projects Gaussians; see [`gaussian`](crate::program::interface::gaussian).
     ///
     /// # Errors
     /// [`InvalidProgram`] if it cannot run on the device.
-    pub fn of_gaussians(device: &Device, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
+    pub fn of_gaussians(level: Level, programs: &DrawPrograms) -> Result<Self, InvalidProgram> {
         Ok(Self {
-            vertex: VertexProgram::new(device, programs, programs.varyings)?,
+            vertex: VertexProgram::new(level, programs, programs.varyings)?,
             fragment: None,
         })
     }
@@ -77,18 +75,14 @@ impl DrawPipeline {
 
 impl VertexProgram {
     /// `varyings` are those that somebody reads.
-    fn new(
-        device: &Device,
-        programs: &DrawPrograms,
-        varyings: u32,
-    ) -> Result<Self, InvalidProgram> {
+    fn new(level: Level, programs: &DrawPrograms, varyings: u32) -> Result<Self, InvalidProgram> {
         let options = Options {
-            lanes: LANES,
+            lanes: VERTEX_BATCH,
             subgroup_size: 64,
             count_work: true,
-            level: device.level(),
+            level,
         };
-        let executable = Arc::new(Executable::new(programs.vertex.clone(), &options)?);
+        let executable = Executable::new(programs.vertex.clone(), &options)?;
         let meaning = |slot: u32| programs.vertex_inputs.get(slot as usize).copied().flatten();
         let is_word = |reg: isa::ir::Reg| {
             let register = programs.vertex.registers.get(reg.0 as usize);
@@ -103,23 +97,8 @@ impl VertexProgram {
         Ok(Self {
             inputs,
             outputs: VertexOutputs::new(programs, varyings as usize),
-            executable,
-            idle: Mutex::default(),
+            machines: MachinePool::new(executable),
         })
-    }
-
-    /// A machine to run batches on.
-    pub(super) fn lease(&self) -> Lease<'_> {
-        let idle = self
-            .idle
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .pop();
-        let machine = idle.unwrap_or_else(|| Machine::new(Arc::clone(&self.executable)));
-        Lease {
-            program: self,
-            machine: Some(machine),
-        }
     }
 }
 
@@ -164,7 +143,7 @@ impl VertexOutputs {
     }
 
     /// Whether a vertex has more to it than position and varyings, in draws of points or of others.
-    pub(super) fn has_extras(&self, points: bool) -> bool {
+    pub(crate) fn has_extras(&self, points: bool) -> bool {
         points && self.point_size.is_some()
             || self.layer.is_some()
             || self.viewport.is_some()
@@ -172,39 +151,7 @@ impl VertexOutputs {
     }
 
     /// Whether there are clip or cull distances.
-    pub(super) fn has_distances(&self) -> bool {
+    pub(crate) fn has_distances(&self) -> bool {
         self.clip.iter().chain(&self.cull).any(Option::is_some)
-    }
-}
-
-/// A machine that goes back to its pipeline when it is dropped.
-pub(super) struct Lease<'a> {
-    program: &'a VertexProgram,
-    /// Present until dropped.
-    machine: Option<Machine>,
-}
-
-impl Deref for Lease<'_> {
-    type Target = Machine;
-
-    fn deref(&self) -> &Machine {
-        self.machine.as_ref().expect("present until dropped")
-    }
-}
-
-impl DerefMut for Lease<'_> {
-    fn deref_mut(&mut self) -> &mut Machine {
-        self.machine.as_mut().expect("present until dropped")
-    }
-}
-
-impl Drop for Lease<'_> {
-    fn drop(&mut self) {
-        if let Some(machine) = self.machine.take() {
-            let idle = &self.program.idle;
-            idle.lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .push(machine);
-        }
     }
 }

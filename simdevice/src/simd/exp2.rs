@@ -1,6 +1,6 @@
 //! Powers of two, 16 at a time: by a table and a short polynomial where processors look words up, by a longer one elsewhere.
 
-use crate::lanes::{bits_of, floats_of};
+use crate::simd::{bits_of, floats_of};
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 /// A polynomial fitted to 2^f for f in [-1/2, 1/2], highest power first; relative error 9.2e-8.
@@ -8,7 +8,7 @@ use fearless_simd::{Simd, f32x16, prelude::*};
     clippy::approx_constant,
     reason = "the coefficients are fitted; one comes near ln 2"
 )]
-pub(super) const POWER_OF_TWO: [f32; 6] = [
+pub(crate) const POWER_OF_TWO: [f32; 6] = [
     0.001_326_472_7,
     0.009_671_513,
     0.055_507_336,
@@ -19,21 +19,21 @@ pub(super) const POWER_OF_TWO: [f32; 6] = [
 
 /// A polynomial for powers of two of fewer terms.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Powers<const TERMS: usize> {
+pub(crate) struct Powers<const TERMS: usize> {
     /// Fitted to 2^f for f in [-1/2, 1/2] in relative error, highest power first.
-    pub(super) coefficients: [f32; TERMS],
+    pub(crate) coefficients: [f32; TERMS],
     /// No result's relative error is greater, rounding included.
-    pub(super) error: f32,
+    pub(crate) error: f32,
 }
 
 /// Of degree 3.
-pub(super) const CUBIC: Powers<4> = Powers {
+pub(crate) const CUBIC: Powers<4> = Powers {
     coefficients: [0.055_171_67, 0.242_611_13, 0.693_260_97, 0.999_928_06],
     error: 7.6e-5,
 };
 
 /// Of degree 2.
-pub(super) const QUADRATIC: Powers<3> = Powers {
+pub(crate) const QUADRATIC: Powers<3> = Powers {
     coefficients: [0.238_428_94, 0.703_448, 1.000_443_1],
     error: 1.73e-3,
 };
@@ -42,7 +42,7 @@ impl<const TERMS: usize> Powers<TERMS> {
     /// As [`exp2_of_negated`], with this polynomial, for `x` up to 125.9: at the end of the range it may be a little less than a
     /// normal number. Fast kernels have no floor so low.
     #[inline(always)]
-    pub(super) fn of_negated<S: Simd>(&self, simd: S, x: f32x16<S>) -> f32x16<S> {
+    pub(crate) fn of_negated<S: Simd>(&self, simd: S, x: f32x16<S>) -> f32x16<S> {
         by_polynomial(simd, x, &self.coefficients)
     }
 }
@@ -50,7 +50,7 @@ impl<const TERMS: usize> Powers<TERMS> {
 /// 2 to the power of `-x`, for `x` between -126 and 126; elsewhere the result means nothing. Error: at most 1.95 ulp by the
 /// table of 32 words, 1.35 ulp by that of 8, 2.1 ulp by the polynomial (measured).
 #[inline(always)]
-pub(super) fn exp2_of_negated<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
+pub(crate) fn exp2_of_negated<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     match devmem::places(simd.level()) {
         Some(32) => by_table(simd, x, &THIRTY_SECONDS),
         Some(8) => by_table(simd, x, &EIGHTHS),
@@ -60,15 +60,15 @@ pub(super) fn exp2_of_negated<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
 
 /// Powers of two by a table of those of fractions, and a polynomial for what is between them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Table<const PLACES: usize, const TERMS: usize> {
+pub(crate) struct Table<const PLACES: usize, const TERMS: usize> {
     /// The bits of 2^(j/PLACES) for each j, less those of j parts of the exponent's unit.
-    pub(super) words: [u32; PLACES],
+    pub(crate) words: [u32; PLACES],
     /// A polynomial fitted to (2^f - 1) / f for f up to half a part, highest power first.
-    pub(super) growth: [f32; TERMS],
+    pub(crate) growth: [f32; TERMS],
 }
 
 /// What the polynomial leaves of 2^f is a relative error of 2.7e-8.
-pub(super) const EIGHTHS: Table<8, 3> = Table {
+pub(crate) const EIGHTHS: Table<8, 3> = Table {
     words: [
         0x3f80_0000,
         0x3f7b_95c2,
@@ -83,7 +83,7 @@ pub(super) const EIGHTHS: Table<8, 3> = Table {
 };
 
 /// What the polynomial leaves of 2^f is a relative error of 5.4e-8.
-pub(super) const THIRTY_SECONDS: Table<32, 2> = Table {
+pub(crate) const THIRTY_SECONDS: Table<32, 2> = Table {
     words: [
         0x3f80_0000,
         0x3f7e_cd87,

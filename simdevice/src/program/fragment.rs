@@ -1,32 +1,31 @@
-//! Fragment programs made ready for draws.
+//! Fragment programs made ready for draws of primitives and of Gaussians.
 
-use crate::counters::Counters;
-use crate::packet::draw::{
-    FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
+use super::pool::{MachinePool, PooledMachine};
+use crate::program::interface::{
+    FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, resolve,
 };
+use crate::stats::counters::Counters;
 use fearless_simd::Level;
 use isa::exec::{Executable, Machine, Options};
 use isa::validate::InvalidProgram;
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// Lanes of the two sizes of batches: few fragments are shaded in the smaller.
-pub(super) const BATCH_LANES: [usize; 2] = [64, 256];
+pub(crate) const BATCH_LANES: [usize; 2] = [64, 256];
 
 /// Components of up to two sources of a colour attachment: the outputs' slots.
-pub(super) type ColorSlots = [[Option<u32>; 4]; 2];
+pub(crate) type ColorSlots = [[Option<u32>; 4]; 2];
 
 /// A fragment program ready for batches of quads.
 #[derive(Debug)]
 pub struct FragmentStage {
-    executables: [Arc<Executable>; 2],
-    pub(super) interface: Interface,
-    /// Machines of earlier draws, to be used again.
-    idle: Mutex<Vec<Machines>>,
+    /// By size of batch.
+    machines: [MachinePool; 2],
+    pub(crate) interface: Interface,
 }
 
 /// What goes into the program and what comes out.
 #[derive(Debug, Default)]
-pub(super) struct Interface {
+pub(crate) struct Interface {
     /// The inputs that it reads: slot, meaning, and of varyings the place in `varyings`.
     pub inputs: Vec<(u32, FragmentInput, usize)>,
     /// The varyings among them, each once, with their interpolation.
@@ -41,9 +40,27 @@ pub(super) struct Interface {
     pub has_side_effects: bool,
 }
 
-/// The machines of one worker, made when they are first needed.
-#[derive(Debug, Default)]
-pub(super) struct Machines([Option<Machine>; 2]);
+/// The machines of one worker, lent when they are first needed.
+#[derive(Debug)]
+pub(crate) struct FragmentMachines<'a> {
+    pools: &'a [MachinePool; 2],
+    lent: [Option<PooledMachine<'a>>; 2],
+}
+
+impl FragmentMachines<'_> {
+    /// The machine for a size of batch.
+    #[inline]
+    pub(crate) fn of_size(&mut self, size: usize) -> &mut Machine {
+        self.lent[size].get_or_insert_with(|| self.pools[size].lend())
+    }
+
+    /// Gives them back, and counts what they did.
+    pub(crate) fn give_back(self, counters: &mut Counters) {
+        for mut machine in self.lent.into_iter().flatten() {
+            counters.add_work(&machine.take_work());
+        }
+    }
+}
 
 impl FragmentStage {
     /// Makes a program ready.
@@ -58,35 +75,22 @@ impl FragmentStage {
                 count_work: true,
                 level,
             };
-            Executable::new(programs.program.clone(), &options).map(Arc::new)
+            Executable::new(programs.program.clone(), &options)
         };
         let executables = [executable(BATCH_LANES[0])?, executable(BATCH_LANES[1])?];
         let interface = Interface::new(programs, &executables[0]);
         Ok(Self {
-            executables,
+            machines: executables.map(MachinePool::new),
             interface,
-            idle: Mutex::default(),
         })
     }
 
     /// Machines for one worker.
-    pub(super) fn take_machines(&self) -> Machines {
-        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        idle.pop().unwrap_or_default()
-    }
-
-    /// Gives them back, and counts what they did.
-    pub(super) fn put_back(&self, mut machines: Machines, counters: &mut Counters) {
-        for machine in machines.0.iter_mut().flatten() {
-            counters.add_work(&machine.take_work());
+    pub(crate) fn machines(&self) -> FragmentMachines<'_> {
+        FragmentMachines {
+            pools: &self.machines,
+            lent: [None, None],
         }
-        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        idle.push(machines);
-    }
-
-    /// The machine for a size of batch.
-    pub(super) fn machine<'a>(&self, machines: &'a mut Machines, size: usize) -> &'a mut Machine {
-        machines.0[size].get_or_insert_with(|| Machine::new(Arc::clone(&self.executables[size])))
     }
 }
 
@@ -159,5 +163,37 @@ impl Interface {
             }
         }
         interface
+    }
+}
+
+/// A resolve shader's program, ready for one device. Its varyings are those of [`resolve`].
+#[derive(Debug)]
+pub struct GaussianFragmentProgram {
+    pub(crate) stage: FragmentStage,
+    pub(crate) reads_depth: bool,
+}
+
+impl GaussianFragmentProgram {
+    /// Makes a program ready.
+    ///
+    /// # Errors
+    /// [`InvalidProgram`] if it cannot run on the device.
+    pub fn new(level: Level, programs: &FragmentPrograms) -> Result<Self, InvalidProgram> {
+        let stage = FragmentStage::new(level, programs)?;
+        let is_depth = |input: FragmentInput| match input {
+            FragmentInput::Varying { index, .. } => index >= resolve::EXPECTED_DEPTH,
+            FragmentInput::FragCoord(axis) => axis == 2,
+            _ => false,
+        };
+        let inputs = &stage.interface.inputs;
+        Ok(Self {
+            reads_depth: inputs.iter().any(|&(_, input, _)| is_depth(input)),
+            stage,
+        })
+    }
+
+    /// Whether it reads a depth.
+    pub fn reads_depth(&self) -> bool {
+        self.reads_depth
     }
 }

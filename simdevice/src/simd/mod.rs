@@ -4,6 +4,8 @@
 //! setting up small triangles used to spend a third of its time with. Nor are fearless_simd's `to_bits` and `from_bits`: as
 //! calls they are compiled without the SIMD level's instructions, and pass vectors through memory.
 
+pub(crate) mod exp2;
+
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::exec::Chunk;
 

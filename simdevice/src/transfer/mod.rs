@@ -6,18 +6,20 @@
 
 mod blit;
 mod image_copy;
+mod region;
 mod resolve;
 #[cfg(test)]
 mod tests;
 
-use crate::device::Device;
 use crate::format::MAX_TEXEL_SIZE;
 use crate::image::{Image, SubresourceLayout};
 use crate::packet::{BufferImageRegion, BufferRange, ClearImage, CopyBuffer, CopyBufferImage};
+use crate::runtime::Runtime;
+use crate::transfer::region::clip;
 pub use blit::blit_image;
 pub use image_copy::copy_image;
 use rayon::prelude::*;
-pub use resolve::{resolve_image, resolve_row};
+pub use resolve::resolve_image;
 use std::sync::Arc;
 
 /// The offset into the memory of bytes `offset..offset + size` of a range, if the range has them.
@@ -70,30 +72,6 @@ pub fn update_buffer(target: &BufferRange, data: &[u8]) {
     target.memory.bump_generation();
 }
 
-/// The part of a region that lies in an image, along one axis.
-#[derive(Clone, Copy)]
-struct Clipped {
-    /// Texels of the region before it.
-    skipped: u32,
-    /// Its first texel in the image.
-    first: u32,
-    /// Its texels.
-    count: u32,
-}
-
-/// Clips texels `offset..offset + extent` to an axis of `size` texels.
-fn clip(offset: i32, extent: u32, size: u32) -> Clipped {
-    let offset = i64::from(offset);
-    let first = offset.max(0);
-    let end = (offset + i64::from(extent)).min(size.into());
-    // Both lie in 0..=u32::MAX where the count is positive.
-    Clipped {
-        skipped: (first - offset) as u32,
-        first: first as u32,
-        count: (end - first).max(0) as u32,
-    }
-}
-
 /// Which way a copy between a buffer and an image goes.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
@@ -107,7 +85,7 @@ pub enum Direction {
 const LEAST_SHARED: u64 = 1 << 20;
 
 /// Executes a copy between a buffer and an image.
-pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, device: &Device) {
+pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, runtime: &Runtime) {
     for region in &copy.regions {
         let layers = &region.subresource;
         let end = copy.image.desc.array_layers;
@@ -117,7 +95,7 @@ pub fn copy_buffer_image(copy: &CopyBufferImage, direction: Direction, device: &
                 .image
                 .subresource(layers.aspect, layers.mip_level, first + index);
             if let Some(layout) = layout {
-                copy_layer(copy, direction, (region, index), &layout, device);
+                copy_layer(copy, direction, (region, index), &layout, runtime);
             }
         }
     }
@@ -133,7 +111,7 @@ fn copy_layer(
     direction: Direction,
     (region, index): (&BufferImageRegion, u32),
     layout: &SubresourceLayout,
-    device: &Device,
+    runtime: &Runtime,
 ) {
     let texel_size = layout.format.texel_size() as u64;
     let [width, height, depth] = region.image_extent;
@@ -181,11 +159,11 @@ fn copy_layer(
     let are_apart = row_length >= width.into()
         && image_height >= height.into()
         && !Arc::ptr_eq(&image.memory, buffer);
-    let threads = device.threads();
+    let threads = runtime.threads();
     let bytes = size.saturating_mul(rows as u64);
     let is_whole = if are_apart && threads > 1 && bytes >= LEAST_SHARED {
         let least = rows.div_ceil(4 * threads);
-        device.install(|| {
+        runtime.install(|| {
             let numbers = (0..rows).into_par_iter();
             numbers.with_min_len(least).all(copy_row)
         })

@@ -1,88 +1,8 @@
-//! Texel and vertex formats: Vulkan's, by Vulkan's names in camel case.
-//!
-//! One table defines them; sizes, aspects and conversions derive from it. Texels are decoded to and encoded from
-//! four 32-bit registers in the order R, G, B, A. Registers of integer formats hold the integer's bits, as shader
-//! registers do; depth and stencil are held in the first register. Components that a format lacks read as
-//! (0, 0, 0, 1). The formats of Vulkan 1.0 with components of up to 32 bits are here, and those of compressed blocks of
-//! texels (see [`Format::decompressed`]), whose blocks are read and written whole, as if each were a texel; which of them
-//! can be used for what is advertised elsewhere.
+//! The table of formats, and how rows of texels are decoded and encoded.
 
-mod block;
-mod convert;
-#[cfg(test)]
-mod tests;
-
-use crate::packet::{Aspect, ClearValue};
-
-/// How the bits of a component are to be read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Numeric {
-    /// 0 to 1.
-    Unorm,
-    /// -1 to 1.
-    Snorm,
-    /// An unsigned integer that is converted to floating point.
-    Uscaled,
-    /// A signed integer that is converted to floating point.
-    Sscaled,
-    /// An unsigned integer.
-    Uint,
-    /// A signed integer.
-    Sint,
-    /// A binary16 or binary32 number.
-    Sfloat,
-    /// A floating-point number without a sign: 5 bits of exponent, 5 or 6 of mantissa.
-    Ufloat,
-    /// 0 to 1 by the sRGB transfer function, alpha linear.
-    Srgb,
-    /// Three 9-bit mantissas with one 5-bit exponent.
-    SharedExponent,
-    /// A depth and a stencil component, which live in planes of their own (see [`Format::plane`]).
-    DepthStencil,
-}
-
-/// A component's meaning.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Channel {
-    /// Red.
-    R,
-    /// Green.
-    G,
-    /// Blue.
-    B,
-    /// Alpha.
-    A,
-    /// Depth.
-    D,
-    /// Stencil.
-    S,
-    /// The shared exponent.
-    E,
-    /// Unused bits.
-    X,
-}
-
-impl Channel {
-    /// The register that holds it, if any.
-    pub(crate) fn register(self) -> Option<usize> {
-        match self {
-            Self::R | Self::D | Self::S => Some(0),
-            Self::G => Some(1),
-            Self::B => Some(2),
-            Self::A => Some(3),
-            Self::E | Self::X => None,
-        }
-    }
-}
-
-/// A component: its meaning and its width in bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Component {
-    /// What it means.
-    pub channel: Channel,
-    /// How many bits it has.
-    pub bits: u32,
-}
+use super::block::{self, Block};
+use super::convert;
+use crate::format::{Aspect, Channel, ClearValue, Component, Numeric};
 
 macro_rules! formats {
     ($($variant:ident: $numeric:ident, $($channel:ident $bits:literal)+;)*) => {
@@ -476,7 +396,11 @@ fn encode_each<const N: usize>(
     }
 }
 
-fn decode_components(numeric: Numeric, components: &[Component], bytes: &[u8]) -> [f32; 4] {
+pub(super) fn decode_components(
+    numeric: Numeric,
+    components: &[Component],
+    bytes: &[u8],
+) -> [f32; 4] {
     let mut texel = [0; MAX_TEXEL_SIZE];
     texel[..bytes.len()].copy_from_slice(bytes);
     let mut rest = u128::from_le_bytes(texel);
@@ -494,7 +418,12 @@ fn decode_components(numeric: Numeric, components: &[Component], bytes: &[u8]) -
     out
 }
 
-fn encode_components(numeric: Numeric, components: &[Component], texel: &[f32; 4], out: &mut [u8]) {
+pub(super) fn encode_components(
+    numeric: Numeric,
+    components: &[Component],
+    texel: &[f32; 4],
+    out: &mut [u8],
+) {
     let (mut bits, mut shift) = (0u128, 0);
     for component in components {
         if let Some(register) = component.channel.register() {
@@ -504,4 +433,54 @@ fn encode_components(numeric: Numeric, components: &[Component], texel: &[f32; 4
         shift += component.bits;
     }
     out.copy_from_slice(&bits.to_le_bytes()[..out.len()]);
+}
+
+impl Format {
+    /// Texels along the side of what is stored as a unit: 4, or 1 for formats without compression.
+    pub const fn block_side(self) -> u32 {
+        if self.decompressed().is_some() {
+            block::SIDE as u32
+        } else {
+            1
+        }
+    }
+
+    /// The format that holds a compressed format's texels one by one, without loss.
+    pub const fn decompressed(self) -> Option<Self> {
+        Some(match self {
+            Self::Bc1RgbUnormBlock
+            | Self::Bc1RgbaUnormBlock
+            | Self::Bc2UnormBlock
+            | Self::Bc3UnormBlock
+            | Self::Bc7UnormBlock => Self::R8G8B8A8Unorm,
+            Self::Bc1RgbSrgbBlock
+            | Self::Bc1RgbaSrgbBlock
+            | Self::Bc2SrgbBlock
+            | Self::Bc3SrgbBlock
+            | Self::Bc7SrgbBlock => Self::R8G8B8A8Srgb,
+            Self::Bc4UnormBlock | Self::Bc4SnormBlock => Self::R32Sfloat,
+            Self::Bc5UnormBlock | Self::Bc5SnormBlock => Self::R32G32Sfloat,
+            Self::Bc6hUfloatBlock | Self::Bc6hSfloatBlock => Self::R16G16B16A16Sfloat,
+            _ => return None,
+        })
+    }
+
+    /// The texels of a block, in the format of [`Format::decompressed`]; `None` if this format is not compressed.
+    pub(crate) fn decode_block(self, bytes: &[u8; 16]) -> Option<Block> {
+        Some(match self {
+            // What would be transparent with alpha is opaque without.
+            Self::Bc1RgbUnormBlock | Self::Bc1RgbSrgbBlock => block::bc1(bytes).opaque(),
+            Self::Bc1RgbaUnormBlock | Self::Bc1RgbaSrgbBlock => block::bc1(bytes),
+            Self::Bc2UnormBlock | Self::Bc2SrgbBlock => block::bc2(bytes),
+            Self::Bc3UnormBlock | Self::Bc3SrgbBlock => block::bc3(bytes),
+            Self::Bc4UnormBlock => block::bc4(bytes, false),
+            Self::Bc4SnormBlock => block::bc4(bytes, true),
+            Self::Bc5UnormBlock => block::bc5(bytes, false),
+            Self::Bc5SnormBlock => block::bc5(bytes, true),
+            Self::Bc6hUfloatBlock => block::bc6h(bytes, false),
+            Self::Bc6hSfloatBlock => block::bc6h(bytes, true),
+            Self::Bc7UnormBlock | Self::Bc7SrgbBlock => block::bc7(bytes),
+            _ => return None,
+        })
+    }
 }

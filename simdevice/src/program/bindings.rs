@@ -25,7 +25,7 @@ pub struct Bindings {
 }
 
 /// Bindings as programs reach them, made once for a draw or dispatch.
-pub(crate) struct Prepared<'a> {
+pub(crate) struct BoundResources<'a> {
     bindings: &'a Bindings,
     images: ImageTable,
     push_constants: Vec<AtomicU32>,
@@ -33,9 +33,9 @@ pub(crate) struct Prepared<'a> {
 
 impl Bindings {
     /// Makes them ready for programs that run at a SIMD level.
-    pub(crate) fn prepare(&self, level: Level) -> Prepared<'_> {
+    pub(crate) fn bind(&self, level: Level) -> BoundResources<'_> {
         let (images, samplers) = (self.images.iter().cloned(), self.samplers.iter().copied());
-        Prepared {
+        BoundResources {
             bindings: self,
             images: ImageTable::new(level, images, samplers),
             push_constants: words(&self.push_constants),
@@ -50,7 +50,7 @@ impl Bindings {
     }
 }
 
-impl Prepared<'_> {
+impl BoundResources<'_> {
     /// What a program reaches.
     pub(crate) fn resources(&self) -> Resources<'_> {
         Resources {

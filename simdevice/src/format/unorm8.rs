@@ -1,9 +1,46 @@
-//! Four bytes of 0 to 1 in a word, 16 words at a time.
+//! Numbers from 0 to 1 in bytes, 16 words at a time.
 
-use super::{Colors, clamp};
-use crate::lanes::bits_of;
-use crate::texture::unorm8_fraction;
-use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
+use crate::simd::bits_of;
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, f32x16, i32x8, i32x16, mask32x16, u32x8, u32x16};
+
+/// 1/255 as the sum of a number of 16 bits, whose product with a code is exact, and the rest: the sum of the two
+/// products rounds as the quotient does.
+const INV_255: [f32; 2] = {
+    let high = f32::from_bits((1f32 / 255.0).to_bits() & !0xFF);
+    [high, (1.0 / 255.0 - high as f64) as f32]
+};
+
+/// Defines how one byte of each word is a fraction of 255, as its quotient rounds.
+macro_rules! unorm8_fraction {
+    ($name:ident, $words:ident, $integers:ident, $floats:ident) => {
+        /// One byte of each word as a fraction of 255, as its quotient rounds.
+        #[inline(always)]
+        pub fn $name<S: Simd>(word: $words<S>, shift: u32) -> $floats<S> {
+            let code = if shift == 24 {
+                word >> 24
+            } else {
+                (word >> shift) & 0xFF
+            };
+            let code = $floats::float_from(code.bitcast::<$integers<S>>());
+            code * INV_255[0] + code * INV_255[1]
+        }
+    };
+}
+
+unorm8_fraction!(unorm8_fraction, u32x16, i32x16, f32x16);
+
+unorm8_fraction!(unorm8_fraction_8, u32x8, i32x8, f32x8);
+
+/// Colours of 16 fragments, by component.
+pub type Colors<S> = [f32x16<S>; 4];
+
+/// Clamps; NaN becomes the least.
+#[inline(always)]
+pub(crate) fn clamp<S: Simd>(simd: S, value: f32x16<S>, low: f32, high: f32) -> f32x16<S> {
+    let (low, high) = (f32x16::splat(simd, low), f32x16::splat(simd, high));
+    value.max_precise(low).min(high)
+}
 
 /// Whether a level's multiplication and addition round once.
 #[inline(always)]

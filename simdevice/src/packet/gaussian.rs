@@ -1,0 +1,87 @@
+//! Sorted sets of Gaussians.
+
+use crate::packet::{AttributeStream, IndexStream};
+use crate::program::bindings::Bindings;
+use crate::program::fragment::GaussianFragmentProgram;
+use crate::state::gaussian::{Camera, GaussianState};
+use crate::state::{Rect, Viewport};
+use std::sync::Arc;
+
+/// See [`Packet::GaussianBegin`].
+#[derive(Clone, Debug)]
+pub struct GaussianBegin {
+    /// What the pipeline fixes.
+    pub state: Arc<GaussianState>,
+    /// The camera, which means nothing to what a vertex program projects.
+    pub camera: Camera,
+    /// The viewport; its width and height are the W and H of the projection.
+    pub viewport: Viewport,
+    /// Pixels outside are not touched.
+    pub scissor: Rect,
+}
+
+/// The vertex attributes of fixed-function projection.
+#[derive(Clone, Debug)]
+pub struct GaussianAttributes {
+    /// The mean in world units: x, y, z.
+    pub position: AttributeStream,
+    /// Standard deviations in world units along the rotated axes: x, y, z.
+    pub scale: AttributeStream,
+    /// The quaternion w, x, y, z; it need not be normalised.
+    pub rotation: AttributeStream,
+    /// Opacity.
+    pub opacity: AttributeStream,
+    /// `(degree + 1)^2` spherical harmonics coefficients of red, green and blue.
+    pub spherical_harmonics: Vec<AttributeStream>,
+    /// What is done to them, usually by instance.
+    pub model: ModelAttributes,
+}
+
+/// The vertex attributes that place a copy of Gaussians in the world.
+#[derive(Clone, Debug, Default)]
+pub struct ModelAttributes {
+    /// The rows of a 3x4 matrix from the Gaussians' space to the world, 4 components each; the identity without it.
+    pub matrix: Option<Box<[AttributeStream; 3]>>,
+    /// A factor of the opacity; 1 without it.
+    pub opacity: Option<AttributeStream>,
+}
+
+impl ModelAttributes {
+    /// Whether there is anything to be done.
+    pub fn is_some(&self) -> bool {
+        self.matrix.is_some() || self.opacity.is_some()
+    }
+}
+
+/// See [`Packet::GaussianAppend`].
+#[derive(Clone, Debug)]
+pub struct GaussianAppend {
+    /// Where the Gaussians are.
+    pub attributes: GaussianAttributes,
+    /// The index buffer that picks them; without one they are consecutive.
+    pub indices: Option<IndexStream>,
+    /// The first vertex, or the first index.
+    pub first: u32,
+    /// How many vertices or indices.
+    pub count: u32,
+    /// The first instance.
+    pub first_instance: u32,
+    /// How many instances.
+    pub instance_count: u32,
+}
+
+/// See [`Packet::GaussianResolveShader`](crate::Packet::GaussianResolveShader). Blending and write masks are those of the
+/// [`GaussianState`](super::GaussianState), one per attachment.
+#[derive(Clone, Debug)]
+pub struct ResolveShader {
+    /// The program.
+    pub program: Arc<GaussianFragmentProgram>,
+    /// What it is bound to.
+    pub bindings: Bindings,
+    /// Whether every sample is shaded for itself.
+    pub sample_shading: bool,
+    /// Alpha makes coverage.
+    pub alpha_to_coverage: bool,
+    /// Alpha becomes 1 after that.
+    pub alpha_to_one: bool,
+}

@@ -1,0 +1,20 @@
+//! Packets: what the driver asks of the device. Plain data; everything a packet needs it holds by [`Arc`](std::sync::Arc).
+
+mod command;
+mod display;
+mod draw;
+mod gaussian;
+mod rendering;
+mod transfer;
+
+pub use command::Packet;
+pub use devmem::BufferRange;
+pub use draw::{AttributeStream, Dispatch, Draw, IndexStream};
+pub use gaussian::{
+    GaussianAppend, GaussianAttributes, GaussianBegin, ModelAttributes, ResolveShader,
+};
+pub use rendering::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
+pub use transfer::{
+    BlitImage, BufferCopyRegion, BufferImageRegion, ClearImage, CopyBuffer, CopyBufferImage,
+    CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers, SubresourceRange,
+};

@@ -1,0 +1,297 @@
+//! What becomes of shaded fragments: coverage that the program takes away, late tests, and the colour attachments.
+
+use super::batch::{Batch, offset};
+use super::color::load;
+use super::depth::Tests;
+use super::prepared::{TileDraw, Timing};
+use super::quads::Quads;
+use crate::program::fragment::Interface;
+use crate::raster::output::{Buffers, Sources, covered_by_alpha, lanes_of};
+use crate::simd::as_floats;
+use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use isa::exec::{LaneMask, Machine};
+
+/// Tests depth and stencil of 16 samples; returns the lanes that pass.
+#[inline(always)]
+pub fn test<S: Simd>(
+    simd: S,
+    tests: &Tests,
+    lanes: u16,
+    front: bool,
+    code: u32x16<S>,
+    quads: &Quads,
+    buffers: &mut Buffers,
+) -> u16 {
+    let mut depths = [0; 16];
+    if tests.reads_depth() {
+        depths = quads.load(buffers.depth.words_mut());
+    }
+    let mut stencils = [0; 16];
+    if tests.stencil.is_some() {
+        let bytes = buffers.stencil.bytes_mut();
+        for (first, stencils) in quads.first.iter().zip(stencils.as_chunks_mut::<4>().0) {
+            stencils.copy_from_slice(&bytes[*first..][..4]);
+        }
+    }
+    let passed = tests.test(simd, lanes, front, code, &mut depths, &mut stencils);
+    if passed != 0 && tests.depth.is_some_and(|(_, write)| write) {
+        // Those that did not pass are as they were.
+        let stored = if quads.consecutive { u16::MAX } else { passed };
+        quads.store(buffers.depth.words_mut(), stored, &depths);
+        for tile in quads.tiles(buffers.depth.samples()) {
+            buffers.depth.changed(tile);
+        }
+    }
+    if tests.stencil.is_some() {
+        let bytes = buffers.stencil.bytes_mut();
+        for lane in super::coverage::bits(lanes.into()) {
+            bytes[quads.first[lane / 4] + lane % 4] = stencils[lane];
+        }
+    }
+    passed
+}
+
+/// Takes a batch's results to the attachments, in order; returns how many samples passed if they are counted here.
+#[inline(always)]
+pub fn write<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    interface: &Interface,
+    batch: &Batch,
+    machine: &Machine,
+    killed: &LaneMask,
+    buffers: &mut Buffers,
+) -> u64 {
+    if draw.plain {
+        write_plain(simd, draw, interface, batch, machine, buffers);
+        return 0;
+    }
+    let late = draw.timing == Timing::Late && draw.tests.any();
+    let sources: Vec<Sources<'_>> = interface
+        .colors
+        .iter()
+        .map(|slots| slots.map(|slots| slots.map(|slot| lanes_of(machine, slot))))
+        .collect();
+    let mut passed = 0;
+    for chunk in 0..batch.chunks() {
+        let killed = killed.words().get(chunk / 4).copied().unwrap_or(0) >> (16 * (chunk % 4));
+        let alive = !(killed as u16);
+        // Quads that cover the same sample take turns; so do those that may face differently in a stencil test.
+        let in_turn = batch.overlaps(chunk) || late && draw.tests.stencil.is_some();
+        let turns: &[u16] = if in_turn {
+            &[0xF, 0xF0, 0xF00, 0xF000]
+        } else {
+            &[0xFFFF]
+        };
+        for &turn in turns {
+            let mut samples = sample_lanes(batch, chunk, alive & turn);
+            remove(simd, draw, interface, machine, chunk, &mut samples);
+            for (sample, lanes) in samples.iter_mut().enumerate().take(draw.positions.len()) {
+                if *lanes == 0 {
+                    continue;
+                }
+                let quads = batch.places(chunk, sample, draw.positions.len());
+                if late {
+                    let code = late_depth(simd, draw, interface, batch, machine, chunk, sample);
+                    let number = turn.trailing_zeros() as usize / 4;
+                    let quad = &batch.chunk_quads(chunk)[number];
+                    let front = batch.records[usize::from(quad.record)].front;
+                    *lanes = test(simd, &draw.tests, *lanes, front, code, &quads, buffers);
+                }
+                passed += u64::from(lanes.count_ones());
+                write_colors(simd, draw, &sources, chunk, *lanes, &quads, buffers);
+            }
+        }
+    }
+    if draw.count_late { passed } else { 0 }
+}
+
+/// As [`write`], for draws of which nothing is removed or tested after shading.
+#[inline(always)]
+fn write_plain<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    interface: &Interface,
+    batch: &Batch,
+    machine: &Machine,
+    buffers: &mut Buffers,
+) {
+    let count = draw.positions.len();
+    for (index, output) in draw.colors.iter().enumerate() {
+        let (Some(output), Some(slots)) = (output, interface.colors.get(index)) else {
+            continue;
+        };
+        let sources = slots.map(|slots| slots.map(|slot| lanes_of(machine, slot)));
+        let dual = output.is_dual_source();
+        let words = buffers.color[index].words_mut();
+        for chunk in 0..batch.chunks() {
+            let source = load(simd, &sources[0], chunk);
+            let covered = Covered::of(batch, chunk);
+            if let Some(packed) = output.replacement(simd, &source) {
+                // Quads are stored in order, so that the last of those at a place stays.
+                for sample in 0..count {
+                    let lanes = covered.lanes(sample);
+                    let quads = batch.places(chunk, sample, count);
+                    quads.store(words, lanes, &packed);
+                }
+                continue;
+            }
+            let mut second = [f32x16::splat(simd, 0.0); 4];
+            if dual {
+                second = load(simd, &sources[1], chunk);
+            }
+            let turns: &[u16] = if batch.overlaps(chunk) {
+                &[0xF, 0xF0, 0xF00, 0xF000]
+            } else {
+                &[0xFFFF]
+            };
+            for &turn in turns {
+                for sample in 0..count {
+                    let lanes = covered.lanes(sample) & turn;
+                    if lanes != 0 {
+                        let quads = batch.places(chunk, sample, count);
+                        output.write(simd, &source, &second, lanes, &quads, words);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What a chunk's quads cover: [`Quad::cover`](super::batch::Quad::cover) of each, from the lowest bits on.
+struct Covered(u64);
+
+impl Covered {
+    #[inline(always)]
+    fn of(batch: &Batch, chunk: usize) -> Self {
+        let [a, b, c, d] = batch.chunk_quads(chunk);
+        let at = |cover: u16, number: u32| u64::from(cover) << (16 * number);
+        Self(at(a.cover, 0) | at(b.cover, 1) | at(c.cover, 2) | at(d.cover, 3))
+    }
+
+    /// The lanes of which a sample is covered.
+    #[inline(always)]
+    fn lanes(&self, sample: usize) -> u16 {
+        let nibbles = self.0 >> (4 * sample) & 0x000F_000F_000F_000F;
+        (nibbles | nibbles >> 12 | nibbles >> 24 | nibbles >> 36) as u16
+    }
+}
+
+/// The lanes of a chunk covered, by sample.
+#[inline(always)]
+fn sample_lanes(batch: &Batch, chunk: usize, among: u16) -> [u16; 4] {
+    let covered = Covered::of(batch, chunk);
+    let mut samples = [0; 4];
+    for (sample, lanes) in samples.iter_mut().enumerate() {
+        *lanes = covered.lanes(sample) & among;
+    }
+    samples
+}
+
+/// Takes away the samples that alpha and the program's sample mask do not cover.
+#[inline(always)]
+fn remove<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    interface: &Interface,
+    machine: &Machine,
+    chunk: usize,
+    samples: &mut [u16; 4],
+) {
+    if let Some(masks) = interface
+        .sample_mask
+        .and_then(|slot| machine.output_chunks(slot).get(chunk))
+    {
+        for (lane, mask) in masks.0.iter().enumerate() {
+            for (sample, lanes) in samples.iter_mut().enumerate() {
+                if mask >> sample & 1 == 0 {
+                    *lanes &= !(1 << lane);
+                }
+            }
+        }
+    }
+    if draw.draw.state.alpha_to_coverage {
+        let alpha = interface.colors.first().and_then(|[first, _]| first[3]);
+        if let Some(alpha) = alpha.and_then(|slot| machine.output_chunks(slot).get(chunk)) {
+            let covered = covered_by_alpha(simd, alpha, draw.positions.len());
+            for (lanes, covered) in samples.iter_mut().zip(covered) {
+                *lanes &= covered;
+            }
+        }
+    }
+}
+
+/// The depths of a chunk's samples as the attachment holds them.
+#[inline(always)]
+fn late_depth<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    interface: &Interface,
+    batch: &Batch,
+    machine: &Machine,
+    chunk: usize,
+    sample: usize,
+) -> u32x16<S> {
+    let written = interface
+        .depth
+        .and_then(|slot| machine.output_chunks(slot).get(chunk));
+    let depth = match written {
+        Some(depth) => as_floats(simd, depth),
+        None => {
+            let mut depth = f32x16::from_slice(simd, &batch.depth[16 * chunk..][..16]);
+            // Samples shaded for themselves have their own depth already.
+            if draw.positions.len() > 1 && !draw.per_sample {
+                let [x, y] = draw.positions[sample].map(offset);
+                let mut offsets = [0.0; 16];
+                for (lane, offset) in offsets.iter_mut().enumerate() {
+                    let quad = &batch.chunk_quads(chunk)[lane / 4];
+                    let [dx, dy] = batch.records[usize::from(quad.record)].depth_slopes;
+                    *offset = dx * x + dy * y;
+                }
+                depth += f32x16::simd_from(simd, offsets);
+            }
+            depth
+        }
+    };
+    let mut codes = [0; 16];
+    for (number, quad) in batch.chunk_quads(chunk).iter().enumerate() {
+        let viewport = usize::from(batch.records[usize::from(quad.record)].viewport);
+        let range = draw.ranges.get(viewport).copied().unwrap_or((0.0, 1.0));
+        let all: [u32; 16] = draw.tests.code.encode(simd, depth, range).into();
+        codes[4 * number..4 * number + 4].copy_from_slice(&all[4 * number..4 * number + 4]);
+    }
+    u32x16::simd_from(simd, codes)
+}
+
+/// Writes 16 fragments to one sample of the colour attachments.
+#[inline(always)]
+fn write_colors<S: Simd>(
+    simd: S,
+    draw: &TileDraw<'_>,
+    sources: &[Sources<'_>],
+    chunk: usize,
+    lanes: u16,
+    quads: &Quads,
+    buffers: &mut Buffers,
+) {
+    if lanes == 0 {
+        return;
+    }
+    for (index, output) in draw.colors.iter().enumerate() {
+        let (Some(output), Some(sources)) = (output, sources.get(index)) else {
+            continue;
+        };
+        let mut source = load(simd, &sources[0], chunk);
+        let mut second = if output.is_dual_source() {
+            load(simd, &sources[1], chunk)
+        } else {
+            [f32x16::splat(simd, 0.0); 4]
+        };
+        if draw.draw.state.alpha_to_one {
+            source[3] = f32x16::splat(simd, 1.0);
+            second[3] = f32x16::splat(simd, 1.0);
+        }
+        let words = buffers.color[index].words_mut();
+        output.write(simd, &source, &second, lanes, quads, words);
+    }
+}

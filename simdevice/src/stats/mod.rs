@@ -1,0 +1,6 @@
+//! Statistics: counters, queries of them, the optimizations that can be switched off, and the recorder of work.
+
+pub mod counters;
+pub mod optimizations;
+pub mod query;
+pub mod recorder;
