@@ -9,7 +9,7 @@ use crate::resource::Buffer;
 use crate::{DeviceScene, Target};
 use gaurast_scene::Camera;
 
-/// What records draws.
+/// A recorder of draws into a command buffer.
 pub(super) struct Recorder<'a> {
     pub(super) device: &'a Device,
     pub(super) gaussian: &'a gaussian_primitive_topology::Device,

@@ -112,9 +112,9 @@ pub fn generate(json: &Path) -> Result<File, Error> {
         /// The operands of an operation, in order.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(crate) struct Operands {{
-            /// Those that are always there.
+            /// Operands that are always there.
             pub required: &'static [Kind],
-            /// Those of which the last may be missing.
+            /// Operands of which the last may be missing.
             pub optional: &'static [Kind],
             /// The kind of which there may be any number more.
             pub repeated: Option<Kind>,

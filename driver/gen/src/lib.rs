@@ -1,6 +1,6 @@
 //! Writes the driver's Rust from the Vulkan registry and from SPIR-V's grammar.
 //!
-//! What the registry says isn't copied by hand: this reads `vk.xml`, the fragment of the driver's own extension, and
+//! It reads `vk.xml`, the fragment of the driver's own extension, and
 //! `driver/support.toml`, which says what of it the driver supports, and writes the files of `driver/src/registry` and
 //! the dispatch table. From the machine-readable grammar of SPIR-V it writes the table that modules are decoded by. All
 //! are checked in, so that building the driver needs neither this crate nor these files, which `driver/gen/fetch.sh`

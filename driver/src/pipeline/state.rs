@@ -382,7 +382,7 @@ pub(crate) fn attribute(
 /// Finds the attribute at `location`.
 ///
 /// # Errors
-/// What is missing or won't do, as the end of a sentence about the location.
+/// The fault of an attribute, as the end of a sentence about its location.
 pub(crate) fn source(info: &GraphicsState, location: u32) -> Result<AttributeSource, String> {
     let attribute = info
         .vertex_input

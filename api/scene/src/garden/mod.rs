@@ -17,7 +17,7 @@ use crate::camera::{Camera, CameraError};
 use crate::scene::Scene;
 use brush::Brush;
 
-/// How many Gaussians [`scene`] is meant for.
+/// The number of Gaussians that [`scene`] is composed for.
 pub const DEFAULT_COUNT: usize = 300_000;
 
 /// A garden of `count` Gaussians of degree 3, the same for the same `seed`. See
