@@ -22,6 +22,7 @@ need vulkan-validationlayers /usr/share/vulkan/explicit_layer.d/VkLayer_khronos_
 need glslang-tools glslangValidator
 need spirv-tools spirv-val
 need valgrind valgrind
+need asciidoctor asciidoctor
 if ! python3 -m pip --version >/dev/null 2>&1; then missing+=(python3-pip); fi
 if [ ${#missing[@]} -gt 0 ]; then
     if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
@@ -79,6 +80,18 @@ step() { # step NAME COMMAND...
 tests=(--workspace --profile checked --lib --bins --tests)
 step format cargo fmt --all --check
 step clippy cargo clippy --workspace --all-targets --profile checked --quiet -- -D warnings
+# The extension's text: no broken reference, table or list.
+specification() {
+    if command -v asciidoctor >/dev/null; then
+        asciidoctor --failure-level WARN --destination-dir "$work/specification" api/spec/*.adoc
+    elif [ -n "${GAURAST_TEST_REQUIRE:-}" ]; then
+        echo "asciidoctor is missing" >&2
+        return 1
+    else
+        printf 'ignored\tasciidoctor is missing\n' >>"$GAURAST_TEST_REPORT"
+    fi
+}
+step specification specification
 # As cargo test would, and with them what tests start or load: the loader's library, a sample.
 step "build tests" cargo build "${tests[@]}" --example hello_gaussians --quiet
 GAURAST_TEST_LIBRARIES=$(realpath "${CARGO_TARGET_DIR:-target}/checked")

@@ -2,13 +2,13 @@
 ** The least that draws 3D Gaussians in C, through the Vulkan loader. It writes hello_gaussians.ppm, and objects go with
 ** the process. The same as examples/hello_gaussians.rs:
 **
-**     cc -std=c11 -I api/include samples/c/hello_gaussians.c -lvulkan -o hello_gaussians
+**     cc -std=c11 -I api/include samples/c/hello_gaussians.c -lvulkan -lm -o hello_gaussians
 **     VK_DRIVER_FILES=driver/icd/gaurast_icd.json ./hello_gaussians   (after cargo build --release)
 */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "vulkan_gaurast.h"
+#include "vulkan_gaurast_defaults.h"
 
 enum { SIZE = 256, FLOATS = 14, COUNT = 5 };
 static const VkFormat FORMAT = VK_FORMAT_R8G8B8A8_UNORM;
@@ -99,14 +99,9 @@ static VkPipeline create_pipeline(void) {
         {3, 0, VK_FORMAT_R32_SFLOAT, 10 * sizeof(float)},
         {4, 0, VK_FORMAT_R32G32B32_SFLOAT, 11 * sizeof(float)},
     };
-    VkPipelineGaussianStateCreateInfoGAURAST gaussian = {
-        .sType = VK_STRUCTURE_TYPE_PIPELINE_GAUSSIAN_STATE_CREATE_INFO_GAURAST,
-        .attributeLocations = {0, 1, 2, 3, 4, VK_GAUSSIAN_LOCATION_UNUSED_GAURAST, VK_GAUSSIAN_LOCATION_UNUSED_GAURAST},
-        .lowPassVariance = 0.3f,
-        .alphaFloor = 1.0f / 255.0f,
-        .alphaCeiling = 0.99f,
-        .transmittanceFloor = 1e-4f,
-    };
+    VkPipelineGaussianStateCreateInfoGAURAST gaussian = vkGaussianStateDefaultsGAURAST();
+    gaussian.attributeLocations = (VkGaussianAttributeLocationsGAURAST){
+        0, 1, 2, 3, 4, VK_GAUSSIAN_LOCATION_UNUSED_GAURAST, VK_GAUSSIAN_LOCATION_UNUSED_GAURAST};
     VkPipelineRenderingCreateInfo rendering = {.sType = VK_STRUCTURE_TYPE_PIPELINE_RENDERING_CREATE_INFO,
         .pNext = &gaussian, .colorAttachmentCount = 1, .pColorAttachmentFormats = &FORMAT};
     VkPipelineVertexInputStateCreateInfo vertices = {.sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO,
@@ -136,13 +131,11 @@ static VkPipeline create_pipeline(void) {
     return pipeline;
 }
 
-/* A camera at the origin that looks along +z. */
+/* A camera at the origin that looks along +z, as wide as it is far. */
 static void set_camera(VkCommandBuffer commands) {
-    VkGaussianCameraGAURAST camera = {.sType = VK_STRUCTURE_TYPE_GAUSSIAN_CAMERA_GAURAST,
-        .model = VK_GAUSSIAN_CAMERA_MODEL_PINHOLE_GAURAST,
-        .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
-        .focalLength = {SIZE, SIZE}, .principalPoint = {SIZE / 2.0f, SIZE / 2.0f},
-        .nearPlane = 0.2f, .farPlane = 1e30f, .depthCoefficients = {1.0f, -0.2f}};
+    const double eye[3] = {0, 0, 0}, ahead[3] = {0, 0, 1}, up[3] = {0, -1, 0};
+    VkGaussianCameraGAURAST camera =
+        vkGaussianCameraLookAtGAURAST(eye, ahead, up, 2.0 * atan(0.5), SIZE, SIZE, 0.2f);
     PFN_vkCmdSetGaussianCameraGAURAST set =
         (PFN_vkCmdSetGaussianCameraGAURAST)vkGetDeviceProcAddr(device, "vkCmdSetGaussianCameraGAURAST");
     set(commands, &camera);

@@ -31,7 +31,7 @@ fn compile(folder: &Path) -> PathBuf {
             .arg("-I")
             .arg(root.join("../../api/include"))
             .arg(root.join("../c/hello_gaussians.c"))
-            .args(["-lvulkan", "-o"])
+            .args(["-lvulkan", "-lm", "-o"])
             .arg(&program),
     );
     program
