@@ -102,6 +102,10 @@ fn pipelines() -> Vec<(&'static str, PipelineRequest<'static>)> {
             missing(2),
         ),
         (
+            "VUID-VkGaussianAttributeLocationsGAURAST-distinct",
+            with(|s| s.attribute_locations(s.attribute_locations.model_opacity(0))),
+        ),
+        (
             "VUID-VkPipelineGaussianStateCreateInfoGAURAST-firstModelMatrix-modes",
             with(|s| {
                 s.order(GaussianOrderGAURAST::PER_PIXEL)
@@ -206,6 +210,10 @@ fn cameras() -> Vec<(&'static str, GaussianCameraGAURAST<'static>)> {
         (
             "VUID-VkGaussianCameraGAURAST-rotation-value",
             camera().rotation([nan; 9]),
+        ),
+        (
+            "VUID-VkGaussianCameraGAURAST-rotation-orthonormal",
+            camera().rotation([0.0; 9]),
         ),
         (
             "VUID-VkGaussianCameraGAURAST-eye-value",

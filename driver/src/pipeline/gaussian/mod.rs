@@ -202,6 +202,7 @@ fn source(
     }
     let degree = gaussian.spherical_harmonics_degree;
     let coefficients = (degree + 1) * (degree + 1);
+    distinct_locations(locations, coefficients)?;
     let first = locations.first_spherical_harmonics;
     let scales = match gaussian.geometry {
         GaussianGeometryGAURAST::GAUSSIAN_2D => 2,

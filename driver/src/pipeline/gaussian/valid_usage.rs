@@ -7,12 +7,13 @@ use crate::pipeline::state::{GraphicsState, reads_second_source};
 use crate::registry::features::Features;
 use ash::vk;
 use gaurast::vk::{
-    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST, GaussianGeometryGAURAST,
-    GaussianLinearizationGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST,
-    GaussianProjectionModeGAURAST, PipelineGaussianStateCreateFlagsGAURAST,
-    PipelineGaussianStateCreateInfoGAURAST,
+    GAUSSIAN_LOCATION_UNUSED_GAURAST, GaussianAntialiasingGAURAST,
+    GaussianAttributeLocationsGAURAST, GaussianGeometryGAURAST, GaussianLinearizationGAURAST,
+    GaussianOrderGAURAST, GaussianPrecisionGAURAST, GaussianProjectionModeGAURAST,
+    PipelineGaussianStateCreateFlagsGAURAST, PipelineGaussianStateCreateInfoGAURAST,
 };
 use simdevice::state::gaussian::GaussianApproximation;
+use std::ops::Range;
 
 pub(super) const STRUCTURE: &str = "VkPipelineGaussianStateCreateInfoGAURAST";
 
@@ -277,6 +278,46 @@ pub(super) fn modes(
     }
     if !merge_draws.contains(gaussian.flags) {
         return Err(unknown("flags", &gaussian.flags));
+    }
+    Ok(())
+}
+
+/// Refuses attributes that share a location: what was left zero names location 0.
+pub(super) fn distinct_locations(
+    locations: &GaussianAttributeLocationsGAURAST,
+    coefficients: u32,
+) -> Result<(), Error> {
+    let members = [
+        ("position", locations.position, 1),
+        ("scale", locations.scale, 1),
+        ("rotation", locations.rotation, 1),
+        ("opacity", locations.opacity, 1),
+        (
+            "firstSphericalHarmonics",
+            locations.first_spherical_harmonics,
+            coefficients,
+        ),
+        ("firstModelMatrix", locations.first_model_matrix, 3),
+        ("modelOpacity", locations.model_opacity, 1),
+    ];
+    let mut used: Vec<(&str, Range<u32>)> = Vec::new();
+    for (name, first, count) in members {
+        if first == GAUSSIAN_LOCATION_UNUSED_GAURAST {
+            continue;
+        }
+        let own = first..first.saturating_add(count);
+        let shared =
+            |(_, other): &&(&str, Range<u32>)| own.start < other.end && other.start < own.end;
+        if let Some((earlier, _)) = used.iter().find(shared) {
+            return Err(Error::usage(
+                "VUID-VkGaussianAttributeLocationsGAURAST-distinct",
+                format!(
+                    "{name} begins at location {first}, where {earlier} is: each needs locations of its own \
+                     (VK_GAUSSIAN_LOCATION_UNUSED_GAURAST stands for none)"
+                ),
+            ));
+        }
+        used.push((name, own));
     }
     Ok(())
 }
