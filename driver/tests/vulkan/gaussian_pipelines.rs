@@ -130,10 +130,11 @@ fn modes_that_are_not_built_are_refused_by_their_feature() {
         })
     };
     let unused = GAUSSIAN_LOCATION_UNUSED_GAURAST;
-    create(&gpu, &placed(unused, 3)).unwrap();
-    // Location 2 alone has four components.
+    // Locations 2 and 3 are the rotation's and the opacity's.
     for (request, word) in [
-        (placed(2, unused), "matrix"),
+        (placed(2, unused), "firstModelMatrix"),
+        (placed(unused, 3), "modelOpacity"),
+        (placed(12, unused), "matrix"),
         (placed(unused, 9), "modelOpacity"),
     ] {
         let error = vk::Result::ERROR_VALIDATION_FAILED_EXT;
