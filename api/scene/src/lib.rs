@@ -6,6 +6,7 @@
 
 pub mod camera;
 pub mod camera_files;
+pub mod camera_path;
 mod error;
 mod formats;
 mod framing;
@@ -16,5 +17,5 @@ mod scene;
 pub use camera::Camera;
 pub use error::{Place, Reason, SceneError};
 pub use formats::{known_extensions, open, open_through, read};
-pub use framing::frame;
+pub use framing::{DEFAULT_UP, Extent, Framing, default_angles, frame, inside};
 pub use scene::{GaussianShape, MAX_SH_DEGREE, SH_C0, Scene, sigmoid};
