@@ -11,6 +11,7 @@ mod error;
 mod formats;
 mod framing;
 pub mod garden;
+mod metadata;
 pub mod random;
 mod scene;
 
@@ -18,4 +19,5 @@ pub use camera::Camera;
 pub use error::{Place, Reason, SceneError};
 pub use formats::{known_extensions, open, open_through, read};
 pub use framing::{DEFAULT_UP, Extent, Framing, default_angles, frame, inside};
+pub use metadata::{Antialiasing, ColorSpace, Geometry, Metadata};
 pub use scene::{GaussianShape, MAX_SH_DEGREE, SH_C0, Scene, sigmoid};

@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::metadata::{Antialiasing, Geometry, Metadata};
+
 /// The value of the constant spherical harmonic, 1 / (2 sqrt(pi)).
 pub const SH_C0: f64 = 0.282_094_791_773_878_14;
 
@@ -31,6 +33,7 @@ pub struct Scene {
     shapes: Vec<GaussianShape>,
     sh_degree: u32,
     sh: Vec<[f32; 3]>,
+    metadata: Metadata,
 }
 
 impl Scene {
@@ -48,7 +51,28 @@ impl Scene {
             shapes: Vec::with_capacity(count),
             sh_degree,
             sh: Vec::with_capacity(count.saturating_mul(sh_coefficients(sh_degree))),
+            metadata: Metadata::default(),
         }
+    }
+
+    /// What the scene's file says of itself.
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// The same, for changes.
+    pub fn metadata_mut(&mut self) -> &mut Metadata {
+        &mut self.metadata
+    }
+
+    /// How the scene wants Gaussians to be filtered: what its file says, or as 3DGS does.
+    pub fn antialiasing(&self) -> Antialiasing {
+        self.metadata.antialiasing.unwrap_or_default()
+    }
+
+    /// What the scene's Gaussians are: what its file says, or volumes.
+    pub fn geometry(&self) -> Geometry {
+        self.metadata.geometry.unwrap_or_default()
     }
 
     /// Appends a Gaussian. `sh` holds its spherical harmonics coefficients, (degree + 1)^2 RGB

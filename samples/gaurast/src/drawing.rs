@@ -27,23 +27,61 @@ pub enum DrawError {
 }
 
 /// The settings that the command line and the scene's file ask for.
-pub fn settings(modes: &ModeArguments) -> Settings {
+pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
+    let surfels = match modes.geometry {
+        Geometry::Auto => scene.geometry() == gaurast_scene::Geometry::Surfel,
+        Geometry::Volume => false,
+        Geometry::Surfel => true,
+    };
+    let compensated = match modes.antialiasing {
+        Antialiasing::Auto => scene.antialiasing() == gaurast_scene::Antialiasing::Compensated,
+        Antialiasing::Off => false,
+        Antialiasing::Compensated => true,
+    };
     Settings {
         sh_degree: modes.sh_degree.unwrap_or(MAX_SH_DEGREE),
         order: modes.order.into(),
-        geometry: match modes.geometry {
-            Geometry::Auto | Geometry::Volume => gaurast_render::Geometry::Volume,
-            Geometry::Surfel => gaurast_render::Geometry::Surfel,
+        geometry: if surfels {
+            gaurast_render::Geometry::Surfel
+        } else {
+            gaurast_render::Geometry::Volume
         },
-        antialiasing: match modes.antialiasing {
-            Antialiasing::Auto | Antialiasing::Off => gaurast_render::Antialiasing::Dilate,
-            Antialiasing::Compensated => gaurast_render::Antialiasing::Compensated,
+        antialiasing: if compensated {
+            gaurast_render::Antialiasing::Compensated
+        } else {
+            gaurast_render::Antialiasing::Dilate
         },
         precision: modes.precision.into(),
         exponential_error: modes.exponential_error,
         contribution_budget: modes.contribution_budget,
         ..Settings::default()
     }
+}
+
+/// What a person should know of how the scene's file is heeded, a sentence each.
+pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
+    let metadata = scene.metadata();
+    let mut notes = metadata.notes.clone();
+    if modes.geometry == Geometry::Auto && scene.geometry() == gaurast_scene::Geometry::Surfel {
+        notes.push("flat Gaussians are drawn (--geometry 2d), as the file says".to_owned());
+    }
+    if modes.antialiasing == Antialiasing::Auto
+        && scene.antialiasing() == gaurast_scene::Antialiasing::Compensated
+    {
+        let note = "opacity makes up for dilation (--antialiasing compensated), as the file says";
+        notes.push(note.to_owned());
+    }
+    if metadata.color_space == Some(gaurast_scene::ColorSpace::LinearRec709Display) {
+        let note = "the file's colours are linear light, and are written without a transfer function";
+        notes.push(note.to_owned());
+    }
+    if let Some(degree) = modes.sh_degree.filter(|degree| *degree > scene.sh_degree()) {
+        notes.push(format!(
+            "--sh-degree {degree} is of no account: the scene has degree {}",
+            scene.sh_degree()
+        ));
+    }
+    notes
 }
 
 /// A device with a scene on it.

@@ -69,20 +69,13 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         return print_json(&keyframes).map_err(Error::Report);
     }
     notes.extend(source.notes.iter().cloned());
-    if let Some(degree) = arguments.modes.sh_degree
-        && degree > scene.sh_degree()
-    {
-        notes.push(format!(
-            "--sh-degree {degree} is of no account: the scene has degree {}",
-            scene.sh_degree()
-        ));
-    }
+    notes.extend(drawing::notes(&arguments.modes, &scene));
     if !quiet && !arguments.report.json {
         for note in &notes {
             eprintln!("gaurast: {note}");
         }
     }
-    let mut settings = drawing::settings(&arguments.modes);
+    let mut settings = drawing::settings(&arguments.modes, &scene);
     settings.depth = arguments.output.depth;
     for view in &views {
         settings.check(&view.camera).map_err(DrawError::Render)?;

@@ -14,6 +14,7 @@ use half::f16;
 
 use super::input::{Format, Input};
 use crate::error::{Fault, Place, Reason};
+use crate::metadata::Antialiasing;
 use crate::scene::{GaussianShape, MAX_SH_DEGREE, Scene, sh_coefficients};
 
 /// The format.
@@ -31,6 +32,9 @@ const MAX_EXPANSION: u64 = 1032;
 
 /// Bytes of extension records that are passed over, at most.
 const MAX_EXTENSIONS: u64 = 1 << 20;
+
+/// Set in the header's flags if the Gaussians were trained with a filter that opacity pays for.
+const FLAG_ANTIALIASED: u8 = 1;
 
 /// Set in the header's flags if extension records follow the arrays.
 const FLAG_EXTENSIONS: u8 = 2;
@@ -171,6 +175,14 @@ impl Header {
         Ok(header)
     }
 
+    fn antialiasing(&self) -> Antialiasing {
+        if self.flags & FLAG_ANTIALIASED != 0 {
+            Antialiasing::Compensated
+        } else {
+            Antialiasing::Off
+        }
+    }
+
     fn position_bytes(&self) -> usize {
         if self.version == 1 { 6 } else { 9 }
     }
@@ -194,6 +206,7 @@ impl Header {
     fn unpack(&self, data: &[u8]) -> Scene {
         let count = self.count as usize;
         let mut scene = Scene::with_capacity(self.sh_degree, count);
+        scene.metadata_mut().antialiasing = Some(self.antialiasing());
         let mut data = data;
         let mut array = |size: usize| {
             let (array, rest) = data.split_at(size * count);

@@ -1,5 +1,6 @@
 //! Scene files: real ones, small ones with known values, malformed ones, and damaged ones.
 
+mod metadata;
 mod ply;
 mod spz;
 mod support;
