@@ -116,6 +116,38 @@ pub struct Encoding<'a> {
     pub quality: u8,
     /// EXR files hold linear light: colours, which are sRGB as they are trained, are turned into that.
     pub linear: bool,
+    /// What the picture's colours are.
+    pub colors: Colors,
+}
+
+/// What the colours of a picture are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Colors {
+    /// sRGB, as they are shown: what 3DGS is trained on.
+    #[default]
+    Srgb,
+    /// Linear light, which files of eight bits hold as sRGB.
+    Linear,
+}
+
+impl Colors {
+    /// A background, which is given as it is shown, as these colours have it.
+    fn behind(self, background: Option<Background>) -> [f32; 3] {
+        let shown = background.map_or([0.0; 3], Background::color);
+        match self {
+            Self::Srgb => shown,
+            Self::Linear => shown.map(|colour| to_linear(colour, 1.0)),
+        }
+    }
+
+    /// A colour, not premultiplied, as it is shown.
+    fn shown(self, colour: f32) -> f32 {
+        match self {
+            Self::Srgb => colour,
+            Self::Linear if colour > 0.003_130_8 => 1.055 * colour.powf(1.0 / 2.4) - 0.055,
+            Self::Linear => 12.92 * colour,
+        }
+    }
 }
 
 impl Default for Encoding<'_> {
@@ -125,6 +157,7 @@ impl Default for Encoding<'_> {
             depth: None,
             quality: DEFAULT_QUALITY,
             linear: false,
+            colors: Colors::Srgb,
         }
     }
 }
@@ -208,7 +241,7 @@ pub fn encode(
     let side = picture.width.max(picture.height);
     let transparent = encoding.background == Some(Background::Transparent);
     match format {
-        PictureFormat::Png => png(picture, encoding.background).map_err(|error| error.to_string()),
+        PictureFormat::Png => png(picture, encoding).map_err(|error| error.to_string()),
         PictureFormat::Jpeg if transparent => Err("JPEG files cannot be transparent".to_owned()),
         PictureFormat::Jpeg if side > MAX_JPEG_SIDE => {
             Err(format!("JPEG files have sides of at most {MAX_JPEG_SIDE}"))
@@ -221,7 +254,7 @@ pub fn encode(
                 encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::F_1_1);
             }
             let [width, height] = [picture.width, picture.height].map(|side| side as u16);
-            let bytes = rgb(picture, encoding.background);
+            let bytes = rgb(picture, encoding);
             encoder
                 .encode(&bytes, width, height, jpeg_encoder::ColorType::Rgb)
                 .map_err(|error| error.to_string())?;
@@ -233,12 +266,9 @@ pub fn encode(
         PictureFormat::WebP => {
             let mut file = Vec::new();
             let (bytes, color) = if transparent {
-                (rgba(picture), image_webp::ColorType::Rgba8)
+                (rgba(picture, encoding.colors), image_webp::ColorType::Rgba8)
             } else {
-                (
-                    rgb(picture, encoding.background),
-                    image_webp::ColorType::Rgb8,
-                )
+                (rgb(picture, encoding), image_webp::ColorType::Rgb8)
             };
             image_webp::WebPEncoder::new(&mut file)
                 .encode(&bytes, picture.width, picture.height, color)
@@ -250,31 +280,27 @@ pub fn encode(
 }
 
 /// Red, green and blue of each pixel in eight bits, over the background, which is black where there is none.
-pub fn rgb(picture: &Picture, background: Option<Background>) -> Vec<u8> {
-    let behind = background.map_or([0.0; 3], Background::color);
-    let over = |&[r, g, b, alpha]: &[f32; 4]| {
-        let channel = |colour: f32, behind: f32| colour + (1.0 - alpha) * behind;
-        let composited = [
-            channel(r, behind[0]),
-            channel(g, behind[1]),
-            channel(b, behind[2]),
-        ];
-        let opaque = if background.is_some() {
-            composited
-        } else {
-            [r, g, b]
+pub fn rgb(picture: &Picture, encoding: &Encoding<'_>) -> Vec<u8> {
+    let Encoding {
+        background, colors, ..
+    } = *encoding;
+    let behind = colors.behind(background);
+    let over = |pixel: &[f32; 4]| {
+        let [r, g, b, _] = match background {
+            Some(_) => over_pixel(*pixel, behind),
+            None => *pixel,
         };
-        opaque.map(to_byte)
+        [r, g, b].map(|colour| to_byte(colors.shown(colour)))
     };
     picture.pixels.iter().flat_map(over).collect()
 }
 
 /// Red, green, blue and alpha of each pixel in eight bits; colours are not premultiplied.
-pub fn rgba(picture: &Picture) -> Vec<u8> {
+fn rgba(picture: &Picture, colors: Colors) -> Vec<u8> {
     let straight = |&[r, g, b, alpha]: &[f32; 4]| {
         let part = |colour: f32| {
             if alpha > 0.0 {
-                to_byte(colour / alpha)
+                to_byte(colors.shown(colour / alpha))
             } else {
                 0
             }
@@ -285,8 +311,8 @@ pub fn rgba(picture: &Picture) -> Vec<u8> {
 }
 
 /// The bytes of a PNG file.
-fn png(picture: &Picture, background: Option<Background>) -> Result<Vec<u8>, png::EncodingError> {
-    let transparent = background == Some(Background::Transparent);
+fn png(picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, png::EncodingError> {
+    let transparent = encoding.background == Some(Background::Transparent);
     let mut file = Vec::new();
     let mut encoder = png::Encoder::new(&mut file, picture.width, picture.height);
     encoder.set_color(if transparent {
@@ -297,9 +323,9 @@ fn png(picture: &Picture, background: Option<Background>) -> Result<Vec<u8>, png
     encoder.set_compression(png::Compression::Fast);
     let mut writer = encoder.write_header()?;
     let bytes = if transparent {
-        rgba(picture)
+        rgba(picture, encoding.colors)
     } else {
-        rgb(picture, background)
+        rgb(picture, encoding)
     };
     writer.write_image_data(&bytes)?;
     writer.finish()?;
@@ -320,10 +346,13 @@ fn exr(picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, exr::error
     let (width, height) = (picture.width as usize, picture.height as usize);
     let pixel = |index: usize| {
         let [r, g, b, a] = match encoding.background {
-            Some(Background::Color(behind)) => over_pixel(picture.pixels[index], behind),
+            Some(Background::Color(_)) => {
+                let behind = encoding.colors.behind(encoding.background);
+                over_pixel(picture.pixels[index], behind)
+            }
             Some(Background::Transparent) | None => picture.pixels[index],
         };
-        if encoding.linear {
+        if encoding.linear && encoding.colors == Colors::Srgb {
             let linear = [r, g, b].map(|colour| to_linear(colour, a));
             [linear[0], linear[1], linear[2], a]
         } else {
@@ -332,9 +361,10 @@ fn exr(picture: &Picture, encoding: &Encoding<'_>) -> Result<Vec<u8>, exr::error
     };
     let mut file = Cursor::new(Vec::new());
     let mut attributes = LayerAttributes::default();
-    attributes
-        .other
-        .insert(Text::from("colorSpace"), color_space(encoding.linear));
+    attributes.other.insert(
+        Text::from("colorSpace"),
+        color_space(encoding.linear || encoding.colors == Colors::Linear),
+    );
     if let Some(depth) = encoding.depth {
         let plane = |name: &str, value: &dyn Fn(usize) -> f32| {
             let samples = (0..width * height).map(value).collect();
@@ -486,6 +516,25 @@ mod tests {
             refused.ends_with("JPEG files cannot be transparent"),
             "{refused}"
         );
+    }
+
+    #[test]
+    fn linear_colours_are_shown_as_srgb() {
+        let half = Picture {
+            width: 1,
+            height: 1,
+            pixels: vec![[0.25, 0.0, 0.5, 0.5]],
+        };
+        let over = |background| Encoding {
+            background,
+            colors: Colors::Linear,
+            ..Encoding::default()
+        };
+        // Half of linear light is 188 of 255 steps, a quarter 137.
+        assert_eq!(rgb(&half, &over(None)), [137, 0, 188]);
+        let white = Some(Background::Color([1.0; 3]));
+        assert_eq!(rgb(&half, &over(white)), [225, 188, 255]);
+        assert_eq!(rgba(&half, Colors::Linear), [188, 0, 255, 128]);
     }
 
     #[test]

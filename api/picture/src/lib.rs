@@ -16,7 +16,7 @@ mod statistics;
 pub use atomic::{folder, write_atomically};
 pub use color::Background;
 pub use files::{
-    DEFAULT_QUALITY, Encoding, OutputError, PictureFormat, check, check_place, encode, rgb, rgba,
+    Colors, DEFAULT_QUALITY, Encoding, OutputError, PictureFormat, check, check_place, encode, rgb,
     write, write_encoded,
 };
 pub use picture::Picture;

@@ -158,7 +158,9 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
         let b = if is_picture {
             gaurast_picture::read(&arguments.b)?
         } else {
-            draw(arguments, [a.width, a.height])?
+            let drawn = draw(arguments, [a.width, a.height])?;
+            let floats = matches!(PictureFormat::of(&arguments.a), Ok(PictureFormat::Exr));
+            if floats { drawn } else { in_eight_bits(drawn) }
         };
         check_sizes(&a, &arguments.a, &b, &arguments.b)?;
         let pair = Pair {
@@ -254,6 +256,14 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
     Ok(frame
         .picture
         .over(background.map_or([0.0; 3], Background::color)))
+}
+
+/// The picture as a file of eight bits holds it.
+fn in_eight_bits(mut picture: Picture) -> Picture {
+    for value in picture.pixels.as_flattened_mut() {
+        *value = (255.0 * value.clamp(0.0, 1.0)).round() / 255.0;
+    }
+    picture
 }
 
 /// The pictures of a folder, by name without extension.

@@ -58,6 +58,11 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
     }
 }
 
+/// Tells if the scene's file says that its colours are linear light.
+pub fn has_linear_colors(scene: &Scene) -> bool {
+    scene.metadata().color_space == Some(gaurast_scene::ColorSpace::LinearRec709Display)
+}
+
 /// What a person should know of how the scene's file is heeded, a sentence each.
 pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
     let metadata = scene.metadata();
@@ -72,7 +77,8 @@ pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
         notes.push(note.to_owned());
     }
     if metadata.color_space == Some(gaurast_scene::ColorSpace::LinearRec709Display) {
-        let note = "the file's colours are linear light, and are written without a transfer function";
+        let note =
+            "the file's colours are linear light, and are written without a transfer function";
         notes.push(note.to_owned());
     }
     if let Some(degree) = modes.sh_degree.filter(|degree| *degree > scene.sh_degree()) {
@@ -239,6 +245,7 @@ fn reasons(frame: &Frame, view: &View) -> Option<String> {
         parts.join(", ")
     };
     Some(format!(
-        "there is nothing in the picture: of {read} Gaussians: {parts}"
+        "there is nothing in the picture: of {read} Gaussian{}: {parts}",
+        if read == 1.0 { "" } else { "s" }
     ))
 }

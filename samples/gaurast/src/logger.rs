@@ -35,10 +35,25 @@ pub fn start() {
     }
 }
 
-/// The last error that was logged.
+/// The last error that was logged, without what tells programs of its kind.
 pub fn last_error() -> Option<String> {
     let logged = LOGGED.lock().unwrap_or_else(PoisonError::into_inner);
-    logged.errors.last().cloned()
+    logged
+        .errors
+        .last()
+        .map(|message| plain(message).to_owned())
+}
+
+/// A message without the kind in brackets after it, and without the call before it.
+fn plain(message: &str) -> &str {
+    let message = match message.rsplit_once(" [") {
+        Some((message, kind)) if kind.ends_with(']') => message,
+        _ => message,
+    };
+    match message.split_once(": ") {
+        Some((call, rest)) if call.starts_with("vk") => rest,
+        _ => message,
+    }
 }
 
 impl Log for Logger {
@@ -64,5 +79,20 @@ impl Log for Logger {
 
     fn flush(&self) {
         self.inner.flush();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_sentences() {
+        assert_eq!(
+            plain("vkCreateDevice: GAURAST_SIMD=mmx is none of best, sse2 [GAURAST-error]"),
+            "GAURAST_SIMD=mmx is none of best, sse2"
+        );
+        let trace = "GAURAST_TRACE=/a: No space left on device (os error 28)";
+        assert_eq!(plain(trace), trace);
     }
 }

@@ -51,11 +51,12 @@ fn main() -> ExitCode {
             sentence,
             code: FAILED,
         },
-        (Err(failure), None) => failure,
-        (Err(failure), Some(logged)) => Failure {
-            sentence: format!("{}: {logged}", failure.sentence),
+        // The driver's message says more than the name of a call and its result.
+        (Err(failure), Some(sentence)) if failure.sentence.starts_with("vk") => Failure {
+            sentence,
             ..failure
         },
+        (Err(failure), _) => failure,
     };
     eprintln!("gaurast: {}", failure.sentence);
     ExitCode::from(failure.code)

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 
-use gaurast_picture::{Background, Encoding, OutputError, Picture, PictureFormat};
+use gaurast_picture::{Background, Colors, Encoding, OutputError, Picture, PictureFormat};
 use thiserror::Error;
 
 use crate::args::OutputArguments;
@@ -142,6 +142,7 @@ pub struct Outputs {
     background: Option<Background>,
     quality: u8,
     linear: bool,
+    colors: Colors,
     fps: f64,
     raw: bool,
 }
@@ -193,6 +194,7 @@ impl Outputs {
             background: arguments.background.or(trained),
             quality: arguments.quality,
             linear: arguments.linear,
+            colors: Colors::Srgb,
             fps: arguments.fps,
             raw: arguments.raw,
         };
@@ -228,6 +230,12 @@ impl Outputs {
             }
         }
         Ok(outputs)
+    }
+
+    /// The outputs of pictures of a scene with such colours.
+    pub fn with_colors(self, linear: bool) -> Self {
+        let colors = if linear { Colors::Linear } else { Colors::Srgb };
+        Self { colors, ..self }
     }
 
     /// Tells if standard output is taken by pictures.
@@ -368,13 +376,14 @@ impl Writer<'_> {
             depth: finished.depth.as_deref(),
             quality: outputs.quality,
             linear: outputs.linear,
+            colors: outputs.colors,
         };
         for path in outputs.files(finished.index, finished.view) {
             gaurast_picture::write_encoded(&path, &finished.picture, &encoding)?;
         }
         if outputs.use_stdout() {
             let bytes = if outputs.raw {
-                gaurast_picture::rgb(&finished.picture, outputs.background)
+                gaurast_picture::rgb(&finished.picture, &encoding)
             } else {
                 gaurast_picture::encode(PictureFormat::Png, &finished.picture, &encoding)
                     .map_err(|reason| WriteError::Stdout(std::io::Error::other(reason)))?
@@ -383,7 +392,7 @@ impl Writer<'_> {
             (stdout.write_all(&bytes).and_then(|()| stdout.flush())).map_err(WriteError::Stdout)?;
         }
         if !self.videos.is_empty() {
-            let bytes = gaurast_picture::rgb(&finished.picture, outputs.background);
+            let bytes = gaurast_picture::rgb(&finished.picture, &encoding);
             for video in &mut self.videos {
                 // What ffmpeg says of it comes at the end.
                 if video.input.write_all(&bytes).is_err() {

@@ -4,6 +4,7 @@ use std::io::{Write, stdout};
 use std::time::Instant;
 
 use gaurast_picture::OutputError;
+use gaurast_scene::camera_path::Keyframe;
 use thiserror::Error;
 
 use crate::args::RenderArguments;
@@ -58,6 +59,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     let quiet = arguments.report.quiet;
     let progress = Progress { quiet };
     let (scene, loading) = source.load(progress)?;
+    let outputs = outputs.with_colors(drawing::has_linear_colors(&scene));
     let garden = source.file.is_none();
     let Views {
         views,
@@ -65,8 +67,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
         framing,
     } = cameras::of_scene(known, &arguments.camera, &scene, garden)?;
     if arguments.camera.frame {
-        let keyframes = cameras::keyframes(&views, &scene);
-        return print_json(&keyframes).map_err(Error::Report);
+        return print_keyframes(&cameras::keyframes(&views, &scene)).map_err(Error::Report);
     }
     notes.extend(source.notes.iter().cloned());
     notes.extend(drawing::notes(&arguments.modes, &scene));
@@ -180,8 +181,17 @@ fn chosen(
     outputs.missing(views, wanted, &arguments.output)
 }
 
+/// Prints a list for `--path`, a line for each.
+fn print_keyframes(keyframes: &[Keyframe]) -> std::io::Result<()> {
+    let lines = keyframes.iter().map(serde_json::to_string);
+    let lines = lines.collect::<Result<Vec<_>, _>>()?.join(",\n ");
+    let mut stdout = stdout().lock();
+    writeln!(stdout, "[{lines}]")?;
+    stdout.flush()
+}
+
 /// Prints a value for programs.
-pub fn print_json(value: &impl serde::Serialize) -> std::io::Result<()> {
+fn print_json(value: &impl serde::Serialize) -> std::io::Result<()> {
     let mut stdout = stdout().lock();
     report::write_json(&mut stdout, value)?;
     stdout.flush()

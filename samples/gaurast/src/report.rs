@@ -73,7 +73,10 @@ impl Summary<'_> {
         let places = self.outputs.told(view(first), view(last));
         let camera = &self.views[first.index].camera;
         let size = format!("{}x{}", camera.width, camera.height);
-        let gaussians = grouped(self.scene.len() as f64);
+        let gaussians = match self.scene.len() {
+            1 => "1 Gaussian".to_owned(),
+            count => format!("{} Gaussians", grouped(count as f64)),
+        };
         let time = if self.drawn.len() == 1 {
             format!("drawn in {}", duration(first.time))
         } else {
@@ -84,7 +87,7 @@ impl Summary<'_> {
             )
         };
         format!(
-            "wrote {places}: {size}, {gaussians} Gaussians read in {}, {time}{kept}",
+            "wrote {places}: {size}, {gaussians} read in {}, {time}{kept}",
             duration(self.loading)
         )
     }

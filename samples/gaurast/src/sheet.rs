@@ -1,5 +1,6 @@
 //! `gaurast views`: a scene from eight sides, to find its front.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -33,6 +34,8 @@ pub enum Error {
     Output(#[from] OutputError),
     #[error("{}: it is there already: --force replaces it", path.display())]
     There { path: PathBuf },
+    #[error("the sheet is written, but not the report: {0}")]
+    Report(std::io::Error),
 }
 
 #[derive(Args)]
@@ -124,10 +127,13 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
             Some(scene) => format!(" {}", scene.display()),
             None => String::new(),
         };
-        println!(
+        let mut stdout = std::io::stdout().lock();
+        writeln!(
+            stdout,
             "wrote {}: eight sides; `gaurast render{scene} --azimuth 45` draws the second",
             path.display()
-        );
+        )
+        .map_err(Error::Report)?;
     }
     Ok(())
 }

@@ -65,7 +65,7 @@ fn one_gaussian_is_drawn_where_it_is() {
     );
     assert!(output.status.success(), "{stderr}");
     assert!(
-        stdout.contains("65 x 49") && stdout.contains("wrote a.png, b.exr: 65x49, 1 Gaussians"),
+        stdout.contains("65 x 49") && stdout.contains("wrote a.png, b.exr: 65x49, 1 Gaussian "),
         "{stdout}"
     );
     assert!(stdout.contains("gaussians drawn"), "{stdout}");

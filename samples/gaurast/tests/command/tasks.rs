@@ -246,9 +246,9 @@ fn sides_distances_and_models() {
         covered(&folder, "a.png")
     };
     let (_, [r, g, _]) = mean(&["--azimuth", "0", "--elevation", "0"]);
-    assert!(r > 10.0 * g, "red is in front: {r} {g}");
+    assert!(r > 4.0 * g, "red is in front: {r} {g}");
     let (_, [r, g, _]) = mean(&["--azimuth", "180", "--elevation", "0"]);
-    assert!(g > 10.0 * r, "green is behind: {r} {g}");
+    assert!(g > 4.0 * r, "green is behind: {r} {g}");
     let (_, [r, g, _]) = mean(&["--azimuth", "90"]);
     assert!(
         (r / g - 1.0).abs() < 0.2,
@@ -272,7 +272,7 @@ fn sides_distances_and_models() {
     );
     std::fs::write(folder.path().join("keys.json"), printed).expect("written");
     let (_, [r, g, _]) = mean(&["--path", "keys.json"]);
-    assert!(g > 10.0 * r, "the same as asked for before: {r} {g}");
+    assert!(g > 4.0 * r, "the same as asked for before: {r} {g}");
 }
 
 #[gaurast_runner::test]
@@ -528,7 +528,7 @@ fn a_training_folder_is_a_scene_with_cameras() {
     );
     let json: serde_json::Value = serde_json::from_str(&compared).expect("JSON");
     let largest = json["pictures"][0]["largest"].as_f64().expect("a number");
-    assert!(largest < 0.003, "{json}");
+    assert_eq!(largest, 0.0, "{json}");
     let same = ["compare", "out", "out", "--fail-below", "30"];
     assert!(succeeds(&folder, &same).contains("mean of 2: PSNR inf dB, SSIM 1.0000"));
     let differ = [
