@@ -121,7 +121,7 @@ fn print(table: &comfy_table::Table, outputs: &[PathBuf]) -> std::io::Result<()>
 
 fn load(path: &Path, progress: Progress) -> Result<Scene, Error> {
     let bar = progress.bytes("reading", 0);
-    let scene = gaurast_scene::open_through(path, |file, len| {
+    let scene = gaurast_scene::open_with(path, &gaurast_scene::Options::default(), |file, len| {
         bar.set_length(len);
         bar.wrap_read(file)
     })?;
