@@ -24,6 +24,17 @@ pub enum Geometry {
     Surfel,
 }
 
+/// What Gaussians are sorted by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SortOrder {
+    /// Their centres' depth along the view direction, as 3DGS does.
+    #[default]
+    Depth,
+    /// Their centres' distance from the camera: `cameraDistance` of glTF.
+    Distance,
+}
+
 /// The colour space that a scene's colours are in, and are blended in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub enum ColorSpace {
@@ -45,11 +56,39 @@ pub struct Metadata {
     pub geometry: Option<Geometry>,
     /// What its colours are.
     pub color_space: Option<ColorSpace>,
+    /// What its Gaussians are to be sorted by.
+    pub order: Option<SortOrder>,
     /// What the reader passed over or had to assume, a sentence each without a full stop.
     pub notes: Vec<String>,
 }
 
 impl Metadata {
+    /// Keeps what `other` says too, and adds its notes.
+    pub(crate) fn join(&mut self, other: Self) {
+        fn agree<T: PartialEq>(field: &mut Option<T>, other: Option<T>) -> bool {
+            let agreed = *field == other;
+            if !agreed {
+                *field = None;
+            }
+            agreed
+        }
+        let agreed = [
+            agree(&mut self.antialiasing, other.antialiasing),
+            agree(&mut self.geometry, other.geometry),
+            agree(&mut self.color_space, other.color_space),
+            agree(&mut self.order, other.order),
+        ];
+        let what = ["antialiasing", "geometry", "colour space", "order"];
+        for (what, _) in what.into_iter().zip(agreed).filter(|(_, agreed)| !agreed) {
+            self.note(format!(
+                "parts of the scene differ in {what}, and none is told"
+            ));
+        }
+        for note in other.notes {
+            self.note(note);
+        }
+    }
+
     /// Adds a note, once.
     pub(crate) fn note(&mut self, note: impl Into<String>) {
         let note = note.into();

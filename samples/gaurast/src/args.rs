@@ -5,9 +5,11 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use gaurast_picture::{Background, DEFAULT_QUALITY, Size};
-use gaurast_scene::MAX_SH_DEGREE;
+use gaurast_scene::{MAX_SH_DEGREE, Transform};
+use glam::{DQuat, DVec3};
 
 use crate::compare::CompareArguments;
+use crate::info::InfoArguments;
 use crate::sheet::ViewsArguments;
 use crate::simulate::SimulateArguments;
 
@@ -34,6 +36,8 @@ pub enum Command {
     Views(Box<ViewsArguments>),
     /// Tells how much two pictures, two folders of pictures, or a picture and a scene differ
     Compare(Box<CompareArguments>),
+    /// Tells what a scene holds
+    Info(Box<InfoArguments>),
     /// Tells what the simulated hardware would have spent on a scene: time, energy, area
     Simulate(Box<SimulateArguments>),
     /// Prints a script that completes this command's arguments in a shell
@@ -86,8 +90,8 @@ fn with_command(mut words: Vec<std::ffi::OsString>) -> Vec<std::ffi::OsString> {
     output (of the highest iteration), nerfstudio's splat.ply, or the one scene file there is. \
     Their frame is that of 3DGS: x right, y down, z forward.\n\n{EXIT_CODES}", gaurast_scene::known_extensions()))]
 pub struct RenderArguments {
-    /// The scene: a file or a folder; a generated garden if there is none
-    pub scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub scene: SceneArguments,
 
     #[command(flatten)]
     pub camera: CameraArguments,
@@ -100,6 +104,54 @@ pub struct RenderArguments {
 
     #[command(flatten)]
     pub report: ReportArguments,
+}
+
+/// What is drawn.
+#[derive(Args, Clone, Debug, Default)]
+pub struct SceneArguments {
+    /// The scene: a file, a folder, or - for standard input; several are drawn together; a generated garden if there is none
+    pub scenes: Vec<PathBuf>,
+
+    /// Put a scene elsewhere: "scale=F turn=X,Y,Z,DEGREES move=X,Y,Z", each if wanted
+    ///
+    /// The first one is of the first scene, the second of the second, and so on; "" leaves a scene where it is. It is scaled
+    /// first, then turned about an axis through the origin, then moved.
+    #[arg(long, value_name = "SPEC", allow_hyphen_values = true)]
+    pub transform: Vec<Placement>,
+
+    /// The level of detail of a scene that has several: 0 is the finest
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub level: u32,
+}
+
+/// A value of `--transform`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Placement(pub Transform);
+
+impl FromStr for Placement {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let mut transform = Transform::default();
+        for word in text.split_whitespace() {
+            let wrong = "a transform is scale=F, turn=X,Y,Z,DEGREES and move=X,Y,Z, with spaces between them";
+            let (name, values) = word.split_once('=').ok_or(wrong)?;
+            let numbers = values
+                .split(',')
+                .map(finite)
+                .collect::<Result<Vec<f64>, _>>()?;
+            match (name, &numbers[..]) {
+                ("scale", &[factor]) if factor > 0.0 => transform.scale = factor,
+                ("move", &[x, y, z]) => transform.translation = DVec3::new(x, y, z),
+                ("turn", &[x, y, z, degrees]) => {
+                    let axis = DVec3::new(x, y, z).try_normalize().ok_or(wrong)?;
+                    transform.rotation = DQuat::from_axis_angle(axis, degrees.to_radians());
+                }
+                _ => return Err(wrong),
+            }
+        }
+        Ok(Self(transform))
+    }
 }
 
 /// Where the scene is seen from.
@@ -388,23 +440,15 @@ pub enum CameraModel {
 /// Values of `--order`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Order {
-    /// Depth along the camera's axis, as 3DGS does
+    /// What the file says; depth where it says nothing
     #[default]
+    Auto,
+    /// Depth along the camera's axis, as 3DGS does
     Depth,
     /// Distance from the camera
     Distance,
     /// Depth along each pixel's own ray: nothing pops as the camera turns
     PerPixel,
-}
-
-impl From<Order> for gaurast_render::Order {
-    fn from(order: Order) -> Self {
-        match order {
-            Order::Depth => Self::Depth,
-            Order::Distance => Self::Distance,
-            Order::PerPixel => Self::PerPixel,
-        }
-    }
 }
 
 /// Values of `--geometry`.
@@ -551,7 +595,7 @@ mod tests {
         assert_eq!(parsed.camera.view, default.camera.view);
         assert_eq!(parsed.report.quiet, default.report.quiet);
         let camera = &parsed.camera;
-        assert!(parsed.scene.is_none() && camera.size.is_none() && camera.fov.is_none());
+        assert!(parsed.scene.scenes.is_empty() && camera.size.is_none() && camera.fov.is_none());
     }
 
     #[test]
@@ -589,6 +633,29 @@ mod tests {
         );
         for bad in ["1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", ""] {
             assert!(bad.parse::<Triple>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn transforms() {
+        let placement: Placement = "scale=2 turn=0,0,5,90 move=1,-2,3".parse().expect("one");
+        let Transform {
+            scale,
+            rotation,
+            translation,
+        } = placement.0;
+        assert_eq!((scale, translation), (2.0, DVec3::new(1.0, -2.0, 3.0)));
+        assert!((rotation * DVec3::X).abs_diff_eq(DVec3::Y, 1e-12));
+        assert_eq!("".parse(), Ok(Placement::default()));
+        for bad in [
+            "scale=0",
+            "move=1,2",
+            "turn=0,0,0,9",
+            "shift=1",
+            "scale",
+            "scale=nan",
+        ] {
+            assert!(bad.parse::<Placement>().is_err(), "{bad}");
         }
     }
 

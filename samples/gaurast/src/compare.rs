@@ -9,7 +9,7 @@ use gaurast_picture::{Background, OutputError, Picture, PictureFormat, Size, Sta
 use serde_json::json;
 use thiserror::Error;
 
-use crate::args::{CameraArguments, ModeArguments};
+use crate::args::{CameraArguments, ModeArguments, SceneArguments};
 use crate::cameras::{self, View, ViewError};
 use crate::drawing::{self, DrawError, Drawing};
 use crate::progress::Progress;
@@ -238,7 +238,10 @@ fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> 
     let progress = Progress {
         quiet: arguments.quiet || arguments.json,
     };
-    let source = Source::of(Some(&arguments.b))?;
+    let source = Source::of(&SceneArguments {
+        scenes: vec![arguments.b.clone()],
+        ..SceneArguments::default()
+    })?;
     let camera = CameraArguments {
         size: Some(arguments.camera.size.unwrap_or(Size(size))),
         ..arguments.camera.clone()

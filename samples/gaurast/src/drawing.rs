@@ -4,10 +4,10 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 use gaurast_render::{Frame, RenderError, Renderer, Settings};
-use gaurast_scene::{MAX_SH_DEGREE, Scene};
+use gaurast_scene::{MAX_SH_DEGREE, Scene, SortOrder};
 use thiserror::Error;
 
-use crate::args::{Antialiasing, Geometry, ModeArguments};
+use crate::args::{Antialiasing, Geometry, ModeArguments, Order};
 use crate::cameras::View;
 use crate::limits;
 use crate::outputs::{Finished, Outputs, WriteError};
@@ -38,9 +38,17 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
         Antialiasing::Off => false,
         Antialiasing::Compensated => true,
     };
+    let order = match modes.order {
+        Order::Auto if metadata_order(scene) == SortOrder::Distance => {
+            gaurast_render::Order::Distance
+        }
+        Order::Auto | Order::Depth => gaurast_render::Order::Depth,
+        Order::Distance => gaurast_render::Order::Distance,
+        Order::PerPixel => gaurast_render::Order::PerPixel,
+    };
     Settings {
         sh_degree: modes.sh_degree.unwrap_or(MAX_SH_DEGREE),
-        order: modes.order.into(),
+        order,
         geometry: if surfels {
             gaurast_render::Geometry::Surfel
         } else {
@@ -56,6 +64,11 @@ pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
         contribution_budget: modes.contribution_budget,
         ..Settings::default()
     }
+}
+
+/// What the scene's file says that Gaussians are sorted by.
+fn metadata_order(scene: &Scene) -> SortOrder {
+    scene.metadata().order.unwrap_or_default()
 }
 
 /// Tells if the scene's file says that its colours are linear light.

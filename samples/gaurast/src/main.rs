@@ -5,6 +5,7 @@ mod cameras;
 mod compare;
 mod drawing;
 mod heatmap;
+mod info;
 mod limits;
 mod logger;
 mod outputs;
@@ -82,6 +83,9 @@ fn run(command: Command) -> Result<(), Failure> {
         }
         Command::Compare(arguments) => {
             compare::run(&arguments).map_err(|error| failure(error.to_string(), error.is_misuse()))
+        }
+        Command::Info(arguments) => {
+            info::run(&arguments).map_err(|error| failure(error.to_string(), false))
         }
         Command::Simulate(arguments) => {
             simulate::run(&arguments).map_err(|error| failure(error.to_string(), false))

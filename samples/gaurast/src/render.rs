@@ -49,7 +49,7 @@ impl Error {
 
 /// Draws a scene and writes the pictures.
 pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
-    let source = Source::of(arguments.scene.as_deref())?;
+    let source = Source::of(&arguments.scene)?;
     let outputs = Outputs::new(&arguments.output, &source.name, source.background)?;
     if let Some(path) = &arguments.output.heatmap {
         gaurast_picture::check(path)?;
@@ -60,7 +60,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     let progress = Progress { quiet };
     let (scene, loading) = source.load(progress)?;
     let outputs = outputs.with_colors(drawing::has_linear_colors(&scene));
-    let garden = source.file.is_none();
+    let garden = source.is_garden();
     let Views {
         views,
         mut notes,
@@ -117,7 +117,7 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
     };
     let summary = Summary {
         scene: &scene,
-        name: arguments.scene.as_deref(),
+        files: &arguments.scene.scenes,
         loading,
         drawing: start.elapsed(),
         views: &views,

@@ -1,7 +1,7 @@
 //! What a rendering did: a line, a table of what the device counted, or JSON.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use ash::vk::PerformanceCounterUnitKHR as Unit;
@@ -18,8 +18,8 @@ use crate::outputs::Outputs;
 /// What a rendering did.
 pub struct Summary<'a> {
     pub scene: &'a Scene,
-    /// The scene's file; the garden if there is none.
-    pub name: Option<&'a Path>,
+    /// The scene's files; the garden if there is none.
+    pub files: &'a [PathBuf],
     pub loading: Duration,
     /// Drawing and writing.
     pub drawing: Duration,
@@ -155,7 +155,7 @@ impl Summary<'_> {
             })
             .collect();
         json!({
-            "scene": self.name,
+            "scenes": self.files,
             "gaussians": self.scene.len(),
             "sh_degree": self.scene.sh_degree(),
             "load_milliseconds": milliseconds(self.loading),

@@ -9,7 +9,7 @@ use gaurast_scene::camera::{CameraError, DEFAULT_FOV};
 use gaurast_scene::{DEFAULT_UP, Extent, Framing};
 use thiserror::Error;
 
-use crate::args::{ModeArguments, Triple};
+use crate::args::{ModeArguments, SceneArguments, Triple};
 use crate::cameras::View;
 use crate::drawing::{self, DrawError, Drawing};
 use crate::progress::Progress;
@@ -40,8 +40,8 @@ pub enum Error {
 
 #[derive(Args)]
 pub struct ViewsArguments {
-    /// The scene: a file or a folder; a generated garden if there is none
-    pub scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub scene: SceneArguments,
 
     /// The direction that is upwards in the scene [default: 0,-1,0]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
@@ -77,7 +77,7 @@ pub struct ViewsArguments {
 
 /// Draws the sheet.
 pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
-    let source = Source::of(arguments.scene.as_deref())?;
+    let source = Source::of(&arguments.scene)?;
     let path = match &arguments.output {
         Some(path) => path.clone(),
         None => format!("{}-views.png", source.name).into(),
@@ -123,10 +123,10 @@ pub fn run(arguments: &ViewsArguments) -> Result<(), Error> {
     bar.finish_and_clear();
     gaurast_picture::write(&path, &sheet.picture, None)?;
     if !arguments.quiet {
-        let scene = match &arguments.scene {
-            Some(scene) => format!(" {}", scene.display()),
-            None => String::new(),
-        };
+        let scenes = arguments.scene.scenes.iter();
+        let scene: String = scenes
+            .map(|scene| format!(" {}", scene.display()))
+            .collect();
         let mut stdout = std::io::stdout().lock();
         writeln!(
             stdout,

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use gaurast_picture::Background;
-use gaurast_scene::{Scene, SceneError};
+use gaurast_scene::{Options, Scene, SceneError, Transform};
 use thiserror::Error;
 
+use crate::args::SceneArguments;
 use crate::progress::Progress;
 
 /// The generated garden's seed.
@@ -38,13 +39,15 @@ pub enum SourceError {
         path.display()
     )]
     Colmap { path: PathBuf },
+    #[error("--transform is given {transforms} times, and there are {scenes} scenes")]
+    Transforms { scenes: usize, transforms: usize },
 }
 
-/// A scene's file, and what lies beside it.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// The scene's files, and what lies beside them.
+#[derive(Clone, Debug, Default)]
 pub struct Source {
-    /// The file; the generated garden if there is none.
-    pub file: Option<PathBuf>,
+    /// The files, and where their Gaussians are put; the generated garden if there is none.
+    pub files: Vec<(PathBuf, Transform)>,
     /// What outputs are named after.
     pub name: String,
     /// Cameras that belong to it.
@@ -53,56 +56,107 @@ pub struct Source {
     pub dataparser: Option<PathBuf>,
     /// The background that it was trained with.
     pub background: Option<Background>,
-    /// What the folder led to, a sentence each.
+    /// What folders led to, a sentence each.
     pub notes: Vec<String>,
+    /// The level of detail.
+    level: u32,
 }
 
 impl Source {
-    /// The source at `path`.
+    /// The source that the command line names. What lies beside the first scene counts.
     ///
     /// # Errors
-    /// If it is a folder without a scene.
-    pub fn of(path: Option<&Path>) -> Result<Self, SourceError> {
-        let Some(path) = path else {
-            return Ok(Self {
-                name: "gaurast".to_owned(),
-                ..Self::default()
+    /// If it is a folder without a scene, or there are more transforms than scenes.
+    pub fn of(arguments: &SceneArguments) -> Result<Self, SourceError> {
+        let (scenes, transforms) = (&arguments.scenes, &arguments.transform);
+        if transforms.len() > scenes.len() {
+            return Err(SourceError::Transforms {
+                scenes: scenes.len(),
+                transforms: transforms.len(),
             });
-        };
-        if path.is_dir() {
-            return folder(path);
         }
-        Ok(Self {
-            name: stem(path),
-            file: Some(path.to_owned()),
-            dataparser: beside(path, "dataparser_transforms.json"),
+        let mut source = Self {
+            name: "gaurast".to_owned(),
+            level: arguments.level,
             ..Self::default()
-        })
+        };
+        let given = transforms.iter().map(|placement| placement.0);
+        let given = given.chain(std::iter::repeat(Transform::default()));
+        for (path, transform) in scenes.iter().zip(given) {
+            let Part {
+                name,
+                file,
+                cameras,
+                dataparser,
+                background,
+                notes,
+            } = part(path)?;
+            if source.files.is_empty() {
+                (source.name, source.cameras) = (name, cameras);
+                (source.dataparser, source.background) = (dataparser, background);
+            }
+            source.files.push((file, transform));
+            source.notes.extend(notes);
+        }
+        Ok(source)
+    }
+
+    /// Tells if the scene is the generated garden.
+    pub fn is_garden(&self) -> bool {
+        self.files.is_empty()
     }
 
     /// Reads the scene, or generates it.
     ///
     /// # Errors
-    /// As the file's reader.
+    /// As the files' reader.
     pub fn load(&self, progress: Progress) -> Result<(Scene, Duration), SourceError> {
         let start = Instant::now();
-        let scene = match &self.file {
-            Some(path) => {
-                let bar = progress.bytes("reading", 0);
-                let scene = gaurast_scene::open_through(path, |file, len| {
-                    bar.set_length(len);
-                    bar.wrap_read(file)
-                })?;
-                bar.finish_and_clear();
-                scene
+        if self.is_garden() {
+            let _step = progress.step("generating");
+            let garden = gaurast_scene::garden::scene(SEED, gaurast_scene::garden::DEFAULT_COUNT);
+            return Ok((garden, start.elapsed()));
+        }
+        let options = Options { level: self.level };
+        let mut scene = Scene::default();
+        for (path, transform) in &self.files {
+            let bar = progress.bytes("reading", 0);
+            let part = gaurast_scene::open_with(path, &options, |file, len| {
+                bar.set_length(len);
+                bar.wrap_read(file)
+            })?;
+            bar.finish_and_clear();
+            if scene.is_empty() && *transform == Transform::default() {
+                scene = part;
+            } else {
+                scene.append(&part, transform);
             }
-            None => {
-                let _step = progress.step("generating");
-                gaurast_scene::garden::scene(SEED, gaurast_scene::garden::DEFAULT_COUNT)
-            }
-        };
+        }
         Ok((scene, start.elapsed()))
     }
+}
+
+/// One scene of several.
+#[derive(Debug, Default)]
+struct Part {
+    file: PathBuf,
+    name: String,
+    cameras: Option<PathBuf>,
+    dataparser: Option<PathBuf>,
+    background: Option<Background>,
+    notes: Vec<String>,
+}
+
+fn part(path: &Path) -> Result<Part, SourceError> {
+    if path.is_dir() {
+        return folder(path);
+    }
+    Ok(Part {
+        name: stem(path),
+        file: path.to_owned(),
+        dataparser: beside(path, "dataparser_transforms.json"),
+        ..Part::default()
+    })
 }
 
 /// A file's name without its folder and its extensions.
@@ -120,7 +174,7 @@ fn beside(path: &Path, name: &str) -> Option<PathBuf> {
     Some(gaurast_picture::folder(path).join(name)).filter(|path| path.is_file())
 }
 
-fn folder(path: &Path) -> Result<Source, SourceError> {
+fn folder(path: &Path) -> Result<Part, SourceError> {
     let io = |source| SourceError::Io {
         path: path.to_owned(),
         source,
@@ -130,33 +184,35 @@ fn folder(path: &Path) -> Result<Source, SourceError> {
         name.to_string_lossy().into_owned()
     });
     let there = |name: &str| Some(path.join(name)).filter(|path| path.is_file());
-    let mut source = Source {
+    let mut part = Part {
         name,
         cameras: there("cameras.json"),
         dataparser: there("dataparser_transforms.json"),
-        ..Source::default()
+        ..Part::default()
     };
-    if let Some((iteration, file)) = newest_iteration(&path.join("point_cloud")) {
-        source.notes.push(format!("iteration {iteration} is drawn"));
-        source.file = Some(file);
+    part.file = if let Some((iteration, file)) = newest_iteration(&path.join("point_cloud")) {
+        part.notes.push(format!("iteration {iteration} is drawn"));
+        file
     } else if let Some(file) = there("point_cloud.ply").or_else(|| there("splat.ply")) {
-        source.file = Some(file);
+        file
+    } else if there("meta.json")
+        .or_else(|| there("lod-meta.json"))
+        .is_some()
+    {
+        // A SOG scene of several files.
+        path.to_owned()
     } else {
-        source.file = only_scene(path).map_err(io)?;
-    }
-    if source.file.is_none() {
-        return Err(why_none(path));
-    }
+        (only_scene(path).map_err(io)?).ok_or_else(|| why_none(path))?
+    };
     if let Some(arguments) = there("cfg_args")
         && let Ok(text) = std::fs::read_to_string(arguments)
         && text.contains("white_background=True")
     {
-        source.background = Some(Background::Color([1.0; 3]));
-        source
-            .notes
+        part.background = Some(Background::Color([1.0; 3]));
+        part.notes
             .push("the background is white, as cfg_args says".to_owned());
     }
-    Ok(source)
+    Ok(part)
 }
 
 /// The scene of the highest iteration in a folder `point_cloud`.
@@ -181,7 +237,9 @@ fn only_scene(folder: &Path) -> std::io::Result<Option<PathBuf>> {
         let extension = path
             .extension()
             .map(|e| format!(".{}", e.to_string_lossy()));
-        if path.is_file() && extension.is_some_and(|e| known.split(", ").any(|k| k == e)) {
+        // A .json may be anything.
+        let is_scene = |e: String| e != ".json" && known.split(", ").any(|k| k == e);
+        if path.is_file() && extension.is_some_and(is_scene) {
             found.push(path);
         }
     }
@@ -210,6 +268,13 @@ mod tests {
         std::fs::write(path, text).expect("written");
     }
 
+    fn of(folder: &Path) -> Result<Source, SourceError> {
+        Source::of(&SceneArguments {
+            scenes: vec![folder.to_owned()],
+            ..SceneArguments::default()
+        })
+    }
+
     #[test]
     fn inrias_output_is_its_highest_iteration() {
         let folder = tempfile::tempdir().expect("a folder");
@@ -226,8 +291,8 @@ mod tests {
             "cfg_args",
             "Namespace(sh_degree=3, white_background=True)",
         );
-        let source = Source::of(Some(folder.path())).expect("a scene");
-        let file = source.file.expect("a file");
+        let source = of(folder.path()).expect("a scene");
+        let (file, _) = &source.files[0];
         assert!(
             file.ends_with("iteration_30000/point_cloud.ply"),
             "{file:?}"
@@ -241,7 +306,7 @@ mod tests {
     fn folders_without_a_scene_say_what_they_hold() {
         let folder = tempfile::tempdir().expect("a folder");
         let refused = || {
-            let error = Source::of(Some(folder.path())).expect_err("no scene");
+            let error = of(folder.path()).expect_err("no scene");
             error.to_string()
         };
         assert!(refused().contains("holds no scene"), "{}", refused());
@@ -250,12 +315,12 @@ mod tests {
         touch(folder.path(), "nerfstudio_models/step.ckpt", "");
         assert!(refused().contains("ns-export"), "{}", refused());
         touch(folder.path(), "a.ply", "");
-        assert!(Source::of(Some(folder.path())).is_ok());
+        assert!(of(folder.path()).is_ok());
         touch(folder.path(), "b.spz", "");
-        assert!(Source::of(Some(folder.path())).is_err());
+        assert!(of(folder.path()).is_err());
         touch(folder.path(), "splat.ply", "");
-        let source = Source::of(Some(folder.path())).expect("nerfstudio's");
-        assert!(source.file.expect("a file").ends_with("splat.ply"));
+        let source = of(folder.path()).expect("nerfstudio's");
+        assert!(source.files[0].0.ends_with("splat.ply"));
     }
 
     #[test]

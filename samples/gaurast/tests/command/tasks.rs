@@ -592,3 +592,63 @@ fn counts_a_pixel_are_drawn() {
         .to_rgb8();
     assert!(heat.pixels().any(|pixel| pixel.0 == [255; 3]));
 }
+
+#[gaurast_runner::test]
+fn scenes_are_put_together() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, colour) in [("red.ply", RED), ("green.ply", GREEN)] {
+        std::fs::write(folder.path().join(name), scene(0.3, &[([0.0; 3], colour)]))
+            .expect("written");
+    }
+    let arguments = [
+        "red.ply",
+        "green.ply",
+        "--transform",
+        "move=-1,0,0",
+        "--transform",
+        "scale=0.5 move=1,0,0",
+        "--azimuth",
+        "0",
+        "--elevation",
+        "0",
+        "--size",
+        "64x32",
+    ];
+    succeeds(&folder, &arguments);
+    let picture = image::open(folder.path().join("red.png"))
+        .expect("a picture")
+        .to_rgb8();
+    let area = |channel: usize, left: u32| {
+        let pixels = (0..32).flat_map(|y| (left..left + 32).map(move |x| (x, y)));
+        pixels
+            .filter(|(x, y)| picture.get_pixel(*x, *y).0[channel] > 60)
+            .count() as f64
+    };
+    let (red, green) = (area(0, 0), area(1, 32));
+    assert!(red > 2.5 * green && green > 4.0, "{red} {green}");
+    assert_eq!((area(1, 0), area(0, 32)), (0.0, 0.0));
+    fails(
+        &folder,
+        &[
+            "red.ply",
+            "--transform",
+            "",
+            "--transform",
+            "",
+            "-o",
+            "a.png",
+        ],
+        "--transform is given 2 times, and there are 1 scenes",
+    );
+    let json = succeeds(&folder, &["info", "red.ply", "green.ply", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(
+        (&json["gaussians"], &json["sh_degree"]),
+        (&2.into(), &0.into())
+    );
+    let text = succeeds(&folder, &["info", "red.ply"]);
+    assert!(
+        text.contains("Gaussians   1") && text.contains("from 0.9"),
+        "{text}"
+    );
+}

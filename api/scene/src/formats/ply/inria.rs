@@ -38,7 +38,7 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     if count == 0 {
         return Err(Reason::Empty.at(Place::Element(VERTEX.to_owned())));
     }
-    let mut scene = Scene::with_capacity(degree, count);
+    let mut scene = Scene::try_with_capacity(degree, count)?;
     if flat {
         scene.metadata_mut().geometry = Some(Geometry::Surfel);
     }
