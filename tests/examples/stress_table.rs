@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use gaurast_bench::quads::QuadRenderer;
-use gaurast_scene::camera::{Camera, Model};
+use gaurast_scene::camera::{Camera, DEFAULT_NEAR, Model};
 use gaurast_scene::{GaussianShape, Scene};
 use gaurast_tests::contexts::{Context, Settings};
 use gaurast_tests::for_levels::levels;
@@ -87,6 +87,8 @@ fn for_quads(stress: &Stress) -> Option<(Scene, Camera)> {
         principal: camera.principal_point.map(f64::from),
         width: stress.size[0],
         height: stress.size[1],
+        near: DEFAULT_NEAR,
+        far: f64::INFINITY,
     };
     plain.then_some((scene, camera))
 }

@@ -5,9 +5,10 @@ use gaurast::gaussian_primitive_topology;
 
 use crate::device::Device;
 use crate::pipeline::BINDINGS;
-use crate::resource::Buffer;
+use crate::resource::{Buffer, Image};
 use crate::{DeviceScene, Target};
 use gaurast_scene::Camera;
+use gaurast_scene::camera::Model;
 
 /// A recorder of draws into a command buffer.
 pub(super) struct Recorder<'a> {
@@ -21,35 +22,43 @@ impl Recorder<'_> {
     /// Draws `scene` into the target's image, which is then in the layout of an attachment.
     pub(super) fn record(&self, target: &Target, scene: &DeviceScene, camera: &Camera) {
         let (image, pipeline) = (&target.image, &scene.pipeline);
-        let camera = camera.to_vulkan();
+        let mut vulkan = camera.to_vulkan();
+        if target.depths.is_some() {
+            vulkan = vulkan.depth_coefficients(DepthScale::of(camera).coefficients);
+        }
         let area = vk::Rect2D::default().extent(image.extent());
         let viewport = vk::Viewport::default()
             .width(area.extent.width as f32)
             .height(area.extent.height as f32)
             .max_depth(1.0);
-        let attachment = vk::RenderingAttachmentInfo::default()
-            .image_view(image.view())
-            .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
-            .load_op(vk::AttachmentLoadOp::CLEAR)
-            .store_op(vk::AttachmentStoreOp::STORE);
-        let attachments = [attachment];
+        let attachment = |image: &Image| {
+            vk::RenderingAttachmentInfo::default()
+                .image_view(image.view())
+                .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .store_op(vk::AttachmentStoreOp::STORE)
+        };
+        let depths = target.depths.as_ref().map(|(image, _)| image);
+        let attachments: Vec<_> = [image].into_iter().chain(depths).map(attachment).collect();
         let rendering = vk::RenderingInfo::default()
             .render_area(area)
             .layer_count(1)
             .color_attachments(&attachments);
         let buffers = scene.buffers.each_ref().map(Buffer::handle);
         use vk::PipelineStageFlags as Stage;
-        let to_attachment = image
-            .barrier(
-                vk::ImageLayout::UNDEFINED,
-                vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-            )
-            .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE);
-        self.barrier(
-            Stage::TRANSFER,
-            Stage::COLOR_ATTACHMENT_OUTPUT,
-            to_attachment,
-        );
+        for image in [image].into_iter().chain(depths) {
+            let to_attachment = image
+                .barrier(
+                    vk::ImageLayout::UNDEFINED,
+                    vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+                )
+                .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE);
+            self.barrier(
+                Stage::TRANSFER,
+                Stage::COLOR_ATTACHMENT_OUTPUT,
+                to_attachment,
+            );
+        }
         let raw = self.device.raw();
         let commands = self.commands;
         // SAFETY: the command buffer is recording; image, pipeline and buffers belong to the same
@@ -61,7 +70,7 @@ impl Recorder<'_> {
             raw.cmd_bind_vertex_buffers(commands, 0, &buffers, &[0; BINDINGS]);
             raw.cmd_set_viewport(commands, 0, &[viewport]);
             raw.cmd_set_scissor(commands, 0, &[area]);
-            (self.gaussian).cmd_set_gaussian_camera(commands, &camera);
+            (self.gaussian).cmd_set_gaussian_camera(commands, &vulkan);
             raw.cmd_draw(commands, scene.count, 1, 0, 0);
             raw.cmd_end_rendering(commands);
         }
@@ -85,6 +94,67 @@ impl Recorder<'_> {
                 &[],
                 &[barrier],
             );
+        }
+    }
+}
+
+/// How a camera's depths are held in 0 to 1, and what they are again.
+pub(super) struct DepthScale {
+    /// A depth z is held as the first plus the second divided by z; or times z, for parallel rays.
+    pub(super) coefficients: [f32; 2],
+    parallel: bool,
+}
+
+impl DepthScale {
+    pub(super) fn of(camera: &Camera) -> Self {
+        let (near, far) = (camera.near, camera.far);
+        let parallel = camera.model == Model::Orthographic;
+        let coefficients = if parallel {
+            [-near / (far - near), 1.0 / (far - near)]
+        } else {
+            // The reciprocal keeps its digits at every distance; nothing is at 0.
+            [0.0, near]
+        };
+        Self {
+            coefficients: coefficients.map(|c| c as f32),
+            parallel,
+        }
+    }
+
+    /// The depth that is held as `value`; infinite where nothing is, at 0.
+    pub(super) fn depth(&self, value: f32) -> f32 {
+        let [constant, factor] = self.coefficients;
+        if value == 0.0 {
+            f32::INFINITY
+        } else if self.parallel {
+            (value - constant) / factor
+        } else {
+            factor / value
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depths_come_back() {
+        let perspective = Camera::orbit(1, [8, 8]).remove(0);
+        let parallel = perspective.orthographic(4.0).with_planes(-2.0, 100.0);
+        for (camera, inverse) in [(perspective, true), (parallel, false)] {
+            let scale = DepthScale::of(&camera);
+            let [constant, factor] = scale.coefficients;
+            for depth in [0.3_f32, 1.0, 17.0, 99.0] {
+                let term = if inverse {
+                    factor / depth
+                } else {
+                    factor * depth
+                };
+                let back = scale.depth(constant + term);
+                assert!((back / depth - 1.0).abs() < 1e-4, "{depth} {back}");
+            }
+            assert_eq!(scale.depth(0.0), f32::INFINITY);
         }
     }
 }

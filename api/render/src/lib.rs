@@ -41,11 +41,12 @@ use ash::vk;
 use thiserror::Error;
 
 use device::{Device, Purpose};
-use draw::Recorder;
+use draw::{DepthScale, Recorder};
 use gaurast::gaussian_primitive_topology;
 use gaurast_picture::Picture;
+use gaurast_scene::camera::{CameraError, Model};
 use gaurast_scene::{Camera, GaussianShape, MAX_SH_DEGREE, Scene};
-pub use modes::{Geometry, Order, Precision};
+pub use modes::{Antialiasing, Geometry, Order, Precision};
 use pipeline::{BINDINGS, GaussianPipeline};
 use process_stats::processor_time;
 pub use query::Counter;
@@ -58,6 +59,9 @@ const STAGING: u64 = 64 << 20;
 
 /// The colour attachment's format: what a draw leaves is kept as it is.
 pub const COLOR_FORMAT: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+
+/// The format of the attachment of expected and median depths.
+const DEPTHS_FORMAT: vk::Format = vk::Format::R32G32_SFLOAT;
 
 /// Why rendering failed.
 #[derive(Debug, Error)]
@@ -105,6 +109,12 @@ pub enum RenderError {
         /// The most in a draw.
         max: u64,
     },
+    /// The camera cannot be drawn with.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The device doesn't draw modes together.
+    #[error("{0}")]
+    Combination(&'static str),
 }
 
 /// Names the call that a Vulkan error came from.
@@ -151,6 +161,10 @@ pub struct Settings {
     pub exponential_error: f32,
     /// What the contributions that are left out at a pixel may add up to.
     pub contribution_budget: f32,
+    /// What becomes of Gaussians that are smaller than a pixel.
+    pub antialiasing: Antialiasing,
+    /// Keep depths, too: see [`Frame::depth`].
+    pub depth: bool,
 }
 
 impl Default for Settings {
@@ -165,6 +179,57 @@ impl Default for Settings {
             precision: Precision::Fp32,
             exponential_error: 0.0,
             contribution_budget: 0.0,
+            antialiasing: Antialiasing::Dilate,
+            depth: false,
+        }
+    }
+}
+
+impl Settings {
+    /// Checks that the device draws these modes together, as `camera` sees it, and that the camera can be drawn with.
+    ///
+    /// # Errors
+    /// [`RenderError::Combination`], or [`RenderError::Camera`].
+    pub fn check(&self, camera: &Camera) -> Result<(), RenderError> {
+        camera.check()?;
+        let half = self.precision == Precision::Fp16;
+        let surfels = self.geometry == Geometry::Surfel;
+        let per_pixel = self.order == Order::PerPixel;
+        let panorama = camera.model == Model::Equirectangular;
+        let refused = [
+            (
+                surfels && half,
+                "flat Gaussians (2d) are not drawn in binary16 (fp16)",
+            ),
+            (
+                surfels && self.antialiasing == Antialiasing::Compensated,
+                "flat Gaussians (2d) are not drawn with compensated opacity",
+            ),
+            (
+                surfels && (panorama || camera.model == Model::Fisheye),
+                "flat Gaussians (2d) are drawn by pinhole and orthographic cameras alone",
+            ),
+            (
+                half && per_pixel,
+                "binary16 (fp16) goes with an order of the whole draw, not with the order per-pixel",
+            ),
+            (
+                half && panorama,
+                "panoramas are not drawn in binary16 (fp16)",
+            ),
+            (self.depth && half, "depths are not kept in binary16 (fp16)"),
+            (
+                self.depth && per_pixel,
+                "depths are not kept in the order per-pixel",
+            ),
+            (
+                self.depth && camera.model == Model::Orthographic && camera.far.is_infinite(),
+                "depths of an orthographic camera need a far plane",
+            ),
+        ];
+        match refused.into_iter().find(|(refused, _)| *refused) {
+            Some((_, sentence)) => Err(RenderError::Combination(sentence)),
+            None => Ok(()),
         }
     }
 }
@@ -174,6 +239,7 @@ pub struct DeviceScene {
     count: u32,
     strides: [u32; BINDINGS],
     stored_degree: u32,
+    settings: Settings,
     pipeline: GaussianPipeline,
     /// One for each of [`BINDINGS`].
     buffers: [Buffer; BINDINGS],
@@ -190,6 +256,12 @@ pub struct Frame {
     pub processor_time: Option<Duration>,
     /// The device's counters of the draw, in its order; none if it has none.
     pub counters: Vec<Counter>,
+    /// The expected and the median depth of every pixel, if the settings keep them; infinite where nothing is.
+    ///
+    /// Depth is the distance along the camera's axis, or from the eye for a fisheye and a panorama. The expected depth
+    /// is the reciprocal of the mean reciprocal, weighted as colours are (the mean itself for parallel rays); the
+    /// median is that of the Gaussian at which half of the light is gone, or of the last one.
+    pub depth: Option<Vec<[f32; 2]>>,
 }
 
 /// Where a frame goes.
@@ -198,6 +270,8 @@ pub struct Target {
     pub image: Image,
     /// Room for the pixels in memory of the host.
     pub readback: Buffer,
+    /// The attachment of depths and the room for them, if there are some.
+    depths: Option<(Image, Buffer)>,
 }
 
 impl Renderer {
@@ -261,6 +335,7 @@ impl Renderer {
             count: count as u32,
             strides,
             stored_degree: scene.sh_degree(),
+            settings,
             pipeline: self.pipeline(strides, scene.sh_degree(), settings)?,
             buffers: [
                 self.upload_bytes(bytemuck::cast_slice(scene.positions()))?,
@@ -285,6 +360,7 @@ impl Renderer {
     /// If Vulkan fails.
     pub fn set(&self, scene: &mut DeviceScene, settings: Settings) -> Result<(), RenderError> {
         scene.pipeline = self.pipeline(scene.strides, scene.stored_degree, settings)?;
+        scene.settings = settings;
         Ok(())
     }
 
@@ -353,13 +429,20 @@ impl Renderer {
     /// Draws `scene` as `camera` sees it, in a picture of the camera's size.
     ///
     /// # Errors
-    /// If the size is not within the device's limits, or Vulkan fails.
+    /// If the size is not within the device's limits, modes don't go together, or Vulkan fails.
     pub fn render(&mut self, scene: &DeviceScene, camera: &Camera) -> Result<Frame, RenderError> {
         let (width, height) = (camera.width, camera.height);
         check_size(&self.device, width, height)?;
+        scene.settings.check(camera)?;
+        let depth = scene.settings.depth;
         let target = match self.target.take() {
-            Some(target) if target.image.extent() == vk::Extent2D { width, height } => target,
-            _ => Target::new(&self.device, width, height)?,
+            Some(target)
+                if target.image.extent() == vk::Extent2D { width, height }
+                    && target.depths.is_some() == depth =>
+            {
+                target
+            }
+            _ => Target::with_depths(&self.device, width, height, depth)?,
         };
         let target = self.target.insert(target);
 
@@ -393,6 +476,19 @@ impl Renderer {
 
         let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
         target.readback.read(&mut pixels)?;
+        let depth = match &target.depths {
+            None => None,
+            Some((_, readback)) => {
+                let mut depths = vec![[0.0; 2]; width as usize * height as usize];
+                readback.read(&mut depths)?;
+                let scale = DepthScale::of(camera);
+                for (depths, [.., alpha]) in depths.iter_mut().zip(&pixels) {
+                    let reached = *alpha > 0.0;
+                    *depths = depths.map(|value| scale.depth(if reached { value } else { 0.0 }));
+                }
+                Some(depths)
+            }
+        };
         let counters = self.query.as_ref().map(CounterQuery::read).transpose()?;
         Ok(Frame {
             picture: Picture {
@@ -403,6 +499,7 @@ impl Renderer {
             time,
             processor_time,
             counters: counters.unwrap_or_default(),
+            depth,
         })
     }
 }
@@ -425,29 +522,48 @@ impl Target {
     /// # Errors
     /// If there is no memory for it, or Vulkan fails.
     pub fn new(device: &Arc<Device>, width: u32, height: u32) -> Result<Self, RenderError> {
-        let bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
+        Self::with_depths(device, width, height, false)
+    }
+
+    fn with_depths(
+        device: &Arc<Device>,
+        width: u32,
+        height: u32,
+        depth: bool,
+    ) -> Result<Self, RenderError> {
+        let extent = vk::Extent2D { width, height };
+        let image = |format| {
+            let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
+                | vk::ImageUsageFlags::TRANSFER_SRC
+                | vk::ImageUsageFlags::TRANSFER_DST;
+            Image::new(device, extent, format, usage)
+        };
+        let readback = |pixel: usize| {
+            let bytes = u64::from(width) * u64::from(height) * pixel as u64;
+            let usage = vk::BufferUsageFlags::TRANSFER_DST;
+            Buffer::new(device, bytes, usage, Memory::HostCached)
+        };
         Ok(Self {
-            image: Image::new(
-                device,
-                vk::Extent2D { width, height },
-                COLOR_FORMAT,
-                vk::ImageUsageFlags::COLOR_ATTACHMENT
-                    | vk::ImageUsageFlags::TRANSFER_SRC
-                    | vk::ImageUsageFlags::TRANSFER_DST,
-            )?,
-            readback: Buffer::new(
-                device,
-                bytes,
-                vk::BufferUsageFlags::TRANSFER_DST,
-                Memory::HostCached,
-            )?,
+            image: image(COLOR_FORMAT)?,
+            readback: readback(size_of::<[f32; 4]>())?,
+            depths: if depth {
+                Some((image(DEPTHS_FORMAT)?, readback(size_of::<[f32; 2]>())?))
+            } else {
+                None
+            },
         })
     }
 }
 
-/// Copies the drawn picture to the buffer that the host reads.
+/// Copies the drawn picture to the buffer that the host reads, and depths if there are some.
 pub fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target) {
-    let image = &target.image;
+    copy_image(device, commands, &target.image, &target.readback);
+    if let Some((image, readback)) = &target.depths {
+        copy_image(device, commands, image, readback);
+    }
+}
+
+fn copy_image(device: &Device, commands: vk::CommandBuffer, image: &Image, readback: &Buffer) {
     let to_source = image
         .barrier(
             vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
@@ -481,7 +597,7 @@ pub fn record_copy(device: &Device, commands: vk::CommandBuffer, target: &Target
             commands,
             image.handle(),
             vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
-            target.readback.handle(),
+            readback.handle(),
             &[region],
         );
         raw.cmd_pipeline_barrier(

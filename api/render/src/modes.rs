@@ -1,6 +1,9 @@
 //! Modes of the pipeline that change what a picture is, not what it costs.
 
-use gaurast::vk::{GaussianGeometryGAURAST, GaussianOrderGAURAST, GaussianPrecisionGAURAST};
+use gaurast::vk::{
+    GaussianAntialiasingGAURAST, GaussianGeometryGAURAST, GaussianOrderGAURAST,
+    GaussianPrecisionGAURAST,
+};
 use serde::{Deserialize, Serialize};
 
 /// What Gaussians are sorted by.
@@ -70,6 +73,26 @@ impl Precision {
         match self {
             Self::Fp32 => GaussianPrecisionGAURAST::FLOAT32,
             Self::Fp16 => GaussianPrecisionGAURAST::FLOAT16,
+        }
+    }
+}
+
+/// What becomes of Gaussians that are smaller than a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Antialiasing {
+    /// They are dilated and keep their opacity, as 3DGS does: what is far off looks too thick.
+    #[default]
+    Dilate,
+    /// Their opacity makes up for the dilation: for scenes that are trained so.
+    Compensated,
+}
+
+impl Antialiasing {
+    /// As the pipeline is told.
+    pub(crate) fn raw(self) -> GaussianAntialiasingGAURAST {
+        match self {
+            Self::Dilate => GaussianAntialiasingGAURAST::DILATE,
+            Self::Compensated => GaussianAntialiasingGAURAST::OPACITY_COMPENSATED,
         }
     }
 }

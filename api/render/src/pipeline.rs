@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use ash::vk;
 use gaurast::vk::{
-    GaussianAttributeLocationsGAURAST, PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST,
-    PipelineGaussianApproximationStateCreateInfoGAURAST, PipelineGaussianStateCreateInfoGAURAST,
+    GaussianAttributeLocationsGAURAST, GaussianResolveInputLocationsGAURAST,
+    PRIMITIVE_TOPOLOGY_GAUSSIAN_LIST_GAURAST, PipelineGaussianApproximationStateCreateInfoGAURAST,
+    PipelineGaussianStateCreateInfoGAURAST,
 };
 
 use crate::device::Device;
-use crate::{During, RenderError, Settings};
+use crate::{DEPTHS_FORMAT, During, RenderError, Settings};
 use gaurast_scene::GaussianShape;
 
 /// Vertex buffers: positions, shapes, spherical harmonics.
@@ -28,7 +29,8 @@ pub(super) struct GaussianPipeline {
 
 impl GaussianPipeline {
     /// A pipeline for vertex buffers of `strides`, that draws by `settings` (with a degree that is
-    /// stored) into an attachment of `format`, in place of what it holds.
+    /// stored) into an attachment of `format`, in place of what it holds; and depths into one of [`DEPTHS_FORMAT`] after it
+    /// if the settings have them.
     pub(super) fn new(
         device: &Arc<Device>,
         strides: [u32; BINDINGS],
@@ -64,13 +66,17 @@ impl GaussianPipeline {
             .rasterization_samples(vk::SampleCountFlags::TYPE_1);
         // Without blending the attachment takes (C, 1 - T) itself.
         let attachments = [vk::PipelineColorBlendAttachmentState::default()
-            .color_write_mask(vk::ColorComponentFlags::RGBA)];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
+            .color_write_mask(vk::ColorComponentFlags::RGBA); 2];
+        let formats = [format, DEPTHS_FORMAT];
+        let count = if settings.depth { 2 } else { 1 };
+        let blend =
+            vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments[..count]);
+        let module = ShaderModule::new(device, settings.depth)?;
+        let stages = module.stages();
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
-        let formats = [format];
         let mut rendering =
-            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats[..count]);
         let mut gaussian = PipelineGaussianStateCreateInfoGAURAST::default()
             .spherical_harmonics_degree(settings.sh_degree)
             .alpha_floor(settings.alpha_floor)
@@ -78,6 +84,7 @@ impl GaussianPipeline {
             .order(settings.order.raw())
             .geometry(settings.geometry.raw())
             .precision(settings.precision.raw())
+            .antialiasing(settings.antialiasing.raw())
             .low_pass_variance(settings.geometry.low_pass_variance())
             .attribute_locations(
                 GaussianAttributeLocationsGAURAST::default()
@@ -87,10 +94,18 @@ impl GaussianPipeline {
                     .opacity(3)
                     .first_spherical_harmonics(FIRST_SH),
             );
+        if settings.depth {
+            gaussian = gaussian.resolve_input_locations(
+                GaussianResolveInputLocationsGAURAST::default()
+                    .accumulated_color(0)
+                    .depth(1),
+            );
+        }
         let mut approximation = PipelineGaussianApproximationStateCreateInfoGAURAST::default()
             .exponential_error(settings.exponential_error)
             .contribution_budget(settings.contribution_budget);
         let create_info = vk::GraphicsPipelineCreateInfo::default()
+            .stages(&stages)
             .vertex_input_state(&vertex_input)
             .input_assembly_state(&input_assembly)
             .viewport_state(&viewport)
@@ -115,6 +130,55 @@ impl GaussianPipeline {
 
     pub(super) fn handle(&self) -> vk::Pipeline {
         self.handle
+    }
+}
+
+/// The shader that hands a pixel's colour and depths on, or none.
+struct ShaderModule {
+    handle: vk::ShaderModule,
+    device: Arc<Device>,
+}
+
+impl ShaderModule {
+    /// The module, if depths are `wanted`.
+    fn new(device: &Arc<Device>, wanted: bool) -> Result<Self, RenderError> {
+        let mut module = Self {
+            handle: vk::ShaderModule::null(),
+            device: device.clone(),
+        };
+        if wanted {
+            let words: Vec<u32> = include_bytes!("shaders/depths.frag.spv")
+                .chunks_exact(4)
+                .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+                .collect();
+            let create_info = vk::ShaderModuleCreateInfo::default().code(&words);
+            // SAFETY: the structure is valid, and the code is a fragment shader of SPIR-V.
+            module.handle = unsafe { device.raw().create_shader_module(&create_info, None) }
+                .during("vkCreateShaderModule")?;
+        }
+        Ok(module)
+    }
+
+    /// The pipeline's stages of it.
+    fn stages(&self) -> Vec<vk::PipelineShaderStageCreateInfo<'static>> {
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::FRAGMENT)
+            .module(self.handle)
+            .name(c"main");
+        if self.handle == vk::ShaderModule::null() {
+            Vec::new()
+        } else {
+            vec![stage]
+        }
+    }
+}
+
+impl Drop for ShaderModule {
+    fn drop(&mut self) {
+        // SAFETY: pipelines outlive the modules that they are made of; the handle may be null.
+        unsafe {
+            self.device.raw().destroy_shader_module(self.handle, None);
+        }
     }
 }
 

@@ -18,7 +18,12 @@ pub enum Model {
     Fisheye,
     /// A panorama of longitude and latitude: focal lengths are pixels per radian.
     Equirectangular,
+    /// Parallel rays: focal lengths are pixels per unit of length.
+    Orthographic,
 }
+
+/// The near plane of 3DGS, in the scene's units.
+pub const DEFAULT_NEAR: f64 = 0.2;
 
 /// A camera with its picture's size.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -38,6 +43,28 @@ pub struct Camera {
     pub width: u32,
     /// The picture's height in pixels.
     pub height: u32,
+    /// Gaussians are drawn beyond this depth, which is positive unless the camera is orthographic.
+    #[serde(default = "default_near", skip_serializing_if = "is_default_near")]
+    pub near: f64,
+    /// Gaussians are drawn before this depth, which may be infinite.
+    #[serde(default = "infinity", skip_serializing_if = "is_infinite")]
+    pub far: f64,
+}
+
+fn default_near() -> f64 {
+    DEFAULT_NEAR
+}
+
+fn is_default_near(near: &f64) -> bool {
+    *near == DEFAULT_NEAR
+}
+
+fn infinity() -> f64 {
+    f64::INFINITY
+}
+
+fn is_infinite(value: &f64) -> bool {
+    value.is_infinite()
 }
 
 /// Why a camera given by hand is none.
@@ -55,6 +82,12 @@ pub enum CameraError {
     /// The field of view is not between 0 and 180 degrees.
     #[error("the field of view is not between 0 and 180 degrees")]
     FieldOfView,
+    /// A focal length is zero, or too large for binary32.
+    #[error("the camera's focal length is zero or beyond binary32, which it is drawn in")]
+    Focal,
+    /// The near plane is not in front of the camera, or the far plane not behind it.
+    #[error("the near plane is not in front of the camera, or the far plane is not beyond it")]
+    Planes,
 }
 
 impl Camera {
@@ -107,6 +140,60 @@ impl Camera {
             principal: [width / 2.0, height / 2.0],
             width: size[0],
             height: size[1],
+            near: DEFAULT_NEAR,
+            far: f64::INFINITY,
+        }
+    }
+
+    /// Checks that the camera can be drawn with: its numbers are finite, as the device's too, and its planes in order.
+    ///
+    /// # Errors
+    /// [`CameraError::NotFinite`], [`CameraError::Focal`] or [`CameraError::Planes`].
+    pub fn check(&self) -> Result<(), CameraError> {
+        let rotation = self.rotation.as_flattened();
+        let binary32 = rotation.iter().chain(&self.principal);
+        if !binary32.copied().all(|x| (x as f32).is_finite())
+            || !self.eye.iter().all(|x| x.is_finite())
+        {
+            return Err(CameraError::NotFinite);
+        }
+        if !self
+            .focal
+            .iter()
+            .all(|f| (*f as f32).is_finite() && *f as f32 > 0.0)
+        {
+            return Err(CameraError::Focal);
+        }
+        let (near, far) = (self.near as f32, self.far as f32);
+        let in_front = near > 0.0 || self.model == Model::Orthographic;
+        if !near.is_finite() || !in_front || far.is_nan() || far <= near {
+            return Err(CameraError::Planes);
+        }
+        Ok(())
+    }
+
+    /// The camera with other near and far planes.
+    #[must_use]
+    pub fn with_planes(&self, near: f64, far: f64) -> Self {
+        Self { near, far, ..*self }
+    }
+
+    /// The camera with the picture magnified about the point straight ahead.
+    #[must_use]
+    pub fn zoomed(&self, factor: f64) -> Self {
+        Self {
+            focal: self.focal.map(|focal| focal * factor),
+            ..*self
+        }
+    }
+
+    /// A camera with the same axes and parallel rays, which shows what is `distance` ahead as large as a pinhole does.
+    #[must_use]
+    pub fn orthographic(&self, distance: f64) -> Self {
+        Self {
+            model: Model::Orthographic,
+            focal: self.focal.map(|focal| focal / distance),
+            ..*self
         }
     }
 
@@ -192,13 +279,14 @@ impl Camera {
         })
     }
 
-    /// The camera as a draw takes it, with the default planes: 0.2 and infinity.
+    /// The camera as a draw takes it.
     pub fn to_vulkan(&self) -> GaussianCameraGAURAST<'static> {
         let rotation = self.rotation.as_flattened();
         let model = match self.model {
             Model::Pinhole => GaussianCameraModelGAURAST::PINHOLE,
             Model::Fisheye => GaussianCameraModelGAURAST::FISHEYE,
             Model::Equirectangular => GaussianCameraModelGAURAST::EQUIRECTANGULAR,
+            Model::Orthographic => GaussianCameraModelGAURAST::ORTHOGRAPHIC,
         };
         GaussianCameraGAURAST::default()
             .model(model)
@@ -206,6 +294,8 @@ impl Camera {
             .eye(self.eye)
             .focal_length(self.focal.map(|f| f as f32))
             .principal_point(self.principal.map(|c| c as f32))
+            .near_plane(self.near as f32)
+            .far_plane(self.far as f32)
     }
 }
 
@@ -249,6 +339,45 @@ mod tests {
         assert_eq!(look(o, z, o, 50.), Some(CameraError::NoUp));
         assert_eq!(look(o, z, y, 180.), Some(CameraError::FieldOfView));
         assert_eq!(look(o, [f64::NAN; 3], y, 50.), Some(CameraError::NotFinite));
+    }
+
+    #[test]
+    fn cameras_that_cannot_be_drawn_with_are_told() {
+        let camera = Camera::orbit(1, [8, 8]).remove(0);
+        assert_eq!(camera.check(), Ok(()));
+        let with = |change: &dyn Fn(&mut Camera)| {
+            let mut changed = camera.clone();
+            change(&mut changed);
+            changed.check().err()
+        };
+        assert_eq!(with(&|c| c.focal[0] = 1e308), Some(CameraError::Focal));
+        assert_eq!(with(&|c| c.focal[1] = 1e-60), Some(CameraError::Focal));
+        assert_eq!(
+            with(&|c| c.principal[0] = 1e39),
+            Some(CameraError::NotFinite)
+        );
+        assert_eq!(with(&|c| c.eye[2] = f64::NAN), Some(CameraError::NotFinite));
+        assert_eq!(with(&|c| c.near = 0.0), Some(CameraError::Planes));
+        assert_eq!(with(&|c| c.far = 0.1), Some(CameraError::Planes));
+        let orthographic = Camera {
+            near: -1.0,
+            ..camera.orthographic(4.0)
+        };
+        assert_eq!(orthographic.check(), Ok(()));
+        assert!((orthographic.focal[0] - camera.focal[0] / 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn planes_are_in_a_stored_camera_only_where_they_are_others() {
+        let camera = Camera::orbit(1, [8, 8]).remove(0);
+        let text = serde_json::to_string(&camera).expect("text");
+        assert!(!text.contains("near") && !text.contains("far"), "{text}");
+        let camera = camera.with_planes(0.01, 50.0);
+        let text = serde_json::to_string(&camera).expect("text");
+        assert_eq!(
+            serde_json::from_str::<Camera>(&text).expect("a camera"),
+            camera
+        );
     }
 
     #[test]

@@ -56,6 +56,10 @@ pub enum Place {
     Byte(u64),
     /// The header, or a field of it.
     Header(&'static str),
+    /// An entry of an archive, or a file beside the one that names it.
+    Entry(String),
+    /// A part of a JSON document.
+    Part(String),
     /// An element of a PLY file.
     Element(String),
     /// A property of an element of a PLY file.
@@ -74,6 +78,8 @@ impl fmt::Display for Place {
             Self::Line(line) => write!(f, "line {line}"),
             Self::Byte(byte) => write!(f, "byte {byte}"),
             Self::Header(field) => write!(f, "header, {field}"),
+            Self::Entry(name) => write!(f, "entry {name:?}"),
+            Self::Part(part) => f.write_str(part),
             Self::Element(element) => write!(f, "element {element}"),
             Self::Property { element, property } => {
                 write!(f, "element {element}, property {property}")
@@ -172,6 +178,40 @@ pub enum Reason {
     /// The compressed stream is damaged.
     #[error("the gzip stream is damaged ({0})")]
     Gzip(io::Error),
+    /// A zstd stream is damaged.
+    #[error("the zstd stream is damaged ({0})")]
+    Zstd(String),
+    /// A zip archive is damaged.
+    #[error("the zip archive is damaged ({0})")]
+    Zip(String),
+    /// A WebP image is damaged.
+    #[error("the WebP image is damaged ({0})")]
+    Image(String),
+    /// A JSON document is malformed, or not what the format demands.
+    #[error("the JSON is malformed ({0})")]
+    Json(String),
+    /// A name that leads out of the folder or the archive, or is none.
+    #[error("this is not the name of a file beside the one that has it")]
+    Name,
+    /// A file that another one names cannot be read.
+    #[error("it cannot be read ({0})")]
+    Companion(io::Error),
+    /// An image of too few or far too many pixels.
+    #[error("{width}x{height} pixels are not what {expected} entries need")]
+    Pixels {
+        /// The image's width.
+        width: u32,
+        /// The image's height.
+        height: u32,
+        /// Entries that it should hold.
+        expected: u64,
+    },
+    /// What the file asks for is known, and not done; or is unknown. A whole clause.
+    #[error("{0}")]
+    Unsupported(String),
+    /// There is not enough memory.
+    #[error("{0} bytes of memory cannot be had")]
+    Memory(u64),
     /// A field holds a value outside its range.
     #[error("{found} is outside {range}")]
     Range {
@@ -183,6 +223,9 @@ pub enum Reason {
     /// There is no Gaussian.
     #[error("it holds no Gaussians")]
     Empty,
+    /// The format is unknown; becomes [`SceneError::UnknownFormat`].
+    #[error("this is not a scene file of a known kind ({0})")]
+    UnknownFormat(String),
     /// The format has no reader; becomes [`SceneError::NotReadYet`].
     #[error("{0} files are not read yet")]
     NotReadYet(&'static str),
@@ -210,6 +253,7 @@ impl Fault {
     pub(crate) fn of(self, path: &Path) -> SceneError {
         let path = path.to_owned();
         match self.reason {
+            Reason::UnknownFormat(known) => SceneError::UnknownFormat { path, known },
             Reason::NotReadYet(format) => SceneError::NotReadYet { path, format },
             Reason::Io(source) => SceneError::Io { path, source },
             reason => SceneError::Malformed {

@@ -1,8 +1,8 @@
-//! A camera that has the whole scene in its picture.
+//! Cameras that suit a scene: one that has all of it in its picture, and one that stands inside.
 
 use glam::DVec3;
 
-use crate::camera::Camera;
+use crate::camera::{Camera, CameraError, DEFAULT_NEAR};
 use crate::scene::Scene;
 
 /// The part of the scene's opacity that lies outside the framed box at each end of each axis.
@@ -19,58 +19,261 @@ const MARGIN: f64 = 1.2;
 /// y down and z forward.
 const FROM: DVec3 = DVec3::new(0.35, -0.35, -1.0);
 
+/// The direction upwards in scenes whose files say nothing.
+pub const DEFAULT_UP: [f64; 3] = [0.0, -1.0, 0.0];
+
+/// The least half of the framed box's side, where nothing tells a size.
+const LEAST: f64 = 1e-3;
+
+/// A box around what is opaque of a scene, in the scene's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// The middle.
+    pub centre: [f64; 3],
+    /// Half of each side; positive.
+    pub half: [f64; 3],
+}
+
+impl Extent {
+    /// The box around most of `scene`'s opacity.
+    pub fn of(scene: &Scene) -> Self {
+        let sample = sample(scene);
+        let (min, max) = bounds(sample.iter().map(|s| (s.position, s.opacity)).collect());
+        let half = (max - min) / 2.0;
+        // A point is framed, too: as large as what is drawn of it.
+        let size = typical_size(&sample);
+        let least = if size > 0.0 {
+            (2.0 * size).min(1e30)
+        } else if half.max_element() > 0.0 {
+            LEAST * half.max_element()
+        } else {
+            LEAST
+        };
+        Self {
+            centre: ((min + max) / 2.0).into(),
+            half: half.max(DVec3::splat(least)).into(),
+        }
+    }
+
+    /// Half of the box's diagonal.
+    pub fn radius(&self) -> f64 {
+        DVec3::from_array(self.half).length()
+    }
+
+    /// A near plane for cameras in and around the box: that of 3DGS, or nearer where the scene is small.
+    pub fn near(&self) -> f64 {
+        DEFAULT_NEAR.min(self.radius() / 5.0)
+    }
+
+    /// How far the box reaches towards `direction`, a unit vector, from its middle.
+    fn reach(&self, direction: DVec3) -> f64 {
+        DVec3::from_array(self.half).dot(direction.abs())
+    }
+}
+
+/// How a scene is looked at from outside. What is not given suits the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Framing {
+    /// Degrees around the scene, from the front (from where the camera looks along +z) to its right.
+    pub azimuth: Option<f64>,
+    /// Degrees above the horizon, at most 90.
+    pub elevation: Option<f64>,
+    /// From the scene's middle, in its units.
+    pub distance: Option<f64>,
+    /// How much larger than framed the picture is.
+    pub zoom: f64,
+    /// The direction upwards in the scene.
+    pub up: [f64; 3],
+    /// The vertical field of view in degrees, more than 0 and less than 180.
+    pub fov: f64,
+    /// The picture's size in pixels.
+    pub size: [u32; 2],
+}
+
+impl Framing {
+    /// A framing that leaves everything to the scene.
+    pub fn new(fov: f64, size: [u32; 2]) -> Self {
+        Self {
+            azimuth: None,
+            elevation: None,
+            distance: None,
+            zoom: 1.0,
+            up: DEFAULT_UP,
+            fov,
+            size,
+        }
+    }
+
+    /// The camera that looks at the middle of `extent`.
+    ///
+    /// # Errors
+    /// [`CameraError::NoUp`] if up is zero, and others for numbers that are not finite.
+    pub fn camera(&self, extent: &Extent) -> Result<Camera, CameraError> {
+        let centre = DVec3::from_array(extent.centre);
+        let (from, up) = self.direction()?;
+        let eye = centre + from;
+        let looking = Camera::look_at(eye.into(), centre.into(), up.into(), self.fov, self.size);
+        let mut camera = match looking {
+            // The scene is so far out that the direction is lost in rounding.
+            Err(CameraError::NoDirection | CameraError::NoUp) => Camera::new(
+                [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
+                eye.into(),
+                self.fov,
+                self.size,
+            ),
+            looking => looking?,
+        };
+        let [right, down, forward] = camera.rotation.map(DVec3::from_array);
+        let half = DVec3::from_array(extent.half);
+        // The distance at which every corner of the box is within the picture.
+        let tangents = [
+            camera.principal[0] / camera.focal[0] / MARGIN,
+            camera.principal[1] / camera.focal[1] / MARGIN,
+        ];
+        let framed = (0..8)
+            .map(|corner| {
+                let sign = |bit: u32| if corner & (1 << bit) == 0 { -1.0 } else { 1.0 };
+                let corner = half * DVec3::new(sign(0), sign(1), sign(2));
+                let [x, y] = [corner.dot(right).abs(), corner.dot(down).abs()];
+                (x / tangents[0]).max(y / tangents[1]) - corner.dot(forward)
+            })
+            .fold(0.0, f64::max);
+        let distance = self.distance.unwrap_or(framed);
+        camera.eye = (centre - forward * distance).into();
+        // Half of the way to the box, where 3DGS's plane is not nearer anyway.
+        let nearest = distance - extent.reach(forward);
+        let near = if nearest > 0.0 {
+            nearest / 2.0
+        } else {
+            extent.near()
+        };
+        Ok(camera
+            .with_planes(near.min(DEFAULT_NEAR), f64::INFINITY)
+            .zoomed(self.zoom))
+    }
+
+    /// From the middle to the eye, and what is upwards in the picture.
+    fn direction(&self) -> Result<(DVec3, DVec3), CameraError> {
+        let given = self.azimuth.is_some() || self.elevation.is_some();
+        if !given && self.up == DEFAULT_UP {
+            return Ok((FROM, DVec3::from_array(self.up)));
+        }
+        let (default_azimuth, default_elevation) = default_angles();
+        let azimuth = self.azimuth.unwrap_or(default_azimuth).to_radians();
+        let elevation = self.elevation.unwrap_or(default_elevation).to_radians();
+        if !(azimuth.is_finite() && elevation.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        let up = (DVec3::from_array(self.up).try_normalize()).ok_or(CameraError::NoUp)?;
+        let front = front(up);
+        let side = up.cross(front);
+        let level = azimuth.cos() * front + azimuth.sin() * side;
+        let from = elevation.cos() * level + elevation.sin() * up;
+        // Straight from above or below, the picture's upper edge is the far or the near one.
+        let upwards = if elevation.cos().abs() < 1e-6 {
+            -level * elevation.sin().signum()
+        } else {
+            up
+        };
+        Ok((from, upwards))
+    }
+}
+
+/// The azimuth and the elevation of a framing that doesn't give them, in degrees.
+pub fn default_angles() -> (f64, f64) {
+    let level = FROM.x.hypot(FROM.z);
+    (
+        FROM.x.atan2(-FROM.z).to_degrees(),
+        (-FROM.y).atan2(level).to_degrees(),
+    )
+}
+
+/// The direction of azimuth 0: towards -z, or as near to it as is level.
+fn front(up: DVec3) -> DVec3 {
+    let level = |direction: DVec3| direction - direction.dot(up) * up;
+    let towards = level(DVec3::NEG_Z);
+    if towards.length() > 0.1 {
+        towards.normalize()
+    } else {
+        level(DVec3::Y).normalize()
+    }
+}
+
 /// A camera that looks forward at `scene` from a little above, with what is opaque of it in
 /// a picture of `size` pixels and a vertical field of view of `fov` degrees (more than 0, less
 /// than 180).
 pub fn frame(scene: &Scene, fov: f64, size: [u32; 2]) -> Camera {
-    let (min, max) = bounds(scene);
-    let centre = (min + max) / 2.0;
-    // A point is framed, too.
-    let half = ((max - min) / 2.0).max(DVec3::splat(1e-3));
-    let eye = centre + FROM;
-    let up = [0.0, -1.0, 0.0];
-    let mut camera =
-        Camera::look_at(eye.into(), centre.into(), up, fov, size).unwrap_or_else(|_| {
-            // The scene is so far out that FROM is lost in rounding.
-            Camera::new(
-                [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
-                eye.into(),
-                fov,
-                size,
-            )
-        });
-    let [right, down, forward] = camera.rotation.map(DVec3::from_array);
-    // The distance at which every corner of the box is within the picture.
-    let tangents = [
-        camera.principal[0] / camera.focal[0] / MARGIN,
-        camera.principal[1] / camera.focal[1] / MARGIN,
-    ];
-    let distance = (0..8)
-        .map(|corner| {
-            let sign = |bit: u32| if corner & (1 << bit) == 0 { -1.0 } else { 1.0 };
-            let corner = half * DVec3::new(sign(0), sign(1), sign(2));
-            let [x, y] = [corner.dot(right).abs(), corner.dot(down).abs()];
-            (x / tangents[0]).max(y / tangents[1]) - corner.dot(forward)
-        })
-        .fold(0.0, f64::max);
-    camera.eye = (centre - forward * distance).into();
-    camera
+    let extent = Extent::of(scene);
+    Framing::new(fov, size).camera(&extent).unwrap_or_else(|_| {
+        Camera::new(
+            [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]],
+            extent.centre,
+            fov,
+            size,
+        )
+    })
 }
 
-/// Opposite corners of a box around most of the scene's opacity.
-fn bounds(scene: &Scene) -> (DVec3, DVec3) {
+/// A camera in the middle of the scene that looks along `azimuth` degrees (0 looks along +z, as from the front), level.
+///
+/// # Errors
+/// [`CameraError::NoUp`] if `up` is zero, and others for numbers that are not finite.
+pub fn inside(
+    extent: &Extent,
+    azimuth: f64,
+    up: [f64; 3],
+    fov: f64,
+    size: [u32; 2],
+) -> Result<Camera, CameraError> {
+    let framing = Framing {
+        azimuth: Some(azimuth),
+        elevation: Some(0.0),
+        up,
+        ..Framing::new(fov, size)
+    };
+    let mut camera = framing.camera(extent)?;
+    camera.eye = extent.centre;
+    Ok(camera.with_planes(extent.near() / 4.0, f64::INFINITY))
+}
+
+/// What is looked at of a Gaussian.
+struct Sample {
+    position: DVec3,
+    opacity: f64,
+    /// Its greatest standard deviation.
+    size: f64,
+}
+
+fn sample(scene: &Scene) -> Vec<Sample> {
     let step = scene.len().div_ceil(SAMPLE).max(1);
-    let mut sample: Vec<(DVec3, f64)> = scene
+    scene
         .positions()
         .iter()
         .zip(scene.shapes())
         .step_by(step)
-        .map(|(position, shape)| {
-            let position = position.map(f64::from);
-            (DVec3::from_array(position), f64::from(shape.opacity))
+        .map(|(position, shape)| Sample {
+            position: DVec3::from_array(position.map(f64::from)),
+            opacity: f64::from(shape.opacity),
+            size: shape.scale.iter().copied().fold(0.0, f32::max).into(),
         })
-        .filter(|(position, opacity)| position.is_finite() && *opacity > 0.0 && *opacity < 1e6)
+        .filter(|s| s.position.is_finite() && s.opacity > 0.0 && s.opacity < 1e6)
+        .collect()
+}
+
+/// The median of the finite sizes; 0 if there are none.
+fn typical_size(sample: &[Sample]) -> f64 {
+    let mut sizes: Vec<f64> = (sample.iter().map(|s| s.size))
+        .filter(|size| size.is_finite())
         .collect();
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let middle = sizes.len() / 2;
+    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Opposite corners of a box around most of the opacity.
+fn bounds(mut sample: Vec<(DVec3, f64)>) -> (DVec3, DVec3) {
     let total: f64 = sample.iter().map(|(_, opacity)| opacity).sum();
     let (mut min, mut max) = (DVec3::ZERO, DVec3::ZERO);
     for axis in 0..3 {
@@ -96,6 +299,20 @@ mod tests {
     use super::*;
     use crate::camera::DEFAULT_FOV;
     use crate::scene::GaussianShape;
+
+    /// A scene of Gaussians of this size at `positions`.
+    fn scene(scale: f32, positions: impl IntoIterator<Item = [f32; 3]>) -> Scene {
+        let mut scene = Scene::with_capacity(0, 0);
+        let shape = GaussianShape {
+            scale: [scale; 3],
+            opacity: 0.9,
+            ..GaussianShape::default()
+        };
+        for position in positions {
+            scene.push(position, shape, &[[0.0; 3]]);
+        }
+        scene
+    }
 
     /// A cube of points around (10, 20, 30), and a few far outliers that are not framed.
     #[test]
@@ -129,6 +346,7 @@ mod tests {
             assert!(extent.iter().any(|e| *e > 0.6), "{extent:?}");
             // Seen from above: y points down.
             assert!(camera.eye[1] < 20.0 && camera.eye[2] < 30.0);
+            assert_eq!(camera.near, DEFAULT_NEAR);
         }
     }
 
@@ -152,5 +370,84 @@ mod tests {
                 .iter()
                 .all(|c| c.is_finite())
         );
+    }
+
+    #[test]
+    fn a_tiny_scene_lies_beyond_the_near_plane() {
+        for size in [0.02_f32, 1e-4, 1e-6] {
+            let corners = [[-1.0, 0.3, 1.0], [1.0, -0.2, -1.0], [0.0, 0.0, 0.0]];
+            let scene = scene(0.05 * size, corners.map(|c| c.map(|x: f32| x * size)));
+            let camera = frame(&scene, DEFAULT_FOV, [640, 360]);
+            let [_, _, forward] = camera.rotation.map(DVec3::from_array);
+            let mut spread = 0.0_f64;
+            for position in scene.positions() {
+                let position = position.map(f64::from);
+                let depth =
+                    (DVec3::from_array(position) - DVec3::from_array(camera.eye)).dot(forward);
+                assert!(depth > camera.near, "{size}: {depth} {}", camera.near);
+                let at = camera.project(position).expect("in front");
+                spread = spread.max((at[1] - 180.0).abs());
+            }
+            assert!(spread > 60.0, "{size}: {spread}");
+            assert_eq!(camera.check(), Ok(()));
+        }
+    }
+
+    #[test]
+    fn one_gaussian_fills_its_picture() {
+        let camera = frame(&scene(0.3, [[5.0, 6.0, 7.0]]), DEFAULT_FOV, [100, 100]);
+        let distance = (DVec3::from_array(camera.eye) - DVec3::new(5.0, 6.0, 7.0)).length();
+        let pixels = camera.focal[0] * 0.3 / distance;
+        assert!((10.0..40.0).contains(&pixels), "{pixels}");
+    }
+
+    #[test]
+    fn angles_go_around_the_scene() {
+        let extent = Extent {
+            centre: [1.0, 2.0, 3.0],
+            half: [1.0; 3],
+        };
+        let at = |azimuth, elevation, up| {
+            let framing = Framing {
+                azimuth: Some(azimuth),
+                elevation: Some(elevation),
+                distance: Some(10.0),
+                up,
+                ..Framing::new(DEFAULT_FOV, [64, 64])
+            };
+            let camera = framing.camera(&extent).expect("a camera");
+            DVec3::from_array(camera.eye) - DVec3::from_array(extent.centre)
+        };
+        let near = |a: DVec3, b: [f64; 3]| assert!(a.abs_diff_eq(b.into(), 1e-9), "{a} {b:?}");
+        near(at(0.0, 0.0, DEFAULT_UP), [0.0, 0.0, -10.0]);
+        near(at(90.0, 0.0, DEFAULT_UP), [10.0, 0.0, 0.0]);
+        near(at(-180.0, 0.0, DEFAULT_UP), [0.0, 0.0, 10.0]);
+        near(at(45.0, 90.0, DEFAULT_UP), [0.0, -10.0, 0.0]);
+        near(at(0.0, -90.0, DEFAULT_UP), [0.0, 10.0, 0.0]);
+        // With z upwards, the front is where y is great.
+        near(at(0.0, 0.0, [0.0, 0.0, 1.0]), [0.0, 10.0, 0.0]);
+        near(at(0.0, 90.0, [0.0, 0.0, 2.0]), [0.0, 0.0, 10.0]);
+        let (azimuth, elevation) = default_angles();
+        near(
+            at(azimuth, elevation, DEFAULT_UP),
+            (FROM.normalize() * 10.0).to_array(),
+        );
+        let no_up = Framing {
+            up: [0.0; 3],
+            ..Framing::new(DEFAULT_FOV, [64, 64])
+        };
+        assert_eq!(no_up.camera(&extent), Err(CameraError::NoUp));
+    }
+
+    #[test]
+    fn inside_is_in_the_middle_and_level() {
+        let extent = Extent {
+            centre: [1.0, 2.0, 3.0],
+            half: [1.0; 3],
+        };
+        let camera = inside(&extent, 0.0, DEFAULT_UP, DEFAULT_FOV, [64, 32]).expect("a camera");
+        assert_eq!(camera.eye, extent.centre);
+        assert!((camera.rotation[2][2] - 1.0).abs() < 1e-12);
+        assert!(camera.near < 0.06);
     }
 }

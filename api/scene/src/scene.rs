@@ -2,6 +2,12 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use rayon::prelude::*;
+
+use crate::error::{Fault, Place, Reason};
+use crate::metadata::{Antialiasing, Geometry, Metadata};
+use crate::transform::{Motion, Transform};
+
 /// The value of the constant spherical harmonic, 1 / (2 sqrt(pi)).
 pub const SH_C0: f64 = 0.282_094_791_773_878_14;
 
@@ -31,6 +37,7 @@ pub struct Scene {
     shapes: Vec<GaussianShape>,
     sh_degree: u32,
     sh: Vec<[f32; 3]>,
+    metadata: Metadata,
 }
 
 impl Scene {
@@ -48,7 +55,134 @@ impl Scene {
             shapes: Vec::with_capacity(count),
             sh_degree,
             sh: Vec::with_capacity(count.saturating_mul(sh_coefficients(sh_degree))),
+            metadata: Metadata::default(),
         }
+    }
+
+    /// As [`Scene::with_capacity`], for a count that a file claims.
+    ///
+    /// # Errors
+    /// If there is not enough memory.
+    pub(crate) fn try_with_capacity(sh_degree: u32, count: usize) -> Result<Self, Fault> {
+        let mut scene = Self::with_capacity(sh_degree, 0);
+        let coefficients = count.checked_mul(scene.sh_stride());
+        let reserved = coefficients.is_some_and(|coefficients| {
+            scene.positions.try_reserve_exact(count).is_ok()
+                && scene.shapes.try_reserve_exact(count).is_ok()
+                && scene.sh.try_reserve_exact(coefficients).is_ok()
+        });
+        if reserved {
+            return Ok(scene);
+        }
+        let each = size_of::<[f32; 3]>() * (1 + scene.sh_stride()) + size_of::<GaussianShape>();
+        let bytes = (each as u64).saturating_mul(count as u64);
+        Err(Reason::Memory(bytes).at(Place::File))
+    }
+
+    /// A scene of `count` Gaussians made in parallel: `each` is given a Gaussian's index and its coefficients to fill,
+    /// zeros so far, and returns its position and shape.
+    ///
+    /// # Errors
+    /// If there is not enough memory.
+    pub(crate) fn try_generate(
+        sh_degree: u32,
+        count: usize,
+        each: impl Fn(usize, &mut [[f32; 3]]) -> ([f32; 3], GaussianShape) + Sync,
+    ) -> Result<Self, Fault> {
+        let mut scene = Self::try_with_capacity(sh_degree, count)?;
+        let stride = scene.sh_stride();
+        scene.positions.resize(count, [0.0; 3]);
+        scene.shapes.resize(count, GaussianShape::default());
+        scene.sh.resize(count * stride, [0.0; 3]);
+        scene
+            .positions
+            .par_iter_mut()
+            .zip(&mut scene.shapes)
+            .zip(scene.sh.par_chunks_exact_mut(stride))
+            .with_min_len(1 << 12)
+            .enumerate()
+            .for_each(|(index, ((position, shape), sh))| (*position, *shape) = each(index, sh));
+        Ok(scene)
+    }
+
+    /// Moves every Gaussian.
+    pub(crate) fn apply(&mut self, motion: &Motion) {
+        let stride = self.sh_stride();
+        self.positions
+            .par_iter_mut()
+            .zip(&mut self.shapes)
+            .zip(self.sh.par_chunks_exact_mut(stride))
+            .with_min_len(1 << 12)
+            .for_each(|((position, shape), sh)| motion.apply(position, shape, sh));
+    }
+
+    /// Appends the Gaussians of `other`, moved by `transform`, and what it says of itself where both agree; where they
+    /// don't, a note says so. The spherical harmonics degree becomes the greater one.
+    pub fn append(&mut self, other: &Self, transform: &Transform) {
+        let mut moved = other.clone();
+        moved.apply(&transform.motion(other.sh_degree));
+        self.join(moved);
+    }
+
+    /// Appends `other` as it is.
+    pub(crate) fn join(&mut self, mut other: Self) {
+        if self.is_empty() {
+            *self = other;
+            return;
+        }
+        let degree = self.sh_degree.max(other.sh_degree);
+        self.raise_degree(degree);
+        other.raise_degree(degree);
+        self.positions.append(&mut other.positions);
+        self.shapes.append(&mut other.shapes);
+        self.sh.append(&mut other.sh);
+        self.metadata.join(other.metadata);
+    }
+
+    /// The Gaussians `range`, with all that the scene says of itself.
+    pub(crate) fn range(&self, range: std::ops::Range<usize>) -> Self {
+        let stride = self.sh_stride();
+        Self {
+            positions: self.positions[range.clone()].to_vec(),
+            shapes: self.shapes[range.clone()].to_vec(),
+            sh: self.sh[range.start * stride..range.end * stride].to_vec(),
+            sh_degree: self.sh_degree,
+            metadata: self.metadata.clone(),
+        }
+    }
+
+    /// Makes the degree `degree`, with coefficients of zero.
+    fn raise_degree(&mut self, degree: u32) {
+        if degree == self.sh_degree {
+            return;
+        }
+        let (old, new) = (self.sh_stride(), sh_coefficients(degree));
+        let mut sh = Vec::with_capacity(self.len() * new);
+        for coefficients in self.sh.chunks_exact(old) {
+            sh.extend_from_slice(coefficients);
+            sh.resize(sh.len() + new - old, [0.0; 3]);
+        }
+        (self.sh, self.sh_degree) = (sh, degree);
+    }
+
+    /// What the scene's file says of itself.
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// The same, for changes.
+    pub fn metadata_mut(&mut self) -> &mut Metadata {
+        &mut self.metadata
+    }
+
+    /// How the scene wants Gaussians to be filtered: what its file says, or as 3DGS does.
+    pub fn antialiasing(&self) -> Antialiasing {
+        self.metadata.antialiasing.unwrap_or_default()
+    }
+
+    /// What the scene's Gaussians are: what its file says, or volumes.
+    pub fn geometry(&self) -> Geometry {
+        self.metadata.geometry.unwrap_or_default()
     }
 
     /// Appends a Gaussian. `sh` holds its spherical harmonics coefficients, (degree + 1)^2 RGB

@@ -1,18 +1,38 @@
 //! `gaurast`: pictures of 3D Gaussian scenes, headless, on a simulated Gaussian rasterizer.
 
 mod args;
+mod cameras;
+mod compare;
+mod drawing;
+mod heatmap;
+mod info;
+mod limits;
+mod logger;
+mod outputs;
 mod progress;
 mod render;
 mod report;
+mod sheet;
 mod simulate;
 mod simulate_plot;
 mod simulate_report;
+mod sources;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 use args::{Arguments, Command};
+
+/// Why the command failed: a sentence, and the exit code.
+struct Failure {
+    sentence: String,
+    code: u8,
+}
+
+/// The exit code of what failed.
+const FAILED: u8 = 1;
+
+/// The exit code of a command line that means nothing, as clap's.
+const MISUSE: u8 = 2;
 
 fn main() -> ExitCode {
     // A file that grows beyond the process's limit is an error like a full disk, and no signal.
@@ -21,19 +41,69 @@ fn main() -> ExitCode {
     unsafe {
         libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
     }
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("warn")).init();
-    let arguments = Arguments::parse();
-    let result = match arguments.command.unwrap_or_default() {
-        Command::Render(arguments) => render::run(&arguments).map_err(|error| error.to_string()),
-        Command::Simulate(arguments) => {
-            simulate::run(&arguments).map_err(|error| error.to_string())
-        }
+    logger::start();
+    let arguments = Arguments::read();
+    let result = run(arguments.command.unwrap_or_default());
+    // What the driver found wrong, such as a trace that does not fit the disk, has no result of its own.
+    let logged = logger::last_error();
+    let failure = match (result, logged) {
+        (Ok(()), None) => return ExitCode::SUCCESS,
+        (Ok(()), Some(sentence)) => Failure {
+            sentence,
+            code: FAILED,
+        },
+        // The driver's message says more than the name of a call and its result.
+        (Err(failure), Some(sentence)) if failure.sentence.starts_with("vk") => Failure {
+            sentence,
+            ..failure
+        },
+        (Err(failure), _) => failure,
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("gaurast: {error}");
-            ExitCode::FAILURE
+    eprintln!("gaurast: {}", failure.sentence);
+    ExitCode::from(failure.code)
+}
+
+fn run(command: Command) -> Result<(), Failure> {
+    let failure = |sentence: String, is_misuse: bool| Failure {
+        sentence,
+        code: if is_misuse { MISUSE } else { FAILED },
+    };
+    match command {
+        Command::Render(arguments) => {
+            let traced = (arguments.output.heatmap.is_some())
+                .then(heatmap::trace_from_now_on)
+                .transpose()
+                .map_err(|error| failure(format!("--heatmap: {error}"), false))?;
+            let result = render::run(&arguments);
+            drop(traced);
+            result.map_err(|error| failure(error.to_string(), error.is_misuse()))
+        }
+        Command::Views(arguments) => {
+            sheet::run(&arguments).map_err(|error| failure(error.to_string(), false))
+        }
+        Command::Compare(arguments) => {
+            compare::run(&arguments).map_err(|error| failure(error.to_string(), error.is_misuse()))
+        }
+        Command::Info(arguments) => {
+            info::run(&arguments).map_err(|error| failure(error.to_string(), false))
+        }
+        Command::Simulate(arguments) => {
+            simulate::run(&arguments).map_err(|error| failure(error.to_string(), false))
+        }
+        #[cfg(feature = "completions")]
+        Command::Completions { shell } => {
+            use clap::CommandFactory;
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "gaurast", &mut script);
+            std::io::Write::write_all(&mut std::io::stdout(), &script)
+                .map_err(|error| failure(format!("output: {error}"), false))
+        }
+        #[cfg(feature = "completions")]
+        Command::Man { folder } => {
+            use clap::CommandFactory;
+            std::fs::create_dir_all(&folder)
+                .and_then(|()| clap_mangen::generate_to(Arguments::command(), &folder))
+                .map_err(|error| failure(format!("{}: {error}", folder.display()), false))
         }
     }
 }

@@ -20,6 +20,20 @@ impl Progress {
         )
     }
 
+    /// A bar of `count` pictures, with the time that the others will take.
+    pub fn pictures(self, count: u64) -> ProgressBar {
+        if count == 1 {
+            return self.step("drawing");
+        }
+        let bar = self.bar(
+            ProgressBar::new(count),
+            "drawing",
+            "{msg:>10} [{bar:40}] {pos}/{len}, {eta} left",
+        );
+        bar.enable_steady_tick(Duration::from_millis(500));
+        bar
+    }
+
     /// A spinner for a step of unknown length.
     pub fn step(self, message: &'static str) -> ProgressBar {
         let bar = self.bar(

@@ -1,160 +1,198 @@
 //! `gaurast render`.
 
 use std::io::{Write, stdout};
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use gaurast_picture::OutputError;
-use gaurast_render::{RenderError, Renderer, Settings};
-use gaurast_scene::camera::{Camera, CameraError, DEFAULT_FOV};
-use gaurast_scene::camera_files::CameraFileError;
-use gaurast_scene::{MAX_SH_DEGREE, Scene, SceneError};
+use gaurast_scene::camera_path::Keyframe;
 use thiserror::Error;
 
-use crate::args::{CameraModel, RenderArguments};
+use crate::args::RenderArguments;
+use crate::cameras::{self, View, ViewError, Views};
+use crate::drawing::{self, DrawError, Drawing};
+use crate::heatmap::{self, HeatmapError};
+use crate::limits;
+use crate::outputs::{Outputs, WriteError};
 use crate::progress::Progress;
-use crate::report;
-
-/// The picture's size where nothing says otherwise.
-const DEFAULT_SIZE: [u32; 2] = [1280, 720];
-
-/// The generated garden's seed.
-const SEED: u64 = 1;
+use crate::report::{self, Summary};
+use crate::sources::{Source, SourceError};
 
 /// Why there is no picture. Displayed as one sentence.
 #[derive(Debug, Error)]
 pub enum Error {
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Source(#[from] SourceError),
     #[error(transparent)]
-    CameraFile(#[from] CameraFileError),
+    View(#[from] ViewError),
     #[error(transparent)]
-    Camera(#[from] CameraError),
-    #[error("{}: view {view}: there are {count} views, counted from 0", path.display())]
-    NoView {
-        path: PathBuf,
-        view: usize,
-        count: usize,
-    },
+    Draw(#[from] DrawError),
     #[error(transparent)]
-    Render(#[from] RenderError),
+    Write(#[from] WriteError),
     #[error(transparent)]
     Output(#[from] OutputError),
+    #[error(transparent)]
+    Heatmap(#[from] HeatmapError),
+    #[error("--heatmap is of one view, and {0} are asked for")]
+    HeatmapViews(usize),
+    #[error("{0}")]
+    Limit(String),
     #[error("the pictures are written, but not the report: {0}")]
     Report(std::io::Error),
 }
 
-/// Draws a scene and writes the picture.
+impl Error {
+    /// Tells if the command line means nothing.
+    pub fn is_misuse(&self) -> bool {
+        matches!(self, Self::View(error) if error.is_misuse())
+    }
+}
+
+/// Draws a scene and writes the pictures.
 pub fn run(arguments: &RenderArguments) -> Result<(), Error> {
-    for path in &arguments.output {
+    let source = Source::of(&arguments.scene)?;
+    let outputs = Outputs::new(&arguments.output, &source.name, source.background)?;
+    if let Some(path) = &arguments.output.heatmap {
         gaurast_picture::check(path)?;
     }
     // A camera file is read first: its mistakes should not wait for a large scene.
-    let view = match &arguments.cameras {
-        Some(path) => Some(file_camera(path, arguments)?),
-        None => None,
-    };
-    let progress = Progress {
-        quiet: arguments.quiet,
-    };
-    let start = Instant::now();
-    let scene = match &arguments.scene {
-        Some(path) => load(path, progress)?,
-        None => {
-            let _step = progress.step("generating");
-            gaurast_scene::garden::scene(SEED, gaurast_scene::garden::DEFAULT_COUNT)
+    let known = cameras::read(&arguments.camera, &source)?;
+    let quiet = arguments.report.quiet;
+    let progress = Progress { quiet };
+    let (scene, loading) = source.load(progress)?;
+    let outputs = outputs.with_colors(drawing::has_linear_colors(&scene));
+    let garden = source.is_garden();
+    let Views {
+        views,
+        mut notes,
+        framing,
+    } = cameras::of_scene(known, &arguments.camera, &scene, garden)?;
+    if arguments.camera.frame {
+        return print_keyframes(&cameras::keyframes(&views, &scene)).map_err(Error::Report);
+    }
+    notes.extend(source.notes.iter().cloned());
+    notes.extend(drawing::notes(&arguments.modes, &scene));
+    if !quiet && !arguments.report.json {
+        for note in &notes {
+            eprintln!("gaurast: {note}");
         }
-    };
-    let loading = start.elapsed();
-    let camera = match view {
-        Some(camera) => camera,
-        None => scene_camera(&scene, arguments)?,
-    };
-    let camera = match arguments.camera {
-        CameraModel::Pinhole => camera,
-        CameraModel::Fisheye => camera.fisheye(arguments.fov.unwrap_or(180.0)),
-        CameraModel::Equirectangular => camera.panorama(),
-    };
+    }
+    let mut settings = drawing::settings(&arguments.modes, &scene);
+    settings.depth = arguments.output.depth;
+    for view in &views {
+        settings.check(&view.camera).map_err(DrawError::Render)?;
+    }
+    let indices = chosen(&views, arguments, &outputs)?;
+    let largest = indices.iter().map(|index| &views[*index].camera);
+    if let Some(camera) = largest.max_by_key(|c| u64::from(c.width) * u64::from(c.height)) {
+        let encoding = outputs.bytes_per_pixel();
+        limits::check_memory(camera, settings.depth, encoding, indices.len())
+            .map_err(Error::Limit)?;
+    }
+    if arguments.output.heatmap.is_some() && indices.len() != 1 {
+        return Err(Error::HeatmapViews(indices.len()));
+    }
 
-    let step = progress.step("rendering");
-    let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
-    if arguments.counters {
-        renderer.count_everything()?;
-    }
-    let mut uploaded = renderer.upload(&scene, arguments.sh_degree)?;
-    let settings = Settings {
-        sh_degree: arguments.sh_degree.unwrap_or(MAX_SH_DEGREE),
-        order: arguments.order.into(),
-        geometry: arguments.geometry.into(),
-        precision: arguments.precision.into(),
-        exponential_error: arguments.exponential_error,
-        contribution_budget: arguments.contribution_budget,
-        ..Settings::default()
+    let start = Instant::now();
+    let drawn = if indices.is_empty() {
+        Vec::new()
+    } else {
+        let step = progress.step("uploading");
+        let mut drawing = Drawing::new(&scene, settings, arguments.report.counters)?;
+        step.finish_and_clear();
+        drawing.all(
+            &views,
+            &indices,
+            &outputs,
+            arguments.report.strict,
+            progress,
+        )?
     };
-    renderer.set(&mut uploaded, settings)?;
-    let frame = renderer.render(&uploaded, &camera)?;
-    step.finish_and_clear();
-
-    let step = progress.step("writing");
-    let background = arguments
-        .background
-        .map(|background| background.0.map(|c| c as f32));
-    for path in &arguments.output {
-        gaurast_picture::write(path, &frame.picture, background)?;
+    let heat = match (&arguments.output.heatmap, indices.first()) {
+        (Some(path), Some(index)) => Some(heatmap::write(
+            path,
+            &views[*index].camera,
+            arguments.output.force,
+        )?),
+        _ => None,
+    };
+    let summary = Summary {
+        scene: &scene,
+        files: &arguments.scene.scenes,
+        loading,
+        drawing: start.elapsed(),
+        views: &views,
+        drawn: &drawn,
+        kept: views_of_shard(&views, arguments).len() - indices.len(),
+        outputs: &outputs,
+        framing: framing.as_deref(),
+        notes: &notes,
+        heatmap: arguments.output.heatmap.as_deref().zip(heat),
+        stats: arguments.report.stats || arguments.report.counters,
+    };
+    if quiet && !arguments.report.json {
+        return Ok(());
     }
-    step.finish_and_clear();
-    if !arguments.quiet {
-        // Whoever reads this may have gone, and scripts should know; the pictures are there all the same.
-        print(&report::table(&scene, loading, &frame), &arguments.output).map_err(Error::Report)?;
+    for drawn in &drawn {
+        if let Some(reason) = drawn.nothing.as_deref().filter(|_| !quiet) {
+            let files = outputs.told(
+                (drawn.index, &views[drawn.index]),
+                (drawn.index, &views[drawn.index]),
+            );
+            eprintln!("gaurast: {files}: {reason}");
+        }
     }
-    Ok(())
+    if arguments.report.json {
+        let value = summary.json();
+        return if outputs.use_stdout() {
+            eprintln!("{value}");
+            Ok(())
+        } else {
+            print_json(&value).map_err(Error::Report)
+        };
+    }
+    // Whoever reads this may have gone, and scripts should know; the pictures are there all the same.
+    let text = summary.text();
+    if outputs.use_stdout() {
+        eprint!("{text}");
+        return Ok(());
+    }
+    let mut stdout = stdout().lock();
+    (stdout.write_all(text.as_bytes()))
+        .and_then(|()| stdout.flush())
+        .map_err(Error::Report)
 }
 
-fn print(table: &comfy_table::Table, outputs: &[PathBuf]) -> std::io::Result<()> {
+/// The indices of the views of this process's share.
+fn views_of_shard(views: &[View], arguments: &RenderArguments) -> Vec<usize> {
+    let of_share = |index: &usize| {
+        let shard = arguments.output.shard;
+        shard.is_none_or(|shard| index % shard.count == shard.index)
+    };
+    (0..views.len()).filter(of_share).collect()
+}
+
+/// The indices of the views that are to be drawn.
+fn chosen(
+    views: &[View],
+    arguments: &RenderArguments,
+    outputs: &Outputs,
+) -> Result<Vec<usize>, WriteError> {
+    let wanted = views_of_shard(views, arguments);
+    outputs.missing(views, wanted, &arguments.output)
+}
+
+/// Prints a list for `--path`, a line for each.
+fn print_keyframes(keyframes: &[Keyframe]) -> std::io::Result<()> {
+    let lines = keyframes.iter().map(serde_json::to_string);
+    let lines = lines.collect::<Result<Vec<_>, _>>()?.join(",\n ");
     let mut stdout = stdout().lock();
-    writeln!(stdout, "{table}")?;
-    for path in outputs {
-        writeln!(stdout, "wrote {}", path.display())?;
-    }
+    writeln!(stdout, "[{lines}]")?;
     stdout.flush()
 }
 
-fn load(path: &Path, progress: Progress) -> Result<Scene, Error> {
-    let bar = progress.bytes("reading", 0);
-    let scene = gaurast_scene::open_through(path, |file, len| {
-        bar.set_length(len);
-        bar.wrap_read(file)
-    })?;
-    bar.finish_and_clear();
-    Ok(scene)
-}
-
-/// The camera of a camera file, at the size asked for.
-fn file_camera(path: &Path, arguments: &RenderArguments) -> Result<Camera, Error> {
-    let size = arguments.size.map(|size| size.0);
-    let mut views = gaurast_scene::camera_files::load(path, size.unwrap_or(DEFAULT_SIZE))?;
-    let (view, count) = (arguments.view, views.len());
-    if view >= count {
-        return Err(Error::NoView {
-            path: path.to_owned(),
-            view,
-            count,
-        });
-    }
-    let camera = views.swap_remove(view).camera;
-    Ok(size.map_or(camera.clone(), |size| camera.resized(size)))
-}
-
-/// The camera given by hand, or one that suits the scene.
-fn scene_camera(scene: &Scene, arguments: &RenderArguments) -> Result<Camera, Error> {
-    let size = arguments.size.map_or(DEFAULT_SIZE, |size| size.0);
-    let fov = arguments.fov;
-    Ok(match (arguments.eye, arguments.target) {
-        (Some(eye), Some(target)) => {
-            let up = arguments.up.map_or([0.0, -1.0, 0.0], |up| up.0);
-            Camera::look_at(eye.0, target.0, up, fov.unwrap_or(DEFAULT_FOV), size)?
-        }
-        _ if arguments.scene.is_none() => gaurast_scene::garden::camera(fov, size)?,
-        _ => gaurast_scene::frame(scene, fov.unwrap_or(DEFAULT_FOV), size),
-    })
+/// Prints a value for programs.
+fn print_json(value: &impl serde::Serialize) -> std::io::Result<()> {
+    let mut stdout = stdout().lock();
+    report::write_json(&mut stdout, value)?;
+    stdout.flush()
 }

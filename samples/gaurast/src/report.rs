@@ -1,52 +1,188 @@
-//! What a rendering did, as a table.
+//! What a rendering did: a line, a table of what the device counted, or JSON.
 
+use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use ash::vk::PerformanceCounterUnitKHR as Unit;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use comfy_table::{CellAlignment, Table};
-use gaurast_render::{Counter, Frame};
+use gaurast_render::Counter;
 use gaurast_scene::Scene;
+use serde_json::json;
 
-/// The table: what the host knows, then everything that the device counted, in its groups.
-pub fn table(scene: &Scene, loading: Duration, frame: &Frame) -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
-    let mut row = {
-        let mut last = String::new();
-        let table = &mut table;
-        move |group: &str, name: &str, value: String| {
-            // A group's name stands in its first row.
-            let shown = if group == last { "" } else { group };
-            table.add_row([shown, name, &value]);
-            group.clone_into(&mut last);
+use crate::cameras::View;
+use crate::drawing::Drawn;
+use crate::outputs::Outputs;
+
+/// What a rendering did.
+pub struct Summary<'a> {
+    pub scene: &'a Scene,
+    /// The scene's files; the garden if there is none.
+    pub files: &'a [PathBuf],
+    pub loading: Duration,
+    /// Drawing and writing.
+    pub drawing: Duration,
+    pub views: &'a [View],
+    pub drawn: &'a [Drawn],
+    /// Views whose files were there.
+    pub kept: usize,
+    pub outputs: &'a Outputs,
+    /// How to have the view again.
+    pub framing: Option<&'a str>,
+    pub notes: &'a [String],
+    /// The picture of the counts, and the greatest.
+    pub heatmap: Option<(&'a Path, f64)>,
+    /// Tables are wanted.
+    pub stats: bool,
+}
+
+impl Summary<'_> {
+    /// The report for people.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        if self.stats {
+            for drawn in self.drawn {
+                text += &format!("{}\n", self.table(drawn));
+            }
         }
-    };
-    let picture = &frame.picture;
-    row(
-        "picture",
-        "size",
-        format!("{} x {}", picture.width, picture.height),
-    );
-    row("scene", "Gaussians", grouped(scene.len() as f64));
-    row("scene", "SH degree", scene.sh_degree().to_string());
-    for counter in &frame.counters {
-        row(&counter.category, &counter.name, value(counter));
+        text += &self.line();
+        if let Some(framing) = self.framing {
+            text += &format!("; {framing}");
+        }
+        text.push('\n');
+        if let Some((path, greatest)) = self.heatmap {
+            text += &format!(
+                "wrote {}: 0 (black) to {greatest:.1} (white) Gaussians a pixel\n",
+                path.display()
+            );
+        }
+        text
     }
-    row(
-        "host time",
-        "load",
-        milliseconds(loading.as_secs_f64() * 1e3),
-    );
-    row(
-        "host time",
-        "render",
-        milliseconds(frame.time.as_secs_f64() * 1e3),
-    );
-    if let Some(column) = table.column_mut(2) {
-        column.set_cell_alignment(CellAlignment::Right);
+
+    /// What was written, where, in which time.
+    fn line(&self) -> String {
+        let kept = match self.kept {
+            0 => String::new(),
+            kept => format!("; {kept} were there"),
+        };
+        let (Some(first), Some(last)) = (self.drawn.first(), self.drawn.last()) else {
+            return format!("wrote nothing{kept}");
+        };
+        let view = |drawn: &Drawn| (drawn.index, &self.views[drawn.index]);
+        let places = self.outputs.told(view(first), view(last));
+        let camera = &self.views[first.index].camera;
+        let size = format!("{}x{}", camera.width, camera.height);
+        let gaussians = match self.scene.len() {
+            1 => "1 Gaussian".to_owned(),
+            count => format!("{} Gaussians", grouped(count as f64)),
+        };
+        let time = if self.drawn.len() == 1 {
+            format!("drawn in {}", duration(first.time))
+        } else {
+            format!(
+                "{} pictures in {}",
+                self.drawn.len(),
+                duration(self.drawing)
+            )
+        };
+        format!(
+            "wrote {places}: {size}, {gaussians} read in {}, {time}{kept}",
+            duration(self.loading)
+        )
     }
-    table
+
+    /// The table of a view: what the host knows, then what the device counted, in its groups.
+    fn table(&self, drawn: &Drawn) -> Table {
+        let mut table = Table::new();
+        table.load_style(UTF8_FULL_CONDENSED);
+        let mut row = {
+            let mut last = String::new();
+            let table = &mut table;
+            move |group: &str, name: &str, value: String| {
+                // A group's name stands in its first row.
+                let shown = if group == last { "" } else { group };
+                table.add_row([shown, name, &value]);
+                group.clone_into(&mut last);
+            }
+        };
+        let camera = &self.views[drawn.index].camera;
+        row(
+            "picture",
+            "size",
+            format!("{} x {}", camera.width, camera.height),
+        );
+        row("scene", "Gaussians", grouped(self.scene.len() as f64));
+        row("scene", "SH degree", self.scene.sh_degree().to_string());
+        for counter in drawn.counters.iter().filter(|counter| counter.value != 0.0) {
+            row(&counter.category, &counter.name, value(counter));
+        }
+        row("host time", "load", duration(self.loading));
+        row("host time", "render", duration(drawn.time));
+        if let Some(column) = table.column_mut(2) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+        table
+    }
+
+    /// Everything, for programs.
+    pub fn json(&self) -> serde_json::Value {
+        let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
+        let pictures: Vec<_> = (self.drawn.iter())
+            .map(|drawn| {
+                let view = &self.views[drawn.index];
+                let counters: Vec<_> = (drawn.counters.iter())
+                    .map(|counter| {
+                        json!({
+                            "group": counter.category,
+                            "name": counter.name,
+                            "unit": format!("{:?}", counter.unit).to_lowercase(),
+                            "value": counter.value,
+                        })
+                    })
+                    .collect();
+                json!({
+                    "index": drawn.index,
+                    "view": view.name,
+                    "files": self.outputs.files(drawn.index, view),
+                    "width": view.camera.width,
+                    "height": view.camera.height,
+                    "camera": view.camera,
+                    "milliseconds": milliseconds(drawn.time),
+                    "nothing": drawn.nothing,
+                    "counters": counters,
+                })
+            })
+            .collect();
+        json!({
+            "scenes": self.files,
+            "gaussians": self.scene.len(),
+            "sh_degree": self.scene.sh_degree(),
+            "load_milliseconds": milliseconds(self.loading),
+            "milliseconds": milliseconds(self.drawing),
+            "kept": self.kept,
+            "framing": self.framing,
+            "notes": self.notes,
+            "heatmap": self.heatmap.map(|(path, greatest)| json!({"file": path, "greatest": greatest})),
+            "pictures": pictures,
+        })
+    }
+}
+
+/// Writes a value for programs: indented, with a line's end.
+pub fn write_json(writer: &mut dyn Write, value: &impl serde::Serialize) -> std::io::Result<()> {
+    let text = serde_json::to_string_pretty(value)?;
+    writeln!(writer, "{text}")
+}
+
+/// A time for people.
+pub fn duration(time: Duration) -> String {
+    let seconds = time.as_secs_f64();
+    if seconds < 1.0 {
+        milliseconds(seconds * 1e3)
+    } else {
+        format!("{seconds:.2} s")
+    }
 }
 
 fn value(counter: &Counter) -> String {
@@ -71,7 +207,7 @@ fn milliseconds(value: f64) -> String {
 }
 
 /// A whole number with a space between groups of three digits.
-fn grouped(value: f64) -> String {
+pub fn grouped(value: f64) -> String {
     let digits = format!("{:.0}", value.abs());
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {
@@ -111,20 +247,8 @@ mod tests {
     }
 
     #[test]
-    fn the_table_shows_every_counter() {
-        let frame = Frame {
-            picture: gaurast_picture::Picture {
-                width: 2,
-                height: 1,
-                pixels: vec![[0.0; 4]; 2],
-            },
-            time: Duration::from_millis(5),
-            processor_time: None,
-            counters: vec![counter(Unit::GENERIC, 4321.0)],
-        };
-        let text = table(&Scene::default(), Duration::ZERO, &frame).to_string();
-        for part in ["2 x 1", "tile pairs", "4 321", "5.00 ms"] {
-            assert!(text.contains(part), "{text}");
-        }
+    fn times_are_readable() {
+        assert_eq!(duration(Duration::from_millis(5)), "5.00 ms");
+        assert_eq!(duration(Duration::from_millis(12_345)), "12.35 s");
     }
 }

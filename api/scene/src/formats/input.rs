@@ -1,9 +1,19 @@
 //! The trait of a scene format, and the input that it reads.
 
-use std::io::{self, BufRead, ErrorKind, Read};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read};
+use std::path::{Component, Path};
 
+use flate2::bufread::GzDecoder;
+
+use super::Options;
 use crate::error::{Fault, Place, Reason};
 use crate::scene::Scene;
+
+/// Deflate's highest ratio of expansion; no honest header claims more.
+pub(super) const MAX_EXPANSION: u64 = 1032;
+
+/// The first bytes of a gzip stream.
+pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// A format of scene files.
 pub(super) trait Format: Sync {
@@ -14,7 +24,9 @@ pub(super) trait Format: Sync {
     fn extensions(&self) -> &'static [&'static str];
 
     /// First bytes that only this format has, where there are any.
-    fn magic(&self) -> Option<&'static [u8]>;
+    fn magic(&self) -> Option<&'static [u8]> {
+        None
+    }
 
     /// Reads a whole scene.
     ///
@@ -28,49 +40,201 @@ pub(super) struct Input<'a> {
     reader: &'a mut dyn BufRead,
     len: u64,
     position: u64,
+    /// Whether the bytes come out of a gzip stream; `len` is a bound then.
+    gzip: bool,
+    origin: Origin<'a>,
+}
+
+/// Where an input comes from, and what the caller asks for.
+#[derive(Clone, Copy)]
+pub(super) struct Origin<'a> {
+    /// The file.
+    pub(super) path: &'a Path,
+    /// What the caller asks for.
+    pub(super) options: &'a Options,
+}
+
+impl Origin<'_> {
+    /// Reads the file `name` beside the input's.
+    pub(super) fn companion(&self, name: &str) -> Result<Vec<u8>, Fault> {
+        let at = |reason: Reason| reason.at(Place::Entry(name.to_owned()));
+        if !is_local(name) {
+            return Err(at(Reason::Name));
+        }
+        let path = self.path.parent().unwrap_or(Path::new("")).join(name);
+        let read = || {
+            let file = std::fs::File::open(&path)?;
+            let metadata = file.metadata()?;
+            if metadata.is_dir() {
+                return Err(ErrorKind::IsADirectory.into());
+            }
+            read_growing(file, metadata.len(), metadata.len())
+        };
+        read().map_err(|error| at(Reason::Companion(error)))
+    }
 }
 
 impl<'a> Input<'a> {
     /// An input of `len` bytes.
-    pub fn new(reader: &'a mut dyn BufRead, len: u64) -> Self {
+    pub(super) fn new(reader: &'a mut dyn BufRead, len: u64, origin: Origin<'a>) -> Self {
         Self {
             reader,
             len,
             position: 0,
+            gzip: false,
+            origin,
         }
     }
 
-    /// The size in bytes.
-    pub fn size(&self) -> u64 {
+    /// Where the input comes from.
+    pub(super) fn origin(&self) -> Origin<'a> {
+        self.origin
+    }
+
+    /// The size in bytes; of what a gzip stream holds, the most that it may be.
+    pub(super) fn size(&self) -> u64 {
         self.len
     }
 
-    /// Bytes that have not been read.
-    pub fn remaining(&self) -> u64 {
+    /// Whether the bytes come out of a gzip stream.
+    pub(super) fn is_compressed(&self) -> bool {
+        self.gzip
+    }
+
+    /// Bytes that have not been read, at most.
+    pub(super) fn remaining(&self) -> u64 {
         self.len.saturating_sub(self.position)
     }
 
     /// Fills `buffer`.
     pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<(), Fault> {
         let position = self.position;
+        let gzip = self.gzip;
         self.read_exact(buffer)
-            .map_err(|error| read_fault(error, position))
+            .map_err(|error| read_fault(error, position, gzip))
+    }
+
+    /// Reads `len` bytes, which are allocated as they come.
+    pub(super) fn bytes(&mut self, len: u64) -> Result<Vec<u8>, Fault> {
+        let bytes = self.up_to(len)?;
+        if (bytes.len() as u64) < len {
+            return Err(Reason::Truncated.at(Place::Byte(self.position)));
+        }
+        Ok(bytes)
+    }
+
+    /// Reads all there is.
+    pub(super) fn rest(&mut self) -> Result<Vec<u8>, Fault> {
+        self.up_to(self.remaining())
+    }
+
+    /// Reads at most `len` bytes, which are allocated as they come.
+    pub(super) fn up_to(&mut self, len: u64) -> Result<Vec<u8>, Fault> {
+        let (position, gzip) = (self.position, self.gzip);
+        let known = if gzip { 0 } else { len };
+        read_growing(self, len, known).map_err(|error| match error.kind() {
+            ErrorKind::OutOfMemory => Reason::Memory(len).at(Place::File),
+            _ => read_fault(error, position, gzip),
+        })
     }
 
     /// Appends the next line to `line`, its end included; at most `limit` bytes.
     pub(super) fn line(&mut self, line: &mut Vec<u8>, limit: u64) -> Result<(), Fault> {
-        let position = self.position;
+        let (position, gzip) = (self.position, self.gzip);
         self.take(limit)
             .read_until(b'\n', line)
-            .map_err(|error| read_fault(error, position))?;
+            .map_err(|error| read_fault(error, position, gzip))?;
         Ok(())
+    }
+
+    /// The input's next bytes.
+    pub(super) fn peek(&mut self) -> Result<&[u8], Fault> {
+        let (position, gzip) = (self.position, self.gzip);
+        self.reader
+            .fill_buf()
+            .map_err(|error| read_fault(error, position, gzip))
+    }
+
+    /// Calls `load` with this input or, if it is a gzip stream, with what that holds. Nothing may follow the stream.
+    pub(super) fn unpacked<T>(
+        &mut self,
+        load: impl FnOnce(&mut Input<'_>) -> Result<T, Fault>,
+    ) -> Result<T, Fault> {
+        if self.gzip || !self.peek()?.starts_with(&GZIP_MAGIC) {
+            return load(self);
+        }
+        let origin = self.origin;
+        let len = self.len.saturating_mul(MAX_EXPANSION);
+        let mut decoder = BufReader::new(GzDecoder::new(&mut *self));
+        let mut inner = Input::new(&mut decoder, len, origin);
+        inner.gzip = true;
+        let loaded = load(&mut inner)?;
+        // To its end, where its sum is.
+        let at = inner.position;
+        let mut rest = inner.take(1 << 20);
+        io::copy(&mut rest, &mut io::sink()).map_err(|error| read_fault(error, at, true))?;
+        if rest.limit() == 0 {
+            return Err(Reason::Trailing.at(Place::Byte(at)));
+        }
+        if self.remaining() > 0 {
+            return Err(Reason::Trailing.at(Place::File));
+        }
+        Ok(loaded)
     }
 }
 
-/// The fault of an `error` met when reading at byte `position`.
-pub(super) fn read_fault(error: io::Error, position: u64) -> Fault {
+/// Whether `name` is that of a file in a folder or below it, on any system.
+pub(super) fn is_local(name: &str) -> bool {
+    const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
+    let device = |part: &str| {
+        let stem = part.split('.').next().unwrap_or(part).trim_end();
+        let stem = stem.to_ascii_lowercase();
+        let port = stem
+            .strip_prefix("com")
+            .or_else(|| stem.strip_prefix("lpt"))
+            .is_some_and(|digit| digit.len() == 1 && digit != "0");
+        port || DEVICES.contains(&stem.as_str())
+    };
+    !name.is_empty()
+        && !name.contains(['\\', ':', '\0'])
+        && Path::new(name)
+            .components()
+            .all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+        && !name.split('/').any(device)
+}
+
+/// Reads at most `len` bytes. Room for `known` of them is made at once, for the others as they come: a size that is only
+/// claimed costs nothing.
+pub(super) fn read_growing(reader: impl Read, len: u64, known: u64) -> io::Result<Vec<u8>> {
+    const STEP: usize = 1 << 20;
+    let no_memory = |_| io::Error::from(ErrorKind::OutOfMemory);
+    let mut reader = reader.take(len);
+    let mut bytes = Vec::new();
+    let known = usize::try_from(known.min(len)).unwrap_or(usize::MAX);
+    bytes.try_reserve_exact(known).map_err(no_memory)?;
+    loop {
+        let wanted = usize::try_from(reader.limit()).unwrap_or(usize::MAX);
+        let step = wanted.min(STEP.max(bytes.len()).max(known - bytes.len().min(known)));
+        if step == 0 {
+            return Ok(bytes);
+        }
+        if bytes.capacity() - bytes.len() < step {
+            bytes.try_reserve_exact(step).map_err(no_memory)?;
+        }
+        // `read_to_end` grows only beyond the room that there is now.
+        if (&mut reader).take(step as u64).read_to_end(&mut bytes)? < step {
+            return Ok(bytes);
+        }
+    }
+}
+
+/// The fault of an `error` met when reading at byte `position`, out of a gzip stream or not.
+fn read_fault(error: io::Error, position: u64, gzip: bool) -> Fault {
     match error.kind() {
         ErrorKind::UnexpectedEof => Reason::Truncated.at(Place::Byte(position)),
+        ErrorKind::InvalidInput | ErrorKind::InvalidData if gzip => {
+            Reason::Gzip(error).at(Place::Byte(position))
+        }
         _ => Reason::Io(error).at(Place::Byte(position)),
     }
 }

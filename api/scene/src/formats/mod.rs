@@ -1,38 +1,57 @@
 //! The table of scene formats, the one place that lists them, and reading by it.
 
+mod gltf;
 mod input;
+mod ksplat;
 mod ply;
+mod sog;
 mod splat;
 mod spz;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Fault, Place, Reason, SceneError};
 use crate::scene::Scene;
-use input::{Format, Input};
+use input::{Format, Input, Origin};
 
-/// Reads the scene file at `path`.
+/// The path that stands for standard input.
+const STANDARD_INPUT: &str = "-";
+
+/// What a caller asks of a reader.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// The level of detail of a scene that has several (streamed SOG): 0 is the finest.
+    pub level: u32,
+}
+
+/// Reads the scene file at `path`, or the one in the folder `path`, or standard input if it is `-`.
 ///
 /// # Errors
 /// If the file cannot be opened or read, is of no known kind, or is malformed.
 pub fn open(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
-    open_through(path.as_ref(), |file, _| file)
+    open_with(path.as_ref(), &Options::default(), |file, _| file)
 }
 
 /// As [`open`], reading through what `wrap` makes of the file and its size in bytes: a reader that shows progress, say.
+/// Standard input, whose size is unknown, is not wrapped; it is read whole before its format is looked for.
 ///
 /// # Errors
 /// As [`open`].
-pub fn open_through<R: Read>(
+pub fn open_with<R: Read>(
     path: &Path,
+    options: &Options,
     wrap: impl FnOnce(File, u64) -> R,
 ) -> Result<Scene, SceneError> {
-    let io = |source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    if path == Path::new(STANDARD_INPUT) {
+        let path = Path::new("standard input");
+        let bytes = input::read_growing(std::io::stdin().lock(), u64::MAX, 0);
+        let bytes = bytes.map_err(|source| io_error(path, source))?;
+        return read_with(path, &mut &bytes[..], bytes.len() as u64, options);
+    }
+    let path = &inside(path);
+    let io = |source| io_error(path, source);
     let file = File::open(path).map_err(io)?;
     let metadata = file.metadata().map_err(io)?;
     if metadata.is_dir() {
@@ -40,25 +59,51 @@ pub fn open_through<R: Read>(
     }
     let len = metadata.len();
     let mut reader = BufReader::with_capacity(1 << 20, wrap(file, len));
-    read(path, &mut reader, len)
+    read_with(path, &mut reader, len, options)
 }
 
-/// Reads a scene of `len` bytes from `reader`; `path` picks the format and names the file in errors.
+fn io_error(path: &Path, source: std::io::Error) -> SceneError {
+    SceneError::Io {
+        path: path.to_owned(),
+        source,
+    }
+}
+
+/// The file that holds the scene of the folder `path`; `path` itself if that is no such folder.
+fn inside(path: &Path) -> PathBuf {
+    [sog::META, sog::STREAMED_META]
+        .map(|name| path.join(name))
+        .into_iter()
+        .find(|file| path.is_dir() && file.is_file())
+        .unwrap_or_else(|| path.to_owned())
+}
+
+/// Reads a scene of `len` bytes from `reader`; `path` picks the format, names the file in errors, and has the folder of
+/// other files that this one names.
 ///
 /// # Errors
 /// As [`open`].
 pub fn read(path: &Path, reader: &mut dyn BufRead, len: u64) -> Result<Scene, SceneError> {
-    let start = reader.fill_buf().map_err(|source| SceneError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
-    let format = choose(path, start).ok_or_else(|| SceneError::UnknownFormat {
-        path: path.to_owned(),
-        known: known_extensions(),
-    })?;
-    log::debug!("reading {} as {}", path.display(), format.name());
-    format
-        .load(&mut Input::new(reader, len))
+    read_with(path, reader, len, &Options::default())
+}
+
+/// As [`read`], with `options`.
+///
+/// # Errors
+/// As [`open`].
+pub fn read_with(
+    path: &Path,
+    reader: &mut dyn BufRead,
+    len: u64,
+    options: &Options,
+) -> Result<Scene, SceneError> {
+    Input::new(reader, len, Origin { path, options })
+        .unpacked(|input| {
+            let format = choose(path, input.peek()?)
+                .ok_or_else(|| Reason::UnknownFormat(known_extensions()).at(Place::File))?;
+            log::debug!("reading {} as {}", path.display(), format.name());
+            format.load(input)
+        })
         .map_err(|fault| fault.of(path))
 }
 
@@ -67,20 +112,14 @@ static FORMATS: &[&dyn Format] = &[
     &ply::Ply,
     &splat::Splat,
     &spz::Spz,
+    &ksplat::KSplat,
+    &sog::Sog,
+    &sog::SogFolder,
+    &gltf::Glb,
+    &gltf::Gltf,
     &NotRead {
-        name: "SOG",
-        extensions: &["sog"],
-        magic: Some(b"PK\x03\x04"),
-    },
-    &NotRead {
-        name: "binary glTF",
-        extensions: &["glb"],
-        magic: Some(b"glTF"),
-    },
-    &NotRead {
-        name: "glTF",
-        extensions: &["gltf"],
-        magic: None,
+        name: "LCC",
+        extensions: &["lcc", "lcc2"],
     },
 ];
 
@@ -88,7 +127,6 @@ static FORMATS: &[&dyn Format] = &[
 struct NotRead {
     name: &'static str,
     extensions: &'static [&'static str],
-    magic: Option<&'static [u8]>,
 }
 
 impl Format for NotRead {
@@ -100,21 +138,22 @@ impl Format for NotRead {
         self.extensions
     }
 
-    fn magic(&self) -> Option<&'static [u8]> {
-        self.magic
-    }
-
     fn load(&self, _: &mut Input<'_>) -> Result<Scene, Fault> {
         Err(Reason::NotReadYet(self.name).at(Place::File))
     }
 }
 
-/// The format of the file `path` that begins with `start`: by extension, then by magic, because
-/// a format without magic may begin with any bytes.
+/// The format of the file `path` that begins with `start`: by extension, that of what is compressed if it is `gz`, then
+/// by magic, because a format without magic may begin with any bytes.
 fn choose(path: &Path, start: &[u8]) -> Option<&'static dyn Format> {
-    let extension = path
-        .extension()
-        .map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    let extension = |path: &Path| {
+        path.extension()
+            .map(|extension| extension.to_string_lossy().to_ascii_lowercase())
+    };
+    let extension = match extension(path) {
+        Some(gz) if gz == "gz" => path.file_stem().map(Path::new).and_then(extension),
+        extension => extension,
+    };
     let by_extension = FORMATS.iter().find(|format| {
         extension
             .as_deref()

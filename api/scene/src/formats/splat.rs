@@ -23,31 +23,22 @@ impl Format for Splat {
         &["splat"]
     }
 
-    fn magic(&self) -> Option<&'static [u8]> {
-        None
-    }
-
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
-        let len = input.size();
-        if len == 0 {
-            return Err(Reason::Empty.at(Place::File));
-        }
-        if !len.is_multiple_of(RECORD as u64) {
-            let record = RECORD as u64;
+        let bytes = input.rest()?;
+        let (records, rest) = bytes.as_chunks::<RECORD>();
+        if !rest.is_empty() {
+            let (len, record) = (bytes.len() as u64, RECORD as u64);
             return Err(Reason::Records { len, record }.at(Place::File));
         }
-        let count = len / RECORD as u64;
-        let mut scene = Scene::with_capacity(0, count as usize);
-        let mut record = [0; RECORD];
-        for _ in 0..count {
-            input.fill(&mut record)?;
-            push(&mut scene, &record);
+        if records.is_empty() {
+            return Err(Reason::Empty.at(Place::File));
         }
-        Ok(scene)
+        Scene::try_generate(0, records.len(), |index, sh| gaussian(&records[index], sh))
     }
 }
 
-fn push(scene: &mut Scene, record: &[u8; RECORD]) {
+/// The position and the shape of a record, whose colour goes to `sh`.
+fn gaussian(record: &[u8; RECORD], sh: &mut [[f32; 3]]) -> ([f32; 3], GaussianShape) {
     let float =
         |index: usize| f32::from_le_bytes(std::array::from_fn(|byte| record[4 * index + byte]));
     let colour = |channel: usize| ((f64::from(record[24 + channel]) / 255.0 - 0.5) / SH_C0) as f32;
@@ -56,9 +47,6 @@ fn push(scene: &mut Scene, record: &[u8; RECORD]) {
         rotation: std::array::from_fn(|i| (f32::from(record[28 + i]) - 128.0) / 128.0),
         opacity: f32::from(record[27]) / 255.0,
     };
-    scene.push(
-        std::array::from_fn(float),
-        shape,
-        &[std::array::from_fn(colour)],
-    );
+    sh[0] = std::array::from_fn(colour);
+    (std::array::from_fn(float), shape)
 }

@@ -1,39 +1,59 @@
-//! Niantic's SPZ, versions 1 to 3: a gzip stream of a 16-byte header and one array per attribute.
+//! Niantic's SPZ, versions 1 to 4: a header and one array per attribute.
 //!
-//! Positions are 24-bit fixed point (version 1: half floats), scales logarithms in sixteenths,
-//! quaternions their first (versions 1 and 2) or smallest three components, opacities bytes,
-//! colours bytes over a range wider than 0 to 1, other coefficients bytes over -1 to 1. The
-//! frame is right-up-back; it is turned half around x, into that of PLY files, as the format's
-//! own library does when asked for it.
+//! Versions 1 to 3 are one gzip stream. Version 4 has a plain header, extension records, a table of sizes, and a zstd
+//! stream for each array. Positions are 24-bit fixed point (version 1: half floats), scales logarithms in sixteenths,
+//! quaternions their first (versions 1 and 2) or smallest three components, opacities bytes, colours bytes over a range
+//! wider than 0 to 1, other coefficients bytes over -1 to 1. The frame is right-up-back, unless an extension names
+//! another; it is turned half around x, into that of PLY files, as the format's own library does when asked for it.
 
 use std::f32::consts::FRAC_1_SQRT_2;
-use std::io::{ErrorKind, Read};
 
-use flate2::bufread::GzDecoder;
+use glam::{DMat3, DVec3};
 use half::f16;
+use ruzstd::decoding::StreamingDecoder;
 
-use super::input::{Format, Input};
+use super::input::{Format, Input, read_growing};
 use crate::error::{Fault, Place, Reason};
+use crate::metadata::{Antialiasing, Metadata};
 use crate::scene::{GaussianShape, MAX_SH_DEGREE, Scene, sh_coefficients};
+use crate::transform::Motion;
 
 /// The format.
 pub(super) struct Spz;
 
 const MAGIC: &[u8; 4] = b"NGSP";
+
+/// Bytes of the header that all versions have.
 const HEADER: usize = 16;
-const READ_VERSIONS: &str = "1 to 3";
+
+/// Bytes of the header of version 4.
+const PLAIN_HEADER: usize = 32;
+
+/// Bytes of an entry of version 4's table: the compressed size and the size of a stream.
+const ENTRY: usize = 16;
+
+const READ_VERSIONS: &str = "1 to 4";
 
 /// The range of colour bytes is 1 / 0.15 wide, in units of the constant coefficient.
 const COLOUR_SCALE: f32 = 0.15;
 
-/// Deflate's highest ratio of expansion; no honest header claims more.
-const MAX_EXPANSION: u64 = 1032;
+/// The ratio up to which the format's library believes that version 4's positions are compressed.
+const MAX_RATIO: u64 = 1024;
 
-/// Bytes of extension records that are passed over, at most.
+/// Bytes of extension records that are read, at most.
 const MAX_EXTENSIONS: u64 = 1 << 20;
 
-/// Set in the header's flags if extension records follow the arrays.
+/// Set in the header's flags if the Gaussians were trained with a filter that opacity pays for.
+const FLAG_ANTIALIASED: u8 = 1;
+
+/// Set in the header's flags if there are extension records.
 const FLAG_EXTENSIONS: u8 = 2;
+
+/// Adobe's extension of the frame that a file is in.
+const COORDINATE_SYSTEM: u32 = 0xadbe_0003;
+
+/// Adobe's extension of a camera's range.
+const SAFE_ORBIT_CAMERA: u32 = 0xadbe_0002;
 
 impl Format for Spz {
     fn name(&self) -> &'static str {
@@ -45,56 +65,141 @@ impl Format for Spz {
     }
 
     fn magic(&self) -> Option<&'static [u8]> {
-        Some(&[0x1f, 0x8b])
+        Some(MAGIC)
     }
 
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
-        let compressed = input.size();
-        let mut start = [0; 2];
-        input.fill(&mut start)?;
-        if start != [0x1f, 0x8b] {
-            return Err(refuse_uncompressed(input, start));
-        }
-        let mut gzip = GzDecoder::new((&start[..]).chain(&mut *input));
-        let mut header = [0; HEADER];
-        fill(&mut gzip, &mut header, 0)?;
-        let header = Header::parse(&header)?;
-        let payload = header.payload();
-        let available = compressed.saturating_mul(MAX_EXPANSION);
-        if payload > available {
-            let claimed = payload;
-            return Err(Reason::TooShort { claimed, available }.at(Place::Header("numPoints")));
-        }
-        // Grows with what is really there, never ahead of it.
-        let mut data = Vec::new();
-        (&mut gzip)
-            .take(payload)
-            .read_to_end(&mut data)
-            .map_err(|error| gzip_fault(error, HEADER as u64 + data.len() as u64))?;
-        if (data.len() as u64) < payload {
-            return Err(Reason::Truncated.at(Place::Byte(HEADER as u64 + data.len() as u64)));
-        }
-        finish(gzip, &header, payload)?;
-        if input.remaining() > 0 {
-            return Err(Reason::Trailing.at(Place::File));
-        }
-        Ok(header.unpack(&data))
+        load_into(input, CoordinateSystem::RIGHT_DOWN_FORWARD)
     }
 }
 
-/// Why a file that is not compressed is refused: version 4 is known, but not read.
-fn refuse_uncompressed(input: &mut Input<'_>, start: [u8; 2]) -> Fault {
-    let mut rest = [0; 6];
-    let expected = "an SPZ file";
-    let not_spz = Reason::Magic { expected }.at(Place::Byte(0));
-    if input.fill(&mut rest).is_err() || [&start[..], &rest[..2]].concat() != MAGIC {
-        return not_spz;
+/// Reads a scene into the frame `into`.
+pub(super) fn load_into(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fault> {
+    input.unpacked(|input| {
+        if input.is_compressed() {
+            load_gzip(input, into)
+        } else {
+            load_plain(input, into)
+        }
+    })
+}
+
+/// Reads versions 1 to 3.
+fn load_gzip(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fault> {
+    let mut header = [0; HEADER];
+    input.fill(&mut header)?;
+    let header = Header::parse(&header)?;
+    if header.version > 3 {
+        return Err(version(header.version));
     }
-    match u32::from_le_bytes([rest[2], rest[3], rest[4], rest[5]]) {
-        // These are never stored without compression.
-        ..=3 => not_spz,
-        found => version(found),
+    let (claimed, available) = (header.sizes().iter().sum(), input.remaining());
+    if claimed > available {
+        return Err(Reason::TooShort { claimed, available }.at(Place::Header("numPoints")));
     }
+    let data = input.bytes(claimed)?;
+    let end = HEADER as u64 + claimed;
+    let allowed = if header.flags & FLAG_EXTENSIONS != 0 {
+        MAX_EXTENSIONS
+    } else {
+        0
+    };
+    let records = input.up_to(allowed + 1)?;
+    if records.len() as u64 > allowed {
+        return Err(Reason::Trailing.at(Place::Byte(end)));
+    }
+    let mut rest = &data[..];
+    let arrays = header.sizes().map(|size| {
+        let (array, after) = rest.split_at(size as usize);
+        rest = after;
+        array
+    });
+    header.unpack(arrays, &Extensions::parse(&records), into)
+}
+
+/// Reads version 4, and refuses others.
+fn load_plain(input: &mut Input<'_>, into: CoordinateSystem) -> Result<Scene, Fault> {
+    let size = input.size();
+    let start = input.up_to(PLAIN_HEADER as u64)?;
+    if !start.starts_with(MAGIC) {
+        let expected = "an SPZ file";
+        return Err(Reason::Magic { expected }.at(Place::Byte(0)));
+    }
+    let Some(header) = start.first_chunk::<HEADER>() else {
+        return Err(Reason::Truncated.at(Place::Byte(start.len() as u64)));
+    };
+    let parsed = Header::parse(header)?;
+    if parsed.version < 4 {
+        let text = format!("version {} is not compressed with gzip", parsed.version);
+        return Err(Reason::Unsupported(text).at(Place::Header("version")));
+    }
+    if start.len() < PLAIN_HEADER {
+        return Err(Reason::Truncated.at(Place::Byte(start.len() as u64)));
+    }
+    let sizes = parsed.sizes();
+    let (claimed, available) = (sizes[0], size.saturating_mul(MAX_RATIO));
+    if claimed > available {
+        return Err(Reason::TooShort { claimed, available }.at(Place::Header("numPoints")));
+    }
+    let streams = if parsed.sh_degree == 0 { 5 } else { 6 };
+    if usize::from(start[15]) != streams {
+        let (found, expected) = (start[15].into(), streams as u64);
+        return Err(Reason::Count { found, expected }.at(Place::Header("numStreams")));
+    }
+    let table = u32::from_le_bytes([start[16], start[17], start[18], start[19]]);
+    let Some(records) = u64::from(table).checked_sub(PLAIN_HEADER as u64) else {
+        let (found, range) = (table, "32 and more");
+        return Err(Reason::Range { found, range }.at(Place::Header("tocByteOffset")));
+    };
+    let records = input.bytes(records)?;
+    let extensions = if parsed.flags & FLAG_EXTENSIONS != 0 {
+        Extensions::parse(&records)
+    } else {
+        Extensions::default()
+    };
+    let entries = input.bytes((streams * ENTRY) as u64)?;
+    let mut arrays = [const { Vec::new() }; 6];
+    for (index, entry) in entries.chunks_exact(ENTRY).enumerate() {
+        let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| entry[at + i]));
+        let (compressed, found, expected) = (word(0), word(8), sizes[index]);
+        let place = Place::Part(format!("stream {index}"));
+        if found != expected {
+            return Err(Reason::Count { found, expected }.at(place));
+        }
+        let available = input.remaining();
+        if compressed > available {
+            let claimed = compressed;
+            return Err(Reason::TooShort { claimed, available }.at(place));
+        }
+        arrays[index] = zstd(&input.bytes(compressed)?, expected).map_err(|r| r.at(place))?;
+    }
+    if input.remaining() > 0 {
+        return Err(Reason::Trailing.at(Place::File));
+    }
+    parsed.unpack(arrays.each_ref().map(Vec::as_slice), &extensions, into)
+}
+
+/// What the zstd stream `compressed` holds: `len` bytes, neither fewer nor more.
+fn zstd(compressed: &[u8], len: u64) -> Result<Vec<u8>, Reason> {
+    let decoder = StreamingDecoder::new(compressed).map_err(|e| Reason::Zstd(one_line(&e)))?;
+    let bytes = read_growing(decoder, len + 1, 0).map_err(|e| match e.kind() {
+        std::io::ErrorKind::OutOfMemory => Reason::Memory(len),
+        _ => Reason::Zstd(one_line(&e)),
+    })?;
+    let (found, expected) = (bytes.len() as u64, len);
+    if found != expected {
+        return Err(Reason::Count { found, expected });
+    }
+    Ok(bytes)
+}
+
+/// A message of another library, in one line.
+pub(super) fn one_line(error: &dyn std::fmt::Display) -> String {
+    error
+        .to_string()
+        .lines()
+        .next()
+        .unwrap_or_default()
+        .to_owned()
 }
 
 fn version(found: u32) -> Fault {
@@ -102,33 +207,84 @@ fn version(found: u32) -> Fault {
     Reason::Version { found, read }.at(Place::Header("version"))
 }
 
-/// Reads to the end of the stream, which checks its sum.
-fn finish(gzip: impl Read, header: &Header, payload: u64) -> Result<(), Fault> {
-    let extended = header.flags & FLAG_EXTENSIONS != 0;
-    let allowed = if extended { MAX_EXTENSIONS } else { 0 };
-    let end = HEADER as u64 + payload;
-    let mut rest = Vec::new();
-    gzip.take(allowed + 1)
-        .read_to_end(&mut rest)
-        .map_err(|error| gzip_fault(error, end))?;
-    if rest.len() as u64 > allowed {
-        return Err(Reason::Trailing.at(Place::Byte(end)));
-    }
-    Ok(())
+/// What the extension records say.
+#[derive(Default)]
+struct Extensions {
+    coordinates: Option<CoordinateSystem>,
+    notes: Metadata,
 }
 
-fn fill(gzip: &mut impl Read, buffer: &mut [u8], position: u64) -> Result<(), Fault> {
-    gzip.read_exact(buffer)
-        .map_err(|error| gzip_fault(error, position))
-}
-
-fn gzip_fault(error: std::io::Error, position: u64) -> Fault {
-    match error.kind() {
-        ErrorKind::UnexpectedEof => Reason::Truncated.at(Place::Byte(position)),
-        ErrorKind::InvalidInput | ErrorKind::InvalidData => {
-            Reason::Gzip(error).at(Place::Byte(position))
+impl Extensions {
+    /// Records of type, size in bytes, and content; what is not a whole record is passed over, as by the format's
+    /// library.
+    fn parse(mut records: &[u8]) -> Self {
+        let mut extensions = Self::default();
+        while let Some((head, rest)) = records.split_first_chunk::<8>() {
+            let [kind, size] =
+                [0, 4].map(|at| u32::from_le_bytes(std::array::from_fn(|i| head[at + i])));
+            let Some((content, rest)) = rest.split_at_checked(size as usize) else {
+                break;
+            };
+            records = rest;
+            let word = content
+                .first_chunk::<4>()
+                .map(|word| u32::from_le_bytes(*word));
+            match (kind, word) {
+                (COORDINATE_SYSTEM, Some(system @ 1..=16)) => {
+                    extensions.coordinates = Some(CoordinateSystem(system));
+                }
+                (COORDINATE_SYSTEM, _) => extensions.notes.note(
+                    "SPZ_ADOBE_coordinate_system names no frame, and right-up-back is assumed",
+                ),
+                (SAFE_ORBIT_CAMERA, _) => extensions
+                    .notes
+                    .note("the extension SPZ_ADOBE_safe_orbit_camera is ignored"),
+                (kind, _) => extensions
+                    .notes
+                    .note(format!("the extension {kind:#010x} is unknown and ignored")),
+            }
         }
-        _ => Reason::Io(error).at(Place::Byte(position)),
+        if !records.is_empty() {
+            extensions
+                .notes
+                .note("bytes that are no extension record are ignored");
+        }
+        extensions
+    }
+}
+
+/// A frame, by the number that the format's library has for it: less one, bits for x that points right, for the height
+/// that points up, and for the depth. Of the first eight, y is the height and z the depth, to the front with its bit; of
+/// the others, z is the height and y the depth, to the back with its bit.
+#[derive(Clone, Copy)]
+pub(super) struct CoordinateSystem(u32);
+
+impl CoordinateSystem {
+    /// That of SPZ files.
+    const RIGHT_UP_BACK: Self = Self(4);
+    /// That of [`Scene`]s.
+    pub(super) const RIGHT_DOWN_FORWARD: Self = Self(6);
+    /// The one that glTF's draft extensions demand.
+    pub(super) const LEFT_UP_FRONT: Self = Self(7);
+
+    /// The matrix from this frame to right-up-front.
+    fn matrix(self) -> DMat3 {
+        let sign = |bit: u32| {
+            if (self.0 - 1) >> bit & 1 == 1 {
+                1.0
+            } else {
+                -1.0
+            }
+        };
+        let [right, height, depth] = [0, 1, 2].map(sign);
+        if self.0 <= 8 {
+            return DMat3::from_diagonal(DVec3::new(right, height, depth));
+        }
+        DMat3::from_cols(
+            DVec3::new(right, 0.0, 0.0),
+            DVec3::new(0.0, 0.0, -depth),
+            DVec3::new(0.0, height, 0.0),
+        )
     }
 }
 
@@ -148,7 +304,7 @@ impl Header {
             let expected = "an SPZ file";
             return Err(Reason::Magic { expected }.at(Place::Byte(0)));
         }
-        if !(1..=3).contains(&word(4)) {
+        if !(1..=4).contains(&word(4)) {
             return Err(version(word(4)));
         }
         let header = Self {
@@ -171,57 +327,61 @@ impl Header {
         Ok(header)
     }
 
-    fn position_bytes(&self) -> usize {
-        if self.version == 1 { 6 } else { 9 }
-    }
-
-    fn rotation_bytes(&self) -> usize {
-        if self.version < 3 { 3 } else { 4 }
-    }
-
-    /// Bytes of one Gaussian's other coefficients.
-    fn rest_bytes(&self) -> usize {
-        3 * (sh_coefficients(self.sh_degree) - 1)
-    }
-
-    /// Bytes of all arrays.
-    fn payload(&self) -> u64 {
-        let each = self.position_bytes() + 1 + 3 + 3 + self.rotation_bytes() + self.rest_bytes();
-        each as u64 * u64::from(self.count)
-    }
-
-    /// The scene whose arrays are `data`, of [`Header::payload`] bytes.
-    fn unpack(&self, data: &[u8]) -> Scene {
-        let count = self.count as usize;
-        let mut scene = Scene::with_capacity(self.sh_degree, count);
-        let mut data = data;
-        let mut array = |size: usize| {
-            let (array, rest) = data.split_at(size * count);
-            data = rest;
-            move |index: usize| &array[size * index..][..size]
-        };
-        let positions = array(self.position_bytes());
-        let opacities = array(1);
-        let colours = array(3);
-        let scales = array(3);
-        let rotations = array(self.rotation_bytes());
-        let rests = array(self.rest_bytes());
-        let mut sh = vec![[0.0; 3]; scene.sh_stride()];
-        for i in 0..count {
-            let shape = GaussianShape {
-                scale: std::array::from_fn(|axis| scale(scales(i)[axis])),
-                rotation: rotation(rotations(i)),
-                opacity: f32::from(opacities(i)[0]) / 255.0,
-            };
-            sh[0] =
-                std::array::from_fn(|c| (f32::from(colours(i)[c]) / 255.0 - 0.5) / COLOUR_SCALE);
-            for (k, rgb) in rests(i).chunks_exact(3).enumerate() {
-                let sign = turn_sh(k + 1);
-                sh[k + 1] = std::array::from_fn(|c| sign * (f32::from(rgb[c]) - 128.0) / 128.0);
-            }
-            scene.push(turn(self.position(positions(i))), shape, &sh);
+    fn antialiasing(&self) -> Antialiasing {
+        if self.flags & FLAG_ANTIALIASED != 0 {
+            Antialiasing::Compensated
+        } else {
+            Antialiasing::Off
         }
-        scene
+    }
+
+    /// Bytes of one Gaussian in the arrays of positions, opacities, colours, scales, rotations and other coefficients.
+    fn strides(&self) -> [usize; 6] {
+        let position = if self.version == 1 { 6 } else { 9 };
+        let rotation = if self.version < 3 { 3 } else { 4 };
+        let rest = 3 * (sh_coefficients(self.sh_degree) - 1);
+        [position, 1, 3, 3, rotation, rest]
+    }
+
+    /// Bytes of the arrays.
+    fn sizes(&self) -> [u64; 6] {
+        self.strides()
+            .map(|stride| stride as u64 * u64::from(self.count))
+    }
+
+    /// The scene of `arrays`, which have [`Header::sizes`], in the frame `into`.
+    fn unpack(
+        &self,
+        arrays: [&[u8]; 6],
+        extensions: &Extensions,
+        into: CoordinateSystem,
+    ) -> Result<Scene, Fault> {
+        let from = extensions
+            .coordinates
+            .unwrap_or(CoordinateSystem::RIGHT_UP_BACK);
+        let map = into.matrix().transpose() * from.matrix();
+        let motion = Motion::new(map, DVec3::ZERO, self.sh_degree);
+        let strides = self.strides();
+        let mut scene = Scene::try_generate(self.sh_degree, self.count as usize, |i, sh| {
+            let [positions, opacities, colours, scales, rotations, rests] =
+                std::array::from_fn(|k| &arrays[k][strides[k] * i..][..strides[k]]);
+            let mut shape = GaussianShape {
+                scale: std::array::from_fn(|axis| scale(scales[axis])),
+                rotation: rotation(rotations),
+                opacity: f32::from(opacities[0]) / 255.0,
+            };
+            sh[0] = std::array::from_fn(|c| (f32::from(colours[c]) / 255.0 - 0.5) / COLOUR_SCALE);
+            for (rgb, bytes) in sh[1..].iter_mut().zip(rests.chunks_exact(3)) {
+                *rgb = std::array::from_fn(|c| (f32::from(bytes[c]) - 128.0) / 128.0);
+            }
+            let mut position = self.position(positions);
+            motion.apply(&mut position, &mut shape, sh);
+            (position, shape)
+        })?;
+        let metadata = scene.metadata_mut();
+        metadata.antialiasing = Some(self.antialiasing());
+        metadata.notes.clone_from(&extensions.notes.notes);
+        Ok(scene)
     }
 
     fn position(&self, bytes: &[u8]) -> [f32; 3] {
@@ -243,13 +403,12 @@ fn scale(byte: u8) -> f32 {
     (f64::from(byte) / 16.0 - 10.0).exp() as f32
 }
 
-/// The quaternion w, x, y, z, turned into the scene's frame.
+/// The quaternion w, x, y, z.
 fn rotation(bytes: &[u8]) -> [f32; 4] {
     let [x, y, z, w] = match *bytes {
         [a, b, c, d] => smallest_three(u32::from_le_bytes([a, b, c, d])),
         _ => first_three(bytes),
     };
-    let [x, y, z] = turn([x, y, z]);
     [w, x, y, z]
 }
 
@@ -286,18 +445,4 @@ fn smallest_three(word: u32) -> [f32; 4] {
             small.next().unwrap_or_default()
         }
     })
-}
-
-/// Turns a vector, or a quaternion's vector part, half around x.
-fn turn([x, y, z]: [f32; 3]) -> [f32; 3] {
-    [x, -y, -z]
-}
-
-/// The sign that coefficient `k` takes when the scene is turned half around x: negating z flips
-/// basis functions of odd l - |m|, negating y those of negative m.
-fn turn_sh(k: usize) -> f32 {
-    let l = k.isqrt() as i32;
-    let m = k as i32 - l * l - l;
-    let flips = (l - m.abs()) + i32::from(m < 0);
-    if flips % 2 == 0 { 1.0 } else { -1.0 }
 }

@@ -32,9 +32,20 @@ fn malformed_spz_is_refused_with_place_and_reason() {
     bad_sum[sum] ^= 0xff;
     assert!(matches!(refusal("a.spz", &bad_sum).1, Reason::Gzip(_)));
 
-    let (place, reason) = refusal("a.spz", &spz_header(4, 100, 1, 0));
+    // Version 4 is not compressed as a whole, and others are nothing else.
+    let (place, reason) = refusal("a.spz", &gzip(&spz_header(4, 100, 1, 0)));
     assert_eq!(place, Place::Header("version"));
     assert!(matches!(reason, Reason::Version { found: 4, .. }));
+    for version in 1..4 {
+        let (place, reason) = refusal(
+            "a.spz",
+            &[spz_header(version, 1, 0, 0), body.to_vec()].concat(),
+        );
+        assert_eq!(place, Place::Header("version"));
+        assert!(matches!(reason, Reason::Unsupported(_)));
+    }
+    let (_, reason) = refusal("a.spz", &spz_header(5, 100, 1, 0));
+    assert!(matches!(reason, Reason::Version { found: 5, .. }));
 
     // A bomb: the header claims little, and a gigabyte follows.
     let bomb = [good(2), vec![0; 64 << 20]].concat();
@@ -214,5 +225,219 @@ fn every_header_byte_of_spz_may_be_anything() {
                 assert_eq!(scene.len(), 1);
             }
         }
+    }
+}
+
+/// A zstd frame of `bytes`, not compressed.
+fn zstd(bytes: &[u8]) -> Vec<u8> {
+    // The magic, a descriptor that says that a size of four bytes follows, the size, and a last, raw block.
+    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0xa0];
+    frame.extend((bytes.len() as u32).to_le_bytes());
+    let block = (bytes.len() as u32) << 3 | 1;
+    frame.extend(&block.to_le_bytes()[..3]);
+    frame.extend(bytes);
+    frame
+}
+
+/// The header, the extension records and the table of version 4, and its streams.
+fn version_4_of(degree: u8, flags: u8, records: &[u8], arrays: &[Vec<u8>]) -> Vec<u8> {
+    let mut file = spz_header(4, 2, degree, flags);
+    file[15] = arrays.len() as u8;
+    file.extend((32 + records.len() as u32).to_le_bytes());
+    file.extend([0; 12]);
+    file.extend(records);
+    let streams: Vec<_> = arrays.iter().map(|array| zstd(array)).collect();
+    for (stream, array) in streams.iter().zip(arrays) {
+        file.extend((stream.len() as u64).to_le_bytes());
+        file.extend((array.len() as u64).to_le_bytes());
+    }
+    file.extend(streams.concat());
+    file
+}
+
+/// Arrays of two Gaussians of degree `degree`.
+fn arrays(degree: u8) -> Vec<Vec<u8>> {
+    let rest = 3 * ((usize::from(degree) + 1).pow(2) - 1);
+    let array = |size: usize| (0..2 * size).map(|i| (37 * i + size) as u8).collect();
+    [9, 1, 3, 3, 4, rest]
+        .into_iter()
+        .filter(|size| *size > 0)
+        .map(array)
+        .collect()
+}
+
+/// A file of version 4 with two Gaussians.
+pub fn version_4(degree: u8, flags: u8) -> Vec<u8> {
+    version_4_of(degree, flags, &[], &arrays(degree))
+}
+
+#[gaurast_runner::test]
+fn version_4_of_spz_is_version_3_otherwise_stored() {
+    for degree in 0..=4 {
+        for flags in [0, 1] {
+            let four = read("a.spz", &version_4(degree, flags)).expect("a good file");
+            let body = [spz_header(3, 2, degree, flags), arrays(degree).concat()].concat();
+            assert_eq!(four, read("a.spz", &gzip(&body)).expect("a good file"));
+        }
+    }
+}
+
+#[gaurast_runner::test]
+fn the_small_files_of_version_4_are_read() {
+    for name in ["a", "b"] {
+        let scene =
+            gaurast_scene::open(data("formats").join(format!("v4-{name}.spz"))).expect(name);
+        assert_eq!((scene.len(), scene.sh_degree()), (4, 0));
+        // The splats are at the corners of a tetrahedron of 24-bit steps, all of one opacity.
+        let opacity = if name == "a" {
+            181.0 / 255.0
+        } else {
+            230.0 / 255.0
+        };
+        for shape in scene.shapes() {
+            close(&[shape.opacity], &[opacity], 1e-6);
+            close(&[shape.rotation.iter().map(|c| c * c).sum()], &[1.0], 1e-5);
+        }
+    }
+    let raw = gaurast_scene::open(data("formats/raw-not-gzipped.spz")).expect_err("no gzip");
+    assert!(
+        raw.to_string()
+            .ends_with("header, version: version 2 is not compressed with gzip"),
+        "{raw}"
+    );
+}
+
+#[gaurast_runner::test]
+fn malformed_version_4_of_spz_is_refused_with_place_and_reason() {
+    let good = version_4(1, 0);
+    let refused = |at: usize, byte: u8| {
+        let mut file = good.clone();
+        file[at] = byte;
+        refusal("a.spz", &file)
+    };
+    assert!(matches!(refused(11, 0x70).1, Reason::TooShort { .. }));
+    let (place, reason) = refused(15, 5);
+    assert_eq!(place, Place::Header("numStreams"));
+    assert!(matches!(
+        reason,
+        Reason::Count {
+            found: 5,
+            expected: 6
+        }
+    ));
+    let (place, reason) = refused(16, 31);
+    assert_eq!(place, Place::Header("tocByteOffset"));
+    assert!(matches!(reason, Reason::Range { found: 31, .. }));
+    assert!(matches!(refused(19, 1).1, Reason::Truncated));
+    let stream = Place::Part("stream 0".to_owned());
+    assert!(matches!(refused(39, 1), (p, Reason::TooShort { .. }) if p == stream));
+    assert!(matches!(refused(40, 1), (p, Reason::Count { found: 1, expected: 18 }) if p == stream));
+    let frame = 32 + 6 * 16;
+    assert!(matches!(refused(frame, 0), (p, Reason::Zstd(_)) if p == stream));
+    let trailing = [good.clone(), vec![0]].concat();
+    assert!(matches!(refusal("a.spz", &trailing).1, Reason::Trailing));
+
+    // A stream that holds more than it should, as far as anyone can tell without reading it all.
+    let mut arrays = arrays(0);
+    arrays[0].extend(vec![0; 100_000]);
+    let mut file = version_4_of(0, 0, &[], &arrays);
+    file[40..48].copy_from_slice(&18_u64.to_le_bytes());
+    assert!(matches!(
+        refusal("a.spz", &file).1,
+        Reason::Count {
+            found: 19,
+            expected: 18
+        }
+    ));
+}
+
+/// A record of an extension.
+fn record(kind: u32, content: &[u8]) -> Vec<u8> {
+    let mut record = kind.to_le_bytes().to_vec();
+    record.extend((content.len() as u32).to_le_bytes());
+    record.extend(content);
+    record
+}
+
+/// Files in each frame that the extension has are one scene, as the format's library turns them.
+#[gaurast_runner::test]
+fn the_frame_that_an_spz_extension_names_is_turned() {
+    let plain = read("a.spz", &version_4(4, 0)).expect("a good file");
+    // The axes that x, y and z are, in order: right, down and forward are those of a scene.
+    let frames = [
+        "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD",
+        "RBD", "LBU", "RBU",
+    ];
+    let raw = {
+        let [x, y, z] = plain.positions()[0];
+        [x, -y, -z]
+    };
+    for (number, frame) in (1_u32..).zip(frames) {
+        let records = record(0xadbe_0003, &number.to_le_bytes());
+        let file = version_4_of(4, 2, &records, &arrays(4));
+        let scene = read("a.spz", &file).expect("a good file");
+        let mut expected = [0.0; 3];
+        for (axis, value) in frame.chars().zip(raw) {
+            let (place, sign) = match axis {
+                'R' => (0, 1.0),
+                'L' => (0, -1.0),
+                'D' => (1, 1.0),
+                'U' => (1, -1.0),
+                'F' => (2, 1.0),
+                _ => (2, -1.0),
+            };
+            expected[place] = sign * value;
+        }
+        assert_eq!(scene.positions()[0], expected, "{frame}");
+        assert_eq!(scene.shapes()[0].scale, plain.shapes()[0].scale);
+        assert!(scene.metadata().notes.is_empty());
+        // Colours: the function of degree 2 that is z^2 less the others' mean, in the file's frame.
+        let energy = |scene: &gaurast_scene::Scene| -> f32 {
+            scene.sh()[4..9].iter().map(|c| c[0] * c[0]).sum()
+        };
+        close(&[energy(&scene)], &[energy(&plain)], 1e-4);
+        if frame == "RUB" {
+            assert_eq!(scene, plain);
+        }
+        // The gradient of degree 1 points along the file's axes as the positions do.
+        let gradient = |sh: &[[f32; 3]]| [-sh[3][1], -sh[1][1], sh[2][1]];
+        let [x, y, z] = gradient(plain.sh());
+        let mut turned = [0.0; 3];
+        for (axis, value) in frame.chars().zip([x, -y, -z]) {
+            let (place, sign) = match axis {
+                'R' => (0, 1.0),
+                'L' => (0, -1.0),
+                'D' => (1, 1.0),
+                'U' => (1, -1.0),
+                'F' => (2, 1.0),
+                _ => (2, -1.0),
+            };
+            turned[place] = sign * value;
+        }
+        assert_eq!(gradient(scene.sh()), turned, "{frame}");
+    }
+}
+
+#[gaurast_runner::test]
+fn other_spz_extensions_are_named() {
+    let records = [
+        record(0xadbe_0002, &[0; 12]),
+        record(0x1234_0001, &[1, 2, 3]),
+        record(0xadbe_0003, &99_u32.to_le_bytes()),
+        vec![1, 2, 3],
+    ]
+    .concat();
+    let four = version_4_of(0, 2, &records, &arrays(0));
+    let body = [spz_header(3, 2, 0, 2), arrays(0).concat(), records].concat();
+    for file in [four, gzip(&body)] {
+        let notes = read("a.spz", &file)
+            .expect("a good file")
+            .metadata()
+            .notes
+            .clone();
+        assert_eq!(notes.len(), 4, "{notes:?}");
+        assert!(notes[0].contains("SPZ_ADOBE_safe_orbit_camera"));
+        assert!(notes[1].contains("0x12340001"));
+        assert!(notes[2].contains("SPZ_ADOBE_coordinate_system"));
     }
 }

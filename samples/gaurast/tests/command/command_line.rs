@@ -52,7 +52,9 @@ fn one_gaussian_is_drawn_where_it_is() {
     let folder = folder();
     write(&folder, "one.ply", ONE);
     let arguments = [
-        &["render", "one.ply", "-o", "a.png", "--output", "b.exr"],
+        &[
+            "render", "one.ply", "--stats", "-o", "a.png", "--output", "b.exr",
+        ],
         &LOOK[..],
     ]
     .concat();
@@ -63,7 +65,7 @@ fn one_gaussian_is_drawn_where_it_is() {
     );
     assert!(output.status.success(), "{stderr}");
     assert!(
-        stdout.contains("65 x 49") && stdout.contains("wrote b.exr"),
+        stdout.contains("65 x 49") && stdout.contains("wrote a.png, b.exr: 65x49, 1 Gaussian "),
         "{stdout}"
     );
     assert!(stdout.contains("gaussians drawn"), "{stdout}");
@@ -123,8 +125,13 @@ fn counters_tell_of_every_stage_of_the_simulated_hardware_if_they_are_asked_for(
         "energy, shader cores",
     ];
     for asked in [true, false] {
-        let counters: &[&str] = if asked { &["--counters"] } else { &[] };
-        let arguments = [&["render", "one.ply", "-o", "a.png"], &LOOK[..], counters].concat();
+        let counters: &[&str] = if asked { &["--counters"] } else { &["--stats"] };
+        let arguments = [
+            &["render", "one.ply", "--force", "-o", "a.png"],
+            &LOOK[..],
+            counters,
+        ]
+        .concat();
         let output = gaurast(&folder, &arguments);
         let stdout = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success());
@@ -149,8 +156,8 @@ fn a_panorama_and_a_fisheye_see_what_is_behind_and_beside() {
     ] {
         let size = if model == "fisheye" { "32x32" } else { "32x16" };
         let arguments = [
-            "render", "one.ply", "-o", "a.png", "--camera", model, "--size", size, "--eye",
-            "0,0,0", "--target", target,
+            "render", "one.ply", "--force", "-o", "a.png", "--camera", model, "--size", size,
+            "--eye", "0,0,0", "--target", target,
         ];
         let output = gaurast(&folder, &arguments);
         let stderr = String::from_utf8_lossy(&output.stderr);
@@ -185,6 +192,7 @@ fn a_camera_file_gives_view_and_size() {
                 "render",
                 "one.ply",
                 "-q",
+                "--force",
                 "--cameras",
                 "cameras.json",
                 "-o",
@@ -245,7 +253,7 @@ fn bad_input_is_one_sentence_and_exit_code_1() {
     fails(&["render", "none.ply"], "gaurast: none.ply: No such file");
     fails(
         &["render", "folder.ply"],
-        "gaurast: folder.ply: is a directory",
+        "gaurast: folder.ply: the folder holds no scene",
     );
     fails(
         &["render", "cut.ply"],
@@ -277,8 +285,8 @@ fn bad_input_is_one_sentence_and_exit_code_1() {
     );
     // These are refused before anything is read or drawn.
     fails(
-        &["render", "none.ply", "-o", "a.jpg"],
-        "gaurast: a.jpg: pictures are written as",
+        &["render", "none.ply", "-o", "a.bmp"],
+        "gaurast: a.bmp: pictures are written as",
     );
     fails(
         &["render", "none.ply", "-o", "no/a.png"],
@@ -322,7 +330,12 @@ fn without_arguments_it_draws_the_garden() {
     let output = gaurast(&folder, &[]);
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{stderr}");
-    assert!(String::from_utf8_lossy(&output.stdout).contains("wrote gaurast.png"));
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        stdout.starts_with("wrote gaurast.png: 1280x720, 300 000 Gaussians"),
+        "{stdout}"
+    );
+    assert_eq!(stdout.lines().count(), 1, "{stdout}");
     let png = image::open(folder.path().join("gaurast.png"))
         .expect("a PNG")
         .to_rgb8();

@@ -54,7 +54,15 @@ fn an_interrupted_render_leaves_the_picture_that_was_there() {
     let mut interrupted = 0;
     for step in 0..12 {
         std::fs::write(&path, old).expect("written");
-        let arguments = ["render", "-q", "--size", "1500x1000", "-o", "a.exr"];
+        let arguments = [
+            "render",
+            "-q",
+            "--force",
+            "--size",
+            "1500x1000",
+            "-o",
+            "a.exr",
+        ];
         let mut child = gaurast(&folder, &arguments).spawn().expect("it starts");
         // Wherever that meets it, from its first step to its last.
         std::thread::sleep(Duration::from_millis(step * 90));
@@ -100,7 +108,7 @@ fn a_limit_of_file_sizes_is_one_sentence_and_keeps_what_was_there() {
     std::fs::write(&path, "an earlier picture").expect("written");
     let command = env!("CARGO_BIN_EXE_gaurast");
     // In units of half a kibibyte, or one: the picture has three mebibytes.
-    let line = format!("ulimit -f 64; exec '{command}' render -q --size 500x400 -o a.exr");
+    let line = format!("ulimit -f 64; exec '{command}' render -q --force --size 500x400 -o a.exr");
     let output = Command::new("sh")
         .args(["-c", &line])
         .current_dir(&folder)

@@ -127,6 +127,7 @@ impl QuadRenderer {
             time: sum,
             processor_time: processor,
             counters,
+            depth: None,
         })
     }
 

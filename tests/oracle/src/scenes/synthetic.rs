@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use gaurast_scene::camera::{Camera, Model};
+use gaurast_scene::camera::{Camera, DEFAULT_NEAR, Model};
 use gaurast_scene::random::normal;
 use gaurast_scene::{GaussianShape, SH_C0, Scene, sigmoid};
 
@@ -47,6 +47,8 @@ pub fn synthetic_camera([width, height]: [u32; 2]) -> Camera {
         principal: [f64::from(width) / 2.0, f64::from(height) / 2.0],
         width,
         height,
+        near: DEFAULT_NEAR,
+        far: f64::INFINITY,
     }
 }
 

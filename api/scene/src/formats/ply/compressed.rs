@@ -74,7 +74,7 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
         same_count("sh", table.count("sh")?, count)?;
     }
 
-    let mut scene = Scene::with_capacity(degree, count);
+    let mut scene = Scene::try_with_capacity(degree, count)?;
     let mut sh = vec![[0.0; 3]; scene.sh_stride()];
     table.read("vertex", &packed, |index, words| {
         let words = std::array::from_fn(|i| words[i] as u32);

@@ -6,15 +6,19 @@
 
 use super::table::{Column, Table};
 use crate::error::{Fault, Place, Reason};
+use crate::metadata::Geometry;
 use crate::scene::{GaussianShape, MAX_SH_DEGREE, Scene, sh_coefficients, sigmoid};
 
 const VERTEX: &str = "vertex";
 
 /// The properties that every file has; `push` unpacks them in this order.
-const REQUIRED: [&str; 14] = [
-    "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity",
-    "f_dc_0", "f_dc_1", "f_dc_2",
+const REQUIRED: [&str; 13] = [
+    "x", "y", "z", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0",
+    "f_dc_1", "f_dc_2",
 ];
+
+/// The property that comes after those, but in files of 2DGS.
+const THIRD_SCALE: &str = "scale_2";
 
 /// Reads the scene.
 pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
@@ -22,28 +26,43 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
         .iter()
         .map(|property| table.column(VERTEX, property))
         .collect::<Result<Vec<_>, _>>()?;
+    let flat = !table
+        .element(VERTEX)
+        .is_some_and(|vertex| vertex.properties.contains_key(THIRD_SCALE));
+    if !flat {
+        columns.push(table.column(VERTEX, THIRD_SCALE)?);
+    }
     let (degree, rest) = rest_columns(&table, VERTEX)?;
     columns.extend(rest);
     let count = table.count(VERTEX)?;
     if count == 0 {
         return Err(Reason::Empty.at(Place::Element(VERTEX.to_owned())));
     }
-    let mut scene = Scene::with_capacity(degree, count);
+    let mut scene = Scene::try_with_capacity(degree, count)?;
+    if flat {
+        scene.metadata_mut().geometry = Some(Geometry::Surfel);
+    }
     let mut sh = vec![[0.0; 3]; scene.sh_stride()];
     table.read(VERTEX, &columns, |_, values| {
-        push(&mut scene, values, &mut sh);
+        push(&mut scene, values, flat, &mut sh);
     })?;
     Ok(scene)
 }
 
-fn push(scene: &mut Scene, values: &[f64], sh: &mut [[f32; 3]]) {
+fn push(scene: &mut Scene, values: &[f64], flat: bool, sh: &mut [[f32; 3]]) {
     let (required, rest) = values.split_at(REQUIRED.len());
+    let (third, rest) = rest.split_at(usize::from(!flat));
+    let log_scale = [required[3], required[4]];
     let shape = GaussianShape {
-        scale: std::array::from_fn(|axis| required[3 + axis].exp() as f32),
-        rotation: std::array::from_fn(|i| required[6 + i] as f32),
-        opacity: sigmoid(required[10]),
+        scale: [
+            log_scale[0].exp() as f32,
+            log_scale[1].exp() as f32,
+            third.first().map_or(0.0, |log| log.exp() as f32),
+        ],
+        rotation: std::array::from_fn(|i| required[5 + i] as f32),
+        opacity: sigmoid(required[9]),
     };
-    sh[0] = std::array::from_fn(|channel| required[11 + channel] as f32);
+    sh[0] = std::array::from_fn(|channel| required[10 + channel] as f32);
     unpack_rest(rest, &mut sh[1..]);
     scene.push(std::array::from_fn(|axis| required[axis] as f32), shape, sh);
 }

@@ -1,5 +1,6 @@
 //! PLY files: the layout of the original 3DGS code, and PlayCanvas's compressed one.
 
+mod comments;
 mod compressed;
 mod inria;
 mod table;
@@ -26,10 +27,19 @@ impl Format for Ply {
 
     fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
         let table = table::Table::open(input)?;
-        if table.element("chunk").is_some() {
-            compressed::load(table)
+        let said = comments::metadata(table.comments());
+        let mut scene = if table.element("chunk").is_some() {
+            compressed::load(table)?
         } else {
-            inria::load(table)
+            inria::load(table)?
+        };
+        let metadata = scene.metadata_mut();
+        // A record without a third scale is evidence, and a comment a claim.
+        metadata.geometry = metadata.geometry.or(said.geometry);
+        metadata.antialiasing = said.antialiasing;
+        for note in said.notes {
+            metadata.note(note);
         }
+        Ok(scene)
     }
 }

@@ -25,6 +25,8 @@ const BLOCK: usize = 1 << 16;
 pub(super) struct Table<'i, 'a> {
     input: &'i mut Input<'a>,
     header: Header,
+    /// The header's comments, without the keyword, in the order of the file.
+    comments: Vec<String>,
     /// The index of the element that comes next.
     next: usize,
     /// Lines consumed, in a text file.
@@ -61,13 +63,24 @@ impl<'i, 'a> Table<'i, 'a> {
         if declared(b"element ") > header.elements.len() || declared(b"property ") > properties {
             return Err(Reason::Twice.at(Place::Header("its declarations")));
         }
+        let comments = text
+            .split(|byte| *byte == b'\n')
+            .filter_map(|line| line.trim_ascii().strip_prefix(b"comment "))
+            .map(|comment| String::from_utf8_lossy(comment.trim_ascii()).into_owned())
+            .collect();
         let lines = text.iter().filter(|byte| **byte == b'\n').count() as u64;
         Ok(Self {
             input,
             header,
+            comments,
             next: 0,
             lines,
         })
+    }
+
+    /// The header's comments, without the keyword, in the order of the file.
+    pub(super) fn comments(&self) -> &[String] {
+        &self.comments
     }
 
     /// The element `name`, if there is one.

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use gaurast_oracle::scenes;
-use gaurast_scene::camera::{Camera, DEFAULT_FOV, Model};
+use gaurast_scene::camera::{Camera, DEFAULT_FOV, DEFAULT_NEAR, Model};
 use gaurast_scene::{GaussianShape, Scene};
 use serde::{Deserialize, Serialize};
 
@@ -303,5 +303,7 @@ fn tiles_camera([width, height]: [u32; 2]) -> Camera {
         principal: [8.0; 2],
         width,
         height,
+        near: DEFAULT_NEAR,
+        far: f64::INFINITY,
     }
 }

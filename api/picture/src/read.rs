@@ -1,0 +1,167 @@
+//! Pictures from files.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use exr::prelude::{ReadChannels, ReadLayers};
+
+use crate::files::{OutputError, PictureFormat};
+use crate::picture::Picture;
+
+/// The most pixels of a picture that is read: larger ones are more likely to be damaged.
+const MAX_PIXELS: u64 = 1 << 29;
+
+/// Reads the picture file at `path`, by its extension: eight or sixteen bits become 0 to 1 and are premultiplied by
+/// alpha; floats stay as they are.
+///
+/// # Errors
+/// [`OutputError::UnknownFormat`], [`OutputError::Io`], or [`OutputError::Encode`] for a file that is damaged.
+pub fn read(path: &Path) -> Result<Picture, OutputError> {
+    let format = PictureFormat::of(path)?;
+    let io = |source| OutputError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let damaged = |reason: String| OutputError::Encode {
+        path: path.to_owned(),
+        reason,
+    };
+    let file = BufReader::new(File::open(path).map_err(io)?);
+    let picture = match format {
+        PictureFormat::Png => png(file),
+        PictureFormat::Jpeg => jpeg(file),
+        PictureFormat::WebP => webp(file),
+        PictureFormat::Exr => exr(file),
+    };
+    picture.map_err(damaged)
+}
+
+/// Checks a size before memory is taken for it.
+fn sized(width: u64, height: u64) -> Result<(), String> {
+    if width.saturating_mul(height) > MAX_PIXELS {
+        return Err(format!("{width}x{height} pixels are more than are read"));
+    }
+    Ok(())
+}
+
+/// A picture of `channels` values a pixel, 1 to 4, each 0 to 1.
+fn picture(width: u32, height: u32, channels: usize, values: impl Iterator<Item = f32>) -> Picture {
+    let values: Vec<f32> = values.collect();
+    let pixel = |values: &[f32]| {
+        let [r, g, b, alpha] = match *values {
+            [grey] => [grey, grey, grey, 1.0],
+            [grey, alpha] => [grey, grey, grey, alpha],
+            [r, g, b] => [r, g, b, 1.0],
+            [r, g, b, alpha, ..] => [r, g, b, alpha],
+            [] => [0.0; 4],
+        };
+        [r * alpha, g * alpha, b * alpha, alpha]
+    };
+    Picture {
+        width,
+        height,
+        pixels: values.chunks_exact(channels).map(pixel).collect(),
+    }
+}
+
+fn of_bytes(bytes: &[u8]) -> impl Iterator<Item = f32> {
+    bytes.iter().map(|byte| f32::from(*byte) / 255.0)
+}
+
+fn png(file: BufReader<File>) -> Result<Picture, String> {
+    let mut decoder = png::Decoder::new(file);
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
+    let (width, height) = (reader.info().width, reader.info().height);
+    sized(width.into(), height.into())?;
+    let size = reader.output_buffer_size().ok_or("it is too large")?;
+    let mut bytes = vec![0; size];
+    let info = (reader.next_frame(&mut bytes)).map_err(|error| error.to_string())?;
+    let bytes = &bytes[..info.buffer_size()];
+    let channels = info.color_type.samples();
+    Ok(if info.bit_depth == png::BitDepth::Sixteen {
+        let values = (bytes.chunks_exact(2))
+            .map(|pair| f32::from(u16::from_be_bytes([pair[0], pair[1]])) / 65_535.0);
+        picture(width, height, channels, values)
+    } else {
+        picture(width, height, channels, of_bytes(bytes))
+    })
+}
+
+fn jpeg(mut file: BufReader<File>) -> Result<Picture, String> {
+    use zune_jpeg::zune_core::bytestream::ZCursor;
+    use zune_jpeg::zune_core::colorspace::ColorSpace;
+    use zune_jpeg::zune_core::options::DecoderOptions;
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)
+        .map_err(|error| error.to_string())?;
+    let options = DecoderOptions::default()
+        .jpeg_set_out_colorspace(ColorSpace::RGB)
+        .set_max_width(usize::from(u16::MAX))
+        .set_max_height(usize::from(u16::MAX));
+    let mut decoder = zune_jpeg::JpegDecoder::new_with_options(ZCursor::new(&bytes), options);
+    let decoded = decoder.decode().map_err(|error| error.to_string())?;
+    let (width, height) = decoder.dimensions().ok_or("it has no size")?;
+    sized(width as u64, height as u64)?;
+    Ok(picture(width as u32, height as u32, 3, of_bytes(&decoded)))
+}
+
+fn webp(file: BufReader<File>) -> Result<Picture, String> {
+    let mut decoder = image_webp::WebPDecoder::new(file).map_err(|error| error.to_string())?;
+    let (width, height) = decoder.dimensions();
+    sized(width.into(), height.into())?;
+    let size = decoder.output_buffer_size().ok_or("it is too large")?;
+    let channels = if decoder.has_alpha() { 4 } else { 3 };
+    let mut bytes = vec![0; size];
+    decoder
+        .read_image(&mut bytes)
+        .map_err(|error| error.to_string())?;
+    Ok(picture(width, height, channels, of_bytes(&bytes)))
+}
+
+fn exr(file: BufReader<File>) -> Result<Picture, String> {
+    let image = exr::image::read::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgba_channels(
+            |size, _| (size.width(), vec![[0.0_f32; 4]; size.area()]),
+            |(width, pixels): &mut (usize, Vec<[f32; 4]>),
+             at,
+             (r, g, b, a): (f32, f32, f32, f32)| {
+                pixels[at.y() * *width + at.x()] = [r, g, b, a];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(file)
+        .map_err(|error| error.to_string())?;
+    let size = image.layer_data.size;
+    Ok(Picture {
+        width: size.width() as u32,
+        height: size.height() as u32,
+        pixels: image.layer_data.channel_data.pixels.1,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_picture_is_one_sentence() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for name in ["a.png", "a.jpg", "a.webp", "a.exr"] {
+            let path = folder.path().join(name);
+            let missing = read(&path).expect_err("it is missing");
+            assert!(matches!(missing, OutputError::Io { .. }), "{missing}");
+            std::fs::write(&path, "neither").expect("written");
+            let damaged = read(&path).expect_err("it is no picture").to_string();
+            assert!(
+                damaged.starts_with(&path.display().to_string()),
+                "{damaged}"
+            );
+            assert_eq!(damaged.lines().count(), 1, "{damaged}");
+        }
+    }
+}

@@ -1,0 +1,427 @@
+//! COLMAP's sparse models: `cameras` and `images`, as `.bin` or `.txt`.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::{CameraFile, CameraFileError, CameraFileOptions, Distortion, Numbers, View, ViewError};
+use crate::camera::Model;
+
+/// COLMAP's camera models, by number: the name, and how many parameters it has.
+const MODELS: [(&str, usize); 11] = [
+    ("SIMPLE_PINHOLE", 3),
+    ("PINHOLE", 4),
+    ("SIMPLE_RADIAL", 4),
+    ("RADIAL", 5),
+    ("OPENCV", 8),
+    ("OPENCV_FISHEYE", 8),
+    ("FULL_OPENCV", 12),
+    ("FOV", 5),
+    ("SIMPLE_RADIAL_FISHEYE", 4),
+    ("RADIAL_FISHEYE", 5),
+    ("THIN_PRISM_FISHEYE", 12),
+];
+
+/// Bytes of a point of an image: its place and the number of the point in space.
+const POINT: usize = 24;
+
+/// The folder of the sparse model that `path` is, or is a file of.
+pub(super) fn folder(path: &Path) -> Option<PathBuf> {
+    let holds = |folder: &Path| {
+        ["bin", "txt"].iter().any(|kind| {
+            folder.join(format!("cameras.{kind}")).is_file()
+                && folder.join(format!("images.{kind}")).is_file()
+        })
+    };
+    if path.is_dir() {
+        return ["", "sparse/0", "sparse", "0"]
+            .iter()
+            .map(|inner| path.join(inner))
+            .find(|folder| holds(folder));
+    }
+    let name = path.file_stem()?.to_str()?;
+    let folder = parent(path);
+    let kind = path.extension().is_some_and(|e| e == "bin" || e == "txt");
+    (kind && (name == "cameras" || name == "images") && holds(&folder)).then_some(folder)
+}
+
+fn parent(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(folder) if folder != Path::new("") => folder.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// A camera's model, picture and numbers.
+struct Intrinsics {
+    model: String,
+    size: [f64; 2],
+    parameters: Vec<f64>,
+}
+
+/// A photograph's pose: world to camera.
+struct Photograph {
+    name: String,
+    /// w, x, y, z.
+    rotation: [f64; 4],
+    translation: [f64; 3],
+    camera: u64,
+}
+
+/// Reads the model in `folder`; views are in the order of their names.
+pub(super) fn read(
+    folder: &Path,
+    options: &CameraFileOptions,
+) -> Result<CameraFile, CameraFileError> {
+    let (cameras_path, images_path) = ["bin", "txt"]
+        .map(|kind| {
+            (
+                folder.join(format!("cameras.{kind}")),
+                folder.join(format!("images.{kind}")),
+            )
+        })
+        .into_iter()
+        .find(|(cameras, images)| cameras.is_file() && images.is_file())
+        .ok_or_else(|| CameraFileError::UnknownKind {
+            path: folder.to_owned(),
+        })?;
+    let binary = cameras_path.extension().is_some_and(|e| e == "bin");
+    let bytes = |path: &Path| {
+        std::fs::read(path).map_err(|source| CameraFileError::Io {
+            path: path.to_owned(),
+            source,
+        })
+    };
+    let damaged = |path: &Path, reason: &str| CameraFileError::Colmap {
+        path: path.to_owned(),
+        reason: reason.to_owned(),
+    };
+    let (cameras, images) = (bytes(&cameras_path)?, bytes(&images_path)?);
+    let (cameras, images) = if binary {
+        (binary_cameras(&cameras), binary_images(&images))
+    } else {
+        (text_cameras(&cameras), text_images(&images))
+    };
+    let cameras = cameras.map_err(|reason| damaged(&cameras_path, reason))?;
+    let mut images = images.map_err(|reason| damaged(&images_path, reason))?;
+    images.sort_by(|a, b| a.name.cmp(&b.name));
+    let mut file = CameraFile::default();
+    for (view, image) in images.into_iter().enumerate() {
+        let camera = cameras
+            .get(&image.camera)
+            .ok_or_else(|| damaged(&images_path, "an image is of a camera that is not there"))?;
+        let view = image
+            .view(camera, options, &mut file.ignored)
+            .map_err(|reason| CameraFileError::View {
+                path: images_path.clone(),
+                view,
+                reason,
+            })?;
+        file.views.push(view);
+    }
+    Ok(file)
+}
+
+impl Photograph {
+    fn view(
+        self,
+        camera: &Intrinsics,
+        options: &CameraFileOptions,
+        ignored: &mut Vec<String>,
+    ) -> Result<View, ViewError> {
+        let p = |index: usize| camera.parameters.get(index).copied().unwrap_or(0.0);
+        let simple = ([p(0), p(0)], [p(1), p(2)]);
+        let full = ([p(0), p(1)], [p(2), p(3)]);
+        let radial = |radial| Distortion {
+            radial,
+            ..Distortion::default()
+        };
+        let (model, (focal, principal), distortion) = match camera.model.as_str() {
+            "SIMPLE_PINHOLE" => (Model::Pinhole, simple, Distortion::default()),
+            "PINHOLE" => (Model::Pinhole, full, Distortion::default()),
+            "SIMPLE_RADIAL" => (Model::Pinhole, simple, radial([p(3), 0.0, 0.0, 0.0])),
+            "RADIAL" => (Model::Pinhole, simple, radial([p(3), p(4), 0.0, 0.0])),
+            "OPENCV" => {
+                let distortion = Distortion {
+                    radial: [p(4), p(5), 0.0, 0.0],
+                    tangential: [p(6), p(7)],
+                };
+                (Model::Pinhole, full, distortion)
+            }
+            "OPENCV_FISHEYE" => (Model::Fisheye, full, radial([p(4), p(5), p(6), p(7)])),
+            "SIMPLE_RADIAL_FISHEYE" => (Model::Fisheye, simple, radial([p(3), 0.0, 0.0, 0.0])),
+            "RADIAL_FISHEYE" => (Model::Fisheye, simple, radial([p(3), p(4), 0.0, 0.0])),
+            other => return Err(ViewError::Model(other.to_owned())),
+        };
+        distortion.check(options.undistorted, ignored)?;
+        let [w, x, y, z] = self.rotation;
+        let quaternion = DQuat::from_xyzw(x, y, z, w);
+        let length = quaternion.length();
+        if !length.is_finite() || length < 1e-9 {
+            return Err(ViewError::Rotation);
+        }
+        let rotation = DMat3::from_quat(quaternion.normalize());
+        let eye = -(rotation.transpose() * DVec3::from_array(self.translation));
+        let camera = Numbers {
+            model,
+            rotation: rotation.transpose().to_cols_array_2d(),
+            eye: eye.into(),
+            focal,
+            principal,
+            size: camera.size,
+        }
+        .camera()?;
+        Ok(View {
+            name: self.name,
+            camera,
+        })
+    }
+}
+
+/// Bytes that are taken from the front.
+struct Bytes<'a>(&'a [u8]);
+
+impl<'a> Bytes<'a> {
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], &'static str> {
+        let (taken, rest) = self.0.split_first_chunk().ok_or("it ends too early")?;
+        self.0 = rest;
+        Ok(*taken)
+    }
+
+    fn u32(&mut self) -> Result<u32, &'static str> {
+        Ok(u32::from_le_bytes(self.take()?))
+    }
+
+    fn u64(&mut self) -> Result<u64, &'static str> {
+        Ok(u64::from_le_bytes(self.take()?))
+    }
+
+    fn f64(&mut self) -> Result<f64, &'static str> {
+        Ok(f64::from_le_bytes(self.take()?))
+    }
+
+    fn text(&mut self) -> Result<&'a [u8], &'static str> {
+        let end = (self.0.iter().position(|byte| *byte == 0)).ok_or("it ends within a name")?;
+        let (text, rest) = self.0.split_at(end);
+        self.0 = &rest[1..];
+        Ok(text)
+    }
+
+    fn skip(&mut self, count: u64, size: usize) -> Result<(), &'static str> {
+        let bytes = usize::try_from(count)
+            .ok()
+            .and_then(|count| count.checked_mul(size))
+            .filter(|bytes| *bytes <= self.0.len())
+            .ok_or("it ends too early")?;
+        self.0 = &self.0[bytes..];
+        Ok(())
+    }
+}
+
+fn binary_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, &'static str> {
+    let mut bytes = Bytes(bytes);
+    let count = bytes.u64()?;
+    let mut cameras = HashMap::new();
+    for _ in 0..count {
+        let id = bytes.u32()?.into();
+        let model = bytes.u32()? as usize;
+        let (name, parameters) = MODELS.get(model).ok_or("it has an unknown camera model")?;
+        let size = [bytes.u64()? as f64, bytes.u64()? as f64];
+        let parameters = (0..*parameters)
+            .map(|_| bytes.f64())
+            .collect::<Result<_, _>>()?;
+        cameras.insert(
+            id,
+            Intrinsics {
+                model: (*name).to_owned(),
+                size,
+                parameters,
+            },
+        );
+    }
+    Ok(cameras)
+}
+
+fn binary_images(bytes: &[u8]) -> Result<Vec<Photograph>, &'static str> {
+    let mut bytes = Bytes(bytes);
+    let count = bytes.u64()?;
+    let mut images = Vec::new();
+    for _ in 0..count {
+        bytes.u32()?;
+        let mut rotation = [0.0; 4];
+        for part in &mut rotation {
+            *part = bytes.f64()?;
+        }
+        let mut translation = [0.0; 3];
+        for part in &mut translation {
+            *part = bytes.f64()?;
+        }
+        let camera = bytes.u32()?.into();
+        let name = String::from_utf8_lossy(bytes.text()?).into_owned();
+        let points = bytes.u64()?;
+        bytes.skip(points, POINT)?;
+        images.push(Photograph {
+            name,
+            rotation,
+            translation,
+            camera,
+        });
+    }
+    Ok(images)
+}
+
+fn lines(bytes: &[u8]) -> Result<impl Iterator<Item = &str>, &'static str> {
+    let text = std::str::from_utf8(bytes).map_err(|_| "it is not text")?;
+    Ok(text.lines().filter(|line| !line.starts_with('#')))
+}
+
+fn number(word: Option<&str>) -> Result<f64, &'static str> {
+    word.and_then(|word| word.parse().ok())
+        .ok_or("a line lacks a number")
+}
+
+fn whole(word: Option<&str>) -> Result<u64, &'static str> {
+    word.and_then(|word| word.parse().ok())
+        .ok_or("a line lacks a whole number")
+}
+
+fn text_cameras(bytes: &[u8]) -> Result<HashMap<u64, Intrinsics>, &'static str> {
+    let mut cameras = HashMap::new();
+    for line in lines(bytes)?.filter(|line| !line.trim().is_empty()) {
+        let mut words = line.split_whitespace();
+        let id = whole(words.next())?;
+        let model = words.next().ok_or("a line lacks the camera model")?;
+        let size = [number(words.next())?, number(words.next())?];
+        let parameters = words
+            .map(|word| number(Some(word)))
+            .collect::<Result<Vec<_>, _>>()?;
+        let known = MODELS.iter().find(|(name, _)| *name == model);
+        let (_, expected) = known.ok_or("it has an unknown camera model")?;
+        if parameters.len() != *expected {
+            return Err("a camera has too many or too few parameters");
+        }
+        cameras.insert(
+            id,
+            Intrinsics {
+                model: model.to_owned(),
+                size,
+                parameters,
+            },
+        );
+    }
+    Ok(cameras)
+}
+
+/// Each image has two lines, of which the second, its points, may be empty.
+fn text_images(bytes: &[u8]) -> Result<Vec<Photograph>, &'static str> {
+    let mut images = Vec::new();
+    let mut lines = lines(bytes)?;
+    while let Some(line) = lines.next() {
+        if line.trim().is_empty() {
+            continue;
+        }
+        let mut words = line.split_whitespace();
+        whole(words.next())?;
+        let mut numbers = [0.0; 7];
+        for part in &mut numbers {
+            *part = number(words.next())?;
+        }
+        let [w, x, y, z, tx, ty, tz] = numbers;
+        let camera = whole(words.next())?;
+        let name = words.collect::<Vec<_>>().join(" ");
+        lines.next();
+        images.push(Photograph {
+            name,
+            rotation: [w, x, y, z],
+            translation: [tx, ty, tz],
+            camera,
+        });
+    }
+    Ok(images)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERAS: &str =
+        "# cameras\n1 PINHOLE 200 100 50 80 90 60\n2 OPENCV 64 48 50 50 32 24 0.1 0 0 0\n";
+    /// b looks along +z from (1, 2, 3); a the same, half turned about y.
+    const IMAGES: &str =
+        "# images\n7 1 0 0 0 -1 -2 -3 1 b.png\n\n9 0 0 1 0 1 -2 3 1 a.png\n1 2 -1\n";
+
+    fn model(cameras: &[u8], images: &[u8], kind: &str) -> Result<CameraFile, CameraFileError> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let sparse = folder.path().join("sparse/0");
+        std::fs::create_dir_all(&sparse).expect("folders");
+        std::fs::write(sparse.join(format!("cameras.{kind}")), cameras).expect("written");
+        std::fs::write(sparse.join(format!("images.{kind}")), images).expect("written");
+        let options = CameraFileOptions {
+            size: [8, 8],
+            dataparser: None,
+            undistorted: false,
+        };
+        super::super::read(folder.path(), &options)
+    }
+
+    #[track_caller]
+    fn check(file: &CameraFile) {
+        let names: Vec<&str> = file.views.iter().map(|view| view.name.as_str()).collect();
+        assert_eq!(names, ["a.png", "b.png"]);
+        for (view, [x, y, z]) in [(1, [1.5, 2.5, 5.0]), (0, [0.5, 2.5, 1.0])] {
+            let camera = &file.views[view].camera;
+            let at = camera.project([x, y, z]).expect("in front");
+            let expected = [50.0 * 0.25 + 90.0, 80.0 * 0.25 + 60.0];
+            for axis in 0..2 {
+                assert!((at[axis] - expected[axis]).abs() < 1e-9, "{view}: {at:?}");
+            }
+            assert_eq!((camera.width, camera.height), (200, 100));
+        }
+    }
+
+    #[test]
+    fn text_and_binary_models_are_the_same_cameras() {
+        check(&model(CAMERAS.as_bytes(), IMAGES.as_bytes(), "txt").expect("cameras"));
+        let mut cameras = 1_u64.to_le_bytes().to_vec();
+        cameras.extend(1_u32.to_le_bytes());
+        cameras.extend(1_u32.to_le_bytes());
+        cameras.extend([200_u64, 100].iter().flat_map(|side| side.to_le_bytes()));
+        cameras.extend(
+            [50.0_f64, 80.0, 90.0, 60.0]
+                .iter()
+                .flat_map(|p| p.to_le_bytes()),
+        );
+        let mut images = 2_u64.to_le_bytes().to_vec();
+        for (name, pose, points) in [
+            ("b.png", [1.0_f64, 0.0, 0.0, 0.0, -1.0, -2.0, -3.0], 0_u64),
+            ("a.png", [0.0, 0.0, 1.0, 0.0, 1.0, -2.0, 3.0], 2),
+        ] {
+            images.extend(7_u32.to_le_bytes());
+            images.extend(pose.iter().flat_map(|part| part.to_le_bytes()));
+            images.extend(1_u32.to_le_bytes());
+            images.extend(name.as_bytes());
+            images.push(0);
+            images.extend(points.to_le_bytes());
+            images.extend(vec![0; POINT * points as usize]);
+        }
+        check(&model(&cameras, &images, "bin").expect("cameras"));
+        for cut in [0, 9, 40, images.len() - 1] {
+            let refused = model(&cameras, &images[..cut], "bin").expect_err("it is cut");
+            assert_eq!(refused.to_string().lines().count(), 1, "{refused}");
+        }
+    }
+
+    #[test]
+    fn distorted_and_unknown_cameras_are_refused() {
+        let distorted = IMAGES.replace(" 1 b.png", " 2 b.png");
+        let refused =
+            model(CAMERAS.as_bytes(), distorted.as_bytes(), "txt").expect_err("distorted");
+        assert!(refused.to_string().contains("k1 = 0.1"), "{refused}");
+        let missing = IMAGES.replace(" 1 b.png", " 5 b.png");
+        let refused = model(CAMERAS.as_bytes(), missing.as_bytes(), "txt").expect_err("missing");
+        assert!(refused.to_string().contains("not there"), "{refused}");
+        let unknown = CAMERAS.replace("PINHOLE", "MIRROR");
+        assert!(model(unknown.as_bytes(), IMAGES.as_bytes(), "txt").is_err());
+    }
+}

@@ -1,0 +1,510 @@
+//! Camera files: `cameras.json` of the original 3DGS code, nerfstudio's `transforms.json` and `camera_path.json`, and
+//! COLMAP's folders of cameras and images.
+
+mod colmap;
+mod nerfstudio;
+
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use serde::Deserialize;
+use thiserror::Error;
+
+use crate::camera::{Camera, DEFAULT_NEAR, Model};
+use nerfstudio::{CameraPath, Dataparser, Transforms};
+
+/// The most pixels along an axis that a camera file may claim.
+const MAX_SIZE: f64 = 1e6;
+
+/// How far a rotation's rows may be from orthonormal.
+const TOLERANCE: f64 = 1e-3;
+
+/// A camera of a file.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// The photograph's name, or empty.
+    pub name: String,
+    /// The camera, with the photograph's size.
+    pub camera: Camera,
+}
+
+/// Why a camera file could not be read. Displayed as one sentence: file, place, reason.
+#[derive(Debug, Error)]
+pub enum CameraFileError {
+    /// The file cannot be opened or read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The file is not JSON, or not of this shape.
+    #[error("{}: {source}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and column.
+        source: serde_json::Error,
+    },
+    /// The file is of none of the kinds.
+    #[error(
+        "{}: this is neither a cameras.json (a list) nor a transforms.json (with frames), a camera_path.json or COLMAP's",
+        path.display()
+    )]
+    UnknownKind {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A binary or text file of COLMAP is damaged.
+    #[error("{}: {reason}", path.display())]
+    Colmap {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A camera's numbers are not a camera.
+    #[error("{}: view {view}: {reason}", path.display())]
+    View {
+        /// The file.
+        path: PathBuf,
+        /// The camera's index in the file, from 0.
+        view: usize,
+        /// What is wrong with it.
+        reason: ViewError,
+    },
+}
+
+/// What is wrong with a camera of a file.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum ViewError {
+    /// The image size is not positive and reasonable.
+    #[error("the image size is not positive whole numbers of pixels")]
+    Size,
+    /// A focal length is absent or not positive.
+    #[error("the focal length is missing, not positive, or beyond binary32")]
+    Focal,
+    /// A position or a principal point is not finite, or beyond binary32.
+    #[error("a number is not finite, or beyond binary32")]
+    NotFinite,
+    /// The lens distorts.
+    #[error(
+        "the lens distorts ({0}), which is drawn only as an ideal lens would see it (--undistorted)"
+    )]
+    Distorted(String),
+    /// The rotation is not one.
+    #[error("the rotation's rows are not perpendicular unit vectors")]
+    Rotation,
+    /// A model other than pinhole.
+    #[error("camera model {0} is not read")]
+    Model(String),
+}
+
+/// What a camera file leaves to whoever reads it.
+#[derive(Clone, Debug)]
+pub struct CameraFileOptions {
+    /// The image size where a transforms.json doesn't give one.
+    pub size: [u32; 2],
+    /// nerfstudio's dataparser_transforms.json, which lies beside a trained model: it takes the cameras of a
+    /// transforms.json to where the model is.
+    pub dataparser: Option<PathBuf>,
+    /// Cameras whose lens distorts are those of an ideal lens.
+    pub undistorted: bool,
+}
+
+/// The cameras of a file.
+#[derive(Clone, Debug, Default)]
+pub struct CameraFile {
+    /// The cameras, in the file's order; COLMAP's in the order of their names.
+    pub views: Vec<View>,
+    /// What the file says and nothing heeds, a sentence each.
+    pub ignored: Vec<String>,
+}
+
+/// Reads all cameras of the file at `path`. `size` stands in for an image size that a
+/// transforms.json doesn't give.
+///
+/// # Errors
+/// If the file cannot be read, is of no known kind, or holds a camera that is none.
+pub fn load(path: &Path, size: [u32; 2]) -> Result<Vec<View>, CameraFileError> {
+    let options = CameraFileOptions {
+        size,
+        dataparser: None,
+        undistorted: false,
+    };
+    Ok(read(path, &options)?.views)
+}
+
+/// Reads all cameras of the file, or of COLMAP's folder, at `path`.
+///
+/// # Errors
+/// If the file cannot be read, is of no known kind, or holds a camera that is none.
+pub fn read(path: &Path, options: &CameraFileOptions) -> Result<CameraFile, CameraFileError> {
+    if let Some(folder) = colmap::folder(path) {
+        let mut file = colmap::read(&folder, options)?;
+        if options.dataparser.is_some() {
+            file.ignored
+                .push("a dataparser's transform is for a transforms.json alone".to_owned());
+        }
+        return Ok(file);
+    }
+    let text = read_text(path)?;
+    let dataparser = match &options.dataparser {
+        Some(path) => Some(dataparser(path)?),
+        None => None,
+    };
+    parse(path, &text, options, dataparser.as_ref())
+}
+
+fn read_text(path: &Path) -> Result<String, CameraFileError> {
+    fs::read_to_string(path).map_err(|source| CameraFileError::Io {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn dataparser(path: &Path) -> Result<Dataparser, CameraFileError> {
+    let text = read_text(path)?;
+    serde_json::from_str(&text).map_err(|source| CameraFileError::Json {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn parse(
+    path: &Path,
+    text: &str,
+    options: &CameraFileOptions,
+    dataparser: Option<&Dataparser>,
+) -> Result<CameraFile, CameraFileError> {
+    let json = |source| CameraFileError::Json {
+        path: path.to_owned(),
+        source,
+    };
+    let unknown = || CameraFileError::UnknownKind {
+        path: path.to_owned(),
+    };
+    let mut ignored = Vec::new();
+    let views: Vec<Result<View, ViewError>> = match text.trim_start().as_bytes().first() {
+        Some(b'[') => {
+            let cameras: Vec<InriaCamera> = serde_json::from_str(text).map_err(json)?;
+            if dataparser.is_some() {
+                ignored.push("a dataparser's transform is for a transforms.json alone".to_owned());
+            }
+            cameras.into_iter().map(InriaCamera::view).collect()
+        }
+        Some(b'{') => {
+            let transforms: Transforms = serde_json::from_str(text).map_err(json)?;
+            if transforms.is_camera_path() {
+                let path: CameraPath = serde_json::from_str(text).map_err(json)?;
+                path.views(options)
+            } else {
+                let frames = transforms
+                    .views(options, dataparser, &mut ignored)
+                    .ok_or_else(unknown)?;
+                frames.collect()
+            }
+        }
+        _ => return Err(unknown()),
+    };
+    let views = views
+        .into_iter()
+        .enumerate()
+        .map(|(view, result)| {
+            result.map_err(|reason| CameraFileError::View {
+                path: path.to_owned(),
+                view,
+                reason,
+            })
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(CameraFile { views, ignored })
+}
+
+/// What a lens does to the picture of a perfect one: OpenCV's radial and tangential coefficients.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Distortion {
+    radial: [f64; 4],
+    tangential: [f64; 2],
+}
+
+impl Distortion {
+    /// Checks that there is none, or that it may be left out, which `ignored` is then told.
+    fn check(self, undistorted: bool, ignored: &mut Vec<String>) -> Result<(), ViewError> {
+        let names = ["k1", "k2", "k3", "k4", "p1", "p2"];
+        let values = self.radial.iter().chain(&self.tangential);
+        let coefficients: Vec<String> = (names.iter().zip(values))
+            .filter(|(_, value)| **value != 0.0)
+            .map(|(name, value)| format!("{name} = {value}"))
+            .collect();
+        if coefficients.is_empty() {
+            return Ok(());
+        }
+        let coefficients = coefficients.join(", ");
+        if !undistorted {
+            return Err(ViewError::Distorted(coefficients));
+        }
+        let note = format!("the lens's distortion ({coefficients}) is left out");
+        if !ignored.contains(&note) {
+            ignored.push(note);
+        }
+        Ok(())
+    }
+}
+
+/// One entry of cameras.json. The rotation is camera to world: its columns are the directions
+/// right, down and forward.
+#[derive(Deserialize)]
+struct InriaCamera {
+    #[serde(default)]
+    img_name: String,
+    width: f64,
+    height: f64,
+    position: [f64; 3],
+    rotation: [[f64; 3]; 3],
+    fx: f64,
+    fy: f64,
+}
+
+impl InriaCamera {
+    fn view(self) -> Result<View, ViewError> {
+        let size = [self.width, self.height];
+        let column = |c: usize| self.rotation.map(|row| row[c]);
+        let camera = Numbers {
+            model: Model::Pinhole,
+            rotation: [column(0), column(1), column(2)],
+            eye: self.position,
+            focal: [self.fx, self.fy],
+            principal: size.map(|s| s / 2.0),
+            size,
+        }
+        .camera()?;
+        Ok(View {
+            name: self.img_name,
+            camera,
+        })
+    }
+}
+
+/// The numbers of a camera, before they are checked.
+struct Numbers {
+    model: Model,
+    /// World to camera.
+    rotation: [[f64; 3]; 3],
+    eye: [f64; 3],
+    focal: [f64; 2],
+    principal: [f64; 2],
+    size: [f64; 2],
+}
+
+impl Numbers {
+    /// The camera.
+    fn camera(self) -> Result<Camera, ViewError> {
+        let Self {
+            model,
+            rotation,
+            eye,
+            focal,
+            principal,
+            size,
+        } = self;
+        if !size
+            .iter()
+            .all(|s| (1.0..=MAX_SIZE).contains(s) && s.fract() == 0.0)
+        {
+            return Err(ViewError::Size);
+        }
+        if !focal
+            .iter()
+            .all(|f| (*f as f32) > 0.0 && (*f as f32).is_finite())
+        {
+            return Err(ViewError::Focal);
+        }
+        let finite =
+            eye.iter().all(|x| x.is_finite()) && principal.iter().all(|x| (*x as f32).is_finite());
+        if !finite {
+            return Err(ViewError::NotFinite);
+        }
+        let orthonormal = (0..3).all(|i| {
+            (0..3).all(|j| {
+                let dot: f64 = rotation[i]
+                    .iter()
+                    .zip(rotation[j])
+                    .map(|(a, b)| a * b)
+                    .sum();
+                (dot - f64::from(u8::from(i == j))).abs() <= TOLERANCE
+            })
+        });
+        if !orthonormal {
+            return Err(ViewError::Rotation);
+        }
+        Ok(Camera {
+            model,
+            rotation,
+            eye,
+            focal,
+            principal,
+            width: size[0] as u32,
+            height: size[1] as u32,
+            near: DEFAULT_NEAR,
+            far: f64::INFINITY,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<View>, CameraFileError> {
+        read_with(text, false, None).map(|file| file.views)
+    }
+
+    fn read_with(
+        text: &str,
+        undistorted: bool,
+        dataparser: Option<&str>,
+    ) -> Result<CameraFile, CameraFileError> {
+        let options = CameraFileOptions {
+            size: [640, 480],
+            dataparser: None,
+            undistorted,
+        };
+        let dataparser: Option<Dataparser> =
+            dataparser.map(|text| serde_json::from_str(text).expect("JSON"));
+        parse(
+            Path::new("cameras.json"),
+            text,
+            &options,
+            dataparser.as_ref(),
+        )
+    }
+
+    #[track_caller]
+    fn close(a: Option<[f64; 2]>, b: [f64; 2]) {
+        let a = a.expect("in front");
+        assert!(
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6),
+            "{a:?} {b:?}"
+        );
+    }
+
+    /// Looks along +x of the world: right is -z, down is +y.
+    const INRIA: &str = r#"[{"id": 0, "img_name": "a", "width": 200, "height": 100,
+        "position": [1, 2, 3], "rotation": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
+        "fy": 80, "fx": 50}]"#;
+
+    #[test]
+    fn inria_camera_projects_known_points() {
+        let views = read(INRIA).expect("a camera");
+        assert_eq!((views.len(), views[0].name.as_str()), (1, "a"));
+        let camera = &views[0].camera;
+        close(camera.project([3., 2., 3.]), [100., 50.]);
+        close(camera.project([3., 3., 2.]), [125., 90.]);
+        assert_eq!(camera.project([0., 2., 3.]), None);
+    }
+
+    #[test]
+    fn nerfstudio_camera_projects_known_points() {
+        // OpenGL's identity camera looks along -z with y up.
+        let text = r#"{"camera_model": "OPENCV", "fl_x": 50, "fl_y": 80, "cx": 90, "cy": 60,
+            "w": 200, "h": 100, "k1": 0.0, "frames": [{"file_path": "a.png", "transform_matrix":
+            [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]}]}"#;
+        let camera = &read(text).expect("a camera")[0].camera;
+        close(camera.project([1., 2., 1.]), [90., 60.]);
+        close(camera.project([2., 3., 1.]), [115., 20.]);
+
+        let by_angle = r#"{"camera_angle_x": 1.5707963267948966, "frames": [{"transform_matrix":
+            [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]}"#;
+        let camera = &read(by_angle).expect("a camera")[0].camera;
+        assert_eq!((camera.width, camera.height), (640, 480));
+        close(camera.project([1., 0., -1.]), [640., 240.]);
+        close(camera.project([0., 0.75, -1.]), [320., 0.]);
+    }
+
+    #[test]
+    fn malformed_files_are_refused_in_one_sentence() {
+        let refused = |text: &str| {
+            let error = read(text).expect_err(text).to_string();
+            assert_eq!(error.lines().count(), 1, "{error}");
+            assert!(error.starts_with("cameras.json: "), "{error}");
+            error
+        };
+        assert!(refused("").contains("neither"));
+        assert!(refused("{}").contains("neither"));
+        assert!(refused("[{]").contains("line 1"));
+        assert!(refused(&INRIA.replace("\"fx\"", "\"f\"")).contains("missing field `fx`"));
+        assert!(refused(&INRIA.replace("50", "-50")).contains("view 0: the focal length"));
+        assert!(refused(&INRIA.replace("200", "0")).contains("image size"));
+        assert!(refused(&INRIA.replace("200", "1e300")).contains("image size"));
+        assert!(refused(&INRIA.replace("[0, 0, 1]", "[0, 0, 2]")).contains("perpendicular"));
+        assert!(refused(&INRIA.replace("[1, 2, 3]", "[1, 2]")).contains("line"));
+        assert!(refused(&INRIA.replace("50", "1e999")).contains("number out of range"));
+        assert!(refused(&INRIA.replace("50", "1e308")).contains("beyond binary32"));
+        let thin = r#"{"camera_model": "THIN_PRISM_FISHEYE", "fl_x": 1, "frames":
+            [{"transform_matrix": []}]}"#;
+        assert!(refused(thin).contains("THIN_PRISM_FISHEYE"));
+        assert!(refused(r#"{"frames": [{"transform_matrix": []}]}"#).contains("focal"));
+        assert!(
+            refused(r#"{"fl_x": 9, "frames": [{"transform_matrix": []}]}"#).contains("rotation")
+        );
+        for cut in 0..INRIA.len() {
+            assert!(read(&INRIA[..cut]).is_err());
+        }
+    }
+
+    const FISHEYE: &str = r#"{"camera_model": "OPENCV_FISHEYE", "fl_x": 50, "cx": 90, "cy": 60,
+        "w": 200, "h": 100, "k1": 0.0, "frames": [{"transform_matrix":
+        [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]}]}"#;
+
+    #[test]
+    fn distortion_is_refused_or_left_out_and_told() {
+        let camera = &read(FISHEYE).expect("a camera")[0].camera;
+        assert_eq!((camera.model, camera.focal), (Model::Fisheye, [50.0; 2]));
+        let distorted = FISHEYE.replace("\"k1\": 0.0", "\"k1\": -0.05, \"p2\": 0.001");
+        let refused = read(&distorted).expect_err("it distorts").to_string();
+        assert!(
+            refused.contains("view 0: the lens distorts (k1 = -0.05, p2 = 0.001)"),
+            "{refused}"
+        );
+        let file = read_with(&distorted, true, None).expect("left out");
+        assert_eq!(file.views[0].camera, *camera);
+        assert_eq!(
+            file.ignored,
+            ["the lens's distortion (k1 = -0.05, p2 = 0.001) is left out"]
+        );
+    }
+
+    #[test]
+    fn a_dataparsers_transform_takes_cameras_to_the_model() {
+        // Half a turn about z, moved by (1, 0, 0), then scaled by 0.5.
+        let dataparser =
+            r#"{"transform": [[-1, 0, 0, 1], [0, -1, 0, 0], [0, 0, 1, 0]], "scale": 0.5}"#;
+        let file = read_with(FISHEYE, false, Some(dataparser)).expect("a camera");
+        let camera = &file.views[0].camera;
+        assert_eq!(camera.eye, [0.0, -1.0, 1.5]);
+        assert_eq!(camera.rotation[0], [-1.0, 0.0, 0.0]);
+        // What was applied to the frames already is part of the transform.
+        let applied = FISHEYE.replace(
+            "\"w\"",
+            "\"applied_transform\": [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]], \"applied_scale\": 0.25, \"w\"",
+        );
+        let dataparser =
+            r#"{"transform": [[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]], "scale": 0.25}"#;
+        let file = read_with(&applied, false, Some(dataparser)).expect("a camera");
+        assert_eq!(file.views[0].camera.eye, [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn a_viewers_camera_path_is_read() {
+        let text = r#"{"camera_type": "perspective", "render_height": 100, "render_width": 200, "fps": 24,
+            "camera_path": [{"camera_to_world": [1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1], "fov": 90}]}"#;
+        let camera = &read(text).expect("a camera")[0].camera;
+        assert_eq!(
+            (camera.width, camera.height, camera.eye),
+            (200, 100, [1.0, 2.0, 3.0])
+        );
+        assert!((camera.focal[0] - 50.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,267 @@
+//! nerfstudio's files: `transforms.json`, `dataparser_transforms.json` and `camera_path.json`.
+
+use glam::{DMat3, DMat4, DVec3};
+use serde::Deserialize;
+
+use super::{CameraFileOptions, Distortion, Numbers, View, ViewError};
+use crate::camera::Model;
+
+/// A transforms.json, or anything with braces around it.
+#[derive(Deserialize)]
+pub(super) struct Transforms {
+    #[serde(flatten)]
+    intrinsics: Intrinsics,
+    frames: Option<Vec<Frame>>,
+    camera_path: Option<serde_json::Value>,
+    /// What was done to the poses of the frames before they were written.
+    applied_transform: Option<[[f64; 4]; 3]>,
+    applied_scale: Option<f64>,
+}
+
+impl Transforms {
+    /// Tells if the file is the viewer's camera path instead.
+    pub(super) fn is_camera_path(&self) -> bool {
+        self.frames.is_none() && self.camera_path.is_some()
+    }
+
+    /// The views, if there are frames.
+    pub(super) fn views(
+        self,
+        options: &CameraFileOptions,
+        dataparser: Option<&Dataparser>,
+        ignored: &mut Vec<String>,
+    ) -> Option<impl Iterator<Item = Result<View, ViewError>>> {
+        let placement = dataparser.map(|dataparser| {
+            let applied = self.applied_transform.map_or(DMat4::IDENTITY, matrix);
+            Placement {
+                transform: matrix(dataparser.transform) * applied.inverse(),
+                scale: dataparser.scale / self.applied_scale.unwrap_or(1.0),
+            }
+        });
+        let views: Vec<_> = (self.frames?.into_iter())
+            .map(|frame| frame.view(&self.intrinsics, options, placement.as_ref(), ignored))
+            .collect();
+        Some(views.into_iter())
+    }
+}
+
+/// A dataparser_transforms.json: from where the photographs were to where the trained model is.
+#[derive(Deserialize)]
+pub(super) struct Dataparser {
+    transform: [[f64; 4]; 3],
+    scale: f64,
+}
+
+/// What takes the frames of a transforms.json to where the model is: the scale comes last.
+struct Placement {
+    transform: DMat4,
+    scale: f64,
+}
+
+fn matrix([x, y, z]: [[f64; 4]; 3]) -> DMat4 {
+    DMat4::from_cols_array_2d(&[x, y, z, [0.0, 0.0, 0.0, 1.0]]).transpose()
+}
+
+/// What transforms.json holds once for all frames, and any frame may hold for itself.
+#[derive(Clone, Default, Deserialize)]
+struct Intrinsics {
+    camera_model: Option<String>,
+    w: Option<f64>,
+    h: Option<f64>,
+    fl_x: Option<f64>,
+    fl_y: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    /// Horizontal field of view in radians.
+    camera_angle_x: Option<f64>,
+    camera_angle_y: Option<f64>,
+    k1: Option<f64>,
+    k2: Option<f64>,
+    k3: Option<f64>,
+    k4: Option<f64>,
+    p1: Option<f64>,
+    p2: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct Frame {
+    #[serde(default)]
+    file_path: String,
+    /// Camera to world, with OpenGL's camera: columns right, up, back and position.
+    transform_matrix: Vec<[f64; 4]>,
+    #[serde(flatten)]
+    intrinsics: Intrinsics,
+}
+
+impl Frame {
+    fn view(
+        self,
+        shared: &Intrinsics,
+        options: &CameraFileOptions,
+        placement: Option<&Placement>,
+        ignored: &mut Vec<String>,
+    ) -> Result<View, ViewError> {
+        let own = self.intrinsics;
+        let model = own.camera_model.or_else(|| shared.camera_model.clone());
+        let model = match model.as_deref() {
+            None | Some("OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL") => {
+                Model::Pinhole
+            }
+            Some("OPENCV_FISHEYE") => Model::Fisheye,
+            Some("EQUIRECTANGULAR") => Model::Equirectangular,
+            Some(other) => return Err(ViewError::Model(other.to_owned())),
+        };
+        let size = [
+            own.w.or(shared.w).unwrap_or(options.size[0].into()),
+            own.h.or(shared.h).unwrap_or(options.size[1].into()),
+        ];
+        let of_angle =
+            |angle: Option<f64>, side: f64| angle.map(|angle| side / 2.0 / (angle / 2.0).tan());
+        let fx = own
+            .fl_x
+            .or(shared.fl_x)
+            .or_else(|| of_angle(own.camera_angle_x.or(shared.camera_angle_x), size[0]));
+        let fy = own
+            .fl_y
+            .or(shared.fl_y)
+            .or_else(|| of_angle(own.camera_angle_y.or(shared.camera_angle_y), size[1]));
+        let whole = model == Model::Equirectangular;
+        let (fx, fy) = if whole {
+            // A panorama fills its picture, whatever the file says.
+            (
+                Some(size[0] / std::f64::consts::TAU),
+                Some(size[1] / std::f64::consts::PI),
+            )
+        } else {
+            (fx, fy)
+        };
+        // Pixels are square unless the file says otherwise.
+        let fx = fx.or(fy).ok_or(ViewError::Focal)?;
+        let principal = [
+            own.cx.or(shared.cx).unwrap_or(size[0] / 2.0),
+            own.cy.or(shared.cy).unwrap_or(size[1] / 2.0),
+        ];
+        let coefficient = |own: Option<f64>, shared: Option<f64>| own.or(shared).unwrap_or(0.0);
+        let distortion = Distortion {
+            radial: [
+                coefficient(own.k1, shared.k1),
+                coefficient(own.k2, shared.k2),
+                coefficient(own.k3, shared.k3),
+                coefficient(own.k4, shared.k4),
+            ],
+            tangential: [
+                coefficient(own.p1, shared.p1),
+                coefficient(own.p2, shared.p2),
+            ],
+        };
+        distortion.check(options.undistorted || whole, ignored)?;
+        let rows = self
+            .transform_matrix
+            .first_chunk()
+            .ok_or(ViewError::Rotation)?;
+        let (rotation, eye) = pose(*rows, placement);
+        let camera = Numbers {
+            model,
+            rotation,
+            eye,
+            focal: [fx, fy.unwrap_or(fx)],
+            principal,
+            size,
+        }
+        .camera()?;
+        Ok(View {
+            name: self.file_path,
+            camera,
+        })
+    }
+}
+
+/// World to camera and the eye, of the rows of an OpenGL camera's matrix.
+fn pose(rows: [[f64; 4]; 3], placement: Option<&Placement>) -> ([[f64; 3]; 3], [f64; 3]) {
+    let rows = match placement {
+        None => rows,
+        Some(placement) => {
+            let placed = (placement.transform * matrix(rows)).transpose();
+            let [x, y, z, _] = placed.to_cols_array_2d();
+            [x, y, z].map(|[a, b, c, position]| [a, b, c, placement.scale * position])
+        }
+    };
+    let [x, y, z] = rows;
+    let column = |c: usize, sign: f64| [sign * x[c], sign * y[c], sign * z[c]];
+    (
+        [column(0, 1.0), column(1, -1.0), column(2, -1.0)],
+        column(3, 1.0),
+    )
+}
+
+/// A camera_path.json, as the viewer exports it.
+#[derive(Deserialize)]
+pub(super) struct CameraPath {
+    #[serde(default)]
+    camera_type: Option<String>,
+    render_width: f64,
+    render_height: f64,
+    camera_path: Vec<PathFrame>,
+}
+
+#[derive(Deserialize)]
+struct PathFrame {
+    /// Row by row.
+    camera_to_world: Vec<f64>,
+    /// The vertical field of view in degrees.
+    fov: f64,
+}
+
+impl CameraPath {
+    /// The views, numbered.
+    pub(super) fn views(self, _: &CameraFileOptions) -> Vec<Result<View, ViewError>> {
+        let size = [self.render_width, self.render_height];
+        let view = |frame: &PathFrame| {
+            let half = (frame.fov.to_radians() / 2.0).tan();
+            let (model, focal) = match self.camera_type.as_deref() {
+                None | Some("perspective") => (Model::Pinhole, [size[1] / 2.0 / half; 2]),
+                Some("equirectangular") => (
+                    Model::Equirectangular,
+                    [
+                        size[0] / std::f64::consts::TAU,
+                        size[1] / std::f64::consts::PI,
+                    ],
+                ),
+                Some(other) => return Err(ViewError::Model(other.to_owned())),
+            };
+            let rows: &[f64; 16] =
+                (frame.camera_to_world.first_chunk()).ok_or(ViewError::Rotation)?;
+            let row = |r: usize| std::array::from_fn(|c| rows[4 * r + c]);
+            let (rotation, eye) = pose([row(0), row(1), row(2)], None);
+            let camera = Numbers {
+                model,
+                rotation: orthonormal(rotation),
+                eye,
+                focal,
+                principal: size.map(|side| side / 2.0),
+                size,
+            }
+            .camera()?;
+            Ok(View {
+                name: String::new(),
+                camera,
+            })
+        };
+        self.camera_path.iter().map(view).collect()
+    }
+}
+
+/// The rotation nearest to what a viewer rounded, if it is near to one.
+fn orthonormal(rows: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    let [right, down, _] = rows.map(DVec3::from_array);
+    let right = right.normalize_or_zero();
+    let down = (down - down.dot(right) * right).normalize_or_zero();
+    let fixed = [right, down, right.cross(down)];
+    let given = DMat3::from_cols_array_2d(&rows);
+    let near = given.abs_diff_eq(DMat3::from_cols(fixed[0], fixed[1], fixed[2]), 0.01);
+    if near {
+        fixed.map(<[f64; 3]>::from)
+    } else {
+        rows
+    }
+}

@@ -1,0 +1,170 @@
+//! Paths of cameras through keyframes.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::camera::{Camera, CameraError, DEFAULT_FOV};
+use crate::framing::DEFAULT_UP;
+
+/// A camera that a path goes through.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Keyframe {
+    /// The camera's position.
+    pub eye: [f64; 3],
+    /// The point that it looks at.
+    pub target: [f64; 3],
+    /// What is upwards in the picture.
+    #[serde(default = "default_up")]
+    pub up: [f64; 3],
+    /// The vertical field of view in degrees.
+    #[serde(default = "default_fov")]
+    pub fov: f64,
+    /// When the camera is here; keyframes are a unit of time apart where none says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time: Option<f64>,
+}
+
+fn default_up() -> [f64; 3] {
+    DEFAULT_UP
+}
+
+fn default_fov() -> f64 {
+    DEFAULT_FOV
+}
+
+impl Keyframe {
+    /// The keyframe of a camera that looks at what is `distance` ahead of it.
+    pub fn of(camera: &Camera, distance: f64) -> Self {
+        let [_, down, forward] = camera.rotation.map(DVec3::from_array);
+        let eye = DVec3::from_array(camera.eye);
+        let half_height = f64::from(camera.height) / 2.0 / camera.focal[1];
+        Self {
+            eye: camera.eye,
+            target: (eye + distance * forward).into(),
+            up: (-down).into(),
+            fov: 2.0 * half_height.atan().to_degrees(),
+            time: None,
+        }
+    }
+
+    /// The camera, with a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// See [`CameraError`].
+    pub fn camera(&self, size: [u32; 2]) -> Result<Camera, CameraError> {
+        Camera::look_at(self.eye, self.target, self.up, self.fov, size)
+    }
+}
+
+/// `count` cameras along a smooth path through `keyframes`, the first and the last included; all keyframes as they are
+/// without a count.
+///
+/// Eyes, targets and fields of view follow a Catmull-Rom spline.
+///
+/// # Errors
+/// See [`CameraError`]; [`CameraError::NotFinite`] where times don't ascend.
+pub fn along(
+    keyframes: &[Keyframe],
+    count: Option<usize>,
+    size: [u32; 2],
+) -> Result<Vec<Camera>, CameraError> {
+    let (Some(count), true) = (count, keyframes.len() > 1) else {
+        return keyframes.iter().map(|frame| frame.camera(size)).collect();
+    };
+    let times: Vec<f64> = (keyframes.iter().enumerate())
+        .map(|(i, frame)| frame.time.unwrap_or(i as f64))
+        .collect();
+    let ascending = times.windows(2).all(|pair| pair[0] < pair[1]);
+    if !ascending || times.iter().any(|time| !time.is_finite()) {
+        return Err(CameraError::NotFinite);
+    }
+    let (first, last) = (times[0], times[times.len() - 1]);
+    (0..count)
+        .map(|i| first + (last - first) * i as f64 / (count.max(2) - 1) as f64)
+        .map(|time| at(keyframes, &times, time).camera(size))
+        .collect()
+}
+
+/// The keyframe at a time between the first and the last.
+fn at(keyframes: &[Keyframe], times: &[f64], time: f64) -> Keyframe {
+    let after = times
+        .partition_point(|t| *t <= time)
+        .clamp(1, times.len() - 1);
+    let part = (time - times[after - 1]) / (times[after] - times[after - 1]);
+    let frame = |index: usize| &keyframes[index.min(keyframes.len() - 1)];
+    let four = [
+        frame((after - 1).saturating_sub(1)),
+        frame(after - 1),
+        frame(after),
+        frame(after + 1),
+    ];
+    let vector = |value: &dyn Fn(&Keyframe) -> [f64; 3]| -> [f64; 3] {
+        let values = four.map(value);
+        std::array::from_fn(|axis| spline(values.map(|v| v[axis]), part))
+    };
+    Keyframe {
+        eye: vector(&|frame| frame.eye),
+        target: vector(&|frame| frame.target),
+        up: vector(&|frame| DVec3::from_array(frame.up).normalize_or_zero().to_array()),
+        fov: spline(four.map(|frame| frame.fov), part),
+        time: Some(time),
+    }
+}
+
+/// The Catmull-Rom spline through the middle two of four values, `t` from 0 to 1 between them.
+fn spline([a, b, c, d]: [f64; 4], t: f64) -> f64 {
+    let (square, cube) = (t * t, t * t * t);
+    0.5 * (2.0 * b
+        + (c - a) * t
+        + (2.0 * a - 5.0 * b + 4.0 * c - d) * square
+        + (3.0 * b - a - 3.0 * c + d) * cube)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keyframe(x: f64) -> Keyframe {
+        Keyframe {
+            eye: [x, 0.0, -4.0],
+            target: [x, 0.0, 0.0],
+            up: DEFAULT_UP,
+            fov: 40.0 + x,
+            time: None,
+        }
+    }
+
+    #[test]
+    fn a_path_goes_through_its_keyframes() {
+        let keyframes = [keyframe(0.0), keyframe(1.0), keyframe(5.0)];
+        let cameras = along(&keyframes, Some(5), [64, 48]).expect("cameras");
+        let eyes: Vec<f64> = cameras.iter().map(|camera| camera.eye[0]).collect();
+        for (index, x) in [(0, 0.0), (2, 1.0), (4, 5.0)] {
+            assert!((eyes[index] - x).abs() < 1e-12, "{eyes:?}");
+        }
+        assert!(eyes.windows(2).all(|pair| pair[0] < pair[1]), "{eyes:?}");
+        assert_eq!(along(&keyframes, None, [64, 48]).expect("cameras").len(), 3);
+        assert_eq!(along(&keyframes, Some(1), [64, 48]).expect("one").len(), 1);
+        let backwards = [
+            Keyframe {
+                time: Some(3.0),
+                ..keyframe(0.0)
+            },
+            keyframe(1.0),
+        ];
+        assert!(along(&backwards, Some(4), [64, 48]).is_err());
+    }
+
+    #[test]
+    fn a_camera_is_its_keyframe_again() {
+        let camera = keyframe(2.0).camera([64, 48]).expect("a camera");
+        let again = Keyframe::of(&camera, 4.0)
+            .camera([64, 48])
+            .expect("a camera");
+        for axis in 0..3 {
+            assert!((camera.eye[axis] - again.eye[axis]).abs() < 1e-12);
+        }
+        assert!((camera.focal[0] - again.focal[0]).abs() < 1e-9);
+    }
+}

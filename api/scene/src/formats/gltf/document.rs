@@ -1,0 +1,158 @@
+//! The parts of a glTF document that Gaussians need.
+
+use std::collections::HashMap;
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+use crate::error::{Fault, Place, Reason};
+
+/// Extensions that a document may require and this reader follows, or that say nothing of Gaussians.
+const FOLLOWED: [&str; 5] = [
+    super::primitive::EXTENSION,
+    "KHR_mesh_quantization",
+    "KHR_lights_punctual",
+    "KHR_xmp_json_ld",
+    "KHR_animation_pointer",
+];
+
+/// Beginnings of names of extensions that say nothing of Gaussians.
+const IRRELEVANT: [&str; 2] = ["KHR_materials_", "KHR_texture_"];
+
+/// A document.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Document {
+    asset: Asset,
+    scene: Option<usize>,
+    #[serde(default)]
+    extensions_required: Vec<String>,
+    #[serde(default)]
+    scenes: Vec<SceneNodes>,
+    #[serde(default)]
+    pub(super) nodes: Vec<Node>,
+    #[serde(default)]
+    pub(super) meshes: Vec<Mesh>,
+    #[serde(default)]
+    pub(super) accessors: Vec<Accessor>,
+    #[serde(default)]
+    pub(super) buffer_views: Vec<BufferView>,
+    #[serde(default)]
+    pub(super) buffers: Vec<Buffer>,
+    #[serde(default)]
+    pub(super) animations: Vec<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+struct Asset {
+    version: String,
+}
+
+#[derive(Deserialize)]
+struct SceneNodes {
+    #[serde(default)]
+    nodes: Vec<usize>,
+}
+
+/// A node of the tree.
+#[derive(Deserialize)]
+pub(super) struct Node {
+    pub(super) mesh: Option<usize>,
+    #[serde(default)]
+    pub(super) children: Vec<usize>,
+    pub(super) matrix: Option<[f64; 16]>,
+    pub(super) translation: Option<[f64; 3]>,
+    /// x, y, z, w.
+    pub(super) rotation: Option<[f64; 4]>,
+    pub(super) scale: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Mesh {
+    pub(super) primitives: Vec<Primitive>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Primitive {
+    pub(super) attributes: HashMap<String, usize>,
+    pub(super) mode: Option<u32>,
+    #[serde(default)]
+    pub(super) extensions: HashMap<String, serde_json::Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Accessor {
+    pub(super) buffer_view: Option<usize>,
+    #[serde(default)]
+    pub(super) byte_offset: usize,
+    pub(super) component_type: u32,
+    #[serde(default)]
+    pub(super) normalized: bool,
+    pub(super) count: usize,
+    #[serde(rename = "type")]
+    pub(super) shape: String,
+    pub(super) sparse: Option<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BufferView {
+    pub(super) buffer: usize,
+    #[serde(default)]
+    pub(super) byte_offset: usize,
+    pub(super) byte_length: usize,
+    pub(super) byte_stride: Option<usize>,
+    #[serde(default)]
+    pub(super) extensions: HashMap<String, IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Buffer {
+    pub(super) uri: Option<String>,
+    pub(super) byte_length: usize,
+}
+
+impl Document {
+    /// Refuses versions and required extensions that are not read.
+    pub(super) fn check(&self) -> Result<(), Fault> {
+        if !self.asset.version.starts_with("2.") {
+            let text = format!(
+                "version {:?} is not one of those read (2.x)",
+                self.asset.version
+            );
+            return Err(Reason::Unsupported(text).at(Place::Part("asset.version".to_owned())));
+        }
+        let unknown = self.extensions_required.iter().find(|name| {
+            !FOLLOWED.contains(&name.as_str())
+                && !super::primitive::DRAFTS.contains(&name.as_str())
+                && !IRRELEVANT.iter().any(|start| name.starts_with(start))
+        });
+        match unknown {
+            Some(name) => {
+                let text = format!("the extension {name:?} is required and not read");
+                Err(Reason::Unsupported(text).at(Place::Part("extensionsRequired".to_owned())))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The root nodes of the default scene; of the first one if none is default, and of all trees if there is none.
+    pub(super) fn roots(&self) -> Result<Vec<usize>, Fault> {
+        if self.scenes.is_empty() {
+            let mut roots = vec![true; self.nodes.len()];
+            for child in self.nodes.iter().flat_map(|node| &node.children) {
+                if let Some(root) = roots.get_mut(*child) {
+                    *root = false;
+                }
+            }
+            return Ok((0..roots.len()).filter(|node| roots[*node]).collect());
+        }
+        let index = self.scene.unwrap_or(0);
+        match self.scenes.get(index) {
+            Some(scene) => Ok(scene.nodes.clone()),
+            None => Err(Reason::Missing.at(Place::Part(format!("scene {index}")))),
+        }
+    }
+}

@@ -1,0 +1,326 @@
+//! glTF 2.0 with `KHR_gaussian_splatting`, as JSON (`.gltf`) and as a binary file (`.glb`).
+//!
+//! Every primitive with the extension becomes Gaussians, moved by its node. The frame, right-up-back, is turned half
+//! around x. Draft extensions that keep a primitive's Gaussians as SPZ are read, and said to be drafts.
+
+mod accessor;
+mod document;
+mod primitive;
+
+use std::borrow::Cow;
+
+use base64::Engine;
+use glam::{DAffine3, DMat3, DQuat, DVec3};
+
+use super::input::{Format, Input, Origin};
+use super::spz::one_line;
+use crate::error::{Fault, Place, Reason};
+use crate::scene::Scene;
+use crate::transform::Motion;
+use document::{Document, Node};
+
+/// The format as JSON.
+pub(super) struct Gltf;
+
+/// The format as a binary file.
+pub(super) struct Glb;
+
+const MAGIC: &[u8; 4] = b"glTF";
+
+/// Bytes of a binary file's header, and of the header of each of its chunks.
+const HEADER: usize = 12;
+const CHUNK_HEADER: usize = 8;
+
+impl Format for Gltf {
+    fn name(&self) -> &'static str {
+        "glTF"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["gltf"]
+    }
+
+    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+        let json = input.rest()?;
+        load(&json, None, input.origin())
+    }
+}
+
+impl Format for Glb {
+    fn name(&self) -> &'static str {
+        "binary glTF"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["glb"]
+    }
+
+    fn magic(&self) -> Option<&'static [u8]> {
+        Some(MAGIC)
+    }
+
+    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+        let bytes = input.rest()?;
+        let word = |at: usize| {
+            let word = bytes.get(at..at + 4)?;
+            Some(u32::from_le_bytes(word.try_into().ok()?))
+        };
+        let truncated = || Reason::Truncated.at(Place::Byte(bytes.len() as u64));
+        if !bytes.starts_with(MAGIC) {
+            let expected = "a binary glTF file";
+            return Err(Reason::Magic { expected }.at(Place::Byte(0)));
+        }
+        let found = word(4).ok_or_else(truncated)?;
+        if found != 2 {
+            let read = "2";
+            return Err(Reason::Version { found, read }.at(Place::Header("version")));
+        }
+        let len = word(8).ok_or_else(truncated)?;
+        let (claimed, available) = (len.into(), bytes.len() as u64);
+        if claimed > available {
+            return Err(Reason::TooShort { claimed, available }.at(Place::Header("length")));
+        }
+        let mut chunks = [None; 2];
+        let mut rest = bytes[..len as usize].get(HEADER..).unwrap_or_default();
+        while let Some((head, after)) = rest.split_first_chunk::<CHUNK_HEADER>() {
+            let [size, kind] =
+                [0, 4].map(|at| u32::from_le_bytes(std::array::from_fn(|i| head[at + i])));
+            let Some((chunk, after)) = after.split_at_checked(size as usize) else {
+                let (claimed, available) = (size.into(), after.len() as u64);
+                return Err(
+                    Reason::TooShort { claimed, available }.at(Place::Header("chunkLength"))
+                );
+            };
+            match &kind.to_le_bytes() {
+                b"JSON" => chunks[0] = chunks[0].or(Some(chunk)),
+                b"BIN\0" => chunks[1] = chunks[1].or(Some(chunk)),
+                // Chunks of extensions are passed over.
+                _ => {}
+            }
+            rest = after;
+        }
+        let json = chunks[0].ok_or_else(|| Reason::Missing.at(Place::Header("the JSON chunk")))?;
+        load(json, chunks[1], input.origin())
+    }
+}
+
+/// Reads the scene of the document `json`, whose first buffer may be a binary file's chunk `binary`.
+fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene, Fault> {
+    let document: Document = serde_json::from_slice(json)
+        .map_err(|error| Reason::Json(one_line(&error)).at(Place::File))?;
+    document.check()?;
+    let mut reader = Reader {
+        document: &document,
+        binary,
+        buffers: document.buffers.iter().map(|_| None).collect(),
+        origin,
+        scene: Scene::default(),
+        visited: vec![false; document.nodes.len()],
+        other_primitives: 0,
+    };
+    let to_scene = DAffine3::from_mat3(DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)));
+    for root in document.roots()? {
+        reader.visit(root, to_scene)?;
+    }
+    let Reader {
+        mut scene,
+        other_primitives,
+        ..
+    } = reader;
+    if scene.is_empty() {
+        let text = "no node of its scene has Gaussians (KHR_gaussian_splatting)";
+        return Err(Reason::Unsupported(text.to_owned()).at(Place::File));
+    }
+    if other_primitives > 0 {
+        scene.metadata_mut().note(format!(
+            "{other_primitives} primitives that are no Gaussians are ignored"
+        ));
+    }
+    if !document.animations.is_empty() {
+        scene.metadata_mut().note("animations are ignored");
+    }
+    Ok(scene)
+}
+
+/// A document that is read into a scene, node by node.
+struct Reader<'a> {
+    document: &'a Document,
+    binary: Option<&'a [u8]>,
+    /// Buffers, as far as they have been needed.
+    buffers: Vec<Option<Cow<'a, [u8]>>>,
+    origin: Origin<'a>,
+    scene: Scene,
+    /// Nodes that have been visited; each is in a tree once.
+    visited: Vec<bool>,
+    other_primitives: usize,
+}
+
+/// The affine map of `node`.
+fn local(node: &Node) -> DAffine3 {
+    if let Some(matrix) = node.matrix {
+        let column = |i: usize| DVec3::from_slice(&matrix[4 * i..4 * i + 3]);
+        return DAffine3 {
+            matrix3: DMat3::from_cols(column(0), column(1), column(2)),
+            translation: column(3),
+        };
+    }
+    DAffine3::from_scale_rotation_translation(
+        node.scale.map_or(DVec3::ONE, DVec3::from_array),
+        node.rotation
+            .map_or(DQuat::IDENTITY, |q| DQuat::from_array(q).normalize()),
+        node.translation.map_or(DVec3::ZERO, DVec3::from_array),
+    )
+}
+
+impl<'a> Reader<'a> {
+    /// Reads the Gaussians of node `root` and of those below it, moved by `above` and by their nodes.
+    fn visit(&mut self, root: usize, above: DAffine3) -> Result<(), Fault> {
+        let mut stack = vec![(root, above)];
+        while let Some((index, above)) = stack.pop() {
+            let place = || Place::Part(format!("node {index}"));
+            let document = self.document;
+            let node = document
+                .nodes
+                .get(index)
+                .ok_or_else(|| Reason::Missing.at(place()))?;
+            if std::mem::replace(&mut self.visited[index], true) {
+                let text = "it is in the tree of nodes twice";
+                return Err(Reason::Unsupported(text.to_owned()).at(place()));
+            }
+            let map = above * local(node);
+            if let Some(mesh) = node.mesh {
+                if !map.is_finite() || map.matrix3.determinant() == 0.0 {
+                    let text = "its transform cannot be inverted";
+                    return Err(Reason::Unsupported(text.to_owned()).at(place()));
+                }
+                self.mesh(mesh, &map)?;
+            }
+            // In the order of the file.
+            stack.extend(node.children.iter().rev().map(|child| (*child, map)));
+        }
+        Ok(())
+    }
+
+    /// Reads the Gaussians of mesh `index`, moved by `map`.
+    fn mesh(&mut self, index: usize, map: &DAffine3) -> Result<(), Fault> {
+        let document = self.document;
+        let mesh = document
+            .meshes
+            .get(index)
+            .ok_or_else(|| Reason::Missing.at(Place::Part(format!("mesh {index}"))))?;
+        for (number, primitive) in mesh.primitives.iter().enumerate() {
+            let place = format!("mesh {index}, primitive {number}");
+            let Some(mut scene) = self.gaussians(primitive, &place)? else {
+                self.other_primitives += 1;
+                continue;
+            };
+            scene.apply(&Motion::new(
+                map.matrix3,
+                map.translation,
+                scene.sh_degree(),
+            ));
+            self.scene.join(scene);
+        }
+        Ok(())
+    }
+
+    /// The bytes of buffer view `index`, named by `place`, and the distance between its elements.
+    fn view(&mut self, index: usize, place: &str) -> Result<(&[u8], Option<usize>), Fault> {
+        let at = |reason: Reason, field: &str| reason.at(Place::Part(format!("{place}, {field}")));
+        let document = self.document;
+        let view = document
+            .buffer_views
+            .get(index)
+            .ok_or_else(|| at(Reason::Missing, "bufferView"))?;
+        if let Some(extension) = view
+            .extensions
+            .keys()
+            .find(|name| name.contains("compression"))
+        {
+            let text = format!("its extension {extension:?} is not read");
+            return Err(at(Reason::Unsupported(text), "bufferView"));
+        }
+        let buffer = self.buffer(view.buffer)?;
+        let bytes = view
+            .byte_offset
+            .checked_add(view.byte_length)
+            .and_then(|end| buffer.get(view.byte_offset..end));
+        let bytes = bytes.ok_or_else(|| {
+            let claimed = (view.byte_offset as u64).saturating_add(view.byte_length as u64);
+            let available = buffer.len() as u64;
+            at(Reason::TooShort { claimed, available }, "bufferView")
+        })?;
+        Ok((bytes, view.byte_stride))
+    }
+
+    /// The bytes of buffer `index`.
+    fn buffer(&mut self, index: usize) -> Result<&[u8], Fault> {
+        let document = self.document;
+        let at = |reason: Reason| reason.at(Place::Part(format!("buffer {index}")));
+        let buffer = document
+            .buffers
+            .get(index)
+            .ok_or_else(|| at(Reason::Missing))?;
+        if self.buffers[index].is_none() {
+            let bytes: Cow<'a, [u8]> = match &buffer.uri {
+                None if index == 0 => {
+                    Cow::Borrowed(self.binary.ok_or_else(|| at(Reason::Missing))?)
+                }
+                None => return Err(at(Reason::Missing)),
+                Some(uri) => {
+                    Cow::Owned(
+                        resource(uri, self.origin).map_err(|fault| match fault.place {
+                            Place::File => at(fault.reason),
+                            _ => fault,
+                        })?,
+                    )
+                }
+            };
+            self.buffers[index] = Some(bytes);
+        }
+        let bytes = self.buffers[index].as_deref().unwrap_or_default();
+        bytes.get(..buffer.byte_length).ok_or_else(|| {
+            let (claimed, available) = (buffer.byte_length as u64, bytes.len() as u64);
+            at(Reason::TooShort { claimed, available })
+        })
+    }
+}
+
+/// The bytes of `uri`: base64 in it, or a file beside the document.
+fn resource(uri: &str, origin: Origin<'_>) -> Result<Vec<u8>, Fault> {
+    let Some(data) = uri.strip_prefix("data:") else {
+        return origin.companion(&percent_decoded(uri));
+    };
+    let malformed = || {
+        let text = "its data is not base64";
+        Reason::Unsupported(text.to_owned()).at(Place::File)
+    };
+    let (kind, data) = data.split_once(',').ok_or_else(malformed)?;
+    if !kind.ends_with(";base64") {
+        return Err(malformed());
+    }
+    base64::engine::general_purpose::STANDARD
+        .decode(data)
+        .map_err(|_| malformed())
+}
+
+/// `text` with `%` and two hexadecimal digits replaced by the byte that they are.
+fn percent_decoded(text: &str) -> String {
+    let digit = |byte: Option<&u8>| char::from(*byte?).to_digit(16);
+    let bytes = text.as_bytes();
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut at = 0;
+    while at < bytes.len() {
+        match (digit(bytes.get(at + 1)), digit(bytes.get(at + 2))) {
+            (Some(high), Some(low)) if bytes[at] == b'%' => {
+                decoded.push((16 * high + low) as u8);
+                at += 3;
+            }
+            _ => {
+                decoded.push(bytes[at]);
+                at += 1;
+            }
+        }
+    }
+    String::from_utf8_lossy(&decoded).into_owned()
+}

@@ -1,0 +1,38 @@
+//! What programs write into a PLY header's comments about how a scene was trained.
+//!
+//! Brush has `SplatRenderMode: default`, `mip` or `2dgs`; Postshot `antialiased 0` or `1`. Case does not matter, and the
+//! last of them wins.
+
+use crate::metadata::{Antialiasing, Geometry, Metadata};
+
+/// What `comments`, each without its keyword, say.
+pub(super) fn metadata(comments: &[String]) -> Metadata {
+    let mut metadata = Metadata::default();
+    for comment in comments {
+        let comment = comment.to_ascii_lowercase();
+        let statement = if let Some(mode) = comment.strip_prefix("splatrendermode:") {
+            match mode.trim() {
+                "default" => Some((Antialiasing::Off, Geometry::Volume)),
+                "mip" => Some((Antialiasing::Compensated, Geometry::Volume)),
+                "2dgs" => Some((Antialiasing::Off, Geometry::Surfel)),
+                other => {
+                    metadata.note(format!("the render mode {other:?} is unknown and ignored"));
+                    None
+                }
+            }
+        } else if let Some(flag) = comment.strip_prefix("antialiased ") {
+            match flag.trim() {
+                "0" => Some((Antialiasing::Off, Geometry::Volume)),
+                "1" => Some((Antialiasing::Compensated, Geometry::Volume)),
+                _ => None,
+            }
+        } else {
+            None
+        };
+        if let Some((antialiasing, geometry)) = statement {
+            metadata.antialiasing = Some(antialiasing);
+            metadata.geometry = Some(geometry);
+        }
+    }
+    metadata
+}

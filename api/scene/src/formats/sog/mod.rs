@@ -1,0 +1,82 @@
+//! PlayCanvas's SOG, versions 1 and 2: a JSON document and WebP images, in which a pixel is a Gaussian.
+//!
+//! The document, `meta.json`, lies with its images in a zip archive (`.sog`) or in a folder. A streamed scene has a
+//! document `lod-meta.json` that names such documents, of several levels of detail. The frame is that of PLY files.
+
+mod attributes;
+mod files;
+mod streamed;
+
+use serde::Deserialize;
+
+use super::input::{Format, Input};
+use super::spz::one_line;
+use crate::error::{Fault, Place, Reason};
+use crate::scene::Scene;
+use files::Files;
+
+/// The name of a scene's document.
+pub(super) const META: &str = "meta.json";
+
+/// The name of a streamed scene's document.
+pub(super) const STREAMED_META: &str = "lod-meta.json";
+
+/// The largest document that is read, in bytes.
+const MAX_META: u64 = 1 << 28;
+
+/// The format as a zip archive.
+pub(super) struct Sog;
+
+impl Format for Sog {
+    fn name(&self) -> &'static str {
+        "SOG"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["sog", "zip"]
+    }
+
+    fn magic(&self) -> Option<&'static [u8]> {
+        Some(b"PK\x03\x04")
+    }
+
+    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+        let archive = input.rest()?;
+        let files = Files::archive(&archive)?;
+        let meta = files.read(META)?;
+        attributes::load(&meta, &files)
+    }
+}
+
+/// The format as a document beside its images, or a streamed scene's.
+pub(super) struct SogFolder;
+
+impl Format for SogFolder {
+    fn name(&self) -> &'static str {
+        "SOG (a folder)"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["json"]
+    }
+
+    fn load(&self, input: &mut Input<'_>) -> Result<Scene, Fault> {
+        let meta = input.up_to(MAX_META)?;
+        /// What tells the two documents apart.
+        #[derive(Deserialize)]
+        struct Kind {
+            tree: Option<serde::de::IgnoredAny>,
+        }
+        let kind: Kind = parse(&meta, Place::File)?;
+        if kind.tree.is_some() {
+            streamed::load(&meta, input.origin())
+        } else {
+            attributes::load(&meta, &Files::folder(input.origin(), ""))
+        }
+    }
+}
+
+/// The JSON document `text`.
+fn parse<'a, T: Deserialize<'a>>(text: &'a [u8], place: Place) -> Result<T, Fault> {
+    serde_json::from_slice(text).map_err(|error| Reason::Json(one_line(&error)).at(place))
+}

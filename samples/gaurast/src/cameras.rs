@@ -1,0 +1,463 @@
+//! The cameras that the command line asks for.
+
+use std::path::PathBuf;
+
+use gaurast_scene::camera::{Camera, CameraError, DEFAULT_FOV, Model};
+use gaurast_scene::camera_files::{self, CameraFileError, CameraFileOptions};
+use gaurast_scene::camera_path::{self, Keyframe};
+use gaurast_scene::{DEFAULT_UP, Extent, Framing, Scene, default_angles};
+use thiserror::Error;
+
+use crate::args::{CameraArguments, CameraModel};
+use crate::sources::{Source, stem};
+
+/// The picture's size where nothing says otherwise.
+pub const DEFAULT_SIZE: [u32; 2] = [1280, 720];
+
+/// The vertical field of view of a fisheye where none is given, in degrees.
+const FISHEYE_FOV: f64 = 180.0;
+
+/// Why there are no cameras. Displayed as one sentence.
+#[derive(Debug, Error)]
+pub enum ViewError {
+    #[error(transparent)]
+    CameraFile(#[from] CameraFileError),
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    #[error("{}: view {view}: there are {count} views, counted from 0", path.display())]
+    NoView {
+        path: PathBuf,
+        view: String,
+        count: usize,
+    },
+    #[error("{}: view {view}: {matches} views have this in their names", path.display())]
+    NoName {
+        path: PathBuf,
+        view: String,
+        matches: usize,
+    },
+    #[error("--view {0}: neither an index, a range such as 3..7 or 0..100:10, nor all")]
+    Range(String),
+    #[error("--view needs --cameras FILE, or a folder with a cameras.json as the scene")]
+    NoCameras,
+    #[error("{}: {source}", path.display())]
+    PathFile {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("{}: not a list of keyframes: {source}", path.display())]
+    Path {
+        path: PathBuf,
+        source: serde_json::Error,
+    },
+    #[error("{}: there is no keyframe", path.display())]
+    NoKeyframe { path: PathBuf },
+}
+
+impl ViewError {
+    /// Tells if the command line means nothing, whatever the files hold.
+    pub fn is_misuse(&self) -> bool {
+        matches!(self, Self::NoCameras | Self::Range(_))
+    }
+}
+
+/// A picture that is asked for.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// The photograph's name, if the camera is a photograph's.
+    pub name: Option<String>,
+    pub camera: Camera,
+}
+
+/// What is asked for.
+#[derive(Debug, Default)]
+pub struct Views {
+    pub views: Vec<View>,
+    /// What a person should know, a sentence each.
+    pub notes: Vec<String>,
+    /// How to have the view again, where it was chosen to suit the scene.
+    pub framing: Option<String>,
+}
+
+/// Cameras that were read before the scene: their mistakes should not wait for a large one.
+pub enum Known {
+    /// Those of a camera file, chosen.
+    File(Views),
+    /// Those of a path.
+    Path(Vec<Camera>),
+    /// The scene decides.
+    Scene,
+}
+
+/// Reads the camera file or the path, if one is asked for.
+///
+/// # Errors
+/// See [`ViewError`].
+pub fn read(arguments: &CameraArguments, source: &Source) -> Result<Known, ViewError> {
+    let size = arguments.size.map(|size| size.0);
+    if let Some(path) = &arguments.path {
+        return Ok(Known::Path(path_cameras(
+            arguments,
+            path,
+            size.unwrap_or(DEFAULT_SIZE),
+        )?));
+    }
+    let by_hand = arguments.eye.is_some()
+        || arguments.up.is_some()
+        || arguments.azimuth.is_some()
+        || arguments.elevation.is_some()
+        || arguments.distance.is_some()
+        || arguments.orbit.is_some()
+        || arguments.fov.is_some();
+    let beside = source.cameras.as_ref().filter(|_| !by_hand);
+    let Some(path) = arguments.cameras.as_ref().or(beside) else {
+        return if arguments.view.is_empty() {
+            Ok(Known::Scene)
+        } else {
+            Err(ViewError::NoCameras)
+        };
+    };
+    let mut views = Views::default();
+    let mut options = CameraFileOptions {
+        size: size.unwrap_or(DEFAULT_SIZE),
+        dataparser: arguments.dataparser.clone(),
+        undistorted: arguments.undistorted,
+    };
+    let transforms = path
+        .file_name()
+        .is_some_and(|name| name.to_string_lossy().starts_with("transforms"));
+    if options.dataparser.is_none() && transforms {
+        options.dataparser.clone_from(&source.dataparser);
+        if let Some(dataparser) = &source.dataparser {
+            let note = format!(
+                "the cameras are taken to the model by {}",
+                dataparser.display()
+            );
+            views.notes.push(note);
+        }
+    }
+    let file = camera_files::read(path, &options)?;
+    views.notes.extend(file.ignored);
+    let chosen = if arguments.view.is_empty() {
+        choose("0", path, &file.views)?
+    } else {
+        let mut chosen = Vec::new();
+        for text in &arguments.view {
+            chosen.extend(choose(text, path, &file.views)?);
+        }
+        chosen
+    };
+    for index in chosen {
+        let camera_files::View { name, camera } = file.views[index].clone();
+        let camera = match size {
+            Some(size) => camera.resized(size),
+            None => camera,
+        };
+        let name = if name.is_empty() {
+            format!("{index:05}")
+        } else {
+            name
+        };
+        views.views.push(View {
+            name: Some(name),
+            camera,
+        });
+    }
+    Ok(Known::File(views))
+}
+
+/// The cameras that see `scene`, in the models and with the planes that are asked for.
+///
+/// # Errors
+/// See [`ViewError`].
+pub fn of_scene(
+    known: Known,
+    arguments: &CameraArguments,
+    scene: &Scene,
+    garden: bool,
+) -> Result<Views, ViewError> {
+    let extent = Extent::of(scene);
+    let mut views = match known {
+        Known::File(mut views) => {
+            for view in &mut views.views {
+                view.camera = with_near(&view.camera, &extent);
+            }
+            views
+        }
+        Known::Path(cameras) => unnamed(cameras.iter().map(|c| with_near(c, &extent))),
+        Known::Scene => by_hand(arguments, &extent, garden)?,
+    };
+    if arguments.model == CameraModel::Equirectangular && arguments.fov.is_some() {
+        let note = "--fov is of no account: a panorama has 360 by 180 degrees";
+        views.notes.push(note.to_owned());
+    }
+    for view in &mut views.views {
+        let camera = projected(&view.camera, arguments, &extent);
+        let camera = camera.zoomed(arguments.zoom.unwrap_or(1.0));
+        let near = arguments.near.unwrap_or(camera.near);
+        view.camera = camera.with_planes(near, arguments.far.unwrap_or(camera.far));
+        view.camera.check()?;
+    }
+    Ok(views)
+}
+
+fn unnamed(cameras: impl Iterator<Item = Camera>) -> Views {
+    let view = |camera| View { name: None, camera };
+    Views {
+        views: cameras.map(view).collect(),
+        ..Views::default()
+    }
+}
+
+/// A near plane that suits a small scene.
+fn with_near(camera: &Camera, extent: &Extent) -> Camera {
+    camera.with_planes(camera.near.min(extent.near()), camera.far)
+}
+
+/// The camera in the model that is asked for.
+fn projected(camera: &Camera, arguments: &CameraArguments, extent: &Extent) -> Camera {
+    match arguments.model {
+        CameraModel::Pinhole => camera.clone(),
+        CameraModel::Fisheye if camera.model == Model::Fisheye => camera.clone(),
+        CameraModel::Fisheye => camera.fisheye(arguments.fov.unwrap_or(FISHEYE_FOV)),
+        CameraModel::Equirectangular => camera.panorama(),
+        CameraModel::Orthographic => {
+            // What is in the middle of the scene, or looked at, is as large as a pinhole shows it.
+            let middle = arguments.target.map_or(extent.centre, |target| target.0);
+            let ahead = distance_ahead(camera, middle).max(1e-6 * extent.radius());
+            let far = camera.far.min(ahead + 100.0 * extent.radius());
+            camera.orthographic(ahead).with_planes(camera.near, far)
+        }
+    }
+}
+
+/// How far `point` is along the camera's axis.
+fn distance_ahead(camera: &Camera, point: [f64; 3]) -> f64 {
+    let [_, _, forward] = camera.rotation;
+    (0..3)
+        .map(|axis| forward[axis] * (point[axis] - camera.eye[axis]))
+        .sum()
+}
+
+/// The camera given by hand, or one that suits the scene; or an orbit from there.
+fn by_hand(arguments: &CameraArguments, extent: &Extent, garden: bool) -> Result<Views, ViewError> {
+    let size = arguments.size.map_or(DEFAULT_SIZE, |size| size.0);
+    let up = arguments.up.map_or(DEFAULT_UP, |up| up.0);
+    let inside = matches!(
+        arguments.model,
+        CameraModel::Fisheye | CameraModel::Equirectangular
+    );
+    // A fisheye's field of view is no pinhole's.
+    let fov = arguments.fov.filter(|_| !inside);
+    let framed = arguments.azimuth.is_some()
+        || arguments.elevation.is_some()
+        || arguments.distance.is_some()
+        || arguments.up.is_some();
+    let mut said = None;
+    let (camera, pivot) = match (arguments.eye, arguments.target) {
+        (Some(eye), Some(target)) => {
+            let camera = Camera::look_at(eye.0, target.0, up, fov.unwrap_or(DEFAULT_FOV), size)?;
+            (with_near(&camera, extent), target.0)
+        }
+        _ if garden && !framed && arguments.orbit.is_none() => {
+            let camera = gaurast_scene::garden::camera(fov, size)?;
+            (camera, extent.centre)
+        }
+        _ if inside && arguments.distance.is_none() => {
+            let azimuth = arguments.azimuth.unwrap_or(0.0);
+            let camera = gaurast_scene::inside(extent, azimuth, up, DEFAULT_FOV, size)?;
+            said = Some(format!("standing at {}", triple(camera.eye)));
+            (camera, extent.centre)
+        }
+        _ => {
+            let framing = Framing {
+                azimuth: arguments.azimuth,
+                elevation: arguments.elevation,
+                distance: arguments.distance,
+                up,
+                ..Framing::new(fov.unwrap_or(DEFAULT_FOV), size)
+            };
+            let camera = framing.camera(extent)?;
+            let (azimuth, elevation) = default_angles();
+            said = Some(format!(
+                "framed by --azimuth {:.1} --elevation {:.1} --distance {:.4}",
+                arguments.azimuth.unwrap_or(azimuth),
+                arguments.elevation.unwrap_or(elevation),
+                distance_ahead(&camera, extent.centre),
+            ));
+            (camera, extent.centre)
+        }
+    };
+    let mut views = match arguments.orbit {
+        None => unnamed([camera].into_iter()),
+        Some(count) => {
+            let turned = |i: u32| {
+                let angle = std::f64::consts::TAU * f64::from(i) / f64::from(count);
+                camera.turned(pivot, up, angle)
+            };
+            unnamed((0..count).map(turned))
+        }
+    };
+    views.framing = said;
+    Ok(views)
+}
+
+/// Three numbers as an option takes them.
+fn triple(values: [f64; 3]) -> String {
+    values.map(|value| format!("{value:.4}")).join(",")
+}
+
+fn path_cameras(
+    arguments: &CameraArguments,
+    path: &std::path::Path,
+    size: [u32; 2],
+) -> Result<Vec<Camera>, ViewError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ViewError::PathFile {
+        path: path.to_owned(),
+        source,
+    })?;
+    let keyframes: Vec<Keyframe> =
+        serde_json::from_str(&text).map_err(|source| ViewError::Path {
+            path: path.to_owned(),
+            source,
+        })?;
+    if keyframes.is_empty() {
+        return Err(ViewError::NoKeyframe {
+            path: path.to_owned(),
+        });
+    }
+    let count = arguments.frames.map(|count| count as usize);
+    Ok(camera_path::along(&keyframes, count, size)?)
+}
+
+/// The indices of the views that `text` means.
+fn choose(
+    text: &str,
+    path: &std::path::Path,
+    views: &[camera_files::View],
+) -> Result<Vec<usize>, ViewError> {
+    let count = views.len();
+    let no_view = |view: &str| ViewError::NoView {
+        path: path.to_owned(),
+        view: view.to_owned(),
+        count,
+    };
+    let text = text.trim();
+    if text == "all" {
+        return if count == 0 {
+            Err(no_view(text))
+        } else {
+            Ok((0..count).collect())
+        };
+    }
+    if let Some((first, rest)) = text.split_once("..") {
+        let (last, step) = rest.split_once(':').unwrap_or((rest, "1"));
+        let number = |word: &str, otherwise: usize| {
+            if word.is_empty() {
+                return Ok(otherwise);
+            }
+            (word.trim_start_matches('=').parse::<usize>())
+                .map_err(|_| ViewError::Range(text.to_owned()))
+        };
+        let (first, last) = (number(first, 0)?, number(last, count.saturating_sub(1))?);
+        let step = number(step, 1)?;
+        if first > last || step == 0 {
+            return Err(ViewError::Range(text.to_owned()));
+        }
+        return if last < count {
+            Ok((first..=last).step_by(step).collect())
+        } else {
+            Err(no_view(text))
+        };
+    }
+    // A number is an index, unless it is written as a photograph's name is.
+    let leading_zero = text.len() > 1 && text.starts_with('0');
+    if let (Ok(index), false) = (text.parse::<usize>(), leading_zero) {
+        if index < count {
+            return Ok(vec![index]);
+        }
+        if !views.iter().any(|view| view.name.contains(text)) {
+            return Err(no_view(text));
+        }
+    }
+    let of_name = |matches: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        let named = views
+            .iter()
+            .enumerate()
+            .filter(|(_, view)| matches(&view.name));
+        named.map(|(index, _)| index).collect()
+    };
+    let file = |name: &str| name.rsplit('/').next().unwrap_or_default().to_owned();
+    let tests: [&dyn Fn(&str) -> bool; 4] = [
+        &|name| name == text,
+        &|name| file(name) == text,
+        &|name| stem(std::path::Path::new(name)) == text,
+        &|name| name.contains(text),
+    ];
+    let found = tests
+        .into_iter()
+        .map(of_name)
+        .find(|found| !found.is_empty());
+    match found.as_deref() {
+        Some([one]) => Ok(vec![*one]),
+        found => Err(ViewError::NoName {
+            path: path.to_owned(),
+            view: text.to_owned(),
+            matches: found.map_or(0, <[usize]>::len),
+        }),
+    }
+}
+
+/// The views as `--path` reads them.
+pub fn keyframes(views: &[View], scene: &Scene) -> Vec<Keyframe> {
+    let extent = Extent::of(scene);
+    let keyframe = |view: &View| {
+        let ahead = distance_ahead(&view.camera, extent.centre);
+        let distance = if ahead > 0.0 { ahead } else { extent.radius() };
+        Keyframe::of(&view.camera, distance)
+    };
+    views.iter().map(keyframe).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn named(names: &[&str]) -> Vec<camera_files::View> {
+        let camera = Camera::orbit(1, [8, 8]).remove(0);
+        let view = |name: &&str| camera_files::View {
+            name: (*name).to_owned(),
+            camera: camera.clone(),
+        };
+        names.iter().map(view).collect()
+    }
+
+    #[test]
+    fn views_are_chosen_by_index_range_and_name() {
+        let views = named(&["images/a.png", "b/00003.jpg", "DSC8679", "DSC8680", "e"]);
+        let choose = |text: &str| choose(text, Path::new("c.json"), &views);
+        let chosen = |text: &str| choose(text).expect(text);
+        assert_eq!(chosen("3"), [3]);
+        assert_eq!(chosen("all"), [0, 1, 2, 3, 4]);
+        assert_eq!(chosen("1..3"), [1, 2, 3]);
+        assert_eq!(chosen("..2"), [0, 1, 2]);
+        assert_eq!(chosen("0..4:2"), [0, 2, 4]);
+        assert_eq!(chosen("a"), [0]);
+        assert_eq!(chosen("a.png"), [0]);
+        assert_eq!(chosen("00003"), [1]);
+        assert_eq!(chosen("8680"), [3], "no index");
+        for (bad, reason) in [
+            ("5", "there are 5 views"),
+            ("2..9", "there are 5 views"),
+            ("3..1", "neither"),
+            ("0..3:0", "neither"),
+            ("a..b", "neither"),
+            ("DSC", "2 views have this"),
+            ("nobody", "0 views have this"),
+        ] {
+            let error = choose(bad).expect_err(bad).to_string();
+            assert!(error.contains(reason), "{bad}: {error}");
+        }
+    }
+}

@@ -1,0 +1,367 @@
+//! `gaurast compare`: how much pictures differ.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use gaurast_picture::{Background, OutputError, Picture, PictureFormat, Size, Statistics, ssim};
+use serde_json::json;
+use thiserror::Error;
+
+use crate::args::{CameraArguments, ModeArguments, SceneArguments};
+use crate::cameras::{self, View, ViewError};
+use crate::drawing::{self, DrawError, Drawing};
+use crate::progress::Progress;
+use crate::report::write_json;
+use crate::sources::{Source, SourceError, stem};
+
+/// Why nothing was compared. Displayed as one sentence.
+#[derive(Debug, Error)]
+pub enum Error {
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error("{}: {source}", path.display())]
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    #[error(transparent)]
+    View(#[from] ViewError),
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    #[error("{}: {a}, but {}: {b}: pictures of one size are compared", path.display(), other.display())]
+    Size {
+        path: PathBuf,
+        a: String,
+        other: PathBuf,
+        b: String,
+    },
+    #[error("{}: there is no picture called {name} here, as in {}", folder.display(), other.display())]
+    Missing {
+        folder: PathBuf,
+        other: PathBuf,
+        name: String,
+    },
+    #[error("{}: there is no picture in the folder", folder.display())]
+    NoPicture { folder: PathBuf },
+    #[error("{}: a folder of pictures is compared with another one", folder.display())]
+    Folder { folder: PathBuf },
+    #[error("a picture is compared with one view of a scene, and {0} are asked for")]
+    Views(usize),
+    #[error("--difference {}: it is there already: --force replaces it", path.display())]
+    There { path: PathBuf },
+    #[error("{name}: the PSNR of {psnr:.2} dB is below {limit}")]
+    Below { name: String, psnr: f64, limit: f64 },
+    #[error("output: {0}")]
+    Stdout(std::io::Error),
+}
+
+impl Error {
+    /// Tells if the command line means nothing.
+    pub fn is_misuse(&self) -> bool {
+        matches!(self, Self::View(error) if error.is_misuse())
+    }
+}
+
+/// The arguments of `gaurast compare`.
+#[derive(Args)]
+#[command(
+    after_help = "PSNR is over red, green and blue, the peak being 1; SSIM is as 3DGS's own evaluation computes \
+    it; FLIP is the mean error of the LDR evaluator, 0 to 1. Colours are compared as they are shown, over the background. \
+    Folders are compared file by file, by their names without extensions."
+)]
+pub struct CompareArguments {
+    /// A picture, or a folder of pictures: .png, .jpg, .webp or .exr
+    pub a: PathBuf,
+
+    /// The reference: a picture, a folder of pictures, or a scene that is drawn for it
+    pub b: PathBuf,
+
+    #[command(flatten)]
+    pub camera: CameraArguments,
+
+    #[command(flatten)]
+    pub modes: ModeArguments,
+
+    /// What is behind the scene, and behind pictures that are transparent
+    #[arg(long, value_name = "COLOUR")]
+    pub background: Option<Background>,
+
+    /// Write the absolute differences as a picture, the largest being white; a folder where folders are compared
+    #[arg(long, value_name = "FILE")]
+    pub difference: Option<PathBuf>,
+
+    /// Replace files that are there
+    #[arg(long)]
+    pub force: bool,
+
+    /// Fail where a picture's PSNR is below this
+    #[arg(long, value_name = "DB")]
+    pub fail_below: Option<f64>,
+
+    /// Print everything as JSON
+    #[arg(long)]
+    pub json: bool,
+
+    /// Print nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Two pictures that are compared.
+struct Pair {
+    name: String,
+    a: Picture,
+    b: Picture,
+    /// Where their difference goes.
+    difference: Option<PathBuf>,
+}
+
+/// How much two pictures differ.
+struct Compared {
+    name: String,
+    statistics: Statistics,
+    ssim: f64,
+}
+
+/// Compares and prints.
+pub fn run(arguments: &CompareArguments) -> Result<(), Error> {
+    let mut compared = Vec::new();
+    if arguments.a.is_dir() {
+        for (name, a, b) in pairs(&arguments.a, &arguments.b)? {
+            let difference = arguments
+                .difference
+                .as_ref()
+                .map(|folder| folder.join(format!("{name}.png")));
+            if let Some(path) = &difference {
+                let folder = gaurast_picture::folder(path);
+                std::fs::create_dir_all(folder).map_err(|source| Error::Io {
+                    path: folder.to_owned(),
+                    source,
+                })?;
+            }
+            let pair = Pair {
+                a: gaurast_picture::read(&a)?,
+                b: gaurast_picture::read(&b)?,
+                name,
+                difference,
+            };
+            check_sizes(&pair.a, &a, &pair.b, &b)?;
+            compared.push(compare(pair, arguments)?);
+        }
+    } else {
+        let a = gaurast_picture::read(&arguments.a)?;
+        let is_picture = PictureFormat::of(&arguments.b).is_ok();
+        let b = if is_picture {
+            gaurast_picture::read(&arguments.b)?
+        } else {
+            let drawn = draw(arguments, [a.width, a.height])?;
+            let floats = matches!(PictureFormat::of(&arguments.a), Ok(PictureFormat::Exr));
+            if floats { drawn } else { in_eight_bits(drawn) }
+        };
+        check_sizes(&a, &arguments.a, &b, &arguments.b)?;
+        let pair = Pair {
+            name: arguments.a.display().to_string(),
+            a,
+            b,
+            difference: arguments.difference.clone(),
+        };
+        compared.push(compare(pair, arguments)?);
+    }
+    if !arguments.quiet || arguments.json {
+        print(arguments, &compared).map_err(Error::Stdout)?;
+    }
+    if let Some(limit) = arguments.fail_below
+        && let Some(worst) = compared.iter().find(|one| one.statistics.psnr < limit)
+    {
+        return Err(Error::Below {
+            name: worst.name.clone(),
+            psnr: worst.statistics.psnr,
+            limit,
+        });
+    }
+    Ok(())
+}
+
+fn check_sizes(a: &Picture, path: &Path, b: &Picture, other: &Path) -> Result<(), Error> {
+    if (a.width, a.height) == (b.width, b.height) {
+        return Ok(());
+    }
+    Err(Error::Size {
+        path: path.to_owned(),
+        a: format!("{}x{}", a.width, a.height),
+        other: other.to_owned(),
+        b: format!("{}x{}", b.width, b.height),
+    })
+}
+
+fn compare(pair: Pair, arguments: &CompareArguments) -> Result<Compared, Error> {
+    let shown = |picture: &Picture| {
+        let behind = arguments.background.map_or([0.0; 3], Background::color);
+        let over = picture.over(behind);
+        // As a screen shows it.
+        over.pixels
+            .iter()
+            .map(|pixel| pixel.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, 1.0) }))
+            .collect::<Vec<_>>()
+    };
+    let (a, b) = (shown(&pair.a), shown(&pair.b));
+    let width = pair.a.width;
+    let statistics = Statistics::new(&a, &b, width);
+    if let Some(path) = &pair.difference {
+        if path.is_file() && !arguments.force {
+            return Err(Error::There { path: path.clone() });
+        }
+        let scale = 1.0 / (statistics.max as f32).max(f32::MIN_POSITIVE);
+        let difference = |(a, b): (&[f32; 4], &[f32; 4])| {
+            let channel = |c: usize| (a[c] - b[c]).abs() * scale;
+            [channel(0), channel(1), channel(2), 1.0]
+        };
+        let picture = Picture {
+            pixels: a.iter().zip(&b).map(difference).collect(),
+            ..pair.a
+        };
+        gaurast_picture::write(path, &picture, None)?;
+    }
+    Ok(Compared {
+        name: pair.name,
+        statistics,
+        ssim: ssim(&a, &b, width),
+    })
+}
+
+/// The scene, drawn for a picture of `size`.
+fn draw(arguments: &CompareArguments, size: [u32; 2]) -> Result<Picture, Error> {
+    let progress = Progress {
+        quiet: arguments.quiet || arguments.json,
+    };
+    let source = Source::of(&SceneArguments {
+        scenes: vec![arguments.b.clone()],
+        ..SceneArguments::default()
+    })?;
+    let camera = CameraArguments {
+        size: Some(arguments.camera.size.unwrap_or(Size(size))),
+        ..arguments.camera.clone()
+    };
+    let known = cameras::read(&camera, &source)?;
+    let (scene, _) = source.load(progress)?;
+    let views = cameras::of_scene(known, &camera, &scene, false)?.views;
+    let [view]: [View; 1] = views
+        .try_into()
+        .map_err(|views: Vec<View>| Error::Views(views.len()))?;
+    let settings = drawing::settings(&arguments.modes, &scene);
+    let mut drawing = Drawing::new(&scene, settings, false)?;
+    let frame = drawing.frame(&view)?;
+    let background = arguments.background.or(source.background);
+    Ok(frame
+        .picture
+        .over(background.map_or([0.0; 3], Background::color)))
+}
+
+/// The picture as a file of eight bits holds it.
+fn in_eight_bits(mut picture: Picture) -> Picture {
+    for value in picture.pixels.as_flattened_mut() {
+        *value = (255.0 * value.clamp(0.0, 1.0)).round() / 255.0;
+    }
+    picture
+}
+
+/// The pictures of a folder, by name without extension.
+fn pictures(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
+    let io = |source| Error::Io {
+        path: folder.to_owned(),
+        source,
+    };
+    let mut found = BTreeMap::new();
+    for entry in folder.read_dir().map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        if path.is_file() && PictureFormat::of(&path).is_ok() {
+            found.insert(stem(&path), path);
+        }
+    }
+    if found.is_empty() {
+        return Err(Error::NoPicture {
+            folder: folder.to_owned(),
+        });
+    }
+    Ok(found)
+}
+
+/// Names, and the files of both folders.
+fn pairs(a: &Path, b: &Path) -> Result<Vec<(String, PathBuf, PathBuf)>, Error> {
+    if !b.is_dir() {
+        return Err(Error::Folder {
+            folder: a.to_owned(),
+        });
+    }
+    let (first, mut second) = (pictures(a)?, pictures(b)?);
+    let missing = |folder: &Path, other: &Path, name: &str| Error::Missing {
+        folder: folder.to_owned(),
+        other: other.to_owned(),
+        name: name.to_owned(),
+    };
+    let mut pairs = Vec::new();
+    for (name, path) in first {
+        let other = second.remove(&name).ok_or_else(|| missing(b, a, &name))?;
+        pairs.push((name, path, other));
+    }
+    match second.keys().next() {
+        Some(name) => Err(missing(a, b, name)),
+        None => Ok(pairs),
+    }
+}
+
+fn print(arguments: &CompareArguments, compared: &[Compared]) -> std::io::Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    let mean = |value: &dyn Fn(&Compared) -> f64| {
+        compared.iter().map(value).sum::<f64>() / compared.len().max(1) as f64
+    };
+    let means = [
+        mean(&|one| one.statistics.psnr),
+        mean(&|one| one.ssim),
+        mean(&|one| one.statistics.flip),
+    ];
+    if arguments.json {
+        // JSON has no infinity: equal pictures have no PSNR.
+        let finite = |value: f64| value.is_finite().then_some(value);
+        let one = |one: &Compared| {
+            json!({
+                "name": one.name,
+                "psnr": finite(one.statistics.psnr),
+                "ssim": one.ssim,
+                "flip": one.statistics.flip,
+                "largest": one.statistics.max,
+                "equal": one.statistics.max == 0.0,
+            })
+        };
+        let pictures: Vec<_> = compared.iter().map(one).collect();
+        let [psnr, ssim, flip] = means;
+        let mean = json!({"psnr": finite(psnr), "ssim": ssim, "flip": flip});
+        write_json(&mut stdout, &json!({"pictures": pictures, "mean": mean}))?;
+        return stdout.flush();
+    }
+    for one in compared {
+        let Statistics {
+            psnr, flip, max, ..
+        } = one.statistics;
+        writeln!(
+            stdout,
+            "{}: PSNR {psnr:.2} dB, SSIM {:.4}, FLIP {flip:.4}, largest difference {:.1} of 255",
+            one.name,
+            one.ssim,
+            255.0 * max
+        )?;
+    }
+    if compared.len() > 1 {
+        let [psnr, ssim, flip] = means;
+        let count = compared.len();
+        writeln!(
+            stdout,
+            "mean of {count}: PSNR {psnr:.2} dB, SSIM {ssim:.4}, FLIP {flip:.4}"
+        )?;
+    }
+    stdout.flush()
+}

@@ -1,0 +1,264 @@
+//! One device, one scene, many views: draws them one after the other while those before are written.
+
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
+
+use gaurast_render::{Frame, RenderError, Renderer, Settings};
+use gaurast_scene::{MAX_SH_DEGREE, Scene, SortOrder};
+use thiserror::Error;
+
+use crate::args::{Antialiasing, Geometry, ModeArguments, Order};
+use crate::cameras::View;
+use crate::limits;
+use crate::outputs::{Finished, Outputs, WriteError};
+use crate::progress::Progress;
+
+/// Why there are no pictures. Displayed as one sentence.
+#[derive(Debug, Error)]
+pub enum DrawError {
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error("{0}")]
+    Limit(String),
+    #[error("{0}")]
+    Nothing(String),
+}
+
+/// The settings that the command line and the scene's file ask for.
+pub fn settings(modes: &ModeArguments, scene: &Scene) -> Settings {
+    let surfels = match modes.geometry {
+        Geometry::Auto => scene.geometry() == gaurast_scene::Geometry::Surfel,
+        Geometry::Volume => false,
+        Geometry::Surfel => true,
+    };
+    let compensated = match modes.antialiasing {
+        Antialiasing::Auto => scene.antialiasing() == gaurast_scene::Antialiasing::Compensated,
+        Antialiasing::Off => false,
+        Antialiasing::Compensated => true,
+    };
+    let order = match modes.order {
+        Order::Auto if metadata_order(scene) == SortOrder::Distance => {
+            gaurast_render::Order::Distance
+        }
+        Order::Auto | Order::Depth => gaurast_render::Order::Depth,
+        Order::Distance => gaurast_render::Order::Distance,
+        Order::PerPixel => gaurast_render::Order::PerPixel,
+    };
+    Settings {
+        sh_degree: modes.sh_degree.unwrap_or(MAX_SH_DEGREE),
+        order,
+        geometry: if surfels {
+            gaurast_render::Geometry::Surfel
+        } else {
+            gaurast_render::Geometry::Volume
+        },
+        antialiasing: if compensated {
+            gaurast_render::Antialiasing::Compensated
+        } else {
+            gaurast_render::Antialiasing::Dilate
+        },
+        precision: modes.precision.into(),
+        exponential_error: modes.exponential_error,
+        contribution_budget: modes.contribution_budget,
+        ..Settings::default()
+    }
+}
+
+/// What the scene's file says that Gaussians are sorted by.
+fn metadata_order(scene: &Scene) -> SortOrder {
+    scene.metadata().order.unwrap_or_default()
+}
+
+/// Tells if the scene's file says that its colours are linear light.
+pub fn has_linear_colors(scene: &Scene) -> bool {
+    scene.metadata().color_space == Some(gaurast_scene::ColorSpace::LinearRec709Display)
+}
+
+/// What a person should know of how the scene's file is heeded, a sentence each.
+pub fn notes(modes: &ModeArguments, scene: &Scene) -> Vec<String> {
+    let metadata = scene.metadata();
+    let mut notes = metadata.notes.clone();
+    if modes.geometry == Geometry::Auto && scene.geometry() == gaurast_scene::Geometry::Surfel {
+        notes.push("flat Gaussians are drawn (--geometry 2d), as the file says".to_owned());
+    }
+    if modes.antialiasing == Antialiasing::Auto
+        && scene.antialiasing() == gaurast_scene::Antialiasing::Compensated
+    {
+        let note = "opacity makes up for dilation (--antialiasing compensated), as the file says";
+        notes.push(note.to_owned());
+    }
+    if metadata.color_space == Some(gaurast_scene::ColorSpace::LinearRec709Display) {
+        let note =
+            "the file's colours are linear light, and are written without a transfer function";
+        notes.push(note.to_owned());
+    }
+    if let Some(degree) = modes.sh_degree.filter(|degree| *degree > scene.sh_degree()) {
+        notes.push(format!(
+            "--sh-degree {degree} is of no account: the scene has degree {}",
+            scene.sh_degree()
+        ));
+    }
+    notes
+}
+
+/// A device with a scene on it.
+pub struct Drawing {
+    renderer: Renderer,
+    scene: gaurast_render::DeviceScene,
+}
+
+/// What became of a view.
+pub struct Drawn {
+    /// Among all views.
+    pub index: usize,
+    pub time: Duration,
+    pub counters: Vec<gaurast_render::Counter>,
+    /// Why there is nothing in the picture, if so.
+    pub nothing: Option<String>,
+}
+
+impl Drawing {
+    /// Puts `scene` on a device, to be drawn by `settings`.
+    ///
+    /// # Errors
+    /// If there is no device, no room, or more threads are asked for than help.
+    pub fn new(scene: &Scene, settings: Settings, counters: bool) -> Result<Self, DrawError> {
+        limits::check_threads().map_err(DrawError::Limit)?;
+        let mut renderer = Renderer::new(vulkan_gaurast::entry())?;
+        if counters {
+            renderer.count_everything()?;
+        }
+        let mut uploaded = renderer.upload(scene, Some(settings.sh_degree))?;
+        renderer.set(&mut uploaded, settings)?;
+        Ok(Self {
+            renderer,
+            scene: uploaded,
+        })
+    }
+
+    /// Draws one view.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn frame(&mut self, view: &View) -> Result<Frame, DrawError> {
+        Ok(self.renderer.render(&self.scene, &view.camera)?)
+    }
+
+    /// Draws the views of these indices and writes them; a picture with nothing in it is an error if `strict`.
+    ///
+    /// # Errors
+    /// The first that there is; pictures that were drawn before it are written.
+    pub fn all(
+        &mut self,
+        views: &[View],
+        indices: &[usize],
+        outputs: &Outputs,
+        strict: bool,
+        progress: Progress,
+    ) -> Result<Vec<Drawn>, DrawError> {
+        let Some(first) = indices.first() else {
+            return Ok(Vec::new());
+        };
+        let size = [views[*first].camera.width, views[*first].camera.height];
+        let mut writer = outputs.writer(size)?;
+        let bar = progress.pictures(indices.len() as u64);
+        let mut drawn = Vec::new();
+        std::thread::scope(|scope| {
+            // Nothing waits in between: one picture is written while the next is drawn.
+            let (send, receive) = sync_channel::<Finished<'_>>(0);
+            let writing = scope.spawn(move || {
+                for finished in receive {
+                    writer.write(&finished)?;
+                }
+                writer.finish()
+            });
+            let mut failed = None;
+            for &index in indices {
+                let frame = match self.frame(&views[index]) {
+                    Ok(frame) => frame,
+                    Err(error) => {
+                        failed = Some(error);
+                        break;
+                    }
+                };
+                let nothing = reasons(&frame, &views[index]);
+                if let Some(reason) = nothing.clone().filter(|_| strict) {
+                    failed = Some(DrawError::Nothing(reason));
+                    break;
+                }
+                let Frame {
+                    picture,
+                    time,
+                    counters,
+                    depth,
+                    ..
+                } = frame;
+                drawn.push(Drawn {
+                    index,
+                    time,
+                    counters,
+                    nothing,
+                });
+                let finished = Finished {
+                    index,
+                    view: &views[index],
+                    picture,
+                    depth,
+                };
+                // The writer tells why it is gone.
+                if send.send(finished).is_err() {
+                    break;
+                }
+                bar.inc(1);
+            }
+            drop(send);
+            let written = writing
+                .join()
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            bar.finish_and_clear();
+            written?;
+            failed.map_or(Ok(()), Err)
+        })?;
+        Ok(drawn)
+    }
+}
+
+/// Why the picture has nothing in it, if so: what became of the Gaussians, counted.
+fn reasons(frame: &Frame, view: &View) -> Option<String> {
+    if frame.picture.pixels.iter().any(|pixel| pixel[3] > 0.0) {
+        return None;
+    }
+    let counted = |name: &str| {
+        let counter = frame.counters.iter().find(|counter| counter.name == name);
+        counter.map_or(0.0, |counter| counter.value)
+    };
+    let mut parts: Vec<String> = frame
+        .counters
+        .iter()
+        .filter(|counter| counter.category == "gaussians skipped" && counter.value > 0.0)
+        .map(|counter| {
+            let plane = match counter.name.as_str() {
+                "before near plane" => format!(" (--near {})", view.camera.near),
+                "beyond far plane" => format!(" (--far {})", view.camera.far),
+                _ => String::new(),
+            };
+            format!("{} {}{plane}", counter.value, counter.name)
+        })
+        .collect();
+    let reached = counted("gaussians drawn");
+    if reached > 0.0 {
+        parts.push(format!("{reached} too faint at every pixel"));
+    }
+    let read = counted("gaussians read");
+    let parts = if parts.is_empty() {
+        "none is in the picture".to_owned()
+    } else {
+        parts.join(", ")
+    };
+    Some(format!(
+        "there is nothing in the picture: of {read} Gaussian{}: {parts}",
+        if read == 1.0 { "" } else { "s" }
+    ))
+}

@@ -1,0 +1,168 @@
+//! `gaurast info`: what a scene holds.
+
+use std::io::Write;
+
+use clap::Args;
+use gaurast_scene::Extent;
+use gaurast_scene::info::{Bar, Info};
+use serde_json::json;
+use thiserror::Error;
+
+use crate::args::SceneArguments;
+use crate::progress::Progress;
+use crate::report::{grouped, write_json};
+use crate::sources::{Source, SourceError};
+
+/// Characters of the longest bar.
+const BAR: usize = 40;
+
+/// Why nothing is told. Displayed as one sentence.
+#[derive(Debug, Error)]
+pub enum Error {
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    #[error("output: {0}")]
+    Stdout(#[from] std::io::Error),
+}
+
+/// The arguments of `gaurast info`.
+#[derive(Args)]
+pub struct InfoArguments {
+    #[command(flatten)]
+    pub scene: SceneArguments,
+
+    /// Print everything as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Reads the scene and tells.
+pub fn run(arguments: &InfoArguments) -> Result<(), Error> {
+    let source = Source::of(&arguments.scene)?;
+    let progress = Progress {
+        quiet: arguments.json,
+    };
+    let (scene, _) = source.load(progress)?;
+    let (info, extent) = (Info::new(&scene), Extent::of(&scene));
+    let mut stdout = std::io::stdout().lock();
+    if arguments.json {
+        let mut value = serde_json::to_value(&info).map_err(std::io::Error::from)?;
+        value["framed"] = json!({"centre": extent.centre, "half": extent.half});
+        value["files"] = json!(
+            source
+                .files
+                .iter()
+                .map(|(file, _)| file)
+                .collect::<Vec<_>>()
+        );
+        value["notes"] = json!(source.notes);
+        write_json(&mut stdout, &value)?;
+    } else {
+        let notes = source.notes.iter().chain(&info.metadata.notes);
+        stdout.write_all(text(&info, &extent).as_bytes())?;
+        for note in notes {
+            writeln!(stdout, "note        {note}")?;
+        }
+    }
+    Ok(stdout.flush()?)
+}
+
+/// The numbers for people.
+fn text(info: &Info, extent: &Extent) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: &str| {
+        text += &format!("{name:<11} {value}\n");
+    };
+    line("Gaussians", &grouped(info.gaussians as f64));
+    line("SH degree", &info.sh_degree.to_string());
+    let mebibytes = info.bytes as f64 / f64::from(1 << 20);
+    line("memory", &format!("{mebibytes:.1} MiB"));
+    if info.non_finite > 0 {
+        let count = grouped(info.non_finite as f64);
+        line("not finite", &format!("{count}, which are not drawn"));
+    }
+    if let Some(bounds) = info.bounds {
+        let axis = |axis: usize| format!("{:.4} to {:.4}", bounds.min[axis], bounds.max[axis]);
+        line("x, y, z", &[axis(0), axis(1), axis(2)].join(", "));
+    }
+    let [x, y, z] = extent.centre;
+    line(
+        "middle",
+        &format!("{x:.4}, {y:.4}, {z:.4} of what is opaque"),
+    );
+    let [x, y, z] = extent.half.map(|half| 2.0 * half);
+    line(
+        "size",
+        &format!("{x:.4} x {y:.4} x {z:.4} of what is opaque"),
+    );
+    let metadata = &info.metadata;
+    let said = [
+        (
+            "antialiasing",
+            metadata.antialiasing.map(|said| format!("{said:?}")),
+        ),
+        (
+            "geometry",
+            metadata.geometry.map(|said| format!("{said:?}")),
+        ),
+        (
+            "colour space",
+            metadata.color_space.map(|said| format!("{said:?}")),
+        ),
+        ("order", metadata.order.map(|said| format!("{said:?}"))),
+    ];
+    let said: Vec<String> = (said.into_iter())
+        .filter_map(|(name, value)| Some(format!("{name} {}", value?)))
+        .collect();
+    let said = if said.is_empty() {
+        "nothing of how it is drawn".to_owned()
+    } else {
+        said.join(", ")
+    };
+    line("says", &said);
+    for (title, bars) in [("opacity", &info.opacities), ("scale", &info.scales)] {
+        text += &histogram(title, bars);
+    }
+    text
+}
+
+/// A line for each bar, but for empty ones at both ends.
+fn histogram(title: &str, bars: &[Bar]) -> String {
+    let greatest = bars.iter().map(|bar| bar.count).max().unwrap_or(0).max(1);
+    let first = bars.iter().position(|bar| bar.count > 0).unwrap_or(0);
+    let last = bars.iter().rposition(|bar| bar.count > 0).unwrap_or(0);
+    bars[first..=last]
+        .iter()
+        .enumerate()
+        .map(|(index, bar)| {
+            let title = if index == 0 { title } else { "" };
+            let length = (BAR * bar.count).div_ceil(greatest);
+            let line = "#".repeat(length);
+            format!(
+                "{title:<11} from {:<7} {line:<BAR$} {}\n",
+                bar.from,
+                grouped(bar.count as f64)
+            )
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_are_as_long_as_they_are_large() {
+        let bars = [(0.0, 0), (0.1, 10), (0.2, 0), (0.3, 40), (0.4, 0)]
+            .map(|(from, count)| Bar { from, count });
+        let text = histogram("opacity", &bars);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 3);
+        let length = |line: &str| line.chars().filter(|c| *c == '#').count();
+        assert_eq!(
+            [length(lines[0]), length(lines[1]), length(lines[2])],
+            [10, 0, 40]
+        );
+        assert!(lines[0].starts_with("opacity     from 0.1"), "{}", lines[0]);
+    }
+}

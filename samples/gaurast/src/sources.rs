@@ -1,0 +1,331 @@
+//! Scenes by file and by folder.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use gaurast_picture::Background;
+use gaurast_scene::{Options, Scene, SceneError, Transform};
+use thiserror::Error;
+
+use crate::args::SceneArguments;
+use crate::progress::Progress;
+
+/// The generated garden's seed.
+const SEED: u64 = 1;
+
+/// Why there is no scene. Displayed as one sentence.
+#[derive(Debug, Error)]
+pub enum SourceError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error("{}: {source}", path.display())]
+    Io {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error(
+        "{}: the folder holds no scene: neither 3DGS's point_cloud/iteration_N/point_cloud.ply, nor nerfstudio's \
+         splat.ply, nor one scene file alone",
+        path.display()
+    )]
+    NoScene { path: PathBuf },
+    #[error(
+        "{}: the folder holds a training checkpoint of nerfstudio: `ns-export gaussian-splat` makes a splat.ply of it",
+        path.display()
+    )]
+    Checkpoint { path: PathBuf },
+    #[error(
+        "{}: the folder holds COLMAP's cameras and points, which are no Gaussians: --cameras reads the cameras",
+        path.display()
+    )]
+    Colmap { path: PathBuf },
+    #[error("--transform is given {transforms} times, and there are {scenes} scenes")]
+    Transforms { scenes: usize, transforms: usize },
+}
+
+/// The scene's files, and what lies beside them.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    /// The files, and where their Gaussians are put; the generated garden if there is none.
+    pub files: Vec<(PathBuf, Transform)>,
+    /// What outputs are named after.
+    pub name: String,
+    /// Cameras that belong to it.
+    pub cameras: Option<PathBuf>,
+    /// nerfstudio's dataparser_transforms.json.
+    pub dataparser: Option<PathBuf>,
+    /// The background that it was trained with.
+    pub background: Option<Background>,
+    /// What folders led to, a sentence each.
+    pub notes: Vec<String>,
+    /// The level of detail.
+    level: u32,
+}
+
+impl Source {
+    /// The source that the command line names. What lies beside the first scene counts.
+    ///
+    /// # Errors
+    /// If it is a folder without a scene, or there are more transforms than scenes.
+    pub fn of(arguments: &SceneArguments) -> Result<Self, SourceError> {
+        let (scenes, transforms) = (&arguments.scenes, &arguments.transform);
+        if transforms.len() > scenes.len() {
+            return Err(SourceError::Transforms {
+                scenes: scenes.len(),
+                transforms: transforms.len(),
+            });
+        }
+        let mut source = Self {
+            name: "gaurast".to_owned(),
+            level: arguments.level,
+            ..Self::default()
+        };
+        let given = transforms.iter().map(|placement| placement.0);
+        let given = given.chain(std::iter::repeat(Transform::default()));
+        for (path, transform) in scenes.iter().zip(given) {
+            let Part {
+                name,
+                file,
+                cameras,
+                dataparser,
+                background,
+                notes,
+            } = part(path)?;
+            if source.files.is_empty() {
+                (source.name, source.cameras) = (name, cameras);
+                (source.dataparser, source.background) = (dataparser, background);
+            }
+            source.files.push((file, transform));
+            source.notes.extend(notes);
+        }
+        Ok(source)
+    }
+
+    /// Tells if the scene is the generated garden.
+    pub fn is_garden(&self) -> bool {
+        self.files.is_empty()
+    }
+
+    /// Reads the scene, or generates it.
+    ///
+    /// # Errors
+    /// As the files' reader.
+    pub fn load(&self, progress: Progress) -> Result<(Scene, Duration), SourceError> {
+        let start = Instant::now();
+        if self.is_garden() {
+            let _step = progress.step("generating");
+            let garden = gaurast_scene::garden::scene(SEED, gaurast_scene::garden::DEFAULT_COUNT);
+            return Ok((garden, start.elapsed()));
+        }
+        let options = Options { level: self.level };
+        let mut scene = Scene::default();
+        for (path, transform) in &self.files {
+            let bar = progress.bytes("reading", 0);
+            let part = gaurast_scene::open_with(path, &options, |file, len| {
+                bar.set_length(len);
+                bar.wrap_read(file)
+            })?;
+            bar.finish_and_clear();
+            if scene.is_empty() && *transform == Transform::default() {
+                scene = part;
+            } else {
+                scene.append(&part, transform);
+            }
+        }
+        Ok((scene, start.elapsed()))
+    }
+}
+
+/// One scene of several.
+#[derive(Debug, Default)]
+struct Part {
+    file: PathBuf,
+    name: String,
+    cameras: Option<PathBuf>,
+    dataparser: Option<PathBuf>,
+    background: Option<Background>,
+    notes: Vec<String>,
+}
+
+fn part(path: &Path) -> Result<Part, SourceError> {
+    if path.is_dir() {
+        return folder(path);
+    }
+    Ok(Part {
+        name: stem(path),
+        file: path.to_owned(),
+        dataparser: beside(path, "dataparser_transforms.json"),
+        ..Part::default()
+    })
+}
+
+/// A file's name without its folder and its extensions.
+pub fn stem(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let stem = name.split('.').next().unwrap_or_default();
+    if stem.is_empty() {
+        "gaurast".to_owned()
+    } else {
+        stem.to_owned()
+    }
+}
+
+fn beside(path: &Path, name: &str) -> Option<PathBuf> {
+    Some(gaurast_picture::folder(path).join(name)).filter(|path| path.is_file())
+}
+
+fn folder(path: &Path) -> Result<Part, SourceError> {
+    let io = |source| SourceError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let whole = path.canonicalize().map_err(io)?;
+    let name = whole.file_name().map_or("gaurast".to_owned(), |name| {
+        name.to_string_lossy().into_owned()
+    });
+    let there = |name: &str| Some(path.join(name)).filter(|path| path.is_file());
+    let mut part = Part {
+        name,
+        cameras: there("cameras.json"),
+        dataparser: there("dataparser_transforms.json"),
+        ..Part::default()
+    };
+    part.file = if let Some((iteration, file)) = newest_iteration(&path.join("point_cloud")) {
+        part.notes.push(format!("iteration {iteration} is drawn"));
+        file
+    } else if let Some(file) = there("point_cloud.ply").or_else(|| there("splat.ply")) {
+        file
+    } else if there("meta.json")
+        .or_else(|| there("lod-meta.json"))
+        .is_some()
+    {
+        // A SOG scene of several files.
+        path.to_owned()
+    } else {
+        (only_scene(path).map_err(io)?).ok_or_else(|| why_none(path))?
+    };
+    if let Some(arguments) = there("cfg_args")
+        && let Ok(text) = std::fs::read_to_string(arguments)
+        && text.contains("white_background=True")
+    {
+        part.background = Some(Background::Color([1.0; 3]));
+        part.notes
+            .push("the background is white, as cfg_args says".to_owned());
+    }
+    Ok(part)
+}
+
+/// The scene of the highest iteration in a folder `point_cloud`.
+fn newest_iteration(folder: &Path) -> Option<(u64, PathBuf)> {
+    let entries = folder.read_dir().ok()?.flatten();
+    entries
+        .filter_map(|entry| {
+            let name = entry.file_name();
+            let iteration = name.to_str()?.strip_prefix("iteration_")?.parse().ok()?;
+            let file = entry.path().join("point_cloud.ply");
+            file.is_file().then_some((iteration, file))
+        })
+        .max_by_key(|(iteration, _)| *iteration)
+}
+
+/// The scene file in `folder`, if there is exactly one.
+fn only_scene(folder: &Path) -> std::io::Result<Option<PathBuf>> {
+    let known = gaurast_scene::known_extensions();
+    let mut found = Vec::new();
+    for entry in folder.read_dir()? {
+        let path = entry?.path();
+        let extension = path
+            .extension()
+            .map(|e| format!(".{}", e.to_string_lossy()));
+        // A .json may be anything.
+        let is_scene = |e: String| e != ".json" && known.split(", ").any(|k| k == e);
+        if path.is_file() && extension.is_some_and(is_scene) {
+            found.push(path);
+        }
+    }
+    Ok(if found.len() == 1 { found.pop() } else { None })
+}
+
+fn why_none(path: &Path) -> SourceError {
+    let path_buf = path.to_owned();
+    let holds = |names: &[&str]| names.iter().any(|name| path.join(name).exists());
+    if holds(&["nerfstudio_models", "config.yml"]) {
+        SourceError::Checkpoint { path: path_buf }
+    } else if holds(&["sparse", "cameras.bin", "cameras.txt"]) {
+        SourceError::Colmap { path: path_buf }
+    } else {
+        SourceError::NoScene { path: path_buf }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn touch(folder: &Path, name: &str, text: &str) {
+        let path = folder.join(name);
+        std::fs::create_dir_all(gaurast_picture::folder(&path)).expect("folders");
+        std::fs::write(path, text).expect("written");
+    }
+
+    fn of(folder: &Path) -> Result<Source, SourceError> {
+        Source::of(&SceneArguments {
+            scenes: vec![folder.to_owned()],
+            ..SceneArguments::default()
+        })
+    }
+
+    #[test]
+    fn inrias_output_is_its_highest_iteration() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for iteration in [7000, 30_000, 900] {
+            touch(
+                folder.path(),
+                &format!("point_cloud/iteration_{iteration}/point_cloud.ply"),
+                "",
+            );
+        }
+        touch(folder.path(), "cameras.json", "[]");
+        touch(
+            folder.path(),
+            "cfg_args",
+            "Namespace(sh_degree=3, white_background=True)",
+        );
+        let source = of(folder.path()).expect("a scene");
+        let (file, _) = &source.files[0];
+        assert!(
+            file.ends_with("iteration_30000/point_cloud.ply"),
+            "{file:?}"
+        );
+        assert!(source.cameras.is_some());
+        assert_eq!(source.background, Some(Background::Color([1.0; 3])));
+        assert_eq!(source.notes.len(), 2);
+    }
+
+    #[test]
+    fn folders_without_a_scene_say_what_they_hold() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let refused = || {
+            let error = of(folder.path()).expect_err("no scene");
+            error.to_string()
+        };
+        assert!(refused().contains("holds no scene"), "{}", refused());
+        touch(folder.path(), "sparse/0/cameras.bin", "");
+        assert!(refused().contains("COLMAP"), "{}", refused());
+        touch(folder.path(), "nerfstudio_models/step.ckpt", "");
+        assert!(refused().contains("ns-export"), "{}", refused());
+        touch(folder.path(), "a.ply", "");
+        assert!(of(folder.path()).is_ok());
+        touch(folder.path(), "b.spz", "");
+        assert!(of(folder.path()).is_err());
+        touch(folder.path(), "splat.ply", "");
+        let source = of(folder.path()).expect("nerfstudio's");
+        assert!(source.files[0].0.ends_with("splat.ply"));
+    }
+
+    #[test]
+    fn names_are_those_of_files() {
+        assert_eq!(stem(Path::new("a/guitar.compressed.ply")), "guitar");
+        assert_eq!(stem(Path::new(".ply")), "gaurast");
+    }
+}
