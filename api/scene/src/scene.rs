@@ -14,6 +14,9 @@ pub const SH_C0: f64 = 0.282_094_791_773_878_14;
 /// The highest spherical harmonics degree that a [`Scene`] holds.
 pub const MAX_SH_DEGREE: u32 = 4;
 
+/// Gaussians that a thread works on at least.
+const PARALLEL: usize = 1 << 12;
+
 /// What one Gaussian is, apart from its position and its colour: 32 bytes, as a vertex buffer
 /// holds it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -79,8 +82,7 @@ impl Scene {
         Err(Reason::Memory(bytes).at(Place::File))
     }
 
-    /// A scene of `count` Gaussians made in parallel: `each` is given a Gaussian's index and its coefficients to fill,
-    /// zeros so far, and returns its position and shape.
+    /// A scene of `count` Gaussians made in parallel, as by [`Scene::extend`].
     ///
     /// # Errors
     /// If there is not enough memory.
@@ -90,19 +92,40 @@ impl Scene {
         each: impl Fn(usize, &mut [[f32; 3]]) -> ([f32; 3], GaussianShape) + Sync,
     ) -> Result<Self, Fault> {
         let mut scene = Self::try_with_capacity(sh_degree, count)?;
-        let stride = scene.sh_stride();
-        scene.positions.resize(count, [0.0; 3]);
-        scene.shapes.resize(count, GaussianShape::default());
-        scene.sh.resize(count * stride, [0.0; 3]);
-        scene
-            .positions
-            .par_iter_mut()
-            .zip(&mut scene.shapes)
-            .zip(scene.sh.par_chunks_exact_mut(stride))
-            .with_min_len(1 << 12)
-            .enumerate()
-            .for_each(|(index, ((position, shape), sh))| (*position, *shape) = each(index, sh));
+        scene.extend(count, each);
         Ok(scene)
+    }
+
+    /// Appends `count` Gaussians made in parallel: `each` is given the index among them of one, and its coefficients to
+    /// fill, zeros so far, and returns its position and shape.
+    pub(crate) fn extend(
+        &mut self,
+        count: usize,
+        each: impl Fn(usize, &mut [[f32; 3]]) -> ([f32; 3], GaussianShape) + Sync,
+    ) {
+        let (first, stride) = (self.len(), self.sh_stride());
+        self.positions.resize(first + count, [0.0; 3]);
+        self.shapes.resize(first + count, GaussianShape::default());
+        self.sh.resize((first + count) * stride, [0.0; 3]);
+        let positions = &mut self.positions[first..];
+        let shapes = &mut self.shapes[first..];
+        let sh = &mut self.sh[first * stride..];
+        let make = |(index, ((position, shape), sh)): (usize, ((&mut _, &mut _), &mut [_]))| {
+            (*position, *shape) = each(index, sh);
+        };
+        // A row of a text file is not worth waking another thread.
+        if count < PARALLEL {
+            let gaussians = positions.iter_mut().zip(shapes);
+            let gaussians = gaussians.zip(sh.chunks_exact_mut(stride));
+            return gaussians.enumerate().for_each(make);
+        }
+        positions
+            .par_iter_mut()
+            .zip(shapes)
+            .zip(sh.par_chunks_exact_mut(stride))
+            .with_min_len(PARALLEL)
+            .enumerate()
+            .for_each(make);
     }
 
     /// Moves every Gaussian.
@@ -112,7 +135,7 @@ impl Scene {
             .par_iter_mut()
             .zip(&mut self.shapes)
             .zip(self.sh.par_chunks_exact_mut(stride))
-            .with_min_len(1 << 12)
+            .with_min_len(PARALLEL)
             .for_each(|((position, shape), sh)| motion.apply(position, shape, sh));
     }
 

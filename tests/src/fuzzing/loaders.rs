@@ -10,12 +10,17 @@ use super::bytes::Bytes;
 
 /// What a file is called, and how it is stored. SPZ files are compressed, so that changes of their bytes seldom get
 /// further than to the check sum: one kind is compressed here.
-const KINDS: [(&str, bool); 5] = [
+const KINDS: [(&str, bool); 10] = [
     ("a.ply", false),
     ("a.splat", false),
     ("a.spz", false),
     ("a.spz", true),
     ("a", false),
+    ("a.ksplat", false),
+    ("a.sog", false),
+    ("a.glb", false),
+    ("a.gltf", false),
+    ("a.ply.gz", true),
 ];
 
 /// Reads bytes as a scene: the first one says of which kind, the others are the file. Returns how many Gaussians it has
@@ -115,7 +120,55 @@ pub fn seeds() -> Vec<Vec<u8>> {
         kind(1, splat),
         kind(3, spz(2, 3)),
         kind(3, spz(3, 4)),
+        kind(7, glb()),
     ]
+}
+
+/// A binary glTF file of one Gaussian.
+fn glb() -> Vec<u8> {
+    let sizes = [3, 4, 3, 1, 3];
+    let names = ["ROTATION", "SCALE", "OPACITY", "SH_DEGREE_0_COEF_0"];
+    let names = names.map(|name| format!("KHR_gaussian_splatting:{name}"));
+    let names = std::iter::once("POSITION").chain(names.iter().map(String::as_str));
+    let attributes: Vec<_> = names
+        .enumerate()
+        .map(|(i, name)| format!("\"{name}\":{i}"))
+        .collect();
+    let mut offset = 0;
+    let (mut accessors, mut views) = (Vec::new(), Vec::new());
+    for (i, size) in sizes.into_iter().enumerate() {
+        let shape = ["", "SCALAR", "VEC2", "VEC3", "VEC4"][size];
+        accessors.push(format!(
+            "{{\"bufferView\":{i},\"componentType\":5126,\"count\":1,\"type\":\"{shape}\"}}"
+        ));
+        views.push(format!(
+            "{{\"buffer\":0,\"byteOffset\":{offset},\"byteLength\":{}}}",
+            4 * size
+        ));
+        offset += 4 * size;
+    }
+    let mut json = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"nodes\":[{{\"mesh\":0,\"scale\":[1,2,3]}}],\
+         \"meshes\":[{{\"primitives\":[{{\"mode\":0,\"attributes\":{{{}}},\"extensions\":\
+         {{\"KHR_gaussian_splatting\":{{\"kernel\":\"ellipse\"}}}}}}]}}],\
+         \"accessors\":[{}],\"bufferViews\":[{}],\"buffers\":[{{\"byteLength\":{offset}}}]}}",
+        attributes.join(","),
+        accessors.join(","),
+        views.join(",")
+    )
+    .into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut file = b"glTF".to_vec();
+    let len = 12 + 8 + json.len() + 8 + offset;
+    for word in [2, len as u32, json.len() as u32] {
+        file.extend(word.to_le_bytes());
+    }
+    file.extend(b"JSON");
+    file.extend(json);
+    file.extend((offset as u32).to_le_bytes());
+    file.extend(b"BIN\0");
+    file.extend((0..offset / 4).flat_map(|i| (0.1 * i as f32 + 0.1).to_le_bytes()));
+    file
 }
 
 /// A compressed PLY file as SuperSplat writes them, of one chunk of two Gaussians.

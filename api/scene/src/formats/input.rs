@@ -131,7 +131,7 @@ impl<'a> Input<'a> {
     /// Reads at most `len` bytes, which are allocated as they come.
     pub(super) fn up_to(&mut self, len: u64) -> Result<Vec<u8>, Fault> {
         let (position, gzip) = (self.position, self.gzip);
-        let known = if gzip { 0 } else { len };
+        let known = if gzip { 0 } else { len.min(self.remaining()) };
         read_growing(self, len, known).map_err(|error| match error.kind() {
             ErrorKind::OutOfMemory => Reason::Memory(len).at(Place::File),
             _ => read_fault(error, position, gzip),

@@ -337,7 +337,7 @@ fn what_gltf_says_is_told_or_refused() {
         Reason::TooShort { .. }
     ));
     assert!(matches!(
-        refused(|f| f.document["bufferViews"][0]["byteLength"] = json!(1 << 40)),
+        refused(|f| f.document["bufferViews"][0]["byteLength"] = json!(1_u64 << 40)),
         Reason::TooShort { .. }
     ));
     assert!(matches!(
@@ -445,14 +445,13 @@ fn a_real_gltf_is_read_without_its_signed_scales() {
     for i in 0..11 {
         assert_eq!(scene.positions()[i], [1.0, -2.0, -3.0]);
         let sh = &scene.sh()[16 * i..16 * (i + 1)];
-        if i < 7 {
-            assert_eq!(sh[0], [0.1, 0.2, 0.3], "{i}");
-        } else {
-            // Degree l, coefficient n: 1.1, 1.2, 1.3 and so on from the constant one on.
+        assert_eq!(sh[0], [0.1, 0.2, 0.3], "{i}");
+        if i >= 7 {
+            // Coefficient k is k + 0.1, k + 0.2, k + 0.3.
             let known = [1, 4, 9, 16][i - 7];
             for (k, rgb) in sh.iter().enumerate() {
                 let sign = if k == 0 { 1.0 } else { TURN[k - 1] };
-                let base = if k < known { k as f32 + 1.0 } else { 0.0 };
+                let base = if k < known { k as f32 } else { 0.0 };
                 let step = if k < known { 0.1 } else { 0.0 };
                 close(
                     rgb,

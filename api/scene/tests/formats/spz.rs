@@ -67,7 +67,7 @@ fn malformed_spz_fixtures_are_refused() {
         ("empty-points-v2", |r| matches!(r, Reason::Empty)),
         ("gzip-not-spz", |r| matches!(r, Reason::Magic { .. })),
         ("huge-count-v2", |r| matches!(r, Reason::TooShort { .. })),
-        ("plaintext-v2", |r| matches!(r, Reason::Magic { .. })),
+        ("plaintext-v2", |r| matches!(r, Reason::Unsupported(_))),
         ("sh-degree-5-v2", |r| matches!(r, Reason::ShDegree(5))),
         ("trailing-decompressed-v2", |r| {
             matches!(r, Reason::Trailing)

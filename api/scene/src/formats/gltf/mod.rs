@@ -133,7 +133,7 @@ fn load(json: &[u8], binary: Option<&[u8]>, origin: Origin<'_>) -> Result<Scene,
     }
     if other_primitives > 0 {
         scene.metadata_mut().note(format!(
-            "{other_primitives} primitives that are no Gaussians are ignored"
+            "what are no Gaussians is ignored: {other_primitives} primitives"
         ));
     }
     if !document.animations.is_empty() {

@@ -11,7 +11,7 @@ use crate::scene::{GaussianShape, MAX_SH_DEGREE, Scene, sh_coefficients, sigmoid
 
 const VERTEX: &str = "vertex";
 
-/// The properties that every file has; `push` unpacks them in this order.
+/// The properties that every file has; `gaussian` unpacks them in this order.
 const REQUIRED: [&str; 13] = [
     "x", "y", "z", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0",
     "f_dc_1", "f_dc_2",
@@ -19,6 +19,9 @@ const REQUIRED: [&str; 13] = [
 
 /// The property that comes after those, but in files of 2DGS.
 const THIRD_SCALE: &str = "scale_2";
+
+/// The most columns of a Gaussian: those and 24 other coefficients.
+const MAX_COLUMNS: usize = REQUIRED.len() + 1 + 3 * 24;
 
 /// Reads the scene.
 pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
@@ -42,21 +45,25 @@ pub(super) fn load(mut table: Table<'_, '_>) -> Result<Scene, Fault> {
     if flat {
         scene.metadata_mut().geometry = Some(Geometry::Surfel);
     }
-    let mut sh = vec![[0.0; 3]; scene.sh_stride()];
-    table.read(VERTEX, &columns, |_, values| {
-        push(&mut scene, values, flat, &mut sh);
+    table.read_blocks(VERTEX, &columns, |rows| {
+        scene.extend(rows.count, |row, sh| {
+            let mut values = [0.0; MAX_COLUMNS];
+            let values = &mut values[..columns.len()];
+            rows.get(row, values);
+            gaussian(values, flat, sh)
+        });
     })?;
     Ok(scene)
 }
 
-fn push(scene: &mut Scene, values: &[f64], flat: bool, sh: &mut [[f32; 3]]) {
+/// The position and the shape of a row's `values`, whose colour goes to `sh`.
+fn gaussian(values: &[f64], flat: bool, sh: &mut [[f32; 3]]) -> ([f32; 3], GaussianShape) {
     let (required, rest) = values.split_at(REQUIRED.len());
     let (third, rest) = rest.split_at(usize::from(!flat));
-    let log_scale = [required[3], required[4]];
     let shape = GaussianShape {
         scale: [
-            log_scale[0].exp() as f32,
-            log_scale[1].exp() as f32,
+            required[3].exp() as f32,
+            required[4].exp() as f32,
             third.first().map_or(0.0, |log| log.exp() as f32),
         ],
         rotation: std::array::from_fn(|i| required[5 + i] as f32),
@@ -64,7 +71,7 @@ fn push(scene: &mut Scene, values: &[f64], flat: bool, sh: &mut [[f32; 3]]) {
     };
     sh[0] = std::array::from_fn(|channel| required[10 + channel] as f32);
     unpack_rest(rest, &mut sh[1..]);
-    scene.push(std::array::from_fn(|axis| required[axis] as f32), shape, sh);
+    (std::array::from_fn(|axis| required[axis] as f32), shape)
 }
 
 /// Transposes channel-major `rest` into RGB triples.

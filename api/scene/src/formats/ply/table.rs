@@ -18,8 +18,8 @@ const MAX_HEADER: usize = 1 << 20;
 /// The longest line of a text payload that is read, in bytes.
 const MAX_LINE: u64 = 1 << 16;
 
-/// Bytes read at once from a binary payload, about.
-const BLOCK: usize = 1 << 16;
+/// Bytes read at once from a binary payload, about: enough for several threads to share.
+const BLOCK: usize = 1 << 23;
 
 /// An opened PLY file, whose elements are read in the order of the file.
 pub(super) struct Table<'i, 'a> {
@@ -168,14 +168,31 @@ impl<'i, 'a> Table<'i, 'a> {
         }))
     }
 
-    /// Reads element `name`: calls `each` with a row's index and its values of `columns`. A
-    /// binary64 holds every type's values exactly. Elements before it are passed over; those
-    /// before the last element read are gone.
+    /// Reads element `name`: calls `each` with a row's index and its values of `columns`. Elements before it are passed
+    /// over; those before the last element read are gone.
     pub(super) fn read(
         &mut self,
         name: &str,
         columns: &[Column],
         mut each: impl FnMut(usize, &[f64]),
+    ) -> Result<(), Fault> {
+        let mut values = vec![0.0; columns.len()];
+        let mut index = 0;
+        self.read_blocks(name, columns, |rows| {
+            for row in 0..rows.count {
+                rows.get(row, &mut values);
+                each(index, &values);
+                index += 1;
+            }
+        })
+    }
+
+    /// The same, many rows at once.
+    pub(super) fn read_blocks(
+        &mut self,
+        name: &str,
+        columns: &[Column],
+        mut each: impl FnMut(&Rows<'_>),
     ) -> Result<(), Fault> {
         self.count(name)?;
         let index = self
@@ -188,7 +205,7 @@ impl<'i, 'a> Table<'i, 'a> {
                     .at(Place::Element(name.to_owned()))
             })?;
         for passed in self.next..index {
-            self.read_element(passed, &[], &mut |_, _| {})?;
+            self.read_element(passed, &[], &mut |_| {})?;
         }
         self.next = index + 1;
         self.read_element(index, columns, &mut each)
@@ -198,15 +215,13 @@ impl<'i, 'a> Table<'i, 'a> {
         &mut self,
         index: usize,
         columns: &[Column],
-        each: &mut impl FnMut(usize, &[f64]),
+        each: &mut dyn FnMut(&Rows<'_>),
     ) -> Result<(), Fault> {
         let element = self.header.elements[index].clone();
         match self.header.encoding {
             Encoding::Ascii => self.read_text(&element, columns, each),
-            Encoding::BinaryLittleEndian => {
-                self.read_binary(&element, columns, each, number::<false>)
-            }
-            Encoding::BinaryBigEndian => self.read_binary(&element, columns, each, number::<true>),
+            Encoding::BinaryLittleEndian => self.read_binary(&element, columns, each, false),
+            Encoding::BinaryBigEndian => self.read_binary(&element, columns, each, true),
         }
     }
 
@@ -214,28 +229,31 @@ impl<'i, 'a> Table<'i, 'a> {
         &mut self,
         element: &ElementDef,
         columns: &[Column],
-        each: &mut impl FnMut(usize, &[f64]),
-        number: impl Fn(&Column, &[u8]) -> f64,
+        each: &mut dyn FnMut(&Rows<'_>),
+        big_endian: bool,
     ) -> Result<(), Fault> {
         let stride = stride(element)?;
         if stride == 0 {
             return Ok(());
         }
-        let rows_per_block = (BLOCK / stride).max(1);
+        let rows_per_block = (BLOCK / stride).clamp(1, element.count.max(1));
         let mut block = vec![0; rows_per_block * stride];
-        let mut values = vec![0.0; columns.len()];
         let mut row = 0;
         while row < element.count {
-            let rows = rows_per_block.min(element.count - row);
-            let block = &mut block[..rows * stride];
-            self.input.fill(block)?;
-            for bytes in block.chunks_exact(stride) {
-                for (value, column) in values.iter_mut().zip(columns) {
-                    *value = number(column, bytes);
-                }
-                each(row, &values);
-                row += 1;
-            }
+            let count = rows_per_block.min(element.count - row);
+            let bytes = &mut block[..count * stride];
+            self.input.fill(bytes)?;
+            let source = Source::Binary {
+                bytes,
+                stride,
+                big_endian,
+            };
+            each(&Rows {
+                count,
+                columns,
+                source,
+            });
+            row += count;
         }
         Ok(())
     }
@@ -244,12 +262,12 @@ impl<'i, 'a> Table<'i, 'a> {
         &mut self,
         element: &ElementDef,
         columns: &[Column],
-        each: &mut impl FnMut(usize, &[f64]),
+        each: &mut dyn FnMut(&Rows<'_>),
     ) -> Result<(), Fault> {
         stride(element)?;
         let mut line = Vec::new();
         let mut values = vec![0.0; columns.len()];
-        for row in 0..element.count {
+        for _ in 0..element.count {
             self.lines += 1;
             let at_line = |reason: Reason, line| reason.at(Place::Line(line));
             line.clear();
@@ -268,9 +286,56 @@ impl<'i, 'a> Table<'i, 'a> {
                 *value = text_number(&column.kind, word)
                     .ok_or_else(|| at_line(Reason::Number(word.to_owned()), self.lines))?;
             }
-            each(row, &values);
+            each(&Rows {
+                count: 1,
+                columns,
+                source: Source::Values(&values),
+            });
         }
         Ok(())
+    }
+}
+
+/// Rows of an element that were read at once.
+pub(super) struct Rows<'a> {
+    /// Their number.
+    pub(super) count: usize,
+    columns: &'a [Column],
+    source: Source<'a>,
+}
+
+/// What rows are made of.
+enum Source<'a> {
+    Binary {
+        bytes: &'a [u8],
+        stride: usize,
+        big_endian: bool,
+    },
+    /// The values of one row.
+    Values(&'a [f64]),
+}
+
+impl Rows<'_> {
+    /// Puts the values of row `row`, one for each column, into `values`. A binary64 holds every type's values exactly.
+    pub(super) fn get(&self, row: usize, values: &mut [f64]) {
+        match self.source {
+            Source::Binary {
+                bytes,
+                stride,
+                big_endian,
+            } => {
+                let bytes = &bytes[row * stride..][..stride];
+                let number = if big_endian {
+                    number::<true>
+                } else {
+                    number::<false>
+                };
+                for (value, column) in values.iter_mut().zip(self.columns) {
+                    *value = number(column, bytes);
+                }
+            }
+            Source::Values(found) => values.copy_from_slice(found),
+        }
     }
 }
 
@@ -329,6 +394,7 @@ fn size(kind: &ScalarType) -> usize {
 }
 
 /// The value of `column` in a binary row.
+#[inline]
 fn number<const BIG_ENDIAN: bool>(column: &Column, row: &[u8]) -> f64 {
     fn bytes<const N: usize, const BIG_ENDIAN: bool>(column: &Column, row: &[u8]) -> [u8; N] {
         let mut bytes = [0; N];
