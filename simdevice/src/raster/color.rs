@@ -1,7 +1,6 @@
 //! What fragments make of a colour attachment, 16 at a time: blending or a logic operation, the write mask, and the
-//! attachment's format. [`super::blend::Blender`] says the same of one fragment.
+//! attachment's format. Tests hold them against a naive twin of one fragment.
 
-use super::blend::clamp_range;
 use super::quads::Quads;
 use super::tile::AREA;
 use crate::format::unorm8::{Colors, clamp, pack_unorm8, pack_unorm8_in_range, unpack_unorm8};
@@ -56,6 +55,15 @@ impl Over {
         } else {
             None
         }
+    }
+}
+
+/// What colours are clamped to before they are blended in a format.
+pub(super) fn clamp_range(format: Format) -> Option<(f32, f32)> {
+    match format.numeric() {
+        Numeric::Unorm | Numeric::Srgb => Some((0.0, 1.0)),
+        Numeric::Snorm => Some((-1.0, 1.0)),
+        _ => None,
     }
 }
 

@@ -1,7 +1,6 @@
 //! The tile engine: tile buffers, the rasterizer's modes and what becomes of their fragments.
 
 mod batch;
-pub mod blend;
 mod color;
 mod coverage;
 mod depth;
@@ -15,6 +14,8 @@ mod quads;
 pub(crate) mod recording;
 mod setup;
 mod target;
+#[cfg(test)]
+mod tests;
 pub mod tile;
 mod write;
 

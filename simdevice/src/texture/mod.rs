@@ -24,7 +24,7 @@ mod table;
 mod tests;
 mod view;
 
-pub use sampler::{AddressMode, BorderColor, CompareOp, Filter, MipmapMode, Sampler};
+pub use sampler::{AddressMode, BorderColor, Filter, MipmapMode, Sampler};
 pub use table::ImageTable;
 pub use view::{
     ComponentSwizzle, IDENTITY, ImageBinding, SampledImage, StorageImage, Swizzle, TexelBuffer,

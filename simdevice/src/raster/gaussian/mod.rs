@@ -25,7 +25,7 @@ pub use compositor::GaussianTile;
 use crate::gaussian::BinnedDraw;
 use crate::limits::TILE_SIZE;
 use crate::raster::color::ColorOutput;
-use crate::raster::depth::{Tests, apply, compare};
+use crate::raster::depth::{Tests, apply};
 use crate::raster::output::{Buffers, Targets};
 use crate::raster::quads::Quads;
 use crate::raster::tile::{AREA, Target, Tile};
@@ -209,7 +209,7 @@ impl<'a> GaussianTileDraw<'a> {
                 let stored = &buffers.stencil.bytes_mut()[start..][..AREA];
                 let reference = face.reference & face.compare_mask;
                 keep(&mut lanes, stored, |stencil| {
-                    compare(face.compare, reference, stencil & face.compare_mask)
+                    face.compare.holds(reference, stencil & face.compare_mask)
                 });
             }
             samples.tested[sample] = lanes;
