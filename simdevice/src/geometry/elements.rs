@@ -2,7 +2,7 @@
 //! vertices of a chunk of primitives.
 
 use super::assemble::{places, primitive_count, uses_pivot};
-use crate::packet::{Draw, IndexStream};
+use crate::packet::Draw;
 use crate::state::Topology;
 use devmem::host;
 
@@ -31,19 +31,14 @@ pub(super) fn runs(draw: &Draw) -> (Vec<Run>, u64) {
     };
     match &draw.indices {
         Some(stream) if draw.state.primitive_restart => {
-            let restart = restart_index(stream);
+            let restart = stream.restart_index();
             let (mut start, mut indices) = (0, Vec::new());
             // Indices outside the buffer read as zero, so that they restart nothing.
-            let known = known_indices(stream).saturating_sub(u64::from(draw.first));
+            let known = stream.len().saturating_sub(u64::from(draw.first));
             let known = known.min(u64::from(draw.count)) as u32;
             for block in (0..known).step_by(SCAN as usize) {
                 let len = SCAN.min(known - block);
-                read_indices(
-                    stream,
-                    u64::from(draw.first) + u64::from(block),
-                    len,
-                    &mut indices,
-                );
+                stream.read(u64::from(draw.first) + u64::from(block), len, &mut indices);
                 for (place, &index) in (block..).zip(&indices) {
                     if index == restart {
                         gathered.push(start, place);
@@ -78,60 +73,6 @@ impl Runs {
             };
             host::push(&mut self.runs, run);
             self.primitives += primitives;
-        }
-    }
-}
-
-/// The index that restarts a primitive: the greatest of its size.
-fn restart_index(stream: &IndexStream) -> u32 {
-    match stream.index_size {
-        1 => 0xFF,
-        2 => 0xFFFF,
-        _ => u32::MAX,
-    }
-}
-
-/// How many indices the buffer has.
-fn known_indices(stream: &IndexStream) -> u64 {
-    let memory = stream.buffer.memory.len();
-    let bytes = stream
-        .buffer
-        .size
-        .min(memory.saturating_sub(stream.buffer.offset));
-    bytes / u64::from(stream.index_size.max(1))
-}
-
-/// Reads `len` indices from number `first` on; those outside the buffer are zero.
-fn read_indices(stream: &IndexStream, first: u64, len: u32, out: &mut Vec<u32>) {
-    let size = u64::from(stream.index_size.max(1));
-    out.clear();
-    host::resize(out, len as usize, 0);
-    let known = known_indices(stream).saturating_sub(first).min(len.into()) as usize;
-    if known == 0 {
-        return;
-    }
-    // Both lie inside the buffer, so that neither overflows.
-    let start = stream.buffer.offset + first * size;
-    let out = &mut out[..known];
-    let memory = &stream.buffer.memory;
-    // What was known to lie inside cannot be refused.
-    match stream.index_size {
-        1 => {
-            let mut bytes: Vec<u8> = host::zeroed(known);
-            let _ = memory.read(start, &mut bytes);
-            out.iter_mut()
-                .zip(bytes)
-                .for_each(|(out, byte)| *out = byte.into());
-        }
-        2 => {
-            let mut halves: Vec<u16> = host::zeroed(known);
-            let _ = memory.read(start, &mut halves);
-            out.iter_mut()
-                .zip(halves)
-                .for_each(|(out, half)| *out = half.into());
-        }
-        _ => {
-            let _ = memory.read(start, out);
         }
     }
 }
@@ -216,11 +157,11 @@ impl Elements {
                 let len = range.end - range.start;
                 if pivot {
                     let mut first = Vec::new();
-                    read_indices(stream, place(0), 1, &mut first);
-                    read_indices(stream, place(range.start), len, &mut indices);
+                    stream.read(place(0), 1, &mut first);
+                    stream.read(place(range.start), len, &mut indices);
                     indices.extend(first);
                 } else {
-                    read_indices(stream, place(range.start), len, &mut indices);
+                    stream.read(place(range.start), len, &mut indices);
                 }
                 self.place_indices(&indices, stream.vertex_offset.into());
                 self.indices = indices;
