@@ -5,7 +5,7 @@ use crate::format::Aspect;
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::*;
 use crate::pass::{Pass, PassDraw};
-use crate::raster::depth::apply;
+use crate::raster::depth_stencil::apply;
 use crate::raster::tests::blender::Blender;
 use crate::state::gaussian::{GaussianOrder, GaussianPrecision, GaussianState};
 use crate::state::{

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::packet::Rendering;
-use crate::raster::coverage::tests::covers;
-use crate::raster::depth::apply;
+use crate::raster::depth_stencil::apply;
 use crate::raster::tests::blender::Blender;
+use crate::raster::triangle::coverage::tests::covers;
 
 const COLORS: [Format; 12] = [
     Format::R8G8B8A8Unorm,

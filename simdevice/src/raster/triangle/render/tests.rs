@@ -19,7 +19,7 @@ use crate::pass::{Pass, PassDraw};
 use crate::program::interface::{
     DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
 };
-use crate::raster::setup::{CENTER, SAMPLES_4};
+use crate::raster::tile::{CENTER, SAMPLES_4};
 use crate::state::*;
 use crate::state::{DrawState, Rect, Topology};
 use devmem::Allocation;
