@@ -277,7 +277,7 @@ impl CommandProcessor {
         });
         let mut before = recorder.map(|_| self.counters.clone());
         let mut front = FrontEnd::new(draw, surface, device.runtime(), &mut self.counters);
-        while let Some(mut part) = front.next_part(&mut self.counters)? {
+        while let Some(mut part) = front.next_segments(&mut self.counters)? {
             if let (Some(record), Some(before)) = (&record, &before) {
                 recording::add_front_end(record, &self.counters.since(before), draw, &part);
             }

@@ -320,7 +320,7 @@ impl Pass {
                 self.samples,
                 runtime,
             ))),
-            PassDraw::Primitives(draw) if draw.chunks.is_empty() => Ready::Nothing,
+            PassDraw::Primitives(draw) if draw.segments.is_empty() => Ready::Nothing,
             PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TriangleTileDraw::new(
                 draw,
                 targets,

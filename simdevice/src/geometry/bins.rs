@@ -195,7 +195,7 @@ impl Bins {
     }
 
     /// The primitives that may touch a macro-tile, given by column and row from the framebuffer's corner, in a layer:
-    /// indices into [`PrimitiveChunk::primitives`](super::PrimitiveChunk::primitives), in the order of the draw.
+    /// indices into [`PrimitiveSegment::primitives`](super::PrimitiveSegment::primitives), in the order of the draw.
     pub fn of(&self, macro_tile: [u32; 2], layer: u32) -> &[u32] {
         let within = |axis: usize, count: u32| {
             let at = macro_tile[axis].checked_sub(self.origin[axis]);

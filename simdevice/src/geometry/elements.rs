@@ -1,5 +1,5 @@
 //! Which vertices a draw names: consecutive ones or indices, runs between primitive restarts, and the distinct
-//! vertices of a chunk of primitives.
+//! vertices of a segment of primitives.
 
 use super::assemble::{places, primitive_count, uses_pivot};
 use crate::packet::Draw;
@@ -96,7 +96,7 @@ pub(super) struct Piece {
     pivot: u32,
 }
 
-/// The distinct vertices of a chunk, each in a slot, and where primitives find them.
+/// The distinct vertices of a segment, each in a slot, and where primitives find them.
 #[derive(Debug, Default)]
 pub(super) struct Elements {
     pub pieces: Vec<Piece>,
@@ -111,7 +111,7 @@ pub(super) struct Elements {
 }
 
 impl Elements {
-    /// Forgets the previous chunk.
+    /// Forgets the previous segment.
     pub(super) fn clear(&mut self) {
         self.pieces.clear();
         self.vertices.clear();
@@ -119,7 +119,7 @@ impl Elements {
         self.slots.clear();
     }
 
-    /// How many primitives the chunk has.
+    /// How many primitives the segment has.
     pub(super) fn primitives(&self) -> u64 {
         let pieces = self.pieces.iter();
         pieces.map(|piece| u64::from(piece.end - piece.first)).sum()

@@ -18,7 +18,7 @@ use crate::simd::{both, three};
 use crate::state::{DrawState, PolygonMode, Rect};
 use devmem::host;
 
-/// What a chunk of primitives became. Vertices and primitives are numbered from 0.
+/// What a segment of primitives became. Vertices and primitives are numbered from 0.
 #[derive(Debug, Default)]
 pub(super) struct Output {
     pub primitives: Vec<Primitive>,
@@ -33,7 +33,7 @@ pub(super) struct Output {
 }
 
 impl Output {
-    /// Forgets an earlier chunk, but keeps its memory.
+    /// Forgets an earlier segment, but keeps its memory.
     pub(super) fn clear(&mut self) {
         self.primitives.clear();
         self.varyings.clear();
@@ -55,7 +55,7 @@ pub(super) struct Setup<'a> {
     pub depth_unit: DepthUnit,
 }
 
-/// A chunk being set up.
+/// A segment being set up.
 pub(super) struct Job<'a> {
     pub(super) setup: &'a Setup<'a>,
     pub(super) shaded: &'a Shaded,
@@ -113,7 +113,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Sets up all primitives of a chunk.
+    /// Sets up all primitives of a segment.
     pub(super) fn run(mut self, elements: &Elements) {
         let state = self.setup.state;
         let count = corner_count(state.topology);

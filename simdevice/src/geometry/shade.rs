@@ -1,4 +1,4 @@
-//! Vertex shading: runs the vertex program on the vertices of a chunk, and projects what it wrote.
+//! Vertex shading: runs the vertex program on the vertices of a segment, and projects what it wrote.
 
 use super::elements::Elements;
 use super::fetch::Fetcher;
@@ -41,7 +41,7 @@ pub(super) const NO_EXTRAS: Extras = Extras {
     cull: [0.0; MAX_CLIP_CULL_DISTANCES],
 };
 
-/// The shaded vertices of a chunk, by slot.
+/// The shaded vertices of a segment, by slot.
 #[derive(Debug, Default)]
 pub(super) struct Shaded {
     pub vertices: Vec<Vertex>,
@@ -65,7 +65,7 @@ pub(super) struct Shader<'a> {
 }
 
 impl Shader<'_> {
-    /// Shades all vertices of a chunk.
+    /// Shades all vertices of a segment.
     pub(super) fn shade(
         &mut self,
         elements: &Elements,

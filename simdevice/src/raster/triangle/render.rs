@@ -58,10 +58,10 @@ pub fn render(
     counters: &mut Counters,
     cancel: &AtomicBool,
 ) -> Result<(), Stopped> {
-    let chunks = &draw.draw.chunks;
-    if chunks
+    let segments = &draw.draw.segments;
+    if segments
         .iter()
-        .all(|chunk| chunk.bins.of(macro_tile.at, macro_tile.layer).is_empty())
+        .all(|segment| segment.bins.of(macro_tile.at, macro_tile.layer).is_empty())
     {
         return Ok(());
     }
@@ -148,7 +148,7 @@ struct RasterPrimitive<'p> {
     primitive: &'p Primitive,
     varyings: &'p Varyings,
     setup: &'p TriangleSetup,
-    /// Its chunk among the draw's, and its number there.
+    /// Its segment among the draw's, and its number there.
     place: (usize, u32),
     /// Its record in the batch, once it has one.
     record: Option<u16>,
@@ -180,9 +180,9 @@ impl Renderer<'_, '_> {
             ..draw.needs
         };
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
-        for (number, chunk) in draw.draw.chunks.iter().enumerate() {
-            for &index in chunk.bins.of(self.macro_tile.at, self.macro_tile.layer) {
-                let Some(primitive) = chunk.primitives.get(index as usize) else {
+        for (number, segment) in draw.draw.segments.iter().enumerate() {
+            for &index in segment.bins.of(self.macro_tile.at, self.macro_tile.layer) {
+                let Some(primitive) = segment.primitives.get(index as usize) else {
                     continue;
                 };
                 if clip.0 != primitive.viewport {
@@ -197,7 +197,7 @@ impl Renderer<'_, '_> {
                 }
                 let mut current = RasterPrimitive {
                     primitive,
-                    varyings: &chunk.varyings,
+                    varyings: &segment.varyings,
                     setup: &setup,
                     place: (number, index),
                     record: None,
@@ -720,10 +720,10 @@ impl Renderer<'_, '_> {
         let slot = match current.slot {
             Some(slot) => slot,
             None => {
-                let (chunk, primitive) = current.place;
+                let (segment, primitive) = current.place;
                 *current
                     .slot
-                    .insert(deferred.add(current.setup, chunk, primitive))
+                    .insert(deferred.add(current.setup, segment, primitive))
             }
         };
         if deferred.defer(tile, slot) {
@@ -743,11 +743,11 @@ impl Renderer<'_, '_> {
             return Ok(());
         };
         let draw = self.draw;
-        let chunk = &draw.draw.chunks[waiting.segment];
-        let primitive = &chunk.primitives[waiting.primitive as usize];
+        let segment = &draw.draw.segments[waiting.segment];
+        let primitive = &segment.primitives[waiting.primitive as usize];
         let mut current = RasterPrimitive {
             primitive,
-            varyings: &chunk.varyings,
+            varyings: &segment.varyings,
             setup: &waiting.setup,
             place: (waiting.segment, waiting.primitive),
             record: None,
