@@ -2,7 +2,7 @@
 //! set up and binned.
 //!
 //! A draw is cut into segments of consecutive primitives, whatever the number of workers. Each worker takes a segment
-//! through all stages, each stage in a module: [`elements`] (which distinct vertices it names), [`fetch`] (their
+//! through all stages, each stage in a module: [`vertex_reuse`] (which distinct vertices it names), [`fetch`] (their
 //! attributes), [`shade`] (the vertex program and the [`viewport`]), [`assemble`] and [`setup`] (primitives, [`clip`]ped,
 //! culled, with [`depth_bias`]); [`bins`] sorts what all segments made by macro-tile. Vertices on the border of two segments
 //! are shaded in both.
@@ -12,7 +12,6 @@ mod bins;
 mod clip;
 mod depth_bias;
 mod draw;
-mod elements;
 mod fetch;
 mod order;
 pub(crate) mod points;
@@ -21,6 +20,7 @@ mod setup;
 mod shade;
 #[cfg(test)]
 mod tests;
+mod vertex_reuse;
 mod viewport;
 
 pub use bins::Bins;
@@ -38,7 +38,6 @@ use assemble::corner_count;
 use bins::Grid;
 use depth_bias::DepthUnit;
 use devmem::host;
-use elements::{Elements, Run, runs};
 use fetch::Fetcher;
 use isa::exec::{Stopped, Watchdog};
 use isa::ir::Rate;
@@ -47,6 +46,7 @@ use setup::{Job, Output, Setup};
 use shade::{Shaded, Shader};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
+use vertex_reuse::{RestartRun, VertexReuse, runs};
 use viewport::Transform;
 
 /// Primitives of a segment.
@@ -72,7 +72,7 @@ pub(crate) struct FrontEnd<'a> {
     runtime: &'a Runtime,
     surface: Surface,
     prepared: BoundResources<'a>,
-    runs: Vec<Run>,
+    runs: Vec<RestartRun>,
     transforms: Vec<Transform>,
     regions: Vec<Rect>,
     /// Primitives of an instance.
@@ -200,7 +200,7 @@ impl<'a> FrontEnd<'a> {
     }
 
     /// Calls `each` with the runs, instances and primitives (first and end) of a segment, in order.
-    fn segment_ranges(&self, segment: u64, mut each: impl FnMut(&Run, u32, u32, u32)) {
+    fn segment_ranges(&self, segment: u64, mut each: impl FnMut(&RestartRun, u32, u32, u32)) {
         let total = self
             .primitives
             .saturating_mul(self.draw.instance_count.into());
@@ -214,7 +214,7 @@ impl<'a> FrontEnd<'a> {
         };
         while at < end {
             let (instance, primitive) = (at / self.primitives, at % self.primitives);
-            let before = |run: &Run| u64::from(run.primitives_before) <= primitive;
+            let before = |run: &RestartRun| u64::from(run.primitives_before) <= primitive;
             let Some(run) = self.runs[..self.runs.partition_point(before)].last() else {
                 return;
             };
@@ -253,7 +253,7 @@ struct Worker<'a> {
     front: &'a FrontEnd<'a>,
     setup: &'a Setup<'a>,
     shader: Shader<'a>,
-    elements: Elements,
+    reuse: VertexReuse,
     shaded: Shaded,
     numbers: Vec<u32>,
     output: Output,
@@ -287,7 +287,7 @@ impl<'a> Worker<'a> {
             front,
             setup,
             shader,
-            elements: Elements::default(),
+            reuse: VertexReuse::default(),
             shaded: Shaded::default(),
             numbers: Vec::new(),
             output: Output::default(),
@@ -298,21 +298,21 @@ impl<'a> Worker<'a> {
 
     /// Takes a segment through all stages.
     fn run_segment(&mut self, segment: u64) -> Result<(), Stopped> {
-        let (front, elements) = (self.front, &mut self.elements);
-        elements.clear();
+        let (front, reuse) = (self.front, &mut self.reuse);
+        reuse.clear();
         front.segment_ranges(segment, |run, instance, first, end| {
-            elements.push(front.draw, run, instance, first, end);
+            reuse.push(front.draw, run, instance, first, end);
         });
-        let ran = self.shader.shade(elements, &mut self.shaded);
+        let ran = self.shader.shade(reuse, &mut self.shaded);
         let (output, counters) = (&mut self.output, &mut self.counters);
         output.clear();
         counters.add_work(&self.shader.machine.take_work());
-        counters.add(Counter::VertexInvocations, elements.vertices.len() as u64);
+        counters.add(Counter::VertexInvocations, reuse.vertices.len() as u64);
         ran?;
         if front.draw.state.rasterizer_discard || self.setup.transforms.is_empty() {
-            output.assembled = elements.primitives();
+            output.assembled = reuse.primitives();
         } else {
-            Job::new(self.setup, &self.shaded, &mut self.numbers, output).run(elements);
+            Job::new(self.setup, &self.shaded, &mut self.numbers, output).run(reuse);
         }
         counters.add(Counter::InputPrimitives, output.assembled);
         counters.add(Counter::ClippingInvocations, output.assembled);

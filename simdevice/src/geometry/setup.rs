@@ -4,9 +4,9 @@ use super::assemble::{corner_count, corners};
 use super::bins::{Grid, Pair};
 use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
 use super::depth_bias::{self, DepthUnit};
-use super::elements::Elements;
 use super::primitive::Primitive;
 use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
+use super::vertex_reuse::VertexReuse;
 use super::viewport::{Projected, Transform, code};
 use crate::geometry::bins::{Pixels, bin};
 use crate::geometry::primitive::PrimitiveKind;
@@ -114,13 +114,13 @@ impl<'a> Job<'a> {
     }
 
     /// Sets up all primitives of a segment.
-    pub(super) fn run(mut self, elements: &Elements) {
+    pub(super) fn run(mut self, reuse: &VertexReuse) {
         let state = self.setup.state;
         let count = corner_count(state.topology);
-        for piece in &elements.pieces {
+        for piece in &reuse.pieces {
             for number in piece.first..piece.end {
                 let found = corners(state.topology, state.provoking_last, number);
-                let slots = three(found.places, |place| elements.slot(piece, place));
+                let slots = three(found.places, |place| reuse.slot(piece, place));
                 let mut current = Current {
                     id: piece.primitives_before.wrapping_add(number),
                     slots,

@@ -1,7 +1,7 @@
 //! Vertex shading: runs the vertex program on the vertices of a segment, and projects what it wrote.
 
-use super::elements::Elements;
 use super::fetch::Fetcher;
+use super::vertex_reuse::VertexReuse;
 use super::viewport::{Projected, Projections, Transform, code};
 use crate::limits::MAX_CLIP_CULL_DISTANCES;
 use crate::program::pool::PooledMachine;
@@ -68,16 +68,16 @@ impl Shader<'_> {
     /// Shades all vertices of a segment.
     pub(super) fn shade(
         &mut self,
-        elements: &Elements,
+        reuse: &VertexReuse,
         shaded: &mut Shaded,
     ) -> Result<(), Stopped> {
         shaded.vertices.clear();
         shaded.extras.clear();
         shaded.varyings.clear();
-        let batches = elements
+        let batches = reuse
             .vertices
             .chunks(VERTEX_BATCH)
-            .zip(elements.instances.chunks(VERTEX_BATCH));
+            .zip(reuse.instances.chunks(VERTEX_BATCH));
         for (vertices, instances) in batches {
             self.fetcher.fetch(&mut self.machine, vertices, instances);
             self.machine.run(

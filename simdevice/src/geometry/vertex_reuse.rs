@@ -8,7 +8,7 @@ use devmem::host;
 
 /// Vertices that no restart interrupts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Run {
+pub(super) struct RestartRun {
     /// The place of its first vertex among the draw's.
     pub start: u32,
     /// How many primitives come before it in the instance.
@@ -21,7 +21,7 @@ pub(super) struct Run {
 const SCAN: u32 = 1 << 16;
 
 /// The runs of a draw that have primitives, and how many vertices all runs have.
-pub(super) fn runs(draw: &Draw) -> (Vec<Run>, u64) {
+pub(super) fn runs(draw: &Draw) -> (Vec<RestartRun>, u64) {
     let topology = draw.state.topology;
     let mut gathered = Runs {
         topology,
@@ -55,7 +55,7 @@ pub(super) fn runs(draw: &Draw) -> (Vec<Run>, u64) {
 
 struct Runs {
     topology: Topology,
-    runs: Vec<Run>,
+    runs: Vec<RestartRun>,
     primitives: u32,
     vertices: u64,
 }
@@ -66,7 +66,7 @@ impl Runs {
         let primitives = primitive_count(self.topology, vertices);
         self.vertices += u64::from(vertices);
         if primitives > 0 {
-            let run = Run {
+            let run = RestartRun {
                 start,
                 primitives_before: self.primitives,
                 primitives,
@@ -88,7 +88,7 @@ pub(super) struct Piece {
     pub primitives_before: u32,
     /// The place in the run of the first of `elements`.
     base: u32,
-    /// Where its elements begin in [`Elements::slots`].
+    /// Where its elements begin in [`VertexReuse::slots`].
     elements: usize,
     /// The first of its slots.
     first_vertex: usize,
@@ -98,7 +98,7 @@ pub(super) struct Piece {
 
 /// The distinct vertices of a segment, each in a slot, and where primitives find them.
 #[derive(Debug, Default)]
-pub(super) struct Elements {
+pub(super) struct VertexReuse {
     pub pieces: Vec<Piece>,
     /// By slot: the vertex's number, which an offset may have made negative.
     pub vertices: Vec<i64>,
@@ -110,7 +110,7 @@ pub(super) struct Elements {
     table: Vec<u32>,
 }
 
-impl Elements {
+impl VertexReuse {
     /// Forgets the previous segment.
     pub(super) fn clear(&mut self) {
         self.pieces.clear();
@@ -126,7 +126,14 @@ impl Elements {
     }
 
     /// Adds primitives `first..end` of a run.
-    pub(super) fn push(&mut self, draw: &Draw, run: &Run, instance: u32, first: u32, end: u32) {
+    pub(super) fn push(
+        &mut self,
+        draw: &Draw,
+        run: &RestartRun,
+        instance: u32,
+        first: u32,
+        end: u32,
+    ) {
         let topology = draw.state.topology;
         let range = places(topology, first, end);
         let place = |place: u32| u64::from(draw.first) + u64::from(run.start) + u64::from(place);
