@@ -274,7 +274,7 @@ impl<'a> Worker<'a> {
             fetcher: Fetcher::new(front.draw, &mut machine),
             machine,
             outputs: setup.outputs,
-            takes_extras: setup.outputs.has_extras(draws_points(setup.state)),
+            takes_optional: setup.outputs.has_optional(draws_points(setup.state)),
             level: front.runtime.level(),
             transform: front.transforms.first().copied().unwrap_or(Transform::NONE),
             resources,

@@ -36,7 +36,7 @@ impl<'a> PointShader<'a> {
                 fetcher: Fetcher::new(draw, &mut machine),
                 machine,
                 outputs: &program.outputs,
-                takes_extras: false,
+                takes_optional: false,
                 level: runtime.level(),
                 transform: Transform::NONE,
                 resources,

@@ -5,7 +5,7 @@ use super::bins::{Grid, Pair};
 use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
 use super::depth_bias::{self, DepthUnit};
 use super::primitive::Primitive;
-use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
+use super::shade::{NO_OPTIONAL_OUTPUTS, OptionalOutputs, Shaded, Vertex};
 use super::vertex_reuse::VertexReuse;
 use super::viewport::{Projected, Transform, code};
 use crate::geometry::bins::{Pixels, bin};
@@ -140,21 +140,24 @@ impl<'a> Job<'a> {
         }
     }
 
-    pub(super) fn extras(&self, slot: u32) -> &Extras {
-        self.shaded.extras.get(slot as usize).unwrap_or(&NO_EXTRAS)
+    pub(super) fn optional(&self, slot: u32) -> &OptionalOutputs {
+        self.shaded
+            .optional
+            .get(slot as usize)
+            .unwrap_or(&NO_OPTIONAL_OUTPUTS)
     }
 
     /// The provoking vertex says which layer and viewport a primitive is drawn to; what doesn't exist is the last
     /// layer, or the first viewport.
     fn choose_target(&self, current: &mut Current) {
-        if self.shaded.extras.is_empty() {
+        if self.shaded.optional.is_empty() {
             return;
         }
-        let extras = self.extras(current.provoking);
-        let layer = extras.layer.min(self.setup.layers.saturating_sub(1));
+        let optional = self.optional(current.provoking);
+        let layer = optional.layer.min(self.setup.layers.saturating_sub(1));
         current.layer = layer.min(u16::MAX.into()) as u16;
-        if (extras.viewport as usize) < self.setup.transforms.len() {
-            current.viewport = extras.viewport as u8;
+        if (optional.viewport as usize) < self.setup.transforms.len() {
+            current.viewport = optional.viewport as u8;
         }
     }
 
@@ -202,7 +205,7 @@ impl<'a> Job<'a> {
             projected: &vertex.projected,
             origin: Origin::Slot(slot),
         };
-        self.push_point(current, place, self.extras(slot).point_size, 0.0);
+        self.push_point(current, place, self.optional(slot).point_size, 0.0);
     }
 
     fn line(&mut self, current: &mut Current, ends: [&Vertex; 2]) {
@@ -235,7 +238,7 @@ impl<'a> Job<'a> {
 
     fn clipper(&self, current: &Current) -> Clipper<'a> {
         let count = self.setup.outputs.clip.iter().rposition(Option::is_some);
-        let distances = current.slots.map(|slot| self.extras(slot).clip);
+        let distances = current.slots.map(|slot| self.optional(slot).clip);
         Clipper {
             transform: self.transform(current),
             distances,
@@ -344,8 +347,8 @@ impl<'a> Job<'a> {
                 self.push_line(current, places[place], places[next(place)], bias);
             } else {
                 let size = match places[place].origin {
-                    Origin::Slot(slot) => self.extras(slot).point_size,
-                    Origin::New { .. } => self.extras(current.provoking).point_size,
+                    Origin::Slot(slot) => self.optional(slot).point_size,
+                    Origin::New { .. } => self.optional(current.provoking).point_size,
                 };
                 self.push_point(current, places[place], size, bias);
             }

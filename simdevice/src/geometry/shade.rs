@@ -24,7 +24,7 @@ pub(super) struct Vertex {
 
 /// What only some vertex programs write.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Extras {
+pub(super) struct OptionalOutputs {
     pub point_size: f32,
     pub layer: u32,
     pub viewport: u32,
@@ -32,8 +32,8 @@ pub(super) struct Extras {
     pub cull: [f32; MAX_CLIP_CULL_DISTANCES],
 }
 
-/// What extras are where nothing is written.
-pub(super) const NO_EXTRAS: Extras = Extras {
+/// What optional are where nothing is written.
+pub(super) const NO_OPTIONAL_OUTPUTS: OptionalOutputs = OptionalOutputs {
     point_size: 1.0,
     layer: 0,
     viewport: 0,
@@ -46,7 +46,7 @@ pub(super) const NO_EXTRAS: Extras = Extras {
 pub(super) struct Shaded {
     pub vertices: Vec<Vertex>,
     /// Empty if no vertex has any.
-    pub extras: Vec<Extras>,
+    pub optional: Vec<OptionalOutputs>,
     /// Vertex by vertex.
     pub varyings: Vec<u32>,
 }
@@ -57,7 +57,7 @@ pub(super) struct Shader<'a> {
     pub fetcher: Fetcher<'a>,
     pub outputs: &'a VertexOutputs,
     /// Whether more than positions and varyings is looked at.
-    pub takes_extras: bool,
+    pub takes_optional: bool,
     pub level: Level,
     pub transform: Transform,
     pub resources: &'a Resources<'a>,
@@ -72,7 +72,7 @@ impl Shader<'_> {
         shaded: &mut Shaded,
     ) -> Result<(), Stopped> {
         shaded.vertices.clear();
-        shaded.extras.clear();
+        shaded.optional.clear();
         shaded.varyings.clear();
         let batches = reuse
             .vertices
@@ -126,8 +126,8 @@ impl Shader<'_> {
                 };
             }
         }
-        if self.takes_extras {
-            self.take_extras(count, shaded);
+        if self.takes_optional {
+            self.take_optional(count, shaded);
         }
         let per_vertex = outputs.varyings.len();
         if per_vertex > 0 {
@@ -151,41 +151,41 @@ impl Shader<'_> {
         dispatch!(self.level, _ => transform.project_all(position))
     }
 
-    fn take_extras(&self, count: usize, shaded: &mut Shaded) {
+    fn take_optional(&self, count: usize, shaded: &mut Shaded) {
         let outputs = self.outputs;
-        let first = shaded.extras.len();
-        shaded.extras.resize(first + count, NO_EXTRAS);
-        let extras = &mut shaded.extras[first..];
+        let first = shaded.optional.len();
+        shaded.optional.resize(first + count, NO_OPTIONAL_OUTPUTS);
+        let optional = &mut shaded.optional[first..];
         let machine = &self.machine;
-        for_lanes(machine, outputs.point_size, extras, |extras, bits| {
-            extras.point_size = f32::from_bits(bits);
+        for_lanes(machine, outputs.point_size, optional, |optional, bits| {
+            optional.point_size = f32::from_bits(bits);
         });
-        for_lanes(machine, outputs.layer, extras, |extras, bits| {
-            extras.layer = bits;
+        for_lanes(machine, outputs.layer, optional, |optional, bits| {
+            optional.layer = bits;
         });
-        for_lanes(machine, outputs.viewport, extras, |extras, bits| {
-            extras.viewport = bits;
+        for_lanes(machine, outputs.viewport, optional, |optional, bits| {
+            optional.viewport = bits;
         });
         for index in 0..MAX_CLIP_CULL_DISTANCES {
-            for_lanes(machine, outputs.clip[index], extras, |extras, bits| {
-                extras.clip[index] = f32::from_bits(bits);
+            for_lanes(machine, outputs.clip[index], optional, |optional, bits| {
+                optional.clip[index] = f32::from_bits(bits);
             });
-            for_lanes(machine, outputs.cull[index], extras, |extras, bits| {
-                extras.cull[index] = f32::from_bits(bits);
+            for_lanes(machine, outputs.cull[index], optional, |optional, bits| {
+                optional.cull[index] = f32::from_bits(bits);
             });
         }
         if outputs.has_distances() {
-            for (vertex, extras) in shaded.vertices[first..].iter_mut().zip(extras) {
-                vertex.code |= distance_code(extras);
+            for (vertex, optional) in shaded.vertices[first..].iter_mut().zip(optional) {
+                vertex.code |= distance_code(optional);
             }
         }
     }
 }
 
 /// The part of a vertex's code that its distances make.
-fn distance_code(extras: &Extras) -> u32 {
+fn distance_code(optional: &OptionalOutputs) -> u32 {
     let mut bits = 0;
-    for (index, distance) in extras.clip.iter().enumerate() {
+    for (index, distance) in optional.clip.iter().enumerate() {
         if *distance < 0.0 {
             bits |= code::USER << index;
         }
@@ -193,7 +193,7 @@ fn distance_code(extras: &Extras) -> u32 {
             bits |= code::INVALID;
         }
     }
-    for (index, distance) in extras.cull.iter().enumerate() {
+    for (index, distance) in optional.cull.iter().enumerate() {
         if *distance < 0.0 {
             bits |= code::CULL << index;
         }
