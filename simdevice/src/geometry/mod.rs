@@ -42,7 +42,7 @@ use fetch::Fetcher;
 use isa::exec::{Stopped, Watchdog};
 use isa::ir::Rate;
 use isa::resources::Resources;
-use setup::{Job, Output, Setup};
+use setup::{Output, SegmentSetup, Setup};
 use shade::{Shaded, Shader};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -312,7 +312,7 @@ impl<'a> Worker<'a> {
         if front.draw.state.rasterizer_discard || self.setup.transforms.is_empty() {
             output.assembled = reuse.primitives();
         } else {
-            Job::new(self.setup, &self.shaded, &mut self.numbers, output).run(reuse);
+            SegmentSetup::new(self.setup, &self.shaded, &mut self.numbers, output).run(reuse);
         }
         counters.add(Counter::InputPrimitives, output.assembled);
         counters.add(Counter::ClippingInvocations, output.assembled);

@@ -2,7 +2,7 @@
 
 use super::fetch::Fetcher;
 use super::vertex_reuse::VertexReuse;
-use super::viewport::{Projected, Projections, Transform, code};
+use super::viewport::{Projections, Transform, WindowVertex, code};
 use crate::limits::MAX_CLIP_CULL_DISTANCES;
 use crate::program::pool::PooledMachine;
 use crate::program::vertex::{VERTEX_BATCH, VertexOutputs};
@@ -17,7 +17,7 @@ use isa::resources::Resources;
 pub(super) struct Vertex {
     /// In clip space.
     pub position: [f32; 4],
-    pub projected: Projected,
+    pub projected: WindowVertex,
     /// See [`code`].
     pub code: u32,
 }
@@ -116,7 +116,7 @@ impl Shader<'_> {
                         position[2][lane],
                         position[3][lane],
                     ],
-                    projected: Projected {
+                    projected: WindowVertex {
                         window: [projections.window[0][lane], projections.window[1][lane]],
                         snapped: [projections.snapped[0][lane], projections.snapped[1][lane]],
                         depth: projections.depth[lane],
