@@ -138,7 +138,7 @@ mod tests {
             };
             for tile in 0..16 {
                 let at = [tile % 4, tile / 4];
-                let (expected, found) = (before.of(at, 0), after.of(at, 0));
+                let (expected, found) = (before.primitives_of(at, 0), after.primitives_of(at, 0));
                 assert_eq!(expected.len(), found.len());
                 for (&expected, &found) in expected.iter().zip(found) {
                     let (a, b) = (

@@ -231,7 +231,7 @@ impl Found {
     /// The primitives that a macro-tile has to look at.
     pub fn binned(&self, macro_tile: [u32; 2], layer: u32) -> Vec<u32> {
         let lists = self.bins.iter().flat_map(|(before, bins)| {
-            let list = bins.of(macro_tile, layer).iter();
+            let list = bins.primitives_of(macro_tile, layer).iter();
             list.map(move |number| before + number)
         });
         lists.collect()

@@ -59,10 +59,12 @@ pub fn render(
     cancel: &AtomicBool,
 ) -> Result<(), Stopped> {
     let segments = &draw.draw.segments;
-    if segments
-        .iter()
-        .all(|segment| segment.bins.of(macro_tile.at, macro_tile.layer).is_empty())
-    {
+    if segments.iter().all(|segment| {
+        segment
+            .bins
+            .primitives_of(macro_tile.at, macro_tile.layer)
+            .is_empty()
+    }) {
         return Ok(());
     }
     let record = draw.draw.record.as_ref();
@@ -181,7 +183,10 @@ impl Renderer<'_, '_> {
         };
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
         for (number, segment) in draw.draw.segments.iter().enumerate() {
-            for &index in segment.bins.of(self.macro_tile.at, self.macro_tile.layer) {
+            for &index in segment
+                .bins
+                .primitives_of(self.macro_tile.at, self.macro_tile.layer)
+            {
                 let Some(primitive) = segment.primitives.get(index as usize) else {
                     continue;
                 };
