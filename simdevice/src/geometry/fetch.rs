@@ -155,7 +155,7 @@ fn is_words(format: Format) -> bool {
             .all(|component| component.bits == 32)
 }
 
-/// VertexReuse in scratch memory.
+/// Elements in scratch memory.
 struct Source<'a> {
     bytes: &'a [u8],
     /// Where each element begins, in bytes.

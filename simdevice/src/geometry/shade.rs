@@ -32,7 +32,7 @@ pub(super) struct OptionalOutputs {
     pub cull: [f32; MAX_CLIP_CULL_DISTANCES],
 }
 
-/// What optional are where nothing is written.
+/// The optional outputs where nothing is written.
 pub(super) const NO_OPTIONAL_OUTPUTS: OptionalOutputs = OptionalOutputs {
     point_size: 1.0,
     layer: 0,
