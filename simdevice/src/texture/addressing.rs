@@ -4,8 +4,8 @@
 //! Vulkan 1.3, "Wrapping Operation" and "(u,v,w,a) to (i,j,k,l,n) Transformation". Periodic coordinates are reduced to
 //! one period before they are scaled to texels, which is exact and keeps large ones as precise as they can be.
 
-use super::packing::Floats;
 use super::sampler::{AddressMode, Filter};
+use super::texels::Floats;
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, prelude::*, u32x16};
 use isa::ir::CHUNK_LANES;
 use isa::resources::Lanes;

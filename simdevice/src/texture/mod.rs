@@ -11,13 +11,13 @@
 mod addressing;
 mod cube;
 mod lod;
-mod packing;
 mod sampler;
 mod scalar;
 mod surface;
 mod table;
 #[cfg(test)]
 mod tests;
+mod texels;
 mod vector;
 mod view;
 

@@ -14,13 +14,15 @@ use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x4, u32x16};
 use super::addressing::{self, Axis, axis, taps};
 use super::cube;
 use super::lod::{self, QUADS, Selection};
-use super::packing::{Around, Kind, PackedLevel, Packing, Rows, Srgb8x4, Texels, Unorm8x4};
 use super::sampler::{AddressMode, Filter, Sampler};
 use super::scalar::{border_texel, reference_value};
 use super::surface::Surface;
+use super::texels::{
+    Footprint2x2, PackedLevel, Rows, Srgb8x4, TexelCodec, Texels, Unorm8x4, VectorLayout,
+};
 use crate::format::Numeric;
 use crate::state::CompareOp;
-use crate::texture::packing::Floats;
+use crate::texture::texels::Floats;
 use isa::ir::{CHUNK_LANES, Dimension};
 use isa::resources::{Lanes, LodRequest, SampleRequest};
 
@@ -31,7 +33,7 @@ type Components = [Floats; 4];
 struct Batch<'a, S> {
     simd: S,
     surface: &'a Surface,
-    packing: &'a Packing,
+    layout: &'a VectorLayout,
     sampler: &'a Sampler,
     request: &'a SampleRequest,
     /// The comparison that is asked for.
@@ -46,7 +48,7 @@ pub(super) fn general<S: Simd>(
     sampler: &Sampler,
     request: &SampleRequest,
 ) -> Option<[Lanes; 4]> {
-    let packing = surface.packing.as_ref()?;
+    let layout = surface.layout.as_ref()?;
     let shape = request.shape;
     if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() {
         return None;
@@ -58,7 +60,7 @@ pub(super) fn general<S: Simd>(
     let batch = Batch {
         simd,
         surface,
-        packing,
+        layout,
         sampler,
         request,
         reference,
@@ -72,10 +74,10 @@ impl<S: Simd> Batch<'_, S> {
     /// Stored components as a program gets them.
     #[inline(always)]
     fn registers(&self, texels: &Components) -> [Lanes; 4] {
-        let components = self.packing.kind.components();
+        let components = self.layout.codec.components();
         let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
         let mut registers = [&zero, &zero, &zero, &one];
-        for (register, stored) in registers.iter_mut().zip(self.packing.order) {
+        for (register, stored) in registers.iter_mut().zip(self.layout.order) {
             if stored < components {
                 *register = &texels[stored];
             }
@@ -153,7 +155,7 @@ impl<S: Simd> Batch<'_, S> {
         if layers.is_some_and(|layers| layers.iter().any(missing)) {
             return None;
         }
-        let sizes = LevelSizes::new(&self.packing.levels, levels);
+        let sizes = LevelSizes::new(&self.layout.levels, levels);
         let dimension = self.request.shape.dimension;
         let x = self.axis(0, filter, coordinate, &sizes);
         let (y, z);
@@ -281,12 +283,12 @@ impl<S: Simd> Batch<'_, S> {
         filter: Filter,
     ) -> Components {
         let dimension = self.request.shape.dimension;
-        let words = self.packing.words(&self.surface.memory);
+        let words = self.layout.words(&self.surface.memory);
         let bordered = x.has_outside || y.has_outside || within[0] != u16::MAX;
         // A cube's outside is that of lanes that nobody asks for.
         let plain = self.reference.is_none() && (!bordered || dimension == Dimension::Cube);
         if filter == Filter::Linear && dimension != Dimension::D1 && plain {
-            let kind = self.packing.kind;
+            let kind = self.layout.codec;
             return kind.bilinear(self.simd, words, rows, &x.weight, &y.weight);
         }
         let texel = |i: usize, j: usize| {
@@ -310,11 +312,11 @@ impl<S: Simd> Batch<'_, S> {
         [i, j]: [usize; 2],
         inside: u16,
     ) -> Components {
-        let mut texels = self.packing.kind.load(self.simd, words, rows, i, j);
+        let mut texels = self.layout.codec.load(self.simd, words, rows, i, j);
         if inside != u16::MAX {
             let border = border_texel(self.surface, self.sampler).map(f32::from_bits);
-            for (register, stored) in self.packing.order.into_iter().enumerate() {
-                if stored < self.packing.kind.components() {
+            for (register, stored) in self.layout.order.into_iter().enumerate() {
+                if stored < self.layout.codec.components() {
                     for lane in (0..CHUNK_LANES).filter(|lane| inside >> lane & 1 == 0) {
                         texels[stored][lane] = border[register];
                     }
@@ -411,18 +413,18 @@ pub(super) fn bilinear<S: Simd>(
     sampler: &Sampler,
     request: &SampleRequest,
 ) -> Option<[Lanes; 4]> {
-    let packing = surface.packing.as_ref()?;
+    let layout = surface.layout.as_ref()?;
     if !is_plain(sampler, request) {
         return None;
     }
-    match packing.kind {
-        Kind::Unorm8x4 => Some(simd.vectorize(
+    match layout.codec {
+        TexelCodec::Unorm8x4 => Some(simd.vectorize(
             #[inline(always)]
-            || filter::<S, Unorm8x4>(simd, surface, packing, sampler, request),
+            || filter::<S, Unorm8x4>(simd, surface, layout, sampler, request),
         )),
-        Kind::Srgb8x4 => Some(simd.vectorize(
+        TexelCodec::Srgb8x4 => Some(simd.vectorize(
             #[inline(always)]
-            || filter::<S, Srgb8x4>(simd, surface, packing, sampler, request),
+            || filter::<S, Srgb8x4>(simd, surface, layout, sampler, request),
         )),
         _ => None,
     }
@@ -454,22 +456,22 @@ fn is_plain(sampler: &Sampler, request: &SampleRequest) -> bool {
 fn filter<S: Simd, T: Texels>(
     simd: S,
     surface: &Surface,
-    packing: &Packing,
+    layout: &VectorLayout,
     sampler: &Sampler,
     request: &SampleRequest,
 ) -> [Lanes; 4] {
-    let words = packing.words(&surface.memory);
+    let words = layout.words(&surface.memory);
     let selection = lod::select_quads(surface, sampler, request);
-    let mut texel = level::<S, T>(simd, words, packing, sampler, request, &selection.high);
+    let mut texel = level::<S, T>(simd, words, layout, sampler, request, &selection.high);
     if selection.weight != [0.0; QUADS] {
-        let low = level::<S, T>(simd, words, packing, sampler, request, &selection.low);
+        let low = level::<S, T>(simd, words, layout, sampler, request, &selection.low);
         let weight = spread(simd, selection.weight);
         for c in 0..T::COMPONENTS {
             // Texels are finite, so that a weight of zero takes nothing.
             texel[c] = texel[c] + weight * (low[c] - texel[c]);
         }
     }
-    registers(surface, packing, texel)
+    registers(surface, layout, texel)
 }
 
 /// The weighted mean of the texels of a level for each quad.
@@ -477,13 +479,13 @@ fn filter<S: Simd, T: Texels>(
 fn level<S: Simd, T: Texels>(
     simd: S,
     words: &[AtomicU32],
-    packing: &Packing,
+    layout: &VectorLayout,
     sampler: &Sampler,
     request: &SampleRequest,
     levels: &[u32; QUADS],
 ) -> [f32x16<S>; 4] {
     let (width, height, base, row_pitch);
-    let first = &packing.levels[levels[0] as usize];
+    let first = &layout.levels[levels[0] as usize];
     if *levels == [levels[0]; QUADS] {
         width = f32x16::splat(simd, first.extent[0] as f32);
         height = f32x16::splat(simd, first.extent[1] as f32);
@@ -492,7 +494,7 @@ fn level<S: Simd, T: Texels>(
     } else {
         let mut each = [first; QUADS];
         for quad in 1..QUADS {
-            each[quad] = &packing.levels[levels[quad] as usize];
+            each[quad] = &layout.levels[levels[quad] as usize];
         }
         width = spread(simd, of_each(each, |level| level.extent[0] as f32));
         height = spread(simd, of_each(each, |level| level.extent[1] as f32));
@@ -511,7 +513,7 @@ fn level<S: Simd, T: Texels>(
         &request.coordinate[1],
         height,
     );
-    let around = Around {
+    let around = Footprint2x2 {
         rows: [base + y.first * row_pitch, base + y.second * row_pitch],
         columns: [x.first, x.second],
         weights: [x.weight, y.weight],
@@ -548,7 +550,11 @@ fn spread_words<S: Simd>(simd: S, [a, b, c, d]: [u32; QUADS]) -> u32x16<S> {
 
 /// Stored components, of which there are four, as a program gets them.
 #[inline(always)]
-fn registers<S: Simd>(surface: &Surface, packing: &Packing, texel: [f32x16<S>; 4]) -> [Lanes; 4] {
+fn registers<S: Simd>(
+    surface: &Surface,
+    layout: &VectorLayout,
+    texel: [f32x16<S>; 4],
+) -> [Lanes; 4] {
     let mut stored = [[0.0; CHUNK_LANES]; 4];
     for c in 0..4 {
         stored[c] = texel[c].into();
@@ -556,7 +562,7 @@ fn registers<S: Simd>(surface: &Surface, packing: &Packing, texel: [f32x16<S>; 4
     let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
     let mut found = [&zero; 4];
     for c in 0..4 {
-        found[c] = &stored[packing.order[c]];
+        found[c] = &stored[layout.order[c]];
     }
     let mut out = [[0; CHUNK_LANES]; 4];
     for (out, from) in out.iter_mut().zip(surface.swizzle) {
