@@ -157,13 +157,13 @@ impl CommandProcessor {
                 set.ok_or(ExecutionError::NoGaussianSet)?.append_draw(draw);
                 Ok(())
             }
-            Packet::GaussianResolveShader(shader) => {
+            Packet::GaussianFragmentStage(shader) => {
                 let set = self.gaussians.as_mut();
                 set.ok_or(ExecutionError::NoGaussianSet)?
                     .shade_fragments(shader);
                 Ok(())
             }
-            Packet::GaussianResolve => {
+            Packet::GaussianEnd => {
                 let set = self.gaussians.take().ok_or(ExecutionError::NoGaussianSet)?;
                 let draw = gaussian::sort_and_bin(
                     set,

@@ -9,7 +9,7 @@ use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, PixelM
 use super::samples::{SAMPLES, Samples};
 use crate::gaussian::BinnedDraw;
 use crate::limits::TILE_SIZE;
-use crate::packet::ResolveShader;
+use crate::packet::GaussianFragmentStage;
 use crate::program::bindings::BoundResources;
 use crate::program::fragment::{FragmentMachines, FragmentStage};
 use crate::program::interface::{FragmentInput, resolve};
@@ -28,7 +28,7 @@ use std::time::Duration;
 /// A resolve shader made ready for tiles, which all workers share.
 pub(super) struct FragmentStageDraw<'a> {
     draw: &'a BinnedDraw,
-    shader: &'a ResolveShader,
+    shader: &'a GaussianFragmentStage,
     stage: &'a FragmentStage,
     bindings: BoundResources<'a>,
     targets: Targets<'a>,
@@ -58,7 +58,7 @@ struct SampleGroup {
 impl<'a> FragmentStageDraw<'a> {
     pub(super) fn new(
         draw: &'a BinnedDraw,
-        shader: &'a ResolveShader,
+        shader: &'a GaussianFragmentStage,
         targets: Targets<'a>,
         samples: usize,
         runtime: &Runtime,
