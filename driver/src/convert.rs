@@ -2,6 +2,7 @@
 
 use crate::abi::error::Error;
 use ash::vk;
+use simdevice::Format;
 use simdevice::format::{Aspect, Channel, ClearValue, Numeric};
 use simdevice::state::{
     BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, LogicOp, PolygonMode, Rect,
@@ -10,7 +11,6 @@ use simdevice::state::{
 use simdevice::texture::{
     AddressMode, BorderColor, ComponentSwizzle, Filter, IDENTITY, MipmapMode, Swizzle,
 };
-use simdevice::{Format, texture};
 use std::ffi::{CStr, c_char};
 
 /// A value that is none of an enumeration's.
@@ -307,20 +307,6 @@ pub(crate) fn address_mode(mode: vk::SamplerAddressMode) -> Result<AddressMode, 
         vk::SamplerAddressMode::CLAMP_TO_BORDER => Ok(AddressMode::ClampToBorder),
         vk::SamplerAddressMode::MIRROR_CLAMP_TO_EDGE => Ok(AddressMode::MirrorClampToEdge),
         other => Err(Error::FeatureNotPresent(format!("address mode {other:?}"))),
-    }
-}
-
-/// A sampler's comparison.
-pub(crate) fn sampler_compare_op(op: vk::CompareOp) -> texture::CompareOp {
-    match op {
-        vk::CompareOp::LESS => texture::CompareOp::Less,
-        vk::CompareOp::EQUAL => texture::CompareOp::Equal,
-        vk::CompareOp::LESS_OR_EQUAL => texture::CompareOp::LessOrEqual,
-        vk::CompareOp::GREATER => texture::CompareOp::Greater,
-        vk::CompareOp::NOT_EQUAL => texture::CompareOp::NotEqual,
-        vk::CompareOp::GREATER_OR_EQUAL => texture::CompareOp::GreaterOrEqual,
-        vk::CompareOp::ALWAYS => texture::CompareOp::Always,
-        _ => texture::CompareOp::Never,
     }
 }
 

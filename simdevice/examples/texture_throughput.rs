@@ -12,9 +12,9 @@ use simdevice::image::{ImageDesc, ImageKind};
 use simdevice::isa::ir::{Dimension, ImageShape};
 use simdevice::isa::resources::{ImageUnit, LodRequest, SampleRequest};
 use simdevice::runtime::SimdLevel;
+use simdevice::state::CompareOp;
 use simdevice::texture::{
-    AddressMode, CompareOp, Filter, IDENTITY, ImageBinding, ImageTable, MipmapMode, SampledImage,
-    Sampler,
+    AddressMode, Filter, IDENTITY, ImageBinding, ImageTable, MipmapMode, SampledImage, Sampler,
 };
 use simdevice::{Allocation, Format, Image, ImageView};
 

@@ -7,8 +7,8 @@ use crate::geometry::{FrontEnd, Surface};
 use crate::hardware_model::HardwareModel;
 use crate::packet::{Draw, Packet};
 use crate::pass::{Pass, PassDraw};
-use crate::raster::recording;
-use crate::raster::tile::AttachmentError;
+use crate::raster::tile_buffer::AttachmentError;
+use crate::raster::triangle::recording;
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::query::{QueryKind, host_time};
 use crate::stats::recorder::{DrawRecord, Owner};
@@ -157,13 +157,13 @@ impl CommandProcessor {
                 set.ok_or(ExecutionError::NoGaussianSet)?.append_draw(draw);
                 Ok(())
             }
-            Packet::GaussianResolveShader(shader) => {
+            Packet::GaussianFragmentStage(shader) => {
                 let set = self.gaussians.as_mut();
                 set.ok_or(ExecutionError::NoGaussianSet)?
                     .shade_fragments(shader);
                 Ok(())
             }
-            Packet::GaussianResolve => {
+            Packet::GaussianEnd => {
                 let set = self.gaussians.take().ok_or(ExecutionError::NoGaussianSet)?;
                 let draw = gaussian::sort_and_bin(
                     set,
@@ -277,7 +277,7 @@ impl CommandProcessor {
         });
         let mut before = recorder.map(|_| self.counters.clone());
         let mut front = FrontEnd::new(draw, surface, device.runtime(), &mut self.counters);
-        while let Some(mut part) = front.next_part(&mut self.counters)? {
+        while let Some(mut part) = front.next_segments(&mut self.counters)? {
             if let (Some(record), Some(before)) = (&record, &before) {
                 recording::add_front_end(record, &self.counters.since(before), draw, &part);
             }

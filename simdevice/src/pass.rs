@@ -12,10 +12,9 @@ use crate::packet::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rende
 use crate::raster::gaussian::GaussianTile;
 use crate::raster::gaussian::GaussianTileDraw;
 use crate::raster::output::{Buffers, Targets};
-use crate::raster::prepared::TileDraw;
-use crate::raster::primitives::{Place, Scratch};
-use crate::raster::tile::{AttachmentError, Target, Tile};
-use crate::raster::{Plane, primitives};
+use crate::raster::tile::Tile;
+use crate::raster::tile_buffer::{AttachmentError, Target, TileBuffer};
+use crate::raster::triangle::{self, MacroTile, Scratch, TriangleTileDraw};
 use crate::runtime::{FlushPolicy, Runtime};
 use crate::state::{Rect, ResolveMode};
 use crate::stats::counters::{Counter, Counters};
@@ -321,8 +320,8 @@ impl Pass {
                 self.samples,
                 runtime,
             ))),
-            PassDraw::Primitives(draw) if draw.chunks.is_empty() => Ready::Nothing,
-            PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TileDraw::new(
+            PassDraw::Primitives(draw) if draw.segments.is_empty() => Ready::Nothing,
+            PassDraw::Primitives(draw) => Ready::Primitives(Box::new(TriangleTileDraw::new(
                 draw,
                 targets,
                 self.samples,
@@ -340,7 +339,7 @@ enum Ready<'a> {
     Nothing,
     Clear(&'a ClearAttachments),
     Gaussians(Box<GaussianTileDraw<'a>>),
-    Primitives(Box<TileDraw<'a>>),
+    Primitives(Box<TriangleTileDraw<'a>>),
 }
 
 /// Prepares what an attachment's aspect is resolved to.
@@ -391,10 +390,10 @@ impl Worker {
                 color: pass
                     .color
                     .iter()
-                    .map(|target| Plane::new(size, target.as_ref()))
+                    .map(|target| TileBuffer::new(size, target.as_ref()))
                     .collect(),
-                depth: Plane::new(size, pass.depth.as_ref()),
-                stencil: Plane::new(size, pass.stencil.as_ref()),
+                depth: TileBuffer::new(size, pass.depth.as_ref()),
+                stencil: TileBuffer::new(size, pass.stencil.as_ref()),
             },
             gaussians: Box::default(),
             scratch: Scratch::default(),
@@ -440,9 +439,9 @@ impl Flush<'_> {
                     }
                 }
                 Ready::Gaussians(_) => {}
-                Ready::Primitives(draw) => primitives::render(
+                Ready::Primitives(draw) => triangle::render(
                     draw,
-                    Place { layer, at, size },
+                    MacroTile { layer, at, size },
                     &mut worker.buffers,
                     &mut worker.scratch,
                     &mut worker.counters,
@@ -456,7 +455,7 @@ impl Flush<'_> {
             .optimizations
             .has(Optimization::EmptyTiles)
         {
-            tiles().for_each(|tile| self.touch_all(worker, layer, &tile));
+            tiles().for_each(|tile| self.load_all(worker, layer, &tile));
         }
         for tile in tiles() {
             self.finish(worker, layer, &tile);
@@ -465,7 +464,7 @@ impl Flush<'_> {
     }
 
     /// Loads or clears what no draw has touched of a tile.
-    fn touch_all(&self, worker: &mut Worker, layer: u32, tile: &Tile) {
+    fn load_all(&self, worker: &mut Worker, layer: u32, tile: &Tile) {
         let (pass, buffers) = (self.pass, &mut worker.buffers);
         let colors = buffers.color.iter_mut().zip(&pass.color);
         let rest = [
@@ -474,7 +473,7 @@ impl Flush<'_> {
         ];
         for (plane, target) in colors.chain(rest) {
             if let Some(target) = target {
-                plane.touch(target, layer, tile);
+                plane.load_or_clear(target, layer, tile);
             }
         }
     }
@@ -505,7 +504,7 @@ impl Flush<'_> {
                 .counters
                 .add(Counter::TilesUntouched, untouched.into());
             if let Some((resolve, mode)) = resolve.filter(|_| self.last) {
-                plane.touch(target, layer, tile);
+                plane.load_or_clear(target, layer, tile);
                 let level = self.runtime.level();
                 plane.resolve(level, target, (resolve, *mode), layer, tile);
             }
@@ -547,7 +546,7 @@ impl Flush<'_> {
                 };
                 if let (Some(target), Some(plane)) = (target, plane) {
                     let format = target.format();
-                    plane.touch(target, layer, tile);
+                    plane.load_or_clear(target, layer, tile);
                     plane.fill_rect(format, tile, rect, &format.encode_clear(aspect, value));
                 }
             }

@@ -21,7 +21,8 @@ impl Sampler {
     /// A sampler as its create info asks for.
     ///
     /// # Errors
-    /// [`Error::FeatureNotPresent`] for anisotropy, and for filters, modes and colours of extensions.
+    /// [`Error::FeatureNotPresent`] for anisotropy, and for filters, modes and colours of extensions;
+    /// [`Error::InvalidUsage`] for a comparison that is none.
     pub(crate) fn new(info: &vk::SamplerCreateInfo<'_>) -> Result<Self, Error> {
         if info.anisotropy_enable != vk::FALSE {
             return Err(Error::FeatureNotPresent("samplerAnisotropy".into()));
@@ -33,7 +34,14 @@ impl Sampler {
         ]
         .map(convert::address_mode);
         let compares = info.compare_enable != vk::FALSE;
-        let compare_op = compares.then(|| convert::sampler_compare_op(info.compare_op));
+        let compare_op = compares
+            .then(|| {
+                convert::compare_op(
+                    info.compare_op,
+                    "VUID-VkSamplerCreateInfo-compareEnable-01080",
+                )
+            })
+            .transpose()?;
         let bias = limits::MAX_SAMPLER_LOD_BIAS;
         Ok(Self {
             state: texture::Sampler {

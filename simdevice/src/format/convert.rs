@@ -101,11 +101,6 @@ pub(super) fn to_unorm8(value: f32) -> u8 {
     to_unorm(value, 8) as u8
 }
 
-/// `from_unorm8(to_unorm8(value))`, without a detour through integers.
-pub(super) fn quantize_unorm8(value: f32) -> f32 {
-    round_ties_even(clamp_unorm(value) * 255.0) as f32 / 255.0
-}
-
 /// R, G and B by the transfer function, A linear.
 pub(super) fn from_srgb8([r, g, b, a]: [u8; 4]) -> [f32; 4] {
     let linear = &SRGB.linear;
@@ -140,16 +135,6 @@ pub(super) fn to_halves(numbers: &[f32], out: &mut [u8]) {
         let count = numbers.len().min(out.len() / 2);
         halves[..count].convert_from_f32_slice(&numbers[..count]);
         out[..2 * count].copy_from_slice(bytemuck::cast_slice(&halves[..count]));
-    }
-}
-
-/// Rounds numbers to binary16.
-pub(super) fn quantize_halves(numbers: &mut [f32]) {
-    for numbers in numbers.chunks_mut(HALVES) {
-        let mut halves = [f16::ZERO; HALVES];
-        let halves = &mut halves[..numbers.len()];
-        halves.convert_from_f32_slice(numbers);
-        halves.convert_to_f32_slice(numbers);
     }
 }
 

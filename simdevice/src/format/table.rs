@@ -240,16 +240,6 @@ impl Format {
         out
     }
 
-    /// Reads the texel of an integer format; signed components are sign-extended.
-    pub fn decode_integer(self, texel: &[u8]) -> [u32; 4] {
-        self.decode(texel).map(f32::to_bits)
-    }
-
-    /// The bytes of an integer format's texel. Components are clamped to what the format can hold.
-    pub fn encode_integer(self, texel: [u32; 4]) -> [u8; MAX_TEXEL_SIZE] {
-        self.encode(texel.map(f32::from_bits))
-    }
-
     /// Reads consecutive texels, as many as both slices have.
     pub fn decode_row(self, bytes: &[u8], out: &mut [[f32; 4]]) {
         match self {
@@ -325,29 +315,6 @@ impl Format {
                 let (numeric, components) = (self.numeric(), self.components());
                 for (out, texel) in out.chunks_exact_mut(self.texel_size()).zip(texels) {
                     encode_components(numeric, components, texel, out);
-                }
-            }
-        }
-    }
-
-    /// Replaces texels by what they would be after a store to memory and a load.
-    pub fn quantize_row(self, texels: &mut [[f32; 4]]) {
-        match self {
-            Self::R8G8B8A8Unorm | Self::B8G8R8A8Unorm | Self::A8B8G8R8UnormPack32 => {
-                for component in texels.as_flattened_mut() {
-                    *component = convert::quantize_unorm8(*component);
-                }
-            }
-            Self::R8G8B8A8Srgb | Self::B8G8R8A8Srgb | Self::A8B8G8R8SrgbPack32 => {
-                for texel in texels {
-                    *texel = convert::from_srgb8(convert::to_srgb8(*texel));
-                }
-            }
-            Self::R16G16B16A16Sfloat => convert::quantize_halves(texels.as_flattened_mut()),
-            Self::R32G32B32A32Sfloat => {}
-            _ => {
-                for texel in texels {
-                    *texel = self.decode(&self.encode(*texel));
                 }
             }
         }

@@ -119,37 +119,16 @@ impl<'a> Group<'a> {
     }
 }
 
-/// Reads `len` indices from number `first` on; those outside the buffer read as zero.
+/// Reads `len` vertices' numbers from index number `first` on.
 fn read_indices(stream: &IndexStream, first: u64, len: usize) -> Vec<u64> {
-    let size = u64::from(stream.index_size);
-    (first..first + len as u64)
-        .map(|number| {
-            let mut bytes = [0u8; 4];
-            read_clipped(
-                &stream.buffer,
-                number.saturating_mul(size),
-                &mut bytes[..stream.index_size.min(4) as usize],
-            );
-            let index = i64::from(u32::from_le_bytes(bytes)) + i64::from(stream.vertex_offset);
-            // A negative sum names no vertex; the largest one lies outside every buffer, which reads zero.
-            u64::try_from(index).unwrap_or(u64::from(u32::MAX))
-        })
-        .collect()
-}
-
-/// Reads bytes at `offset` of the range; zeros unless all of them lie inside it.
-fn read_clipped(buffer: &crate::packet::BufferRange, offset: u64, out: &mut [u8]) {
-    let inside = offset
-        .checked_add(out.len() as u64)
-        .is_some_and(|end| end <= buffer.size);
-    let read = inside
-        && buffer
-            .offset
-            .checked_add(offset)
-            .is_some_and(|start| buffer.memory.read(start, out).is_ok());
-    if !read {
-        out.fill(0);
-    }
+    let mut indices = Vec::new();
+    stream.read(first, len as u32, &mut indices);
+    let vertex = |index: u32| {
+        let vertex = i64::from(index) + i64::from(stream.vertex_offset);
+        // A negative sum names no vertex; the largest one lies outside every buffer, which reads zero.
+        u64::try_from(vertex).unwrap_or(u64::from(u32::MAX))
+    };
+    indices.into_iter().map(vertex).collect()
 }
 
 /// Bytes of the attribute format, and whether it is 32-bit floats.
@@ -238,18 +217,14 @@ impl Fetcher {
     /// Reads an element of `size` bytes.
     fn read_element(&mut self, stream: &AttributeStream, element: u64, size: usize) -> &[u8] {
         self.grow(size);
-        let offset = element
-            .saturating_mul(u64::from(stream.stride))
-            .saturating_add(u64::from(stream.offset));
         let bytes = &mut self.bytes[..size];
-        read_clipped(&stream.buffer, offset, bytes);
+        stream.read(element, bytes);
         bytes
     }
 
     /// Fills the scratch with one element every returned number of bytes.
     fn read_bytes(&mut self, stream: &AttributeStream, group: &Group<'_>, size: usize) -> usize {
         let stride = stream.stride as usize;
-        let at = |lane| at(stream, group, lane);
         if group.is_consecutive(stream)
             && stream.stride <= WHOLE_SPAN_STRIDE
             && stride >= size
@@ -257,16 +232,16 @@ impl Fetcher {
         {
             let span = stride * (group.len - 1) + size;
             self.grow(span);
-            let start = at(0);
-            if start.saturating_add(span as u64) <= stream.buffer.size {
-                read_clipped(&stream.buffer, start, &mut self.bytes[..span]);
+            let first = group.element(stream, 0);
+            if stream.place(first, span as u64).is_some() {
+                stream.read(first, &mut self.bytes[..span]);
                 return stride;
             }
         }
         self.grow(size * group.len);
         let elements = self.bytes.chunks_exact_mut(size).take(group.len);
         for (lane, element) in elements.enumerate() {
-            read_clipped(&stream.buffer, at(lane), element);
+            stream.read(group.element(stream, lane), element);
         }
         size
     }
@@ -353,7 +328,7 @@ impl<'a> CoefficientReader<'a> {
         for (stream, out) in self.streams.iter().zip(out.chunks_exact_mut(3)) {
             let mut bytes = [0u8; 16];
             let bytes = &mut bytes[..layout(stream.format).0.min(16)];
-            read_clipped(&stream.buffer, at(stream), bytes);
+            stream.read(group.element(stream, lane), bytes);
             out.copy_from_slice(&stream.format.decode(bytes)[..3]);
         }
     }

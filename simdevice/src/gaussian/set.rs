@@ -3,7 +3,7 @@
 use super::depth::CenterDepth;
 use super::lanes::GROUP;
 use crate::format::Format;
-use crate::packet::{Draw, GaussianAppend, GaussianBegin, ResolveShader};
+use crate::packet::{Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage};
 use crate::state::gaussian::GaussianGeometry;
 use crate::state::{Rect, Viewport};
 use devmem::host;
@@ -20,7 +20,7 @@ pub struct GaussianSet {
     pub(super) depth: Option<CenterDepth>,
     /// What depths are rounded to.
     pub(super) depth_format: Format,
-    pub(super) resolve: Option<ResolveShader>,
+    pub(super) resolve: Option<GaussianFragmentStage>,
     pub(super) appends: Vec<GaussianAppend>,
     /// Those that a vertex program projects, which come after the others.
     pub(super) draws: Vec<Draw>,
@@ -88,7 +88,7 @@ impl GaussianSet {
     }
 
     /// Has a fragment program make the colours of the set's fragments.
-    pub fn shade_fragments(&mut self, shader: &ResolveShader) {
+    pub fn shade_fragments(&mut self, shader: &GaussianFragmentStage) {
         if shader.program.reads_depth() {
             let begin = &self.begin;
             self.depth = Some(CenterDepth::new(

@@ -8,7 +8,7 @@ use super::splat::{ProjectedGroup, Splat};
 use super::surfel::Surfel;
 use super::tile_lists::TileLists;
 use crate::format::depth::DepthEncoding;
-use crate::packet::ResolveShader;
+use crate::packet::GaussianFragmentStage;
 use crate::runtime::Runtime;
 use crate::state::Rect;
 use crate::state::gaussian::{GaussianOrder, GaussianState};
@@ -47,7 +47,7 @@ pub struct BinnedDraw {
     /// What is left out in its tiles.
     pub(crate) optimizations: Optimizations,
     /// What makes the colours of its fragments.
-    pub(crate) resolve: Option<ResolveShader>,
+    pub(crate) resolve: Option<GaussianFragmentStage>,
     /// How its depths are numbers.
     pub(crate) depth_unit: DepthEncoding,
     /// How the depths of a tile's list follow one another.

@@ -195,8 +195,8 @@ impl Bins {
     }
 
     /// The primitives that may touch a macro-tile, given by column and row from the framebuffer's corner, in a layer:
-    /// indices into [`PrimitiveChunk::primitives`](super::PrimitiveChunk::primitives), in the order of the draw.
-    pub fn of(&self, macro_tile: [u32; 2], layer: u32) -> &[u32] {
+    /// indices into [`PrimitiveSegment::primitives`](super::PrimitiveSegment::primitives), in the order of the draw.
+    pub fn primitives_of(&self, macro_tile: [u32; 2], layer: u32) -> &[u32] {
         let within = |axis: usize, count: u32| {
             let at = macro_tile[axis].checked_sub(self.origin[axis]);
             at.filter(|&at| at < count)
@@ -276,11 +276,11 @@ mod tests {
             (at(15, 15, 2047), 3),
         ];
         let bins = Bins::new(&grid, layers, &pairs);
-        assert_eq!(bins.of([3, 2], 1000), [0, 2]);
-        assert_eq!(bins.of([0, 0], 0), [1]);
-        assert_eq!(bins.of([15, 15], 2047), [3]);
-        assert_eq!(bins.of([3, 3], 1000), [0; 0]);
-        assert_eq!(bins.of([15, 15], 2048), [0; 0]);
+        assert_eq!(bins.primitives_of([3, 2], 1000), [0, 2]);
+        assert_eq!(bins.primitives_of([0, 0], 0), [1]);
+        assert_eq!(bins.primitives_of([15, 15], 2047), [3]);
+        assert_eq!(bins.primitives_of([3, 3], 1000), [0; 0]);
+        assert_eq!(bins.primitives_of([15, 15], 2048), [0; 0]);
         assert_eq!(bins.pairs(), 4);
         assert!(bins.memory_bytes() < 100);
     }

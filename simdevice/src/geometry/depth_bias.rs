@@ -1,6 +1,6 @@
 //! Depth bias of polygons (Vulkan 1.3, "Depth Bias").
 
-use super::viewport::Projected;
+use super::viewport::WindowVertex;
 use crate::format::{Channel, Format, Numeric};
 use crate::state::DepthBias;
 
@@ -44,9 +44,9 @@ impl DepthUnit {
 }
 
 /// What is added to the depth of a triangle.
-pub(super) fn bias(bias: &DepthBias, unit: DepthUnit, corners: [&Projected; 3]) -> f32 {
+pub(super) fn bias(bias: &DepthBias, unit: DepthUnit, corners: [&WindowVertex; 3]) -> f32 {
     let [a, b, c] = corners;
-    let difference = |to: &Projected, from: &Projected| {
+    let difference = |to: &WindowVertex, from: &WindowVertex| {
         let [x, y] = [0, 1].map(|axis| to.window[axis] - from.window[axis]);
         [x, y, to.depth - from.depth]
     };

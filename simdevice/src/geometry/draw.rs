@@ -19,7 +19,7 @@ pub struct PrimitiveDraw {
     /// What the fragment program is bound to.
     pub bindings: Bindings,
     /// The primitives, in order.
-    pub chunks: Vec<PrimitiveChunk>,
+    pub segments: Vec<PrimitiveSegment>,
     /// The pixels that they may touch, by viewport: those of the pass's area that lie in the scissor and in the
     /// viewport. Primitives may reach farther.
     pub regions: Vec<Rect>,
@@ -29,7 +29,7 @@ pub struct PrimitiveDraw {
 
 /// Consecutive primitives of a draw that were set up together.
 #[derive(Debug, Default)]
-pub struct PrimitiveChunk {
+pub struct PrimitiveSegment {
     /// The primitives, in the order in which macro-tiles look at them where there are many.
     pub primitives: Vec<Primitive>,
     /// The varyings of their vertices.
@@ -41,8 +41,8 @@ pub struct PrimitiveChunk {
 impl PrimitiveDraw {
     /// How many varyings each vertex has.
     pub(crate) fn varyings_per_vertex(&self) -> usize {
-        let first = self.chunks.first();
-        first.map_or(0, |chunk| chunk.varyings.per_vertex)
+        let first = self.segments.first();
+        first.map_or(0, |segment| segment.varyings.per_vertex)
     }
 
     /// A draw without primitives.
@@ -51,7 +51,7 @@ impl PrimitiveDraw {
             pipeline: Arc::clone(&draw.pipeline),
             state: Arc::clone(&draw.state),
             bindings: draw.fragment_bindings.clone(),
-            chunks: Vec::new(),
+            segments: Vec::new(),
             regions: Vec::new(),
             record: None,
         }
@@ -59,11 +59,14 @@ impl PrimitiveDraw {
 
     /// Bytes of host memory that it holds while it waits.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        self.chunks.iter().map(PrimitiveChunk::memory_bytes).sum()
+        self.segments
+            .iter()
+            .map(PrimitiveSegment::memory_bytes)
+            .sum()
     }
 }
 
-impl PrimitiveChunk {
+impl PrimitiveSegment {
     fn memory_bytes(&self) -> u64 {
         let primitives = size_of_val(&*self.primitives);
         let varyings = size_of_val(&*self.varyings.values);

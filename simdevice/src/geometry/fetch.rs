@@ -175,7 +175,7 @@ impl<'a> Source<'a> {
             .saturating_add(size as u64);
         if span <= SPAN_BYTES * elements.len() as u64
             && greatest.abs_diff(least) <= 4 * elements.len() as u64
-            && let Some(offset) = byte_offset(stream, least, span)
+            && let Some(offset) = place(stream, least, span)
         {
             scratch.resize(span as usize, 0);
             if stream.buffer.memory.read(offset, scratch).is_ok() {
@@ -192,9 +192,8 @@ impl<'a> Source<'a> {
         scratch.resize(size * elements.len(), 0);
         for (lane, bytes) in scratch.chunks_exact_mut(size).enumerate() {
             starts[lane] = (lane * size) as u32;
-            if let Some(offset) = byte_offset(stream, elements[lane], size as u64) {
-                // A refused read leaves zeros.
-                let _ = stream.buffer.memory.read(offset, bytes);
+            if let Ok(element) = u64::try_from(elements[lane]) {
+                stream.read(element, bytes);
             }
         }
         Self {
@@ -222,17 +221,9 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Where in memory `bytes` bytes from an element on lie, if they lie inside the buffer.
-fn byte_offset(stream: &AttributeStream, element: i64, bytes: u64) -> Option<u64> {
-    let start = u64::try_from(element)
-        .ok()?
-        .checked_mul(stream.stride.into())?
-        .checked_add(stream.offset.into())?;
-    let end = start.checked_add(bytes)?;
-    if end > stream.buffer.size {
-        return None;
-    }
-    stream.buffer.offset.checked_add(start)
+/// As [`AttributeStream::place`]; a negative element lies outside.
+fn place(stream: &AttributeStream, element: i64, bytes: u64) -> Option<u64> {
+    stream.place(u64::try_from(element).ok()?, bytes)
 }
 
 /// The inputs that an attribute's components go to.

@@ -1,10 +1,10 @@
 //! The front end of points, lines and triangles: vertices are fetched and shaded, and primitives assembled, clipped,
 //! set up and binned.
 //!
-//! A draw is cut into chunks of consecutive primitives, whatever the number of workers. Each worker takes a chunk
-//! through all stages, each stage in a module: [`elements`] (which distinct vertices it names), [`fetch`] (their
+//! A draw is cut into segments of consecutive primitives, whatever the number of workers. Each worker takes a segment
+//! through all stages, each stage in a module: [`vertex_reuse`] (which distinct vertices it names), [`fetch`] (their
 //! attributes), [`shade`] (the vertex program and the [`viewport`]), [`assemble`] and [`setup`] (primitives, [`clip`]ped,
-//! culled, with [`depth_bias`]); [`bins`] sorts what all chunks made by macro-tile. Vertices on the border of two chunks
+//! culled, with [`depth_bias`]); [`bins`] sorts what all segments made by macro-tile. Vertices on the border of two segments
 //! are shaded in both.
 
 mod assemble;
@@ -12,7 +12,6 @@ mod bins;
 mod clip;
 mod depth_bias;
 mod draw;
-mod elements;
 mod fetch;
 mod order;
 pub(crate) mod points;
@@ -21,10 +20,11 @@ mod setup;
 mod shade;
 #[cfg(test)]
 mod tests;
+mod vertex_reuse;
 mod viewport;
 
 pub use bins::Bins;
-pub use draw::{PrimitiveChunk, PrimitiveDraw};
+pub use draw::{PrimitiveDraw, PrimitiveSegment};
 pub use primitive::{Primitive, PrimitiveKind, Varyings};
 
 use crate::format::Format;
@@ -38,22 +38,22 @@ use assemble::corner_count;
 use bins::Grid;
 use depth_bias::DepthUnit;
 use devmem::host;
-use elements::{Elements, Run, runs};
 use fetch::Fetcher;
 use isa::exec::{Stopped, Watchdog};
 use isa::ir::Rate;
 use isa::resources::Resources;
-use setup::{Job, Output, Setup};
+use setup::{Output, SegmentSetup, Setup};
 use shade::{Shaded, Shader};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
+use vertex_reuse::{RestartRun, VertexReuse, runs};
 use viewport::Transform;
 
-/// Primitives of a chunk.
-const CHUNK: u64 = 2048;
+/// Primitives of a segment.
+const SEGMENT: u64 = 2048;
 
-/// Chunks of a part: what is set up before any of it is rendered.
-const PART: u64 = 512;
+/// Segments of a part: what is set up before any of it is rendered.
+const PART_SEGMENTS: u64 = 512;
 
 /// What is drawn to.
 #[derive(Clone, Copy, Debug)]
@@ -72,15 +72,15 @@ pub(crate) struct FrontEnd<'a> {
     runtime: &'a Runtime,
     surface: Surface,
     prepared: BoundResources<'a>,
-    runs: Vec<Run>,
+    runs: Vec<RestartRun>,
     transforms: Vec<Transform>,
     regions: Vec<Rect>,
     /// Primitives of an instance.
     primitives: u64,
-    /// Whether a chunk may have primitives of several instances.
+    /// Whether a segment may have primitives of several instances.
     mixes_instances: bool,
-    chunks: u64,
-    /// The first chunk that was not taken.
+    segments: u64,
+    /// The first segment that was not taken.
     next: u64,
 }
 
@@ -104,10 +104,10 @@ impl<'a> FrontEnd<'a> {
             .map(|run| u64::from(run.primitives))
             .sum::<u64>();
         let mixes_instances = mixes_instances(draw);
-        let chunks = if mixes_instances {
-            primitives.saturating_mul(instances).div_ceil(CHUNK)
+        let segments = if mixes_instances {
+            primitives.saturating_mul(instances).div_ceil(SEGMENT)
         } else {
-            primitives.div_ceil(CHUNK).saturating_mul(instances)
+            primitives.div_ceil(SEGMENT).saturating_mul(instances)
         };
         let viewports = state.viewports.iter();
         let transforms = viewports
@@ -130,7 +130,7 @@ impl<'a> FrontEnd<'a> {
             regions: regions.collect(),
             primitives,
             mixes_instances,
-            chunks,
+            segments,
             next: 0,
         }
     }
@@ -139,20 +139,20 @@ impl<'a> FrontEnd<'a> {
     ///
     /// # Errors
     /// [`Stopped`] if the vertex program ran for too long.
-    pub(crate) fn next_part(
+    pub(crate) fn next_segments(
         &mut self,
         counters: &mut Counters,
     ) -> Result<Option<PrimitiveDraw>, Stopped> {
-        if self.next >= self.chunks {
+        if self.next >= self.segments {
             return Ok(None);
         }
         let started = Instant::now();
-        let range = self.next..self.chunks.min(self.next + PART);
+        let range = self.next..self.segments.min(self.next + PART_SEGMENTS);
         self.next = range.end;
         let done = self.process(range, counters);
         self.draw.vertex_bindings.bump_generations();
-        let part = done.map(|chunks| PrimitiveDraw {
-            chunks,
+        let part = done.map(|segments| PrimitiveDraw {
+            segments,
             regions: self.regions.clone(),
             ..PrimitiveDraw::empty(self.draw)
         });
@@ -160,12 +160,12 @@ impl<'a> FrontEnd<'a> {
         part.map(Some)
     }
 
-    /// Takes chunks through all stages, each by whichever worker is free.
+    /// Takes segments through all stages, each by whichever worker is free.
     fn process(
         &self,
         range: std::ops::Range<u64>,
         counters: &mut Counters,
-    ) -> Result<Vec<PrimitiveChunk>, Stopped> {
+    ) -> Result<Vec<PrimitiveSegment>, Stopped> {
         let setup = Setup {
             state: &self.draw.state,
             outputs: &self.draw.pipeline.vertex.outputs,
@@ -182,7 +182,7 @@ impl<'a> FrontEnd<'a> {
             1,
             &cancel,
             || Worker::new(self, &setup, &resources, &cancel),
-            Worker::run_chunk,
+            Worker::run_segment,
         );
         ran?;
         let mut done = Vec::new();
@@ -191,30 +191,30 @@ impl<'a> FrontEnd<'a> {
             host::reserve(&mut done, worker.done.len());
             done.extend(worker.done);
         }
-        done.sort_unstable_by_key(|(chunk, _)| *chunk);
-        Ok(host::collect(done.into_iter().map(|(_, chunk)| chunk)))
+        done.sort_unstable_by_key(|(segment, _)| *segment);
+        Ok(host::collect(done.into_iter().map(|(_, segment)| segment)))
     }
 
     fn grid(&self) -> Grid {
         Grid::new(self.surface.area, self.runtime.config().macro_tile_size)
     }
 
-    /// Calls `each` with the runs, instances and primitives (first and end) of a chunk, in order.
-    fn pieces(&self, chunk: u64, mut each: impl FnMut(&Run, u32, u32, u32)) {
+    /// Calls `each` with the runs, instances and primitives (first and end) of a segment, in order.
+    fn segment_ranges(&self, segment: u64, mut each: impl FnMut(&RestartRun, u32, u32, u32)) {
         let total = self
             .primitives
             .saturating_mul(self.draw.instance_count.into());
         let (mut at, end) = if self.mixes_instances {
-            (chunk * CHUNK, total.min((chunk + 1) * CHUNK))
+            (segment * SEGMENT, total.min((segment + 1) * SEGMENT))
         } else {
-            let per_instance = self.primitives.div_ceil(CHUNK);
-            let start = chunk / per_instance * self.primitives;
-            let first = chunk % per_instance * CHUNK;
-            (start + first, start + self.primitives.min(first + CHUNK))
+            let per_instance = self.primitives.div_ceil(SEGMENT);
+            let start = segment / per_instance * self.primitives;
+            let first = segment % per_instance * SEGMENT;
+            (start + first, start + self.primitives.min(first + SEGMENT))
         };
         while at < end {
             let (instance, primitive) = (at / self.primitives, at % self.primitives);
-            let before = |run: &Run| u64::from(run.primitives_before) <= primitive;
+            let before = |run: &RestartRun| u64::from(run.primitives_before) <= primitive;
             let Some(run) = self.runs[..self.runs.partition_point(before)].last() else {
                 return;
             };
@@ -248,18 +248,18 @@ fn draws_points(state: &DrawState) -> bool {
     corner_count(state.topology) == 1 || state.polygon_mode == PolygonMode::Point
 }
 
-/// What one worker takes chunks through.
+/// What one worker takes segments through.
 struct Worker<'a> {
     front: &'a FrontEnd<'a>,
     setup: &'a Setup<'a>,
     shader: Shader<'a>,
-    elements: Elements,
+    reuse: VertexReuse,
     shaded: Shaded,
     numbers: Vec<u32>,
     output: Output,
     counters: Counters,
-    /// What became of the chunks that left anything, with their numbers.
-    done: Vec<(u64, PrimitiveChunk)>,
+    /// What became of the segments that left anything, with their numbers.
+    done: Vec<(u64, PrimitiveSegment)>,
 }
 
 impl<'a> Worker<'a> {
@@ -274,7 +274,7 @@ impl<'a> Worker<'a> {
             fetcher: Fetcher::new(front.draw, &mut machine),
             machine,
             outputs: setup.outputs,
-            takes_extras: setup.outputs.has_extras(draws_points(setup.state)),
+            takes_optional: setup.outputs.has_optional(draws_points(setup.state)),
             level: front.runtime.level(),
             transform: front.transforms.first().copied().unwrap_or(Transform::NONE),
             resources,
@@ -287,7 +287,7 @@ impl<'a> Worker<'a> {
             front,
             setup,
             shader,
-            elements: Elements::default(),
+            reuse: VertexReuse::default(),
             shaded: Shaded::default(),
             numbers: Vec::new(),
             output: Output::default(),
@@ -296,23 +296,23 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Takes a chunk through all stages.
-    fn run_chunk(&mut self, chunk: u64) -> Result<(), Stopped> {
-        let (front, elements) = (self.front, &mut self.elements);
-        elements.clear();
-        front.pieces(chunk, |run, instance, first, end| {
-            elements.push(front.draw, run, instance, first, end);
+    /// Takes a segment through all stages.
+    fn run_segment(&mut self, segment: u64) -> Result<(), Stopped> {
+        let (front, reuse) = (self.front, &mut self.reuse);
+        reuse.clear();
+        front.segment_ranges(segment, |run, instance, first, end| {
+            reuse.push(front.draw, run, instance, first, end);
         });
-        let ran = self.shader.shade(elements, &mut self.shaded);
+        let ran = self.shader.shade(reuse, &mut self.shaded);
         let (output, counters) = (&mut self.output, &mut self.counters);
         output.clear();
         counters.add_work(&self.shader.machine.take_work());
-        counters.add(Counter::VertexInvocations, elements.vertices.len() as u64);
+        counters.add(Counter::VertexInvocations, reuse.vertices.len() as u64);
         ran?;
         if front.draw.state.rasterizer_discard || self.setup.transforms.is_empty() {
-            output.assembled = elements.primitives();
+            output.assembled = reuse.primitives();
         } else {
-            Job::new(self.setup, &self.shaded, &mut self.numbers, output).run(elements);
+            SegmentSetup::new(self.setup, &self.shaded, &mut self.numbers, output).run(reuse);
         }
         counters.add(Counter::InputPrimitives, output.assembled);
         counters.add(Counter::ClippingInvocations, output.assembled);
@@ -320,13 +320,13 @@ impl<'a> Worker<'a> {
         counters.add(Counter::PrimitivesDrawn, output.primitives.len() as u64);
         if !output.primitives.is_empty() {
             let kept = self.keep();
-            host::push(&mut self.done, (chunk, kept));
+            host::push(&mut self.done, (segment, kept));
         }
         Ok(())
     }
 
-    /// What was made of a chunk, in memory of its size, sorted by macro-tile.
-    fn keep(&mut self) -> PrimitiveChunk {
+    /// What was made of a segment, in memory of its size, sorted by macro-tile.
+    fn keep(&mut self) -> PrimitiveSegment {
         let (output, setup) = (&self.output, self.setup);
         let started = Instant::now();
         let mut bins = Bins::new(&setup.grid, setup.layers, &output.pairs);
@@ -335,7 +335,7 @@ impl<'a> Worker<'a> {
         self.counters.add(Counter::BinnedPairs, bins.pairs());
         let elapsed = started.elapsed().as_nanos() as u64;
         self.counters.add(Counter::BinningTime, elapsed);
-        PrimitiveChunk {
+        PrimitiveSegment {
             primitives,
             varyings: Varyings { values, per_vertex },
             bins,

@@ -1,4 +1,4 @@
-//! The order in which a chunk's primitives and vertices lie in memory: that in which macro-tiles look at them. A tile then
+//! The order in which a segment's primitives and vertices lie in memory: that in which macro-tiles look at them. A tile then
 //! reads memory from end to end, where else it would wait for each of many small primitives.
 
 use super::bins::Bins;
@@ -6,10 +6,10 @@ use super::primitive::Primitive;
 use super::setup::{NONE, Output};
 use devmem::host;
 
-/// A chunk of fewer primitives is left as it is. The front end's own tests look at primitives in the order of the draw.
+/// A segment of fewer primitives is left as it is. The front end's own tests look at primitives in the order of the draw.
 pub(super) const FEW: usize = if cfg!(test) { usize::MAX } else { 128 };
 
-/// The primitives and the varyings of a chunk, in the order of its bins, which are made to name them, unless there are less
+/// The primitives and the varyings of a segment, in the order of its bins, which are made to name them, unless there are less
 /// than `few`.
 pub(super) fn in_order(
     output: &Output,
@@ -138,7 +138,7 @@ mod tests {
             };
             for tile in 0..16 {
                 let at = [tile % 4, tile / 4];
-                let (expected, found) = (before.of(at, 0), after.of(at, 0));
+                let (expected, found) = (before.primitives_of(at, 0), after.primitives_of(at, 0));
                 assert_eq!(expected.len(), found.len());
                 for (&expected, &found) in expected.iter().zip(found) {
                     let (a, b) = (

@@ -1,9 +1,9 @@
 //! Vertex shading alone: what the vertex program of a draw of points writes, for those who make something other than
 //! points of it.
 
-use super::elements::{Elements, Run};
 use super::fetch::Fetcher;
 use super::shade::{Shaded, Shader};
+use super::vertex_reuse::{RestartRun, VertexReuse};
 use super::viewport::Transform;
 use crate::packet::Draw;
 use crate::runtime::Runtime;
@@ -16,7 +16,7 @@ use std::sync::atomic::AtomicBool;
 pub(crate) struct PointShader<'a> {
     draw: &'a Draw,
     shader: Shader<'a>,
-    elements: Elements,
+    reuse: VertexReuse,
     shaded: Shaded,
 }
 
@@ -36,7 +36,7 @@ impl<'a> PointShader<'a> {
                 fetcher: Fetcher::new(draw, &mut machine),
                 machine,
                 outputs: &program.outputs,
-                takes_extras: false,
+                takes_optional: false,
                 level: runtime.level(),
                 transform: Transform::NONE,
                 resources,
@@ -45,7 +45,7 @@ impl<'a> PointShader<'a> {
                     cancel: Some(cancel),
                 },
             },
-            elements: Elements::default(),
+            reuse: VertexReuse::default(),
             shaded: Shaded::default(),
         }
     }
@@ -67,25 +67,25 @@ impl<'a> PointShader<'a> {
         end: u32,
         counters: &mut Counters,
     ) -> Result<(), Stopped> {
-        let run = Run {
+        let run = RestartRun {
             start: 0,
             primitives_before: 0,
             primitives: self.draw.count,
         };
-        self.elements.clear();
-        self.elements.push(self.draw, &run, instance, first, end);
-        let ran = self.shader.shade(&self.elements, &mut self.shaded);
+        self.reuse.clear();
+        self.reuse.push(self.draw, &run, instance, first, end);
+        let ran = self.shader.shade(&self.reuse, &mut self.shaded);
         counters.add_work(&self.shader.machine.take_work());
-        let invocations = self.elements.vertices.len() as u64;
+        let invocations = self.reuse.vertices.len() as u64;
         counters.add(Counter::VertexInvocations, invocations);
         ran
     }
 
     /// The position in clip space and the varyings of each point that was shaded last, in order.
     pub(crate) fn points(&self) -> impl Iterator<Item = ([f32; 4], &[u32])> {
-        let pieces = self.elements.pieces.iter();
+        let pieces = self.reuse.pieces.iter();
         let slots = pieces.flat_map(|piece| {
-            (piece.first..piece.end).map(|place| self.elements.slot(piece, place) as usize)
+            (piece.first..piece.end).map(|place| self.reuse.slot(piece, place) as usize)
         });
         let per_vertex = self.shader.outputs.varyings.len();
         slots.map(move |slot| {

@@ -35,7 +35,7 @@ pub struct Primitive {
     pub depth: [f32; 3],
     /// 1 / w at the vertices.
     pub inverse_w: [f32; 3],
-    /// The vertices at the corners, in [`PrimitiveChunk::varyings`].
+    /// The vertices at the corners, in [`PrimitiveSegment::varyings`].
     pub vertices: [u32; 3],
     /// The vertex that flat varyings are taken from.
     pub provoking: u32,

@@ -4,10 +4,10 @@ use super::assemble::{corner_count, corners};
 use super::bins::{Grid, Pair};
 use super::clip::{ClipVertex, Clipper, MOST_VERTICES};
 use super::depth_bias::{self, DepthUnit};
-use super::elements::Elements;
 use super::primitive::Primitive;
-use super::shade::{Extras, NO_EXTRAS, Shaded, Vertex};
-use super::viewport::{Projected, Transform, code};
+use super::shade::{NO_OPTIONAL_OUTPUTS, OptionalOutputs, Shaded, Vertex};
+use super::vertex_reuse::VertexReuse;
+use super::viewport::{Transform, WindowVertex, code};
 use crate::geometry::bins::{Pixels, bin};
 use crate::geometry::primitive::PrimitiveKind;
 use crate::geometry::viewport::{ONE, snap_away, snap_length};
@@ -18,7 +18,7 @@ use crate::simd::{both, three};
 use crate::state::{DrawState, PolygonMode, Rect};
 use devmem::host;
 
-/// What a chunk of primitives became. Vertices and primitives are numbered from 0.
+/// What a segment of primitives became. Vertices and primitives are numbered from 0.
 #[derive(Debug, Default)]
 pub(super) struct Output {
     pub primitives: Vec<Primitive>,
@@ -33,7 +33,7 @@ pub(super) struct Output {
 }
 
 impl Output {
-    /// Forgets an earlier chunk, but keeps its memory.
+    /// Forgets an earlier segment, but keeps its memory.
     pub(super) fn clear(&mut self) {
         self.primitives.clear();
         self.varyings.clear();
@@ -55,8 +55,8 @@ pub(super) struct Setup<'a> {
     pub depth_unit: DepthUnit,
 }
 
-/// A chunk being set up.
-pub(super) struct Job<'a> {
+/// A segment being set up.
+pub(super) struct SegmentSetup<'a> {
     pub(super) setup: &'a Setup<'a>,
     pub(super) shaded: &'a Shaded,
     /// By slot: the vertex's number in the output, or [`NONE`].
@@ -69,7 +69,7 @@ pub(super) const NONE: u32 = u32::MAX;
 
 /// The primitive being set up.
 #[derive(Clone, Copy)]
-pub(super) struct Current {
+pub(super) struct AssembledPrimitive {
     pub id: u32,
     /// Slots of its corners.
     pub slots: [u32; 3],
@@ -82,8 +82,8 @@ pub(super) struct Current {
 
 /// A vertex of a primitive after clipping.
 #[derive(Clone, Copy)]
-pub(super) struct Place<'p> {
-    pub projected: &'p Projected,
+pub(super) struct CornerVertex<'p> {
+    pub projected: &'p WindowVertex,
     pub origin: Origin,
 }
 
@@ -95,7 +95,7 @@ pub(super) enum Origin {
     New { number: u32 },
 }
 
-impl<'a> Job<'a> {
+impl<'a> SegmentSetup<'a> {
     /// `out` must be clear.
     pub(super) fn new(
         setup: &'a Setup<'a>,
@@ -113,15 +113,15 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Sets up all primitives of a chunk.
-    pub(super) fn run(mut self, elements: &Elements) {
+    /// Sets up all primitives of a segment.
+    pub(super) fn run(mut self, reuse: &VertexReuse) {
         let state = self.setup.state;
         let count = corner_count(state.topology);
-        for piece in &elements.pieces {
+        for piece in &reuse.pieces {
             for number in piece.first..piece.end {
                 let found = corners(state.topology, state.provoking_last, number);
-                let slots = three(found.places, |place| elements.slot(piece, place));
-                let mut current = Current {
+                let slots = three(found.places, |place| reuse.slot(piece, place));
+                let mut current = AssembledPrimitive {
                     id: piece.primitives_before.wrapping_add(number),
                     slots,
                     provoking: slots[found.provoking],
@@ -140,30 +140,33 @@ impl<'a> Job<'a> {
         }
     }
 
-    pub(super) fn extras(&self, slot: u32) -> &Extras {
-        self.shaded.extras.get(slot as usize).unwrap_or(&NO_EXTRAS)
+    pub(super) fn optional(&self, slot: u32) -> &OptionalOutputs {
+        self.shaded
+            .optional
+            .get(slot as usize)
+            .unwrap_or(&NO_OPTIONAL_OUTPUTS)
     }
 
     /// The provoking vertex says which layer and viewport a primitive is drawn to; what doesn't exist is the last
     /// layer, or the first viewport.
-    fn choose_target(&self, current: &mut Current) {
-        if self.shaded.extras.is_empty() {
+    fn choose_target(&self, current: &mut AssembledPrimitive) {
+        if self.shaded.optional.is_empty() {
             return;
         }
-        let extras = self.extras(current.provoking);
-        let layer = extras.layer.min(self.setup.layers.saturating_sub(1));
+        let optional = self.optional(current.provoking);
+        let layer = optional.layer.min(self.setup.layers.saturating_sub(1));
         current.layer = layer.min(u16::MAX.into()) as u16;
-        if (extras.viewport as usize) < self.setup.transforms.len() {
-            current.viewport = extras.viewport as u8;
+        if (optional.viewport as usize) < self.setup.transforms.len() {
+            current.viewport = optional.viewport as u8;
         }
     }
 
-    pub(super) fn transform(&self, current: &Current) -> &'a Transform {
+    pub(super) fn transform(&self, current: &AssembledPrimitive) -> &'a Transform {
         &self.setup.transforms[usize::from(current.viewport)]
     }
 
     /// A shaded vertex as the primitive's viewport, which is not the first, has it.
-    fn projected_again(&self, current: &Current, slot: u32) -> Vertex {
+    fn projected_again(&self, current: &AssembledPrimitive, slot: u32) -> Vertex {
         let mut vertex = self.shaded.vertices[slot as usize];
         let transform = self.transform(current);
         vertex.projected = transform.project(vertex.position);
@@ -177,8 +180,8 @@ impl<'a> Job<'a> {
     #[inline(always)]
     fn with_vertices<const N: usize>(
         &mut self,
-        current: &mut Current,
-        then: impl FnOnce(&mut Self, &mut Current, [&Vertex; N]),
+        current: &mut AssembledPrimitive,
+        then: impl FnOnce(&mut Self, &mut AssembledPrimitive, [&Vertex; N]),
     ) {
         let shaded = self.shaded;
         if current.viewport == 0 {
@@ -192,20 +195,20 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn point(&mut self, current: &mut Current, [vertex]: [&Vertex; 1]) {
+    fn point(&mut self, current: &mut AssembledPrimitive, [vertex]: [&Vertex; 1]) {
         if vertex.code & (code::CLIP | code::ANY_SIDE | code::ANY_CULL) != 0 {
             return;
         }
         self.out.clipped += 1;
         let slot = current.slots[0];
-        let place = Place {
+        let place = CornerVertex {
             projected: &vertex.projected,
             origin: Origin::Slot(slot),
         };
-        self.push_point(current, place, self.extras(slot).point_size, 0.0);
+        self.push_point(current, place, self.optional(slot).point_size, 0.0);
     }
 
-    fn line(&mut self, current: &mut Current, ends: [&Vertex; 2]) {
+    fn line(&mut self, current: &mut AssembledPrimitive, ends: [&Vertex; 2]) {
         let (all, any) = (ends[0].code & ends[1].code, ends[0].code | ends[1].code);
         // A wide line may reach into the view volume from beyond its side.
         if all & code::OUTSIDE & !code::ANY_SIDE != 0 || any & code::INVALID != 0 {
@@ -226,16 +229,16 @@ impl<'a> Job<'a> {
             }
         }
         self.out.clipped += 1;
-        let [from, to] = [0, 1].map(|end: usize| Place {
+        let [from, to] = [0, 1].map(|end: usize| CornerVertex {
             projected: &projected[end],
             origin: origins[end],
         });
         self.push_line(current, from, to, 0.0);
     }
 
-    fn clipper(&self, current: &Current) -> Clipper<'a> {
+    fn clipper(&self, current: &AssembledPrimitive) -> Clipper<'a> {
         let count = self.setup.outputs.clip.iter().rposition(Option::is_some);
-        let distances = current.slots.map(|slot| self.extras(slot).clip);
+        let distances = current.slots.map(|slot| self.optional(slot).clip);
         Clipper {
             transform: self.transform(current),
             distances,
@@ -244,7 +247,7 @@ impl<'a> Job<'a> {
     }
 
     #[inline(always)]
-    fn triangle(&mut self, current: &mut Current, vertices: [&Vertex; 3]) {
+    fn triangle(&mut self, current: &mut AssembledPrimitive, vertices: [&Vertex; 3]) {
         let [a, b, c] = three(vertices, |vertex| vertex.code);
         let (all, any) = (a & b & c, a | b | c);
         if all & code::OUTSIDE != 0 || any & code::INVALID != 0 {
@@ -259,7 +262,7 @@ impl<'a> Job<'a> {
         if !self.faces(current, area) {
             return;
         }
-        let place = |corner: usize| Place {
+        let place = |corner: usize| CornerVertex {
             projected: &vertices[corner].projected,
             origin: Origin::Slot(current.slots[corner]),
         };
@@ -272,7 +275,7 @@ impl<'a> Job<'a> {
     }
 
     #[cold]
-    fn clipped_triangle(&mut self, current: &mut Current, vertices: [&Vertex; 3]) {
+    fn clipped_triangle(&mut self, current: &mut AssembledPrimitive, vertices: [&Vertex; 3]) {
         let clipper = self.clipper(current);
         let polygon = clipper.triangle(vertices.map(|vertex| vertex.position));
         let clipped = polygon.vertices();
@@ -281,7 +284,7 @@ impl<'a> Job<'a> {
         }
         self.out.clipped += clipped.len() as u64 - 2;
         let transform = self.transform(current);
-        let mut projected = [Projected::default(); MOST_VERTICES];
+        let mut projected = [WindowVertex::default(); MOST_VERTICES];
         for (projected, vertex) in projected.iter_mut().zip(clipped) {
             *projected = match vertex.corner() {
                 Some(corner) => vertices[corner].projected,
@@ -295,12 +298,12 @@ impl<'a> Job<'a> {
         if !self.faces(current, area) || (fills && area == 0) {
             return;
         }
-        let mut places = [Place {
+        let mut places = [CornerVertex {
             projected: &projected[0],
             origin: Origin::Slot(current.slots[0]),
         }; MOST_VERTICES];
         for (number, vertex) in clipped.iter().enumerate() {
-            places[number] = Place {
+            places[number] = CornerVertex {
                 projected: &projected[number],
                 origin: match vertex.corner() {
                     Some(corner) => Origin::Slot(current.slots[corner]),
@@ -325,7 +328,7 @@ impl<'a> Job<'a> {
 
     /// Finds out which way a polygon of that area faces, and whether such polygons are drawn. y points down, so that
     /// a positive area is clockwise. One without area faces the back.
-    fn faces(&self, current: &mut Current, area: i64) -> bool {
+    fn faces(&self, current: &mut AssembledPrimitive, area: i64) -> bool {
         let state = self.setup.state;
         current.front = area != 0 && (area > 0) == state.front_clockwise;
         !if current.front {
@@ -336,7 +339,12 @@ impl<'a> Job<'a> {
     }
 
     /// Draws a polygon's edges, or their first vertices, where they belong to its outline.
-    fn outline(&mut self, current: &Current, places: &[Place], edge: impl Fn(usize) -> bool) {
+    fn outline(
+        &mut self,
+        current: &AssembledPrimitive,
+        places: &[CornerVertex],
+        edge: impl Fn(usize) -> bool,
+    ) {
         let bias = self.bias([places[0], places[1], places[2]]);
         let next = |place: usize| (place + 1) % places.len();
         for place in (0..places.len()).filter(|&place| edge(place)) {
@@ -344,15 +352,15 @@ impl<'a> Job<'a> {
                 self.push_line(current, places[place], places[next(place)], bias);
             } else {
                 let size = match places[place].origin {
-                    Origin::Slot(slot) => self.extras(slot).point_size,
-                    Origin::New { .. } => self.extras(current.provoking).point_size,
+                    Origin::Slot(slot) => self.optional(slot).point_size,
+                    Origin::New { .. } => self.optional(current.provoking).point_size,
                 };
                 self.push_point(current, places[place], size, bias);
             }
         }
     }
 
-    pub(super) fn bias(&self, corners: [Place; 3]) -> f32 {
+    pub(super) fn bias(&self, corners: [CornerVertex; 3]) -> f32 {
         match &self.setup.state.depth_bias {
             Some(bias) => {
                 let corners = corners.map(|place| place.projected);
@@ -393,9 +401,14 @@ struct Shape {
     pixels: Pixels,
 }
 
-impl Job<'_> {
+impl SegmentSetup<'_> {
     #[inline(always)]
-    pub(super) fn push_triangle(&mut self, current: &Current, places: [Place; 3], area: i64) {
+    pub(super) fn push_triangle(
+        &mut self,
+        current: &AssembledPrimitive,
+        places: [CornerVertex; 3],
+        area: i64,
+    ) {
         let [a, b, c] = places;
         let places = nearest_first(if area > 0 { [a, b, c] } else { [a, c, b] });
         let corners = three(places, |place| place.projected.snapped);
@@ -416,7 +429,13 @@ impl Job<'_> {
         self.push(current, &shape, places);
     }
 
-    pub(super) fn push_line(&mut self, current: &Current, from: Place, to: Place, bias: f32) {
+    pub(super) fn push_line(
+        &mut self,
+        current: &AssembledPrimitive,
+        from: CornerVertex,
+        to: CornerVertex,
+        bias: f32,
+    ) {
         let (a, b) = (from.projected.window, to.projected.window);
         let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
         let length = (dx * dx + dy * dy).sqrt();
@@ -449,7 +468,13 @@ impl Job<'_> {
         }
     }
 
-    pub(super) fn push_point(&mut self, current: &Current, place: Place, size: f32, bias: f32) {
+    pub(super) fn push_point(
+        &mut self,
+        current: &AssembledPrimitive,
+        place: CornerVertex,
+        size: f32,
+        bias: f32,
+    ) {
         let size = if size.is_nan() {
             1.0
         } else {
@@ -472,7 +497,7 @@ impl Job<'_> {
 
     /// The pixels that may have a sample within the bounds of these corners, where they may be drawn to.
     #[inline(always)]
-    fn pixels(&self, current: &Current, corners: &[[i32; 2]]) -> Option<Pixels> {
+    fn pixels(&self, current: &AssembledPrimitive, corners: &[[i32; 2]]) -> Option<Pixels> {
         // Where samples lie within a pixel: the least and the greatest coordinate.
         let (low, high) = if self.setup.state.samples == 1 {
             (128, 128)
@@ -501,7 +526,7 @@ impl Job<'_> {
     }
 
     #[inline(always)]
-    fn push(&mut self, current: &Current, shape: &Shape, places: [Place; 3]) {
+    fn push(&mut self, current: &AssembledPrimitive, shape: &Shape, places: [CornerVertex; 3]) {
         let vertices = three(places, |place| self.number(place.origin));
         let provoking = self.number(Origin::Slot(current.provoking));
         let primitive = Primitive {
@@ -546,7 +571,11 @@ impl Job<'_> {
     }
 
     /// Makes a vertex that clipping found, and puts its varyings into the output.
-    pub(super) fn new_vertex(&mut self, current: &Current, vertex: &ClipVertex) -> Origin {
+    pub(super) fn new_vertex(
+        &mut self,
+        current: &AssembledPrimitive,
+        vertex: &ClipVertex,
+    ) -> Origin {
         let number = self.out.vertices;
         self.out.vertices += 1;
         let weights = vertex.weights;
@@ -587,7 +616,7 @@ impl Job<'_> {
 /// Turned so that no vertex is nearer than the first. What varies is found as its value there and what others add: a far
 /// vertex may have a value so great that too little is left of the sum near the eye.
 #[inline(always)]
-fn nearest_first([a, b, c]: [Place<'_>; 3]) -> [Place<'_>; 3] {
+fn nearest_first([a, b, c]: [CornerVertex<'_>; 3]) -> [CornerVertex<'_>; 3] {
     let [wa, wb, wc] = three([a, b, c], |place| place.projected.inverse_w);
     if wb > wa && wb >= wc {
         [b, c, a]
@@ -600,10 +629,10 @@ fn nearest_first([a, b, c]: [Place<'_>; 3]) -> [Place<'_>; 3] {
 
 /// Where a triangle's vertices were before snapping, from its corners.
 #[inline(always)]
-fn offsets(places: [Place; 3]) -> [[i16; 2]; 3] {
+fn offsets(places: [CornerVertex; 3]) -> [[i16; 2]; 3] {
     let mut offsets = UNMOVED;
     for (offset, place) in offsets.iter_mut().zip(places) {
-        let Projected {
+        let WindowVertex {
             window, snapped, ..
         } = place.projected;
         for axis in 0..2 {

@@ -1,8 +1,8 @@
-//! Vertex shading: runs the vertex program on the vertices of a chunk, and projects what it wrote.
+//! Vertex shading: runs the vertex program on the vertices of a segment, and projects what it wrote.
 
-use super::elements::Elements;
 use super::fetch::Fetcher;
-use super::viewport::{Projected, Projections, Transform, code};
+use super::vertex_reuse::VertexReuse;
+use super::viewport::{Projections, Transform, WindowVertex, code};
 use crate::limits::MAX_CLIP_CULL_DISTANCES;
 use crate::program::pool::PooledMachine;
 use crate::program::vertex::{VERTEX_BATCH, VertexOutputs};
@@ -17,14 +17,14 @@ use isa::resources::Resources;
 pub(super) struct Vertex {
     /// In clip space.
     pub position: [f32; 4],
-    pub projected: Projected,
+    pub projected: WindowVertex,
     /// See [`code`].
     pub code: u32,
 }
 
 /// What only some vertex programs write.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Extras {
+pub(super) struct OptionalOutputs {
     pub point_size: f32,
     pub layer: u32,
     pub viewport: u32,
@@ -32,8 +32,8 @@ pub(super) struct Extras {
     pub cull: [f32; MAX_CLIP_CULL_DISTANCES],
 }
 
-/// What extras are where nothing is written.
-pub(super) const NO_EXTRAS: Extras = Extras {
+/// The optional outputs where nothing is written.
+pub(super) const NO_OPTIONAL_OUTPUTS: OptionalOutputs = OptionalOutputs {
     point_size: 1.0,
     layer: 0,
     viewport: 0,
@@ -41,12 +41,12 @@ pub(super) const NO_EXTRAS: Extras = Extras {
     cull: [0.0; MAX_CLIP_CULL_DISTANCES],
 };
 
-/// The shaded vertices of a chunk, by slot.
+/// The shaded vertices of a segment, by slot.
 #[derive(Debug, Default)]
 pub(super) struct Shaded {
     pub vertices: Vec<Vertex>,
     /// Empty if no vertex has any.
-    pub extras: Vec<Extras>,
+    pub optional: Vec<OptionalOutputs>,
     /// Vertex by vertex.
     pub varyings: Vec<u32>,
 }
@@ -57,7 +57,7 @@ pub(super) struct Shader<'a> {
     pub fetcher: Fetcher<'a>,
     pub outputs: &'a VertexOutputs,
     /// Whether more than positions and varyings is looked at.
-    pub takes_extras: bool,
+    pub takes_optional: bool,
     pub level: Level,
     pub transform: Transform,
     pub resources: &'a Resources<'a>,
@@ -65,19 +65,19 @@ pub(super) struct Shader<'a> {
 }
 
 impl Shader<'_> {
-    /// Shades all vertices of a chunk.
+    /// Shades all vertices of a segment.
     pub(super) fn shade(
         &mut self,
-        elements: &Elements,
+        reuse: &VertexReuse,
         shaded: &mut Shaded,
     ) -> Result<(), Stopped> {
         shaded.vertices.clear();
-        shaded.extras.clear();
+        shaded.optional.clear();
         shaded.varyings.clear();
-        let batches = elements
+        let batches = reuse
             .vertices
             .chunks(VERTEX_BATCH)
-            .zip(elements.instances.chunks(VERTEX_BATCH));
+            .zip(reuse.instances.chunks(VERTEX_BATCH));
         for (vertices, instances) in batches {
             self.fetcher.fetch(&mut self.machine, vertices, instances);
             self.machine.run(
@@ -116,7 +116,7 @@ impl Shader<'_> {
                         position[2][lane],
                         position[3][lane],
                     ],
-                    projected: Projected {
+                    projected: WindowVertex {
                         window: [projections.window[0][lane], projections.window[1][lane]],
                         snapped: [projections.snapped[0][lane], projections.snapped[1][lane]],
                         depth: projections.depth[lane],
@@ -126,8 +126,8 @@ impl Shader<'_> {
                 };
             }
         }
-        if self.takes_extras {
-            self.take_extras(count, shaded);
+        if self.takes_optional {
+            self.take_optional(count, shaded);
         }
         let per_vertex = outputs.varyings.len();
         if per_vertex > 0 {
@@ -151,41 +151,41 @@ impl Shader<'_> {
         dispatch!(self.level, _ => transform.project_all(position))
     }
 
-    fn take_extras(&self, count: usize, shaded: &mut Shaded) {
+    fn take_optional(&self, count: usize, shaded: &mut Shaded) {
         let outputs = self.outputs;
-        let first = shaded.extras.len();
-        shaded.extras.resize(first + count, NO_EXTRAS);
-        let extras = &mut shaded.extras[first..];
+        let first = shaded.optional.len();
+        shaded.optional.resize(first + count, NO_OPTIONAL_OUTPUTS);
+        let optional = &mut shaded.optional[first..];
         let machine = &self.machine;
-        for_lanes(machine, outputs.point_size, extras, |extras, bits| {
-            extras.point_size = f32::from_bits(bits);
+        for_lanes(machine, outputs.point_size, optional, |optional, bits| {
+            optional.point_size = f32::from_bits(bits);
         });
-        for_lanes(machine, outputs.layer, extras, |extras, bits| {
-            extras.layer = bits;
+        for_lanes(machine, outputs.layer, optional, |optional, bits| {
+            optional.layer = bits;
         });
-        for_lanes(machine, outputs.viewport, extras, |extras, bits| {
-            extras.viewport = bits;
+        for_lanes(machine, outputs.viewport, optional, |optional, bits| {
+            optional.viewport = bits;
         });
         for index in 0..MAX_CLIP_CULL_DISTANCES {
-            for_lanes(machine, outputs.clip[index], extras, |extras, bits| {
-                extras.clip[index] = f32::from_bits(bits);
+            for_lanes(machine, outputs.clip[index], optional, |optional, bits| {
+                optional.clip[index] = f32::from_bits(bits);
             });
-            for_lanes(machine, outputs.cull[index], extras, |extras, bits| {
-                extras.cull[index] = f32::from_bits(bits);
+            for_lanes(machine, outputs.cull[index], optional, |optional, bits| {
+                optional.cull[index] = f32::from_bits(bits);
             });
         }
         if outputs.has_distances() {
-            for (vertex, extras) in shaded.vertices[first..].iter_mut().zip(extras) {
-                vertex.code |= distance_code(extras);
+            for (vertex, optional) in shaded.vertices[first..].iter_mut().zip(optional) {
+                vertex.code |= distance_code(optional);
             }
         }
     }
 }
 
 /// The part of a vertex's code that its distances make.
-fn distance_code(extras: &Extras) -> u32 {
+fn distance_code(optional: &OptionalOutputs) -> u32 {
     let mut bits = 0;
-    for (index, distance) in extras.clip.iter().enumerate() {
+    for (index, distance) in optional.clip.iter().enumerate() {
         if *distance < 0.0 {
             bits |= code::USER << index;
         }
@@ -193,7 +193,7 @@ fn distance_code(extras: &Extras) -> u32 {
             bits |= code::INVALID;
         }
     }
-    for (index, distance) in extras.cull.iter().enumerate() {
+    for (index, distance) in optional.cull.iter().enumerate() {
         if *distance < 0.0 {
             bits |= code::CULL << index;
         }

@@ -54,7 +54,7 @@ pub(super) struct Transform {
 
 /// A vertex in the framebuffer.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Projected {
+pub(super) struct WindowVertex {
     /// Pixels, not snapped.
     pub window: [f32; 2],
     /// 1/256 pixels.
@@ -128,14 +128,14 @@ impl Transform {
     /// Divides by w and maps to the viewport. Each coordinate is rounded after the division and once more after
     /// multiplication and addition, which are fused.
     #[inline(always)]
-    pub(super) fn project(&self, [x, y, z, w]: [f32; 4]) -> Projected {
+    pub(super) fn project(&self, [x, y, z, w]: [f32; 4]) -> WindowVertex {
         let inverse_w = 1.0 / w;
         let map = |ndc: f32, axis: usize| {
             let (scale, translate) = (self.scale[axis], self.translate[axis]);
             (f64::from(ndc) * f64::from(scale) + f64::from(translate)) as f32
         };
         let window = [map(x * inverse_w, 0), map(y * inverse_w, 1)];
-        Projected {
+        WindowVertex {
             window,
             snapped: [snap(window[0]), snap(window[1])],
             depth: map(z * inverse_w, 2),
@@ -145,7 +145,7 @@ impl Transform {
 
     /// Why a vertex at this position needs clipping; `projected` is its projection.
     #[inline(always)]
-    pub(super) fn code(&self, position: [f32; 4], projected: &Projected) -> u32 {
+    pub(super) fn code(&self, position: [f32; 4], projected: &WindowVertex) -> u32 {
         let [x, y, z, w] = position;
         let bit = |condition: bool, bit: u32| if condition { bit } else { 0 };
         let finite = (x * 0.0 + y * 0.0) + (z * 0.0 + w * 0.0) == 0.0;

@@ -8,7 +8,8 @@ use super::transfer::{
     BlitImage, ClearImage, CopyBuffer, CopyBufferImage, CopyImage, ResolveImage,
 };
 use super::{
-    ClearAttachments, Dispatch, Draw, GaussianAppend, GaussianBegin, Rendering, ResolveShader,
+    ClearAttachments, Dispatch, Draw, GaussianAppend, GaussianBegin, GaussianFragmentStage,
+    Rendering,
 };
 use crate::stats::query::QueryPool;
 use devmem::BufferRange;
@@ -60,9 +61,9 @@ pub enum Packet {
     /// were added with attributes.
     GaussianAppendDraw(Box<Draw>),
     /// Has a fragment program make the colours of the set's fragments.
-    GaussianResolveShader(Box<ResolveShader>),
+    GaussianFragmentStage(Box<GaussianFragmentStage>),
     /// Ends the set: it is sorted, binned and becomes one draw of the current pass.
-    GaussianResolve,
+    GaussianEnd,
     /// Runs workgroups of a compute program.
     Dispatch(Box<Dispatch>),
     /// Draws points, lines or triangles in the current pass.
@@ -173,8 +174,8 @@ impl Display for Packet {
             Self::GaussianBegin(begin) => write!(f, "{}", gaussian_begin(begin)),
             Self::GaussianAppend(append) => write!(f, "{}", gaussian_append(append)),
             Self::GaussianAppendDraw(draw) => write!(f, "{}", gaussian_append_draw(draw)),
-            Self::GaussianResolveShader(_) => f.write_str("shade the fragments of gaussians"),
-            Self::GaussianResolve => f.write_str("resolve gaussians"),
+            Self::GaussianFragmentStage(_) => f.write_str("shade the fragments of gaussians"),
+            Self::GaussianEnd => f.write_str("end gaussians"),
             Self::Dispatch(dispatch) => {
                 let [x, y, z] = dispatch.count;
                 write!(f, "dispatch {x}x{y}x{z} workgroups")?;

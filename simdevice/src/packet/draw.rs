@@ -1,38 +1,11 @@
 //! Draws of points, lines and triangles, and dispatches.
 
-use crate::format::Format;
+use super::streams::{AttributeStream, IndexStream};
 use crate::program::bindings::Bindings;
 use crate::program::compute::ComputeProgram;
 use crate::program::vertex::DrawPipeline;
 use crate::state::DrawState;
-use devmem::BufferRange;
 use std::sync::Arc;
-
-/// Where one vertex attribute is read from. An element outside `buffer` reads as zero.
-#[derive(Clone, Debug)]
-pub struct AttributeStream {
-    /// The vertex buffer, from the bound offset on.
-    pub buffer: BufferRange,
-    /// Bytes from one vertex to the next.
-    pub stride: u32,
-    /// Bytes from the vertex's start to the attribute.
-    pub offset: u32,
-    /// How it is stored.
-    pub format: Format,
-    /// Read by instance (advancing every `divisor` instances; 0: never) instead of by vertex.
-    pub instance_divisor: Option<u32>,
-}
-
-/// An index buffer.
-#[derive(Clone, Debug)]
-pub struct IndexStream {
-    /// The indices, from the bound offset on.
-    pub buffer: BufferRange,
-    /// Bytes per index: 1, 2 or 4.
-    pub index_size: u32,
-    /// Added to every index.
-    pub vertex_offset: i32,
-}
 
 /// See [`Packet::Draw`](crate::Packet::Draw) and [`Packet::GaussianAppendDraw`](crate::Packet::GaussianAppendDraw).
 #[derive(Clone, Debug)]

@@ -70,10 +70,10 @@ pub struct GaussianAppend {
     pub instance_count: u32,
 }
 
-/// See [`Packet::GaussianResolveShader`](crate::Packet::GaussianResolveShader). Blending and write masks are those of the
+/// See [`Packet::GaussianFragmentStage`](crate::Packet::GaussianFragmentStage). Blending and write masks are those of the
 /// [`GaussianState`](super::GaussianState), one per attachment.
 #[derive(Clone, Debug)]
-pub struct ResolveShader {
+pub struct GaussianFragmentStage {
     /// The program.
     pub program: Arc<GaussianFragmentProgram>,
     /// What it is bound to.

@@ -5,15 +5,17 @@ mod display;
 mod draw;
 mod gaussian;
 mod rendering;
+mod streams;
 mod transfer;
 
 pub use command::Packet;
 pub use devmem::BufferRange;
-pub use draw::{AttributeStream, Dispatch, Draw, IndexStream};
+pub use draw::{Dispatch, Draw};
 pub use gaussian::{
-    GaussianAppend, GaussianAttributes, GaussianBegin, ModelAttributes, ResolveShader,
+    GaussianAppend, GaussianAttributes, GaussianBegin, GaussianFragmentStage, ModelAttributes,
 };
 pub use rendering::{Attachment, AttachmentClear, ClearAttachments, LoadOp, Rendering, StoreOp};
+pub use streams::{AttributeStream, IndexStream};
 pub use transfer::{
     BlitImage, BufferCopyRegion, BufferImageRegion, ClearImage, CopyBuffer, CopyBufferImage,
     CopyImage, ImageBlitRegion, ImageCopyRegion, ResolveImage, SubresourceLayers, SubresourceRange,

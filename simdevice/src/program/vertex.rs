@@ -143,7 +143,7 @@ impl VertexOutputs {
     }
 
     /// Whether a vertex has more to it than position and varyings, in draws of points or of others.
-    pub(crate) fn has_extras(&self, points: bool) -> bool {
+    pub(crate) fn has_optional(&self, points: bool) -> bool {
         points && self.point_size.is_some()
             || self.layer.is_some()
             || self.viewport.is_some()

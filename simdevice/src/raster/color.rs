@@ -1,9 +1,8 @@
 //! What fragments make of a colour attachment, 16 at a time: blending or a logic operation, the write mask, and the
-//! attachment's format. [`super::blend::Blender`] says the same of one fragment.
+//! attachment's format. Tests hold them against a naive twin of one fragment.
 
-use super::blend::clamp_range;
-use super::quads::Quads;
 use super::tile::AREA;
+use super::tile_buffer::QuadAddresses;
 use crate::format::unorm8::{Colors, clamp, pack_unorm8, pack_unorm8_in_range, unpack_unorm8};
 use crate::format::{Component, Format, MAX_TEXEL_SIZE, Numeric};
 use crate::simd::{as_floats, bits_of, floats_of};
@@ -56,6 +55,15 @@ impl Over {
         } else {
             None
         }
+    }
+}
+
+/// What colours are clamped to before they are blended in a format.
+pub(super) fn clamp_range(format: Format) -> Option<(f32, f32)> {
+    match format.numeric() {
+        Numeric::Unorm | Numeric::Srgb => Some((0.0, 1.0)),
+        Numeric::Snorm => Some((-1.0, 1.0)),
+        _ => None,
     }
 }
 
@@ -141,7 +149,7 @@ impl ColorOutput {
         })
     }
 
-    /// Blends fragments into the texels of a plane (`words`, its memory).
+    /// Blends fragments into the texels of a tile buffer (`words`, its memory).
     #[inline(always)]
     pub fn write<S: Simd>(
         &self,
@@ -149,7 +157,7 @@ impl ColorOutput {
         source: &Colors<S>,
         second: &Colors<S>,
         lanes: u16,
-        quads: &Quads,
+        quads: &QuadAddresses,
         words: &mut [u32],
     ) {
         match self.codec {
@@ -193,7 +201,7 @@ impl ColorOutput {
         }
     }
 
-    /// Blends the fragments of a tile, which are all covered, into its texels: those of a plane (`words`, its memory) from
+    /// Blends the fragments of a tile, which are all covered, into its texels: those of a tile buffer (`words`, its memory) from
     /// `first` on.
     #[inline(always)]
     pub fn write_tile<S: Simd>(
@@ -230,12 +238,12 @@ impl ColorOutput {
             if dual {
                 second = load(simd, &sources[1], chunk);
             }
-            let quads = Quads::block(first + 16 * chunk);
+            let quads = QuadAddresses::block(first + 16 * chunk);
             self.write(simd, &source, &second, u16::MAX, &quads, words);
         }
     }
 
-    /// The words that replace a plane's texels, whatever those are; `None` if they matter, or aren't words.
+    /// The words that replace a tile buffer's texels, whatever those are; `None` if they matter, or aren't words.
     #[inline(always)]
     pub fn replacement<S: Simd>(&self, simd: S, source: &Colors<S>) -> Option<[u32; 16]> {
         match self.codec {
@@ -256,7 +264,7 @@ impl ColorOutput {
         source: &Colors<S>,
         second: &Colors<S>,
         lanes: u16,
-        quads: &Quads,
+        quads: &QuadAddresses,
         words: &mut [u32],
     ) {
         let blended = match self.equations {
@@ -310,7 +318,7 @@ impl ColorOutput {
         source: &Colors<S>,
         second: &Colors<S>,
         lanes: u16,
-        quads: &Quads,
+        quads: &QuadAddresses,
         words: &mut [u32],
     ) {
         let size = self.format.texel_size();
@@ -335,7 +343,7 @@ impl ColorOutput {
         &self,
         components: &[[f32; 16]; 4],
         lanes: u16,
-        quads: &Quads,
+        quads: &QuadAddresses,
         bytes: &mut [u8],
         size: usize,
     ) {
@@ -520,7 +528,7 @@ fn blend_over<S: Simd>(
 
 /// The texels of 16 lanes.
 #[inline(never)]
-fn decode(format: Format, bytes: &[u8], quads: &Quads) -> [[f32; 4]; 16] {
+fn decode(format: Format, bytes: &[u8], quads: &QuadAddresses) -> [[f32; 4]; 16] {
     let size = format.texel_size();
     let mut stored = [0; 16 * MAX_TEXEL_SIZE];
     for (lane, texel) in stored[..16 * size].chunks_exact_mut(size).enumerate() {

@@ -1,9 +1,8 @@
 //! Where fragments of both modes go: tile buffers, attachments, and the sources of their colours.
 
 use crate::program::fragment::FragmentStage;
-use crate::raster::Plane;
 use crate::raster::color::ColorOutput;
-use crate::raster::tile::Target;
+use crate::raster::tile_buffer::{Target, TileBuffer};
 use crate::simd::as_floats;
 use crate::state::{BlendState, LogicOp};
 use fearless_simd::Simd;
@@ -35,9 +34,9 @@ pub fn lanes_of(machine: &Machine, slot: Option<u32>) -> &[Chunk] {
 /// The tile buffers of a worker.
 #[derive(Debug)]
 pub struct Buffers {
-    pub color: Vec<Plane>,
-    pub depth: Plane,
-    pub stencil: Plane,
+    pub color: Vec<TileBuffer>,
+    pub depth: TileBuffer,
+    pub stencil: TileBuffer,
 }
 
 /// The attachments of a pass.

@@ -3,7 +3,6 @@
 //! Pixels are kept in an order in which 2x2 quads are consecutive, then 4x4 blocks, then rows of blocks, so that a quad
 //! is four lanes of a vector and a block all sixteen.
 
-pub use super::target::{AttachmentError, Target};
 pub use crate::limits::MAX_FRAMEBUFFER_SIZE;
 use crate::limits::{MAX_MACRO_TILE_SIZE, TILE_SIZE};
 use crate::state::Rect;
@@ -12,7 +11,7 @@ use crate::state::Rect;
 pub const SIDE: usize = TILE_SIZE as usize;
 /// Pixels of a tile.
 pub const AREA: usize = SIDE * SIDE;
-// A plane keeps a bit per tile.
+// A tile buffer keeps a bit per tile.
 const _: () = assert!((MAX_MACRO_TILE_SIZE / TILE_SIZE).pow(2) <= u64::BITS);
 
 /// Where the pixel at (x, y) from a tile's corner stands in the tile.
@@ -74,6 +73,12 @@ impl Tile {
         ]
     }
 }
+
+/// Vulkan's standard sample positions of 4 samples, in 1/256 pixels.
+pub const SAMPLES_4: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];
+
+/// The only sample of a pixel is at its centre, in 1/256 pixels.
+pub const CENTER: [[i32; 2]; 1] = [[128, 128]];
 
 /// The column of each lane of a block.
 pub const LANE_X: [i32; 16] = lanes(0);

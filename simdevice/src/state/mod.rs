@@ -150,7 +150,7 @@ pub enum PolygonMode {
     Point,
 }
 
-/// A comparison: `reference op stored`.
+/// A comparison of a reference with what memory holds: `reference op stored`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs, reason = "the names are Vulkan's")]
 pub enum CompareOp {
@@ -162,6 +162,24 @@ pub enum CompareOp {
     NotEqual,
     GreaterOrEqual,
     Always,
+}
+
+impl CompareOp {
+    /// Tells whether it holds. A comparison with NaN is false, but for [`CompareOp::NotEqual`] and
+    /// [`CompareOp::Always`].
+    #[inline(always)]
+    pub fn holds<T: PartialOrd>(self, reference: T, stored: T) -> bool {
+        match self {
+            Self::Never => false,
+            Self::Less => reference < stored,
+            Self::Equal => reference == stored,
+            Self::LessOrEqual => reference <= stored,
+            Self::Greater => reference > stored,
+            Self::NotEqual => reference != stored,
+            Self::GreaterOrEqual => reference >= stored,
+            Self::Always => true,
+        }
+    }
 }
 
 /// What becomes of a stencil value.

@@ -7,7 +7,7 @@ use super::cube::Hit;
 use super::sampler::{Filter, MipmapMode, Sampler};
 use super::surface::Surface;
 use crate::limits::MAX_LOD_BIAS;
-use crate::texture::packing::Floats;
+use crate::texture::texels::Floats;
 use isa::ir::{CHUNK_LANES, Dimension};
 use isa::resources::{Lanes, LodRequest, SampleRequest};
 

@@ -5,26 +5,23 @@
 //! specification says. Weights are binary32 throughout, sRGB is decoded before it is filtered, cubes are seamless.
 //! Hostile coordinates are safe: NaN counts as 0, and everything is bounds-checked.
 //!
-//! There are two ways to filter: lane by lane (`filter`), which does everything, and 16 lanes at once (`batch`), which
+//! There are two ways to filter: lane by lane (`scalar`), which does everything, and 16 lanes at once (`vector`), which
 //! does the common formats. They agree bit for bit, at every SIMD level.
 
-mod address;
-mod axis;
-mod batch;
+mod addressing;
 mod cube;
-mod fetch;
-mod filter;
 mod lod;
-mod packing;
-mod plain;
 mod sampler;
+mod scalar;
 mod surface;
 mod table;
 #[cfg(test)]
 mod tests;
+mod texels;
+mod vector;
 mod view;
 
-pub use sampler::{AddressMode, BorderColor, CompareOp, Filter, MipmapMode, Sampler};
+pub use sampler::{AddressMode, BorderColor, Filter, MipmapMode, Sampler};
 pub use table::ImageTable;
 pub use view::{
     ComponentSwizzle, IDENTITY, ImageBinding, SampledImage, StorageImage, Swizzle, TexelBuffer,

@@ -1,5 +1,7 @@
 //! Samplers: how coordinates become texels and how texels are mixed.
 
+use crate::state::CompareOp;
+
 /// How texels of one mip level are mixed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Filter {
@@ -34,44 +36,6 @@ pub enum AddressMode {
     ClampToBorder,
     /// The image is mirrored once, then its edge goes on.
     MirrorClampToEdge,
-}
-
-/// A comparison of a reference with what memory holds: `reference op texel`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum CompareOp {
-    /// False.
-    Never,
-    /// `reference < texel`.
-    Less,
-    /// `reference == texel`.
-    Equal,
-    /// `reference <= texel`.
-    LessOrEqual,
-    /// `reference > texel`.
-    Greater,
-    /// `reference != texel`.
-    NotEqual,
-    /// `reference >= texel`.
-    GreaterOrEqual,
-    /// True.
-    Always,
-}
-
-impl CompareOp {
-    /// Whether it holds. A comparison with NaN is false, but for [`CompareOp::NotEqual`] and [`CompareOp::Always`].
-    #[inline(always)]
-    pub fn holds(self, reference: f32, texel: f32) -> bool {
-        match self {
-            Self::Never => false,
-            Self::Less => reference < texel,
-            Self::Equal => reference == texel,
-            Self::LessOrEqual => reference <= texel,
-            Self::Greater => reference > texel,
-            Self::NotEqual => reference != texel,
-            Self::GreaterOrEqual => reference >= texel,
-            Self::Always => true,
-        }
-    }
 }
 
 /// What [`AddressMode::ClampToBorder`] reads outside the image: the bits of red, green, blue, alpha. Floats or

@@ -3,7 +3,7 @@
 use devmem::Allocation;
 use std::sync::Arc;
 
-use super::packing::{Kind, PackedLevel, Packing};
+use super::texels::{PackedLevel, TexelCodec, VectorLayout};
 use super::view::{ComponentSwizzle, IDENTITY, SampledImage, StorageImage, Swizzle, TexelBuffer};
 use crate::format::{Aspect, Channel, Format, MAX_TEXEL_SIZE};
 use crate::image::ImageView;
@@ -48,7 +48,7 @@ pub(super) struct Surface {
     pub samples: u32,
     pub swizzle: Swizzle,
     /// How 16 texels are decoded at once, if that is known.
-    pub packing: Option<Packing>,
+    pub layout: Option<VectorLayout>,
     /// Texels may be written.
     pub writable: bool,
 }
@@ -103,16 +103,16 @@ impl Surface {
             layers,
             samples: image.desc.samples,
             swizzle: IDENTITY,
-            packing: None,
+            layout: None,
             writable: false,
         };
-        surface.packing = surface.find_packing();
+        surface.layout = surface.find_packing();
         Some(surface)
     }
 
     /// How its texels are read 16 at a time; None if they are to be read one by one.
-    fn find_packing(&self) -> Option<Packing> {
-        let kind = Kind::of(self.format)?;
+    fn find_packing(&self) -> Option<VectorLayout> {
+        let kind = TexelCodec::of(self.format)?;
         let begin = self.levels.iter().map(|level| level.offset).min()?;
         let end = self
             .levels
@@ -148,7 +148,7 @@ impl Surface {
             let found = components.iter().position(|c| c.channel == channel);
             found.unwrap_or(otherwise)
         };
-        Some(Packing {
+        Some(VectorLayout {
             kind,
             words: (begin / 4) as usize..(end.min(self.memory.len()) / 4) as usize,
             levels: levels.collect::<Option<_>>()?,
@@ -185,7 +185,7 @@ impl Surface {
             layers: 1,
             samples: 1,
             swizzle: IDENTITY,
-            packing: None,
+            layout: None,
             writable: true,
         })
     }

@@ -6,7 +6,7 @@ use fearless_simd::Level;
 use super::sampler::Sampler;
 use super::surface::Surface;
 use super::view::ImageBinding;
-use super::{batch, fetch, filter, lod, plain};
+use super::{lod, scalar, vector};
 use isa::ir::{AtomicOp, Dimension, ImageShape};
 use isa::resources::{ImageUnit, Lanes, SampleRequest, TexelRequest};
 
@@ -67,25 +67,25 @@ impl ImageUnit for ImageTable {
         };
         let batched = if self.batched {
             dispatch!(self.level, simd => {
-                match plain::sample(simd, surface, sampler, request) {
-                    None => batch::sample(simd, surface, sampler, request),
+                match vector::bilinear(simd, surface, sampler, request) {
+                    None => vector::general(simd, surface, sampler, request),
                     found => found,
                 }
             })
         } else {
             None
         };
-        batched.unwrap_or_else(|| filter::sample(surface, sampler, request))
+        batched.unwrap_or_else(|| scalar::sample(surface, sampler, request))
     }
 
     fn read(&self, image: u32, request: &TexelRequest) -> [Lanes; 4] {
         self.surface(image)
-            .map_or_else(Default::default, |surface| fetch::read(surface, request))
+            .map_or_else(Default::default, |surface| scalar::read(surface, request))
     }
 
     fn write(&self, image: u32, request: &TexelRequest, texel: &[Lanes; 4]) {
         if let Some(surface) = self.surface(image) {
-            fetch::write(surface, request, texel);
+            scalar::write(surface, request, texel);
         }
     }
 
@@ -99,7 +99,7 @@ impl ImageUnit for ImageTable {
     ) -> Lanes {
         self.surface(image)
             .map_or_else(Default::default, |surface| {
-                fetch::atomic(surface, request, op, value, comparator)
+                scalar::atomic(surface, request, op, value, comparator)
             })
     }
 

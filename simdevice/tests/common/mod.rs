@@ -137,7 +137,7 @@ pub fn gaussians_in(host_visible: bool, seed: u64, count: u32, blend: BlendState
     vec![
         Packet::GaussianBegin(Box::new(begin(blend))),
         Packet::GaussianAppend(Box::new(append)),
-        Packet::GaussianResolve,
+        Packet::GaussianEnd,
     ]
 }
 

@@ -235,7 +235,7 @@ fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
     };
     vec![
         Packet::GaussianBegin(Box::new(begin(OVER))),
-        Packet::GaussianResolveShader(Box::new(ResolveShader {
+        Packet::GaussianFragmentStage(Box::new(GaussianFragmentStage {
             program: Arc::new(GaussianFragmentProgram::new(device.level(), &resolved).unwrap()),
             bindings: Bindings::default(),
             sample_shading: false,
@@ -255,7 +255,7 @@ fn shaded(device: &Device, seed: u64, count: u32) -> Vec<Packet> {
             instance_count: 1,
             draw_index: 0,
         })),
-        Packet::GaussianResolve,
+        Packet::GaussianEnd,
     ]
 }
 

@@ -83,7 +83,7 @@ fn sets_of_gaussians_do_not_nest_or_outlive_the_pass() {
     processor.execute(begin).unwrap();
     processor.reset();
     assert_eq!(
-        processor.execute(&Packet::GaussianResolve),
+        processor.execute(&Packet::GaussianEnd),
         Err(ExecutionError::NoGaussianSet)
     );
     processor.execute(&pass()).unwrap();

@@ -513,6 +513,6 @@ fn gaussians(
     vec![
         Packet::GaussianBegin(Box::new(begin)),
         Packet::GaussianAppend(Box::new(append)),
-        Packet::GaussianResolve,
+        Packet::GaussianEnd,
     ]
 }

@@ -10,7 +10,7 @@ use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
 use simdevice::packet::{
     Attachment, AttributeStream, BufferRange, Draw, GaussianAppend, GaussianAttributes,
-    GaussianBegin, LoadOp, ModelAttributes, Rendering, ResolveShader, StoreOp,
+    GaussianBegin, LoadOp, ModelAttributes, Rendering, GaussianFragmentStage, StoreOp,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::program::interface::{DrawPrograms, VertexInput, VertexOutput, gaussian};
@@ -229,7 +229,7 @@ pub struct Case<'a> {
     /// Parts of them that are draws of their own.
     pub draws: Vec<Draw>,
     pub depth: Option<(CompareOp, bool)>,
-    pub resolve: Option<ResolveShader>,
+    pub resolve: Option<GaussianFragmentStage>,
     /// What is drawn before.
     pub before: Vec<Draw>,
     /// Gaussians that the device projects, with the camera that sees them, in place of the draws.
@@ -394,7 +394,7 @@ impl Case<'_> {
             scissor: everything,
         })));
         let shader = self.resolve.iter().cloned();
-        packets.extend(shader.map(|shader| Packet::GaussianResolveShader(Box::new(shader))));
+        packets.extend(shader.map(|shader| Packet::GaussianFragmentStage(Box::new(shader))));
         let append = |append| Packet::GaussianAppend(Box::new(append));
         packets.extend(appends.into_iter().map(append));
         packets.extend(draws.iter().map(|draw| {
@@ -407,7 +407,7 @@ impl Case<'_> {
                 ..draw.clone()
             }))
         }));
-        packets.extend([Packet::GaussianResolve, Packet::EndRendering]);
+        packets.extend([Packet::GaussianEnd, Packet::EndRendering]);
         let mut processor = CommandProcessor::new(Arc::clone(device));
         for packet in &packets {
             processor.execute(packet).expect("it fits");

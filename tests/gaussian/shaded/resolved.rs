@@ -9,7 +9,7 @@ use gaurast_tests::scenes;
 use simdevice::Format;
 use simdevice::isa::builder::Builder;
 use simdevice::isa::ir::{Rate, Type};
-use simdevice::packet::ResolveShader;
+use simdevice::packet::GaussianFragmentStage;
 use simdevice::program::bindings::Bindings;
 use simdevice::program::fragment::GaussianFragmentProgram;
 use simdevice::program::interface::{
@@ -22,7 +22,7 @@ use simdevice::stats::counters::Counter;
 use std::sync::Arc;
 
 /// Passes its inputs on: four to each attachment in turn.
-fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> ResolveShader {
+fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> GaussianFragmentStage {
     let mut builder = Builder::new();
     for slot in 0..inputs.len() as u32 {
         let input = builder.input(slot, Type::B32, Rate::Varying);
@@ -43,7 +43,7 @@ fn passing_on(device: &simdevice::Device, inputs: &[FragmentInput]) -> ResolveSh
         per_sample: false,
         has_side_effects: false,
     };
-    ResolveShader {
+    GaussianFragmentStage {
         program: Arc::new(
             GaussianFragmentProgram::new(device.level(), &programs).expect("a program"),
         ),
@@ -221,7 +221,7 @@ fn what_a_program_writes_is_blended() {
     };
     assert!(unblended.run(&device).color == shaded.others[0]);
     // Alpha may become coverage.
-    let by_alpha = ResolveShader {
+    let by_alpha = GaussianFragmentStage {
         alpha_to_coverage: true,
         alpha_to_one: true,
         ..passing_on(&device, &accumulated)
@@ -257,7 +257,7 @@ fn samples_share_invocations_unless_each_is_shaded() {
         FragmentInput::FragCoord(3),
     ];
     let case = |sample_shading| Case {
-        resolve: Some(ResolveShader {
+        resolve: Some(GaussianFragmentStage {
             sample_shading,
             ..passing_on(&device, &inputs)
         }),
@@ -286,7 +286,7 @@ fn samples_that_differ_are_shaded_for_themselves() {
     let outputs = cloud(45, 800);
     let device = device(SimdLevel::Best);
     let case = |sample_shading| Case {
-        resolve: Some(ResolveShader {
+        resolve: Some(GaussianFragmentStage {
             sample_shading,
             ..passing_on(&device, &everything()[..6])
         }),

@@ -568,7 +568,7 @@ fn draw(bytes: &mut Bytes<'_>, resources: &Resources) -> Vec<Packet> {
     let appends = bytes.below(3);
     let mut packets = vec![begin(bytes)];
     packets.extend((0..appends).map(|_| append(bytes, resources)));
-    packets.push(Packet::GaussianResolve);
+    packets.push(Packet::GaussianEnd);
     packets
 }
 
@@ -577,6 +577,6 @@ fn one_of_a_draw(bytes: &mut Bytes<'_>, resources: &Resources) -> Packet {
     match bytes.below(3) {
         0 => begin(bytes),
         1 => append(bytes, resources),
-        _ => Packet::GaussianResolve,
+        _ => Packet::GaussianEnd,
     }
 }

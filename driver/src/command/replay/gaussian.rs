@@ -12,7 +12,7 @@ use crate::pipeline::gaussian::{
 use crate::pipeline::state::AttributeSource;
 use simdevice::Packet;
 use simdevice::packet::{
-    GaussianAppend, GaussianAttributes, GaussianBegin, ModelAttributes, ResolveShader,
+    GaussianAppend, GaussianAttributes, GaussianBegin, ModelAttributes, GaussianFragmentStage,
 };
 use simdevice::program::bindings::Bindings;
 use simdevice::state::gaussian::{
@@ -34,7 +34,7 @@ pub(crate) fn begin(state: &State, gaussian: &GaussianPipeline) -> Result<Vec<Pa
     }))];
     if let Some(stage) = &gaussian.resolve {
         let (sets, constants) = (&state.graphics_sets, &state.push_constants);
-        packets.push(Packet::GaussianResolveShader(Box::new(ResolveShader {
+        packets.push(Packet::GaussianFragmentStage(Box::new(GaussianFragmentStage {
             program: Arc::clone(&stage.program),
             bindings: descriptors::bindings(&stage.descriptors, sets, constants)?,
             sample_shading: stage.sample_shading,

@@ -100,7 +100,7 @@ fn end_merged_draws_before(
 
 fn end_merged_draws(state: &mut State, execution: &mut Execution<'_>) -> Result<(), Error> {
     if std::mem::take(&mut state.merged_draws_open) {
-        execution.execute(&Packet::GaussianResolve)?;
+        execution.execute(&Packet::GaussianEnd)?;
     }
     Ok(())
 }
@@ -226,7 +226,7 @@ fn packets(
             state.merged_draws_open = gaussian.merges_draws;
             packets.push(append);
             if !gaussian.merges_draws {
-                packets.push(Packet::GaussianResolve);
+                packets.push(Packet::GaussianEnd);
             }
             Ok(packets)
         }

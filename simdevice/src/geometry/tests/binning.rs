@@ -77,7 +77,7 @@ fn macro_tiles_have_what_touches_them_in_order() {
         };
         let mut counters = Counters::default();
         let mut front = FrontEnd::new(&draw, surface, device.runtime(), &mut counters);
-        let found = Found::new(front.next_part(&mut counters).unwrap().unwrap());
+        let found = Found::new(front.next_segments(&mut counters).unwrap().unwrap());
         let mut pairs = 0;
         for layer in 0..5 {
             for row in 0..12 {

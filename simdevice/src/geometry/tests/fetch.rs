@@ -48,7 +48,7 @@ fn naive(
                 let at = stream.buffer.offset + start;
                 stream.buffer.memory.read(at, &mut bytes).unwrap();
             }
-            out.push(stream.format.decode_integer(&bytes));
+            out.push(stream.format.decode(&bytes).map(f32::to_bits));
         }
     }
     out

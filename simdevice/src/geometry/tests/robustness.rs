@@ -212,6 +212,6 @@ fn a_vertex_program_without_end_is_stopped() {
     };
     let mut counters = crate::stats::counters::Counters::default();
     let mut front = FrontEnd::new(&draw, surface, device.runtime(), &mut counters);
-    let stopped = front.next_part(&mut counters).unwrap_err();
+    let stopped = front.next_segments(&mut counters).unwrap_err();
     assert!(matches!(stopped, isa::exec::Stopped::TimedOut { .. }));
 }

@@ -209,18 +209,20 @@ impl Found {
             regions: part.regions,
             ..Self::default()
         };
-        for chunk in part.chunks {
-            let per_vertex = chunk.varyings.per_vertex;
+        for segment in part.segments {
+            let per_vertex = segment.varyings.per_vertex;
             let vertices = (found.varyings.values.len() / per_vertex.max(1)) as u32;
-            found.bins.push((found.primitives.len() as u32, chunk.bins));
+            found
+                .bins
+                .push((found.primitives.len() as u32, segment.bins));
             found
                 .primitives
-                .extend(chunk.primitives.iter().map(|primitive| Primitive {
+                .extend(segment.primitives.iter().map(|primitive| Primitive {
                     vertices: primitive.vertices.map(|vertex| vertex + vertices),
                     provoking: primitive.provoking + vertices,
                     ..*primitive
                 }));
-            found.varyings.values.extend(chunk.varyings.values);
+            found.varyings.values.extend(segment.varyings.values);
             found.varyings.per_vertex = per_vertex;
         }
         found
@@ -229,7 +231,7 @@ impl Found {
     /// The primitives that a macro-tile has to look at.
     pub fn binned(&self, macro_tile: [u32; 2], layer: u32) -> Vec<u32> {
         let lists = self.bins.iter().flat_map(|(before, bins)| {
-            let list = bins.of(macro_tile, layer).iter();
+            let list = bins.primitives_of(macro_tile, layer).iter();
             list.map(move |number| before + number)
         });
         lists.collect()
@@ -251,7 +253,7 @@ pub fn parts(device: &Device, draw: &Draw) -> (Vec<Found>, Counters) {
     let mut counters = Counters::default();
     let mut front = FrontEnd::new(draw, surface, device.runtime(), &mut counters);
     let mut parts = Vec::new();
-    while let Some(part) = front.next_part(&mut counters).unwrap() {
+    while let Some(part) = front.next_segments(&mut counters).unwrap() {
         parts.push(Found::new(part));
     }
     (parts, counters)

@@ -38,7 +38,7 @@ fn bytes_are_the_nearest_and_read_back_as_their_format_says() {
 #[test]
 fn stores_touch_only_their_lanes() {
     let values = std::array::from_fn(|lane| 100 + lane as u32);
-    let quads = Quads {
+    let quads = QuadAddresses {
         first: [8, 0, 8, 4],
         consecutive: false,
     };
@@ -51,7 +51,7 @@ fn stores_touch_only_their_lanes() {
             7, 7, 7, 7, 112, 113, 114, 115, 100, 109, 110, 103, 7, 7, 7, 7
         ]
     );
-    let block = Quads {
+    let block = QuadAddresses {
         first: [0, 4, 8, 12],
         consecutive: true,
     };
@@ -88,7 +88,7 @@ fn kernels_of_usual_equations_have_the_bits_of_the_equations() {
                         let [r, g, b, a] = source;
                         let load = |lanes| f32x16::simd_from(simd, lanes);
                         let source = [load(r), load(g), load(b), load(a)];
-                        let quads = Quads { first: [0, 4, 8, 12], consecutive: true };
+                        let quads = QuadAddresses { first: [0, 4, 8, 12], consecutive: true };
                         output.write(simd, &source, &source, 0xFBFF, &quads, &mut words);
                     });
                     words
@@ -122,7 +122,7 @@ fn whole_blocks_of_wide_texels_are_what_their_lanes_are() {
                     let [r, g, b, a] = source;
                     let load = |lanes| f32x16::simd_from(simd, lanes);
                     let source = [load(r), load(g), load(b), load(a)];
-                    let quads = Quads { first: [1, 5, 9, 13], consecutive };
+                    let quads = QuadAddresses { first: [1, 5, 9, 13], consecutive };
                     for &lanes in lanes {
                         output.write(simd, &source, &source, lanes, &quads, &mut words);
                     }

@@ -9,15 +9,14 @@ use super::grid::{BLOCK_PIXELS, BLOCK_X, BLOCK_Y, BLOCKS, LANE_X, LANE_Y, PixelM
 use super::samples::{SAMPLES, Samples};
 use crate::gaussian::BinnedDraw;
 use crate::limits::TILE_SIZE;
-use crate::packet::ResolveShader;
+use crate::packet::GaussianFragmentStage;
 use crate::program::bindings::BoundResources;
 use crate::program::fragment::{FragmentMachines, FragmentStage};
 use crate::program::interface::{FragmentInput, resolve};
 use crate::raster::color::{ColorOutput, load};
 use crate::raster::output::{Buffers, Sources, Targets, color_outputs, covered_by_alpha, lanes_of};
-use crate::raster::quads::Quads;
-use crate::raster::setup::{CENTER, SAMPLES_4};
-use crate::raster::tile::Tile;
+use crate::raster::tile::{CENTER, SAMPLES_4, Tile};
+use crate::raster::tile_buffer::QuadAddresses;
 use crate::runtime::Runtime;
 use crate::stats::counters::{Counter, Counters};
 use devmem::dispatch;
@@ -29,7 +28,7 @@ use std::time::Duration;
 /// A resolve shader made ready for tiles, which all workers share.
 pub(super) struct FragmentStageDraw<'a> {
     draw: &'a BinnedDraw,
-    shader: &'a ResolveShader,
+    shader: &'a GaussianFragmentStage,
     stage: &'a FragmentStage,
     bindings: BoundResources<'a>,
     targets: Targets<'a>,
@@ -59,7 +58,7 @@ struct SampleGroup {
 impl<'a> FragmentStageDraw<'a> {
     pub(super) fn new(
         draw: &'a BinnedDraw,
-        shader: &'a ResolveShader,
+        shader: &'a GaussianFragmentStage,
         targets: Targets<'a>,
         samples: usize,
         runtime: &Runtime,
@@ -110,7 +109,7 @@ impl<'a> FragmentStageDraw<'a> {
     ) -> Result<(), Stopped> {
         for (index, output) in self.colors.iter().enumerate() {
             if let (Some(_), Some(target)) = (output, &self.targets.color[index]) {
-                tools.buffers.color[index].touch(target, 0, tile);
+                tools.buffers.color[index].load_or_clear(target, 0, tile);
             }
         }
         let groups: Vec<SampleGroup> = (0..self.samples)
@@ -371,7 +370,7 @@ impl<'a> FragmentStageDraw<'a> {
             }
             let plane = &mut buffers.color[index];
             let first = plane.start(tile.index, sample) + block * BLOCK_PIXELS;
-            let quads = Quads::block(first);
+            let quads = QuadAddresses::block(first);
             output.write(simd, &source, &second, lanes, &quads, plane.words_mut());
         }
     }

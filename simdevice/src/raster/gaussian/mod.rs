@@ -25,10 +25,10 @@ pub use compositor::GaussianTile;
 use crate::gaussian::BinnedDraw;
 use crate::limits::TILE_SIZE;
 use crate::raster::color::ColorOutput;
-use crate::raster::depth::{Tests, apply, compare};
+use crate::raster::depth_stencil::{Tests, apply};
 use crate::raster::output::{Buffers, Targets};
-use crate::raster::quads::Quads;
-use crate::raster::tile::{AREA, Target, Tile};
+use crate::raster::tile::{AREA, Tile};
+use crate::raster::tile_buffer::{QuadAddresses, Target};
 use crate::runtime::Runtime;
 use crate::state::{BlendState, StencilFace, StencilOp};
 use crate::stats::counters::{Counter, Counters};
@@ -109,14 +109,14 @@ impl<'a> GaussianTileDraw<'a> {
             return Ok(());
         }
         if let Some(target) = self.targets.depth.filter(|_| self.tests.reads_depth()) {
-            buffers.depth.touch(target, 0, tile);
+            buffers.depth.load_or_clear(target, 0, tile);
         }
         if let Some(target) = self
             .targets
             .stencil
             .filter(|_| self.tests.stencil.is_some())
         {
-            buffers.stencil.touch(target, 0, tile);
+            buffers.stencil.load_or_clear(target, 0, tile);
         }
         let mut samples = self.test_first(tile, buffers);
         let reads_depth = self
@@ -209,7 +209,7 @@ impl<'a> GaussianTileDraw<'a> {
                 let stored = &buffers.stencil.bytes_mut()[start..][..AREA];
                 let reference = face.reference & face.compare_mask;
                 keep(&mut lanes, stored, |stencil| {
-                    compare(face.compare, reference, stencil & face.compare_mask)
+                    face.compare.holds(reference, stencil & face.compare_mask)
                 });
             }
             samples.tested[sample] = lanes;
@@ -287,7 +287,7 @@ impl<'a> GaussianTileDraw<'a> {
         else {
             return;
         };
-        plane.touch(target, 0, tile);
+        plane.load_or_clear(target, 0, tile);
         for (sample, lanes) in covered.iter().enumerate().take(self.samples) {
             let start = plane.start(tile.index, sample);
             let accumulators = &samples.accumulators[sample];
@@ -401,7 +401,7 @@ fn blend<S: Simd>(
         }
         let source = fragments.accumulators[accumulators[block]].fragments(simd, block);
         let first = start + block * BLOCK_PIXELS;
-        let quads = Quads::block(first);
+        let quads = QuadAddresses::block(first);
         output.write(simd, &source, &no_second, lanes as u16, &quads, words);
     }
 }

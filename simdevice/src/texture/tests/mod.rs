@@ -11,6 +11,7 @@ use super::*;
 use crate::format::Aspect;
 use crate::image::{ImageDesc, ImageKind};
 use crate::runtime::SimdLevel;
+use crate::state::CompareOp;
 use crate::{Allocation, Format, Image, ImageView};
 use isa::ir::{Dimension, ImageShape};
 use isa::resources::{ImageUnit, Lanes, LodRequest, SampleRequest, TexelRequest};

@@ -1,6 +1,6 @@
 //! Filters and levels of detail against the specification's formulas, taken literally, in binary64.
 
-use super::super::address;
+use super::super::addressing;
 use super::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -28,12 +28,12 @@ fn indices_wrap_as_specified() {
     for mode in MODES {
         for size in 1..9 {
             for i in -40..41 {
-                let wrapped = address::wrap(mode, i, size as u32);
+                let wrapped = addressing::wrap(mode, i, size as u32);
                 assert_eq!(wrapped, walk(mode, i, size), "{mode:?} {i} of {size}");
             }
         }
         for i in [i32::MIN, i32::MAX] {
-            assert!(address::wrap(mode, i, 7).is_none_or(|index| index < 7));
+            assert!(addressing::wrap(mode, i, 7).is_none_or(|index| index < 7));
         }
     }
 }

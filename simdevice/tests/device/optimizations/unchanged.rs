@@ -109,7 +109,7 @@ fn what_a_program_resolves_is_a_set_of_its_own() {
         inputs: (0..4).map(input).collect(),
         ..programs().fragment.unwrap()
     };
-    let shader = Packet::GaussianResolveShader(Box::new(ResolveShader {
+    let shader = Packet::GaussianFragmentStage(Box::new(GaussianFragmentStage {
         program: Arc::new(GaussianFragmentProgram::new(device.level(), &program).unwrap()),
         bindings: Bindings::default(),
         sample_shading: false,

@@ -5,8 +5,8 @@ use crate::format::Aspect;
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::*;
 use crate::pass::{Pass, PassDraw};
-use crate::raster::blend::Blender;
-use crate::raster::depth::{apply, compare};
+use crate::raster::depth_stencil::apply;
+use crate::raster::tests::blender::Blender;
 use crate::state::gaussian::{GaussianOrder, GaussianPrecision, GaussianState};
 use crate::state::{
     BlendEquation, BlendFactor, BlendOp, BlendState, CompareOp, DepthStencil, DepthTest, Rect,
@@ -260,7 +260,8 @@ impl Scene {
                 .filter(|_| has_stencil);
             let stencil_passes = face.is_none_or(|face| {
                 let masked = picture.stencil[at] & face.compare_mask;
-                compare(face.compare, face.reference & face.compare_mask, masked)
+                face.compare
+                    .holds(face.reference & face.compare_mask, masked)
             });
             let tile = [x / 16, y / 16];
             let inside = [x % 16, y % 16].map(|at| at as usize);
@@ -268,7 +269,7 @@ impl Scene {
                 stencil_passes
                     && tests
                         .depth
-                        .is_none_or(|test| compare(test.compare, depth, stored))
+                        .is_none_or(|test| test.compare.holds(depth, stored))
             });
             if let Some(face) = face.filter(|_| found.reached) {
                 let op = match (stencil_passes, found.fragment.is_some()) {

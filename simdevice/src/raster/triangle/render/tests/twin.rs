@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::packet::Rendering;
-use crate::raster::blend::Blender;
-use crate::raster::coverage::tests::covers;
-use crate::raster::depth::{apply, compare};
+use crate::raster::depth_stencil::apply;
+use crate::raster::tests::blender::Blender;
+use crate::raster::triangle::coverage::tests::covers;
 
 const COLORS: [Format; 12] = [
     Format::R8G8B8A8Unorm,
@@ -347,8 +347,7 @@ fn fragment(
         .map(|faces| faces[usize::from(!primitive.front)]);
     let stencil = picture.stencil[at];
     let stencil_passes = face.is_none_or(|face| {
-        compare(
-            face.compare,
+        face.compare.holds(
             face.reference & face.compare_mask,
             stencil & face.compare_mask,
         )
@@ -360,7 +359,7 @@ fn fragment(
     };
     let code = scene.depth.map(|format| depth_code(format, depth));
     let depth_passes = match (code, tests.depth) {
-        (Some(code), Some(test)) => compare(test.compare, code, picture.depth[at]),
+        (Some(code), Some(test)) => test.compare.holds(code, picture.depth[at]),
         _ => true,
     };
     if let Some(face) = face {

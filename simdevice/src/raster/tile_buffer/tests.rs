@@ -2,7 +2,6 @@ use super::*;
 use crate::format::Aspect;
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::StoreOp;
-use crate::raster::tile::AttachmentError;
 use devmem::Allocation;
 use isa::level::SimdLevel;
 use std::sync::Arc;
@@ -50,10 +49,10 @@ fn untouched_tiles_keep_their_bytes_and_touched_ones_are_stored() {
     memory.fill(0, memory.len(), 7).unwrap();
     let target = Target::new(&view, Aspect::Color, 1, StoreOp::Store).unwrap();
     assert_eq!(target.extent(), [20, 17]);
-    let mut plane = Plane::new(32, Some(&target));
+    let mut plane = TileBuffer::new(32, Some(&target));
     for tile in Tile::of_macro_tile(32, [0, 0], AREA_20X17) {
         if tile.index == 1 {
-            plane.touch(&target, 0, &tile);
+            plane.load_or_clear(&target, 0, &tile);
             assert_eq!(plane.sample_mut(1, 0)[..4], [7; 4]);
             plane.fill_rect(target.format(), &tile, pixel(17, 1), &[255; 4]);
         }
@@ -79,9 +78,9 @@ fn texels_of_every_size_survive_a_load_and_a_store() {
                 let before: Vec<u8> = (0..memory.len()).map(|at| (at * 7 % 251) as u8).collect();
                 memory.write(0, &before).unwrap();
                 let target = Target::new(&view, aspect, 1, StoreOp::Store).unwrap();
-                let mut plane = Plane::new(32, Some(&target));
+                let mut plane = TileBuffer::new(32, Some(&target));
                 for tile in Tile::of_macro_tile(32, [0, 0], AREA_20X17) {
-                    plane.touch(&target, 0, &tile);
+                    plane.load_or_clear(&target, 0, &tile);
                     plane.finish(&target, 0, &tile, true);
                 }
                 let mut after = vec![0u8; before.len()];
@@ -116,18 +115,18 @@ fn depth_and_stencil_keep_their_precision() {
     let [tile] = Tile::of_macro_tile(16, [0, 0], area).collect::<Vec<_>>()[..] else {
         panic!("one tile");
     };
-    let mut depths = Plane::new(16, Some(&depth));
-    let mut stencils = Plane::new(16, Some(&stencil));
-    depths.touch(&depth, 0, &tile);
+    let mut depths = TileBuffer::new(16, Some(&depth));
+    let mut stencils = TileBuffer::new(16, Some(&stencil));
+    depths.load_or_clear(&depth, 0, &tile);
     depths.words_mut()[5] = 0xFF_FFFE;
     depths.finish(&depth, 0, &tile, true);
-    stencils.touch(&stencil, 0, &tile);
+    stencils.load_or_clear(&stencil, 0, &tile);
     stencils.bytes_mut()[6] = 200;
     stencils.finish(&stencil, 0, &tile, true);
     (depth.clear, stencil.clear) = (None, None);
-    depths.touch(&depth, 0, &tile);
+    depths.load_or_clear(&depth, 0, &tile);
     assert_eq!(depths.words_mut()[4..6], [0xBF_FFFF, 0xFF_FFFE]);
-    stencils.touch(&stencil, 0, &tile);
+    stencils.load_or_clear(&stencil, 0, &tile);
     assert_eq!(stencils.bytes_mut()[5..8], [3, 200, 3]);
 }
 
@@ -177,9 +176,9 @@ fn means_of_bytes_are_those_of_the_format() {
     let resolve = Target::new(&resolved, Aspect::Color, 1, StoreOp::Store).unwrap();
     for (name, level) in SimdLevel::supported() {
         let level = level.resolve().unwrap();
-        let mut plane = Plane::new(32, Some(&target));
+        let mut plane = TileBuffer::new(32, Some(&target));
         for tile in Tile::of_macro_tile(32, [0, 0], AREA_20X17) {
-            plane.touch(&target, 0, &tile);
+            plane.load_or_clear(&target, 0, &tile);
             plane.resolve(level, &target, (&resolve, ResolveMode::Average), 0, &tile);
         }
         for y in 0..17 {

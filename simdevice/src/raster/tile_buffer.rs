@@ -1,27 +1,30 @@
-//! Tile buffer A: a macro-tile's piece of an attachment.
+//! Tile buffers: a macro-tile's piece of an attachment, where quads lie in it, and where it is loaded from and stored to.
 //!
 //! A tile (16x16 pixels) of an attachment is loaded or cleared when a draw first touches it, and stored if it was;
 //! what no draw touches is never loaded, and cleared only in memory. Texels are held as the bytes that they are in
 //! memory, so that a store and a load in the middle of a pass change nothing; depths as the number that their format
-//! holds (see [`super::depth`]). Tiles rather than macro-tiles are loaded and stored, so that the size of a macro-tile
+//! holds (see [`super::depth_stencil`]). Tiles rather than macro-tiles are loaded and stored, so that the size of a macro-tile
 //! changes nothing either.
 
-use super::tile::{AREA, SIDE, Target, Tile, place};
+use super::tile::{AREA, SIDE, Tile, place};
 use crate::format::unorm8::{pack_unorm8, unorm8_fraction};
-use crate::format::{Format, MAX_TEXEL_SIZE};
+use crate::format::{Aspect, Format, MAX_TEXEL_SIZE};
 use crate::image::resolve::resolve_row;
-use crate::limits::TILE_SIZE;
+use crate::image::{Image, ImageKind, ImageView, SubresourceLayout};
+use crate::limits::{MAX_FRAMEBUFFER_SIZE, MAX_SAMPLES, TILE_SIZE};
+use crate::packet::StoreOp;
 use crate::state::{Rect, ResolveMode};
 use devmem::dispatch;
 use devmem::host;
 use fearless_simd::{Level, Simd, f32x16, prelude::*, u32x16};
+use std::sync::Arc;
 
 /// The most samples of a pixel.
-const MAX_SAMPLES: usize = 4;
+const SAMPLES: usize = MAX_SAMPLES as usize;
 
 /// One attachment's texels of a macro-tile: by tile, then sample, then pixel (see [`place`]).
 #[derive(Debug, Default)]
-pub struct Plane {
+pub struct TileBuffer {
     /// Bytes, kept in words so that texels of words are aligned.
     words: Vec<u32>,
     /// Bytes of a texel here.
@@ -76,8 +79,8 @@ fn unpack(format: Format, bytes: &[u8]) -> [u8; MAX_TEXEL_SIZE] {
     texel
 }
 
-impl Plane {
-    /// A plane for macro-tiles of `size` pixels of a target.
+impl TileBuffer {
+    /// A buffer for macro-tiles of `size` pixels of a target.
     pub fn new(size: u32, target: Option<&Target>) -> Self {
         let Some(target) = target else {
             return Self::default();
@@ -124,7 +127,7 @@ impl Plane {
         &self.words
     }
 
-    /// As [`Plane::words`], to be changed.
+    /// As [`TileBuffer::words`], to be changed.
     #[inline(always)]
     pub fn words_mut(&mut self) -> &mut [u32] {
         &mut self.words
@@ -163,19 +166,19 @@ impl Plane {
 
     /// Loads or clears a tile if this is the first touch.
     #[inline]
-    pub fn touch(&mut self, target: &Target, layer: u32, tile: &Tile) {
+    pub fn load_or_clear(&mut self, target: &Target, layer: u32, tile: &Tile) {
         if !self.is_touched(tile.index) {
-            self.bring(target, layer, tile);
+            self.load(target, layer, tile);
         }
     }
 
     /// Marks a tile as touched whose texels are all overwritten before anybody reads them.
-    pub fn touch_unread(&mut self, tile: usize) {
+    pub fn mark_overwritten(&mut self, tile: usize) {
         self.touched |= 1 << tile;
     }
 
     #[cold]
-    fn bring(&mut self, target: &Target, layer: u32, tile: &Tile) {
+    fn load(&mut self, target: &Target, layer: u32, tile: &Tile) {
         self.touched |= 1 << tile.index;
         let (format, stride) = (target.format(), self.stride);
         for sample in 0..self.samples {
@@ -252,12 +255,12 @@ impl Plane {
         let Some(resolved_rows) = resolve.sample(layer, 0) else {
             return;
         };
-        if samples == MAX_SAMPLES
+        if samples == SAMPLES
             && mode == ResolveMode::Average
             && is_unorm8(format)
             && resolve.format() == format
         {
-            let words = &self.words[tile.index * MAX_SAMPLES * AREA..][..MAX_SAMPLES * AREA];
+            let words = &self.words[tile.index * SAMPLES * AREA..][..SAMPLES * AREA];
             let mut means = [0; AREA];
             dispatch!(level, simd => unorm8_means(simd, words, &mut means));
             let mut row = [0; 4 * SIDE];
@@ -273,7 +276,7 @@ impl Plane {
         let copied = mode == ResolveMode::SampleZero || !has_mean || samples == 1;
         for (y, columns) in tile.rows(tile.pixels) {
             let count = columns.len();
-            let mut decoded = [[[0f32; 4]; SIDE]; MAX_SAMPLES];
+            let mut decoded = [[[0f32; 4]; SIDE]; SAMPLES];
             let mut row = [0; SIDE * MAX_TEXEL_SIZE];
             let used = if copied { 1 } else { samples };
             for (sample, decoded) in decoded.iter_mut().enumerate().take(used) {
@@ -418,6 +421,248 @@ fn set_each<const N: usize>(texels: &mut [u8], y: usize, first: usize, row: &[u8
     }
     for (x, texel) in row.as_chunks::<N>().0.iter().enumerate() {
         tiles[0][place(first + x, y)] = *texel;
+    }
+}
+
+/// Where the quads of 16 lanes are in a tile buffer: texels, from its beginning.
+#[derive(Clone, Copy, Debug)]
+pub struct QuadAddresses {
+    pub first: [usize; 4],
+    /// Whether they follow one another.
+    pub consecutive: bool,
+}
+
+impl QuadAddresses {
+    /// Those of a block, from a texel on.
+    #[inline(always)]
+    pub fn block(first: usize) -> Self {
+        Self {
+            first: [first, first + 4, first + 8, first + 12],
+            consecutive: true,
+        }
+    }
+
+    /// The texel of a lane.
+    #[inline(always)]
+    pub fn texel(&self, lane: usize) -> usize {
+        self.first[lane / 4] + lane % 4
+    }
+
+    /// The tiles that they are in, of a tile buffer of `samples` samples a pixel.
+    #[inline(always)]
+    pub fn tiles(&self, samples: usize) -> [usize; 4] {
+        // A power of two.
+        let shift = (samples * AREA).trailing_zeros();
+        let [a, b, c, d] = self.first;
+        [a >> shift, b >> shift, c >> shift, d >> shift]
+    }
+
+    /// The words of 16 lanes' texels of a word each.
+    #[inline(always)]
+    pub fn load(&self, words: &[u32]) -> [u32; 16] {
+        let mut out = [0; 16];
+        if self.consecutive {
+            out.copy_from_slice(&words[self.first[0]..][..16]);
+        } else {
+            for (quad, out) in self.first.iter().zip(out.chunks_exact_mut(4)) {
+                out.copy_from_slice(&words[*quad..][..4]);
+            }
+        }
+        out
+    }
+
+    /// Sets the texels of some lanes.
+    #[inline(always)]
+    pub fn store(&self, words: &mut [u32], lanes: u16, values: &[u32; 16]) {
+        if self.consecutive && lanes == u16::MAX {
+            words[self.first[0]..][..16].copy_from_slice(values);
+            return;
+        }
+        for (quad, first) in self.first.iter().enumerate() {
+            let values = &values[4 * quad..][..4];
+            match lanes >> (4 * quad) & 15 {
+                0 => {}
+                15 => words[*first..][..4].copy_from_slice(values),
+                some => {
+                    // Another quad of the vector may be at the same place with other lanes.
+                    let texels = &mut words[*first..][..4];
+                    let mask = &QUAD_MASKS[usize::from(some)];
+                    for lane in 0..4 {
+                        texels[lane] = values[lane] & mask[lane] | texels[lane] & !mask[lane];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// For each set of lanes of a quad: all ones in those.
+const QUAD_MASKS: [[u32; 4]; 16] = {
+    let mut masks = [[0; 4]; 16];
+    let mut set = 0;
+    while set < 16 {
+        let mut lane = 0;
+        while lane < 4 {
+            if set >> lane & 1 == 1 {
+                masks[set][lane] = u32::MAX;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    masks
+};
+
+/// An attachment's view cannot be rendered to.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum AttachmentError {
+    /// The view's format lacks the aspect, or its texels differ in size from the image's.
+    #[error("a view of format {0:?} cannot be this attachment")]
+    Format(Format),
+    /// The image lacks the view's subresource.
+    #[error("the image lacks mip level {level}, layer {layer}")]
+    Subresource {
+        /// The mip level.
+        level: u32,
+        /// The array layer.
+        layer: u32,
+    },
+    /// Neither 1 sample per texel nor [`MAX_SAMPLES`].
+    #[error("attachments of {0} samples cannot be rendered to")]
+    Samples(u32),
+    /// Wider or higher than [`MAX_FRAMEBUFFER_SIZE`].
+    #[error("an attachment of {0}x{1} pixels is too large")]
+    Extent(u32, u32),
+}
+
+/// One aspect of an attachment: where its texels are, and what a tile begins with.
+#[derive(Clone, Debug)]
+pub struct Target {
+    image: Arc<Image>,
+    format: Format,
+    /// Subresource and z of each layer.
+    layers: Vec<(SubresourceLayout, u32)>,
+    /// The bytes of the texel that it is cleared to, until that is done.
+    pub clear: Option<[u8; MAX_TEXEL_SIZE]>,
+    /// What becomes of it at the end of the pass.
+    pub store: StoreOp,
+}
+
+impl Target {
+    /// The first `layer_count` layers of `view`, or as many as the image has.
+    ///
+    /// # Errors
+    /// [`AttachmentError`] if the view cannot be rendered to.
+    pub fn new(
+        view: &ImageView,
+        aspect: Aspect,
+        layer_count: u32,
+        store: StoreOp,
+    ) -> Result<Self, AttachmentError> {
+        let (image, level) = (&view.image, view.base_mip_level);
+        let format = view
+            .format
+            .plane(aspect)
+            .ok_or(AttachmentError::Format(view.format))?;
+        if ![1, MAX_SAMPLES].contains(&image.desc.samples) {
+            return Err(AttachmentError::Samples(image.desc.samples));
+        }
+        let layer = |index: u32| {
+            let layer = view.base_layer.checked_add(index)?;
+            match image.desc.kind {
+                ImageKind::D1 | ImageKind::D2 => {
+                    Some((image.subresource(aspect, level, layer)?, 0))
+                }
+                // The layers of a view of a 3D image are its slices.
+                ImageKind::D3 => {
+                    let layout = image.subresource(aspect, level, 0)?;
+                    (layer < layout.extent[2]).then_some((layout, layer))
+                }
+            }
+        };
+        let layers: Vec<_> = (0..layer_count.max(1)).map_while(layer).collect();
+        let Some((layout, _)) = layers.first() else {
+            return Err(AttachmentError::Subresource {
+                level,
+                layer: view.base_layer,
+            });
+        };
+        if layout.format.texel_size() != format.texel_size() {
+            return Err(AttachmentError::Format(view.format));
+        }
+        let [width, height, _] = layout.extent;
+        if width.max(height) > MAX_FRAMEBUFFER_SIZE {
+            return Err(AttachmentError::Extent(width, height));
+        }
+        Ok(Self {
+            image: image.clone(),
+            format,
+            layers,
+            clear: None,
+            store,
+        })
+    }
+
+    /// How its texels are read.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// How many layers are rendered to.
+    pub fn layer_count(&self) -> u32 {
+        self.layers.len() as u32
+    }
+
+    /// Its width and height in pixels.
+    pub fn extent(&self) -> [u32; 2] {
+        self.layers
+            .iter()
+            .map(|(layout, _)| [layout.extent[0], layout.extent[1]])
+            .next()
+            .unwrap_or_default()
+    }
+
+    /// Marks its memory as changed.
+    pub fn bump_generation(&self) {
+        self.image.memory.bump_generation();
+    }
+
+    /// Samples per pixel.
+    pub fn samples(&self) -> u32 {
+        self.image.desc.samples
+    }
+
+    /// One sample of all texels of a layer, if the attachment has that.
+    pub(super) fn sample(&self, layer: u32, sample: u32) -> Option<SampleRows<'_>> {
+        let (layout, z) = self.layers.get(layer as usize)?;
+        Some(SampleRows {
+            image: &self.image,
+            layout: layout.sample(sample),
+            z: *z,
+        })
+    }
+}
+
+/// One sample of all texels of an attachment's layer.
+pub(super) struct SampleRows<'a> {
+    image: &'a Image,
+    layout: SubresourceLayout,
+    z: u32,
+}
+
+impl SampleRows<'_> {
+    /// Reads the bytes of texels from pixel (x, y) on; they stay as they are where there are none.
+    #[inline]
+    pub fn read(&self, [x, y]: [u32; 2], bytes: &mut [u8]) {
+        // Tiles are clipped to the attachments before they are rendered.
+        let _ = self.image.read_row(&self.layout, [x, y, self.z], bytes);
+    }
+
+    /// Writes the bytes of texels from pixel (x, y) on, where there are any.
+    #[inline]
+    pub fn write(&self, [x, y]: [u32; 2], bytes: &[u8]) {
+        // As above.
+        let _ = self.image.write_row(&self.layout, [x, y, self.z], bytes);
     }
 }
 

@@ -16,12 +16,6 @@ const ONE: i64 = 256;
 /// Units of [`Primitive::offsets`] in 1/256 pixel.
 const OFFSETS_IN_SUB_PIXEL: f64 = 65_536.0;
 
-/// Vulkan's standard sample positions of 4 samples, in 1/256 pixels.
-pub const SAMPLES_4: [[i32; 2]; 4] = [[96, 32], [224, 96], [32, 160], [160, 224]];
-
-/// The only sample of a pixel is at its centre.
-pub const CENTER: [[i32; 2]; 1] = [[128, 128]];
-
 /// An edge: a sample of pixel (x, y) is inside if `a x + b y + c[sample] >= 0`. Dividing the edge function of 1/256
 /// pixels by 256 and rounding down changes no sign, since `a x + b y` is an integer.
 #[derive(Clone, Copy, Debug, Default)]
@@ -33,9 +27,9 @@ pub struct Edge {
     pub lanes: [i32; 16],
 }
 
-/// What does not depend on tiles.
+/// What of a primitive does not depend on tiles.
 #[derive(Clone, Debug, Default)]
-pub struct Setup {
+pub struct TriangleSetup {
     edges: [Edge; 4],
     edge_count: usize,
     /// The pixels that may have samples in it.
@@ -44,7 +38,7 @@ pub struct Setup {
     /// How the barycentrics' numerators of corners 1 and 2 grow with x and y, per 1/256 pixel, were the vertices at the
     /// corners.
     numerators: [[i64; 2]; 2],
-    moved: Moved,
+    correction: SnapCorrection,
     inverse_area: f64,
     /// What the barycentrics add at each lane of a block.
     pub lane_barycentrics: [[f32; 16]; 2],
@@ -70,8 +64,8 @@ pub struct Setup {
 
 /// What barycentrics owe to the vertices not being at the corners, but where they were before snapping.
 #[derive(Clone, Copy, Debug, Default)]
-struct Moved {
-    /// To be added to [`Setup::numerators`].
+struct SnapCorrection {
+    /// To be added to [`TriangleSetup::numerators`].
     numerators: [[f64; 2]; 2],
     /// The barycentrics' numerators at corner 0.
     at_origin: [f64; 2],
@@ -79,7 +73,7 @@ struct Moved {
     area: f64,
 }
 
-impl Moved {
+impl SnapCorrection {
     /// Of vertices that are at the corners, which enclose half of `area`.
     fn nowhere(area: i64) -> Self {
         Self {
@@ -124,7 +118,7 @@ fn pixels(low: i32, high: i32, samples: usize) -> (i32, i32) {
     }
 }
 
-impl Setup {
+impl TriangleSetup {
     /// Becomes that of a primitive; returns false, and is undefined, if none of its samples lies in `clip`. What lanes
     /// add is found only as far as it is needed.
     #[inline(always)]
@@ -186,11 +180,11 @@ impl Setup {
             [w2[1] - w0[1], w0[0] - w2[0]],
             [w0[1] - w1[1], w1[0] - w0[0]],
         ];
-        let moved =
-            Moved::new(numerators, area, primitive.offsets).unwrap_or_else(|| Moved::nowhere(area));
-        let inverse_area = 1.0 / moved.area;
+        let correction = SnapCorrection::new(numerators, area, primitive.offsets)
+            .unwrap_or_else(|| SnapCorrection::nowhere(area));
+        let inverse_area = 1.0 / correction.area;
         let sums = both([0, 1], |corner: usize| {
-            let ([a, b], [c, d]) = (numerators[corner], moved.numerators[corner]);
+            let ([a, b], [c, d]) = (numerators[corner], correction.numerators[corner]);
             [a as f64 + c, b as f64 + d]
         });
         let slopes = both(sums, |n| both(n, |n| n * ONE as f64 * inverse_area));
@@ -212,7 +206,7 @@ impl Setup {
         self.bounds = bounds;
         self.origin = w0;
         self.numerators = numerators;
-        self.moved = moved;
+        self.correction = correction;
         self.inverse_area = inverse_area;
         if needs.barycentrics {
             self.lane_barycentrics = [lanes(slopes[0]), lanes(slopes[1])];
@@ -247,8 +241,8 @@ impl Setup {
         let dy = i64::from(y) * ONE + ONE / 2 - self.origin[1];
         // The large part is exact.
         let numerator = |corner: usize| {
-            let ([a, b], [c, d]) = (self.numerators[corner], self.moved.numerators[corner]);
-            let small = c * dx as f64 + d * dy as f64 + self.moved.at_origin[corner];
+            let ([a, b], [c, d]) = (self.numerators[corner], self.correction.numerators[corner]);
+            let small = c * dx as f64 + d * dy as f64 + self.correction.at_origin[corner];
             ((a * dx + b * dy) as f64 + small) * self.inverse_area
         };
         [numerator(0), numerator(1)]
@@ -264,7 +258,7 @@ impl Setup {
     /// Bounds of depth at its samples within the tile at pixel (x, y), rounding included.
     #[inline(always)]
     pub fn depth_bounds(&self, x: i32, y: i32) -> [f32; 2] {
-        let half = super::tile::SIDE as i32 / 2;
+        let half = crate::raster::tile::SIDE as i32 / 2;
         let middle = self.depth(self.barycentrics(x + half, y + half));
         let [dx, dy] = both(self.depth_slopes, f32::abs);
         // From the middle of the pixel beside the tile's middle, samples are at most 8.5 pixels away.
@@ -273,7 +267,7 @@ impl Setup {
         [middle - reach - margin, middle + reach + margin]
     }
 
-    /// 1 / w in units of [`Setup::scale`] where the barycentrics are these.
+    /// 1 / w in units of [`TriangleSetup::scale`] where the barycentrics are these.
     #[inline(always)]
     pub fn inverse_w(&self, [b1, b2]: [f64; 2]) -> f32 {
         let [w0, w1, w2] = self.inverse_w;

@@ -1,13 +1,13 @@
 //! Batches of fragments: 2x2 quads of any primitives of a draw within a macro-tile, and what the fragment program gets
 //! of them.
 
-use super::quads::Quads;
-use super::setup::Setup;
+use super::setup::Needs;
+use super::setup::TriangleSetup;
 use crate::geometry::{Primitive, PrimitiveKind, Varyings};
 use crate::limits::TILE_SIZE;
 use crate::program::fragment::{BATCH_LANES, Interface};
 use crate::program::interface::{FragmentInput, Interpolation, Sampling};
-use crate::raster::setup::Needs;
+use crate::raster::tile_buffer::QuadAddresses;
 use crate::simd::{bits_of, both, three};
 use crate::stats::optimizations::{Optimization, Optimizations};
 use fearless_simd::f32x4;
@@ -52,7 +52,7 @@ pub struct Record {
     pub front: bool,
     pub viewport: u8,
     is_point: bool,
-    /// 1 / w at corners 1 and 2, as [`Setup::weights`].
+    /// 1 / w at corners 1 and 2, as [`TriangleSetup::weights`].
     weights: [f32; 2],
     /// What [`BlockValues::inverse_w`] is to be multiplied by.
     scale: f32,
@@ -135,27 +135,40 @@ pub struct BlockValues<S: Simd> {
 impl<S: Simd> BlockValues<S> {
     /// Those of the block at pixel (x, y), as far as they are needed.
     #[inline(always)]
-    pub fn new(simd: S, setup: &Setup, [x, y]: [i32; 2], needs: Needs) -> Self {
+    pub fn new(simd: S, setup: &TriangleSetup, [x, y]: [i32; 2], needs: Needs) -> Self {
         let bases = setup.barycentrics(x, y);
-        let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
-        let mut values = Self {
+        let mut values = Self::of_depth(simd, setup, bases, needs.depth);
+        values.find_rest(simd, setup, bases, needs);
+        values
+    }
+
+    /// Depth alone, if it is needed: what early tests take. `bases` are the barycentrics of the block's first pixel.
+    #[inline(always)]
+    pub fn of_depth(simd: S, setup: &TriangleSetup, bases: [f64; 2], is_needed: bool) -> Self {
+        Self {
             barycentrics: [f32x16::splat(simd, 0.0); 2],
-            depth: f32x16::splat(simd, 0.0),
+            depth: if is_needed {
+                f32x16::simd_from(simd, setup.lane_depth) + setup.depth(bases)
+            } else {
+                f32x16::splat(simd, 0.0)
+            },
             inverse_w: f32x16::splat(simd, 1.0),
-        };
-        if needs.depth {
-            values.depth = add(setup.depth(bases), setup.lane_depth);
         }
+    }
+
+    /// Adds the values besides depth, as far as they are needed.
+    #[inline(always)]
+    pub fn find_rest(&mut self, simd: S, setup: &TriangleSetup, bases: [f64; 2], needs: Needs) {
+        let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
         if needs.barycentrics {
-            values.barycentrics = [
+            self.barycentrics = [
                 add(bases[0] as f32, setup.lane_barycentrics[0]),
                 add(bases[1] as f32, setup.lane_barycentrics[1]),
             ];
         }
         if needs.inverse_w && !setup.affine {
-            values.inverse_w = add(setup.inverse_w(bases), setup.lane_w);
+            self.inverse_w = add(setup.inverse_w(bases), setup.lane_w);
         }
-        values
     }
 
     /// As lanes, in the order of the fields.
@@ -194,7 +207,7 @@ impl Batch {
     pub fn add_primitive(
         &mut self,
         primitive: &Primitive,
-        setup: &Setup,
+        setup: &TriangleSetup,
         interface: &Interface,
         varyings: &Varyings,
     ) -> u16 {
@@ -274,16 +287,16 @@ impl Batch {
         &chunks[chunk]
     }
 
-    /// Where a chunk's quads are in a plane of `samples` samples a pixel.
+    /// Where a chunk's quads are in a tile buffer of `samples` samples a pixel.
     #[inline(always)]
-    pub fn places(&self, chunk: usize, sample: usize, samples: usize) -> Quads {
+    pub fn places(&self, chunk: usize, sample: usize, samples: usize) -> QuadAddresses {
         let mut first = [0; 4];
         for (first, quad) in first.iter_mut().zip(self.chunk_quads(chunk)) {
             let tile = usize::from(quad.tile) * samples + sample;
-            *first = tile * super::tile::AREA + usize::from(quad.place);
+            *first = tile * crate::raster::tile::AREA + usize::from(quad.place);
         }
         let [a, b, c, d] = first;
-        Quads {
+        QuadAddresses {
             first,
             consecutive: b == a + 4 && c == a + 8 && d == a + 12,
         }
@@ -378,7 +391,7 @@ pub fn covered_lanes(cover: u16) -> u16 {
 #[inline(always)]
 pub fn at_sample<S: Simd>(
     values: &BlockValues<S>,
-    setup: &Setup,
+    setup: &TriangleSetup,
     position: [i32; 2],
 ) -> BlockValues<S> {
     let [x, y] = both(position, offset);

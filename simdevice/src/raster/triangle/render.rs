@@ -1,44 +1,36 @@
 //! Triangle mode of the tile engine: the primitives of a draw, one after another, through coverage, early tests and
 //! shading.
 
-use super::batch::{Batch, BlockValues, QUADS, Quad, Samples, at_sample, offset};
+use super::batch::{Batch, BlockValues, QUADS, Quad, add_attributes, at_sample, offset};
 use super::coverage::{Coverage, bits};
-use super::depth::Tests;
-use super::pending::Pending;
-use super::prepared::TileDraw;
-use super::prepared::Timing;
-use super::quads::Quads;
+use super::draw::{Path, TriangleTileDraw};
 use super::recording::{self, MacroTileWork};
-use super::setup::Setup;
-use super::tile::{AREA, SIDE};
+use super::setup::{Needs, TriangleSetup};
+use super::whole_tile::{DeferredTiles, FullTile};
+use super::write::{test, write};
 use crate::geometry::{Primitive, Varyings};
 use crate::limits::TILE_SIZE;
 use crate::program::fragment::{FragmentMachines, FragmentStage};
 use crate::program::interface::FragmentInput;
-use crate::raster::batch::add_attributes;
+use crate::raster::depth_stencil::Tests;
 use crate::raster::output::{Buffers, lanes_of};
-use crate::raster::setup::Needs;
-use crate::raster::tile::{BLOCKS, Tile, block_corner};
-use crate::raster::write::{test, write};
+use crate::raster::tile::{AREA, BLOCKS, SIDE, Tile, block_corner};
+use crate::raster::tile_buffer::QuadAddresses;
 use crate::simd::both;
 use crate::state::Rect;
 use crate::stats::counters::{Counter, Counters};
 use crate::stats::optimizations::Optimization;
 use devmem::dispatch;
-use fearless_simd::{Simd, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16};
 use isa::exec::{Stopped, Watchdog};
 use std::sync::atomic::AtomicBool;
 
-mod full_tile;
-
-use full_tile::FullTile;
-
-/// What a worker needs besides.
+/// The memory that a worker needs besides.
 #[derive(Debug, Default)]
 pub struct Scratch {
     batch: Box<Batch>,
     full: Box<FullTile>,
-    pending: Box<Pending>,
+    deferred: Box<DeferredTiles>,
 }
 
 /// From how many blocks of a tile on it pays to ask whether a primitive is hidden in all of it.
@@ -46,7 +38,7 @@ const HIDDEN_BLOCKS: u32 = 6;
 
 /// The macro-tile that a worker renders.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct MacroTile {
     pub layer: u32,
     /// Column and row of the macro-tile.
     pub at: [u32; 2],
@@ -59,18 +51,20 @@ pub struct Place {
 /// # Errors
 /// [`Stopped`] if its program ran for too long, or `cancel` was set.
 pub fn render(
-    draw: &TileDraw<'_>,
-    place: Place,
+    draw: &TriangleTileDraw<'_>,
+    macro_tile: MacroTile,
     buffers: &mut Buffers,
     scratch: &mut Scratch,
     counters: &mut Counters,
     cancel: &AtomicBool,
 ) -> Result<(), Stopped> {
-    let chunks = &draw.draw.chunks;
-    if chunks
-        .iter()
-        .all(|chunk| chunk.bins.of(place.at, place.layer).is_empty())
-    {
+    let segments = &draw.draw.segments;
+    if segments.iter().all(|segment| {
+        segment
+            .bins
+            .primitives_of(macro_tile.at, macro_tile.layer)
+            .is_empty()
+    }) {
         return Ok(());
     }
     let record = draw.draw.record.as_ref();
@@ -78,7 +72,7 @@ pub fn render(
     let mut machines = draw.stage.map(FragmentStage::machines);
     let mut renderer = Renderer {
         draw,
-        place,
+        macro_tile,
         buffers,
         batch: &mut scratch.batch,
         full: &mut scratch.full,
@@ -89,16 +83,19 @@ pub fn render(
         quads_masked: 0,
         work: record.map(|_| MacroTileWork::default()),
     };
-    renderer
-        .batch
-        .begin(draw.needs, place.at, place.size, draw.optimizations);
+    renderer.batch.begin(
+        draw.needs,
+        macro_tile.at,
+        macro_tile.size,
+        draw.optimizations,
+    );
     let level = draw.level;
-    let pending = &mut *scratch.pending;
-    pending.clear();
-    let done = if draw.positions.len() == 1 {
-        dispatch!(level, simd => renderer.run::<_, 1>(simd, pending))
+    let deferred = &mut *scratch.deferred;
+    deferred.clear();
+    let done = if draw.samples.positions.len() == 1 {
+        dispatch!(level, simd => renderer.run::<_, 1>(simd, deferred))
     } else {
-        dispatch!(level, simd => renderer.run::<_, 4>(simd, pending))
+        dispatch!(level, simd => renderer.run::<_, 4>(simd, deferred))
     };
     let done = done.and_then(|()| renderer.flush());
     let (passed, masked) = (renderer.samples_passed, renderer.quads_masked);
@@ -111,15 +108,21 @@ pub fn render(
         machines.give_back(counters);
     }
     if let (Some(record), Some(before), Some(work)) = (record, before, work) {
-        recording::add_macro_tile(record, place.at, place.size, work, &counters.since(&before));
+        recording::add_macro_tile(
+            record,
+            macro_tile.at,
+            macro_tile.size,
+            work,
+            &counters.since(&before),
+        );
     }
     done
 }
 
 /// A draw in a macro-tile.
 pub(super) struct Renderer<'a, 'd> {
-    pub draw: &'a TileDraw<'d>,
-    pub place: Place,
+    pub draw: &'a TriangleTileDraw<'d>,
+    pub macro_tile: MacroTile,
     pub buffers: &'a mut Buffers,
     pub batch: &'a mut Batch,
     full: &'a mut FullTile,
@@ -133,17 +136,26 @@ pub(super) struct Renderer<'a, 'd> {
     pub work: Option<MacroTileWork>,
 }
 
+/// A tile of the macro-tile.
+#[derive(Clone, Copy)]
+struct PlacedTile {
+    /// Row by row within the macro-tile.
+    index: usize,
+    /// The first pixel in the framebuffer.
+    corner: [i32; 2],
+}
+
 /// A primitive while it is rasterized.
-struct Current<'p> {
+struct RasterPrimitive<'p> {
     primitive: &'p Primitive,
     varyings: &'p Varyings,
-    setup: &'p Setup,
-    /// Its chunk among the draw's, and its place there.
+    setup: &'p TriangleSetup,
+    /// Its segment among the draw's, and its number there.
     place: (usize, u32),
     /// Its record in the batch, once it has one.
     record: Option<u16>,
-    /// Where it is kept, once a tile waits for it.
-    kept: Option<u8>,
+    /// Its slot among deferred primitives, once a tile waits for it.
+    slot: Option<u8>,
     range: (f32, f32),
 }
 
@@ -153,26 +165,29 @@ impl Renderer<'_, '_> {
     fn run<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        pending: &mut Pending,
+        deferred: &mut DeferredTiles,
     ) -> Result<(), Stopped> {
-        let size = self.place.size;
+        let size = self.macro_tile.size;
         let whole = Rect {
-            x: (self.place.at[0] * size) as i32,
-            y: (self.place.at[1] * size) as i32,
+            x: (self.macro_tile.at[0] * size) as i32,
+            y: (self.macro_tile.at[1] * size) as i32,
             width: size,
             height: size,
         };
         let mut coverage = Coverage::<N>::default();
-        let mut setup = Setup::default();
+        let mut setup = TriangleSetup::default();
         let draw = self.draw;
         let needs = Needs {
             depth: draw.needs.depth || draw.tests.any(),
             ..draw.needs
         };
         let mut clip = (u8::MAX, Rect { width: 0, ..whole });
-        for (number, chunk) in draw.draw.chunks.iter().enumerate() {
-            for &index in chunk.bins.of(self.place.at, self.place.layer) {
-                let Some(primitive) = chunk.primitives.get(index as usize) else {
+        for (number, segment) in draw.draw.segments.iter().enumerate() {
+            for &index in segment
+                .bins
+                .primitives_of(self.macro_tile.at, self.macro_tile.layer)
+            {
+                let Some(primitive) = segment.primitives.get(index as usize) else {
                     continue;
                 };
                 if clip.0 != primitive.viewport {
@@ -182,25 +197,25 @@ impl Renderer<'_, '_> {
                     };
                     clip = (primitive.viewport, pixels.intersect(whole));
                 }
-                if !setup.prepare(simd, primitive, draw.positions, clip.1, needs) {
+                if !setup.prepare(simd, primitive, draw.samples.positions, clip.1, needs) {
                     continue;
                 }
-                let mut current = Current {
+                let mut current = RasterPrimitive {
                     primitive,
-                    varyings: &chunk.varyings,
+                    varyings: &segment.varyings,
                     setup: &setup,
                     place: (number, index),
                     record: None,
-                    kept: None,
+                    slot: None,
                     range: self.depth_range(primitive),
                 };
                 let corner = [whole.x, whole.y];
-                self.primitive(simd, &mut current, &mut coverage, pending, corner)?;
+                self.primitive(simd, &mut current, &mut coverage, deferred, corner)?;
             }
         }
-        if N == 1 && draw.defers {
+        if N == 1 && matches!(draw.path, Path::Deferred { .. }) {
             for tile in 0..(size / TILE_SIZE).pow(2) as usize {
-                self.shade_pending(simd, pending, tile)?;
+                self.shade_deferred(simd, deferred, tile)?;
             }
         }
         Ok(())
@@ -218,9 +233,9 @@ impl Renderer<'_, '_> {
     fn primitive<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut Current<'_>,
+        current: &mut RasterPrimitive<'_>,
         coverage: &mut Coverage<N>,
-        pending: &mut Pending,
+        deferred: &mut DeferredTiles,
         corner: [i32; 2],
     ) -> Result<(), Stopped> {
         let bounds = current.setup.bounds;
@@ -232,7 +247,7 @@ impl Renderer<'_, '_> {
             (bounds.x + bounds.width as i32 - 1 - corner[0]) / SIDE as i32,
             (bounds.y + bounds.height as i32 - 1 - corner[1]) / SIDE as i32,
         ];
-        let side = self.place.size / TILE_SIZE;
+        let side = self.macro_tile.size / TILE_SIZE;
         for row in first[1]..=last[1] {
             for column in first[0]..=last[0] {
                 let x = corner[0] + column * SIDE as i32;
@@ -248,86 +263,90 @@ impl Renderer<'_, '_> {
                     work.list(tile, blocks);
                 }
                 if found {
-                    self.tile(simd, current, coverage, pending, (tile, [x, y]))?;
+                    let tile = PlacedTile {
+                        index: tile,
+                        corner: [x, y],
+                    };
+                    self.tile(simd, current, coverage, deferred, tile)?;
                 }
             }
         }
         Ok(())
     }
 
-    /// What a primitive covers of a tile at pixel `at`, block by block.
+    /// A tile of which a primitive covers something.
     #[inline(always)]
     fn tile<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut Current<'_>,
+        current: &mut RasterPrimitive<'_>,
         coverage: &Coverage<N>,
-        pending: &mut Pending,
-        (tile, at): (usize, [i32; 2]),
+        deferred: &mut DeferredTiles,
+        tile: PlacedTile,
     ) -> Result<(), Stopped> {
         let draw = self.draw;
-        let early = match draw.timing {
-            Timing::Early => Some(&draw.tests).filter(|tests| tests.any()),
-            Timing::Late => draw.filter.as_ref(),
-        };
         if draw.tests.any() {
-            self.touch_tests(tile);
+            self.load_tests(tile.index);
         }
-        if let Some(tests) = early
+        if let Some(tests) = &draw.early
             && coverage.blocks.count_ones() >= HIDDEN_BLOCKS
-            && tests.stencil.is_none()
-            && draw.optimizations.has(Optimization::HierarchicalDepth)
-            && self.is_hidden(simd, tests, current, tile, at)
+            && self.is_hidden(simd, tests, current, tile)
         {
             if let Some(work) = &mut self.work {
-                work.hide(tile, coverage.blocks.count_ones());
+                work.hide(tile.index, coverage.blocks.count_ones());
             }
             return Ok(());
         }
-        if N == 1 && (draw.defers || draw.takes_tiles) {
-            if coverage.is_whole() {
-                return self.whole_tile(simd, current, coverage, pending, (tile, at));
+        match draw.path {
+            Path::Deferred { .. } | Path::WholeTiles if N == 1 && coverage.is_whole() => {
+                return self.whole_tile(simd, current, coverage, deferred, tile);
             }
-            if pending.waits(tile) {
-                self.shade_pending(simd, pending, tile)?;
+            Path::Deferred { .. } if N == 1 && deferred.is_deferred(tile.index) => {
+                self.shade_deferred(simd, deferred, tile.index)?;
                 // The batch may have begun anew.
                 current.record = None;
             }
+            _ => {}
         }
-        let state = &draw.draw.state;
-        let masked = state.sample_mask & ((1 << N) - 1) != (1 << N) - 1;
+        self.blocks(simd, current, coverage, tile)
+    }
+
+    /// What a primitive covers of a tile, block by block: early tests, then the batch.
+    #[inline(always)]
+    fn blocks<S: Simd, const N: usize>(
+        &mut self,
+        simd: S,
+        current: &mut RasterPrimitive<'_>,
+        coverage: &Coverage<N>,
+        tile: PlacedTile,
+    ) -> Result<(), Stopped> {
+        let draw = self.draw;
+        let sample_mask = draw.draw.state.sample_mask;
+        let masked = sample_mask & ((1 << N) - 1) != (1 << N) - 1;
         let skips_masked = draw.optimizations.has(Optimization::MaskedQuads);
-        let mut touched = false;
+        let mut loaded = false;
         for block in bits(coverage.blocks) {
             let mut lanes = coverage.lanes[block];
             if masked {
                 for (sample, lanes) in lanes.iter_mut().enumerate() {
-                    if state.sample_mask >> sample & 1 == 0 {
+                    if sample_mask >> sample & 1 == 0 {
                         *lanes = 0;
                     }
                 }
             }
-            let x = at[0] + (block % 4 * 4) as i32;
-            let y = at[1] + (block / 4 * 4) as i32;
             let setup = current.setup;
-            let [b1, b2] = setup.barycentrics(x, y);
-            let add = |base: f32, lanes: [f32; 16]| f32x16::simd_from(simd, lanes) + base;
-            let mut values = BlockValues {
-                barycentrics: [f32x16::splat(simd, 0.0); 2],
-                depth: f32x16::splat(simd, 0.0),
-                inverse_w: f32x16::splat(simd, 1.0),
-            };
-            if early.is_some() || draw.needs.depth {
-                values.depth = add(setup.depth([b1, b2]), setup.lane_depth);
-            }
-            if let Some(tests) = early {
+            let [x, y] = block_corner(tile.corner, block);
+            let bases = setup.barycentrics(x, y);
+            let needs_depth = draw.early.is_some() || draw.needs.depth;
+            let mut values = BlockValues::of_depth(simd, setup, bases, needs_depth);
+            if let Some(tests) = &draw.early {
                 let depth = values.depth;
-                self.test(simd, tests, current, depth, &mut lanes, (tile, block));
+                self.test(simd, tests, current, depth, &mut lanes, (tile.index, block));
             }
             if let Some(work) = &mut self.work {
-                work.test(tile, &coverage.lanes[block], &lanes);
+                work.test(tile.index, &coverage.lanes[block], &lanes);
             }
-            if !draw.count_late {
+            if !draw.counts_late {
                 for lanes in lanes {
                     self.samples_passed += u64::from(lanes.count_ones());
                 }
@@ -339,44 +358,49 @@ impl Renderer<'_, '_> {
             if draw.stage.is_none() {
                 continue;
             }
-            if any == 0 && (skips_masked || draw.per_sample) {
+            if any == 0 && (skips_masked || draw.samples.each_shaded) {
                 self.quads_masked += 4;
                 continue;
             }
-            let setup = current.setup;
-            if draw.needs.barycentrics {
-                values.barycentrics = [
-                    add(b1 as f32, setup.lane_barycentrics[0]),
-                    add(b2 as f32, setup.lane_barycentrics[1]),
-                ];
-            }
-            if draw.needs.inverse_w && !setup.affine {
-                values.inverse_w = add(setup.inverse_w([b1, b2]), setup.lane_w);
-            }
-            if !touched {
-                self.touch_colors(tile, coverage);
-                touched = true;
+            values.find_rest(simd, setup, bases, draw.needs);
+            if !loaded {
+                self.load_colors(tile.index, coverage);
+                loaded = true;
             }
             let quad = Quad {
-                tile: tile as u8,
+                tile: tile.index as u8,
                 place: (block * 16) as u8,
                 ..Quad::default()
             };
-            if draw.per_sample {
-                for sample in 0..N {
-                    if lanes[sample] != 0 {
-                        let mut only = [0; N];
-                        only[sample] = lanes[sample];
-                        let quad = Quad {
-                            sample: sample as u8,
-                            ..quad
-                        };
-                        let values = at_sample(&values, current.setup, draw.positions[sample]);
-                        self.append(current, quad, &only, &values)?;
-                    }
-                }
+            if draw.samples.each_shaded {
+                self.append_samples(current, quad, &lanes, &values)?;
             } else {
                 self.append(current, quad, &lanes, &values)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// As [`Renderer::append`], once for each sample, with its own values.
+    #[inline(always)]
+    fn append_samples<S: Simd, const N: usize>(
+        &mut self,
+        current: &mut RasterPrimitive<'_>,
+        quad: Quad,
+        lanes: &[u16; N],
+        values: &BlockValues<S>,
+    ) -> Result<(), Stopped> {
+        for (sample, &covered) in lanes.iter().enumerate() {
+            if covered != 0 {
+                let mut only = [0; N];
+                only[sample] = covered;
+                let quad = Quad {
+                    sample: sample as u8,
+                    ..quad
+                };
+                let position = self.draw.samples.positions[sample];
+                let values = at_sample(values, current.setup, position);
+                self.append(current, quad, &only, &values)?;
             }
         }
         Ok(())
@@ -387,7 +411,7 @@ impl Renderer<'_, '_> {
     #[inline(always)]
     fn append<S: Simd, const N: usize>(
         &mut self,
-        current: &mut Current<'_>,
+        current: &mut RasterPrimitive<'_>,
         quad: Quad,
         lanes: &[u16; N],
         values: &BlockValues<S>,
@@ -415,7 +439,7 @@ impl Renderer<'_, '_> {
             for (sample, lanes) in lanes.iter().enumerate() {
                 cover |= (lanes >> (4 * number) & 15) << (4 * sample);
             }
-            if cover == 0 && (skips_masked || self.draw.per_sample) {
+            if cover == 0 && (skips_masked || self.draw.samples.each_shaded) {
                 self.quads_masked += 1;
                 continue;
             }
@@ -438,7 +462,7 @@ impl Renderer<'_, '_> {
         Ok(())
     }
 
-    fn record(&mut self, current: &mut Current<'_>) -> u16 {
+    fn record(&mut self, current: &mut RasterPrimitive<'_>) -> u16 {
         let Some(stage) = self.draw.stage else {
             return 0;
         };
@@ -458,7 +482,7 @@ impl Renderer<'_, '_> {
         &mut self,
         simd: S,
         tests: &Tests,
-        current: &Current<'_>,
+        current: &RasterPrimitive<'_>,
         at_centers: f32x16<S>,
         lanes: &mut [u16; N],
         (tile, block): (usize, usize),
@@ -470,13 +494,13 @@ impl Renderer<'_, '_> {
             }
             let mut depth = at_centers;
             if N != 1 {
-                let [x, y] = draw.positions[sample];
+                let [x, y] = draw.samples.positions[sample];
                 let [dx, dy] = current.setup.depth_slopes;
                 depth += dx * offset(x) + dy * offset(y);
             }
             let code = tests.code.encode(simd, depth, current.range);
             let first = (tile * N + sample) * AREA + 16 * block;
-            let quads = Quads::block(first);
+            let quads = QuadAddresses::block(first);
             *lanes = test(
                 simd,
                 tests,
@@ -489,23 +513,26 @@ impl Renderer<'_, '_> {
         }
     }
 
-    /// Whether a primitive fails the depth test in all of a tile.
+    /// Tells whether a primitive fails the depth test in all of a tile, if that is looked at.
     #[inline(always)]
     fn is_hidden<S: Simd>(
         &mut self,
         simd: S,
         tests: &Tests,
-        current: &Current<'_>,
-        tile: usize,
-        at: [i32; 2],
+        current: &RasterPrimitive<'_>,
+        tile: PlacedTile,
     ) -> bool {
-        if tests.depth.is_none() {
+        let looks = tests.stencil.is_none()
+            && self.draw.optimizations.has(Optimization::HierarchicalDepth)
+            && tests.depth.is_some();
+        if !looks {
             return false;
         }
-        let bounds = current.setup.depth_bounds(at[0], at[1]);
+        let [x, y] = tile.corner;
+        let bounds = current.setup.depth_bounds(x, y);
         let (low, high) = current.range;
         let code = |depth: f32| tests.code.encode_one(depth.max(low).min(high));
-        let stored = self.buffers.depth.range(simd, tile);
+        let stored = self.buffers.depth.range(simd, tile.index);
         let hidden = tests.hides(both(bounds, code), stored);
         self.counters.add(Counter::TilesHidden, hidden.into());
         hidden
@@ -523,12 +550,8 @@ impl Renderer<'_, '_> {
         let machine = machines.of_size(size);
         let batch = &mut *self.batch;
         batch.prepare();
-        let samples = Samples {
-            positions: draw.positions,
-            each_shaded: draw.per_sample,
-        };
         let affine = dispatch!(level, simd => batch.set_inputs(
-            simd, &stage.interface, samples, machine
+            simd, &stage.interface, draw.samples, machine
         ));
         self.counters.add(Counter::BatchesAffine, affine.into());
         let watchdog = Watchdog {
@@ -556,34 +579,29 @@ impl Renderer<'_, '_> {
         self.batch.clear();
         Ok(())
     }
-}
 
-#[cfg(test)]
-mod tests;
-
-impl Renderer<'_, '_> {
     /// Makes sure that depth and stencil of a tile are there.
-    fn touch_tests(&mut self, tile: usize) {
-        let (targets, layer) = (self.draw.targets, self.place.layer);
+    fn load_tests(&mut self, tile: usize) {
+        let (targets, layer) = (self.draw.targets, self.macro_tile.layer);
         if let Some(target) = targets
             .depth
             .filter(|_| !self.buffers.depth.is_touched(tile))
         {
             let tile = self.tile_of(tile);
-            self.buffers.depth.touch(target, layer, &tile);
+            self.buffers.depth.load_or_clear(target, layer, &tile);
         }
         if let Some(target) = targets
             .stencil
             .filter(|_| !self.buffers.stencil.is_touched(tile))
         {
             let tile = self.tile_of(tile);
-            self.buffers.stencil.touch(target, layer, &tile);
+            self.buffers.stencil.load_or_clear(target, layer, &tile);
         }
     }
 
     /// Makes sure that a tile of the colours written is there.
     #[inline(always)]
-    fn touch_colors<const N: usize>(&mut self, tile: usize, coverage: &Coverage<N>) {
+    fn load_colors<const N: usize>(&mut self, tile: usize, coverage: &Coverage<N>) {
         for (index, output) in self.draw.colors.iter().enumerate() {
             let Some(output) = output else { continue };
             if self.buffers.color[index].is_touched(tile) {
@@ -591,26 +609,26 @@ impl Renderer<'_, '_> {
             }
             // What is overwritten as a whole need not be loaded or cleared.
             let state = &self.draw.draw.state;
-            if self.draw.keeps_all
+            if self.draw.writes_all()
                 && output.overwrites()
                 && coverage.is_whole()
                 && state.sample_mask & 15 == 15
                 && self.draw.optimizations.has(Optimization::OverwrittenTiles)
             {
-                self.buffers.color[index].touch_unread(tile);
+                self.buffers.color[index].mark_overwritten(tile);
                 self.counters.add(Counter::TilesOverwritten, 1);
             } else if let Some(target) = &self.draw.targets.color[index] {
                 let tile = self.tile_of(tile);
-                self.buffers.color[index].touch(target, self.place.layer, &tile);
+                self.buffers.color[index].load_or_clear(target, self.macro_tile.layer, &tile);
             }
         }
     }
 
-    /// A tile of the macro-tile.
+    /// The tile of an index.
     #[cold]
     fn tile_of(&self, index: usize) -> Tile {
-        let side = self.place.size / TILE_SIZE;
-        let [column, row] = self.place.at;
+        let side = self.macro_tile.size / TILE_SIZE;
+        let [column, row] = self.macro_tile.at;
         let at = [
             column * side + index as u32 % side,
             row * side + index as u32 / side,
@@ -629,116 +647,130 @@ impl Renderer<'_, '_> {
     }
 
     /// Makes sure that a tile of the colours written is there, of which nothing will be left.
-    fn touch_unread(&mut self, tile: usize) {
+    fn mark_colors_overwritten(&mut self, tile: usize) {
         if !self.draw.optimizations.has(Optimization::OverwrittenTiles) {
-            return self.touch_read(tile);
+            return self.load_colors_written(tile);
         }
         for (index, output) in self.draw.colors.iter().enumerate() {
             if output.is_some() && !self.buffers.color[index].is_touched(tile) {
-                self.buffers.color[index].touch_unread(tile);
+                self.buffers.color[index].mark_overwritten(tile);
                 self.counters.add(Counter::TilesOverwritten, 1);
             }
         }
     }
 
     /// Makes sure that a tile of the colours written is there, with what it holds.
-    fn touch_read(&mut self, tile: usize) {
+    fn load_colors_written(&mut self, tile: usize) {
         for (index, output) in self.draw.colors.iter().enumerate() {
             if output.is_some()
                 && !self.buffers.color[index].is_touched(tile)
                 && let Some(target) = &self.draw.targets.color[index]
             {
                 let tile = self.tile_of(tile);
-                self.buffers.color[index].touch(target, self.place.layer, &tile);
+                self.buffers.color[index].load_or_clear(target, self.macro_tile.layer, &tile);
             }
         }
     }
-}
 
-impl Renderer<'_, '_> {
-    /// A tile at pixel `at` that a primitive covers as a whole, in a draw with one sample a pixel.
+    /// A tile that a primitive covers as a whole, in a draw with one sample a pixel.
     #[inline(always)]
     fn whole_tile<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        current: &mut Current<'_>,
+        current: &mut RasterPrimitive<'_>,
         coverage: &Coverage<N>,
-        pending: &mut Pending,
-        (tile, at): (usize, [i32; 2]),
+        deferred: &mut DeferredTiles,
+        tile: PlacedTile,
     ) -> Result<(), Stopped> {
         let draw = self.draw;
         let (mut lanes, mut passed) = ([u16::MAX; BLOCKS], AREA as u64);
         if draw.tests.any() {
             passed = 0;
             for (block, lanes) in lanes.iter_mut().enumerate() {
-                let [x, y] = block_corner(at, block);
-                let setup = current.setup;
-                let base = setup.depth(setup.barycentrics(x, y));
-                let depth = f32x16::simd_from(simd, setup.lane_depth) + base;
+                let [x, y] = block_corner(tile.corner, block);
+                let bases = current.setup.barycentrics(x, y);
+                let depth = BlockValues::of_depth(simd, current.setup, bases, true).depth;
                 let mut only = [*lanes];
-                self.test(simd, &draw.tests, current, depth, &mut only, (tile, block));
+                let place = (tile.index, block);
+                self.test(simd, &draw.tests, current, depth, &mut only, place);
                 *lanes = only[0];
                 passed += u64::from(lanes.count_ones());
             }
         }
         self.samples_passed += passed;
-        if passed == AREA as u64 && !draw.defers {
-            self.touch_colors(tile, coverage);
-        } else if passed == AREA as u64 {
-            self.touch_unread(tile);
-            let slot = match current.kept {
-                Some(slot) => slot,
-                None => {
-                    let (chunk, primitive) = current.place;
-                    *current
-                        .kept
-                        .insert(pending.keep(current.setup, chunk, primitive))
-                }
-            };
-            if pending.cover(tile, slot) {
-                self.counters
-                    .add(Counter::QuadsOverwritten, AREA as u64 / 4);
+        if passed == AREA as u64 {
+            if matches!(draw.path, Path::Deferred { .. }) {
+                self.defer(current, deferred, tile.index);
+                return Ok(());
             }
-            return Ok(());
+            self.load_colors(tile.index, coverage);
         }
-        if pending.waits(tile) {
-            self.shade_pending(simd, pending, tile)?;
+        if deferred.is_deferred(tile.index) {
+            self.shade_deferred(simd, deferred, tile.index)?;
             // The batch may have begun anew.
             current.record = None;
         }
-        self.shade_tile(simd, current, (tile, at), &lanes)
+        self.shade_tile(simd, current, tile, &lanes)
+    }
+
+    /// Lets a tile wait for a primitive, of which all passes.
+    #[inline(always)]
+    fn defer(
+        &mut self,
+        current: &mut RasterPrimitive<'_>,
+        deferred: &mut DeferredTiles,
+        tile: usize,
+    ) {
+        self.mark_colors_overwritten(tile);
+        let slot = match current.slot {
+            Some(slot) => slot,
+            None => {
+                let (segment, primitive) = current.place;
+                *current
+                    .slot
+                    .insert(deferred.add(current.setup, segment, primitive))
+            }
+        };
+        if deferred.defer(tile, slot) {
+            self.counters
+                .add(Counter::QuadsOverwritten, AREA as u64 / 4);
+        }
     }
 
     /// Shades a tile that waits, if it does.
-    fn shade_pending<S: Simd>(
+    fn shade_deferred<S: Simd>(
         &mut self,
         simd: S,
-        pending: &mut Pending,
+        deferred: &mut DeferredTiles,
         tile: usize,
     ) -> Result<(), Stopped> {
-        let Some(kept) = pending.take(tile) else {
+        let Some(waiting) = deferred.take(tile) else {
             return Ok(());
         };
         let draw = self.draw;
-        let chunk = &draw.draw.chunks[kept.chunk];
-        let primitive = &chunk.primitives[kept.primitive as usize];
-        let mut current = Current {
+        let segment = &draw.draw.segments[waiting.segment];
+        let primitive = &segment.primitives[waiting.primitive as usize];
+        let mut current = RasterPrimitive {
             primitive,
-            varyings: &chunk.varyings,
-            setup: &kept.setup,
-            place: (kept.chunk, kept.primitive),
+            varyings: &segment.varyings,
+            setup: &waiting.setup,
+            place: (waiting.segment, waiting.primitive),
             record: None,
-            kept: None,
+            slot: None,
             range: self.depth_range(primitive),
         };
-        let side = (self.place.size / TILE_SIZE) as usize;
+        let side = (self.macro_tile.size / TILE_SIZE) as usize;
         let place = [tile % side, tile / side];
         let corner = [0, 1].map(|axis| {
-            (self.place.at[axis] * self.place.size) as i32 + (place[axis] * SIDE) as i32
+            (self.macro_tile.at[axis] * self.macro_tile.size) as i32 + (place[axis] * SIDE) as i32
         });
+        let tile = PlacedTile {
+            index: tile,
+            corner,
+        };
         simd.vectorize(
             #[inline(always)]
-            || self.shade_tile(simd, &mut current, (tile, corner), &[u16::MAX; BLOCKS]),
+            || self.shade_tile(simd, &mut current, tile, &[u16::MAX; BLOCKS]),
         )
     }
 
@@ -747,29 +779,29 @@ impl Renderer<'_, '_> {
     fn shade_tile<S: Simd>(
         &mut self,
         simd: S,
-        current: &mut Current<'_>,
-        (tile, at): (usize, [i32; 2]),
+        current: &mut RasterPrimitive<'_>,
+        tile: PlacedTile,
         lanes: &[u16; BLOCKS],
     ) -> Result<(), Stopped> {
-        if self.draw.takes_tiles && *lanes == [u16::MAX; BLOCKS] {
-            self.touch_read(tile);
-            return self.shade_full_tile(simd, current, (tile, at));
+        if self.draw.path.batches_tiles() && *lanes == [u16::MAX; BLOCKS] {
+            self.load_colors_written(tile.index);
+            return self.shade_full_tile(simd, current, tile);
         }
         let needs = self.draw.needs;
-        let mut touched = false;
+        let mut loaded = false;
         for (block, &lanes) in lanes.iter().enumerate() {
             if lanes == 0 && self.draw.optimizations.has(Optimization::MaskedQuads) {
                 self.quads_masked += 4;
                 continue;
             }
-            let corner = block_corner(at, block);
+            let corner = block_corner(tile.corner, block);
             let values = BlockValues::new(simd, current.setup, corner, needs);
-            if !touched {
-                self.touch_read(tile);
-                touched = true;
+            if !loaded {
+                self.load_colors_written(tile.index);
+                loaded = true;
             }
             let quad = Quad {
-                tile: tile as u8,
+                tile: tile.index as u8,
                 place: (block * 16) as u8,
                 ..Quad::default()
             };
@@ -777,23 +809,21 @@ impl Renderer<'_, '_> {
         }
         Ok(())
     }
-}
 
-impl Renderer<'_, '_> {
-    /// Shades the tile at pixel `at`, which is there, in a draw that takes tiles at once.
+    /// Shades a tile, whose colours are there, as a batch of its own.
     #[inline(always)]
     fn shade_full_tile<S: Simd>(
         &mut self,
         simd: S,
-        current: &mut Current<'_>,
-        (tile, at): (usize, [i32; 2]),
+        current: &mut RasterPrimitive<'_>,
+        tile: PlacedTile,
     ) -> Result<(), Stopped> {
         let draw = self.draw;
         let Some(stage) = draw.stage else {
             return Ok(());
         };
         // Earlier fragments of the tile come first.
-        if self.batch.has_tile(tile) {
+        if self.batch.has_tile(tile.index) {
             self.flush()?;
             current.record = None;
         }
@@ -809,7 +839,7 @@ impl Renderer<'_, '_> {
                 inverse_w: divides,
                 ..draw.needs
             };
-            full.find_barycentrics(simd, current.setup, at, needs);
+            full.find_barycentrics(simd, current.setup, tile.corner, needs);
         }
         let Some(machines) = self.machines.as_mut() else {
             return Ok(());
@@ -834,11 +864,14 @@ impl Renderer<'_, '_> {
         for (index, output) in draw.colors.iter().enumerate() {
             if let (Some(output), Some(slots)) = (output, interface.colors.get(index)) {
                 let sources = both(*slots, |slots| slots.map(|slot| lanes_of(machine, slot)));
-                let plane = &mut self.buffers.color[index];
-                let first = plane.start(tile, 0);
-                output.write_tile(simd, &sources, first, plane.words_mut());
+                let buffer = &mut self.buffers.color[index];
+                let first = buffer.start(tile.index, 0);
+                output.write_tile(simd, &sources, first, buffer.words_mut());
             }
         }
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,8 +1,8 @@
 //! Which samples a primitive covers: exact integer edge functions, first of a tile, then of its 4x4 blocks, then of the
 //! samples.
 
-use super::setup::{Edge, Setup};
-use super::tile::SIDE;
+use super::setup::{Edge, TriangleSetup};
+use crate::raster::tile::SIDE;
 use crate::raster::tile::{BLOCK_X, BLOCK_Y, LANE_X, LANE_Y};
 use crate::state::Rect;
 use fearless_simd::{Simd, i32x16, mask32x16, prelude::*};
@@ -59,7 +59,7 @@ impl<const N: usize> Coverage<N> {
     /// Finds the samples covered of the tile at pixel (x, y), none outside the primitive's bounds. Returns whether
     /// there may be any.
     #[inline(always)]
-    pub fn find<S: Simd>(&mut self, simd: S, setup: &Setup, x: i32, y: i32) -> bool {
+    pub fn find<S: Simd>(&mut self, simd: S, setup: &TriangleSetup, x: i32, y: i32) -> bool {
         self.blocks = 0;
         let part = setup.bounds.intersect(Rect {
             x,

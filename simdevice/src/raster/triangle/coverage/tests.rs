@@ -1,6 +1,7 @@
 use super::*;
 use crate::geometry::{Primitive, PrimitiveKind};
-use crate::raster::setup::{CENTER, Needs, SAMPLES_4};
+use crate::raster::tile::{CENTER, SAMPLES_4};
+use crate::raster::triangle::setup::Needs;
 use devmem::dispatch;
 use fearless_simd::Level;
 use isa::level::SimdLevel;
@@ -66,7 +67,7 @@ fn fast<const N: usize>(
     clip: Rect,
 ) -> Vec<[bool; N]> {
     let mut out = vec![[false; N]; (SIZE * SIZE) as usize];
-    let mut setup = Setup::default();
+    let mut setup = TriangleSetup::default();
     if !dispatch!(level, simd => setup.prepare(simd, primitive, positions, clip, Needs::default()))
     {
         return out;

@@ -149,26 +149,12 @@ fn compare_vectors<S: Simd>(
     }
 }
 
-/// `reference op stored`.
-pub fn compare<T: PartialOrd>(op: CompareOp, reference: T, stored: T) -> bool {
-    match op {
-        CompareOp::Never => false,
-        CompareOp::Less => reference < stored,
-        CompareOp::Equal => reference == stored,
-        CompareOp::LessOrEqual => reference <= stored,
-        CompareOp::Greater => reference > stored,
-        CompareOp::NotEqual => reference != stored,
-        CompareOp::GreaterOrEqual => reference >= stored,
-        CompareOp::Always => true,
-    }
-}
-
 /// The lanes that pass the stencil test.
 fn test_stencil(face: &StencilFace, lanes: u16, stencils: &[u8; 16]) -> u16 {
     let reference = face.reference & face.compare_mask;
     let mut passed = 0;
     for (lane, stencil) in stencils.iter().enumerate() {
-        let passes = compare(face.compare, reference, stencil & face.compare_mask);
+        let passes = face.compare.holds(reference, stencil & face.compare_mask);
         passed |= u16::from(passes) << lane;
     }
     passed & lanes

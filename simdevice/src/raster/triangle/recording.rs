@@ -104,7 +104,7 @@ pub(crate) fn add_front_end(
     let mut preprocess = shader_work(counters);
     preprocess.bytes += bytes as f64;
     let mut sized = [0; 4];
-    for primitive in part.chunks.iter().flat_map(|chunk| &chunk.primitives) {
+    for primitive in part.segments.iter().flat_map(|segment| &segment.primitives) {
         let Some(&region) = part.regions.get(usize::from(primitive.viewport)) else {
             continue;
         };

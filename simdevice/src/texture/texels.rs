@@ -18,7 +18,7 @@ use isa::resources::Lanes;
 
 /// How texels lie in words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum TexelCodec {
     Unorm8,
     Unorm8x2,
     Unorm8x4,
@@ -29,7 +29,7 @@ pub(super) enum Kind {
     Float32x4,
 }
 
-/// A mip level: extents in texels; place and pitches in texels, from the first of `Packing::words`.
+/// A mip level: extents in texels; place and pitches in texels, from the first of `VectorLayout::words`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PackedLevel {
     pub extent: [u32; 3],
@@ -41,8 +41,8 @@ pub(super) struct PackedLevel {
 
 /// How the texels of a surface are read 16 at a time.
 #[derive(Clone, Debug)]
-pub(super) struct Packing {
-    pub kind: Kind,
+pub(super) struct VectorLayout {
+    pub codec: TexelCodec,
     /// The words of the memory that the surface begins and ends within.
     pub words: Range<usize>,
     pub levels: Vec<PackedLevel>,
@@ -50,7 +50,7 @@ pub(super) struct Packing {
     pub order: [usize; 4],
 }
 
-impl Packing {
+impl VectorLayout {
     /// The words that texels are read from, of the memory of the surface.
     #[inline]
     pub fn words<'a>(&self, memory: &'a Allocation) -> &'a [AtomicU32] {
@@ -58,7 +58,7 @@ impl Packing {
     }
 }
 
-impl Kind {
+impl TexelCodec {
     /// The kind of a format; None if its texels are to be read one by one.
     pub fn of(format: Format) -> Option<Self> {
         Some(match format {
@@ -88,18 +88,18 @@ pub(super) struct Rows<'a> {
     pub y: &'a [Lanes; 2],
 }
 
-/// Calls a kernel for a [`Kind`], compiled on its own.
-macro_rules! for_kind {
+/// Calls a kernel for a [`TexelCodec`], compiled on its own.
+macro_rules! for_codec {
     ($simd:expr, $kind:expr, $kernel:ident($($argument:expr),*)) => {
         match $kind {
-            Kind::Unorm8 => for_kind!($simd, $kernel, Unorm8, $($argument),*),
-            Kind::Unorm8x2 => for_kind!($simd, $kernel, Unorm8x2, $($argument),*),
-            Kind::Unorm8x4 => for_kind!($simd, $kernel, Unorm8x4, $($argument),*),
-            Kind::Srgb8x4 => for_kind!($simd, $kernel, Srgb8x4, $($argument),*),
-            Kind::Unorm16 => for_kind!($simd, $kernel, Unorm16, $($argument),*),
-            Kind::Float16x4 => for_kind!($simd, $kernel, Float16x4, $($argument),*),
-            Kind::Float32 => for_kind!($simd, $kernel, Float32, $($argument),*),
-            Kind::Float32x4 => for_kind!($simd, $kernel, Float32x4, $($argument),*),
+            TexelCodec::Unorm8 => for_codec!($simd, $kernel, Unorm8, $($argument),*),
+            TexelCodec::Unorm8x2 => for_codec!($simd, $kernel, Unorm8x2, $($argument),*),
+            TexelCodec::Unorm8x4 => for_codec!($simd, $kernel, Unorm8x4, $($argument),*),
+            TexelCodec::Srgb8x4 => for_codec!($simd, $kernel, Srgb8x4, $($argument),*),
+            TexelCodec::Unorm16 => for_codec!($simd, $kernel, Unorm16, $($argument),*),
+            TexelCodec::Float16x4 => for_codec!($simd, $kernel, Float16x4, $($argument),*),
+            TexelCodec::Float32 => for_codec!($simd, $kernel, Float32, $($argument),*),
+            TexelCodec::Float32x4 => for_codec!($simd, $kernel, Float32x4, $($argument),*),
         }
     };
     ($simd:expr, $kernel:ident, $kind:ident, $($argument:expr),*) => {
@@ -110,7 +110,7 @@ macro_rules! for_kind {
     };
 }
 
-impl Kind {
+impl TexelCodec {
     /// How many components are stored.
     pub fn components(self) -> usize {
         match self {
@@ -130,7 +130,7 @@ impl Kind {
         i: usize,
         j: usize,
     ) -> [Floats; 4] {
-        for_kind!(simd, self, load(words, rows, i, j))
+        for_codec!(simd, self, load(words, rows, i, j))
     }
 
     /// The weighted mean of all four texels.
@@ -143,7 +143,7 @@ impl Kind {
         weight_x: &Floats,
         weight_y: &Floats,
     ) -> [Floats; 4] {
-        for_kind!(simd, self, bilinear(words, rows, weight_x, weight_y))
+        for_codec!(simd, self, bilinear(words, rows, weight_x, weight_y))
     }
 }
 
@@ -174,7 +174,7 @@ fn bilinear<S: Simd, T: Texels>(
     weight_x: &Floats,
     weight_y: &Floats,
 ) -> [Floats; 4] {
-    let around = Around {
+    let around = Footprint2x2 {
         rows: [row_start(simd, rows, 0), row_start(simd, rows, 1)],
         columns: [
             u32x16::simd_from(simd, rows.x[0]),
@@ -195,7 +195,7 @@ fn bilinear<S: Simd, T: Texels>(
 
 /// Four texels around each of 16 points.
 #[derive(Clone, Copy)]
-pub(super) struct Around<S: Simd> {
+pub(super) struct Footprint2x2<S: Simd> {
     /// Where the upper and the lower row begin.
     pub rows: [u32x16<S>; 2],
     /// The left and the right column.
@@ -204,7 +204,7 @@ pub(super) struct Around<S: Simd> {
     pub weights: [f32x16<S>; 2],
 }
 
-impl<S: Simd> Around<S> {
+impl<S: Simd> Footprint2x2<S> {
     /// The weighted mean.
     #[inline(always)]
     pub fn filter<T: Texels>(&self, simd: S, words: &[AtomicU32]) -> [f32x16<S>; 4] {
@@ -235,7 +235,7 @@ impl<S: Simd> Around<S> {
     }
 }
 
-/// As [`Around`], of eight points.
+/// As [`Footprint2x2`], of eight points.
 struct Half<S: Simd> {
     rows: [u32x8<S>; 2],
     columns: [u32x8<S>; 2],
@@ -268,7 +268,7 @@ fn row_start<S: Simd>(simd: S, rows: &Rows<'_>, j: usize) -> u32x16<S> {
     u32x16::simd_from(simd, rows.base) + y * u32x16::simd_from(simd, rows.row_pitch)
 }
 
-/// A [`Kind`] as a type.
+/// A [`TexelCodec`] as a type.
 pub(super) trait Texels {
     /// How many components are stored.
     const COMPONENTS: usize;
@@ -461,7 +461,7 @@ mod tests {
     use crate::runtime::SimdLevel;
     use devmem::dispatch;
 
-    /// Texels 0.. of these words, as a packing and as their format decodes them.
+    /// Texels 0.. of these words, as a layout and as their format decodes them.
     fn agree<T: Texels>(format: Format, words: &[u32]) {
         let atomics: Vec<AtomicU32> = words.iter().copied().map(AtomicU32::new).collect();
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();

@@ -1,81 +1,48 @@
-//! Blending: what a fragment's colour makes of an attachment's (Vulkan 1.3, 29.1).
+//! Blending of one fragment (Vulkan 1.3, 29.1): the naive twin of [`crate::raster::color`].
 
-use crate::format::{Format, Numeric};
+use crate::format::Format;
+use crate::raster::color::clamp_range;
 use crate::state::{BlendEquation, BlendFactor, BlendOp, BlendState};
-
-/// Premultiplied "over", the equation of most Gaussian draws.
-const OVER: BlendEquation = BlendEquation {
-    source: BlendFactor::One,
-    destination: BlendFactor::OneMinusSrcAlpha,
-    op: BlendOp::Add,
-};
 
 /// The blending of one attachment, prepared for many fragments.
 #[derive(Clone, Debug)]
 pub struct Blender {
-    format: Format,
-    mode: Mode,
+    /// Of colours and of alpha.
+    equations: Option<(BlendEquation, BlendEquation)>,
     constants: [f32; 4],
     /// What sources, destinations and constants are clamped to.
     range: Option<(f32, f32)>,
     write: [bool; 4],
 }
 
-/// The equations, those that need no look at factors apart.
-#[derive(Clone, Copy, Debug)]
-enum Mode {
-    Replace,
-    Over,
-    General(BlendEquation, BlendEquation),
-}
-
 impl Blender {
     /// Prepares `state` for an attachment of `format`.
     pub fn new(state: &BlendState, constants: [f32; 4], format: Format) -> Self {
         let range = clamp_range(format);
-        let mode = match state.equations {
-            // Integers are never blended.
-            _ if format.is_integer() => Mode::Replace,
-            None => Mode::Replace,
-            Some((OVER, OVER)) => Mode::Over,
-            Some((color, alpha)) => Mode::General(color, alpha),
-        };
         Self {
-            format,
-            mode,
+            // Integers are never blended.
+            equations: state.equations.filter(|_| !format.is_integer()),
             constants: clamp(constants, range),
             range,
             write: std::array::from_fn(|component| state.write_mask >> component & 1 == 1),
         }
     }
 
-    /// Whether it never changes the attachment.
-    pub fn writes_nothing(&self) -> bool {
-        self.write == [false; 4]
-    }
-
     /// What `source` makes of `destination`, before it is quantised to the format.
-    #[inline]
     pub fn blend(&self, source: [f32; 4], destination: [f32; 4]) -> [f32; 4] {
         self.blend_dual(source, [0.0; 4], destination)
     }
 
     /// As [`Blender::blend`], with the second source of dual-source blending.
-    #[inline]
     pub fn blend_dual(
         &self,
         source: [f32; 4],
         second: [f32; 4],
         destination: [f32; 4],
     ) -> [f32; 4] {
-        let blended = match self.mode {
-            Mode::Replace => source,
-            Mode::Over => {
-                let (s, d) = (clamp(source, self.range), clamp(destination, self.range));
-                let rest = 1.0 - s[3];
-                std::array::from_fn(|component| s[component] + d[component] * rest)
-            }
-            Mode::General(color, alpha) => {
+        let blended = match self.equations {
+            None => source,
+            Some((color, alpha)) => {
                 let (s, d) = (clamp(source, self.range), clamp(destination, self.range));
                 let second = clamp(second, self.range);
                 let [r, g, b, _] = evaluate(color, s, second, d, self.constants);
@@ -91,39 +58,8 @@ impl Blender {
             }
         })
     }
-
-    /// Blends the fragments that exist, pixel by pixel, into a row of texels, and quantises them. Returns whether
-    /// there were any.
-    pub fn blend_row(
-        &self,
-        row: &mut [[f32; 4]],
-        fragments: impl Iterator<Item = Option<[f32; 4]>>,
-    ) -> bool {
-        let mut any = false;
-        for (texel, fragment) in row.iter_mut().zip(fragments) {
-            if let Some(source) = fragment {
-                *texel = self.blend(source, *texel);
-                any = true;
-            }
-        }
-        // What was not blended is representable already, and quantising leaves it as it is.
-        if any {
-            self.format.quantize_row(row);
-        }
-        any
-    }
 }
 
-/// What colours are clamped to before they are blended in a format.
-pub(super) fn clamp_range(format: Format) -> Option<(f32, f32)> {
-    match format.numeric() {
-        Numeric::Unorm | Numeric::Srgb => Some((0.0, 1.0)),
-        Numeric::Snorm => Some((-1.0, 1.0)),
-        _ => None,
-    }
-}
-
-#[inline]
 fn clamp(color: [f32; 4], range: Option<(f32, f32)>) -> [f32; 4] {
     match range {
         Some((low, high)) => color.map(|component| component.clamp(low, high)),
@@ -198,7 +134,6 @@ fn factors(
     }
 }
 
-#[cfg(test)]
 mod tests {
     use super::*;
 
@@ -336,23 +271,6 @@ mod tests {
     }
 
     #[test]
-    fn over_is_the_general_equation() {
-        let general = Blender {
-            mode: Mode::General(OVER, OVER),
-            ..blender(OVER, OVER, Format::R8G8B8A8Unorm)
-        };
-        let over = blender(OVER, OVER, Format::R8G8B8A8Unorm);
-        assert!(matches!(over.mode, Mode::Over));
-        for (source, destination) in [
-            ([0.1, 0.2, 0.3, 0.4], [0.5, 0.6, 0.7, 0.8]),
-            ([1.5, 0.0, 0.3, 1.0], [0.1, 0.6, 0.0, 1.0]),
-        ] {
-            let expected = general.blend(source, destination);
-            assert_eq!(over.blend(source, destination), expected);
-        }
-    }
-
-    #[test]
     fn masked_components_and_zero_factors_keep_nothing_they_should_not() {
         let replace = BlendEquation {
             source: BlendFactor::One,
@@ -366,21 +284,5 @@ mod tests {
         let blender = Blender::new(&state, CONSTANTS, Format::R32G32B32A32Sfloat);
         let blended = blender.blend([1.0, 2.0, 3.0, 4.0], [f32::INFINITY, 6.0, f32::NAN, 8.0]);
         assert_eq!(blended, [1.0, 6.0, 3.0, 8.0]);
-        assert!(!blender.writes_nothing());
-    }
-
-    #[test]
-    fn rows_are_quantised_where_fragments_exist() {
-        let over = blender(OVER, OVER, Format::R8G8B8A8Unorm);
-        let background = Format::R8G8B8A8Unorm.decode(&[10, 20, 30, 255]);
-        let mut row = [background; 3];
-        let fragments = [None, Some([0.001, 0.0, 0.0, 0.001]), None];
-        over.blend_row(&mut row, fragments.into_iter());
-        assert_eq!(row, [background; 3], "less than half a code");
-        let fragments = [Some([0.25; 4]), None, None];
-        over.blend_row(&mut row, fragments.into_iter());
-        // In codes: 63.75 + 0.75 d = 71.25, 78.75, 86.25, 255.
-        assert_eq!(Format::R8G8B8A8Unorm.encode(row[0])[..4], [71, 79, 86, 255]);
-        assert_eq!(row[1..], [background; 2]);
     }
 }

@@ -1,12 +1,12 @@
 //! What becomes of shaded fragments: coverage that the program takes away, late tests, and the colour attachments.
 
 use super::batch::{Batch, offset};
-use super::color::load;
-use super::depth::Tests;
-use super::prepared::{TileDraw, Timing};
-use super::quads::Quads;
+use super::draw::{Path, TriangleTileDraw};
 use crate::program::fragment::Interface;
+use crate::raster::color::load;
+use crate::raster::depth_stencil::Tests;
 use crate::raster::output::{Buffers, Sources, covered_by_alpha, lanes_of};
+use crate::raster::tile_buffer::QuadAddresses;
 use crate::simd::as_floats;
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use isa::exec::{LaneMask, Machine};
@@ -19,7 +19,7 @@ pub fn test<S: Simd>(
     lanes: u16,
     front: bool,
     code: u32x16<S>,
-    quads: &Quads,
+    quads: &QuadAddresses,
     buffers: &mut Buffers,
 ) -> u16 {
     let mut depths = [0; 16];
@@ -55,18 +55,18 @@ pub fn test<S: Simd>(
 #[inline(always)]
 pub fn write<S: Simd>(
     simd: S,
-    draw: &TileDraw<'_>,
+    draw: &TriangleTileDraw<'_>,
     interface: &Interface,
     batch: &Batch,
     machine: &Machine,
     killed: &LaneMask,
     buffers: &mut Buffers,
 ) -> u64 {
-    if draw.plain {
-        write_plain(simd, draw, interface, batch, machine, buffers);
+    if draw.blends_directly() {
+        write_directly(simd, draw, interface, batch, machine, buffers);
         return 0;
     }
-    let late = draw.timing == Timing::Late && draw.tests.any();
+    let late = draw.path == Path::LateTests && draw.tests.any();
     let sources: Vec<Sources<'_>> = interface
         .colors
         .iter()
@@ -86,11 +86,15 @@ pub fn write<S: Simd>(
         for &turn in turns {
             let mut samples = sample_lanes(batch, chunk, alive & turn);
             remove(simd, draw, interface, machine, chunk, &mut samples);
-            for (sample, lanes) in samples.iter_mut().enumerate().take(draw.positions.len()) {
+            for (sample, lanes) in samples
+                .iter_mut()
+                .enumerate()
+                .take(draw.samples.positions.len())
+            {
                 if *lanes == 0 {
                     continue;
                 }
-                let quads = batch.places(chunk, sample, draw.positions.len());
+                let quads = batch.places(chunk, sample, draw.samples.positions.len());
                 if late {
                     let code = late_depth(simd, draw, interface, batch, machine, chunk, sample);
                     let number = turn.trailing_zeros() as usize / 4;
@@ -103,20 +107,20 @@ pub fn write<S: Simd>(
             }
         }
     }
-    if draw.count_late { passed } else { 0 }
+    if draw.counts_late { passed } else { 0 }
 }
 
 /// As [`write`], for draws of which nothing is removed or tested after shading.
 #[inline(always)]
-fn write_plain<S: Simd>(
+fn write_directly<S: Simd>(
     simd: S,
-    draw: &TileDraw<'_>,
+    draw: &TriangleTileDraw<'_>,
     interface: &Interface,
     batch: &Batch,
     machine: &Machine,
     buffers: &mut Buffers,
 ) {
-    let count = draw.positions.len();
+    let count = draw.samples.positions.len();
     for (index, output) in draw.colors.iter().enumerate() {
         let (Some(output), Some(slots)) = (output, interface.colors.get(index)) else {
             continue;
@@ -192,7 +196,7 @@ fn sample_lanes(batch: &Batch, chunk: usize, among: u16) -> [u16; 4] {
 #[inline(always)]
 fn remove<S: Simd>(
     simd: S,
-    draw: &TileDraw<'_>,
+    draw: &TriangleTileDraw<'_>,
     interface: &Interface,
     machine: &Machine,
     chunk: usize,
@@ -213,7 +217,7 @@ fn remove<S: Simd>(
     if draw.draw.state.alpha_to_coverage {
         let alpha = interface.colors.first().and_then(|[first, _]| first[3]);
         if let Some(alpha) = alpha.and_then(|slot| machine.output_chunks(slot).get(chunk)) {
-            let covered = covered_by_alpha(simd, alpha, draw.positions.len());
+            let covered = covered_by_alpha(simd, alpha, draw.samples.positions.len());
             for (lanes, covered) in samples.iter_mut().zip(covered) {
                 *lanes &= covered;
             }
@@ -225,7 +229,7 @@ fn remove<S: Simd>(
 #[inline(always)]
 fn late_depth<S: Simd>(
     simd: S,
-    draw: &TileDraw<'_>,
+    draw: &TriangleTileDraw<'_>,
     interface: &Interface,
     batch: &Batch,
     machine: &Machine,
@@ -240,8 +244,8 @@ fn late_depth<S: Simd>(
         None => {
             let mut depth = f32x16::from_slice(simd, &batch.depth[16 * chunk..][..16]);
             // Samples shaded for themselves have their own depth already.
-            if draw.positions.len() > 1 && !draw.per_sample {
-                let [x, y] = draw.positions[sample].map(offset);
+            if draw.samples.positions.len() > 1 && !draw.samples.each_shaded {
+                let [x, y] = draw.samples.positions[sample].map(offset);
                 let mut offsets = [0.0; 16];
                 for (lane, offset) in offsets.iter_mut().enumerate() {
                     let quad = &batch.chunk_quads(chunk)[lane / 4];
@@ -267,11 +271,11 @@ fn late_depth<S: Simd>(
 #[inline(always)]
 fn write_colors<S: Simd>(
     simd: S,
-    draw: &TileDraw<'_>,
+    draw: &TriangleTileDraw<'_>,
     sources: &[Sources<'_>],
     chunk: usize,
     lanes: u16,
-    quads: &Quads,
+    quads: &QuadAddresses,
     buffers: &mut Buffers,
 ) {
     if lanes == 0 {

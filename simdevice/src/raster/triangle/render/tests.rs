@@ -7,7 +7,7 @@ use super::*;
 use crate::device::Device;
 use crate::format::{Aspect, ClearValue, Format};
 use crate::geometry::{Bins, PrimitiveKind, Varyings};
-use crate::geometry::{PrimitiveChunk, PrimitiveDraw};
+use crate::geometry::{PrimitiveDraw, PrimitiveSegment};
 use crate::image::{Image, ImageDesc, ImageKind, ImageView};
 use crate::packet::{Attachment, LoadOp, Rendering, StoreOp};
 use crate::program::bindings::Bindings;
@@ -19,7 +19,7 @@ use crate::pass::{Pass, PassDraw};
 use crate::program::interface::{
     DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling,
 };
-use crate::raster::setup::{CENTER, SAMPLES_4};
+use crate::raster::tile::{CENTER, SAMPLES_4};
 use crate::state::*;
 use crate::state::{DrawState, Rect, Topology};
 use devmem::Allocation;
@@ -178,7 +178,7 @@ fn draw(
         state,
         bindings: Bindings::default(),
         regions: scissors.map(|scissor| scissor.intersect(area)).collect(),
-        chunks: vec![PrimitiveChunk {
+        segments: vec![PrimitiveSegment {
             bins: Bins::everywhere(
                 &primitives,
                 area,

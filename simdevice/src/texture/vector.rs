@@ -1,35 +1,39 @@
-//! Samples of 16 lanes at once. The bits are those of [`super::filter`], which does what this cannot; nothing here is
+//! Samples of 16 lanes at once. The bits are those of [`super::scalar`], which does what this cannot; nothing here is
 //! fused, so that every SIMD level gives them.
 //!
-//! Work goes in phases that hand arrays to each other: levels of detail, the texels along each axis, the texels'
+//! [`bilinear`] takes plain samples, by far the most: of 2D images of four bytes a texel, linear within levels, where quads
+//! alone choose the levels. Everything stays in vectors there, from the coordinates to the registers.
+//!
+//! In [`general`] work goes in phases that hand arrays to each other: levels of detail, the texels along each axis, the texels'
 //! contents and their mean. Only the first depends on everything, so that few kernels are compiled for each SIMD level.
 
 use std::sync::atomic::AtomicU32;
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, f32x4, f32x16, prelude::*, u32x4, u32x16};
 
-use super::address;
-use super::axis::{Axis, axis};
+use super::addressing::{self, Axis, axis, taps};
 use super::cube;
-use super::filter::{border_texel, reference_value};
-use super::lod;
-use super::lod::Selection;
-use super::packing::{PackedLevel, Packing, Rows};
-use super::sampler::{AddressMode, CompareOp, Filter, Sampler};
+use super::lod::{self, QUADS, Selection};
+use super::sampler::{AddressMode, Filter, Sampler};
+use super::scalar::{border_texel, reference_value};
 use super::surface::Surface;
+use super::texels::{
+    Footprint2x2, PackedLevel, Rows, Srgb8x4, TexelCodec, Texels, Unorm8x4, VectorLayout,
+};
 use crate::format::Numeric;
-use crate::texture::packing::Floats;
+use crate::state::CompareOp;
+use crate::texture::texels::Floats;
 use isa::ir::{CHUNK_LANES, Dimension};
-use isa::resources::{Lanes, SampleRequest};
+use isa::resources::{Lanes, LodRequest, SampleRequest};
 
 /// The components of 16 texels.
-type Texels = [Floats; 4];
+type Components = [Floats; 4];
 
 /// What a request reads, and how.
 struct Batch<'a, S> {
     simd: S,
     surface: &'a Surface,
-    packing: &'a Packing,
+    layout: &'a VectorLayout,
     sampler: &'a Sampler,
     request: &'a SampleRequest,
     /// The comparison that is asked for.
@@ -38,13 +42,13 @@ struct Batch<'a, S> {
 
 /// Filters for all lanes; None if this request has to be filtered lane by lane.
 #[inline(always)]
-pub(super) fn sample<S: Simd>(
+pub(super) fn general<S: Simd>(
     simd: S,
     surface: &Surface,
     sampler: &Sampler,
     request: &SampleRequest,
 ) -> Option<[Lanes; 4]> {
-    let packing = surface.packing.as_ref()?;
+    let layout = surface.layout.as_ref()?;
     let shape = request.shape;
     if shape.multisampled || shape.dimension == Dimension::Buffer || request.gather.is_some() {
         return None;
@@ -56,7 +60,7 @@ pub(super) fn sample<S: Simd>(
     let batch = Batch {
         simd,
         surface,
-        packing,
+        layout,
         sampler,
         request,
         reference,
@@ -69,11 +73,11 @@ pub(super) fn sample<S: Simd>(
 impl<S: Simd> Batch<'_, S> {
     /// Stored components as a program gets them.
     #[inline(always)]
-    fn registers(&self, texels: &Texels) -> [Lanes; 4] {
-        let components = self.packing.kind.components();
+    fn registers(&self, texels: &Components) -> [Lanes; 4] {
+        let components = self.layout.codec.components();
         let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
         let mut registers = [&zero, &zero, &zero, &one];
-        for (register, stored) in registers.iter_mut().zip(self.packing.order) {
+        for (register, stored) in registers.iter_mut().zip(self.layout.order) {
             if stored < components {
                 *register = &texels[stored];
             }
@@ -87,7 +91,7 @@ impl<S: Simd> Batch<'_, S> {
 
     /// With the filter that each lane asks for.
     #[inline(always)]
-    fn select_filter(&self, selection: &Selection) -> Option<Texels> {
+    fn select_filter(&self, selection: &Selection) -> Option<Components> {
         let first = selection.filter[0];
         let mut texels = self.select_levels(selection, first)?;
         if selection.filter != [first; CHUNK_LANES] {
@@ -109,7 +113,7 @@ impl<S: Simd> Batch<'_, S> {
 
     /// Mixed between levels.
     #[inline(always)]
-    fn select_levels(&self, selection: &Selection, filter: Filter) -> Option<Texels> {
+    fn select_levels(&self, selection: &Selection, filter: Filter) -> Option<Components> {
         let high = self.filter_level(&selection.high, filter)?;
         let weights = selection.weight.iter().map(|weight| weight.to_bits());
         if weights.fold(0, |all, bits| all | bits) == 0 {
@@ -132,7 +136,7 @@ impl<S: Simd> Batch<'_, S> {
 
     /// Of one level for each lane; None if some lie across the edge of a cube's face. Compiled on its own.
     #[inline(always)]
-    fn filter_level(&self, levels: &Lanes, filter: Filter) -> Option<Texels> {
+    fn filter_level(&self, levels: &Lanes, filter: Filter) -> Option<Components> {
         self.simd.vectorize(
             #[inline(always)]
             || self.footprint(levels, filter),
@@ -140,7 +144,7 @@ impl<S: Simd> Batch<'_, S> {
     }
 
     #[inline(always)]
-    fn footprint(&self, levels: &Lanes, filter: Filter) -> Option<Texels> {
+    fn footprint(&self, levels: &Lanes, filter: Filter) -> Option<Components> {
         let face = (self.request.shape.dimension == Dimension::Cube).then(|| self.faces());
         let (faces, coordinate) = match &face {
             Some((faces, coordinate)) => (Some(faces), coordinate),
@@ -151,7 +155,7 @@ impl<S: Simd> Batch<'_, S> {
         if layers.is_some_and(|layers| layers.iter().any(missing)) {
             return None;
         }
-        let sizes = LevelSizes::new(&self.packing.levels, levels);
+        let sizes = LevelSizes::new(&self.layout.levels, levels);
         let dimension = self.request.shape.dimension;
         let x = self.axis(0, filter, coordinate, &sizes);
         let (y, z);
@@ -229,7 +233,7 @@ impl<S: Simd> Batch<'_, S> {
         let coordinate = &self.request.coordinate[shape.dimension.coordinates()];
         let mut layers = faces.copied().unwrap_or_default();
         for (layer, coordinate) in layers.iter_mut().zip(coordinate) {
-            *layer += address::layer(f32::from_bits(*coordinate), elements) * per_element;
+            *layer += addressing::layer(f32::from_bits(*coordinate), elements) * per_element;
         }
         Some(layers)
     }
@@ -277,14 +281,14 @@ impl<S: Simd> Batch<'_, S> {
         [x, y]: [&Axis; 2],
         within: [u16; 2],
         filter: Filter,
-    ) -> Texels {
+    ) -> Components {
         let dimension = self.request.shape.dimension;
-        let words = self.packing.words(&self.surface.memory);
+        let words = self.layout.words(&self.surface.memory);
         let bordered = x.has_outside || y.has_outside || within[0] != u16::MAX;
         // A cube's outside is that of lanes that nobody asks for.
         let plain = self.reference.is_none() && (!bordered || dimension == Dimension::Cube);
         if filter == Filter::Linear && dimension != Dimension::D1 && plain {
-            let kind = self.packing.kind;
+            let kind = self.layout.codec;
             return kind.bilinear(self.simd, words, rows, &x.weight, &y.weight);
         }
         let texel = |i: usize, j: usize| {
@@ -299,7 +303,7 @@ impl<S: Simd> Batch<'_, S> {
         }
     }
 
-    /// Texels (i, j) of those around, or the border's where they aren't `inside`; compared, if that is asked for.
+    /// Components (i, j) of those around, or the border's where they aren't `inside`; compared, if that is asked for.
     #[inline(always)]
     fn texels(
         &self,
@@ -307,12 +311,12 @@ impl<S: Simd> Batch<'_, S> {
         rows: &Rows<'_>,
         [i, j]: [usize; 2],
         inside: u16,
-    ) -> Texels {
-        let mut texels = self.packing.kind.load(self.simd, words, rows, i, j);
+    ) -> Components {
+        let mut texels = self.layout.codec.load(self.simd, words, rows, i, j);
         if inside != u16::MAX {
             let border = border_texel(self.surface, self.sampler).map(f32::from_bits);
-            for (register, stored) in self.packing.order.into_iter().enumerate() {
-                if stored < self.packing.kind.components() {
+            for (register, stored) in self.layout.order.into_iter().enumerate() {
+                if stored < self.layout.codec.components() {
                     for lane in (0..CHUNK_LANES).filter(|lane| inside >> lane & 1 == 0) {
                         texels[stored][lane] = border[register];
                     }
@@ -391,7 +395,7 @@ fn compare(op: CompareOp, reference: &Floats, depths: &mut Floats) {
 
 /// The weighted means of texels.
 #[inline(always)]
-fn mix(a: &Texels, b: &Texels, weight: &Floats) -> Texels {
+fn mix(a: &Components, b: &Components, weight: &Floats) -> Components {
     let mut mixed = *a;
     for (mixed, b) in mixed.iter_mut().zip(b) {
         for lane in 0..CHUNK_LANES {
@@ -399,4 +403,170 @@ fn mix(a: &Texels, b: &Texels, weight: &Floats) -> Texels {
         }
     }
     mixed
+}
+
+/// Filters for all lanes; None if the request isn't plain.
+#[inline(always)]
+pub(super) fn bilinear<S: Simd>(
+    simd: S,
+    surface: &Surface,
+    sampler: &Sampler,
+    request: &SampleRequest,
+) -> Option<[Lanes; 4]> {
+    let layout = surface.layout.as_ref()?;
+    if !is_plain(sampler, request) {
+        return None;
+    }
+    match layout.codec {
+        TexelCodec::Unorm8x4 => Some(simd.vectorize(
+            #[inline(always)]
+            || filter::<S, Unorm8x4>(simd, surface, layout, sampler, request),
+        )),
+        TexelCodec::Srgb8x4 => Some(simd.vectorize(
+            #[inline(always)]
+            || filter::<S, Srgb8x4>(simd, surface, layout, sampler, request),
+        )),
+        _ => None,
+    }
+}
+
+/// Whether there is nothing but to filter.
+#[inline(always)]
+fn is_plain(sampler: &Sampler, request: &SampleRequest) -> bool {
+    let shape = request.shape;
+    let [x, y, _] = sampler.address_modes;
+    let mut moved = 0;
+    for offset in request.offset[..2].as_flattened() {
+        moved |= offset;
+    }
+    shape.dimension == Dimension::D2
+        && !shape.arrayed
+        && !shape.multisampled
+        && request.lod == LodRequest::Automatic
+        && request.gather.is_none()
+        && (request.compare.is_none() || sampler.compare_op.is_none())
+        && (sampler.mag_filter, sampler.min_filter) == (Filter::Linear, Filter::Linear)
+        && !sampler.unnormalized_coordinates
+        && x != AddressMode::ClampToBorder
+        && y != AddressMode::ClampToBorder
+        && moved == 0
+}
+
+#[inline(always)]
+fn filter<S: Simd, T: Texels>(
+    simd: S,
+    surface: &Surface,
+    layout: &VectorLayout,
+    sampler: &Sampler,
+    request: &SampleRequest,
+) -> [Lanes; 4] {
+    let words = layout.words(&surface.memory);
+    let selection = lod::select_quads(surface, sampler, request);
+    let mut texel = level::<S, T>(simd, words, layout, sampler, request, &selection.high);
+    if selection.weight != [0.0; QUADS] {
+        let low = level::<S, T>(simd, words, layout, sampler, request, &selection.low);
+        let weight = spread(simd, selection.weight);
+        for c in 0..T::COMPONENTS {
+            // Texels are finite, so that a weight of zero takes nothing.
+            texel[c] = texel[c] + weight * (low[c] - texel[c]);
+        }
+    }
+    registers(surface, layout, texel)
+}
+
+/// The weighted mean of the texels of a level for each quad.
+#[inline(always)]
+fn level<S: Simd, T: Texels>(
+    simd: S,
+    words: &[AtomicU32],
+    layout: &VectorLayout,
+    sampler: &Sampler,
+    request: &SampleRequest,
+    levels: &[u32; QUADS],
+) -> [f32x16<S>; 4] {
+    let (width, height, base, row_pitch);
+    let first = &layout.levels[levels[0] as usize];
+    if *levels == [levels[0]; QUADS] {
+        width = f32x16::splat(simd, first.extent[0] as f32);
+        height = f32x16::splat(simd, first.extent[1] as f32);
+        base = u32x16::splat(simd, first.base);
+        row_pitch = u32x16::splat(simd, first.row_pitch);
+    } else {
+        let mut each = [first; QUADS];
+        for quad in 1..QUADS {
+            each[quad] = &layout.levels[levels[quad] as usize];
+        }
+        width = spread(simd, of_each(each, |level| level.extent[0] as f32));
+        height = spread(simd, of_each(each, |level| level.extent[1] as f32));
+        base = spread_words(simd, of_each(each, |level| level.base));
+        row_pitch = spread_words(simd, of_each(each, |level| level.row_pitch));
+    }
+    let x = taps(
+        simd,
+        sampler.address_modes[0],
+        &request.coordinate[0],
+        width,
+    );
+    let y = taps(
+        simd,
+        sampler.address_modes[1],
+        &request.coordinate[1],
+        height,
+    );
+    let around = Footprint2x2 {
+        rows: [base + y.first * row_pitch, base + y.second * row_pitch],
+        columns: [x.first, x.second],
+        weights: [x.weight, y.weight],
+    };
+    around.filter::<T>(simd, words)
+}
+
+/// A number of each level. (The standard library's `map` is not always inlined.)
+#[inline(always)]
+fn of_each<T: Copy + Default>(
+    levels: [&PackedLevel; QUADS],
+    value: impl Fn(&PackedLevel) -> T,
+) -> [T; QUADS] {
+    let mut values = [T::default(); QUADS];
+    for quad in 0..QUADS {
+        values[quad] = value(levels[quad]);
+    }
+    values
+}
+
+/// A number of each quad for its lanes.
+#[inline(always)]
+fn spread<S: Simd>(simd: S, [a, b, c, d]: [f32; QUADS]) -> f32x16<S> {
+    let upper = f32x4::splat(simd, a).combine(f32x4::splat(simd, b));
+    upper.combine(f32x4::splat(simd, c).combine(f32x4::splat(simd, d)))
+}
+
+/// As [`spread`], of integers.
+#[inline(always)]
+fn spread_words<S: Simd>(simd: S, [a, b, c, d]: [u32; QUADS]) -> u32x16<S> {
+    let upper = u32x4::splat(simd, a).combine(u32x4::splat(simd, b));
+    upper.combine(u32x4::splat(simd, c).combine(u32x4::splat(simd, d)))
+}
+
+/// Stored components, of which there are four, as a program gets them.
+#[inline(always)]
+fn registers<S: Simd>(
+    surface: &Surface,
+    layout: &VectorLayout,
+    texel: [f32x16<S>; 4],
+) -> [Lanes; 4] {
+    let mut stored = [[0.0; CHUNK_LANES]; 4];
+    for c in 0..4 {
+        stored[c] = texel[c].into();
+    }
+    let (zero, one) = ([0.0; CHUNK_LANES], [1.0; CHUNK_LANES]);
+    let mut found = [&zero; 4];
+    for c in 0..4 {
+        found[c] = &stored[layout.order[c]];
+    }
+    let mut out = [[0; CHUNK_LANES]; 4];
+    for (out, from) in out.iter_mut().zip(surface.swizzle) {
+        *out = bytemuck::cast(*from.pick(&found, &zero, &one));
+    }
+    out
 }

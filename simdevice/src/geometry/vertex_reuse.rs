@@ -1,14 +1,14 @@
 //! Which vertices a draw names: consecutive ones or indices, runs between primitive restarts, and the distinct
-//! vertices of a chunk of primitives.
+//! vertices of a segment of primitives.
 
 use super::assemble::{places, primitive_count, uses_pivot};
-use crate::packet::{Draw, IndexStream};
+use crate::packet::Draw;
 use crate::state::Topology;
 use devmem::host;
 
 /// Vertices that no restart interrupts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Run {
+pub(super) struct RestartRun {
     /// The place of its first vertex among the draw's.
     pub start: u32,
     /// How many primitives come before it in the instance.
@@ -21,7 +21,7 @@ pub(super) struct Run {
 const SCAN: u32 = 1 << 16;
 
 /// The runs of a draw that have primitives, and how many vertices all runs have.
-pub(super) fn runs(draw: &Draw) -> (Vec<Run>, u64) {
+pub(super) fn runs(draw: &Draw) -> (Vec<RestartRun>, u64) {
     let topology = draw.state.topology;
     let mut gathered = Runs {
         topology,
@@ -31,19 +31,14 @@ pub(super) fn runs(draw: &Draw) -> (Vec<Run>, u64) {
     };
     match &draw.indices {
         Some(stream) if draw.state.primitive_restart => {
-            let restart = restart_index(stream);
+            let restart = stream.restart_index();
             let (mut start, mut indices) = (0, Vec::new());
             // Indices outside the buffer read as zero, so that they restart nothing.
-            let known = known_indices(stream).saturating_sub(u64::from(draw.first));
+            let known = stream.len().saturating_sub(u64::from(draw.first));
             let known = known.min(u64::from(draw.count)) as u32;
             for block in (0..known).step_by(SCAN as usize) {
                 let len = SCAN.min(known - block);
-                read_indices(
-                    stream,
-                    u64::from(draw.first) + u64::from(block),
-                    len,
-                    &mut indices,
-                );
+                stream.read(u64::from(draw.first) + u64::from(block), len, &mut indices);
                 for (place, &index) in (block..).zip(&indices) {
                     if index == restart {
                         gathered.push(start, place);
@@ -60,7 +55,7 @@ pub(super) fn runs(draw: &Draw) -> (Vec<Run>, u64) {
 
 struct Runs {
     topology: Topology,
-    runs: Vec<Run>,
+    runs: Vec<RestartRun>,
     primitives: u32,
     vertices: u64,
 }
@@ -71,67 +66,13 @@ impl Runs {
         let primitives = primitive_count(self.topology, vertices);
         self.vertices += u64::from(vertices);
         if primitives > 0 {
-            let run = Run {
+            let run = RestartRun {
                 start,
                 primitives_before: self.primitives,
                 primitives,
             };
             host::push(&mut self.runs, run);
             self.primitives += primitives;
-        }
-    }
-}
-
-/// The index that restarts a primitive: the greatest of its size.
-fn restart_index(stream: &IndexStream) -> u32 {
-    match stream.index_size {
-        1 => 0xFF,
-        2 => 0xFFFF,
-        _ => u32::MAX,
-    }
-}
-
-/// How many indices the buffer has.
-fn known_indices(stream: &IndexStream) -> u64 {
-    let memory = stream.buffer.memory.len();
-    let bytes = stream
-        .buffer
-        .size
-        .min(memory.saturating_sub(stream.buffer.offset));
-    bytes / u64::from(stream.index_size.max(1))
-}
-
-/// Reads `len` indices from number `first` on; those outside the buffer are zero.
-fn read_indices(stream: &IndexStream, first: u64, len: u32, out: &mut Vec<u32>) {
-    let size = u64::from(stream.index_size.max(1));
-    out.clear();
-    host::resize(out, len as usize, 0);
-    let known = known_indices(stream).saturating_sub(first).min(len.into()) as usize;
-    if known == 0 {
-        return;
-    }
-    // Both lie inside the buffer, so that neither overflows.
-    let start = stream.buffer.offset + first * size;
-    let out = &mut out[..known];
-    let memory = &stream.buffer.memory;
-    // What was known to lie inside cannot be refused.
-    match stream.index_size {
-        1 => {
-            let mut bytes: Vec<u8> = host::zeroed(known);
-            let _ = memory.read(start, &mut bytes);
-            out.iter_mut()
-                .zip(bytes)
-                .for_each(|(out, byte)| *out = byte.into());
-        }
-        2 => {
-            let mut halves: Vec<u16> = host::zeroed(known);
-            let _ = memory.read(start, &mut halves);
-            out.iter_mut()
-                .zip(halves)
-                .for_each(|(out, half)| *out = half.into());
-        }
-        _ => {
-            let _ = memory.read(start, out);
         }
     }
 }
@@ -147,7 +88,7 @@ pub(super) struct Piece {
     pub primitives_before: u32,
     /// The place in the run of the first of `elements`.
     base: u32,
-    /// Where its elements begin in [`Elements::slots`].
+    /// Where its elements begin in [`VertexReuse::slots`].
     elements: usize,
     /// The first of its slots.
     first_vertex: usize,
@@ -155,9 +96,9 @@ pub(super) struct Piece {
     pivot: u32,
 }
 
-/// The distinct vertices of a chunk, each in a slot, and where primitives find them.
+/// The distinct vertices of a segment, each in a slot, and where primitives find them.
 #[derive(Debug, Default)]
-pub(super) struct Elements {
+pub(super) struct VertexReuse {
     pub pieces: Vec<Piece>,
     /// By slot: the vertex's number, which an offset may have made negative.
     pub vertices: Vec<i64>,
@@ -169,8 +110,8 @@ pub(super) struct Elements {
     table: Vec<u32>,
 }
 
-impl Elements {
-    /// Forgets the previous chunk.
+impl VertexReuse {
+    /// Forgets the previous segment.
     pub(super) fn clear(&mut self) {
         self.pieces.clear();
         self.vertices.clear();
@@ -178,14 +119,21 @@ impl Elements {
         self.slots.clear();
     }
 
-    /// How many primitives the chunk has.
+    /// How many primitives the segment has.
     pub(super) fn primitives(&self) -> u64 {
         let pieces = self.pieces.iter();
         pieces.map(|piece| u64::from(piece.end - piece.first)).sum()
     }
 
     /// Adds primitives `first..end` of a run.
-    pub(super) fn push(&mut self, draw: &Draw, run: &Run, instance: u32, first: u32, end: u32) {
+    pub(super) fn push(
+        &mut self,
+        draw: &Draw,
+        run: &RestartRun,
+        instance: u32,
+        first: u32,
+        end: u32,
+    ) {
         let topology = draw.state.topology;
         let range = places(topology, first, end);
         let place = |place: u32| u64::from(draw.first) + u64::from(run.start) + u64::from(place);
@@ -216,11 +164,11 @@ impl Elements {
                 let len = range.end - range.start;
                 if pivot {
                     let mut first = Vec::new();
-                    read_indices(stream, place(0), 1, &mut first);
-                    read_indices(stream, place(range.start), len, &mut indices);
+                    stream.read(place(0), 1, &mut first);
+                    stream.read(place(range.start), len, &mut indices);
                     indices.extend(first);
                 } else {
-                    read_indices(stream, place(range.start), len, &mut indices);
+                    stream.read(place(range.start), len, &mut indices);
                 }
                 self.place_indices(&indices, stream.vertex_offset.into());
                 self.indices = indices;

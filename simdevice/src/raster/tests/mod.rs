@@ -1,0 +1,3 @@
+//! What the tests of both modes share.
+
+pub(super) mod blender;
