@@ -1,7 +1,7 @@
 //! An entry point's variables: their places in registers or memory, their initializers, and the outputs at the end.
 
 use isa::ir::{MAX_MEMORY_BYTES, Space};
-use spirv::{Decoration, StorageClass};
+use spirv::{BuiltIn, Decoration, StorageClass};
 
 use super::descriptors::{descriptor, resource};
 use super::inputs_outputs::{IoLocation, is_computed};
@@ -180,6 +180,27 @@ fn compute_inputs(t: &mut Translator, id: u32) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Tells if code names an input that differs from sample to sample. That it may never run changes nothing: such an input
+/// asks for a run for each sample.
+pub fn names_a_sample(t: &Translator) -> bool {
+    let is_of_sample =
+        |built_in| matches!(built_in, Some(BuiltIn::SampleId | BuiltIn::SamplePosition));
+    let mut used = t.analysis.used.iter();
+    used.any(|id| {
+        let Some(variable) = t.globals.variables.get(id) else {
+            return false;
+        };
+        let members = match t.globals.types.get(variable.pointee) {
+            Ok(Type::Struct(members)) => members.as_ref(),
+            _ => &[],
+        };
+        variable.class == StorageClass::Input
+            && (is_of_sample(t.module.built_in(*id))
+                || t.module.has(*id, Decoration::Sample)
+                || members.iter().any(|it| is_of_sample(it.built_in)))
+    })
 }
 
 /// Assigns what was stored to the output variables.
