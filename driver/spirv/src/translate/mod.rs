@@ -224,7 +224,6 @@ fn empty_interface(stage: Stage) -> Interface {
         discards: false,
         per_sample: false,
         has_side_effects: false,
-        uses_subgroups: false,
     }
 }
 
