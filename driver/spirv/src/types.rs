@@ -216,7 +216,12 @@ pub(crate) struct Types {
     entries: HashMap<u32, Entry>,
     /// Pointers announced, not declared yet.
     forward: HashSet<u32>,
+    /// The layout that members of a matrix type have, where all have the same.
+    matrix_layouts: HashMap<u32, Option<MatrixLayout>>,
 }
+
+/// The layout of a matrix: bytes from one column (or row) to the next, and whether it is from row to row.
+pub(crate) type MatrixLayout = (u32, bool);
 
 impl Types {
     /// Announces a pointer type whose pointee isn't declared yet.
@@ -246,6 +251,9 @@ impl Types {
             Type::Struct(members) => members.iter().map(|member| member.ty).collect(),
             _ => Vec::new(),
         };
+        if let Type::Struct(members) = &ty {
+            self.note_matrix_layouts(members);
+        }
         let mut depth = 0;
         let mut all = Some(0_u32);
         for part in parts {
@@ -281,6 +289,35 @@ impl Types {
             },
         );
         Ok(())
+    }
+
+    fn note_matrix_layouts(&mut self, members: &[Member]) {
+        for member in members {
+            if let (Some(stride), Some(matrix)) = (member.matrix_stride, self.matrix_in(member.ty))
+            {
+                let layout = Some((stride, member.row_major));
+                let noted = self.matrix_layouts.entry(matrix).or_insert(layout);
+                if *noted != layout {
+                    *noted = None;
+                }
+            }
+        }
+    }
+
+    /// The matrix type that a type is, or is an array of.
+    pub fn matrix_in(&self, mut id: u32) -> Option<u32> {
+        loop {
+            match self.get(id).ok()? {
+                Type::Array { element, .. } | Type::RuntimeArray { element, .. } => id = *element,
+                Type::Matrix { .. } => return Some(id),
+                _ => return None,
+            }
+        }
+    }
+
+    /// The layout that all members of a matrix type have.
+    pub fn matrix_layout(&self, matrix: u32) -> Option<MatrixLayout> {
+        self.matrix_layouts.get(&matrix).copied().flatten()
     }
 
     /// A type by id.

@@ -118,6 +118,7 @@ fn translate_here(
         promoted: PromotedVariables::default(),
         interface,
         next_resource_slot: 0,
+        workgroup_block: None,
         values: HashMap::new(),
         types: HashMap::new(),
     };
@@ -315,9 +316,11 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::StorageImageReadWithoutFormat
             | C::StorageImageWriteWithoutFormat
             | C::MultiViewport
-            | C::MultiView
             | C::VariablePointers
             | C::VariablePointersStorageBuffer
+            | C::WorkgroupMemoryExplicitLayoutKHR
+            | C::WorkgroupMemoryExplicitLayout8BitAccessKHR
+            | C::WorkgroupMemoryExplicitLayout16BitAccessKHR
             | C::DotProduct
             | C::DotProductInputAll
             | C::DotProductInput4x8Bit

@@ -10,22 +10,22 @@ use isa::op::Op as Ir;
 use spirv::{Decoration, Op, StorageClass};
 
 use super::translator::Translator;
-use super::value::{EXPLICIT, MemoryRef, Pointer, TIGHT};
+use super::value::{EXPLICIT, MemoryLayout, MemoryRef, Pointer};
+use super::variables::workgroup_layout;
 use crate::error::{Result, malformed, unsupported};
 use crate::instruction::Instruction;
-use crate::types::Type;
 
 /// The registers of a pointer.
 pub fn pointer_to_value(t: &mut Translator, pointer: &Pointer) -> Result<Rc<[Reg]>> {
     let Pointer::Memory(place) = pointer else {
         return unsupported("this pointer as a value");
     };
+    if place.space != Space::Global {
+        check_layout(t, place)?;
+    }
     match place.space {
         Space::Global => Ok([address(t, place)?].into()),
         Space::Buffer(binding) => {
-            if place.layout.component_stride.is_some() || is_matrix(t, place.ty)? {
-                return unsupported("a variable pointer into a matrix");
-            }
             let slot = slot_number(t, binding);
             Ok([slot, bytes_before(t, place, 0)].into())
         }
@@ -51,34 +51,50 @@ pub fn pointer_from_value(t: &mut Translator, ty: u32, regs: &[Reg]) -> Result<P
             Ok(at(Space::Global, *address, EXPLICIT))
         }
         (StorageClass::StorageBuffer, [slot, bytes]) => {
-            if is_matrix(t, pointee)? {
-                return unsupported("a variable pointer to a matrix");
-            }
+            let layout = pointee_layout(t, pointee, EXPLICIT)?;
             let one = t.emit.u32(1);
             let binding = Binding {
                 slot: 0,
                 count: t.next_resource_slot,
                 index: Some(t.emit.op(Ir::ISub, &[*slot, one])),
             };
-            Ok(at(Space::Buffer(binding), *bytes, EXPLICIT))
+            Ok(at(Space::Buffer(binding), *bytes, layout))
         }
         (StorageClass::Workgroup, [bytes]) => {
+            let layout = pointee_layout(t, pointee, workgroup_layout(t))?;
             let one = t.emit.u32(1);
             let base = t.emit.op(Ir::ISub, &[*bytes, one]);
-            Ok(at(Space::Shared, base, TIGHT))
+            Ok(at(Space::Shared, base, layout))
         }
         _ => unsupported("this value as a pointer"),
     }
 }
 
-/// Tells if a type is a matrix or an array of them, whose layout its own type doesn't say.
-fn is_matrix(t: &Translator, mut ty: u32) -> Result<bool> {
-    loop {
-        match t.globals.types.get(ty)? {
-            Type::Array { element, .. } | Type::RuntimeArray { element, .. } => ty = *element,
-            Type::Matrix { .. } => return Ok(true),
-            _ => return Ok(false),
-        }
+/// Refuses a pointer whose type doesn't say how what it points to lies in memory.
+fn check_layout(t: &Translator, place: &MemoryRef) -> Result<()> {
+    if place.layout.component_stride.is_some() {
+        return unsupported("a variable pointer into a matrix whose rows are in order");
+    }
+    pointee_layout(t, place.ty, place.layout).map(|_| ())
+}
+
+/// The layout of what a variable pointer leads to. Only its type is known then: of a matrix, all members of its type must
+/// have one layout.
+fn pointee_layout(t: &Translator, pointee: u32, layout: MemoryLayout) -> Result<MemoryLayout> {
+    let Some(matrix) = t
+        .globals
+        .types
+        .matrix_in(pointee)
+        .filter(|_| layout.explicit)
+    else {
+        return Ok(layout);
+    };
+    match t.globals.types.matrix_layout(matrix) {
+        Some(layout_of_all) => Ok(MemoryLayout {
+            matrix: Some(layout_of_all),
+            ..layout
+        }),
+        None => unsupported("a variable pointer to a matrix that has several layouts"),
     }
 }
 
@@ -173,7 +189,7 @@ fn pointer_difference(t: &mut Translator, it: &Instruction, a: &[Reg], b: &[Reg]
 /// Bytes from one element to the next of the array that a pointer of a type leads into; never zero.
 pub fn element_stride(t: &Translator, ty: u32) -> Result<u32> {
     let (class, pointee) = t.globals.types.pointer(ty)?;
-    if class == StorageClass::Workgroup {
+    if class == StorageClass::Workgroup && !workgroup_layout(t).explicit {
         let bytes = t.globals.types.tight_size(pointee)?;
         return Ok(u32::try_from(bytes).unwrap_or(u32::MAX).max(1));
     }

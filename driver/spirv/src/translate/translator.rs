@@ -31,6 +31,8 @@ pub struct Translator<'a> {
     pub promoted: PromotedVariables,
     pub interface: Interface,
     pub next_resource_slot: u32,
+    /// The place of the blocks in workgroup memory, once it is allocated.
+    pub workgroup_block: Option<u32>,
     pub values: HashMap<u32, Value>,
     /// Types of the ids in `values`.
     pub types: HashMap<u32, u32>,

@@ -1,5 +1,5 @@
-//! Shaders in SPIR-V's assembly run on the shader cores: what GLSL has no words for. Each row of results is compared with
-//! what the host computes.
+//! Shaders run on the shader cores, most in SPIR-V's assembly: what GLSL has no words for. Each row of results is
+//! compared with what the host computes.
 
 use crate::common::{Dispatch, Random, buffer, contents, translated, words_of};
 use devmem::BufferRange;
@@ -205,11 +205,23 @@ fn code_that_never_runs_may_be_wrong() {
 fn pointers_are_chosen_at_run_time() {
     let first: Vec<u32> = (0..80).map(|index| 1000 + 7 * index).collect();
     let second: Vec<u32> = (0..80).map(|index| 50_000 + 11 * index).collect();
-    let results = run(
-        "variable_pointers.comp",
-        &[&buffer(&first), &buffer(&second)],
-        7 * LANES,
-    );
+    // Two matrices of two columns, 16 bytes apart.
+    let matrices: Vec<u32> = (0..16).map(|index| (index as f32).to_bits()).collect();
+    let shader = translated("variable_pointers.comp", &Specialization::default());
+    let (first_buffer, second_buffer) = (buffer(&first), buffer(&second));
+    let results = buffer(&[0; 8 * LANES]);
+    Dispatch {
+        buffers: &[
+            ((0, 0, 0), &first_buffer),
+            ((0, 1, 0), &second_buffer),
+            ((0, 2, 0), &results),
+            ((0, 3, 0), &buffer(&matrices)),
+        ],
+        ..Dispatch::new(&shader, [1, 1, 1])
+    }
+    .run()
+    .unwrap();
+    let results = contents(&results);
     let row = |index: usize| &results[LANES * index..][..LANES];
     for at in 0..LANES {
         let is_odd = at % 2 == 1;
@@ -231,10 +243,24 @@ fn pointers_are_chosen_at_run_time() {
         assert_eq!(row(5)[at], shared as u32, "workgroup memory, lane {at}");
         let stored = if is_odd { second[at] } else { at as u32 };
         assert_eq!(row(6)[at], stored, "stored, lane {at}");
+        let corners = if is_odd { 12 + 13 } else { 4 + 5 };
+        assert_eq!(row(7)[at], corners, "matrix, lane {at}");
     }
-    let shader = translated("variable_pointers.comp", &Specialization::default());
+    // A pointer may lead to any of them.
     let writable = shader.interface.descriptors.iter().map(|it| it.writable);
-    assert!(writable.eq([true; 3]));
+    assert!(writable.eq([true; 4]));
+}
+
+#[gaurast_runner::test]
+fn blocks_of_shared_memory_lie_in_one_place() {
+    let results = run("shared_blocks.comp", &[], 3 * LANES);
+    let word = |index: usize| 0x10203 * (index as u32 + 1);
+    for lane in 0..LANES {
+        assert_eq!(results[lane], word((lane + 1).min(63)) >> 16, "lane {lane}");
+        assert_eq!(results[LANES + lane], word(lane) >> 8 & 0xff, "lane {lane}");
+        let replaced = word(lane) & 0xff_ffff | (lane as u32) << 24;
+        assert_eq!(results[2 * LANES + lane], replaced, "lane {lane}");
+    }
 }
 
 #[gaurast_runner::test]
