@@ -27,6 +27,9 @@ pub(crate) const MAX_FRAMEBUFFER_LAYERS: u32 = 2048;
 /// The most invocations of a workgroup.
 pub const MAX_WORKGROUP_INVOCATIONS: u32 = 1024;
 
+/// Invocations of a subgroup of vertices or fragments.
+pub const DRAW_SUBGROUP_SIZE: u32 = 32;
+
 /// The most bytes of workgroup memory that a program should ask for.
 pub const MAX_SHARED_BYTES: u32 = 64 << 10;
 

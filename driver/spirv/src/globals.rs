@@ -65,6 +65,8 @@ pub(crate) struct Globals {
     pub types: Types,
     pub constants: HashMap<u32, Constant>,
     pub variables: HashMap<u32, GlobalVariable>,
+    /// Types of the undefined ids that aren't values: images, samplers and pointers.
+    pub undefined: HashMap<u32, u32>,
     scalars: usize,
 }
 
@@ -230,6 +232,10 @@ impl Globals {
         it: &Instruction,
     ) -> Result<()> {
         let (id, ty) = (it.result()?, it.ty()?);
+        if it.opcode == Op::Undef && self.types.is_opaque(ty) {
+            self.undefined.insert(id, ty);
+            return Ok(());
+        }
         let spec_id = module.literal(id, Decoration::SpecId);
         let given = |bytes| match spec_id {
             Some(spec_id) => specialization.bits(spec_id, bytes),

@@ -222,7 +222,7 @@ pub enum DepthMode {
     Greater,
     /// At most the primitive's.
     Less,
-    /// The primitive's.
+    /// The primitive's. A depth that breaks this promise is written all the same.
     Unchanged,
 }
 
@@ -251,8 +251,6 @@ pub struct Interface {
     pub per_sample: bool,
     /// It stores to buffers or images, or uses atomics: it can't be skipped.
     pub has_side_effects: bool,
-    /// It uses operations of a subgroup.
-    pub uses_subgroups: bool,
 }
 
 impl Interface {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use spirv::{BuiltIn, Decoration, ExecutionModel, Op};
+use spirv::{BuiltIn, Capability, Decoration, ExecutionModel, Op};
 
 use super::decoder::{HEADER_WORDS, decode};
 use super::error::Error;
@@ -237,6 +237,12 @@ impl Module {
                 Some((entry.string(2)?.to_owned(), model))
             })
             .collect()
+    }
+
+    /// Tells if the module declares a capability.
+    pub(crate) fn declares(&self, capability: Capability) -> bool {
+        let mut declared = self.sections.capabilities.iter();
+        declared.any(|it| it.enumerant(0, Capability::from_u32) == Some(capability))
     }
 
     /// Tells if an id is decorated so.

@@ -186,6 +186,22 @@ pub(crate) enum Type {
     Function,
 }
 
+/// The scalars of a pointer as a value; there are none if pointers of the storage class are no values.
+pub(crate) fn pointer_scalars(class: StorageClass) -> &'static [Scalar] {
+    const WORD: Scalar = Scalar::Int {
+        width: 32,
+        signed: false,
+    };
+    match class {
+        StorageClass::PhysicalStorageBuffer => &[Scalar::Address],
+        // A descriptor's slot and bytes from its start; the slot is counted from 1, and 0 in the null pointer.
+        StorageClass::StorageBuffer => &[WORD, WORD],
+        // Bytes from the start of workgroup memory, counted from 1; 0 is the null pointer.
+        StorageClass::Workgroup => &[WORD],
+        _ => &[],
+    }
+}
+
 #[derive(Clone, Debug)]
 struct Entry {
     ty: Type,
@@ -200,7 +216,12 @@ pub(crate) struct Types {
     entries: HashMap<u32, Entry>,
     /// Pointers announced, not declared yet.
     forward: HashSet<u32>,
+    /// The layout that members of a matrix type have, where all have the same.
+    matrix_layouts: HashMap<u32, Option<MatrixLayout>>,
 }
+
+/// The layout of a matrix: bytes from one column (or row) to the next, and whether it is from row to row.
+pub(crate) type MatrixLayout = (u32, bool);
 
 impl Types {
     /// Announces a pointer type whose pointee isn't declared yet.
@@ -230,6 +251,9 @@ impl Types {
             Type::Struct(members) => members.iter().map(|member| member.ty).collect(),
             _ => Vec::new(),
         };
+        if let Type::Struct(members) = &ty {
+            self.note_matrix_layouts(members);
+        }
         let mut depth = 0;
         let mut all = Some(0_u32);
         for part in parts {
@@ -250,10 +274,10 @@ impl Types {
                 all.and_then(|each| each.checked_mul(*count))
             }
             Type::Struct(_) => all,
-            Type::Pointer {
-                class: StorageClass::PhysicalStorageBuffer,
-                ..
-            } => Some(1),
+            Type::Pointer { class, .. } => match pointer_scalars(*class) {
+                [] => None,
+                scalars => Some(scalars.len() as u32),
+            },
             _ => None,
         };
         self.entries.insert(
@@ -265,6 +289,35 @@ impl Types {
             },
         );
         Ok(())
+    }
+
+    fn note_matrix_layouts(&mut self, members: &[Member]) {
+        for member in members {
+            if let (Some(stride), Some(matrix)) = (member.matrix_stride, self.matrix_in(member.ty))
+            {
+                let layout = Some((stride, member.row_major));
+                let noted = self.matrix_layouts.entry(matrix).or_insert(layout);
+                if *noted != layout {
+                    *noted = None;
+                }
+            }
+        }
+    }
+
+    /// The matrix type that a type is, or is an array of.
+    pub fn matrix_in(&self, mut id: u32) -> Option<u32> {
+        loop {
+            match self.get(id).ok()? {
+                Type::Array { element, .. } | Type::RuntimeArray { element, .. } => id = *element,
+                Type::Matrix { .. } => return Some(id),
+                _ => return None,
+            }
+        }
+    }
+
+    /// The layout that all members of a matrix type have.
+    pub fn matrix_layout(&self, matrix: u32) -> Option<MatrixLayout> {
+        self.matrix_layouts.get(&matrix).copied().flatten()
     }
 
     /// A type by id.
@@ -289,6 +342,15 @@ impl Types {
         self.scalars(id).is_ok()
     }
 
+    /// Tells if a type is of images, samplers or pointers that aren't values.
+    pub fn is_opaque(&self, id: u32) -> bool {
+        match self.get(id) {
+            Ok(Type::Image(_) | Type::Sampler | Type::SampledImage { .. }) => true,
+            Ok(Type::Pointer { class, .. }) => pointer_scalars(*class).is_empty(),
+            _ => false,
+        }
+    }
+
     /// The scalars of a value, in order.
     pub fn flatten(&self, id: u32) -> Result<Vec<Scalar>> {
         let mut scalars = Vec::with_capacity(self.scalars(id)? as usize);
@@ -299,7 +361,7 @@ impl Types {
     fn flatten_into(&self, id: u32, into: &mut Vec<Scalar>) -> Result<()> {
         match self.get(id)? {
             Type::Scalar(scalar) => into.push(*scalar),
-            Type::Pointer { .. } => into.push(Scalar::Address),
+            Type::Pointer { class, .. } => into.extend_from_slice(pointer_scalars(*class)),
             Type::Vector { element, count }
             | Type::Matrix {
                 column: element,
@@ -388,7 +450,10 @@ impl Types {
     pub fn tight_size(&self, id: u32) -> Result<u64> {
         Ok(match self.get(id)? {
             Type::Scalar(scalar) => u64::from(scalar.tight_format().bytes()),
-            Type::Pointer { .. } => 8,
+            Type::Pointer { class, .. } => {
+                let scalars = pointer_scalars(*class).iter();
+                scalars.map(|it| u64::from(it.tight_format().bytes())).sum()
+            }
             Type::Vector { element, count }
             | Type::Matrix {
                 column: element,

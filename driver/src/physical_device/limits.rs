@@ -92,7 +92,7 @@ pub(crate) const MAX_WORKGROUP_INVOCATIONS: u32 = simdevice::limits::MAX_WORKGRO
 pub(crate) const MAX_SHARED_BYTES: u32 = simdevice::limits::MAX_SHARED_BYTES;
 
 /// Invocations of a subgroup, unless a pipeline requires another size.
-pub(crate) const SUBGROUP_SIZE: u32 = 32;
+pub(crate) const SUBGROUP_SIZE: u32 = simdevice::limits::DRAW_SUBGROUP_SIZE;
 
 /// The least and the greatest size that a pipeline may require.
 pub(crate) const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=128;
@@ -254,7 +254,11 @@ fn find_properties() -> Properties {
         device_node_mask: 0,
         device_luid_valid: false,
         subgroup_size: SUBGROUP_SIZE,
-        subgroup_supported_stages: vk::ShaderStageFlags::COMPUTE,
+        subgroup_supported_stages: vk::ShaderStageFlags::from_raw(
+            vk::ShaderStageFlags::VERTEX.as_raw()
+                | vk::ShaderStageFlags::FRAGMENT.as_raw()
+                | vk::ShaderStageFlags::COMPUTE.as_raw(),
+        ),
         subgroup_supported_operations: vk::SubgroupFeatureFlags::BASIC
             | vk::SubgroupFeatureFlags::VOTE
             | vk::SubgroupFeatureFlags::ARITHMETIC
@@ -263,7 +267,7 @@ fn find_properties() -> Properties {
             | vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE
             | vk::SubgroupFeatureFlags::CLUSTERED
             | vk::SubgroupFeatureFlags::QUAD,
-        subgroup_quad_operations_in_all_stages: false,
+        subgroup_quad_operations_in_all_stages: true,
         point_clipping_behavior: vk::PointClippingBehavior::ALL_CLIP_PLANES,
         max_multiview_view_count: 0,
         max_multiview_instance_index: 0,

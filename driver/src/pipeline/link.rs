@@ -2,13 +2,14 @@
 //!
 //! Stages meet by location and component. A varying is carried only if the fragment program reads it: other outputs are
 //! taken off the vertex program, so that the device drops what computes them. What is read and never written is zero.
+//! Clip and cull distances that the fragment program reads are carried as varyings too.
 
 use crate::abi::error::Error;
 use gaurast_spirv::{
     BuiltIn, DepthMode, Input, InputSource, Interface, Interpolation, Output, OutputTarget,
     Sampling, ScalarType, Shader,
 };
-use simdevice::isa::ir::{Constant, Program};
+use simdevice::isa::ir::{Constant, Output as ProgramOutput, Program};
 use simdevice::program::interface;
 use simdevice::program::interface::{
     DrawPrograms, FragmentInput, FragmentOutput, FragmentPrograms, VertexInput, VertexOutput,
@@ -37,16 +38,17 @@ pub(crate) type Varyings = HashMap<InterfaceComponent, u32>;
 /// # Errors
 /// [`Error::FeatureNotPresent`] if the stages exchange what the device cannot carry.
 pub(crate) fn link(
-    vertex: Shader,
-    fragment: Option<Shader>,
+    mut vertex: Shader,
+    mut fragment: Option<Shader>,
     stream: impl Fn(u32) -> Option<usize>,
     live_outputs: LiveOutputs<'_>,
 ) -> Result<DrawPrograms, Error> {
     check_widths(&vertex.interface)?;
-    let varyings = match &fragment {
+    let varyings = match &mut fragment {
         None => Varyings::new(),
         Some(fragment) => {
             check_widths(&fragment.interface)?;
+            carry_distances(&mut vertex, fragment);
             varyings(&vertex.interface, &fragment.interface)
         }
     };
@@ -135,10 +137,7 @@ fn fragment_programs(
         .map(|input| fragment_input(input, varyings))
         .collect();
     zero_inputs(&mut program, &inputs);
-    let keeps_depth = matches!(
-        interface.depth,
-        DepthMode::NotWritten | DepthMode::Unchanged
-    );
+    let keeps_depth = interface.depth == DepthMode::NotWritten;
     let outputs: Vec<_> = interface
         .outputs
         .iter()
@@ -178,6 +177,65 @@ fn check_widths(interface: &Interface) -> Result<(), Error> {
         )));
     }
     Ok(())
+}
+
+/// The location, beyond all of applications, at which a distance is carried.
+fn location_of_distance(built_in: BuiltIn) -> Option<u32> {
+    match built_in {
+        BuiltIn::ClipDistance => Some(u32::MAX),
+        BuiltIn::CullDistance => Some(u32::MAX - 1),
+        _ => None,
+    }
+}
+
+/// Makes varyings of the distances that the fragment program reads. The vertex program's outputs stay what they are and
+/// are written to varyings as well.
+fn carry_distances(vertex: &mut Shader, fragment: &mut Shader) {
+    for input in &mut fragment.interface.inputs {
+        let InputSource::BuiltIn {
+            built_in,
+            component,
+        } = input.source
+        else {
+            continue;
+        };
+        let Some(location) = location_of_distance(built_in) else {
+            continue;
+        };
+        input.source = InputSource::Location {
+            location,
+            component,
+            interpolation: Interpolation::Perspective,
+            sampling: Sampling::Center,
+        };
+        let written = OutputTarget::BuiltIn {
+            built_in,
+            component,
+        };
+        let outputs = &mut vertex.interface.outputs;
+        let Some(slot) = outputs.iter().position(|output| output.target == written) else {
+            continue;
+        };
+        let mut program_outputs = vertex.program.outputs.iter();
+        let Some(reg) = program_outputs
+            .find(|output| output.slot as usize == slot)
+            .map(|output| output.reg)
+        else {
+            continue;
+        };
+        vertex.program.outputs.push(ProgramOutput {
+            slot: outputs.len() as u32,
+            reg,
+        });
+        outputs.push(Output {
+            target: OutputTarget::Location {
+                location,
+                component,
+                index: 0,
+            },
+            numeric: outputs[slot].numeric,
+        });
+    }
 }
 
 /// Numbers what the vertex stage writes and the fragment stage reads, in order of their components.
@@ -426,7 +484,6 @@ mod tests {
                 discards: false,
                 per_sample: false,
                 has_side_effects: false,
-                uses_subgroups: false,
             },
         }
     }
@@ -501,6 +558,53 @@ mod tests {
             })
         };
         assert_eq!(fragment.outputs, [color(0), None, color(1)]);
+    }
+
+    #[test]
+    fn distances_that_are_read_are_carried() {
+        let vertex = shader(
+            Stage::Vertex,
+            vec![],
+            vec![
+                built_in(BuiltIn::ClipDistance, 0),
+                built_in(BuiltIn::ClipDistance, 1),
+                built_in(BuiltIn::CullDistance, 0),
+            ],
+        );
+        let read = |built_in, component| Input {
+            source: InputSource::BuiltIn {
+                built_in,
+                component,
+            },
+            numeric: FLOAT,
+        };
+        let inputs = vec![
+            read(BuiltIn::ClipDistance, 1),
+            read(BuiltIn::CullDistance, 0),
+            read(BuiltIn::CullDistance, 3),
+        ];
+        let fragment = shader(Stage::Fragment, inputs, vec![to(0, 0)]);
+        let linked = link(vertex, Some(fragment), |_| None, LiveOutputs::default()).unwrap();
+        assert_eq!(linked.varyings, 2);
+        let outputs = [
+            VertexOutput::ClipDistance(0),
+            VertexOutput::ClipDistance(1),
+            VertexOutput::CullDistance(0),
+            VertexOutput::Varying(1),
+            VertexOutput::Varying(0),
+        ];
+        assert_eq!(linked.vertex_outputs, outputs.map(Some));
+        let registers: Vec<_> = linked.vertex.outputs.iter().map(|it| it.reg).collect();
+        assert_eq!((registers[3], registers[4]), (registers[1], registers[2]));
+        let varying = |index| {
+            Some(FragmentInput::Varying {
+                index,
+                interpolation: interface::Interpolation::Perspective,
+                sampling: interface::Sampling::Center,
+            })
+        };
+        let inputs = linked.fragment.unwrap().inputs;
+        assert_eq!(inputs, [varying(1), varying(0), None]);
     }
 
     #[test]

@@ -33,11 +33,6 @@ pub(crate) fn translate(
     let shader = stage
         .module
         .translate(stage.name, kind, &stage.specialization, &options)?;
-    if shader.interface.uses_subgroups {
-        return Err(Error::FeatureNotPresent(format!(
-            "a subgroup operation in the {kind} shader (subgroupSupportedStages)"
-        )));
-    }
     layout.check(&shader.interface)?;
     if device.dumps_ir() {
         eprintln!("{kind} shader {}:\n{}", stage.name, shader.program);

@@ -26,6 +26,7 @@ mod polygon_attachments;
 mod polygon_draws;
 mod polygon_pipelines;
 mod polygon_resources;
+mod polygon_shaders;
 mod polygons;
 mod queries;
 mod render_passes;

@@ -1,6 +1,7 @@
 //! Fragment programs made ready for draws of primitives and of Gaussians.
 
 use super::pool::{MachinePool, PooledMachine};
+use crate::limits::DRAW_SUBGROUP_SIZE;
 use crate::program::interface::{
     FragmentInput, FragmentOutput, FragmentPrograms, Interpolation, Sampling, resolve,
 };
@@ -71,7 +72,7 @@ impl FragmentStage {
         let executable = |lanes| {
             let options = Options {
                 lanes,
-                subgroup_size: BATCH_LANES[0],
+                subgroup_size: DRAW_SUBGROUP_SIZE as usize,
                 count_work: true,
                 level,
             };

@@ -1,7 +1,7 @@
 //! Vertex programs made ready for draws, alone or with a fragment program.
 
 use super::pool::MachinePool;
-use crate::limits::MAX_CLIP_CULL_DISTANCES;
+use crate::limits::{DRAW_SUBGROUP_SIZE, MAX_CLIP_CULL_DISTANCES};
 use crate::program::fragment::FragmentStage;
 use crate::program::interface::{
     DrawPrograms, FragmentInput, Interpolation, VertexInput, VertexOutput,
@@ -78,7 +78,7 @@ impl VertexProgram {
     fn new(level: Level, programs: &DrawPrograms, varyings: u32) -> Result<Self, InvalidProgram> {
         let options = Options {
             lanes: VERTEX_BATCH,
-            subgroup_size: 64,
+            subgroup_size: DRAW_SUBGROUP_SIZE as usize,
             count_work: true,
             level,
         };

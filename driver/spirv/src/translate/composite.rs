@@ -300,16 +300,26 @@ fn minor(
     }
 }
 
+/// The precision that a matrix of scalars is decomposed in: halves are rounded once, at the end.
+fn working_precision(scalar: Scalar) -> Scalar {
+    match scalar {
+        Scalar::Float { width: 16 } => Scalar::Float { width: 32 },
+        other => other,
+    }
+}
+
 /// The determinant of a square matrix.
 pub fn determinant(t: &mut Translator, scalar: Scalar, matrix: &Matrix) -> Result<Reg> {
+    let working = working_precision(scalar);
     let all: Vec<usize> = (0..matrix.rows).collect();
     let columns: Vec<usize> = (0..matrix.columns).collect();
-    minor(t, scalar, matrix, &all, &columns)
+    let found = minor(t, working, matrix, &all, &columns)?;
+    Ok(t.emit.wrap_to_width(scalar, found))
 }
 
 /// The inverse of a square matrix: its adjugate divided by its determinant.
 pub fn inverse(t: &mut Translator, scalar: Scalar, matrix: &Matrix) -> Result<Vec<Reg>> {
-    let size = matrix.rows;
+    let (size, working) = (matrix.rows, working_precision(scalar));
     if size != matrix.columns {
         return malformed("the matrix isn't square");
     }
@@ -319,7 +329,7 @@ pub fn inverse(t: &mut Translator, scalar: Scalar, matrix: &Matrix) -> Result<Ve
     for column in 0..size {
         for row in 0..size {
             // Element (row, column) of the adjugate is the cofactor (column, row).
-            let minor = minor(t, scalar, matrix, &all(column), &all(row))?;
+            let minor = minor(t, working, matrix, &all(column), &all(row))?;
             let odd = (row + column) % 2 == 1;
             adjugate.push(if odd {
                 t.emit
@@ -330,9 +340,12 @@ pub fn inverse(t: &mut Translator, scalar: Scalar, matrix: &Matrix) -> Result<Ve
         }
     }
     let first_row: Vec<Reg> = (0..size).map(|column| matrix.at(0, column)).collect();
-    let determinant = dot(t, scalar, &first_row, &adjugate[..size], false)?;
+    let determinant = dot(t, working, &first_row, &adjugate[..size], false)?;
     Ok(adjugate
         .into_iter()
-        .map(|cofactor| t.emit.over(scalar, cofactor, determinant))
+        .map(|cofactor| {
+            let element = t.emit.over(working, cofactor, determinant);
+            t.emit.wrap_to_width(scalar, element)
+        })
         .collect())
 }

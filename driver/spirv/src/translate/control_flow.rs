@@ -7,7 +7,8 @@
 use std::collections::{HashMap, VecDeque};
 use std::rc::Rc;
 
-use isa::ir::{Label, MAX_NESTING, Reg};
+use isa::ir::{Label, MAX_NESTING, Reg, Type};
+use isa::op::Op as Ir;
 use spirv::Op;
 
 use super::emitter::Emitter;
@@ -44,6 +45,12 @@ struct MergeVariables {
     /// The variables concerned, each with the registers that the edges assign, or that the one edge brought.
     variables: Vec<(usize, Rc<[Option<Reg>]>)>,
     assigns: bool,
+}
+
+/// A switch's selector and, for each case, the values that lead there.
+struct WordSelector {
+    reg: Reg,
+    values: Vec<Vec<u32>>,
 }
 
 /// Registers that held the variables that a construct stores to, before it.
@@ -204,19 +211,24 @@ impl<'a> ControlFlow<'a> {
             Node::Edge(edge) => self.emit_edge(edge),
             Node::Exit(index) => self.emit_exit(*index),
             Node::If {
-                block,
-                condition,
-                then,
-                otherwise,
                 merge_point,
+                scope,
                 modified,
+                ..
             } => {
-                let terminator = self.terminator(*block)?;
-                let condition = self
-                    .t
-                    .reg(*condition)
-                    .map_err(|diagnostic| diagnostic.locate(terminator.reference()))?;
-                self.emit_if(condition, then, otherwise, *merge_point, modified)
+                self.begin_merge_point(*merge_point, modified)?;
+                match scope {
+                    None => self.emit_if(node)?,
+                    Some(construct) => {
+                        let saved = self.save(modified)?;
+                        let label = self.t.emit.builder.begin_scope();
+                        self.call_mut()?.labels.insert(*construct, label);
+                        self.emit_if(node)?;
+                        self.t.emit.builder.end();
+                        self.restore(&saved);
+                    }
+                }
+                self.end_merge_point(*merge_point)
             }
             Node::Switch {
                 block,
@@ -316,19 +328,31 @@ impl<'a> ControlFlow<'a> {
         Ok(())
     }
 
-    fn emit_if(
-        &mut self,
-        condition: Reg,
-        then: &[Node],
-        otherwise: &[Node],
-        merge_point: Option<MergePoint>,
-        modified: &[u32],
-    ) -> Result<()> {
-        self.begin_merge_point(merge_point, modified)?;
+    /// The branches of a selection.
+    fn emit_if(&mut self, node: &Node) -> Result<()> {
+        let Node::If {
+            block,
+            condition,
+            then,
+            otherwise,
+            modified,
+            ..
+        } = node
+        else {
+            return Ok(());
+        };
+        let Some(condition) = condition else {
+            return self.emit_nodes(then);
+        };
+        let terminator = self.terminator(*block)?;
+        let condition = self
+            .t
+            .reg(*condition)
+            .map_err(|diagnostic| diagnostic.locate(terminator.reference()))?;
         match self.t.emit.known(condition) {
             // Specialization may decide a branch.
-            Some(0) => self.emit_nodes(otherwise)?,
-            Some(_) => self.emit_nodes(then)?,
+            Some(0) => self.emit_nodes(otherwise),
+            Some(_) => self.emit_nodes(then),
             None => {
                 let saved = self.save(modified)?;
                 self.t.emit.builder.begin_if(condition);
@@ -340,9 +364,9 @@ impl<'a> ControlFlow<'a> {
                     self.restore(&saved);
                 }
                 self.t.emit.builder.end();
+                Ok(())
             }
         }
-        self.end_merge_point(merge_point)
     }
 
     fn emit_switch(
@@ -361,10 +385,11 @@ impl<'a> ControlFlow<'a> {
             }
         }
         let saved = self.save(modified)?;
-        let label = self.t.emit.builder.begin_switch(selector);
+        let selector = self.word_selector(selector, cases)?;
+        let label = self.t.emit.builder.begin_switch(selector.reg);
         self.call_mut()?.labels.insert(construct, label);
-        for case in cases {
-            self.t.emit.builder.begin_case(&case.values, case.default);
+        for (case, values) in cases.iter().zip(&selector.values) {
+            self.t.emit.builder.begin_case(values, case.default);
             self.restore(&saved);
             if let Some((merge_point, _)) = case.entry {
                 self.end_merge_point(Some(merge_point))?;
@@ -377,6 +402,37 @@ impl<'a> ControlFlow<'a> {
         self.t.emit.builder.end();
         self.restore(&saved);
         self.end_merge_point(merge_point)
+    }
+
+    /// A selector of 32 bits, and the values of each case: those of a selector of 64 bits are numbered.
+    fn word_selector(&mut self, selector: Reg, cases: &[Case]) -> Result<WordSelector> {
+        let all = || cases.iter().map(|case| case.values.as_slice());
+        if self.t.emit.builder.type_of(selector) != Type::B64 {
+            let narrowed = |values: &[u64]| values.iter().map(|value| *value as u32).collect();
+            return Ok(WordSelector {
+                reg: selector,
+                values: all().map(narrowed).collect(),
+            });
+        }
+        let mut reg = self.t.emit.u32(u32::MAX);
+        let mut numbered = Vec::with_capacity(cases.len());
+        let mut next = 0;
+        for values in all() {
+            self.t.emit.charge_budget(values.len())?;
+            let first = next;
+            for value in values {
+                let value = self.t.emit.u64(*value);
+                let this = self.t.emit.op(Ir::IEq64, &[selector, value]);
+                let number = self.t.emit.u32(next);
+                reg = self.t.emit.select(this, number, reg);
+                next += 1;
+            }
+            numbered.push((first..next).collect());
+        }
+        Ok(WordSelector {
+            reg,
+            values: numbered,
+        })
     }
 
     fn emit_loop(&mut self, node: &Node) -> Result<()> {

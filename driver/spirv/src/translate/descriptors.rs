@@ -1,7 +1,7 @@
 //! Descriptors: the resource slots of the variables that they are bound to.
 
 use isa::ir::{Binding, Space};
-use spirv::{Decoration, Dim, StorageClass};
+use spirv::{Capability, Decoration, Dim, StorageClass};
 
 use super::translator::Translator;
 use super::value::{EXPLICIT, MemoryRef, Pointer};
@@ -114,6 +114,9 @@ fn image_use(t: &Translator, image: &ImageType) -> Result<ImageUse> {
 pub fn descriptors(t: &Translator, ty: u32) -> Result<(u32, u32)> {
     match t.globals.types.get(ty)? {
         Type::Array { element, count, .. } => Ok((*element, *count)),
+        Type::RuntimeArray { .. } if !t.module.declares(Capability::RuntimeDescriptorArray) => {
+            malformed("an array of descriptors without a length needs RuntimeDescriptorArray")
+        }
         Type::RuntimeArray { element, .. } => Ok((*element, t.options.unsized_descriptors)),
         _ => malformed("an index into what is no array of descriptors"),
     }
@@ -161,15 +164,16 @@ pub fn mark_written(t: &mut Translator, place: &MemoryRef) {
     }
 }
 
-/// Notes that a descriptor's memory may be written.
+/// Notes that a descriptor's memory may be written; that of a variable pointer may be any storage buffer's.
 pub fn mark_binding_written(t: &mut Translator, binding: Binding) {
     t.interface.has_side_effects = true;
-    let found = t
-        .interface
-        .descriptors
-        .iter_mut()
-        .find(|it| (it.slot..it.slot + it.count).contains(&binding.slot));
-    if let Some(descriptor) = found {
-        descriptor.writable = true;
+    let end = binding.slot + binding.count;
+    for descriptor in &mut t.interface.descriptors {
+        let slots = descriptor.slot..descriptor.slot + descriptor.count;
+        let overlaps = slots.start < end && binding.slot < slots.end;
+        let is_whole = slots.start <= binding.slot && end <= slots.end;
+        if overlaps && (is_whole || descriptor.kind == DescriptorKind::StorageBuffer) {
+            descriptor.writable = true;
+        }
     }
 }

@@ -357,24 +357,131 @@ fn fold_bools(t: &mut Translator, it: &Instruction, op: Ir) -> Result<()> {
 fn extended_arithmetic(t: &mut Translator, it: &Instruction) -> Result<()> {
     let (scalar, a) = t.vector(it.id(0)?)?;
     let (_, b) = t.vector(it.id(1)?)?;
-    if !matches!(scalar, Scalar::Int { width: 32, .. }) || a.len() != b.len() {
-        return unsupported("this on anything but two vectors of 32-bit integers");
+    let Scalar::Int { width, .. } = scalar else {
+        return malformed("the operands aren't integers");
+    };
+    if a.len() != b.len() {
+        return malformed("the operands differ in size");
     }
-    let (low, high) = match it.opcode {
+    let (mut low, mut high) = (Vec::with_capacity(2 * a.len()), Vec::new());
+    for (a, b) in a.iter().zip(b.iter()) {
+        let halves = match width {
+            64 => wide_halves(t, it.opcode, *a, *b),
+            32 => word_halves(t, it.opcode, *a, *b),
+            _ => narrow_halves(t, it.opcode, scalar, width, *a, *b),
+        };
+        low.push(halves.low);
+        high.push(halves.high);
+    }
+    low.append(&mut high);
+    t.define(it, low)
+}
+
+/// The two results of extended arithmetic.
+struct Halves {
+    low: Reg,
+    /// The carry, the borrow or the high half of the product.
+    high: Reg,
+}
+
+fn word_halves(t: &mut Translator, opcode: Op, a: Reg, b: Reg) -> Halves {
+    let (low, high) = match opcode {
         Op::IAddCarry => (Ir::IAdd, Ir::UAddCarry),
         Op::ISubBorrow => (Ir::ISub, Ir::USubBorrow),
         Op::UMulExtended => (Ir::IMul, Ir::UMulHi),
         _ => (Ir::IMul, Ir::SMulHi),
     };
-    let mut regs = Vec::with_capacity(2 * a.len());
-    for op in [low, high] {
-        regs.extend(
-            a.iter()
-                .zip(b.iter())
-                .map(|(a, b)| t.emit.op(op, &[*a, *b])),
-        );
+    Halves {
+        low: t.emit.op(low, &[a, b]),
+        high: t.emit.op(high, &[a, b]),
     }
-    t.define(it, regs)
+}
+
+/// Extended arithmetic on 8 or 16 bits: 32 bits hold the whole result, of which the high half is cut off.
+fn narrow_halves(
+    t: &mut Translator,
+    opcode: Op,
+    scalar: Scalar,
+    width: u32,
+    a: Reg,
+    b: Reg,
+) -> Halves {
+    let extend = |t: &mut Translator, reg| match opcode {
+        Op::SMulExtended => t.emit.sign_extend(scalar, reg),
+        _ => t.emit.zero_extend(scalar, reg),
+    };
+    let (a, b) = (extend(t, a), extend(t, b));
+    let whole = match opcode {
+        Op::IAddCarry => t.emit.op(Ir::IAdd, &[a, b]),
+        Op::ISubBorrow => t.emit.op(Ir::ISub, &[a, b]),
+        _ => t.emit.op(Ir::IMul, &[a, b]),
+    };
+    let high = if opcode == Op::ISubBorrow {
+        t.emit.op(Ir::USubBorrow, &[a, b])
+    } else {
+        let by = t.emit.u32(width);
+        t.emit.op(Ir::SShr, &[whole, by])
+    };
+    Halves {
+        low: t.emit.wrap_to_width(scalar, whole),
+        high: t.emit.wrap_to_width(scalar, high),
+    }
+}
+
+/// Extended arithmetic on 64 bits.
+fn wide_halves(t: &mut Translator, opcode: Op, a: Reg, b: Reg) -> Halves {
+    match opcode {
+        Op::IAddCarry | Op::ISubBorrow => {
+            let (low, carries) = if opcode == Op::IAddCarry {
+                let sum = t.emit.op(Ir::IAdd64, &[a, b]);
+                (sum, t.emit.op(Ir::ULt64, &[sum, a]))
+            } else {
+                let difference = t.emit.op(Ir::ISub64, &[a, b]);
+                (difference, t.emit.op(Ir::ULt64, &[a, b]))
+            };
+            let (one, zero) = (t.emit.u64(1), t.emit.u64(0));
+            let high = t.emit.select(carries, one, zero);
+            Halves { low, high }
+        }
+        _ => {
+            let mut high = wide_product_high(t, a, b);
+            if opcode == Op::SMulExtended {
+                // A negative factor counts for 2^64 more as an unsigned one.
+                let zero = t.emit.u64(0);
+                for (factor, other) in [(a, b), (b, a)] {
+                    let negative = t.emit.op(Ir::SLt64, &[factor, zero]);
+                    let excess = t.emit.select(negative, other, zero);
+                    high = t.emit.op(Ir::ISub64, &[high, excess]);
+                }
+            }
+            let low = t.emit.op(Ir::IMul64, &[a, b]);
+            Halves { low, high }
+        }
+    }
+}
+
+/// The high half of an unsigned product of 64 bits, from the four products of the factors' halves.
+fn wide_product_high(t: &mut Translator, a: Reg, b: Reg) -> Reg {
+    let by = t.emit.u32(32);
+    let low_half = |t: &mut Translator, reg| {
+        let low = t.emit.op(Ir::Low32, &[reg]);
+        t.emit.op(Ir::UToU64, &[low])
+    };
+    let (a_low, b_low) = (low_half(t, a), low_half(t, b));
+    let a_high = t.emit.op(Ir::UShr64, &[a, by]);
+    let b_high = t.emit.op(Ir::UShr64, &[b, by]);
+    let lowest = t.emit.op(Ir::IMul64, &[a_low, b_low]);
+    let carry = t.emit.op(Ir::UShr64, &[lowest, by]);
+    let first = t.emit.op(Ir::IMul64, &[a_high, b_low]);
+    let first = t.emit.op(Ir::IAdd64, &[first, carry]);
+    let second = t.emit.op(Ir::IMul64, &[a_low, b_high]);
+    let first_low = low_half(t, first);
+    let second = t.emit.op(Ir::IAdd64, &[second, first_low]);
+    let first_high = t.emit.op(Ir::UShr64, &[first, by]);
+    let second_high = t.emit.op(Ir::UShr64, &[second, by]);
+    let highest = t.emit.op(Ir::IMul64, &[a_high, b_high]);
+    let highest = t.emit.op(Ir::IAdd64, &[highest, first_high]);
+    t.emit.op(Ir::IAdd64, &[highest, second_high])
 }
 
 fn shift(t: &mut Translator, it: &Instruction) -> Result<()> {
@@ -396,40 +503,153 @@ fn shift(t: &mut Translator, it: &Instruction) -> Result<()> {
     })
 }
 
+/// Operations on the bits of integers of any width.
 fn bit_operation(t: &mut Translator, it: &Instruction) -> Result<()> {
-    let (scalar, a) = t.vector(it.id(0)?)?;
-    let opcode = it.opcode;
-    if !matches!(scalar, Scalar::Int { width: 32, .. }) {
-        return unsupported("this on anything but 32-bit integers");
-    }
-    let mut others = Vec::new();
-    let scalars_from = if opcode == Op::BitFieldInsert { 2 } else { 1 };
-    if opcode == Op::BitFieldInsert {
-        others.push(t.regs(it.id(1)?)?);
-    }
-    let op = match opcode {
-        Op::BitReverse => Ir::BitReverse,
-        Op::BitCount => Ir::BitCount,
-        Op::BitFieldInsert => Ir::BitfieldInsert,
-        Op::BitFieldSExtract => Ir::BitfieldSExtract,
-        _ => Ir::BitfieldUExtract,
+    let (scalar, base) = t.vector(it.id(0)?)?;
+    let Scalar::Int { width, .. } = scalar else {
+        return malformed("the operand isn't an integer");
     };
-    // Offset and count are one for all components.
-    let operands = op.signature().operands.len();
-    for index in scalars_from..operands {
-        others.push(vec![t.reg(it.id(index)?)?; a.len()].into());
-    }
-    if others.iter().any(|other| other.len() != a.len()) {
+    let (result, _) = t.globals.types.vector(it.ty()?)?;
+    let opcode = it.opcode;
+    let mut next = 1;
+    let insert = if opcode == Op::BitFieldInsert {
+        next += 1;
+        Some(t.regs(it.id(1)?)?)
+    } else {
+        None
+    };
+    if insert.as_ref().is_some_and(|regs| regs.len() != base.len()) {
         return malformed("the operands differ in size");
     }
-    let regs = (0..a.len())
-        .map(|index| {
-            let mut src = vec![a[index]];
-            src.extend(others.iter().map(|other| other[index]));
-            t.emit.op(op, &src)
-        })
-        .collect();
+    let field = match opcode {
+        Op::BitReverse | Op::BitCount => None,
+        // Offset and count are one for all components.
+        _ => Some(BitField {
+            offset: bit_number(t, it.id(next)?)?,
+            count: bit_number(t, it.id(next + 1)?)?,
+        }),
+    };
+    let mut regs = Vec::with_capacity(base.len());
+    for (index, base) in base.iter().enumerate() {
+        let insert = insert.as_ref().map(|regs| regs[index]);
+        let reg = match (opcode, field) {
+            (Op::BitCount, _) => bit_count(t, scalar, *base, result),
+            (Op::BitReverse, _) => reversed_bits(t, scalar, width, *base),
+            (_, Some(field)) if scalar.is_wide() => wide_bit_field(t, opcode, *base, insert, field),
+            (_, Some(field)) => bit_field(t, opcode, *base, insert, field),
+            _ => return unsupported(format!("Op{opcode:?}")),
+        };
+        regs.push(t.emit.wrap_to_width(result, reg));
+    }
     t.define(it, regs)
+}
+
+/// A run of bits: both are registers of 32 bits.
+#[derive(Clone, Copy)]
+struct BitField {
+    offset: Reg,
+    count: Reg,
+}
+
+/// An offset or a count of bits in a register of 32 bits.
+fn bit_number(t: &mut Translator, id: u32) -> Result<Reg> {
+    let (scalar, regs) = t.vector(id)?;
+    match *regs {
+        [reg] if scalar.is_wide() => Ok(t.emit.op(Ir::Low32, &[reg])),
+        [reg] => Ok(t.emit.zero_extend(scalar, reg)),
+        _ => malformed(format!("%{id} isn't a scalar")),
+    }
+}
+
+fn bit_count(t: &mut Translator, scalar: Scalar, base: Reg, result: Scalar) -> Reg {
+    let count = if scalar.is_wide() {
+        let [low, high] = [Ir::Low32, Ir::High32].map(|half| {
+            let half = t.emit.op(half, &[base]);
+            t.emit.op(Ir::BitCount, &[half])
+        });
+        t.emit.op(Ir::IAdd, &[low, high])
+    } else {
+        let base = t.emit.zero_extend(scalar, base);
+        t.emit.op(Ir::BitCount, &[base])
+    };
+    if result.is_wide() {
+        t.emit.op(Ir::UToU64, &[count])
+    } else {
+        count
+    }
+}
+
+fn reversed_bits(t: &mut Translator, scalar: Scalar, width: u32, base: Reg) -> Reg {
+    match width {
+        64 => {
+            let [low, high] = [Ir::Low32, Ir::High32].map(|half| {
+                let half = t.emit.op(half, &[base]);
+                t.emit.op(Ir::BitReverse, &[half])
+            });
+            t.emit.op(Ir::Join64, &[high, low])
+        }
+        32 => t.emit.op(Ir::BitReverse, &[base]),
+        _ => {
+            let base = t.emit.zero_extend(scalar, base);
+            let reversed = t.emit.op(Ir::BitReverse, &[base]);
+            let by = t.emit.u32(32 - width);
+            t.emit.op(Ir::UShr, &[reversed, by])
+        }
+    }
+}
+
+fn bit_field(
+    t: &mut Translator,
+    opcode: Op,
+    base: Reg,
+    insert: Option<Reg>,
+    field: BitField,
+) -> Reg {
+    let BitField { offset, count } = field;
+    match (opcode, insert) {
+        (_, Some(insert)) => t
+            .emit
+            .op(Ir::BitfieldInsert, &[base, insert, offset, count]),
+        (Op::BitFieldSExtract, _) => t.emit.op(Ir::BitfieldSExtract, &[base, offset, count]),
+        _ => t.emit.op(Ir::BitfieldUExtract, &[base, offset, count]),
+    }
+}
+
+/// As [`bit_field`], of 64 bits.
+fn wide_bit_field(
+    t: &mut Translator,
+    opcode: Op,
+    base: Reg,
+    insert: Option<Reg>,
+    BitField { offset, count }: BitField,
+) -> Reg {
+    let (zero, whole) = (t.emit.u32(0), t.emit.u32(64));
+    let none = t.emit.op(Ir::IEq, &[count, zero]);
+    let (wide_zero, ones) = (t.emit.u64(0), t.emit.u64(u64::MAX));
+    let above = t.emit.op(Ir::ISub, &[whole, count]);
+    match (opcode, insert) {
+        (_, Some(insert)) => {
+            let mask = t.emit.op(Ir::UShr64, &[ones, above]);
+            let mask = t.emit.op(Ir::Shl64, &[mask, offset]);
+            let mask = t.emit.select(none, wide_zero, mask);
+            let others = t.emit.op(Ir::Not64, &[mask]);
+            let kept = t.emit.op(Ir::And64, &[base, others]);
+            let moved = t.emit.op(Ir::Shl64, &[insert, offset]);
+            let moved = t.emit.op(Ir::And64, &[moved, mask]);
+            t.emit.op(Ir::Or64, &[kept, moved])
+        }
+        _ => {
+            let shift = if opcode == Op::BitFieldSExtract {
+                Ir::SShr64
+            } else {
+                Ir::UShr64
+            };
+            let left = t.emit.op(Ir::ISub, &[above, offset]);
+            let top = t.emit.op(Ir::Shl64, &[base, left]);
+            let extracted = t.emit.op(shift, &[top, above]);
+            t.emit.select(none, wide_zero, extracted)
+        }
+    }
 }
 
 /// An extended instruction of GLSL.std.450 that works component by component.

@@ -24,12 +24,12 @@ pub fn glsl(t: &mut Translator, it: &Instruction) -> Result<()> {
         G::Ldexp => {
             let (scalar, a) = t.vector(it.id(2)?)?;
             let (exponent, b) = t.vector(it.id(3)?)?;
-            if a.len() != b.len() || exponent.is_wide() {
+            if a.len() != b.len() {
                 return malformed("the operands don't fit each other");
             }
             let mut regs = Vec::with_capacity(a.len());
             for (a, b) in a.iter().zip(b.iter()) {
-                let b = t.emit.sign_extend(exponent, *b);
+                let b = ldexp_exponent(t, exponent, *b);
                 let reg = t
                     .emit
                     .op(op_for_width(scalar, Ir::FLdexp, Ir::FLdexp64), &[*a, b]);
@@ -71,6 +71,21 @@ pub fn glsl(t: &mut Translator, it: &Instruction) -> Result<()> {
         }
         _ => glsl_elementwise(t, it, op),
     }
+}
+
+/// An exponent of 32 bits. One of 64 bits is brought near zero first, yet stays beyond that of any float.
+fn ldexp_exponent(t: &mut Translator, scalar: Scalar, exponent: Reg) -> Reg {
+    const MOST: i64 = 1 << 16;
+    if !scalar.is_wide() {
+        return t.emit.sign_extend(scalar, exponent);
+    }
+    let (least, most) = (
+        t.emit.u64((-MOST).cast_unsigned()),
+        t.emit.u64(MOST.cast_unsigned()),
+    );
+    let exponent = t.emit.op(Ir::SMax64, &[exponent, least]);
+    let exponent = t.emit.op(Ir::SMin64, &[exponent, most]);
+    t.emit.op(Ir::Low32, &[exponent])
 }
 
 fn split_float(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {

@@ -8,8 +8,10 @@ use super::composite::{composite, linear_algebra};
 use super::elementwise::{conversion, derivative, elementwise};
 use super::glsl::glsl;
 use super::image::image;
+use super::integer_dot::integer_dot;
 use super::memory::{copy_memory, load, store};
 use super::pointer::{access_chain, array_length};
+use super::pointer_value::compare_pointers;
 use super::subgroup::subgroup;
 use super::translator::Translator;
 use super::value::Value;
@@ -66,13 +68,8 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
     match it.opcode {
         Op::Nop => Ok(()),
         Op::Undef => {
-            let scalars = t.globals.types.flatten(it.ty()?)?;
-            t.emit.charge_budget(scalars.len())?;
-            let zeros = scalars
-                .iter()
-                .map(|it| t.emit.constant(it.register(), 0))
-                .collect();
-            t.define(it, zeros)
+            let undefined = t.undefined(it.ty()?)?;
+            t.define_as(it, undefined)
         }
         Op::Variable => local_variable(t, it),
         Op::Load => load(t, it),
@@ -83,6 +80,7 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         | Op::PtrAccessChain
         | Op::InBoundsPtrAccessChain => access_chain(t, it),
         Op::ArrayLength => array_length(t, it),
+        Op::PtrEqual | Op::PtrNotEqual | Op::PtrDiff => compare_pointers(t, it),
         Op::ExtInst => extended(t, it),
         Op::CopyObject => {
             let value = t.value(it.id(0)?)?;
@@ -156,6 +154,9 @@ pub fn instruction(t: &mut Translator, it: &Instruction) -> Result<()> {
         | Op::AtomicFAddEXT
         | Op::AtomicFMinEXT
         | Op::AtomicFMaxEXT => atomic(t, it),
+        Op::SDot | Op::UDot | Op::SUDot | Op::SDotAccSat | Op::UDotAccSat | Op::SUDotAccSat => {
+            integer_dot(t, it)
+        }
         op if is_image(op) => image(t, it),
         op if is_subgroup(op) => subgroup(t, it),
         _ => elementwise(t, it),

@@ -6,7 +6,7 @@ use spirv::GlslStd450Op as G;
 
 use super::inputs_outputs::IoLocation;
 use super::translator::Translator;
-use super::value::Pointer;
+use super::value::{DynamicIndex, Pointer};
 use crate::error::{Result, malformed, unsupported};
 use crate::instruction::Instruction;
 use crate::interface::{InputSource, Interpolation, Sampling};
@@ -48,27 +48,99 @@ fn sample_offsets(samples: u32) -> &'static [[i8; 2]] {
     }
 }
 
+/// A point of the pixel at which an input is taken.
+#[derive(Clone, Copy)]
+enum Point {
+    Centroid,
+    /// Moved from where inputs are taken otherwise, in pixels.
+    Offset([Reg; 2]),
+}
+
+/// A part of an input variable.
+#[derive(Clone, Copy)]
+struct Interpolant<'a> {
+    variable: u32,
+    /// Scalars before it.
+    start: usize,
+    /// Moves from there that are known at run time only.
+    indices: &'a [DynamicIndex],
+    ty: u32,
+}
+
 /// Interpolation elsewhere in the pixel. At a centroid it is an input of its own; at a sample or an offset it
 /// follows from the derivatives of the attribute divided by w, which are constant over the primitive.
 pub fn interpolate(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
     let pointer = t.pointer(it.id(2)?)?;
-    if op == G::InterpolateAtCentroid {
-        let regs = read_input(t, &pointer, Sampling::Centroid)?;
-        return t.define(it, regs);
-    }
-    let regs = read_input(t, &pointer, Sampling::Center)?;
-    let [dx, dy] = if op == G::InterpolateAtOffset {
-        match *t.regs(it.id(3)?)? {
-            [dx, dy] => [dx, dy],
-            _ => return malformed("the offset doesn't have two components"),
-        }
-    } else {
-        let sample = t.reg(it.id(3)?)?;
-        sample_offset(t, sample)
+    let Some(interpolant) = interpolant(t, &pointer) else {
+        return unsupported("interpolation of what isn't an input");
     };
-    let interpolation = interpolation_of(t, &pointer);
+    let point = match op {
+        G::InterpolateAtCentroid => Point::Centroid,
+        G::InterpolateAtOffset => match *t.regs(it.id(3)?)? {
+            [dx, dy] => Point::Offset(from_own_point(t, [dx, dy])?),
+            _ => return malformed("the offset doesn't have two components"),
+        },
+        _ => {
+            let sample = t.reg(it.id(3)?)?;
+            let offset = sample_offset(t, sample);
+            Point::Offset(from_own_point(t, offset)?)
+        }
+    };
+    let regs = interpolated(t, interpolant, point)?;
+    t.define(it, regs)
+}
+
+/// An offset from the pixel's centre as one from where the fragment takes its inputs: the centre too, or a sample if each
+/// is shaded.
+fn from_own_point(t: &mut Translator, offset: [Reg; 2]) -> Result<[Reg; 2]> {
+    let mut moved = offset;
+    for (axis, moved) in (0..).zip(&mut moved) {
+        let position = t.io.frag_coord(&mut t.emit, axis)?;
+        let within = t.emit.op(Ir::FFract, &[position]);
+        let centre = t.emit.f32(0.5);
+        let own = t.emit.op(Ir::FSub, &[within, centre]);
+        *moved = t.emit.op(Ir::FSub, &[*moved, own]);
+    }
+    Ok(moved)
+}
+
+/// The interpolant elsewhere in the pixel. Of an array indexed at run time, each element is interpolated before one is
+/// picked: neighbours in a quad, from which derivatives follow, may pick others.
+fn interpolated(t: &mut Translator, interpolant: Interpolant, point: Point) -> Result<Vec<Reg>> {
+    let Some((dynamic, inner)) = interpolant.indices.split_first() else {
+        return interpolated_part(t, interpolant, point);
+    };
+    let element = |index: u32| Interpolant {
+        start: interpolant.start + (index * dynamic.scalars) as usize,
+        indices: inner,
+        ..interpolant
+    };
+    // An index out of range reads the first element.
+    let mut picked = interpolated(t, element(0), point)?;
+    for index in 1..dynamic.count {
+        let candidate = interpolated(t, element(index), point)?;
+        t.emit.charge_budget(candidate.len())?;
+        let this = t.emit.index_is(dynamic.index, index);
+        for (picked, candidate) in picked.iter_mut().zip(candidate) {
+            *picked = t.emit.select(this, candidate, *picked);
+        }
+    }
+    Ok(picked)
+}
+
+/// As [`interpolated`], of a part whose place is constant.
+fn interpolated_part(
+    t: &mut Translator,
+    interpolant: Interpolant,
+    point: Point,
+) -> Result<Vec<Reg>> {
+    let Point::Offset([dx, dy]) = point else {
+        return read_input(t, interpolant, Sampling::Centroid);
+    };
+    let regs = read_input(t, interpolant, Sampling::Center)?;
+    let interpolation = interpolation_of(t, interpolant);
     if interpolation == Some(Interpolation::Flat) {
-        return t.define(it, regs);
+        return Ok(regs);
     }
     let linear = interpolation == Some(Interpolation::Linear);
     let at = |t: &mut Translator, value: Reg| {
@@ -89,7 +161,7 @@ pub fn interpolate(t: &mut Translator, it: &Instruction, op: G) -> Result<()> {
             t.emit.op(Ir::FDiv, &[over_w, moved_w])
         });
     }
-    t.define(it, moved)
+    Ok(moved)
 }
 
 /// The offset of a sample from the pixel's centre.
@@ -109,12 +181,14 @@ fn sample_offset(t: &mut Translator, sample: Reg) -> [Reg; 2] {
 }
 
 /// Reads a part of an input as it is elsewhere in the pixel.
-fn read_input(t: &mut Translator, pointer: &Pointer, sampling: Sampling) -> Result<Vec<Reg>> {
-    let Some((variable, start, ty)) = interpolant(t, pointer) else {
-        return unsupported("interpolation of what isn't an input");
-    };
-    let scalars = t.globals.types.flatten(ty)?;
-    let locations = t.io.locations(variable)?;
+fn read_input(
+    t: &mut Translator,
+    interpolant: Interpolant,
+    sampling: Sampling,
+) -> Result<Vec<Reg>> {
+    let scalars = t.globals.types.flatten(interpolant.ty)?;
+    t.emit.charge_budget(scalars.len())?;
+    let locations = t.io.locations(interpolant.variable)?;
     let mut regs = Vec::with_capacity(scalars.len());
     for (offset, scalar) in scalars.into_iter().enumerate() {
         let Some(IoLocation::Location {
@@ -122,7 +196,7 @@ fn read_input(t: &mut Translator, pointer: &Pointer, sampling: Sampling) -> Resu
             component,
             interpolation,
             ..
-        }) = locations.get(start + offset)
+        }) = locations.get(interpolant.start + offset)
         else {
             return unsupported("interpolation of a built-in");
         };
@@ -137,8 +211,8 @@ fn read_input(t: &mut Translator, pointer: &Pointer, sampling: Sampling) -> Resu
     Ok(regs)
 }
 
-/// The input variable that a pointer leads into, the scalar where, and the type of what it points to.
-fn interpolant(t: &Translator, pointer: &Pointer) -> Option<(u32, usize, u32)> {
+/// The part of an input variable that a pointer leads to.
+fn interpolant<'a>(t: &Translator, pointer: &'a Pointer) -> Option<Interpolant<'a>> {
     let Pointer::PromotedVariable {
         variable,
         start,
@@ -148,16 +222,22 @@ fn interpolant(t: &Translator, pointer: &Pointer) -> Option<(u32, usize, u32)> {
     else {
         return None;
     };
-    let variable = t.promoted.variables[*variable]
-        .input
-        .filter(|_| indices.is_empty())?;
-    Some((variable, *start, *ty))
+    Some(Interpolant {
+        variable: t.promoted.variables[*variable].input?,
+        start: *start,
+        indices,
+        ty: *ty,
+    })
 }
 
-/// The interpolation of the input that a pointer leads into.
-fn interpolation_of(t: &mut Translator, pointer: &Pointer) -> Option<Interpolation> {
-    let (variable, start, _) = interpolant(t, pointer)?;
-    match t.io.locations(variable).ok()?.get(start)? {
+/// The interpolation of an interpolant.
+fn interpolation_of(t: &mut Translator, interpolant: Interpolant) -> Option<Interpolation> {
+    match t
+        .io
+        .locations(interpolant.variable)
+        .ok()?
+        .get(interpolant.start)?
+    {
         IoLocation::Location { interpolation, .. } => Some(*interpolation),
         IoLocation::BuiltIn { .. } => None,
     }

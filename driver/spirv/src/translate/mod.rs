@@ -19,10 +19,12 @@ mod glsl;
 mod image;
 mod inputs_outputs;
 mod instruction;
+mod integer_dot;
 mod interpolation;
 mod memory;
 mod options;
 mod pointer;
+mod pointer_value;
 mod promoted;
 mod structurize;
 mod subgroup;
@@ -116,6 +118,7 @@ fn translate_here(
         promoted: PromotedVariables::default(),
         interface,
         next_resource_slot: 0,
+        workgroup_block: None,
         values: HashMap::new(),
         types: HashMap::new(),
     };
@@ -200,9 +203,9 @@ fn execution_mode(globals: &Globals, it: &Instruction, interface: &mut Interface
 
 fn finish(mut t: Translator) -> Result<Shader, Error> {
     variables::declare_push_constants(&mut t);
+    t.interface.per_sample = t.io.per_sample || variables::names_a_sample(&t);
     t.interface.inputs = t.io.inputs;
     t.interface.outputs = t.io.outputs;
-    t.interface.per_sample = t.io.per_sample;
     Ok(Shader {
         program: t.emit.builder.finish()?,
         interface: t.interface,
@@ -222,7 +225,6 @@ fn empty_interface(stage: Stage) -> Interface {
         discards: false,
         per_sample: false,
         has_side_effects: false,
-        uses_subgroups: false,
     }
 }
 
@@ -314,6 +316,15 @@ pub fn is_supported(capability: Capability) -> bool {
             | C::StorageImageReadWithoutFormat
             | C::StorageImageWriteWithoutFormat
             | C::MultiViewport
+            | C::VariablePointers
+            | C::VariablePointersStorageBuffer
+            | C::WorkgroupMemoryExplicitLayoutKHR
+            | C::WorkgroupMemoryExplicitLayout8BitAccessKHR
+            | C::WorkgroupMemoryExplicitLayout16BitAccessKHR
+            | C::DotProduct
+            | C::DotProductInputAll
+            | C::DotProductInput4x8Bit
+            | C::DotProductInput4x8BitPacked
             | C::GroupNonUniform
             | C::GroupNonUniformVote
             | C::GroupNonUniformArithmetic

@@ -5,6 +5,7 @@ use isa::op::Op as Ir;
 use spirv::Op;
 
 use super::descriptors::{descriptor_count, descriptors, resource};
+use super::pointer_value::element_stride;
 use super::translator::Translator;
 use super::value::{DynamicIndex, MemoryLayout, MemoryRef, Pointer, Value, scalar_bytes};
 use crate::error::{Result, malformed, unsupported};
@@ -53,13 +54,11 @@ fn index(t: &mut Translator, id: u32) -> Result<Index> {
 
 /// A pointer moved by whole elements of the array that it points into.
 fn next_element(t: &mut Translator, pointer: Pointer, ty: u32, element: Index) -> Result<Pointer> {
-    let stride = t.module.literal(ty, spirv::Decoration::ArrayStride);
-    match (pointer, stride) {
-        (Pointer::Memory(place), Some(stride)) => {
-            Ok(Pointer::Memory(moved(t, place, element, stride)?))
-        }
-        _ => unsupported("pointer arithmetic on this pointer"),
-    }
+    let Pointer::Memory(place) = pointer else {
+        return unsupported("pointer arithmetic on this pointer");
+    };
+    let stride = element_stride(t, ty)?;
+    Ok(Pointer::Memory(moved(t, place, element, stride)?))
 }
 
 fn pointer_to_part(t: &mut Translator, pointer: Pointer, index: Index) -> Result<Pointer> {
@@ -71,15 +70,20 @@ fn pointer_to_part(t: &mut Translator, pointer: Pointer, index: Index) -> Result
             ty,
         } => {
             let (part, start) = match index {
-                Index::Constant(index) => {
+                Index::Constant(index) if has_part(t, ty, index) => {
                     let (part, before) = t.globals.types.part(ty, index)?;
                     (part, start + before as usize)
                 }
-                Index::Dynamic { reg, .. } => {
+                // What is past the end may stand in code that never runs.
+                _ => {
+                    let index = match index {
+                        Index::Constant(index) => t.emit.u32(index),
+                        Index::Dynamic { reg, .. } => reg,
+                    };
                     let (part, count) = elements(t, ty)?;
                     let scalars = t.globals.types.scalars(part)?;
                     indices.push(DynamicIndex {
-                        index: reg,
+                        index,
                         count,
                         scalars,
                     });
@@ -102,6 +106,11 @@ fn pointer_to_part(t: &mut Translator, pointer: Pointer, index: Index) -> Result
         }
         Pointer::Texel { .. } => malformed("a texel has no parts"),
     }
+}
+
+/// Tells if a constant index is within a composite type; members of a struct always are, or the module is malformed.
+fn has_part(t: &Translator, ty: u32, index: u32) -> bool {
+    elements(t, ty).map_or(true, |(_, count)| index < count)
 }
 
 /// The element type and the length of what a run-time index may go into.
@@ -262,8 +271,8 @@ pub fn array_length(t: &mut Translator, it: &Instruction) -> Result<()> {
     let member = it.number(1)?;
     let Pointer::Memory(MemoryRef {
         space: Space::Buffer(buffer),
-        offset: 0,
-        base: None,
+        offset: before,
+        base,
         ty,
         ..
     }) = pointer
@@ -283,7 +292,12 @@ pub fn array_length(t: &mut Translator, it: &Instruction) -> Result<()> {
     };
     let offset = members[member as usize].offset.unwrap_or(0);
     let size = t.emit.builder.buffer_size(buffer);
-    let (offset, stride) = (t.emit.u32(offset), t.emit.u32((*stride).max(1)));
+    let offset = t.emit.u32(offset.saturating_add(before));
+    let stride = t.emit.u32((*stride).max(1));
+    let offset = match base {
+        Some(base) => t.emit.op(Ir::IAdd, &[base, offset]),
+        None => offset,
+    };
     let end = t.emit.op(Ir::UMax, &[size, offset]);
     let bytes = t.emit.op(Ir::ISub, &[end, offset]);
     let length = t.emit.op(Ir::UDiv, &[bytes, stride]);

@@ -14,7 +14,7 @@ use crate::error::{Result, malformed, unsupported};
 use crate::instruction::{Instruction, Operand};
 use crate::module::Function;
 
-/// A construct that can be left by a break: an index, unique in the function.
+/// A construct that can be left from within others: an index, unique in the function.
 pub type Construct = usize;
 
 /// A place where control flow comes together: an index into [`Tree::edges`].
@@ -25,7 +25,7 @@ pub type MergePoint = usize;
 pub enum Jump {
     /// By reaching its end, or by going on.
     None,
-    /// By breaking out of a loop or switch.
+    /// By breaking out of a loop, a switch or a selection.
     Break(Construct),
     /// By continuing a loop.
     Continue(Construct),
@@ -43,7 +43,7 @@ pub struct Edge {
 /// A case of a switch.
 #[derive(Clone, Debug)]
 pub struct Case {
-    pub values: Vec<u32>,
+    pub values: Vec<u64>,
     pub default: bool,
     pub body: Vec<Node>,
     pub fallthrough: bool,
@@ -59,7 +59,10 @@ pub enum Node {
     Edge(Edge),
     If {
         block: usize,
-        condition: u32,
+        /// None if both branches lead to `then`.
+        condition: Option<u32>,
+        /// Given if edges break out of it.
+        scope: Option<Construct>,
         then: Vec<Node>,
         otherwise: Vec<Node>,
         merge_point: Option<MergePoint>,
@@ -112,6 +115,7 @@ pub fn structurize(function: &Function, stores: &[Vec<u32>]) -> Result<Tree> {
         frames: Vec::new(),
         edges: Vec::new(),
         constructs: 0,
+        broken: HashSet::new(),
         visited: vec![false; function.blocks.len()],
         modified: vec![HashSet::new()],
         returns: 0,
@@ -141,6 +145,7 @@ pub fn structurize(function: &Function, stores: &[Vec<u32>]) -> Result<Tree> {
 /// A construct around the block being walked.
 enum Frame {
     Selection {
+        construct: Construct,
         merge: usize,
         merge_point: MergePoint,
     },
@@ -170,6 +175,8 @@ struct Structurizer<'a> {
     frames: Vec<Frame>,
     edges: Vec<usize>,
     constructs: usize,
+    /// Constructs that edges break out of.
+    broken: HashSet<Construct>,
     visited: Vec<bool>,
     /// Variables that the open constructs store to, innermost last.
     modified: Vec<HashSet<u32>>,
@@ -266,7 +273,7 @@ impl Structurizer<'_> {
             Op::BranchConditional => {
                 let then = self.block_of(terminator.id(1)?)?;
                 let otherwise = self.block_of(terminator.id(2)?)?;
-                if then == otherwise {
+                if then == otherwise && self.selection_merge(block)?.is_none() {
                     return self.follow(block, then, nodes);
                 }
                 self.conditional(block, terminator.id(0)?, then, otherwise, nodes)
@@ -289,7 +296,9 @@ impl Structurizer<'_> {
     /// The merge point at the end of the innermost construct, if that is where a block is.
     fn end_of_construct(&self, to: usize) -> Option<MergePoint> {
         let (block, merge_point) = match self.frames.last()? {
-            Frame::Selection { merge, merge_point } => (*merge, *merge_point),
+            Frame::Selection {
+                merge, merge_point, ..
+            } => (*merge, *merge_point),
             Frame::Case {
                 next: Some(next), ..
             } => *next,
@@ -311,8 +320,16 @@ impl Structurizer<'_> {
             }
             _ => None,
         };
-        self.frames.iter().rev().find_map(|frame| match frame {
-            Frame::Selection { .. } => None,
+        let innermost = self.frames.len().saturating_sub(1);
+        let mut frames = self.frames.iter().enumerate().rev();
+        frames.find_map(|(depth, frame)| match frame {
+            // The innermost construct is left by reaching its end.
+            Frame::Selection { .. } if depth == innermost => None,
+            Frame::Selection {
+                construct,
+                merge,
+                merge_point,
+            } => leave(&Some((*merge, *merge_point)), *construct),
             Frame::Case {
                 construct, merge, ..
             }
@@ -337,6 +354,9 @@ impl Structurizer<'_> {
 
     fn edge(&mut self, from: usize, to: usize, (jump, merge_point): (Jump, MergePoint)) -> Node {
         self.edges[merge_point] += 1;
+        if let Jump::Break(construct) = jump {
+            self.broken.insert(construct);
+        }
         let merge_point = Some(merge_point);
         Node::Edge(Edge {
             from,
@@ -394,18 +414,28 @@ impl Structurizer<'_> {
         };
         // A merge block that ends an outer construct too is that construct's business.
         let merge_point = (!self.is_target(merge)).then(|| self.add_merge_point());
+        let construct = self.add_construct();
         if let Some(merge_point) = merge_point {
-            self.frames.push(Frame::Selection { merge, merge_point });
+            self.frames.push(Frame::Selection {
+                construct,
+                merge,
+                merge_point,
+            });
         }
         self.begin_modified();
+        let condition = (then != otherwise).then_some(condition);
         let then = self.arm(block, then)?;
-        let otherwise = self.arm(block, otherwise)?;
+        let otherwise = match condition {
+            Some(_) => self.arm(block, otherwise)?,
+            None => Vec::new(),
+        };
         if merge_point.is_some() {
             self.frames.pop();
         }
         nodes.push(Node::If {
             block,
             condition,
+            scope: self.broken.contains(&construct).then_some(construct),
             then,
             otherwise,
             merge_point,
@@ -427,7 +457,8 @@ impl Structurizer<'_> {
     ) -> Result<Option<usize>> {
         let node = |then, otherwise, modified| Node::If {
             block,
-            condition,
+            condition: Some(condition),
+            scope: None,
             then,
             otherwise,
             merge_point: None,
@@ -444,10 +475,7 @@ impl Structurizer<'_> {
             nodes.push(node(Vec::new(), vec![edge], none));
             return self.follow(block, then, nodes);
         }
-        if self.end_of_construct(then).is_none() && self.end_of_construct(otherwise).is_none() {
-            return malformed("a conditional branch within a construct has no merge block");
-        }
-        // One arm ends here; the other takes along the rest of the list.
+        // One arm ends here and the other takes along the rest of the list, or they never meet again.
         self.begin_modified();
         let then = self.arm(block, then)?;
         let otherwise = self.arm(block, otherwise)?;
@@ -582,7 +610,7 @@ const MAX_STEPS: usize = 1 << 22;
 #[derive(Default)]
 struct Target {
     pub block: usize,
-    pub values: Vec<u32>,
+    pub values: Vec<u64>,
     pub default: bool,
 }
 
@@ -604,15 +632,15 @@ impl Structurizer<'_> {
         let default = target(self.block_of(terminator.id(1)?)?);
         let mut found = Vec::new();
         for pair in terminator.operands.get(2..).unwrap_or_default().chunks(2) {
-            match pair {
-                [Operand::Literal(value), Operand::Id(label)] => {
-                    if !values.insert(*value) {
-                        return malformed(format!("two cases for {value}"));
-                    }
-                    found.push((target(self.block_of(*label)?), *value));
-                }
-                _ => return unsupported("a selector that isn't 32 bits"),
+            let (value, label) = match pair {
+                [Operand::Literal(value), Operand::Id(label)] => (u64::from(*value), *label),
+                [Operand::Literal64(value), Operand::Id(label)] => (*value, *label),
+                _ => return malformed("a case isn't a number and a block"),
+            };
+            if !values.insert(value) {
+                return malformed(format!("two cases for {value}"));
             }
+            found.push((target(self.block_of(label)?), value));
         }
         targets[default].default = true;
         for (which, value) in found {

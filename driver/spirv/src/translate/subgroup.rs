@@ -35,7 +35,6 @@ fn group_op(opcode: Op, scalar: Scalar) -> Option<Ir> {
 
 /// `OpGroupNonUniform*` and the older `OpSubgroup*KHR`.
 pub fn subgroup(t: &mut Translator, it: &Instruction) -> Result<()> {
-    t.interface.uses_subgroups = true;
     let opcode = it.opcode;
     // The newer instructions name a scope first.
     let khr = matches!(

@@ -3,22 +3,22 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use isa::ir::{Reg, Space};
-use isa::op::Op as Ir;
-use spirv::{Decoration, StorageClass};
+use isa::ir::{Binding, Reg, Space};
+use spirv::Decoration;
 
 use super::analysis::Analysis;
 use super::emitter::Emitter;
 use super::inputs_outputs::InputsOutputs;
 use super::options::Options;
+use super::pointer_value::{pointer_from_value, pointer_to_value};
 use super::promoted::PromotedVariables;
-use super::value::{EXPLICIT, MemoryRef, Pointer, Value};
+use super::value::{MemoryRef, Pointer, TIGHT, Value};
 use crate::error::{Result, malformed, unsupported};
 use crate::globals::Globals;
 use crate::instruction::Instruction;
 use crate::interface::Interface;
 use crate::module::Module;
-use crate::types::Scalar;
+use crate::types::{Scalar, Type};
 
 /// The translation of an entry point.
 pub struct Translator<'a> {
@@ -31,6 +31,8 @@ pub struct Translator<'a> {
     pub promoted: PromotedVariables,
     pub interface: Interface,
     pub next_resource_slot: u32,
+    /// The place of the blocks in workgroup memory, once it is allocated.
+    pub workgroup_block: Option<u32>,
     pub values: HashMap<u32, Value>,
     /// Types of the ids in `values`.
     pub types: HashMap<u32, u32>,
@@ -64,20 +66,57 @@ impl Translator<'_> {
             self.types.insert(id, constant.ty);
             return Ok(Value::Regs(regs));
         }
+        if let Some(ty) = self.globals.undefined.get(&id).copied() {
+            self.types.insert(id, ty);
+            return self.undefined(ty);
+        }
         malformed(format!("%{id} isn't defined before its use"))
     }
 
-    /// The registers of a value; a device address counts as one.
+    /// An undefined value of a type. Images, samplers and pointers lead nowhere: they read as zero.
+    pub fn undefined(&mut self, ty: u32) -> Result<Value> {
+        let index = self.emit.u32(0);
+        let nowhere = Binding {
+            slot: 0,
+            count: 0,
+            index: Some(index),
+        };
+        let types = &self.globals.types;
+        Ok(match types.get(ty)? {
+            Type::Image(image) => Value::Image(nowhere, *image),
+            Type::Sampler => Value::Sampler(nowhere),
+            Type::SampledImage { image } => match types.get(*image)? {
+                Type::Image(image) => Value::SampledImage(nowhere, *image, nowhere),
+                _ => return malformed("a sampled image of no image"),
+            },
+            Type::Pointer { pointee, .. } if types.is_opaque(ty) => Value::Pointer(
+                Pointer::Memory(MemoryRef {
+                    space: Space::Buffer(nowhere),
+                    base: None,
+                    offset: 0,
+                    layout: TIGHT,
+                    ty: *pointee,
+                })
+                .into(),
+            ),
+            _ => {
+                let scalars = types.flatten(ty)?;
+                self.emit.charge_budget(scalars.len())?;
+                let zeros = scalars.iter();
+                Value::Regs(
+                    zeros
+                        .map(|it| self.emit.constant(it.register(), 0))
+                        .collect(),
+                )
+            }
+        })
+    }
+
+    /// The registers of a value; a pointer is one where its storage class allows it.
     pub fn regs(&mut self, id: u32) -> Result<Rc<[Reg]>> {
         match self.value(id)? {
             Value::Regs(regs) => Ok(regs),
-            Value::Pointer(pointer) => match pointer.address() {
-                Some(address) => {
-                    let address = self.pointer_to_address(address)?;
-                    Ok([address].into())
-                }
-                None => unsupported(format!("pointer %{id} as a value")),
-            },
+            Value::Pointer(pointer) => pointer_to_value(self, &pointer),
             _ => malformed(format!("%{id} isn't a value")),
         }
     }
@@ -135,34 +174,11 @@ impl Translator<'_> {
         match self.value(id)? {
             Value::Pointer(pointer) => Ok((*pointer).clone()),
             Value::Regs(regs) => {
-                let (class, pointee) = self.globals.types.pointer(self.type_of(id)?)?;
-                match (class, &*regs) {
-                    (StorageClass::PhysicalStorageBuffer, [address]) => {
-                        Ok(Pointer::Memory(MemoryRef {
-                            space: Space::Global,
-                            base: Some(*address),
-                            offset: 0,
-                            layout: EXPLICIT,
-                            ty: pointee,
-                        }))
-                    }
-                    _ => unsupported(format!("%{id} as a pointer")),
-                }
+                let ty = self.type_of(id)?;
+                pointer_from_value(self, ty, &regs)
             }
             _ => malformed(format!("%{id} isn't a pointer")),
         }
-    }
-
-    /// The 64-bit address of a place.
-    pub fn pointer_to_address(&mut self, place: &MemoryRef) -> Result<Reg> {
-        let Some(base) = place.base else {
-            return malformed("the pointer has no address");
-        };
-        if place.offset == 0 {
-            return Ok(base);
-        }
-        let offset = self.emit.u64(u64::from(place.offset));
-        Ok(self.emit.op(Ir::IAdd64, &[base, offset]))
     }
 
     /// Tells if an instruction's product and a sum may be fused.

@@ -44,16 +44,6 @@ pub enum Pointer {
     },
 }
 
-impl Pointer {
-    /// The place in memory, if it is one with a device address.
-    pub fn address(&self) -> Option<&MemoryRef> {
-        match self {
-            Self::Memory(place) if place.space == Space::Global => Some(place),
-            _ => None,
-        }
-    }
-}
-
 /// A move within a variable that is known at run time only.
 #[derive(Clone, Copy, Debug)]
 pub struct DynamicIndex {

@@ -1,13 +1,13 @@
 //! An entry point's variables: their places in registers or memory, their initializers, and the outputs at the end.
 
 use isa::ir::{MAX_MEMORY_BYTES, Space};
-use spirv::{Decoration, StorageClass};
+use spirv::{BuiltIn, Decoration, StorageClass};
 
 use super::descriptors::{descriptor, resource};
 use super::inputs_outputs::{IoLocation, is_computed};
 use super::memory::store_to;
 use super::translator::Translator;
-use super::value::{EXPLICIT, MemoryRef, Pointer, TIGHT, Value};
+use super::value::{EXPLICIT, MemoryLayout, MemoryRef, Pointer, TIGHT, Value};
 use crate::error::{Diagnostic, Error, Result, malformed, unsupported};
 use crate::globals::GlobalVariable;
 use crate::instruction::Instruction;
@@ -72,13 +72,18 @@ fn global_variable(t: &mut Translator, id: u32) -> Result<Value> {
             }
         }
         StorageClass::Workgroup => {
-            let bytes = tight_bytes(t, pointee)?;
-            let offset = t.emit.builder.allocate_shared(bytes, 8);
+            let layout = workgroup_layout(t);
+            let offset = if layout.explicit {
+                workgroup_block(t)?
+            } else {
+                let bytes = tight_bytes(t, pointee)?;
+                t.emit.builder.allocate_shared(bytes, 8)
+            };
             Pointer::Memory(MemoryRef {
                 space: Space::Shared,
                 base: None,
                 offset,
-                layout: TIGHT,
+                layout,
                 ty: pointee,
             })
         }
@@ -154,8 +159,45 @@ pub fn local_variable(t: &mut Translator, it: &Instruction) -> Result<()> {
     t.define_as(it, Value::Pointer(pointer.into()))
 }
 
+/// The blocks among the entry point's workgroup variables, by their types.
+fn workgroup_blocks(t: &Translator) -> impl Iterator<Item = u32> {
+    let used = t.analysis.used.iter();
+    let variables = used.filter_map(|id| t.globals.variables.get(id));
+    variables
+        .filter(|it| it.class == StorageClass::Workgroup)
+        .map(|it| it.pointee)
+        .filter(|ty| t.module.has(*ty, Decoration::Block))
+}
+
+/// The layout of workgroup memory: explicit if an entry point's variables there are blocks, as then all are.
+pub fn workgroup_layout(t: &Translator) -> MemoryLayout {
+    if workgroup_blocks(t).next().is_some() {
+        EXPLICIT
+    } else {
+        TIGHT
+    }
+}
+
+/// The place of the blocks in workgroup memory, which is one for all.
+fn workgroup_block(t: &mut Translator) -> Result<u32> {
+    if let Some(offset) = t.workgroup_block {
+        return Ok(offset);
+    }
+    let mut size = 0;
+    for ty in workgroup_blocks(t) {
+        size = size.max(t.globals.types.explicit_size(ty)?);
+    }
+    let offset = t.emit.builder.allocate_shared(memory_bytes(size)?, 8);
+    t.workgroup_block = Some(offset);
+    Ok(offset)
+}
+
 fn tight_bytes(t: &Translator, ty: u32) -> Result<u32> {
-    let size = t.globals.types.tight_size(ty)?;
+    memory_bytes(t.globals.types.tight_size(ty)?)
+}
+
+/// A number of bytes that workgroup or private memory may have.
+fn memory_bytes(size: u64) -> Result<u32> {
     match u32::try_from(size) {
         Ok(bytes) if bytes <= MAX_MEMORY_BYTES => Ok(bytes),
         _ => Err(Diagnostic::Located(Error::TooLarge {
@@ -180,6 +222,27 @@ fn compute_inputs(t: &mut Translator, id: u32) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Tells if code names an input that differs from sample to sample. That it may never run changes nothing: such an input
+/// asks for a run for each sample.
+pub fn names_a_sample(t: &Translator) -> bool {
+    let is_of_sample =
+        |built_in| matches!(built_in, Some(BuiltIn::SampleId | BuiltIn::SamplePosition));
+    let mut used = t.analysis.used.iter();
+    used.any(|id| {
+        let Some(variable) = t.globals.variables.get(id) else {
+            return false;
+        };
+        let members = match t.globals.types.get(variable.pointee) {
+            Ok(Type::Struct(members)) => members.as_ref(),
+            _ => &[],
+        };
+        variable.class == StorageClass::Input
+            && (is_of_sample(t.module.built_in(*id))
+                || t.module.has(*id, Decoration::Sample)
+                || members.iter().any(|it| is_of_sample(it.built_in)))
+    })
 }
 
 /// Assigns what was stored to the output variables.

@@ -261,6 +261,76 @@ fn float_functions() {
     check_floats(&shader, &inputs);
 }
 
+/// A matrix near the identity, its columns one after the other, as halves.
+fn half_matrix(random: &mut Random) -> [half::f16; 16] {
+    std::array::from_fn(|index| {
+        let diagonal = if index % 5 == 0 { 3.0 } else { 0.0 };
+        half::f16::from_f32(diagonal + 2.0 * (random.unit() - 0.5))
+    })
+}
+
+#[gaurast_runner::test]
+fn inverses_of_halves_are_rounded_once() {
+    let mut random = Random(41);
+    let matrices: Vec<[half::f16; 16]> = (0..64).map(|_| half_matrix(&mut random)).collect();
+    let words: Vec<u32> = matrices
+        .iter()
+        .flatten()
+        .map(|value| value.to_f32().to_bits())
+        .collect();
+    let (source, inverses, determinants) = (
+        buffer(&words),
+        buffer(&vec![0; 16 * 64]),
+        buffer(&vec![0; 64]),
+    );
+    let shader = translated("half_matrix.comp", &Specialization::default());
+    Dispatch {
+        buffers: &[
+            ((0, 0, 0), &source),
+            ((0, 1, 0), &inverses),
+            ((0, 2, 0), &determinants),
+        ],
+        ..Dispatch::new(&shader, [1, 1, 1])
+    }
+    .run()
+    .unwrap();
+    let (inverses, determinants) = (float_contents(&inverses), float_contents(&determinants));
+    // Half a unit in the last place of a half, and what binary32 adds to it.
+    let close = |found: f32, exact: f64, what: &str| {
+        let unit = (exact.abs().log2().floor().max(-14.0) - 10.0).exp2();
+        let error = (f64::from(found) - exact).abs();
+        assert!(error <= 0.51 * unit, "{what}: {found}, not {exact}");
+    };
+    for (lane, matrix) in matrices.iter().enumerate() {
+        let rows: Vec<Vec<f64>> = (0..4)
+            .map(|row| {
+                (0..4)
+                    .map(|column| matrix[4 * column + row].to_f64())
+                    .collect()
+            })
+            .collect();
+        let exact = determinant(&rows);
+        close(determinants[lane], exact, "determinant");
+        for (row, column) in (0..16).map(|index| (index / 4, index % 4)) {
+            let minor: Vec<Vec<f64>> = (0..4)
+                .filter(|other| *other != column)
+                .map(|from| {
+                    let others = (0..4).filter(|other| *other != row);
+                    others.map(|other| rows[from][other]).collect()
+                })
+                .collect();
+            let sign = if (row + column) % 2 == 0 { 1.0 } else { -1.0 };
+            let element = sign * determinant(&minor) / exact;
+            let found = inverses[16 * lane + 4 * column + row];
+            close(
+                found,
+                element,
+                &format!("matrix {lane}, row {row}, column {column}"),
+            );
+        }
+    }
+}
+
 type Exactly = fn(u32, u32, [f32; 4]) -> u32;
 
 fn bits(value: f32) -> u32 {

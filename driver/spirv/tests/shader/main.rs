@@ -1,7 +1,9 @@
 //! The translation of SPIR-V to programs of the shader cores, and what those compute.
 
+mod assembled;
 mod common;
 mod execution;
+mod fragments;
 mod functions;
 mod fuzz;
 mod interfaces;

@@ -36,6 +36,10 @@ const COMPILER: Tool = Tool {
     program: "glslangValidator",
     version: "Glslang Version: 11:12.",
 };
+const ASSEMBLER: Tool = Tool {
+    program: "spirv-as",
+    version: "SPIRV-Tools v2023.1",
+};
 const OPTIMIZER: Tool = Tool {
     program: "spirv-opt",
     version: "SPIRV-Tools v2023.1",
@@ -78,8 +82,17 @@ impl Tool {
     }
 }
 
+/// The file of a shader in SPIR-V's assembly, if it is written in that.
+fn assembly(name: &str) -> Option<std::path::PathBuf> {
+    let path = folder().join(format!("{name}.spvasm"));
+    path.exists().then_some(path)
+}
+
 /// Compiles a shader's source to SPIR-V.
 fn compiled(name: &str) -> Vec<u8> {
+    if let Some(path) = assembly(name) {
+        return ASSEMBLER.output(&["--target-env", "spv1.5"], &path);
+    }
     COMPILER.output(&["-V", "--target-env", "vulkan1.3"], &folder().join(name))
 }
 
@@ -92,9 +105,10 @@ fn assert_kept(name: &str, fresh: &[u8]) {
     );
 }
 
-#[gaurast_runner::test(needs = [COMPILER.need()])]
+#[gaurast_runner::test(needs = [COMPILER.need(), ASSEMBLER.need()])]
 fn kept_binaries_match_their_sources() {
     COMPILER.require_version();
+    ASSEMBLER.require_version();
     for name in all_shaders() {
         if !name.ends_with(".opt") {
             assert_kept(&name, &compiled(&name));

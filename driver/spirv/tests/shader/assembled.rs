@@ -1,0 +1,383 @@
+//! Shaders run on the shader cores, most in SPIR-V's assembly: what GLSL has no words for. Each row of results is
+//! compared with what the host computes.
+
+use crate::common::{Dispatch, Random, buffer, contents, translated, words_of};
+use devmem::BufferRange;
+use gaurast_spirv::{Module, Specialization};
+
+/// Invocations of each shader here.
+const LANES: usize = 64;
+
+/// Runs a shader over the buffers at its bindings, whose last has these rows of 32-bit results.
+fn run(name: &str, operands: &[&BufferRange], words: usize) -> Vec<u32> {
+    let shader = translated(name, &Specialization::default());
+    let results = buffer(&vec![0xdead_beef; words]);
+    let all: Vec<_> = (0..)
+        .zip(operands.iter().copied().chain([&results]))
+        .map(|(binding, range)| ((0, binding, 0), range))
+        .collect();
+    Dispatch {
+        buffers: &all,
+        ..Dispatch::new(&shader, [1, 1, 1])
+    }
+    .run()
+    .unwrap();
+    contents(&results)
+}
+
+/// As [`run`], over one buffer of 64-bit operands and with rows of 64-bit results.
+fn run_wide(name: &str, operands: &[u64], rows: usize) -> Vec<Vec<u64>> {
+    let words: Vec<u32> = operands
+        .iter()
+        .flat_map(|value| [*value as u32, (*value >> 32) as u32])
+        .collect();
+    let results = run(name, &[&buffer(&words)], 2 * LANES * rows);
+    let results: Vec<u64> = results
+        .chunks_exact(2)
+        .map(|pair| u64::from(pair[1]) << 32 | u64::from(pair[0]))
+        .collect();
+    results.chunks(LANES).map(<[u64]>::to_vec).collect()
+}
+
+fn random_long(random: &mut Random) -> u64 {
+    let long = u64::from(random.next()) << 32 | u64::from(random.next());
+    long >> random.below(64)
+}
+
+/// The low bits of a number.
+fn low(value: u128, width: u32) -> u64 {
+    (value & ((1 << width) - 1)) as u64
+}
+
+/// The low bits of a number, read as a signed one.
+fn signed(value: u64, width: u32) -> i128 {
+    i128::from((value << (64 - width)).cast_signed() >> (64 - width))
+}
+
+#[gaurast_runner::test]
+fn extended_arithmetic_of_all_widths() {
+    let mut random = Random(71);
+    let mut operands: Vec<u64> = (0..2 * LANES).map(|_| random_long(&mut random)).collect();
+    let extremes = [0, 1, u64::MAX, 1 << 63, i64::MAX as u64, 0x80, 0x8000, 0xff];
+    operands[..8].copy_from_slice(&extremes);
+    operands[LANES + 2..LANES + 10].copy_from_slice(&extremes);
+    let rows = run_wide("extended_arithmetic.comp", &operands, 24);
+    for (index, row) in rows.iter().enumerate() {
+        let width = [8, 16, 64][index / 8];
+        for (lane, found) in row.iter().enumerate() {
+            let a = u128::from(operands[lane]) & ((1 << width) - 1);
+            let b = u128::from(operands[LANES + lane]) & ((1 << width) - 1);
+            let product = signed(a as u64, width) * signed(b as u64, width);
+            let whole = match index % 8 / 2 {
+                0 => a + b,
+                1 if index % 2 == 0 => a.wrapping_sub(b),
+                1 => u128::from(a < b) << width,
+                2 => a * b,
+                _ => product.cast_unsigned(),
+            };
+            let expected = low(whole >> (width * (index as u32 % 2)), width);
+            // What is kept of a signed result beyond its width is not looked at.
+            assert_eq!(
+                low(u128::from(*found), width),
+                expected,
+                "row {index}, lane {lane}: {a:#x} {b:#x}"
+            );
+        }
+    }
+}
+
+#[gaurast_runner::test]
+fn bit_fields_with_wide_offsets_and_exponents() {
+    let mut random = Random(73);
+    let mut operands: Vec<u64> = (0..2 * LANES).map(|_| random_long(&mut random)).collect();
+    let most = |lane: usize| {
+        if lane < 24 {
+            16
+        } else if lane < 48 {
+            32
+        } else {
+            64
+        }
+    };
+    let offsets: Vec<u64> = (0..LANES)
+        .map(|lane| random.below(most(lane)) as u64)
+        .collect();
+    let counts: Vec<u64> = (0..LANES)
+        .map(|lane| match lane {
+            0 => 0,
+            lane => random.below(most(lane) - offsets[lane] as usize + 1) as u64,
+        })
+        .collect();
+    let mut exponents: Vec<u64> = (0..LANES)
+        .map(|_| (random.below(300) as i64 - 150).cast_unsigned())
+        .collect();
+    let far = [i64::MAX, i64::MIN, 1 << 32, -1 << 32, (1 << 40) + 3, 0];
+    exponents[..6].copy_from_slice(&far.map(i64::cast_unsigned));
+    operands.extend(offsets.iter().chain(&counts).chain(&exponents));
+    let rows = run_wide("bit_fields.comp", &operands, 13);
+    for (lane, ((offset, count), exponent)) in
+        offsets.iter().zip(&counts).zip(&exponents).enumerate()
+    {
+        let (base, insert) = (operands[lane], operands[LANES + lane]);
+        let mask = low(u128::MAX, *count as u32);
+        for (first, width) in [(0, 32), (3, 16), (6, 64)] {
+            if offset + count > u64::from(width) {
+                continue;
+            }
+            let own = low(u128::from(base), width);
+            let field = own.checked_shr(*offset as u32).unwrap_or(0) & mask;
+            let moved = (u128::from(insert & mask) << offset) as u64;
+            let kept = own & !((u128::from(mask) << offset) as u64);
+            let sign = match count {
+                0 => 0,
+                count => signed(field, *count as u32) as u64,
+            };
+            let what = format!("lane {lane}: {base:#x} {insert:#x} {offset} {count}, {width} bits");
+            assert_eq!(
+                rows[first][lane],
+                kept | low(u128::from(moved), width),
+                "{what}"
+            );
+            assert_eq!(rows[first + 1][lane], field, "{what}");
+            assert_eq!(
+                rows[first + 2][lane],
+                low(u128::from(sign), width),
+                "{what}"
+            );
+        }
+        assert_eq!(rows[9][lane], u64::from(base.count_ones()));
+        assert_eq!(rows[10][lane], base.reverse_bits());
+        assert_eq!(rows[11][lane], u64::from((base as u16).reverse_bits()));
+        let scaled = 1.5 * (exponent.cast_signed().clamp(-1000, 1000) as f64).exp2();
+        let found = f32::from_bits(rows[12][lane] as u32);
+        assert_eq!(found, scaled as f32, "exponent {}", exponent.cast_signed());
+    }
+}
+
+#[gaurast_runner::test]
+fn constructs_are_left_early() {
+    let results = run("exits.comp", &[], 4 * LANES);
+    let row = |index: usize| &results[LANES * index..][..LANES];
+    for at in 0..LANES as u32 {
+        let (is_odd, has_two) = (at & 1 != 0, at & 2 != 0);
+        let lane = at as usize;
+        let both = if has_two { 20 } else { 10 } + u32::from(is_odd);
+        assert_eq!(row(0)[lane], both, "lane {at}");
+        let inner = match (is_odd, has_two) {
+            (false, _) => 3,
+            (true, true) => 100 + 4,
+            (true, false) => 41 + 5,
+        };
+        assert_eq!(row(1)[lane], inner, "lane {at}");
+        let (mut sum, mut turn) = (0, 0);
+        let last = loop {
+            let goes_on = match (turn + at) & 7 {
+                0 => {
+                    sum += 110;
+                    true
+                }
+                1 => {
+                    sum += 100;
+                    true
+                }
+                2 => false,
+                3 => break turn,
+                _ => is_odd,
+            };
+            sum += u32::from(goes_on);
+            turn += 1;
+            if turn >= 5 {
+                break turn;
+            }
+        };
+        assert_eq!(row(2)[lane], sum + last * 40_000, "lane {at}");
+        assert_eq!(row(3)[lane], if has_two { 4 } else { 3 }, "lane {at}");
+    }
+}
+
+#[gaurast_runner::test]
+fn code_that_never_runs_may_be_wrong() {
+    let results = run("never_run.comp", &[], 2 * LANES);
+    assert_eq!(results, [1; 2 * LANES]);
+}
+
+#[gaurast_runner::test]
+fn pointers_are_chosen_at_run_time() {
+    let first: Vec<u32> = (0..80).map(|index| 1000 + 7 * index).collect();
+    let second: Vec<u32> = (0..80).map(|index| 50_000 + 11 * index).collect();
+    // Two matrices of two columns, 16 bytes apart.
+    let matrices: Vec<u32> = (0..16).map(|index| (index as f32).to_bits()).collect();
+    let shader = translated("variable_pointers.comp", &Specialization::default());
+    let (first_buffer, second_buffer) = (buffer(&first), buffer(&second));
+    let results = buffer(&[0; 8 * LANES]);
+    Dispatch {
+        buffers: &[
+            ((0, 0, 0), &first_buffer),
+            ((0, 1, 0), &second_buffer),
+            ((0, 2, 0), &results),
+            ((0, 3, 0), &buffer(&matrices)),
+        ],
+        ..Dispatch::new(&shader, [1, 1, 1])
+    }
+    .run()
+    .unwrap();
+    let results = contents(&results);
+    let row = |index: usize| &results[LANES * index..][..LANES];
+    for at in 0..LANES {
+        let is_odd = at % 2 == 1;
+        let chosen = if is_odd { &first } else { &second };
+        assert_eq!(row(0)[at], chosen[at + 2], "moved, lane {at}");
+        assert_eq!(row(1)[at], chosen[at], "returned, lane {at}");
+        assert_eq!(
+            row(2)[at],
+            chosen[at..at + 3].iter().sum::<u32>(),
+            "lane {at}"
+        );
+        assert_eq!(
+            row(3)[at],
+            if is_odd { 65 } else { 0 },
+            "compared, lane {at}"
+        );
+        assert_eq!(row(4)[at], 2, "distance, lane {at}");
+        let shared = if is_odd { at } else { 128 * at };
+        assert_eq!(row(5)[at], shared as u32, "workgroup memory, lane {at}");
+        let stored = if is_odd { second[at] } else { at as u32 };
+        assert_eq!(row(6)[at], stored, "stored, lane {at}");
+        let corners = if is_odd { 12 + 13 } else { 4 + 5 };
+        assert_eq!(row(7)[at], corners, "matrix, lane {at}");
+    }
+    // A pointer may lead to any of them.
+    let writable = shader.interface.descriptors.iter().map(|it| it.writable);
+    assert!(writable.eq([true; 4]));
+}
+
+#[gaurast_runner::test]
+fn blocks_of_shared_memory_lie_in_one_place() {
+    let results = run("shared_blocks.comp", &[], 3 * LANES);
+    let word = |index: usize| 0x10203 * (index as u32 + 1);
+    for lane in 0..LANES {
+        assert_eq!(results[lane], word((lane + 1).min(63)) >> 16, "lane {lane}");
+        assert_eq!(results[LANES + lane], word(lane) >> 8 & 0xff, "lane {lane}");
+        let replaced = word(lane) & 0xff_ffff | (lane as u32) << 24;
+        assert_eq!(results[2 * LANES + lane], replaced, "lane {lane}");
+    }
+}
+
+#[gaurast_runner::test]
+fn dot_products_of_integers() {
+    let mut random = Random(79);
+    let mut operands: Vec<u32> = (0..3 * LANES).map(|_| random.next()).collect();
+    let extremes = [0, u32::MAX, 0x8080_8080, 0x7f7f_7f7f, 0x8000_8000];
+    operands[..5].copy_from_slice(&extremes);
+    operands[LANES..LANES + 5].copy_from_slice(&extremes);
+    let limits = [i32::MAX, i32::MIN, -1, i32::MAX - 2, i32::MIN + 9].map(i32::cast_unsigned);
+    operands[2 * LANES..2 * LANES + 5].copy_from_slice(&limits);
+    let results = run("integer_dot.comp", &[&buffer(&operands)], 9 * LANES);
+    for lane in 0..LANES {
+        let [a, b, c] = [0, 1, 2].map(|index| operands[LANES * index + lane]);
+        let [sa, sb, sc] = [a, b, c].map(|word| i64::from(word.cast_signed()));
+        let unsigned = |word: u32| word.to_le_bytes().map(i64::from);
+        let signed = |word: u32| word.to_le_bytes().map(|byte| i64::from(byte.cast_signed()));
+        let shorts = |word: u32| [i64::from(word as i16), i64::from((word >> 16) as i16)];
+        let dot = |a: &[i64], b: &[i64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<i64>();
+        let int = |value: i64| value.clamp(i32::MIN.into(), i32::MAX.into()) as u32;
+        let mixed = dot(&signed(a), &unsigned(b));
+        let products = sa.wrapping_mul(sb).wrapping_add(sb.wrapping_mul(sc));
+        let square = dot(&signed(a), &signed(a)) + i64::from(c as i16);
+        let expected = [
+            dot(&signed(a), &signed(b)) as u32,
+            dot(&unsigned(a), &unsigned(b)) as u32,
+            mixed as u32,
+            mixed as u32,
+            int(dot(&signed(a), &signed(b)) + sc),
+            (dot(&unsigned(a), &unsigned(b)) + i64::from(c)).min(u32::MAX.into()) as u32,
+            int(dot(&shorts(a), &shorts(b)) + sc),
+            products as u32,
+            square.clamp(i16::MIN.into(), i16::MAX.into()) as u32,
+        ];
+        for (row, expected) in expected.into_iter().enumerate() {
+            let found = results[LANES * row + lane];
+            assert_eq!(found, expected, "row {row}: {a:#x} {b:#x} {c:#x}");
+        }
+    }
+}
+
+/// A module's words without the declarations of a capability.
+fn without(words: &[u32], capability: spirv::Capability) -> Vec<u32> {
+    let mut kept = words[..5].to_vec();
+    let mut rest = &words[5..];
+    while let [first, ..] = rest {
+        let (instruction, others) = rest.split_at((first >> 16) as usize);
+        if instruction != [2 << 16 | spirv::Op::Capability as u32, capability as u32] {
+            kept.extend_from_slice(instruction);
+        }
+        rest = others;
+    }
+    kept
+}
+
+#[gaurast_runner::test]
+fn descriptor_arrays_without_a_length_need_their_capability() {
+    let words = words_of("unsized_descriptors.comp");
+    let attempt = |words: &[u32]| {
+        let module = Module::parse(words).unwrap();
+        let specialization = Specialization::default();
+        let options = gaurast_spirv::Options {
+            unsized_descriptors: 5,
+            ..crate::common::OPTIONS
+        };
+        let stage = gaurast_spirv::Stage::Compute;
+        gaurast_spirv::translate(&module, "main", stage, &specialization, &options)
+    };
+    let shader = attempt(&words).unwrap();
+    let counts: Vec<u32> = shader
+        .interface
+        .descriptors
+        .iter()
+        .map(|it| it.count)
+        .collect();
+    assert_eq!(counts, [5, 1]);
+    let lacking = without(&words, spirv::Capability::RuntimeDescriptorArray);
+    assert_ne!(lacking, words);
+    let refused = attempt(&lacking).unwrap_err().to_string();
+    assert!(
+        refused.contains("needs RuntimeDescriptorArray"),
+        "{refused}"
+    );
+}
+
+/// The capabilities of Vulkan 1.3 that need no feature.
+#[gaurast_runner::test]
+fn capabilities_that_need_no_feature_are_accepted() {
+    use spirv::Capability as C;
+    let words = words_of("descriptor_arrays.comp");
+    for capability in [
+        C::Matrix,
+        C::Shader,
+        C::InputAttachment,
+        C::Sampled1D,
+        C::Image1D,
+        C::SampledBuffer,
+        C::ImageBuffer,
+        C::ImageQuery,
+        C::DerivativeControl,
+        C::StorageImageExtendedFormats,
+        C::StorageImageReadWithoutFormat,
+        C::StorageImageWriteWithoutFormat,
+        C::DeviceGroup,
+        C::ShaderNonUniform,
+    ] {
+        let mut declaring = words[..5].to_vec();
+        declaring.extend([2 << 16 | spirv::Op::Capability as u32, capability as u32]);
+        declaring.extend_from_slice(&words[5..]);
+        let module = Module::parse(&declaring).unwrap();
+        let translated = gaurast_spirv::translate(
+            &module,
+            "main",
+            gaurast_spirv::Stage::Compute,
+            &Specialization::default(),
+            &crate::common::OPTIONS,
+        );
+        assert!(translated.is_ok(), "{capability:?}: {:?}", translated.err());
+    }
+}
