@@ -5,8 +5,12 @@
 
 pub mod area;
 pub mod chart;
+pub mod exponential;
+pub mod module;
+pub mod number;
 pub mod paper;
 pub mod pe;
+pub mod rtl;
 pub mod scene;
 pub mod sensitivity;
 pub mod stepped;
